@@ -1,0 +1,2 @@
+//! The binary `squirrel`.
+fn main() {}

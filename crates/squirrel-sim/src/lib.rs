@@ -1,0 +1,2 @@
+//! The simulator of squirrel: plant, world, sensors, flight log and import.
+pub mod log;
