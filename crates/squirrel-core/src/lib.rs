@@ -1,1 +1,29 @@
-//! squirrel-core.
+//! The flight code of squirrel: one control stack that flies in simulation, in Python and on a Cortex-M7, bit for bit.
+//!
+//! Layers, top down. Each knows only what lies below it:
+//!
+//! - [`stack`]: the whole flight code as one function of (state, sensor frame); 300 Hz inside, 10 Hz outside.
+//! - [`guidance`]: what to follow: reference trajectories, obstacle sensing.
+//! - [`control`]: how to follow it: position control, wing decisions, thrust-wing coordination, attitude, mixer.
+//! - [`effects`]: physics that a vehicle may have on top of the base model, one file an effect.
+//! - [`aero`], [`dynamics`]: the base model: plate, rotors, drag, rigid body, RK4. Generic over the scalar.
+//! - [`vehicle`]: the numbers of one airframe, checked once.
+//! - [`frames`], [`math`]: vectors that know their frame, and arithmetic whose bits do not depend on the target.
+//!
+//! No allocation, no clock, no panic in a step; all memory of a controller is one plain `Copy` struct. SI units and
+//! radians. World frame NED, body frame FRD, quaternions Hamilton, body to world.
+
+#![cfg_attr(not(test), no_std)]
+#![forbid(unsafe_code)]
+
+pub mod aero;
+//control
+pub mod dynamics;
+pub mod effects;
+pub mod frames;
+//guidance
+pub mod math;
+//stack
+pub mod vehicle;
+
+pub use nalgebra;

@@ -1,0 +1,34 @@
+//! Aerodynamics that the flight code itself evaluates.
+
+pub mod flat_plate;
+
+use crate::frames::{Body, In};
+use crate::math::limit;
+
+/// Angle of attack of the wing plane, rad, in [-pi/2, pi/2]: `sin(alpha) = n . v / |v|`, positive where the air hits the
+/// belly. 0 below 0.3 m/s, where the direction of the air means nothing (EQUATIONS T5).
+///
+/// * `velocity` - velocity relative to the air, m/s
+pub fn angle_of_attack(velocity: In<Body, f32>) -> f32 {
+    let speed = velocity.vector.norm();
+    if !(speed >= 0.3) {
+        return 0.0;
+    }
+    libm::asinf(limit(velocity.vector.z / speed, -1.0, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    #[test]
+    fn air_on_the_belly_is_a_positive_angle() {
+        let falling = In::new(Vector3::new(0.0, 0.0, 5.0));
+        assert!((angle_of_attack(falling) - core::f32::consts::FRAC_PI_2).abs() < 1e-3);
+        let nose_up_glide = In::new(Vector3::new(7.0 * 0.866, 0.0, 3.5));
+        assert!((angle_of_attack(nose_up_glide) - 0.5236).abs() < 1e-3);
+        assert!(angle_of_attack(In::new(Vector3::new(7.0, 0.0, -1.0))) < 0.0);
+        assert_eq!(angle_of_attack(In::zero()), 0.0);
+    }
+}

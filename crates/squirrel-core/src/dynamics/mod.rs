@@ -1,0 +1,201 @@
+//! The base model: rotors, drag and a rigid body (paper, eq. 3), integrated by RK4.
+//!
+//! ```text
+//! r'' = g e3 + R f / m            f = rotors + drag + surfaces + effects, body frame
+//! w'  = J^-1 (M - w x J w)        q' = 1/2 q (0, w)        Omega_i' = (Omega_target,i - Omega_i) / tau
+//! ```
+//! Air enters only through the air-relative velocity `R^T (v - wind)` (the paper writes the ground velocity; EQUATIONS
+//! T6). Wings are a caller's closure, because their own states belong to the plant.
+
+mod rk4;
+mod rotors;
+mod state;
+
+pub use rk4::{VectorSpace, rk4};
+pub use rotors::RotorDrive;
+pub use state::State;
+
+use crate::effects::Effects;
+use crate::frames::{Body, In, Ned, Wrench};
+use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
+use crate::vehicle::Vehicle;
+use nalgebra::Vector3;
+
+/// Motion of the airframe through the air, expressed in the body frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Air<T: Real> {
+    /// Velocity relative to the air, m/s.
+    pub velocity: In<Body, T>,
+    /// Its norm, m/s.
+    pub speed: T,
+    /// Angular rate of the airframe, rad/s.
+    pub omega: In<Body, T>,
+}
+
+impl<T: Real> Air<T> {
+    /// From velocity over ground and wind.
+    #[inline(always)]
+    pub fn new(state: &State<T>, wind: In<Ned, T>) -> Self {
+        let velocity = state.ned_from_body().inverse() * (state.velocity - wind);
+        Self { velocity, speed: velocity.vector.norm(), omega: state.omega }
+    }
+}
+
+/// Base drag of the airframe, body frame: `F = -(D v + 1/2 rho C_d A |v| v)`.
+#[inline(always)]
+pub fn drag<T: Real>(vehicle: &Vehicle<T>, air: &Air<T>) -> In<Body, T> {
+    let drag = &vehicle.parameters().drag;
+    let quadratic = real::<T>(0.5 * AIR_DENSITY_KG_M3) * drag.area_m2 * air.speed;
+    let v = air.velocity.vector;
+    In::new(-(drag.linear_n_s_per_m.component_mul(&v) + v * quadratic))
+}
+
+/// Force and moment on the airframe without gravity, body frame.
+///
+/// * `wind` - wind velocity, m/s, without what `effects` adds
+/// * `surfaces` - wrench of the wings for a given motion through the air
+#[inline(always)]
+pub fn wrench<T: Real>(
+    vehicle: &Vehicle<T>,
+    effects: &Effects<T>,
+    state: &State<T>,
+    wind: In<Ned, T>,
+    surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
+) -> Wrench<Body, T> {
+    let air = Air::new(state, wind + effects.wind());
+    rotors::wrench(vehicle, &state.rotor_speed_rad_s)
+        + Wrench::from_force(drag(vehicle, &air))
+        + surfaces(&air)
+        + effects.wrench(&air)
+}
+
+/// Time derivative of the state: each field of the result is the rate of the field of the same name.
+///
+/// * `drive` - rotor targets and lags, held over the step
+/// * other arguments as in [`wrench`]
+#[inline(always)]
+pub fn derivative<T: Real>(
+    vehicle: &Vehicle<T>,
+    effects: &Effects<T>,
+    state: &State<T>,
+    drive: &RotorDrive<T>,
+    wind: In<Ned, T>,
+    surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
+) -> State<T> {
+    let wrench = wrench(vehicle, effects, state, wind, surfaces);
+    rigid_body(vehicle, state, &wrench, drive.rates(vehicle.rotor_blocks(), &state.rotor_speed_rad_s))
+}
+
+#[inline(always)]
+fn rigid_body<T: Real>(
+    vehicle: &Vehicle<T>,
+    state: &State<T>,
+    wrench: &Wrench<Body, T>,
+    rotor_rate: crate::vehicle::PerRotor<T>,
+) -> State<T> {
+    let p = vehicle.parameters();
+    let omega = state.omega.vector;
+    let force_ned = (state.ned_from_body() * wrench.force).vector;
+    let gravity_ned = Vector3::new(T::zero(), T::zero(), real(GRAVITY_M_S2));
+    let spin = p.inertia_kg_m2 * omega;
+    State {
+        position: state.velocity,
+        velocity: In::new(gravity_ned + force_ned * (T::one() / p.mass_kg)),
+        attitude: state.attitude_rate(),
+        omega: In::new(vehicle.inertia_inverse() * (wrench.moment.vector - omega.cross(&spin))),
+        rotor_speed_rad_s: rotor_rate,
+    }
+}
+
+/// Specific force at the centre of mass, m/s^2: what an ideal accelerometer reads.
+pub fn specific_force<T: Real>(vehicle: &Vehicle<T>, wrench: &Wrench<Body, T>) -> In<Body, T> {
+    wrench.force * (T::one() / vehicle.parameters().mass_kg)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicle::fixtures::squirrel;
+    use nalgebra::Matrix3;
+
+    fn no_surfaces(_: &Air<f64>) -> Wrench<Body, f64> {
+        Wrench::zero()
+    }
+
+    #[test]
+    fn hover_trim_stands_still() {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let share = vehicle.weight_n() / 4.0;
+        let command = vehicle.parameters().propulsion.command_for_thrust(share);
+        let drive = RotorDrive::new(&vehicle, &Effects::none(), &[command; 8], 14.8);
+        let mut state = State::at_rest();
+        state.rotor_speed_rad_s = drive.target_rad_s;
+        for _ in 0..1000 {
+            state = rk4(state, 1e-3, |s| {
+                derivative(&vehicle, &Effects::none(), s, &drive, In::zero(), no_surfaces)
+            });
+        }
+        assert!(state.position.vector.norm() < 1e-9 && state.omega.vector.norm() < 1e-9);
+    }
+
+    #[test]
+    fn torque_free_tumbling_keeps_energy_and_angular_momentum() {
+        let mut p = squirrel::<f64>();
+        p.inertia_kg_m2 = Matrix3::from_diagonal(&Vector3::new(0.01, 0.02, 0.028));
+        p.drag.area_m2 = 0.0;
+        let vehicle = Vehicle::new(p).unwrap();
+        let drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.0; 8], 14.8);
+        let mut state = State { omega: In::new(Vector3::new(3.0, 0.05, 8.0)), ..State::at_rest() };
+        let invariants = |s: &State<f64>| {
+            let momentum = p.inertia_kg_m2 * s.omega.vector;
+            let momentum_ned = (s.ned_from_body() * In::new(momentum)).vector;
+            (0.5 * s.omega.vector.dot(&momentum), momentum_ned)
+        };
+        let (energy, momentum_ned) = invariants(&state);
+        for _ in 0..10_000 {
+            state = rk4(state, 1e-3, |s| {
+                derivative(&vehicle, &Effects::none(), s, &drive, In::zero(), no_surfaces)
+            })
+            .normalised();
+        }
+        let (energy_end, momentum_end) = invariants(&state);
+        assert!((energy_end / energy - 1.0).abs() < 1e-9, "energy drifted by {}", energy_end / energy - 1.0);
+        assert!((momentum_end - momentum_ned).norm() / momentum_ned.norm() < 1e-9);
+    }
+
+    #[test]
+    fn rk4_is_of_fourth_order() {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let drive =
+            RotorDrive::new(&vehicle, &Effects::none(), &[0.7, 0.6, 0.72, 0.66, 0.0, 0.0, 0.0, 0.0], 14.8);
+        let fly = |steps: usize| {
+            let mut state = State { velocity: In::new(Vector3::new(3.0, -1.0, 0.5)), ..State::at_rest() };
+            for _ in 0..steps {
+                state = rk4(state, 0.4 / steps as f64, |s| {
+                    derivative(&vehicle, &Effects::none(), s, &drive, In::zero(), no_surfaces)
+                });
+            }
+            state.position.vector
+        };
+        let reference = fly(6400);
+        let ratio = (fly(50) - reference).norm() / (fly(100) - reference).norm();
+        assert!((12.0..20.0).contains(&ratio), "halving the step divides the error by {ratio}");
+    }
+
+    #[test]
+    fn an_accelerometer_at_rest_reads_minus_g_along_down() {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let mut state = State::at_rest();
+        let speed = (vehicle.weight_n() / 4.0 / 6.0e-7).sqrt();
+        state.rotor_speed_rad_s = [speed, speed, speed, speed, 0.0, 0.0, 0.0, 0.0];
+        let w = wrench(&vehicle, &Effects::none(), &state, In::zero(), no_surfaces);
+        assert!((specific_force(&vehicle, &w).vector - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).norm() < 1e-9);
+    }
+
+    #[test]
+    fn drag_opposes_the_motion_through_the_air_not_over_ground() {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let air = Air::new(&State::at_rest(), In::new(Vector3::new(5.0, 0.0, 0.0)));
+        assert!(drag(&vehicle, &air).vector.x > 0.0, "a hovering vehicle is pushed with the wind");
+    }
+}

@@ -1,0 +1,86 @@
+//! Arithmetic whose bits do not depend on the target.
+//!
+//! `f32::min` and `f32::max` differ between x86-64 and Cortex-M7 on NaN and on the sign of zero, and the platform's
+//! `sin` differs in the last bit. Flight code therefore uses the compare-select helpers and the `libm` calls below.
+
+use nalgebra::{RealField, Vector3};
+
+/// Standard gravity, m/s^2.
+pub const GRAVITY_M_S2: f64 = 9.80665;
+/// Air density at sea level in the standard atmosphere, kg/m^3. The paper states none.
+pub const AIR_DENSITY_KG_M3: f64 = 1.225;
+
+/// A scalar that the dynamics can be evaluated in: `f32` on the target, `f64` in the simulator.
+pub trait Real: RealField + Copy {}
+impl<T: RealField + Copy> Real for T {}
+
+/// The constant `x` in the scalar type `T`.
+#[inline(always)]
+pub fn real<T: Real>(x: f64) -> T {
+    nalgebra::convert(x)
+}
+
+/// The smaller of two numbers; `b` if `a` is NaN.
+#[inline(always)]
+pub fn lower<T: PartialOrd>(a: T, b: T) -> T {
+    if a < b { a } else { b }
+}
+
+/// The larger of two numbers; `b` if `a` is NaN.
+#[inline(always)]
+pub fn upper<T: PartialOrd>(a: T, b: T) -> T {
+    if a > b { a } else { b }
+}
+
+/// `x` limited to `[low, high]`; `low` if `x` is NaN, so that a limit holds whatever comes in.
+#[inline(always)]
+pub fn limit<T: PartialOrd>(x: T, low: T, high: T) -> T {
+    lower(upper(x, low), high)
+}
+
+/// `v` shortened to length `max` where it is longer, direction kept.
+#[inline]
+pub fn limit_norm<T: Real>(v: Vector3<T>, max: T) -> Vector3<T> {
+    let norm = v.norm();
+    if norm > max { v * (max / norm) } else { v }
+}
+
+/// Angle wrapped into (-pi, pi], rad. Total: a non-finite angle gives 0.
+pub fn wrap_angle(angle: f32) -> f32 {
+    use core::f32::consts::PI;
+    if !angle.is_finite() {
+        return 0.0;
+    }
+    let turns = libm::floorf((angle + PI) / (2.0 * PI));
+    let wrapped = angle - turns * 2.0 * PI;
+    if wrapped <= -PI { PI } else { wrapped }
+}
+
+/// True where every component is finite.
+pub fn all_finite(v: &Vector3<f32>) -> bool {
+    v.iter().all(|x| x.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_holds_for_nan() {
+        assert_eq!(limit(f32::NAN, -1.0, 2.0), -1.0);
+        assert_eq!(limit(f32::INFINITY, -1.0, 2.0), 2.0);
+        assert_eq!(limit(0.5, -1.0, 2.0), 0.5);
+    }
+
+    #[test]
+    fn wrapping_keeps_the_direction() {
+        for k in -3i8..=3 {
+            for step in -31i8..=31 {
+                let angle = f32::from(step) * 0.1;
+                let turned = angle + f32::from(k) * core::f32::consts::TAU;
+                assert!((wrap_angle(turned) - angle).abs() < 1e-5, "{turned}");
+            }
+        }
+        assert_eq!(wrap_angle(f32::NAN), 0.0);
+    }
+}

@@ -1,0 +1,363 @@
+//! The numbers of one airframe: mass, rotors, propulsion, drag, wing, limits. Checked once, constant in flight.
+//!
+//! [`Parameters`] is plain data, as a file or a program writes it. [`Vehicle::new`] checks every number and derives
+//! what the hot loops need; an error names the field as the vehicle file spells it, and the value.
+
+mod check;
+mod thrust_curve;
+
+pub use check::ParameterError;
+pub use thrust_curve::ThrustCurve;
+
+use crate::frames::{Body, In};
+use crate::math::{Real, real};
+use nalgebra::{Matrix3, Vector3};
+
+/// Most rotors a vehicle may have. Rotor loops run over blocks of [`ROTOR_BLOCK`]; unused places are zero.
+pub const MAX_ROTORS: usize = 8;
+/// Rotors per block: a fixed inner length lets the compiler unroll.
+pub const ROTOR_BLOCK: usize = 4;
+
+/// One number per rotor, in command order.
+pub type PerRotor<T> = [T; MAX_ROTORS];
+
+/// Where a rotor sits and which way it twists the airframe.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rotor<T: Real> {
+    /// Hub position in the body frame, m. Thrust acts along -z.
+    pub position: In<Body, T>,
+    /// Sign of the reaction torque about +z (down): -1 for a rotor that turns clockwise seen from above.
+    pub yaw_sign: T,
+}
+
+/// What one rotor command number means.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CommandKind {
+    /// 0..1, fraction of the top rotor speed.
+    SpeedFraction,
+    /// 0..1, duty cycle.
+    Duty,
+    /// 1000..2000 us pulse width, linear in duty.
+    PwmMicroseconds,
+    /// Thrust, N.
+    ThrustNewton,
+}
+
+/// How commands become rotor speed, thrust and reaction torque. All rotors are alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Propulsion<T> {
+    /// Meaning of a command.
+    pub command: CommandKind,
+    /// Top rotor speed at the reference voltage, rad/s.
+    pub speed_max_rad_s: T,
+    /// Thrust over speed squared, N s^2 (per rad^2).
+    pub thrust_coefficient_n_s2: T,
+    /// Reaction torque over speed squared, N m s^2 (per rad^2).
+    pub torque_coefficient_n_m_s2: T,
+    /// First-order lag of rotor speed when speeding up, s; 0 for none.
+    pub time_constant_up_s: T,
+    /// First-order lag of rotor speed when slowing down, s; 0 for none.
+    pub time_constant_down_s: T,
+    /// Battery voltage at which the numbers above hold, V.
+    pub reference_voltage_v: T,
+    /// The paper's cubic from the voltage that a duty cycle applies to thrust; replaces the square law of the command.
+    pub thrust_curve: Option<ThrustCurve<T>>,
+}
+
+/// Drag of airframe and rotors without wings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drag<T: Real> {
+    /// Force over airspeed per body axis, N s/m: `F = -linear * v`.
+    pub linear_n_s_per_m: Vector3<T>,
+    /// Drag area `C_d A`, m^2: `F = -1/2 rho C_d A |v| v`.
+    pub area_m2: T,
+}
+
+/// A pair of wings that lie in the body's x-y plane when spread.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wing<T> {
+    /// Area of one side, m^2.
+    pub area_per_side_m2: T,
+    /// Normal force coefficient over sin(angle of attack); 2 for the paper's flat plate.
+    pub normal_force_slope: T,
+    /// Distance of each side's centre from the x axis, m.
+    pub lateral_arm_m: T,
+    /// First-order lag of deployment, s.
+    pub time_constant_s: T,
+}
+
+/// What the flight code may ask for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits<T> {
+    /// Limit of |roll| and of |pitch|, rad.
+    pub tilt_max_rad: T,
+    /// Limit of the collective thrust, N.
+    pub thrust_max_n: T,
+}
+
+/// Every number of an airframe, unchecked.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameters<T: Real> {
+    /// Mass, kg.
+    pub mass_kg: T,
+    /// Inertia about the centre of mass in the body frame, kg m^2.
+    pub inertia_kg_m2: Matrix3<T>,
+    /// The first `rotor_count` entries, in command order.
+    pub rotors: [Rotor<T>; MAX_ROTORS],
+    /// Number of rotors, 1 to [`MAX_ROTORS`].
+    pub rotor_count: usize,
+    /// How commands become thrust.
+    pub propulsion: Propulsion<T>,
+    /// Drag without wings.
+    pub drag: Drag<T>,
+    /// The wings, if the vehicle has any.
+    pub wing: Option<Wing<T>>,
+    /// Limits for the flight code.
+    pub limits: Limits<T>,
+}
+
+/// A checked airframe with what the loops derive from it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Vehicle<T: Real> {
+    parameters: Parameters<T>,
+    inertia_inverse: Matrix3<T>,
+    per_speed_squared: RotorWrench<T>,
+}
+
+/// Thrust (along -z) and moments that each rotor gives per speed squared; zero where there is no rotor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RotorWrench<T> {
+    pub(crate) thrust: PerRotor<T>,
+    pub(crate) roll: PerRotor<T>,
+    pub(crate) pitch: PerRotor<T>,
+    pub(crate) yaw: PerRotor<T>,
+}
+
+impl<T: Real> RotorWrench<T> {
+    fn new(p: &Parameters<T>) -> Self {
+        let none = [T::zero(); MAX_ROTORS];
+        let mut out = Self { thrust: none, roll: none, pitch: none, yaw: none };
+        let k_f = p.propulsion.thrust_coefficient_n_s2;
+        for (i, rotor) in p.rotors[..p.rotor_count].iter().enumerate() {
+            // r x (0, 0, -T)
+            out.thrust[i] = k_f;
+            out.roll[i] = -rotor.position.vector.y * k_f;
+            out.pitch[i] = rotor.position.vector.x * k_f;
+            out.yaw[i] = rotor.yaw_sign * p.propulsion.torque_coefficient_n_m_s2;
+        }
+        out
+    }
+}
+
+impl<T: Real> Rotor<T> {
+    /// A place that no rotor takes.
+    pub fn unused() -> Self {
+        Self { position: In::zero(), yaw_sign: T::zero() }
+    }
+    /// A rotor in the plane of the centre of mass, m.
+    pub fn planar(x_m: f64, y_m: f64, yaw_sign: f64) -> Self {
+        Self { position: In::new(Vector3::new(real(x_m), real(y_m), T::zero())), yaw_sign: real(yaw_sign) }
+    }
+}
+
+impl<T: Real> Vehicle<T> {
+    /// Checks the parameters.
+    ///
+    /// # Errors
+    /// [`ParameterError`] names the first field that is not finite, out of range or physically impossible.
+    pub fn new(parameters: Parameters<T>) -> Result<Self, ParameterError> {
+        check::check(&parameters)?;
+        let inertia_inverse =
+            parameters.inertia_kg_m2.try_inverse().ok_or(ParameterError::inertia("inertia is singular"))?;
+        Ok(Self { parameters, inertia_inverse, per_speed_squared: RotorWrench::new(&parameters) })
+    }
+    #[inline(always)]
+    pub(crate) fn rotor_wrench_per_speed_squared(&self) -> &RotorWrench<T> {
+        &self.per_speed_squared
+    }
+    /// The checked numbers.
+    #[inline(always)]
+    pub fn parameters(&self) -> &Parameters<T> {
+        &self.parameters
+    }
+    /// Inverse of the inertia, 1/(kg m^2).
+    #[inline(always)]
+    pub fn inertia_inverse(&self) -> &Matrix3<T> {
+        &self.inertia_inverse
+    }
+    /// The rotors in command order.
+    pub fn rotors(&self) -> &[Rotor<T>] {
+        &self.parameters.rotors[..self.parameters.rotor_count]
+    }
+    /// Number of blocks of [`ROTOR_BLOCK`] that hold all rotors.
+    #[inline(always)]
+    pub fn rotor_blocks(&self) -> usize {
+        self.parameters.rotor_count.div_ceil(ROTOR_BLOCK)
+    }
+    /// Weight, N.
+    pub fn weight_n(&self) -> T {
+        self.parameters.mass_kg * real(crate::math::GRAVITY_M_S2)
+    }
+    /// Top thrust of one rotor at the reference voltage, N.
+    pub fn rotor_thrust_max_n(&self) -> T {
+        let p = &self.parameters.propulsion;
+        match p.thrust_curve {
+            Some(curve) => curve.thrust_n(p.reference_voltage_v),
+            None => p.thrust_coefficient_n_s2 * p.speed_max_rad_s * p.speed_max_rad_s,
+        }
+    }
+    /// The same vehicle in another scalar, checked again: what is sound in `f64` may degenerate in `f32`.
+    ///
+    /// # Errors
+    /// As [`Vehicle::new`].
+    pub fn cast<U: Real>(&self) -> Result<Vehicle<U>, ParameterError> {
+        fn to<T: Real, U: Real>(x: T) -> U {
+            real(nalgebra::try_convert(x).unwrap_or(f64::NAN))
+        }
+        let p = &self.parameters;
+        let propulsion = Propulsion {
+            command: p.propulsion.command,
+            speed_max_rad_s: to(p.propulsion.speed_max_rad_s),
+            thrust_coefficient_n_s2: to(p.propulsion.thrust_coefficient_n_s2),
+            torque_coefficient_n_m_s2: to(p.propulsion.torque_coefficient_n_m_s2),
+            time_constant_up_s: to(p.propulsion.time_constant_up_s),
+            time_constant_down_s: to(p.propulsion.time_constant_down_s),
+            reference_voltage_v: to(p.propulsion.reference_voltage_v),
+            thrust_curve: match p.propulsion.thrust_curve {
+                Some(curve) => Some(ThrustCurve::new(
+                    curve.coefficients().map(to),
+                    to(p.propulsion.reference_voltage_v),
+                )?),
+                None => None,
+            },
+        };
+        Vehicle::new(Parameters {
+            mass_kg: to(p.mass_kg),
+            inertia_kg_m2: p.inertia_kg_m2.map(to),
+            rotors: p
+                .rotors
+                .map(|r| Rotor { position: In::new(r.position.vector.map(to)), yaw_sign: to(r.yaw_sign) }),
+            rotor_count: p.rotor_count,
+            propulsion,
+            drag: Drag { linear_n_s_per_m: p.drag.linear_n_s_per_m.map(to), area_m2: to(p.drag.area_m2) },
+            wing: p.wing.map(|w| Wing {
+                area_per_side_m2: to(w.area_per_side_m2),
+                normal_force_slope: to(w.normal_force_slope),
+                lateral_arm_m: to(w.lateral_arm_m),
+                time_constant_s: to(w.time_constant_s),
+            }),
+            limits: Limits {
+                tilt_max_rad: to(p.limits.tilt_max_rad),
+                thrust_max_n: to(p.limits.thrust_max_n),
+            },
+        })
+    }
+}
+
+impl<T: Real> Propulsion<T> {
+    /// Steady rotor speed at the reference voltage for a command, rad/s. Commands outside their range are limited.
+    #[inline]
+    pub fn target_speed_rad_s(&self, command: T) -> T {
+        let fraction = match self.command {
+            CommandKind::ThrustNewton => return self.speed_for_thrust(command),
+            CommandKind::SpeedFraction | CommandKind::Duty => command,
+            CommandKind::PwmMicroseconds => (command - real(1000.0)) * real(1e-3),
+        };
+        let fraction = crate::math::limit(fraction, T::zero(), T::one());
+        match &self.thrust_curve {
+            None => fraction * self.speed_max_rad_s,
+            Some(curve) => self.speed_for_thrust(curve.thrust_n(fraction * self.reference_voltage_v)),
+        }
+    }
+    /// The command that gives a thrust, at the reference voltage. Inverse of [`Self::target_speed_rad_s`].
+    ///
+    /// * `thrust_n` - thrust of one rotor, N; limited to what the rotor can give
+    #[inline]
+    pub fn command_for_thrust(&self, thrust_n: T) -> T {
+        let fraction = match (self.command, &self.thrust_curve) {
+            (CommandKind::ThrustNewton, _) => return crate::math::upper(thrust_n, T::zero()),
+            (_, Some(curve)) => curve.voltage_v(thrust_n) / self.reference_voltage_v,
+            (_, None) => self.speed_for_thrust(thrust_n) / self.speed_max_rad_s,
+        };
+        let fraction = crate::math::limit(fraction, T::zero(), T::one());
+        match self.command {
+            CommandKind::PwmMicroseconds => real::<T>(1000.0) + fraction * real(1000.0),
+            _ => fraction,
+        }
+    }
+    #[inline(always)]
+    fn speed_for_thrust(&self, thrust_n: T) -> T {
+        (crate::math::upper(thrust_n, T::zero()) / self.thrust_coefficient_n_s2).sqrt()
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod fixtures {
+    use super::*;
+
+    /// The squirrel's numbers as the tests of this crate use them.
+    pub(crate) fn squirrel<T: Real>() -> Parameters<T> {
+        let mut rotors = [Rotor::unused(); MAX_ROTORS];
+        let d = 0.085;
+        for (i, (x, y, s)) in
+            [(d, -d, -1.0), (-d, -d, 1.0), (-d, d, -1.0), (d, d, 1.0)].into_iter().enumerate()
+        {
+            rotors[i] = Rotor::planar(x, y, s);
+        }
+        Parameters {
+            mass_kg: real(0.548),
+            inertia_kg_m2: Matrix3::from_diagonal(&Vector3::new(real(3.22e-3), real(4.68e-3), real(7.72e-3))),
+            rotors,
+            rotor_count: 4,
+            propulsion: Propulsion {
+                command: CommandKind::SpeedFraction,
+                speed_max_rad_s: real(3000.0),
+                thrust_coefficient_n_s2: real(6.0e-7),
+                torque_coefficient_n_m_s2: real(6.6e-9),
+                time_constant_up_s: real(0.03),
+                time_constant_down_s: real(0.04),
+                reference_voltage_v: real(14.8),
+                thrust_curve: None,
+            },
+            drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: real(0.01) },
+            wing: Some(Wing {
+                area_per_side_m2: real(0.02),
+                normal_force_slope: real(2.0),
+                lateral_arm_m: real(0.09),
+                time_constant_s: real(0.07),
+            }),
+            limits: Limits { tilt_max_rad: real(core::f64::consts::FRAC_PI_6), thrust_max_n: real(10.7) },
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn command_and_thrust_are_inverse_for_every_kind() {
+        let kinds = [
+            CommandKind::SpeedFraction,
+            CommandKind::Duty,
+            CommandKind::PwmMicroseconds,
+            CommandKind::ThrustNewton,
+        ];
+        for kind in kinds {
+            let mut p = fixtures::squirrel::<f64>().propulsion;
+            p.command = kind;
+            for thrust in [0.0, 0.3, 1.3435, 4.0] {
+                let speed = p.target_speed_rad_s(p.command_for_thrust(thrust));
+                assert!((p.thrust_coefficient_n_s2 * speed * speed - thrust).abs() < 1e-12, "{kind:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn casting_keeps_the_airframe() {
+        let vehicle = Vehicle::new(fixtures::squirrel::<f64>()).unwrap();
+        let single: Vehicle<f32> = vehicle.cast().unwrap();
+        assert_eq!(single.parameters().mass_kg, 0.548_f32);
+        assert_eq!(single, Vehicle::new(fixtures::squirrel::<f32>()).unwrap());
+    }
+}
