@@ -62,6 +62,11 @@ impl<F: Frame, T: Real> In<F, T> {
     }
 }
 
+impl<F: Frame> In<F, f32> {
+    /// The origin, as a constant.
+    pub const ORIGIN: Self = Self { vector: Vector3::new(0.0, 0.0, 0.0), frame: PhantomData };
+}
+
 impl<F: Frame, T: Real> Default for In<F, T> {
     fn default() -> Self {
         Self::zero()

@@ -17,11 +17,11 @@
 #![forbid(unsafe_code)]
 
 pub mod aero;
-//control
+pub mod control;
 pub mod dynamics;
 pub mod effects;
 pub mod frames;
-//guidance
+pub mod guidance;
 pub mod math;
 //stack
 pub mod vehicle;

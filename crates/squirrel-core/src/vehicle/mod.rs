@@ -7,6 +7,7 @@ mod check;
 mod thrust_curve;
 
 pub use check::ParameterError;
+pub(crate) use check::positive;
 pub use thrust_curve::ThrustCurve;
 
 use crate::frames::{Body, In};

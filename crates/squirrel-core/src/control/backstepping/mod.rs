@@ -1,0 +1,296 @@
+//! Integral backstepping attitude control: attitude error to body torque.
+//!
+//! Two forms of one idea. [`euler`] is the law of the paper's source (Bouabdallah and Siegwart 2007) made exact with the
+//! Euler kinematics; [`quaternion`] has no singularity and does not unwind. Both return every term.
+
+pub mod euler;
+pub mod quaternion;
+
+use super::command_filter::EulerReference;
+use crate::frames::{Body, Ned, Rotation};
+use crate::math::{Real, limit, real};
+use crate::vehicle::ParameterError;
+use nalgebra::{Matrix3, Vector3};
+
+/// Which law turns error into torque.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AttitudeForm {
+    /// EQUATIONS B.2; singular at 90 deg of pitch.
+    Euler,
+    /// EQUATIONS B.3.
+    Quaternion,
+}
+
+/// Gains of the attitude loop, roll, pitch, yaw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AttitudeGains {
+    /// The law.
+    pub form: AttitudeForm,
+    /// Gain of the angle error, 1/s.
+    pub c1_per_s: Vector3<f32>,
+    /// Gain of the rate error, 1/s.
+    pub c2_per_s: Vector3<f32>,
+    /// Gain of the integral, 1/s^2.
+    pub lambda_per_s2: Vector3<f32>,
+    /// Limit of the integral of the angle error, rad s.
+    pub integral_max_rad_s: f32,
+    /// Corner of the command filter, rad/s.
+    pub filter_frequency_rad_s: f32,
+    /// Damping of the command filter.
+    pub filter_damping: f32,
+}
+
+/// What the attitude loop remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct AttitudeState {
+    /// Integral of the angle error, rad s.
+    pub integral: Vector3<f32>,
+    /// The quaternion law took the long way's sign at the last step.
+    pub negative_sign: bool,
+}
+
+/// Every term of one attitude step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AttitudeTerms {
+    /// Angle error as the law defines it (reference minus angle, or minus twice the vector part), rad.
+    pub angle_error: Vector3<f32>,
+    /// Rate error, rad/s.
+    pub rate_error: Vector3<f32>,
+    /// Integral of the angle error, rad s.
+    pub integral: Vector3<f32>,
+    /// Gyroscopic part of the torque, `w x J w`, N m.
+    pub gyroscopic_n_m: Vector3<f32>,
+    /// The whole torque, N m.
+    pub torque_n_m: Vector3<f32>,
+}
+
+impl AttitudeGains {
+    /// # Errors
+    /// The first gain that is not finite and positive, by its name in `[control.attitude]`.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let lists = [
+            ("control.attitude.c1_per_s", &self.c1_per_s),
+            ("control.attitude.c2_per_s", &self.c2_per_s),
+            ("control.attitude.lambda_per_s2", &self.lambda_per_s2),
+        ];
+        for (field, list) in lists {
+            for (i, x) in list.iter().enumerate() {
+                if !(x.is_finite() && *x > 0.0) {
+                    return Err(ParameterError::at(field, i, *x, "must be finite and > 0"));
+                }
+            }
+        }
+        let numbers = [
+            ("control.attitude.integral_max_rad_s", self.integral_max_rad_s),
+            ("control.attitude.filter_frequency_rad_s", self.filter_frequency_rad_s),
+            ("control.attitude.filter_damping", self.filter_damping),
+        ];
+        for (field, x) in numbers {
+            if !(x.is_finite() && x > 0.0) {
+                return Err(ParameterError::of(field, x, "must be finite and > 0"));
+            }
+        }
+        Ok(())
+    }
+
+    /// One step of the loop: torque, and the integral moved on.
+    ///
+    /// * `inertia_kg_m2` - of the vehicle
+    /// * `ned_from_body`, `omega` (rad/s, body) - as estimated
+    /// * `reference` - filtered command
+    /// * `hold_integral` - actuators are saturated, do not wind up
+    /// * `dt_s` - time since the last step
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "each is one physical quantity; a struct would be used once"
+    )]
+    pub fn update(
+        &self,
+        state: &mut AttitudeState,
+        inertia_kg_m2: &Matrix3<f32>,
+        ned_from_body: &Rotation<Ned, Body, f32>,
+        omega: &Vector3<f32>,
+        reference: &EulerReference,
+        hold_integral: bool,
+        dt_s: f32,
+    ) -> AttitudeTerms {
+        let (torque, angle_error, rate_error) = match self.form {
+            AttitudeForm::Euler => {
+                let law = euler::Law { c1: self.c1_per_s, c2: self.c2_per_s, lambda: self.lambda_per_s2 };
+                let (roll, pitch, yaw) = ned_from_body.euler();
+                let out = law.torque(
+                    inertia_kg_m2,
+                    &Vector3::new(roll, pitch, yaw),
+                    omega,
+                    &reference.angle,
+                    &reference.rate,
+                    &reference.acceleration,
+                    &state.integral,
+                );
+                (out.torque, out.e1, out.e2)
+            }
+            AttitudeForm::Quaternion => {
+                let law = quaternion::Law::from_euler_gains(
+                    &self.c1_per_s,
+                    &self.c2_per_s,
+                    &self.lambda_per_s2,
+                    inertia_kg_m2,
+                );
+                let target = quaternion::Target::from_euler(
+                    &reference.angle,
+                    &reference.rate,
+                    &reference.acceleration,
+                );
+                // The integral of half the error drives the quaternion law; its sign is opposite.
+                let chi = state.integral * -0.5;
+                let out = law.torque(
+                    inertia_kg_m2,
+                    &ned_from_body.quaternion,
+                    omega,
+                    &target,
+                    &chi,
+                    state.negative_sign,
+                );
+                state.negative_sign = out.negative_sign;
+                (out.torque, out.z1 * -2.0, -out.z2)
+            }
+        };
+        if !hold_integral {
+            let next = state.integral + angle_error * dt_s;
+            state.integral = next.map(|x| limit(x, -self.integral_max_rad_s, self.integral_max_rad_s));
+        }
+        AttitudeTerms {
+            angle_error,
+            rate_error,
+            integral: state.integral,
+            gyroscopic_n_m: omega.cross(&(inertia_kg_m2 * omega)),
+            torque_n_m: torque,
+        }
+    }
+}
+
+/// Body rate for Euler angle rates: `omega = E(angle) rate`.
+pub(super) fn body_rate_matrix<T: Real>(angle: &Vector3<T>) -> Matrix3<T> {
+    let (sr, cr) = angle.x.sin_cos();
+    let (sp, cp) = angle.y.sin_cos();
+    let (o, l) = (T::zero(), T::one());
+    Matrix3::new(l, o, -sp, o, cr, sr * cp, o, -sr, cr * cp)
+}
+
+/// Time derivative of [`body_rate_matrix`] along `rate`.
+pub(super) fn body_rate_matrix_derivative<T: Real>(angle: &Vector3<T>, rate: &Vector3<T>) -> Matrix3<T> {
+    let (sr, cr) = angle.x.sin_cos();
+    let (sp, cp) = angle.y.sin_cos();
+    let (r, p) = (rate.x, rate.y);
+    let o = T::zero();
+    Matrix3::new(o, o, -cp * p, o, -sr * r, cr * cp * r - sr * sp * p, o, -cr * r, -sr * cp * r - cr * sp * p)
+}
+
+/// Euler angle rates for a body rate; total: the cosine of pitch is kept away from 0.
+pub(super) fn euler_rate<T: Real>(angle: &Vector3<T>, omega: &Vector3<T>) -> Vector3<T> {
+    let (sr, cr) = angle.x.sin_cos();
+    let (sp, cp) = angle.y.sin_cos();
+    let floor: T = real(0.05);
+    let cp = if cp.abs() < floor { floor } else { cp };
+    let yaw_rate = (sr * omega.y + cr * omega.z) / cp;
+    Vector3::new(omega.x + sp * yaw_rate, cr * omega.y - sr * omega.z, yaw_rate)
+}
+
+#[cfg(test)]
+mod fixtures {
+    use crate::dynamics::{VectorSpace, rk4};
+    use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+
+    pub(super) fn inertia() -> Matrix3<f64> {
+        Matrix3::from_diagonal(&Vector3::new(3.22e-3, 4.68e-3, 7.72e-3))
+    }
+
+    /// A body that only turns, with the controller's integral.
+    #[derive(Debug, Clone, Copy)]
+    pub(super) struct Turning {
+        q: Quaternion<f64>,
+        pub(super) omega: Vector3<f64>,
+        pub(super) chi: Vector3<f64>,
+    }
+    impl Turning {
+        pub(super) fn attitude(&self) -> UnitQuaternion<f64> {
+            UnitQuaternion::new_unchecked(self.q)
+        }
+        pub(super) fn times(mut self, sign: f64) -> Self {
+            self.q *= sign;
+            self
+        }
+    }
+    impl VectorSpace<f64> for Turning {
+        fn plus_scaled(&self, h: f64, k: &Self) -> Self {
+            Self { q: self.q + k.q * h, omega: self.omega + k.omega * h, chi: self.chi + k.chi * h }
+        }
+    }
+
+    /// Attitudes up to `largest` rad from level about several axes, turning, with an integral.
+    pub(super) fn starts(largest: f64) -> Vec<Turning> {
+        let axes = [Vector3::x(), Vector3::y(), Vector3::new(1.0, -1.0, 0.5), Vector3::new(-0.3, 1.0, 1.0)];
+        let attitude = |axis: &Vector3<f64>, angle: f64| {
+            UnitQuaternion::from_axis_angle(&nalgebra::Unit::new_normalize(*axis), angle).into_inner()
+        };
+        let mut all = Vec::new();
+        for axis in &axes {
+            for share in [0.2, 1.0] {
+                all.push(Turning {
+                    q: attitude(axis, share * largest),
+                    omega: Vector3::new(1.0, -2.0, 0.5),
+                    chi: Vector3::new(0.01, -0.02, 0.03),
+                });
+            }
+        }
+        all
+    }
+
+    /// Flies the closed loop in continuous time and asserts that `value` never rises and comes down to nearly nothing.
+    pub(super) fn never_rises(
+        start: Turning,
+        duration_s: f64,
+        value: impl Fn(&Turning, f64) -> f64,
+        torque_and_integrand: impl Fn(&Turning, f64) -> (Vector3<f64>, Vector3<f64>),
+    ) {
+        let dt = 5e-4;
+        let (mut s, first) = (start, value(&start, 0.0));
+        let mut last = first;
+        for step in 0..(duration_s / dt) as usize {
+            let t = step as f64 * dt;
+            s = rk4_with_time(s, t, dt, &torque_and_integrand);
+            s.q = s.q.normalize();
+            let now = value(&s, t + dt);
+            assert!(now <= last * (1.0 + 1e-9) + 1e-12, "V rose from {last} to {now} at {t} s");
+            last = now;
+        }
+        assert!(last < 0.05 * first, "V only fell from {first} to {last}");
+    }
+
+    /// Time is part of the law, so it is part of the state that RK4 moves.
+    #[derive(Clone, Copy)]
+    struct Timed(Turning, f64);
+    impl VectorSpace<f64> for Timed {
+        fn plus_scaled(&self, h: f64, k: &Self) -> Self {
+            Timed(self.0.plus_scaled(h, &k.0), self.1 + h * k.1)
+        }
+    }
+
+    fn rk4_with_time(
+        s: Turning,
+        t: f64,
+        dt: f64,
+        torque_and_integrand: &impl Fn(&Turning, f64) -> (Vector3<f64>, Vector3<f64>),
+    ) -> Turning {
+        rk4(Timed(s, t), dt, |Timed(s, t)| {
+            let (torque, integrand) = torque_and_integrand(s, *t);
+            let j = inertia();
+            let omega_dot = j.try_inverse().unwrap() * (torque - s.omega.cross(&(j * s.omega)));
+            Timed(
+                Turning { q: s.q * Quaternion::from_imag(s.omega) * 0.5, omega: omega_dot, chi: integrand },
+                1.0,
+            )
+        })
+        .0
+    }
+}

@@ -1,0 +1,322 @@
+//! Mixer: collective thrust and torque to rotor thrusts, within what each rotor can give.
+//!
+//! Paper, eq. 1 and 2: `F = T^-1 U` with the rows of `T` the thrust, roll, pitch and yaw that one newton of each rotor
+//! gives. Here `T` comes from the vehicle's geometry, for any layout: rotor i gives `(1, -y_i, x_i, s_i k_m / k_f)`, and
+//! `F = T^+ U` has the smallest norm where there are more than four rotors. (The printed `T` has `d_fr` in the pitch row;
+//! it must be `d_fp`: EQUATIONS T2.)
+//!
+//! Where a rotor would leave `[0, F_max]`, priority is roll and pitch over thrust over yaw, exactly, in this order:
+//! 1. the largest share `s <= 1` of the roll and pitch torque, direction kept, that some thrust and yaw allow;
+//! 2. the thrust nearest to the demand that some yaw allows at that `s`;
+//! 3. the yaw torque nearest to the demand at both.
+//!
+//! Along `T^+` the rotor thrusts are `s a_i + u b_i + y c_i`, so each step is an interval after eliminating the variables
+//! of the later steps (Fourier-Motzkin): no iteration, at most `n^2` inequalities in the common saturated case.
+
+use crate::math::{limit, lower, upper};
+use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
+use nalgebra::{Matrix4, SMatrix, Vector3};
+
+/// Slopes below this count as zero; all slopes are of order one by scaling.
+const FLAT: f32 = 1e-4;
+/// Half-planes in (s, u) that pairs of rotors can give, and those of rotors without yaw.
+const MAX_HALF_PLANES: usize = MAX_ROTORS * MAX_ROTORS + 2 * MAX_ROTORS;
+
+/// Collective thrust and torque.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ThrustTorque {
+    /// Collective thrust, N, >= 0.
+    pub thrust_n: f32,
+    /// Torque about the body axes, N m.
+    pub torque_n_m: Vector3<f32>,
+}
+
+/// Rotor thrusts and what they achieve.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MixerTerms {
+    /// Thrust of each rotor, N, within `[0, F_max]`.
+    pub rotor_thrust_n: PerRotor<f32>,
+    /// What these thrusts amount to.
+    pub achieved: ThrustTorque,
+    /// Share of the roll and pitch demand that is met, 0..1.
+    pub roll_pitch_share: f32,
+    /// Some part of the demand is not met.
+    pub saturated: bool,
+}
+
+/// The allocation of one vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mixer {
+    count: usize,
+    thrust_max_n: f32,
+    /// Columns of `T^+`: thrust per newton of collective, per newton metre of roll, pitch, and of scaled yaw.
+    collective: PerRotor<f32>,
+    roll: PerRotor<f32>,
+    pitch: PerRotor<f32>,
+    yaw: PerRotor<f32>,
+    /// Newton metres of yaw torque per unit of the scaled yaw variable.
+    yaw_unit_n_m: f32,
+    effectiveness: [PerRotor<f32>; 4],
+}
+
+/// `slope_s * s + slope_u * u <= bound`.
+#[derive(Clone, Copy)]
+struct HalfPlane {
+    slope_s: f32,
+    slope_u: f32,
+    bound: f32,
+}
+
+/// A closed interval; empty where `low > high`.
+#[derive(Clone, Copy)]
+struct Interval {
+    low: f32,
+    high: f32,
+}
+
+impl Interval {
+    const ALL: Self = Self { low: f32::NEG_INFINITY, high: f32::INFINITY };
+    /// Keeps the part where `slope * x <= bound`.
+    #[inline(always)]
+    fn cut(&mut self, slope: f32, bound: f32) {
+        if slope > FLAT {
+            self.high = lower(self.high, bound / slope);
+        } else if slope < -FLAT {
+            self.low = upper(self.low, bound / slope);
+        }
+    }
+    fn is_empty(&self) -> bool {
+        self.low > self.high + 1e-5
+    }
+}
+
+impl Mixer {
+    /// # Errors
+    /// A layout that cannot hover or cannot roll and pitch, with the field of the vehicle file.
+    pub fn new(vehicle: &Vehicle<f32>) -> Result<Self, ParameterError> {
+        let count = vehicle.rotors().len();
+        let propulsion = &vehicle.parameters().propulsion;
+        let torque_per_thrust = propulsion.torque_coefficient_n_m_s2 / propulsion.thrust_coefficient_n_s2;
+        let mut t = SMatrix::<f32, 4, MAX_ROTORS>::zeros();
+        for (i, rotor) in vehicle.rotors().iter().enumerate() {
+            let r = rotor.position.vector;
+            t.set_column(i, &nalgebra::Vector4::new(1.0, -r.y, r.x, rotor.yaw_sign * torque_per_thrust));
+        }
+        let inverse = pseudo_inverse(&t)?;
+        let reached = t * inverse;
+        for axis in 0..3 {
+            if !((reached[(axis, axis)] - 1.0).abs() < 1e-3) {
+                return Err(ParameterError::at(
+                    "rotor[].position_body_m",
+                    axis,
+                    reached[(axis, axis)],
+                    "the layout cannot produce thrust (0), roll (1) or pitch (2) on its own",
+                ));
+            }
+        }
+        let column = |k: usize| {
+            let mut out = [0.0; MAX_ROTORS];
+            for (i, x) in out.iter_mut().enumerate() {
+                *x = inverse[(i, k)];
+            }
+            out
+        };
+        let collective = column(0);
+        for (i, b) in collective[..count].iter().enumerate() {
+            if !(*b > 1e-3) {
+                return Err(ParameterError::at(
+                    "rotor[].position_body_m",
+                    i,
+                    *b,
+                    "in hover this rotor would carry no thrust (share must be > 0.001)",
+                ));
+            }
+        }
+        // The yaw column is scaled to the size of the thrust column, so that all slopes below are of order one.
+        let yaw_raw = column(3);
+        let largest = |c: &PerRotor<f32>| c.iter().fold(0.0, |m, x| upper(m, x.abs()));
+        let (yaw_size, collective_size) = (largest(&yaw_raw), largest(&collective));
+        let yaw_unit_n_m = if yaw_size > 0.0 { collective_size / yaw_size } else { 0.0 };
+        let row = |k: usize| {
+            let mut out = [0.0; MAX_ROTORS];
+            for (i, x) in out.iter_mut().enumerate() {
+                *x = t[(k, i)];
+            }
+            out
+        };
+        Ok(Self {
+            count,
+            thrust_max_n: vehicle.rotor_thrust_max_n(),
+            collective,
+            roll: column(1),
+            pitch: column(2),
+            yaw: yaw_raw.map(|c| c * yaw_unit_n_m),
+            yaw_unit_n_m,
+            effectiveness: [row(0), row(1), row(2), row(3)],
+        })
+    }
+
+    /// Thrust of each rotor at its limit, N.
+    pub fn rotor_thrust_max_n(&self) -> f32 {
+        self.thrust_max_n
+    }
+
+    /// Rotor thrusts for a demand. Total: non-finite demands count as zero.
+    pub fn allocate(&self, demand: &ThrustTorque) -> MixerTerms {
+        let finite = |x: f32| if x.is_finite() { x } else { 0.0 };
+        let thrust = upper(finite(demand.thrust_n), 0.0);
+        let torque = demand.torque_n_m.map(finite);
+        let yaw = if self.yaw_unit_n_m > 0.0 { torque.z / self.yaw_unit_n_m } else { 0.0 };
+        let mut tilt = [0.0; MAX_ROTORS];
+        for i in 0..self.count {
+            tilt[i] = self.roll[i] * torque.x + self.pitch[i] * torque.y;
+        }
+        let (mut s, mut u, mut y) = (1.0, thrust, yaw);
+        let saturated = !self.fits(&tilt, s, u, y);
+        if saturated {
+            let mut yaw_range = self.yaw_interval(&tilt, s, u);
+            if yaw_range.is_empty() {
+                (s, u) = self.share_and_thrust(&tilt, thrust);
+                yaw_range = self.yaw_interval(&tilt, s, u);
+            }
+            y = limit(yaw, yaw_range.low, yaw_range.high);
+        }
+        self.terms(&tilt, s, u, y, saturated)
+    }
+
+    fn rotor_thrust(&self, tilt: &PerRotor<f32>, i: usize, s: f32, u: f32, y: f32) -> f32 {
+        s * tilt[i] + u * self.collective[i] + y * self.yaw[i]
+    }
+
+    fn fits(&self, tilt: &PerRotor<f32>, s: f32, u: f32, y: f32) -> bool {
+        (0..self.count).all(|i| {
+            let f = self.rotor_thrust(tilt, i, s, u, y);
+            f >= 0.0 && f <= self.thrust_max_n
+        })
+    }
+
+    /// Yaw values that keep every rotor within its limits at a given share and thrust.
+    fn yaw_interval(&self, tilt: &PerRotor<f32>, s: f32, u: f32) -> Interval {
+        let mut range = Interval::ALL;
+        for i in 0..self.count {
+            let rest = self.rotor_thrust(tilt, i, s, u, 0.0);
+            if self.yaw[i].abs() <= FLAT {
+                if rest < -1e-5 || rest > self.thrust_max_n + 1e-5 {
+                    return Interval { low: f32::INFINITY, high: f32::NEG_INFINITY };
+                }
+                continue;
+            }
+            range.cut(self.yaw[i], self.thrust_max_n - rest);
+            range.cut(-self.yaw[i], rest);
+        }
+        if range.low == f32::NEG_INFINITY { Interval { low: 0.0, high: 0.0 } } else { range }
+    }
+
+    /// Steps 1 and 2: the largest share, then the nearest thrust.
+    fn share_and_thrust(&self, tilt: &PerRotor<f32>, thrust: f32) -> (f32, f32) {
+        let mut planes = [HalfPlane { slope_s: 0.0, slope_u: 0.0, bound: 0.0 }; MAX_HALF_PLANES];
+        let mut used = 0;
+        let mut add = |plane: HalfPlane| {
+            if let Some(place) = planes.get_mut(used) {
+                *place = plane;
+                used += 1;
+            }
+        };
+        for i in 0..self.count {
+            let (a, b, c) = (tilt[i], self.collective[i], self.yaw[i]);
+            if c.abs() <= FLAT {
+                add(HalfPlane { slope_s: a, slope_u: b, bound: self.thrust_max_n });
+                add(HalfPlane { slope_s: -a, slope_u: -b, bound: 0.0 });
+                continue;
+            }
+            let floor = if c > 0.0 { 0.0 } else { self.thrust_max_n };
+            for j in 0..self.count {
+                if i == j || self.yaw[j].abs() <= FLAT {
+                    continue;
+                }
+                // Yaw must lie above what rotor i needs and below what rotor j allows.
+                let c_j = self.yaw[j];
+                let ceiling = if c_j > 0.0 { self.thrust_max_n } else { 0.0 };
+                add(HalfPlane {
+                    slope_s: tilt[j] / c_j - a / c,
+                    slope_u: self.collective[j] / c_j - b / c,
+                    bound: ceiling / c_j - floor / c,
+                });
+            }
+        }
+        let planes = &planes[..used];
+        let at_share = |s: f32| {
+            let mut range = Interval::ALL;
+            for p in planes {
+                range.cut(p.slope_u, p.bound - s * p.slope_s);
+            }
+            range
+        };
+        let share = largest_share(planes);
+        let range = at_share(share);
+        (share, limit(thrust, range.low, upper(range.low, range.high)))
+    }
+
+    fn terms(&self, tilt: &PerRotor<f32>, s: f32, u: f32, y: f32, saturated: bool) -> MixerTerms {
+        let mut rotor_thrust_n = [0.0; MAX_ROTORS];
+        let mut sum = [0.0; 4];
+        for i in 0..self.count {
+            let f = limit(self.rotor_thrust(tilt, i, s, u, y), 0.0, self.thrust_max_n);
+            rotor_thrust_n[i] = f;
+            for (total, row) in sum.iter_mut().zip(&self.effectiveness) {
+                *total += row[i] * f;
+            }
+        }
+        let achieved = ThrustTorque { thrust_n: sum[0], torque_n_m: Vector3::new(sum[1], sum[2], sum[3]) };
+        MixerTerms { rotor_thrust_n, achieved, roll_pitch_share: s, saturated }
+    }
+}
+
+/// The largest `s` in [0, 1] for which some `u` satisfies all half-planes, by eliminating `u`.
+fn largest_share(planes: &[HalfPlane]) -> f32 {
+    let mut share = Interval { low: 0.0, high: 1.0 };
+    for p in planes {
+        if p.slope_u.abs() <= FLAT {
+            share.cut(p.slope_s, p.bound);
+        }
+    }
+    for above in planes.iter().filter(|p| p.slope_u > FLAT) {
+        for below in planes.iter().filter(|p| p.slope_u < -FLAT) {
+            let slope = above.slope_s / above.slope_u - below.slope_s / below.slope_u;
+            share.cut(slope, above.bound / above.slope_u - below.bound / below.slope_u);
+        }
+    }
+    limit(share.high, 0.0, 1.0)
+}
+
+/// `T^T (T T^T)^-1`; a yaw row of zeros is left out.
+fn pseudo_inverse(t: &SMatrix<f32, 4, MAX_ROTORS>) -> Result<SMatrix<f32, MAX_ROTORS, 4>, ParameterError> {
+    let mut scaled = *t;
+    let mut scale = [1.0; 4];
+    for (k, s) in scale.iter_mut().enumerate() {
+        let size = t.row(k).norm();
+        if size > 0.0 {
+            *s = 1.0 / size;
+        }
+        for x in scaled.row_mut(k).iter_mut() {
+            *x *= *s;
+        }
+    }
+    let mut gram: Matrix4<f32> = scaled * scaled.transpose();
+    if gram[(3, 3)] == 0.0 {
+        gram[(3, 3)] = 1.0;
+    }
+    let inverse = gram.try_inverse().filter(|m| m.amax() < 1e4).ok_or(ParameterError {
+        field: "rotor[].position_body_m",
+        index: None,
+        value: f64::from(gram.determinant()),
+        reason: "the layout cannot control roll, pitch and thrust independently; determinant",
+    })?;
+    let mut out = scaled.transpose() * inverse;
+    for (k, s) in scale.iter().enumerate() {
+        for x in out.column_mut(k).iter_mut() {
+            *x *= *s;
+        }
+    }
+    Ok(out)
+}

@@ -1,0 +1,304 @@
+//! Primary controller (PC): cascaded position and velocity control, 10 Hz.
+//!
+//! Paper, section III.B:
+//! ```text
+//! v_jd = k_p^p (j_d - j)      e_j = v_jd - v_j      a_cmd,j = k_p^v e_j + k_i^v int(e_j) + k_d^v e_j'
+//! U = m (g - a_cmd,z) / (cos(roll) cos(pitch))      pitch_d = -(m/U) a_cmd,x      roll_d = (m/U) a_cmd,y
+//! ```
+//! Differs: accelerations are turned into the heading frame first (the paper's law holds at zero yaw only, EQUATIONS T7),
+//! limited, and the integral is frozen while anything is saturated. `U` uses the measured tilt with the product of cosines
+//! kept above 0.5 (T8). [`AngleLaw::Exact`] inverts the thrust direction instead of taking sines as angles.
+
+use super::{AttitudeThrust, Reference};
+use crate::frames::{In, Ned};
+use crate::math::{GRAVITY_M_S2, limit, limit_norm, upper};
+use crate::vehicle::ParameterError;
+use nalgebra::{Vector2, Vector3};
+
+/// How an acceleration becomes roll and pitch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AngleLaw {
+    /// As printed in the paper: angle for sine, 4.7 % off at 30 deg.
+    SmallAngle,
+    /// `pitch = atan2(-a_x, g - a_z)`, `roll = atan2(a_y cos(pitch), g - a_z)`.
+    Exact,
+}
+
+/// Gains of the position and velocity loops, north, east, down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PositionGains {
+    /// Position to velocity, 1/s.
+    pub position_per_s: Vector3<f32>,
+    /// Velocity error to acceleration, 1/s.
+    pub velocity_per_s: Vector3<f32>,
+    /// Integral of the velocity error to acceleration, 1/s^2.
+    pub integral_per_s2: Vector3<f32>,
+    /// Derivative of the velocity error to acceleration.
+    pub derivative: Vector3<f32>,
+    /// Share of the reference velocity that is fed forward, 0 in the paper.
+    pub velocity_feed_forward: f32,
+    /// Limit of the horizontal acceleration command, m/s^2.
+    pub acceleration_max_horizontal_m_s2: f32,
+    /// Limit of the vertical acceleration command, m/s^2.
+    pub acceleration_max_vertical_m_s2: f32,
+    /// Limit of the integral of the velocity error, m.
+    pub integral_max_m: f32,
+    /// From acceleration to angles.
+    pub angle_law: AngleLaw,
+}
+
+/// What the loop remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PositionState {
+    /// Integral of the velocity error, m.
+    pub integral: Vector3<f32>,
+    /// Velocity error of the last tick, m/s, once there was one.
+    pub last_error: Option<Vector3<f32>>,
+}
+
+/// Every term of one tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PositionTerms {
+    /// Reference minus position, m.
+    pub position_error: In<Ned, f32>,
+    /// Desired minus measured velocity, m/s.
+    pub velocity_error: In<Ned, f32>,
+    /// Integral of the velocity error, m.
+    pub integral: Vector3<f32>,
+    /// Acceleration command before limits, m/s^2.
+    pub acceleration_demand: In<Ned, f32>,
+    /// Acceleration command, m/s^2.
+    pub acceleration: In<Ned, f32>,
+    /// Angles and thrust that would give it, not limited.
+    pub request: AttitudeThrust,
+}
+
+/// Measured motion at a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Position, m.
+    pub position: In<Ned, f32>,
+    /// Velocity over ground, m/s.
+    pub velocity: In<Ned, f32>,
+    /// Roll, rad.
+    pub roll_rad: f32,
+    /// Pitch, rad.
+    pub pitch_rad: f32,
+    /// Yaw, rad.
+    pub yaw_rad: f32,
+}
+
+impl PositionGains {
+    /// # Errors
+    /// The first gain that is not finite or out of range, by its name in `[control.position]`.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let lists = [
+            ("control.position.position_per_s", &self.position_per_s, true),
+            ("control.position.velocity_per_s", &self.velocity_per_s, true),
+            ("control.position.integral_per_s2", &self.integral_per_s2, false),
+            ("control.position.derivative", &self.derivative, false),
+        ];
+        for (field, list, strict) in lists {
+            for (i, x) in list.iter().enumerate() {
+                if !(x.is_finite() && (*x > 0.0 || (!strict && *x == 0.0))) {
+                    let reason = if strict { "must be finite and > 0" } else { "must be finite and >= 0" };
+                    return Err(ParameterError::at(field, i, *x, reason));
+                }
+            }
+        }
+        let numbers = [
+            ("control.position.acceleration_max_horizontal_m_s2", self.acceleration_max_horizontal_m_s2),
+            ("control.position.acceleration_max_vertical_m_s2", self.acceleration_max_vertical_m_s2),
+            ("control.position.integral_max_m", self.integral_max_m),
+        ];
+        for (field, x) in numbers {
+            if !(x.is_finite() && x > 0.0) {
+                return Err(ParameterError::of(field, x, "must be finite and > 0"));
+            }
+        }
+        let share = self.velocity_feed_forward;
+        if !(0.0..=1.0).contains(&share) {
+            return Err(ParameterError::of(
+                "control.position.velocity_feed_forward",
+                share,
+                "must be 0 to 1",
+            ));
+        }
+        Ok(())
+    }
+
+    /// One tick.
+    ///
+    /// * `mass_kg` - of the vehicle
+    /// * `hold_integral` - the last command was saturated
+    /// * `dt_s` - time since the last tick
+    pub fn update(
+        &self,
+        state: &mut PositionState,
+        mass_kg: f32,
+        motion: &Motion,
+        reference: &Reference,
+        hold_integral: bool,
+        dt_s: f32,
+    ) -> PositionTerms {
+        let position_error = reference.position.vector - motion.position.vector;
+        let velocity_desired = self.position_per_s.component_mul(&position_error)
+            + reference.velocity.vector * self.velocity_feed_forward;
+        let error = velocity_desired - motion.velocity.vector;
+        let slope = match state.last_error {
+            Some(last) if dt_s > 0.0 => (error - last) / dt_s,
+            _ => Vector3::zeros(),
+        };
+        if !hold_integral {
+            let max = self.integral_max_m;
+            state.integral = (state.integral + error * dt_s).map(|x| limit(x, -max, max));
+        }
+        state.last_error = Some(error);
+        let demand = self.velocity_per_s.component_mul(&error)
+            + self.integral_per_s2.component_mul(&state.integral)
+            + self.derivative.component_mul(&slope);
+        let horizontal =
+            limit_norm(Vector3::new(demand.x, demand.y, 0.0), self.acceleration_max_horizontal_m_s2);
+        let max = self.acceleration_max_vertical_m_s2;
+        let acceleration = Vector3::new(horizontal.x, horizontal.y, limit(demand.z, -max, max));
+        PositionTerms {
+            position_error: In::new(position_error),
+            velocity_error: In::new(error),
+            integral: state.integral,
+            acceleration_demand: In::new(demand),
+            acceleration: In::new(acceleration),
+            request: request(self.angle_law, mass_kg, &acceleration, motion),
+        }
+    }
+}
+
+/// Horizontal part of a NED vector in the heading frame: forward, right.
+pub(super) fn heading_frame(v_ned: &Vector3<f32>, yaw_rad: f32) -> Vector2<f32> {
+    let (s, c) = (libm::sinf(yaw_rad), libm::cosf(yaw_rad));
+    Vector2::new(c * v_ned.x + s * v_ned.y, -s * v_ned.x + c * v_ned.y)
+}
+
+fn request(law: AngleLaw, mass_kg: f32, acceleration_ned: &Vector3<f32>, motion: &Motion) -> AttitudeThrust {
+    let a = heading_frame(acceleration_ned, motion.yaw_rad);
+    // Thrust never asks for free fall or less: a downward command stronger than that keeps a tenth of g.
+    let lift = upper(GRAVITY_M_S2 as f32 - acceleration_ned.z, 0.1 * GRAVITY_M_S2 as f32);
+    let cosines = libm::cosf(motion.roll_rad) * libm::cosf(motion.pitch_rad);
+    let thrust_n = mass_kg * lift / upper(cosines, 0.5);
+    let (roll_rad, pitch_rad) = match law {
+        AngleLaw::SmallAngle => (mass_kg / thrust_n * a.y, -mass_kg / thrust_n * a.x),
+        AngleLaw::Exact => {
+            let pitch = libm::atan2f(-a.x, lift);
+            (libm::atan2f(a.y * libm::cosf(pitch), lift), pitch)
+        }
+    };
+    AttitudeThrust { roll_rad, pitch_rad, thrust_n }
+}
+
+#[cfg(test)]
+pub(super) mod fixtures {
+    use super::*;
+
+    pub(in super::super) fn gains() -> PositionGains {
+        PositionGains {
+            position_per_s: Vector3::new(1.6, 1.6, 0.8),
+            velocity_per_s: Vector3::new(2.5, 2.5, 1.6),
+            integral_per_s2: Vector3::new(0.15, 0.15, 0.15),
+            derivative: Vector3::new(0.05, 0.05, 0.05),
+            velocity_feed_forward: 0.0,
+            acceleration_max_horizontal_m_s2: 11.0,
+            acceleration_max_vertical_m_s2: 3.0,
+            integral_max_m: 2.0,
+            angle_law: AngleLaw::Exact,
+        }
+    }
+    pub(in super::super) fn still() -> Motion {
+        Motion { position: In::zero(), velocity: In::zero(), roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0 }
+    }
+    pub(in super::super) fn at(north: f32, east: f32, down: f32) -> Reference {
+        Reference {
+            position: In::new(Vector3::new(north, east, down)),
+            velocity: In::zero(),
+            acceleration: In::zero(),
+            yaw_rad: 0.0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fixtures::*;
+    use super::*;
+    use crate::frames::{Body, Rotation};
+
+    fn tick(gains: &PositionGains, motion: &Motion, reference: &Reference) -> PositionTerms {
+        gains.update(&mut PositionState::default(), 0.548, motion, reference, false, 0.1)
+    }
+
+    #[test]
+    fn on_the_spot_it_asks_for_hover() {
+        let terms = tick(&gains(), &still(), &at(0.0, 0.0, 0.0));
+        assert!((terms.request.thrust_n - 0.548 * 9.80665).abs() < 1e-4);
+        assert_eq!((terms.request.roll_rad, terms.request.pitch_rad), (0.0, 0.0));
+    }
+
+    #[test]
+    fn a_goal_ahead_lowers_the_nose_and_one_to_the_right_rolls_right() {
+        let terms = tick(&gains(), &still(), &at(2.0, 1.0, 0.0));
+        assert!(terms.request.pitch_rad < 0.0 && terms.request.roll_rad > 0.0, "{terms:?}");
+        let above = tick(&gains(), &still(), &at(0.0, 0.0, -2.0));
+        assert!(above.request.thrust_n > 0.548 * 9.80665, "a goal above asks for more thrust");
+    }
+
+    /// Thrust along the requested attitude must be the requested acceleration, whatever the heading.
+    #[test]
+    fn the_exact_law_inverts_the_dynamics_at_any_yaw() {
+        for yaw in [-3.0, -1.0, 0.0, 0.7, 2.5] {
+            let motion = Motion { yaw_rad: yaw, ..still() };
+            let terms = tick(&gains(), &motion, &at(1.0, -0.7, -0.3));
+            let r = terms.request;
+            let ned_from_body = Rotation::<Ned, Body, f32>::from_euler(r.roll_rad, r.pitch_rad, yaw);
+            let a = terms.acceleration.vector;
+            let lift = GRAVITY_M_S2 as f32 - a.z;
+            // Thrust that holds the vertical at the requested tilt.
+            let u = 0.548 * lift / (r.roll_rad.cos() * r.pitch_rad.cos());
+            let got = (ned_from_body * In::new(Vector3::new(0.0, 0.0, -u / 0.548))).vector
+                + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32);
+            assert!((got - a).norm() < 1e-4, "yaw {yaw}: {got} for {a}");
+        }
+    }
+
+    #[test]
+    fn both_angle_laws_agree_to_first_order() {
+        let mut paper = gains();
+        paper.angle_law = AngleLaw::SmallAngle;
+        for size in [0.02_f32, 0.04] {
+            let exact = tick(&gains(), &still(), &at(size, -size, 0.0)).request;
+            let printed = tick(&paper, &still(), &at(size, -size, 0.0)).request;
+            let difference =
+                (exact.pitch_rad - printed.pitch_rad).abs() + (exact.roll_rad - printed.roll_rad).abs();
+            assert!(difference < 20.0 * size.powi(3), "{difference}");
+        }
+    }
+
+    #[test]
+    fn limits_hold_and_a_held_integral_does_not_move() {
+        let mut state = PositionState::default();
+        let far = at(100.0, 50.0, -40.0);
+        let terms = gains().update(&mut state, 0.548, &still(), &far, true, 0.1);
+        assert_eq!(state.integral, Vector3::zeros());
+        let a = terms.acceleration.vector;
+        assert!(a.xy().norm() <= 11.0 + 1e-4 && a.z.abs() <= 3.0);
+        for _ in 0..1000 {
+            gains().update(&mut state, 0.548, &still(), &far, false, 0.1);
+        }
+        assert!(state.integral.amax() <= 2.0);
+    }
+
+    #[test]
+    fn a_bad_gain_is_named() {
+        let mut bad = gains();
+        bad.velocity_per_s.y = f32::NAN;
+        assert!(bad.check().unwrap_err().to_string().starts_with("control.position.velocity_per_s[1] = NaN"));
+        gains().check().unwrap();
+    }
+}

@@ -1,0 +1,229 @@
+//! Missions: which reference to follow, and what to do about an obstacle.
+//!
+//! An avoidance mission flies straight at a target speed. When [`super::sensing`] reports an obstacle, a new
+//! [`Trajectory`] starts at the measured position, at rest, turned by a steering angle (paper, section V.B and V.C;
+//! EQUATIONS T20). Its height stays the mission's height, so that lost height counts as error.
+
+use super::sensing::{Obstacle, Sensing, offset};
+use super::trajectory::Trajectory;
+use crate::control::Reference;
+use crate::frames::{In, Ned};
+use crate::math::wrap_angle;
+use crate::vehicle::ParameterError;
+use nalgebra::Vector3;
+
+/// What to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Mission {
+    /// Hold a position, m.
+    Hover {
+        /// The position, m.
+        position: In<Ned, f32>,
+    },
+    /// Fly straight and steer away from obstacles.
+    Avoid {
+        /// The first run.
+        run: Trajectory,
+        /// What is seen.
+        sensing: Sensing,
+        /// How far to turn.
+        steering: Steering,
+    },
+    /// Circle around a centre at constant speed, heading north.
+    Circle {
+        /// Centre, m.
+        centre: In<Ned, f32>,
+        /// Radius, m.
+        radius_m: f32,
+        /// Speed along the circle, m/s.
+        speed_m_s: f32,
+    },
+}
+
+/// Steering angles, drawn anew for each encounter from the seed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steering {
+    /// Smallest turn, rad; positive is to the right.
+    pub min_rad: f32,
+    /// Largest turn, rad.
+    pub max_rad: f32,
+    /// Turn to either side, drawn from the seed too.
+    pub both_sides: bool,
+    /// Seed of the draw.
+    pub seed: u32,
+}
+
+/// What guidance remembers.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MissionState {
+    /// The run after the last encounter, if any, and when it started, us.
+    pub turned: Option<(Trajectory, u64)>,
+    /// The obstacle being avoided.
+    pub handled: Option<Obstacle>,
+    /// Encounters so far.
+    pub encounters: u32,
+}
+
+impl Mission {
+    /// # Errors
+    /// A number out of range, by its name in a scenario.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        use crate::vehicle::positive;
+        match self {
+            Self::Hover { .. } => Ok(()),
+            Self::Avoid { run, sensing, steering } => {
+                positive("speed_m_s", run.speed_m_s)?;
+                positive("ramp_s", run.ramp_s)?;
+                sensing.check()?;
+                for (field, angle) in
+                    [("steering.min_rad", steering.min_rad), ("steering.max_rad", steering.max_rad)]
+                {
+                    if !(angle.abs() <= core::f32::consts::PI) {
+                        return Err(ParameterError::of(field, angle, "must be within half a turn"));
+                    }
+                }
+                Ok(())
+            }
+            Self::Circle { radius_m, speed_m_s, .. } => {
+                positive("radius_m", *radius_m)?;
+                positive("speed_m_s", *speed_m_s)
+            }
+        }
+    }
+
+    /// Looks for an obstacle and turns away from it. Called at the outer rate.
+    pub fn sense(
+        &self,
+        state: &mut MissionState,
+        time_us: u64,
+        position: In<Ned, f32>,
+        velocity: In<Ned, f32>,
+        obstacles: &[Obstacle],
+    ) {
+        let Self::Avoid { run, sensing, steering } = self else { return };
+        // Debounce: the obstacle is forgotten once it is out of range.
+        if state.handled.is_some_and(|o| offset(position, &o).norm() > sensing.range_m) {
+            state.handled = None;
+        }
+        let Some(seen) = sensing.nearest(position, velocity, obstacles, state.handled.map(|o| o.id)) else {
+            return;
+        };
+        let course = libm::atan2f(velocity.vector.y, velocity.vector.x);
+        let start = In::new(Vector3::new(position.vector.x, position.vector.y, run.start.vector.z));
+        let turned =
+            Trajectory { start, course_rad: wrap_angle(course + steering.angle(state.encounters)), ..*run };
+        state.turned = Some((turned, time_us));
+        state.handled = Some(seen);
+        state.encounters = state.encounters.wrapping_add(1);
+    }
+
+    /// The reference at a time since the start of the mission.
+    pub fn reference(&self, state: &MissionState, time_us: u64) -> Reference {
+        let since = |start_us: u64| time_us.saturating_sub(start_us) as f32 * 1e-6;
+        match self {
+            Self::Hover { position } => Reference {
+                position: *position,
+                velocity: In::zero(),
+                acceleration: In::zero(),
+                yaw_rad: 0.0,
+            },
+            Self::Avoid { run, .. } => match &state.turned {
+                Some((turned, start_us)) => turned.at(since(*start_us)),
+                None => run.at(since(0)),
+            },
+            Self::Circle { centre, radius_m, speed_m_s } => {
+                let rate = speed_m_s / radius_m;
+                let angle = wrap_angle(rate * since(0));
+                let (s, c) = (libm::sinf(angle), libm::cosf(angle));
+                let radius = Vector3::new(c, s, 0.0) * *radius_m;
+                Reference {
+                    position: *centre + In::new(radius),
+                    velocity: In::new(Vector3::new(-s, c, 0.0) * *speed_m_s),
+                    acceleration: In::new(-radius * (rate * rate)),
+                    yaw_rad: 0.0,
+                }
+            }
+        }
+    }
+}
+
+impl Steering {
+    /// The turn at encounter `n`, rad.
+    fn angle(&self, n: u32) -> f32 {
+        let bits = scramble(self.seed ^ n.wrapping_mul(0x9E37_79B9));
+        let share = (bits >> 8) as f32 / (1u32 << 24) as f32;
+        let angle = self.min_rad + (self.max_rad - self.min_rad) * share;
+        if self.both_sides && bits & 1 == 1 { -angle } else { angle }
+    }
+}
+
+/// A well mixed 32-bit function (the finaliser of MurmurHash3): flight code needs a draw, not a generator with state.
+fn scramble(mut x: u32) -> u32 {
+    x ^= x >> 16;
+    x = x.wrapping_mul(0x85EB_CA6B);
+    x ^= x >> 13;
+    x = x.wrapping_mul(0xC2B2_AE35);
+    x ^ (x >> 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn avoid() -> Mission {
+        Mission::Avoid {
+            run: Trajectory {
+                start: In::new(Vector3::new(0.0, 0.0, -10.0)),
+                course_rad: 0.0,
+                speed_m_s: 7.0,
+                ramp_s: 2.0,
+            },
+            sensing: Sensing { range_m: 5.0, half_view_rad: 0.2618, speed_min_m_s: 1.0 },
+            steering: Steering { min_rad: 1.92, max_rad: 2.27, both_sides: false, seed: 3 },
+        }
+    }
+
+    #[test]
+    fn an_obstacle_turns_the_reference_once() {
+        let (mission, mut state) = (avoid(), MissionState::default());
+        let velocity = In::new(Vector3::new(7.0, 0.0, 0.0));
+        let trunk = [Obstacle { id: 1, north_m: 24.0, east_m: 0.0 }];
+        mission.sense(&mut state, 0, In::new(Vector3::new(18.0, 0.0, -10.0)), velocity, &trunk);
+        assert_eq!(state.encounters, 0, "6 m away is out of range");
+        let here = In::new(Vector3::new(19.5, 0.3, -9.0));
+        mission.sense(&mut state, 3_000_000, here, velocity, &trunk);
+        mission.sense(&mut state, 3_100_000, here, velocity, &trunk);
+        assert_eq!(state.encounters, 1, "the same obstacle does not trigger twice");
+        let start = mission.reference(&state, 3_000_000);
+        assert_eq!(
+            start.position.vector,
+            Vector3::new(19.5, 0.3, -10.0),
+            "starts here, at the mission's height"
+        );
+        assert_eq!(start.velocity.vector.norm(), 0.0);
+        let later = mission.reference(&state, 8_000_000).velocity.vector;
+        let turn = libm::atan2f(later.y, later.x);
+        assert!((1.92..=2.27).contains(&turn), "turned by {turn}");
+    }
+
+    #[test]
+    fn steering_angles_fill_their_range_and_both_sides() {
+        let steering = Steering { min_rad: 1.0, max_rad: 2.0, both_sides: true, seed: 1 };
+        let angles: Vec<f32> = (0..1000).map(|n| steering.angle(n)).collect();
+        assert!(angles.iter().all(|a| (1.0..=2.0).contains(&a.abs())));
+        let right = angles.iter().filter(|a| **a > 0.0).count();
+        let far = angles.iter().filter(|a| a.abs() > 1.5).count();
+        assert!((400..600).contains(&right) && (400..600).contains(&far), "{right} {far}");
+    }
+
+    #[test]
+    fn the_circle_closes_and_its_velocity_is_tangential() {
+        let circle = Mission::Circle { centre: In::zero(), radius_m: 2.0, speed_m_s: 3.0 };
+        let state = MissionState::default();
+        for k in 0..20u64 {
+            let r = circle.reference(&state, k * 100_000);
+            assert!(r.position.vector.dot(&r.velocity.vector).abs() < 1e-4);
+            assert!((r.position.vector.norm() - 2.0).abs() < 1e-5);
+        }
+    }
+}
