@@ -23,7 +23,7 @@ pub mod effects;
 pub mod frames;
 pub mod guidance;
 pub mod math;
-//stack
+pub mod stack;
 pub mod vehicle;
 
 pub use nalgebra;

@@ -1,0 +1,356 @@
+//! The whole flight code as one function: `step(state, frame) -> output`.
+//!
+//! ```text
+//! frame -> latest valid measurements
+//!   10 Hz:  guidance -> TWCC (PC, WOEG, WIIC) -> roll, pitch, thrust, wings
+//!   300 Hz: command filter -> integral backstepping -> mixer -> rotor commands
+//! ```
+//! [`Stack`] is constant in flight; [`StackState`] is everything that changes, one plain struct that can be frozen, logged
+//! and thawed. Time comes in with the frame. A step never panics, allocates or loops without bound; a measurement that is
+//! not finite is rejected and the last valid one kept.
+
+mod frame;
+
+pub use frame::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
+
+use crate::control::backstepping::{AttitudeGains, AttitudeState, AttitudeTerms};
+use crate::control::command_filter::{self, EulerReference};
+use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
+use crate::control::position::Motion;
+use crate::control::twcc::{Airframe, TwccParameters, TwccState, TwccTerms};
+use crate::control::wiic::Envelope;
+use crate::control::{AttitudeThrust, Reference};
+use crate::frames::{Body, In, Ned, Rotation};
+use crate::guidance::mission::{Mission, MissionState};
+use crate::math::lower;
+use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
+use nalgebra::Vector3;
+
+/// Period of the outer loop, us.
+pub const OUTER_PERIOD_US: u64 = 100_000;
+/// Longest step that the inner loop integrates over, s; a longer gap counts as this.
+const INNER_STEP_MAX_S: f32 = 0.02;
+
+/// Gains of the whole stack.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StackParameters {
+    /// Inner loop.
+    pub attitude: AttitudeGains,
+    /// Outer loop.
+    pub twcc: TwccParameters,
+}
+
+/// The flight code of one vehicle on one mission.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stack {
+    vehicle: Vehicle<f32>,
+    airframe: Airframe,
+    mixer: Mixer,
+    parameters: StackParameters,
+    mission: Mission,
+}
+
+/// The latest valid measurements.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Known {
+    /// Angular rate and specific force.
+    pub imu: Option<Imu>,
+    /// Attitude estimate.
+    pub attitude: Option<Rotation<Ned, Body, f32>>,
+    /// Position and velocity.
+    pub gnss: Option<Gnss>,
+    /// Altitude above the origin, m, up.
+    pub altitude_m: Option<f32>,
+    /// Wing force as if spread, N.
+    pub wing_force: Option<In<Ned, f32>>,
+}
+
+/// Everything that changes in flight.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StackState {
+    /// Latest valid measurements.
+    pub known: Known,
+    /// Time of the last frame, us; `None` before the first.
+    pub time_us: Option<u64>,
+    /// Number of the outer period that was handled last.
+    pub outer_index: Option<u64>,
+    /// Guidance.
+    pub mission: MissionState,
+    /// Outer loop.
+    pub twcc: TwccState,
+    /// Command filter.
+    pub filter: EulerReference,
+    /// Inner loop.
+    pub attitude: AttitudeState,
+    /// What the outer loop asked for last.
+    pub command: AttitudeThrust,
+    /// Heading asked for last, rad.
+    pub yaw_rad: f32,
+    /// Wing command asked for last.
+    pub wing_command: f32,
+    /// The mixer could not meet the last demand.
+    pub saturated: bool,
+    /// Measurements rejected so far because they were not finite.
+    pub rejected: u32,
+}
+
+/// Commands and every term behind them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StackOutput {
+    /// One command a rotor, in the vehicle's unit.
+    pub rotor_command: PerRotor<f32>,
+    /// Left and right wing, 0 folded to 1 spread.
+    pub wing_command: [f32; 2],
+    /// What is followed.
+    pub reference: Reference,
+    /// The outer loop, where it ran in this step.
+    pub outer: Option<TwccTerms>,
+    /// The inner loop, once attitude and rate are known; rotors stand still before that.
+    pub inner: Option<InnerTerms>,
+}
+
+/// Every term of one inner step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InnerTerms {
+    /// Filtered attitude command.
+    pub filter: EulerReference,
+    /// Attitude loop.
+    pub attitude: AttitudeTerms,
+    /// Demand on the mixer.
+    pub demand: ThrustTorque,
+    /// Mixer.
+    pub mixer: MixerTerms,
+}
+
+impl Stack {
+    /// # Errors
+    /// The first number of vehicle, gains or mission that cannot be used, with its field.
+    pub fn new(
+        vehicle: Vehicle<f32>,
+        parameters: StackParameters,
+        mission: Mission,
+    ) -> Result<Self, ParameterError> {
+        let p = vehicle.parameters();
+        parameters.attitude.check()?;
+        parameters.twcc.check(p.limits.thrust_max_n)?;
+        mission.check()?;
+        let airframe = Airframe {
+            mass_kg: p.mass_kg,
+            wing_area_m2: p.wing.map_or(0.0, |w| 2.0 * w.area_per_side_m2),
+            envelope: Envelope {
+                tilt_max_rad: p.limits.tilt_max_rad,
+                thrust_min_n: parameters.twcc.thrust_min_n,
+                thrust_max_n: p.limits.thrust_max_n,
+            },
+        };
+        Ok(Self { mixer: Mixer::new(&vehicle)?, vehicle, airframe, parameters, mission })
+    }
+
+    /// The vehicle as the flight code believes it to be.
+    pub fn vehicle(&self) -> &Vehicle<f32> {
+        &self.vehicle
+    }
+
+    /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any frame.
+    pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
+        let elapsed_us = state.time_us.map_or(0, |last| frame.time_us.saturating_sub(last));
+        state.time_us = Some(frame.time_us);
+        state.rejected = state.rejected.saturating_add(frame.merge_into(&mut state.known));
+
+        let outer_index = frame.time_us / OUTER_PERIOD_US;
+        let outer = if state.outer_index == Some(outer_index) {
+            None
+        } else {
+            let periods = state.outer_index.map_or(1, |last| outer_index.saturating_sub(last));
+            state.outer_index = Some(outer_index);
+            self.outer(state, frame, lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6)
+        };
+        let reference = self.mission.reference(&state.mission, frame.time_us);
+        state.yaw_rad = reference.yaw_rad;
+        let dt_s = lower(elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
+        let inner = self.inner(state, dt_s);
+        let mut rotor_command = [0.0; MAX_ROTORS];
+        let propulsion = &self.vehicle.parameters().propulsion;
+        for (i, command) in rotor_command.iter_mut().take(self.vehicle.rotors().len()).enumerate() {
+            let thrust = inner.map_or(0.0, |terms| terms.mixer.rotor_thrust_n[i]);
+            *command = propulsion.command_for_thrust(thrust);
+        }
+        StackOutput { rotor_command, wing_command: [state.wing_command; 2], reference, outer, inner }
+    }
+
+    fn outer(&self, state: &mut StackState, frame: &SensorFrame, dt_s: f32) -> Option<TwccTerms> {
+        let (Some(gnss), Some(ned_from_body)) = (state.known.gnss, state.known.attitude) else { return None };
+        let mut position = gnss.position;
+        if let Some(altitude) = state.known.altitude_m {
+            position.vector.z = -altitude;
+        }
+        self.mission.sense(&mut state.mission, frame.time_us, position, gnss.velocity, frame.obstacles());
+        let reference = self.mission.reference(&state.mission, frame.time_us);
+        let (roll_rad, pitch_rad, yaw_rad) = ned_from_body.euler();
+        let motion = Motion { position, velocity: gnss.velocity, roll_rad, pitch_rad, yaw_rad };
+        let terms = self.parameters.twcc.update(
+            &mut state.twcc,
+            &self.airframe,
+            &motion,
+            &ned_from_body,
+            state.known.wing_force,
+            &reference,
+            dt_s,
+        );
+        state.command = terms.command;
+        state.wing_command = terms.wing_command;
+        Some(terms)
+    }
+
+    fn inner(&self, state: &mut StackState, dt_s: f32) -> Option<InnerTerms> {
+        let (Some(imu), Some(ned_from_body)) = (state.known.imu, state.known.attitude) else { return None };
+        let gains = &self.parameters.attitude;
+        let target = Vector3::new(state.command.roll_rad, state.command.pitch_rad, state.yaw_rad);
+        command_filter::step(
+            &mut state.filter,
+            &target,
+            gains.filter_frequency_rad_s,
+            gains.filter_damping,
+            dt_s,
+        );
+        let attitude = gains.update(
+            &mut state.attitude,
+            &self.vehicle.parameters().inertia_kg_m2,
+            &ned_from_body,
+            &imu.omega.vector,
+            &state.filter,
+            state.saturated,
+            dt_s,
+        );
+        let demand = ThrustTorque { thrust_n: state.command.thrust_n, torque_n_m: attitude.torque_n_m };
+        let mixer = self.mixer.allocate(&demand);
+        state.saturated = mixer.saturated;
+        Some(InnerTerms { filter: state.filter, attitude, demand, mixer })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::backstepping::AttitudeForm;
+    use crate::control::twcc;
+    use crate::guidance::sensing::Obstacle;
+    use crate::vehicle::fixtures::squirrel;
+    use proptest::prelude::*;
+
+    fn stack(form: AttitudeForm) -> Stack {
+        let attitude = AttitudeGains {
+            form,
+            c1_per_s: Vector3::new(9.0, 9.0, 4.0),
+            c2_per_s: Vector3::new(14.0, 14.0, 5.0),
+            lambda_per_s2: Vector3::new(8.0, 8.0, 2.0),
+            integral_max_rad_s: 0.1,
+            filter_frequency_rad_s: 20.0,
+            filter_damping: 1.0,
+        };
+        let parameters = StackParameters { attitude, twcc: twcc::fixtures::parameters() };
+        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, Mission::Hover { position: In::zero() }).unwrap()
+    }
+
+    fn level(time_us: u64) -> SensorFrame {
+        SensorFrame {
+            imu: Some(Imu { omega: In::zero(), specific_force: In::new(Vector3::new(0.0, 0.0, -9.80665)) }),
+            attitude: Some(Rotation::identity()),
+            gnss: Some(Gnss { position: In::zero(), velocity: In::zero() }),
+            ..SensorFrame::empty(time_us)
+        }
+    }
+
+    #[test]
+    fn level_on_the_spot_it_commands_hover() {
+        for form in [AttitudeForm::Euler, AttitudeForm::Quaternion] {
+            let (stack, mut state) = (stack(form), StackState::default());
+            let output = stack.step(&mut state, &level(0));
+            let p = &stack.vehicle().parameters().propulsion;
+            let total: f32 = output.rotor_command[..4]
+                .iter()
+                .map(|u| p.thrust_coefficient_n_s2 * p.target_speed_rad_s(*u).powi(2))
+                .sum();
+            assert!((total - stack.vehicle().weight_n()).abs() < 1e-4);
+            assert_eq!(output.rotor_command[4..], [0.0; 4]);
+        }
+    }
+
+    #[test]
+    fn the_outer_loop_runs_ten_times_a_second() {
+        let (stack, mut state) = (stack(AttitudeForm::Quaternion), StackState::default());
+        let ticks: Vec<u64> = (0..300u64)
+            .map(|k| k * 1_000_000 / 300)
+            .filter(|t| stack.step(&mut state, &level(*t)).outer.is_some())
+            .collect();
+        assert_eq!(ticks, (0..10).map(|k| k * 100_000).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn rotors_stand_still_until_the_attitude_is_known() {
+        let (stack, mut state) = (stack(AttitudeForm::Quaternion), StackState::default());
+        let output = stack.step(&mut state, &SensorFrame::empty(0));
+        assert_eq!(output.rotor_command, [0.0; MAX_ROTORS]);
+        assert!(output.inner.is_none() && output.outer.is_none());
+    }
+
+    /// A thawed copy continues as the original: the state hides nothing.
+    #[test]
+    fn a_frozen_state_continues_bit_for_bit() {
+        let (stack, mut state) = (stack(AttitudeForm::Euler), StackState::default());
+        let frame = |k: u64| {
+            let mut f = level(k * 3333);
+            f.attitude = Some(Rotation::from_euler(0.01 * (k as f32).sin(), 0.02, 0.0));
+            f
+        };
+        for k in 0..100 {
+            stack.step(&mut state, &frame(k));
+        }
+        let mut thawed = state;
+        for k in 100..200 {
+            assert_eq!(stack.step(&mut state, &frame(k)), stack.step(&mut thawed, &frame(k)));
+        }
+    }
+
+    fn wild() -> impl Strategy<Value = f32> {
+        prop_oneof![
+            4 => -20.0..20.0f32,
+            1 => Just(f32::NAN),
+            1 => Just(f32::INFINITY),
+            1 => Just(f32::MAX),
+            1 => Just(-f32::MAX),
+        ]
+    }
+
+    proptest! {
+        /// Outputs stay finite and inside limits for any sensor values and times, also backwards.
+        #[test]
+        fn outputs_stay_finite_and_inside_limits(
+            values in proptest::collection::vec(wild(), 17 * 20),
+            times in proptest::collection::vec(0..3_000_000u64, 20),
+            euler in any::<bool>(),
+        ) {
+            let stack = stack(if euler { AttitudeForm::Euler } else { AttitudeForm::Quaternion });
+            let mut state = StackState::default();
+            for (v, t) in values.chunks(17).zip(times) {
+                let mut frame = SensorFrame::empty(t);
+                frame.imu = Some(Imu {
+                    omega: In::new(Vector3::new(v[0], v[1], v[2])),
+                    specific_force: In::new(Vector3::new(v[3], v[4], v[5])),
+                });
+                frame.attitude = Rotation::from_wxyz([v[6], v[7], v[8], v[9]]);
+                frame.gnss = Some(Gnss {
+                    position: In::new(Vector3::new(v[10], v[11], v[12])),
+                    velocity: In::new(Vector3::new(v[13], v[14], v[15])),
+                });
+                frame.altitude_m = Some(v[16]);
+                frame.set_obstacles(&[Obstacle { id: 1, north_m: v[0], east_m: v[1] }]);
+                let output = stack.step(&mut state, &frame);
+                for u in &output.rotor_command[..4] {
+                    prop_assert!((0.0..=1.0).contains(u), "{u}");
+                }
+                prop_assert!((0.0..=1.0).contains(&output.wing_command[0]));
+            }
+        }
+    }
+}
