@@ -1,10 +1,15 @@
 //! Damaged, cut, re-written and foreign files: each is found, named in one line, and as much as is whole is recovered.
+#![expect(clippy::unwrap_used, reason = "a test may panic, its helpers too")]
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use mcap::records::Metadata;
+use mcap::records::{MessageHeader, Metadata};
+use prost::Message as _;
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
 use squirrel_sim::log::{FlightLog, LogError};
 
 fn path(name: &str) -> PathBuf {
@@ -47,17 +52,20 @@ fn read_error(file: &Path) -> String {
 fn every_flipped_byte_is_found() {
     let file = path("flip.mcap");
     flight(2).write(&file).unwrap();
-    let mut bytes = fs::read(&file).unwrap();
-    for at in 0..bytes.len() {
+    let bytes = fs::read(&file).unwrap();
+    let mut disk = fs::OpenOptions::new().write(true).open(&file).unwrap();
+    let mut put = |at: usize, byte: u8| {
+        disk.seek(SeekFrom::Start(at as u64)).unwrap();
+        disk.write_all(&[byte]).unwrap();
+    };
+    for (at, &byte) in bytes.iter().enumerate() {
         for flip in [0x01, 0x80, 0xff] {
-            bytes[at] ^= flip;
-            fs::write(&file, &bytes).unwrap();
+            put(at, byte ^ flip);
             let error = read_error(&file);
             assert!(error.starts_with("corrupt: "), "byte {at} of {}: {error}", bytes.len());
-            bytes[at] ^= flip;
         }
+        put(at, byte);
     }
-    fs::write(&file, &bytes).unwrap();
     assert_eq!(FlightLog::read(&file).unwrap(), flight(2));
 }
 
@@ -249,6 +257,80 @@ fn a_row_of_another_width_is_named() {
 }
 
 #[test]
+fn numbers_and_names_of_fields_are_those_of_the_schema_in_the_file() {
+    let field = |name: &str, number, kind: Type| FieldDescriptorProto {
+        name: Some(name.to_owned()),
+        number: Some(number),
+        r#type: Some(kind.into()),
+        label: Some(if kind == Type::Fixed32 { Label::Repeated } else { Label::Optional }.into()),
+        ..FieldDescriptorProto::default()
+    };
+    let message = DescriptorProto {
+        name: Some("Later".to_owned()),
+        field: vec![
+            field("crc32", 20, Type::Fixed32),
+            field("a_rad", 9, Type::Double),
+            field("time_s", 7, Type::Double),
+            field("b_m", 3, Type::Double),
+            field("note", 2, Type::String),
+        ],
+        ..DescriptorProto::default()
+    };
+    let set = FileDescriptorSet {
+        file: vec![FileDescriptorProto {
+            package: Some("squirrel".to_owned()),
+            message_type: vec![message],
+            ..FileDescriptorProto::default()
+        }],
+    };
+    let crc = |value: f64| crc32fast::hash(&[0.5_f64.to_le_bytes(), value.to_le_bytes()].concat());
+    let mut message = Vec::new();
+    prost::encoding::fixed32::encode_repeated(20, &[crc(-2.0), crc(0.25)], &mut message);
+    prost::encoding::double::encode(9, &0.25, &mut message);
+    prost::encoding::string::encode(2, &"unknown to this reader".to_owned(), &mut message);
+    prost::encoding::double::encode(7, &0.5, &mut message);
+    prost::encoding::double::encode(3, &-2.0, &mut message);
+
+    let file = path("later.mcap");
+    let mut writer = mcap::Writer::new(fs::File::create(&file).unwrap()).unwrap();
+    let schema = writer.add_schema("squirrel.Later", "protobuf", &set.encode_to_vec()).unwrap();
+    let channel_id = writer.add_channel(schema, "later", "protobuf", &BTreeMap::new()).unwrap();
+    let header = MessageHeader { channel_id, sequence: 0, log_time: 500_000_000, publish_time: 0 };
+    writer.write_to_known_channel(&header, &message).unwrap();
+    writer.write_metadata(&Metadata { name: "squirrel".to_owned(), metadata: BTreeMap::new() }).unwrap();
+    writer.finish().unwrap();
+
+    let mut expected = FlightLog::default();
+    expected.source_mut("later").push(0.5, &[("a_rad", &[0.25]), ("b_m", &[-2.0])]);
+    assert_eq!(FlightLog::read(&file).unwrap(), expected);
+}
+
+#[test]
+fn a_message_without_its_checksums_is_found() {
+    let file = path("no_crc.mcap");
+    flight(1).write(&file).unwrap();
+    // The last field of the message: key of two bytes, length, two checksums.
+    rewrite(&file, |topic, _, message| message.truncate(message.len() - if topic == "imu" { 11 } else { 0 }));
+    assert_eq!(read_error(&file), "corrupt: imu at 0.000000 s: 0 CRC32s for 2 channels");
+}
+
+#[test]
+fn chunks_that_squirrel_cannot_unpack_are_not_called_corrupt() {
+    let file = path("packed.mcap");
+    flight(3).write(&file).unwrap();
+    let mut bytes = fs::read(&file).unwrap();
+    bytes.truncate(bytes.len() / 2);
+    let at = bytes.windows(4).position(|word| word == b"zstd").unwrap();
+    bytes[at..at + 4].copy_from_slice(b"lzma");
+    fs::write(&file, &bytes).unwrap();
+    assert_eq!(
+        read_error(&file),
+        "not a flight log of squirrel: its chunks are packed with lzma, not zstd; \
+         `squirrel import` reads other logs"
+    );
+}
+
+#[test]
 fn files_that_are_no_flight_log_get_one_clear_line() {
     let missing = path("missing.mcap");
     assert!(read_error(&missing).contains("No such file"));
@@ -264,9 +346,8 @@ fn files_that_are_no_flight_log_get_one_clear_line() {
     let file = path("json.mcap");
     let mut writer = mcap::Writer::new(fs::File::create(&file).unwrap()).unwrap();
     let schema = writer.add_schema("Odometry", "jsonschema", b"{}").unwrap();
-    let channel = writer.add_channel(schema, "/odom", "json", &BTreeMap::new()).unwrap();
-    let header =
-        mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
+    let channel_id = writer.add_channel(schema, "/odom", "json", &BTreeMap::new()).unwrap();
+    let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
     writer.write_to_known_channel(&header, b"{}").unwrap();
     writer.finish().unwrap();
     assert_eq!(

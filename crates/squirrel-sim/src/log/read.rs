@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use mcap::MAGIC;
 use mcap::records::Record;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{MAGIC, McapError};
 
 use super::envelope::{self, Damage, Frame};
 use super::message::SourceReader;
-use super::{FlightLog, LogError, METADATA_NAME, check, foxglove};
+use super::{FlightLog, LogError, METADATA_NAME, check, foxglove, schema};
 
-/// Largest record or unpacked chunk, so that a wrong length in a damaged file does not eat the memory.
+/// Largest record or unpacked chunk, far above the 1 MiB that is written: a wrong length in a damaged file does not eat
+/// the memory.
 const RECORD_MAX_BYTES: usize = 256 << 20;
 
 /// What [`FlightLog::recover`] found.
@@ -50,12 +51,12 @@ impl FlightLog {
         })
     }
 
-    /// Reads what is whole of a truncated flight log: every source up to the last whole chunk, which is at most one second
-    /// before the cut, and the metadata. A file that is whole is read as [`FlightLog::read`] does.
+    /// Reads what is whole of a truncated flight log: every source up to the last whole chunk, which ends at most one
+    /// second before the cut, and the metadata. A file that is whole is read as [`FlightLog::read`] does.
     ///
     /// # Errors
-    /// [`LogError`] as [`FlightLog::read`], but for the missing end; [`LogError::NothingWhole`] if the cut is before the
-    /// end of the metadata.
+    /// [`LogError`] as [`FlightLog::read`], but for the missing end; [`LogError::NothingWhole`] if the cut is before
+    /// the end of the metadata.
     pub fn recover(path: &Path) -> Result<(Self, Recovery), LogError> {
         let (log, recovery, _) = load(path)?;
         Ok((log, recovery))
@@ -160,7 +161,13 @@ impl<'a> Reader<'a> {
         let mut reader = LinearReader::new_with_options(options);
         let mut rest = frame.bytes;
         while let Some(event) = reader.next_event() {
-            match event.map_err(|error| self.corrupt(format!("chunk at byte {}: {error}", frame.start)))? {
+            let event = event.map_err(|error| match error {
+                McapError::UnsupportedCompression(name) => {
+                    self.foreign(format!("its chunks are packed with {name}, not zstd"))
+                }
+                error => self.corrupt(format!("chunk at byte {}: {error}", frame.start)),
+            });
+            match event? {
                 LinearReadEvent::ReadRequest(need) => {
                     let (now, later) = rest.split_at(need.min(rest.len()));
                     reader.insert(now.len()).copy_from_slice(now);
@@ -209,8 +216,7 @@ impl<'a> Reader<'a> {
         if [foxglove::TRANSFORM_SCHEMA, foxglove::SCENE_SCHEMA].contains(&name) {
             return Ok(Topic::Foxglove);
         }
-        if channel.message_encoding != "protobuf" || encoding != "protobuf" || !name.starts_with("squirrel.")
-        {
+        if channel.message_encoding != "protobuf" || encoding != "protobuf" || !schema::is_source(name) {
             let encoding = &channel.message_encoding;
             return Err(self.foreign(format!("topic `{topic}` has {encoding} messages of schema `{name}`")));
         }

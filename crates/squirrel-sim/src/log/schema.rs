@@ -26,6 +26,11 @@ pub(super) fn message_name(source_name: &str) -> String {
     format!("{PACKAGE}.{}", camel_case(source_name))
 }
 
+/// Whether a schema name is that of a source.
+pub(super) fn is_source(message_name: &str) -> bool {
+    message_name.split_once('.').is_some_and(|(package, _)| package == PACKAGE)
+}
+
 /// Serialised `FileDescriptorSet` of one source.
 pub(super) fn encode(source_name: &str, source: &Source) -> Vec<u8> {
     let mut fields = vec![field(TIME, Type::Double, false)];

@@ -9,9 +9,9 @@ use mcap::{McapError, WriteOptions};
 
 use super::{FlightLog, LogError, METADATA_NAME, Source, check, foxglove, message, schema};
 
-/// A chunk is what a truncated file loses. It is closed by flight time, because only time bounds the loss for every mix
-/// of sources: 1 s is some 300 kB of a simulated flight and 2 kB of a GNSS receiver alone. Beyond 1 MiB, mcap's default,
-/// it is closed by bytes too.
+/// A chunk is what a truncated file loses. It is closed by flight time, because only time bounds the loss for every
+/// mix of sources: 1 s is some 300 kB of a simulated flight and 2 kB of a GNSS receiver alone. Beyond 1 MiB, mcap's
+/// default, it is closed by bytes too.
 const CHUNK_NS: u64 = 1_000_000_000;
 
 /// Poses for the 3-D panel, at most 50 a second.
