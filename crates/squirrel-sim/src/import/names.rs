@@ -66,14 +66,21 @@ pub(super) fn nearest_canonical(name: &str) -> String {
     nearest(name, FIXED.iter().map(|(fixed, _)| *fixed)) + "; truth.*, reference.* and control.* are open"
 }
 
-/// Up to three candidates by edit distance, those with the same first part (before a dot) first.
+/// Up to three candidates by edit distance; those with the same first part (before a dot) alone, if there are any.
 pub(super) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> String {
     let first = |s: &str| s.split('.').next().map(str::to_owned);
     let mut ranked: Vec<_> =
         candidates.map(|c| (first(c) != first(name), edit_distance(name, c), c)).collect();
     ranked.sort_unstable();
     ranked.dedup();
-    ranked.iter().take(3).map(|(.., c)| *c).collect::<Vec<_>>().join(", ")
+    let best = ranked.first().is_some_and(|(other, ..)| *other);
+    ranked
+        .iter()
+        .filter(|(other, ..)| *other == best)
+        .take(3)
+        .map(|(.., c)| *c)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// Levenshtein distance over bytes: insertions, deletions, substitutions.
