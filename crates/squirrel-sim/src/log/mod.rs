@@ -2,8 +2,26 @@
 //!
 //! A [`FlightLog`] is a set of sources (`imu`, `gnss`, `control.inner`, ...), each with its own time axis, each with
 //! named channels (`imu.omega_body_rad_s`). Sources run at their own rate; a log may lack any of them.
+//!
+//! In the file each source is a topic whose messages are described by a protobuf schema in the file, so that Foxglove
+//! and the MCAP libraries of other languages read it without squirrel.
+
+mod check;
+mod envelope;
+mod error;
+mod foxglove;
+mod message;
+mod read;
+mod schema;
+mod write;
 
 use std::collections::BTreeMap;
+
+pub use error::LogError;
+pub use read::Recovery;
+
+/// Name of the MCAP metadata record that holds [`FlightLog::metadata`].
+const METADATA_NAME: &str = "squirrel";
 
 /// One channel of a source: `width` numbers a sample, row after row.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,5 +66,40 @@ impl FlightLog {
         let (source, channel) = name.rsplit_once('.')?;
         let source = self.sources.get(source)?;
         Some((&source.time_s, source.channels.get(channel)?))
+    }
+
+    /// The source of that name, made empty if the log lacks it.
+    pub fn source_mut(&mut self, name: &str) -> &mut Source {
+        self.sources.entry(name.to_owned()).or_default()
+    }
+}
+
+impl Source {
+    /// Appends one sample: its time, s, and a row of every channel. The first sample makes the channels.
+    ///
+    /// # Panics
+    /// If a later sample has other channels or widths than the first, or a row is empty: the caller builds the rows, so
+    /// that is a mistake in the program. Times are checked when the log is written.
+    pub fn push(&mut self, time_s: f64, rows: &[(&str, &[f64])]) {
+        if self.time_s.is_empty() {
+            let channel = |&(name, row): &(&str, &[f64])| {
+                (name.to_owned(), Channel { width: row.len(), values: Vec::new() })
+            };
+            self.channels = rows.iter().map(channel).collect();
+        }
+        assert_eq!(rows.len(), self.channels.len(), "a sample has every channel of its source once");
+        for &(name, row) in rows {
+            let Some(channel) = self.channels.get_mut(name) else {
+                panic!("`{name}` is not in the first sample")
+            };
+            assert!(
+                !row.is_empty() && row.len() == channel.width,
+                "`{name}` has {} numbers, in the first sample {}",
+                row.len(),
+                channel.width
+            );
+            channel.values.extend_from_slice(row);
+        }
+        self.time_s.push(time_s);
     }
 }

@@ -1,0 +1,205 @@
+//! Import of foreign flight logs: CSV files become a [`FlightLog`] in NED, FRD, SI and radians by a TOML map.
+//!
+//! The map names, for each canonical channel, the columns, their scale and offset, their frame, and how time is written:
+//!
+//! ```toml
+//! keep = "pz > 0.4"                     # rows worth importing, as a condition on source columns
+//! [[source]]
+//! file = "imu.csv"                      # inside the flight folder; left out when PATH is the file itself
+//! time = { column = "t", unit = "us", offset_s = 0.0 }
+//! [source.channels]
+//! "imu.omega_body_rad_s"          = { columns = ["gx", "gy", "gz"], body = "flu", scale = 0.0174532925 }
+//! "attitude.q_ned_from_body_wxyz" = { columns = ["qx", "qy", "qz", "qw"], order = "xyzw", world = "nwu", body = "flu", direction = "world_from_body" }
+//! "rotor.command"                 = { columns = ["m1", "m2", "m3", "m4"], rotors = [1, 3, 2, 4] }
+//! "battery.voltage_v"             = { columns = ["vbat"], repeats = "forward_filled" }
+//! ```
+//!
+//! - A number becomes `value * scale + offset` (each one number, or one a column) before frames are turned.
+//! - `world` (`ned`, `enu`, `nwu`) belongs to channels with `_ned_` in their name, `body` (`frd`, `flu`) to those with
+//!   `_body_`; an attitude needs both, and `order` and `direction`. `baro.altitude_m` is up.
+//! - `rotors[i]` is the number, from 1, of the vehicle's rotor in column `i`; without it columns are in vehicle order.
+//! - `forward_filled` drops rows that only repeat the last sample: a slow sensor written at a fast rate gets its own slow
+//!   time axis. Channels of one log source (`battery.*`) share the axis; a row stays when any of them changes.
+//! - `keep` may join parts with `and` that look at different files. A part drops rows of the files that have its
+//!   columns; of all other files it drops rows outside the time spans in which it keeps consecutive rows of the first
+//!   file that has them.
+//! - Empty cells and `nan` are NaN in the log and counted in the report.
+//! - The earliest kept time over all files is time zero; metadata `time_zero_s` has it in the foreign clock.
+
+mod build;
+mod error;
+mod files;
+mod frames;
+mod map;
+mod mask;
+mod names;
+mod report;
+mod table;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+pub use error::ImportError;
+pub use map::ImportMap;
+pub use report::{ChannelReport, FileReport, ImportReport};
+
+use crate::log::FlightLog;
+use map::SourceMap;
+use mask::Condition;
+use names::nearest;
+use table::{CsvFile, Table};
+
+/// Imports one flight.
+///
+/// `paths` is the flight's folder, or its file, or all of its files (matched to the map by file name). The log has
+/// metadata `imported_from` (file names), `map` (the map's text) and `time_zero_s`.
+///
+/// # Errors
+/// The first thing wrong with the files, naming file, column, row and value; see [`ImportError`].
+pub fn import(map: &ImportMap, paths: &[PathBuf]) -> Result<(FlightLog, ImportReport), ImportError> {
+    let found = files::find(map, paths)?;
+    let opened = found.iter().map(|path| CsvFile::open(path)).collect::<Result<Vec<_>, _>>()?;
+    check_mask_columns(map, &opened)?;
+    let tables = map
+        .sources
+        .iter()
+        .zip(opened)
+        .map(|(source, file)| read(source, &map.keep, file))
+        .collect::<Result<Vec<_>, _>>()?;
+    let times: Vec<Vec<f64>> =
+        map.sources.iter().zip(&tables).map(|(s, table)| seconds(s, table)).collect::<Result<_, _>>()?;
+    let kept = kept_rows(&map.keep, &tables, &times);
+    for ((source, table), (rows, time_s)) in map.sources.iter().zip(&tables).zip(kept.iter().zip(&times)) {
+        check_order(source, table, rows, time_s)?;
+    }
+    // Times increase, so each file's first kept row is its earliest.
+    let zero_s = kept.iter().zip(&times).map(|(rows, time_s)| time_s[rows[0]]).fold(f64::INFINITY, f64::min);
+
+    let names = files::names(&found);
+    let mut report = ImportReport::default();
+    let mut log = FlightLog::default();
+    for (index, source) in map.sources.iter().enumerate() {
+        let (table, rows) = (&tables[index], &kept[index]);
+        report.files.push(FileReport {
+            file: names[index].clone(),
+            rows: table.len(),
+            rows_masked: table.len() - rows.len(),
+        });
+        let time_s: Vec<f64> = times[index].iter().map(|t| t - zero_s).collect();
+        build::add_source(&mut log, &mut report, map, source, table, &time_s, rows)?;
+    }
+    let mut imported_from = names;
+    imported_from.dedup();
+    log.metadata = BTreeMap::from([
+        ("imported_from".to_owned(), imported_from.join(", ")),
+        ("map".to_owned(), map.text.clone()),
+        ("time_zero_s".to_owned(), zero_s.to_string()),
+    ]);
+    Ok((log, report))
+}
+
+/// Every part of the mask needs one file that has all of its columns.
+fn check_mask_columns(map: &ImportMap, files: &[CsvFile]) -> Result<(), ImportError> {
+    for term in &map.keep {
+        let columns = term.columns();
+        if files.iter().any(|file| has_all(file, &columns)) {
+            continue;
+        }
+        let nowhere = columns.iter().find(|column| files.iter().all(|file| !has_all(file, &[column])));
+        let problem = match nowhere {
+            Some(column) => {
+                let all = files.iter().flat_map(CsvFile::header).map(String::as_str);
+                format!("no file has a column `{column}`; nearest: {}", nearest(column, all))
+            }
+            None => {
+                format!("no single file has all of {}: split the condition with `and`", columns.join(", "))
+            }
+        };
+        return Err(ImportError::MapField { map: map.name.clone(), field: "keep".to_owned(), problem });
+    }
+    Ok(())
+}
+
+fn has_all(file: &CsvFile, columns: &[&str]) -> bool {
+    columns.iter().all(|column| file.header().iter().any(|name| name == column))
+}
+
+/// Reads the columns of a source and those that the mask looks at.
+fn read(source: &SourceMap, keep: &[Condition], file: CsvFile) -> Result<Table, ImportError> {
+    let mut wanted = vec![source.time.column.as_str()];
+    wanted.extend(source.channels.iter().flat_map(|channel| &channel.columns).map(String::as_str));
+    for columns in keep.iter().map(Condition::columns).filter(|columns| has_all(&file, columns)) {
+        wanted.extend(columns);
+    }
+    file.read(&wanted)
+}
+
+fn seconds(source: &SourceMap, table: &Table) -> Result<Vec<f64>, ImportError> {
+    let time = table.column(&source.time.column);
+    match time.iter().position(|t| t.is_nan()) {
+        None => Ok(time.iter().map(|&t| source.time.seconds(t)).collect()),
+        Some(row) => Err(ImportError::Cell {
+            file: table.name.clone(),
+            column: source.time.column.clone(),
+            row: table.lines[row],
+            value: String::new(),
+            problem: "is no time",
+        }),
+    }
+}
+
+/// Row numbers, from 0, that the mask keeps of each table.
+fn kept_rows(keep: &[Condition], tables: &[Table], times: &[Vec<f64>]) -> Vec<Vec<usize>> {
+    let mut kept: Vec<Vec<bool>> = tables.iter().map(|table| vec![true; table.len()]).collect();
+    for term in keep {
+        let columns = term.columns();
+        let by_rows: Vec<Option<Vec<bool>>> =
+            tables.iter().map(|table| table.has_all(&columns).then(|| term.rows(table))).collect();
+        let first = by_rows.iter().zip(times).find_map(|(rows, time_s)| Some((rows.as_ref()?, time_s)));
+        let spans = first.map_or_else(Vec::new, |(rows, time_s)| spans(rows, time_s));
+        for ((kept, rows), time_s) in kept.iter_mut().zip(by_rows).zip(times) {
+            let rows = rows.unwrap_or_else(|| time_s.iter().map(|&t| inside(&spans, t)).collect());
+            for (kept, row) in kept.iter_mut().zip(rows) {
+                *kept &= row;
+            }
+        }
+    }
+    kept.iter().map(|kept| (0..kept.len()).filter(|&row| kept[row]).collect()).collect()
+}
+
+/// First and last time of each run of kept rows.
+fn spans(kept: &[bool], time_s: &[f64]) -> Vec<(f64, f64)> {
+    let mut spans: Vec<(f64, f64)> = Vec::new();
+    for (row, &t) in time_s.iter().enumerate().filter(|(row, _)| kept[*row]) {
+        match spans.last_mut() {
+            Some(span) if row > 0 && kept[row - 1] => span.1 = t,
+            _ => spans.push((t, t)),
+        }
+    }
+    spans
+}
+
+fn inside(spans: &[(f64, f64)], t: f64) -> bool {
+    spans.get(spans.partition_point(|span| span.1 < t)).is_some_and(|span| span.0 <= t)
+}
+
+/// The kept rows must exist and their time must increase.
+fn check_order(source: &SourceMap, table: &Table, rows: &[usize], time_s: &[f64]) -> Result<(), ImportError> {
+    if rows.is_empty() {
+        return Err(ImportError::NothingKept { file: table.name.clone(), rows: table.len() });
+    }
+    let Some(pair) = rows.windows(2).find(|pair| time_s[pair[1]] <= time_s[pair[0]]) else {
+        return Ok(());
+    };
+    let time = table.column(&source.time.column);
+    let (previous, time) = (time[pair[0]], time[pair[1]]);
+    Err(ImportError::TimeOrder {
+        file: table.name.clone(),
+        column: source.time.column.clone(),
+        row: table.lines[pair[1]],
+        problem: if time < previous { "runs backwards" } else { "repeats" },
+        time,
+        previous,
+        previous_row: table.lines[pair[0]],
+    })
+}

@@ -1,0 +1,60 @@
+//! What an import did: rows read and dropped, samples a channel got.
+
+use std::fmt;
+
+/// Summary of an import, in the order of the map.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ImportReport {
+    /// One entry a `[[source]]`.
+    pub files: Vec<FileReport>,
+    /// One entry a channel.
+    pub channels: Vec<ChannelReport>,
+}
+
+/// Rows of one file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FileReport {
+    /// File name without folders.
+    pub file: String,
+    /// Rows in the file, header not counted.
+    pub rows: usize,
+    /// Rows that `keep` dropped.
+    pub rows_masked: usize,
+}
+
+/// Samples of one channel.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChannelReport {
+    /// Canonical name.
+    pub channel: String,
+    /// Samples in the log.
+    pub samples: usize,
+    /// Median rate, Hz; `None` with fewer than two samples.
+    pub rate_hz: Option<f64>,
+    /// Samples in the log with at least one number missing (NaN).
+    pub samples_missing: usize,
+    /// Kept rows that only repeated the sample before.
+    pub repeats_dropped: usize,
+}
+
+impl fmt::Display for ImportReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for FileReport { file, rows, rows_masked } in &self.files {
+            writeln!(f, "{file}: {rows} rows, {rows_masked} dropped by `keep`")?;
+        }
+        for report in &self.channels {
+            write!(f, "{}: {} samples", report.channel, report.samples)?;
+            if let Some(rate_hz) = report.rate_hz {
+                write!(f, " at {rate_hz:.1} Hz")?;
+            }
+            if report.samples_missing > 0 {
+                write!(f, ", {} with missing numbers", report.samples_missing)?;
+            }
+            if report.repeats_dropped > 0 {
+                write!(f, ", {} repeats dropped", report.repeats_dropped)?;
+            }
+            writeln!(f)?;
+        }
+        Ok(())
+    }
+}

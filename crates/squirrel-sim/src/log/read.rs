@@ -1,0 +1,242 @@
+//! Reads a flight from an MCAP file: nothing that has changed since it was written gets through unnoticed.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use mcap::records::Record;
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{MAGIC, McapError};
+
+use super::envelope::{self, Damage, Frame};
+use super::message::SourceReader;
+use super::{FlightLog, LogError, METADATA_NAME, check, foxglove, schema};
+
+/// Largest record or unpacked chunk, far above the 1 MiB that is written: a wrong length in a damaged file does not eat
+/// the memory.
+const RECORD_MAX_BYTES: usize = 256 << 20;
+
+/// What [`FlightLog::recover`] found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recovery {
+    /// Length of the file, bytes.
+    pub bytes_total: u64,
+    /// Bytes from the start of the file up to the last whole record.
+    pub bytes_whole: u64,
+    /// Samples of all sources.
+    pub messages: u64,
+    /// Time of the last sample, s; 0 if there is none.
+    pub end_time_s: f64,
+}
+
+impl FlightLog {
+    /// Reads a flight log; the bits of every value are those that were written.
+    ///
+    /// A channel that a message lacks is NaN in that sample. Topics with Foxglove's own schemas are skipped.
+    ///
+    /// # Errors
+    /// [`LogError`]: the file cannot be read, is empty, is no MCAP file, is no log of squirrel, is truncated, or any of
+    /// its bytes or values does not match its checksum.
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let (log, recovery, cut) = load(path)?;
+        if !cut {
+            return Ok(log);
+        }
+        let start_s = log.sources.values().map(|source| source.time_s[0]).reduce(f64::min);
+        Err(LogError::Truncated {
+            file: path.display().to_string(),
+            bytes_total: recovery.bytes_total,
+            duration_s: start_s.map_or(0.0, |start_s| recovery.end_time_s - start_s),
+            messages: recovery.messages,
+        })
+    }
+
+    /// Reads what is whole of a truncated flight log: every source up to the last whole chunk, which ends at most one
+    /// second before the cut, and the metadata. A file that is whole is read as [`FlightLog::read`] does.
+    ///
+    /// # Errors
+    /// [`LogError`] as [`FlightLog::read`], but for the missing end; [`LogError::NothingWhole`] if the cut is before
+    /// the end of the metadata.
+    pub fn recover(path: &Path) -> Result<(Self, Recovery), LogError> {
+        let (log, recovery, _) = load(path)?;
+        Ok((log, recovery))
+    }
+}
+
+/// The file's name and bytes, if they look like an MCAP file.
+fn open(path: &Path) -> Result<(String, Vec<u8>), LogError> {
+    let file = path.display().to_string();
+    let bytes = match fs::read(path) {
+        Ok(bytes) => bytes,
+        Err(error) => return Err(LogError::Io { file, error }),
+    };
+    if bytes.is_empty() {
+        return Err(LogError::Empty { file });
+    }
+    if bytes.starts_with(MAGIC) || MAGIC.starts_with(&bytes) {
+        Ok((file, bytes))
+    } else if bytes.ends_with(MAGIC) {
+        Err(LogError::Corrupt { file, what: "the first 8 bytes are not those of an MCAP file".to_owned() })
+    } else {
+        Err(LogError::NotMcap { file })
+    }
+}
+
+/// Reads a file that is whole, or else what is whole of a file that was cut; the flag says that it was.
+fn load(path: &Path) -> Result<(FlightLog, Recovery, bool), LogError> {
+    let (file, bytes) = open(path)?;
+    let cut = match envelope::check(&bytes) {
+        Ok(()) => false,
+        Err(Damage::Cut) => true,
+        Err(Damage::Corrupt(what)) => return Err(LogError::Corrupt { file, what }),
+    };
+    let mut reader = Reader::new(&file);
+    let mut whole = MAGIC.len().min(bytes.len());
+    for frame in envelope::frames(&bytes) {
+        match reader.frame(frame) {
+            Ok(()) => whole = frame.end(),
+            Err(LogError::Corrupt { .. }) if cut => break,
+            Err(error) => return Err(error),
+        }
+    }
+    let bytes_total = bytes.len() as u64;
+    if cut && reader.metadata.is_none() {
+        return Err(LogError::NothingWhole { file, bytes_total });
+    }
+    let log = reader.finish()?;
+    let ends = log.sources.values().filter_map(|source| source.time_s.last().copied());
+    let recovery = Recovery {
+        bytes_total,
+        bytes_whole: if cut { whole as u64 } else { bytes_total },
+        messages: log.sources.values().map(|source| source.time_s.len() as u64).sum(),
+        end_time_s: ends.reduce(f64::max).unwrap_or(0.0),
+    };
+    Ok((log, recovery, cut))
+}
+
+/// Gathers a flight from the records of a file.
+struct Reader<'a> {
+    file: &'a str,
+    metadata: Option<BTreeMap<String, String>>,
+    schemas: BTreeMap<u16, Schema>,
+    topics: BTreeMap<u16, Topic>,
+}
+
+struct Schema {
+    name: String,
+    encoding: String,
+    set: Vec<u8>,
+}
+
+enum Topic {
+    /// For a viewer; says nothing that the sources do not say.
+    Foxglove,
+    Source(SourceReader),
+}
+
+impl<'a> Reader<'a> {
+    fn new(file: &'a str) -> Self {
+        Self { file, metadata: None, schemas: BTreeMap::new(), topics: BTreeMap::new() }
+    }
+
+    fn corrupt(&self, what: impl std::fmt::Display) -> LogError {
+        LogError::Corrupt { file: self.file.to_owned(), what: what.to_string() }
+    }
+
+    fn foreign(&self, why: String) -> LogError {
+        LogError::Foreign { file: self.file.to_owned(), why }
+    }
+
+    /// One record of the file.
+    fn frame(&mut self, frame: Frame) -> Result<(), LogError> {
+        if frame.opcode != mcap::records::op::CHUNK {
+            return self.record(frame.opcode, frame.body());
+        }
+        // MCAP's own reader unpacks the chunk; it gives nothing out before the chunk's CRC is right.
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(RECORD_MAX_BYTES);
+        let mut reader = LinearReader::new_with_options(options);
+        let mut rest = frame.bytes;
+        while let Some(event) = reader.next_event() {
+            let event = event.map_err(|error| match error {
+                McapError::UnsupportedCompression(name) => {
+                    self.foreign(format!("its chunks are packed with {name}, not zstd"))
+                }
+                error => self.corrupt(format!("chunk at byte {}: {error}", frame.start)),
+            });
+            match event? {
+                LinearReadEvent::ReadRequest(need) => {
+                    let (now, later) = rest.split_at(need.min(rest.len()));
+                    reader.insert(now.len()).copy_from_slice(now);
+                    reader.notify_read(now.len());
+                    rest = later;
+                }
+                LinearReadEvent::Record { data, opcode } => self.record(opcode, data)?,
+            }
+        }
+        Ok(())
+    }
+
+    /// One record of the file or of a chunk in it.
+    fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), LogError> {
+        use mcap::records::op::{CHANNEL, MESSAGE, METADATA, SCHEMA};
+        // The others are indexes for random access, or nothing that squirrel writes.
+        if ![CHANNEL, MESSAGE, METADATA, SCHEMA].contains(&opcode) {
+            return Ok(());
+        }
+        match mcap::parse_record(opcode, body).map_err(|error| self.corrupt(error))? {
+            Record::Metadata(record) if record.name == METADATA_NAME => {
+                self.metadata.get_or_insert_default().extend(record.metadata);
+            }
+            Record::Schema { header, data } => {
+                let schema = Schema { name: header.name, encoding: header.encoding, set: data.into_owned() };
+                self.schemas.insert(header.id, schema);
+            }
+            Record::Channel(channel) if !self.topics.contains_key(&channel.id) => {
+                let topic = self.topic(&channel)?;
+                self.topics.insert(channel.id, topic);
+            }
+            Record::Message { header, data } => match self.topics.get_mut(&header.channel_id) {
+                Some(Topic::Source(source)) => source.push(self.file, &data)?,
+                Some(Topic::Foxglove) => {}
+                None => return Err(self.corrupt(format!("message of unknown channel {}", header.channel_id))),
+            },
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn topic(&self, channel: &mcap::records::Channel) -> Result<Topic, LogError> {
+        let topic = &channel.topic;
+        let schema = self.schemas.get(&channel.schema_id);
+        let (name, encoding) = schema.map_or(("", ""), |schema| (&schema.name, &schema.encoding));
+        if [foxglove::TRANSFORM_SCHEMA, foxglove::SCENE_SCHEMA].contains(&name) {
+            return Ok(Topic::Foxglove);
+        }
+        if channel.message_encoding != "protobuf" || encoding != "protobuf" || !schema::is_source(name) {
+            let encoding = &channel.message_encoding;
+            return Err(self.foreign(format!("topic `{topic}` has {encoding} messages of schema `{name}`")));
+        }
+        if self.topics.values().any(|other| matches!(other, Topic::Source(source) if source.name() == topic))
+        {
+            return Err(self.foreign(format!("topic `{topic}` has two channels")));
+        }
+        let set = schema.map_or(&[][..], |schema| &schema.set);
+        SourceReader::new(topic, name, set).map(Topic::Source).map_err(|what| self.corrupt(what))
+    }
+
+    fn finish(self) -> Result<FlightLog, LogError> {
+        let foreign = self.foreign(format!("no metadata record `{METADATA_NAME}`"));
+        let metadata = self.metadata.ok_or(foreign)?;
+        let sources = self.topics.into_values().filter_map(|topic| match topic {
+            Topic::Source(source) if !source.is_empty() => Some(source.into_named()),
+            _ => None,
+        });
+        let log = FlightLog { metadata, sources: sources.collect() };
+        check::check(self.file, &log)?;
+        Ok(log)
+    }
+}

@@ -1,0 +1,240 @@
+//! The maps in `vehicles/maps` against real flights: what they import must obey physics in NED and FRD.
+//!
+//! The flights are not part of the repository; without them the tests say so and pass, except on CI.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+use std::path::{Path, PathBuf};
+
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use squirrel_sim::import::{ImportMap, ImportReport, import};
+use squirrel_sim::log::FlightLog;
+
+const GRAVITY_M_S2: f64 = 9.80665;
+
+/// The shared folder, if it is there.
+fn shared(part: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(part);
+    if path.exists() {
+        return Some(path);
+    }
+    assert!(std::env::var_os("CI").is_none(), "{} is needed on CI", path.display());
+    println!("skipped: no {}", path.display());
+    None
+}
+
+fn map_file(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles/maps").join(name)
+}
+
+fn import_with(map: &str, path: PathBuf) -> (FlightLog, ImportReport) {
+    let map = ImportMap::load(&map_file(map)).unwrap();
+    import(&map, &[path]).unwrap()
+}
+
+fn vectors(log: &FlightLog, name: &str) -> (Vec<f64>, Vec<Vector3<f64>>) {
+    let (time_s, channel) = log.channel(name).unwrap();
+    assert_eq!(channel.width, 3);
+    (time_s.to_vec(), (0..time_s.len()).map(|i| Vector3::from_row_slice(channel.row(i))).collect())
+}
+
+fn attitudes(log: &FlightLog) -> Vec<UnitQuaternion<f64>> {
+    let (time_s, channel) = log.channel("attitude.q_ned_from_body_wxyz").unwrap();
+    let unit = |q: &[f64]| UnitQuaternion::from_quaternion(Quaternion::new(q[0], q[1], q[2], q[3]));
+    (0..time_s.len()).map(|i| unit(channel.row(i))).collect()
+}
+
+fn mean(v: &[Vector3<f64>]) -> Vector3<f64> {
+    v.iter().sum::<Vector3<f64>>() / v.len() as f64
+}
+
+/// Correlation and regression slope of y on x, axis by axis.
+fn correlation(x: &[Vector3<f64>], y: &[Vector3<f64>]) -> (Vector3<f64>, Vector3<f64>) {
+    assert_eq!(x.len(), y.len());
+    let (mean_x, mean_y) = (mean(x), mean(y));
+    let sum = |f: &dyn Fn(Vector3<f64>, Vector3<f64>) -> Vector3<f64>| {
+        x.iter().zip(y).map(|(x, y)| f(x - mean_x, y - mean_y)).sum::<Vector3<f64>>()
+    };
+    let xx = sum(&|x, _| x.component_mul(&x));
+    let yy = sum(&|_, y| y.component_mul(&y));
+    let xy = sum(&|x, y| x.component_mul(&y));
+    (xy.component_div(&xx.component_mul(&yy).map(f64::sqrt)), xy.component_div(&xx))
+}
+
+/// Correlation and slope near 1 on each axis that moves (an axis that does not shows the noise of its sensor); at least
+/// two must move.
+fn assert_moving_axes_agree(x: &[Vector3<f64>], y: &[Vector3<f64>], moving: f64, what: &str) {
+    let center = mean(x);
+    let variance = mean(&x.iter().map(|x| (x - center).map(|x| x * x)).collect::<Vec<_>>());
+    let (r, slope) = correlation(x, y);
+    println!("{what}: spread {:.3?}, correlation {r:.3?}, slope {slope:.3?}", variance.map(f64::sqrt));
+    let axes: Vec<usize> = (0..3).filter(|&axis| variance[axis].sqrt() > moving).collect();
+    assert!(axes.len() >= 2, "{what}: hardly moves");
+    for axis in axes {
+        assert!(r[axis] > 0.9 && (slope[axis] - 1.0).abs() < 0.1, "{what}, axis {axis}: {r} {slope}");
+    }
+}
+
+/// Starts of windows of `step` samples without a gap in time.
+fn windows(time_s: &[f64], step: usize) -> Vec<usize> {
+    let typical = (time_s[step] - time_s[0]) * 1.5;
+    (0..time_s.len() - step).filter(|&i| time_s[i + step] - time_s[i] < typical).collect()
+}
+
+/// Mean body rate over windows of `step` samples: by gyro, and by the attitude's turn over the window.
+fn rates(log: &FlightLog, step: usize) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
+    let (time_s, omega) = vectors(log, "imu.omega_body_rad_s");
+    let q = attitudes(log);
+    windows(&time_s, step)
+        .into_iter()
+        .map(|i| {
+            let turn = (q[i].inverse() * q[i + step]).scaled_axis() / (time_s[i + step] - time_s[i]);
+            (mean(&omega[i..i + step]), turn)
+        })
+        .unzip()
+}
+
+/// Mean velocity over `step` samples, and the step in position over time.
+fn velocities(log: &FlightLog, step: usize) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
+    let (time_s, position) = vectors(log, "gnss.position_ned_m");
+    let (_, velocity) = vectors(log, "gnss.velocity_ned_m_s");
+    windows(&time_s, step)
+        .into_iter()
+        .map(|i| {
+            // Trapezoid, so that mean and step are of the same time.
+            let inner = mean(&velocity[i + 1..i + step]) * (step - 1) as f64;
+            let mean = (inner + (velocity[i] + velocity[i + step]) * 0.5) / step as f64;
+            (mean, (position[i + step] - position[i]) / (time_s[i + step] - time_s[i]))
+        })
+        .unzip()
+}
+
+/// Correlation of the angular acceleration, `lag` samples later, with what an X quadrotor's rotors ask for: rotors 1 to
+/// 4 front right, back right, back left, front left; reaction of 1 and 3 about +z (down), of 2 and 4 about -z.
+fn motor_geometry(log: &FlightLog, lag: usize, step: usize) -> Vector3<f64> {
+    let (time_s, omega) = vectors(log, "imu.omega_body_rad_s");
+    let (_, command) = log.channel("rotor.command").unwrap();
+    let (asked, got): (Vec<_>, Vec<_>) = windows(&time_s, lag + step)
+        .into_iter()
+        .map(|i| {
+            let mut asked = Vector3::zeros();
+            for row in i..i + step {
+                let thrust: Vec<f64> = command.row(row).iter().map(|u| u * u).collect();
+                let &[t1, t2, t3, t4] = thrust.as_slice() else { panic!("not four rotors") };
+                asked += Vector3::new(-t1 - t2 + t3 + t4, t1 - t2 - t3 + t4, t1 - t2 + t3 - t4);
+            }
+            (asked, omega[i + lag + step] - omega[i + lag])
+        })
+        .unzip();
+    correlation(&asked, &got).0
+}
+
+#[test]
+fn nanobench_obeys_physics() {
+    let Some(folder) = shared("flights/nanobench") else { return };
+    // Flights with much motion in roll and pitch, and one with little: its Vicon attitude is mostly noise.
+    for (file, least) in [
+        ("B2_circle_medium_rep1.csv", 0.9),
+        ("B3_figure8_fast_rep1.csv", 0.9),
+        ("B8_star_slow_rep1.csv", 0.9),
+        ("B9_trefoil_slow_rep1.csv", 0.6),
+    ] {
+        let (log, report) = import_with("nanobench.toml", folder.join(file));
+        println!("{report}");
+        assert!(report.files[0].rows_masked > 100, "take-off and landing are dropped");
+        assert_eq!(log.metadata["imported_from"], file);
+
+        let (_, force) = vectors(&log, "imu.specific_force_body_m_s2");
+        let hover = mean(&force);
+        assert!((hover - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).amax() < 0.2, "{file}: {hover}");
+
+        let (gyro, turn) = rates(&log, 20);
+        let (r, slope) = correlation(&gyro, &turn);
+        println!("{file}: gyro against attitude, correlation {r:.3?}, slope {slope:.3?}");
+        assert!(r.x > 0.9 && r.y > least && r.z > 0.6, "{file}: {r}");
+        assert!(slope.min() > 0.8 && slope.max() < 1.2, "{file}: rad/s, not deg/s: {slope}");
+
+        let (velocity, step) = velocities(&log, 10);
+        let (r, slope) = correlation(&velocity, &step);
+        assert!(r.min() > 0.99 && (slope.add_scalar(-1.0)).amax() < 0.02, "{file}: {r} {slope}");
+
+        // Height is up: flights are at about 1 m, so down is about -1 m.
+        let (_, position) = vectors(&log, "gnss.position_ned_m");
+        assert!(position.iter().all(|p| p.z < -0.4 && p.z > -1.4), "{file}");
+
+        // Force in NED from the accelerometer against that from the velocity, 0.2 s apart.
+        let (time_s, velocity) = vectors(&log, "gnss.velocity_ned_m_s");
+        let q = attitudes(&log);
+        let (felt, moved): (Vec<_>, Vec<_>) = windows(&time_s, 20)
+            .into_iter()
+            .map(|i| {
+                let felt: Vec<_> = (i..i + 20).map(|k| q[k] * force[k]).collect();
+                let acceleration = (velocity[i + 20] - velocity[i]) / (time_s[i + 20] - time_s[i]);
+                (mean(&felt), acceleration - Vector3::new(0.0, 0.0, GRAVITY_M_S2))
+            })
+            .unzip();
+        let (r, _) = correlation(&felt, &moved);
+        println!("{file}: accelerometer against velocity in NED, correlation {r:.3?}");
+        assert!(r.min() > 0.8, "{file}: {r}");
+
+        let r = motor_geometry(&log, 3, 2);
+        println!("{file}: rotors against angular acceleration, correlation {r:.3?}");
+        assert!(r.min() > 0.2, "{file}: {r}");
+    }
+}
+
+#[test]
+fn arpl_obeys_physics() {
+    let Some(folder) = shared("flights/arpl-motorlag") else { return };
+    for file in ["log10.csv", "log16.csv"] {
+        let (log, report) = import_with("arpl.toml", folder.join(file));
+        println!("{report}");
+        let (_, force) = vectors(&log, "imu.specific_force_body_m_s2");
+        let hover = mean(&force);
+        assert!((hover - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).amax() < 0.6, "{file}: {hover}");
+        assert!(force.iter().all(|f| f.x.abs() < 6.0 && f.y.abs() < 6.0), "{file}");
+        let (_, omega) = vectors(&log, "imu.omega_body_rad_s");
+        let fastest = omega.iter().map(Vector3::amax).fold(0.0, f64::max);
+        assert!(
+            (1.0..2000_f64.to_radians()).contains(&fastest),
+            "{file}: range of the sensor: {fastest} rad/s"
+        );
+        let r = motor_geometry(&log, 30, 20);
+        println!("{file}: rotors against angular acceleration, correlation {r:.3?}");
+        assert!(r.min() > 0.2, "{file}: {r}");
+    }
+}
+
+#[test]
+fn practice_obeys_physics() {
+    let Some(folder) = shared("gap-practice/cases") else { return };
+    let mut cases: Vec<PathBuf> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    cases.sort();
+    assert!(!cases.is_empty());
+    for case in cases {
+        let (log, report) = import_with("practice.toml", case.join("train/flight00"));
+        let name = case.file_name().unwrap().display().to_string();
+        for (channel, rate_hz) in [
+            ("imu.omega_body_rad_s", 300.0),
+            ("gnss.position_ned_m", 10.0),
+            ("baro.altitude_m", 50.0),
+            ("battery.voltage_v", 50.0),
+            ("wing.command", 300.0),
+        ] {
+            let found = report.channels.iter().find(|c| c.channel == channel).unwrap();
+            assert!((found.rate_hz.unwrap() / rate_hz - 1.0).abs() < 0.01, "{name}: {found:?}");
+        }
+        let (gyro, turn) = rates(&log, 15);
+        assert_moving_axes_agree(&gyro, &turn, 0.1, &format!("{name}: gyro and attitude"));
+        let (velocity, step) = velocities(&log, 10);
+        assert_moving_axes_agree(&velocity, &step, 0.2, &format!("{name}: velocity and position"));
+        let (_, force) = vectors(&log, "imu.specific_force_body_m_s2");
+        let hover = mean(&force);
+        assert!((hover.z + GRAVITY_M_S2).abs() < 1.0, "{name}: {hover}");
+        let (time_s, baro) = log.channel("baro.altitude_m").unwrap();
+        let (gnss_s, position) = vectors(&log, "gnss.position_ned_m");
+        let middle = gnss_s.len() / 2;
+        let row = time_s.partition_point(|&t| t < gnss_s[middle]);
+        assert!((baro.values[row] + position[middle].z).abs() < 2.0, "{name}: altitude is up, down is not");
+    }
+}
