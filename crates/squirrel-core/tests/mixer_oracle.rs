@@ -7,9 +7,7 @@ use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use squirrel_core::control::mixer::{Mixer, ThrustTorque};
 use squirrel_core::nalgebra::{Matrix3, Vector3};
-use squirrel_core::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle,
-};
+use squirrel_core::vehicle::{CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle};
 
 /// A small deterministic generator, so that the thousand demands are the same on every machine.
 struct Draw(u64);
@@ -59,18 +57,31 @@ fn solve(p: &[f64], q: &[f64], a: &[(Vec<f64>, f64)], g: &[(Vec<f64>, f64)]) -> 
     let rows: Vec<&(Vec<f64>, f64)> = a.iter().chain(g).collect();
     let matrix = CscMatrix::from(&rows.iter().map(|(row, _)| row.clone()).collect::<Vec<_>>());
     let bounds: Vec<f64> = rows.iter().map(|(_, b)| *b).collect();
-    let diagonal: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| if i == j { p[i] } else { 0.0 }).collect()).collect();
+    let diagonal: Vec<Vec<f64>> =
+        (0..n).map(|i| (0..n).map(|j| if i == j { p[i] } else { 0.0 }).collect()).collect();
     let cones = [SupportedConeT::ZeroConeT(a.len()), SupportedConeT::NonnegativeConeT(g.len())];
-    let settings = DefaultSettings { verbose: false, tol_gap_abs: 1e-11, tol_gap_rel: 1e-11, tol_feas: 1e-11, ..Default::default() };
-    let mut solver = DefaultSolver::new(&CscMatrix::from(&diagonal), q, &matrix, &bounds, &cones, settings).unwrap();
+    let settings = DefaultSettings {
+        verbose: false,
+        tol_gap_abs: 1e-11,
+        tol_gap_rel: 1e-11,
+        tol_feas: 1e-11,
+        ..Default::default()
+    };
+    let mut solver =
+        DefaultSolver::new(&CscMatrix::from(&diagonal), q, &matrix, &bounds, &cones, settings).unwrap();
     solver.solve();
-    assert!(matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved), "{:?}", solver.solution.status);
+    assert!(
+        matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved),
+        "{:?}",
+        solver.solution.status
+    );
     solver.solution.x.clone()
 }
 
 /// Rotor thrusts of the lexicographic optimum; variables are four thrusts and the share.
 fn oracle(t: &[[f64; 4]; 4], thrust_max: f64, demand: &ThrustTorque) -> Vec<f64> {
-    let want = [demand.thrust_n, demand.torque_n_m.x, demand.torque_n_m.y, demand.torque_n_m.z].map(f64::from);
+    let want =
+        [demand.thrust_n, demand.torque_n_m.x, demand.torque_n_m.y, demand.torque_n_m.z].map(f64::from);
     let row = |k: usize, share: f64| t[k].iter().copied().chain([share]).collect::<Vec<f64>>();
     let unit = |i: usize, sign: f64| (0..5).map(|j| if i == j { sign } else { 0.0 }).collect::<Vec<f64>>();
     // Torque rows are scaled to newtons, so that all constraints are of one size.
@@ -88,7 +99,9 @@ fn oracle(t: &[[f64; 4]; 4], thrust_max: f64, demand: &ThrustTorque) -> Vec<f64>
     // |thrust - demand| through an extra variable would do; a square does too, and keeps the size.
     let nearest = |k: usize, goal: f64, equal: &[(Vec<f64>, f64)], bounds: &[(Vec<f64>, f64)]| {
         let lift = |r: &[(Vec<f64>, f64)]| {
-            r.iter().map(|(v, b)| (v.iter().copied().chain([0.0]).collect(), *b)).collect::<Vec<(Vec<f64>, f64)>>()
+            r.iter()
+                .map(|(v, b)| (v.iter().copied().chain([0.0]).collect(), *b))
+                .collect::<Vec<(Vec<f64>, f64)>>()
         };
         let mut a = lift(equal);
         let s = if k == 0 { 1.0 } else { 100.0 };
@@ -161,8 +174,12 @@ fn round_trip_for_random_layouts() {
         let Ok(mixer) = Mixer::new(&vehicle(&positions, &signs)) else { continue };
         let demand = ThrustTorque {
             thrust_n: draw.within(8.0, 14.0) as f32,
-            torque_n_m: Vector3::new(draw.within(-0.1, 0.1), draw.within(-0.1, 0.1), draw.within(-0.005, 0.005))
-                .map(|x| x as f32),
+            torque_n_m: Vector3::new(
+                draw.within(-0.1, 0.1),
+                draw.within(-0.1, 0.1),
+                draw.within(-0.005, 0.005),
+            )
+            .map(|x| x as f32),
         };
         let answer = mixer.allocate(&demand);
         if answer.saturated {
@@ -178,7 +195,8 @@ fn round_trip_for_random_layouts() {
 fn torque_signs_are_the_paper_s() {
     let mixer = Mixer::new(&vehicle(&PAPER_X, &PAPER_SIGNS)).unwrap();
     let rotors = |x: f32, y: f32, z: f32| {
-        let f = mixer.allocate(&ThrustTorque { thrust_n: 6.0, torque_n_m: Vector3::new(x, y, z) }).rotor_thrust_n;
+        let f =
+            mixer.allocate(&ThrustTorque { thrust_n: 6.0, torque_n_m: Vector3::new(x, y, z) }).rotor_thrust_n;
         [f[0] > 1.5, f[1] > 1.5, f[2] > 1.5, f[3] > 1.5]
     };
     assert_eq!(rotors(0.05, 0.0, 0.0), [true, true, false, false], "roll right: left rotors");

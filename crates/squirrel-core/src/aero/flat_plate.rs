@@ -3,8 +3,11 @@
 //! A normal-force coefficient of `2 sin(alpha)` on `1/2 rho |v|^2 A`; no tangential part. `v` is relative to the air here
 //! (the paper takes the ground velocity; EQUATIONS T6).
 
-use crate::frames::{Frame, In};
+use crate::dynamics::Air;
+use crate::frames::{Body, Frame, In, Wrench};
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
+use crate::vehicle::Wing;
+use nalgebra::Vector3;
 
 /// Force of the air on the plate, N, in the frame of its arguments.
 ///
@@ -17,11 +20,28 @@ pub fn force<F: Frame, T: Real>(velocity: In<F, T>, normal: In<F, T>, area_m2: T
     In::new(n * (-real::<T>(AIR_DENSITY_KG_M3) * area_m2 * v.norm() * n.dot(&v)))
 }
 
+/// Wrench of a left and a right plate: `N = 1/2 rho S c_N |v| w` along -z at `y = -+ arm`, with `w` the z component of the
+/// air's velocity at that side, so that roll is damped.
+///
+/// * `deployment` - left, right, 0..1
+#[inline(always)]
+pub fn wing_pair<T: Real>(wing: &Wing<T>, air: &Air<T>, deployment: [T; 2]) -> Wrench<Body, T> {
+    let scale =
+        real::<T>(0.5 * AIR_DENSITY_KG_M3) * wing.area_per_side_m2 * wing.normal_force_slope * air.speed;
+    let roll_down = air.omega.vector.x * wing.lateral_arm_m;
+    let left = scale * (air.velocity.vector.z - roll_down) * deployment[0];
+    let right = scale * (air.velocity.vector.z + roll_down) * deployment[1];
+    Wrench {
+        force: In::new(Vector3::new(T::zero(), T::zero(), -(left + right))),
+        // (0, -+arm, 0) x (0, 0, -N)
+        moment: In::new(Vector3::new((left - right) * wing.lateral_arm_m, T::zero(), T::zero())),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frames::{Body, Ned, Rotation};
-    use nalgebra::Vector3;
+    use crate::frames::{Ned, Rotation};
 
     const AREA_M2: f64 = 0.04;
 
@@ -57,5 +77,24 @@ mod tests {
     fn edge_on_air_does_nothing() {
         let f = force(In::<Body, f64>::new(Vector3::new(9.0, -3.0, 0.0)), In::new(Vector3::z()), AREA_M2);
         assert_eq!(f.vector.norm(), 0.0);
+    }
+
+    #[test]
+    fn the_pair_is_the_plate_and_damps_roll() {
+        let wing = Wing {
+            area_per_side_m2: 0.02,
+            normal_force_slope: 2.0,
+            lateral_arm_m: 0.1,
+            time_constant_s: 0.1,
+        };
+        let velocity = In::<Body, f64>::new(Vector3::new(6.0, 1.0, 3.0));
+        let mut air = Air { velocity, speed: velocity.vector.norm(), omega: In::zero() };
+        let still = wing_pair(&wing, &air, [1.0; 2]);
+        assert!((still.force - force(velocity, In::new(Vector3::z()), AREA_M2)).vector.norm() < 1e-12);
+        assert_eq!(still.moment.vector.norm(), 0.0);
+        air.omega = In::new(Vector3::new(2.0, 0.0, 0.0));
+        assert!(wing_pair(&wing, &air, [1.0; 2]).moment.vector.x < 0.0);
+        air.omega = In::zero();
+        assert!(wing_pair(&wing, &air, [1.0, 0.0]).moment.vector.x > 0.0, "left lift rolls right");
     }
 }

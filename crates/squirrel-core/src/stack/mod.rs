@@ -249,16 +249,17 @@ mod tests {
             filter_damping: 1.0,
         };
         let parameters = StackParameters { attitude, twcc: twcc::fixtures::parameters() };
-        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, Mission::Hover { position: In::zero() }).unwrap()
+        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, Mission::Hover { position: In::zero() })
+            .unwrap()
     }
 
     fn level(time_us: u64) -> SensorFrame {
-        SensorFrame {
-            imu: Some(Imu { omega: In::zero(), specific_force: In::new(Vector3::new(0.0, 0.0, -9.80665)) }),
-            attitude: Some(Rotation::identity()),
-            gnss: Some(Gnss { position: In::zero(), velocity: In::zero() }),
-            ..SensorFrame::empty(time_us)
-        }
+        let mut frame = SensorFrame::empty(time_us);
+        frame.imu =
+            Some(Imu { omega: In::zero(), specific_force: In::new(Vector3::new(0.0, 0.0, -9.80665)) });
+        frame.attitude = Some(Rotation::identity());
+        frame.gnss = Some(Gnss { position: In::zero(), velocity: In::zero() });
+        frame
     }
 
     #[test]

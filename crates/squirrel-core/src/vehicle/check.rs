@@ -144,7 +144,7 @@ fn inertia<T: Real>(j: &Matrix3<T>) -> Result<(), ParameterError> {
     }
     let moments = SymmetricEigen::new(*j).eigenvalues;
     let mut m = [plain(moments[0]), plain(moments[1]), plain(moments[2])];
-    m.sort_by(f64::total_cmp);
+    m.sort_unstable_by(f64::total_cmp);
     if m[0] <= 0.0 {
         return Err(ParameterError {
             field,

@@ -182,13 +182,12 @@ impl TimeMap {
 }
 
 fn syntax_error(text: &str, name: &str, error: &toml::de::Error) -> ImportError {
-    let start = error.span().map_or(0, |span| span.start.min(text.len()));
-    let line = text.bytes().take(start).filter(|&b| b == b'\n').count();
+    let place = crate::toml_text::place(text, error);
     ImportError::MapSyntax {
         map: name.to_owned(),
-        line: line + 1,
-        message: error.message().trim().replace('\n', ", "),
-        text: text.lines().nth(line).unwrap_or_default().trim().chars().take(120).collect(),
+        line: place.line,
+        message: place.message,
+        text: place.text,
     }
 }
 

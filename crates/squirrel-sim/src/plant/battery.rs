@@ -1,0 +1,162 @@
+//! Battery: open-circuit voltage over charge, inner resistance, one RC pair (EQUATIONS D.5).
+//!
+//! `V = OCV(charge) - I R0 - V1`, `V1' = (I R1 - V1) / tau1`, `charge' = -I / capacity`. The current carries the rotors'
+//! shaft power: `I = sum(Q_i Omega_i) / (efficiency V) + idle`. The simulator always computes the voltage; thrust feels it
+//! only through the `battery_sag` effect.
+
+/// Numbers of a battery pack.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatteryParameters {
+    /// Cells in series.
+    pub cells: u32,
+    /// Capacity, Ah.
+    pub capacity_ah: f64,
+    /// Resistance of the pack with its leads, ohm.
+    pub r0_ohm: f64,
+    /// Resistance of the RC pair, ohm.
+    pub r1_ohm: f64,
+    /// Time constant of the RC pair, s.
+    pub tau1_s: f64,
+    /// Open-circuit voltage of one cell, V, over charge 0..1, as rising pairs `[charge, volt]`.
+    pub ocv_v_of_charge: Vec<[f64; 2]>,
+    /// Shaft power over electric power.
+    pub efficiency: f64,
+    /// Current of everything but the rotors, A.
+    pub idle_current_a: f64,
+}
+
+/// What a battery remembers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BatteryState {
+    /// Charge, 1 full to 0 empty.
+    pub charge: f64,
+    /// Voltage of the RC pair, V.
+    pub rc_voltage_v: f64,
+    /// Terminal voltage, V.
+    pub voltage_v: f64,
+    /// Current, A.
+    pub current_a: f64,
+}
+
+impl BatteryParameters {
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let positive = [
+            ("cells", f64::from(self.cells)),
+            ("capacity_ah", self.capacity_ah),
+            ("r0_ohm", self.r0_ohm),
+            ("r1_ohm", self.r1_ohm),
+            ("tau1_s", self.tau1_s),
+            ("efficiency", self.efficiency),
+        ];
+        for (key, x) in positive {
+            if !(x.is_finite() && x > 0.0) {
+                return Err(format!("battery.{key} = {x}: must be finite and > 0"));
+            }
+        }
+        if !(0.0..=100.0).contains(&self.idle_current_a) {
+            return Err(format!("battery.idle_current_a = {}: must be 0 to 100", self.idle_current_a));
+        }
+        let table = &self.ocv_v_of_charge;
+        let rising = table.windows(2).all(|w| w[0][0] < w[1][0] && w[0][1] <= w[1][1]);
+        let plausible = |[charge, volt]: &[f64; 2]| (0.0..=1.0).contains(charge) && (0.5..=6.0).contains(volt);
+        if table.len() < 2 || !rising || !table.iter().all(plausible) {
+            return Err(format!(
+                "battery.ocv_v_of_charge = {table:?}: must be at least two rising pairs [charge 0..1, cell volt 0.5..6]"
+            ));
+        }
+        Ok(())
+    }
+
+    /// A rested battery.
+    ///
+    /// * `charge` - 0..1
+    pub fn rested(&self, charge: f64) -> BatteryState {
+        BatteryState { charge, rc_voltage_v: 0.0, voltage_v: self.open_circuit_v(charge), current_a: 0.0 }
+    }
+
+    /// Open-circuit voltage of the pack, V; held beyond the ends of the table.
+    pub fn open_circuit_v(&self, charge: f64) -> f64 {
+        let table = &self.ocv_v_of_charge;
+        let i = table.iter().rposition(|[c, _]| *c <= charge).unwrap_or(0).min(table.len() - 2);
+        let ([c0, v0], [c1, v1]) = (table[i], table[i + 1]);
+        let share = ((charge - c0) / (c1 - c0)).clamp(0.0, 1.0);
+        f64::from(self.cells) * (v0 + (v1 - v0) * share)
+    }
+
+    /// One step.
+    ///
+    /// * `shaft_power_w` - of all rotors
+    /// * `decay` - `1 - exp(-dt / tau1)`
+    pub fn step(&self, state: &mut BatteryState, shaft_power_w: f64, dt_s: f64, decay: f64) {
+        // Below half of a cell's lowest voltage the power law would ask for unbounded current.
+        let floor = 0.5 * f64::from(self.cells) * self.ocv_v_of_charge[0][1];
+        let current = shaft_power_w / (self.efficiency * state.voltage_v.max(floor)) + self.idle_current_a;
+        state.rc_voltage_v += (current * self.r1_ohm - state.rc_voltage_v) * decay;
+        state.charge = (state.charge - current * dt_s / (3600.0 * self.capacity_ah)).max(0.0);
+        state.current_a = current;
+        state.voltage_v =
+            (self.open_circuit_v(state.charge) - current * self.r0_ohm - state.rc_voltage_v).max(0.0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn battery() -> BatteryParameters {
+        BatteryParameters {
+            cells: 4,
+            capacity_ah: 1.0,
+            r0_ohm: 0.03,
+            r1_ohm: 0.01,
+            tau1_s: 4.0,
+            ocv_v_of_charge: vec![[0.0, 3.3], [0.1, 3.6], [0.5, 3.8], [1.0, 4.2]],
+            efficiency: 0.7,
+            idle_current_a: 0.0,
+        }
+    }
+
+    #[test]
+    fn sags_at_once_by_r0_then_slowly_by_r1() {
+        let b = battery();
+        let mut s = b.rested(1.0);
+        assert!((s.voltage_v - 16.8).abs() < 1e-12);
+        let decay = 1.0 - (-1e-3_f64 / b.tau1_s).exp();
+        b.step(&mut s, 200.0, 1e-3, decay);
+        let first = s.voltage_v;
+        assert!((16.8 - first - s.current_a * 0.03).abs() < 1e-3, "first drop is ohmic");
+        for _ in 0..20_000 {
+            b.step(&mut s, 200.0, 1e-3, decay);
+        }
+        let slow = b.open_circuit_v(s.charge) - s.current_a * (0.03 + 0.01);
+        assert!((s.voltage_v - slow).abs() < 0.01 && s.voltage_v < first);
+    }
+
+    #[test]
+    fn charge_counts_ampere_hours() {
+        let b = battery();
+        let mut s = b.rested(1.0);
+        let mut ampere_seconds = 0.0;
+        for _ in 0..10_000 {
+            b.step(&mut s, 150.0, 1e-2, 1.0 - (-1e-2_f64 / 4.0).exp());
+            ampere_seconds += s.current_a * 1e-2;
+        }
+        assert!((1.0 - s.charge - ampere_seconds / 3600.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_empty_battery_stays_finite() {
+        let b = battery();
+        let mut s = b.rested(0.0);
+        for _ in 0..1000 {
+            b.step(&mut s, 1e4, 1e-2, 0.01);
+        }
+        assert!(s.voltage_v >= 0.0 && s.current_a.is_finite() && s.charge == 0.0);
+    }
+
+    #[test]
+    fn a_falling_table_is_refused_by_name() {
+        let bad = BatteryParameters { ocv_v_of_charge: vec![[0.0, 4.0], [1.0, 3.0]], ..battery() };
+        assert!(bad.check().unwrap_err().starts_with("battery.ocv_v_of_charge"));
+    }
+}

@@ -1,0 +1,285 @@
+//! The plant: what really flies. Rigid body and rotors by RK4, wings, battery, servos, wind. f64.
+//!
+//! One step holds the commands, the battery voltage and the wind, and integrates rigid body, rotor speeds and membrane
+//! together by RK4. Battery, servos and wind are stepped exactly beside it.
+
+mod battery;
+mod fast_math;
+mod membrane;
+mod servo;
+mod wind;
+
+pub use battery::{BatteryParameters, BatteryState};
+pub use membrane::{Membrane, MembraneParameters, MembraneState};
+pub use servo::{ServoParameters, ServoState};
+pub use wind::{GustModel, Wind, WindParameters};
+
+use squirrel_core::aero::flat_plate;
+use squirrel_core::dynamics::{self, Air, RotorDrive, State, VectorSpace, rk4};
+use squirrel_core::effects::Effects;
+use squirrel_core::frames::{Body, In, Ned, Wrench};
+use squirrel_core::vehicle::{PerRotor, Vehicle, Wing};
+
+/// How the wings of the plant behave. Independent of what the controller believes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WingPlant {
+    /// No wing.
+    None,
+    /// The paper's flat plate, left and right.
+    Flat {
+        /// The wings.
+        wing: Wing<f64>,
+        /// What moves them.
+        servo: ServoParameters,
+    },
+    /// Silicone membrane.
+    Membrane {
+        /// The wings.
+        membrane: Box<Membrane>,
+        /// What moves them.
+        servo: ServoParameters,
+    },
+}
+
+/// Everything of the plant that does not change in flight.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    vehicle: Vehicle<f64>,
+    effects: Effects<f64>,
+    wing: WingPlant,
+    battery: Option<BatteryParameters>,
+    dt_s: f64,
+    battery_decay: f64,
+    servo_lag: f64,
+}
+
+/// Everything that changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlantState {
+    /// Rigid body and rotors.
+    pub body: State<f64>,
+    /// Membrane, left and right.
+    pub membrane: MembraneState,
+    /// Angle of attack of each side at the last step, rad.
+    wing_angle_rad: [f64; 2],
+    wing_angle_rate_rad_s: [f64; 2],
+    /// Left and right servo.
+    pub servo: [ServoState; 2],
+    /// Battery; constant at the reference voltage for a vehicle without one.
+    pub battery: BatteryState,
+}
+
+/// Rigid body and membrane, integrated together.
+#[derive(Clone, Copy)]
+struct Moving {
+    body: State<f64>,
+    membrane: MembraneState,
+}
+
+impl VectorSpace<f64> for Moving {
+    #[inline(always)]
+    fn plus_scaled(&self, h: f64, rate: &Self) -> Self {
+        Self {
+            body: self.body.plus_scaled(h, &rate.body),
+            membrane: self.membrane.plus_scaled(h, &rate.membrane),
+        }
+    }
+}
+
+impl Plant {
+    /// # Errors
+    /// A step that is not positive, or longer than twice a rotor time constant, which RK4 could not follow.
+    pub fn new(
+        vehicle: Vehicle<f64>,
+        effects: Effects<f64>,
+        wing: WingPlant,
+        battery: Option<BatteryParameters>,
+        dt_s: f64,
+    ) -> Result<Self, String> {
+        if !(dt_s.is_finite() && dt_s > 0.0) {
+            return Err(format!("dt_s = {dt_s}: must be finite and > 0"));
+        }
+        let p = &vehicle.parameters().propulsion;
+        for (key, tau) in
+            [("time_constant_up_s", p.time_constant_up_s), ("time_constant_down_s", p.time_constant_down_s)]
+        {
+            if tau > 0.0 && dt_s > 2.0 * tau {
+                return Err(format!("dt_s = {dt_s}: must be at most twice propulsion.{key} = {tau}"));
+            }
+        }
+        let decay = |tau: f64| 1.0 - (-dt_s / tau).exp();
+        let servo_lag = match &wing {
+            WingPlant::None => 1.0,
+            WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. } => decay(servo.time_constant_s),
+        };
+        let battery_decay = battery.as_ref().map_or(1.0, |b| decay(b.tau1_s));
+        Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_lag })
+    }
+
+    /// The airframe.
+    pub fn vehicle(&self) -> &Vehicle<f64> {
+        &self.vehicle
+    }
+    /// The effects that act.
+    pub fn effects(&self) -> &Effects<f64> {
+        &self.effects
+    }
+    /// Step, s.
+    pub fn dt_s(&self) -> f64 {
+        self.dt_s
+    }
+
+    /// A plant at rest in a given pose, wings folded.
+    ///
+    /// * `charge` - of the battery, 0..1
+    pub fn initial_state(&self, body: State<f64>, charge: f64) -> PlantState {
+        let battery = match &self.battery {
+            Some(battery) => battery.rested(charge),
+            None => BatteryState {
+                charge,
+                rc_voltage_v: 0.0,
+                voltage_v: self.vehicle.parameters().propulsion.reference_voltage_v,
+                current_a: 0.0,
+            },
+        };
+        PlantState {
+            body,
+            membrane: MembraneState::at_rest(),
+            wing_angle_rad: [0.0; 2],
+            wing_angle_rate_rad_s: [0.0; 2],
+            servo: [ServoState::default(); 2],
+            battery,
+        }
+    }
+
+    /// One step by RK4.
+    ///
+    /// * `rotor_command` - in the vehicle's unit; `wing_command` - left, right, 0..1; `wind` - m/s; all held
+    pub fn step(
+        &self,
+        state: &mut PlantState,
+        rotor_command: &PerRotor<f64>,
+        wing_command: [f64; 2],
+        wind: In<Ned, f64>,
+    ) {
+        let drive = self.drive(state, rotor_command);
+        self.advance(state, &drive, wing_command, wind, |_, next| next);
+    }
+
+    /// One step in which another integrator moves the rigid body: rotors and wings as in [`Self::step`], while `body` gets
+    /// the wrench without gravity at the start of the step and gives the new body. Its rotor speeds are not looked at.
+    ///
+    /// # Errors
+    /// What `body` says.
+    pub fn step_with<E>(
+        &self,
+        state: &mut PlantState,
+        rotor_command: &PerRotor<f64>,
+        wing_command: [f64; 2],
+        wind: In<Ned, f64>,
+        body: impl FnOnce(&State<f64>, &Wrench<Body, f64>) -> Result<State<f64>, E>,
+    ) -> Result<(), E> {
+        let drive = self.drive(state, rotor_command);
+        let wrench = self.wrench(state, wind);
+        let moved = body(&state.body, &wrench)?;
+        self.advance(state, &drive, wing_command, wind, |_, next| State {
+            rotor_speed_rad_s: next.rotor_speed_rad_s,
+            ..moved
+        });
+        Ok(())
+    }
+
+    fn drive(&self, state: &mut PlantState, rotor_command: &PerRotor<f64>) -> RotorDrive<f64> {
+        let drive = RotorDrive::new(&self.vehicle, &self.effects, rotor_command, state.battery.voltage_v);
+        drive.settle(&mut state.body.rotor_speed_rad_s);
+        drive
+    }
+
+    #[inline(always)]
+    fn advance(
+        &self,
+        state: &mut PlantState,
+        drive: &RotorDrive<f64>,
+        wing_command: [f64; 2],
+        wind: In<Ned, f64>,
+        body: impl FnOnce(&State<f64>, State<f64>) -> State<f64>,
+    ) {
+        let (vehicle, effects, dt) = (&self.vehicle, &self.effects, self.dt_s);
+        let before = state.body;
+        let next = match &self.wing {
+            WingPlant::None => rk4(before, dt, |s| {
+                dynamics::derivative(vehicle, effects, s, drive, wind, |_| Wrench::zero())
+            }),
+            WingPlant::Flat { wing, servo } => {
+                let deployment = self.deploy(state, servo, wing_command);
+                rk4(before, dt, |s| {
+                    dynamics::derivative(vehicle, effects, s, drive, wind, |air| {
+                        flat_plate::wing_pair(wing, air, deployment)
+                    })
+                })
+            }
+            WingPlant::Membrane { membrane, servo } => {
+                let deployment = self.deploy(state, servo, wing_command);
+                let air = Air::new(&before, wind + effects.wind());
+                let angle = membrane.angle_of_attack(&air);
+                for side in 0..2 {
+                    state.wing_angle_rate_rad_s[side] = (angle[side] - state.wing_angle_rad[side]) / dt;
+                }
+                state.wing_angle_rad = angle;
+                let rate = state.wing_angle_rate_rad_s;
+                let moved = rk4(Moving { body: before, membrane: state.membrane }, dt, |s| {
+                    let mut membrane_rate = s.membrane;
+                    let body = dynamics::derivative(vehicle, effects, &s.body, drive, wind, |air| {
+                        let (wrench, change) = membrane.evaluate(air, rate, deployment, &s.membrane);
+                        membrane_rate = change;
+                        wrench
+                    });
+                    Moving { body, membrane: membrane_rate }
+                });
+                state.membrane = moved.membrane;
+                moved.body
+            }
+        };
+        state.body = body(&before, next).normalised();
+        if let Some(battery) = &self.battery {
+            let k_m = vehicle.parameters().propulsion.torque_coefficient_n_m_s2;
+            let power: f64 = before.rotor_speed_rad_s.iter().map(|w| k_m * w * w * w).sum();
+            battery.step(&mut state.battery, power, dt, self.battery_decay);
+        }
+    }
+
+    #[inline(always)]
+    fn deploy(&self, state: &mut PlantState, servo: &ServoParameters, command: [f64; 2]) -> [f64; 2] {
+        let mut mean = [0.0; 2];
+        for side in 0..2 {
+            mean[side] = servo.step(&mut state.servo[side], command[side], self.dt_s, self.servo_lag);
+        }
+        mean
+    }
+
+    /// Wrench of the wings alone at a deployment, left and right.
+    fn wing_wrench(&self, state: &PlantState, air: &Air<f64>, deployment: [f64; 2]) -> Wrench<Body, f64> {
+        match &self.wing {
+            WingPlant::None => Wrench::zero(),
+            WingPlant::Flat { wing, .. } => flat_plate::wing_pair(wing, air, deployment),
+            WingPlant::Membrane { membrane, .. } => {
+                membrane.evaluate(air, state.wing_angle_rate_rad_s, deployment, &state.membrane).0
+            }
+        }
+    }
+
+    /// Force and moment on the airframe now, without gravity.
+    pub fn wrench(&self, state: &PlantState, wind: In<Ned, f64>) -> Wrench<Body, f64> {
+        let deployment = [state.servo[0].deployment, state.servo[1].deployment];
+        dynamics::wrench(&self.vehicle, &self.effects, &state.body, wind, |air| {
+            self.wing_wrench(state, air, deployment)
+        })
+    }
+
+    /// Force of the wings, N: as deployed now, and as if spread.
+    pub fn wing_force(&self, state: &PlantState, wind: In<Ned, f64>) -> [In<Body, f64>; 2] {
+        let air = Air::new(&state.body, wind + self.effects.wind());
+        let now = [state.servo[0].deployment, state.servo[1].deployment];
+        [self.wing_wrench(state, &air, now).force, self.wing_wrench(state, &air, [1.0; 2]).force]
+    }
+}

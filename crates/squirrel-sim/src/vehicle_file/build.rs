@@ -1,0 +1,286 @@
+//! From the tables of a vehicle file to checked parameters. Errors are `field = value: reason`.
+
+use super::VehicleFile;
+use super::quantity::Quantity;
+use super::tables::{
+    AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, FormName, InertiaValue, PositionTable,
+    PropulsionTable, ThrustLawName, TriggerName, VehicleTable, WingControlTable, WingName, WingTable, WingTestName,
+};
+use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ServoParameters, WingPlant};
+use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
+use squirrel_core::control::position::{AngleLaw, PositionGains};
+use squirrel_core::control::twcc::{ForceModel, Trigger, TwccParameters, WingPolicy};
+use squirrel_core::control::wiic::ThrustLaw;
+use squirrel_core::control::woeg::{WingEvents, WingTest};
+use squirrel_core::effects::Effects;
+use squirrel_core::frames::In;
+use squirrel_core::nalgebra::{Matrix3, Vector3};
+use squirrel_core::stack::StackParameters;
+use squirrel_core::vehicle::{
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, ThrustCurve, Vehicle, Wing,
+};
+use std::collections::BTreeMap;
+
+type Problem = String;
+
+pub(super) fn build(t: VehicleTable) -> Result<VehicleFile, Problem> {
+    let mut rotors = [Rotor::unused(); MAX_ROTORS];
+    for (place, rotor) in rotors.iter_mut().zip(&t.rotor) {
+        let position = In::new(Vector3::from(rotor.position_body_m.0));
+        *place = Rotor { position, yaw_sign: rotor.yaw_sign };
+    }
+    let (wing, wing_plant) = match &t.wing {
+        Some(table) => wing(table)?,
+        None => (None, WingPlant::None),
+    };
+    let parameters = Parameters {
+        mass_kg: t.mass.mass_kg.0,
+        inertia_kg_m2: match t.mass.inertia_kg_m2.0 {
+            InertiaValue::Diagonal(moments) => Matrix3::from_diagonal(&Vector3::from(moments)),
+            InertiaValue::Full(rows) => Matrix3::from_fn(|r, c| rows[r][c]),
+        },
+        rotors,
+        rotor_count: t.rotor.len(),
+        propulsion: propulsion(&t.propulsion)?,
+        drag: Drag {
+            linear_n_s_per_m: Vector3::from(t.drag.linear_n_s_per_m.map_or([0.0; 3], |q| q.0)),
+            area_m2: t.drag.area_m2.map_or(0.0, |q| q.0),
+        },
+        wing,
+        limits: Limits { tilt_max_rad: t.limits.tilt_max_rad.0, thrust_max_n: t.limits.thrust_max_n.0 },
+    };
+    let vehicle = Vehicle::new(parameters).map_err(|e| e.to_string())?;
+    let size_body_m = match t.size_body_m {
+        Some(size) => size.0,
+        None => default_size(&vehicle),
+    };
+    for (i, length) in size_body_m.iter().enumerate() {
+        if !(length.is_finite() && *length > 0.0) {
+            return Err(format!("size_body_m[{i}] = {length}: must be finite and > 0"));
+        }
+    }
+    let control = t.control.map(control).transpose()?;
+    if let Some(gains) = &control {
+        gains.attitude.check().map_err(|e| e.to_string())?;
+        gains.twcc.check(vehicle.parameters().limits.thrust_max_n as f32).map_err(|e| e.to_string())?;
+    }
+    t.sensors.check()?;
+    Ok(VehicleFile {
+        name: t.name,
+        text: String::new(),
+        vehicle,
+        size_body_m,
+        wing: wing_plant,
+        battery: t.battery.map(battery).transpose()?,
+        control,
+        sensors: t.sensors,
+        effects: effects(t.effects)?,
+        provenance: Vec::new(),
+    })
+}
+
+/// A box that holds all hubs, for a vehicle that states no size.
+fn default_size(vehicle: &Vehicle<f64>) -> [f64; 3] {
+    let reach = |axis: usize| {
+        vehicle.rotors().iter().map(|r| r.position.vector[axis].abs()).fold(0.02, f64::max)
+    };
+    [2.0 * reach(0), 2.0 * reach(1), 0.04]
+}
+
+fn propulsion(t: &PropulsionTable) -> Result<Propulsion<f64>, Problem> {
+    let both = t.time_constant_s.as_ref().map(|q| q.0);
+    let lag = |own: &Option<Quantity<f64>>, key: &str| {
+        own.as_ref().map(|q| q.0).or(both).ok_or_else(|| {
+            format!("propulsion.{key}: missing; give it, or propulsion.time_constant_s for both directions")
+        })
+    };
+    let thrust_curve = match &t.pwm_to_thrust_n {
+        Some(q) => Some(ThrustCurve::new(q.0, t.reference_voltage_v.0).map_err(|e| e.to_string())?),
+        None => None,
+    };
+    Ok(Propulsion {
+        command: match t.command {
+            CommandName::SpeedFraction => CommandKind::SpeedFraction,
+            CommandName::PwmUs => CommandKind::PwmMicroseconds,
+            CommandName::Duty => CommandKind::Duty,
+            CommandName::ThrustN => CommandKind::ThrustNewton,
+        },
+        speed_max_rad_s: t.speed_max_rad_s.0,
+        thrust_coefficient_n_s2: t.thrust_coefficient_n_s2.0,
+        torque_coefficient_n_m_s2: t.torque_coefficient_n_m_s2.0,
+        time_constant_up_s: lag(&t.time_constant_up_s, "time_constant_up_s")?,
+        time_constant_down_s: lag(&t.time_constant_down_s, "time_constant_down_s")?,
+        reference_voltage_v: t.reference_voltage_v.0,
+        thrust_curve,
+    })
+}
+
+fn wing(t: &WingTable) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
+    let given = [
+        ("area_per_side_m2", &t.area_per_side_m2),
+        ("normal_force_slope", &t.normal_force_slope),
+        ("lateral_arm_m", &t.lateral_arm_m),
+        ("time_constant_s", &t.time_constant_s),
+        ("dead_time_s", &t.dead_time_s),
+        ("rate_max_per_s", &t.rate_max_per_s),
+    ];
+    let model = match t.model {
+        Some(model @ (WingName::Flat | WingName::Membrane)) => model,
+        Some(WingName::None) | None => {
+            if let Some((key, Some(q))) = given.iter().find(|(_, q)| q.is_some()) {
+                return Err(format!("wing.{key} = {}: given, but wing.model names no wing", q.0));
+            }
+            return match t.membrane.first_key_value() {
+                Some((key, q)) => {
+                    Err(format!("wing.membrane.{key} = {}: given, but wing.model names no wing", q.0))
+                }
+                None => Ok((None, WingPlant::None)),
+            };
+        }
+    };
+    let need = |key: &str, q: &Option<Quantity<f64>>| match q {
+        Some(q) => Ok(q.0),
+        None => Err(format!("wing.{key}: missing; a wing needs it")),
+    };
+    let wing = Wing {
+        area_per_side_m2: need("area_per_side_m2", &t.area_per_side_m2)?,
+        normal_force_slope: need("normal_force_slope", &t.normal_force_slope)?,
+        lateral_arm_m: need("lateral_arm_m", &t.lateral_arm_m)?,
+        time_constant_s: need("time_constant_s", &t.time_constant_s)?,
+    };
+    let servo = ServoParameters {
+        dead_time_s: t.dead_time_s.as_ref().map_or(0.0, |q| q.0),
+        rate_max_per_s: t.rate_max_per_s.as_ref().map_or(f64::INFINITY, |q| q.0),
+        time_constant_s: wing.time_constant_s,
+    };
+    servo.check()?;
+    if model == WingName::Flat {
+        if let Some((key, q)) = t.membrane.first_key_value() {
+            return Err(format!("wing.membrane.{key} = {}: given, but wing.model is \"flat\"", q.0));
+        }
+        return Ok((Some(wing), WingPlant::Flat { wing, servo }));
+    }
+    let membrane = membrane(&t.membrane, &wing)?;
+    Ok((Some(wing), WingPlant::Membrane { membrane: Box::new(membrane), servo }))
+}
+
+/// Overrides of the membrane model's defaults.
+fn membrane(given: &BTreeMap<String, Quantity<f64>>, wing: &Wing<f64>) -> Result<Membrane, Problem> {
+    let mut table = toml::Table::new();
+    for (key, q) in given {
+        if matches!(key.as_str(), "area_per_side_m2" | "lateral_arm_m") {
+            return Err(format!("wing.membrane.{key} = {}: belongs into [wing]", q.0));
+        }
+        table.insert(key.clone(), toml::Value::Float(q.0));
+    }
+    table.insert("area_per_side_m2".to_owned(), toml::Value::Float(wing.area_per_side_m2));
+    table.insert("lateral_arm_m".to_owned(), toml::Value::Float(wing.lateral_arm_m));
+    let parameters: MembraneParameters =
+        table.try_into().map_err(|e: toml::de::Error| format!("wing.membrane: {}", e.message()))?;
+    Membrane::new(parameters).map_err(|e| format!("wing.membrane: {e}"))
+}
+
+fn battery(t: BatteryTable) -> Result<BatteryParameters, Problem> {
+    let parameters = BatteryParameters {
+        cells: t.cells,
+        capacity_ah: t.capacity_ah.0,
+        r0_ohm: t.r0_ohm.0,
+        r1_ohm: t.r1_ohm.0,
+        tau1_s: t.tau1_s.0,
+        ocv_v_of_charge: t.ocv_v_of_charge.0,
+        efficiency: t.efficiency.map_or(0.7, |q| q.0),
+        idle_current_a: t.idle_current_a.map_or(0.3, |q| q.0),
+    };
+    parameters.check()?;
+    Ok(parameters)
+}
+
+fn effects(tables: BTreeMap<String, BTreeMap<String, Quantity<f64>>>) -> Result<Effects<f64>, Problem> {
+    let mut effects = Effects::none();
+    for (name, table) in tables {
+        let Some(found) = effects.insert(&name) else {
+            let known = Effects::<f64>::NAMES.join(", ");
+            return Err(format!("effects.{name}: no such effect; known are {known}"));
+        };
+        for (key, q) in &table {
+            let Some(i) = found.parameters.iter().position(|p| p.key == key) else {
+                let known: Vec<_> = found.parameters.iter().map(|p| p.key).collect();
+                return Err(format!("effects.{name}.{key} = {}: no such parameter; known are {}", q.0, known.join(", ")));
+            };
+            if !q.0.is_finite() {
+                return Err(format!("effects.{name}.{key} = {}: must be finite", q.0));
+            }
+            found.values[i] = q.0;
+        }
+        if let Some(missing) = found.parameters.iter().find(|p| !table.contains_key(p.key)) {
+            return Err(format!("effects.{name}.{}: missing", missing.key));
+        }
+    }
+    Ok(effects)
+}
+
+fn triple(q: &Quantity<[f64; 3]>) -> Vector3<f32> {
+    Vector3::from(q.0).map(|x| x as f32)
+}
+
+fn control(t: ControlTable) -> Result<StackParameters, Problem> {
+    Ok(StackParameters {
+        attitude: attitude(&t.attitude),
+        twcc: twcc(&t.position, &t.wing, t.thrust_min_n.0 as f32),
+    })
+}
+
+fn attitude(t: &AttitudeTable) -> AttitudeGains {
+    AttitudeGains {
+        form: match t.form {
+            FormName::Euler => AttitudeForm::Euler,
+            FormName::Quaternion => AttitudeForm::Quaternion,
+        },
+        c1_per_s: triple(&t.c1_per_s),
+        c2_per_s: triple(&t.c2_per_s),
+        lambda_per_s2: triple(&t.lambda_per_s2),
+        integral_max_rad_s: t.integral_max_rad_s.0 as f32,
+        filter_frequency_rad_s: t.filter_frequency_rad_s.0 as f32,
+        filter_damping: t.filter_damping.0 as f32,
+    }
+}
+
+fn twcc(position: &PositionTable, wing: &WingControlTable, thrust_min_n: f32) -> TwccParameters {
+    TwccParameters {
+        position: PositionGains {
+            position_per_s: triple(&position.position_per_s),
+            velocity_per_s: triple(&position.velocity_per_s),
+            integral_per_s2: triple(&position.integral_per_s2),
+            derivative: triple(&position.derivative),
+            velocity_feed_forward: position.velocity_feed_forward.0 as f32,
+            acceleration_max_horizontal_m_s2: position.acceleration_max_horizontal_m_s2.0 as f32,
+            acceleration_max_vertical_m_s2: position.acceleration_max_vertical_m_s2.0 as f32,
+            integral_max_m: position.integral_max_m.0 as f32,
+            angle_law: match position.angle_law {
+                AngleLawName::SmallAngle => AngleLaw::SmallAngle,
+                AngleLawName::Exact => AngleLaw::Exact,
+            },
+        },
+        wing_events: WingEvents {
+            test: match wing.test {
+                WingTestName::Normal => WingTest::Normal,
+                WingTestName::Acceleration => WingTest::Acceleration,
+            },
+            open_above_n: wing.open_above_n.0 as f32,
+            close_below_n: wing.close_below_n.0 as f32,
+        },
+        thrust_law: match wing.thrust_law {
+            ThrustLawName::Literal => ThrustLaw::Literal,
+            ThrustLawName::Exact => ThrustLaw::Exact,
+        },
+        trigger: match wing.trigger {
+            TriggerName::Angle => Trigger::Angle,
+            TriggerName::AngleOrThrust => Trigger::AngleOrThrust,
+        },
+        // The arm of a flight chooses these two.
+        force_model: ForceModel::FlatPlate,
+        policy: WingPolicy::Folded,
+        dwell_s: wing.dwell_s.0 as f32,
+        thrust_min_n,
+    }
+}

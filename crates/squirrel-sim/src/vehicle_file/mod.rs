@@ -1,0 +1,133 @@
+//! Vehicle files: TOML in, checked vehicle, plant parameters and gains out.
+//!
+//! Any number may be plain or `{ value, sd, source }`. Unknown keys are refused. An error is one line that names the file,
+//! the field and the value.
+
+mod build;
+mod quantity;
+mod tables;
+
+pub use quantity::Provenance;
+
+use crate::plant::{BatteryParameters, WingPlant};
+use crate::sensors::SensorParameters;
+use squirrel_core::effects::Effects;
+use squirrel_core::stack::StackParameters;
+use squirrel_core::vehicle::Vehicle;
+use std::path::Path;
+
+/// The squirrel of the paper, as shipped.
+pub const SQUIRREL_TOML: &str = include_str!("../../../../vehicles/squirrel.toml");
+
+/// Everything that a vehicle file says.
+#[derive(Debug, Clone)]
+pub struct VehicleFile {
+    /// The file's name for the vehicle.
+    pub name: String,
+    /// The text of the file, kept for the log.
+    pub text: String,
+    /// Airframe.
+    pub vehicle: Vehicle<f64>,
+    /// Length, width, height, m.
+    pub size_body_m: [f64; 3],
+    /// How the wing behaves in the simulator.
+    pub wing: WingPlant,
+    /// Battery; without one the voltage stays at the reference.
+    pub battery: Option<BatteryParameters>,
+    /// Gains; a vehicle that is only analysed needs none.
+    pub control: Option<StackParameters>,
+    /// Sensors.
+    pub sensors: SensorParameters,
+    /// Effects on top of the base model.
+    pub effects: Effects<f64>,
+    /// Every number of the file by field.
+    pub provenance: Vec<(String, Provenance)>,
+}
+
+/// Why a vehicle file cannot be used; one line.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VehicleFileError {
+    /// The file could not be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// Path as given.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not TOML, or a key, type or name that the format does not have.
+    #[error("{file}, line {line}: {message} (in `{text}`)")]
+    Syntax {
+        /// Path as given.
+        file: String,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong.
+        message: String,
+        /// The line itself.
+        text: String,
+    },
+    /// A number that cannot be.
+    #[error("{file}: {problem}")]
+    Field {
+        /// Path as given.
+        file: String,
+        /// `field = value: reason`.
+        problem: String,
+    },
+}
+
+impl VehicleFile {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// One line that names the file, the field and the value.
+    pub fn load(path: &Path) -> Result<Self, VehicleFileError> {
+        let file = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Self::parse(&text, &file),
+            Err(source) => Err(VehicleFileError::Read { file, source }),
+        }
+    }
+
+    /// Checks the text of a file.
+    ///
+    /// * `file` - what errors call it
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse(text: &str, file: &str) -> Result<Self, VehicleFileError> {
+        let syntax = |error: &toml::de::Error| {
+            let place = crate::toml_text::place(text, error);
+            VehicleFileError::Syntax {
+                file: file.to_owned(),
+                line: place.line,
+                message: place.message,
+                text: place.text,
+            }
+        };
+        let tables: tables::VehicleTable = toml::from_str(text).map_err(|e| syntax(&e))?;
+        let raw: toml::Table = text.parse().map_err(|e| syntax(&e))?;
+        let built = build::build(tables);
+        let mut built = built.map_err(|problem| VehicleFileError::Field { file: file.to_owned(), problem })?;
+        text.clone_into(&mut built.text);
+        built.provenance = quantity::provenance(&raw);
+        Ok(built)
+    }
+
+    /// The shipped squirrel.
+    ///
+    /// # Panics
+    /// Never: a test parses the shipped file.
+    #[allow(clippy::expect_used, reason = "the text is part of the program and tested")]
+    pub fn squirrel() -> Self {
+        Self::parse(SQUIRREL_TOML, "squirrel.toml").expect("the shipped vehicle is sound")
+    }
+
+    /// Name of the source of a number that the file gives without provenance: `None` if it has one.
+    pub fn without_source(&self) -> impl Iterator<Item = &str> {
+        let bare = |p: &Provenance| p.source.is_none() && p.value.parse::<bool>().is_err();
+        self.provenance.iter().filter(move |(_, p)| bare(p)).map(|(field, _)| field.as_str())
+    }
+}
