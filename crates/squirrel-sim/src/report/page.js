@@ -14,10 +14,10 @@ for (const svg of document.querySelectorAll("svg.scene")) {
   });
   const draw = () => {
     const [sa, ca, se, ce] = [Math.sin(azimuth), Math.cos(azimuth), Math.sin(elevation), Math.cos(elevation)];
-    const zoom = Math.min(1, ((height - top) / 2 - edge) / (Math.hypot(halfE, halfN) * se + halfH * ce));
+    const zoom = Math.min(1, ((height - top - edge) / 2) / (Math.hypot(halfE, halfN) * se + halfH * ce));
     const view = ([e, n, h]) => {
       const [right, away] = [e * ca + n * sa, n * ca - e * sa];
-      const y = (height + top - edge / 2) / 2 - zoom * (h * ce + away * se);
+      const y = (height + top - edge) / 2 - zoom * (h * ce + away * se);
       return [(width / 2 + zoom * right).toFixed(1), y.toFixed(1), away * ce - h * se];
     };
     const order = [];

@@ -94,9 +94,10 @@ impl Page {
             self.add("<tr>");
             for i in 0..head.len() {
                 let text = row.cells.get(i).map_or("\u{2013}", |c| c.as_str());
-                let swatch = row.ink.filter(|_| i == 0).map_or(String::new(), |ink| {
-                    format!("<i class=\"swatch {}\"></i>", ink.class())
-                });
+                let swatch = row
+                    .ink
+                    .filter(|_| i == 0)
+                    .map_or(String::new(), |ink| format!("<i class=\"swatch {}\"></i>", ink.class()));
                 self.add(&format!("<td>{swatch}{}</td>", escape(text)));
             }
             self.add("</tr>\n");

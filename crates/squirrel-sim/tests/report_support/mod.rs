@@ -12,10 +12,11 @@ const MASS_KG: f64 = 0.548;
 const GRAVITY_M_S2: f64 = 9.81;
 
 /// Obstacles of the manoeuvre: north, east, radius, m.
-pub const OBSTACLES: [[f64; 3]; 2] = [[3.2, 4.0, 1.5], [-7.5, 6.0, 1.0]];
+pub(crate) const OBSTACLES: [[f64; 3]; 2] = [[3.2, 4.0, 1.5], [-7.5, 6.0, 1.0]];
 
 /// An arm: its name, the sideways acceleration that it can hold, m/s2, and whether it has wings.
-pub const ARMS: [(&str, f64, bool); 3] = [("pc", 5.2, false), ("twcc_flat", 7.0, true), ("twcc_parnn", 8.6, true)];
+pub(crate) const ARMS: [(&str, f64, bool); 3] =
+    [("pc", 5.2, false), ("twcc_flat", 7.0, true), ("twcc_parnn", 8.6, true)];
 
 /// North, east of the reference and its course: north, a quarter turn to the right, east.
 fn reference(time_s: f64) -> ([f64; 2], [f64; 2]) {
@@ -33,13 +34,15 @@ fn reference(time_s: f64) -> ([f64; 2], [f64; 2]) {
 }
 
 fn source(time_s: Vec<f64>, channels: Vec<(&str, usize, Vec<f64>)>) -> Source {
-    let channels =
-        channels.into_iter().map(|(name, width, values)| (name.to_owned(), Channel { width, values })).collect();
+    let channels = channels
+        .into_iter()
+        .map(|(name, width, values)| (name.to_owned(), Channel { width, values }))
+        .collect();
     Source { time_s, channels }
 }
 
 /// Flies one arm for `duration_s`.
-pub fn fly(hold_m_s2: f64, wings: bool, duration_s: f64) -> FlightLog {
+pub(crate) fn fly(hold_m_s2: f64, wings: bool, duration_s: f64) -> FlightLog {
     let samples = (duration_s * RATE_HZ) as usize + 1;
     let time: Vec<f64> = (0..samples).map(|i| i as f64 / RATE_HZ).collect();
     let (mut position, mut velocity) = ([-20.0, 0.0, 2.0], [SPEED_M_S, 0.0, 0.0]);
@@ -66,7 +69,13 @@ pub fn fly(hold_m_s2: f64, wings: bool, duration_s: f64) -> FlightLog {
             flag = f64::from(u8::from(wings && size > 4.8));
             let cos = (limit.min(size) / GRAVITY_M_S2).atan().min(30f64.to_radians()).cos();
             thrust_command = (MASS_KG * GRAVITY_M_S2 / cos + 0.9 * (2.0 - position[2])).clamp(2.0, 6.6);
-            let mode = if flag == 0.0 { 0.0 } else if thrust_command >= 6.6 { 2.0 } else { 1.0 };
+            let mode = if flag == 0.0 {
+                0.0
+            } else if thrust_command >= 6.6 {
+                2.0
+            } else {
+                1.0
+            };
             outer_time.push(t);
             for (channel, value) in outer.iter_mut().zip([flag, mode, thrust_command]) {
                 channel.push(value);
@@ -77,8 +86,11 @@ pub fn fly(hold_m_s2: f64, wings: bool, duration_s: f64) -> FlightLog {
         tilt_n += (wanted[0].clamp(-5.66, 5.66) / GRAVITY_M_S2 - tilt_n) * dt / 0.09;
         tilt_e += (wanted[1].clamp(-5.66, 5.66) / GRAVITY_M_S2 - tilt_e) * dt / 0.09;
         let more = 1.0 + open * (limit / 5.66 - 1.0).max(0.0);
-        let sink = -1.6 * (wanted[0].hypot(wanted[1]) / 9.0).powi(2) - 2.0 * velocity[2] + 2.0 * (2.0 - position[2]);
-        for (k, a) in [tilt_n * GRAVITY_M_S2 * more, tilt_e * GRAVITY_M_S2 * more, sink].into_iter().enumerate() {
+        let sink =
+            -1.6 * (wanted[0].hypot(wanted[1]) / 9.0).powi(2) - 2.0 * velocity[2] + 2.0 * (2.0 - position[2]);
+        for (k, a) in
+            [tilt_n * GRAVITY_M_S2 * more, tilt_e * GRAVITY_M_S2 * more, sink].into_iter().enumerate()
+        {
             velocity[k] += a * dt;
             position[k] += velocity[k] * dt;
         }
@@ -123,14 +135,14 @@ pub fn fly(hold_m_s2: f64, wings: bool, duration_s: f64) -> FlightLog {
 }
 
 /// The logs of all arms.
-pub fn logs(duration_s: f64) -> Vec<FlightLog> {
+pub(crate) fn logs(duration_s: f64) -> Vec<FlightLog> {
     ARMS.iter().map(|&(_, hold, wings)| fly(hold, wings, duration_s)).collect()
 }
 
 /// The views on these logs.
-pub fn views(logs: &[FlightLog]) -> Vec<FlightView<'_>> {
+pub(crate) fn views(logs: &[FlightLog]) -> Vec<FlightView<'_>> {
     let view = |(log, (arm, hold, _)): (_, &(&'static str, f64, bool))| FlightView {
-        arm: *arm,
+        arm,
         log,
         obstacles: &OBSTACLES,
         tilt_max_rad: 30f64.to_radians(),
@@ -147,7 +159,7 @@ pub fn views(logs: &[FlightLog]) -> Vec<FlightView<'_>> {
 }
 
 /// What stands above the panels.
-pub fn heading() -> Heading {
+pub(crate) fn heading() -> Heading {
     let fact = |name: &str, value: &str| (name.to_owned(), value.to_owned());
     Heading {
         title: "Quarter turn at 7 m/s, radius 5 m".to_owned(),

@@ -49,10 +49,10 @@ impl Series {
         let mut corners = Vec::with_capacity(self.x.len());
         let mut held = f64::NAN;
         for (&x, &y) in self.x.iter().zip(&self.y) {
-            if self.step {
+            if self.step && held != y {
                 corners.push([x, held]);
-                held = y;
             }
+            held = y;
             corners.push([x, y]);
         }
         corners
@@ -111,7 +111,7 @@ pub struct LineChart {
     pub spans: Vec<Span>,
     /// Strips below the plot.
     pub lanes: Vec<Lane>,
-    /// Charts of one link (a word without blanks) share a cursor; they should share the x range too.
+    /// Charts of one link share a cursor; they should share the x range too.
     pub link: Option<&'static str>,
 }
 
@@ -139,11 +139,13 @@ impl LineChart {
     /// Draws the chart.
     pub fn svg(&self) -> Svg {
         let legend = self.legend();
-        let top = 8.0 + legend.height();
+        let top = 12.0 + legend.height();
         let bottom = top + self.plot_height;
-        let lanes_bottom = bottom + if self.lanes.is_empty() { 0.0 } else { 6.0 } + LANE * self.lanes.len() as f64;
+        let lanes_bottom =
+            bottom + if self.lanes.is_empty() { 0.0 } else { 6.0 } + LANE * self.lanes.len() as f64;
         let mut canvas = Canvas::new(self.width, lanes_bottom + 38.0);
-        let plot = Plot { x: self.x_scale(), y: self.y_scale(), left: LEFT, right: self.width - RIGHT, top, bottom };
+        let plot =
+            Plot { x: self.x_scale(), y: self.y_scale(), left: LEFT, right: self.width - RIGHT, top, bottom };
 
         for span in &self.spans {
             draw_span(&mut canvas, &plot, span, "shade", top, self.plot_height);
@@ -206,7 +208,8 @@ impl LineChart {
     fn cursor(&self, plot: &Plot, bottom: f64) -> String {
         let Some(link) = self.link else { return String::new() };
         let [left, right, top, bottom] = [plot.left, plot.right, plot.top, bottom].map(px);
-        let (lo, hi, unit) = (plot.x.lo(), plot.x.hi(), escape(&self.x.unit));
+        let (lo, hi) = (plot.x.lo(), plot.x.hi());
+        let [link, unit] = [link, &self.x.unit].map(escape);
         format!(
             r#"data-link="{link}" data-box="{left},{top},{right},{bottom}" data-range="{lo:e},{hi:e}" data-unit="{unit}""#
         )

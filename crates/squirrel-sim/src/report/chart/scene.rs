@@ -52,13 +52,13 @@ pub struct Scene {
 }
 
 const WIDTH: f64 = 1160.0;
-const HEIGHT: f64 = 560.0;
-const TOP: f64 = 44.0;
-/// Room for labels around the box.
-const EDGE: f64 = 46.0;
+const HEIGHT: f64 = 550.0;
+const TOP: f64 = 40.0;
+/// Room for labels left, right and below.
+const EDGE: f64 = 40.0;
 /// First view: from the south-west, a little above.
 const AZIMUTH: f64 = -0.6;
-const ELEVATION: f64 = 0.5;
+const ELEVATION: f64 = 0.42;
 
 /// The box around everything and the way from metres to pixels around its middle.
 #[derive(Debug)]
@@ -90,7 +90,7 @@ impl Frame {
         let ((sin_a, cos_a), (sin_e, cos_e)) = (AZIMUTH.sin_cos(), ELEVATION.sin_cos());
         let zoom = self.zoom();
         let (right, away) = (e * cos_a + n * sin_a, n * cos_a - e * sin_a);
-        let middle = 0.5 * (HEIGHT + TOP - EDGE * 0.5);
+        let middle = 0.5 * (HEIGHT + TOP - EDGE);
         ([0.5 * WIDTH + zoom * right, middle - zoom * (h * cos_e + away * sin_e)], away * cos_e - h * sin_e)
     }
 
@@ -98,7 +98,7 @@ impl Frame {
     fn zoom(&self) -> f64 {
         let [e, n, h] = self.half;
         let (sin_e, cos_e) = ELEVATION.sin_cos();
-        let room = 0.5 * (HEIGHT - TOP) - EDGE;
+        let room = 0.5 * (HEIGHT - TOP - EDGE);
         (room / (e.hypot(n) * sin_e + h * cos_e)).min(1.0)
     }
 }
@@ -110,10 +110,15 @@ impl Scene {
         let mut canvas = Canvas::new(WIDTH, HEIGHT);
         draw_floor(&mut canvas, &frame);
         for track in self.tracks.iter().filter(|t| !t.dashed) {
+            let shadow = format!("shadow {}", track.ink.class());
             let floor = |p: &[f64; 3]| frame.place([p[0], p[1], frame.height.lo()]);
             let points = track.points.iter().map(floor).collect::<Vec<_>>();
             for stretch in stretches(&points, usize::MAX, |_| None) {
-                canvas.raw(&polyline(&frame, &format!("shadow {}", track.ink.class()), &stretch.1));
+                canvas.raw(&polyline(&frame, &shadow, &stretch.1));
+            }
+            // Stems tie the dots to the shadow: without them the eye cannot tell height from distance.
+            for mark in track.marks.iter().map(|m| frame.place(*m)).filter(|m| !m[0].is_nan()) {
+                canvas.raw(&polyline(&frame, &shadow, &[mark, [mark[0], mark[1], -frame.half[2]]]));
             }
         }
         canvas.raw(r#"<g class="solid">"#);
@@ -250,18 +255,19 @@ fn draw_floor(canvas: &mut Canvas, frame: &Frame) {
         canvas.raw(&polyline(frame, "grid", &[[-half_e, n, -half_h], [half_e, n, -half_h]]));
     }
     for (e, scale) in east.iter().zip(frame.east.ticks()) {
-        canvas.raw(&label(frame, 'e', *e, 18.0, "tick", &frame.east.label(*scale)));
+        canvas.raw(&label(frame, 'e', *e, 26.0, "tick", &frame.east.label(*scale)));
     }
     for (n, scale) in north.iter().zip(frame.north.ticks()) {
-        canvas.raw(&label(frame, 'n', *n, 18.0, "tick", &frame.north.label(*scale)));
+        canvas.raw(&label(frame, 'n', *n, 26.0, "tick", &frame.north.label(*scale)));
     }
-    for tick in frame.height.ticks() {
+    // The floor itself goes without a number: the corner below already carries those of the floor edges.
+    for tick in frame.height.ticks().iter().skip(1) {
         let h = (2.0 * frame.height.fraction(*tick) - 1.0) * half_h;
-        canvas.raw(&label(frame, 'h', h, 10.0, "tick", &frame.height.label(*tick)));
+        canvas.raw(&label(frame, 'h', h, 14.0, "tick", &frame.height.label(*tick)));
     }
-    canvas.raw(&label(frame, 'e', 0.0, 50.0, "axis", &Axis::new("east", "m").title()));
-    canvas.raw(&label(frame, 'n', 0.0, 50.0, "axis", &Axis::new("north", "m").title()));
-    canvas.raw(&label(frame, 'h', half_h + 20.0, 10.0, "axis", &Axis::new("height", "m").title()));
+    canvas.raw(&label(frame, 'e', 0.0, 62.0, "axis", &Axis::new("east", "m").title()));
+    canvas.raw(&label(frame, 'n', 0.0, 62.0, "axis", &Axis::new("north", "m").title()));
+    canvas.raw(&label(frame, 'h', half_h + 22.0, 14.0, "axis", &Axis::new("height", "m").title()));
 }
 
 /// A label `offset` px outside the edge of an axis (`e`, `n` or `h`) at `value` px along it.

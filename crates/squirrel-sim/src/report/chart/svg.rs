@@ -41,7 +41,7 @@ pub(super) fn px(value: f64) -> String {
 
 /// Width of a text in pixels, guessed on the safe side: the font is the reader's.
 pub(super) fn text_width(text: &str) -> f64 {
-    6.9 * text.chars().count() as f64
+    text.chars().map(|c| if "mwMW@".contains(c) { 12.0 } else { 7.2 }).sum()
 }
 
 /// Where a text stands relative to its point.
@@ -140,10 +140,8 @@ impl Canvas {
 
     pub(super) fn rect(&mut self, class: &str, x: f64, y: f64, width: f64, height: f64) {
         let (x, y, width, height) = (px(x), px(y), px(width), px(height));
-        let _ = write!(
-            self.body,
-            r#"<rect class="{class}" x="{x}" y="{y}" width="{width}" height="{height}"/>"#
-        );
+        let _ =
+            write!(self.body, r#"<rect class="{class}" x="{x}" y="{y}" width="{width}" height="{height}"/>"#);
     }
 
     pub(super) fn circle(&mut self, class: &str, centre: [f64; 2], radius: f64) {

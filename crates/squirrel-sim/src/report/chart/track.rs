@@ -66,6 +66,7 @@ pub struct TrackChart {
 const LEFT: f64 = 46.0;
 const RIGHT: f64 = 14.0;
 const BAR: f64 = 96.0;
+const TALLEST: f64 = 440.0;
 
 impl TrackChart {
     /// Draws the chart.
@@ -89,6 +90,11 @@ impl TrackChart {
         for track in &self.tracks {
             self.draw_track(&mut canvas, &plot, track);
         }
+        for track in &self.tracks {
+            for mark in track.marks.iter().map(|m| plot.point(*m)).filter(|m| !m[0].is_nan()) {
+                canvas.circle(&format!("dot {}", track.ink.class()), mark, 3.2);
+            }
+        }
         canvas.text("axis", [4.0, 12.0], Anchor::Start, &self.y.title());
         canvas.text("axis", [right, plot.bottom + 33.0], Anchor::End, &self.x.title());
         legend.draw(&mut canvas, plot.bottom + 33.0);
@@ -105,13 +111,19 @@ impl TrackChart {
         let y = range(&self.y, self.coordinates(1));
         let intervals = |px: f64| ((px / 55.0) as usize).clamp(2, 10);
         if let Some(height) = self.plot_height {
-            return (Scale::exact(x[0], x[1], intervals(width)), self.y.scale(self.coordinates(1), 4), height);
+            return (
+                Scale::exact(x[0], x[1], intervals(width)),
+                self.y.scale(self.coordinates(1), 4),
+                height,
+            );
         }
         // A sane scale has a positive finite span, whatever the data.
-        let spans = [x, y].map(|r| Scale::exact(r[0], r[1], 2)).map(|s| [f64::midpoint(s.lo(), s.hi()), s.hi() - s.lo()]);
+        let spans = [x, y]
+            .map(|r| Scale::exact(r[0], r[1], 2))
+            .map(|s| [f64::midpoint(s.lo(), s.hi()), s.hi() - s.lo()]);
         let [[x_middle, x_span], [y_middle, y_span]] = spans;
         // Equal scales: a long narrow track gets air on its sides instead of a very tall or flat plot.
-        let height = width * (y_span / x_span).clamp(0.4, 1.3);
+        let height = (width * (y_span / x_span).clamp(0.4, 1.3)).min(TALLEST);
         let per_px = (x_span / width).max(y_span / height);
         let scale = |middle: f64, px: f64| {
             let half = 0.5 * px * per_px;
@@ -142,13 +154,10 @@ impl TrackChart {
                 let gap = |i: usize| points[kept[i]][0].is_nan() || points[kept[i + 1]][0].is_nan();
                 for run in runs(kept.len(), usize::MAX, bin, gap) {
                     let class = run.bin.map_or_else(|| "muted".to_owned(), |bin| format!("v{bin}"));
-                    canvas.path(&format!("track {class}{dashed}"), &path(&kept[run.first..=run.last]));
+                    canvas.path(&format!("track {class}"), &path(&kept[run.first..=run.last]));
                 }
             }
             _ => canvas.path(&format!("line {}{dashed}", track.ink.class()), &path(&kept)),
-        }
-        for mark in track.marks.iter().map(|m| plot.point(*m)).filter(|m| !m[0].is_nan()) {
-            canvas.circle(&format!("dot {}", track.ink.class()), mark, 3.2);
         }
     }
 }

@@ -1,6 +1,7 @@
 //! From a flight log to the curves of the report. What the log lacks comes back as a sentence, not as a failure.
 
 use crate::log::{Channel, FlightLog};
+use crate::report::chart::drawable;
 
 /// A number over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,8 +103,12 @@ pub(super) fn wings(log: &FlightLog, name: &str) -> Result<Curve, Lack> {
 /// Distances to the reference at the times of the flown path; NaN outside the reference.
 pub(super) fn errors(log: &FlightLog) -> Result<Errors, Lack> {
     let (flown, reference) = (flown(log)?, reference(log)?);
-    let mut errors =
-        Errors { time_s: flown.time_s, distance_m: Vec::new(), horizontal_m: Vec::new(), height_m: Vec::new() };
+    let mut errors = Errors {
+        time_s: flown.time_s,
+        distance_m: Vec::new(),
+        horizontal_m: Vec::new(),
+        height_m: Vec::new(),
+    };
     for (&time, p) in errors.time_s.iter().zip(&flown.points) {
         let r = reference.at(time);
         let (north, east, height) = (p[0] - r[0], p[1] - r[1], p[2] - r[2]);
@@ -130,11 +135,32 @@ impl Path {
         [0, 1, 2].map(|axis| p0[axis] + share * (p1[axis] - p0[axis]))
     }
 
-    /// The first point at or after each multiple of `every_s`.
-    pub(super) fn marks(&self, every_s: f64) -> Vec<[f64; 3]> {
-        let count = |t: f64| (t / every_s + 1e-6).floor();
-        let crossed = |w: &[f64]| count(w[1]) > count(w[0]);
-        self.time_s.windows(2).zip(&self.points[1..]).filter(|(w, _)| crossed(w)).map(|(_, p)| *p).collect()
+    /// Index of the first point at or after each multiple of `every_s`.
+    pub(super) fn marks(&self, every_s: f64) -> Vec<usize> {
+        let count = |i: usize| (self.time_s[i] / every_s + 1e-6).floor();
+        (1..self.time_s.len()).filter(|&i| count(i) > count(i - 1)).collect()
+    }
+
+    /// Horizontal distance flown up to each point, m; a gap counts as a straight line.
+    pub(super) fn distances(&self) -> Vec<f64> {
+        let (mut sum, mut last) = (0.0, None::<[f64; 2]>);
+        let step = |p: &[f64; 3]| {
+            let here = [p[0], p[1]];
+            if here.into_iter().all(drawable) {
+                sum += last.map_or(0.0, |l| (here[0] - l[0]).hypot(here[1] - l[1]));
+                last = Some(here);
+            }
+            sum
+        };
+        self.points.iter().map(step).collect()
+    }
+
+    /// Distance flown where the path is nearest to a point (north, east, m); `None` for a path without points.
+    pub(super) fn nearest(&self, [north, east]: [f64; 2]) -> Option<f64> {
+        let away = |p: &[f64; 3]| (p[0] - north).hypot(p[1] - east);
+        let distances =
+            self.points.iter().map(away).zip(self.distances()).filter(|(away, _)| drawable(*away));
+        distances.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, flown)| flown)
     }
 }
 

@@ -52,7 +52,10 @@ pub fn render(heading: &Heading, flights: &[FlightView<'_>]) -> String {
 
 /// The table of arms: the columns of all summaries in the order in which they first appear.
 fn arms(page: &mut Page, flights: &[FlightView<'_>]) {
-    page.section("Arms", "Look for the column in which the arms differ most; the panels below show where it comes from.");
+    page.section(
+        "Arms",
+        "Look for the column in which the arms differ most; the panels below show where it comes from.",
+    );
     let mut head = vec!["arm".to_owned()];
     for (name, _) in flights.iter().flat_map(|f| &f.summary) {
         if !head[1..].contains(name) {

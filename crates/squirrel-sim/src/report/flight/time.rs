@@ -70,18 +70,21 @@ impl Time<'_> {
         self.all(&mut chart, &mut notes, |flight| tilt_deg(flight.log));
         let limits = self.flights.iter().map(|f| (f.tilt_max_rad, f.tilt_max_rad.to_degrees()));
         chart.limits = distinct_limits(limits, "deg");
-        let caption = "Look for arms that sit at the limit: they ask for more sideways force than tilt can give.";
+        let caption =
+            "Look for arms that sit at the limit: they ask for more sideways force than tilt can give.";
         figure("Tilt", caption, &chart, notes)
     }
 
     fn thrust(&self) -> Figure {
-        let y = Axis::new("thrust", "N").with_range(Range::Including(0.0, 1.0));
+        let y = Axis::new("thrust", "N");
         let (mut chart, mut notes) = (self.chart("collective thrust over time", Columns::Two, y), Vec::new());
         for (i, flight) in self.flights.iter().enumerate() {
-            // The inner loop is the same quantity at its own rate: worth a thin line, not worth a note.
-            if let Ok(curve) = scalar(flight.log, "control.inner.thrust_n") {
-                let line = Series::line("", Ink::Series(i), curve.time_s, curve.values);
-                chart.series.push(Series { pale: true, ..line });
+            match scalar(flight.log, "control.inner.thrust_n") {
+                Ok(c) => {
+                    let line = Series::line("", Ink::Series(i), c.time_s, c.values);
+                    chart.series.push(Series { pale: true, ..line });
+                }
+                Err(lack) => notes.push(lacks(flight, &lack)),
             }
         }
         for (i, flight) in self.flights.iter().enumerate() {
@@ -97,7 +100,7 @@ impl Time<'_> {
     }
 
     fn wings(&self, i: usize, flight: &FlightView<'_>, columns: Columns) -> Figure {
-        let y = Axis::new("open", "").with_range(Range::Including(0.0, 1.0));
+        let y = Axis::new("deployment", "").with_range(Range::Including(0.0, 1.0));
         let mut chart = self.chart(&format!("{}: wings, flag and mode over time", flight.arm), columns, y);
         chart.plot_height = 130.0;
         let mut notes = Vec::new();
@@ -111,7 +114,7 @@ impl Time<'_> {
             Err(lack) => note(&lack),
         }
         match scalar(flight.log, "control.outer.flag") {
-            Ok(c) => chart.spans = spans(&c, |v| (v > 0.5).then_some((Ink::Highlight, "flag"))),
+            Ok(c) => chart.spans = flags(&c),
             Err(lack) => note(&lack),
         }
         match scalar(flight.log, "control.outer.mode") {
@@ -128,7 +131,8 @@ impl Time<'_> {
             for (i, (flight, errors)) in self.flights.iter().zip(&read).enumerate() {
                 match errors {
                     Ok(e) => {
-                        let line = Series::line(flight.arm, Ink::Series(i), e.time_s.clone(), pick(e).clone());
+                        let line =
+                            Series::line(flight.arm, Ink::Series(i), e.time_s.clone(), pick(e).clone());
                         chart.series.push(line);
                     }
                     Err(lack) => notes.push(lacks(flight, lack)),
@@ -152,10 +156,16 @@ impl Time<'_> {
     fn speed(&self, columns: Columns) -> Figure {
         let y = Axis::new("speed", "m/s").with_range(Range::Including(0.0, 1.0));
         let (mut chart, mut notes) = (self.chart("speed over time", columns, y), Vec::new());
-        let reference = self.flights.iter().find_map(|f| speed(f.log, "reference").ok());
-        if let Some(curve) = reference {
-            let line = Series::line("reference", Ink::Reference, curve.time_s, curve.values);
-            chart.series.push(Series { dashed: true, ..line });
+        for flight in self.flights {
+            match speed(flight.log, "reference") {
+                // All arms fly the same reference: one line stands for all.
+                Ok(c) if chart.series.is_empty() => {
+                    let line = Series::line("reference", Ink::Reference, c.time_s, c.values);
+                    chart.series.push(Series { dashed: true, ..line });
+                }
+                Ok(_) => {}
+                Err(lack) => notes.push(lacks(flight, &lack)),
+            }
         }
         self.all(&mut chart, &mut notes, |flight| speed(flight.log, "truth"));
         figure("Speed", "Look for arms that brake where the reference does not.", &chart, notes)
@@ -189,12 +199,23 @@ fn spans(curve: &Curve, meaning: impl Fn(f64) -> Option<(Ink, &'static str)>) ->
     named.map(|(from, to, (ink, name))| Span { from, to, ink, name: name.to_owned() }).collect()
 }
 
+/// A span of no length: names a state that may never come, so that the legends, and the plots below them, align from arm
+/// to arm.
+fn never(ink: Ink, name: &str) -> Span {
+    Span { from: 0.0, to: 0.0, ink, name: name.to_owned() }
+}
+
+/// When the outer loop found that wings would help.
+fn flags(flag: &Curve) -> Vec<Span> {
+    let (ink, name) = (Ink::Highlight, "flag");
+    let on = spans(flag, |value| (value > 0.5).then_some((ink, name)));
+    std::iter::once(never(ink, name)).chain(on).collect()
+}
+
 /// What the outer loop did: 0 position control, 1 wings in control, 2 thrust at its limit.
 fn lane(modes: &Curve) -> Lane {
     let inks = [(Ink::Muted, "pc"), (Ink::Reference, "wiic"), (Ink::Limit, "thrust limit")];
     let meaning = |mode: f64| (0..inks.len()).find(|&i| i as f64 == mode).map(|i| inks[i]);
-    // Spans of no length name the modes that never came: legends, and so plots, then align from arm to arm.
-    let (from, to) = (0.0, 0.0);
-    let names = inks.map(|(ink, name)| Span { from, to, ink, name: name.to_owned() });
+    let names = inks.map(|(ink, name)| never(ink, name));
     Lane { label: "mode".to_owned(), spans: names.into_iter().chain(spans(modes, meaning)).collect() }
 }

@@ -23,8 +23,6 @@ struct Tracks<'a> {
     mark_every_s: f64,
     /// Extent of north, east and height over all arms, references and obstacles, m.
     extents: [(f64, f64); 3],
-    /// The horizontal axis of the side view, 0 north or 1 east: the one along which the arms flew farther.
-    along: usize,
 }
 
 const NAMES: [&str; 3] = ["north", "east", "height"];
@@ -37,8 +35,8 @@ pub(super) fn add(page: &mut Page, flights: &[FlightView<'_>]) {
     page.section(
         "From above and from the side",
         &format!(
-            "Look for the distance to the obstacle and for speed lost in the turn (a dot every {} s); seen from above both \
-             scales are equal, seen from the side height is stretched.",
+            "Look for the distance to the obstacle and for height or speed lost in the turn (a dot every {} s); the side view \
+             unrolls the track, stretches height, and has an obstacle where the arm passes it.",
             tracks.mark_every_s
         ),
     );
@@ -75,11 +73,11 @@ impl<'a> Tracks<'a> {
         });
         let speeds = || flown.iter().filter_map(|f| f.speed.as_ref().ok()).flatten().copied();
         let values = extent(speeds()).map(|_| Values::new(&Axis::new("speed", "m/s"), speeds()));
-        let times = extent(flown.iter().filter_map(|f| f.path.as_ref().ok()).flat_map(|p| p.time_s.iter().copied()));
+        let times =
+            extent(flown.iter().filter_map(|f| f.path.as_ref().ok()).flat_map(|p| p.time_s.iter().copied()));
         let duration = times.map_or(1.0, |(from, to)| to - from);
-        let along = usize::from(extents[1].1 - extents[1].0 > extents[0].1 - extents[0].0);
         let mark_every_s = Scale::nice(0.0, duration, 15).step().max(1.0);
-        Self { flights, flown, values, mark_every_s, extents, along }
+        Self { flights, flown, values, mark_every_s, extents }
     }
 
     fn axis(&self, axis: usize) -> Axis {
@@ -107,7 +105,7 @@ impl<'a> Tracks<'a> {
                 dashed: false,
                 points: path.points.clone(),
                 values: flown.speed.clone().unwrap_or_default(),
-                marks: path.marks(self.mark_every_s),
+                marks: path.marks(self.mark_every_s).into_iter().map(|i| path.points[i]).collect(),
             });
         }
         let mut cylinders: Vec<Cylinder> = Vec::new();
@@ -133,28 +131,52 @@ impl<'a> Tracks<'a> {
     fn above(&self, i: usize, columns: Columns) -> Svg {
         let obstacles = self.flights[i].obstacles.iter();
         let discs = obstacles.map(|o| Obstacle::Disc { centre: [o[1], o[0]], radius: o[2] });
-        self.view(i, "from above", columns, [1, 0], discs.collect())
+        let [north, east] = [self.axis(0), self.axis(1)];
+        let flat = |path: &Path| path.points.iter().map(|p| [p[1], p[0]]).collect();
+        self.view(i, "from above", columns, (east, north), &flat, discs.collect())
     }
 
+    /// The track unrolled: height over the distance flown. An obstacle stands where the arm passes it.
     fn side(&self, i: usize, columns: Columns) -> Svg {
-        let (along, obstacles) = (self.along, self.flights[i].obstacles.iter());
-        let uprights = obstacles.map(|o| Obstacle::Column { x: [o[along] - o[2], o[along] + o[2]] });
-        self.view(i, "from the side", columns, [along, 2], uprights.collect())
+        let paths = || self.flown.iter().flat_map(|f| f.path.iter().chain(&f.reference));
+        let longest = extent(paths().flat_map(Path::distances)).map_or(1.0, |(_, longest)| longest);
+        let distance = Axis::new("distance flown", "m").with_range(Range::Including(0.0, longest));
+        let mut columns_passed = Vec::new();
+        if let Ok(path) = &self.flown[i].path {
+            let passed =
+                self.flights[i].obstacles.iter().filter_map(|o| Some((path.nearest([o[0], o[1]])?, o[2])));
+            columns_passed
+                .extend(passed.map(|(at, radius)| Obstacle::Column { x: [at - radius, at + radius] }));
+        }
+        let flat =
+            |path: &Path| path.distances().into_iter().zip(&path.points).map(|(d, p)| [d, p[2]]).collect();
+        self.view(i, "from the side", columns, (distance, self.axis(2)), &flat, columns_passed)
     }
 
-    /// The track of arm `i` projected on two axes.
-    fn view(&self, i: usize, what: &str, columns: Columns, axes: [usize; 2], obstacles: Vec<Obstacle>) -> Svg {
-        let flat = |points: &[[f64; 3]]| points.iter().map(|p| axes.map(|axis| p[axis])).collect::<Vec<_>>();
+    /// The track of arm `i` and its reference as `flat` projects them.
+    fn view(
+        &self,
+        i: usize,
+        what: &str,
+        columns: Columns,
+        (x, y): (Axis, Axis),
+        flat: &dyn Fn(&Path) -> Vec<[f64; 2]>,
+        obstacles: Vec<Obstacle>,
+    ) -> Svg {
         let flown = &self.flown[i];
+        // Alone the side view stands beside the view from above, otherwise below it.
+        let beside = if self.flights.len() == 1 { 360.0 } else { 135.0 };
+        let plot_height = (y.label == NAMES[2]).then_some(beside);
         let mut tracks = Vec::new();
         if let Ok(path) = &flown.path {
+            let points = flat(path);
             tracks.push(Track {
                 name: String::new(),
                 ink: Ink::Series(i),
                 dashed: false,
-                points: flat(&path.points),
+                marks: path.marks(self.mark_every_s).into_iter().map(|i| points[i]).collect(),
+                points,
                 values: flown.speed.clone().unwrap_or_default(),
-                marks: flat(&path.marks(self.mark_every_s)),
             });
         }
         if let Ok(reference) = &flown.reference {
@@ -162,7 +184,7 @@ impl<'a> Tracks<'a> {
                 name: "reference".to_owned(),
                 ink: Ink::Reference,
                 dashed: true,
-                points: flat(&reference.points),
+                points: flat(reference),
                 values: Vec::new(),
                 marks: Vec::new(),
             });
@@ -170,9 +192,9 @@ impl<'a> Tracks<'a> {
         TrackChart {
             label: format!("{} {what}", self.flights[i].arm),
             width: columns.width(),
-            plot_height: (axes[1] == 2).then_some(0.36 * columns.width()),
-            x: self.axis(axes[0]),
-            y: self.axis(axes[1]),
+            plot_height,
+            x,
+            y,
             tracks,
             obstacles,
             values: self.values.clone(),
