@@ -71,7 +71,7 @@ impl Values {
         }
         for &tick in self.scale.ticks() {
             let x = left + width * self.scale.fraction(tick);
-            canvas.text("tick", [x, y + 22.0], Anchor::Middle, &self.scale.label(tick));
+            canvas.text("tick", [x, y + 24.0], Anchor::Middle, &self.scale.label(tick));
         }
         canvas.text("axis", [left - 10.0, y + 9.0], Anchor::End, &self.title);
     }

@@ -154,7 +154,7 @@ impl Time<'_> {
     }
 
     fn speed(&self, columns: Columns) -> Figure {
-        let y = Axis::new("speed", "m/s").with_range(Range::Including(0.0, 1.0));
+        let y = Axis::new("speed", "m/s");
         let (mut chart, mut notes) = (self.chart("speed over time", columns, y), Vec::new());
         for flight in self.flights {
             match speed(flight.log, "reference") {
