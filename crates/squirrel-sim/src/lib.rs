@@ -1,3 +1,4 @@
 //! The simulator of squirrel: plant, world, sensors, flight log and import.
 pub mod import;
 pub mod log;
+pub mod report;
