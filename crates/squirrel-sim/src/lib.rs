@@ -1,4 +1,20 @@
-//! The simulator of squirrel: plant, world, sensors, flight log and import.
+//! The simulator of squirrel: plant, world, sensors, flight log, import of foreign logs, reports.
+//!
+//! - [`flight`] closes the loop: [`plant`] (and [`world`] near contact) moves, [`sensors`] measure, the flight code of
+//!   `squirrel-core` commands, the log records. [`replay`] runs the flight code again on a log's inputs.
+//! - [`vehicle_file`] and [`scenario`] read what to fly; [`arm`] says who flies.
+//! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it.
+
+pub mod arm;
+pub mod flight;
 pub mod import;
 pub mod log;
+pub mod plant;
+pub mod replay;
 pub mod report;
+pub mod scenario;
+pub mod sensors;
+mod toml_text;
+pub mod vehicle_file;
+#[cfg(feature = "rapier")]
+pub mod world;

@@ -47,6 +47,8 @@ pub struct Steering {
     pub min_rad: f32,
     /// Largest turn, rad.
     pub max_rad: f32,
+    /// Time to reach the target speed after the turn, s.
+    pub ramp_s: f32,
     /// Turn to either side, drawn from the seed too.
     pub both_sides: bool,
     /// Seed of the draw.
@@ -74,9 +76,10 @@ impl Mission {
             Self::Avoid { run, sensing, steering } => {
                 positive("speed_m_s", run.speed_m_s)?;
                 positive("ramp_s", run.ramp_s)?;
+                positive("turn_ramp_s", steering.ramp_s)?;
                 sensing.check()?;
                 for (field, angle) in
-                    [("steering.min_rad", steering.min_rad), ("steering.max_rad", steering.max_rad)]
+                    [("steering_min_rad", steering.min_rad), ("steering_max_rad", steering.max_rad)]
                 {
                     if !(angle.abs() <= core::f32::consts::PI) {
                         return Err(ParameterError::of(field, angle, "must be within half a turn"));
@@ -110,8 +113,12 @@ impl Mission {
         };
         let course = libm::atan2f(velocity.vector.y, velocity.vector.x);
         let start = In::new(Vector3::new(position.vector.x, position.vector.y, run.start.vector.z));
-        let turned =
-            Trajectory { start, course_rad: wrap_angle(course + steering.angle(state.encounters)), ..*run };
+        let turned = Trajectory {
+            start,
+            course_rad: wrap_angle(course + steering.angle(state.encounters)),
+            speed_m_s: run.speed_m_s,
+            ramp_s: steering.ramp_s,
+        };
         state.turned = Some((turned, time_us));
         state.handled = Some(seen);
         state.encounters = state.encounters.wrapping_add(1);
@@ -179,7 +186,7 @@ mod tests {
                 ramp_s: 2.0,
             },
             sensing: Sensing { range_m: 5.0, half_view_rad: 0.2618, speed_min_m_s: 1.0 },
-            steering: Steering { min_rad: 1.92, max_rad: 2.27, both_sides: false, seed: 3 },
+            steering: Steering { min_rad: 1.92, max_rad: 2.27, ramp_s: 2.0, both_sides: false, seed: 3 },
         }
     }
 
@@ -208,7 +215,7 @@ mod tests {
 
     #[test]
     fn steering_angles_fill_their_range_and_both_sides() {
-        let steering = Steering { min_rad: 1.0, max_rad: 2.0, both_sides: true, seed: 1 };
+        let steering = Steering { min_rad: 1.0, max_rad: 2.0, ramp_s: 2.0, both_sides: true, seed: 1 };
         let angles: Vec<f32> = (0..1000).map(|n| steering.angle(n)).collect();
         assert!(angles.iter().all(|a| (1.0..=2.0).contains(&a.abs())));
         let right = angles.iter().filter(|a| **a > 0.0).count();

@@ -34,9 +34,9 @@ impl Sensing {
     /// # Errors
     /// A number that is not finite and positive, by its name in a scenario.
     pub fn check(&self) -> Result<(), ParameterError> {
-        crate::vehicle::positive("sensing.range_m", self.range_m)?;
-        crate::vehicle::positive("sensing.half_view_rad", self.half_view_rad)?;
-        crate::vehicle::positive("sensing.speed_min_m_s", self.speed_min_m_s)
+        crate::vehicle::positive("range_m", self.range_m)?;
+        crate::vehicle::positive("half_view_rad", self.half_view_rad)?;
+        crate::vehicle::positive("speed_min_m_s", self.speed_min_m_s)
     }
 
     /// The nearest obstacle in range and view other than `handled`.

@@ -1,0 +1,85 @@
+//! Arms: who flies. Each pairs a controller with a plant, so that what a gain comes from can be told apart.
+
+use crate::plant::WingPlant;
+use squirrel_core::control::twcc::{ForceModel, TwccParameters, WingPolicy};
+
+/// A controller and what it flies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Arm {
+    /// The primary controller, wings folded.
+    Pc,
+    /// The primary controller, wings always open.
+    PcWingsOpen,
+    /// WIIC's thrust law with a wing force of zero, wings folded.
+    WiicNoWings,
+    /// The controller of [`Arm::TwccFlat`]; the plant has no wings.
+    Phantom,
+    /// TWCC that believes in the flat plate.
+    TwccFlat,
+    /// TWCC that is told what the plant's wing would do.
+    TwccOracle,
+}
+
+impl Arm {
+    /// All arms.
+    pub const ALL: [Self; 6] =
+        [Self::Pc, Self::PcWingsOpen, Self::WiicNoWings, Self::Phantom, Self::TwccFlat, Self::TwccOracle];
+
+    /// Name on the command line and in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Pc => "pc",
+            Self::PcWingsOpen => "pc_wings_open",
+            Self::WiicNoWings => "wiic_no_wings",
+            Self::Phantom => "phantom",
+            Self::TwccFlat => "twcc_flat",
+            Self::TwccOracle => "twcc_oracle",
+        }
+    }
+
+    /// The arm of a name.
+    ///
+    /// # Errors
+    /// One line that lists the names.
+    pub fn parse(name: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|arm| arm.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            format!("arm = {name}: no such arm; known are {names}")
+        })
+    }
+
+    /// Gives the flight code this arm's policy.
+    pub fn configure(self, twcc: &mut TwccParameters) {
+        twcc.policy = match self {
+            Self::Pc => WingPolicy::Folded,
+            Self::PcWingsOpen => WingPolicy::Open,
+            Self::WiicNoWings => WingPolicy::CoordinatedWithoutWings,
+            Self::Phantom | Self::TwccFlat | Self::TwccOracle => WingPolicy::Coordinated,
+        };
+        twcc.force_model =
+            if self.is_told_the_force() { ForceModel::Given } else { ForceModel::FlatPlate };
+    }
+
+    /// The wing that the plant of this arm has.
+    pub fn plant_wing(self, wing: &WingPlant) -> WingPlant {
+        if self == Self::Phantom { WingPlant::None } else { wing.clone() }
+    }
+
+    /// Whether the simulator tells the flight code what the wings would do.
+    pub fn is_told_the_force(self) -> bool {
+        self == Self::TwccOracle
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_arms_are_one_to_one() {
+        for arm in Arm::ALL {
+            assert_eq!(Arm::parse(arm.name()), Ok(arm));
+        }
+        assert!(Arm::parse("twcc").unwrap_err().contains("twcc_flat"));
+    }
+}

@@ -1,0 +1,137 @@
+//! What a flight amounted to.
+
+use super::integrator::Contact;
+use crate::plant::PlantState;
+use crate::scenario::Scenario;
+use squirrel_core::control::twcc::Mode;
+use squirrel_core::nalgebra::Vector2;
+use squirrel_core::stack::StackOutput;
+
+/// Figures of one flight, over the measured window.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Metrics {
+    /// Root mean square of the distance to the reference, m.
+    pub rmse_m: f64,
+    /// The same without height, m.
+    pub rmse_horizontal_m: f64,
+    /// Largest sink below the reference height, m.
+    pub height_lost_m: f64,
+    /// Largest climb above the reference height, m.
+    pub height_gained_m: f64,
+    /// Time with wings more than half spread, s.
+    pub wings_open_s: f64,
+    /// Time in which WIIC flew, s.
+    pub wiic_s: f64,
+    /// Smallest distance to the surface of an obstacle, m; negative inside; absent without obstacles.
+    pub clearance_m: Option<f64>,
+    /// Length of the measured window, s.
+    pub window_s: f64,
+    /// Obstacles that were avoided, or tried to.
+    pub encounters: u32,
+    /// Time of the first contact with ground or an obstacle, s.
+    pub contact_s: Option<f64>,
+}
+
+/// Collects [`Metrics`].
+pub(super) struct Meter<'a> {
+    scenario: &'a Scenario,
+    start_us: Option<u64>,
+    last_us: u64,
+    over: bool,
+    samples: u64,
+    square: f64,
+    square_horizontal: f64,
+    wings_us: u64,
+    wiic_us: u64,
+    mode: Mode,
+    metrics: Metrics,
+}
+
+impl<'a> Meter<'a> {
+    pub(super) fn new(scenario: &'a Scenario) -> Self {
+        let metrics = Metrics {
+            rmse_m: 0.0,
+            rmse_horizontal_m: 0.0,
+            height_lost_m: 0.0,
+            height_gained_m: 0.0,
+            wings_open_s: 0.0,
+            wiic_s: 0.0,
+            clearance_m: None,
+            window_s: 0.0,
+            encounters: 0,
+            contact_s: None,
+        };
+        Self {
+            scenario,
+            start_us: None,
+            last_us: 0,
+            over: false,
+            samples: 0,
+            square: 0.0,
+            square_horizontal: 0.0,
+            wings_us: 0,
+            wiic_us: 0,
+            mode: Mode::Primary,
+            metrics,
+        }
+    }
+
+    pub(super) fn tick(&mut self, time_us: u64, state: &PlantState, output: &StackOutput, encounters: u32) {
+        let step_us = time_us - self.last_us;
+        self.last_us = time_us;
+        self.metrics.encounters = encounters;
+        if let Some(outer) = &output.outer {
+            self.mode = outer.mode;
+        }
+        let at = state.body.position.vector;
+        for [north, east, radius] in &self.scenario.obstacles {
+            let clearance = Vector2::new(north - at.x, east - at.y).norm() - radius;
+            if self.metrics.clearance_m.is_none_or(|c| clearance < c) {
+                self.metrics.clearance_m = Some(clearance);
+            }
+        }
+        let windowed = self.scenario.measured_window_s > 0.0;
+        if self.start_us.is_none() && (!windowed || encounters > 0) {
+            self.start_us = Some(time_us);
+        }
+        let Some(start_us) = self.start_us else { return };
+        let elapsed_s = (time_us - start_us) as f64 * 1e-6;
+        if windowed && elapsed_s > self.scenario.measured_window_s {
+            self.over = true;
+            return;
+        }
+        let error = at - output.reference.position.vector.cast::<f64>();
+        self.samples += 1;
+        self.square += error.norm_squared();
+        self.square_horizontal += error.xy().norm_squared();
+        self.metrics.window_s = elapsed_s;
+        self.metrics.height_lost_m = self.metrics.height_lost_m.max(error.z);
+        self.metrics.height_gained_m = self.metrics.height_gained_m.max(-error.z);
+        if state.servo[0].deployment + state.servo[1].deployment > 1.0 {
+            self.wings_us += step_us;
+        }
+        if self.mode == Mode::Wiic {
+            self.wiic_us += step_us;
+        }
+    }
+
+    pub(super) fn contact(&mut self, contact: Contact) {
+        if contact == Contact::Touching && self.metrics.contact_s.is_none() {
+            self.metrics.contact_s = Some(self.last_us as f64 * 1e-6);
+        }
+    }
+
+    /// The measured window has passed.
+    pub(super) fn is_over(&self) -> bool {
+        self.over
+    }
+
+    pub(super) fn finish(mut self) -> Metrics {
+        let n = self.samples.max(1) as f64;
+        self.metrics.rmse_m = (self.square / n).sqrt();
+        self.metrics.rmse_horizontal_m = (self.square_horizontal / n).sqrt();
+        self.metrics.wings_open_s = self.wings_us as f64 * 1e-6;
+        self.metrics.wiic_s = self.wiic_us as f64 * 1e-6;
+        self.metrics
+    }
+}

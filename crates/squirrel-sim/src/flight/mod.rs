@@ -1,0 +1,197 @@
+//! Flights: plant, sensors and flight code in closed loop.
+//!
+//! The plant steps at its own rate (1 kHz by default); the flight code runs at the first plant step at or after each
+//! 1/300 s, wind and sensors are sampled there. Everything random comes from the scenario's seed.
+
+mod integrator;
+mod metrics;
+mod record;
+
+pub use integrator::Integrator;
+pub use metrics::Metrics;
+pub use record::{INPUT_SOURCES, frames};
+pub(crate) use record::record_output;
+
+use crate::arm::Arm;
+use crate::log::FlightLog;
+use crate::plant::{Plant, PlantState, Wind};
+use crate::scenario::Scenario;
+use crate::sensors::{Sensors, Truth};
+use crate::vehicle_file::VehicleFile;
+use integrator::Mover;
+use squirrel_core::dynamics::{State, specific_force};
+use squirrel_core::frames::{In, Ned};
+use squirrel_core::guidance::sensing::Obstacle;
+use squirrel_core::nalgebra::Vector3;
+use squirrel_core::stack::{MAX_OBSTACLES, Stack, StackState};
+use squirrel_core::vehicle::MAX_ROTORS;
+
+/// Rate of the flight code, Hz (paper, section III.A).
+pub const CONTROL_RATE_HZ: u64 = 300;
+/// Default step of the plant, us.
+pub const PLANT_STEP_US: u64 = 1000;
+/// Obstacles further than this are not handed to the flight code, m.
+const OBSTACLE_HORIZON_M: f64 = 50.0;
+
+/// What to fly.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// Vehicle.
+    pub vehicle: VehicleFile,
+    /// Controller and plant pairing.
+    pub arm: Arm,
+    /// Mission, air, obstacles, seed.
+    pub scenario: Scenario,
+    /// What moves the body.
+    pub integrator: Integrator,
+}
+
+/// A flight that was flown.
+#[derive(Debug, Clone)]
+pub struct Flight {
+    /// What it amounted to.
+    pub metrics: Metrics,
+    /// The log, if one was asked for.
+    pub log: Option<FlightLog>,
+}
+
+/// Why a flight could not be flown; one line.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct FlightError(pub String);
+
+impl Setup {
+    /// The flight code of this setup.
+    ///
+    /// # Errors
+    /// The first number that cannot be used, with its field.
+    pub fn stack(&self) -> Result<Stack, FlightError> {
+        let fail = |e: squirrel_core::vehicle::ParameterError| FlightError(e.to_string());
+        let Some(mut parameters) = self.vehicle.control else {
+            return Err(FlightError(format!("{}: [control] is missing; a flight needs gains", self.vehicle.name)));
+        };
+        self.arm.configure(&mut parameters.twcc);
+        let mut vehicle = *self.vehicle.vehicle.parameters();
+        if let Some(ratio) = self.scenario.thrust_to_weight {
+            vehicle.limits.thrust_max_n = ratio * self.vehicle.vehicle.weight_n();
+        }
+        let vehicle = squirrel_core::vehicle::Vehicle::new(vehicle).and_then(|v| v.cast()).map_err(fail)?;
+        Stack::new(vehicle, parameters, self.scenario.mission()).map_err(fail)
+    }
+
+    /// Largest collective thrust over weight.
+    pub fn thrust_to_weight(&self) -> f64 {
+        let vehicle = &self.vehicle.vehicle;
+        self.scenario.thrust_to_weight.unwrap_or(vehicle.parameters().limits.thrust_max_n / vehicle.weight_n())
+    }
+
+    /// Flies.
+    ///
+    /// * `record` - keep a log
+    /// * `progress` - called with the time flown, s, ten times a second of flight
+    ///
+    /// # Errors
+    /// A setup that cannot be used, or a plant that left the finite numbers.
+    pub fn fly(&self, record: bool, mut progress: impl FnMut(f64)) -> Result<Flight, FlightError> {
+        self.scenario.check().map_err(FlightError)?;
+        let stack = self.stack()?;
+        let dt_s = PLANT_STEP_US as f64 * 1e-6;
+        let plant = Plant::new(
+            self.vehicle.vehicle,
+            self.vehicle.effects,
+            self.arm.plant_wing(&self.vehicle.wing),
+            self.vehicle.battery.clone(),
+            dt_s,
+        )
+        .map_err(FlightError)?;
+        let mut mover = Mover::new(self)?;
+        let mut state = plant.initial_state(self.hovering(&plant), self.scenario.battery_charge);
+        let seed = self.scenario.seed;
+        let mut wind = Wind::new(self.scenario.wind(), seed ^ 0x5851_F42D_4C95_7F2D);
+        let mut sensors = Sensors::new(self.vehicle.sensors, seed);
+        let mut stack_state = StackState::default();
+        let mut metrics = metrics::Meter::new(&self.scenario);
+        let mut recorder = record.then(|| record::Recorder::new(self, plant.vehicle().rotors().len()));
+        let (mut rotor_command, mut wing_command) = ([0.0; MAX_ROTORS], [0.0; 2]);
+        let (mut tick, mut last_tick_us) = (0u64, 0u64);
+        let steps = (self.scenario.duration_s / dt_s).round() as u64;
+        for step in 0..=steps {
+            let time_us = step * PLANT_STEP_US;
+            if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
+                wind.advance((time_us - last_tick_us) as f64 * 1e-6, state.body.velocity.vector.norm());
+                let air = wind.velocity();
+                let truth = truth(&plant, &state, air);
+                let (mut frame, battery) = sensors.poll(time_us, &truth);
+                frame.set_obstacles(&self.nearest_obstacles(&state.body));
+                let wing_force = plant.wing_force(&state, air);
+                if self.arm.is_told_the_force() {
+                    let as_if_spread = state.body.ned_from_body() * wing_force[1];
+                    frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
+                }
+                let output = stack.step(&mut stack_state, &frame);
+                if !state.body.is_finite() {
+                    return Err(FlightError(format!("at {:.3} s the vehicle's state is not finite", time_us as f64 * 1e-6)));
+                }
+                rotor_command = output.rotor_command.map(f64::from);
+                wing_command = output.wing_command.map(f64::from);
+                metrics.tick(time_us, &state, &output, stack_state.mission.encounters);
+                if let Some(recorder) = &mut recorder {
+                    recorder.tick(&frame, battery, &output, &state, air, wing_force[0]);
+                }
+                if tick % (CONTROL_RATE_HZ / 10) == 0 {
+                    progress(time_us as f64 * 1e-6);
+                }
+                if metrics.is_over() {
+                    break;
+                }
+                (tick, last_tick_us) = (tick + 1, time_us);
+            }
+            let contact = mover.step(&plant, &mut state, &rotor_command, wing_command, wind.velocity())?;
+            metrics.contact(contact);
+        }
+        Ok(Flight { metrics: metrics.finish(), log: recorder.map(record::Recorder::finish) })
+    }
+
+    /// At the start of the mission, level, rotors at hover speed.
+    fn hovering(&self, plant: &Plant) -> State<f64> {
+        let vehicle = plant.vehicle();
+        let share = vehicle.weight_n() / vehicle.rotors().len() as f64;
+        let propulsion = &vehicle.parameters().propulsion;
+        let speed = propulsion.target_speed_rad_s(propulsion.command_for_thrust(share));
+        let mut state = State::at_rest();
+        state.position = In::new(Vector3::new(0.0, 0.0, -self.scenario.height_m));
+        state.rotor_speed_rad_s[..vehicle.rotors().len()].fill(speed);
+        state
+    }
+
+    fn nearest_obstacles(&self, body: &State<f64>) -> Vec<Obstacle> {
+        let at = body.position.vector;
+        let mut near: Vec<(f64, usize)> = Vec::new();
+        for (i, [north, east, _]) in self.scenario.obstacles.iter().enumerate() {
+            let distance = (north - at.x).hypot(east - at.y);
+            if distance < OBSTACLE_HORIZON_M {
+                near.push((distance, i));
+            }
+        }
+        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        near.truncate(MAX_OBSTACLES);
+        near.iter()
+            .map(|(_, i)| {
+                let [north, east, _] = self.scenario.obstacles[*i];
+                Obstacle { id: *i as u32, north_m: north as f32, east_m: east as f32 }
+            })
+            .collect()
+    }
+}
+
+fn truth(plant: &Plant, state: &PlantState, air: In<Ned, f64>) -> Truth {
+    Truth {
+        position: state.body.position,
+        velocity: state.body.velocity,
+        ned_from_body: state.body.ned_from_body(),
+        omega: state.body.omega,
+        specific_force: specific_force(plant.vehicle(), &plant.wrench(state, air)),
+        voltage_v: state.battery.voltage_v,
+        current_a: state.battery.current_a,
+    }
+}

@@ -1,0 +1,278 @@
+//! Recording: every input of the flight code and every term it returns, as a flight log; and the way back to frames.
+//!
+//! Inputs are `f32` and stored as `f64`, so that a log holds their exact bits. Sources that the flight code reads are in
+//! [`INPUT_SOURCES`]; a frame is rebuilt from the samples that carry its time.
+
+use super::Setup;
+use crate::log::FlightLog;
+use crate::plant::PlantState;
+use crate::sensors::BatteryReading;
+use squirrel_core::frames::{Body, In, Ned, Rotation};
+use squirrel_core::guidance::sensing::Obstacle;
+use squirrel_core::nalgebra::Vector3;
+use squirrel_core::stack::{Gnss, Imu, MAX_OBSTACLES, SensorFrame, StackOutput};
+
+/// Sources that the flight code reads. `frame` has a sample for each step of the flight code.
+pub const INPUT_SOURCES: [&str; 7] = ["frame", "imu", "attitude", "gnss", "baro", "obstacle", "wing_force"];
+/// Version of the log's content.
+const FORMAT: &str = "1";
+
+pub(super) struct Recorder {
+    log: FlightLog,
+    rotors: usize,
+    last_obstacles: Vec<Obstacle>,
+}
+
+fn wide(v: &Vector3<f32>) -> [f64; 3] {
+    [f64::from(v.x), f64::from(v.y), f64::from(v.z)]
+}
+
+impl Recorder {
+    pub(super) fn new(setup: &Setup, rotors: usize) -> Self {
+        let mut log = FlightLog::default();
+        let scenario = &setup.scenario;
+        let vehicle = setup.vehicle.vehicle.parameters();
+        let obstacles: Vec<String> = scenario.obstacles.iter().map(|o| format!("{o:?}")).collect();
+        let thrust_max_n = setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n();
+        for (key, value) in [
+            ("format", FORMAT.to_owned()),
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("git", option_env!("SQUIRREL_GIT_HASH").unwrap_or("unknown").to_owned()),
+            ("vehicle", setup.vehicle.name.clone()),
+            ("vehicle_toml", setup.vehicle.text.clone()),
+            ("scenario_toml", scenario.to_toml()),
+            ("arm", setup.arm.name().to_owned()),
+            ("integrator", setup.integrator.name().to_owned()),
+            ("seed", scenario.seed.to_string()),
+            ("tilt_max_rad", vehicle.limits.tilt_max_rad.to_string()),
+            ("thrust_max_n", thrust_max_n.to_string()),
+            ("obstacles_json", format!("[{}]", obstacles.join(","))),
+        ] {
+            log.metadata.insert(key.to_owned(), value);
+        }
+        Self { log, rotors, last_obstacles: Vec::new() }
+    }
+
+    pub(super) fn tick(
+        &mut self,
+        frame: &SensorFrame,
+        battery: Option<BatteryReading>,
+        output: &StackOutput,
+        state: &PlantState,
+        air: In<Ned, f64>,
+        wing_force: In<Body, f64>,
+    ) {
+        let t = frame.time_us as f64 * 1e-6;
+        self.inputs(t, frame);
+        if let Some(b) = battery {
+            let rows: &[(&str, &[f64])] = &[("voltage_v", &[b.voltage_v]), ("current_a", &[b.current_a])];
+            self.log.source_mut("battery").push(t, rows);
+        }
+        record_output(&mut self.log, t, output, self.rotors);
+        self.plant(t, state, air, wing_force);
+    }
+
+    fn inputs(&mut self, t: f64, frame: &SensorFrame) {
+        let log = &mut self.log;
+        log.source_mut("frame").push(t, &[("time_us", &[frame.time_us as f64])]);
+        if let Some(imu) = frame.imu {
+            let omega = wide(&imu.omega.vector);
+            let force = wide(&imu.specific_force.vector);
+            log.source_mut("imu").push(t, &[("omega_body_rad_s", &omega), ("specific_force_body_m_s2", &force)]);
+        }
+        if let Some(attitude) = frame.attitude {
+            log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude.wxyz().map(f64::from))]);
+        }
+        if let Some(gnss) = frame.gnss {
+            let position = wide(&gnss.position.vector);
+            let velocity = wide(&gnss.velocity.vector);
+            log.source_mut("gnss").push(t, &[("position_ned_m", &position), ("velocity_ned_m_s", &velocity)]);
+        }
+        if let Some(altitude) = frame.altitude_m {
+            log.source_mut("baro").push(t, &[("altitude_m", &[f64::from(altitude)])]);
+        }
+        if frame.obstacles() != self.last_obstacles {
+            self.last_obstacles = frame.obstacles().to_vec();
+            let mut rows = [f64::NAN; 3 * MAX_OBSTACLES];
+            for (row, o) in rows.chunks_exact_mut(3).zip(frame.obstacles()) {
+                row.copy_from_slice(&[f64::from(o.id), f64::from(o.north_m), f64::from(o.east_m)]);
+            }
+            log.source_mut("obstacle").push(t, &[("id_north_m_east_m", &rows)]);
+        }
+        if let Some(force) = frame.wing_force {
+            log.source_mut("wing_force").push(t, &[("as_if_spread_ned_n", &wide(&force.vector))]);
+        }
+    }
+
+    fn plant(&mut self, t: f64, state: &PlantState, air: In<Ned, f64>, wing_force: In<Body, f64>) {
+        let body = &state.body;
+        let deployment = state.servo.map(|s| s.deployment);
+        let log = &mut self.log;
+        log.source_mut("truth").push(
+            t,
+            &[
+                ("position_ned_m", body.position.vector.as_slice()),
+                ("velocity_ned_m_s", body.velocity.vector.as_slice()),
+                ("q_ned_from_body_wxyz", &body.ned_from_body().wxyz()),
+                ("omega_body_rad_s", body.omega.vector.as_slice()),
+                ("wing_force_body_n", wing_force.vector.as_slice()),
+                ("wind_ned_m_s", air.vector.as_slice()),
+                ("battery_charge", &[state.battery.charge]),
+                ("rotor_speed_rad_s", &body.rotor_speed_rad_s[..self.rotors]),
+                ("wing_deployment", &deployment),
+            ],
+        );
+    }
+
+    pub(super) fn finish(self) -> FlightLog {
+        self.log
+    }
+}
+
+/// Records every term of one step of the flight code.
+pub(crate) fn record_output(log: &mut FlightLog, t: f64, output: &StackOutput, rotors: usize) {
+    let command = output.rotor_command.map(f64::from);
+    log.source_mut("rotor").push(t, &[("command", &command[..rotors])]);
+    log.source_mut("wing").push(t, &[("command", &output.wing_command.map(f64::from))]);
+    let r = &output.reference;
+    log.source_mut("reference").push(
+        t,
+        &[
+            ("position_ned_m", &wide(&r.position.vector)),
+            ("velocity_ned_m_s", &wide(&r.velocity.vector)),
+            ("acceleration_ned_m_s2", &wide(&r.acceleration.vector)),
+            ("yaw_rad", &[f64::from(r.yaw_rad)]),
+        ],
+    );
+    if let Some(outer) = &output.outer {
+        let p = &outer.position;
+        let angles = |roll: f32, pitch: f32| [f64::from(roll), f64::from(pitch)];
+        log.source_mut("control.outer").push(
+            t,
+            &[
+                ("position_error_ned_m", &wide(&p.position_error.vector)),
+                ("velocity_error_ned_m_s", &wide(&p.velocity_error.vector)),
+                ("velocity_error_integral_ned_m", &wide(&p.integral)),
+                ("acceleration_demand_ned_m_s2", &wide(&p.acceleration_demand.vector)),
+                ("acceleration_command_ned_m_s2", &wide(&p.acceleration.vector)),
+                ("request_roll_pitch_rad", &angles(p.request.roll_rad, p.request.pitch_rad)),
+                ("request_thrust_n", &[f64::from(p.request.thrust_n)]),
+                ("wing_force_ned_n", &wide(&outer.wing_force.vector)),
+                ("angle_of_attack_rad", &[f64::from(outer.angle_of_attack_rad)]),
+                ("helpful_force_n", &[f64::from(outer.wing.helpful_n)]),
+                ("flag", &[f64::from(u8::from(outer.wing.flag))]),
+                ("mode", &[f64::from(outer.mode as u8)]),
+                ("reason", &[f64::from(outer.reason as u8)]),
+                ("roll_pitch_command_rad", &angles(outer.command.roll_rad, outer.command.pitch_rad)),
+                ("thrust_command_n", &[f64::from(outer.command.thrust_n)]),
+                ("clamped", &[f64::from(u8::from(outer.clamped))]),
+            ],
+        );
+    }
+    if let Some(inner) = &output.inner {
+        let thrusts = inner.mixer.rotor_thrust_n.map(f64::from);
+        log.source_mut("control.inner").push(
+            t,
+            &[
+                ("filter_angle_rad", &wide(&inner.filter.angle)),
+                ("filter_rate_rad_s", &wide(&inner.filter.rate)),
+                ("angle_error_rad", &wide(&inner.attitude.angle_error)),
+                ("rate_error_rad_s", &wide(&inner.attitude.rate_error)),
+                ("integral_rad_s", &wide(&inner.attitude.integral)),
+                ("gyroscopic_torque_n_m", &wide(&inner.attitude.gyroscopic_n_m)),
+                ("torque_n_m", &wide(&inner.attitude.torque_n_m)),
+                ("thrust_n", &[f64::from(inner.mixer.achieved.thrust_n)]),
+                ("achieved_torque_n_m", &wide(&inner.mixer.achieved.torque_n_m)),
+                ("roll_pitch_share", &[f64::from(inner.mixer.roll_pitch_share)]),
+                ("saturated", &[f64::from(u8::from(inner.mixer.saturated))]),
+                ("rotor_thrust_n", &thrusts[..rotors]),
+            ],
+        );
+    }
+}
+
+/// Walks one input source in step with the frames.
+struct Cursor<'a> {
+    time_s: &'a [f64],
+    next: usize,
+}
+
+impl Cursor<'_> {
+    /// Index of the sample with exactly this time.
+    fn at(&mut self, t: f64) -> Option<usize> {
+        let found = self.time_s.get(self.next).is_some_and(|x| *x == t);
+        self.next += usize::from(found);
+        found.then(|| self.next - 1)
+    }
+}
+
+/// The frames that a log's flight code got, in order.
+///
+/// # Errors
+/// One line that names a channel that a frame needs and the log lacks or holds in another shape.
+pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
+    let channel = |name: &str, width: usize| match log.channel(name) {
+        None => Ok(None),
+        Some((_, c)) if c.width != width => Err(format!("{name}: has {} numbers a sample, must have {width}", c.width)),
+        Some((time_s, c)) => Ok(Some((Cursor { time_s, next: 0 }, c))),
+    };
+    let Some((times, time_us)) = log.channel("frame.time_us") else {
+        return Err("frame.time_us: missing; the log was not recorded by this flight code".to_owned());
+    };
+    let mut imu = channel("imu.omega_body_rad_s", 3)?;
+    let force = channel("imu.specific_force_body_m_s2", 3)?;
+    let mut attitude = channel("attitude.q_ned_from_body_wxyz", 4)?;
+    let mut gnss = channel("gnss.position_ned_m", 3)?;
+    let velocity = channel("gnss.velocity_ned_m_s", 3)?;
+    let mut baro = channel("baro.altitude_m", 1)?;
+    let mut obstacle = channel("obstacle.id_north_m_east_m", 3 * MAX_OBSTACLES)?;
+    let mut wing_force = channel("wing_force.as_if_spread_ned_n", 3)?;
+
+    let narrow = |row: &[f64]| Vector3::new(row[0] as f32, row[1] as f32, row[2] as f32);
+    let mut obstacles: Vec<Obstacle> = Vec::new();
+    let mut all = Vec::with_capacity(times.len());
+    for (t, us) in times.iter().zip(&time_us.values) {
+        let mut frame = SensorFrame::empty(*us as u64);
+        if let Some((cursor, omega)) = &mut imu
+            && let Some(i) = cursor.at(*t)
+        {
+            let force = force.as_ref().map_or(Vector3::zeros(), |(_, c)| narrow(c.row(i)));
+            frame.imu = Some(Imu { omega: In::new(narrow(omega.row(i))), specific_force: In::new(force) });
+        }
+        if let Some((cursor, q)) = &mut attitude
+            && let Some(i) = cursor.at(*t)
+        {
+            let q = q.row(i);
+            let q = squirrel_core::nalgebra::Quaternion::new(q[0] as f32, q[1] as f32, q[2] as f32, q[3] as f32);
+            frame.attitude = Some(Rotation::new(squirrel_core::nalgebra::Unit::new_unchecked(q)));
+        }
+        if let Some((cursor, position)) = &mut gnss
+            && let Some(i) = cursor.at(*t)
+        {
+            let velocity = velocity.as_ref().map_or(Vector3::zeros(), |(_, c)| narrow(c.row(i)));
+            frame.gnss =
+                Some(Gnss { position: In::new(narrow(position.row(i))), velocity: In::new(velocity) });
+        }
+        if let Some((cursor, altitude)) = &mut baro
+            && let Some(i) = cursor.at(*t)
+        {
+            frame.altitude_m = Some(altitude.row(i)[0] as f32);
+        }
+        if let Some((cursor, rows)) = &mut obstacle
+            && let Some(i) = cursor.at(*t)
+        {
+            let present = rows.row(i).chunks_exact(3).filter(|r| r[0].is_finite());
+            obstacles = present
+                .map(|r| Obstacle { id: r[0] as u32, north_m: r[1] as f32, east_m: r[2] as f32 })
+                .collect();
+        }
+        frame.set_obstacles(&obstacles);
+        if let Some((cursor, force)) = &mut wing_force
+            && let Some(i) = cursor.at(*t)
+        {
+            frame.wing_force = Some(In::new(narrow(force.row(i))));
+        }
+        all.push(frame);
+    }
+    Ok(all)
+}

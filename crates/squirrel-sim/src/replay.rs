@@ -1,0 +1,112 @@
+//! Replay: the log's inputs through the flight code again, and every output compared bit for bit.
+//!
+//! The log says which vehicle, arm and scenario flew; the flight code is rebuilt from that (or from another vehicle file, to
+//! see what a changed gain would have done) and stepped with the recorded frames.
+
+use crate::arm::Arm;
+use crate::flight::{self, Integrator, Setup};
+use crate::log::FlightLog;
+use crate::scenario::Scenario;
+use crate::vehicle_file::VehicleFile;
+use squirrel_core::stack::StackState;
+
+/// Sources that the flight code writes.
+pub const OUTPUT_SOURCES: [&str; 5] = ["rotor", "wing", "reference", "control.outer", "control.inner"];
+
+/// The first output that differs.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Difference {
+    /// Channel: `control.outer.thrust_command_n`.
+    pub channel: String,
+    /// Time in the log, s.
+    pub time_s: f64,
+    /// Index within the sample.
+    pub index: usize,
+    /// Value in the log.
+    pub logged: f64,
+    /// Value of the replay.
+    pub replayed: f64,
+}
+
+/// What a replay found.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Replay {
+    /// Steps of the flight code.
+    pub steps: usize,
+    /// Output numbers compared.
+    pub values: usize,
+    /// The earliest difference; `None` where every bit is the same.
+    pub first_difference: Option<Difference>,
+}
+
+/// The setup that a log was flown with.
+///
+/// # Errors
+/// One line that names the metadata that is missing or cannot be used.
+pub fn setup(log: &FlightLog) -> Result<Setup, String> {
+    let text = |key: &str| {
+        log.metadata.get(key).ok_or_else(|| format!("metadata {key}: missing; the log was not recorded by squirrel fly"))
+    };
+    let vehicle = VehicleFile::parse(text("vehicle_toml")?, "metadata vehicle_toml").map_err(|e| e.to_string())?;
+    let scenario = Scenario::parse(text("scenario_toml")?, "metadata scenario_toml")?;
+    let integrator = Integrator::parse(text("integrator")?)?;
+    Ok(Setup { vehicle, arm: Arm::parse(text("arm")?)?, scenario, integrator })
+}
+
+/// Flies the log's inputs through the flight code of `setup`.
+///
+/// # Errors
+/// One line that names what the log lacks or what cannot be used.
+pub fn replay(log: &FlightLog, setup: &Setup) -> Result<Replay, String> {
+    let stack = setup.stack().map_err(|e| e.to_string())?;
+    let frames = flight::frames(log)?;
+    let mut state = StackState::default();
+    let mut again = FlightLog::default();
+    let rotors = stack.vehicle().rotors().len();
+    for frame in &frames {
+        let output = stack.step(&mut state, frame);
+        flight::record_output(&mut again, frame.time_us as f64 * 1e-6, &output, rotors);
+    }
+    let mut replay = Replay { steps: frames.len(), values: 0, first_difference: None };
+    for name in OUTPUT_SOURCES {
+        compare(log, &again, name, &mut replay)?;
+    }
+    Ok(replay)
+}
+
+fn compare(log: &FlightLog, again: &FlightLog, name: &str, replay: &mut Replay) -> Result<(), String> {
+    let (Some(logged), Some(replayed)) = (log.sources.get(name), again.sources.get(name)) else {
+        return if log.sources.contains_key(name) == again.sources.contains_key(name) {
+            Ok(())
+        } else {
+            Err(format!("{name}: in only one of log and replay"))
+        };
+    };
+    if logged.time_s.len() != replayed.time_s.len() {
+        let (a, b) = (logged.time_s.len(), replayed.time_s.len());
+        return Err(format!("{name}: {a} samples in the log, {b} in the replay"));
+    }
+    for (channel, values) in &replayed.channels {
+        let full = format!("{name}.{channel}");
+        let Some(before) = logged.channels.get(channel) else {
+            return Err(format!("{full}: missing in the log"));
+        };
+        if before.width != values.width {
+            return Err(format!("{full}: has {} numbers a sample, must have {}", before.width, values.width));
+        }
+        replay.values += values.values.len();
+        let differs = |(a, b): (&f64, &f64)| a.to_bits() != b.to_bits();
+        let Some(at) = before.values.iter().zip(&values.values).position(differs) else { continue };
+        let time_s = logged.time_s[at / values.width];
+        if replay.first_difference.as_ref().is_none_or(|d| time_s < d.time_s) {
+            replay.first_difference = Some(Difference {
+                channel: full,
+                time_s,
+                index: at % values.width,
+                logged: before.values[at],
+                replayed: values.values[at],
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,326 @@
+//! Scenarios: what to fly, in which air, among which obstacles. A TOML file or one of the built-in ones.
+
+use crate::plant::{GustModel, WindParameters};
+use serde::{Deserialize, Serialize};
+use squirrel_core::frames::In;
+use squirrel_core::guidance::mission::{Mission, Steering};
+use squirrel_core::guidance::sensing::Sensing;
+use squirrel_core::guidance::trajectory::Trajectory;
+use squirrel_core::nalgebra::Vector3;
+use std::path::Path;
+
+/// A flight to fly. Units are in the names; heights are positive up.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Scenario {
+    /// Name.
+    pub name: String,
+    /// Seed of everything random: sensors, gusts, steering angles.
+    #[serde(default)]
+    pub seed: u64,
+    /// Longest flight, s.
+    pub duration_s: f64,
+    /// Height of the mission above the ground, m.
+    pub height_m: f64,
+    /// Ratio of the largest collective thrust to the weight; overrides `limits.thrust_max_n` of the vehicle.
+    #[serde(default)]
+    pub thrust_to_weight: Option<f64>,
+    /// Charge of the battery at the start, 0..1.
+    #[serde(default = "full")]
+    pub battery_charge: f64,
+    /// Errors are measured from the first encounter for this long, s; 0 for the whole flight.
+    #[serde(default)]
+    pub measured_window_s: f64,
+    /// Obstacles are solid; otherwise they are only seen, as in the paper's flights.
+    #[serde(default)]
+    pub solid_obstacles: bool,
+    /// Vertical cylinders: `[north_m, east_m, radius_m]`.
+    #[serde(default)]
+    pub obstacles: Vec<[f64; 3]>,
+    /// What to fly.
+    pub mission: MissionTable,
+    /// Moving air.
+    #[serde(default)]
+    pub wind: WindTable,
+}
+
+fn full() -> f64 {
+    1.0
+}
+
+/// What to fly.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+pub enum MissionTable {
+    /// Hold the start.
+    Hover {},
+    /// Fly straight, steer away from obstacles.
+    Avoid {
+        /// Direction of the first run, clockwise from north.
+        course_rad: f64,
+        /// Target speed.
+        speed_m_s: f64,
+        /// Time to reach it from the start.
+        ramp_s: f64,
+        /// Time to reach it after a turn.
+        turn_ramp_s: f64,
+        /// `R_d`.
+        range_m: f64,
+        /// Half of the field of view.
+        half_view_rad: f64,
+        /// Smallest steering angle, positive to the right.
+        steering_min_rad: f64,
+        /// Largest steering angle.
+        steering_max_rad: f64,
+        /// Steer to either side.
+        both_sides: bool,
+    },
+    /// Circle about the start.
+    Circle {
+        /// Radius.
+        radius_m: f64,
+        /// Speed.
+        speed_m_s: f64,
+    },
+}
+
+/// Moving air.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WindTable {
+    /// Steady wind: where the air moves to.
+    pub mean_ned_m_s: [f64; 3],
+    /// Standard deviation of gusts per axis.
+    pub gust_sigma_m_s: f64,
+    /// Correlation time of Gauss-Markov gusts.
+    pub gust_time_constant_s: f64,
+    /// Scale length; where given, gusts have the Dryden spectra instead.
+    pub gust_dryden_length_m: Option<f64>,
+}
+
+impl Default for WindTable {
+    fn default() -> Self {
+        Self {
+            mean_ned_m_s: [0.0; 3],
+            gust_sigma_m_s: 0.0,
+            gust_time_constant_s: 1.5,
+            gust_dryden_length_m: None,
+        }
+    }
+}
+
+/// Names of the built-in scenarios.
+pub const BUILT_IN: [&str; 4] = ["hover", "avoid", "steer", "track"];
+
+impl Scenario {
+    /// A built-in scenario by name, or a TOML file by path.
+    ///
+    /// # Errors
+    /// One line that names the file, field and value.
+    pub fn find(name_or_path: &str) -> Result<Self, String> {
+        if let Some(scenario) = Self::built_in(name_or_path) {
+            return Ok(scenario);
+        }
+        if Path::new(name_or_path).extension().is_none_or(|e| e != "toml") {
+            let names = BUILT_IN.join(", ");
+            return Err(format!("scenario = {name_or_path}: no such scenario; known are {names}, or a .toml file"));
+        }
+        let text = std::fs::read_to_string(name_or_path).map_err(|e| format!("{name_or_path}: {e}"))?;
+        Self::parse(&text, name_or_path)
+    }
+
+    /// From TOML.
+    ///
+    /// # Errors
+    /// One line that names `file`, field and value.
+    pub fn parse(text: &str, file: &str) -> Result<Self, String> {
+        let scenario: Self = toml::from_str(text).map_err(|e| {
+            let place = crate::toml_text::place(text, &e);
+            format!("{file}, line {}: {} (in `{}`)", place.line, place.message, place.text)
+        })?;
+        scenario.check().map_err(|problem| format!("{file}: {problem}"))?;
+        Ok(scenario)
+    }
+
+    /// As TOML; parsing it gives the same scenario, bit for bit.
+    ///
+    /// # Panics
+    /// Never: every field has a TOML form.
+    #[allow(clippy::expect_used, reason = "a struct of numbers and strings always serialises")]
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a scenario is representable")
+    }
+
+    fn base(name: &str, duration_s: f64, mission: MissionTable) -> Self {
+        Self {
+            name: name.to_owned(),
+            seed: 0,
+            duration_s,
+            height_m: 30.0,
+            thrust_to_weight: None,
+            battery_charge: 1.0,
+            measured_window_s: 0.0,
+            solid_obstacles: false,
+            obstacles: Vec::new(),
+            mission,
+            wind: WindTable::default(),
+        }
+    }
+
+    fn built_in(name: &str) -> Option<Self> {
+        match name {
+            "hover" => Some(Self::base("hover", 10.0, MissionTable::Hover {})),
+            "track" => {
+                Some(Self::base("track", 20.0, MissionTable::Circle { radius_m: 6.0, speed_m_s: 4.0 }))
+            }
+            // The paper's real flights: 7.3 m/s, R_d 4 m, 110 to 130 deg.
+            "avoid" => Some(Self::turn("avoid", 7.3, 4.0, 110.0, 130.0)),
+            // The paper's simulated study: R_d 5 m, one angle.
+            "steer" => Some(Self::turn("steer", 7.0, 5.0, 120.0, 120.0)),
+            _ => None,
+        }
+    }
+
+    /// One obstacle on a straight run, and a turn of `min_deg` to `max_deg` to the right away from it.
+    pub fn turn(name: &str, speed_m_s: f64, range_m: f64, min_deg: f64, max_deg: f64) -> Self {
+        let mission = MissionTable::Avoid {
+            course_rad: 0.0,
+            speed_m_s,
+            ramp_s: 4.0,
+            turn_ramp_s: 2.0,
+            range_m,
+            half_view_rad: 15.0_f64.to_radians(),
+            steering_min_rad: min_deg.to_radians(),
+            steering_max_rad: max_deg.to_radians(),
+            both_sides: false,
+        };
+        Self {
+            measured_window_s: 6.0,
+            // Far enough for the run to have settled at its speed.
+            obstacles: vec![[4.5 * speed_m_s, 0.0, 0.5]],
+            ..Self::base(name, 13.0, mission)
+        }
+    }
+
+    /// # Errors
+    /// `field = value: reason`.
+    pub fn check(&self) -> Result<(), String> {
+        let positive = [("duration_s", self.duration_s), ("height_m", self.height_m)];
+        for (field, x) in positive {
+            if !(x.is_finite() && x > 0.0 && x <= 1e5) {
+                return Err(format!("{field} = {x}: must be > 0 and <= 1e5"));
+            }
+        }
+        if let Some(ratio) = self.thrust_to_weight
+            && !(ratio > 1.0 && ratio <= 100.0)
+        {
+            return Err(format!("thrust_to_weight = {ratio}: must be > 1 and <= 100"));
+        }
+        if !(0.0..=1.0).contains(&self.battery_charge) {
+            return Err(format!("battery_charge = {}: must be 0 to 1", self.battery_charge));
+        }
+        if !(0.0..=1e5).contains(&self.measured_window_s) {
+            return Err(format!("measured_window_s = {}: must be 0 to 1e5", self.measured_window_s));
+        }
+        for (i, [north, east, radius]) in self.obstacles.iter().enumerate() {
+            if !(north.abs() <= 1e5 && east.abs() <= 1e5 && *radius > 0.0 && *radius <= 100.0) {
+                return Err(format!(
+                    "obstacles[{i}] = [{north}, {east}, {radius}]: must be finite, radius > 0 and <= 100"
+                ));
+            }
+        }
+        let wind = &self.wind;
+        if let Some(x) = wind.mean_ned_m_s.iter().find(|x| x.is_nan() || x.abs() > 100.0) {
+            return Err(format!("wind.mean_ned_m_s = {x}: must be within 100"));
+        }
+        if !(0.0..=50.0).contains(&wind.gust_sigma_m_s) {
+            return Err(format!("wind.gust_sigma_m_s = {}: must be 0 to 50", wind.gust_sigma_m_s));
+        }
+        for (field, x) in [
+            ("wind.gust_time_constant_s", wind.gust_time_constant_s),
+            ("wind.gust_dryden_length_m", wind.gust_dryden_length_m.unwrap_or(1.0)),
+        ] {
+            if !(x.is_finite() && x > 0.0) {
+                return Err(format!("{field} = {x}: must be finite and > 0"));
+            }
+        }
+        self.mission().check().map_err(|e| format!("mission.{e}"))
+    }
+
+    /// The mission for the flight code.
+    pub fn mission(&self) -> Mission {
+        let start = In::new(Vector3::new(0.0, 0.0, -self.height_m as f32));
+        match self.mission {
+            MissionTable::Hover {} => Mission::Hover { position: start },
+            MissionTable::Avoid {
+                course_rad,
+                speed_m_s,
+                ramp_s,
+                turn_ramp_s,
+                range_m,
+                half_view_rad,
+                steering_min_rad,
+                steering_max_rad,
+                both_sides,
+            } => Mission::Avoid {
+                run: Trajectory {
+                    start,
+                    course_rad: course_rad as f32,
+                    speed_m_s: speed_m_s as f32,
+                    ramp_s: ramp_s as f32,
+                },
+                sensing: Sensing {
+                    range_m: range_m as f32,
+                    half_view_rad: half_view_rad as f32,
+                    speed_min_m_s: 1.0,
+                },
+                steering: Steering {
+                    min_rad: steering_min_rad as f32,
+                    max_rad: steering_max_rad as f32,
+                    ramp_s: turn_ramp_s as f32,
+                    both_sides,
+                    seed: (self.seed ^ (self.seed >> 32)) as u32,
+                },
+            },
+            MissionTable::Circle { radius_m, speed_m_s } => Mission::Circle {
+                centre: In::new(start.vector - Vector3::new(radius_m as f32, 0.0, 0.0)),
+                radius_m: radius_m as f32,
+                speed_m_s: speed_m_s as f32,
+            },
+        }
+    }
+
+    /// The moving air.
+    pub fn wind(&self) -> WindParameters {
+        let gust = match self.wind.gust_dryden_length_m {
+            Some(scale_length_m) => GustModel::Dryden { scale_length_m },
+            None => GustModel::GaussMarkov { time_constant_s: self.wind.gust_time_constant_s },
+        };
+        WindParameters { mean_ned_m_s: self.wind.mean_ned_m_s, gust_sigma_m_s: self.wind.gust_sigma_m_s, gust }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_in_scenarios_survive_toml_bit_for_bit() {
+        for name in BUILT_IN {
+            let scenario = Scenario::find(name).unwrap();
+            scenario.check().unwrap();
+            assert_eq!(Scenario::parse(&scenario.to_toml(), name).unwrap(), scenario);
+        }
+    }
+
+    #[test]
+    fn errors_name_file_field_and_value() {
+        let text = Scenario::find("avoid").unwrap().to_toml();
+        let error = |from: &str, to: &str| Scenario::parse(&text.replace(from, to), "s.toml").unwrap_err();
+        assert_eq!(error("speed_m_s = 7.3", "speed_m_s = -1.0"), "s.toml: mission.speed_m_s = -1: must be finite and > 0");
+        assert!(error("duration_s = 13.0", "duration_s = nan").starts_with("s.toml: duration_s = NaN"));
+        assert!(error("range_m", "rnage_m").contains("s.toml, line"));
+        assert!(Scenario::find("loop").unwrap_err().contains("avoid"));
+        assert!(Scenario::find("missing.toml").unwrap_err().starts_with("missing.toml"));
+    }
+}
