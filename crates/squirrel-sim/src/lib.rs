@@ -1,2 +1,3 @@
 //! The simulator of squirrel: plant, world, sensors, flight log and import.
 pub mod log;
+pub mod plant;
