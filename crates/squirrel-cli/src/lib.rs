@@ -1,1 +1,69 @@
-//! squirrel-cli.
+//! The command line of squirrel.
+//!
+//! Results go to stdout, talk and progress bars to stderr, and to `--json FILE` for machines. Exit codes: 0 done, 1 failed
+//! with one line that names file, field and value, 2 wrong usage.
+
+mod commands;
+mod output;
+
+use clap::{Parser, Subcommand};
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+/// A flight stack for multirotors that change shape: fly it, log it, replay it, compare it with measured flights.
+#[derive(Debug, Parser)]
+#[command(name = "squirrel", version, about, disable_help_subcommand = true)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Fly the paper's avoidance manoeuvre with three controllers (the default).
+    Demo(commands::demo::Demo),
+    /// Fly one scenario with one controller and log it.
+    Fly(commands::fly::Fly),
+    /// Run an experiment with many flights.
+    #[command(subcommand)]
+    Study(commands::study::Study),
+    /// Run a log's inputs through the flight code again and compare every bit.
+    Replay(commands::replay::Replay),
+    /// Turn a foreign log into a flight log, or recover a truncated one.
+    Import(commands::import::Import),
+    /// Find where simulation and measurement disagree.
+    #[command(subcommand)]
+    Gap(commands::gap::Gap),
+    /// Check vehicle files.
+    #[command(subcommand)]
+    Vehicle(commands::vehicle::VehicleCommand),
+}
+
+/// Runs the program on arguments, the first of which is its name.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments) {
+        Ok(cli) => cli,
+        Err(usage) => {
+            // Help and version are results; anything else is wrong usage, exit code 2.
+            let code = usage.exit_code();
+            let _ = usage.print();
+            return ExitCode::from(u8::try_from(code).unwrap_or(2));
+        }
+    };
+    let done = match cli.command.unwrap_or_else(|| Command::Demo(commands::demo::Demo::default())) {
+        Command::Demo(demo) => demo.run(),
+        Command::Fly(fly) => fly.run(),
+        Command::Study(study) => study.run(),
+        Command::Replay(replay) => replay.run(),
+        Command::Import(import) => import.run(),
+        Command::Gap(gap) => gap.run(),
+        Command::Vehicle(vehicle) => vehicle.run(),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(problem) => {
+            output::talk(&format!("error: {}", problem.replace('\n', " ")));
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,1 +1,7 @@
-//! squirrel-study.
+//! The experiments: arms against each other on paired seeds, with intervals.
+//!
+//! - [`thrust`]: what wings are worth as a function of the effective thrust-to-weight ratio.
+//! - [`statistics`]: means, and intervals by a paired bootstrap.
+
+pub mod statistics;
+pub mod thrust;

@@ -170,7 +170,7 @@ mod tests {
 
     #[test]
     fn each_sensor_speaks_at_its_rate_and_after_its_latency() {
-        let mut p = SensorParameters::default();
+        let mut p = SensorParameters::ideal();
         p.gnss.timing = Timing { rate_hz: 10.0, latency_s: 0.15, seed: None };
         let mut sensors = Sensors::new(p, 1);
         let (mut imu, mut fixes) = (0, Vec::new());

@@ -1,0 +1,115 @@
+//! `squirrel fly`: one scenario, one arm, one log.
+
+use super::{facts, figures, vehicle, view};
+use crate::output::{self, Table, say, talk};
+use serde::Serialize;
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{Integrator, Metrics, Setup};
+use squirrel_sim::report::flight::{Heading, render};
+use squirrel_sim::scenario::Scenario;
+use std::path::PathBuf;
+
+/// Options of a flight.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Fly {
+    /// Vehicle file; the shipped squirrel if left out.
+    #[arg(long)]
+    vehicle: Option<PathBuf>,
+    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_oracle.
+    #[arg(long, default_value = "twcc_flat")]
+    arm: String,
+    /// hover, avoid, steer, track, or a scenario file (.toml).
+    #[arg(long, default_value = "avoid")]
+    scenario: String,
+    /// Seed of everything random; overrides the scenario's.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Largest collective thrust over weight; overrides vehicle and scenario.
+    #[arg(long)]
+    thrust_to_weight: Option<f64>,
+    /// rk4 (rapier near contact), or rapier throughout (first order).
+    #[arg(long, default_value = "rk4")]
+    integrator: String,
+    /// Flight log to write.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// HTML report to write.
+    #[arg(long)]
+    report: Option<PathBuf>,
+    /// Write the figures here as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Flown {
+    vehicle: String,
+    arm: &'static str,
+    scenario: String,
+    seed: u64,
+    thrust_to_weight: f64,
+    #[serde(flatten)]
+    metrics: Metrics,
+}
+
+impl Fly {
+    pub(crate) fn run(&self) -> Result<(), String> {
+        let mut scenario = Scenario::find(&self.scenario)?;
+        if let Some(seed) = self.seed {
+            scenario.seed = seed;
+        }
+        if self.thrust_to_weight.is_some() {
+            scenario.thrust_to_weight = self.thrust_to_weight;
+        }
+        let setup = Setup {
+            vehicle: vehicle(self.vehicle.as_deref())?,
+            arm: Arm::parse(&self.arm)?,
+            scenario,
+            integrator: Integrator::parse(&self.integrator)?,
+        };
+        let record = self.out.is_some() || self.report.is_some();
+        let bar = output::progress((setup.scenario.duration_s * 10.0) as u64, "x 0.1 s");
+        let flown = setup.fly(record, |t| bar.set_position((t * 10.0) as u64));
+        bar.finish_and_clear();
+        let flight = flown.map_err(|e| match &self.vehicle {
+            Some(file) => format!("{}: {e}", file.display()),
+            None => e.to_string(),
+        })?;
+        let ratio = setup.thrust_to_weight();
+        say(&format!(
+            "{} flies {} with {}, seed {}, effective thrust-to-weight {ratio:.2}\n",
+            setup.vehicle.name,
+            setup.scenario.name,
+            setup.arm.name(),
+            setup.scenario.seed,
+        ));
+        let cells = figures(&flight.metrics);
+        let mut table = Table::new(&cells.iter().map(|(n, _)| n.as_str()).collect::<Vec<_>>());
+        table.row(cells.iter().map(|(_, v)| v.clone()).collect());
+        table.print();
+        if let Some(log) = &flight.log {
+            if let Some(path) = &self.out {
+                log.write(path).map_err(|e| e.to_string())?;
+                talk(&format!("wrote {}", path.display()));
+            }
+            if let Some(path) = &self.report {
+                let heading = Heading {
+                    title: format!("{}: {}", setup.scenario.name, setup.arm.name()),
+                    lead: String::new(),
+                    facts: facts(&setup),
+                };
+                output::write_file(path, render(&heading, &[view(&setup, log, cells)]).as_bytes())?;
+                talk(&format!("wrote {}", path.display()));
+            }
+        }
+        let result = Flown {
+            vehicle: setup.vehicle.name.clone(),
+            arm: setup.arm.name(),
+            scenario: setup.scenario.name.clone(),
+            seed: setup.scenario.seed,
+            thrust_to_weight: ratio,
+            metrics: flight.metrics,
+        };
+        output::write_json(self.json.as_deref(), &result)
+    }
+}

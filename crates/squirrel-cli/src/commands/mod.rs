@@ -1,0 +1,67 @@
+//! One file a command.
+
+pub(crate) mod demo;
+pub(crate) mod fly;
+pub(crate) mod gap;
+pub(crate) mod import;
+pub(crate) mod replay;
+pub(crate) mod study;
+pub(crate) mod vehicle;
+
+use squirrel_sim::flight::{Metrics, Setup};
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::report::flight::FlightView;
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::Path;
+
+/// The vehicle of a `--vehicle` option: a file, or the shipped squirrel.
+fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
+    match path {
+        None => Ok(VehicleFile::squirrel()),
+        Some(path) => VehicleFile::load(path).map_err(|e| e.to_string()),
+    }
+}
+
+/// The table columns that every flight has: name with unit, and the figure.
+fn figures(metrics: &Metrics) -> Vec<(String, String)> {
+    let cell = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        cell("RMSE 3-D m", format!("{:.2}", metrics.rmse_m)),
+        cell("RMSE horiz. m", format!("{:.2}", metrics.rmse_horizontal_m)),
+        cell("height lost m", format!("{:.2}", metrics.height_lost_m)),
+        cell("height gained m", format!("{:.2}", metrics.height_gained_m)),
+        cell("wings open s", format!("{:.2}", metrics.wings_open_s)),
+        cell("clearance m", metrics.clearance_m.map_or_else(|| "-".to_owned(), |c| format!("{c:.2}"))),
+        cell("contact s", metrics.contact_s.map_or_else(|| "-".to_owned(), |t| format!("{t:.2}"))),
+    ]
+}
+
+/// How the report sees one flight.
+fn view<'a>(
+    setup: &'a Setup,
+    log: &'a FlightLog,
+    summary: Vec<(String, String)>,
+) -> FlightView<'a> {
+    let vehicle = setup.vehicle.vehicle.parameters();
+    FlightView {
+        arm: setup.arm.name(),
+        log,
+        obstacles: &setup.scenario.obstacles,
+        tilt_max_rad: vehicle.limits.tilt_max_rad,
+        thrust_max_n: setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n(),
+        summary,
+    }
+}
+
+/// Facts at the head of a report.
+fn facts(setup: &Setup) -> Vec<(String, String)> {
+    let fact = |name: &str, value: String| (name.to_owned(), value);
+    vec![
+        fact("vehicle", setup.vehicle.name.clone()),
+        fact("scenario", setup.scenario.name.clone()),
+        fact("seed", setup.scenario.seed.to_string()),
+        fact("effective thrust-to-weight", format!("{:.2}", setup.thrust_to_weight())),
+        fact("integrator", setup.integrator.name().to_owned()),
+        fact("version", env!("CARGO_PKG_VERSION").to_owned()),
+    ]
+}

@@ -1,0 +1,64 @@
+//! `squirrel replay`: the flight code again on a log's inputs, bit for bit.
+
+use crate::output::{self, say};
+use serde::Serialize;
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::replay;
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::PathBuf;
+
+/// Options of a replay.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Replay {
+    /// Flight log recorded by `squirrel fly` or `squirrel demo`.
+    flight: PathBuf,
+    /// Fly this vehicle file instead of the one in the log.
+    #[arg(long)]
+    vehicle: Option<PathBuf>,
+    /// Write the result here as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+#[derive(Serialize)]
+struct Replayed<'a> {
+    flight: String,
+    arm: &'static str,
+    identical: bool,
+    #[serde(flatten)]
+    replay: &'a replay::Replay,
+}
+
+impl Replay {
+    pub(crate) fn run(&self) -> Result<(), String> {
+        let file = self.flight.display();
+        let log = FlightLog::read(&self.flight).map_err(|e| e.to_string())?;
+        let mut setup = replay::setup(&log).map_err(|e| format!("{file}: {e}"))?;
+        if let Some(path) = &self.vehicle {
+            setup.vehicle = VehicleFile::load(path).map_err(|e| e.to_string())?;
+        }
+        let replay = replay::replay(&log, &setup).map_err(|e| format!("{file}: {e}"))?;
+        let result = Replayed {
+            flight: file.to_string(),
+            arm: setup.arm.name(),
+            identical: replay.first_difference.is_none(),
+            replay: &replay,
+        };
+        output::write_json(self.json.as_deref(), &result)?;
+        match &replay.first_difference {
+            None => {
+                say(&format!(
+                    "{file}: {} steps of {}, {} output numbers, every bit identical",
+                    replay.steps,
+                    setup.arm.name(),
+                    replay.values
+                ));
+                Ok(())
+            }
+            Some(d) => Err(format!(
+                "{file}: {}[{}] at {:.6} s is the first output that differs: {} in the log, {} in the replay",
+                d.channel, d.index, d.time_s, d.logged, d.replayed
+            )),
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! `squirrel vehicle`: vehicle files.
+
+use crate::output::{Table, say};
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::PathBuf;
+
+/// What to do with a vehicle file.
+#[derive(Debug, clap::Subcommand)]
+pub(crate) enum VehicleCommand {
+    /// Check a file and show its numbers with tolerance and source.
+    Check {
+        /// Vehicle file.
+        file: PathBuf,
+    },
+}
+
+impl VehicleCommand {
+    pub(crate) fn run(&self) -> Result<(), String> {
+        let Self::Check { file } = self;
+        let vehicle = VehicleFile::load(file).map_err(|e| e.to_string())?;
+        let v = &vehicle.vehicle;
+        say(&format!(
+            "{}: sound. {} rotors, {:.3} kg, hover at {:.2} of top thrust, thrust limit {:.2} of weight\n",
+            vehicle.name,
+            v.rotors().len(),
+            v.parameters().mass_kg,
+            v.weight_n() / v.rotor_thrust_max_n() / v.rotors().len() as f64,
+            v.parameters().limits.thrust_max_n / v.weight_n(),
+        ));
+        let mut table = Table::new(&["field", "value", "sd", "source"]);
+        for (field, p) in &vehicle.provenance {
+            let text = |x: &Option<String>| x.clone().unwrap_or_else(|| "-".to_owned());
+            table.row(vec![field.clone(), p.value.clone(), text(&p.sd), text(&p.source)]);
+        }
+        table.print();
+        Ok(())
+    }
+}

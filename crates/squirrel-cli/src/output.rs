@@ -1,0 +1,84 @@
+//! What people and machines see: tables on stdout, talk on stderr, files that are whole or absent.
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is where the program speaks")]
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
+
+/// A result line on stdout.
+pub(crate) fn say(line: &str) {
+    // A closed pipe (`squirrel | head`) is not an error of ours.
+    let _ = writeln!(std::io::stdout(), "{line}");
+}
+
+/// A line for people on stderr.
+pub(crate) fn talk(line: &str) {
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// A progress bar on stderr; silent where nobody looks.
+pub(crate) fn progress(length: u64, unit: &str) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
+    let template = format!("{{msg:12}} {{bar:40}} {{pos}}/{{len}} {unit}  {{eta}}");
+    if let Ok(style) = ProgressStyle::with_template(&template) {
+        bar.set_style(style);
+    }
+    if !std::io::stderr().is_terminal() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    bar
+}
+
+/// A table with aligned columns: the first to the left, numbers to the right.
+pub(crate) struct Table {
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    pub(crate) fn new(header: &[&str]) -> Self {
+        Self { rows: vec![header.iter().map(|&h| h.to_owned()).collect()] }
+    }
+    pub(crate) fn row(&mut self, cells: Vec<String>) {
+        self.rows.push(cells);
+    }
+    pub(crate) fn print(&self) {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0);
+        let width = |c: usize| self.rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..columns).map(width).collect();
+        for (i, row) in self.rows.iter().enumerate() {
+            let mut line = String::new();
+            for (c, cell) in row.iter().enumerate() {
+                let w = widths[c];
+                line += &if c == 0 { format!("{cell:<w$}") } else { format!("  {cell:>w$}") };
+            }
+            say(line.trim_end());
+            if i == 0 {
+                say(&"-".repeat(widths.iter().sum::<usize>() + 2 * columns.saturating_sub(1)));
+            }
+        }
+    }
+}
+
+/// Writes a file under a temporary name beside it, then renames: a reader never sees half of it.
+pub(crate) fn write_file(path: &Path, content: &[u8]) -> Result<(), String> {
+    let fail = |e: std::io::Error| format!("{}: {e}", path.display());
+    let mut name = path.file_name().ok_or_else(|| format!("{}: not a file name", path.display()))?.to_owned();
+    name.push(".partial");
+    let partial: PathBuf = path.with_file_name(name);
+    std::fs::write(&partial, content).map_err(fail)?;
+    std::fs::rename(&partial, path).map_err(fail)
+}
+
+/// Writes a result as JSON where `--json` asks for it.
+pub(crate) fn write_json(path: Option<&Path>, result: &impl serde::Serialize) -> Result<(), String> {
+    let Some(path) = path else { return Ok(()) };
+    let mut text = serde_json::to_string_pretty(result).map_err(|e| format!("{}: {e}", path.display()))?;
+    text.push('\n');
+    write_file(path, text.as_bytes())
+}
+
+/// Makes a folder for results.
+pub(crate) fn folder(path: &Path) -> Result<(), String> {
+    std::fs::create_dir_all(path).map_err(|e| format!("{}: {e}", path.display()))
+}
