@@ -1,2 +1,4 @@
 //! The simulator of squirrel: plant, world, sensors, flight log and import.
 pub mod log;
+#[cfg(feature = "rapier")]
+pub mod world;
