@@ -1,0 +1,67 @@
+//! The airframe of the world's tests: the squirrel's mass and rotors with an inertia that is not diagonal.
+
+use squirrel_core::dynamics::State;
+use squirrel_core::frames::{In, Rotation};
+use squirrel_core::nalgebra::{Matrix3, Vector3};
+use squirrel_core::vehicle::{CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle};
+use squirrel_sim::world::WorldParameters;
+
+pub(crate) const SIZE_BODY_M: [f64; 3] = [0.276, 0.373, 0.025];
+
+pub(crate) fn vehicle() -> Vehicle<f64> {
+    let mut rotors = [Rotor::unused(); MAX_ROTORS];
+    let d = 0.085;
+    for (rotor, (x, y, s)) in
+        rotors.iter_mut().zip([(d, -d, -1.0), (-d, -d, 1.0), (-d, d, -1.0), (d, d, 1.0)])
+    {
+        *rotor = Rotor::planar(x, y, s);
+    }
+    Vehicle::new(Parameters {
+        mass_kg: 0.548,
+        inertia_kg_m2: Matrix3::new(
+            3.22e-3, 2.0e-4, -1.0e-4, 2.0e-4, 4.68e-3, 1.5e-4, -1.0e-4, 1.5e-4, 7.72e-3,
+        ),
+        rotors,
+        rotor_count: 4,
+        propulsion: Propulsion {
+            command: CommandKind::SpeedFraction,
+            speed_max_rad_s: 3000.0,
+            thrust_coefficient_n_s2: 6.0e-7,
+            torque_coefficient_n_m_s2: 6.6e-9,
+            time_constant_up_s: 0.03,
+            time_constant_down_s: 0.04,
+            reference_voltage_v: 14.8,
+            thrust_curve: None,
+        },
+        drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: 0.01 },
+        wing: None,
+        limits: Limits { tilt_max_rad: 0.5, thrust_max_n: 10.7 },
+    })
+    .unwrap()
+}
+
+/// A world with ground and nothing else.
+pub(crate) fn open_field() -> WorldParameters {
+    WorldParameters {
+        size_body_m: SIZE_BODY_M,
+        obstacles: Vec::new(),
+        ground: true,
+        restitution: 0.3,
+        friction: 0.6,
+    }
+}
+
+/// Height over ground, m; velocity, m/s; roll, pitch and yaw, rad.
+#[allow(dead_code)] // Not every test file throws the vehicle.
+pub(crate) fn thrown(height_m: f64, velocity: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> State<f64> {
+    State {
+        position: In::new(Vector3::new(0.0, 0.0, -height_m)),
+        velocity: In::new(Vector3::from(velocity)),
+        attitude: Rotation::<squirrel_core::frames::Ned, squirrel_core::frames::Body, f64>::from_euler(
+            roll, pitch, yaw,
+        )
+        .quaternion
+        .into_inner(),
+        ..State::at_rest()
+    }
+}
