@@ -56,8 +56,7 @@ impl Arm {
             Self::WiicNoWings => WingPolicy::CoordinatedWithoutWings,
             Self::Phantom | Self::TwccFlat | Self::TwccOracle => WingPolicy::Coordinated,
         };
-        twcc.force_model =
-            if self.is_told_the_force() { ForceModel::Given } else { ForceModel::FlatPlate };
+        twcc.force_model = if self.is_told_the_force() { ForceModel::Given } else { ForceModel::FlatPlate };
     }
 
     /// The wing that the plant of this arm has.

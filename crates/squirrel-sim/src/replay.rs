@@ -45,9 +45,12 @@ pub struct Replay {
 /// One line that names the metadata that is missing or cannot be used.
 pub fn setup(log: &FlightLog) -> Result<Setup, String> {
     let text = |key: &str| {
-        log.metadata.get(key).ok_or_else(|| format!("metadata {key}: missing; the log was not recorded by squirrel fly"))
+        log.metadata
+            .get(key)
+            .ok_or_else(|| format!("metadata {key}: missing; the log was not recorded by squirrel fly"))
     };
-    let vehicle = VehicleFile::parse(text("vehicle_toml")?, "metadata vehicle_toml").map_err(|e| e.to_string())?;
+    let vehicle =
+        VehicleFile::parse(text("vehicle_toml")?, "metadata vehicle_toml").map_err(|e| e.to_string())?;
     let scenario = Scenario::parse(text("scenario_toml")?, "metadata scenario_toml")?;
     let integrator = Integrator::parse(text("integrator")?)?;
     Ok(Setup { vehicle, arm: Arm::parse(text("arm")?)?, scenario, integrator })

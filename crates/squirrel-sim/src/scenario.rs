@@ -123,7 +123,9 @@ impl Scenario {
         }
         if Path::new(name_or_path).extension().is_none_or(|e| e != "toml") {
             let names = BUILT_IN.join(", ");
-            return Err(format!("scenario = {name_or_path}: no such scenario; known are {names}, or a .toml file"));
+            return Err(format!(
+                "scenario = {name_or_path}: no such scenario; known are {names}, or a .toml file"
+            ));
         }
         let text = std::fs::read_to_string(name_or_path).map_err(|e| format!("{name_or_path}: {e}"))?;
         Self::parse(&text, name_or_path)
@@ -296,7 +298,11 @@ impl Scenario {
             Some(scale_length_m) => GustModel::Dryden { scale_length_m },
             None => GustModel::GaussMarkov { time_constant_s: self.wind.gust_time_constant_s },
         };
-        WindParameters { mean_ned_m_s: self.wind.mean_ned_m_s, gust_sigma_m_s: self.wind.gust_sigma_m_s, gust }
+        WindParameters {
+            mean_ned_m_s: self.wind.mean_ned_m_s,
+            gust_sigma_m_s: self.wind.gust_sigma_m_s,
+            gust,
+        }
     }
 }
 
@@ -317,7 +323,10 @@ mod tests {
     fn errors_name_file_field_and_value() {
         let text = Scenario::find("avoid").unwrap().to_toml();
         let error = |from: &str, to: &str| Scenario::parse(&text.replace(from, to), "s.toml").unwrap_err();
-        assert_eq!(error("speed_m_s = 7.3", "speed_m_s = -1.0"), "s.toml: mission.speed_m_s = -1: must be finite and > 0");
+        assert_eq!(
+            error("speed_m_s = 7.3", "speed_m_s = -1.0"),
+            "s.toml: mission.speed_m_s = -1: must be finite and > 0"
+        );
         assert!(error("duration_s = 13.0", "duration_s = nan").starts_with("s.toml: duration_s = NaN"));
         assert!(error("range_m", "rnage_m").contains("s.toml, line"));
         assert!(Scenario::find("loop").unwrap_err().contains("avoid"));

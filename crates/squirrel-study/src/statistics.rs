@@ -66,7 +66,11 @@ mod tests {
         let flat = [4.6432, 4.3026, 4.5007];
         let parnn = [3.9292, 4.1752, 4.2986];
         assert_eq!(percent(gain(&wingless, &parnn)), 13.1);
-        assert_eq!(percent(1.0 - mean(&parnn) / mean(&wingless)), 11.58, "the reduction of the error is smaller");
+        assert_eq!(
+            percent(1.0 - mean(&parnn) / mean(&wingless)),
+            11.58,
+            "the reduction of the error is smaller"
+        );
         assert_eq!(percent(gain(&wingless, &flat)), 4.32);
         assert_eq!(percent(gain(&flat, &parnn)), 8.41);
     }

@@ -83,7 +83,8 @@ impl Demo {
             let mut cells = figures(&flight.metrics);
             cells.insert(2, ("gain %".to_owned(), format!("{:+.1}", 100.0 * gain)));
             let table = table.get_or_insert_with(|| {
-                let names: Vec<&str> = std::iter::once("arm").chain(cells.iter().map(|(n, _)| n.as_str())).collect();
+                let names: Vec<&str> =
+                    std::iter::once("arm").chain(cells.iter().map(|(n, _)| n.as_str())).collect();
                 Table::new(&names)
             });
             let name = std::iter::once(setup.arm.name().to_owned());

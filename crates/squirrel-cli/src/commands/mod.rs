@@ -2,7 +2,7 @@
 
 pub(crate) mod demo;
 pub(crate) mod fly;
-pub(crate) mod gap;
+//pub(crate) mod gap;
 pub(crate) mod import;
 pub(crate) mod replay;
 pub(crate) mod study;
@@ -37,11 +37,7 @@ fn figures(metrics: &Metrics) -> Vec<(String, String)> {
 }
 
 /// How the report sees one flight.
-fn view<'a>(
-    setup: &'a Setup,
-    log: &'a FlightLog,
-    summary: Vec<(String, String)>,
-) -> FlightView<'a> {
+fn view<'a>(setup: &'a Setup, log: &'a FlightLog, summary: Vec<(String, String)>) -> FlightView<'a> {
     let vehicle = setup.vehicle.vehicle.parameters();
     FlightView {
         arm: setup.arm.name(),

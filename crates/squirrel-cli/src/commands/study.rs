@@ -52,16 +52,27 @@ impl Options {
         } else {
             self.arms.iter().map(|name| Arm::parse(name)).collect::<Result<_, _>>()?
         };
-        let plan = Plan { vehicle: vehicle(self.vehicle.as_deref())?, arms, trials: self.trials, seed: self.seed };
+        let plan =
+            Plan { vehicle: vehicle(self.vehicle.as_deref())?, arms, trials: self.trials, seed: self.seed };
         let bar = output::progress(thrust::flights(&plan), "flights");
         let study = thrust::run(&plan, || bar.inc(1));
         bar.finish_and_clear();
         let study = study.map_err(|e| e.to_string())?;
 
-        say(&format!("Avoidance manoeuvre, {} trials an arm on paired seeds from {}.", study.trials, study.seed));
+        say(&format!(
+            "Avoidance manoeuvre, {} trials an arm on paired seeds from {}.",
+            study.trials, study.seed
+        ));
         say("Gain is mean error of pc over mean error of the arm, minus 1, with its paired 95 % interval.\n");
         let mut table = Table::new(&[
-            "T/W", "arm", "RMSE 3-D m", "RMSE horiz. m", "gain %", "95 % interval", "height lost m", "height gained m",
+            "T/W",
+            "arm",
+            "RMSE 3-D m",
+            "RMSE horiz. m",
+            "gain %",
+            "95 % interval",
+            "height lost m",
+            "height gained m",
             "wings open s",
         ]);
         let mut csv = String::from(

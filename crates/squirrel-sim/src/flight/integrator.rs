@@ -63,7 +63,12 @@ impl Mover {
         let solid = if scenario.solid_obstacles { scenario.obstacles.as_slice() } else { &[] };
         let obstacles = solid
             .iter()
-            .map(|&[north_m, east_m, radius_m]| Cylinder { north_m, east_m, radius_m, height_m: TRUNK_HEIGHT_M })
+            .map(|&[north_m, east_m, radius_m]| Cylinder {
+                north_m,
+                east_m,
+                radius_m,
+                height_m: TRUNK_HEIGHT_M,
+            })
             .collect();
         let parameters = WorldParameters {
             size_body_m: setup.vehicle.size_body_m,
@@ -72,8 +77,7 @@ impl Mover {
             restitution: 0.2,
             friction: 0.6,
         };
-        let world =
-            World::new(&setup.vehicle.vehicle, parameters).map_err(|e| FlightError(e.to_string()))?;
+        let world = World::new(&setup.vehicle.vehicle, parameters).map_err(|e| FlightError(e.to_string()))?;
         Ok(Self { integrator: setup.integrator, world })
     }
 

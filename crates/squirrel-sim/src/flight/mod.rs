@@ -9,8 +9,8 @@ mod record;
 
 pub use integrator::Integrator;
 pub use metrics::Metrics;
-pub use record::{INPUT_SOURCES, frames};
 pub(crate) use record::record_output;
+pub use record::{INPUT_SOURCES, frames};
 
 use crate::arm::Arm;
 use crate::log::FlightLog;
@@ -68,7 +68,10 @@ impl Setup {
     pub fn stack(&self) -> Result<Stack, FlightError> {
         let fail = |e: squirrel_core::vehicle::ParameterError| FlightError(e.to_string());
         let Some(mut parameters) = self.vehicle.control else {
-            return Err(FlightError(format!("{}: [control] is missing; a flight needs gains", self.vehicle.name)));
+            return Err(FlightError(format!(
+                "{}: [control] is missing; a flight needs gains",
+                self.vehicle.name
+            )));
         };
         self.arm.configure(&mut parameters.twcc);
         let mut vehicle = *self.vehicle.vehicle.parameters();
@@ -82,7 +85,9 @@ impl Setup {
     /// Largest collective thrust over weight.
     pub fn thrust_to_weight(&self) -> f64 {
         let vehicle = &self.vehicle.vehicle;
-        self.scenario.thrust_to_weight.unwrap_or(vehicle.parameters().limits.thrust_max_n / vehicle.weight_n())
+        self.scenario
+            .thrust_to_weight
+            .unwrap_or(vehicle.parameters().limits.thrust_max_n / vehicle.weight_n())
     }
 
     /// Flies.
@@ -130,7 +135,10 @@ impl Setup {
                 }
                 let output = stack.step(&mut stack_state, &frame);
                 if !state.body.is_finite() {
-                    return Err(FlightError(format!("at {:.3} s the vehicle's state is not finite", time_us as f64 * 1e-6)));
+                    return Err(FlightError(format!(
+                        "at {:.3} s the vehicle's state is not finite",
+                        time_us as f64 * 1e-6
+                    )));
                 }
                 rotor_command = output.rotor_command.map(f64::from);
                 wing_command = output.wing_command.map(f64::from);

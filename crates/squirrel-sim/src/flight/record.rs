@@ -78,7 +78,8 @@ impl Recorder {
         if let Some(imu) = frame.imu {
             let omega = wide(&imu.omega.vector);
             let force = wide(&imu.specific_force.vector);
-            log.source_mut("imu").push(t, &[("omega_body_rad_s", &omega), ("specific_force_body_m_s2", &force)]);
+            log.source_mut("imu")
+                .push(t, &[("omega_body_rad_s", &omega), ("specific_force_body_m_s2", &force)]);
         }
         if let Some(attitude) = frame.attitude {
             log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude.wxyz().map(f64::from))]);
@@ -213,7 +214,9 @@ impl Cursor<'_> {
 pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
     let channel = |name: &str, width: usize| match log.channel(name) {
         None => Ok(None),
-        Some((_, c)) if c.width != width => Err(format!("{name}: has {} numbers a sample, must have {width}", c.width)),
+        Some((_, c)) if c.width != width => {
+            Err(format!("{name}: has {} numbers a sample, must have {width}", c.width))
+        }
         Some((time_s, c)) => Ok(Some((Cursor { time_s, next: 0 }, c))),
     };
     let Some((times, time_us)) = log.channel("frame.time_us") else {
@@ -243,7 +246,8 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
             && let Some(i) = cursor.at(*t)
         {
             let q = q.row(i);
-            let q = squirrel_core::nalgebra::Quaternion::new(q[0] as f32, q[1] as f32, q[2] as f32, q[3] as f32);
+            let q =
+                squirrel_core::nalgebra::Quaternion::new(q[0] as f32, q[1] as f32, q[2] as f32, q[3] as f32);
             frame.attitude = Some(Rotation::new(squirrel_core::nalgebra::Unit::new_unchecked(q)));
         }
         if let Some((cursor, position)) = &mut gnss

@@ -58,7 +58,8 @@ impl BatteryParameters {
         }
         let table = &self.ocv_v_of_charge;
         let rising = table.windows(2).all(|w| w[0][0] < w[1][0] && w[0][1] <= w[1][1]);
-        let plausible = |[charge, volt]: &[f64; 2]| (0.0..=1.0).contains(charge) && (0.5..=6.0).contains(volt);
+        let plausible =
+            |[charge, volt]: &[f64; 2]| (0.0..=1.0).contains(charge) && (0.5..=6.0).contains(volt);
         if table.len() < 2 || !rising || !table.iter().all(plausible) {
             return Err(format!(
                 "battery.ocv_v_of_charge = {table:?}: must be at least two rising pairs [charge 0..1, cell volt 0.5..6]"

@@ -48,8 +48,12 @@ pub struct Wind {
 impl Wind {
     /// Gusts start in their stationary distribution.
     pub fn new(parameters: WindParameters, seed: u64) -> Self {
-        let mut wind =
-            Self { parameters, rng: Pcg64Mcg::seed_from_u64(seed), first: Vector3::zeros(), second: Vector3::zeros() };
+        let mut wind = Self {
+            parameters,
+            rng: Pcg64Mcg::seed_from_u64(seed),
+            first: Vector3::zeros(),
+            second: Vector3::zeros(),
+        };
         match parameters.gust {
             GustModel::GaussMarkov { .. } => wind.first = wind.noise(),
             // The second-order axes forget their start within a few of these steps.
@@ -109,7 +113,8 @@ mod tests {
     use super::*;
 
     fn spread(gust: GustModel, dt_s: f64) -> [f64; 3] {
-        let mut wind = Wind::new(WindParameters { mean_ned_m_s: [2.0, 0.0, 0.0], gust_sigma_m_s: 1.5, gust }, 1);
+        let mut wind =
+            Wind::new(WindParameters { mean_ned_m_s: [2.0, 0.0, 0.0], gust_sigma_m_s: 1.5, gust }, 1);
         let n = 400_000;
         let mut square = Vector3::zeros();
         for _ in 0..n {

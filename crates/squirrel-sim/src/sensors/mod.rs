@@ -6,7 +6,9 @@
 
 mod parameters;
 
-pub use parameters::{AttitudeSensor, BaroSensor, BatterySensor, GnssSensor, ImuSensor, SensorParameters, Timing};
+pub use parameters::{
+    AttitudeSensor, BaroSensor, BatterySensor, GnssSensor, ImuSensor, SensorParameters, Timing,
+};
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -56,7 +58,8 @@ struct Line<S> {
 impl<S> Line<S> {
     fn new(timing: Timing, seed: u64, stream: u64) -> Self {
         // Streams are apart by a large odd number; the seeding itself mixes the bits.
-        let own = timing.seed.unwrap_or_else(|| seed.wrapping_add(stream.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
+        let own =
+            timing.seed.unwrap_or_else(|| seed.wrapping_add(stream.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
         Self { timing, rng: Pcg64Mcg::seed_from_u64(own), taken: 0, waiting: VecDeque::new() }
     }
 
@@ -112,8 +115,10 @@ impl Sensors {
         let mut frame = SensorFrame::empty(time_us);
         frame.imu = self.imu.poll(time_us, |rng| Imu {
             omega: In::new(
-                (truth.omega.vector + Vector3::from(p.imu.gyro_bias_rad_s) + noise(rng, p.imu.gyro_noise_rad_s))
-                    .map(|x| x as f32),
+                (truth.omega.vector
+                    + Vector3::from(p.imu.gyro_bias_rad_s)
+                    + noise(rng, p.imu.gyro_noise_rad_s))
+                .map(|x| x as f32),
             ),
             specific_force: In::new(
                 (truth.specific_force.vector
@@ -225,7 +230,10 @@ mod tests {
             let mut p = SensorParameters::default();
             p.baro.noise_m = baro_noise;
             let mut sensors = Sensors::new(p, 5);
-            (0..100u64).filter_map(|k| sensors.poll(k * 3334, &truth()).0.imu).map(|i| i.omega.vector.x).last()
+            (0..100u64)
+                .filter_map(|k| sensors.poll(k * 3334, &truth()).0.imu)
+                .map(|i| i.omega.vector.x)
+                .last()
         };
         assert_eq!(gyro(0.0), gyro(1.0));
     }

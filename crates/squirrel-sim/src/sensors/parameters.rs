@@ -176,10 +176,16 @@ impl SensorParameters {
         ];
         for (sensor, timing) in timings {
             if !(timing.rate_hz > 0.0 && timing.rate_hz <= 1e5) {
-                return Err(format!("sensors.{sensor}.timing.rate_hz = {}: must be > 0 and <= 1e5", timing.rate_hz));
+                return Err(format!(
+                    "sensors.{sensor}.timing.rate_hz = {}: must be > 0 and <= 1e5",
+                    timing.rate_hz
+                ));
             }
             if !(0.0..=10.0).contains(&timing.latency_s) {
-                return Err(format!("sensors.{sensor}.timing.latency_s = {}: must be 0 to 10", timing.latency_s));
+                return Err(format!(
+                    "sensors.{sensor}.timing.latency_s = {}: must be 0 to 10",
+                    timing.latency_s
+                ));
             }
         }
         let noises = [

@@ -3,8 +3,9 @@
 use super::VehicleFile;
 use super::quantity::Quantity;
 use super::tables::{
-    AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, FormName, InertiaValue, PositionTable,
-    PropulsionTable, ThrustLawName, TriggerName, VehicleTable, WingControlTable, WingName, WingTable, WingTestName,
+    AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, FormName, InertiaValue,
+    PositionTable, PropulsionTable, ThrustLawName, TriggerName, VehicleTable, WingControlTable, WingName,
+    WingTable, WingTestName,
 };
 use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ServoParameters, WingPlant};
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
@@ -81,9 +82,8 @@ pub(super) fn build(t: VehicleTable) -> Result<VehicleFile, Problem> {
 
 /// A box that holds all hubs, for a vehicle that states no size.
 fn default_size(vehicle: &Vehicle<f64>) -> [f64; 3] {
-    let reach = |axis: usize| {
-        vehicle.rotors().iter().map(|r| r.position.vector[axis].abs()).fold(0.02, f64::max)
-    };
+    let reach =
+        |axis: usize| vehicle.rotors().iter().map(|r| r.position.vector[axis].abs()).fold(0.02, f64::max);
     [2.0 * reach(0), 2.0 * reach(1), 0.04]
 }
 
@@ -205,7 +205,11 @@ fn effects(tables: BTreeMap<String, BTreeMap<String, Quantity<f64>>>) -> Result<
         for (key, q) in &table {
             let Some(i) = found.parameters.iter().position(|p| p.key == key) else {
                 let known: Vec<_> = found.parameters.iter().map(|p| p.key).collect();
-                return Err(format!("effects.{name}.{key} = {}: no such parameter; known are {}", q.0, known.join(", ")));
+                return Err(format!(
+                    "effects.{name}.{key} = {}: no such parameter; known are {}",
+                    q.0,
+                    known.join(", ")
+                ));
             };
             if !q.0.is_finite() {
                 return Err(format!("effects.{name}.{key} = {}: must be finite", q.0));

@@ -110,7 +110,8 @@ impl VehicleFile {
         let tables: tables::VehicleTable = toml::from_str(text).map_err(|e| syntax(&e))?;
         let raw: toml::Table = text.parse().map_err(|e| syntax(&e))?;
         let built = build::build(tables);
-        let mut built = built.map_err(|problem| VehicleFileError::Field { file: file.to_owned(), problem })?;
+        let mut built =
+            built.map_err(|problem| VehicleFileError::Field { file: file.to_owned(), problem })?;
         text.clone_into(&mut built.text);
         built.provenance = quantity::provenance(&raw);
         Ok(built)

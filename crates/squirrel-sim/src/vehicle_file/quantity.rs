@@ -73,7 +73,8 @@ pub(super) fn provenance(table: &toml::Table) -> Vec<(String, Provenance)> {
 fn walk(value: &toml::Value, field: String, all: &mut Vec<(String, Provenance)>) {
     match value {
         toml::Value::Table(table) if table.contains_key("value") => {
-            let text = |key: &str| table.get(key).map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned));
+            let text =
+                |key: &str| table.get(key).map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned));
             let value = text("value").unwrap_or_default();
             all.push((field, Provenance { value, sd: text("sd"), source: text("source") }));
         }
