@@ -22,7 +22,8 @@ pub struct Scenario {
     pub duration_s: f64,
     /// Height of the mission above the ground, m.
     pub height_m: f64,
-    /// Ratio of the largest collective thrust to the weight; overrides `limits.thrust_max_n` of the vehicle.
+    /// Effective thrust-to-weight ratio: what all rotors together can give over the weight. Overrides the vehicle's top
+    /// rotor speed and `limits.thrust_max_n`, as a weak battery would.
     #[serde(default)]
     pub thrust_to_weight: Option<f64>,
     /// Charge of the battery at the start, 0..1.
@@ -175,8 +176,12 @@ impl Scenario {
             "track" => {
                 Some(Self::base("track", 20.0, MissionTable::Circle { radius_m: 6.0, speed_m_s: 4.0 }))
             }
-            // The paper's real flights: 7.3 m/s, R_d 4 m, 110 to 130 deg.
-            "avoid" => Some(Self::turn("avoid", 7.3, 4.0, 110.0, 130.0)),
+            // The paper's real flights: 7.3 m/s, R_d 4 m, 110 to 130 deg. At this thrust-to-weight ratio the paper's
+            // gain and its sinking wingless drone appear together.
+            "avoid" => Some(Self {
+                thrust_to_weight: Some(1.25),
+                ..Self::turn("avoid", 7.3, 4.0, 110.0, 130.0)
+            }),
             // The paper's simulated study: R_d 5 m, one angle.
             "steer" => Some(Self::turn("steer", 7.0, 5.0, 120.0, 120.0)),
             _ => None,

@@ -24,7 +24,7 @@ use squirrel_core::frames::{In, Ned};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::{MAX_OBSTACLES, Stack, StackState};
-use squirrel_core::vehicle::MAX_ROTORS;
+use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
 
 /// Rate of the flight code, Hz (paper, section III.A).
 pub const CONTROL_RATE_HZ: u64 = 300;
@@ -74,12 +74,22 @@ impl Setup {
             )));
         };
         self.arm.configure(&mut parameters.twcc);
-        let mut vehicle = *self.vehicle.vehicle.parameters();
-        if let Some(ratio) = self.scenario.thrust_to_weight {
-            vehicle.limits.thrust_max_n = ratio * self.vehicle.vehicle.weight_n();
-        }
-        let vehicle = squirrel_core::vehicle::Vehicle::new(vehicle).and_then(|v| v.cast()).map_err(fail)?;
+        let vehicle = self.flown_vehicle()?.cast().map_err(fail)?;
         Stack::new(vehicle, parameters, self.scenario.mission()).map_err(fail)
+    }
+
+    /// The vehicle with the scenario's thrust-to-weight ratio: rotors whose top speed is lower, as on a weak battery, and a
+    /// thrust limit to match.
+    fn flown_vehicle(&self) -> Result<Vehicle<f64>, FlightError> {
+        let mut p = *self.vehicle.vehicle.parameters();
+        if let Some(ratio) = self.scenario.thrust_to_weight {
+            p.limits.thrust_max_n = ratio * self.vehicle.vehicle.weight_n();
+            let each = p.limits.thrust_max_n / p.rotor_count as f64;
+            p.propulsion.speed_max_rad_s = (each / p.propulsion.thrust_coefficient_n_s2).sqrt();
+            // The curve belongs to the rotors at full strength.
+            p.propulsion.thrust_curve = None;
+        }
+        Vehicle::new(p).map_err(|e| FlightError(e.to_string()))
     }
 
     /// Largest collective thrust over weight.
@@ -102,7 +112,7 @@ impl Setup {
         let stack = self.stack()?;
         let dt_s = PLANT_STEP_US as f64 * 1e-6;
         let plant = Plant::new(
-            self.vehicle.vehicle,
+            self.flown_vehicle()?,
             self.vehicle.effects,
             self.arm.plant_wing(&self.vehicle.wing),
             self.vehicle.battery.clone(),
