@@ -1,0 +1,108 @@
+//! One inner and one outer step of the flight code.
+
+use criterion::{Criterion, criterion_group, criterion_main};
+use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
+use squirrel_core::control::position::{AngleLaw, PositionGains};
+use squirrel_core::control::twcc::{ForceModel, Trigger, TwccParameters, WingPolicy};
+use squirrel_core::control::wiic::ThrustLaw;
+use squirrel_core::control::woeg::{WingEvents, WingTest};
+use squirrel_core::frames::{In, Rotation};
+use squirrel_core::guidance::mission::Mission;
+use squirrel_core::nalgebra::{Matrix3, Vector3};
+use squirrel_core::stack::{Gnss, Imu, OUTER_PERIOD_US, SensorFrame, Stack, StackParameters, StackState};
+use squirrel_core::vehicle::{
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle, Wing,
+};
+use std::hint::black_box;
+
+fn stack(form: AttitudeForm) -> Stack {
+    let mut rotors = [Rotor::unused(); MAX_ROTORS];
+    for (i, (x, y, s)) in [(1.0, -1.0, -1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, 1.0)].into_iter().enumerate()
+    {
+        rotors[i] = Rotor::planar(0.085 * x, 0.085 * y, s);
+    }
+    let vehicle = Vehicle::new(Parameters {
+        mass_kg: 0.548,
+        inertia_kg_m2: Matrix3::from_diagonal(&Vector3::new(3.22e-3, 4.68e-3, 7.72e-3)),
+        rotors,
+        rotor_count: 4,
+        propulsion: Propulsion {
+            command: CommandKind::SpeedFraction,
+            speed_max_rad_s: 3000.0,
+            thrust_coefficient_n_s2: 6.0e-7,
+            torque_coefficient_n_m_s2: 6.6e-9,
+            time_constant_up_s: 0.04,
+            time_constant_down_s: 0.04,
+            reference_voltage_v: 14.8,
+            thrust_curve: None,
+        },
+        drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: 0.01 },
+        wing: Some(Wing { area_per_side_m2: 0.02, normal_force_slope: 2.0, lateral_arm_m: 0.09, time_constant_s: 0.03 }),
+        limits: Limits { tilt_max_rad: 0.52, thrust_max_n: 10.0 },
+    })
+    .expect("sound");
+    let attitude = AttitudeGains {
+        form,
+        c1_per_s: Vector3::new(9.0, 9.0, 4.0),
+        c2_per_s: Vector3::new(14.0, 14.0, 5.0),
+        lambda_per_s2: Vector3::new(8.0, 8.0, 2.0),
+        integral_max_rad_s: 0.1,
+        filter_frequency_rad_s: 20.0,
+        filter_damping: 1.0,
+    };
+    let twcc = TwccParameters {
+        position: PositionGains {
+            position_per_s: Vector3::new(1.6, 1.6, 0.8),
+            velocity_per_s: Vector3::new(2.5, 2.5, 1.6),
+            integral_per_s2: Vector3::repeat(0.15),
+            derivative: Vector3::repeat(0.05),
+            velocity_feed_forward: 0.0,
+            acceleration_max_horizontal_m_s2: 11.0,
+            acceleration_max_vertical_m_s2: 3.0,
+            integral_max_m: 2.0,
+            angle_law: AngleLaw::Exact,
+        },
+        wing_events: WingEvents { test: WingTest::Normal, open_above_n: 0.1, close_below_n: 0.05 },
+        thrust_law: ThrustLaw::Exact,
+        trigger: Trigger::Angle,
+        force_model: ForceModel::FlatPlate,
+        policy: WingPolicy::Coordinated,
+        dwell_s: 0.3,
+        thrust_min_n: 0.5,
+    };
+    Stack::new(vehicle, StackParameters { attitude, twcc }, Mission::Hover { position: In::zero() }).expect("sound")
+}
+
+fn frame(time_us: u64) -> SensorFrame {
+    let mut frame = SensorFrame::empty(time_us);
+    frame.imu = Some(Imu {
+        omega: In::new(Vector3::new(0.1, -0.2, 0.05)),
+        specific_force: In::new(Vector3::new(0.1, 0.0, -9.8)),
+    });
+    frame.attitude = Some(Rotation::from_euler(0.1, 0.4, 0.02));
+    frame.gnss = Some(Gnss { position: In::new(Vector3::new(1.0, 0.5, 0.1)), velocity: In::new(Vector3::new(6.0, 1.0, 0.2)) });
+    frame
+}
+
+fn steps(c: &mut Criterion) {
+    for (name, form) in [("euler", AttitudeForm::Euler), ("quaternion", AttitudeForm::Quaternion)] {
+        let stack = stack(form);
+        let mut ready = StackState::default();
+        stack.step(&mut ready, &frame(0));
+        c.bench_function(&format!("inner_step_{name}"), |b| {
+            b.iter(|| {
+                let mut state = ready;
+                stack.step(&mut state, black_box(&frame(3333)))
+            });
+        });
+        c.bench_function(&format!("inner_and_outer_step_{name}"), |b| {
+            b.iter(|| {
+                let mut state = ready;
+                stack.step(&mut state, black_box(&frame(OUTER_PERIOD_US)))
+            });
+        });
+    }
+}
+
+criterion_group!(benches, steps);
+criterion_main!(benches);

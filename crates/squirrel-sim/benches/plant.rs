@@ -1,0 +1,62 @@
+//! One plant step, and one vehicle in complete closed loop.
+//!
+//! `plant_step_without_wing` counts RK4 steps of rigid body, four rotor lags, drag and battery; `closed_loop` counts seconds
+//! of flight (plant at 1 kHz with membrane wing, battery, gusts and noisy sensors; flight code at 300 and 10 Hz; no log), so
+//! its throughput is the ratio to real time.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use squirrel_core::dynamics::State;
+use squirrel_core::frames::In;
+use squirrel_core::nalgebra::Vector3;
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::plant::{Plant, PlantState, WingPlant};
+use squirrel_sim::scenario::Scenario;
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::hint::black_box;
+
+fn start(plant: &Plant) -> PlantState {
+    let mut body = State::at_rest();
+    body.velocity = In::new(Vector3::new(5.0, 1.0, 0.3));
+    body.rotor_speed_rad_s[..4].fill(1500.0);
+    plant.initial_state(body, 1.0)
+}
+
+fn plant_steps(c: &mut Criterion) {
+    let file = VehicleFile::squirrel();
+    let mut group = c.benchmark_group("plant_step");
+    for (name, wing) in [("without_wing", WingPlant::None), ("membrane_wing", file.wing.clone())] {
+        let plant = Plant::new(file.vehicle, file.effects, wing, file.battery.clone(), 1e-3).expect("sound");
+        let command = [0.5, 0.501, 0.5, 0.499, 0.0, 0.0, 0.0, 0.0];
+        let steps = 1000;
+        group.throughput(Throughput::Elements(steps));
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                let mut state = start(&plant);
+                for _ in 0..steps {
+                    plant.step(&mut state, black_box(&command), [1.0; 2], In::zero());
+                }
+                state
+            });
+        });
+    }
+    group.finish();
+}
+
+fn closed_loop(c: &mut Criterion) {
+    let mut scenario = Scenario::find("track").expect("built in");
+    scenario.duration_s = 10.0;
+    scenario.wind.gust_sigma_m_s = 0.5;
+    let setup = Setup { vehicle: VehicleFile::squirrel(), arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
+    let mut group = c.benchmark_group("closed_loop");
+    group.throughput(Throughput::Elements(10));
+    group.bench_function("seconds_of_flight", |b| b.iter(|| setup.fly(false, |_| {}).expect("flies").metrics));
+    group.finish();
+}
+
+criterion_group! {
+    name = benches;
+    config = Criterion::default().sample_size(20).measurement_time(std::time::Duration::from_secs(3));
+    targets = plant_steps, closed_loop
+}
+criterion_main!(benches);
