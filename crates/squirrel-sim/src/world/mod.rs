@@ -81,7 +81,7 @@ impl World {
         // No cap on speed, which is 400 m/s by default.
         integration.normalized_max_linear_velocity = f64::MAX;
         // Impulses carried over from the step before push on a body that has bounced or turned since: tumbling impacts
-        // gained up to 6 % of energy that way, 0.3 % without. More iterations make up for the worse first guess.
+        // gained up to 6 % of energy that way, 0.4 % without. More iterations make up for the worse first guess.
         integration.warmstart_coefficient = 0.0;
         integration.num_internal_pgs_iterations = 4;
         integration.num_internal_stabilization_iterations = 4;
