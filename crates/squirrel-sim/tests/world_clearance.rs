@@ -39,7 +39,7 @@ proptest! {
         horizon_m in prop_oneof![0.0..0.3, 0.3..30.0, Just(1e4), Just(f64::INFINITY)],
     ) {
         let parameters = WorldParameters { obstacles, ground, ..open_field() };
-        let world = World::new(&vehicle(), parameters.clone()).unwrap();
+        let world = World::new(&vehicle(), &parameters).unwrap();
         for (x, y, z) in positions {
             let p = Vector3::new(x, y, z);
             let clearance_m = world.clearance(In::<Ned, f64>::new(p), horizon_m);
@@ -59,7 +59,7 @@ proptest! {
         attitude in prop::array::uniform3(-3.0..3.0),
         dt_s in 1e-4..1e-2,
     ) {
-        let mut world = World::new(&vehicle(), WorldParameters { obstacles, ..open_field() }).unwrap();
+        let mut world = World::new(&vehicle(), &WorldParameters { obstacles, ..open_field() }).unwrap();
         let mut state = thrown(0.0, velocity, attitude);
         state.position = In::new(Vector3::new(position.0, position.1, position.2));
         let contact = world.step(&state, &Wrench::zero(), dt_s).unwrap().1;
@@ -70,7 +70,7 @@ proptest! {
 #[test]
 fn far_away_and_no_number_at_all() {
     let obstacles = vec![Cylinder { north_m: 10.0, east_m: 0.0, radius_m: 1.0, height_m: 5.0 }];
-    let world = World::new(&vehicle(), WorldParameters { obstacles, ..open_field() }).unwrap();
+    let world = World::new(&vehicle(), &WorldParameters { obstacles, ..open_field() }).unwrap();
     let at = |x, y, z| In::<Ned, f64>::new(Vector3::new(x, y, z));
     assert_eq!(world.clearance(at(1e300, -1e300, -1e300), 5.0), 5.0);
     assert_eq!(world.clearance(at(f64::NEG_INFINITY, 0.0, -100.0), 5.0), 5.0);

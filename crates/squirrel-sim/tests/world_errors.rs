@@ -14,7 +14,7 @@ fn refusal(change: impl Fn(&mut WorldParameters)) -> String {
     let tree = Cylinder { north_m: 5.0, east_m: 5.0, radius_m: 0.2, height_m: 8.0 };
     let mut parameters = WorldParameters { obstacles: vec![tree; 4], ..open_field() };
     change(&mut parameters);
-    World::new(&vehicle(), parameters).unwrap_err().to_string()
+    World::new(&vehicle(), &parameters).expect_err("refused").to_string()
 }
 
 #[test]
@@ -39,7 +39,7 @@ fn a_world_that_cannot_be_names_field_index_and_value() {
 
 #[test]
 fn a_step_that_cannot_be_names_the_quantity_and_the_world_goes_on() {
-    let mut world = World::new(&vehicle(), open_field()).unwrap();
+    let mut world = World::new(&vehicle(), &open_field()).unwrap();
     let good = thrown(0.3, [1.0, 0.0, 0.0], [0.1, 0.2, 0.3]);
     let nan = In::new(Vector3::new(0.0, f64::NAN, 0.0));
     let no_force = Wrench::zero();
@@ -77,7 +77,7 @@ fn a_step_that_cannot_be_names_the_quantity_and_the_world_goes_on() {
     assert!(overflow.to_string().contains("force"), "{overflow}");
 
     // After all that the world still works: it falls, lands and rests like a new one.
-    let mut fresh = World::new(&vehicle(), open_field()).unwrap();
+    let mut fresh = World::new(&vehicle(), &open_field()).unwrap();
     let (mut state, mut expected) = (good, good);
     for _ in 0..3000 {
         state = world.step(&state, &no_force, 1e-3).unwrap().0;
@@ -85,6 +85,12 @@ fn a_step_that_cannot_be_names_the_quantity_and_the_world_goes_on() {
     }
     assert_eq!(state, expected);
     assert!(-state.position.vector.z > 0.012);
+}
+
+#[test]
+fn a_world_may_move_to_another_thread() {
+    fn sends<T: Send>(_: &T) {}
+    sends(&World::new(&vehicle(), &open_field()).unwrap());
 }
 
 fn huge() -> impl Strategy<Value = In<Body, f64>> {
@@ -101,7 +107,7 @@ proptest! {
     ) {
         let tree = Cylinder { north_m: 2.0, east_m: 0.0, radius_m: 0.2, height_m: 8.0 };
         let mut world =
-            World::new(&vehicle(), WorldParameters { obstacles: vec![tree; 3], ..open_field() }).unwrap();
+            World::new(&vehicle(), &WorldParameters { obstacles: vec![tree; 3], ..open_field() }).unwrap();
         let good = thrown(0.3, [1.0, 0.0, 0.0], [0.1, 0.2, 0.3]);
         let state = State {
             position: In::new(position.vector),

@@ -16,7 +16,7 @@
 //! ```
 //!
 //! Contact is a model too. At rest the box sinks into the ground by 0.16 mm for 25 mm of thickness. Steps should be 1 ms or
-//! less near solids: contact keeps its lever arms over the step, and a fast tumble gains up to 0.3 % of its energy in the
+//! less near solids: contact keeps its lever arms over the step, and a fast tumble gains up to 0.5 % of its energy in the
 //! course of its impacts at 1 ms, 1 % at 4 ms (`tests/world_contact.rs`).
 
 mod convert;
@@ -70,8 +70,8 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError::Value`] names the first parameter that is not finite or out of range.
-    pub fn new(vehicle: &Vehicle<f64>, parameters: WorldParameters) -> Result<Self, WorldError> {
-        parameters::check(&parameters)?;
+    pub fn new(vehicle: &Vehicle<f64>, parameters: &WorldParameters) -> Result<Self, WorldError> {
+        parameters::check(parameters)?;
         let half = Vector3::from(parameters.size_body_m) * 0.5;
         let mut physics = PhysicsWorld::new();
         physics.gravity = convert::to_vector(Vector3::new(0.0, 0.0, GRAVITY_M_S2));
@@ -81,7 +81,7 @@ impl World {
         // No cap on speed, which is 400 m/s by default.
         integration.normalized_max_linear_velocity = f64::MAX;
         // Impulses carried over from the step before push on a body that has bounced or turned since: tumbling impacts
-        // gained up to 6 % of energy that way, 0.3 % without. More iterations make up for the worse first guess.
+        // gained up to 6 % of energy that way, 0.5 % without. More iterations make up for the worse first guess.
         integration.warmstart_coefficient = 0.0;
         integration.num_internal_pgs_iterations = 4;
         integration.num_internal_stabilization_iterations = 4;

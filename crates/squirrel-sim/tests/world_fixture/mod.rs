@@ -37,7 +37,7 @@ pub(crate) fn vehicle() -> Vehicle<f64> {
         wing: None,
         limits: Limits { tilt_max_rad: 0.5, thrust_max_n: 10.7 },
     })
-    .unwrap()
+    .expect("the fixture is a possible airframe")
 }
 
 /// A world with ground and nothing else.
