@@ -10,8 +10,8 @@ use crate::scenario::Scenario;
 use crate::vehicle_file::VehicleFile;
 use squirrel_core::stack::StackState;
 
-/// Sources that the flight code writes.
-pub const OUTPUT_SOURCES: [&str; 5] = ["rotor", "wing", "reference", "control.outer", "control.inner"];
+/// Sources that the flight code writes, causes before consequences: of two that differ at one time, the first is named.
+pub const OUTPUT_SOURCES: [&str; 5] = ["reference", "control.outer", "control.inner", "wing", "rotor"];
 
 /// The first output that differs.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -94,7 +94,8 @@ impl Recorder {
         }
         if frame.obstacles() != self.last_obstacles {
             self.last_obstacles = frame.obstacles().to_vec();
-            let mut rows = [f64::NAN; 3 * MAX_OBSTACLES];
+            // An id of -1 marks a place without an obstacle.
+            let mut rows = [-1.0, 0.0, 0.0].repeat(MAX_OBSTACLES);
             for (row, o) in rows.chunks_exact_mut(3).zip(frame.obstacles()) {
                 row.copy_from_slice(&[f64::from(o.id), f64::from(o.north_m), f64::from(o.east_m)]);
             }
@@ -265,7 +266,7 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
         if let Some((cursor, rows)) = &mut obstacle
             && let Some(i) = cursor.at(*t)
         {
-            let present = rows.row(i).chunks_exact(3).filter(|r| r[0].is_finite());
+            let present = rows.row(i).chunks_exact(3).filter(|r| r[0] >= 0.0);
             obstacles = present
                 .map(|r| Obstacle { id: r[0] as u32, north_m: r[1] as f32, east_m: r[2] as f32 })
                 .collect();

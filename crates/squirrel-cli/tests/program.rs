@@ -1,0 +1,216 @@
+//! The program as a user runs it: exit codes, files, one clear line where something is wrong.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder of its own for each test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let _ = fs::remove_dir_all(&path);
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+    fn write(&self, name: &str, text: &str) -> String {
+        fs::write(self.0.join(name), text).unwrap();
+        name.to_owned()
+    }
+    fn run(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_squirrel")).args(arguments).current_dir(&self.0).output().unwrap()
+    }
+    fn files(&self) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(&self.0).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+    /// Runs, expects exit code 0, returns stdout.
+    fn succeeds(&self, arguments: &[&str]) -> String {
+        let output = self.run(arguments);
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    }
+    /// Runs, expects exit code 1 and one line on stderr that holds all `words`, and no new file.
+    fn fails(&self, arguments: &[&str], words: &[&str]) {
+        let before = self.files();
+        let output = self.run(arguments);
+        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
+        assert_eq!(stderr.trim_end().lines().count(), 1, "{arguments:?}: {stderr}");
+        for word in words {
+            assert!(stderr.contains(word), "{arguments:?}: `{word}` is not in: {stderr}");
+        }
+        assert_eq!(self.files(), before, "{arguments:?} left something behind");
+    }
+}
+
+const SQUIRREL: &str = include_str!("../../../vehicles/squirrel.toml");
+
+fn json(folder: &Folder, name: &str) -> serde_json::Value {
+    serde_json::from_str(&fs::read_to_string(folder.0.join(name)).unwrap()).unwrap()
+}
+
+#[test]
+fn without_arguments_it_flies_the_demo() {
+    let folder = Folder::new("demo");
+    let table = folder.succeeds(&[]);
+    for word in ["thrust-to-weight 1.25", "pc", "twcc_flat", "twcc_oracle", "RMSE 3-D", "gain %", "height lost"] {
+        assert!(table.contains(word), "`{word}` is not in:\n{table}");
+    }
+    let mut files: Vec<String> = fs::read_dir(folder.0.join("squirrel-demo"))
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
+    files.sort();
+    assert_eq!(files, ["flight-pc.mcap", "flight-twcc_flat.mcap", "flight-twcc_oracle.mcap", "report.html"]);
+    let report = fs::read_to_string(folder.0.join("squirrel-demo/report.html")).unwrap();
+    assert!(report.contains("<svg") && report.contains("twcc_oracle"));
+    for outside in ["src=\"http", "href=\"http", "url(http", "@import", "<link"] {
+        assert!(!report.contains(outside), "the report reaches outside: {outside}");
+    }
+}
+
+#[test]
+fn the_demo_is_the_same_bytes_twice_and_replays() {
+    let folder = Folder::new("twice");
+    let figures = |out: &str| {
+        folder.succeeds(&["demo", "--out", out, "--seed", "3", "--json", &format!("{out}.json")]);
+        ["report.html", "flight-pc.mcap", "flight-twcc_flat.mcap"].map(|f| fs::read(folder.0.join(out).join(f)).unwrap())
+    };
+    assert!(figures("a") == figures("b"), "two runs differ");
+    assert_eq!(json(&folder, "a.json"), json(&folder, "b.json"));
+    let line = folder.succeeds(&["replay", "a/flight-twcc_flat.mcap", "--json", "replay.json"]);
+    assert!(line.contains("every bit identical"), "{line}");
+    assert_eq!(json(&folder, "replay.json")["identical"], true);
+}
+
+#[test]
+fn replay_names_the_first_output_of_a_changed_gain_and_a_flipped_byte() {
+    let folder = Folder::new("replay");
+    folder.succeeds(&["fly", "--arm", "pc", "--scenario", "hover", "--out", "f.mcap"]);
+    folder.write("v.toml", &SQUIRREL.replace("c2_per_s = { value = [14.0", "c2_per_s = { value = [14.5"));
+    folder.fails(&["replay", "f.mcap", "--vehicle", "v.toml"], &["f.mcap", "control.inner.", "is the first output"]);
+    let mut bytes = fs::read(folder.0.join("f.mcap")).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 4;
+    fs::write(folder.0.join("f.mcap"), bytes).unwrap();
+    folder.fails(&["replay", "f.mcap"], &["f.mcap", "CRC"]);
+}
+
+#[test]
+fn a_truncated_log_says_what_is_whole_and_can_be_recovered() {
+    let folder = Folder::new("truncated");
+    folder.succeeds(&["fly", "--arm", "pc", "--scenario", "hover", "--out", "f.mcap"]);
+    let bytes = fs::read(folder.0.join("f.mcap")).unwrap();
+    fs::write(folder.0.join("cut.mcap"), &bytes[..bytes.len() * 2 / 3]).unwrap();
+    folder.fails(&["replay", "cut.mcap"], &["cut.mcap", "truncated", "s of flight"]);
+    let said = folder.succeeds(&["import", "--recover", "cut.mcap", "--out", "whole.mcap"]);
+    assert!(said.contains("bytes are whole"), "{said}");
+    assert!(folder.succeeds(&["replay", "whole.mcap"]).contains("every bit identical"));
+}
+
+#[test]
+fn fly_writes_log_report_and_figures() {
+    let folder = Folder::new("fly");
+    let arguments = ["fly", "--arm", "twcc_flat", "--scenario", "avoid", "--seed", "2", "--thrust-to-weight", "1.3"];
+    let outputs = ["--out", "f.mcap", "--report", "r.html", "--json", "f.json"];
+    let table = folder.succeeds(&[&arguments[..], &outputs[..]].concat());
+    assert!(table.contains("1.30") && table.contains("RMSE"), "{table}");
+    assert_eq!(folder.files(), ["f.json", "f.mcap", "r.html"]);
+    let figures = json(&folder, "f.json");
+    assert_eq!(figures["arm"], "twcc_flat");
+    assert!(figures["rmse_m"].as_f64().unwrap() > 1.0 && figures["thrust_to_weight"] == 1.3);
+}
+
+#[test]
+fn the_study_writes_its_table_for_machines() {
+    let folder = Folder::new("study");
+    let arguments = ["study", "thrust", "--arms", "pc,twcc_flat", "--trials", "2", "--seed", "1", "--out", "d"];
+    let table = folder.succeeds(&arguments);
+    assert!(table.contains("95 % interval"), "{table}");
+    let study = json(&folder, "d/thrust.json");
+    assert_eq!(study["rows"].as_array().unwrap().len(), 12);
+    assert_eq!(fs::read_to_string(folder.0.join("d/thrust.csv")).unwrap().lines().count(), 13);
+}
+
+#[test]
+fn wrong_usage_is_exit_code_two() {
+    let folder = Folder::new("usage");
+    for arguments in [&["flie"][..], &["fly", "--speed", "3"], &["replay"], &["fly", "--seed", "one"]] {
+        assert_eq!(folder.run(arguments).status.code(), Some(2), "{arguments:?}");
+    }
+    assert_eq!(folder.run(&["--help"]).status.code(), Some(0));
+}
+
+#[test]
+fn bad_vehicles_get_one_line_with_file_field_and_value() {
+    let folder = Folder::new("bad-vehicles");
+    let cases: [(&str, &str, &str, &[&str]); 10] = [
+        ("unknown key", "[mass]\n", "[mass]\nmas_kg = 1.0\n", &["line", "mas_kg"]),
+        ("negative mass", "value = 0.548,", "value = -0.548,", &["mass.mass_kg = -0.548"]),
+        ("NaN", "value = 0.548,", "value = nan,", &["mass.mass_kg = NaN"]),
+        ("impossible inertia", "4.68e-3, 7.72e-3]", "4.68e-3, 9.72e-3]", &["mass.inertia_kg_m2 = 0.00972"]),
+        ("indefinite inertia", "[3.22e-3, 4.68e-3", "[-3.22e-3, 4.68e-3", &["mass.inertia_kg_m2 = -0.00322"]),
+        ("wing area without wing", "model = \"membrane\"\n", "", &["wing.area_per_side_m2 = 0.02"]),
+        ("unknown effect", "[limits]", "[effects.magic]\nx = 1.0\n[limits]", &["effects.magic"]),
+        ("zero gain", "value = [1.6, 1.6, 0.8]", "value = [1.6, 0.0, 0.8]", &["control.position.position_per_s[1] = 0"]),
+        ("text for a number", "value = 0.548,", "value = \"heavy\",", &["line", "heavy"]),
+        ("rates", "[control]\n", "[sensors.gnss.timing]\nrate_hz = -1.0\n[control]\n", &["sensors.gnss.timing.rate_hz = -1"]),
+    ];
+    for (what, from, to, words) in cases {
+        let text = SQUIRREL.replacen(from, to, 1);
+        assert_ne!(text, SQUIRREL, "{what}");
+        folder.write("v.toml", &text);
+        let words = [&["v.toml"][..], words].concat();
+        folder.fails(&["vehicle", "check", "v.toml"], &words);
+        folder.fails(&["fly", "--vehicle", "v.toml", "--out", "f.mcap"], &words);
+    }
+    folder.fails(&["vehicle", "check", "none.toml"], &["none.toml"]);
+    folder.write("empty.toml", "");
+    folder.fails(&["vehicle", "check", "empty.toml"], &["empty.toml"]);
+    folder.fails(&["fly", "--scenario", "loop"], &["scenario = loop", "avoid"]);
+    folder.fails(&["fly", "--arm", "hero"], &["arm = hero", "twcc_flat"]);
+    folder.fails(&["fly", "--integrator", "euler"], &["integrator = euler"]);
+    folder.fails(&["fly", "--thrust-to-weight", "nan"], &["thrust_to_weight = NaN"]);
+    folder.fails(&["study", "thrust", "--trials", "0"], &["trials = 0"]);
+}
+
+#[test]
+fn a_sound_vehicle_is_shown_with_its_sources() {
+    let folder = Folder::new("vehicle");
+    folder.write("v.toml", SQUIRREL);
+    let table = folder.succeeds(&["vehicle", "check", "v.toml"]);
+    assert!(table.contains("squirrel: sound") && table.contains("paper, Table I"), "{table}");
+}
+
+const MAP: &str = r#"
+[[source]]
+time = { column = "t", unit = "s" }
+[source.channels]
+"imu.omega_body_rad_s" = { columns = ["gx", "gy", "gz"], body = "frd" }
+"#;
+
+#[test]
+fn bad_tables_get_one_line_with_file_field_and_value() {
+    let folder = Folder::new("bad-tables");
+    folder.write("map.toml", MAP);
+    let cases: [(&str, &[&str]); 6] = [
+        ("t,gx,gy\n0,1,2\n", &["gz"]),
+        ("t,gx,gy,gz\n0,1,2,3\n0.1,1,2,3\n0.05,1,2,3\n", &["0.05", "0.1"]),
+        ("t,gx,gy,gz\n0,1,two,3\n", &["gy", "two"]),
+        ("t,gx,gy,gz\n0,1,inf,3\n", &["gy", "inf"]),
+        ("t,gx,gy,gz\n", &["f.csv"]),
+        ("", &["f.csv"]),
+    ];
+    for (text, words) in cases {
+        folder.write("f.csv", text);
+        let words = [&["f.csv"][..], words].concat();
+        folder.fails(&["import", "--map", "map.toml", "f.csv", "--out", "f.mcap"], &words);
+    }
+    folder.write("f.csv", "t,gx,gy,gz\n0,1,2,3\n0.1,1,2,3\n");
+    folder.succeeds(&["import", "--map", "map.toml", "f.csv", "--out", "f.mcap"]);
+    folder.fails(&["replay", "f.mcap"], &["f.mcap", "metadata"]);
+}
