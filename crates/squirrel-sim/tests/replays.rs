@@ -49,7 +49,7 @@ fn a_changed_input_changes_an_output() {
         ("attitude.q_ned_from_body_wxyz", 1000),
         ("gnss.position_ned_m", 50),
         ("gnss.velocity_ned_m_s", 50),
-        ("baro.altitude_m", 252),
+        ("baro.altitude_m", 250),
         ("wing_force.as_if_spread_ned_n", 1500),
     ] {
         let (source, name) = channel.rsplit_once('.').unwrap();
