@@ -101,12 +101,13 @@ impl Window {
     /// Means over the window of what is logged: `speed 1.2 m/s, climb 0.0 m/s, tilt 4 deg, throttle 0.71, 3.55 V`.
     fn condition(&self) -> String {
         let mut text = String::new();
-        let mut part = |before: &str, sum: Option<f64>, digits: usize, after: &str| {
+        let mut part = |before: &str, sum: Option<f64>, digits: i32, after: &str| {
             if let Some(sum) = sum {
                 let comma = if text.is_empty() { "" } else { ", " };
+                let unit = 10_f64.powi(digits);
                 // Adding zero turns -0.0 into 0.0.
-                let rounded = (sum / self.samples * 1e3).round() / 1e3 + 0.0;
-                let _ = write!(text, "{comma}{before}{rounded:.digits$}{after}");
+                let rounded = (sum / self.samples * unit).round() / unit + 0.0;
+                let _ = write!(text, "{comma}{before}{rounded:.*}{after}", digits as usize);
             }
         };
         part("speed ", self.speed_m_s, 1, " m/s");
