@@ -66,7 +66,9 @@ pub enum GapError {
         needed: usize,
     },
     /// A time axis that does not run forwards.
-    #[error("{flight}: {channel}: time_s[{index}] = {time_s}: must be finite and later than the sample before")]
+    #[error(
+        "{flight}: {channel}: time_s[{index}] = {time_s}: must be finite and later than the sample before"
+    )]
     Time {
         /// Name of the flight.
         flight: String,
@@ -76,6 +78,18 @@ pub enum GapError {
         index: usize,
         /// Its time, s.
         time_s: f64,
+    },
+    /// An attitude that is no rotation.
+    #[error("{flight}: {channel}: norm {norm} at {time_s:.3} s, must be 1 within 5 %")]
+    Rotation {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Time in the flight, s.
+        time_s: f64,
+        /// Norm of the quaternion.
+        norm: f64,
     },
     /// A channel that is there and holds nothing.
     #[error("{flight}: {channel}: none of its {samples} samples has usable numbers, at least 2 are needed")]
@@ -111,16 +125,20 @@ pub enum GapError {
         /// Smallest usable time, s.
         least_s: f64,
     },
-    /// Numbers so large that the residual overflows.
-    #[error("{flight}: {channel}: the residual at {time_s:.3} s is {value}, must be finite")]
-    NotFinite {
+    /// A residual that nothing can be computed with.
+    #[error(
+        "{flight}: {channel}: the residual at {time_s:.3} s is {value:e}, must be finite and below {most:e}"
+    )]
+    TooLarge {
         /// Name of the flight.
         flight: String,
         /// Channel of the residual.
         channel: &'static str,
         /// Time in the flight, s.
         time_s: f64,
-        /// The residual.
+        /// The residual, N or N m.
         value: f64,
+        /// Largest residual, N or N m.
+        most: f64,
     },
 }

@@ -54,6 +54,26 @@ fn a_hover_that_the_model_explains_has_no_residual() {
     assert!((r.per_flight["f"].duration_s - 2.57).abs() < 1e-9);
 }
 
+/// Rates that no rotor explains: a steady turn leaves `w x J w`, a growing one `J w'`.
+#[test]
+fn turning_without_a_cause_is_a_moment() {
+    let squirrel = VehicleFile::squirrel();
+    let j = squirrel.vehicle.parameters().inertia_kg_m2.diagonal();
+    let turning = |omega: &dyn Fn(f64) -> [f64; 3]| {
+        let mut log = hover(3.0);
+        for (k, row) in values(&mut log, "imu", "omega_body_rad_s").chunks_exact_mut(3).enumerate() {
+            row.copy_from_slice(&omega(k as f64 * 0.01));
+        }
+        run(&squirrel, &log).unwrap().residual.moment_body_rms_n_m
+    };
+    let near = |found: [f64; 3], wanted: [f64; 3]| {
+        let error = found.iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(error < 1e-9, "{found:?} N m, must be {wanted:?}");
+    };
+    near(turning(&|_| [2.0, 3.0, 5.0]), [15.0 * (j.z - j.y), 10.0 * (j.z - j.x), 6.0 * (j.y - j.x)]);
+    near(turning(&|t| [0.0, 4.0 * t, 0.0]), [0.0, 4.0 * j.y, 0.0]);
+}
+
 #[test]
 fn what_a_residual_needs_is_named() {
     for (source, channel) in
@@ -68,7 +88,10 @@ fn what_a_residual_needs_is_named() {
     }
     assert_eq!(find(&VehicleFile::squirrel(), &[]).unwrap_err(), GapError::NoFlights);
     let twice = [("f".to_owned(), hover(3.0)), ("f".to_owned(), hover(3.0))];
-    assert_eq!(find(&VehicleFile::squirrel(), &twice).unwrap_err().to_string(), "f: two flights have this name");
+    assert_eq!(
+        find(&VehicleFile::squirrel(), &twice).unwrap_err().to_string(),
+        "f: two flights have this name"
+    );
 }
 
 #[test]
@@ -83,7 +106,10 @@ fn what_the_log_lacks_is_noted() {
     };
     let still = "missing; drag and wings are those of zero velocity over ground";
     assert_eq!(note("gnss", "velocity_ned_m_s"), format!("f: gnss.velocity_ned_m_s: {still}"));
-    assert_eq!(note("attitude", "q_ned_from_body_wxyz"), format!("f: attitude.q_ned_from_body_wxyz: {still}"));
+    assert_eq!(
+        note("attitude", "q_ned_from_body_wxyz"),
+        format!("f: attitude.q_ned_from_body_wxyz: {still}")
+    );
     assert!(note("battery", "voltage_v").ends_with("battery_sag is that of the reference voltage, 14.8 V"));
     assert_eq!(note("wing", "command"), "f: wing.command: missing; the wings are taken as folded");
 
@@ -97,14 +123,26 @@ fn what_the_log_lacks_is_noted() {
 
 #[test]
 fn shapes_and_times_that_cannot_be_are_refused() {
-    let rotors = run(&vehicle_with("crazyflie21_brushed.toml", &[("yaw_sign = 1\n[[rotor]]\nposition_body_m = { value = [0.0325, -0.0325, 0.0], sd = [5e-4, 5e-4, 1e-3], source = \"manufacturer's data sheet\" }\nyaw_sign = -1", "yaw_sign = 1")]), &hover(3.0));
+    let rotors = run(
+        &vehicle_with(
+            "crazyflie21_brushed.toml",
+            &[(
+                "yaw_sign = 1\n[[rotor]]\nposition_body_m = { value = [0.0325, -0.0325, 0.0], sd = [5e-4, 5e-4, 1e-3], source = \"manufacturer's data sheet\" }\nyaw_sign = -1",
+                "yaw_sign = 1",
+            )],
+        ),
+        &hover(3.0),
+    );
     assert_eq!(
         rotors.unwrap_err().to_string(),
         "f: rotor.command: has 4 rotors, the vehicle crazyflie21_brushed has 3"
     );
-    let width = error(|log| log.sources.get_mut("attitude").unwrap().channels.get_mut("q_ned_from_body_wxyz").unwrap().width = 3);
+    let width = error(|log| {
+        let attitude = log.sources.get_mut("attitude").unwrap();
+        attitude.channels.get_mut("q_ned_from_body_wxyz").unwrap().width = 3;
+    });
     assert_eq!(width, "f: attitude.q_ned_from_body_wxyz: has 3 numbers a sample, must have 4");
-    let length = error(|log| drop(values(log, "gnss", "velocity_ned_m_s").pop()));
+    let length = error(|log| values(log, "gnss", "velocity_ned_m_s").truncate(902));
     assert_eq!(length, "f: gnss.velocity_ned_m_s: has 902 numbers, its time axis asks for 903");
     let backwards = error(|log| log.sources.get_mut("imu").unwrap().time_s[7] = 0.05);
     assert_eq!(
@@ -114,7 +152,13 @@ fn shapes_and_times_that_cannot_be_are_refused() {
     let nan = error(|log| log.sources.get_mut("rotor").unwrap().time_s[300] = f64::NAN);
     assert!(nan.starts_with("f: rotor.command: time_s[300] = NaN"), "{nan}");
     let huge = error(|log| values(log, "imu", "specific_force_body_m_s2")[450] = f64::MAX);
-    assert!(huge.starts_with("f: force_body_x_n: the residual at ") && huge.ends_with("must be finite"), "{huge}");
+    assert!(
+        huge.starts_with("f: force_body_x_n: the residual at ")
+            && huge.ends_with("must be finite and below 1e100"),
+        "{huge}"
+    );
+    let zero = error(|log| values(log, "attitude", "q_ned_from_body_wxyz")[400] = 0.0);
+    assert_eq!(zero, "f: attitude.q_ned_from_body_wxyz: norm 0 at 1.000 s, must be 1 within 5 %");
     let empty = error(|log| *log = FlightLog::default());
     assert_eq!(empty, "f: imu.specific_force_body_m_s2: missing; the residual needs it");
 }
@@ -183,9 +227,13 @@ fn wing_commands_may_come_as_edges() {
 
 #[test]
 fn a_vehicle_that_the_plant_cannot_step_is_refused() {
-    let stiff = vehicle_with("squirrel.toml", &[("value = 0.04, sd = 0.004", "value = 0.0004, sd = 0.00004")]);
+    let stiff =
+        vehicle_with("squirrel.toml", &[("value = 0.04, sd = 0.004", "value = 0.0004, sd = 0.00004")]);
     let message = run(&stiff, &hover(3.0)).unwrap_err().to_string();
-    assert!(message.starts_with("squirrel: dt_s = 0.001") && message.contains("time_constant_up_s"), "{message}");
+    assert!(
+        message.starts_with("squirrel: dt_s = 0.001") && message.contains("time_constant_up_s"),
+        "{message}"
+    );
 }
 
 /// Other vehicles and scales: a flight of a Crazyflie without attitude, position and battery.

@@ -21,7 +21,11 @@ fn python() -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("numpy");
     let own = folder.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" });
     if !run(&own, &["-c", "import numpy"]) {
-        assert!(run(&python, &["-m", "venv", folder.to_str().unwrap()]), "{} -m venv failed", python.display());
+        assert!(
+            run(&python, &["-m", "venv", folder.to_str().unwrap()]),
+            "{} -m venv failed",
+            python.display()
+        );
         assert!(run(&own, &["-m", "pip", "install", "--quiet", "numpy>=2.3.5"]), "NumPy cannot be installed");
     }
     own
@@ -36,7 +40,10 @@ fn numpy_finds_the_same_residual_force() {
     // The shipped numbers have no drag, so that attitude and velocity would go unchecked.
     let draggy = vehicle_with(
         "crazyflie21_brushed.toml",
-        &[("value = [0.0, 0.0, 0.0], sd", "value = [0.02, 0.04, 0.1], sd"), ("value = 0.0, sd", "value = 0.003, sd")],
+        &[
+            ("value = [0.0, 0.0, 0.0], sd", "value = [0.02, 0.04, 0.1], sd"),
+            ("value = 0.0, sd", "value = 0.003, sd"),
+        ],
     );
     let flights = [("B2".to_owned(), imported("nanobench.toml", &csv))];
     let mut forces = Vec::new();
@@ -53,12 +60,12 @@ fn numpy_finds_the_same_residual_force() {
         for axis in 0..3 {
             let (ours, numpy) =
                 (ours.force_body_rms_n[axis], numpy["force_body_rms_n"][axis].as_f64().unwrap());
-            assert!((ours / numpy - 1.0).abs() < 1e-4, "axis {axis}: {ours} N, NumPy {numpy} N");
+            assert!((ours / numpy - 1.0).abs() < 1e-3, "axis {axis}: {ours} N, NumPy {numpy} N");
         }
         forces.push(ours.force_body_rms_n);
     }
-    for axis in 0..3 {
-        assert!((forces[0][axis] / forces[1][axis] - 1.0).abs() > 1e-3, "drag is seen on axis {axis}");
+    for (shipped, draggy) in forces[0].iter().zip(&forces[1]) {
+        assert!((shipped / draggy - 1.0).abs() > 0.01, "drag is seen: {shipped} N, {draggy} N");
     }
 }
 

@@ -21,7 +21,8 @@ const HIDDEN: [(&str, &str, &str); 7] = [
 
 fn residual(case: &str) -> Option<[f64; 6]> {
     let flight = shared("gap-practice/cases")?.join(case).join("train/flight00");
-    let finding = find(&vehicle("practice.toml"), &[(case.to_owned(), imported("practice.toml", &flight))]).unwrap();
+    let finding =
+        find(&vehicle("practice.toml"), &[(case.to_owned(), imported("practice.toml", &flight))]).unwrap();
     let r = finding.residual;
     let ([fx, fy, fz], [mx, my, mz]) = (r.force_body_rms_n, r.moment_body_rms_n_m);
     assert!(r.per_flight[case].duration_s > 39.0 && finding.notes.is_empty());

@@ -42,7 +42,10 @@ fn noise_bar(vehicle: &VehicleFile) -> ([f64; 3], [f64; 3]) {
 fn assert_noise(vehicle: &VehicleFile, finding: &Finding) {
     let (force, moment) = noise_bar(vehicle);
     let r = &finding.residual;
-    println!("force {:?}, bar {force:?}\nmoment {:?}, bar {moment:?}", r.force_body_rms_n, r.moment_body_rms_n_m);
+    println!(
+        "force {:?}, bar {force:?}\nmoment {:?}, bar {moment:?}",
+        r.force_body_rms_n, r.moment_body_rms_n_m
+    );
     for axis in 0..3 {
         assert!(r.force_body_rms_n[axis] < force[axis], "force, axis {axis}");
         assert!(r.moment_body_rms_n_m[axis] < moment[axis], "moment, axis {axis}");
@@ -62,7 +65,8 @@ fn the_own_vehicle_leaves_noise() {
 fn wings_and_effects_of_the_own_vehicle_leave_noise() {
     let flat = squirrel_with(&[("\"membrane\"", "\"flat\"")]);
     let sagging = squirrel_with(&[("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]")]);
-    let draggy = squirrel_with(&[("[limits]", "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.2\n\n[limits]")]);
+    let draggy =
+        squirrel_with(&[("[limits]", "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.2\n\n[limits]")]);
     for vehicle in [VehicleFile::squirrel(), flat, sagging, draggy] {
         let log = fly(&vehicle, "avoid", Arm::TwccFlat);
         let (_, wing) = log.channel("wing.command").unwrap();
@@ -85,7 +89,10 @@ fn a_wrong_mass_shows_as_weight() {
 #[test]
 fn sag_that_the_model_lacks_grows_as_the_voltage_falls() {
     // Right with a full battery, which is so small that it sags a volt within the flight.
-    let small = [("value = 1.0, source = \"assumed: 850", "value = 0.08, source = \"assumed: 850"), ("value = 14.8", "value = 16.2")];
+    let small = [
+        ("value = 1.0, source = \"assumed: 850", "value = 0.08, source = \"assumed: 850"),
+        ("value = 14.8", "value = 16.2"),
+    ];
     let model = squirrel_with(&small);
     let sag = ("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]");
     let sagging = squirrel_with(&[small[0], small[1], sag]);
@@ -127,9 +134,21 @@ fn a_finding_has_one_form() {
     let finding = find(&vehicle, &flights).unwrap();
     assert_eq!(text(&finding), text(&find(&vehicle, &flights).unwrap()));
     let json = text(&finding);
-    let order = ["{\"residual\":{\"force_body_rms_n\":[", "],\"moment_body_rms_n_m\":[", "\"per_flight\":{\"a\":{", "\"samples\":",
-        "\"duration_s\":", "\"b\":{", "\"where\":[{\"flight\":\"", "\"t0_s\":", "\"t1_s\":", "\"channel\":", "\"condition\":",
-        "\"share\":", "\"notes\":[]}"];
+    let order = [
+        "{\"residual\":{\"force_body_rms_n\":[",
+        "],\"moment_body_rms_n_m\":[",
+        "\"per_flight\":{\"a\":{",
+        "\"samples\":",
+        "\"duration_s\":",
+        "\"b\":{",
+        "\"where\":[{\"flight\":\"",
+        "\"t0_s\":",
+        "\"t1_s\":",
+        "\"channel\":",
+        "\"condition\":",
+        "\"share\":",
+        "\"notes\":[]}",
+    ];
     let mut at = 0;
     for part in order {
         at += json[at..].find(part).unwrap_or_else(|| panic!("{part} after byte {at} of {json}"));

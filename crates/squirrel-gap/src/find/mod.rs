@@ -23,6 +23,8 @@
 //! **Numbers.** RMS values are over samples, over all flights together or for each. A place is a window of one second, at
 //! whole seconds of a flight's time, and a channel; its share is its part of the sum of the squared residual of that
 //! channel over all flights. The places with the largest shares are those furthest above the channel's average.
+//!
+//! `tests/residual_numpy.py` computes the force again, from a CSV file and without any code of this workspace.
 
 mod filter;
 mod recording;

@@ -3,10 +3,10 @@
 //! The model is the simulator's own plant, led along the measured motion: it propagates rotors, servos and membranes under
 //! the logged commands and gives force and moment, while velocity, attitude and rates are what was measured.
 
-use super::GapError;
-use super::filter::derivative;
+use super::filter::{DERIVATIVE_REACH, derivative};
 use super::recording::{Recording, Sample};
 use super::series::{Span, between};
+use super::{CHANNELS, GapError};
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{Body, In, Wrench};
@@ -17,6 +17,8 @@ use std::convert::Infallible;
 
 /// How long the first sample of a piece is held before it, so that rotors, servos and membranes start settled, s.
 const SETTLE_S: f64 = 1.0;
+/// Far beyond any vehicle, and its square still sums up, N or N m.
+const RESIDUAL_MAX: f64 = 1e100;
 
 /// The residual at one time.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +29,14 @@ pub(super) struct Residual {
     pub(super) deployment: [f64; 2],
     /// Force and moment, body frame, N and N m.
     pub(super) value: Vector6<f64>,
+}
+
+/// What the model says at one time.
+struct Prediction {
+    /// Without gravity, body frame.
+    wrench: Wrench<Body, f64>,
+    /// Of the wings, left and right, 0 to 1.
+    deployment: [f64; 2],
 }
 
 /// Residuals of one piece, without the edges.
@@ -41,25 +51,30 @@ pub(super) fn residuals(
     let samples = recording.grid(piece);
     let model = model(vehicle, recording, &samples)?;
     let parameters = vehicle.vehicle.parameters();
-    let raw: Vec<Vector6<f64>> = (super::filter::DERIVATIVE_REACH
-        ..samples.len() - super::filter::DERIVATIVE_REACH)
+    let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..samples.len() - DERIVATIVE_REACH)
         .map(|k| {
             let omega = samples[k].body.omega.vector;
             let omega_dot = derivative(|k| samples[k].body.omega.vector, k, recording.period_s);
             let force = samples[k].specific_force * parameters.mass_kg;
             let moment =
                 parameters.inertia_kg_m2 * omega_dot + omega.cross(&(parameters.inertia_kg_m2 * omega));
-            let wrench = &model[k].0;
+            let wrench = &model[k].wrench;
             stack(force - wrench.force.vector, moment - wrench.moment.vector)
         })
         .collect();
     let first = recording.edge();
-    let filtered = recording.filter.apply(&raw).into_iter().enumerate();
-    filtered
-        .map(|(i, value)| {
-            let sample = samples[first + i];
-            recording.check_finite(sample.time_s, &value)?;
-            Ok(Residual { sample, deployment: model[first + i].1, value })
+    recording
+        .filter
+        .apply(&raw)
+        .into_iter()
+        .zip(samples[first..].iter().zip(&model[first..]))
+        .map(|(value, (sample, prediction))| {
+            if let Some(i) = value.iter().position(|x| x.is_nan() || x.abs() >= RESIDUAL_MAX) {
+                let (flight, time_s) = (recording.flight.to_owned(), sample.time_s);
+                let (channel, value) = (CHANNELS[i], value[i]);
+                return Err(GapError::TooLarge { flight, channel, time_s, value, most: RESIDUAL_MAX });
+            }
+            Ok(Residual { sample: *sample, deployment: prediction.deployment, value })
         })
         .collect()
 }
@@ -68,12 +83,12 @@ fn stack(force: Vector3<f64>, moment: Vector3<f64>) -> Vector6<f64> {
     Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
 }
 
-/// Force and moment of the model, and the deployment of its wings, at each sample.
+/// The model at each sample.
 fn model(
     vehicle: &VehicleFile,
     recording: &Recording,
     samples: &[Sample],
-) -> Result<Vec<(Wrench<Body, f64>, [f64; 2])>, GapError> {
+) -> Result<Vec<Prediction>, GapError> {
     // No coarser than the simulator, and a whole number of steps to a sample.
     let step_max_s = PLANT_STEP_US as f64 * 1e-6;
     let steps = (recording.period_s / step_max_s - 1e-6).ceil().max(1.0) as usize;
@@ -113,7 +128,7 @@ fn model(
                     wrench = now;
                 }
             }
-            (wrench, deployment)
+            Prediction { wrench, deployment }
         })
         .collect())
 }

@@ -71,6 +71,21 @@ impl Series {
             .ok_or_else(|| GapError::Missing { flight: flight.to_owned(), channel })
     }
 
+    /// Refuses samples that are no rotation.
+    ///
+    /// # Errors
+    /// [`GapError::Rotation`] with the first norm that is not 1 within 5 %.
+    pub(super) fn check_rotations(&self, flight: &str) -> Result<(), GapError> {
+        for (time_s, q) in self.time_s.iter().zip(self.values.chunks_exact(self.width)) {
+            let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if !(0.95..=1.05).contains(&norm) {
+                let (flight, channel) = (flight.to_owned(), self.channel);
+                return Err(GapError::Rotation { flight, channel, time_s: *time_s, norm });
+            }
+        }
+        Ok(())
+    }
+
     /// Median distance of its samples, s.
     pub(super) fn median_period_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
@@ -136,12 +151,12 @@ impl Series {
     }
 }
 
-/// Normalised interpolation by the shorter way; level where the two leave nothing to normalise.
+/// Normalised interpolation of two rotations by the shorter way.
 pub(super) fn between(a: Quaternion<f64>, b: Quaternion<f64>, share: f64) -> Quaternion<f64> {
     let b = if a.dot(&b) < 0.0 { -b } else { b };
     let q = a + (b - a) * share;
-    let norm = q.norm();
-    if norm > 0.0 { q * (1.0 / norm) } else { Quaternion::identity() }
+    // At worst the two are a half turn apart, so that this is not 0.
+    q * (1.0 / q.norm())
 }
 
 /// The times that lie in a span of each list; both in order.
@@ -173,7 +188,10 @@ mod tests {
     #[test]
     fn a_series_is_a_line_between_samples_and_held_beyond_its_ends() {
         let s = series(&[1.0, 2.0, 4.0], &[10.0, 20.0, 0.0]);
-        assert_eq!([0.0, 1.0, 1.5, 2.0, 3.0, 4.0, 9.0].map(|t| s.number(t)), [10.0, 10.0, 15.0, 20.0, 10.0, 0.0, 0.0]);
+        assert_eq!(
+            [0.0, 1.0, 1.5, 2.0, 3.0, 4.0, 9.0].map(|t| s.number(t)),
+            [10.0, 10.0, 15.0, 20.0, 10.0, 0.0, 0.0]
+        );
         assert_eq!([0.0, 1.9, 2.0, 9.0].map(|t| s.held(t)[0]), [10.0, 10.0, 20.0, 0.0]);
     }
 
