@@ -1,0 +1,144 @@
+//! Why a gap cannot be measured.
+
+/// What is wrong with a set of flights; one line that names the flight, the channel and the value.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GapError {
+    /// Nothing to look at.
+    #[error("flights: none given, at least one is needed")]
+    NoFlights,
+    /// Two flights have one name, so that a result could mean either.
+    #[error("{flight}: two flights have this name")]
+    SameName {
+        /// The name.
+        flight: String,
+    },
+    /// The plant cannot be stepped with these numbers.
+    #[error("{vehicle}: {problem}")]
+    Vehicle {
+        /// Name of the vehicle.
+        vehicle: String,
+        /// `field = value: reason`.
+        problem: String,
+    },
+    /// A channel without which there is no residual.
+    #[error("{flight}: {channel}: missing; the residual needs it")]
+    Missing {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+    },
+    /// A channel of another shape than its name promises.
+    #[error("{flight}: {channel}: has {found} numbers a sample, must have {needed}")]
+    Width {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Numbers a sample in the log.
+        found: usize,
+        /// Numbers a sample that the channel must have.
+        needed: usize,
+    },
+    /// The log is of another vehicle.
+    #[error("{flight}: rotor.command: has {log} rotors, the vehicle {vehicle} has {rotors}")]
+    Rotors {
+        /// Name of the flight.
+        flight: String,
+        /// Rotors in the log.
+        log: usize,
+        /// Name of the vehicle.
+        vehicle: String,
+        /// Rotors of the vehicle.
+        rotors: usize,
+    },
+    /// A channel whose numbers do not fit its time axis.
+    #[error("{flight}: {channel}: has {found} numbers, its time axis asks for {needed}")]
+    Length {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Numbers in the channel.
+        found: usize,
+        /// Samples times numbers a sample.
+        needed: usize,
+    },
+    /// A time axis that does not run forwards.
+    #[error(
+        "{flight}: {channel}: time_s[{index}] = {time_s}: must be finite and later than the sample before"
+    )]
+    Time {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Sample, from 0.
+        index: usize,
+        /// Its time, s.
+        time_s: f64,
+    },
+    /// An attitude that is no rotation.
+    #[error("{flight}: {channel}: norm {norm} at {time_s:.3} s, must be 1 within 5 %")]
+    Rotation {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Time in the flight, s.
+        time_s: f64,
+        /// Norm of the quaternion.
+        norm: f64,
+    },
+    /// A channel that is there and holds nothing.
+    #[error("{flight}: {channel}: none of its {samples} samples has usable numbers, at least 2 are needed")]
+    Empty {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Samples in the log.
+        samples: usize,
+    },
+    /// A rate that cannot carry the pass band.
+    #[error("{flight}: {channel}: its rate is {rate_hz:.3} Hz, must be at least {least_hz} Hz")]
+    Rate {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Rate of the log, Hz.
+        rate_hz: f64,
+        /// Smallest rate, Hz.
+        least_hz: f64,
+    },
+    /// Less than a second in which all channels exist and the filter has no edge.
+    #[error("{flight}: {channel}: leaves {usable_s:.3} s of usable flight, at least {least_s} s are needed")]
+    TooShort {
+        /// Name of the flight.
+        flight: String,
+        /// The channel that leaves so little.
+        channel: &'static str,
+        /// Usable time, s.
+        usable_s: f64,
+        /// Smallest usable time, s.
+        least_s: f64,
+    },
+    /// A residual that nothing can be computed with.
+    #[error(
+        "{flight}: {channel}: the residual at {time_s:.3} s is {value:e}, must be finite and below {most:e}"
+    )]
+    TooLarge {
+        /// Name of the flight.
+        flight: String,
+        /// Channel of the residual.
+        channel: &'static str,
+        /// Time in the flight, s.
+        time_s: f64,
+        /// The residual, N or N m.
+        value: f64,
+        /// Largest residual, N or N m.
+        most: f64,
+    },
+}

@@ -1,0 +1,115 @@
+//! The low-pass that measurement and model share: a zero-phase FIR, and the derivative that goes with it.
+//!
+//! ```text
+//! h = floor(0.2 s * rate + 1/2)                                        half length: 2 h + 1 taps
+//! b_i = (0.54 + 0.46 cos(pi i / h)) sin(2 pi f_c i / rate) / (pi i)    i = -h .. h;  b_0 = 2 f_c / rate
+//! y_k = sum_i b_i x_(k+i) / sum_i b_i                                  f_c = 12 Hz
+//! x'_k = (x_(k-2) - 8 x_(k-1) + 8 x_(k+1) - x_(k+2)) / (12 T)          T = 1 / rate
+//! ```
+//! 12 Hz keeps what rotors and wings can do and drops what propellers shake. A Hamming window of 0.4 s passes 8 Hz whole
+//! and nothing above 16 Hz. The five-point difference reads 1 % low at 12 Hz on a 100 Hz log; three points would read 9 %
+//! low and favour the model of a sluggish vehicle. Both are linear and the same at all times, so that their order, and
+//! whether measurement and model pass apart or as their difference, does not matter.
+
+use nalgebra::Vector6;
+use std::f64::consts::{PI, TAU};
+
+/// Corner (-6 dB), Hz.
+pub(super) const CUTOFF_HZ: f64 = 12.0;
+/// Half the length of the filter, s.
+const HALF_LENGTH_S: f64 = 0.2;
+
+/// Samples on each side of a derivative that it looks at.
+pub(super) const DERIVATIVE_REACH: usize = 2;
+
+/// The taps at one rate, from the middle outwards.
+pub(super) struct LowPass {
+    taps: Vec<f64>,
+}
+
+impl LowPass {
+    pub(super) fn new(rate_hz: f64) -> Self {
+        let half = (HALF_LENGTH_S * rate_hz + 0.5).floor();
+        let tap = |i: usize| {
+            let i = i as f64;
+            let sinc = if i == 0.0 {
+                2.0 * CUTOFF_HZ / rate_hz
+            } else {
+                (TAU * CUTOFF_HZ * i / rate_hz).sin() / (PI * i)
+            };
+            sinc * (0.54 + 0.46 * (PI * i / half).cos())
+        };
+        let mut taps: Vec<f64> = (0..=half as usize).map(tap).collect();
+        let sum = 2.0 * taps.iter().sum::<f64>() - taps[0];
+        for tap in &mut taps {
+            *tap /= sum;
+        }
+        Self { taps }
+    }
+
+    /// Samples that the filter costs at each end.
+    pub(super) fn reach(&self) -> usize {
+        self.taps.len() - 1
+    }
+
+    /// The filtered samples without the edges: sample 0 of the result is sample [`Self::reach`] of `x`.
+    pub(super) fn apply(&self, x: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
+        let (reach, end) = (self.reach(), x.len().saturating_sub(self.reach()));
+        (reach..end)
+            .map(|k| {
+                let pairs = self.taps.iter().enumerate().skip(1);
+                pairs.fold(x[k] * self.taps[0], |sum, (i, tap)| sum + (x[k - i] + x[k + i]) * *tap)
+            })
+            .collect()
+    }
+}
+
+/// Five-point derivative of `x` at sample `k`, per second; `k` must be [`DERIVATIVE_REACH`] away from the ends.
+pub(super) fn derivative<V>(x: impl Fn(usize) -> V, k: usize, period_s: f64) -> V
+where
+    V: std::ops::Sub<Output = V> + std::ops::Add<Output = V> + std::ops::Mul<f64, Output = V>,
+{
+    ((x(k + 1) - x(k - 1)) * 8.0 + (x(k - 2) - x(k + 2))) * (1.0 / (12.0 * period_s))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gain at a frequency, from the response to a cosine about the middle sample.
+    fn gain(rate_hz: f64, frequency_hz: f64) -> f64 {
+        let filter = LowPass::new(rate_hz);
+        let n = filter.reach();
+        let wave = |k: usize| (TAU * frequency_hz * (k as f64 - n as f64) / rate_hz).cos();
+        let x: Vec<_> = (0..=2 * n).map(|k| Vector6::repeat(wave(k))).collect();
+        let y = filter.apply(&x);
+        assert_eq!(y.len(), 1, "one sample has no edge");
+        y[0][3]
+    }
+
+    #[test]
+    fn taps_scale_with_the_rate() {
+        for rate_hz in [50.0, 100.0, 300.0, 333.3, 1000.0] {
+            assert!((gain(rate_hz, 0.0) - 1.0).abs() < 1e-12, "a constant stays");
+            assert!((gain(rate_hz, 6.0) - 1.0).abs() < 0.01, "{rate_hz}");
+            assert!((gain(rate_hz, CUTOFF_HZ) - 0.5).abs() < 0.01, "{rate_hz}");
+            assert!(gain(rate_hz, 18.0).abs() < 0.01, "{rate_hz}");
+        }
+        assert_eq!(LowPass::new(300.0).reach(), 60);
+        assert_eq!(LowPass::new(100.0).reach(), 20);
+    }
+
+    #[test]
+    fn a_series_shorter_than_the_filter_gives_nothing() {
+        assert!(LowPass::new(100.0).apply(&[Vector6::zeros(); 40]).is_empty());
+        assert!(LowPass::new(100.0).apply(&[]).is_empty());
+    }
+
+    #[test]
+    fn the_derivative_reads_one_percent_low_at_the_corner() {
+        let rate_hz = 100.0;
+        let w = TAU * CUTOFF_HZ;
+        let slope = derivative(|k| (w * (k as f64 - 2.0) / rate_hz).sin(), 2, 1.0 / rate_hz);
+        assert!((0.985..0.995).contains(&(slope / w)), "{}", slope / w);
+    }
+}

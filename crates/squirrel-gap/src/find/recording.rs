@@ -1,0 +1,219 @@
+//! What the residual needs of one flight: its channels, a uniform time grid, and the pieces of it without gaps.
+
+use super::GapError;
+use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
+use super::series::{Series, Span, common};
+use nalgebra::{Quaternion, Vector3};
+use squirrel_core::dynamics::State;
+use squirrel_core::frames::In;
+use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::plant::WingPlant;
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// Slowest IMU whose samples still describe what passes the filter, Hz.
+const RATE_MIN_HZ: f64 = 4.0 * CUTOFF_HZ;
+/// Shortest flight worth a number, s.
+const USABLE_MIN_S: f64 = 1.0;
+
+/// The channels of one flight.
+pub(super) struct Recording<'a> {
+    pub(super) flight: &'a str,
+    /// Step of the grid: the median period of the IMU, s.
+    pub(super) period_s: f64,
+    pub(super) filter: LowPass,
+    /// Where every channel exists for longer than the filter has edges.
+    pub(super) pieces: Vec<Span>,
+    /// What the log lacks, and what was taken instead.
+    pub(super) notes: Vec<String>,
+    specific_force: Series,
+    omega: Series,
+    rotor: Series,
+    wing: Option<Series>,
+    attitude: Option<Series>,
+    velocity: Option<Series>,
+    voltage: Option<Series>,
+    reference_voltage_v: f64,
+}
+
+/// One measured sample on the grid.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sample {
+    /// Time in the flight, s.
+    pub(super) time_s: f64,
+    /// Accelerometer, m/s^2, body frame.
+    pub(super) specific_force: Vector3<f64>,
+    /// Measured velocity, attitude and angular rate; position and rotor speeds are not measured.
+    pub(super) body: State<f64>,
+    /// Battery, V; the reference voltage where it is not logged.
+    pub(super) voltage_v: f64,
+}
+
+impl<'a> Recording<'a> {
+    /// # Errors
+    /// [`GapError`] with the first channel that is missing, cannot be, or leaves less than a second.
+    pub(super) fn new(vehicle: &VehicleFile, flight: &'a str, log: &FlightLog) -> Result<Self, GapError> {
+        let parameters = vehicle.vehicle.parameters();
+        let specific_force = Series::need(flight, log, "imu.specific_force_body_m_s2", 3)?;
+        let omega = Series::need(flight, log, "imu.omega_body_rad_s", 3)?;
+        let rotor =
+            Series::need(flight, log, "rotor.command", parameters.rotor_count).map_err(|e| match e {
+                GapError::Width { flight, found, needed, .. } => {
+                    GapError::Rotors { flight, log: found, vehicle: vehicle.name.clone(), rotors: needed }
+                }
+                other => other,
+            })?;
+        let optional = |channel, width| Series::read(flight, log, channel, width);
+        let attitude = optional("attitude.q_ned_from_body_wxyz", 4)?;
+        if let Some(attitude) = &attitude {
+            attitude.check_rotations(flight)?;
+        }
+        let velocity = optional("gnss.velocity_ned_m_s", 3)?;
+        let voltage = optional("battery.voltage_v", 1)?;
+        let has_wings = vehicle.wing != WingPlant::None;
+        let wing = if has_wings { optional("wing.command", 2)? } else { None };
+
+        let mut notes = Vec::new();
+        for (channel, series) in
+            [("attitude.q_ned_from_body_wxyz", &attitude), ("gnss.velocity_ned_m_s", &velocity)]
+        {
+            if series.is_none() {
+                notes.push(format!(
+                    "{flight}: {channel}: missing; drag and wings are those of zero velocity over ground"
+                ));
+            }
+        }
+        if voltage.is_none() && vehicle.effects.battery_sag.is_some() {
+            let reference = parameters.propulsion.reference_voltage_v;
+            notes.push(format!(
+                "{flight}: battery.voltage_v: missing; battery_sag is that of the reference voltage, {reference} V"
+            ));
+        }
+        if has_wings && wing.is_none() {
+            notes.push(format!("{flight}: wing.command: missing; the wings are taken as folded"));
+        }
+
+        let period_s = specific_force.median_period_s();
+        let rate_hz = 1.0 / period_s;
+        if rate_hz < RATE_MIN_HZ {
+            let (flight, channel) = (flight.to_owned(), specific_force.channel);
+            return Err(GapError::Rate { flight, channel, rate_hz, least_hz: RATE_MIN_HZ });
+        }
+        let mut recording = Self {
+            flight,
+            period_s,
+            filter: LowPass::new(rate_hz),
+            pieces: vec![(f64::NEG_INFINITY, f64::INFINITY)],
+            notes,
+            specific_force,
+            omega,
+            rotor,
+            wing,
+            attitude,
+            velocity,
+            voltage,
+            reference_voltage_v: parameters.propulsion.reference_voltage_v,
+        };
+        recording.pieces = recording.usable()?;
+        Ok(recording)
+    }
+
+    /// The spans in which every channel exists, without those that the filter eats.
+    fn usable(&self) -> Result<Vec<Span>, GapError> {
+        let streams = [Some(&self.specific_force), Some(&self.omega), Some(&self.rotor)];
+        let optional = [self.attitude.as_ref(), self.velocity.as_ref()];
+        let mut spans = vec![(f64::NEG_INFINITY, f64::INFINITY)];
+        for series in streams.into_iter().chain(optional).flatten() {
+            spans = self.usable_with(&spans, series.channel, &series.spans())?;
+        }
+        // Some logs hold only the edges of the wing command.
+        if let Some(wing) = &self.wing {
+            spans = self.usable_with(&spans, wing.channel, &[(wing.start_s(), f64::INFINITY)])?;
+        }
+        Ok(spans)
+    }
+
+    /// What one more channel leaves of the spans.
+    fn usable_with(
+        &self,
+        spans: &[Span],
+        channel: &'static str,
+        exists: &[Span],
+    ) -> Result<Vec<Span>, GapError> {
+        let mut left = common(spans, exists);
+        left.retain(|span| self.samples_usable(*span) > 0);
+        let usable_s = left.iter().map(|span| self.samples_usable(*span) as f64 * self.period_s).sum::<f64>();
+        if usable_s < USABLE_MIN_S {
+            let flight = self.flight.to_owned();
+            return Err(GapError::TooShort { flight, channel, usable_s, least_s: USABLE_MIN_S });
+        }
+        Ok(left)
+    }
+
+    /// Samples at each end of a piece that have no residual.
+    pub(super) fn edge(&self) -> usize {
+        self.filter.reach() + DERIVATIVE_REACH
+    }
+
+    fn samples(&self, (start_s, end_s): Span) -> usize {
+        // The slack keeps a last sample that rounding has put behind the end.
+        ((end_s - start_s) / self.period_s + 1e-6) as usize + 1
+    }
+
+    fn samples_usable(&self, span: Span) -> usize {
+        self.samples(span).saturating_sub(2 * self.edge())
+    }
+
+    /// The measured samples of one piece.
+    pub(super) fn grid(&self, piece: Span) -> Vec<Sample> {
+        (0..self.samples(piece)).map(|k| self.sample(piece.0 + k as f64 * self.period_s)).collect()
+    }
+
+    fn sample(&self, time_s: f64) -> Sample {
+        let attitude = self.attitude.as_ref().map(|q| q.rotation(time_s));
+        // Without both, the velocity through the air in the body frame is not known.
+        let velocity = attitude.and(self.velocity.as_ref()).map_or(Vector3::zeros(), |v| v.vector(time_s));
+        let body = State {
+            velocity: In::new(velocity),
+            attitude: attitude.unwrap_or(Quaternion::identity()),
+            omega: In::new(self.omega.vector(time_s)),
+            ..State::at_rest()
+        };
+        let voltage_v = self.voltage.as_ref().map_or(self.reference_voltage_v, |v| v.number(time_s));
+        Sample { time_s, specific_force: self.specific_force.vector(time_s), body, voltage_v }
+    }
+
+    /// The rotor command in force at a time, in the vehicle's unit.
+    pub(super) fn rotor_command(&self, time_s: f64) -> PerRotor<f64> {
+        let mut command = [0.0; MAX_ROTORS];
+        for (place, u) in command.iter_mut().zip(self.rotor.held(time_s)) {
+            *place = *u;
+        }
+        command
+    }
+
+    /// The wing command in force at a time, left and right, 0 to 1.
+    pub(super) fn wing_command(&self, time_s: f64) -> [f64; 2] {
+        self.wing.as_ref().map_or([0.0; 2], |wing| {
+            let row = wing.held(time_s);
+            [row[0], row[1]]
+        })
+    }
+
+    /// Velocity over ground, m/s, if logged.
+    pub(super) fn velocity_ned(&self, time_s: f64) -> Option<Vector3<f64>> {
+        self.velocity.as_ref().map(|v| v.vector(time_s))
+    }
+    /// Whether the log has an attitude.
+    pub(super) fn has_attitude(&self) -> bool {
+        self.attitude.is_some()
+    }
+    /// Whether the log has a battery voltage.
+    pub(super) fn has_voltage(&self) -> bool {
+        self.voltage.is_some()
+    }
+    /// Whether the vehicle has wings and the log their command.
+    pub(super) fn has_wing(&self) -> bool {
+        self.wing.is_some()
+    }
+}

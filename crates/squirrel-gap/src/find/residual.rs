@@ -1,0 +1,145 @@
+//! The residual of one piece of a flight: measured minus model, sample by sample.
+//!
+//! The model is the simulator's own plant, led along the measured motion: it propagates rotors, servos and membranes under
+//! the logged commands and gives force and moment, while velocity, attitude and rates are what was measured.
+
+use super::filter::{DERIVATIVE_REACH, derivative};
+use super::recording::{Recording, Sample};
+use super::series::{Span, between};
+use super::{CHANNELS, GapError};
+use nalgebra::{Vector3, Vector6};
+use squirrel_core::dynamics::State;
+use squirrel_core::frames::{Body, In, Wrench};
+use squirrel_sim::flight::PLANT_STEP_US;
+use squirrel_sim::plant::{Plant, PlantState};
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::convert::Infallible;
+
+/// How long the first sample of a piece is held before it, so that rotors, servos and membranes start settled, s.
+const SETTLE_S: f64 = 1.0;
+/// Far beyond any vehicle, and its square still sums up, N or N m.
+const RESIDUAL_MAX: f64 = 1e100;
+
+/// The residual at one time.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Residual {
+    /// What was measured there.
+    pub(super) sample: Sample,
+    /// Deployment of the model's wings, left and right, 0 to 1.
+    pub(super) deployment: [f64; 2],
+    /// Force and moment, body frame, N and N m.
+    pub(super) value: Vector6<f64>,
+}
+
+/// What the model says at one time.
+struct Prediction {
+    /// Without gravity, body frame.
+    wrench: Wrench<Body, f64>,
+    /// Of the wings, left and right, 0 to 1.
+    deployment: [f64; 2],
+}
+
+/// Residuals of one piece, without the edges.
+///
+/// # Errors
+/// A vehicle that the plant cannot step, or a residual that is not finite.
+pub(super) fn residuals(
+    vehicle: &VehicleFile,
+    recording: &Recording,
+    piece: Span,
+) -> Result<Vec<Residual>, GapError> {
+    let samples = recording.grid(piece);
+    let model = model(vehicle, recording, &samples)?;
+    let parameters = vehicle.vehicle.parameters();
+    let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..samples.len() - DERIVATIVE_REACH)
+        .map(|k| {
+            let omega = samples[k].body.omega.vector;
+            let omega_dot = derivative(|k| samples[k].body.omega.vector, k, recording.period_s);
+            let force = samples[k].specific_force * parameters.mass_kg;
+            let moment =
+                parameters.inertia_kg_m2 * omega_dot + omega.cross(&(parameters.inertia_kg_m2 * omega));
+            let wrench = &model[k].wrench;
+            stack(force - wrench.force.vector, moment - wrench.moment.vector)
+        })
+        .collect();
+    let first = recording.edge();
+    recording
+        .filter
+        .apply(&raw)
+        .into_iter()
+        .zip(samples[first..].iter().zip(&model[first..]))
+        .map(|(value, (sample, prediction))| {
+            if let Some(i) = value.iter().position(|x| x.is_nan() || x.abs() >= RESIDUAL_MAX) {
+                let (flight, time_s) = (recording.flight.to_owned(), sample.time_s);
+                let (channel, value) = (CHANNELS[i], value[i]);
+                return Err(GapError::TooLarge { flight, channel, time_s, value, most: RESIDUAL_MAX });
+            }
+            Ok(Residual { sample: *sample, deployment: prediction.deployment, value })
+        })
+        .collect()
+}
+
+fn stack(force: Vector3<f64>, moment: Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
+}
+
+/// The model at each sample.
+fn model(
+    vehicle: &VehicleFile,
+    recording: &Recording,
+    samples: &[Sample],
+) -> Result<Vec<Prediction>, GapError> {
+    // No coarser than the simulator, and a whole number of steps to a sample.
+    let step_max_s = PLANT_STEP_US as f64 * 1e-6;
+    let steps = (recording.period_s / step_max_s - 1e-6).ceil().max(1.0) as usize;
+    let dt_s = recording.period_s / steps as f64;
+    // Without a battery, whose voltage is measured.
+    let plant = Plant::new(vehicle.vehicle, vehicle.effects, vehicle.wing.clone(), None, dt_s)
+        .map_err(|problem| GapError::Vehicle { vehicle: vehicle.name.clone(), problem })?;
+    let follow = |state: &mut PlantState, at_s: f64, voltage_v: f64, next: State<f64>| {
+        // A command acts from the step that is nearest to its time.
+        let command_s = at_s + 0.5 * dt_s;
+        let (rotor, wing) = (recording.rotor_command(command_s), recording.wing_command(command_s));
+        let mut now = Wrench::zero();
+        state.battery.voltage_v = voltage_v;
+        let Ok(()) = plant.step_with::<Infallible>(state, &rotor, wing, In::zero(), |_, wrench| {
+            now = *wrench;
+            Ok(next)
+        });
+        now
+    };
+
+    let first = &samples[0];
+    let mut state = plant.initial_state(first.body, 1.0);
+    for _ in 0..(SETTLE_S / dt_s) as usize {
+        follow(&mut state, first.time_s, first.voltage_v, first.body);
+    }
+    Ok(samples
+        .iter()
+        .zip(samples.iter().skip(1).chain(samples.last()))
+        .map(|(sample, next)| {
+            let deployment = state.servo.map(|servo| servo.deployment);
+            let mut wrench = Wrench::zero();
+            for step in 0..steps {
+                let at_s = sample.time_s + step as f64 * dt_s;
+                let body = led(&sample.body, &next.body, (step + 1) as f64 / steps as f64);
+                let now = follow(&mut state, at_s, sample.voltage_v, body);
+                if step == 0 {
+                    wrench = now;
+                }
+            }
+            Prediction { wrench, deployment }
+        })
+        .collect())
+}
+
+/// The measured motion between two samples.
+fn led(a: &State<f64>, b: &State<f64>, share: f64) -> State<f64> {
+    let line = |a: Vector3<f64>, b: Vector3<f64>| a + (b - a) * share;
+    State {
+        velocity: In::new(line(a.velocity.vector, b.velocity.vector)),
+        attitude: between(a.attitude, b.attitude, share),
+        omega: In::new(line(a.omega.vector, b.omega.vector)),
+        ..State::at_rest()
+    }
+}

@@ -1,0 +1,227 @@
+//! One channel of a log as a series that can be asked at any time, and the time spans in which it can.
+//!
+//! Samples with a number that is not finite are left out. A channel exists between two of its samples that are at most
+//! five of its median periods apart; beyond, a line between them would be invention.
+
+use super::GapError;
+use nalgebra::{Quaternion, Vector3};
+use squirrel_sim::log::FlightLog;
+
+/// Longest distance of two samples that still belong together, in median periods.
+const GAP_PERIODS: f64 = 5.0;
+
+/// First and last time, s.
+pub(super) type Span = (f64, f64);
+
+pub(super) struct Series {
+    pub(super) channel: &'static str,
+    width: usize,
+    time_s: Vec<f64>,
+    values: Vec<f64>,
+}
+
+impl Series {
+    /// The usable samples of a channel; `None` if the log lacks it.
+    ///
+    /// # Errors
+    /// Shape, length or times that cannot be, or fewer than two usable samples.
+    pub(super) fn read(
+        flight: &str,
+        log: &FlightLog,
+        channel: &'static str,
+        width: usize,
+    ) -> Result<Option<Self>, GapError> {
+        let Some((time_s, found)) = log.channel(channel) else { return Ok(None) };
+        let flight = || flight.to_owned();
+        if found.width != width {
+            return Err(GapError::Width { flight: flight(), channel, found: found.width, needed: width });
+        }
+        if found.values.len() != time_s.len() * width {
+            let (found, needed) = (found.values.len(), time_s.len() * width);
+            return Err(GapError::Length { flight: flight(), channel, found, needed });
+        }
+        let runs_forward = |i: usize| time_s[i].is_finite() && (i == 0 || time_s[i] > time_s[i - 1]);
+        if let Some(index) = (0..time_s.len()).find(|&i| !runs_forward(i)) {
+            return Err(GapError::Time { flight: flight(), channel, index, time_s: time_s[index] });
+        }
+        let mut series = Self { channel, width, time_s: Vec::new(), values: Vec::new() };
+        for (t, row) in time_s.iter().zip(found.values.chunks_exact(width)) {
+            if row.iter().all(|x| x.is_finite()) {
+                series.time_s.push(*t);
+                series.values.extend_from_slice(row);
+            }
+        }
+        if series.time_s.len() < 2 {
+            return Err(GapError::Empty { flight: flight(), channel, samples: time_s.len() });
+        }
+        Ok(Some(series))
+    }
+
+    /// As [`Self::read`], for a channel that must be there.
+    ///
+    /// # Errors
+    /// As [`Self::read`], or the channel is missing.
+    pub(super) fn need(
+        flight: &str,
+        log: &FlightLog,
+        channel: &'static str,
+        width: usize,
+    ) -> Result<Self, GapError> {
+        Self::read(flight, log, channel, width)?
+            .ok_or_else(|| GapError::Missing { flight: flight.to_owned(), channel })
+    }
+
+    /// Refuses samples that are no rotation.
+    ///
+    /// # Errors
+    /// [`GapError::Rotation`] with the first norm that is not 1 within 5 %.
+    pub(super) fn check_rotations(&self, flight: &str) -> Result<(), GapError> {
+        for (time_s, q) in self.time_s.iter().zip(self.values.chunks_exact(self.width)) {
+            let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+            if !(0.95..=1.05).contains(&norm) {
+                let (flight, channel) = (flight.to_owned(), self.channel);
+                return Err(GapError::Rotation { flight, channel, time_s: *time_s, norm });
+            }
+        }
+        Ok(())
+    }
+
+    /// Median distance of its samples, s.
+    pub(super) fn median_period_s(&self) -> f64 {
+        let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_unstable_by(f64::total_cmp);
+        let middle = steps.len() / 2;
+        if steps.len() % 2 == 1 { steps[middle] } else { 0.5 * (steps[middle - 1] + steps[middle]) }
+    }
+
+    /// The times in which the channel exists.
+    pub(super) fn spans(&self) -> Vec<Span> {
+        let longest_s = GAP_PERIODS * self.median_period_s();
+        let mut spans: Vec<Span> = Vec::new();
+        for &t in &self.time_s {
+            match spans.last_mut() {
+                Some(span) if t - span.1 <= longest_s => span.1 = t,
+                _ => spans.push((t, t)),
+            }
+        }
+        spans
+    }
+
+    /// Time of the first sample, s.
+    pub(super) fn start_s(&self) -> f64 {
+        self.time_s[0]
+    }
+
+    /// The samples about `t`, and how far `t` is from the first to the second, 0 to 1; the end sample twice beyond the ends.
+    fn about(&self, t: f64) -> (&[f64], &[f64], f64) {
+        let after = self.time_s.partition_point(|&x| x <= t);
+        let (i, j) = (after.saturating_sub(1), after.min(self.time_s.len() - 1));
+        let step = self.time_s[j] - self.time_s[i];
+        let share = if step > 0.0 { (t - self.time_s[i]) / step } else { 0.0 };
+        (self.row(i), self.row(j), share)
+    }
+
+    fn row(&self, i: usize) -> &[f64] {
+        &self.values[i * self.width..(i + 1) * self.width]
+    }
+
+    /// The last sample at or before `t`; the first one before all.
+    pub(super) fn held(&self, t: f64) -> &[f64] {
+        self.row(self.time_s.partition_point(|&x| x <= t).saturating_sub(1))
+    }
+
+    /// A number on the line between the samples about `t`.
+    pub(super) fn number(&self, t: f64) -> f64 {
+        let (a, b, share) = self.about(t);
+        a[0] + (b[0] - a[0]) * share
+    }
+
+    /// A vector on the line between the samples about `t`.
+    pub(super) fn vector(&self, t: f64) -> Vector3<f64> {
+        let (a, b, share) = self.about(t);
+        let [a, b] = [a, b].map(Vector3::from_column_slice);
+        a + (b - a) * share
+    }
+
+    /// A rotation between the samples about `t`, given and wanted as `[w, x, y, z]`.
+    pub(super) fn rotation(&self, t: f64) -> Quaternion<f64> {
+        let (a, b, share) = self.about(t);
+        let [a, b] = [a, b].map(|q| Quaternion::new(q[0], q[1], q[2], q[3]));
+        between(a, b, share)
+    }
+}
+
+/// Normalised interpolation of two rotations by the shorter way.
+pub(super) fn between(a: Quaternion<f64>, b: Quaternion<f64>, share: f64) -> Quaternion<f64> {
+    let b = if a.dot(&b) < 0.0 { -b } else { b };
+    let q = a + (b - a) * share;
+    // At worst the two are a half turn apart, so that this is not 0.
+    q * (1.0 / q.norm())
+}
+
+/// The times that lie in a span of each list; both in order.
+pub(super) fn common(a: &[Span], b: &[Span]) -> Vec<Span> {
+    let mut all = Vec::new();
+    let (mut i, mut j) = (0, 0);
+    while i < a.len() && j < b.len() {
+        let span = (a[i].0.max(b[j].0), a[i].1.min(b[j].1));
+        if span.0 < span.1 {
+            all.push(span);
+        }
+        if a[i].1 < b[j].1 { i += 1 } else { j += 1 }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn series(time_s: &[f64], values: &[f64]) -> Series {
+        let mut log = FlightLog::default();
+        for (t, value) in time_s.iter().zip(values) {
+            log.source_mut("battery").push(*t, &[("voltage_v", &[*value])]);
+        }
+        Series::need("f", &log, "battery.voltage_v", 1).unwrap()
+    }
+
+    #[test]
+    fn a_series_is_a_line_between_samples_and_held_beyond_its_ends() {
+        let s = series(&[1.0, 2.0, 4.0], &[10.0, 20.0, 0.0]);
+        assert_eq!(
+            [0.0, 1.0, 1.5, 2.0, 3.0, 4.0, 9.0].map(|t| s.number(t)),
+            [10.0, 10.0, 15.0, 20.0, 10.0, 0.0, 0.0]
+        );
+        assert_eq!([0.0, 1.9, 2.0, 9.0].map(|t| s.held(t)[0]), [10.0, 10.0, 20.0, 0.0]);
+    }
+
+    #[test]
+    fn five_periods_without_a_sample_are_a_gap_and_so_are_nans() {
+        let mut time_s: Vec<f64> = (0..20).map(f64::from).collect();
+        let mut values = vec![1.0; 20];
+        assert_eq!(series(&time_s, &values).spans(), [(0.0, 19.0)]);
+        values[5..9].fill(f64::NAN);
+        assert_eq!(series(&time_s, &values).spans(), [(0.0, 19.0)], "five periods from sample to sample");
+        values[9] = f64::NAN;
+        assert_eq!(series(&time_s, &values).spans(), [(0.0, 4.0), (10.0, 19.0)]);
+        for t in &mut time_s[15..] {
+            *t += 100.0;
+        }
+        assert_eq!(series(&time_s, &values).spans(), [(0.0, 4.0), (10.0, 14.0), (115.0, 119.0)]);
+    }
+
+    #[test]
+    fn common_spans_are_the_intersection() {
+        let a = [(0.0, 10.0), (20.0, 30.0)];
+        assert_eq!(common(&a, &[(5.0, 22.0), (23.0, 24.0)]), [(5.0, 10.0), (20.0, 22.0), (23.0, 24.0)]);
+        assert_eq!(common(&a, &[(10.0, 20.0)]), []);
+    }
+
+    #[test]
+    fn rotations_go_the_shorter_way() {
+        let q = Quaternion::new(0.8, 0.6, 0.0, 0.0);
+        let middle = between(q, -Quaternion::new(0.8, -0.6, 0.0, 0.0), 0.5);
+        assert!((middle - Quaternion::identity()).norm() < 1e-15);
+        assert_eq!(between(q, q, 0.3).norm(), 1.0);
+    }
+}

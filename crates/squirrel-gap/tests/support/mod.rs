@@ -1,0 +1,44 @@
+//! Flights and vehicles for the tests of the gap workflow.
+#![allow(dead_code, reason = "each test binary uses its part")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+use std::path::{Path, PathBuf};
+
+use squirrel_sim::import::{ImportMap, import};
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// A part of the shared folder. It is not in the repository; without it a test says so and passes, except on CI.
+pub(crate) fn shared(part: &str) -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(part);
+    if path.exists() {
+        return Some(path);
+    }
+    assert!(std::env::var_os("CI").is_none(), "{} is needed on CI", path.display());
+    println!("skipped: no {}", path.display());
+    None
+}
+
+/// A file of the folder `vehicles`.
+pub(crate) fn vehicles(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles").join(file)
+}
+
+pub(crate) fn vehicle(file: &str) -> VehicleFile {
+    VehicleFile::load(&vehicles(file)).unwrap()
+}
+
+/// A shipped vehicle file with a part of its text replaced.
+pub(crate) fn vehicle_with(file: &str, changes: &[(&str, &str)]) -> VehicleFile {
+    let mut text = std::fs::read_to_string(vehicles(file)).unwrap();
+    for (from, to) in changes {
+        assert!(text.contains(from), "{file} has no `{from}`");
+        text = text.replace(from, to);
+    }
+    VehicleFile::parse(&text, file).unwrap()
+}
+
+pub(crate) fn imported(map: &str, path: &Path) -> FlightLog {
+    let map = ImportMap::load(&vehicles("maps").join(map)).unwrap();
+    import(&map, &[path.to_owned()]).unwrap().0
+}
