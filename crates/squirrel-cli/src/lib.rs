@@ -31,7 +31,9 @@ enum Command {
     Replay(commands::replay::Replay),
     /// Turn a foreign log into a flight log, or recover a truncated one.
     Import(commands::import::Import),
-    //Gap(commands::gap::Gap),
+    /// Find where simulation and measurement disagree.
+    #[command(subcommand)]
+    Gap(commands::gap::Gap),
     /// Check vehicle files.
     #[command(subcommand)]
     Vehicle(commands::vehicle::VehicleCommand),
@@ -54,7 +56,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Study(study) => study.run(),
         Command::Replay(replay) => replay.run(),
         Command::Import(import) => import.run(),
-        //Command::Gap(gap) => gap.run(),
+        Command::Gap(gap) => gap.run(),
         Command::Vehicle(vehicle) => vehicle.run(),
     };
     match done {

@@ -16,6 +16,9 @@ pub(crate) enum Gap {
         /// Flight logs.
         #[arg(long, required = true, num_args = 1..)]
         flights: Vec<PathBuf>,
+        /// Folder for find.json.
+        #[arg(long)]
+        out: Option<PathBuf>,
         /// Write the result here as JSON.
         #[arg(long)]
         json: Option<PathBuf>,
@@ -24,7 +27,7 @@ pub(crate) enum Gap {
 
 impl Gap {
     pub(crate) fn run(&self) -> Result<(), String> {
-        let Self::Find { vehicle, flights, json } = self;
+        let Self::Find { vehicle, flights, out, json } = self;
         let vehicle = VehicleFile::load(vehicle).map_err(|e| e.to_string())?;
         let logs = flights
             .iter()
@@ -35,12 +38,12 @@ impl Gap {
         say(&format!("residual force, body x y z:   {}  N rms", triple(&finding.residual.force_body_rms_n)));
         say(&format!("residual moment, body x y z:  {}  N m rms\n", triple(&finding.residual.moment_body_rms_n_m)));
         let mut table = Table::new(&["flight", "from s", "to s", "channel", "share %", "condition"]);
-        for w in finding.r#where.iter().take(10) {
+        for w in finding.places.iter().take(10) {
             table.row(vec![
                 w.flight.clone(),
                 format!("{:.2}", w.t0_s),
                 format!("{:.2}", w.t1_s),
-                w.channel.clone(),
+                w.channel.to_owned(),
                 format!("{:.1}", 100.0 * w.share),
                 w.condition.clone(),
             ]);
@@ -48,6 +51,10 @@ impl Gap {
         table.print();
         for note in &finding.notes {
             talk(&format!("note: {note}"));
+        }
+        if let Some(folder) = out {
+            output::folder(folder)?;
+            output::write_json(Some(&folder.join("find.json")), &finding)?;
         }
         output::write_json(json.as_deref(), &finding)
     }

@@ -2,7 +2,7 @@
 
 pub(crate) mod demo;
 pub(crate) mod fly;
-//pub(crate) mod gap;
+pub(crate) mod gap;
 pub(crate) mod import;
 pub(crate) mod replay;
 pub(crate) mod study;
@@ -38,12 +38,13 @@ fn figures(metrics: &Metrics) -> Vec<(String, String)> {
 
 /// How the report sees one flight.
 fn view<'a>(setup: &'a Setup, log: &'a FlightLog, summary: Vec<(String, String)>) -> FlightView<'a> {
-    let vehicle = setup.vehicle.vehicle.parameters();
+    // The limit holds for roll and for pitch; both at once tilt the thrust further.
+    let one_axis = setup.vehicle.vehicle.parameters().limits.tilt_max_rad.cos();
     FlightView {
         arm: setup.arm.name(),
         log,
         obstacles: &setup.scenario.obstacles,
-        tilt_max_rad: vehicle.limits.tilt_max_rad,
+        tilt_max_rad: (one_axis * one_axis).acos(),
         thrust_max_n: setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n(),
         summary,
     }

@@ -19,7 +19,7 @@ use crate::effects::Effects;
 use crate::frames::{Body, In, Ned, Wrench};
 use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
 use crate::vehicle::Vehicle;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Motion of the airframe through the air, expressed in the body frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,9 +36,19 @@ impl<T: Real> Air<T> {
     /// From velocity over ground and wind.
     #[inline(always)]
     pub fn new(state: &State<T>, wind: In<Ned, T>) -> Self {
-        let velocity = state.ned_from_body().inverse() * (state.velocity - wind);
+        Self::turned(state, wind, &rotation_matrix(state))
+    }
+    #[inline(always)]
+    fn turned(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T>) -> Self {
+        let velocity = In::new(ned_from_body.tr_mul(&(state.velocity - wind).vector));
         Self { velocity, speed: velocity.vector.norm(), omega: state.omega }
     }
+}
+
+/// The attitude as a matrix: two products with it cost less, and wait less, than two with the quaternion.
+#[inline(always)]
+fn rotation_matrix<T: Real>(state: &State<T>) -> Matrix3<T> {
+    state.ned_from_body().quaternion.to_rotation_matrix().into_inner()
 }
 
 /// Base drag of the airframe, body frame: `F = -(D v + 1/2 rho C_d A |v| v)`.
@@ -62,11 +72,21 @@ pub fn wrench<T: Real>(
     wind: In<Ned, T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> Wrench<Body, T> {
-    let air = Air::new(state, wind + effects.wind());
+    wrench_in(vehicle, effects, state, &Air::new(state, wind + effects.wind()), surfaces)
+}
+
+#[inline(always)]
+fn wrench_in<T: Real>(
+    vehicle: &Vehicle<T>,
+    effects: &Effects<T>,
+    state: &State<T>,
+    air: &Air<T>,
+    surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
+) -> Wrench<Body, T> {
     rotors::wrench(vehicle, &state.rotor_speed_rad_s)
-        + Wrench::from_force(drag(vehicle, &air))
-        + surfaces(&air)
-        + effects.wrench(&air)
+        + Wrench::from_force(drag(vehicle, air))
+        + surfaces(air)
+        + effects.wrench(air)
 }
 
 /// Time derivative of the state: each field of the result is the rate of the field of the same name.
@@ -82,41 +102,30 @@ pub fn derivative<T: Real>(
     wind: In<Ned, T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> State<T> {
-    let wrench = wrench(vehicle, effects, state, wind, surfaces);
-    rigid_body(vehicle, state, &wrench, drive.rates(vehicle.rotor_blocks(), &state.rotor_speed_rad_s))
-}
-
-#[inline(always)]
-fn rigid_body<T: Real>(
-    vehicle: &Vehicle<T>,
-    state: &State<T>,
-    wrench: &Wrench<Body, T>,
-    rotor_rate: crate::vehicle::PerRotor<T>,
-) -> State<T> {
-    let p = vehicle.parameters();
-    let omega = state.omega.vector;
-    let force_ned = (state.ned_from_body() * wrench.force).vector;
+    let ned_from_body = rotation_matrix(state);
+    let air = Air::turned(state, wind + effects.wind(), &ned_from_body);
+    let wrench = wrench_in(vehicle, effects, state, &air, surfaces);
     let gravity_ned = Vector3::new(T::zero(), T::zero(), real(GRAVITY_M_S2));
-    let spin = p.inertia_kg_m2 * omega;
+    let omega = state.omega.vector;
+    let spin = vehicle.parameters().inertia_kg_m2 * omega;
     State {
         position: state.velocity,
-        velocity: In::new(gravity_ned + force_ned * (T::one() / p.mass_kg)),
+        velocity: In::new(gravity_ned + ned_from_body * (wrench.force.vector * vehicle.inverse_mass())),
         attitude: state.attitude_rate(),
         omega: In::new(vehicle.inertia_inverse() * (wrench.moment.vector - omega.cross(&spin))),
-        rotor_speed_rad_s: rotor_rate,
+        rotor_speed_rad_s: drive.rates(vehicle.rotor_blocks(), &state.rotor_speed_rad_s),
     }
 }
 
 /// Specific force at the centre of mass, m/s^2: what an ideal accelerometer reads.
 pub fn specific_force<T: Real>(vehicle: &Vehicle<T>, wrench: &Wrench<Body, T>) -> In<Body, T> {
-    wrench.force * (T::one() / vehicle.parameters().mass_kg)
+    wrench.force * vehicle.inverse_mass()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::vehicle::fixtures::squirrel;
-    use nalgebra::Matrix3;
 
     fn no_surfaces(_: &Air<f64>) -> Wrench<Body, f64> {
         Wrench::zero()

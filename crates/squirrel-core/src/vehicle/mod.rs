@@ -121,6 +121,7 @@ pub struct Parameters<T: Real> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Vehicle<T: Real> {
     parameters: Parameters<T>,
+    inverse_mass: T,
     inertia_inverse: Matrix3<T>,
     per_speed_squared: RotorWrench<T>,
 }
@@ -170,7 +171,8 @@ impl<T: Real> Vehicle<T> {
         check::check(&parameters)?;
         let inertia_inverse =
             parameters.inertia_kg_m2.try_inverse().ok_or(ParameterError::inertia("inertia is singular"))?;
-        Ok(Self { parameters, inertia_inverse, per_speed_squared: RotorWrench::new(&parameters) })
+        let inverse_mass = T::one() / parameters.mass_kg;
+        Ok(Self { parameters, inverse_mass, inertia_inverse, per_speed_squared: RotorWrench::new(&parameters) })
     }
     #[inline(always)]
     pub(crate) fn rotor_wrench_per_speed_squared(&self) -> &RotorWrench<T> {
@@ -180,6 +182,11 @@ impl<T: Real> Vehicle<T> {
     #[inline(always)]
     pub fn parameters(&self) -> &Parameters<T> {
         &self.parameters
+    }
+    /// Inverse of the mass, 1/kg.
+    #[inline(always)]
+    pub fn inverse_mass(&self) -> T {
+        self.inverse_mass
     }
     /// Inverse of the inertia, 1/(kg m^2).
     #[inline(always)]

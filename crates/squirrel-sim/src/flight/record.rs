@@ -68,7 +68,7 @@ impl Recorder {
             let rows: &[(&str, &[f64])] = &[("voltage_v", &[b.voltage_v]), ("current_a", &[b.current_a])];
             self.log.source_mut("battery").push(t, rows);
         }
-        record_output(&mut self.log, t, output, self.rotors);
+        record_output(&mut self.log, t, output, self.rotors, Some(state));
         self.plant(t, state, air, wing_force);
     }
 
@@ -108,7 +108,6 @@ impl Recorder {
 
     fn plant(&mut self, t: f64, state: &PlantState, air: In<Ned, f64>, wing_force: In<Body, f64>) {
         let body = &state.body;
-        let deployment = state.servo.map(|s| s.deployment);
         let log = &mut self.log;
         log.source_mut("truth").push(
             t,
@@ -120,8 +119,6 @@ impl Recorder {
                 ("wing_force_body_n", wing_force.vector.as_slice()),
                 ("wind_ned_m_s", air.vector.as_slice()),
                 ("battery_charge", &[state.battery.charge]),
-                ("rotor_speed_rad_s", &body.rotor_speed_rad_s[..self.rotors]),
-                ("wing_deployment", &deployment),
             ],
         );
     }
@@ -132,10 +129,26 @@ impl Recorder {
 }
 
 /// Records every term of one step of the flight code.
-pub(crate) fn record_output(log: &mut FlightLog, t: f64, output: &StackOutput, rotors: usize) {
+///
+/// * `plant` - what rotors and wings really did, where a plant flew
+pub(crate) fn record_output(
+    log: &mut FlightLog,
+    t: f64,
+    output: &StackOutput,
+    rotors: usize,
+    plant: Option<&PlantState>,
+) {
     let command = output.rotor_command.map(f64::from);
-    log.source_mut("rotor").push(t, &[("command", &command[..rotors])]);
-    log.source_mut("wing").push(t, &[("command", &output.wing_command.map(f64::from))]);
+    let wing_command = output.wing_command.map(f64::from);
+    let mut rotor: Vec<(&str, &[f64])> = vec![("command", &command[..rotors])];
+    let mut wing: Vec<(&str, &[f64])> = vec![("command", &wing_command)];
+    let deployment = plant.map(|p| p.servo.map(|s| s.deployment));
+    if let (Some(plant), Some(deployment)) = (plant, &deployment) {
+        rotor.push(("speed_rad_s", &plant.body.rotor_speed_rad_s[..rotors]));
+        wing.push(("deployment", deployment));
+    }
+    log.source_mut("rotor").push(t, &rotor);
+    log.source_mut("wing").push(t, &wing);
     let r = &output.reference;
     log.source_mut("reference").push(
         t,
