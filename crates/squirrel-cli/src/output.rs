@@ -51,8 +51,9 @@ impl Table {
         for (i, row) in self.rows.iter().enumerate() {
             let mut line = String::new();
             for (c, cell) in row.iter().enumerate() {
+                use std::fmt::Write as _;
                 let w = widths[c];
-                line += &if c == 0 { format!("{cell:<w$}") } else { format!("  {cell:>w$}") };
+                let _ = if c == 0 { write!(line, "{cell:<w$}") } else { write!(line, "  {cell:>w$}") };
             }
             say(line.trim_end());
             if i == 0 {

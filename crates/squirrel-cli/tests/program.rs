@@ -1,5 +1,7 @@
 //! The program as a user runs it: exit codes, files, one clear line where something is wrong.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -57,7 +59,9 @@ fn json(folder: &Folder, name: &str) -> serde_json::Value {
 fn without_arguments_it_flies_the_demo() {
     let folder = Folder::new("demo");
     let table = folder.succeeds(&[]);
-    for word in ["thrust-to-weight 1.25", "pc", "twcc_flat", "twcc_oracle", "RMSE 3-D", "gain %", "height lost"] {
+    for word in
+        ["thrust-to-weight 1.25", "pc", "twcc_flat", "twcc_oracle", "RMSE 3-D", "gain %", "height lost"]
+    {
         assert!(table.contains(word), "`{word}` is not in:\n{table}");
     }
     let mut files: Vec<String> = fs::read_dir(folder.0.join("squirrel-demo"))
@@ -78,7 +82,8 @@ fn the_demo_is_the_same_bytes_twice_and_replays() {
     let folder = Folder::new("twice");
     let figures = |out: &str| {
         folder.succeeds(&["demo", "--out", out, "--seed", "3", "--json", &format!("{out}.json")]);
-        ["report.html", "flight-pc.mcap", "flight-twcc_flat.mcap"].map(|f| fs::read(folder.0.join(out).join(f)).unwrap())
+        ["report.html", "flight-pc.mcap", "flight-twcc_flat.mcap"]
+            .map(|f| fs::read(folder.0.join(out).join(f)).unwrap())
     };
     assert!(figures("a") == figures("b"), "two runs differ");
     assert_eq!(json(&folder, "a.json"), json(&folder, "b.json"));
@@ -92,7 +97,10 @@ fn replay_names_the_first_output_of_a_changed_gain_and_a_flipped_byte() {
     let folder = Folder::new("replay");
     folder.succeeds(&["fly", "--arm", "pc", "--scenario", "hover", "--out", "f.mcap"]);
     folder.write("v.toml", &SQUIRREL.replace("c2_per_s = { value = [14.0", "c2_per_s = { value = [14.5"));
-    folder.fails(&["replay", "f.mcap", "--vehicle", "v.toml"], &["f.mcap", "control.inner.", "is the first output"]);
+    folder.fails(
+        &["replay", "f.mcap", "--vehicle", "v.toml"],
+        &["f.mcap", "control.inner.", "is the first output"],
+    );
     let mut bytes = fs::read(folder.0.join("f.mcap")).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
@@ -115,7 +123,8 @@ fn a_truncated_log_says_what_is_whole_and_can_be_recovered() {
 #[test]
 fn fly_writes_log_report_and_figures() {
     let folder = Folder::new("fly");
-    let arguments = ["fly", "--arm", "twcc_flat", "--scenario", "avoid", "--seed", "2", "--thrust-to-weight", "1.3"];
+    let arguments =
+        ["fly", "--arm", "twcc_flat", "--scenario", "avoid", "--seed", "2", "--thrust-to-weight", "1.3"];
     let outputs = ["--out", "f.mcap", "--report", "r.html", "--json", "f.json"];
     let table = folder.succeeds(&[&arguments[..], &outputs[..]].concat());
     assert!(table.contains("1.30") && table.contains("RMSE"), "{table}");
@@ -128,7 +137,8 @@ fn fly_writes_log_report_and_figures() {
 #[test]
 fn the_study_writes_its_table_for_machines() {
     let folder = Folder::new("study");
-    let arguments = ["study", "thrust", "--arms", "pc,twcc_flat", "--trials", "2", "--seed", "1", "--out", "d"];
+    let arguments =
+        ["study", "thrust", "--arms", "pc,twcc_flat", "--trials", "2", "--seed", "1", "--out", "d"];
     let table = folder.succeeds(&arguments);
     assert!(table.contains("95 % interval"), "{table}");
     let study = json(&folder, "d/thrust.json");
@@ -156,9 +166,19 @@ fn bad_vehicles_get_one_line_with_file_field_and_value() {
         ("indefinite inertia", "[3.22e-3, 4.68e-3", "[-3.22e-3, 4.68e-3", &["mass.inertia_kg_m2 = -0.00322"]),
         ("wing area without wing", "model = \"membrane\"\n", "", &["wing.area_per_side_m2 = 0.02"]),
         ("unknown effect", "[limits]", "[effects.magic]\nx = 1.0\n[limits]", &["effects.magic"]),
-        ("zero gain", "value = [1.6, 1.6, 0.8]", "value = [1.6, 0.0, 0.8]", &["control.position.position_per_s[1] = 0"]),
+        (
+            "zero gain",
+            "value = [1.6, 1.6, 0.8]",
+            "value = [1.6, 0.0, 0.8]",
+            &["control.position.position_per_s[1] = 0"],
+        ),
         ("text for a number", "value = 0.548,", "value = \"heavy\",", &["line", "heavy"]),
-        ("rates", "[control]\n", "[sensors.gnss.timing]\nrate_hz = -1.0\n[control]\n", &["sensors.gnss.timing.rate_hz = -1"]),
+        (
+            "rates",
+            "[control]\n",
+            "[sensors.gnss.timing]\nrate_hz = -1.0\n[control]\n",
+            &["sensors.gnss.timing.rate_hz = -1"],
+        ),
     ];
     for (what, from, to, words) in cases {
         let text = SQUIRREL.replacen(from, to, 1);

@@ -17,7 +17,8 @@ use std::hint::black_box;
 
 fn stack(form: AttitudeForm) -> Stack {
     let mut rotors = [Rotor::unused(); MAX_ROTORS];
-    for (i, (x, y, s)) in [(1.0, -1.0, -1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, 1.0)].into_iter().enumerate()
+    for (i, (x, y, s)) in
+        [(1.0, -1.0, -1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, 1.0)].into_iter().enumerate()
     {
         rotors[i] = Rotor::planar(0.085 * x, 0.085 * y, s);
     }
@@ -37,7 +38,12 @@ fn stack(form: AttitudeForm) -> Stack {
             thrust_curve: None,
         },
         drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: 0.01 },
-        wing: Some(Wing { area_per_side_m2: 0.02, normal_force_slope: 2.0, lateral_arm_m: 0.09, time_constant_s: 0.03 }),
+        wing: Some(Wing {
+            area_per_side_m2: 0.02,
+            normal_force_slope: 2.0,
+            lateral_arm_m: 0.09,
+            time_constant_s: 0.03,
+        }),
         limits: Limits { tilt_max_rad: 0.52, thrust_max_n: 10.0 },
     })
     .expect("sound");
@@ -70,7 +76,8 @@ fn stack(form: AttitudeForm) -> Stack {
         dwell_s: 0.3,
         thrust_min_n: 0.5,
     };
-    Stack::new(vehicle, StackParameters { attitude, twcc }, Mission::Hover { position: In::zero() }).expect("sound")
+    Stack::new(vehicle, StackParameters { attitude, twcc }, Mission::Hover { position: In::zero() })
+        .expect("sound")
 }
 
 fn frame(time_us: u64) -> SensorFrame {
@@ -80,7 +87,10 @@ fn frame(time_us: u64) -> SensorFrame {
         specific_force: In::new(Vector3::new(0.1, 0.0, -9.8)),
     });
     frame.attitude = Some(Rotation::from_euler(0.1, 0.4, 0.02));
-    frame.gnss = Some(Gnss { position: In::new(Vector3::new(1.0, 0.5, 0.1)), velocity: In::new(Vector3::new(6.0, 1.0, 0.2)) });
+    frame.gnss = Some(Gnss {
+        position: In::new(Vector3::new(1.0, 0.5, 0.1)),
+        velocity: In::new(Vector3::new(6.0, 1.0, 0.2)),
+    });
     frame
 }
 

@@ -127,7 +127,7 @@ impl<To: Frame, From: Frame, T: Real> Rotation<To, From, T> {
     /// From `[w, x, y, z]`; `None` unless finite with a norm that is not zero.
     pub fn from_wxyz(wxyz: [T; 4]) -> Option<Self> {
         let q = Quaternion::new(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
-        if !q.coords.iter().all(|x| x.is_finite()) {
+        if !q.coords.iter().all(T::is_finite) {
             return None;
         }
         UnitQuaternion::try_new(q, crate::math::real(1e-6)).map(Self::new)

@@ -47,10 +47,12 @@ fn closed_loop(c: &mut Criterion) {
     let mut scenario = Scenario::find("track").expect("built in");
     scenario.duration_s = 10.0;
     scenario.wind.gust_sigma_m_s = 0.5;
-    let setup = Setup { vehicle: VehicleFile::squirrel(), arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
+    let setup =
+        Setup { vehicle: VehicleFile::squirrel(), arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
     let mut group = c.benchmark_group("closed_loop");
     group.throughput(Throughput::Elements(10));
-    group.bench_function("seconds_of_flight", |b| b.iter(|| setup.fly(false, |_| {}).expect("flies").metrics));
+    group
+        .bench_function("seconds_of_flight", |b| b.iter(|| setup.fly(false, |_| {}).expect("flies").metrics));
     group.finish();
 }
 

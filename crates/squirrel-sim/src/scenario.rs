@@ -178,10 +178,9 @@ impl Scenario {
             }
             // The paper's real flights: 7.3 m/s, R_d 4 m, 110 to 130 deg. At this thrust-to-weight ratio the paper's
             // gain and its sinking wingless drone appear together.
-            "avoid" => Some(Self {
-                thrust_to_weight: Some(1.25),
-                ..Self::turn("avoid", 7.3, 4.0, 110.0, 130.0)
-            }),
+            "avoid" => {
+                Some(Self { thrust_to_weight: Some(1.25), ..Self::turn("avoid", 7.3, 4.0, 110.0, 130.0) })
+            }
             // The paper's simulated study: R_d 5 m, one angle.
             "steer" => Some(Self::turn("steer", 7.0, 5.0, 120.0, 120.0)),
             _ => None,

@@ -1,5 +1,7 @@
 //! Flights in closed loop: what plant, sensors and flight code do together.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Metrics, Setup};
 use squirrel_sim::scenario::Scenario;
@@ -72,7 +74,10 @@ fn arms_do_what_they_are_named_for() {
 /// The paper's battery hypothesis, as physics: with `battery_sag` the rotors feel the voltage, without it they do not.
 #[test]
 fn thrust_feels_the_battery_only_through_its_effect() {
-    let text = format!("{}\n[effects.battery_sag]\nvoltage_exponent = 0.9\n", squirrel_sim::vehicle_file::SQUIRREL_TOML);
+    let text = format!(
+        "{}\n[effects.battery_sag]\nvoltage_exponent = 0.9\n",
+        squirrel_sim::vehicle_file::SQUIRREL_TOML
+    );
     let rotor_command = |text: &str, charge: f64| {
         let mut setup = setup(Arm::Pc, "hover");
         setup.vehicle = VehicleFile::parse(text, "test").unwrap();
@@ -83,7 +88,10 @@ fn thrust_feels_the_battery_only_through_its_effect() {
     };
     let plain = squirrel_sim::vehicle_file::SQUIRREL_TOML;
     assert!((rotor_command(plain, 1.0) - rotor_command(plain, 0.2)).abs() < 2e-3);
-    assert!(rotor_command(&text, 0.2) > rotor_command(&text, 1.0) + 0.02, "an emptier battery needs more command");
+    assert!(
+        rotor_command(&text, 0.2) > rotor_command(&text, 1.0) + 0.02,
+        "an emptier battery needs more command"
+    );
 }
 
 #[cfg(feature = "rapier")]

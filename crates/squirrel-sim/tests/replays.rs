@@ -1,5 +1,7 @@
 //! Replay: the same bits from the same inputs, and the first thing that differs where something was changed.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{INPUT_SOURCES, Integrator, Setup};
 use squirrel_sim::log::FlightLog;
@@ -33,7 +35,8 @@ fn every_arm_replays_bit_for_bit_through_a_file() {
 #[test]
 fn a_changed_gain_is_found_at_the_first_output_that_it_reaches() {
     let mut log = flown(Arm::TwccFlat);
-    let changed = log.metadata["vehicle_toml"].replace("c1_per_s = { value = [9.0,", "c1_per_s = { value = [9.001,");
+    let changed =
+        log.metadata["vehicle_toml"].replace("c1_per_s = { value = [9.0,", "c1_per_s = { value = [9.001,");
     assert_ne!(changed, log.metadata["vehicle_toml"]);
     log.metadata.insert("vehicle_toml".to_owned(), changed);
     let difference = replay(&log, &setup(&log).unwrap()).unwrap().first_difference.unwrap();

@@ -1,5 +1,7 @@
 //! What the thrust study shows, on the trials that the README states.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::thrust::{Plan, Thrust, run};

@@ -36,7 +36,10 @@ impl Gap {
         let finding = squirrel_gap::find(&vehicle, &logs).map_err(|e| e.to_string())?;
         let triple = |x: &[f64; 3]| x.map(|v| format!("{v:.4e}")).join("  ");
         say(&format!("residual force, body x y z:   {}  N rms", triple(&finding.residual.force_body_rms_n)));
-        say(&format!("residual moment, body x y z:  {}  N m rms\n", triple(&finding.residual.moment_body_rms_n_m)));
+        say(&format!(
+            "residual moment, body x y z:  {}  N m rms\n",
+            triple(&finding.residual.moment_body_rms_n_m)
+        ));
         let mut table = Table::new(&["flight", "from s", "to s", "channel", "share %", "condition"]);
         for w in finding.places.iter().take(10) {
             table.row(vec![

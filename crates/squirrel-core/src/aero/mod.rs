@@ -27,7 +27,7 @@ mod tests {
         let falling = In::new(Vector3::new(0.0, 0.0, 5.0));
         assert!((angle_of_attack(falling) - core::f32::consts::FRAC_PI_2).abs() < 1e-3);
         let nose_up_glide = In::new(Vector3::new(7.0 * 0.866, 0.0, 3.5));
-        assert!((angle_of_attack(nose_up_glide) - 0.5236).abs() < 1e-3);
+        assert!((angle_of_attack(nose_up_glide) - core::f32::consts::FRAC_PI_6).abs() < 1e-3);
         assert!(angle_of_attack(In::new(Vector3::new(7.0, 0.0, -1.0))) < 0.0);
         assert_eq!(angle_of_attack(In::zero()), 0.0);
     }

@@ -85,7 +85,7 @@ impl Interval {
             self.low = upper(self.low, bound / slope);
         }
     }
-    fn is_empty(&self) -> bool {
+    fn is_empty(self) -> bool {
         self.low > self.high + 1e-5
     }
 }

@@ -104,15 +104,15 @@ impl SensorFrame {
                 known.gnss = Some(gnss);
             }
         }
-        if let Some(altitude) = self.altitude_m {
-            if accept(altitude.abs() <= POSITION_MAX_M) {
-                known.altitude_m = Some(altitude);
-            }
+        if let Some(altitude) = self.altitude_m
+            && accept(altitude.abs() <= POSITION_MAX_M)
+        {
+            known.altitude_m = Some(altitude);
         }
-        if let Some(force) = self.wing_force {
-            if accept(all_finite(&force.vector)) {
-                known.wing_force = Some(force);
-            }
+        if let Some(force) = self.wing_force
+            && accept(all_finite(&force.vector))
+        {
+            known.wing_force = Some(force);
         }
         rejected
     }

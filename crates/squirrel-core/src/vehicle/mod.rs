@@ -172,7 +172,12 @@ impl<T: Real> Vehicle<T> {
         let inertia_inverse =
             parameters.inertia_kg_m2.try_inverse().ok_or(ParameterError::inertia("inertia is singular"))?;
         let inverse_mass = T::one() / parameters.mass_kg;
-        Ok(Self { parameters, inverse_mass, inertia_inverse, per_speed_squared: RotorWrench::new(&parameters) })
+        Ok(Self {
+            parameters,
+            inverse_mass,
+            inertia_inverse,
+            per_speed_squared: RotorWrench::new(&parameters),
+        })
     }
     #[inline(always)]
     pub(crate) fn rotor_wrench_per_speed_squared(&self) -> &RotorWrench<T> {

@@ -77,7 +77,8 @@ impl Mover {
             restitution: 0.2,
             friction: 0.6,
         };
-        let world = World::new(&setup.vehicle.vehicle, &parameters).map_err(|e| FlightError(e.to_string()))?;
+        let world =
+            World::new(&setup.vehicle.vehicle, &parameters).map_err(|e| FlightError(e.to_string()))?;
         Ok(Self { integrator: setup.integrator, world })
     }
 

@@ -178,18 +178,18 @@ mod tests {
         let mut p = SensorParameters::ideal();
         p.gnss.timing = Timing { rate_hz: 10.0, latency_s: 0.15, seed: None };
         let mut sensors = Sensors::new(p, 1);
-        let (mut imu, mut fixes) = (0, Vec::new());
+        let (mut imu, mut fixes) = (0_i32, Vec::new());
         for k in 0..3000u64 {
             let time_us = k * 1000 / 3;
             let mut now = truth();
             now.position = In::new(Vector3::new(time_us as f64 * 1e-6, 0.0, 0.0));
             let (frame, _) = sensors.poll(time_us, &now);
-            imu += usize::from(frame.imu.is_some());
+            imu += i32::from(frame.imu.is_some());
             if let Some(gnss) = frame.gnss {
                 fixes.push((time_us, gnss.position.vector.x));
             }
         }
-        assert!((imu as i64 - 300).abs() <= 1, "{imu} samples in a second at 300 Hz");
+        assert!((imu - 300).abs() <= 1, "{imu} samples in a second at 300 Hz");
         assert_eq!(fixes.len(), 9);
         for (time_us, north) in fixes {
             let age = time_us as f64 * 1e-6 - f64::from(north);

@@ -60,7 +60,7 @@ pub(super) fn build(t: VehicleTable) -> Result<VehicleFile, Problem> {
             return Err(format!("size_body_m[{i}] = {length}: must be finite and > 0"));
         }
     }
-    let control = t.control.map(control).transpose()?;
+    let control = t.control.as_ref().map(control);
     if let Some(gains) = &control {
         gains.attitude.check().map_err(|e| e.to_string())?;
         gains.twcc.check(vehicle.parameters().limits.thrust_max_n as f32).map_err(|e| e.to_string())?;
@@ -227,11 +227,11 @@ fn triple(q: &Quantity<[f64; 3]>) -> Vector3<f32> {
     Vector3::from(q.0).map(|x| x as f32)
 }
 
-fn control(t: ControlTable) -> Result<StackParameters, Problem> {
-    Ok(StackParameters {
+fn control(t: &ControlTable) -> StackParameters {
+    StackParameters {
         attitude: attitude(&t.attitude),
         twcc: twcc(&t.position, &t.wing, t.thrust_min_n.0 as f32),
-    })
+    }
 }
 
 fn attitude(t: &AttitudeTable) -> AttitudeGains {
