@@ -44,7 +44,7 @@ fn stack(form: AttitudeForm) -> Stack {
             lateral_arm_m: 0.09,
             time_constant_s: 0.03,
         }),
-        limits: Limits { tilt_max_rad: 0.52, thrust_max_n: 10.0 },
+        limits: Limits { tilt_max_rad: 0.52, thrust_max_n: 10.0, rotor_thrust_max_n: None },
     })
     .expect("sound");
     let attitude = AttitudeGains {

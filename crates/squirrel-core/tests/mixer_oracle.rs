@@ -45,7 +45,7 @@ fn vehicle(positions: &[[f64; 2]], signs: &[f64]) -> Vehicle<f32> {
         },
         drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: 0.0 },
         wing: None,
-        limits: Limits { tilt_max_rad: 0.5, thrust_max_n: 20.0 },
+        limits: Limits { tilt_max_rad: 0.5, thrust_max_n: 20.0, rotor_thrust_max_n: None },
     };
     Vehicle::new(parameters).unwrap()
 }

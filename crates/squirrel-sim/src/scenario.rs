@@ -22,8 +22,8 @@ pub struct Scenario {
     pub duration_s: f64,
     /// Height of the mission above the ground, m.
     pub height_m: f64,
-    /// Effective thrust-to-weight ratio: what all rotors together can give over the weight. Overrides the vehicle's top
-    /// rotor speed and `limits.thrust_max_n`, as a weak battery would.
+    /// Effective thrust-to-weight ratio: what all rotors together may be asked for over the weight. Overrides
+    /// `limits.thrust_max_n` and `limits.rotor_thrust_max_n` of the vehicle.
     #[serde(default)]
     pub thrust_to_weight: Option<f64>,
     /// Charge of the battery at the start, 0..1.

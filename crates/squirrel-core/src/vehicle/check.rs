@@ -95,7 +95,8 @@ pub(super) fn check<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {
             "must be <= 1.4 rad (80 deg)",
         ));
     }
-    positive("limits.thrust_max_n", p.limits.thrust_max_n)
+    positive("limits.thrust_max_n", p.limits.thrust_max_n)?;
+    p.limits.rotor_thrust_max_n.map_or(Ok(()), |limit| positive("limits.rotor_thrust_max_n", limit))
 }
 
 fn rotors<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {

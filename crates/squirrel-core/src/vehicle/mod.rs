@@ -94,6 +94,8 @@ pub struct Limits<T> {
     pub tilt_max_rad: T,
     /// Limit of the collective thrust, N.
     pub thrust_max_n: T,
+    /// Limit of the thrust of each rotor, N, where it is below what the rotor can give.
+    pub rotor_thrust_max_n: Option<T>,
 }
 
 /// Every number of an airframe, unchecked.
@@ -211,13 +213,14 @@ impl<T: Real> Vehicle<T> {
     pub fn weight_n(&self) -> T {
         self.parameters.mass_kg * real(crate::math::GRAVITY_M_S2)
     }
-    /// Top thrust of one rotor at the reference voltage, N.
+    /// Most thrust that one rotor may be asked for, N: its top thrust at the reference voltage, or its limit if lower.
     pub fn rotor_thrust_max_n(&self) -> T {
         let p = &self.parameters.propulsion;
-        match p.thrust_curve {
+        let top = match p.thrust_curve {
             Some(curve) => curve.thrust_n(p.reference_voltage_v),
             None => p.thrust_coefficient_n_s2 * p.speed_max_rad_s * p.speed_max_rad_s,
-        }
+        };
+        self.parameters.limits.rotor_thrust_max_n.map_or(top, |limit| crate::math::lower(limit, top))
     }
     /// The same vehicle in another scalar, checked again: what is sound in `f64` may degenerate in `f32`.
     ///
@@ -262,6 +265,7 @@ impl<T: Real> Vehicle<T> {
             limits: Limits {
                 tilt_max_rad: to(p.limits.tilt_max_rad),
                 thrust_max_n: to(p.limits.thrust_max_n),
+                rotor_thrust_max_n: p.limits.rotor_thrust_max_n.map(to),
             },
         })
     }
@@ -339,7 +343,11 @@ pub(crate) mod fixtures {
                 lateral_arm_m: real(0.09),
                 time_constant_s: real(0.07),
             }),
-            limits: Limits { tilt_max_rad: real(core::f64::consts::FRAC_PI_6), thrust_max_n: real(10.7) },
+            limits: Limits {
+                tilt_max_rad: real(core::f64::consts::FRAC_PI_6),
+                thrust_max_n: real(10.7),
+                rotor_thrust_max_n: None,
+            },
         }
     }
 }

@@ -74,30 +74,27 @@ impl Setup {
             )));
         };
         self.arm.configure(&mut parameters.twcc);
-        let vehicle = self.flown_vehicle()?.cast().map_err(fail)?;
+        let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
         Stack::new(vehicle, parameters, self.scenario.mission()).map_err(fail)
     }
 
-    /// The vehicle with the scenario's thrust-to-weight ratio: rotors whose top speed is lower, as on a weak battery, and a
-    /// thrust limit to match.
-    fn flown_vehicle(&self) -> Result<Vehicle<f64>, FlightError> {
+    /// The vehicle as the flight code may use it: with the scenario's thrust-to-weight ratio, no rotor is asked for more than
+    /// its share. The plant keeps its rotors, so that a command means the same in every flight of the vehicle.
+    fn limited_vehicle(&self) -> Result<Vehicle<f64>, FlightError> {
         let mut p = *self.vehicle.vehicle.parameters();
         if let Some(ratio) = self.scenario.thrust_to_weight {
             p.limits.thrust_max_n = ratio * self.vehicle.vehicle.weight_n();
-            let each = p.limits.thrust_max_n / p.rotor_count as f64;
-            p.propulsion.speed_max_rad_s = (each / p.propulsion.thrust_coefficient_n_s2).sqrt();
-            // The curve belongs to the rotors at full strength.
-            p.propulsion.thrust_curve = None;
+            p.limits.rotor_thrust_max_n = Some(p.limits.thrust_max_n / p.rotor_count as f64);
         }
         Vehicle::new(p).map_err(|e| FlightError(e.to_string()))
     }
 
-    /// Largest collective thrust over weight.
+    /// Most collective thrust that the flight code may ask for, over the weight.
     pub fn thrust_to_weight(&self) -> f64 {
         let vehicle = &self.vehicle.vehicle;
-        self.scenario
-            .thrust_to_weight
-            .unwrap_or(vehicle.parameters().limits.thrust_max_n / vehicle.weight_n())
+        let rotors = vehicle.rotor_thrust_max_n() * vehicle.rotors().len() as f64 / vehicle.weight_n();
+        let limit = vehicle.parameters().limits.thrust_max_n / vehicle.weight_n();
+        self.scenario.thrust_to_weight.unwrap_or(limit).min(rotors)
     }
 
     /// Flies.
@@ -112,7 +109,7 @@ impl Setup {
         let stack = self.stack()?;
         let dt_s = PLANT_STEP_US as f64 * 1e-6;
         let plant = Plant::new(
-            self.flown_vehicle()?,
+            self.vehicle.vehicle,
             self.vehicle.effects,
             self.arm.plant_wing(&self.vehicle.wing),
             self.vehicle.battery.clone(),

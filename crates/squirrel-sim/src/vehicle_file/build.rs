@@ -48,7 +48,11 @@ pub(super) fn build(t: VehicleTable) -> Result<VehicleFile, Problem> {
             area_m2: t.drag.area_m2.map_or(0.0, |q| q.0),
         },
         wing,
-        limits: Limits { tilt_max_rad: t.limits.tilt_max_rad.0, thrust_max_n: t.limits.thrust_max_n.0 },
+        limits: Limits {
+            tilt_max_rad: t.limits.tilt_max_rad.0,
+            thrust_max_n: t.limits.thrust_max_n.0,
+            rotor_thrust_max_n: t.limits.rotor_thrust_max_n.map(|q| q.0),
+        },
     };
     let vehicle = Vehicle::new(parameters).map_err(|e| e.to_string())?;
     let size_body_m = match t.size_body_m {

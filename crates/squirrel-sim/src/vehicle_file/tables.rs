@@ -119,6 +119,7 @@ pub(super) struct BatteryTable {
 pub(super) struct LimitsTable {
     pub(super) tilt_max_rad: Number,
     pub(super) thrust_max_n: Number,
+    pub(super) rotor_thrust_max_n: Option<Number>,
 }
 
 #[derive(Deserialize)]

@@ -35,7 +35,7 @@ pub(crate) fn vehicle() -> Vehicle<f64> {
         },
         drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: 0.01 },
         wing: None,
-        limits: Limits { tilt_max_rad: 0.5, thrust_max_n: 10.7 },
+        limits: Limits { tilt_max_rad: 0.5, thrust_max_n: 10.7, rotor_thrust_max_n: None },
     })
     .expect("the fixture is a possible airframe")
 }
