@@ -1,6 +1,6 @@
 //! `squirrel demo`: the paper's avoidance manoeuvre with three controllers, on numbers that are part of the program.
 
-use super::{facts, figures, view};
+use super::{facts, figures, view, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
 use squirrel_sim::arm::Arm;
@@ -92,7 +92,7 @@ impl Demo {
             rows.push(Row { arm: setup.arm.name(), gain, metrics: flight.metrics });
             if let Some(log) = &flight.log {
                 let path = self.out.join(format!("flight-{}.mcap", setup.arm.name()));
-                log.write(&path).map_err(|e| e.to_string())?;
+                write_log(log, &path)?;
                 views.push(view(setup, log, cells));
             }
         }

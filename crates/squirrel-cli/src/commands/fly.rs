@@ -1,6 +1,6 @@
 //! `squirrel fly`: one scenario, one arm, one log.
 
-use super::{facts, figures, vehicle, view};
+use super::{facts, figures, vehicle, view, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
 use squirrel_sim::arm::Arm;
@@ -89,7 +89,7 @@ impl Fly {
         table.print();
         if let Some(log) = &flight.log {
             if let Some(path) = &self.out {
-                log.write(path).map_err(|e| e.to_string())?;
+                write_log(log, path)?;
                 talk(&format!("wrote {}", path.display()));
             }
             if let Some(path) = &self.report {

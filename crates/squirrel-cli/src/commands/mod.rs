@@ -22,6 +22,13 @@ fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
     }
 }
 
+/// Writes a log that says which commit of the program flew.
+fn write_log(log: &FlightLog, path: &Path) -> Result<(), String> {
+    let mut log = log.clone();
+    log.metadata.insert("git".to_owned(), option_env!("SQUIRREL_COMMIT").unwrap_or("unknown").to_owned());
+    log.write(path).map_err(|e| e.to_string())
+}
+
 /// The table columns that every flight has: name with unit, and the figure.
 fn figures(metrics: &Metrics) -> Vec<(String, String)> {
     let cell = |name: &str, value: String| (name.to_owned(), value);

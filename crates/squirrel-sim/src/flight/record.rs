@@ -37,7 +37,6 @@ impl Recorder {
         for (key, value) in [
             ("format", FORMAT.to_owned()),
             ("version", env!("CARGO_PKG_VERSION").to_owned()),
-            ("git", option_env!("SQUIRREL_GIT_HASH").unwrap_or("unknown").to_owned()),
             ("vehicle", setup.vehicle.name.clone()),
             ("vehicle_toml", setup.vehicle.text.clone()),
             ("scenario_toml", scenario.to_toml()),
