@@ -3,7 +3,8 @@
 //! Read the smallest of several runs on a quiet machine. The target is 60 ns an evaluation in a generic x86-64 build.
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use squirrel_core::dynamics::{Air, VectorSpace, rk4};
+use squirrel_core::aero::Air;
+use squirrel_core::dynamics::{VectorSpace, rk4};
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_sim::plant::{Membrane, MembraneParameters, MembraneState};

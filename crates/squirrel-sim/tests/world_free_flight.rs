@@ -4,7 +4,8 @@
 
 mod world_fixture;
 
-use squirrel_core::dynamics::{Air, RotorDrive, State, derivative, rk4, wrench};
+use squirrel_core::aero::Air;
+use squirrel_core::dynamics::{RotorDrive, State, derivative, rk4, wrench};
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::nalgebra::Vector3;

@@ -3,7 +3,7 @@
 //! A normal-force coefficient of `2 sin(alpha)` on `1/2 rho |v|^2 A`; no tangential part. `v` is relative to the air here
 //! (the paper takes the ground velocity; EQUATIONS T6).
 
-use crate::dynamics::Air;
+use crate::aero::Air;
 use crate::frames::{Body, Frame, In, Wrench};
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
 use crate::vehicle::Wing;

@@ -1,9 +1,28 @@
-//! Aerodynamics that the flight code itself evaluates.
+//! Aerodynamics: motion through the air, and the flat plate.
 
 pub mod flat_plate;
 
 use crate::frames::{Body, In};
-use crate::math::limit;
+use crate::math::{Real, limit};
+
+/// Motion of the airframe through the air, expressed in the body frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Air<T: Real> {
+    /// Velocity relative to the air, m/s.
+    pub velocity: In<Body, T>,
+    /// Its norm, m/s.
+    pub speed: T,
+    /// Angular rate of the airframe, rad/s.
+    pub omega: In<Body, T>,
+}
+
+impl<T: Real> Air<T> {
+    /// From the velocity relative to the air, m/s, and the angular rate, rad/s.
+    #[inline(always)]
+    pub fn new(velocity: In<Body, T>, omega: In<Body, T>) -> Self {
+        Self { velocity, speed: velocity.vector.norm(), omega }
+    }
+}
 
 /// Angle of attack of the wing plane, rad, in [-pi/2, pi/2]: `sin(alpha) = n . v / |v|`, positive where the air hits the
 /// belly. 0 below 0.3 m/s, where the direction of the air means nothing (EQUATIONS T5).

@@ -15,34 +15,24 @@ pub use rk4::{VectorSpace, rk4};
 pub use rotors::RotorDrive;
 pub use state::State;
 
+use crate::aero::Air;
 use crate::effects::Effects;
 use crate::frames::{Body, In, Ned, Wrench};
 use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
 use crate::vehicle::Vehicle;
 use nalgebra::{Matrix3, Vector3};
 
-/// Motion of the airframe through the air, expressed in the body frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Air<T: Real> {
-    /// Velocity relative to the air, m/s.
-    pub velocity: In<Body, T>,
-    /// Its norm, m/s.
-    pub speed: T,
-    /// Angular rate of the airframe, rad/s.
-    pub omega: In<Body, T>,
+/// Motion of the airframe through the air.
+///
+/// * `wind` - velocity of the air, m/s
+#[inline(always)]
+pub fn air<T: Real>(state: &State<T>, wind: In<Ned, T>) -> Air<T> {
+    air_in(state, wind, &rotation_matrix(state))
 }
 
-impl<T: Real> Air<T> {
-    /// From velocity over ground and wind.
-    #[inline(always)]
-    pub fn new(state: &State<T>, wind: In<Ned, T>) -> Self {
-        Self::turned(state, wind, &rotation_matrix(state))
-    }
-    #[inline(always)]
-    fn turned(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T>) -> Self {
-        let velocity = In::new(ned_from_body.tr_mul(&(state.velocity - wind).vector));
-        Self { velocity, speed: velocity.vector.norm(), omega: state.omega }
-    }
+#[inline(always)]
+fn air_in<T: Real>(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T>) -> Air<T> {
+    Air::new(In::new(ned_from_body.tr_mul(&(state.velocity - wind).vector)), state.omega)
 }
 
 /// The attitude as a matrix: two products with it cost less, and wait less, than two with the quaternion.
@@ -72,7 +62,7 @@ pub fn wrench<T: Real>(
     wind: In<Ned, T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> Wrench<Body, T> {
-    wrench_in(vehicle, effects, state, &Air::new(state, wind + effects.wind()), surfaces)
+    wrench_in(vehicle, effects, state, &air(state, wind + effects.wind()), surfaces)
 }
 
 #[inline(always)]
@@ -103,7 +93,7 @@ pub fn derivative<T: Real>(
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> State<T> {
     let ned_from_body = rotation_matrix(state);
-    let air = Air::turned(state, wind + effects.wind(), &ned_from_body);
+    let air = air_in(state, wind + effects.wind(), &ned_from_body);
     let wrench = wrench_in(vehicle, effects, state, &air, surfaces);
     let gravity_ned = Vector3::new(T::zero(), T::zero(), real(GRAVITY_M_S2));
     let omega = state.omega.vector;
@@ -204,7 +194,7 @@ mod tests {
     #[test]
     fn drag_opposes_the_motion_through_the_air_not_over_ground() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
-        let air = Air::new(&State::at_rest(), In::new(Vector3::new(5.0, 0.0, 0.0)));
+        let air = air(&State::at_rest(), In::new(Vector3::new(5.0, 0.0, 0.0)));
         assert!(drag(&vehicle, &air).vector.x > 0.0, "a hovering vehicle is pushed with the wind");
     }
 }

@@ -1,7 +1,7 @@
 //! Rotor (induced, H-force) drag: `F_xy -= D (u, v)`, proportional to airspeed in the rotor plane.
 
 use super::{Effect, EffectParameter};
-use crate::dynamics::Air;
+use crate::aero::Air;
 use crate::frames::{Body, In, Wrench};
 use crate::math::Real;
 use nalgebra::Vector3;

@@ -17,7 +17,7 @@ pub use linear_drag::LinearDrag;
 pub use motor_lag::MotorLag;
 pub use quadratic_drag::QuadraticDrag;
 
-use crate::dynamics::Air;
+use crate::aero::Air;
 use crate::frames::{Body, In, Ned, Wrench};
 use crate::math::Real;
 

@@ -1,7 +1,7 @@
 //! Parasitic drag: `F -= 1/2 rho C_d A V (u, v, w)`.
 
 use super::{Effect, EffectParameter};
-use crate::dynamics::Air;
+use crate::aero::Air;
 use crate::frames::{Body, Wrench};
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
 

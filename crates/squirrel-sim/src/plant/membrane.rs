@@ -28,7 +28,8 @@ mod tests;
 pub use parameters::MembraneParameters;
 
 use super::fast_math::{Pair, angle, cbrt, tanh};
-use squirrel_core::dynamics::{Air, VectorSpace};
+use squirrel_core::aero::Air;
+use squirrel_core::dynamics::VectorSpace;
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::math::AIR_DENSITY_KG_M3;
 use squirrel_core::nalgebra::Vector3;

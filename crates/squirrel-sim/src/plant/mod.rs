@@ -14,8 +14,9 @@ pub use membrane::{Membrane, MembraneParameters, MembraneState};
 pub use servo::{ServoParameters, ServoState};
 pub use wind::{GustModel, Wind, WindParameters};
 
+use squirrel_core::aero::Air;
 use squirrel_core::aero::flat_plate;
-use squirrel_core::dynamics::{self, Air, RotorDrive, State, VectorSpace, rk4};
+use squirrel_core::dynamics::{self, RotorDrive, State, VectorSpace, rk4};
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Wrench};
 use squirrel_core::vehicle::{PerRotor, Vehicle, Wing};
@@ -220,7 +221,7 @@ impl Plant {
             }
             WingPlant::Membrane { membrane, servo } => {
                 let deployment = self.deploy(state, servo, wing_command);
-                let air = Air::new(&before, wind + effects.wind());
+                let air = dynamics::air(&before, wind + effects.wind());
                 let angle = membrane.angle_of_attack(&air);
                 for side in 0..2 {
                     state.wing_angle_rate_rad_s[side] = (angle[side] - state.wing_angle_rad[side]) / dt;
@@ -278,7 +279,7 @@ impl Plant {
 
     /// Force of the wings, N: as deployed now, and as if spread.
     pub fn wing_force(&self, state: &PlantState, wind: In<Ned, f64>) -> [In<Body, f64>; 2] {
-        let air = Air::new(&state.body, wind + self.effects.wind());
+        let air = dynamics::air(&state.body, wind + self.effects.wind());
         let now = [state.servo[0].deployment, state.servo[1].deployment];
         [self.wing_wrench(state, &air, now).force, self.wing_wrench(state, &air, [1.0; 2]).force]
     }
