@@ -196,7 +196,7 @@ fn round_trip_for_random_layouts() {
     assert!(compared > 300, "only {compared} of 500 layouts can fly this demand unsaturated");
 }
 
-/// EQUATIONS T2 on the printed matrix: rotor 1 front-left, 2 back-left, 3 back-right, 4 front-right.
+/// docs/equations.md T2 on the printed matrix: rotor 1 front-left, 2 back-left, 3 back-right, 4 front-right.
 #[test]
 fn torque_signs_are_the_paper_s() {
     let mixer = Mixer::new(&vehicle(&PAPER_X, &PAPER_SIGNS)).unwrap();

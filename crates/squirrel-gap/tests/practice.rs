@@ -8,7 +8,7 @@ use support::{imported, shared, vehicle};
 
 /// The case in which nothing is hidden.
 const NOTHING: &str = "ff290cd742";
-/// What is hidden in the others that fly richly, and the channel in which EFFECTS says that it shows.
+/// What is hidden in the others that fly richly, and the channel in which physics says that it shows.
 const HIDDEN: [(&str, &str, &str); 7] = [
     ("30dbccbde0", "mass lost in flight", "force_body_z_n"),
     ("3e8121d5ef", "motor_lag", "moment_body_y_n_m"),

@@ -46,7 +46,7 @@ fn one_seed_one_flight() {
     assert!(one(4) != one(5));
 }
 
-/// FINDINGS of the paper's real flights: the wingless drone sinks when thrust is scarce, and not otherwise.
+/// As in the paper's real flights: the wingless drone sinks when thrust is scarce, and not otherwise.
 #[test]
 fn the_wingless_drone_sinks_only_when_thrust_is_scarce() {
     let lost = |arm, ratio| {

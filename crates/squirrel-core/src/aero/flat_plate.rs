@@ -1,7 +1,7 @@
 //! The paper's flat wing: `f = -rho sin(alpha) A |v|^2 n = -rho A |v| (n . v) n` (paper, eq. 4 and 5).
 //!
 //! A normal-force coefficient of `2 sin(alpha)` on `1/2 rho |v|^2 A`; no tangential part. `v` is relative to the air here
-//! (the paper takes the ground velocity; EQUATIONS T6).
+//! (the paper takes the ground velocity; docs/equations.md T6).
 
 use crate::aero::Air;
 use crate::frames::{Body, Frame, In, Wrench};

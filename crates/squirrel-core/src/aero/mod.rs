@@ -25,7 +25,7 @@ impl<T: Real> Air<T> {
 }
 
 /// Angle of attack of the wing plane, rad, in [-pi/2, pi/2]: `sin(alpha) = n . v / |v|`, positive where the air hits the
-/// belly. 0 below 0.3 m/s, where the direction of the air means nothing (EQUATIONS T5).
+/// belly. 0 below 0.3 m/s, where the direction of the air means nothing (docs/equations.md T5).
 ///
 /// * `velocity` - velocity relative to the air, m/s
 pub fn angle_of_attack(velocity: In<Body, f32>) -> f32 {

@@ -1,6 +1,6 @@
 //! Command filter: smooths the 10 Hz steps of the outer loop and supplies their derivatives.
 //!
-//! `x'' = w^2 (u - x) - 2 zeta w x'` per axis (EQUATIONS B.2): steps must not be differentiated, and the backstepping law
+//! `x'' = w^2 (u - x) - 2 zeta w x'` per axis (docs/equations.md B.2): steps must not be differentiated, and the backstepping law
 //! wants the first and second derivative of its reference.
 
 use crate::math::wrap_angle;

@@ -3,7 +3,7 @@
 //! Paper, eq. 1 and 2: `F = T^-1 U` with the rows of `T` the thrust, roll, pitch and yaw that one newton of each rotor
 //! gives. Here `T` comes from the vehicle's geometry, for any layout: rotor i gives `(1, -y_i, x_i, s_i k_m / k_f)`, and
 //! `F = T^+ U` has the smallest norm where there are more than four rotors. (The printed `T` has `d_fr` in the pitch row;
-//! it must be `d_fp`: EQUATIONS T2.)
+//! it must be `d_fp`: docs/equations.md T2.)
 //!
 //! Where a rotor would leave `[0, F_max]`, priority is roll and pitch over thrust over yaw, exactly, in this order:
 //! 1. the largest share `s <= 1` of the roll and pitch torque, direction kept, that some thrust and yaw allow;

@@ -5,7 +5,7 @@
 //! v_jd = k_p^p (j_d - j)      e_j = v_jd - v_j      a_cmd,j = k_p^v e_j + k_i^v int(e_j) + k_d^v e_j'
 //! U = m (g - a_cmd,z) / (cos(roll) cos(pitch))      pitch_d = -(m/U) a_cmd,x      roll_d = (m/U) a_cmd,y
 //! ```
-//! Differs: accelerations are turned into the heading frame first (the paper's law holds at zero yaw only, EQUATIONS T7),
+//! Differs: accelerations are turned into the heading frame first (the paper's law holds at zero yaw only, docs/equations.md T7),
 //! limited, and the integral is frozen while anything is saturated. `U` uses the measured tilt with the product of cosines
 //! kept above 0.5 (T8). [`AngleLaw::Exact`] inverts the thrust direction instead of taking sines as angles.
 

@@ -4,7 +4,7 @@
 //! request leaves the limit and WOEG's flag is up, WIIC flies with wings spread. Differs from the paper:
 //! - the request must come back below 0.9 of the limit before WIIC lets go, and a decision is kept for a dwell time, so
 //!   that the wings do not chatter at 10 Hz (the paper switches at once);
-//! - the trigger may include thrust (EQUATIONS T22, [`Trigger::AngleOrThrust`]): on thrust alone PC's angles stay,
+//! - the trigger may include thrust (docs/equations.md T22, [`Trigger::AngleOrThrust`]): on thrust alone PC's angles stay,
 //!   thrust goes to its limit and the wings open where they help;
 //! - PC's integral is frozen while WIIC flies or anything is clamped;
 //! - every decision has a [`Reason`].

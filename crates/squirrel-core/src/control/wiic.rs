@@ -1,7 +1,7 @@
 //! Wing-informed integration controller (WIIC): the angle stays at its limit, thrust makes the motion.
 //!
 //! Paper, eq. 8, pitch at its limit: `pitch_d = pitch_max`, `U = -(m / pitch_max)(a_x - f_x / m)`,
-//! `roll_d = (m / U)(a_y - f_y / m)`. Printed for one sign and zero yaw only. Here, in the heading frame (EQUATIONS T9):
+//! `roll_d = (m / U)(a_y - f_y / m)`. Printed for one sign and zero yaw only. Here, in the heading frame (docs/equations.md T9):
 //!
 //! - [`ThrustLaw::Literal`]: the printed law with the sign of the request, and its twin for roll.
 //! - [`ThrustLaw::Exact`]: pitch case `A = -m(a_x - f_x/m) / (s sin(pitch_max))`, `B = m(a_y - f_y/m)`,

@@ -1,6 +1,6 @@
 //! Wing operation event generator (WOEG): would spread wings help?
 //!
-//! Paper, section III.B, gives two definitions (EQUATIONS T11); both are here:
+//! Paper, section III.B, gives two definitions (docs/equations.md T11); both are here:
 //! - [`WingTest::Normal`]: the force estimate pushes against the body's down axis, `-n . f > e`. For a flat plate this is
 //!   "the air hits the belly".
 //! - [`WingTest::Acceleration`]: the force estimate points where the position loop wants to go, `f_xy . a_cmd,xy > e |a_cmd|`.

@@ -4,7 +4,7 @@
 //! r'' = g e3 + R f / m            f = rotors + drag + surfaces + effects, body frame
 //! w'  = J^-1 (M - w x J w)        q' = 1/2 q (0, w)        Omega_i' = (Omega_target,i - Omega_i) / tau
 //! ```
-//! Air enters only through the air-relative velocity `R^T (v - wind)` (the paper writes the ground velocity; EQUATIONS
+//! Air enters only through the air-relative velocity `R^T (v - wind)` (the paper writes the ground velocity; docs/equations.md
 //! T6). Wings are a caller's closure, because their own states belong to the plant.
 
 mod rk4;

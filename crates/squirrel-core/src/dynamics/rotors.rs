@@ -1,7 +1,7 @@
 //! Rotors: from command to speed, from speed to force and moment.
 //!
 //! `T_i = k_f Omega_i^2` along -z, `Q_i = yaw_sign_i k_m Omega_i^2` about +z, `Omega_i' = (target_i - Omega_i) / tau`
-//! with its own `tau` for speeding up and slowing down (EQUATIONS D.5).
+//! with its own `tau` for speeding up and slowing down (docs/equations.md D.5).
 
 use crate::effects::Effects;
 use crate::frames::{Body, In, Wrench};

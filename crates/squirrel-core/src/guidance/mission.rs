@@ -2,7 +2,7 @@
 //!
 //! An avoidance mission flies straight at a target speed. When [`super::sensing`] reports an obstacle, a new
 //! [`Trajectory`] starts at the measured position, at rest, turned by a steering angle (paper, section V.B and V.C;
-//! EQUATIONS T20). Its height stays the mission's height, so that lost height counts as error.
+//! docs/equations.md T20). Its height stays the mission's height, so that lost height counts as error.
 
 use super::sensing::{Obstacle, Sensing, offset};
 use super::trajectory::Trajectory;

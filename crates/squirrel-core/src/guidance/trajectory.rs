@@ -1,6 +1,6 @@
 //! The paper's reference: a cubic until the target speed is reached, then a straight line at that speed.
 //!
-//! Paper, section V.B; the coefficients are not printed. EQUATIONS T20: `s(t) = V (t^2 / T - t^3 / (3 T^2))` for `t < T`,
+//! Paper, section V.B; the coefficients are not printed. docs/equations.md T20: `s(t) = V (t^2 / T - t^3 / (3 T^2))` for `t < T`,
 //! then `s = V (t - T/3)`: starts at rest, reaches `V` at `T` without a step in acceleration, peak acceleration `2 V / T`.
 
 use crate::control::Reference;

@@ -1,6 +1,6 @@
 //! The paper's propulsion fit: rotor thrust as a cubic of the voltage that a duty cycle applies, and its inverse.
 //!
-//! `F = a0 + a1 V + a2 V^2 + a3 V^3`, `V = duty * V_battery` (paper, section II.B; EQUATIONS B.5). The paper gives no
+//! `F = a0 + a1 V + a2 V^2 + a3 V^3`, `V = duty * V_battery` (paper, section II.B). The paper gives no
 //! coefficients. A cubic has no inverse unless it rises, so construction proves that it does on `[0, V_ref]`; the
 //! inverse is then a bisection to a bracket and Newton steps inside it, with a fixed count.
 

@@ -1,4 +1,4 @@
-//! Battery: open-circuit voltage over charge, inner resistance, one RC pair (EQUATIONS D.5).
+//! Battery: open-circuit voltage over charge, inner resistance, one RC pair (docs/equations.md D.5).
 //!
 //! `V = OCV(charge) - I R0 - V1`, `V1' = (I R1 - V1) / tau1`, `charge' = -I / capacity`. The current carries the rotors'
 //! shaft power: `I = sum(Q_i Omega_i) / (efficiency V) + idle`. The simulator always computes the voltage; thrust feels it

@@ -5,8 +5,6 @@
 //! rounded everywhere) on a [`Pair`], so that both sides of a wing share each instruction, and the bits are the same on
 //! every target. Polynomials are minimax in relative error; the tests sweep each function against the standard library.
 
-#![allow(clippy::inline_always, reason = "a call in between and the two sides no longer share registers")]
-
 use core::f64::consts::{FRAC_PI_2, LN_2, LOG2_E};
 use core::ops::{Add, Div, Mul, Sub};
 use squirrel_core::math::{limit, lower, upper};

@@ -1,4 +1,4 @@
-//! Reduced-order membrane wing: the simulator's truth about the wings (EQUATIONS D.3), f64.
+//! Reduced-order membrane wing: the simulator's truth about the wings (docs/equations.md D.3), f64.
 //!
 //! It shares nothing with what a controller may believe: neither the flat plate nor a network. Each side feels its own
 //! air, which damps roll, and carries three states: the elastic camber, its creep and the attached fraction of the flow
@@ -18,8 +18,6 @@
 //! changes sign. Where `2 (1 + creep) K_p q c > 8 lambda_0 E t` (8.5 m/s with the defaults) a flat membrane is unstable
 //! edge on and bulges to either side: that follows from the equations, and slack sails do it. The code carries `s` inside
 //! `sin alpha` and `C_N`, which saves most of the sign changes.
-
-#![allow(clippy::inline_always, reason = "a call in between and the two sides no longer share registers")]
 
 mod parameters;
 #[cfg(test)]

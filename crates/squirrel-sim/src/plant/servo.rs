@@ -1,4 +1,4 @@
-//! Wing servos: dead time, rate limit, first-order lag (EQUATIONS D.4).
+//! Wing servos: dead time, rate limit, first-order lag (docs/equations.md D.4).
 
 /// Numbers of a wing servo with its crank.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! Numbers of the sensors; the table `[sensors]` of a vehicle file.
 //!
-//! Defaults are of the size that EQUATIONS C.1 and C.4 assume: a consumer inertial unit and a 10 Hz receiver whose velocity
+//! Defaults are of the size that docs/equations.md C.1 and C.4 assume: a consumer inertial unit and a 10 Hz receiver whose velocity
 //! is its best output.
 
 use serde::Deserialize;

@@ -15,9 +15,9 @@ use nalgebra::{Matrix3, Vector3};
 /// Which law turns error into torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AttitudeForm {
-    /// EQUATIONS B.2; singular at 90 deg of pitch.
+    /// docs/equations.md B.2; singular at 90 deg of pitch.
     Euler,
-    /// EQUATIONS B.3.
+    /// docs/equations.md B.3.
     Quaternion,
 }
 

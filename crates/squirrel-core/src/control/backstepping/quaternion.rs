@@ -1,6 +1,6 @@
 //! Integral backstepping on the rotation group: no singularity, no unwinding.
 //!
-//! Derived for this project (EQUATIONS B.3); not in the paper.
+//! Derived for this project (docs/equations.md B.3); not in the paper.
 //!
 //! ```text
 //! q_e = q_d^-1 q    s = sign(w_e)    z1 = s vec(q_e)    R_e = R_d^T R    w_e = w - R_e^T w_d    chi' = z1

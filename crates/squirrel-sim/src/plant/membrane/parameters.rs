@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use squirrel_core::vehicle::ParameterError;
 
-/// The numbers of a pair of membrane wings. Area and arm have no default; the others have those of EQUATIONS D.1 to D.3.
+/// The numbers of a pair of membrane wings. Area and arm have no default; the others have those of docs/equations.md D.1 to D.3.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MembraneParameters {
