@@ -34,9 +34,9 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
         .into_iter()
         .find(|name| succeeds(Command::new(name).arg("--version")))
         .ok_or("no Chromium in PATH (apt install chromium)")?;
-    // Chromium succeeds without having written anything, so the picture gets its name only when it is there.
+    // Chromium succeeds without having written anything, and refuses endings that it does not know.
     let profile = std::env::temp_dir().join(format!("squirrel-chromium-{}", std::process::id()));
-    let unfinished = png.with_extension("png.part");
+    let unfinished = png.with_extension("part.png");
     let drawn = call(
         Command::new(browser)
             .args(FLAGS)
