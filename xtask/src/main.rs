@@ -1,2 +1,57 @@
-//! Chores.
-fn main() {}
+//! The repository's chores: `cargo xtask CHORE`.
+//!
+//! No dependency, so that the first command on a fresh machine starts within seconds. Talk goes to stderr.
+
+mod chores;
+mod fresh;
+mod png;
+mod python;
+mod run;
+mod thumb;
+
+use std::process::ExitCode;
+
+/// A chore: name, arguments, what it does, how.
+type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
+
+const CHORES: [Chore; 6] = [
+    ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
+    ("lint", "", "format, clippy and documentation only", chores::lint),
+    ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
+    ("thumb", "", "check that the flight code compiles for a Cortex-M7 without std", thumb::chore),
+    ("report-png", "HTML [PNG [WIDTHxHEIGHT]]", "draw a report with a headless Chromium", png::chore),
+    (
+        "clean-fresh",
+        "",
+        "clone HEAD into a temporary directory, run the README's two commands there",
+        fresh::chore,
+    ),
+];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let Some((name, rest)) = arguments.split_first() else {
+        eprint!("{}", usage());
+        return ExitCode::SUCCESS;
+    };
+    let Some((_, _, _, chore)) = CHORES.iter().find(|chore| chore.0 == name) else {
+        eprint!("xtask: no chore '{name}'\n{}", usage());
+        return ExitCode::from(2);
+    };
+    match chore(rest) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("xtask {name}: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn usage() -> String {
+    use std::fmt::Write as _;
+    let mut text = String::from("cargo xtask CHORE\n");
+    for (name, arguments, about, _) in CHORES {
+        let _ = writeln!(text, "  {:<39} {about}", format!("{name} {arguments}"));
+    }
+    text
+}

@@ -1,0 +1,141 @@
+//! The lists of steps.
+//!
+//! Everything is built in the release profile: `clippy` and `doc` share the metadata of the dependencies and, with `test`,
+//! the build scripts and procedural macros; `test`, `bench` and the demo share the libraries.
+
+use crate::run::{Action, Step, call, cargo, root, run, succeeds};
+use crate::{python, thumb};
+use std::path::Path;
+use std::process::Command;
+
+const LINT: [Step; 4] = [
+    Step { name: "tools", action: Action::Function(tools) },
+    Step { name: "format", action: Action::Cargo(&["fmt", "--all", "--check"]) },
+    Step {
+        name: "clippy",
+        action: Action::Cargo(&[
+            "clippy",
+            "--release",
+            "--workspace",
+            "--all-targets",
+            "--locked",
+            "--",
+            "-D",
+            "warnings",
+        ]),
+    },
+    Step {
+        name: "doc",
+        action: Action::CargoWith(
+            ("RUSTDOCFLAGS", "-D warnings"),
+            &["doc", "--release", "--workspace", "--no-deps", "--locked"],
+        ),
+    },
+];
+
+const TEST: [Step; 5] = [
+    Step { name: "python", action: Action::Function(python::prepare) },
+    Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
+    Step { name: "thumb", action: Action::Function(thumb::check) },
+    Step { name: "deny", action: Action::Function(deny) },
+    Step {
+        name: "demo",
+        action: Action::Cargo(&["run", "--release", "--locked", "--", "demo", "--out", "target/demo"]),
+    },
+];
+
+/// `cargo xtask lint`.
+pub(crate) fn lint(_: &[String]) -> Result<(), String> {
+    run(&LINT)
+}
+
+/// `cargo xtask test`.
+pub(crate) fn test(_: &[String]) -> Result<(), String> {
+    let steps: Vec<Step> = LINT.into_iter().chain(TEST).collect();
+    run(&steps)
+}
+
+/// `cargo xtask bench`: whole workspace, so that features and thus the built libraries are those of `test`; benches by
+/// name, because the test harness of the libraries does not know criterion's arguments.
+pub(crate) fn bench(arguments: &[String]) -> Result<(), String> {
+    let mut command = cargo()?;
+    command.args(["bench", "--workspace", "--locked"]);
+    for name in bench_names(&root()?)? {
+        command.args(["--bench", &name]);
+    }
+    call(command.arg("--").args(arguments))
+}
+
+/// The files in the crates' `benches` folders, without extension, in order.
+fn bench_names(root: &Path) -> Result<Vec<String>, String> {
+    let list = |path: &Path| std::fs::read_dir(path).map_err(|error| format!("{}: {error}", path.display()));
+    let mut names = Vec::new();
+    for package in list(&root.join("crates"))? {
+        let folder = package.map_err(|error| error.to_string())?.path().join("benches");
+        if !folder.is_dir() {
+            continue;
+        }
+        for file in list(&folder)? {
+            let path = file.map_err(|error| error.to_string())?.path();
+            if let (Some("rs"), Some(stem)) = (path.extension().and_then(|e| e.to_str()), path.file_stem()) {
+                names.push(stem.to_string_lossy().into_owned());
+            }
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// rustfmt and clippy, which rustup's minimal profile leaves out.
+fn tools() -> Result<String, String> {
+    let missing: Vec<&str> = [("rustfmt", "fmt"), ("clippy", "clippy")]
+        .into_iter()
+        .filter(|(_, subcommand)| !succeeds(Command::new("cargo").args([subcommand, "--version"])))
+        .map(|(component, _)| component)
+        .collect();
+    if missing.is_empty() {
+        return Ok(String::new());
+    }
+    call(Command::new("rustup").args(["component", "add"]).args(&missing))?;
+    Ok(format!("added {}", missing.join(" ")))
+}
+
+/// cargo-deny where it is installed. Building it takes minutes and its advisories come over the network, so a fresh machine
+/// does without: `xtask/tests` checks licences and dependencies there.
+fn deny() -> Result<String, String> {
+    if !succeeds(Command::new("cargo").args(["deny", "--version"])) {
+        return Ok(said("skipped: no cargo-deny (cargo install --locked cargo-deny@0.20.2)"));
+    }
+    call(cargo()?.args(["deny", "--locked", "check", "bans", "licenses", "sources"]))?;
+    if !succeeds(Command::new("cargo").args(["deny", "fetch", "db"])) {
+        return Ok(said("advisories skipped: their database cannot be fetched"));
+    }
+    call(cargo()?.args(["deny", "--locked", "check", "--disable-fetch", "advisories"]))
+        .map(|()| String::new())
+}
+
+/// A note that also stands where it happened.
+fn said(note: &str) -> String {
+    eprintln!("{note}");
+    note.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn step_names_are_unique_and_fit_the_table() {
+        let mut names: Vec<&str> = LINT.iter().chain(&TEST).map(|step| step.name).collect();
+        assert!(names.iter().all(|name| name.len() <= 10), "{names:?}");
+        names.sort_unstable();
+        assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");
+    }
+
+    #[test]
+    fn benches_are_found_by_their_files() {
+        let names = bench_names(Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()).unwrap();
+        assert!(names.contains(&"membrane".to_owned()), "{names:?}");
+        assert!(names.is_sorted());
+    }
+}

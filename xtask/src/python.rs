@@ -1,0 +1,75 @@
+//! The tests' Python: a virtual environment of its own in the target directory, packages pinned.
+
+use crate::run::{call, output, target_directory};
+use std::path::PathBuf;
+use std::process::Command;
+
+/// What the tests import; the venv is made anew when this text changes.
+const PACKAGES: &str = "numpy==2.4.6";
+
+/// Oldest Python, as the README says.
+const OLDEST: (u32, u32) = (3, 11);
+
+/// Newest first would pick a pre-release; what the user calls `python3` is what he expects.
+const CANDIDATES: [&str; 6] = ["python3", "python3.14", "python3.13", "python3.12", "python3.11", "python"];
+
+/// The interpreter of the virtual environment, whether it exists yet or not.
+///
+/// # Errors
+/// As [`target_directory`].
+pub(crate) fn interpreter() -> Result<PathBuf, String> {
+    Ok(venv()?.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" }))
+}
+
+fn venv() -> Result<PathBuf, String> {
+    Ok(target_directory()?.join("venv"))
+}
+
+/// Makes the virtual environment unless it is there.
+///
+/// # Errors
+/// No Python that is new enough, or venv or pip failed.
+pub(crate) fn prepare() -> Result<String, String> {
+    let (venv, python) = (venv()?, interpreter()?);
+    // Written last: an environment that was broken off half-way has none.
+    let stamp = venv.join("squirrel-packages.txt");
+    let made = std::fs::read_to_string(&stamp).is_ok_and(|text| text == PACKAGES);
+    if made && output(Command::new(&python).arg("--version")).is_some() {
+        return Ok(String::new());
+    }
+    let base = CANDIDATES
+        .into_iter()
+        .find(|name| version(name).is_some_and(|version| version >= OLDEST))
+        .ok_or_else(|| format!("no Python {}.{} or newer in PATH", OLDEST.0, OLDEST.1))?;
+    call(Command::new(base).args(["-m", "venv", "--clear"]).arg(&venv))
+        .map_err(|error| format!("{error} (on Debian: apt install python3-venv)"))?;
+    call(
+        Command::new(&python)
+            .args(["-m", "pip", "install", "--quiet", "--only-binary=:all:"])
+            .args(PACKAGES.split(' ')),
+    )?;
+    std::fs::write(&stamp, PACKAGES).map_err(|error| format!("{}: {error}", stamp.display()))?;
+    Ok(format!("made with {base}"))
+}
+
+fn version(python: &str) -> Option<(u32, u32)> {
+    parse_version(&output(Command::new(python).arg("--version"))?)
+}
+
+/// `Python 3.11.7` to (3, 11).
+fn parse_version(text: &str) -> Option<(u32, u32)> {
+    let mut numbers = text.strip_prefix("Python ")?.split('.');
+    Some((numbers.next()?.parse().ok()?, numbers.next()?.parse().ok()?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse_version;
+
+    #[test]
+    fn versions_compare_as_numbers() {
+        assert_eq!(parse_version("Python 3.11.7"), Some((3, 11)));
+        assert!(parse_version("Python 3.9.2") < parse_version("Python 3.11.0rc1"));
+        assert_eq!(parse_version("Python was not found; run without arguments"), None);
+    }
+}
