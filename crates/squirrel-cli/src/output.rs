@@ -69,8 +69,10 @@ pub(crate) fn write_file(path: &Path, content: &[u8]) -> Result<(), String> {
     let mut name = path.file_name().ok_or_else(|| format!("{}: not a file name", path.display()))?.to_owned();
     name.push(".partial");
     let partial: PathBuf = path.with_file_name(name);
-    std::fs::write(&partial, content).map_err(fail)?;
-    std::fs::rename(&partial, path).map_err(fail)
+    std::fs::write(&partial, content).and_then(|()| std::fs::rename(&partial, path)).map_err(|e| {
+        let _ = std::fs::remove_file(&partial);
+        fail(e)
+    })
 }
 
 /// Writes a result as JSON where `--json` asks for it.

@@ -158,7 +158,26 @@ fn wrong_usage_is_exit_code_two() {
 #[test]
 fn bad_vehicles_get_one_line_with_file_field_and_value() {
     let folder = Folder::new("bad-vehicles");
-    let cases: [(&str, &str, &str, &[&str]); 10] = [
+    let cases: [(&str, &str, &str, &[&str]); 14] = [
+        (
+            "filter",
+            "frequency_rad_s = { value = 20.0",
+            "frequency_rad_s = { value = 400.0",
+            &["filter_frequency_rad_s = 400"],
+        ),
+        (
+            "negative drag",
+            "[limits]",
+            "[effects.linear_drag]\nextra_drag_n_s_per_m = -5.0\n[limits]",
+            &["effects.linear_drag.extra_drag_n_s_per_m = -5"],
+        ),
+        (
+            "efficiency",
+            "efficiency = { value = 0.7",
+            "efficiency = { value = 7.0",
+            &["battery.efficiency = 7"],
+        ),
+        ("missing number", "tau1_s = ", "# tau1_s = ", &["line", "tau1_s"]),
         ("unknown key", "[mass]\n", "[mass]\nmas_kg = 1.0\n", &["line", "mas_kg"]),
         ("negative mass", "value = 0.548,", "value = -0.548,", &["mass.mass_kg = -0.548"]),
         ("NaN", "value = 0.548,", "value = nan,", &["mass.mass_kg = NaN"]),
@@ -196,13 +215,20 @@ fn bad_vehicles_get_one_line_with_file_field_and_value() {
     folder.fails(&["fly", "--integrator", "euler"], &["integrator = euler"]);
     folder.fails(&["fly", "--thrust-to-weight", "nan"], &["thrust_to_weight = NaN"]);
     folder.fails(&["study", "thrust", "--trials", "0"], &["trials = 0"]);
+    let avoid = squirrel_sim::scenario::Scenario::find("avoid").unwrap();
+    folder.write("nan.toml", &avoid.to_toml().replace("course_rad = 0.0", "course_rad = nan"));
+    folder.fails(&["fly", "--scenario", "nan.toml"], &["nan.toml", "course_rad = NaN"]);
+    let nothing = squirrel_sim::scenario::Scenario { obstacles: Vec::new(), ..avoid };
+    folder.write("nothing.toml", &nothing.to_toml());
+    folder.fails(&["fly", "--scenario", "nothing.toml"], &["duration_s = 13", "no encounter"]);
 }
 
 #[test]
 fn a_sound_vehicle_is_shown_with_its_sources() {
     let folder = Folder::new("vehicle");
     folder.write("v.toml", SQUIRREL);
-    let table = folder.succeeds(&["vehicle", "check", "v.toml"]);
+    let table = folder.succeeds(&["vehicle", "check", "v.toml", "--json", "v.json"]);
+    assert_eq!(json(&folder, "v.json")["numbers"]["mass.mass_kg"]["source"], "paper, Table I");
     assert!(table.contains("squirrel: sound") && table.contains("paper, Table I"), "{table}");
 }
 
@@ -231,6 +257,7 @@ fn bad_tables_get_one_line_with_file_field_and_value() {
         folder.fails(&["import", "--map", "map.toml", "f.csv", "--out", "f.mcap"], &words);
     }
     folder.write("f.csv", "t,gx,gy,gz\n0,1,2,3\n0.1,1,2,3\n");
-    folder.succeeds(&["import", "--map", "map.toml", "f.csv", "--out", "f.mcap"]);
+    folder.succeeds(&["import", "--map", "map.toml", "f.csv", "--out", "f.mcap", "--json", "f.json"]);
+    assert_eq!(json(&folder, "f.json")["channels"][0]["samples"], 2);
     folder.fails(&["replay", "f.mcap"], &["f.mcap", "metadata"]);
 }

@@ -45,7 +45,7 @@ pub fn limit_norm<T: Real>(v: Vector3<T>, max: T) -> Vector3<T> {
     if norm > max { v * (max / norm) } else { v }
 }
 
-/// Angle wrapped into (-pi, pi], rad. Total: a non-finite angle gives 0.
+/// Angle wrapped into (-pi, pi], rad, to within the rounding of the angle. Total: a non-finite angle gives 0.
 pub fn wrap_angle(angle: f32) -> f32 {
     use core::f32::consts::PI;
     if !angle.is_finite() {

@@ -79,5 +79,7 @@ fn a_log_without_what_replay_needs_is_refused_by_name() {
     assert!(replay(&frameless, &setup(&log).unwrap()).unwrap_err().starts_with("frame.time_us: missing"));
     let mut outputless = log.clone();
     outputless.sources.remove(OUTPUT_SOURCES[0]);
-    assert!(replay(&outputless, &setup(&log).unwrap()).unwrap_err().starts_with("reference: in only one"));
+    assert!(
+        replay(&outputless, &setup(&log).unwrap()).unwrap_err().starts_with("control.status: in only one")
+    );
 }

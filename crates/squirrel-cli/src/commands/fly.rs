@@ -61,20 +61,23 @@ impl Fly {
         if self.thrust_to_weight.is_some() {
             scenario.thrust_to_weight = self.thrust_to_weight;
         }
+        // What the options changed is the scenario's, and so are errors in it; the rest is the vehicle's.
+        scenario.check().map_err(|e| format!("scenario {}: {e}", self.scenario))?;
         let setup = Setup {
             vehicle: vehicle(self.vehicle.as_deref())?,
             arm: Arm::parse(&self.arm)?,
             scenario,
             integrator: Integrator::parse(&self.integrator)?,
         };
+        setup.stack().map_err(|e| match &self.vehicle {
+            Some(file) => format!("{}: {e}", file.display()),
+            None => e.to_string(),
+        })?;
         let record = self.out.is_some() || self.report.is_some();
         let bar = output::progress((setup.scenario.duration_s * 10.0) as u64, "x 0.1 s");
         let flown = setup.fly(record, |t| bar.set_position((t * 10.0) as u64));
         bar.finish_and_clear();
-        let flight = flown.map_err(|e| match &self.vehicle {
-            Some(file) => format!("{}: {e}", file.display()),
-            None => e.to_string(),
-        })?;
+        let flight = flown.map_err(|e| e.to_string())?;
         let ratio = setup.thrust_to_weight();
         say(&format!(
             "{} flies {} with {}, seed {}, effective thrust-to-weight {ratio:.2}\n",

@@ -1,6 +1,6 @@
 //! `squirrel import`: foreign logs in, flight logs out.
 
-use crate::output::{say, talk};
+use crate::output::{self, say, talk};
 use squirrel_sim::import::{ImportMap, import};
 use squirrel_sim::log::FlightLog;
 use std::path::PathBuf;
@@ -20,6 +20,9 @@ pub(crate) struct Import {
     /// Flight log to write.
     #[arg(long)]
     out: PathBuf,
+    /// Write what was read here as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
 }
 
 impl Import {
@@ -30,7 +33,7 @@ impl Import {
         log.write(&self.out).map_err(|e| e.to_string())?;
         say(report.to_string().trim_end());
         talk(&format!("wrote {}", self.out.display()));
-        Ok(())
+        output::write_json(self.json.as_deref(), &report)
     }
 
     fn recover(&self) -> Result<(), String> {
@@ -48,6 +51,6 @@ impl Import {
             recovery.messages
         ));
         talk(&format!("wrote {}", self.out.display()));
-        Ok(())
+        output::write_json(self.json.as_deref(), &recovery)
     }
 }

@@ -1,7 +1,9 @@
 //! `squirrel vehicle`: vehicle files.
 
-use crate::output::{Table, say};
-use squirrel_sim::vehicle_file::VehicleFile;
+use crate::output::{self, Table, say};
+use serde::Serialize;
+use squirrel_sim::vehicle_file::{Provenance, VehicleFile};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// What to do with a vehicle file.
@@ -11,12 +13,22 @@ pub(crate) enum VehicleCommand {
     Check {
         /// Vehicle file.
         file: PathBuf,
+        /// Write the numbers here as JSON.
+        #[arg(long)]
+        json: Option<PathBuf>,
     },
+}
+
+#[derive(Serialize)]
+struct Checked<'a> {
+    vehicle: &'a str,
+    sound: bool,
+    numbers: BTreeMap<&'a str, &'a Provenance>,
 }
 
 impl VehicleCommand {
     pub(crate) fn run(&self) -> Result<(), String> {
-        let Self::Check { file } = self;
+        let Self::Check { file, json } = self;
         let vehicle = VehicleFile::load(file).map_err(|e| e.to_string())?;
         let v = &vehicle.vehicle;
         say(&format!(
@@ -33,6 +45,9 @@ impl VehicleCommand {
             table.row(vec![field.clone(), p.value.clone(), text(&p.sd), text(&p.source)]);
         }
         table.print();
-        Ok(())
+        let numbers: BTreeMap<&str, &Provenance> =
+            vehicle.provenance.iter().map(|(field, p)| (field.as_str(), p)).collect();
+        let result = Checked { vehicle: &vehicle.name, sound: true, numbers };
+        output::write_json(json.as_deref(), &result)
     }
 }

@@ -10,6 +10,8 @@
 //! 2. the thrust nearest to the demand that some yaw allows at that `s`;
 //! 3. the yaw torque nearest to the demand at both.
 //!
+//! `F_max` is the vehicle's limit at the reference voltage; it does not follow the measured battery voltage.
+//!
 //! Along `T^+` the rotor thrusts are `s a_i + u b_i + y c_i`, so each step is an interval after eliminating the variables
 //! of the later steps (Fourier-Motzkin): no iteration, at most `n^2` inequalities in the common saturated case.
 
@@ -310,7 +312,7 @@ fn pseudo_inverse(t: &SMatrix<f32, 4, MAX_ROTORS>) -> Result<SMatrix<f32, MAX_RO
         field: "rotor[].position_body_m",
         index: None,
         value: f64::from(gram.determinant()),
-        reason: "the layout cannot control roll, pitch and thrust independently; determinant",
+        reason: "the layout cannot control thrust, roll, pitch and yaw independently; determinant",
     })?;
     let mut out = scaled.transpose() * inverse;
     for (k, s) in scale.iter().enumerate() {

@@ -61,8 +61,12 @@ pub struct PositionState {
 pub struct PositionTerms {
     /// Reference minus position, m.
     pub position_error: In<Ned, f32>,
+    /// Velocity that the position loop asks for, m/s.
+    pub velocity_desired: In<Ned, f32>,
     /// Desired minus measured velocity, m/s.
     pub velocity_error: In<Ned, f32>,
+    /// Derivative of the velocity error, m/s^2.
+    pub velocity_error_slope: Vector3<f32>,
     /// Integral of the velocity error, m.
     pub integral: Vector3<f32>,
     /// Acceleration command before limits, m/s^2.
@@ -163,7 +167,9 @@ impl PositionGains {
         let acceleration = Vector3::new(horizontal.x, horizontal.y, limit(demand.z, -max, max));
         PositionTerms {
             position_error: In::new(position_error),
+            velocity_desired: In::new(velocity_desired),
             velocity_error: In::new(error),
+            velocity_error_slope: slope,
             integral: state.integral,
             acceleration_demand: In::new(demand),
             acceleration: In::new(acceleration),

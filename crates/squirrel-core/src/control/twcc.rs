@@ -2,10 +2,10 @@
 //!
 //! Paper, section III.B. PC always runs. While its request stays inside the angle limit it flies, wings folded. Where the
 //! request leaves the limit and WOEG's flag is up, WIIC flies with wings spread. Differs from the paper:
-//! - the request must come back below 0.9 of the limit before WIIC lets go, and a decision is kept for a dwell time, so
-//!   that the wings do not chatter at 10 Hz (the paper switches at once);
+//! - the request must come back below 0.9 of the limit before WIIC lets go, and a decision about the wings is kept for a dwell
+//!   time, so that they do not chatter at 10 Hz (the paper switches at once); while only the dwell time holds, PC flies;
 //! - the trigger may include thrust (docs/equations.md T22, [`Trigger::AngleOrThrust`]): on thrust alone PC's angles stay,
-//!   thrust goes to its limit and the wings open where they help;
+//!   thrust is at its limit and the wings open where they help;
 //! - PC's integral is frozen while WIIC flies or anything is clamped;
 //! - every decision has a [`Reason`].
 
@@ -79,7 +79,7 @@ pub enum Reason {
     PitchLimit = 3,
     /// The thrust request is beyond its limit and the wings help.
     ThrustLimit = 4,
-    /// A decision is younger than the dwell time.
+    /// The last decision about the wings is younger than the dwell time; PC flies.
     Dwell = 5,
     /// The policy does not coordinate.
     PolicyFixed = 6,
@@ -115,8 +115,8 @@ pub struct TwccState {
     pub flag: bool,
     /// Who flew at the last tick.
     pub mode: Mode,
-    /// Time since the last change of mode, s.
-    pub mode_age_s: f32,
+    /// Time since the last change of mode, s; `None` before the first, which waits for nothing.
+    pub mode_age_s: Option<f32>,
     /// The last command was clamped.
     pub clamped: bool,
 }
@@ -215,17 +215,19 @@ impl TwccParameters {
             pitch_rad: limit(request.pitch_rad, -envelope.tilt_max_rad, envelope.tilt_max_rad),
             thrust_n: limit(request.thrust_n, envelope.thrust_min_n, envelope.thrust_max_n),
         };
-        let command = match mode {
-            Mode::Primary => primary,
-            Mode::FullThrust => AttitudeThrust { thrust_n: envelope.thrust_max_n, ..primary },
-            Mode::Wiic => wiic::command(
+        // WIIC's law belongs to a request beyond the limits. While only the dwell time keeps the wings open, PC flies; and on
+        // thrust alone PC's thrust is at its limit already.
+        let command = if mode == Mode::Wiic && reason != Reason::Dwell {
+            wiic::command(
                 self.thrust_law,
                 airframe.mass_kg,
                 heading_frame(&position.acceleration.vector, motion.yaw_rad),
                 heading_frame(&wing_force.vector, motion.yaw_rad),
                 request,
                 envelope,
-            ),
+            )
+        } else {
+            primary
         };
         let wing_command = match self.policy {
             WingPolicy::Folded | WingPolicy::CoordinatedWithoutWings => 0.0,
@@ -275,16 +277,15 @@ impl TwccParameters {
             (true, ..) => (Mode::Wiic, Reason::RollLimit),
             (false, true, true) => (Mode::FullThrust, Reason::ThrustLimit),
         };
-        state.mode_age_s += dt_s;
+        state.mode_age_s = state.mode_age_s.map(|age| age + dt_s);
         if wanted == state.mode {
             return (wanted, reason);
         }
-        // A first change needs no dwell: there is no earlier decision to protect.
-        if state.mode != Mode::Primary && state.mode_age_s < self.dwell_s {
+        if state.mode_age_s.is_some_and(|age| age < self.dwell_s) {
             return (state.mode, Reason::Dwell);
         }
         state.mode = wanted;
-        state.mode_age_s = 0.0;
+        state.mode_age_s = Some(0.0);
         (wanted, reason)
     }
 }
@@ -351,8 +352,16 @@ mod tests {
         // The goal jumps ahead: PC's request is inside the limits, yet the wings stay for 0.3 s.
         let modes: Vec<_> = (0..4).map(|_| tick(&p, &mut state, 0.4, 4.4)).collect();
         assert_eq!(modes[0].reason, Reason::Dwell);
+        assert_eq!(modes[0].wing_command, 1.0);
+        assert_eq!(
+            modes[0].command.pitch_rad, modes[0].position.request.pitch_rad,
+            "PC flies, not WIIC's limit angle"
+        );
         assert_eq!(modes[1].mode, Mode::Wiic);
         assert_eq!(modes[3].mode, Mode::Primary);
+        // And once folded they stay folded for as long.
+        let again = tick(&p, &mut state, 0.4, 0.0);
+        assert_eq!((again.mode, again.reason), (Mode::Primary, Reason::Dwell));
     }
 
     #[test]

@@ -55,13 +55,16 @@ pub struct Steering {
     pub seed: u32,
 }
 
+/// Most obstacles that are remembered as being avoided; of more, the first is forgotten.
+pub const MAX_HANDLED: usize = 4;
+
 /// What guidance remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct MissionState {
     /// The run after the last encounter, if any, and when it started, us.
     pub turned: Option<(Trajectory, u64)>,
-    /// The obstacle being avoided.
-    pub handled: Option<Obstacle>,
+    /// Obstacles that are being avoided.
+    pub handled: [Option<Obstacle>; MAX_HANDLED],
     /// Encounters so far.
     pub encounters: u32,
 }
@@ -71,9 +74,17 @@ impl Mission {
     /// A number out of range, by its name in a scenario.
     pub fn check(&self) -> Result<(), ParameterError> {
         use crate::vehicle::positive;
+        let finite = |field, place: &In<Ned, f32>| match place.vector.iter().find(|x| !x.is_finite()) {
+            Some(x) => Err(ParameterError::of(field, *x, "must be finite")),
+            None => Ok(()),
+        };
         match self {
-            Self::Hover { .. } => Ok(()),
+            Self::Hover { position } => finite("position", position),
             Self::Avoid { run, sensing, steering } => {
+                finite("start", &run.start)?;
+                if !(run.course_rad.abs() <= core::f32::consts::TAU) {
+                    return Err(ParameterError::of("course_rad", run.course_rad, "must be within one turn"));
+                }
                 positive("speed_m_s", run.speed_m_s)?;
                 positive("ramp_s", run.ramp_s)?;
                 positive("turn_ramp_s", steering.ramp_s)?;
@@ -85,9 +96,17 @@ impl Mission {
                         return Err(ParameterError::of(field, angle, "must be within half a turn"));
                     }
                 }
+                if steering.min_rad > steering.max_rad {
+                    return Err(ParameterError::of(
+                        "steering_min_rad",
+                        steering.min_rad,
+                        "must be <= steering_max_rad",
+                    ));
+                }
                 Ok(())
             }
-            Self::Circle { radius_m, speed_m_s, .. } => {
+            Self::Circle { centre, radius_m, speed_m_s } => {
+                finite("centre", centre)?;
                 positive("radius_m", *radius_m)?;
                 positive("speed_m_s", *speed_m_s)
             }
@@ -104,13 +123,14 @@ impl Mission {
         obstacles: &[Obstacle],
     ) {
         let Self::Avoid { run, sensing, steering } = self else { return };
-        // Debounce: the obstacle is forgotten once it is out of range.
-        if state.handled.is_some_and(|o| offset(position, &o).norm() > sensing.range_m) {
-            state.handled = None;
+        // Debounce: an obstacle is forgotten once it is out of range.
+        for handled in &mut state.handled {
+            if handled.is_some_and(|o| offset(position, &o).norm() > sensing.range_m) {
+                *handled = None;
+            }
         }
-        let Some(seen) = sensing.nearest(position, velocity, obstacles, state.handled.map(|o| o.id)) else {
-            return;
-        };
+        let known = |id: u32| state.handled.iter().flatten().any(|o| o.id == id);
+        let Some(seen) = sensing.nearest(position, velocity, obstacles, known) else { return };
         let course = libm::atan2f(velocity.vector.y, velocity.vector.x);
         let start = In::new(Vector3::new(position.vector.x, position.vector.y, run.start.vector.z));
         let turned = Trajectory {
@@ -120,7 +140,8 @@ impl Mission {
             ramp_s: steering.ramp_s,
         };
         state.turned = Some((turned, time_us));
-        state.handled = Some(seen);
+        let free = state.handled.iter().position(Option::is_none).unwrap_or(0);
+        state.handled[free] = Some(seen);
         state.encounters = state.encounters.wrapping_add(1);
     }
 
@@ -157,7 +178,7 @@ impl Mission {
 impl Steering {
     /// The turn at encounter `n`, rad.
     fn angle(&self, n: u32) -> f32 {
-        let bits = scramble(self.seed ^ n.wrapping_mul(0x9E37_79B9));
+        let bits = scramble(self.seed.wrapping_add((n.wrapping_add(1)).wrapping_mul(0x9E37_79B9)));
         let share = (bits >> 8) as f32 / (1u32 << 24) as f32;
         let angle = self.min_rad + (self.max_rad - self.min_rad) * share;
         if self.both_sides && bits & 1 == 1 { -angle } else { angle }
@@ -211,6 +232,26 @@ mod tests {
         let later = mission.reference(&state, 8_000_000).velocity.vector;
         let turn = libm::atan2f(later.y, later.x);
         assert!((1.92..=2.27).contains(&turn), "turned by {turn}");
+    }
+
+    #[test]
+    fn of_two_near_obstacles_neither_triggers_twice() {
+        let (mission, mut state) = (avoid(), MissionState::default());
+        let velocity = In::new(Vector3::new(7.0, 0.0, 0.0));
+        let two = [3.0, 4.0].map(|x| Obstacle { id: x as u32, north_m: x, east_m: 0.0 });
+        for tick in 0..6 {
+            mission.sense(&mut state, tick * 100_000, In::zero(), velocity, &two);
+        }
+        assert_eq!(state.encounters, 2);
+    }
+
+    #[test]
+    fn numbers_that_are_none_are_refused_by_name() {
+        let Mission::Avoid { run, sensing, steering } = avoid() else { unreachable!() };
+        let broken = Mission::Avoid { run: Trajectory { course_rad: f32::NAN, ..run }, sensing, steering };
+        assert!(broken.check().unwrap_err().to_string().starts_with("course_rad = NaN"));
+        let hover = Mission::Hover { position: In::new(Vector3::new(0.0, f32::INFINITY, 0.0)) };
+        assert!(hover.check().is_err());
     }
 
     #[test]

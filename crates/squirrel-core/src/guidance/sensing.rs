@@ -35,19 +35,26 @@ impl Sensing {
     /// A number that is not finite and positive, by its name in a scenario.
     pub fn check(&self) -> Result<(), ParameterError> {
         crate::vehicle::positive("range_m", self.range_m)?;
-        crate::vehicle::positive("half_view_rad", self.half_view_rad)?;
+        if !(self.half_view_rad > 0.0 && self.half_view_rad <= core::f32::consts::PI) {
+            return Err(ParameterError::of(
+                "half_view_rad",
+                self.half_view_rad,
+                "must be > 0 and within half a turn",
+            ));
+        }
         crate::vehicle::positive("speed_min_m_s", self.speed_min_m_s)
     }
 
-    /// The nearest obstacle in range and view other than `handled`.
+    /// The nearest obstacle in range and view that is not known yet.
     ///
     /// * `position`, `velocity` - as estimated, m and m/s
+    /// * `known` - whether an obstacle of that identity is being avoided already
     pub fn nearest(
         &self,
         position: In<Ned, f32>,
         velocity: In<Ned, f32>,
         obstacles: &[Obstacle],
-        handled: Option<u32>,
+        known: impl Fn(u32) -> bool,
     ) -> Option<Obstacle> {
         let course = velocity.vector.xy();
         let speed = course.norm();
@@ -56,7 +63,7 @@ impl Sensing {
         }
         let view = libm::cosf(self.half_view_rad);
         let mut best: Option<(f32, Obstacle)> = None;
-        for obstacle in obstacles.iter().filter(|o| Some(o.id) != handled) {
+        for obstacle in obstacles.iter().filter(|o| !known(o.id)) {
             let offset = offset(position, obstacle);
             let distance = offset.norm();
             let ahead = offset.dot(&course) >= view * distance * speed;
@@ -82,7 +89,9 @@ mod tests {
 
     fn see(north_m: f32, east_m: f32, handled: Option<u32>) -> bool {
         let velocity = In::new(Vector3::new(7.0, 0.0, 0.0));
-        SENSING.nearest(In::zero(), velocity, &[Obstacle { id: 7, north_m, east_m }], handled).is_some()
+        SENSING
+            .nearest(In::zero(), velocity, &[Obstacle { id: 7, north_m, east_m }], |id| Some(id) == handled)
+            .is_some()
     }
 
     #[test]
@@ -100,9 +109,9 @@ mod tests {
         let two =
             [Obstacle { id: 1, north_m: 4.0, east_m: 0.0 }, Obstacle { id: 2, north_m: 3.0, east_m: 0.2 }];
         let velocity = In::new(Vector3::new(7.0, 0.0, 0.0));
-        assert_eq!(SENSING.nearest(In::zero(), velocity, &two, None).map(|o| o.id), Some(2));
-        assert!(SENSING.nearest(In::zero(), In::zero(), &two, None).is_none());
+        assert_eq!(SENSING.nearest(In::zero(), velocity, &two, |_| false).map(|o| o.id), Some(2));
+        assert!(SENSING.nearest(In::zero(), In::zero(), &two, |_| false).is_none());
         let nan = In::new(Vector3::new(f32::NAN, 0.0, 0.0));
-        assert!(SENSING.nearest(In::zero(), nan, &two, None).is_none());
+        assert!(SENSING.nearest(In::zero(), nan, &two, |_| false).is_none());
     }
 }

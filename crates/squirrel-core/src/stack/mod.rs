@@ -13,7 +13,7 @@ mod frame;
 
 pub use frame::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
 
-use crate::control::backstepping::{AttitudeGains, AttitudeState, AttitudeTerms};
+use crate::control::backstepping::{AttitudeGains, AttitudeState, AttitudeTerms, INNER_STEP_MAX_S};
 use crate::control::command_filter::{self, EulerReference};
 use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
 use crate::control::position::Motion;
@@ -28,8 +28,6 @@ use nalgebra::Vector3;
 
 /// Period of the outer loop, us.
 pub const OUTER_PERIOD_US: u64 = 100_000;
-/// Longest step that the inner loop integrates over, s; a longer gap counts as this.
-const INNER_STEP_MAX_S: f32 = 0.02;
 
 /// Gains of the whole stack.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -90,7 +88,7 @@ pub struct StackState {
     pub wing_command: f32,
     /// The mixer could not meet the last demand.
     pub saturated: bool,
-    /// Measurements rejected so far because they were not finite.
+    /// Measurements rejected so far: not finite, or larger than any flight.
     pub rejected: u32,
 }
 
@@ -103,9 +101,12 @@ pub struct StackOutput {
     pub wing_command: [f32; 2],
     /// What is followed.
     pub reference: Reference,
+    /// Measurements rejected so far.
+    pub rejected: u32,
     /// The outer loop, where it ran in this step.
     pub outer: Option<TwccTerms>,
-    /// The inner loop, once attitude and rate are known; rotors stand still before that.
+    /// The inner loop, once attitude and rate are known; rotors stand still before that. Until the first fix it asks for no
+    /// thrust, and rotors only turn as far as levelling takes.
     pub inner: Option<InnerTerms>,
 }
 
@@ -136,7 +137,8 @@ impl Stack {
         mission.check()?;
         let airframe = Airframe {
             mass_kg: p.mass_kg,
-            wing_area_m2: p.wing.map_or(0.0, |w| 2.0 * w.area_per_side_m2),
+            // Two sides; the flat plate's own slope is 2.
+            wing_area_m2: p.wing.map_or(0.0, |w| w.area_per_side_m2 * w.normal_force_slope),
             envelope: Envelope {
                 tilt_max_rad: p.limits.tilt_max_rad,
                 thrust_min_n: parameters.twcc.thrust_min_n,
@@ -175,7 +177,14 @@ impl Stack {
             let thrust = inner.map_or(0.0, |terms| terms.mixer.rotor_thrust_n[i]);
             *command = propulsion.command_for_thrust(thrust);
         }
-        StackOutput { rotor_command, wing_command: [state.wing_command; 2], reference, outer, inner }
+        StackOutput {
+            rotor_command,
+            wing_command: [state.wing_command; 2],
+            reference,
+            rejected: state.rejected,
+            outer,
+            inner,
+        }
     }
 
     fn outer(&self, state: &mut StackState, frame: &SensorFrame, dt_s: f32) -> Option<TwccTerms> {
@@ -313,45 +322,83 @@ mod tests {
         }
     }
 
-    fn wild() -> impl Strategy<Value = f32> {
+    /// Mostly plausible, sometimes anything, so that single sensors fail while the others fly on.
+    fn number(size: f32) -> impl Strategy<Value = f32> {
         prop_oneof![
-            4 => -20.0..20.0f32,
+            20 => -size..size,
             1 => Just(f32::NAN),
             1 => Just(f32::INFINITY),
             1 => Just(f32::MAX),
             1 => Just(-f32::MAX),
         ]
     }
+    fn vector(size: f32) -> impl Strategy<Value = Vector3<f32>> {
+        [number(size), number(size), number(size)].prop_map(Vector3::from)
+    }
+    fn frame() -> impl Strategy<Value = SensorFrame> {
+        let attitude = prop_oneof![
+            6 => (-3.0..3.0f32, -1.5..1.5f32, -3.0..3.0f32).prop_map(|(r, p, y)| Some(Rotation::from_euler(r, p, y))),
+            1 => [number(1.0), number(1.0), number(1.0), number(1.0)].prop_map(Rotation::from_wxyz),
+            1 => Just(None),
+        ];
+        (0..3_000_000u64, vector(30.0), vector(40.0), attitude, vector(50.0), vector(15.0), number(100.0))
+            .prop_map(|(time_us, omega, force, attitude, position, velocity, altitude)| {
+                let mut frame = SensorFrame::empty(time_us);
+                frame.imu = Some(Imu { omega: In::new(omega), specific_force: In::new(force) });
+                frame.attitude = attitude;
+                frame.gnss = Some(Gnss { position: In::new(position), velocity: In::new(velocity) });
+                frame.altitude_m = Some(altitude);
+                frame.wing_force = Some(In::new(force));
+                frame.set_obstacles(&[Obstacle { id: 1, north_m: omega.x, east_m: omega.y }]);
+                frame
+            })
+    }
 
     proptest! {
-        /// Outputs stay finite and inside limits for any sensor values and times, also backwards.
+        /// State and outputs stay finite, outputs inside limits, for any sensor values and times, also backwards.
         #[test]
-        fn outputs_stay_finite_and_inside_limits(
-            values in proptest::collection::vec(wild(), 17 * 20),
-            times in proptest::collection::vec(0..3_000_000u64, 20),
+        fn state_and_outputs_stay_finite_and_inside_limits(
+            frames in proptest::collection::vec(frame(), 60),
             euler in any::<bool>(),
         ) {
             let stack = stack(if euler { AttitudeForm::Euler } else { AttitudeForm::Quaternion });
             let mut state = StackState::default();
-            for (v, t) in values.chunks(17).zip(times) {
-                let mut frame = SensorFrame::empty(t);
-                frame.imu = Some(Imu {
-                    omega: In::new(Vector3::new(v[0], v[1], v[2])),
-                    specific_force: In::new(Vector3::new(v[3], v[4], v[5])),
-                });
-                frame.attitude = Rotation::from_wxyz([v[6], v[7], v[8], v[9]]);
-                frame.gnss = Some(Gnss {
-                    position: In::new(Vector3::new(v[10], v[11], v[12])),
-                    velocity: In::new(Vector3::new(v[13], v[14], v[15])),
-                });
-                frame.altitude_m = Some(v[16]);
-                frame.set_obstacles(&[Obstacle { id: 1, north_m: v[0], east_m: v[1] }]);
+            for frame in frames {
                 let output = stack.step(&mut state, &frame);
                 for u in &output.rotor_command[..4] {
                     prop_assert!((0.0..=1.0).contains(u), "{u}");
                 }
                 prop_assert!((0.0..=1.0).contains(&output.wing_command[0]));
+                let remembered = [
+                    state.filter.angle,
+                    state.filter.rate,
+                    state.filter.acceleration,
+                    state.attitude.integral,
+                    state.twcc.position.integral,
+                    state.twcc.position.last_error.unwrap_or_default(),
+                ];
+                prop_assert!(remembered.iter().all(crate::math::all_finite), "{remembered:?}");
+                if let Some(inner) = &output.inner {
+                    let demand = inner.demand;
+                    prop_assert!(demand.thrust_n.is_finite() && crate::math::all_finite(&demand.torque_n_m), "{demand:?}");
+                }
             }
         }
+    }
+
+    #[test]
+    fn a_filter_that_would_run_away_is_refused() {
+        let mut gains = stack(AttitudeForm::Euler).parameters.attitude;
+        gains.filter_frequency_rad_s = 60.0;
+        let error = gains.check().unwrap_err().to_string();
+        assert!(error.starts_with("control.attitude.filter_frequency_rad_s = 60"), "{error}");
+        // The largest frequency that passes settles at the longest step.
+        gains.filter_frequency_rad_s = 41.0;
+        gains.check().unwrap();
+        let mut filter = EulerReference::default();
+        for _ in 0..5000 {
+            command_filter::step(&mut filter, &Vector3::repeat(0.5), 41.0, 1.0, INNER_STEP_MAX_S);
+        }
+        assert!((filter.angle - Vector3::repeat(0.5)).norm() < 1e-3, "{filter:?}");
     }
 }

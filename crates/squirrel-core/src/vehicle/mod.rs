@@ -288,7 +288,7 @@ impl<T: Real> Propulsion<T> {
     }
     /// The command that gives a thrust, at the reference voltage. Inverse of [`Self::target_speed_rad_s`].
     ///
-    /// * `thrust_n` - thrust of one rotor, N; limited to what the rotor can give
+    /// * `thrust_n` - thrust of one rotor, N, not below 0; commands that are fractions or pulses are limited to their range
     #[inline]
     pub fn command_for_thrust(&self, thrust_n: T) -> T {
         let fraction = match (self.command, &self.thrust_curve) {

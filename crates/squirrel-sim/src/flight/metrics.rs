@@ -126,12 +126,20 @@ impl<'a> Meter<'a> {
         self.over
     }
 
-    pub(super) fn finish(mut self) -> Metrics {
-        let n = self.samples.max(1) as f64;
+    /// # Errors
+    /// The measured window never began: a flight without an encounter has no error to report.
+    pub(super) fn finish(mut self) -> Result<Metrics, String> {
+        if self.samples == 0 {
+            return Err(format!(
+                "duration_s = {}: no encounter in that time, so there is nothing to measure",
+                self.scenario.duration_s
+            ));
+        }
+        let n = self.samples as f64;
         self.metrics.rmse_m = (self.square / n).sqrt();
         self.metrics.rmse_horizontal_m = (self.square_horizontal / n).sqrt();
         self.metrics.wings_open_s = self.wings_us as f64 * 1e-6;
         self.metrics.wiic_s = self.wiic_us as f64 * 1e-6;
-        self.metrics
+        Ok(self.metrics)
     }
 }

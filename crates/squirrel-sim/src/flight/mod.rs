@@ -22,6 +22,7 @@ use integrator::Mover;
 use squirrel_core::dynamics::{State, specific_force};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::guidance::sensing::Obstacle;
+use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::{MAX_OBSTACLES, Stack, StackState};
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
@@ -126,13 +127,18 @@ impl Setup {
         let mut recorder = record.then(|| record::Recorder::new(self, plant.vehicle().rotors().len()));
         let (mut rotor_command, mut wing_command) = ([0.0; MAX_ROTORS], [0.0; 2]);
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
+        let mut contact_specific_force: Option<In<Ned, f64>> = None;
         let steps = (self.scenario.duration_s / dt_s).round() as u64;
         for step in 0..=steps {
             let time_us = step * PLANT_STEP_US;
             if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
-                wind.advance((time_us - last_tick_us) as f64 * 1e-6, state.body.velocity.vector.norm());
+                let through_air = state.body.velocity - wind.velocity() - plant.effects().wind();
+                wind.advance((time_us - last_tick_us) as f64 * 1e-6, through_air.vector.norm());
                 let air = wind.velocity();
-                let truth = truth(&plant, &state, air);
+                let mut truth = truth(&plant, &state, air);
+                if let Some(push) = contact_specific_force {
+                    truth.specific_force = state.body.ned_from_body().inverse() * push;
+                }
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
                 frame.set_obstacles(&self.nearest_obstacles(&state.body));
                 let wing_force = plant.wing_force(&state, air);
@@ -151,7 +157,14 @@ impl Setup {
                 wing_command = output.wing_command.map(f64::from);
                 metrics.tick(time_us, &state, &output, stack_state.mission.encounters);
                 if let Some(recorder) = &mut recorder {
-                    recorder.tick(&frame, battery, &output, &state, air, wing_force[0]);
+                    recorder.tick(
+                        &frame,
+                        battery,
+                        &output,
+                        &state,
+                        air + plant.effects().wind(),
+                        wing_force[0],
+                    );
                 }
                 if tick % (CONTROL_RATE_HZ / 10) == 0 {
                     progress(time_us as f64 * 1e-6);
@@ -161,10 +174,18 @@ impl Setup {
                 }
                 (tick, last_tick_us) = (tick + 1, time_us);
             }
+            let before = state.body.velocity;
             let contact = mover.step(&plant, &mut state, &rotor_command, wing_command, wind.velocity())?;
             metrics.contact(contact);
+            // While something pushes back, an accelerometer reads the whole change of velocity less gravity.
+            contact_specific_force = (contact == integrator::Contact::Touching).then(|| {
+                (state.body.velocity - before) * (1.0 / dt_s) - In::new(Vector3::z() * GRAVITY_M_S2)
+            });
         }
-        Ok(Flight { metrics: metrics.finish(), log: recorder.map(record::Recorder::finish) })
+        Ok(Flight {
+            metrics: metrics.finish().map_err(FlightError)?,
+            log: recorder.map(record::Recorder::finish),
+        })
     }
 
     /// At the start of the mission, level, rotors at hover speed.

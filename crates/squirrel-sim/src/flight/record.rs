@@ -158,6 +158,7 @@ pub(crate) fn record_output(
             ("yaw_rad", &[f64::from(r.yaw_rad)]),
         ],
     );
+    log.source_mut("control.status").push(t, &[("rejected", &[f64::from(output.rejected)])]);
     if let Some(outer) = &output.outer {
         let p = &outer.position;
         let angles = |roll: f32, pitch: f32| [f64::from(roll), f64::from(pitch)];
@@ -165,6 +166,8 @@ pub(crate) fn record_output(
             t,
             &[
                 ("position_error_ned_m", &wide(&p.position_error.vector)),
+                ("velocity_desired_ned_m_s", &wide(&p.velocity_desired.vector)),
+                ("velocity_error_slope_ned_m_s2", &wide(&p.velocity_error_slope)),
                 ("velocity_error_ned_m_s", &wide(&p.velocity_error.vector)),
                 ("velocity_error_integral_ned_m", &wide(&p.integral)),
                 ("acceleration_demand_ned_m_s2", &wide(&p.acceleration_demand.vector)),
@@ -190,6 +193,8 @@ pub(crate) fn record_output(
             &[
                 ("filter_angle_rad", &wide(&inner.filter.angle)),
                 ("filter_rate_rad_s", &wide(&inner.filter.rate)),
+                ("filter_acceleration_rad_s2", &wide(&inner.filter.acceleration)),
+                ("thrust_demand_n", &[f64::from(inner.demand.thrust_n)]),
                 ("angle_error_rad", &wide(&inner.attitude.angle_error)),
                 ("rate_error_rad_s", &wide(&inner.attitude.rate_error)),
                 ("integral_rad_s", &wide(&inner.attitude.integral)),
@@ -235,6 +240,14 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
     let Some((times, time_us)) = log.channel("frame.time_us") else {
         return Err("frame.time_us: missing; the log was not recorded by this flight code".to_owned());
     };
+    for (one, other) in [
+        ("imu.omega_body_rad_s", "imu.specific_force_body_m_s2"),
+        ("gnss.position_ned_m", "gnss.velocity_ned_m_s"),
+    ] {
+        if log.channel(one).is_some() && log.channel(other).is_none() {
+            return Err(format!("{other}: missing, but there is {one}"));
+        }
+    }
     let mut imu = channel("imu.omega_body_rad_s", 3)?;
     let force = channel("imu.specific_force_body_m_s2", 3)?;
     let mut attitude = channel("attitude.q_ned_from_body_wxyz", 4)?;
@@ -290,6 +303,12 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
             frame.wing_force = Some(In::new(narrow(force.row(i))));
         }
         all.push(frame);
+    }
+    let cursors = [&imu, &attitude, &gnss, &baro, &obstacle, &wing_force];
+    for (cursor, _) in cursors.into_iter().flatten() {
+        if let Some(t) = cursor.time_s.get(cursor.next) {
+            return Err(format!("an input at {t:.6} s belongs to no step of the flight code"));
+        }
     }
     Ok(all)
 }

@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// Summary of an import, in the order of the map.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct ImportReport {
     /// One entry a `[[source]]`.
     pub files: Vec<FileReport>,
@@ -12,7 +12,7 @@ pub struct ImportReport {
 }
 
 /// Rows of one file.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct FileReport {
     /// File name without folders.
     pub file: String,
@@ -23,7 +23,7 @@ pub struct FileReport {
 }
 
 /// Samples of one channel.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ChannelReport {
     /// Canonical name.
     pub channel: String,

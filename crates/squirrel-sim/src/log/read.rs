@@ -17,7 +17,7 @@ use super::{FlightLog, LogError, METADATA_NAME, check, foxglove, schema};
 const RECORD_MAX_BYTES: usize = 256 << 20;
 
 /// What [`FlightLog::recover`] found.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Recovery {
     /// Length of the file, bytes.
     pub bytes_total: u64,

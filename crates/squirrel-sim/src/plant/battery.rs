@@ -53,6 +53,9 @@ impl BatteryParameters {
                 return Err(format!("battery.{key} = {x}: must be finite and > 0"));
             }
         }
+        if self.efficiency > 1.0 {
+            return Err(format!("battery.efficiency = {}: must be <= 1", self.efficiency));
+        }
         if !(0.0..=100.0).contains(&self.idle_current_a) {
             return Err(format!("battery.idle_current_a = {}: must be 0 to 100", self.idle_current_a));
         }

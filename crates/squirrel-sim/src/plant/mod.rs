@@ -104,8 +104,11 @@ impl Plant {
         for (key, tau) in
             [("time_constant_up_s", p.time_constant_up_s), ("time_constant_down_s", p.time_constant_down_s)]
         {
+            let tau = tau + effects.rotor_extra_time_constant_s();
             if tau > 0.0 && dt_s > 2.0 * tau {
-                return Err(format!("dt_s = {dt_s}: must be at most twice propulsion.{key} = {tau}"));
+                return Err(format!(
+                    "dt_s = {dt_s}: must be at most twice propulsion.{key} = {tau}, effects included"
+                ));
             }
         }
         let decay = |tau: f64| 1.0 - (-dt_s / tau).exp();

@@ -37,9 +37,10 @@ impl ServoParameters {
     ///
     /// * `lag` - `1 - exp(-dt / time_constant)`
     pub fn step(&self, state: &mut ServoState, command: f64, dt_s: f64, lag: f64) -> f64 {
+        let command = command.clamp(0.0, 1.0);
         let last_asked = state.pending.map_or(state.target, |(waiting, _)| waiting);
         if command != last_asked {
-            state.pending = Some((command.clamp(0.0, 1.0), self.dead_time_s));
+            state.pending = Some((command, self.dead_time_s));
         }
         if let Some((waiting, left)) = state.pending {
             if left <= 0.5 * dt_s {
@@ -86,9 +87,15 @@ mod tests {
     fn deployment_stays_between_folded_and_spread() {
         let servo = ServoParameters { dead_time_s: 0.01, rate_max_per_s: 50.0, time_constant_s: 0.01 };
         let mut state = ServoState::default();
-        for k in 0..1000 {
-            servo.step(&mut state, if k % 30 < 15 { 7.0 } else { -3.0 }, 1e-3, 0.1);
+        let (mut least, mut most) = (1.0_f64, 0.0_f64);
+        for k in 0..4000 {
+            servo.step(&mut state, if k % 400 < 200 { 7.0 } else { -3.0 }, 1e-3, 0.1);
             assert!((0.0..=1.0).contains(&state.deployment));
+            most = most.max(state.deployment);
+            if k > 400 {
+                least = least.min(state.deployment);
+            }
         }
+        assert!(most > 0.999 && least < 0.001, "{least} to {most}");
     }
 }

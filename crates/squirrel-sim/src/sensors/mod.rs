@@ -151,7 +151,7 @@ impl Sensors {
         });
         let battery = self.battery.poll(time_us, |rng| BatteryReading {
             voltage_v: truth.voltage_v + p.battery.voltage_bias_v + noise(rng, p.battery.voltage_noise_v).x,
-            current_a: truth.current_a + noise(rng, p.battery.current_noise_a).x,
+            current_a: truth.current_a + p.battery.current_bias_a + noise(rng, p.battery.current_noise_a).x,
         });
         (frame, battery)
     }

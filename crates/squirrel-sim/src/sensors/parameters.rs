@@ -1,8 +1,9 @@
 //! Numbers of the sensors; the table `[sensors]` of a vehicle file.
 //!
-//! Defaults are of the size that docs/equations.md C.1 and C.4 assume: a consumer inertial unit and a 10 Hz receiver whose velocity
-//! is its best output.
+//! Defaults are of the size of docs/equations.md C: a consumer inertial unit, and a 10 Hz receiver over a flight of seconds, in which
+//! its slow position error does not show. No sensor is late by default.
 
+use crate::vehicle_file::plain;
 use serde::Deserialize;
 
 /// When a sensor speaks.
@@ -10,9 +11,11 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub struct Timing {
     /// Samples per second.
+    #[serde(deserialize_with = "plain")]
     pub rate_hz: f64,
     /// From sampling to arrival, s.
     #[serde(default)]
+    #[serde(deserialize_with = "plain")]
     pub latency_s: f64,
     /// Seed of its noise; by default derived from the seed of the flight.
     pub seed: Option<u64>,
@@ -25,12 +28,16 @@ pub struct ImuSensor {
     /// When it speaks.
     pub timing: Timing,
     /// White noise per sample, rad/s.
+    #[serde(deserialize_with = "plain")]
     pub gyro_noise_rad_s: f64,
     /// Constant bias, rad/s.
+    #[serde(deserialize_with = "plain")]
     pub gyro_bias_rad_s: [f64; 3],
     /// White noise per sample, m/s^2.
+    #[serde(deserialize_with = "plain")]
     pub accel_noise_m_s2: f64,
     /// Constant bias, m/s^2.
+    #[serde(deserialize_with = "plain")]
     pub accel_bias_m_s2: [f64; 3],
 }
 
@@ -41,8 +48,10 @@ pub struct AttitudeSensor {
     /// When it speaks.
     pub timing: Timing,
     /// White error about each body axis, rad.
+    #[serde(deserialize_with = "plain")]
     pub noise_rad: f64,
     /// Constant error about the body axes, rad.
+    #[serde(deserialize_with = "plain")]
     pub bias_rad: [f64; 3],
 }
 
@@ -53,12 +62,16 @@ pub struct GnssSensor {
     /// When it speaks.
     pub timing: Timing,
     /// White noise of position per axis, m.
+    #[serde(deserialize_with = "plain")]
     pub position_noise_m: f64,
     /// Constant error of position, m.
+    #[serde(deserialize_with = "plain")]
     pub position_bias_m: [f64; 3],
     /// White noise of velocity per axis, m/s.
+    #[serde(deserialize_with = "plain")]
     pub velocity_noise_m_s: f64,
     /// Constant error of velocity, m/s.
+    #[serde(deserialize_with = "plain")]
     pub velocity_bias_m_s: [f64; 3],
 }
 
@@ -69,8 +82,10 @@ pub struct BaroSensor {
     /// When it speaks.
     pub timing: Timing,
     /// White noise, m.
+    #[serde(deserialize_with = "plain")]
     pub noise_m: f64,
     /// Constant error, m.
+    #[serde(deserialize_with = "plain")]
     pub bias_m: f64,
 }
 
@@ -81,11 +96,17 @@ pub struct BatterySensor {
     /// When it speaks.
     pub timing: Timing,
     /// White noise of voltage, V.
+    #[serde(deserialize_with = "plain")]
     pub voltage_noise_v: f64,
     /// Constant error of voltage, V.
+    #[serde(deserialize_with = "plain")]
     pub voltage_bias_v: f64,
     /// White noise of current, A.
+    #[serde(deserialize_with = "plain")]
     pub current_noise_a: f64,
+    /// Constant error of current, A.
+    #[serde(deserialize_with = "plain")]
+    pub current_bias_a: f64,
 }
 
 /// All sensors of a vehicle.
@@ -147,7 +168,13 @@ impl Default for BaroSensor {
 }
 impl Default for BatterySensor {
     fn default() -> Self {
-        Self { timing: every(50.0), voltage_noise_v: 0.01, voltage_bias_v: 0.0, current_noise_a: 0.1 }
+        Self {
+            timing: every(50.0),
+            voltage_noise_v: 0.01,
+            voltage_bias_v: 0.0,
+            current_noise_a: 0.1,
+            current_bias_a: 0.0,
+        }
     }
 }
 
@@ -211,6 +238,7 @@ impl SensorParameters {
             ("gnss.velocity_bias_m_s", self.gnss.velocity_bias_m_s),
             ("baro.bias_m", [self.baro.bias_m, 0.0, 0.0]),
             ("battery.voltage_bias_v", [self.battery.voltage_bias_v, 0.0, 0.0]),
+            ("battery.current_bias_a", [self.battery.current_bias_a, 0.0, 0.0]),
         ];
         for (key, list) in biases {
             if let Some(x) = list.iter().find(|x| !x.is_finite()) {

@@ -28,7 +28,7 @@ pub(super) fn build(t: VehicleTable) -> Result<VehicleFile, Problem> {
     let mut rotors = [Rotor::unused(); MAX_ROTORS];
     for (place, rotor) in rotors.iter_mut().zip(&t.rotor) {
         let position = In::new(Vector3::from(rotor.position_body_m.0));
-        *place = Rotor { position, yaw_sign: rotor.yaw_sign };
+        *place = Rotor { position, yaw_sign: rotor.yaw_sign.0 };
     }
     let (wing, wing_plant) = match &t.wing {
         Some(table) => wing(table)?,
@@ -186,7 +186,7 @@ fn membrane(given: &BTreeMap<String, Quantity<f64>>, wing: &Wing<f64>) -> Result
 
 fn battery(t: BatteryTable) -> Result<BatteryParameters, Problem> {
     let parameters = BatteryParameters {
-        cells: t.cells,
+        cells: t.cells.0,
         capacity_ah: t.capacity_ah.0,
         r0_ohm: t.r0_ohm.0,
         r1_ohm: t.r1_ohm.0,
@@ -217,6 +217,9 @@ fn effects(tables: BTreeMap<String, BTreeMap<String, Quantity<f64>>>) -> Result<
             };
             if !q.0.is_finite() {
                 return Err(format!("effects.{name}.{key} = {}: must be finite", q.0));
+            }
+            if q.0 < 0.0 && !found.parameters[i].signed {
+                return Err(format!("effects.{name}.{key} = {}: must be >= 0", q.0));
             }
             found.values[i] = q.0;
         }

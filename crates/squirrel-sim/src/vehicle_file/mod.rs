@@ -8,6 +8,7 @@ mod quantity;
 mod tables;
 
 pub use quantity::Provenance;
+pub(crate) use quantity::plain;
 
 use crate::plant::{BatteryParameters, WingPlant};
 use crate::sensors::SensorParameters;

@@ -1,6 +1,6 @@
 //! A number in a vehicle file: plain, or `{ value, sd, source }`.
 
-use serde::de::value::{F64Deserializer, MapAccessDeserializer, SeqAccessDeserializer};
+use serde::de::value::{F64Deserializer, I64Deserializer, MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{Deserialize, Deserializer, Error, IntoDeserializer, MapAccess, SeqAccess, Visitor};
 use std::fmt;
 use std::marker::PhantomData;
@@ -15,7 +15,7 @@ pub(super) struct Quantity<V>(pub(super) V);
 struct Detailed<V> {
     value: V,
     #[serde(rename = "sd")]
-    _sd: Option<V>,
+    _sd: Option<Deviation>,
     #[serde(rename = "source")]
     _source: Option<String>,
     #[serde(rename = "low")]
@@ -24,6 +24,20 @@ struct Detailed<V> {
     _high: Option<V>,
     #[serde(rename = "domain")]
     _domain: Option<String>,
+}
+
+/// One standard deviation for all numbers, or one each.
+#[derive(serde::Deserialize)]
+#[serde(untagged, expecting = "a number or a list of numbers")]
+enum Deviation {
+    All(#[allow(dead_code, reason = "checked here, used by the gap workflow")] f64),
+    Each(#[allow(dead_code, reason = "checked here, used by the gap workflow")] Vec<f64>),
+    Rows(#[allow(dead_code, reason = "checked here, used by the gap workflow")] Vec<Vec<f64>>),
+}
+
+/// For fields of other tables that take a quantity: the value alone.
+pub(crate) fn plain<'de, D: Deserializer<'de>, V: Deserialize<'de>>(deserializer: D) -> Result<V, D::Error> {
+    Quantity::deserialize(deserializer).map(|q| q.0)
 }
 
 impl<'de, V: Deserialize<'de>> Deserialize<'de> for Quantity<V> {
@@ -39,7 +53,9 @@ impl<'de, V: Deserialize<'de>> Deserialize<'de> for Quantity<V> {
                 V::deserialize(number)
             }
             fn visit_i64<E: Error>(self, x: i64) -> Result<V, E> {
-                self.visit_f64(x as f64)
+                // An integer serves as a float too, and as itself where a count is asked for.
+                let number: I64Deserializer<E> = x.into_deserializer();
+                V::deserialize(number)
             }
             fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<V, A::Error> {
                 V::deserialize(SeqAccessDeserializer::new(seq))
@@ -53,7 +69,7 @@ impl<'de, V: Deserialize<'de>> Deserialize<'de> for Quantity<V> {
 }
 
 /// What the long form says of one number beside its value.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct Provenance {
     /// The value as written.
     pub value: String,

@@ -46,7 +46,7 @@ pub(super) enum InertiaValue {
 #[serde(deny_unknown_fields)]
 pub(super) struct RotorTable {
     pub(super) position_body_m: Triple,
-    pub(super) yaw_sign: f64,
+    pub(super) yaw_sign: Number,
 }
 
 #[derive(Deserialize, Clone, Copy)]
@@ -104,7 +104,7 @@ pub(super) struct WingTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BatteryTable {
-    pub(super) cells: u32,
+    pub(super) cells: Quantity<u32>,
     pub(super) capacity_ah: Number,
     pub(super) r0_ohm: Number,
     pub(super) r1_ohm: Number,

@@ -12,6 +12,9 @@ use crate::math::{Real, limit, real};
 use crate::vehicle::ParameterError;
 use nalgebra::{Matrix3, Vector3};
 
+/// Longest step that the inner loop integrates over, s; a longer gap counts as this.
+pub const INNER_STEP_MAX_S: f32 = 0.02;
+
 /// Which law turns error into torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AttitudeForm {
@@ -89,6 +92,17 @@ impl AttitudeGains {
             if !(x.is_finite() && x > 0.0) {
                 return Err(ParameterError::of(field, x, "must be finite and > 0"));
             }
+        }
+        // Where the filter's step is stable, for the longest step that the stack takes.
+        let turn = self.filter_frequency_rad_s * INNER_STEP_MAX_S;
+        if turn * turn + 4.0 * self.filter_damping * turn >= 4.0 {
+            let reason =
+                "the filter would run away: with x = frequency * 0.02 s, x^2 + 4 damping x must be < 4";
+            return Err(ParameterError::of(
+                "control.attitude.filter_frequency_rad_s",
+                self.filter_frequency_rad_s,
+                reason,
+            ));
         }
         Ok(())
     }
