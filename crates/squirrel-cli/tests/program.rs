@@ -158,7 +158,25 @@ fn wrong_usage_is_exit_code_two() {
 #[test]
 fn bad_vehicles_get_one_line_with_file_field_and_value() {
     let folder = Folder::new("bad-vehicles");
-    let cases: [(&str, &str, &str, &[&str]); 14] = [
+    let cases: [(&str, &str, &str, &[&str]); 17] = [
+        (
+            "fifth rotor",
+            "[limits]",
+            "[effects.weak_rotor]\nrotor = 5\nthrust_loss_fraction = 0.1\n[limits]",
+            &["effects.weak_rotor.rotor = 5", "1 to 4"],
+        ),
+        (
+            "fourth axis",
+            "[limits]",
+            "[effects.inertia_error]\naxis = \"w\"\ninertia_fraction = 0.1\n[limits]",
+            &["effects.inertia_error.axis = \"w\"", "x, y, z"],
+        ),
+        (
+            "half an effect",
+            "[limits]",
+            "[effects.constant_wind]\nwind_north_m_s = 1.0\n[limits]",
+            &["effects.constant_wind.wind_east_m_s: missing"],
+        ),
         (
             "filter",
             "frequency_rad_s = { value = 20.0",

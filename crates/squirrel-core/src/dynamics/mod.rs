@@ -16,7 +16,7 @@ pub use rotors::RotorDrive;
 pub use state::State;
 
 use crate::aero::Air;
-use crate::effects::Effects;
+use crate::effects::{Effects, Situation};
 use crate::frames::{Body, In, Ned, Wrench};
 use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
 use crate::vehicle::Vehicle;
@@ -32,7 +32,13 @@ pub fn air<T: Real>(state: &State<T>, wind: In<Ned, T>) -> Air<T> {
 
 #[inline(always)]
 fn air_in<T: Real>(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T>) -> Air<T> {
-    Air::new(In::new(ned_from_body.tr_mul(&(state.velocity - wind).vector)), state.omega)
+    let relative_ned = (state.velocity - wind).vector;
+    // The norm is that of the body velocity too; taken before the rotation, its root does not wait for it.
+    Air {
+        velocity: In::new(ned_from_body.tr_mul(&relative_ned)),
+        speed: relative_ned.norm(),
+        omega: state.omega,
+    }
 }
 
 /// The attitude as a matrix: two products with it cost less, and wait less, than two with the quaternion.
@@ -52,6 +58,7 @@ pub fn drag<T: Real>(vehicle: &Vehicle<T>, air: &Air<T>) -> In<Body, T> {
 
 /// Force and moment on the airframe without gravity, body frame.
 ///
+/// * `vehicle` - with what effects change once, see [`Effects::alter`]
 /// * `wind` - wind velocity, m/s, without what `effects` adds
 /// * `surfaces` - wrench of the wings for a given motion through the air
 #[inline(always)]
@@ -62,7 +69,7 @@ pub fn wrench<T: Real>(
     wind: In<Ned, T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> Wrench<Body, T> {
-    wrench_in(vehicle, effects, state, &air(state, wind + effects.wind()), surfaces)
+    wrench_in(vehicle, effects, state, &air(state, total_wind(effects, wind)), surfaces)
 }
 
 #[inline(always)]
@@ -73,10 +80,25 @@ fn wrench_in<T: Real>(
     air: &Air<T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> Wrench<Body, T> {
-    rotors::wrench(vehicle, &state.rotor_speed_rad_s)
-        + Wrench::from_force(drag(vehicle, air))
-        + surfaces(air)
-        + effects.wrench(air)
+    let mut rotors = rotors::wrench(vehicle, &state.rotor_speed_rad_s);
+    let rest = Wrench::from_force(drag(vehicle, air)) + surfaces(air);
+    if !effects.any() {
+        return rotors + rest;
+    }
+    let height_m = -state.position.vector.z;
+    let factor = effects.thrust_factor(air, height_m);
+    rotors.force = rotors.force * factor;
+    rotors.moment.vector.x *= factor;
+    rotors.moment.vector.y *= factor;
+    let base = rotors + rest;
+    let thrust_n = -rotors.force.vector.z;
+    base + effects.wrench(&Situation { air, height_m, thrust_n, force: base.force })
+}
+
+/// Wind with what effects add to it, m/s.
+#[inline(always)]
+pub fn total_wind<T: Real>(effects: &Effects<T>, wind: In<Ned, T>) -> In<Ned, T> {
+    if effects.any() { wind + effects.wind() } else { wind }
 }
 
 /// Time derivative of the state: each field of the result is the rate of the field of the same name.
@@ -93,7 +115,7 @@ pub fn derivative<T: Real>(
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> State<T> {
     let ned_from_body = rotation_matrix(state);
-    let air = air_in(state, wind + effects.wind(), &ned_from_body);
+    let air = air_in(state, total_wind(effects, wind), &ned_from_body);
     let wrench = wrench_in(vehicle, effects, state, &air, surfaces);
     let gravity_ned = Vector3::new(T::zero(), T::zero(), real(GRAVITY_M_S2));
     let omega = state.omega.vector;

@@ -30,12 +30,15 @@ impl<T: Real> RotorDrive<T> {
         battery_voltage_v: T,
     ) -> Self {
         let propulsion = &vehicle.parameters().propulsion;
-        let ratio = effects.rotor_speed_ratio(battery_voltage_v, propulsion.reference_voltage_v);
+        let (mut ratio, mut extra) = (T::one(), T::zero());
+        if effects.any() {
+            ratio = effects.rotor_speed_ratio(battery_voltage_v, propulsion.reference_voltage_v);
+            extra = effects.rotor_extra_time_constant_s();
+        }
         let mut target_rad_s = [T::zero(); MAX_ROTORS];
         for (target, u) in target_rad_s.iter_mut().zip(command).take(vehicle.parameters().rotor_count) {
             *target = propulsion.target_speed_rad_s(*u) * ratio;
         }
-        let extra = effects.rotor_extra_time_constant_s();
         let inverse = |tau: T| if tau > T::zero() { T::one() / tau } else { T::zero() };
         Self {
             target_rad_s,

@@ -10,6 +10,7 @@ pub use check::ParameterError;
 pub(crate) use check::positive;
 pub use thrust_curve::ThrustCurve;
 
+use crate::effects::Alteration;
 use crate::frames::{Body, In};
 use crate::math::{Real, real};
 use nalgebra::{Matrix3, Vector3};
@@ -184,6 +185,31 @@ impl<T: Real> Vehicle<T> {
     #[inline(always)]
     pub(crate) fn rotor_wrench_per_speed_squared(&self) -> &RotorWrench<T> {
         &self.per_speed_squared
+    }
+    /// The vehicle with numbers that effects changed; its geometry and propulsion stay as declared.
+    ///
+    /// # Errors
+    /// A mass or inertia that is not positive. The triangle inequality is not asked for: an error of one moment is a
+    /// hypothesis about numbers, not a body.
+    pub(crate) fn altered(&self, change: &Alteration<T>) -> Result<Self, ParameterError> {
+        check::positive("mass.mass_kg", change.mass_kg)?;
+        let mut out = *self;
+        out.inverse_mass = T::one() / change.mass_kg;
+        out.parameters.mass_kg = change.mass_kg;
+        out.parameters.inertia_kg_m2 = change.inertia_kg_m2;
+        for moment in change.inertia_kg_m2.diagonal().iter() {
+            check::positive("mass.inertia_kg_m2", *moment)?;
+        }
+        out.inertia_inverse =
+            change.inertia_kg_m2.try_inverse().ok_or(ParameterError::inertia("inertia is singular"))?;
+        let rotors = &mut out.per_speed_squared;
+        for i in 0..MAX_ROTORS {
+            rotors.thrust[i] *= change.thrust[i];
+            rotors.roll[i] *= change.thrust[i];
+            rotors.pitch[i] *= change.thrust[i];
+            rotors.yaw[i] *= change.torque[i];
+        }
+        Ok(out)
     }
     /// The checked numbers.
     #[inline(always)]

@@ -83,7 +83,7 @@ impl<'a> Recording<'a> {
                 ));
             }
         }
-        if voltage.is_none() && vehicle.effects.battery_sag.is_some() {
+        if voltage.is_none() && vehicle.effects.has("battery_sag") {
             let reference = parameters.propulsion.reference_voltage_v;
             notes.push(format!(
                 "{flight}: battery.voltage_v: missing; battery_sag is that of the reference voltage, {reference} V"

@@ -50,7 +50,12 @@ pub(super) fn residuals(
 ) -> Result<Vec<Residual>, GapError> {
     let samples = recording.grid(piece);
     let model = model(vehicle, recording, &samples)?;
-    let parameters = vehicle.vehicle.parameters();
+    // Effects on mass and inertia change what the measured motion is worth in newtons.
+    let airframe = vehicle.effects.alter(&vehicle.vehicle).map_err(|problem| GapError::Vehicle {
+        vehicle: vehicle.name.clone(),
+        problem: problem.to_string(),
+    })?;
+    let parameters = airframe.parameters();
     let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..samples.len() - DERIVATIVE_REACH)
         .map(|k| {
             let omega = samples[k].body.omega.vector;

@@ -111,6 +111,7 @@ impl Plant {
                 ));
             }
         }
+        let vehicle = effects.alter(&vehicle).map_err(|e| format!("with effects, {e}"))?;
         let decay = |tau: f64| 1.0 - (-dt_s / tau).exp();
         let servo_lag = match &wing {
             WingPlant::None => 1.0,
@@ -120,7 +121,7 @@ impl Plant {
         Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_lag })
     }
 
-    /// The airframe.
+    /// The airframe, with what effects change of it.
     pub fn vehicle(&self) -> &Vehicle<f64> {
         &self.vehicle
     }
@@ -224,7 +225,7 @@ impl Plant {
             }
             WingPlant::Membrane { membrane, servo } => {
                 let deployment = self.deploy(state, servo, wing_command);
-                let air = dynamics::air(&before, wind + effects.wind());
+                let air = dynamics::air(&before, dynamics::total_wind(effects, wind));
                 let angle = membrane.angle_of_attack(&air);
                 for side in 0..2 {
                     state.wing_angle_rate_rad_s[side] = (angle[side] - state.wing_angle_rad[side]) / dt;
@@ -282,7 +283,7 @@ impl Plant {
 
     /// Force of the wings, N: as deployed now, and as if spread.
     pub fn wing_force(&self, state: &PlantState, wind: In<Ned, f64>) -> [In<Body, f64>; 2] {
-        let air = dynamics::air(&state.body, wind + self.effects.wind());
+        let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, wind));
         let now = [state.servo[0].deployment, state.servo[1].deployment];
         [self.wing_wrench(state, &air, now).force, self.wing_wrench(state, &air, [1.0; 2]).force]
     }

@@ -3,9 +3,9 @@
 use super::VehicleFile;
 use super::quantity::Quantity;
 use super::tables::{
-    AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, FormName, InertiaValue,
-    PositionTable, PropulsionTable, ThrustLawName, TriggerName, VehicleTable, WingControlTable, WingName,
-    WingTable, WingTestName,
+    AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, EffectValue, FormName,
+    InertiaValue, PositionTable, PropulsionTable, ThrustLawName, TriggerName, VehicleTable, WingControlTable,
+    WingName, WingTable, WingTestName,
 };
 use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ServoParameters, WingPlant};
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
@@ -13,7 +13,7 @@ use squirrel_core::control::position::{AngleLaw, PositionGains};
 use squirrel_core::control::twcc::{ForceModel, Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Effects, Kind};
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::stack::StackParameters;
@@ -79,7 +79,7 @@ pub(super) fn build(t: VehicleTable) -> Result<VehicleFile, Problem> {
         battery: t.battery.map(battery).transpose()?,
         control,
         sensors: t.sensors,
-        effects: effects(t.effects)?,
+        effects: effects(t.effects, vehicle.rotors().len())?,
         provenance: Vec::new(),
     })
 }
@@ -199,35 +199,53 @@ fn battery(t: BatteryTable) -> Result<BatteryParameters, Problem> {
     Ok(parameters)
 }
 
-fn effects(tables: BTreeMap<String, BTreeMap<String, Quantity<f64>>>) -> Result<Effects<f64>, Problem> {
+fn effects(
+    tables: BTreeMap<String, BTreeMap<String, EffectValue>>,
+    rotor_count: usize,
+) -> Result<Effects<f64>, Problem> {
     let mut effects = Effects::none();
     for (name, table) in tables {
         let Some(found) = effects.insert(&name) else {
             let known = Effects::<f64>::NAMES.join(", ");
             return Err(format!("effects.{name}: no such effect; known are {known}"));
         };
-        for (key, q) in &table {
+        for (key, value) in &table {
+            let field = format!("effects.{name}.{key} = {value}");
             let Some(i) = found.parameters.iter().position(|p| p.key == key) else {
                 let known: Vec<_> = found.parameters.iter().map(|p| p.key).collect();
-                return Err(format!(
-                    "effects.{name}.{key} = {}: no such parameter; known are {}",
-                    q.0,
-                    known.join(", ")
-                ));
+                return Err(format!("{field}: no such parameter; known are {}", known.join(", ")));
             };
-            if !q.0.is_finite() {
-                return Err(format!("effects.{name}.{key} = {}: must be finite", q.0));
-            }
-            if q.0 < 0.0 && !found.parameters[i].signed {
-                return Err(format!("effects.{name}.{key} = {}: must be >= 0", q.0));
-            }
-            found.values[i] = q.0;
+            found.values[i] = effect_value(value, found.parameters[i].kind, rotor_count)
+                .map_err(|reason| format!("{field}: {reason}"))?;
         }
         if let Some(missing) = found.parameters.iter().find(|p| !table.contains_key(p.key)) {
             return Err(format!("effects.{name}.{}: missing", missing.key));
         }
     }
     Ok(effects)
+}
+
+fn effect_value(value: &EffectValue, kind: Kind, rotor_count: usize) -> Result<f64, Problem> {
+    match (kind, value) {
+        (Kind::OneOf(names), EffectValue::Name(given)) if names.contains(&given.as_str()) => {
+            Ok(names.iter().position(|n| n == given).unwrap_or(0) as f64)
+        }
+        (Kind::OneOf(names), _) => Err(format!("must be one of {}", names.join(", "))),
+        (_, EffectValue::Name(_)) => Err("must be a number".to_owned()),
+        (Kind::Rotor, EffectValue::Number(q)) => {
+            let number = q.0;
+            if (1..=rotor_count).any(|r| r as f64 == number) {
+                Ok(number)
+            } else {
+                Err(format!("must be a rotor's number, 1 to {rotor_count}"))
+            }
+        }
+        (Kind::Size { signed, .. }, EffectValue::Number(q)) => match q.0 {
+            x if !x.is_finite() => Err("must be finite".to_owned()),
+            x if x < 0.0 && !signed => Err("must be >= 0".to_owned()),
+            x => Ok(x),
+        },
+    }
 }
 
 fn triple(q: &Quantity<[f64; 3]>) -> Vector3<f32> {

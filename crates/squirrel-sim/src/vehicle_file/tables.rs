@@ -25,7 +25,24 @@ pub(super) struct VehicleTable {
     #[serde(default)]
     pub(super) sensors: crate::sensors::SensorParameters,
     #[serde(default)]
-    pub(super) effects: BTreeMap<String, BTreeMap<String, Number>>,
+    pub(super) effects: BTreeMap<String, BTreeMap<String, EffectValue>>,
+}
+
+/// A parameter of an effect: a number, or a name where there are only a few.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "a number, { value, sd, source }, or a name")]
+pub(super) enum EffectValue {
+    Number(Number),
+    Name(String),
+}
+
+impl std::fmt::Display for EffectValue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(q) => write!(f, "{}", q.0),
+            Self::Name(name) => write!(f, "\"{name}\""),
+        }
+    }
 }
 
 #[derive(Deserialize)]

@@ -1,0 +1,26 @@
+//! One rotor gives less: `T_i (1 - e)` and `Q_i (1 - e)`.
+
+use super::{Alteration, Effect, EffectParameter, Kind};
+use crate::math::{Real, real};
+
+/// Which rotor, and the fraction that it lacks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WeakRotor<T>(pub(super) [T; 2]);
+
+impl<T: Real> Effect<T> for WeakRotor<T> {
+    const NAME: &'static str = "weak_rotor";
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter { key: "rotor", kind: Kind::Rotor },
+        EffectParameter::size("thrust_loss_fraction", 0.05, 0.2),
+    ];
+
+    fn alter(&self, airframe: &mut Alteration<T>) {
+        let [rotor, loss] = self.0;
+        for (i, (thrust, torque)) in airframe.thrust.iter_mut().zip(&mut airframe.torque).enumerate() {
+            if rotor == real((i + 1) as f64) {
+                *thrust *= T::one() - loss;
+                *torque *= T::one() - loss;
+            }
+        }
+    }
+}

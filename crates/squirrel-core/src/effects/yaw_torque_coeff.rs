@@ -1,0 +1,19 @@
+//! Reaction torque coefficient off by a fraction: `k_m (1 + e)`.
+
+use super::{Alteration, Effect, EffectParameter};
+use crate::math::Real;
+
+/// Fraction by which the reaction torque exceeds the nominal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct YawTorqueCoeff<T>(pub(super) [T; 1]);
+
+impl<T: Real> Effect<T> for YawTorqueCoeff<T> {
+    const NAME: &'static str = "yaw_torque_coeff";
+    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed("torque_fraction", 0.12, 0.4)];
+
+    fn alter(&self, airframe: &mut Alteration<T>) {
+        for factor in &mut airframe.torque {
+            *factor *= T::one() + self.0[0];
+        }
+    }
+}
