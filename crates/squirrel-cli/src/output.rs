@@ -30,7 +30,7 @@ pub(crate) fn progress(length: u64, unit: &str) -> ProgressBar {
     bar
 }
 
-/// A table with aligned columns: the first to the left, numbers to the right.
+/// A table with aligned columns: columns of numbers to the right, text to the left.
 pub(crate) struct Table {
     rows: Vec<Vec<String>>,
 }
@@ -48,12 +48,20 @@ impl Table {
             self.rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0)
         };
         let widths: Vec<usize> = (0..columns).map(width).collect();
+        let is_number =
+            |cell: &String| cell == "-" || cell.starts_with(|c: char| c.is_ascii_digit() || "+-".contains(c));
+        let numbers: Vec<bool> =
+            (0..columns).map(|c| self.rows[1..].iter().filter_map(|r| r.get(c)).all(is_number)).collect();
         for (i, row) in self.rows.iter().enumerate() {
             let mut line = String::new();
             for (c, cell) in row.iter().enumerate() {
                 use std::fmt::Write as _;
-                let w = widths[c];
-                let _ = if c == 0 { write!(line, "{cell:<w$}") } else { write!(line, "  {cell:>w$}") };
+                let (w, gap) = (widths[c], if c == 0 { "" } else { "  " });
+                let _ = if numbers[c] {
+                    write!(line, "{gap}{cell:>w$}")
+                } else {
+                    write!(line, "{gap}{cell:<w$}")
+                };
             }
             say(line.trim_end());
             if i == 0 {

@@ -19,6 +19,9 @@ pub(crate) enum VehicleCommand {
     },
 }
 
+/// Longer values, such as a table of voltages, are cut in print; the JSON has them whole.
+const VALUE_WIDTH: usize = 32;
+
 #[derive(Serialize)]
 struct Checked<'a> {
     vehicle: &'a str,
@@ -42,7 +45,11 @@ impl VehicleCommand {
         let mut table = Table::new(&["field", "value", "sd", "source"]);
         for (field, p) in &vehicle.provenance {
             let text = |x: &Option<String>| x.clone().unwrap_or_else(|| "-".to_owned());
-            table.row(vec![field.clone(), p.value.clone(), text(&p.sd), text(&p.source)]);
+            let value = match p.value.char_indices().nth(VALUE_WIDTH) {
+                Some((end, _)) => format!("{}...", &p.value[..end]),
+                None => p.value.clone(),
+            };
+            table.row(vec![field.clone(), value, text(&p.sd), text(&p.source)]);
         }
         table.print();
         let numbers: BTreeMap<&str, &Provenance> =
