@@ -1,5 +1,9 @@
 //! One inner and one outer step of the flight code.
 
+#[path = "../tests/airframe/mod.rs"]
+mod airframe;
+
+use airframe::{PAPER_SIGNS, PAPER_X, vehicle};
 use criterion::{Criterion, criterion_group, criterion_main};
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
 use squirrel_core::control::position::{AngleLaw, PositionGains};
@@ -8,45 +12,12 @@ use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
 use squirrel_core::frames::{In, Rotation};
 use squirrel_core::guidance::mission::Mission;
-use squirrel_core::nalgebra::{Matrix3, Vector3};
+use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::{Gnss, Imu, OUTER_PERIOD_US, SensorFrame, Stack, StackParameters, StackState};
-use squirrel_core::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle, Wing,
-};
 use std::hint::black_box;
 
 fn stack(form: AttitudeForm) -> Stack {
-    let mut rotors = [Rotor::unused(); MAX_ROTORS];
-    for (i, (x, y, s)) in
-        [(1.0, -1.0, -1.0), (-1.0, -1.0, 1.0), (-1.0, 1.0, -1.0), (1.0, 1.0, 1.0)].into_iter().enumerate()
-    {
-        rotors[i] = Rotor::planar(0.085 * x, 0.085 * y, s);
-    }
-    let vehicle = Vehicle::new(Parameters {
-        mass_kg: 0.548,
-        inertia_kg_m2: Matrix3::from_diagonal(&Vector3::new(3.22e-3, 4.68e-3, 7.72e-3)),
-        rotors,
-        rotor_count: 4,
-        propulsion: Propulsion {
-            command: CommandKind::SpeedFraction,
-            speed_max_rad_s: 3000.0,
-            thrust_coefficient_n_s2: 6.0e-7,
-            torque_coefficient_n_m_s2: 6.6e-9,
-            time_constant_up_s: 0.04,
-            time_constant_down_s: 0.04,
-            reference_voltage_v: 14.8,
-            thrust_curve: None,
-        },
-        drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: 0.01 },
-        wing: Some(Wing {
-            area_per_side_m2: 0.02,
-            normal_force_slope: 2.0,
-            lateral_arm_m: 0.09,
-            time_constant_s: 0.03,
-        }),
-        limits: Limits { tilt_max_rad: 0.52, thrust_max_n: 10.0, rotor_thrust_max_n: None },
-    })
-    .expect("sound");
+    let vehicle = vehicle(&PAPER_X, &PAPER_SIGNS);
     let attitude = AttitudeGains {
         form,
         c1_per_s: Vector3::new(9.0, 9.0, 4.0),

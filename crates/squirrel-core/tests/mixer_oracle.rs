@@ -5,11 +5,13 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod airframe;
+
+use airframe::{PAPER_SIGNS, PAPER_X, vehicle};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
 use squirrel_core::control::mixer::{Mixer, ThrustTorque};
-use squirrel_core::nalgebra::{Matrix3, Vector3};
-use squirrel_core::vehicle::{CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle};
+use squirrel_core::nalgebra::Vector3;
 
 /// A small deterministic generator, so that the thousand demands are the same on every machine.
 struct Draw(u64);
@@ -22,36 +24,6 @@ impl Draw {
         low + (high - low) * self.unit()
     }
 }
-
-fn vehicle(positions: &[[f64; 2]], signs: &[f64]) -> Vehicle<f32> {
-    let mut rotors = [Rotor::unused(); MAX_ROTORS];
-    for (i, ([x, y], sign)) in positions.iter().zip(signs).enumerate() {
-        rotors[i] = Rotor::planar(*x, *y, *sign);
-    }
-    let parameters = Parameters {
-        mass_kg: 0.548,
-        inertia_kg_m2: Matrix3::from_diagonal(&Vector3::new(3.22e-3, 4.68e-3, 7.72e-3)),
-        rotors,
-        rotor_count: positions.len(),
-        propulsion: Propulsion {
-            command: CommandKind::SpeedFraction,
-            speed_max_rad_s: 3000.0,
-            thrust_coefficient_n_s2: 6.0e-7,
-            torque_coefficient_n_m_s2: 6.6e-9,
-            time_constant_up_s: 0.03,
-            time_constant_down_s: 0.03,
-            reference_voltage_v: 14.8,
-            thrust_curve: None,
-        },
-        drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: 0.0 },
-        wing: None,
-        limits: Limits { tilt_max_rad: 0.5, thrust_max_n: 20.0, rotor_thrust_max_n: None },
-    };
-    Vehicle::new(parameters).unwrap()
-}
-
-const PAPER_X: [[f64; 2]; 4] = [[0.085, -0.085], [-0.085, -0.085], [-0.085, 0.085], [0.085, 0.085]];
-const PAPER_SIGNS: [f64; 4] = [-1.0, 1.0, -1.0, 1.0];
 
 /// Minimises `1/2 x' diag(p) x + q' x` subject to `a x = b` and `g x <= h`; panics unless solved.
 fn solve(p: &[f64], q: &[f64], a: &[(Vec<f64>, f64)], g: &[(Vec<f64>, f64)]) -> Vec<f64> {

@@ -3,41 +3,17 @@
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{In, Rotation};
 use squirrel_core::nalgebra::{Matrix3, Vector3};
-use squirrel_core::vehicle::{CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle};
+use squirrel_core::vehicle::Vehicle;
+use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_sim::world::WorldParameters;
 
 pub(crate) const SIZE_BODY_M: [f64; 3] = [0.276, 0.373, 0.025];
 
 pub(crate) fn vehicle() -> Vehicle<f64> {
-    let mut rotors = [Rotor::unused(); MAX_ROTORS];
-    let d = 0.085;
-    for (rotor, (x, y, s)) in
-        rotors.iter_mut().zip([(d, -d, -1.0), (-d, -d, 1.0), (-d, d, -1.0), (d, d, 1.0)])
-    {
-        *rotor = Rotor::planar(x, y, s);
-    }
-    Vehicle::new(Parameters {
-        mass_kg: 0.548,
-        inertia_kg_m2: Matrix3::new(
-            3.22e-3, 2.0e-4, -1.0e-4, 2.0e-4, 4.68e-3, 1.5e-4, -1.0e-4, 1.5e-4, 7.72e-3,
-        ),
-        rotors,
-        rotor_count: 4,
-        propulsion: Propulsion {
-            command: CommandKind::SpeedFraction,
-            speed_max_rad_s: 3000.0,
-            thrust_coefficient_n_s2: 6.0e-7,
-            torque_coefficient_n_m_s2: 6.6e-9,
-            time_constant_up_s: 0.03,
-            time_constant_down_s: 0.04,
-            reference_voltage_v: 14.8,
-            thrust_curve: None,
-        },
-        drag: Drag { linear_n_s_per_m: Vector3::zeros(), area_m2: 0.01 },
-        wing: None,
-        limits: Limits { tilt_max_rad: 0.5, thrust_max_n: 10.7, rotor_thrust_max_n: None },
-    })
-    .expect("the fixture is a possible airframe")
+    let mut parameters = *VehicleFile::squirrel().vehicle.parameters();
+    parameters.inertia_kg_m2 =
+        Matrix3::new(3.22e-3, 2.0e-4, -1.0e-4, 2.0e-4, 4.68e-3, 1.5e-4, -1.0e-4, 1.5e-4, 7.72e-3);
+    Vehicle::new(parameters).expect("the fixture is a possible airframe")
 }
 
 /// A world with ground and nothing else.
