@@ -3,6 +3,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is where the program speaks")]
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::fmt::Write as _;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 
@@ -55,7 +56,6 @@ impl Table {
         for (i, row) in self.rows.iter().enumerate() {
             let mut line = String::new();
             for (c, cell) in row.iter().enumerate() {
-                use std::fmt::Write as _;
                 let (w, gap) = (widths[c], if c == 0 { "" } else { "  " });
                 let _ = if numbers[c] {
                     write!(line, "{gap}{cell:>w$}")

@@ -41,7 +41,7 @@ struct Row {
 }
 
 #[derive(Serialize)]
-struct Result_ {
+struct Figures {
     vehicle: String,
     thrust_to_weight: f64,
     seed: u64,
@@ -78,7 +78,7 @@ impl Demo {
         let mut rows = Vec::new();
         let mut views = Vec::new();
         let mut table: Option<Table> = None;
-        for (setup, flight) in setups.iter().zip(&flights) {
+        for (setup, flight) in setups.iter().zip(&mut flights) {
             let gain = reference / flight.metrics.rmse_m - 1.0;
             let mut cells = figures(&flight.metrics);
             cells.insert(2, ("gain %".to_owned(), format!("{:+.1}", 100.0 * gain)));
@@ -90,7 +90,7 @@ impl Demo {
             let name = std::iter::once(setup.arm.name().to_owned());
             table.row(name.chain(cells.iter().map(|(_, v)| v.clone())).collect());
             rows.push(Row { arm: setup.arm.name(), gain, metrics: flight.metrics });
-            if let Some(log) = &flight.log {
+            if let Some(log) = &mut flight.log {
                 let path = self.out.join(format!("flight-{}.mcap", setup.arm.name()));
                 write_log(log, &path)?;
                 views.push(view(setup, log, cells));
@@ -108,7 +108,7 @@ impl Demo {
         };
         let report = self.out.join("report.html");
         output::write_file(&report, render(&heading, &views).as_bytes())?;
-        let result = Result_ {
+        let result = Figures {
             vehicle: setups[0].vehicle.name.clone(),
             thrust_to_weight: ratio,
             seed: self.seed,

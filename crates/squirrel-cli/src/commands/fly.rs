@@ -77,7 +77,7 @@ impl Fly {
         let bar = output::progress((setup.scenario.duration_s * 10.0) as u64, "x 0.1 s");
         let flown = setup.fly(record, |t| bar.set_position((t * 10.0) as u64));
         bar.finish_and_clear();
-        let flight = flown.map_err(|e| e.to_string())?;
+        let mut flight = flown.map_err(|e| e.to_string())?;
         let ratio = setup.thrust_to_weight();
         say(&format!(
             "{} flies {} with {}, seed {}, effective thrust-to-weight {ratio:.2}\n",
@@ -90,7 +90,7 @@ impl Fly {
         let mut table = Table::new(&cells.iter().map(|(n, _)| n.as_str()).collect::<Vec<_>>());
         table.row(cells.iter().map(|(_, v)| v.clone()).collect());
         table.print();
-        if let Some(log) = &flight.log {
+        if let Some(log) = &mut flight.log {
             if let Some(path) = &self.out {
                 write_log(log, path)?;
                 talk(&format!("wrote {}", path.display()));

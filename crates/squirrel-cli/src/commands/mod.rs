@@ -23,8 +23,7 @@ fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
 }
 
 /// Writes a log that says which commit of the program flew.
-fn write_log(log: &FlightLog, path: &Path) -> Result<(), String> {
-    let mut log = log.clone();
+fn write_log(log: &mut FlightLog, path: &Path) -> Result<(), String> {
     log.metadata.insert("git".to_owned(), option_env!("SQUIRREL_COMMIT").unwrap_or("unknown").to_owned());
     log.write(path).map_err(|e| e.to_string())
 }

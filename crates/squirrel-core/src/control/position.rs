@@ -12,7 +12,7 @@
 use super::{AttitudeThrust, Reference};
 use crate::frames::{In, Ned};
 use crate::math::{GRAVITY_M_S2, limit, limit_norm, upper};
-use crate::vehicle::ParameterError;
+use crate::vehicle::{ParameterError, each_not_negative, each_positive, positive};
 use nalgebra::{Vector2, Vector3};
 
 /// How an acceleration becomes roll and pitch.
@@ -96,30 +96,14 @@ impl PositionGains {
     /// # Errors
     /// The first gain that is not finite or out of range, by its name in `[control.position]`.
     pub fn check(&self) -> Result<(), ParameterError> {
-        let lists = [
-            ("control.position.position_per_s", &self.position_per_s, true),
-            ("control.position.velocity_per_s", &self.velocity_per_s, true),
-            ("control.position.integral_per_s2", &self.integral_per_s2, false),
-            ("control.position.derivative", &self.derivative, false),
-        ];
-        for (field, list, strict) in lists {
-            for (i, x) in list.iter().enumerate() {
-                if !(x.is_finite() && (*x > 0.0 || (!strict && *x == 0.0))) {
-                    let reason = if strict { "must be finite and > 0" } else { "must be finite and >= 0" };
-                    return Err(ParameterError::at(field, i, *x, reason));
-                }
-            }
-        }
-        let numbers = [
-            ("control.position.acceleration_max_horizontal_m_s2", self.acceleration_max_horizontal_m_s2),
-            ("control.position.acceleration_max_vertical_m_s2", self.acceleration_max_vertical_m_s2),
-            ("control.position.integral_max_m", self.integral_max_m),
-        ];
-        for (field, x) in numbers {
-            if !(x.is_finite() && x > 0.0) {
-                return Err(ParameterError::of(field, x, "must be finite and > 0"));
-            }
-        }
+        each_positive("control.position.position_per_s", self.position_per_s.as_slice())?;
+        each_positive("control.position.velocity_per_s", self.velocity_per_s.as_slice())?;
+        each_not_negative("control.position.integral_per_s2", self.integral_per_s2.as_slice())?;
+        each_not_negative("control.position.derivative", self.derivative.as_slice())?;
+        let horizontal = self.acceleration_max_horizontal_m_s2;
+        positive("control.position.acceleration_max_horizontal_m_s2", horizontal)?;
+        positive("control.position.acceleration_max_vertical_m_s2", self.acceleration_max_vertical_m_s2)?;
+        positive("control.position.integral_max_m", self.integral_max_m)?;
         let share = self.velocity_feed_forward;
         if !(0.0..=1.0).contains(&share) {
             return Err(ParameterError::of(

@@ -82,8 +82,6 @@ pub struct StackState {
     pub attitude: AttitudeState,
     /// What the outer loop asked for last.
     pub command: AttitudeThrust,
-    /// Heading asked for last, rad.
-    pub yaw_rad: f32,
     /// Wing command asked for last.
     pub wing_command: f32,
     /// The mixer could not meet the last demand.
@@ -168,9 +166,8 @@ impl Stack {
             self.outer(state, frame, lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6)
         };
         let reference = self.mission.reference(&state.mission, frame.time_us);
-        state.yaw_rad = reference.yaw_rad;
         let dt_s = lower(elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
-        let inner = self.inner(state, dt_s);
+        let inner = self.inner(state, reference.yaw_rad, dt_s);
         let mut rotor_command = [0.0; MAX_ROTORS];
         let propulsion = &self.vehicle.parameters().propulsion;
         for (i, command) in rotor_command.iter_mut().take(self.vehicle.rotors().len()).enumerate() {
@@ -211,10 +208,10 @@ impl Stack {
         Some(terms)
     }
 
-    fn inner(&self, state: &mut StackState, dt_s: f32) -> Option<InnerTerms> {
+    fn inner(&self, state: &mut StackState, yaw_rad: f32, dt_s: f32) -> Option<InnerTerms> {
         let (Some(imu), Some(ned_from_body)) = (state.known.imu, state.known.attitude) else { return None };
         let gains = &self.parameters.attitude;
-        let target = Vector3::new(state.command.roll_rad, state.command.pitch_rad, state.yaw_rad);
+        let target = Vector3::new(state.command.roll_rad, state.command.pitch_rad, yaw_rad);
         command_filter::step(
             &mut state.filter,
             &target,

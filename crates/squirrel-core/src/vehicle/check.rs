@@ -64,6 +64,27 @@ pub(crate) fn not_negative<T: Real>(field: &'static str, value: T) -> Result<(),
     Err(ParameterError::of(field, value, "must be finite and >= 0"))
 }
 
+/// Every number of a list must be finite and > 0.
+pub(crate) fn each_positive<T: Real>(field: &'static str, list: &[T]) -> Result<(), ParameterError> {
+    each(field, list, positive)
+}
+
+/// Every number of a list must be finite and >= 0.
+pub(crate) fn each_not_negative<T: Real>(field: &'static str, list: &[T]) -> Result<(), ParameterError> {
+    each(field, list, not_negative)
+}
+
+fn each<T: Real>(
+    field: &'static str,
+    list: &[T],
+    check: fn(&'static str, T) -> Result<(), ParameterError>,
+) -> Result<(), ParameterError> {
+    for (i, x) in list.iter().enumerate() {
+        check(field, *x).map_err(|error| ParameterError { index: Some(i), ..error })?;
+    }
+    Ok(())
+}
+
 pub(super) fn check<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {
     positive("mass.mass_kg", p.mass_kg)?;
     inertia(&p.inertia_kg_m2)?;
@@ -75,11 +96,7 @@ pub(super) fn check<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {
     not_negative("propulsion.time_constant_up_s", propulsion.time_constant_up_s)?;
     not_negative("propulsion.time_constant_down_s", propulsion.time_constant_down_s)?;
     positive("propulsion.reference_voltage_v", propulsion.reference_voltage_v)?;
-    for (i, d) in p.drag.linear_n_s_per_m.iter().enumerate() {
-        if !(d.is_finite() && *d >= T::zero()) {
-            return Err(ParameterError::at("drag.linear_n_s_per_m", i, *d, "must be finite and >= 0"));
-        }
-    }
+    each_not_negative("drag.linear_n_s_per_m", p.drag.linear_n_s_per_m.as_slice())?;
     not_negative("drag.area_m2", p.drag.area_m2)?;
     if let Some(wing) = &p.wing {
         positive("wing.area_per_side_m2", wing.area_per_side_m2)?;

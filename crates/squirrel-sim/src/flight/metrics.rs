@@ -107,7 +107,7 @@ impl<'a> Meter<'a> {
         self.metrics.window_s = elapsed_s;
         self.metrics.height_lost_m = self.metrics.height_lost_m.max(error.z);
         self.metrics.height_gained_m = self.metrics.height_gained_m.max(-error.z);
-        if state.servo[0].deployment + state.servo[1].deployment > 1.0 {
+        if state.deployment().iter().sum::<f64>() > 1.0 {
             self.wings_us += step_us;
         }
         if self.mode == Mode::Wiic {

@@ -141,9 +141,8 @@ impl Setup {
                 }
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
                 frame.set_obstacles(&self.nearest_obstacles(&state.body));
-                let wing_force = plant.wing_force(&state, air);
                 if self.arm.is_told_the_force() {
-                    let as_if_spread = state.body.ned_from_body() * wing_force[1];
+                    let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
                 let output = stack.step(&mut stack_state, &frame);
@@ -163,7 +162,7 @@ impl Setup {
                         &output,
                         &state,
                         air + plant.effects().wind(),
-                        wing_force[0],
+                        plant.wing_force(&state, air, state.deployment()),
                     );
                 }
                 if tick % (CONTROL_RATE_HZ / 10) == 0 {

@@ -141,7 +141,7 @@ pub(crate) fn record_output(
     let wing_command = output.wing_command.map(f64::from);
     let mut rotor: Vec<(&str, &[f64])> = vec![("command", &command[..rotors])];
     let mut wing: Vec<(&str, &[f64])> = vec![("command", &wing_command)];
-    let deployment = plant.map(|p| p.servo.map(|s| s.deployment));
+    let deployment = plant.map(PlantState::deployment);
     if let (Some(plant), Some(deployment)) = (plant, &deployment) {
         rotor.push(("speed_rad_s", &plant.body.rotor_speed_rad_s[..rotors]));
         wing.push(("deployment", deployment));

@@ -70,6 +70,13 @@ pub struct PlantState {
     pub battery: BatteryState,
 }
 
+impl PlantState {
+    /// Deployment of the left and the right wing, 0..1.
+    pub fn deployment(&self) -> [f64; 2] {
+        self.servo.map(|servo| servo.deployment)
+    }
+}
+
 /// Rigid body and membrane, integrated together.
 #[derive(Clone, Copy)]
 struct Moving {
@@ -168,7 +175,7 @@ impl Plant {
         wind: In<Ned, f64>,
     ) {
         let drive = self.drive(state, rotor_command);
-        self.advance(state, &drive, wing_command, wind, |_, next| next);
+        self.advance(state, &drive, wing_command, wind, |next| next);
     }
 
     /// One step in which another integrator moves the rigid body: rotors and wings as in [`Self::step`], while `body` gets
@@ -187,7 +194,7 @@ impl Plant {
         let drive = self.drive(state, rotor_command);
         let wrench = self.wrench(state, wind);
         let moved = body(&state.body, &wrench)?;
-        self.advance(state, &drive, wing_command, wind, |_, next| State {
+        self.advance(state, &drive, wing_command, wind, |next| State {
             rotor_speed_rad_s: next.rotor_speed_rad_s,
             ..moved
         });
@@ -207,7 +214,7 @@ impl Plant {
         drive: &RotorDrive<f64>,
         wing_command: [f64; 2],
         wind: In<Ned, f64>,
-        body: impl FnOnce(&State<f64>, State<f64>) -> State<f64>,
+        body: impl FnOnce(State<f64>) -> State<f64>,
     ) {
         let (vehicle, effects, dt) = (&self.vehicle, &self.effects, self.dt_s);
         let before = state.body;
@@ -245,7 +252,7 @@ impl Plant {
                 moved.body
             }
         };
-        state.body = body(&before, next).normalised();
+        state.body = body(next).normalised();
         if let Some(battery) = &self.battery {
             let k_m = vehicle.parameters().propulsion.torque_coefficient_n_m_s2;
             let power: f64 = before.rotor_speed_rad_s.iter().map(|w| k_m * w * w * w).sum();
@@ -275,16 +282,15 @@ impl Plant {
 
     /// Force and moment on the airframe now, without gravity.
     pub fn wrench(&self, state: &PlantState, wind: In<Ned, f64>) -> Wrench<Body, f64> {
-        let deployment = [state.servo[0].deployment, state.servo[1].deployment];
+        let deployment = state.deployment();
         dynamics::wrench(&self.vehicle, &self.effects, &state.body, wind, |air| {
             self.wing_wrench(state, air, deployment)
         })
     }
 
-    /// Force of the wings, N: as deployed now, and as if spread.
-    pub fn wing_force(&self, state: &PlantState, wind: In<Ned, f64>) -> [In<Body, f64>; 2] {
+    /// Force of the wings at a deployment, left and right, N: [`PlantState::deployment`] for now, 1 for as if spread.
+    pub fn wing_force(&self, state: &PlantState, wind: In<Ned, f64>, deployment: [f64; 2]) -> In<Body, f64> {
         let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, wind));
-        let now = [state.servo[0].deployment, state.servo[1].deployment];
-        [self.wing_wrench(state, &air, now).force, self.wing_wrench(state, &air, [1.0; 2]).force]
+        self.wing_wrench(state, &air, deployment).force
     }
 }

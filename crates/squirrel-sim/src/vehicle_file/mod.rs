@@ -127,9 +127,9 @@ impl VehicleFile {
         Self::parse(SQUIRREL_TOML, "squirrel.toml").expect("the shipped vehicle is sound")
     }
 
-    /// Name of the source of a number that the file gives without provenance: `None` if it has one.
+    /// Fields whose number the file gives without a source.
     pub fn without_source(&self) -> impl Iterator<Item = &str> {
-        let bare = |p: &Provenance| p.source.is_none() && p.value.parse::<bool>().is_err();
+        let bare = |p: &Provenance| p.source.is_none();
         self.provenance.iter().filter(move |(_, p)| bare(p)).map(|(field, _)| field.as_str())
     }
 }

@@ -9,7 +9,7 @@ pub mod quaternion;
 use super::command_filter::EulerReference;
 use crate::frames::{Body, Ned, Rotation};
 use crate::math::{Real, limit, real};
-use crate::vehicle::ParameterError;
+use crate::vehicle::{ParameterError, each_positive, positive};
 use nalgebra::{Matrix3, Vector3};
 
 /// Longest step that the inner loop integrates over, s; a longer gap counts as this.
@@ -71,28 +71,12 @@ impl AttitudeGains {
     /// # Errors
     /// The first gain that is not finite and positive, by its name in `[control.attitude]`.
     pub fn check(&self) -> Result<(), ParameterError> {
-        let lists = [
-            ("control.attitude.c1_per_s", &self.c1_per_s),
-            ("control.attitude.c2_per_s", &self.c2_per_s),
-            ("control.attitude.lambda_per_s2", &self.lambda_per_s2),
-        ];
-        for (field, list) in lists {
-            for (i, x) in list.iter().enumerate() {
-                if !(x.is_finite() && *x > 0.0) {
-                    return Err(ParameterError::at(field, i, *x, "must be finite and > 0"));
-                }
-            }
-        }
-        let numbers = [
-            ("control.attitude.integral_max_rad_s", self.integral_max_rad_s),
-            ("control.attitude.filter_frequency_rad_s", self.filter_frequency_rad_s),
-            ("control.attitude.filter_damping", self.filter_damping),
-        ];
-        for (field, x) in numbers {
-            if !(x.is_finite() && x > 0.0) {
-                return Err(ParameterError::of(field, x, "must be finite and > 0"));
-            }
-        }
+        each_positive("control.attitude.c1_per_s", self.c1_per_s.as_slice())?;
+        each_positive("control.attitude.c2_per_s", self.c2_per_s.as_slice())?;
+        each_positive("control.attitude.lambda_per_s2", self.lambda_per_s2.as_slice())?;
+        positive("control.attitude.integral_max_rad_s", self.integral_max_rad_s)?;
+        positive("control.attitude.filter_frequency_rad_s", self.filter_frequency_rad_s)?;
+        positive("control.attitude.filter_damping", self.filter_damping)?;
         // Where the filter's step is stable, for the longest step that the stack takes.
         let turn = self.filter_frequency_rad_s * INNER_STEP_MAX_S;
         if turn * turn + 4.0 * self.filter_damping * turn >= 4.0 {
