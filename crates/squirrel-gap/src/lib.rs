@@ -7,6 +7,9 @@
 
 mod error;
 pub mod find;
+mod flight;
+mod name;
+mod predictor;
 
 pub use error::GapError;
 pub use find::{Finding, find};

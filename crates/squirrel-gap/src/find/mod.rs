@@ -26,15 +26,12 @@
 //!
 //! `tests/residual_numpy.py` computes the force again, from a CSV file and without any code of this workspace.
 
-mod filter;
-mod recording;
 mod residual;
-mod series;
 mod windows;
 
 use crate::GapError;
 use nalgebra::Vector6;
-use recording::Recording;
+use crate::flight::recording::Recording;
 use serde::Serialize;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;

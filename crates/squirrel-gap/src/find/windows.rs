@@ -1,6 +1,6 @@
 //! Where the residual is: windows of one second, channel by channel, the worst first.
 
-use super::recording::Recording;
+use crate::flight::recording::Recording;
 use super::residual::Residual;
 use super::{CHANNELS, Place};
 use nalgebra::{Vector3, Vector6};

@@ -1,0 +1,5 @@
+mod evidence;
+mod linear;
+mod parameters;
+mod search;
+mod whiten;

@@ -1,0 +1,328 @@
+//! The search for the set of effects with the most evidence: forward, drop, swap, each step refined through the simulator.
+
+use super::evidence::{BETA, Gram, Posterior, dot};
+use super::linear::{Linear, Member, hypothesis};
+use super::parameters::Catalogue;
+use crate::GapError;
+use crate::predictor::Predictor;
+use nalgebra::DMatrix;
+
+/// What an effect must be worth to be named, nats.
+pub(crate) const NATS_MIN: f64 = 6.0;
+/// Part of the smallest size worth reporting that an effect must reach.
+const SIZE_MIN: f64 = 0.5;
+/// Candidates that are refined after each linear ranking.
+const REFINED: usize = 4;
+/// Most steps of a refinement.
+const STEPS_MAX: usize = 6;
+/// Most effects in a set.
+const MEMBERS_MAX: usize = 4;
+/// Most times that the predictor is linearised anew.
+const ROUNDS_MAX: usize = 3;
+
+/// A set of effects with its best numbers and its evidence.
+pub(crate) struct Scored {
+    pub(crate) members: Vec<Member>,
+    /// Relative to nothing in particular; differences within one [`Linear`] count.
+    pub(crate) log_evidence: f64,
+    /// Of the members' free numbers, then of all columns of the [`Linear`].
+    pub(crate) posterior: Posterior,
+    pub(crate) gram: Gram,
+    /// Prior deviations, in the order of the posterior.
+    pub(crate) prior: Vec<f64>,
+    /// Which number of which member each of the first columns is.
+    pub(crate) free: Vec<(usize, usize)>,
+    /// Whitened columns of the free numbers.
+    pub(crate) own: Vec<Vec<f64>>,
+    /// Whitened measurement, with the free numbers' part in it.
+    pub(crate) y: Vec<f64>,
+}
+
+/// The predictor and what can be named in it.
+pub(crate) struct Search<'a> {
+    pub(crate) predictor: &'a Predictor<'a>,
+    pub(crate) catalogue: &'a Catalogue,
+    /// Called after each piece of work.
+    pub(crate) progress: &'a dyn Fn(),
+}
+
+/// What a search found.
+pub(crate) struct Found {
+    pub(crate) linear: Linear,
+    pub(crate) null: Scored,
+    pub(crate) best: Scored,
+}
+
+impl Search<'_> {
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn run(&self) -> Result<Found, GapError> {
+        let mut members: Vec<Member> = Vec::new();
+        let mut round = 1;
+        loop {
+            let linear = Linear::about(self.predictor, self.catalogue, &members)?;
+            (self.progress)();
+            let null = self.score(&linear, &[])?;
+            let mut best = if members.is_empty() { self.score(&linear, &[])? } else { self.score(&linear, &members)? };
+            self.extend(&linear, &mut best)?;
+            self.drop_and_swap(&linear, &mut best)?;
+            let settled = self.same_set(&best.members, &members);
+            if settled || round == ROUNDS_MAX {
+                return Ok(Found { linear, null, best });
+            }
+            members.clone_from(&best.members);
+            round += 1;
+        }
+    }
+
+    fn same_set(&self, a: &[Member], b: &[Member]) -> bool {
+        let names = |list: &[Member]| {
+            let mut all: Vec<(usize, _)> = list
+                .iter()
+                .map(|m| {
+                    let candidate = &self.catalogue.candidates[m.candidate];
+                    (candidate.fixed.iter().map(|(_, v)| *v as usize).sum::<usize>(), candidate.effect)
+                })
+                .collect();
+            all.sort_unstable();
+            all
+        };
+        names(a) == names(b)
+    }
+
+    /// Adds effects as long as the evidence asks for them.
+    fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+        while best.members.len() < MEMBERS_MAX {
+            let Some(next) = self.best_addition(linear, best, &[])? else { break };
+            if next.log_evidence < best.log_evidence + NATS_MIN {
+                break;
+            }
+            *best = next;
+        }
+        Ok(())
+    }
+
+    /// The best set with one more effect that is large enough to report.
+    fn best_addition(
+        &self,
+        linear: &Linear,
+        set: &Scored,
+        except: &[&str],
+    ) -> Result<Option<Scored>, GapError> {
+        let mut best: Option<Scored> = None;
+        for member in self.ranked(linear, set, except).into_iter().take(REFINED) {
+            let members = [set.members.as_slice(), &[member.1]].concat();
+            let scored = self.score(linear, &members)?;
+            (self.progress)();
+            if self.is_large(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
+                best = Some(scored);
+            }
+        }
+        Ok(best)
+    }
+
+    /// Whether each member is at least half the smallest size worth reporting.
+    pub(crate) fn is_large(&self, scored: &Scored) -> bool {
+        scored.members.iter().all(|member| {
+            let candidate = &self.catalogue.candidates[member.candidate];
+            candidate.parameters.iter().any(|p| {
+                let p = &self.catalogue.parameters[*p];
+                let size = member.values[p.slot];
+                (if p.signed { size.abs() } else { size }) >= SIZE_MIN * p.smallest
+            })
+        })
+    }
+
+    /// Candidates by the evidence that a linear model gives them beside a set, best first, with their linear numbers.
+    pub(crate) fn ranked(&self, linear: &Linear, set: &Scored, except: &[&str]) -> Vec<(f64, Member)> {
+        let offset = set.free.len();
+        let mut all = Vec::new();
+        for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
+            let in_set = set.members.iter().any(|m| self.effect(m) == candidate.effect);
+            if in_set || except.contains(&candidate.effect) {
+                continue;
+            }
+            let mut prior = set.prior.clone();
+            self.silence(candidate.effect, &mut prior[offset..]);
+            for p in &candidate.parameters {
+                prior[offset + p] = self.catalogue.parameters[*p].slab;
+            }
+            let Some(posterior) = set.gram.posterior(&prior, BETA) else { continue };
+            let mut member = self.catalogue.absent(self.predictor, index);
+            let mut plausible = true;
+            for p in &candidate.parameters {
+                let parameter = &self.catalogue.parameters[*p];
+                let value = &mut member.values[parameter.slot];
+                *value += posterior.mean[offset + p];
+                plausible &= parameter.signed || *value > 0.0;
+                *value = value.clamp(-1.5 * parameter.largest, 1.5 * parameter.largest);
+            }
+            if plausible {
+                all.push((posterior.log_evidence, member));
+            }
+        }
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Of the several lines of a payload, the best two.
+        let mut payloads = 0;
+        all.retain(|(_, m)| {
+            payloads += usize::from(self.effect(m) == "payload_swing");
+            self.effect(m) != "payload_swing" || payloads <= 2
+        });
+        let _ = linear;
+        all
+    }
+
+    pub(crate) fn effect(&self, member: &Member) -> &'static str {
+        self.catalogue.candidates[member.candidate].effect
+    }
+
+    /// Takes the spikes of an effect out.
+    fn silence(&self, effect: &str, prior: &mut [f64]) {
+        for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
+            if self.catalogue.candidates[parameter.candidate].effect == effect {
+                // Other rotors may still be off by their tolerance; the payload is one thing at several lengths.
+                let own = effect == "payload_swing";
+                if own {
+                    prior[p] = 0.0;
+                }
+            }
+        }
+    }
+
+    fn drop_and_swap(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+        // Later members may have taken over what an early one was named for.
+        let mut changed = true;
+        let mut passes = 0;
+        while changed && passes < 3 {
+            changed = false;
+            passes += 1;
+            for i in (0..best.members.len()).rev() {
+                let mut rest = best.members.clone();
+                let out = rest.remove(i);
+                let without = self.score(linear, &rest)?;
+                if without.log_evidence > best.log_evidence - NATS_MIN {
+                    *best = without;
+                    changed = true;
+                    break;
+                }
+                if best.members.len() > 1
+                    && let Some(other) = self.best_addition(linear, &without, &[self.effect(&out)])?
+                    && other.log_evidence > best.log_evidence
+                {
+                    *best = other;
+                    self.extend(linear, best)?;
+                    changed = true;
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refines the numbers of a set by Gauss-Newton through the simulator, everything else floating with its tolerance.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn score(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
+        let mut at = members.to_vec();
+        let mut best: Option<Scored> = None;
+        for _ in 0..STEPS_MAX {
+            let scored = self.evaluate(linear, &at)?;
+            let mut next = at.clone();
+            let mut moved: f64 = 0.0;
+            for (column, (member, slot)) in scored.free.iter().enumerate() {
+                let (smallest, largest, signed) = self.range(&at[*member], *slot);
+                let low = if signed { -2.0 * largest } else { 0.02 * smallest };
+                let value = &mut next[*member].values[*slot];
+                let target = scored.posterior.mean[column].clamp(low, 2.0 * largest);
+                moved = moved.max((target - *value).abs() / smallest);
+                *value = target;
+            }
+            let better = best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence);
+            if better {
+                best = Some(scored);
+            }
+            if moved < 0.01 || !better {
+                break;
+            }
+            at = next;
+        }
+        best.ok_or(GapError::NoFlights)
+    }
+
+    /// Range of a number of a member.
+    pub(crate) fn range(&self, member: &Member, slot: usize) -> (f64, f64, bool) {
+        use squirrel_core::effects::{Effects, Kind};
+        let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
+        match list[slot].kind {
+            Kind::Size { smallest, largest, signed } => (smallest, largest, signed),
+            _ => (1.0, 1.0, true),
+        }
+    }
+
+    /// Evidence of a set, linearised in its free numbers where they are.
+    fn evaluate(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
+        let segments = &self.predictor.segments;
+        let about = hypothesis(self.predictor, self.catalogue, members);
+        let residual = self.predictor.residual(&about)?;
+        let mut y = linear.whitener.apply(segments, &residual);
+        let (mut own, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new());
+        let mut spikes = linear.tolerance.clone();
+        for (index, member) in members.iter().enumerate() {
+            let candidate = &self.catalogue.candidates[member.candidate];
+            self.silence(candidate.effect, &mut spikes);
+            let slots = candidate.parameters.iter().map(|p| self.catalogue.parameters[*p].slot);
+            for slot in slots.chain(candidate.shape.iter().map(|(slot, _)| *slot)) {
+                let (smallest, largest, _) = self.range(member, slot);
+                let step = 0.1 * smallest;
+                let mut moved = members.to_vec();
+                moved[index].values[slot] += step;
+                let after = self.predictor.residual(&hypothesis(self.predictor, self.catalogue, &moved))?;
+                let column: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
+                let column = linear.whitener.apply(segments, &column);
+                for (value, c) in y.iter_mut().zip(&column) {
+                    *value += c * member.values[slot];
+                }
+                own.push(column);
+                free.push((index, slot));
+                prior.push(0.6 * largest);
+            }
+            for p in &candidate.parameters {
+                spikes[*p] = 0.0;
+            }
+        }
+        let (k, n) = (own.len(), linear.columns.len());
+        let mut gram = Gram {
+            g: DMatrix::zeros(k + n, k + n),
+            b: nalgebra::DVector::zeros(k + n),
+            yy: dot(&y, &y),
+        };
+        gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram.g);
+        for i in 0..k {
+            for j in 0..k {
+                gram.g[(i, j)] = dot(&own[i], &own[j]);
+            }
+            for j in 0..n {
+                let x = dot(&own[i], &linear.columns[j]);
+                gram.g[(i, k + j)] = x;
+                gram.g[(k + j, i)] = x;
+            }
+            gram.b[i] = dot(&own[i], &y);
+        }
+        for j in 0..n {
+            gram.b[k + j] = dot(&linear.columns[j], &y);
+        }
+        prior.extend(spikes);
+        let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NoFlights)?;
+        Ok(Scored {
+            members: members.to_vec(),
+            log_evidence: posterior.log_evidence,
+            posterior,
+            gram,
+            prior,
+            free,
+            own,
+            y,
+        })
+    }
+}
