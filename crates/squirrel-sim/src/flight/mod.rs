@@ -225,7 +225,12 @@ fn truth(plant: &Plant, state: &PlantState, air: In<Ned, f64>) -> Truth {
         velocity: state.body.velocity,
         ned_from_body: state.body.ned_from_body(),
         omega: state.body.omega,
-        specific_force: specific_force(plant.vehicle(), &plant.wrench(state, air)),
+        specific_force: specific_force(
+            plant.vehicle(),
+            plant.effects(),
+            state.body.omega,
+            &plant.wrench(state, air),
+        ),
         voltage_v: state.battery.voltage_v,
         current_a: state.battery.current_a,
     }
