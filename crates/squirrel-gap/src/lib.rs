@@ -8,7 +8,8 @@
 mod error;
 pub mod find;
 mod flight;
-mod name;
+#[doc(hidden)]
+pub mod name;
 mod predictor;
 
 pub use error::GapError;

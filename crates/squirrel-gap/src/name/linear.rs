@@ -25,6 +25,8 @@ pub(crate) struct Member {
 /// A flight's predictions as a linear model about some effects.
 pub(crate) struct Linear {
     pub(crate) whitener: Whitener,
+    /// Columns as they are, in the units of the rows.
+    pub(crate) raw: Vec<Vec<f64>>,
     /// Whitened columns: the catalogue's parameters, then what the sensors of each flight may do.
     pub(crate) columns: Vec<Vec<f64>>,
     /// Tolerances of the columns, one standard deviation.
@@ -137,10 +139,11 @@ impl Linear {
             .chain(tolerance[catalogue.parameters.len()..].iter().copied())
             .collect();
         let whitener = whitener(predictor, &columns, &widest, &residual);
+        let raw = columns;
         let columns: Vec<Vec<f64>> =
-            columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
+            raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = Gram::new(&columns, &whitener.apply(&predictor.segments, &residual));
-        Ok(Self { whitener, columns, tolerance, gram })
+        Ok(Self { whitener, raw, columns, tolerance, gram })
     }
 }
 

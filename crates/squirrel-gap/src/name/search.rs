@@ -1,5 +1,6 @@
 //! The search for the set of effects with the most evidence: forward, drop, swap, each step refined through the simulator.
 
+use crate::predictor::hooks::*;
 use super::evidence::{BETA, Gram, Posterior, dot};
 use super::linear::{Linear, Member, hypothesis};
 use super::parameters::Catalogue;

@@ -77,7 +77,7 @@ impl Whitener {
 fn autoregression(series: &[&[f64]]) -> Option<([f64; ORDER], f64)> {
     let mut gram = DMatrix::zeros(ORDER, ORDER);
     let mut right = DVector::zeros(ORDER);
-    let (mut total, mut n) = (0.0, 0.0);
+    let (mut total, mut n) = (0.0_f64, 0.0_f64);
     for x in series {
         for w in x.windows(ORDER + 1) {
             for i in 0..ORDER {
@@ -102,7 +102,8 @@ fn autoregression(series: &[&[f64]]) -> Option<([f64; ORDER], f64)> {
         }
     }
     let a = gram.clone().cholesky()?.solve(&right);
-    let left = (total - 2.0 * a.dot(&right) + (a.transpose() * gram * &a)[(0, 0)]).max(1e-12 * total);
+    let left: f64 = total - 2.0 * a.dot(&right) + a.dot(&(gram * &a));
+    let left = left.max(1e-12 * total);
     let mut coefficients = [0.0; ORDER];
     coefficients.copy_from_slice(a.as_slice());
     Some((coefficients, (left / n).sqrt()))

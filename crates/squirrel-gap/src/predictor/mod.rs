@@ -10,10 +10,12 @@
 //! written twice. Forces show in the first family, sensors that lie in the second.
 
 mod commands;
+pub(crate) mod hooks;
 mod track;
 
 pub(crate) use track::{Motion, SensorErrors, Track};
 
+use crate::predictor::hooks::*;
 use crate::GapError;
 use crate::flight::filter::DERIVATIVE_REACH;
 use crate::flight::recording::Recording;
@@ -194,7 +196,7 @@ impl<'a> Predictor<'a> {
     /// Whether the sensors of a track do under the hypothesis what they do in the vehicle file.
     fn shares_motion(&self, track: &Track, hypothesis: &Hypothesis) -> bool {
         hypothesis.errors[track.flight] == SensorErrors::default()
-            && hypothesis.effects.same_sensors(&self.vehicle.effects)
+            && sensors(&hypothesis.effects) == sensors(&self.vehicle.effects)
     }
 
     /// Residual of the dynamics of a piece.
@@ -215,6 +217,13 @@ impl<'a> Predictor<'a> {
         let filtered = track.filter.apply(&predicted[reach..predicted.len() - reach], track.every);
         track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
     }
+}
+
+/// What effects do to the sensors, in numbers; each is a line in time.
+fn sensors(effects: &Effects<f64>) -> [f64; 9] {
+    let [b0, b1] = [0.0, 1.0].map(|t| effects.specific_force_bias(t).vector);
+    let [h0, h1] = [0.0, 1.0].map(|t| effects.heading_bias_rad(t));
+    [b0.x, b0.y, b0.z, b1.x, b1.y, b1.z, h0, h1, effects.gnss_latency_s()]
 }
 
 /// How long the first sample of a piece is held before it, so that rotors and servos start settled, s.
