@@ -5,8 +5,8 @@ use super::parameters::{Candidate, Catalogue};
 use super::whiten::Whitener;
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
-use nalgebra::DVector;
-use std::collections::BTreeMap;
+use nalgebra::{DMatrix, DVector};
+use squirrel_core::effects::Effects;
 
 /// Tolerance of the tilt of an attitude estimate, rad.
 const TILT_RAD: f64 = 0.006;
@@ -22,35 +22,109 @@ pub(crate) struct Member {
     pub(crate) values: Vec<f64>,
 }
 
-/// A flight's predictions as a linear model about some effects.
+/// Where the predictor is asked: effects that are named, and everything else inside its tolerance.
+#[derive(Debug, Clone)]
+pub(crate) struct Point {
+    pub(crate) members: Vec<Member>,
+    /// One number a column: the catalogue's parameters, then tilt (north, east) and height of each flight's sensors.
+    pub(crate) base: Vec<f64>,
+}
+
+/// The predictor as a linear model about a point.
 pub(crate) struct Linear {
+    pub(crate) point: Point,
     pub(crate) whitener: Whitener,
-    /// Columns as they are, in the units of the rows.
+    /// Columns as they are, in the units of the rows: as in [`Point::base`].
     pub(crate) raw: Vec<Vec<f64>>,
-    /// Whitened columns: the catalogue's parameters, then what the sensors of each flight may do.
+    /// The same, whitened.
     pub(crate) columns: Vec<Vec<f64>>,
     /// Tolerances of the columns, one standard deviation.
     pub(crate) tolerance: Vec<f64>,
-    /// Inner products of the columns.
-    pub(crate) gram: Gram,
+    /// Inner products of the whitened columns.
+    pub(crate) gram: DMatrix<f64>,
 }
 
-/// The hypothesis that a set of effects acts, on top of the vehicle file.
-pub(crate) fn hypothesis(predictor: &Predictor, catalogue: &Catalogue, members: &[Member]) -> Hypothesis {
+/// Numbers of a flight's sensors among the columns.
+const SENSOR_COLUMNS: usize = 3;
+
+/// The hypothesis of a point, on top of the vehicle file.
+///
+/// # Errors
+/// A mass or inertia that no body has.
+pub(crate) fn hypothesis(
+    predictor: &Predictor,
+    catalogue: &Catalogue,
+    point: &Point,
+) -> Result<Hypothesis, GapError> {
     let mut all = predictor.nominal();
-    for member in members {
-        set(&mut all, &catalogue.candidates[member.candidate], &member.values);
+    for member in &point.members {
+        if let Some(found) = all.effects.insert(catalogue.candidates[member.candidate].effect) {
+            found.values.copy_from_slice(&member.values);
+        }
     }
-    all
+    let mut sides = [0.0; 2];
+    for (parameter, &x) in catalogue.parameters.iter().zip(&point.base) {
+        if x == 0.0 {
+            continue;
+        }
+        let candidate = &catalogue.candidates[parameter.candidate];
+        if candidate.effect == "wing_asymmetry" {
+            sides[candidate.fixed[0].1 as usize] = x;
+            continue;
+        }
+        let mut alone = catalogue.absent(predictor, parameter.candidate);
+        alone.values[parameter.slot] += x;
+        // What changes the airframe's numbers does so in a row, so that two rotors can be weak; the rest adds up.
+        let mut effects = Effects::none();
+        if let Some(found) = effects.insert(candidate.effect) {
+            found.values.copy_from_slice(&alone.values);
+        }
+        let altered = effects.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
+        if altered != all.vehicle {
+            all.vehicle = altered;
+        } else {
+            add(&mut all.effects, candidate, parameter.slot, x);
+        }
+    }
+    // A loss on both sides is a change of the gain and a loss on one side.
+    if sides != [0.0; 2] {
+        let of = |effect: &str| catalogue.candidates.iter().find(|c| c.effect == effect);
+        let gain = match of("wing_asymmetry") {
+            Some(left) if !all.effects.has("wing_asymmetry") => {
+                add(&mut all.effects, left, 1, sides[0] - sides[1]);
+                -sides[1]
+            }
+            _ => -0.5 * (sides[0] + sides[1]),
+        };
+        if let Some(membrane) = of("wing_membrane") {
+            add(&mut all.effects, membrane, 0, gain);
+        }
+    }
+    for (errors, x) in all.errors.iter_mut().zip(point.base[catalogue.parameters.len()..].chunks_exact(SENSOR_COLUMNS)) {
+        errors.tilt_rad = [x[0], x[1]];
+        errors.height_m = x[2];
+    }
+    Ok(all)
 }
 
-fn set(hypothesis: &mut Hypothesis, candidate: &Candidate, values: &[f64]) {
-    if let Some(found) = hypothesis.effects.insert(candidate.effect) {
-        found.values.copy_from_slice(values);
+fn add(effects: &mut Effects<f64>, candidate: &Candidate, slot: usize, x: f64) {
+    let present = effects.has(candidate.effect);
+    if let Some(found) = effects.insert(candidate.effect) {
+        if !present {
+            for (slot, value) in &candidate.fixed {
+                found.values[*slot] = *value;
+            }
+        }
+        found.values[slot] += x;
     }
 }
 
 impl Catalogue {
+    /// Numbers beside the members in a [`Point`].
+    pub(crate) fn columns(&self, predictor: &Predictor) -> usize {
+        self.parameters.len() + SENSOR_COLUMNS * predictor.names.len()
+    }
+
     /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the same choices.
     pub(crate) fn absent(&self, predictor: &Predictor, candidate: usize) -> Member {
         let own = &self.candidates[candidate];
@@ -69,81 +143,56 @@ impl Catalogue {
 }
 
 impl Linear {
-    /// Predicts every parameter once about `members`, fits the whitening to what the fullest model leaves, and whitens.
+    /// Predicts every parameter once about a point, fits the whitening to what the fullest model leaves, and whitens.
     ///
     /// # Errors
     /// What the predictor says.
     pub(crate) fn about(
         predictor: &Predictor,
         catalogue: &Catalogue,
-        members: &[Member],
+        point: &Point,
     ) -> Result<Self, GapError> {
-        let about = hypothesis(predictor, catalogue, members);
-        let residual = predictor.residual(&about)?;
-        let mut columns = Vec::new();
-        let mut tolerance = Vec::new();
-        // A second choice of an effect that acts already (another weak rotor) cannot act beside it; it is differenced
-        // against the set without that effect.
-        let mut without: BTreeMap<&str, (Hypothesis, Vec<f64>)> = BTreeMap::new();
-        for (index, parameter) in catalogue.parameters.iter().enumerate() {
-            let candidate = &catalogue.candidates[parameter.candidate];
-            let acting = members.iter().find(|m| catalogue.candidates[m.candidate].effect == candidate.effect);
-            let mut start = match acting {
-                Some(member) if member.candidate == parameter.candidate => member.clone(),
-                _ => catalogue.absent(predictor, parameter.candidate),
-            };
-            let (mut changed, before) = match acting {
-                Some(member) if member.candidate != parameter.candidate => {
-                    if !without.contains_key(candidate.effect) {
-                        let rest: Vec<Member> = members.iter().filter(|m| *m != member).cloned().collect();
-                        let rest = hypothesis(predictor, catalogue, &rest);
-                        let rows = predictor.residual(&rest)?;
-                        without.insert(candidate.effect, (rest, rows));
-                    }
-                    let (rest, rows) = &without[candidate.effect];
-                    (rest.clone(), rows)
+        let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
+        let n = catalogue.columns(predictor);
+        let (mut raw, mut tolerance, mut widest) = (Vec::new(), Vec::new(), Vec::new());
+        for column in 0..n {
+            let mut moved = point.clone();
+            let parameter = catalogue.parameters.get(column);
+            let sensor = column.wrapping_sub(catalogue.parameters.len());
+            let member = parameter.and_then(|p| {
+                moved.members.iter_mut().find(|m| m.candidate == p.candidate).map(|m| &mut m.values[p.slot])
+            });
+            // From nothing, a secant to a typical size: some effects have no slope there. From a size, a small step.
+            let step = match (parameter, member) {
+                (Some(p), Some(value)) => {
+                    *value += 0.1 * p.smallest;
+                    0.1 * p.smallest
                 }
-                _ => (about.clone(), &residual),
+                (Some(p), None) => {
+                    let typical = (p.smallest * p.largest).sqrt();
+                    moved.base[column] += typical;
+                    typical
+                }
+                (None, _) => {
+                    let sd = [TILT_RAD, TILT_RAD, HEIGHT_M][sensor % SENSOR_COLUMNS];
+                    moved.base[column] += sd;
+                    sd
+                }
             };
-            // From zero, a secant to a typical size: some effects have no slope at zero. From a size, a small step.
-            let value = start.values[parameter.slot];
-            let step = if value == 0.0 {
-                (parameter.smallest * parameter.largest).sqrt()
-            } else {
-                0.1 * parameter.smallest
-            };
-            start.values[parameter.slot] += step;
-            set(&mut changed, candidate, &start.values);
-            let after = predictor.residual(&changed)?;
-            columns.push(before.iter().zip(&after).map(|(b, a)| (b - a) / step).collect::<Vec<f64>>());
-            tolerance.push(catalogue.parameters[index].tolerance);
+            let flight = parameter.is_none().then_some(sensor / SENSOR_COLUMNS);
+            let mut after = residual.clone();
+            predictor.residual_of(&hypothesis(predictor, catalogue, &moved)?, flight, &mut after)?;
+            for (after, before) in after.iter_mut().zip(&residual) {
+                *after = (before - *after) / step;
+            }
+            raw.push(after);
+            tolerance.push(parameter.map_or(step, |p| p.tolerance));
+            widest.push(parameter.map_or(step, |p| p.slab));
         }
-        for flight in 0..predictor.names.len() {
-            let mut error = |sd: f64, change: fn(&mut crate::predictor::SensorErrors, f64)| {
-                let mut changed = about.clone();
-                change(&mut changed.errors[flight], sd);
-                let mut after = residual.clone();
-                predictor.residual_of(&changed, Some(flight), &mut after)?;
-                columns.push(residual.iter().zip(&after).map(|(b, a)| (b - a) / sd).collect());
-                tolerance.push(sd);
-                Ok::<(), GapError>(())
-            };
-            error(TILT_RAD, |e, x| e.tilt_rad[0] += x)?;
-            error(TILT_RAD, |e, x| e.tilt_rad[1] += x)?;
-            error(HEIGHT_M, |e, x| e.height_m += x)?;
-        }
-        let widest: Vec<f64> = catalogue
-            .parameters
-            .iter()
-            .map(|p| p.slab)
-            .chain(tolerance[catalogue.parameters.len()..].iter().copied())
-            .collect();
-        let whitener = whitener(predictor, &columns, &widest, &residual);
-        let raw = columns;
-        let columns: Vec<Vec<f64>> =
-            raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
-        let gram = Gram::new(&columns, &whitener.apply(&predictor.segments, &residual));
-        Ok(Self { whitener, raw, columns, tolerance, gram })
+        let whitener = whitener(predictor, &raw, &widest, &residual);
+        let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
+        let gram = Gram::new(&columns, &vec![0.0; whitener.rows()]).g;
+        Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram })
     }
 }
 

@@ -30,11 +30,18 @@ pub fn explore(vehicle: &squirrel_sim::vehicle_file::VehicleFile, flights: &[(St
         let _ = writeln!(out, "    rank {} {:.1} {:?}", search.effect(&m), e - found.null.log_evidence, m.values);
     }
     let best = &found.best;
-    let h = linear::hypothesis(&predictor, &catalogue, &best.members);
-    let r = predictor.residual(&h).unwrap();
-    let k = best.free.len();
-    let spikes = best.posterior.mean.rows(k, found.linear.raw.len()).into_owned();
-    let e = linear::subtract(&r, &found.linear.raw, &spikes);
+    let point = search.settled(best);
+    let h = linear::hypothesis(&predictor, &catalogue, &point).unwrap();
+    let e = predictor.residual(&h).unwrap();
+    let spikes = point.base;
+    for (i, x) in spikes.iter().enumerate() {
+        let z = x / found.linear.tolerance[i];
+        if z.abs() > 1.5 {
+            let name = catalogue.parameters.get(i).map_or("sensor".to_owned(), |p| format!("{} {} {:?}", catalogue.candidates[p.candidate].effect, p.key, catalogue.candidates[p.candidate].fixed));
+            let _ = write!(out, "   spike {name} {x:.4} = {z:.1} sd;");
+        }
+    }
+    let _ = writeln!(out);
     for f in 0..predictor.names.len() {
         let _ = write!(out, "  LF {f}: ");
         for c in 0..9 {

@@ -13,7 +13,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 /// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.
 const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
 /// Width of the slab over the largest plausible size.
-const SLAB_OF_LARGEST: f64 = 0.6;
+pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
 /// Lengths at which a payload is looked for, m: its frequency is not linear in anything.
 const PAYLOAD_LENGTHS_M: [f64; 5] = [0.3, 0.4, 0.52, 0.68, 0.9];
 

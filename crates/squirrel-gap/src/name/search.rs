@@ -2,10 +2,10 @@
 
 use crate::predictor::hooks::*;
 use super::evidence::{BETA, Gram, Posterior, dot};
-use super::linear::{Linear, Member, hypothesis};
-use super::parameters::Catalogue;
+use super::linear::{Linear, Member, Point, hypothesis};
+use super::parameters::{Catalogue, SLAB_OF_LARGEST};
 use crate::GapError;
-use crate::predictor::Predictor;
+use crate::predictor::{Hypothesis, Predictor};
 use nalgebra::DMatrix;
 
 /// What an effect must be worth to be named, nats.
@@ -58,22 +58,34 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn run(&self) -> Result<Found, GapError> {
-        let mut members: Vec<Member> = Vec::new();
+        let mut point = Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] };
         let mut round = 1;
         loop {
-            let linear = Linear::about(self.predictor, self.catalogue, &members)?;
+            let linear = Linear::about(self.predictor, self.catalogue, &point)?;
             (self.progress)();
             let null = self.score(&linear, &[])?;
-            let mut best = if members.is_empty() { self.score(&linear, &[])? } else { self.score(&linear, &members)? };
+            let mut best = self.score(&linear, &point.members)?;
             self.extend(&linear, &mut best)?;
             self.drop_and_swap(&linear, &mut best)?;
-            let settled = self.same_set(&best.members, &members);
+            let settled = round > 1 && self.same_set(&best.members, &point.members);
             if settled || round == ROUNDS_MAX {
                 return Ok(Found { linear, null, best });
             }
-            members.clone_from(&best.members);
+            point = self.settled(&best);
             round += 1;
         }
+    }
+
+    /// The point at which a set explains most: its members, and everything else where it most likely is.
+    pub(crate) fn settled(&self, set: &Scored) -> Point {
+        let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
+        for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
+            // These two are far from linear where they are small.
+            if ["ground_effect", "payload_swing"].contains(&self.catalogue.candidates[parameter.candidate].effect) {
+                *x = 0.0;
+            }
+        }
+        Point { members: set.members.clone(), base }
     }
 
     fn same_set(&self, a: &[Member], b: &[Member]) -> bool {
@@ -144,7 +156,13 @@ impl Search<'_> {
                 continue;
             }
             let mut prior = set.prior.clone();
-            self.silence(candidate.effect, &mut prior[offset..]);
+            if candidate.effect == "payload_swing" {
+                for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
+                    if self.catalogue.candidates[parameter.candidate].effect == "payload_swing" {
+                        prior[offset + p] = 0.0;
+                    }
+                }
+            }
             for p in &candidate.parameters {
                 prior[offset + p] = self.catalogue.parameters[*p].slab;
             }
@@ -177,17 +195,8 @@ impl Search<'_> {
         self.catalogue.candidates[member.candidate].effect
     }
 
-    /// Takes the spikes of an effect out.
-    fn silence(&self, effect: &str, prior: &mut [f64]) {
-        for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
-            if self.catalogue.candidates[parameter.candidate].effect == effect {
-                // Other rotors may still be off by their tolerance; the payload is one thing at several lengths.
-                let own = effect == "payload_swing";
-                if own {
-                    prior[p] = 0.0;
-                }
-            }
-        }
+    fn hypothesis(&self, point: &Point) -> Result<Hypothesis, GapError> {
+        hypothesis(self.predictor, self.catalogue, point)
     }
 
     fn drop_and_swap(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
@@ -264,32 +273,44 @@ impl Search<'_> {
     /// Evidence of a set, linearised in its free numbers where they are.
     fn evaluate(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
         let segments = &self.predictor.segments;
-        let about = hypothesis(self.predictor, self.catalogue, members);
-        let residual = self.predictor.residual(&about)?;
-        let mut y = linear.whitener.apply(segments, &residual);
-        let (mut own, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new());
+        let mut point = Point { members: members.to_vec(), base: linear.point.base.clone() };
         let mut spikes = linear.tolerance.clone();
+        for member in members {
+            let candidate = &self.catalogue.candidates[member.candidate];
+            for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
+                let other = &self.catalogue.candidates[parameter.candidate];
+                // Another rotor may still be off by its tolerance; the payload is one thing at several lengths.
+                let same = parameter.candidate == member.candidate
+                    || (other.effect == candidate.effect && other.fixed == candidate.fixed);
+                if same {
+                    spikes[p] = 0.0;
+                    point.base[p] = 0.0;
+                }
+            }
+        }
+        let residual = self.predictor.residual(&self.hypothesis(&point)?)?;
+        let mut y = linear.whitener.apply(segments, &residual);
+        for (column, x) in linear.columns.iter().zip(&point.base) {
+            if *x != 0.0 {
+                add_scaled(&mut y, column, *x);
+            }
+        }
+        let (mut own, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new());
         for (index, member) in members.iter().enumerate() {
             let candidate = &self.catalogue.candidates[member.candidate];
-            self.silence(candidate.effect, &mut spikes);
             let slots = candidate.parameters.iter().map(|p| self.catalogue.parameters[*p].slot);
             for slot in slots.chain(candidate.shape.iter().map(|(slot, _)| *slot)) {
                 let (smallest, largest, _) = self.range(member, slot);
                 let step = 0.1 * smallest;
-                let mut moved = members.to_vec();
-                moved[index].values[slot] += step;
-                let after = self.predictor.residual(&hypothesis(self.predictor, self.catalogue, &moved))?;
+                let mut moved = point.clone();
+                moved.members[index].values[slot] += step;
+                let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
                 let column: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
                 let column = linear.whitener.apply(segments, &column);
-                for (value, c) in y.iter_mut().zip(&column) {
-                    *value += c * member.values[slot];
-                }
+                add_scaled(&mut y, &column, member.values[slot]);
                 own.push(column);
                 free.push((index, slot));
-                prior.push(0.6 * largest);
-            }
-            for p in &candidate.parameters {
-                spikes[*p] = 0.0;
+                prior.push(SLAB_OF_LARGEST * largest);
             }
         }
         let (k, n) = (own.len(), linear.columns.len());
@@ -298,7 +319,7 @@ impl Search<'_> {
             b: nalgebra::DVector::zeros(k + n),
             yy: dot(&y, &y),
         };
-        gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram.g);
+        gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram);
         for i in 0..k {
             for j in 0..k {
                 gram.g[(i, j)] = dot(&own[i], &own[j]);
@@ -325,5 +346,11 @@ impl Search<'_> {
             own,
             y,
         })
+    }
+}
+
+fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {
+    for (y, c) in y.iter_mut().zip(column) {
+        *y += c * x;
     }
 }

@@ -22,6 +22,7 @@ use crate::flight::recording::Recording;
 use commands::Commands;
 use nalgebra::Vector6;
 use squirrel_core::effects::Effects;
+use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::plant::{Plant, PlantState};
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -54,9 +55,10 @@ pub(crate) struct Segment {
     pub(crate) step_s: f64,
 }
 
-/// A hypothesis: the effects that act, and what the sensors of each flight do.
+/// A hypothesis: the airframe, the effects that act, and what the sensors of each flight do.
 #[derive(Debug, Clone)]
 pub(crate) struct Hypothesis {
+    pub(crate) vehicle: Vehicle<f64>,
     pub(crate) effects: Effects<f64>,
     pub(crate) errors: Vec<SensorErrors>,
 }
@@ -124,6 +126,7 @@ impl<'a> Predictor<'a> {
     /// The hypothesis that the vehicle file is right.
     pub(crate) fn nominal(&self) -> Hypothesis {
         Hypothesis {
+            vehicle: self.vehicle.vehicle,
             effects: self.vehicle.effects,
             errors: vec![SensorErrors::default(); self.names.len()],
         }
@@ -152,16 +155,15 @@ impl<'a> Predictor<'a> {
         flight: Option<usize>,
         rows: &mut [f64],
     ) -> Result<(), GapError> {
-        let problem = |problem: String| GapError::Vehicle { vehicle: self.vehicle.name.clone(), problem };
         // The step matters to `step` alone; here the plant is only led.
         let plant = Plant::new(
-            self.vehicle.vehicle,
+            hypothesis.vehicle,
             hypothesis.effects,
             self.vehicle.wing.clone(),
             None,
             squirrel_sim::flight::PLANT_STEP_US as f64 * 1e-6,
         )
-        .map_err(problem)?;
+        .map_err(|problem| self.refused(problem))?;
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
             let skip = flight.is_some_and(|flight| flight != track.flight);
@@ -191,6 +193,11 @@ impl<'a> Predictor<'a> {
             }
         }
         Ok(())
+    }
+
+    /// A hypothesis that the plant cannot be stepped with.
+    pub(crate) fn refused(&self, problem: String) -> GapError {
+        GapError::Vehicle { vehicle: self.vehicle.name.clone(), problem }
     }
 
     /// Whether the sensors of a track do under the hypothesis what they do in the vehicle file.
