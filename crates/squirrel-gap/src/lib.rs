@@ -8,6 +8,7 @@
 mod error;
 pub mod find;
 mod flight;
+mod leftover;
 #[doc(hidden)]
 pub mod name;
 mod predictor;

@@ -206,6 +206,11 @@ impl<'a> Recording<'a> {
         })
     }
 
+    /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard deviation.
+    pub(crate) fn imu_noise(&self) -> [Vector3<f64>; 2] {
+        [self.specific_force.white_deviation(), self.omega.white_deviation()]
+    }
+
     /// Velocity over ground, m/s, if logged.
     pub(crate) fn velocity_ned(&self, time_s: f64) -> Option<Vector3<f64>> {
         self.velocity.as_ref().map(|v| v.vector(time_s))

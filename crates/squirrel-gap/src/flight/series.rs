@@ -112,6 +112,18 @@ impl Series {
         self.time_s.iter().copied().zip(self.values.chunks_exact(self.width))
     }
 
+    /// Deviation of the white part of three numbers a sample: that of the third difference, which motion hardly enters.
+    pub(crate) fn white_deviation(&self) -> Vector3<f64> {
+        let at = |i| Vector3::from_column_slice(self.row(i));
+        let n = self.time_s.len().saturating_sub(3);
+        let sum: Vector3<f64> = (0..n)
+            .map(|i| at(i + 3) - at(i + 2) * 3.0 + at(i + 1) * 3.0 - at(i))
+            .map(|d| d.component_mul(&d))
+            .sum();
+        // 1 + 9 + 9 + 1
+        (sum / (20 * n.max(1)) as f64).map(f64::sqrt)
+    }
+
     /// Time of the first sample, s.
     pub(crate) fn start_s(&self) -> f64 {
         self.time_s[0]

@@ -42,19 +42,15 @@ pub fn explore(vehicle: &squirrel_sim::vehicle_file::VehicleFile, flights: &[(St
         }
     }
     let _ = writeln!(out);
-    for f in 0..predictor.names.len() {
-        let _ = write!(out, "  LF {f}: ");
-        for c in 0..9 {
-            for s in predictor.segments.iter().filter(|s| s.channel == c && s.flight == f) {
-                let x = &e[s.rows.clone()];
-                let n = if c < 6 { 8 } else { 4 };
-                let means: Vec<f64> = x.chunks_exact(n).map(|w| w.iter().sum::<f64>() / n as f64).collect();
-                let rms = (means.iter().map(|m| m * m).sum::<f64>() / means.len() as f64).sqrt();
-                let all = (x.iter().map(|m| m * m).sum::<f64>() / x.len() as f64).sqrt();
-                let _ = write!(out, "{rms:.4}/{all:.3} ");
-            }
-        }
-        let _ = writeln!(out);
+    let nominal = r;
+    let motions: Vec<_> = (0..predictor.tracks.len()).map(|i| predictor.motion(i, &h)).collect();
+    let wind: Vec<usize> = (0..catalogue.parameters.len()).filter(|i| catalogue.parameters[*i].key.starts_with("wind_")).collect();
+    let t2 = std::time::Instant::now();
+    let left = crate::leftover::leftover(&predictor, &motions, &e, &nominal, [&found.linear.raw[wind[0]], &found.linear.raw[wind[1]]], 0.12);
+    let _ = writeln!(out, "  leftover {:.0} ms {:?} goes with {:?} {:?} line {:?} gust {}", t2.elapsed().as_secs_f64() * 1e3, left.excess, left.goes_with(), &left.families[..left.families.len().min(3)], left.line, left.looks_like_gust());
+    for b in &left.bands {
+        let _ = write!(out, " {}{} {:.2} {:.2};", b.flight, b.channel, b.slow / b.slow_floor, b.whole / b.whole_floor);
     }
+    let _ = writeln!(out);
     out
 }

@@ -26,6 +26,14 @@ impl Commands {
         Self { rotor: rotor.collect(), wing: wing.collect(), began_s: recording.pieces[0].0 }
     }
 
+    /// The commands with the last stamps before a time.
+    pub(crate) fn at(&self, time_s: f64) -> (PerRotor<f64>, [f64; 2]) {
+        let rotor = self.rotor.partition_point(|(t, _)| *t <= time_s + SNAP_S).saturating_sub(1);
+        let wing = self.wing.partition_point(|(t, _)| *t <= time_s + SNAP_S);
+        let wing = wing.checked_sub(1).map_or([0.0; 2], |i| self.wing[i].1);
+        (self.rotor[rotor].1, wing)
+    }
+
     /// A clock that runs forwards from a time.
     pub(crate) fn clock(&self, effects: &Effects<f64>, time_s: f64) -> Clock<'_> {
         // Stamps run as s = clock(t), a line through the beginning of the flight; a command acts a latency after its time.

@@ -195,6 +195,14 @@ impl<'a> Predictor<'a> {
         Ok(())
     }
 
+    /// Mean commanded rotor speed over top speed, and mean wing command, 0 to 1, at a time of a flight.
+    pub(crate) fn commanded(&self, flight: usize, time_s: f64) -> (f64, f64) {
+        let p = self.vehicle.vehicle.parameters();
+        let (rotor, wing) = self.commands[flight].at(time_s);
+        let speed: f64 = rotor[..p.rotor_count].iter().map(|u| p.propulsion.target_speed_rad_s(*u)).sum();
+        (speed / (p.rotor_count as f64 * p.propulsion.speed_max_rad_s), 0.5 * (wing[0] + wing[1]))
+    }
+
     /// A hypothesis that the plant cannot be stepped with.
     pub(crate) fn refused(&self, problem: String) -> GapError {
         GapError::Vehicle { vehicle: self.vehicle.name.clone(), problem }

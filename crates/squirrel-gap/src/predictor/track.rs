@@ -43,6 +43,8 @@ pub(crate) struct Track {
     pub(crate) began_s: f64,
     pub(crate) time_s: Vec<f64>,
     pub(crate) voltage_v: Vec<f64>,
+    /// White noise of accelerometer, m/s^2, and gyroscope, rad/s, one standard deviation.
+    pub(crate) imu_noise: [Vector3<f64>; 2],
     /// Samples of the grid to one of the residual.
     pub(crate) every: usize,
     pub(crate) filter: LowPass,
@@ -91,6 +93,7 @@ impl Track {
             flight,
             period_s,
             began_s: recording.pieces[0].0,
+            imu_noise: recording.imu_noise(),
             every,
             measured: filter.apply(&raw, every),
             filter,
