@@ -14,23 +14,23 @@ pub(super) struct Family {
 }
 
 /// Where the vehicle was in one block of the leftover.
-pub(super) struct Moment {
-    pub(super) flight: usize,
-    pub(super) time_s: f64,
-    pub(super) duration_s: f64,
-    pub(super) position: Vector3<f64>,
-    pub(super) velocity_body: Vector3<f64>,
-    pub(super) velocity_ned: Vector3<f64>,
-    pub(super) omega: Vector3<f64>,
-    pub(super) heading_rad: f64,
-    pub(super) ned_from_body: nalgebra::Matrix3<f64>,
-    pub(super) throttle: f64,
-    pub(super) wings: f64,
-    pub(super) voltage_v: f64,
+pub(crate) struct Moment {
+    pub(crate) flight: usize,
+    pub(crate) time_s: f64,
+    pub(crate) duration_s: f64,
+    pub(crate) position: Vector3<f64>,
+    pub(crate) velocity_body: Vector3<f64>,
+    pub(crate) velocity_ned: Vector3<f64>,
+    pub(crate) omega: Vector3<f64>,
+    pub(crate) heading_rad: f64,
+    pub(crate) ned_from_body: nalgebra::Matrix3<f64>,
+    pub(crate) throttle: f64,
+    pub(crate) wings: f64,
+    pub(crate) voltage_v: f64,
 }
 
 /// Means over a block of rows of the residual.
-pub(super) fn moment(
+pub(crate) fn moment(
     predictor: &Predictor,
     track: &Track,
     motion: &Motion,

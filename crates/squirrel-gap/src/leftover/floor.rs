@@ -12,15 +12,15 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 /// Correlation time of turbulence, s.
-const TURBULENCE_S: f64 = 1.5;
+pub(crate) const TURBULENCE_S: f64 = 1.5;
 /// What the smoothed GNSS velocity is off by, and for how long, m/s and s.
 const VELOCITY_ERROR_M_S: f64 = 0.03;
 const VELOCITY_ERROR_S: f64 = 0.5;
 
 /// Draws of the residual that noise alone would leave; only the rows of the dynamics are filled.
-pub(super) fn draws(
+pub(crate) fn draws(
     predictor: &Predictor,
-    wind_columns: [&[f64]; 2],
+    wind_columns: &[Vec<f64>; 2],
     turbulence_m_s: f64,
     count: usize,
 ) -> Vec<Vec<f64>> {

@@ -9,7 +9,8 @@ mod features;
 pub(crate) mod floor;
 
 use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor};
-use features::{Moment, families, moment, predicted_share};
+pub(crate) use features::{Moment, moment};
+use features::{families, predicted_share};
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
 const BLOCK: usize = 8;
@@ -33,6 +34,8 @@ pub(crate) struct Band {
     pub(crate) whole: f64,
     /// The same of the noise.
     pub(crate) slow_floor: f64,
+    /// The slow part of the vehicle as it was.
+    pub(crate) slow_nominal: f64,
     pub(crate) whole_floor: f64,
 }
 
@@ -67,6 +70,12 @@ impl Leftover {
         }
     }
 
+    /// The channels that stand out, in words.
+    pub(crate) fn channels(&self) -> String {
+        let names: Vec<&str> = self.excess.iter().map(|(channel, _)| CHANNELS[*channel]).collect();
+        format!("nothing that was tried; it stands out in {}", names.join(", "))
+    }
+
     /// Whether only horizontal force stands out, and nothing predicts it.
     pub(crate) fn looks_like_gust(&self) -> bool {
         self.is_real()
@@ -84,7 +93,7 @@ pub(crate) fn leftover(
     motions: &[Motion],
     left: &[f64],
     nominal: &[f64],
-    wind_columns: [&[f64]; 2],
+    wind_columns: &[Vec<f64>; 2],
     turbulence_m_s: f64,
 ) -> Leftover {
     let draws = floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS);
@@ -104,6 +113,7 @@ pub(crate) fn leftover(
             slow: rms_of_means(&own),
             whole: rms(&own),
             slow_floor: mean(rms_of_means),
+            slow_nominal: rms_of_means(&rows(nominal)),
             whole_floor: mean(rms),
         };
         let allowed = |floor: f64, ratio: f64, explained: f64| {

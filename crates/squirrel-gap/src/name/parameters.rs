@@ -6,7 +6,7 @@
 
 use crate::predictor::hooks::*;
 use crate::GapError;
-use squirrel_core::effects::{EffectParameter, Effects, Kind};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind};
 use squirrel_sim::plant::WingPlant;
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -82,10 +82,15 @@ impl Catalogue {
         fixed: Vec<(usize, f64)>,
         shape: &[(&str, f64)],
     ) -> Result<(), GapError> {
+        let standard = list.iter().find_map(|p| match p.kind {
+            Kind::OneOf(names) if p.key == FORM => Some(names[0]),
+            _ => None,
+        });
+        let standard = standard.unwrap_or_default();
         let (candidate, mut own, mut started) = (self.candidates.len(), Vec::new(), Vec::new());
         for (slot, parameter) in list.iter().enumerate() {
             let Kind::Size { smallest, largest, signed } = parameter.kind else { continue };
-            if !parameter.in_standard_form() {
+            if !parameter.exists_in(standard) {
                 continue;
             }
             if let Some((_, start)) = shape.iter().find(|(key, _)| *key == parameter.key) {
@@ -115,7 +120,7 @@ fn choices(list: &[EffectParameter], rotors: usize) -> Vec<Vec<(usize, f64)>> {
     for (slot, parameter) in list.iter().enumerate() {
         let values: Vec<f64> = match parameter.kind {
             Kind::Rotor => (1..=rotors).map(|i| i as f64).collect(),
-            Kind::OneOf(_) if parameter.key == "form" => vec![0.0],
+            Kind::OneOf(_) if parameter.key == FORM => vec![0.0],
             Kind::OneOf(names) => (0..names.len()).map(|i| i as f64).collect(),
             Kind::Size { .. } => continue,
         };

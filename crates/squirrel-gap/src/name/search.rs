@@ -1,7 +1,7 @@
 //! The search for the set of effects with the most evidence: forward, drop, swap, each step refined through the simulator.
 
 use crate::predictor::hooks::*;
-use super::evidence::{BETA, Gram, Posterior, dot};
+use super::evidence::{Gram, Posterior, dot};
 use super::linear::{Linear, Member, Point, hypothesis};
 use super::parameters::{Catalogue, SLAB_OF_LARGEST};
 use crate::GapError;
@@ -43,6 +43,8 @@ pub(crate) struct Scored {
 pub(crate) struct Search<'a> {
     pub(crate) predictor: &'a Predictor<'a>,
     pub(crate) catalogue: &'a Catalogue,
+    /// Tempering of the likelihood.
+    pub(crate) beta: f64,
     /// Called after each piece of work.
     pub(crate) progress: &'a dyn Fn(),
 }
@@ -52,6 +54,8 @@ pub(crate) struct Found {
     pub(crate) linear: Linear,
     pub(crate) null: Scored,
     pub(crate) best: Scored,
+    /// What each member is worth: evidence of the set over the set without it, nats.
+    pub(crate) worth: Vec<f64>,
 }
 
 impl Search<'_> {
@@ -69,7 +73,8 @@ impl Search<'_> {
             self.drop_and_swap(&linear, &mut best)?;
             let settled = round > 1 && self.same_set(&best.members, &point.members);
             if settled || round == ROUNDS_MAX {
-                return Ok(Found { linear, null, best });
+                let worth = self.worth(&linear, &null, &best)?;
+                return Ok(Found { linear, null, best, worth });
             }
             point = self.settled(&best);
             round += 1;
@@ -86,6 +91,18 @@ impl Search<'_> {
             }
         }
         Point { members: set.members.clone(), base }
+    }
+
+    fn worth(&self, linear: &Linear, null: &Scored, best: &Scored) -> Result<Vec<f64>, GapError> {
+        (0..best.members.len())
+            .map(|i| {
+                let mut rest = best.members.clone();
+                rest.remove(i);
+                let without =
+                    if rest.is_empty() { null.log_evidence } else { self.score(linear, &rest)?.log_evidence };
+                Ok(best.log_evidence - without)
+            })
+            .collect()
     }
 
     fn same_set(&self, a: &[Member], b: &[Member]) -> bool {
@@ -111,6 +128,8 @@ impl Search<'_> {
                 break;
             }
             *best = next;
+            // Before a second effect explains what the first leaves, the first may have another form.
+            self.choose_forms(linear, best)?;
         }
         Ok(())
     }
@@ -123,7 +142,7 @@ impl Search<'_> {
         except: &[&str],
     ) -> Result<Option<Scored>, GapError> {
         let mut best: Option<Scored> = None;
-        for member in self.ranked(linear, set, except).into_iter().take(REFINED) {
+        for member in self.ranked(set, except).into_iter().take(REFINED) {
             let members = [set.members.as_slice(), &[member.1]].concat();
             let scored = self.score(linear, &members)?;
             (self.progress)();
@@ -147,7 +166,7 @@ impl Search<'_> {
     }
 
     /// Candidates by the evidence that a linear model gives them beside a set, best first, with their linear numbers.
-    pub(crate) fn ranked(&self, linear: &Linear, set: &Scored, except: &[&str]) -> Vec<(f64, Member)> {
+    pub(crate) fn ranked(&self, set: &Scored, except: &[&str]) -> Vec<(f64, Member)> {
         let offset = set.free.len();
         let mut all = Vec::new();
         for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
@@ -166,7 +185,7 @@ impl Search<'_> {
             for p in &candidate.parameters {
                 prior[offset + p] = self.catalogue.parameters[*p].slab;
             }
-            let Some(posterior) = set.gram.posterior(&prior, BETA) else { continue };
+            let Some(posterior) = set.gram.posterior(&prior, self.beta) else { continue };
             let mut member = self.catalogue.absent(self.predictor, index);
             let mut plausible = true;
             for p in &candidate.parameters {
@@ -187,7 +206,6 @@ impl Search<'_> {
             payloads += usize::from(self.effect(m) == "payload_swing");
             self.effect(m) != "payload_swing" || payloads <= 2
         });
-        let _ = linear;
         all
     }
 
@@ -297,9 +315,7 @@ impl Search<'_> {
         }
         let (mut own, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new());
         for (index, member) in members.iter().enumerate() {
-            let candidate = &self.catalogue.candidates[member.candidate];
-            let slots = candidate.parameters.iter().map(|p| self.catalogue.parameters[*p].slot);
-            for slot in slots.chain(candidate.shape.iter().map(|(slot, _)| *slot)) {
+            for slot in self.free_slots(member) {
                 let (smallest, largest, _) = self.range(member, slot);
                 let step = 0.1 * smallest;
                 let mut moved = point.clone();
@@ -335,7 +351,7 @@ impl Search<'_> {
             gram.b[k + j] = dot(&linear.columns[j], &y);
         }
         prior.extend(spikes);
-        let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NoFlights)?;
+        let posterior = gram.posterior(&prior, self.beta).ok_or(GapError::NoFlights)?;
         Ok(Scored {
             members: members.to_vec(),
             log_evidence: posterior.log_evidence,

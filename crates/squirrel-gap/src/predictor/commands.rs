@@ -26,6 +26,10 @@ impl Commands {
         Self { rotor: rotor.collect(), wing: wing.collect(), began_s: recording.pieces[0].0 }
     }
 
+    pub(crate) fn has_wing(&self) -> bool {
+        !self.wing.is_empty()
+    }
+
     /// The commands with the last stamps before a time.
     pub(crate) fn at(&self, time_s: f64) -> (PerRotor<f64>, [f64; 2]) {
         let rotor = self.rotor.partition_point(|(t, _)| *t <= time_s + SNAP_S).saturating_sub(1);

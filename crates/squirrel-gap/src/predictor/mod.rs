@@ -21,6 +21,7 @@ use crate::flight::filter::DERIVATIVE_REACH;
 use crate::flight::recording::Recording;
 use commands::Commands;
 use nalgebra::Vector6;
+use squirrel_core::dynamics::State;
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::log::FlightLog;
@@ -156,14 +157,7 @@ impl<'a> Predictor<'a> {
         rows: &mut [f64],
     ) -> Result<(), GapError> {
         // The step matters to `step` alone; here the plant is only led.
-        let plant = Plant::new(
-            hypothesis.vehicle,
-            hypothesis.effects,
-            self.vehicle.wing.clone(),
-            None,
-            squirrel_sim::flight::PLANT_STEP_US as f64 * 1e-6,
-        )
-        .map_err(|problem| self.refused(problem))?;
+        let plant = self.plant_at(hypothesis, squirrel_sim::flight::PLANT_STEP_US as f64 * 1e-6)?;
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
             let skip = flight.is_some_and(|flight| flight != track.flight);
@@ -208,6 +202,96 @@ impl<'a> Predictor<'a> {
         GapError::Vehicle { vehicle: self.vehicle.name.clone(), problem }
     }
 
+    /// The motion of each piece for the effects of the vehicle file and errorless sensors.
+    pub(crate) fn plain(&self) -> &[Motion] {
+        &self.plain
+    }
+    /// Whether every flight has attitude and velocity.
+    pub(crate) fn has_motion(&self) -> bool {
+        self.tracks.iter().all(|t| t.attitude().is_some() && !t.velocity().is_empty())
+    }
+    /// Whether every flight has a height.
+    pub(crate) fn has_height(&self) -> bool {
+        self.tracks.iter().all(|t| t.attitude().is_some() && !t.altitude_m().is_empty())
+    }
+    /// Whether every flight has a battery voltage.
+    pub(crate) fn has_voltage(&self) -> bool {
+        self.tracks.iter().all(|t| t.has_voltage)
+    }
+    /// Whether the vehicle has wings and every flight their command.
+    pub(crate) fn has_wings(&self) -> bool {
+        self.commands.iter().all(Commands::has_wing)
+    }
+
+    /// What a metre per second of wind from the south and from the west changes in the rows.
+    ///
+    /// # Errors
+    /// As [`Self::residual`].
+    pub(crate) fn wind_columns(&self) -> Result<[Vec<f64>; 2], GapError> {
+        let still = self.residual(&self.nominal())?;
+        let column = |axis: usize| {
+            let mut moved = self.nominal();
+            if let Some(wind) = moved.effects.insert("constant_wind") {
+                wind.values[axis] += 1.0;
+            }
+            let after = self.residual(&moved)?;
+            Ok(still.iter().zip(&after).map(|(b, a)| b - a).collect())
+        };
+        Ok([column(0)?, column(1)?])
+    }
+
+    /// The plant of a hypothesis, without a battery, whose voltage is measured.
+    ///
+    /// # Errors
+    /// [`GapError::Vehicle`]: the plant cannot be stepped with these numbers.
+    pub(crate) fn plant_at(&self, hypothesis: &Hypothesis, dt_s: f64) -> Result<Plant, GapError> {
+        Plant::new(hypothesis.vehicle, hypothesis.effects, self.vehicle.wing.clone(), None, dt_s)
+            .map_err(|problem| self.refused(problem))
+    }
+
+    /// The commands of a flight as the vehicle got them, from a time on.
+    pub(crate) fn clock(&self, flight: usize, effects: &Effects<f64>, time_s: f64) -> commands::Clock<'_> {
+        self.commands[flight].clock(effects, time_s)
+    }
+
+    /// The plant's state at some samples of a piece, in order: led there along the measured motion.
+    pub(crate) fn led_states(
+        &self,
+        plant: &Plant,
+        piece: usize,
+        motion: &Motion,
+        samples: &[usize],
+    ) -> Vec<PlantState> {
+        let track = &self.tracks[piece];
+        let mut out = Vec::with_capacity(samples.len());
+        let (mut state, mut clock) = self.settled(plant, track, motion);
+        for k in 0..track.time_s.len() {
+            if samples.get(out.len()) == Some(&k) {
+                let body = State { rotor_speed_rad_s: state.body.rotor_speed_rad_s, ..motion.body[k] };
+                out.push(PlantState { body, ..state });
+            }
+            if out.len() == samples.len() {
+                break;
+            }
+            predict(plant, &mut state, &mut clock, track, motion, k);
+        }
+        out
+    }
+
+    /// The plant at the start of a piece, where its first sample has been held for a while.
+    fn settled<'b>(
+        &'b self,
+        plant: &Plant,
+        track: &Track,
+        motion: &Motion,
+    ) -> (PlantState, commands::Clock<'b>) {
+        let mut state = plant.initial_state(motion.body[0], 1.0);
+        let clock = self.clock(track.flight, plant.effects(), track.time_s[0]);
+        let (rotor, wing) = clock.now();
+        plant.lead(&mut state, &motion.body[0], &rotor, wing, track.voltage_v[0], SETTLE_S);
+        (state, clock)
+    }
+
     /// Whether the sensors of a track do under the hypothesis what they do in the vehicle file.
     fn shares_motion(&self, track: &Track, hypothesis: &Hypothesis) -> bool {
         hypothesis.errors[track.flight] == SensorErrors::default()
@@ -216,12 +300,7 @@ impl<'a> Predictor<'a> {
 
     /// Residual of the dynamics of a piece.
     fn dynamics(&self, plant: &Plant, track: &Track, motion: &Motion) -> Vec<Vector6<f64>> {
-        let effects = plant.effects();
-        let commands = &self.commands[track.flight];
-        let mut state = plant.initial_state(motion.body[0], 1.0);
-        let mut clock = commands.clock(effects, track.time_s[0]);
-        let first = clock.now();
-        plant.lead(&mut state, &motion.body[0], &first.0, first.1, track.voltage_v[0], SETTLE_S);
+        let (mut state, mut clock) = self.settled(plant, track, motion);
         let last = track.time_s.len() - 1;
         let mut predicted = Vec::with_capacity(track.time_s.len());
         for k in 0..=last {

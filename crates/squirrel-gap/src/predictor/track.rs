@@ -43,6 +43,7 @@ pub(crate) struct Track {
     pub(crate) began_s: f64,
     pub(crate) time_s: Vec<f64>,
     pub(crate) voltage_v: Vec<f64>,
+    pub(crate) has_voltage: bool,
     /// White noise of accelerometer, m/s^2, and gyroscope, rad/s, one standard deviation.
     pub(crate) imu_noise: [Vector3<f64>; 2],
     /// Samples of the grid to one of the residual.
@@ -93,6 +94,7 @@ impl Track {
             flight,
             period_s,
             began_s: recording.pieces[0].0,
+            has_voltage: recording.has_voltage(),
             imu_noise: recording.imu_noise(),
             every,
             measured: filter.apply(&raw, every),
@@ -127,6 +129,17 @@ impl Track {
     /// GNSS velocities, m/s.
     pub(crate) fn velocity(&self) -> &[(f64, Vector3<f64>)] {
         &self.velocity
+    }
+    /// White noise of the GNSS velocity, m/s, one standard deviation, from differences of strapdown and fixes.
+    pub(crate) fn velocity_noise(&self) -> Vector3<f64> {
+        let plain = self.motion(&Effects::none(), &SensorErrors::default()).kinematic;
+        let n = plain.len().saturating_sub(3).max(1) as f64;
+        let sum: Vector3<f64> = plain
+            .windows(4)
+            .map(|w| w[3].1 - w[2].1 * 3.0 + w[1].1 * 3.0 - w[0].1)
+            .map(|d| d.component_mul(&d))
+            .sum();
+        (sum / (20.0 * n)).map(f64::sqrt)
     }
     /// GNSS positions, m.
     pub(crate) fn position(&self) -> &[(f64, Vector3<f64>)] {
