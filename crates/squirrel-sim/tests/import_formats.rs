@@ -9,7 +9,7 @@ use import_support::formats::{Cells, Ulog, mcap_bytes, parquet_bytes};
 use import_support::{Flight, OMEGA, one_source};
 use parquet::basic::Compression;
 
-const ROWS: i32 = 50;
+const ROWS: i32 = 24;
 const FORMATS: [&str; 3] = ["f.parquet", "f.ulg", "f.mcap"];
 
 /// Time in us and three rates that are exact in `f32`; row 7 has a missing number.
@@ -38,7 +38,7 @@ fn parquet(compression: Compression) -> Vec<u8> {
             Cells::Floats(axis(1)),
             Cells::Doubles(doubles),
         ],
-        20,
+        9,
         compression,
     )
 }
@@ -128,8 +128,8 @@ fn a_prefix_of_a_file_is_an_error_or_a_shorter_flight() {
                 Ok((log, report)) => {
                     let times = format!("{:?}", log.channel("imu.omega_body_rad_s").unwrap().0);
                     assert!(whole.starts_with(times.trim_end_matches(']')), "{file}, {length}: {times}");
-                    let cut = report.files[0].bytes_cut;
-                    assert!(report.to_string().contains("is left out") || cut == 0 || cut > 1, "{report}");
+                    let said = report.to_string().contains("ends inside a record");
+                    assert_eq!(said, report.files[0].bytes_cut > 0, "{report}");
                     shorter += 1;
                 }
             }
@@ -147,18 +147,16 @@ fn a_changed_byte_is_never_a_panic() {
         let bytes = std::fs::read(flight.folder().join(file)).unwrap();
         let mut refused = 0;
         for place in 0..bytes.len() {
-            for change in [0x01, 0x80, 0xff] {
-                let mut changed = bytes.clone();
-                changed[place] ^= change;
-                flight.write(file, &changed);
-                if let Err(error) = flight.import(&map(file), &[file]) {
-                    let message = error.to_string();
-                    assert!(message.contains(file) && !message.contains('\n'), "{place}: {message}");
-                    refused += 1;
-                }
+            let mut changed = bytes.clone();
+            changed[place] ^= [0x01, 0x80, 0xff][place % 3];
+            flight.write(file, &changed);
+            if let Err(error) = flight.import(&map(file), &[file]) {
+                let message = error.to_string();
+                assert!(message.contains(file) && !message.contains('\n'), "{place}: {message}");
+                refused += 1;
             }
         }
-        assert!(refused > 100, "{file}: {refused}");
+        assert!(refused > 50, "{file}: {refused}");
     }
 }
 

@@ -116,16 +116,20 @@ fn ulog_records_that_contradict_the_format_are_refused() {
     let start = || Ulog::new().flags(None).format("a:uint64_t timestamp;float x;");
     let message = [0; 12];
     let cases = [
-        (start().data(5, &message), "f.ulg: the record at byte 93 is a message of unknown id 5"),
+        (start().data(5, &message), "f.ulg: the record at byte 91 is a message of unknown id 5"),
         (start().subscribe(5, "b", 0).data(5, &message), "f.ulg: no message of topic `a`; nearest: b"),
         (Ulog::new().subscribe(5, "a", 0).data(5, &message), "f.ulg: format `a` is not defined"),
-        (start().record(b'A', b"\0\0"), "f.ulg: the record at byte 93 is too short for a topic"),
-        (start().record(b'D', b"\0"), "f.ulg: the record at byte 93 is too short for a message"),
-        (start().record(b'F', b"nothing"), "f.ulg: the record at byte 93 is no format: no `:`"),
-        (start().record(b'F', b"\xff:"), "f.ulg: the record at byte 93 has a name that is no text"),
+        (start().record(b'A', b"\0\0"), "f.ulg: the record at byte 91 is too short for a topic"),
+        (start().record(b'D', b"\0"), "f.ulg: the record at byte 91 is too short for a message"),
+        (start().record(b'F', b"nothing"), "f.ulg: the record at byte 91 is no format: no `:`"),
+        (start().record(b'F', b"\xff:"), "f.ulg: the record at byte 91 has a name that is no text"),
         (
             start().subscribe(5, "a", 0).data(5, &message[1..]),
-            "f.ulg: the message of `a` at byte 105 has 11 bytes, its format 12",
+            "f.ulg: the message of `a` at byte 103 has 11 bytes, its format 12",
+        ),
+        (
+            Ulog::new().flags(Some(1 << 40)),
+            "f.ulg: the record at byte 16 says that data are appended at byte 1099511627776 of 59",
         ),
         (
             Ulog::new().record(b'B', &[0xff; 40]),

@@ -6,10 +6,12 @@
 use std::fs::File;
 use std::path::Path;
 
-use parquet::basic::ConvertedType;
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::basic::{ConvertedType, Encoding};
+use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
+use parquet::file::metadata::ColumnChunkMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
@@ -26,6 +28,8 @@ pub(super) struct ParquetFile<'a> {
     name: String,
     columns: Vec<String>,
     reader: SerializedFileReader<File>,
+    /// Length of the file.
+    bytes: u64,
     meter: &'a Meter<'a>,
 }
 
@@ -38,13 +42,14 @@ impl<'a> ParquetFile<'a> {
         let name = path.display().to_string();
         let read_error = |source| ImportError::Read { file: path.display().to_string(), source };
         let file = File::open(path).map_err(read_error)?;
-        if file.metadata().map_err(read_error)?.len() == 0 {
+        let bytes = file.metadata().map_err(read_error)?.len();
+        if bytes == 0 {
             return Err(ImportError::Empty { file: name });
         }
         let reader = SerializedFileReader::new(file).map_err(|error| damaged(&name, &error))?;
         let schema = reader.metadata().file_metadata().schema_descr();
         let columns = schema.columns().iter().map(|column| column.path().string()).collect();
-        Ok(Self { name, columns, reader, meter })
+        Ok(Self { name, columns, reader, bytes, meter })
     }
 
     /// All numbers of one column.
@@ -54,8 +59,10 @@ impl<'a> ParquetFile<'a> {
         for group in 0..self.reader.num_row_groups() {
             let before = values.len();
             let group = self.reader.get_row_group(group).map_err(|error| damaged(&self.name, &error))?;
-            let reader = group.get_column_reader(place).map_err(|error| damaged(&self.name, &error))?;
-            match numbers(reader, &descriptor, &mut values) {
+            self.check_place(group.metadata().column(place))?;
+            let pages = group.get_column_page_reader(place).map_err(|error| damaged(&self.name, &error))?;
+            let pages = Box::new(Pages { inner: pages, has_dictionary: false });
+            match numbers(get_column_reader(descriptor.clone(), pages), &descriptor, &mut values) {
                 Ok(true) => {}
                 Ok(false) => {
                     return Err(ImportError::ColumnType {
@@ -85,6 +92,19 @@ impl<'a> ParquetFile<'a> {
             })?;
         }
         Ok(values)
+    }
+
+    /// A column chunk must lie inside the file: the reader takes that for granted.
+    fn check_place(&self, chunk: &ColumnChunkMetaData) -> Result<(), ImportError> {
+        let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
+        let size = chunk.compressed_size();
+        let ends = start.checked_add(size).and_then(|end| u64::try_from(end).ok());
+        if start >= 0 && size >= 0 && ends.is_some_and(|end| end <= self.bytes) {
+            return Ok(());
+        }
+        let column = chunk.column_path();
+        let problem = format!("column `{column}` claims {size} bytes at byte {start} of {}", self.bytes);
+        Err(ImportError::Damaged { file: self.name.clone(), problem })
     }
 }
 
@@ -171,5 +191,44 @@ fn append<T: DataType>(
             let next = |at: &i16| if *at == level { present.next() } else { None };
             values.extend(levels.iter().map(next).map(|x| x.map_or(f64::NAN, &to_f64)));
         }
+    }
+}
+
+/// The pages of a column chunk; a page that needs a dictionary comes only after one, which the decoder takes for granted.
+struct Pages {
+    inner: Box<dyn PageReader>,
+    has_dictionary: bool,
+}
+
+impl Iterator for Pages {
+    type Item = Result<Page, ParquetError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
+impl PageReader for Pages {
+    fn get_next_page(&mut self) -> Result<Option<Page>, ParquetError> {
+        let page = self.inner.get_next_page()?;
+        if let Some(page) = &page {
+            let needs_dictionary =
+                matches!(page.encoding(), Encoding::PLAIN_DICTIONARY | Encoding::RLE_DICTIONARY);
+            self.has_dictionary |= page.is_dictionary_page();
+            if needs_dictionary && !self.has_dictionary {
+                return Err(ParquetError::General(
+                    "a page refers to a dictionary that is not there".to_owned(),
+                ));
+            }
+        }
+        Ok(page)
+    }
+
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>, ParquetError> {
+        self.inner.peek_next_page()
+    }
+
+    fn skip_next_page(&mut self) -> Result<(), ParquetError> {
+        self.inner.skip_next_page()
     }
 }

@@ -124,8 +124,9 @@ struct Records {
     topics: BTreeSet<String>,
     /// Payloads of the wanted topic, without message id.
     messages: Vec<Range<usize>>,
-    /// Where the first appended data start.
+    /// Where appended data start.
     appended: Vec<usize>,
+    bytes_total: usize,
     bytes_cut: usize,
 }
 
@@ -137,11 +138,12 @@ impl Records {
         if bytes.len() < HEADER_BYTES {
             return Err(format!("ends inside the header, after {} bytes", bytes.len()));
         }
+        self.bytes_total = bytes.len();
         let mut start = HEADER_BYTES;
         loop {
             // Appended data start where they say, and what stands before them may end inside a record.
             let section_end = self.appended.iter().copied().find(|&at| at > start).unwrap_or(bytes.len());
-            let rest = &bytes[start..section_end.max(start)];
+            let rest = &bytes[start..section_end];
             match record(rest) {
                 Some((kind, payload)) => {
                     let at = start + RECORD_HEAD_BYTES;
@@ -166,10 +168,9 @@ impl Records {
                 if flags[0] & !FLAG_APPENDED != 0 || flags[1..].iter().any(|&flag| flag != 0) {
                     return Err(format!("has flags of a later format: {flags:02x?}"));
                 }
-                let offsets = payload[16..].chunks_exact(8).take(3).filter_map(|offset| offset.first_chunk());
-                let offsets = offsets.filter_map(|&offset| usize::try_from(u64::from_le_bytes(offset)).ok());
-                self.appended = offsets.filter(|&offset| offset > 0).collect();
-                self.appended.sort_unstable();
+                if flags[0] == FLAG_APPENDED {
+                    self.appended(&payload[16..])?;
+                }
             }
             b'F' => {
                 let (name, fields) = text(payload)?.split_once(':').ok_or("is no format: no `:`")?;
@@ -195,6 +196,21 @@ impl Records {
             // Parameters, texts, drop-outs and the like are no numbers over time; later types are to be skipped.
             _ => {}
         }
+        Ok(())
+    }
+
+    /// Takes up to three offsets of appended data; 0 is none.
+    fn appended(&mut self, offsets: &[u8]) -> Result<(), String> {
+        for offset in offsets.chunks_exact(8).take(3).filter_map(|offset| offset.first_chunk()) {
+            let at = u64::from_le_bytes(*offset);
+            if at > self.bytes_total as u64 {
+                return Err(format!("says that data are appended at byte {at} of {}", self.bytes_total));
+            }
+            if at > 0 {
+                self.appended.push(at as usize);
+            }
+        }
+        self.appended.sort_unstable();
         Ok(())
     }
 }
