@@ -1,0 +1,203 @@
+//! The equations of motion: rotors, drag, wings, every effect, a rigid body. World NED, body FRD.
+
+use super::extras::{Extras, Ground, Lift, Sag};
+use super::state::State;
+use super::unknown::{self, Motion};
+use crate::airframe::{AIR_DENSITY_KG_M3, Airframe, GRAVITY_M_S2, MAX_ROTORS};
+use crate::outside::Outside;
+use nalgebra::{Matrix3, Vector2, Vector3, Vector4};
+
+/// What is held over a step.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Input {
+    /// Time at the start of the step, s.
+    pub(super) time_s: f64,
+    /// Share of the top speed, a number a rotor.
+    pub(super) rotor: [f64; MAX_ROTORS],
+    /// Left, right, 0 to 1.
+    pub(super) wing: Vector2<f64>,
+    pub(super) voltage_v: f64,
+    /// Over that of hover.
+    pub(super) current_ratio: f64,
+    /// Turbulence and gusts, NED, m/s.
+    pub(super) moving_air: Vector3<f64>,
+}
+
+/// A vehicle and what acts on it.
+#[derive(Debug, Clone)]
+pub(super) struct World {
+    pub(super) airframe: Airframe,
+    pub(super) extras: Extras,
+    pub(super) outside: Option<Outside>,
+}
+
+/// Rate of the state and what an accelerometer at the geometric centre feels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rates {
+    pub(super) state: State,
+    pub(super) specific_force: Vector3<f64>,
+}
+
+/// Height at which a logarithmic wind has its stated speed, and roughness, m.
+const LOG_WIND: [f64; 2] = [3.0, 0.05];
+
+impl World {
+    fn wind(&self, height_m: f64) -> Vector3<f64> {
+        let wind = self.extras.wind_ned;
+        if !self.extras.log_wind {
+            return wind;
+        }
+        let [reference, roughness] = LOG_WIND;
+        wind * ((height_m.max(2.0 * roughness) / roughness).ln() / (reference / roughness).ln())
+    }
+
+    fn speed_ratio(&self, input: &Input) -> f64 {
+        let volts = input.voltage_v / self.airframe.reference_voltage_v;
+        match self.extras.sag {
+            Sag::None => 1.0,
+            Sag::Power(k) => volts.powf(k),
+            Sag::Linear(k) => 1.0 + k * (volts - 1.0),
+            Sag::LoadDependent(k) => volts.powf(k * (0.6 + 0.4 * input.current_ratio.min(3.0))),
+        }
+    }
+
+    fn lift_and_ground(&self, across: f64, down: f64, height_m: f64) -> f64 {
+        let lift = match self.extras.lift {
+            Lift::None => 0.0,
+            Lift::Saturating(k) => k * across * across / (1.0 + 0.004 * across * across),
+            Lift::Linear(k) => k * across,
+            Lift::Quadratic(k) => k * across * across,
+        };
+        let ground = match self.extras.ground {
+            Ground::None => 1.0,
+            Ground::Image(radius) => {
+                let ratio = radius / height_m.max(0.5 * radius);
+                1.0 / (1.0 - ratio * ratio / 16.0)
+            }
+            Ground::Exponential(gain, length) => 1.0 + gain * (-height_m.max(0.0) / length).exp(),
+        };
+        (1.0 + lift) * (1.0 + self.extras.inflow * down) * ground
+    }
+
+    /// Force and moment of the wings.
+    fn wings(&self, v: Vector3<f64>, roll_rate: f64, deployment: Vector2<f64>) -> (f64, f64) {
+        let (a, x) = (&self.airframe, &self.extras);
+        let speed = v.norm();
+        let gain = if x.wing_gain_speed_m_s > 0.0 {
+            x.wing_gain * (speed / x.wing_gain_speed_m_s).min(1.0)
+        } else {
+            x.wing_gain
+        };
+        let scale = 0.5 * AIR_DENSITY_KG_M3 * a.wing_area_m2 * a.wing_slope * (1.0 + gain) * speed;
+        let side = |sign: f64, open: f64, loss: f64| {
+            scale * (v.z + sign * a.wing_arm_m * roll_rate + x.wing_angle_rad * v.x) * open * (1.0 - loss)
+        };
+        let left = side(-1.0, deployment.x, x.wing_loss[0]);
+        let right = side(1.0, deployment.y, x.wing_loss[1]);
+        (-(left + right), a.wing_arm_m * (left - right))
+    }
+
+    /// Rates of everything at a state, `ahead_s` after the start of the step.
+    pub(super) fn rates(&self, state: &State, input: &Input, ahead_s: f64) -> Rates {
+        let (a, x) = (&self.airframe, &self.extras);
+        let time_s = input.time_s + ahead_s;
+        let rotation = state.ned_from_body();
+        let height_m = -state.position.z;
+        let v = rotation.tr_mul(&(state.velocity - self.wind(height_m) - input.moving_air));
+        let speed = v.norm();
+        let omega = state.omega;
+        let throttle = input.rotor.iter().sum::<f64>() / a.rotors.len() as f64;
+        let motion = Motion {
+            time_s,
+            state,
+            rotation: &rotation,
+            air_body: v,
+            throttle,
+            hover_throttle: a.hover_command(),
+        };
+        let unknown = self.outside.map(|outside| unknown::act(&outside, &motion)).unwrap_or_default();
+
+        let factor = self.lift_and_ground(v.x.hypot(v.y), v.z, height_m) * unknown.thrust_factor;
+        let ratio = self.speed_ratio(input);
+        let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
+        let (mut thrust, mut spin, mut spin_rate) = (0.0, 0.0, 0.0);
+        let mut rotor_rates = state.rotors * 0.0;
+        for (i, rotor) in a.rotors.iter().enumerate() {
+            let weak = if unknown.weak_rotor == Some(i) { 1.0 - unknown.weak_loss } else { 1.0 };
+            let square = state.rotors[i] * state.rotors[i] * weak;
+            let t = rotor.thrust_coefficient_n_s2 * x.thrust[i] * square * factor;
+            thrust += t;
+            moment += rotor.position_body_m.cross(&Vector3::new(0.0, 0.0, -t));
+            moment.z += rotor.yaw_sign * rotor.torque_coefficient_n_m_s2 * x.torque[i] * square;
+            let gap = input.rotor[i] * a.speed_max_rad_s * ratio - state.rotors[i];
+            rotor_rates[i] = gap / (a.rotor_time_constant_s + x.lag_s[usize::from(gap < 0.0)]);
+            spin -= rotor.yaw_sign * state.rotors[i];
+            spin_rate -= rotor.yaw_sign * rotor_rates[i];
+        }
+        force.z -= thrust;
+        let half_density = 0.5 * AIR_DENSITY_KG_M3 * speed;
+        force -= (a.drag_n_s_per_m + x.linear_drag).component_mul(&v);
+        force -= half_density * (x.drag_area.add_scalar(a.drag_area_m2)).component_mul(&v);
+        let deployment =
+            unknown.left_wing.map_or(state.deployment, |left| Vector2::new(left, state.deployment.y));
+        let (wing_force, wing_moment) = self.wings(v, omega.x, deployment);
+        force.z += wing_force;
+        moment.x += wing_moment;
+        // The centre of mass is off the point that all this refers to.
+        moment -= x.cg_m.cross(&force);
+        force -= thrust * Vector3::new(x.tilt.x, x.tilt.y, 0.0);
+        moment += x.flapping * Vector3::new(-v.y, v.x, 0.0);
+        let damped = Vector3::new(omega.x, omega.y, 0.5 * omega.z);
+        moment -= x.damping * if x.quadratic_damping { damped.component_mul(&omega.abs()) } else { damped };
+        let e3 = Vector3::z();
+        moment -= x.rotor_inertia * (omega.cross(&e3) * spin + e3 * spin_rate);
+        force += unknown.force_body + rotation.tr_mul(&unknown.force_ned);
+        moment += unknown.moment_body;
+        let pull = x.payload_kg * GRAVITY_M_S2;
+        let swing_force =
+            Vector3::new(state.swing.x, state.swing.y, x.payload_length_m) * (pull / x.payload_length_m);
+        force += rotation.tr_mul(&swing_force);
+
+        let mass = a.mass_kg * x.mass * unknown.mass_factor;
+        let gravity_body = rotation.tr_mul(&Vector3::new(0.0, 0.0, GRAVITY_M_S2));
+        let mut specific = force / mass;
+        if x.added_mass_kg > 0.0 {
+            // (m + m_a) w' = F_z + m g_z - m (omega x v)_z, all in the body frame.
+            let turning = omega.cross(&rotation.tr_mul(&state.velocity)).z;
+            let w_rate = (force.z + mass * (gravity_body.z - turning)) / (mass + x.added_mass_kg);
+            specific.z = w_rate - gravity_body.z + turning;
+        }
+        let inertia = Matrix3::from_diagonal(&a.inertia_kg_m2.component_mul(&x.inertia));
+        let torque = moment - omega.cross(&(inertia * omega));
+        let omega_rate = torque.component_div(&inertia.diagonal());
+        let acceleration = rotation * specific + GRAVITY_M_S2 * e3;
+        let servo = a.servo_time_constant_s + x.servo_lag_s;
+        let swing_rate = |s: f64, rate: f64, a: f64| {
+            -GRAVITY_M_S2 / x.payload_length_m * s - x.payload_damping_per_s * rate - a
+        };
+        let swing = state.swing;
+        let lever = -x.cg_m;
+        Rates {
+            state: State {
+                position: state.velocity,
+                velocity: acceleration,
+                attitude: state.attitude_rate(),
+                omega: omega_rate,
+                rotors: rotor_rates,
+                deployment: (input.wing - state.deployment) / servo,
+                swing: if x.payload_kg > 0.0 {
+                    Vector4::new(
+                        swing.z,
+                        swing.w,
+                        swing_rate(swing.x, swing.z, acceleration.x),
+                        swing_rate(swing.y, swing.w, acceleration.y),
+                    )
+                } else {
+                    Vector4::zeros()
+                },
+                memory: unknown.memory_rate,
+            },
+            specific_force: specific + omega_rate.cross(&lever) + omega.cross(&omega.cross(&lever)),
+        }
+    }
+}
