@@ -15,6 +15,8 @@ const SIZE_MIN: f64 = 0.5;
 const REFINED: usize = 4;
 /// Most steps of a refinement.
 const STEPS_MAX: usize = 6;
+/// Evidence that a step towards the mode may cost, nats.
+const STEP_NATS: f64 = 1.0;
 /// Most effects in a set.
 const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
@@ -268,8 +270,8 @@ impl Search<'_> {
                 break;
             }
             let scored = self.evaluate(linear, &next)?;
-            if std::env::var("GN").is_ok() { eprintln!("GN {:?} {:.2} -> {:?} {:.2} share {share}", best.members.iter().map(|m| (self.effect(m), m.values.clone())).collect::<Vec<_>>(), best.log_evidence, next.iter().map(|m| m.values.clone()).collect::<Vec<_>>(), scored.log_evidence); }
-            if scored.log_evidence > best.log_evidence {
+            // Where the model is linear, every point of it has the same evidence: the mode is where steps end.
+            if scored.log_evidence > best.log_evidence - STEP_NATS {
                 best = scored;
             } else {
                 // Too far for what the columns know: half the way.
