@@ -256,7 +256,7 @@ impl Case {
             capacity_ah: 1.3 * heavy,
         };
         // One training flight starts high, the other low; the held-out one anywhere between.
-        let charges = [draw.uniform(0.85, 0.95), draw.uniform(0.45, 0.6), draw.uniform(0.5, 0.9)];
+        let charges = [draw.uniform(0.85, 0.95), draw.uniform(0.5, 0.65), draw.uniform(0.55, 0.9)];
         let order = Order {
             nominal: &self.nominal,
             real: &real,
