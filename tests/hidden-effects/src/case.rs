@@ -291,7 +291,10 @@ impl Case {
 pub const FLIGHTS: [&str; 3] = ["train/flight00.mcap", "train/flight01.mcap", "held-out/flight00.mcap"];
 
 /// Writes JSON under a temporary name, then renames.
-pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CaseError> {
+///
+/// # Errors
+/// [`CaseError::Io`] if the disk refuses.
+pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CaseError> {
     let mut text = serde_json::to_string_pretty(value)
         .map_err(|error| CaseError::Io { file: path.display().to_string(), source: error.into() })?;
     text.push('\n');

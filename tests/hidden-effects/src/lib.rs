@@ -5,6 +5,7 @@
 //! of squirrel's dynamics, so that a mistake in the simulator does not hide itself from the diagnosis.
 
 pub mod airframe;
+pub mod bench;
 pub mod case;
 pub mod catalogue;
 pub mod draw;
