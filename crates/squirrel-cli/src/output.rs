@@ -31,6 +31,18 @@ pub(crate) fn progress(length: u64, unit: &str) -> ProgressBar {
     bar
 }
 
+/// A line on stderr that says what is being done; silent where nobody looks.
+pub(crate) fn spinner() -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}  {elapsed}") {
+        bar.set_style(style);
+    }
+    if !std::io::stderr().is_terminal() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+    }
+    bar
+}
+
 /// A table with aligned columns: columns of numbers to the right, text to the left.
 pub(crate) struct Table {
     rows: Vec<Vec<String>>,

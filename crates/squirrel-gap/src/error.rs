@@ -21,6 +21,16 @@ pub enum GapError {
         /// `field = value: reason`.
         problem: String,
     },
+    /// A number of the vehicle whose tolerance naming needs.
+    #[error("{vehicle}: {field} = {value}: has no sd; naming needs to know how far it may be off")]
+    Tolerance {
+        /// Name of the vehicle.
+        vehicle: String,
+        /// The field.
+        field: String,
+        /// Its value.
+        value: f64,
+    },
     /// A channel without which there is no residual.
     #[error("{flight}: {channel}: missing; the residual needs it")]
     Missing {

@@ -7,6 +7,19 @@
 
 mod error;
 pub mod find;
+mod flight;
+mod leftover;
+mod add;
+mod compatibility;
+mod diagnose;
+mod name;
+mod predictor;
+mod shrink;
+mod verdict;
+mod words;
 
+pub use add::{add, difference};
+pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};
+pub use verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};

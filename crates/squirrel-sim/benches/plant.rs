@@ -1,4 +1,4 @@
-//! One plant step, and one vehicle in complete closed loop.
+//! One plant step, one call of the led plant, and one vehicle in complete closed loop.
 //!
 //! `plant_step_without_wing` counts RK4 steps of rigid body, four rotor lags, drag and battery; `closed_loop` counts seconds
 //! of flight (plant at 1 kHz with membrane wing, battery, gusts and noisy sensors; flight code at 300 and 10 Hz; no log), so
@@ -43,6 +43,33 @@ fn plant_steps(c: &mut Criterion) {
     group.finish();
 }
 
+fn leading(c: &mut Criterion) {
+    let file = VehicleFile::squirrel();
+    let plant = Plant::new(file.vehicle, file.effects, WingPlant::None, None, 1e-3).expect("sound");
+    let motion = start(&plant).body;
+    let command = [0.5, 0.501, 0.5, 0.499, 0.0, 0.0, 0.0, 0.0];
+    let mut group = c.benchmark_group("lead");
+    let calls = 1000;
+    group.throughput(Throughput::Elements(calls));
+    group.bench_function("without_wing", |b| {
+        b.iter(|| {
+            let mut state = start(&plant);
+            for _ in 0..calls {
+                black_box(plant.lead(
+                    &mut state,
+                    black_box(&motion),
+                    black_box(&command),
+                    [1.0; 2],
+                    14.8,
+                    0.01,
+                ));
+            }
+            state
+        });
+    });
+    group.finish();
+}
+
 fn closed_loop(c: &mut Criterion) {
     let mut scenario = Scenario::find("track").expect("built in");
     scenario.duration_s = 10.0;
@@ -59,6 +86,6 @@ fn closed_loop(c: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20).measurement_time(std::time::Duration::from_secs(3));
-    targets = plant_steps, closed_loop
+    targets = plant_steps, leading, closed_loop
 }
 criterion_main!(benches);

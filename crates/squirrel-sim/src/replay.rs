@@ -11,8 +11,8 @@ use crate::vehicle_file::VehicleFile;
 use squirrel_core::stack::StackState;
 
 /// Sources that the flight code writes, causes before consequences: of two that differ at one time, the first is named.
-pub const OUTPUT_SOURCES: [&str; 6] =
-    ["control.status", "reference", "control.outer", "control.inner", "wing", "rotor"];
+pub const OUTPUT_SOURCES: [&str; 7] =
+    ["control.status", "reference", "control.excitation", "control.outer", "control.inner", "wing", "rotor"];
 
 /// The first output that differs.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -1,5 +1,9 @@
 //! Scenarios: what to fly, in which air, among which obstacles. A TOML file or one of the built-in ones.
 
+mod excite;
+
+pub use excite::ExciteTable;
+
 use crate::plant::{GustModel, WindParameters};
 use serde::{Deserialize, Serialize};
 use squirrel_core::frames::In;
@@ -7,6 +11,7 @@ use squirrel_core::guidance::mission::{Mission, Steering};
 use squirrel_core::guidance::sensing::Sensing;
 use squirrel_core::guidance::trajectory::Trajectory;
 use squirrel_core::nalgebra::Vector3;
+use squirrel_core::vehicle::ParameterError;
 use std::path::Path;
 
 /// A flight to fly. Units are in the names; heights are positive up.
@@ -83,6 +88,8 @@ pub enum MissionTable {
         /// Speed.
         speed_m_s: f64,
     },
+    /// Manoeuvres for identification.
+    Excite(ExciteTable),
 }
 
 /// Moving air.
@@ -111,7 +118,8 @@ impl Default for WindTable {
 }
 
 /// Names of the built-in scenarios.
-pub const BUILT_IN: [&str; 4] = ["hover", "avoid", "steer", "track"];
+pub const BUILT_IN: [&str; 7] =
+    ["hover", "avoid", "steer", "track", "excite_calm", "excite_normal", "excite_rich"];
 
 impl Scenario {
     /// A built-in scenario by name, or a TOML file by path.
@@ -183,7 +191,11 @@ impl Scenario {
             }
             // The paper's simulated study: R_d 5 m, one angle.
             "steer" => Some(Self::turn("steer", 7.0, 5.0, 120.0, 120.0)),
-            _ => None,
+            _ => {
+                let (height_m, table) = ExciteTable::built_in(name)?;
+                let mission = MissionTable::Excite(table);
+                Some(Self { height_m, ..Self::base(name, excite::DURATION_S, mission) })
+            }
         }
     }
 
@@ -250,13 +262,38 @@ impl Scenario {
                 return Err(format!("{field} = {x}: must be finite and > 0"));
             }
         }
-        self.mission().check().map_err(|e| format!("mission.{e}"))
+        if let MissionTable::Excite(table) = &self.mission {
+            table.check().map_err(|e| format!("mission.{e}"))?;
+        }
+        let mission = self.mission().map_err(|e| format!("mission.{e}"))?;
+        mission.check().map_err(|e| format!("mission.{e}"))
+    }
+
+    /// Charge of the battery at the start, 0..1.
+    pub fn start_charge(&self) -> f64 {
+        match &self.mission {
+            MissionTable::Excite(table) if self.seed.is_multiple_of(2) => table.even_seed_charge,
+            _ => self.battery_charge,
+        }
+    }
+
+    /// The manoeuvres of an excitation flight in plain words, one a line; `None` for other scenarios.
+    ///
+    /// # Errors
+    /// As [`Self::mission`].
+    pub fn pilot_card(&self) -> Result<Option<String>, ParameterError> {
+        let MissionTable::Excite(table) = &self.mission else { return Ok(None) };
+        let programme = table.programme(self.height_m, self.seed)?;
+        Ok(Some(excite::card(&programme, self.height_m)))
     }
 
     /// The mission for the flight code.
-    pub fn mission(&self) -> Mission {
+    ///
+    /// # Errors
+    /// Numbers of an excitation flight that cannot be flown.
+    pub fn mission(&self) -> Result<Mission, ParameterError> {
         let start = In::new(Vector3::new(0.0, 0.0, -self.height_m as f32));
-        match self.mission {
+        let mission = match self.mission {
             MissionTable::Hover {} => Mission::Hover { position: start },
             MissionTable::Avoid {
                 course_rad,
@@ -293,7 +330,9 @@ impl Scenario {
                 radius_m: radius_m as f32,
                 speed_m_s: speed_m_s as f32,
             },
-        }
+            MissionTable::Excite(ref table) => Mission::Excite(table.programme(self.height_m, self.seed)?),
+        };
+        Ok(mission)
     }
 
     /// The moving air.
@@ -308,6 +347,12 @@ impl Scenario {
             gust,
         }
     }
+}
+
+/// The pilot's card of a built-in excitation scenario at seed 0: what to fly, when, how fast and how high, one manoeuvre a
+/// line. `None` for other names.
+pub fn pilot_card(name: &str) -> Option<String> {
+    Scenario::built_in(name)?.pilot_card().ok()?
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_sim::import::{ImportMap, ImportReport, import};
 use squirrel_sim::log::FlightLog;
+use squirrel_sim::vehicle_file::VehicleFile;
 
 const GRAVITY_M_S2: f64 = 9.80665;
 
@@ -236,5 +237,50 @@ fn practice_obeys_physics() {
         let middle = gnss_s.len() / 2;
         let row = time_s.partition_point(|&t| t < gnss_s[middle]);
         assert!((baro.values[row] + position[middle].z).abs() < 2.0, "{name}: altitude is up, down is not");
+    }
+}
+
+/// Mean thrust that a vehicle file makes of the rotor commands, over mass times the mean upward specific force.
+fn thrust_over_force(vehicle: &str, log: &FlightLog) -> f64 {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles").join(vehicle);
+    let vehicle = VehicleFile::load(&path).unwrap().vehicle;
+    let propulsion = &vehicle.parameters().propulsion;
+    let (_, force) = vectors(log, "imu.specific_force_body_m_s2");
+    let (_, command) = log.channel("rotor.command").unwrap();
+    let speeds = command.values.iter().map(|&u| propulsion.target_speed_rad_s(u));
+    let thrust_n: f64 = speeds.map(|speed| propulsion.thrust_coefficient_n_s2 * speed * speed).sum();
+    let force_m_s2 = -mean(&force).z;
+    // In the mean over a flight the rotors carry the weight, whatever happens in between.
+    assert!((force_m_s2 / GRAVITY_M_S2 - 1.0).abs() < 0.05, "{force_m_s2}");
+    thrust_n / force.len() as f64 / (vehicle.parameters().mass_kg * force_m_s2)
+}
+
+#[test]
+fn the_thrust_of_the_vehicle_files_carries_the_weight() {
+    let Some(folder) = shared("flights") else { return };
+    for (map, vehicle, file, within) in [
+        ("arpl.toml", "crazyflie2_arpl.toml", "arpl-motorlag/log10.csv", 0.001),
+        ("arpl.toml", "crazyflie2_arpl.toml", "arpl-motorlag/log16.csv", 0.05),
+        ("nanobench.toml", "crazyflie21_brushed_curve.toml", "nanobench/B8_star_slow_rep1.csv", 0.01),
+        ("nanobench.toml", "crazyflie21_brushed_curve.toml", "nanobench/B3_figure8_fast_rep1.csv", 0.01),
+        ("nanobench.toml", "crazyflie21_brushed_curve.toml", "nanobench/B2_circle_medium_rep1.csv", 0.05),
+    ] {
+        let (log, _) = import_with(map, folder.join(file));
+        let ratio = thrust_over_force(vehicle, &log);
+        println!("{vehicle}, {file}: thrust over force {ratio:.4}");
+        assert!((ratio - 1.0).abs() < within, "{vehicle}, {file}: {ratio}");
+    }
+}
+
+/// Every number of the vehicle says how well it is known, and the rotors follow at once.
+#[test]
+fn the_arpl_vehicle_has_no_lag_and_all_tolerances() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles/crazyflie2_arpl.toml");
+    let vehicle = VehicleFile::load(&path).unwrap();
+    let propulsion = &vehicle.vehicle.parameters().propulsion;
+    assert_eq!((propulsion.time_constant_up_s, propulsion.time_constant_down_s), (0.0, 0.0));
+    for (field, number) in &vehicle.provenance {
+        let certain = field.ends_with("yaw_sign");
+        assert!(certain || (number.sd.is_some() && number.source.is_some()), "{field}: {number:?}");
     }
 }

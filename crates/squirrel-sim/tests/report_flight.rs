@@ -175,6 +175,7 @@ fn text_is_escaped_everywhere() {
         title: bad.to_owned(),
         lead: bad.to_owned(),
         facts: vec![(bad.to_owned(), bad.to_owned())],
+        card: bad.to_owned(),
     };
     let html = render(&heading, &flights);
     check(&html);

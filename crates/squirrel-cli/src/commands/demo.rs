@@ -105,6 +105,7 @@ impl Demo {
                    pc keeps the wings folded; the others may open them to brake."
                 .to_owned(),
             facts: facts(&setups[0]),
+            card: String::new(),
         };
         let report = self.out.join("report.html");
         output::write_file(&report, render(&heading, &views).as_bytes())?;

@@ -18,7 +18,7 @@ pub(crate) struct Fly {
     /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_oracle.
     #[arg(long, default_value = "twcc_flat")]
     arm: String,
-    /// hover, avoid, steer, track, or a scenario file (.toml).
+    /// hover, avoid, steer, track, excite_calm, excite_normal, excite_rich, or a scenario file (.toml).
     #[arg(long, default_value = "avoid")]
     scenario: String,
     /// Seed of everything random; overrides the scenario's.
@@ -100,6 +100,7 @@ impl Fly {
                     title: format!("{}: {}", setup.scenario.name, setup.arm.name()),
                     lead: String::new(),
                     facts: facts(&setup),
+                    card: setup.scenario.pilot_card().map_err(|e| e.to_string())?.unwrap_or_default(),
                 };
                 output::write_file(path, render(&heading, &[view(&setup, log, cells)]).as_bytes())?;
                 talk(&format!("wrote {}", path.display()));

@@ -1,38 +1,87 @@
-//! `squirrel gap`: where simulation and measurement disagree.
+//! `squirrel gap`: where simulation and measurement disagree, what is missing, and what adding it is worth.
 
 use crate::output::{self, Table, say, talk};
+use squirrel_gap::{Diagnosis, Kind, NamedEffect, Value, Verdict};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Steps of the gap workflow.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Gap {
     /// Residual force and moment of measured flights against a vehicle, per channel and window, ranked.
-    Find {
-        /// Vehicle file.
+    Find(Flights),
+    /// Which effect the vehicle file lacks.
+    Name(Flights),
+    /// A new vehicle file with the missing effect in it.
+    Add {
+        #[command(flatten)]
+        flights: Flights,
+        /// Print the patch and write nothing.
         #[arg(long)]
-        vehicle: PathBuf,
-        /// Flight logs.
-        #[arg(long, required = true, num_args = 1..)]
-        flights: Vec<PathBuf>,
-        /// Folder for find.json.
-        #[arg(long)]
-        out: Option<PathBuf>,
-        /// Write the result here as JSON.
-        #[arg(long)]
-        json: Option<PathBuf>,
+        dry_run: bool,
     },
+    /// What the missing effect is worth on held-out flights, re-simulated.
+    Shrink(Flights),
+    /// All of it, with a report.
+    Run(Flights),
 }
+
+/// What every step looks at.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Flights {
+    /// Vehicle file.
+    #[arg(long)]
+    vehicle: PathBuf,
+    /// Flight logs, or folders of them, that the explanation is fitted to.
+    #[arg(long, required = true, num_args = 1..)]
+    flights: Vec<PathBuf>,
+    /// Flight logs, or folders of them, that it never sees.
+    #[arg(long, num_args = 1..)]
+    held_out: Vec<PathBuf>,
+    /// Folder for what is written.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Write the result here as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+type Logs = Vec<(String, FlightLog)>;
 
 impl Gap {
     pub(crate) fn run(&self) -> Result<(), String> {
-        let Self::Find { vehicle, flights, out, json } = self;
-        let vehicle = VehicleFile::load(vehicle).map_err(|e| e.to_string())?;
-        let logs = flights
-            .iter()
-            .map(|path| Ok((path.display().to_string(), FlightLog::read(path).map_err(|e| e.to_string())?)))
-            .collect::<Result<Vec<_>, String>>()?;
+        match self {
+            Self::Find(flights) => flights.find(),
+            Self::Name(flights) => flights.name(),
+            Self::Add { flights, dry_run } => flights.add(*dry_run),
+            Self::Shrink(flights) => flights.shrink(),
+            Self::Run(flights) => flights.everything(),
+        }
+    }
+}
+
+impl Flights {
+    fn read(&self) -> Result<(VehicleFile, Logs, Logs), String> {
+        let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
+        Ok((vehicle, logs(&self.flights)?, logs(&self.held_out)?))
+    }
+
+    fn diagnose(&self) -> Result<(VehicleFile, Vec<String>, Diagnosis), String> {
+        let (vehicle, flights, held_out) = self.read()?;
+        let bar = output::spinner();
+        let diagnosis = squirrel_gap::diagnose(&vehicle, &flights, &held_out, &|what| {
+            bar.set_message(what.to_owned());
+            bar.inc(1);
+        });
+        bar.finish_and_clear();
+        let names = flights.into_iter().map(|(name, _)| name).collect();
+        Ok((vehicle, names, diagnosis.map_err(|e| e.to_string())?))
+    }
+
+    fn find(&self) -> Result<(), String> {
+        let (vehicle, flights, held_out) = self.read()?;
+        let logs = [flights, held_out].concat();
         let finding = squirrel_gap::find(&vehicle, &logs).map_err(|e| e.to_string())?;
         let triple = |x: &[f64; 3]| x.map(|v| format!("{v:.4e}")).join("  ");
         say(&format!("residual force, body x y z:   {}  N rms", triple(&finding.residual.force_body_rms_n)));
@@ -40,25 +89,176 @@ impl Gap {
             "residual moment, body x y z:  {}  N m rms\n",
             triple(&finding.residual.moment_body_rms_n_m)
         ));
-        let mut table = Table::new(&["flight", "from s", "to s", "channel", "share %", "condition"]);
-        for w in finding.places.iter().take(10) {
-            table.row(vec![
-                w.flight.clone(),
-                format!("{:.2}", w.t0_s),
-                format!("{:.2}", w.t1_s),
-                w.channel.to_owned(),
-                format!("{:.1}", 100.0 * w.share),
-                w.condition.clone(),
-            ]);
-        }
-        table.print();
-        for note in &finding.notes {
-            talk(&format!("note: {note}"));
-        }
-        if let Some(folder) = out {
+        places(&finding.places);
+        notes(&finding.notes);
+        if let Some(folder) = &self.out {
             output::folder(folder)?;
             output::write_json(Some(&folder.join("find.json")), &finding)?;
         }
-        output::write_json(json.as_deref(), &finding)
+        output::write_json(self.json.as_deref(), &finding)
     }
+
+    fn name(&self) -> Result<(), String> {
+        let (_, _, diagnosis) = self.diagnose()?;
+        show(&diagnosis.verdict);
+        self.write(&diagnosis.verdict)
+    }
+
+    fn shrink(&self) -> Result<(), String> {
+        if self.held_out.is_empty() {
+            return Err("--held-out: none given; shrink needs flights that the fit never sees".to_owned());
+        }
+        self.name()
+    }
+
+    fn add(&self, dry_run: bool) -> Result<(), String> {
+        let (vehicle, flights, mut diagnosis) = self.diagnose()?;
+        show(&diagnosis.verdict);
+        if !nameable(&diagnosis.verdict) {
+            return self.write(&diagnosis.verdict);
+        }
+        let text = squirrel_gap::add(&vehicle, &diagnosis, &flights)?;
+        if dry_run {
+            say(&squirrel_gap::difference(&vehicle.text, &text));
+            return output::write_json(self.json.as_deref(), &diagnosis.verdict);
+        }
+        self.patch(&text, &mut diagnosis.verdict)?;
+        self.write(&diagnosis.verdict)
+    }
+
+    fn everything(&self) -> Result<(), String> {
+        let (vehicle, flights, mut diagnosis) = self.diagnose()?;
+        show(&diagnosis.verdict);
+        if nameable(&diagnosis.verdict) {
+            let text = squirrel_gap::add(&vehicle, &diagnosis, &flights)?;
+            self.patch(&text, &mut diagnosis.verdict)?;
+        }
+        self.write(&diagnosis.verdict)
+    }
+
+    fn folder(&self) -> Result<&Path, String> {
+        let folder = self.out.as_deref().ok_or("--out: none given; a folder is needed for what is written")?;
+        output::folder(folder)?;
+        Ok(folder)
+    }
+
+    /// Writes the patched vehicle file.
+    fn patch(&self, text: &str, verdict: &mut Verdict) -> Result<(), String> {
+        let file = self.vehicle.file_name().unwrap_or_default();
+        let path = self.folder()?.join(file);
+        if same_file(&path, &self.vehicle) {
+            return Err(format!("{}: --out is the folder of the vehicle file, which is never overwritten", path.display()));
+        }
+        output::write_file(&path, text.as_bytes())?;
+        verdict.model_patch = Some(path.display().to_string());
+        say(&format!("vehicle with the effect: {}", path.display()));
+        Ok(())
+    }
+
+    fn write(&self, verdict: &Verdict) -> Result<(), String> {
+        if let Some(folder) = &self.out {
+            output::folder(folder)?;
+            output::write_json(Some(&folder.join("verdict.json")), verdict)?;
+        }
+        output::write_json(self.json.as_deref(), verdict)
+    }
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    a.canonicalize().ok().is_some_and(|a| b.canonicalize().ok() == Some(a))
+}
+
+/// Whether the verdict has effects that a vehicle file can take.
+fn nameable(verdict: &Verdict) -> bool {
+    !verdict.effects.is_empty()
+        && matches!(verdict.verdict, Kind::Named | Kind::NamedFormDiffers | Kind::Ambiguous)
+}
+
+/// Logs by path; a folder stands for the logs in it, in the order of their names.
+fn logs(paths: &[PathBuf]) -> Result<Logs, String> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let at = |e: std::io::Error| format!("{}: {e}", path.display());
+        let mut inside = Vec::new();
+        for entry in std::fs::read_dir(path).map_err(at)? {
+            let file = entry.map_err(at)?.path();
+            if file.extension().is_some_and(|e| e == "mcap") {
+                inside.push(file);
+            }
+        }
+        if inside.is_empty() {
+            return Err(format!("{}: no .mcap file in this folder", path.display()));
+        }
+        inside.sort();
+        files.extend(inside);
+    }
+    files
+        .iter()
+        .map(|path| Ok((path.display().to_string(), FlightLog::read(path).map_err(|e| e.to_string())?)))
+        .collect()
+}
+
+fn places(places: &[squirrel_gap::find::Place]) {
+    let mut table = Table::new(&["flight", "from s", "to s", "channel", "x noise", "share %", "condition"]);
+    for w in places.iter().take(10) {
+        table.row(vec![
+            w.flight.clone(),
+            format!("{:.2}", w.t0_s),
+            format!("{:.2}", w.t1_s),
+            w.channel.to_owned(),
+            format!("{:.1}", w.noise),
+            format!("{:.1}", 100.0 * w.share),
+            w.condition.clone(),
+        ]);
+    }
+    table.print();
+}
+
+fn notes(notes: &[String]) {
+    for note in notes {
+        talk(&format!("note: {note}"));
+    }
+}
+
+fn show(verdict: &Verdict) {
+    say(&format!("{}\n", verdict.words));
+    if !verdict.effects.is_empty() {
+        effects(&verdict.effects);
+    }
+    if !verdict.alternatives.is_empty() {
+        let mut table = Table::new(&["other explanation", "nats"]);
+        for other in &verdict.alternatives {
+            table.row(vec![other.effects.join(" + "), format!("{:.1}", other.evidence_nats)]);
+        }
+        table.print();
+        say("");
+    }
+    places(&verdict.places);
+    notes(&verdict.notes);
+}
+
+fn effects(effects: &[NamedEffect]) {
+    let mut table = Table::new(&["effect", "form", "nats", "parameter", "value", "low", "high"]);
+    for effect in effects {
+        for (key, value) in &effect.parameters {
+            let numbers = match value {
+                Value::Choice { value } => [(*value).to_owned(), "-".to_owned(), "-".to_owned()],
+                Value::Number { value, low, high } => [value, low, high].map(|x| format!("{x:.4e}")),
+            };
+            let mut row = vec![
+                effect.name.to_owned(),
+                effect.form.to_owned(),
+                format!("{:.1}", effect.evidence_nats),
+                (*key).to_owned(),
+            ];
+            row.extend(numbers);
+            table.row(row);
+        }
+    }
+    table.print();
+    say("");
 }

@@ -17,6 +17,18 @@ pub struct EulerReference {
     pub acceleration: Vector3<f32>,
 }
 
+impl EulerReference {
+    /// The sum of two references; angles are wrapped.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Self {
+        Self {
+            angle: (self.angle + other.angle).map(wrap_angle),
+            rate: self.rate + other.rate,
+            acceleration: self.acceleration + other.acceleration,
+        }
+    }
+}
+
 /// One step towards `target`, semi-implicit.
 ///
 /// * `target` - roll, pitch, yaw command, rad

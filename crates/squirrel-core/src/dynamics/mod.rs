@@ -118,20 +118,46 @@ pub fn derivative<T: Real>(
     let air = air_in(state, total_wind(effects, wind), &ned_from_body);
     let wrench = wrench_in(vehicle, effects, state, &air, surfaces);
     let gravity_ned = Vector3::new(T::zero(), T::zero(), real(GRAVITY_M_S2));
-    let omega = state.omega.vector;
-    let spin = vehicle.parameters().inertia_kg_m2 * omega;
     State {
         position: state.velocity,
         velocity: In::new(gravity_ned + ned_from_body * (wrench.force.vector * vehicle.inverse_mass())),
         attitude: state.attitude_rate(),
-        omega: In::new(vehicle.inertia_inverse() * (wrench.moment.vector - omega.cross(&spin))),
+        omega: angular_acceleration(vehicle, state.omega, &wrench),
         rotor_speed_rad_s: drive.rates(vehicle.rotor_blocks(), &state.rotor_speed_rad_s),
     }
 }
 
-/// Specific force at the centre of mass, m/s^2: what an ideal accelerometer reads.
-pub fn specific_force<T: Real>(vehicle: &Vehicle<T>, wrench: &Wrench<Body, T>) -> In<Body, T> {
-    wrench.force * vehicle.inverse_mass()
+/// Angular acceleration, rad/s^2: `J^-1 (M - w x J w)`.
+///
+/// * `omega` - angular rate, rad/s
+#[inline(always)]
+pub fn angular_acceleration<T: Real>(
+    vehicle: &Vehicle<T>,
+    omega: In<Body, T>,
+    wrench: &Wrench<Body, T>,
+) -> In<Body, T> {
+    let spin = vehicle.parameters().inertia_kg_m2 * omega.vector;
+    In::new(vehicle.inertia_inverse() * (wrench.moment.vector - omega.vector.cross(&spin)))
+}
+
+/// What an accelerometer reads without noise, m/s^2: `f / m + w' x r + w x (w x r)`, with `r` from the centre of mass, on
+/// which the state and the wrench are, to the accelerometer.
+///
+/// * `omega` - angular rate, rad/s
+#[inline(always)]
+pub fn specific_force<T: Real>(
+    vehicle: &Vehicle<T>,
+    effects: &Effects<T>,
+    omega: In<Body, T>,
+    wrench: &Wrench<Body, T>,
+) -> In<Body, T> {
+    let centre = wrench.force * vehicle.inverse_mass();
+    if !effects.any() {
+        return centre;
+    }
+    let (w, r) = (omega.vector, effects.accelerometer_position().vector);
+    let omega_dot = angular_acceleration(vehicle, omega, wrench).vector;
+    centre + In::new(omega_dot.cross(&r) + w.cross(&w.cross(&r)))
 }
 
 #[cfg(test)]
@@ -210,7 +236,20 @@ mod tests {
         let speed = (vehicle.weight_n() / 4.0 / 6.0e-7).sqrt();
         state.rotor_speed_rad_s = [speed, speed, speed, speed, 0.0, 0.0, 0.0, 0.0];
         let w = wrench(&vehicle, &Effects::none(), &state, In::zero(), no_surfaces);
-        assert!((specific_force(&vehicle, &w).vector - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).norm() < 1e-9);
+        let read = specific_force(&vehicle, &Effects::none(), state.omega, &w);
+        assert!((read.vector - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).norm() < 1e-9);
+    }
+
+    /// The centre of mass is 10 mm ahead of the accelerometer: yawing pulls it inwards, pitching up pushes it down.
+    #[test]
+    fn an_accelerometer_off_the_centre_of_mass_feels_the_rotation() {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let mut effects = Effects::none();
+        effects.insert("cg_offset").unwrap().values.copy_from_slice(&[0.01, 0.0]);
+        let moment = In::new(Vector3::new(0.0, 4.68e-3 * 5.0, 0.0));
+        let wrench = Wrench { force: In::zero(), moment };
+        let read = specific_force(&vehicle, &effects, In::new(Vector3::new(0.0, 0.0, 3.0)), &wrench).vector;
+        assert!((read - Vector3::new(0.09, 0.0, 0.05)).norm() < 1e-12, "{read}");
     }
 
     #[test]

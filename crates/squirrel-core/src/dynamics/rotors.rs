@@ -65,6 +65,22 @@ impl<T: Real> RotorDrive<T> {
         rate
     }
 
+    /// Moves rotor speeds exactly over a time of any length: `target + (speed - target) exp(-dt / tau)`.
+    #[inline]
+    pub fn lead(&self, speed: &mut PerRotor<T>, dt_s: T) {
+        let keep = |inverse: T| if inverse > T::zero() { (-dt_s * inverse).exp() } else { T::zero() };
+        let up = keep(self.inverse_time_constant_up);
+        let down = if self.inverse_time_constant_down == self.inverse_time_constant_up {
+            up
+        } else {
+            keep(self.inverse_time_constant_down)
+        };
+        for (speed, target) in speed.iter_mut().zip(&self.target_rad_s) {
+            let gap = *target - *speed;
+            *speed = *target - gap * if gap > T::zero() { up } else { down };
+        }
+    }
+
     /// Rotor speeds at the start of a step: a rotor without lag is at its target at once.
     #[inline(always)]
     pub fn settle(&self, speed: &mut PerRotor<T>) {
@@ -130,6 +146,19 @@ mod tests {
         let down = drive.rates(1, &[2000.0; MAX_ROTORS]);
         assert!((up[0] - 500.0 / 0.03).abs() < 1e-6 && (down[0] + 500.0 / 0.04).abs() < 1e-6);
         assert_eq!(up[4], 0.0, "no rotor, no rate");
+    }
+
+    #[test]
+    fn leading_is_exact_for_any_time() {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.5; MAX_ROTORS], 14.8);
+        let mut speed = [1000.0, 2000.0, 1500.0, 1000.0, 0.0, 0.0, 0.0, 0.0];
+        drive.lead(&mut speed, 0.0);
+        assert_eq!(speed[..2], [1000.0, 2000.0]);
+        drive.lead(&mut speed, 0.06);
+        assert!((speed[0] - (1500.0 - 500.0 * (-2.0_f64).exp())).abs() < 1e-9, "up in 0.03 s");
+        assert!((speed[1] - (1500.0 + 500.0 * (-1.5_f64).exp())).abs() < 1e-9, "down in 0.04 s");
+        assert_eq!((speed[2], speed[4]), (1500.0, 0.0));
     }
 
     #[test]

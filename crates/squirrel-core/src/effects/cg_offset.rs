@@ -1,4 +1,6 @@
 //! Centre of mass off the geometric centre: `M -= r x F`, with `r = (x, y, 0)` and all forces of rotors, drag and wings.
+//!
+//! The accelerometer stays at the geometric centre, at `-r` from the centre of mass, and feels the rotation there.
 
 use super::{Effect, EffectParameter, Situation};
 use crate::frames::{Body, In, Wrench};
@@ -14,6 +16,10 @@ impl<T: Real> Effect<T> for CgOffset<T> {
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::signed("cg_x_m", 0.003, 0.012), EffectParameter::signed("cg_y_m", 0.003, 0.012)];
 
+    #[inline(always)]
+    fn accelerometer_position(&self) -> In<Body, T> {
+        In::new(Vector3::new(-self.0[0], -self.0[1], T::zero()))
+    }
     #[inline(always)]
     fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
         let r = Vector3::new(self.0[0], self.0[1], T::zero());

@@ -146,6 +146,11 @@ pub trait Effect<T: Real>: Copy {
     fn thrust_factor(&self, _air: &Air<T>, _height_m: T) -> T {
         T::one()
     }
+    /// Where the effect puts the accelerometer, from the centre of mass, m.
+    #[inline(always)]
+    fn accelerometer_position(&self) -> In<Body, T> {
+        In::zero()
+    }
     /// Force and moment that the effect adds.
     #[inline(always)]
     fn wrench(&self, _situation: &Situation<'_, T>) -> Wrench<Body, T> {
@@ -250,6 +255,13 @@ macro_rules! catalogue {
                 let mut product = T::one();
                 $(if let Some(effect) = &self.$field { product *= effect.thrust_factor(air, height_m); })+
                 product
+            }
+            /// Where the accelerometer sits, from the centre of mass, m.
+            #[inline(never)]
+            pub fn accelerometer_position(&self) -> In<Body, T> {
+                let mut sum = In::zero();
+                $(if let Some(effect) = &self.$field { sum = sum + effect.accelerometer_position(); })+
+                sum
             }
             /// Sum of forces and moments.
             #[inline(never)]

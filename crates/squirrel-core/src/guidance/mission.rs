@@ -4,6 +4,7 @@
 //! [`Trajectory`] starts at the measured position, at rest, turned by a steering angle (paper, section V.B and V.C;
 //! docs/equations.md T20). Its height stays the mission's height, so that lost height counts as error.
 
+use super::excite::{Excitation, Programme};
 use super::sensing::{Obstacle, Sensing, offset};
 use super::trajectory::Trajectory;
 use crate::control::Reference;
@@ -14,6 +15,7 @@ use nalgebra::Vector3;
 
 /// What to do.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "flight code has no heap, and there is one mission a flight")]
 pub enum Mission {
     /// Hold a position, m.
     Hover {
@@ -38,6 +40,8 @@ pub enum Mission {
         /// Speed along the circle, m/s.
         speed_m_s: f32,
     },
+    /// Manoeuvres for identification.
+    Excite(Programme),
 }
 
 /// Steering angles, drawn anew for each encounter from the seed.
@@ -110,6 +114,8 @@ impl Mission {
                 positive("radius_m", *radius_m)?;
                 positive("speed_m_s", *speed_m_s)
             }
+            // A programme is checked when it is made.
+            Self::Excite(_) => Ok(()),
         }
     }
 
@@ -171,6 +177,31 @@ impl Mission {
                     yaw_rad: 0.0,
                 }
             }
+            Self::Excite(programme) => programme.reference(time_us),
+        }
+    }
+
+    /// Wing command that the mission forces whatever the controller wants, 0 folded to 1 spread.
+    pub fn wing_command(&self, time_us: u64) -> Option<f32> {
+        match self {
+            Self::Excite(programme) => Some(programme.wing_command(time_us)),
+            _ => None,
+        }
+    }
+
+    /// What the mission adds to attitude and thrust commands.
+    pub fn excitation(&self, time_us: u64) -> Option<Excitation> {
+        match self {
+            Self::Excite(programme) => programme.excitation(time_us),
+            _ => None,
+        }
+    }
+
+    /// Roll and pitch that [`Self::excitation`] may add, rad: the outer loop leaves them free.
+    pub fn excitation_tilt_rad(&self) -> f32 {
+        match self {
+            Self::Excite(programme) => programme.multisine().tilt_max_rad(),
+            _ => 0.0,
         }
     }
 }
@@ -186,7 +217,7 @@ impl Steering {
 }
 
 /// A well mixed 32-bit function (the finaliser of MurmurHash3): flight code needs a draw, not a generator with state.
-fn scramble(mut x: u32) -> u32 {
+pub fn scramble(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x85EB_CA6B);
     x ^= x >> 13;

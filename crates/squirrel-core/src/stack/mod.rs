@@ -3,7 +3,7 @@
 //! ```text
 //! frame -> latest valid measurements
 //!   10 Hz:  guidance -> TWCC (PC, WOEG, WIIC) -> roll, pitch, thrust, wings
-//!   300 Hz: command filter -> integral backstepping -> mixer -> rotor commands
+//!   300 Hz: command filter (+ excitation) -> integral backstepping -> mixer -> rotor commands
 //! ```
 //! [`Stack`] is constant in flight; [`StackState`] is everything that changes, one plain struct that can be frozen, logged
 //! and thawed. Time comes in with the frame. A step never panics, allocates or loops without bound; a measurement that is
@@ -21,6 +21,7 @@ use crate::control::twcc::{Airframe, TwccParameters, TwccState, TwccTerms};
 use crate::control::wiic::Envelope;
 use crate::control::{AttitudeThrust, Reference};
 use crate::frames::{Body, In, Ned, Rotation};
+use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
 use crate::math::lower;
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
@@ -113,6 +114,8 @@ pub struct StackOutput {
 pub struct InnerTerms {
     /// Filtered attitude command.
     pub filter: EulerReference,
+    /// What the mission adds to it and to the thrust.
+    pub excitation: Option<Excitation>,
     /// Attitude loop.
     pub attitude: AttitudeTerms,
     /// Demand on the mixer.
@@ -133,12 +136,17 @@ impl Stack {
         parameters.attitude.check()?;
         parameters.twcc.check(p.limits.thrust_max_n)?;
         mission.check()?;
+        let tilt_max_rad = p.limits.tilt_max_rad - mission.excitation_tilt_rad();
+        if !(tilt_max_rad > 0.0) {
+            let reason = "must be above what the mission's multisine adds";
+            return Err(ParameterError::of("limits.tilt_max_rad", p.limits.tilt_max_rad, reason));
+        }
         let airframe = Airframe {
             mass_kg: p.mass_kg,
             // Two sides; the flat plate's own slope is 2.
             wing_area_m2: p.wing.map_or(0.0, |w| w.area_per_side_m2 * w.normal_force_slope),
             envelope: Envelope {
-                tilt_max_rad: p.limits.tilt_max_rad,
+                tilt_max_rad,
                 thrust_min_n: parameters.twcc.thrust_min_n,
                 thrust_max_n: p.limits.thrust_max_n,
             },
@@ -167,7 +175,7 @@ impl Stack {
         };
         let reference = self.mission.reference(&state.mission, frame.time_us);
         let dt_s = lower(elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
-        let inner = self.inner(state, reference.yaw_rad, dt_s);
+        let inner = self.inner(state, frame.time_us, reference.yaw_rad, dt_s);
         let mut rotor_command = [0.0; MAX_ROTORS];
         let propulsion = &self.vehicle.parameters().propulsion;
         for (i, command) in rotor_command.iter_mut().take(self.vehicle.rotors().len()).enumerate() {
@@ -204,11 +212,11 @@ impl Stack {
             dt_s,
         );
         state.command = terms.command;
-        state.wing_command = terms.wing_command;
+        state.wing_command = self.mission.wing_command(frame.time_us).unwrap_or(terms.wing_command);
         Some(terms)
     }
 
-    fn inner(&self, state: &mut StackState, yaw_rad: f32, dt_s: f32) -> Option<InnerTerms> {
+    fn inner(&self, state: &mut StackState, time_us: u64, yaw_rad: f32, dt_s: f32) -> Option<InnerTerms> {
         let (Some(imu), Some(ned_from_body)) = (state.known.imu, state.known.attitude) else { return None };
         let gains = &self.parameters.attitude;
         let target = Vector3::new(state.command.roll_rad, state.command.pitch_rad, yaw_rad);
@@ -219,19 +227,25 @@ impl Stack {
             gains.filter_damping,
             dt_s,
         );
+        let excitation = self.mission.excitation(time_us);
+        let (mut wanted, mut thrust_n) = (state.filter, state.command.thrust_n);
+        if let Some(extra) = &excitation {
+            wanted = wanted.plus(&extra.attitude);
+            thrust_n *= 1.0 + extra.thrust_share;
+        }
         let attitude = gains.update(
             &mut state.attitude,
             &self.vehicle.parameters().inertia_kg_m2,
             &ned_from_body,
             &imu.omega.vector,
-            &state.filter,
+            &wanted,
             state.saturated,
             dt_s,
         );
-        let demand = ThrustTorque { thrust_n: state.command.thrust_n, torque_n_m: attitude.torque_n_m };
+        let demand = ThrustTorque { thrust_n, torque_n_m: attitude.torque_n_m };
         let mixer = self.mixer.allocate(&demand);
         state.saturated = mixer.saturated;
-        Some(InnerTerms { filter: state.filter, attitude, demand, mixer })
+        Some(InnerTerms { filter: state.filter, excitation, attitude, demand, mixer })
     }
 }
 

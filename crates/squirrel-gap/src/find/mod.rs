@@ -20,26 +20,24 @@
 //! command acts from the step nearest to its time, and the motion between two samples lies on a line. Before a piece its
 //! first sample is held for 1 s, so that rotors, servos and membranes start settled.
 //!
-//! **Numbers.** RMS values are over samples, over all flights together or for each. A place is a window of one second, at
-//! whole seconds of a flight's time, and a channel; its share is its part of the sum of the squared residual of that
-//! channel over all flights. The places with the largest shares are those furthest above the channel's average.
+//! **Numbers.** RMS values are over samples, over all flights together or for each. A place is a window of one second and a
+//! channel, taken from the residual that `name` works with; places rank by their rms over that of the noise which the log
+//! itself shows. A share is a place's part of the sum of the squared residual of its channel over all flights.
 //!
 //! `tests/residual_numpy.py` computes the force again, from a CSV file and without any code of this workspace.
 
-mod filter;
-mod recording;
+mod places;
 mod residual;
-mod series;
-mod windows;
 
 use crate::GapError;
+use crate::predictor::Predictor;
 use nalgebra::Vector6;
-use recording::Recording;
+use crate::flight::recording::Recording;
 use serde::Serialize;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
-use windows::Windows;
+pub(crate) use places::places;
 
 /// The channels of a residual, in order.
 pub const CHANNELS: [&str; 6] = [
@@ -102,6 +100,8 @@ pub struct Place {
     pub condition: String,
     /// Part of the channel's squared residual over all flights that lies here, 0 to 1.
     pub share: f64,
+    /// Rms of the residual here over what noise alone would leave.
+    pub noise: f64,
 }
 
 /// Sum of squares and number of samples.
@@ -135,7 +135,6 @@ pub fn find(vehicle: &VehicleFile, flights: &[(String, FlightLog)]) -> Result<Fi
         return Err(GapError::NoFlights);
     }
     let mut total = Sum::default();
-    let mut windows = Windows::default();
     let mut per_flight = BTreeMap::new();
     let mut notes = Vec::new();
     for (flight, log) in flights {
@@ -145,7 +144,6 @@ pub fn find(vehicle: &VehicleFile, flights: &[(String, FlightLog)]) -> Result<Fi
             for residual in residual::residuals(vehicle, &recording, *piece)? {
                 total.add(&residual.value);
                 sum.add(&residual.value);
-                windows.add(&vehicle.vehicle, &recording, &residual);
             }
         }
         let (force_body_rms_n, moment_body_rms_n_m) = sum.rms();
@@ -162,5 +160,7 @@ pub fn find(vehicle: &VehicleFile, flights: &[(String, FlightLog)]) -> Result<Fi
     }
     let (force_body_rms_n, moment_body_rms_n_m) = total.rms();
     let residual = ResidualRms { force_body_rms_n, moment_body_rms_n_m, per_flight };
-    Ok(Finding { residual, places: windows.worst(), notes })
+    let predictor = Predictor::new(vehicle, flights)?;
+    let places = places(&predictor, &predictor.residual(&predictor.nominal())?)?;
+    Ok(Finding { residual, places, notes })
 }

@@ -3,9 +3,9 @@
 //! The model is the simulator's own plant, led along the measured motion: it propagates rotors, servos and membranes under
 //! the logged commands and gives force and moment, while velocity, attitude and rates are what was measured.
 
-use super::filter::{DERIVATIVE_REACH, derivative};
-use super::recording::{Recording, Sample};
-use super::series::{Span, between};
+use crate::flight::filter::{DERIVATIVE_REACH, derivative};
+use crate::flight::recording::{Recording, Sample};
+use crate::flight::series::{Span, between};
 use super::{CHANNELS, GapError};
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::dynamics::State;
@@ -70,7 +70,7 @@ pub(super) fn residuals(
     let first = recording.edge();
     recording
         .filter
-        .apply(&raw)
+        .apply(&raw, 1)
         .into_iter()
         .zip(samples[first..].iter().zip(&model[first..]))
         .map(|(value, (sample, prediction))| {

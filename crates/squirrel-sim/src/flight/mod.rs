@@ -76,7 +76,7 @@ impl Setup {
         };
         self.arm.configure(&mut parameters.twcc);
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
-        Stack::new(vehicle, parameters, self.scenario.mission()).map_err(fail)
+        Stack::new(vehicle, parameters, self.scenario.mission().map_err(fail)?).map_err(fail)
     }
 
     /// The vehicle as the flight code may use it: with the scenario's thrust-to-weight ratio, no rotor is asked for more than
@@ -118,7 +118,7 @@ impl Setup {
         )
         .map_err(FlightError)?;
         let mut mover = Mover::new(self)?;
-        let mut state = plant.initial_state(self.hovering(&plant), self.scenario.battery_charge);
+        let mut state = plant.initial_state(self.hovering(&plant), self.scenario.start_charge());
         let seed = self.scenario.seed;
         let mut wind = Wind::new(self.scenario.wind(), seed ^ 0x5851_F42D_4C95_7F2D);
         let mut sensors = Sensors::new(self.vehicle.sensors, seed);
@@ -225,7 +225,12 @@ fn truth(plant: &Plant, state: &PlantState, air: In<Ned, f64>) -> Truth {
         velocity: state.body.velocity,
         ned_from_body: state.body.ned_from_body(),
         omega: state.body.omega,
-        specific_force: specific_force(plant.vehicle(), &plant.wrench(state, air)),
+        specific_force: specific_force(
+            plant.vehicle(),
+            plant.effects(),
+            state.body.omega,
+            &plant.wrench(state, air),
+        ),
         voltage_v: state.battery.voltage_v,
         current_a: state.battery.current_a,
     }

@@ -186,6 +186,17 @@ pub(crate) fn record_output(
             ],
         );
     }
+    if let Some(excitation) = output.inner.as_ref().and_then(|inner| inner.excitation) {
+        log.source_mut("control.excitation").push(
+            t,
+            &[
+                ("angle_rad", &wide(&excitation.attitude.angle)),
+                ("rate_rad_s", &wide(&excitation.attitude.rate)),
+                ("acceleration_rad_s2", &wide(&excitation.attitude.acceleration)),
+                ("thrust_share", &[f64::from(excitation.thrust_share)]),
+            ],
+        );
+    }
     if let Some(inner) = &output.inner {
         let thrusts = inner.mixer.rotor_thrust_n.map(f64::from);
         log.source_mut("control.inner").push(

@@ -72,6 +72,7 @@ pub(super) fn add_source(
                 (0..rows.len()).filter(|&i| channel.row(i).iter().any(|x| x.is_nan())).count();
             report.channels.push(ChannelReport {
                 channel: map.name.clone(),
+                columns: map.columns.clone(),
                 samples: rows.len(),
                 rate_hz,
                 samples_missing,
@@ -117,7 +118,7 @@ fn channel(map: &ChannelMap, table: &Table, rows: &[usize]) -> Result<Channel, I
                 return Err(ImportError::Cell {
                     file: table.name.clone(),
                     column: map.columns[i].clone(),
-                    row: table.lines[row],
+                    row: table.rows[row],
                     value: columns[i][row].to_string(),
                     problem: "is infinite after scale and offset",
                 });
@@ -130,7 +131,7 @@ fn channel(map: &ChannelMap, table: &Table, rows: &[usize]) -> Result<Channel, I
                 let q = attitude.next(*frame, [a, b, c, d]).map_err(|norm| ImportError::QuaternionNorm {
                     file: table.name.clone(),
                     columns: map.columns.join(", "),
-                    row: table.lines[row],
+                    row: table.rows[row],
                     norm,
                 })?;
                 values.extend(q);

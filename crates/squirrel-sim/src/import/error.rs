@@ -1,6 +1,7 @@
 //! What can be wrong with an import map or a foreign log: one line each, naming file, field, row and value.
 //!
-//! Rows are line numbers as an editor shows them; the header is row 1.
+//! Rows are line numbers of a CSV file as an editor shows them (the header is row 1); in other files they are counted from
+//! 1. The file of a topic is named with it: ``log.ulg, topic `sensor_gyro` ``.
 
 use std::io;
 
@@ -21,7 +22,7 @@ pub enum ImportError {
     MapSyntax {
         /// Name of the map.
         map: String,
-        /// Line number, from 1.
+        /// Row, from 1.
         line: usize,
         /// What is wrong.
         message: String,
@@ -68,22 +69,58 @@ pub enum ImportError {
         /// Path as given.
         path: String,
     },
+    /// No format has this extension.
+    #[error(
+        "{file}: import reads .csv, .parquet, .ulg (PX4) and .mcap (JSON messages), by the file's extension"
+    )]
+    UnknownFormat {
+        /// Path as given.
+        file: String,
+    },
+    /// The file contradicts its format: cut off, changed, or another format under this extension.
+    #[error("{file}: {problem}")]
+    Damaged {
+        /// Path as given, and topic.
+        file: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The file has no message of a topic.
+    #[error("{file}: no message of topic `{topic}`; nearest: {nearest}")]
+    MissingTopic {
+        /// Path as given.
+        file: String,
+        /// The topic that the map asks for, and the instance if it is not the first.
+        topic: String,
+        /// Topics with a similar name.
+        nearest: String,
+    },
+    /// A column that does not hold one number a row.
+    #[error("{file}: column `{column}` holds {kind}, not one number a row")]
+    ColumnType {
+        /// Path as given.
+        file: String,
+        /// The column that the map asks for.
+        column: String,
+        /// What it holds.
+        kind: String,
+    },
     /// The file has no header.
     #[error("{file}: empty file")]
     Empty {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
     },
     /// The file has a header and nothing else.
     #[error("{file}: a header and no rows")]
     HeaderOnly {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
     },
     /// The header lacks a column.
     #[error("{file}: no column `{column}`; nearest: {nearest}")]
     MissingColumn {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
         /// The column that the map asks for.
         column: String,
@@ -93,7 +130,7 @@ pub enum ImportError {
     /// The header has a column more than once.
     #[error("{file}: column `{column}` is in the header {count} times")]
     RepeatedColumn {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
         /// The column that the map asks for.
         column: String,
@@ -103,25 +140,25 @@ pub enum ImportError {
     /// A row is shorter or longer than the header.
     #[error("{file}, row {row}: {cells} cells, the header has {expected}")]
     RowLength {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
-        /// Line number, from 1.
+        /// Row, from 1.
         row: u64,
         /// Cells in this row.
         cells: usize,
         /// Cells in the header.
         expected: usize,
     },
-    /// A cell is no number, an infinite one, or an empty time.
+    /// A value is no number, an infinite one, or an empty time.
     #[error("{file}, column `{column}`, row {row}: `{value}` {problem}")]
     Cell {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
         /// The column.
         column: String,
-        /// Line number, from 1.
+        /// Row, from 1.
         row: u64,
-        /// The cell as written.
+        /// The value as written.
         value: String,
         /// What is wrong with it.
         problem: &'static str,
@@ -131,11 +168,11 @@ pub enum ImportError {
         "{file}, column `{column}`, row {row}: time {problem}: {time} after {previous} in row {previous_row}"
     )]
     TimeOrder {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
         /// The time column.
         column: String,
-        /// Line number, from 1.
+        /// Row, from 1.
         row: u64,
         /// `runs backwards` or `repeats`.
         problem: &'static str,
@@ -143,17 +180,17 @@ pub enum ImportError {
         time: f64,
         /// Time of the last kept row before it, in the unit of the file.
         previous: f64,
-        /// Line number of that row.
+        /// That row.
         previous_row: u64,
     },
     /// A quaternion is too long or too short to be a rotation.
     #[error("{file}, columns {columns}, row {row}: quaternion norm {norm:.4} is more than 5 % away from 1")]
     QuaternionNorm {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
         /// The four columns.
         columns: String,
-        /// Line number, from 1.
+        /// Row, from 1.
         row: u64,
         /// The norm after scale and offset.
         norm: f64,
@@ -161,7 +198,7 @@ pub enum ImportError {
     /// A channel without a single number.
     #[error("{file}, columns {columns}: `{channel}` has no number in any kept row")]
     AllMissing {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
         /// Columns of the channel.
         columns: String,
@@ -171,7 +208,7 @@ pub enum ImportError {
     /// The mask drops everything.
     #[error("{file}: `keep` drops all {rows} rows")]
     NothingKept {
-        /// The CSV file.
+        /// Path as given, and topic.
         file: String,
         /// Rows in the file.
         rows: usize,

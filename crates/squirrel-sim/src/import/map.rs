@@ -25,10 +25,13 @@ pub struct ImportMap {
     pub(super) sources: Vec<SourceMap>,
 }
 
-/// One file of the foreign log.
+/// One file of the foreign log, or one topic of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SourceMap {
     pub(super) file: Option<String>,
+    pub(super) topic: Option<String>,
+    /// Which of several publishers of a topic, from 0.
+    pub(super) instance: Option<u8>,
     pub(super) time: TimeMap,
     pub(super) channels: Vec<ChannelMap>,
 }
@@ -69,6 +72,8 @@ struct MapToml {
 #[serde(deny_unknown_fields)]
 struct SourceToml {
     file: Option<String>,
+    topic: Option<String>,
+    instance: Option<u8>,
     time: TimeMap,
     channels: BTreeMap<String, ChannelToml>,
 }
@@ -148,19 +153,20 @@ impl ImportMap {
         }
         let mut seen = BTreeSet::new();
         let mut sources = Vec::new();
-        for (index, source) in toml.source.into_iter().enumerate() {
+        for (index, mut source) in toml.source.into_iter().enumerate() {
             let number = index + 1;
             check_source(&source)
                 .map_err(|(field, problem)| field_error(format!("source {number}, {field}"), problem))?;
             let mut channels = Vec::new();
-            for (channel, toml) in source.channels {
+            for (channel, toml) in std::mem::take(&mut source.channels) {
                 let field = format!("source {number}, `{channel}`");
                 if !seen.insert(channel.clone()) {
                     return Err(field_error(field, "is in another source already".to_owned()));
                 }
                 channels.push(channel_map(channel, toml).map_err(|problem| field_error(field, problem))?);
             }
-            sources.push(SourceMap { file: source.file, time: source.time, channels });
+            let SourceToml { file, topic, instance, time, .. } = source;
+            sources.push(SourceMap { file, topic, instance, time, channels });
         }
         let keep = keep.map_or_else(Vec::new, Condition::into_terms);
         Ok(Self { name: name.to_owned(), text: text.to_owned(), keep, sources })

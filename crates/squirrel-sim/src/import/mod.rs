@@ -1,4 +1,5 @@
-//! Import of foreign flight logs: CSV files become a [`FlightLog`] in NED, FRD, SI and radians by a TOML map.
+//! Import of foreign flight logs: CSV, Parquet, ULog and MCAP files become a [`FlightLog`] in NED, FRD, SI and radians by
+//! a TOML map. The extension of a file says its format.
 //!
 //! The map names, for each canonical channel, the columns, their scale and offset, their frame, and how time is written:
 //!
@@ -14,6 +15,23 @@
 //! "battery.voltage_v"             = { columns = ["vbat"], repeats = "forward_filled" }
 //! ```
 //!
+//! ULog files of PX4 (`.ulg`) and MCAP files with JSON messages (`.mcap`) have topics: a source reads one, its fields are
+//! the columns. `instance` counts the publishers of a ULog topic from 0.
+//!
+//! ```toml
+//! [[source]]
+//! file = "log.ulg"
+//! topic = "sensor_gyro"
+//! instance = 1                          # 0 if left out
+//! time = { column = "timestamp", unit = "us" }
+//! channels = { "imu.omega_body_rad_s" = { columns = ["x", "y", "z"], body = "frd" } }
+//! [[source]]
+//! file = "bag.mcap"
+//! topic = "/battery"
+//! time = { column = "log_time", unit = "ns" }   # MCAP's own time of a message; or a field of it
+//! channels = { "battery.voltage_v" = { columns = ["cells[0].voltage"] } }
+//! ```
+//!
 //! - A number becomes `value * scale + offset` (each one number, or one a column) before frames are turned.
 //! - `world` (`ned`, `enu`, `nwu`) belongs to channels with `_ned_` in their name, `body` (`frd`, `flu`) to those with
 //!   `_body_`; an attitude needs both, and `order` and `direction`. `baro.altitude_m` is up.
@@ -23,18 +41,24 @@
 //! - `keep` may join parts with `and` that look at different files. A part drops rows of the files that have its
 //!   columns; of all other files it drops rows outside the time spans in which it keeps consecutive rows of the first
 //!   file that has them.
-//! - Empty cells and `nan` are NaN in the log and counted in the report.
+//! - Empty cells, nulls and `nan` are NaN in the log and counted in the report.
 //! - The earliest kept time over all files is time zero; metadata `time_zero_s` has it in the foreign clock.
 
 mod build;
+mod csv_file;
 mod error;
 mod files;
 mod frames;
 mod map;
 mod mask;
+mod mcap_file;
+mod meter;
 mod names;
+mod parquet_file;
 mod report;
 mod table;
+mod ulog_file;
+mod ulog_format;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -46,8 +70,9 @@ pub use report::{ChannelReport, FileReport, ImportReport};
 use crate::log::FlightLog;
 use map::SourceMap;
 use mask::Condition;
+use meter::Meter;
 use names::nearest;
-use table::{CsvFile, Table};
+use table::{Table, TableFile};
 
 /// Imports one flight.
 ///
@@ -57,8 +82,26 @@ use table::{CsvFile, Table};
 /// # Errors
 /// The first thing wrong with the files, naming file, column, row and value; see [`ImportError`].
 pub fn import(map: &ImportMap, paths: &[PathBuf]) -> Result<(FlightLog, ImportReport), ImportError> {
+    import_watched(map, paths, &|_, _| {})
+}
+
+/// Imports one flight as [`import`] does, and says how far it is.
+///
+/// * `watch` - gets, about once a MiB, the bytes worked through and the bytes of all files
+///
+/// # Errors
+/// As [`import`].
+pub fn import_watched(
+    map: &ImportMap,
+    paths: &[PathBuf],
+    watch: &dyn Fn(u64, u64),
+) -> Result<(FlightLog, ImportReport), ImportError> {
     let found = files::find(map, paths)?;
-    let opened = found.iter().map(|path| CsvFile::open(path)).collect::<Result<Vec<_>, _>>()?;
+    // A file that two sources read is worked through twice.
+    let total = found.iter().filter_map(|path| Some(path.metadata().ok()?.len())).sum();
+    let meter = Meter::new(total, watch);
+    let opened = (0..).zip(&found).map(|(index, path)| table::open(map, index, path, &meter));
+    let opened = opened.collect::<Result<Vec<_>, _>>()?;
     check_mask_columns(map, &opened)?;
     let tables = map
         .sources
@@ -82,8 +125,11 @@ pub fn import(map: &ImportMap, paths: &[PathBuf]) -> Result<(FlightLog, ImportRe
         let (table, rows) = (&tables[index], &kept[index]);
         report.files.push(FileReport {
             file: names[index].clone(),
+            topic: source.topic.clone(),
+            instance: source.instance,
             rows: table.len(),
             rows_masked: table.len() - rows.len(),
+            bytes_cut: table.bytes_cut,
         });
         let time_s: Vec<f64> = times[index].iter().map(|t| t - zero_s).collect();
         build::add_source(&mut log, &mut report, map, source, table, &time_s, rows)?;
@@ -99,16 +145,17 @@ pub fn import(map: &ImportMap, paths: &[PathBuf]) -> Result<(FlightLog, ImportRe
 }
 
 /// Every part of the mask needs one file that has all of its columns.
-fn check_mask_columns(map: &ImportMap, files: &[CsvFile]) -> Result<(), ImportError> {
+fn check_mask_columns(map: &ImportMap, files: &[Box<dyn TableFile + '_>]) -> Result<(), ImportError> {
     for term in &map.keep {
         let columns = term.columns();
-        if files.iter().any(|file| has_all(file, &columns)) {
+        if files.iter().any(|file| has_all(file.as_ref(), &columns)) {
             continue;
         }
-        let nowhere = columns.iter().find(|column| files.iter().all(|file| !has_all(file, &[column])));
+        let nowhere =
+            columns.iter().find(|column| files.iter().all(|file| !has_all(file.as_ref(), &[column])));
         let problem = match nowhere {
             Some(column) => {
-                let all = files.iter().flat_map(CsvFile::header).map(String::as_str);
+                let all = files.iter().flat_map(|file| file.columns()).map(String::as_str);
                 format!("no file has a column `{column}`; nearest: {}", nearest(column, all))
             }
             None => {
@@ -120,16 +167,20 @@ fn check_mask_columns(map: &ImportMap, files: &[CsvFile]) -> Result<(), ImportEr
     Ok(())
 }
 
-fn has_all(file: &CsvFile, columns: &[&str]) -> bool {
-    columns.iter().all(|column| file.header().iter().any(|name| name == column))
+fn has_all(file: &dyn TableFile, columns: &[&str]) -> bool {
+    columns.iter().all(|column| file.columns().iter().any(|name| name == column))
 }
 
 /// Reads the columns of a source and those that the mask looks at.
-fn read(source: &SourceMap, keep: &[Condition], file: CsvFile) -> Result<Table, ImportError> {
+fn read(source: &SourceMap, keep: &[Condition], file: Box<dyn TableFile + '_>) -> Result<Table, ImportError> {
+    let of_channels = source.channels.iter().flat_map(|channel| &channel.columns).map(String::as_str);
+    let of_mask =
+        keep.iter().map(Condition::columns).filter(|columns| has_all(file.as_ref(), columns)).flatten();
     let mut wanted = vec![source.time.column.as_str()];
-    wanted.extend(source.channels.iter().flat_map(|channel| &channel.columns).map(String::as_str));
-    for columns in keep.iter().map(Condition::columns).filter(|columns| has_all(&file, columns)) {
-        wanted.extend(columns);
+    for column in of_channels.chain(of_mask) {
+        if !wanted.contains(&column) {
+            wanted.push(column);
+        }
     }
     file.read(&wanted)
 }
@@ -141,7 +192,7 @@ fn seconds(source: &SourceMap, table: &Table) -> Result<Vec<f64>, ImportError> {
         Some(row) => Err(ImportError::Cell {
             file: table.name.clone(),
             column: source.time.column.clone(),
-            row: table.lines[row],
+            row: table.rows[row],
             value: String::new(),
             problem: "is no time",
         }),
@@ -196,10 +247,10 @@ fn check_order(source: &SourceMap, table: &Table, rows: &[usize], time_s: &[f64]
     Err(ImportError::TimeOrder {
         file: table.name.clone(),
         column: source.time.column.clone(),
-        row: table.lines[pair[1]],
+        row: table.rows[pair[1]],
         problem: if time < previous { "runs backwards" } else { "repeats" },
         time,
         previous,
-        previous_row: table.lines[pair[0]],
+        previous_row: table.rows[pair[0]],
     })
 }

@@ -11,15 +11,21 @@ pub struct ImportReport {
     pub channels: Vec<ChannelReport>,
 }
 
-/// Rows of one file.
+/// Rows of one file, or of one topic of a file.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct FileReport {
     /// File name without folders.
     pub file: String,
-    /// Rows in the file, header not counted.
+    /// Topic, where the file has topics.
+    pub topic: Option<String>,
+    /// Which publisher of the topic, from 0, where the map says.
+    pub instance: Option<u8>,
+    /// Rows in the file, header not counted; messages of the topic.
     pub rows: usize,
     /// Rows that `keep` dropped.
     pub rows_masked: usize,
+    /// Bytes left out at the end of a file that ends inside a record.
+    pub bytes_cut: u64,
 }
 
 /// Samples of one channel.
@@ -27,6 +33,8 @@ pub struct FileReport {
 pub struct ChannelReport {
     /// Canonical name.
     pub channel: String,
+    /// Columns that it is made of, in the order of the map.
+    pub columns: Vec<String>,
     /// Samples in the log.
     pub samples: usize,
     /// Median rate, Hz; `None` with fewer than two samples.
@@ -39,11 +47,23 @@ pub struct ChannelReport {
 
 impl fmt::Display for ImportReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for FileReport { file, rows, rows_masked } in &self.files {
-            writeln!(f, "{file}: {rows} rows, {rows_masked} dropped by `keep`")?;
+        for FileReport { file, topic, instance, rows, rows_masked, bytes_cut } in &self.files {
+            write!(f, "{file}")?;
+            if let Some(topic) = topic {
+                write!(f, ", {topic}")?;
+            }
+            if let Some(instance) = instance {
+                write!(f, " instance {instance}")?;
+            }
+            write!(f, ": {rows} rows, {rows_masked} dropped by `keep`")?;
+            if *bytes_cut > 0 {
+                write!(f, "; the file ends inside a record, its last {bytes_cut} bytes are left out")?;
+            }
+            writeln!(f)?;
         }
         for report in &self.channels {
-            write!(f, "{}: {} samples", report.channel, report.samples)?;
+            let columns = report.columns.join(", ");
+            write!(f, "{} from {columns}: {} samples", report.channel, report.samples)?;
             if let Some(rate_hz) = report.rate_hz {
                 write!(f, " at {rate_hz:.1} Hz")?;
             }

@@ -1,142 +1,103 @@
-//! One CSV file in memory: the columns that a map asks for, as numbers, with the line each row came from.
+//! What every reader gives: the columns that a map asks for, as numbers, with the row of the file each came from.
 
-use std::fs::File;
-use std::io::{self, Read};
+use std::fs;
 use std::path::Path;
 
-use csv::{ByteRecord, Reader, ReaderBuilder, Terminator, Trim};
-
+use super::csv_file::CsvFile;
 use super::error::ImportError;
+use super::map::ImportMap;
+use super::mcap_file::McapFile;
+use super::meter::Meter;
 use super::names::nearest;
+use super::parquet_file::ParquetFile;
+use super::ulog_file::UlogFile;
 
-/// A CSV file whose header is read and whose rows are not.
-pub(super) struct CsvFile {
-    /// Path as given, for error messages.
-    name: String,
-    header: Vec<String>,
-    reader: Reader<Box<dyn Read>>,
+/// A file, or a topic of one, whose column names are known and whose numbers are not read yet.
+pub(super) trait TableFile {
+    /// Names of the columns.
+    fn columns(&self) -> &[String];
+
+    /// Reads some columns to the end of the file; `wanted` has no name twice.
+    ///
+    /// # Errors
+    /// A missing or repeated column, a value that is no number or infinite, a damaged file, no rows.
+    fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError>;
 }
 
-/// Columns of a CSV file. An empty cell is NaN; nothing is infinite.
+/// Columns of a file. A missing value is NaN, always with the same bits; nothing is infinite.
 #[derive(Debug)]
 pub(super) struct Table {
-    /// Path as given, for error messages.
+    /// Path as given, and the topic if the file has topics, for error messages.
     pub(super) name: String,
     columns: Vec<(String, Vec<f64>)>,
-    /// Line number of each row, from 1, the header included.
-    pub(super) lines: Vec<u64>,
+    /// Number of each row from 1: in CSV the line of the file, in a topic the message.
+    pub(super) rows: Vec<u64>,
+    /// Bytes at the end of the file that hold no whole record.
+    pub(super) bytes_cut: u64,
 }
 
-impl CsvFile {
-    /// Opens a file and reads its header.
-    ///
-    /// # Errors
-    /// [`ImportError::Read`], [`ImportError::Empty`].
-    pub(super) fn open(path: &Path) -> Result<Self, ImportError> {
-        let name = path.display().to_string();
-        let read_error = |source| ImportError::Read { file: path.display().to_string(), source };
-        let file = File::open(path).map_err(read_error)?;
-        // A newline at the very end, whether or not the file has one: the line of a row is then always the reader's
-        // line less one. Empty lines are skipped, a carriage return is trimmed as white space.
-        let input: Box<dyn Read> = Box::new(file.chain(&b"\n"[..]));
-        let mut reader = ReaderBuilder::new()
-            .has_headers(false)
-            .flexible(true)
-            .terminator(Terminator::Any(b'\n'))
-            .trim(Trim::All)
-            .buffer_capacity(1 << 16)
-            .from_reader(input);
-        let mut record = ByteRecord::new();
-        while next_record(&mut reader, &mut record).map_err(read_error)? {
-            if !is_blank(&record) {
-                let header = record.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect();
-                return Ok(Self { name, header, reader });
-            }
-        }
-        Err(ImportError::Empty { file: name })
+/// Opens the file of one `[[source]]`; its extension says the format.
+///
+/// # Errors
+/// An unknown extension, `topic` or `instance` where the format has none or missing where it has, an unreadable or
+/// empty file, a damaged header, a missing topic.
+pub(super) fn open<'a>(
+    map: &ImportMap,
+    index: usize,
+    path: &Path,
+    meter: &'a Meter<'a>,
+) -> Result<Box<dyn TableFile + 'a>, ImportError> {
+    let file = path.display().to_string();
+    let source = &map.sources[index];
+    let topic_error = |key: &str, problem: String| ImportError::MapField {
+        map: map.name.clone(),
+        field: format!("source {}, {key}", index + 1),
+        problem,
+    };
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    let (has_topics, has_instances) = match extension.as_str() {
+        "csv" | "parquet" => (false, false),
+        "mcap" => (true, false),
+        "ulg" => (true, true),
+        _ => return Err(ImportError::UnknownFormat { file }),
+    };
+    if source.instance.is_some() && !has_instances {
+        return Err(topic_error("instance", format!("means nothing for `{file}`: leave it out")));
     }
-
-    /// Names in the header.
-    pub(super) fn header(&self) -> &[String] {
-        &self.header
+    let topic = match (&source.topic, has_topics) {
+        (Some(topic), true) => topic,
+        (None, true) => return Err(topic_error("topic", format!("missing: say which topic of `{file}`"))),
+        (Some(_), false) => {
+            return Err(topic_error("topic", format!("means nothing for `{file}`: leave it out")));
+        }
+        (None, false) if extension == "csv" => return Ok(Box::new(CsvFile::open(path, meter)?)),
+        (None, false) => return Ok(Box::new(ParquetFile::open(path, meter)?)),
+    };
+    let bytes = fs::read(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
+    if bytes.is_empty() {
+        return Err(ImportError::Empty { file });
     }
-
-    /// Reads some columns to the end of the file. A column may be asked for more than once.
-    ///
-    /// # Errors
-    /// A missing or repeated column, a row of the wrong length, a cell that is no number or infinite, no rows.
-    pub(super) fn read(mut self, wanted: &[&str]) -> Result<Table, ImportError> {
-        let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
-        let mut places = Vec::new();
-        for &column in wanted {
-            if columns.iter().all(|(name, _)| name != column) {
-                places.push(self.place(column)?);
-                columns.push((column.to_owned(), Vec::new()));
-            }
-        }
-        let mut lines = Vec::new();
-        let mut record = ByteRecord::new();
-        loop {
-            let more = next_record(&mut self.reader, &mut record)
-                .map_err(|source| ImportError::Read { file: self.name.clone(), source })?;
-            if !more {
-                break;
-            }
-            let row = self.reader.position().line() - 1;
-            if record.len() != self.header.len() {
-                if is_blank(&record) {
-                    continue;
-                }
-                return Err(ImportError::RowLength {
-                    file: self.name,
-                    row,
-                    cells: record.len(),
-                    expected: self.header.len(),
-                });
-            }
-            for (&place, (column, values)) in places.iter().zip(&mut columns) {
-                let cell = &record[place];
-                values.push(number(cell).map_err(|problem| ImportError::Cell {
-                    file: self.name.clone(),
-                    column: column.clone(),
-                    row,
-                    value: String::from_utf8_lossy(cell).chars().take(40).collect(),
-                    problem,
-                })?);
-            }
-            lines.push(row);
-        }
-        if lines.is_empty() {
-            return Err(ImportError::HeaderOnly { file: self.name });
-        }
-        Ok(Table { name: self.name, columns, lines })
+    if has_instances {
+        let instance = source.instance.unwrap_or(0);
+        return Ok(Box::new(UlogFile::open(&file, bytes, topic, instance, meter)?));
     }
-
-    fn place(&self, column: &str) -> Result<usize, ImportError> {
-        let mut found = self.header.iter().enumerate().filter(|(_, name)| *name == column);
-        match (found.next(), found.count()) {
-            (Some((place, _)), 0) => Ok(place),
-            (Some(_), others) => Err(ImportError::RepeatedColumn {
-                file: self.name.clone(),
-                column: column.to_owned(),
-                count: others + 1,
-            }),
-            (None, _) => Err(ImportError::MissingColumn {
-                file: self.name.clone(),
-                column: column.to_owned(),
-                nearest: nearest(column, self.header.iter().map(String::as_str)),
-            }),
-        }
-    }
+    Ok(Box::new(McapFile::open(&file, &bytes, topic, meter)?))
 }
 
 impl Table {
-    /// Rows.
-    pub(super) fn len(&self) -> usize {
-        self.lines.len()
+    /// * `rows` - number of each row in the file
+    /// * `values` - one list a wanted column, as long as `rows`
+    pub(super) fn new(name: String, wanted: &[&str], values: Vec<Vec<f64>>, rows: Vec<u64>) -> Self {
+        let columns = wanted.iter().map(|&column| column.to_owned()).zip(values).collect();
+        Self { name, columns, rows, bytes_cut: 0 }
     }
 
-    /// The numbers of a column that was asked for in [`CsvFile::read`]; empty if it was not.
+    /// Rows.
+    pub(super) fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The numbers of a column that was asked for; empty if it was not.
     pub(super) fn column(&self, name: &str) -> &[f64] {
         self.columns.iter().find(|(column, _)| column == name).map_or(&[], |(_, values)| values)
     }
@@ -148,29 +109,51 @@ impl Table {
 
     #[cfg(test)]
     pub(super) fn from_columns(columns: &[(&str, &[f64])]) -> Self {
-        let columns: Vec<_> = columns.iter().map(|(name, x)| ((*name).to_owned(), x.to_vec())).collect();
-        let lines = (2..).take(columns[0].1.len()).collect();
-        Self { name: "test.csv".to_owned(), columns, lines }
+        let (names, values): (Vec<&str>, Vec<_>) =
+            columns.iter().map(|(name, x)| (*name, x.to_vec())).unzip();
+        let rows = (2..).take(columns[0].1.len()).collect();
+        Self::new("test.csv".to_owned(), &names, values, rows)
     }
 }
 
-fn next_record(reader: &mut Reader<Box<dyn Read>>, record: &mut ByteRecord) -> io::Result<bool> {
-    reader.read_byte_record(record).map_err(io::Error::from)
+/// Where each wanted column stands among those of the file.
+///
+/// # Errors
+/// [`ImportError::MissingColumn`], [`ImportError::RepeatedColumn`].
+pub(super) fn places(file: &str, columns: &[String], wanted: &[&str]) -> Result<Vec<usize>, ImportError> {
+    let place = |column: &&str| {
+        let mut found = columns.iter().enumerate().filter(|(_, name)| name == column);
+        match (found.next(), found.count()) {
+            (Some((place, _)), 0) => Ok(place),
+            (Some(_), others) => Err(ImportError::RepeatedColumn {
+                file: file.to_owned(),
+                column: (*column).to_owned(),
+                count: others + 1,
+            }),
+            (None, _) => Err(ImportError::MissingColumn {
+                file: file.to_owned(),
+                column: (*column).to_owned(),
+                nearest: nearest(column, columns.iter().map(String::as_str)),
+            }),
+        }
+    };
+    wanted.iter().map(place).collect()
 }
 
-fn is_blank(record: &ByteRecord) -> bool {
-    record.iter().all(<[u8]>::is_empty) && record.len() <= 1
+/// A number of a file as the table has it; an error is what is wrong with it.
+pub(super) fn checked(number: f64) -> Result<f64, &'static str> {
+    match number {
+        x if x.is_infinite() => Err("is infinite"),
+        x if x.is_nan() => Ok(f64::NAN), // one bit pattern, whatever the file has
+        x => Ok(x),
+    }
 }
 
-fn number(cell: &[u8]) -> Result<f64, &'static str> {
-    if cell.is_empty() {
+/// A number written as text; empty is NaN.
+pub(super) fn parsed(text: &[u8]) -> Result<f64, &'static str> {
+    if text.is_empty() {
         return Ok(f64::NAN);
     }
-    let number = std::str::from_utf8(cell).ok().and_then(|text| text.parse::<f64>().ok());
-    match number {
-        None => Err("is no number"),
-        Some(x) if x.is_infinite() => Err("is infinite"),
-        Some(x) if x.is_nan() => Ok(f64::NAN), // one bit pattern, whatever sign was written
-        Some(x) => Ok(x),
-    }
+    let number = std::str::from_utf8(text).ok().and_then(|text| text.parse::<f64>().ok());
+    number.map_or(Err("is no number"), checked)
 }

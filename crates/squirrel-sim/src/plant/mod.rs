@@ -5,11 +5,13 @@
 
 mod battery;
 mod fast_math;
+mod lead;
 mod membrane;
 mod servo;
 mod wind;
 
 pub use battery::{BatteryParameters, BatteryState};
+pub use lead::Led;
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
 pub use servo::{ServoParameters, ServoState};
 pub use wind::{GustModel, Wind, WindParameters};
@@ -51,7 +53,7 @@ pub struct Plant {
     battery: Option<BatteryParameters>,
     dt_s: f64,
     battery_decay: f64,
-    servo_lag: f64,
+    servo_keep: f64,
 }
 
 /// Everything that changes.
@@ -74,6 +76,14 @@ impl PlantState {
     /// Deployment of the left and the right wing, 0..1.
     pub fn deployment(&self) -> [f64; 2] {
         self.servo.map(|servo| servo.deployment)
+    }
+
+    /// New angles of attack, rad, a step after the last ones: their rate is held until the next.
+    fn turn_wings(&mut self, angle_rad: [f64; 2], dt_s: f64) {
+        for side in 0..2 {
+            self.wing_angle_rate_rad_s[side] = (angle_rad[side] - self.wing_angle_rad[side]) / dt_s;
+        }
+        self.wing_angle_rad = angle_rad;
     }
 }
 
@@ -120,12 +130,14 @@ impl Plant {
         }
         let vehicle = effects.alter(&vehicle).map_err(|e| format!("with effects, {e}"))?;
         let decay = |tau: f64| 1.0 - (-dt_s / tau).exp();
-        let servo_lag = match &wing {
-            WingPlant::None => 1.0,
-            WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. } => decay(servo.time_constant_s),
+        let servo_keep = match &wing {
+            WingPlant::None => 0.0,
+            WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. } => {
+                (-dt_s / servo.time_constant_s).exp()
+            }
         };
         let battery_decay = battery.as_ref().map_or(1.0, |b| decay(b.tau1_s));
-        Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_lag })
+        Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_keep })
     }
 
     /// The airframe, with what effects change of it.
@@ -233,11 +245,7 @@ impl Plant {
             WingPlant::Membrane { membrane, servo } => {
                 let deployment = self.deploy(state, servo, wing_command);
                 let air = dynamics::air(&before, dynamics::total_wind(effects, wind));
-                let angle = membrane.angle_of_attack(&air);
-                for side in 0..2 {
-                    state.wing_angle_rate_rad_s[side] = (angle[side] - state.wing_angle_rad[side]) / dt;
-                }
-                state.wing_angle_rad = angle;
+                state.turn_wings(membrane.angle_of_attack(&air), dt);
                 let rate = state.wing_angle_rate_rad_s;
                 let moved = rk4(Moving { body: before, membrane: state.membrane }, dt, |s| {
                     let mut membrane_rate = s.membrane;
@@ -260,11 +268,14 @@ impl Plant {
         }
     }
 
+    /// Mean deployment over a step.
     #[inline(always)]
     fn deploy(&self, state: &mut PlantState, servo: &ServoParameters, command: [f64; 2]) -> [f64; 2] {
         let mut mean = [0.0; 2];
         for side in 0..2 {
-            mean[side] = servo.step(&mut state.servo[side], command[side], self.dt_s, self.servo_lag);
+            let before = state.servo[side].deployment;
+            servo.lead(&mut state.servo[side], command[side], self.dt_s, self.servo_keep);
+            mean[side] = 0.5 * (before + state.servo[side].deployment);
         }
         mean
     }

@@ -32,28 +32,48 @@ impl ServoParameters {
         Ok(())
     }
 
-    /// One step; returns the mean deployment over it. A command that changes again within the dead time replaces the one
+    /// Moves a servo exactly over a time of any length; a command that changes again within the dead time replaces the one
     /// that waits.
     ///
-    /// * `lag` - `1 - exp(-dt / time_constant)`
-    pub fn step(&self, state: &mut ServoState, command: f64, dt_s: f64, lag: f64) -> f64 {
+    /// * `keep` - `exp(-dt / time_constant)`, for a whole `dt_s` of lag
+    pub fn lead(&self, state: &mut ServoState, command: f64, dt_s: f64, keep: f64) {
         let command = command.clamp(0.0, 1.0);
         let last_asked = state.pending.map_or(state.target, |(waiting, _)| waiting);
         if command != last_asked {
             state.pending = Some((command, self.dead_time_s));
         }
-        if let Some((waiting, left)) = state.pending {
-            if left <= 0.5 * dt_s {
+        let mut left_s = dt_s;
+        if let Some((waiting, wait_s)) = state.pending {
+            let before_s = wait_s.min(dt_s);
+            self.follow(state, before_s, dt_s, keep);
+            left_s = dt_s - before_s;
+            if wait_s <= dt_s {
                 state.target = waiting;
                 state.pending = None;
             } else {
-                state.pending = Some((waiting, left - dt_s));
+                state.pending = Some((waiting, wait_s - dt_s));
             }
         }
-        let before = state.deployment;
-        let most = self.rate_max_per_s * dt_s;
-        state.deployment += ((state.target - before) * lag).clamp(-most, most);
-        0.5 * (before + state.deployment)
+        self.follow(state, left_s, dt_s, keep);
+    }
+
+    /// Towards the target for a part of a step: at the largest rate while further than `rate tau`, then by the lag.
+    fn follow(&self, state: &mut ServoState, time_s: f64, dt_s: f64, keep: f64) {
+        let gap = state.target - state.deployment;
+        if gap == 0.0 || time_s <= 0.0 {
+            return;
+        }
+        let mut lag_s = time_s;
+        let beyond = gap.abs() - self.rate_max_per_s * self.time_constant_s;
+        if beyond > 0.0 {
+            let at_rate_s = (beyond / self.rate_max_per_s).min(time_s);
+            state.deployment += (self.rate_max_per_s * at_rate_s).copysign(gap);
+            lag_s -= at_rate_s;
+        }
+        if lag_s > 0.0 {
+            let keep = if lag_s == dt_s { keep } else { (-lag_s / self.time_constant_s).exp() };
+            state.deployment = state.target - (state.target - state.deployment) * keep;
+        }
     }
 }
 
@@ -63,9 +83,9 @@ mod tests {
 
     fn opening_time(servo: &ServoParameters, to: f64) -> f64 {
         let mut state = ServoState::default();
-        let lag = 1.0 - (-1e-3 / servo.time_constant_s).exp();
+        let keep = (-1e-3 / servo.time_constant_s).exp();
         for step in 0..2000 {
-            servo.step(&mut state, 1.0, 1e-3, lag);
+            servo.lead(&mut state, 1.0, 1e-3, keep);
             if state.deployment >= to {
                 return f64::from(step + 1) * 1e-3;
             }
@@ -83,13 +103,32 @@ mod tests {
         assert!((opening_time(&slow, 0.8) - 0.16).abs() < 0.02, "0.8 of the stroke at 5 per second");
     }
 
+    /// Dead time, rate limit and lag end inside steps; where a servo gets to does not depend on them.
+    #[test]
+    fn long_and_short_steps_end_at_the_same_place() {
+        let servo = ServoParameters { dead_time_s: 0.021, rate_max_per_s: 6.0, time_constant_s: 0.03 };
+        let after = |steps: u32, command: f64, mut state: ServoState| {
+            let dt_s = 0.21 / f64::from(steps);
+            (0..steps)
+                .for_each(|_| servo.lead(&mut state, command, dt_s, (-dt_s / servo.time_constant_s).exp()));
+            state
+        };
+        let (long, short) = (after(1, 1.0, ServoState::default()), after(999, 1.0, ServoState::default()));
+        // 21 ms dead, 0.82 at 6 per second, then the lag.
+        let by_hand = 1.0 - 0.18 * (-(0.21 - 0.021 - 0.82 / 6.0) / 0.03_f64).exp();
+        assert!((long.deployment - by_hand).abs() < 1e-12, "{} for {by_hand}", long.deployment);
+        assert!((short.deployment - by_hand).abs() < 1e-12, "{}", short.deployment);
+        let folded = after(1, 0.3, long).deployment;
+        assert!((folded - after(77, 0.3, long).deployment).abs() < 1e-12 && folded < 0.35);
+    }
+
     #[test]
     fn deployment_stays_between_folded_and_spread() {
         let servo = ServoParameters { dead_time_s: 0.01, rate_max_per_s: 50.0, time_constant_s: 0.01 };
         let mut state = ServoState::default();
         let (mut least, mut most) = (1.0_f64, 0.0_f64);
         for k in 0..4000 {
-            servo.step(&mut state, if k % 400 < 200 { 7.0 } else { -3.0 }, 1e-3, 0.1);
+            servo.lead(&mut state, if k % 400 < 200 { 7.0 } else { -3.0 }, 1e-3, (-0.1_f64).exp());
             assert!((0.0..=1.0).contains(&state.deployment));
             most = most.max(state.deployment);
             if k > 400 {

@@ -83,6 +83,11 @@ impl Page {
         self.paragraph("say", text);
     }
 
+    /// Adds text whose lines stay as they are.
+    pub fn preformatted(&mut self, text: &str) {
+        self.add(&format!("<pre>{}</pre>\n", escape(text)));
+    }
+
     /// Adds a table; a row shorter than the head is filled with dashes.
     pub fn table(&mut self, head: &[String], rows: &[Row]) {
         self.add("<div class=\"wide\"><table>\n<thead><tr>");

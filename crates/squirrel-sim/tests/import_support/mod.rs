@@ -1,8 +1,10 @@
 //! A flight folder in the temporary directory, for tests of the import.
 #![allow(dead_code, reason = "each test binary uses its part")]
 
+pub(crate) mod formats;
+
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use squirrel_sim::import::{ImportError, ImportMap, ImportReport, import};
@@ -39,6 +41,10 @@ impl Flight {
         let path = self.folder.join(file);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         fs::write(path, bytes).unwrap();
+    }
+
+    pub(crate) fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// Imports some files of the folder; `""` is the folder itself.

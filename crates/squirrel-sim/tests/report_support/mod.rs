@@ -173,5 +173,6 @@ pub(crate) fn heading() -> Heading {
             fact("scenario", "avoid"),
             fact("wind", "none"),
         ],
+        card: String::new(),
     }
 }

@@ -19,6 +19,8 @@ pub struct Heading {
     pub lead: String,
     /// Names and values, such as vehicle, seed and thrust-to-weight.
     pub facts: Vec<(String, String)>,
+    /// The manoeuvres in words, one a line; may be empty.
+    pub card: String,
 }
 
 /// One flight of the manoeuvre.
@@ -42,6 +44,10 @@ pub struct FlightView<'a> {
 pub fn render(heading: &Heading, flights: &[FlightView<'_>]) -> String {
     let mut page = Page::new(&heading.title, &heading.lead);
     page.facts(&heading.facts);
+    if !heading.card.is_empty() {
+        page.section("Pilot's card", "What was flown, from the scenario.");
+        page.preformatted(&heading.card);
+    }
     arms(&mut page, flights);
     if !flights.is_empty() {
         tracks::add(&mut page, flights);

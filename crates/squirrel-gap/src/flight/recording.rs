@@ -1,6 +1,6 @@
 //! What the residual needs of one flight: its channels, a uniform time grid, and the pieces of it without gaps.
 
-use super::GapError;
+use crate::GapError;
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
 use super::series::{Series, Span, common};
 use nalgebra::{Quaternion, Vector3};
@@ -17,42 +17,44 @@ const RATE_MIN_HZ: f64 = 4.0 * CUTOFF_HZ;
 const USABLE_MIN_S: f64 = 1.0;
 
 /// The channels of one flight.
-pub(super) struct Recording<'a> {
-    pub(super) flight: &'a str,
+pub(crate) struct Recording<'a> {
+    pub(crate) flight: &'a str,
     /// Step of the grid: the median period of the IMU, s.
-    pub(super) period_s: f64,
-    pub(super) filter: LowPass,
+    pub(crate) period_s: f64,
+    pub(crate) filter: LowPass,
     /// Where every channel exists for longer than the filter has edges.
-    pub(super) pieces: Vec<Span>,
+    pub(crate) pieces: Vec<Span>,
     /// What the log lacks, and what was taken instead.
-    pub(super) notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
+    pub(crate) rotor: Series,
+    pub(crate) wing: Option<Series>,
+    pub(crate) velocity: Option<Series>,
+    pub(crate) position: Option<Series>,
+    pub(crate) baro: Option<Series>,
     specific_force: Series,
     omega: Series,
-    rotor: Series,
-    wing: Option<Series>,
     attitude: Option<Series>,
-    velocity: Option<Series>,
     voltage: Option<Series>,
     reference_voltage_v: f64,
 }
 
 /// One measured sample on the grid.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
+pub(crate) struct Sample {
     /// Time in the flight, s.
-    pub(super) time_s: f64,
+    pub(crate) time_s: f64,
     /// Accelerometer, m/s^2, body frame.
-    pub(super) specific_force: Vector3<f64>,
+    pub(crate) specific_force: Vector3<f64>,
     /// Measured velocity, attitude and angular rate; position and rotor speeds are not measured.
-    pub(super) body: State<f64>,
+    pub(crate) body: State<f64>,
     /// Battery, V; the reference voltage where it is not logged.
-    pub(super) voltage_v: f64,
+    pub(crate) voltage_v: f64,
 }
 
 impl<'a> Recording<'a> {
     /// # Errors
     /// [`GapError`] with the first channel that is missing, cannot be, or leaves less than a second.
-    pub(super) fn new(vehicle: &VehicleFile, flight: &'a str, log: &FlightLog) -> Result<Self, GapError> {
+    pub(crate) fn new(vehicle: &VehicleFile, flight: &'a str, log: &FlightLog) -> Result<Self, GapError> {
         let parameters = vehicle.vehicle.parameters();
         let specific_force = Series::need(flight, log, "imu.specific_force_body_m_s2", 3)?;
         let omega = Series::need(flight, log, "imu.omega_body_rad_s", 3)?;
@@ -69,6 +71,8 @@ impl<'a> Recording<'a> {
             attitude.check_rotations(flight)?;
         }
         let velocity = optional("gnss.velocity_ned_m_s", 3)?;
+        let position = optional("gnss.position_ned_m", 3)?;
+        let baro = optional("baro.altitude_m", 1)?;
         let voltage = optional("battery.voltage_v", 1)?;
         let has_wings = vehicle.wing != WingPlant::None;
         let wing = if has_wings { optional("wing.command", 2)? } else { None };
@@ -105,12 +109,14 @@ impl<'a> Recording<'a> {
             filter: LowPass::new(rate_hz),
             pieces: vec![(f64::NEG_INFINITY, f64::INFINITY)],
             notes,
-            specific_force,
-            omega,
             rotor,
             wing,
-            attitude,
             velocity,
+            position,
+            baro,
+            specific_force,
+            omega,
+            attitude,
             voltage,
             reference_voltage_v: parameters.propulsion.reference_voltage_v,
         };
@@ -151,7 +157,7 @@ impl<'a> Recording<'a> {
     }
 
     /// Samples at each end of a piece that have no residual.
-    pub(super) fn edge(&self) -> usize {
+    pub(crate) fn edge(&self) -> usize {
         self.filter.reach() + DERIVATIVE_REACH
     }
 
@@ -165,7 +171,7 @@ impl<'a> Recording<'a> {
     }
 
     /// The measured samples of one piece.
-    pub(super) fn grid(&self, piece: Span) -> Vec<Sample> {
+    pub(crate) fn grid(&self, piece: Span) -> Vec<Sample> {
         (0..self.samples(piece)).map(|k| self.sample(piece.0 + k as f64 * self.period_s)).collect()
     }
 
@@ -184,7 +190,7 @@ impl<'a> Recording<'a> {
     }
 
     /// The rotor command in force at a time, in the vehicle's unit.
-    pub(super) fn rotor_command(&self, time_s: f64) -> PerRotor<f64> {
+    pub(crate) fn rotor_command(&self, time_s: f64) -> PerRotor<f64> {
         let mut command = [0.0; MAX_ROTORS];
         for (place, u) in command.iter_mut().zip(self.rotor.held(time_s)) {
             *place = *u;
@@ -193,27 +199,32 @@ impl<'a> Recording<'a> {
     }
 
     /// The wing command in force at a time, left and right, 0 to 1.
-    pub(super) fn wing_command(&self, time_s: f64) -> [f64; 2] {
+    pub(crate) fn wing_command(&self, time_s: f64) -> [f64; 2] {
         self.wing.as_ref().map_or([0.0; 2], |wing| {
             let row = wing.held(time_s);
             [row[0], row[1]]
         })
     }
 
+    /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard deviation.
+    pub(crate) fn imu_noise(&self) -> [Vector3<f64>; 2] {
+        [self.specific_force.white_deviation(), self.omega.white_deviation()]
+    }
+
     /// Velocity over ground, m/s, if logged.
-    pub(super) fn velocity_ned(&self, time_s: f64) -> Option<Vector3<f64>> {
+    pub(crate) fn velocity_ned(&self, time_s: f64) -> Option<Vector3<f64>> {
         self.velocity.as_ref().map(|v| v.vector(time_s))
     }
     /// Whether the log has an attitude.
-    pub(super) fn has_attitude(&self) -> bool {
+    pub(crate) fn has_attitude(&self) -> bool {
         self.attitude.is_some()
     }
     /// Whether the log has a battery voltage.
-    pub(super) fn has_voltage(&self) -> bool {
+    pub(crate) fn has_voltage(&self) -> bool {
         self.voltage.is_some()
     }
     /// Whether the vehicle has wings and the log their command.
-    pub(super) fn has_wing(&self) -> bool {
+    pub(crate) fn has_wing(&self) -> bool {
         self.wing.is_some()
     }
 }

@@ -15,20 +15,20 @@ use nalgebra::Vector6;
 use std::f64::consts::{PI, TAU};
 
 /// Corner (-6 dB), Hz.
-pub(super) const CUTOFF_HZ: f64 = 12.0;
+pub(crate) const CUTOFF_HZ: f64 = 12.0;
 /// Half the length of the filter, s.
 const HALF_LENGTH_S: f64 = 0.2;
 
 /// Samples on each side of a derivative that it looks at.
-pub(super) const DERIVATIVE_REACH: usize = 2;
+pub(crate) const DERIVATIVE_REACH: usize = 2;
 
 /// The taps at one rate, from the middle outwards.
-pub(super) struct LowPass {
+pub(crate) struct LowPass {
     taps: Vec<f64>,
 }
 
 impl LowPass {
-    pub(super) fn new(rate_hz: f64) -> Self {
+    pub(crate) fn new(rate_hz: f64) -> Self {
         let half = (HALF_LENGTH_S * rate_hz + 0.5).floor();
         let tap = |i: usize| {
             let i = i as f64;
@@ -48,14 +48,15 @@ impl LowPass {
     }
 
     /// Samples that the filter costs at each end.
-    pub(super) fn reach(&self) -> usize {
+    pub(crate) fn reach(&self) -> usize {
         self.taps.len() - 1
     }
 
-    /// The filtered samples without the edges: sample 0 of the result is sample [`Self::reach`] of `x`.
-    pub(super) fn apply(&self, x: &[Vector6<f64>]) -> Vec<Vector6<f64>> {
+    /// One filtered sample of `every`, without the edges: sample 0 of the result is sample [`Self::reach`] of `x`.
+    pub(crate) fn apply(&self, x: &[Vector6<f64>], every: usize) -> Vec<Vector6<f64>> {
         let (reach, end) = (self.reach(), x.len().saturating_sub(self.reach()));
         (reach..end)
+            .step_by(every)
             .map(|k| {
                 let pairs = self.taps.iter().enumerate().skip(1);
                 pairs.fold(x[k] * self.taps[0], |sum, (i, tap)| sum + (x[k - i] + x[k + i]) * *tap)
@@ -65,7 +66,7 @@ impl LowPass {
 }
 
 /// Five-point derivative of `x` at sample `k`, per second; `k` must be [`DERIVATIVE_REACH`] away from the ends.
-pub(super) fn derivative<V>(x: impl Fn(usize) -> V, k: usize, period_s: f64) -> V
+pub(crate) fn derivative<V>(x: impl Fn(usize) -> V, k: usize, period_s: f64) -> V
 where
     V: std::ops::Sub<Output = V> + std::ops::Add<Output = V> + std::ops::Mul<f64, Output = V>,
 {
@@ -82,7 +83,7 @@ mod tests {
         let n = filter.reach();
         let wave = |k: usize| (TAU * frequency_hz * (k as f64 - n as f64) / rate_hz).cos();
         let x: Vec<_> = (0..=2 * n).map(|k| Vector6::repeat(wave(k))).collect();
-        let y = filter.apply(&x);
+        let y = filter.apply(&x, 1);
         assert_eq!(y.len(), 1, "one sample has no edge");
         y[0][3]
     }
@@ -101,8 +102,8 @@ mod tests {
 
     #[test]
     fn a_series_shorter_than_the_filter_gives_nothing() {
-        assert!(LowPass::new(100.0).apply(&[Vector6::zeros(); 40]).is_empty());
-        assert!(LowPass::new(100.0).apply(&[]).is_empty());
+        assert!(LowPass::new(100.0).apply(&[Vector6::zeros(); 40], 1).is_empty());
+        assert!(LowPass::new(100.0).apply(&[], 1).is_empty());
     }
 
     #[test]

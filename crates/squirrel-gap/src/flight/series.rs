@@ -3,7 +3,7 @@
 //! Samples with a number that is not finite are left out. A channel exists between two of its samples that are at most
 //! five of its median periods apart; beyond, a line between them would be invention.
 
-use super::GapError;
+use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
 use squirrel_sim::log::FlightLog;
 
@@ -11,10 +11,10 @@ use squirrel_sim::log::FlightLog;
 const GAP_PERIODS: f64 = 5.0;
 
 /// First and last time, s.
-pub(super) type Span = (f64, f64);
+pub(crate) type Span = (f64, f64);
 
-pub(super) struct Series {
-    pub(super) channel: &'static str,
+pub(crate) struct Series {
+    pub(crate) channel: &'static str,
     width: usize,
     time_s: Vec<f64>,
     values: Vec<f64>,
@@ -25,7 +25,7 @@ impl Series {
     ///
     /// # Errors
     /// Shape, length or times that cannot be, or fewer than two usable samples.
-    pub(super) fn read(
+    pub(crate) fn read(
         flight: &str,
         log: &FlightLog,
         channel: &'static str,
@@ -61,7 +61,7 @@ impl Series {
     ///
     /// # Errors
     /// As [`Self::read`], or the channel is missing.
-    pub(super) fn need(
+    pub(crate) fn need(
         flight: &str,
         log: &FlightLog,
         channel: &'static str,
@@ -75,7 +75,7 @@ impl Series {
     ///
     /// # Errors
     /// [`GapError::Rotation`] with the first norm that is not 1 within 5 %.
-    pub(super) fn check_rotations(&self, flight: &str) -> Result<(), GapError> {
+    pub(crate) fn check_rotations(&self, flight: &str) -> Result<(), GapError> {
         for (time_s, q) in self.time_s.iter().zip(self.values.chunks_exact(self.width)) {
             let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
             if !(0.95..=1.05).contains(&norm) {
@@ -87,7 +87,7 @@ impl Series {
     }
 
     /// Median distance of its samples, s.
-    pub(super) fn median_period_s(&self) -> f64 {
+    pub(crate) fn median_period_s(&self) -> f64 {
         let mut steps: Vec<f64> = self.time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_unstable_by(f64::total_cmp);
         let middle = steps.len() / 2;
@@ -95,7 +95,7 @@ impl Series {
     }
 
     /// The times in which the channel exists.
-    pub(super) fn spans(&self) -> Vec<Span> {
+    pub(crate) fn spans(&self) -> Vec<Span> {
         let longest_s = GAP_PERIODS * self.median_period_s();
         let mut spans: Vec<Span> = Vec::new();
         for &t in &self.time_s {
@@ -107,8 +107,25 @@ impl Series {
         spans
     }
 
+    /// Time and numbers of each sample.
+    pub(crate) fn samples(&self) -> impl Iterator<Item = (f64, &[f64])> {
+        self.time_s.iter().copied().zip(self.values.chunks_exact(self.width))
+    }
+
+    /// Deviation of the white part of three numbers a sample: that of the third difference, which motion hardly enters.
+    pub(crate) fn white_deviation(&self) -> Vector3<f64> {
+        let at = |i| Vector3::from_column_slice(self.row(i));
+        let n = self.time_s.len().saturating_sub(3);
+        let sum: Vector3<f64> = (0..n)
+            .map(|i| at(i + 3) - at(i + 2) * 3.0 + at(i + 1) * 3.0 - at(i))
+            .map(|d| d.component_mul(&d))
+            .sum();
+        // 1 + 9 + 9 + 1
+        (sum / (20 * n.max(1)) as f64).map(f64::sqrt)
+    }
+
     /// Time of the first sample, s.
-    pub(super) fn start_s(&self) -> f64 {
+    pub(crate) fn start_s(&self) -> f64 {
         self.time_s[0]
     }
 
@@ -126,25 +143,25 @@ impl Series {
     }
 
     /// The last sample at or before `t`; the first one before all.
-    pub(super) fn held(&self, t: f64) -> &[f64] {
+    pub(crate) fn held(&self, t: f64) -> &[f64] {
         self.row(self.time_s.partition_point(|&x| x <= t).saturating_sub(1))
     }
 
     /// A number on the line between the samples about `t`.
-    pub(super) fn number(&self, t: f64) -> f64 {
+    pub(crate) fn number(&self, t: f64) -> f64 {
         let (a, b, share) = self.about(t);
         a[0] + (b[0] - a[0]) * share
     }
 
     /// A vector on the line between the samples about `t`.
-    pub(super) fn vector(&self, t: f64) -> Vector3<f64> {
+    pub(crate) fn vector(&self, t: f64) -> Vector3<f64> {
         let (a, b, share) = self.about(t);
         let [a, b] = [a, b].map(Vector3::from_column_slice);
         a + (b - a) * share
     }
 
     /// A rotation between the samples about `t`, given and wanted as `[w, x, y, z]`.
-    pub(super) fn rotation(&self, t: f64) -> Quaternion<f64> {
+    pub(crate) fn rotation(&self, t: f64) -> Quaternion<f64> {
         let (a, b, share) = self.about(t);
         let [a, b] = [a, b].map(|q| Quaternion::new(q[0], q[1], q[2], q[3]));
         between(a, b, share)
@@ -152,7 +169,7 @@ impl Series {
 }
 
 /// Normalised interpolation of two rotations by the shorter way.
-pub(super) fn between(a: Quaternion<f64>, b: Quaternion<f64>, share: f64) -> Quaternion<f64> {
+pub(crate) fn between(a: Quaternion<f64>, b: Quaternion<f64>, share: f64) -> Quaternion<f64> {
     let b = if a.dot(&b) < 0.0 { -b } else { b };
     let q = a + (b - a) * share;
     // At worst the two are a half turn apart, so that this is not 0.
@@ -160,7 +177,7 @@ pub(super) fn between(a: Quaternion<f64>, b: Quaternion<f64>, share: f64) -> Qua
 }
 
 /// The times that lie in a span of each list; both in order.
-pub(super) fn common(a: &[Span], b: &[Span]) -> Vec<Span> {
+pub(crate) fn common(a: &[Span], b: &[Span]) -> Vec<Span> {
     let mut all = Vec::new();
     let (mut i, mut j) = (0, 0);
     while i < a.len() && j < b.len() {

@@ -1,0 +1,108 @@
+//! The vehicle file with the named effects in it: a patch that keeps every comment and the order of what was there.
+
+use crate::diagnose::Diagnosis;
+use crate::verdict::Value;
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::fmt::Write;
+use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
+
+/// The text of the vehicle file with the effects of a diagnosis added, each number with its interval, the flights that it
+/// comes from, and what they covered.
+///
+/// * `flights` - names of the flights
+///
+/// # Errors
+/// One line: the text is not TOML, or the patched file would not be a vehicle.
+pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
+    let mut document: DocumentMut = vehicle.text.parse().map_err(|e| format!("{}: {e}", vehicle.name))?;
+    let effects = document.entry("effects").or_insert_with(|| {
+        let mut table = Table::new();
+        // Only `[effects.<name>]` headers show.
+        table.set_implicit(true);
+        Item::Table(table)
+    });
+    let Some(effects) = effects.as_table_mut() else {
+        return Err(format!("{}: effects: must be a table", vehicle.name));
+    };
+    let source = format!("gap: {}", flights.join(", "));
+    let domain = domain(diagnosis);
+    for effect in &diagnosis.verdict.effects {
+        let table = effects.entry(effect.name).or_insert_with(|| Item::Table(Table::new()));
+        let Some(table) = table.as_table_mut() else {
+            return Err(format!("{}: effects.{}: must be a table", vehicle.name, effect.name));
+        };
+        if effect.form != "standard" && (effect.form != standard_form(effect.name) || table.contains_key("form")) {
+            table.insert("form", value(effect.form));
+        }
+        for (key, number) in &effect.parameters {
+            let item = match *number {
+                Value::Choice { value: name } => value(name),
+                Value::Number { value: x, low, high } if low == high => value(x as i64),
+                Value::Number { value: x, low, high } => {
+                    let mut inline = InlineTable::new();
+                    inline.insert("value", rounded(x).into());
+                    inline.insert("low", rounded(low).into());
+                    inline.insert("high", rounded(high).into());
+                    inline.insert("source", source.as_str().into());
+                    inline.insert("domain", domain.as_str().into());
+                    value(inline)
+                }
+            };
+            table.insert(key, item);
+        }
+    }
+    let text = document.to_string();
+    VehicleFile::parse(&text, &vehicle.name).map_err(|e| format!("the patched vehicle: {e}"))?;
+    Ok(text)
+}
+
+fn standard_form(effect: &str) -> &'static str {
+    use squirrel_core::effects::{Effects, FORM, Kind};
+    let list = Effects::<f64>::parameters(effect).unwrap_or_default();
+    list.iter()
+        .find_map(|p| match p.kind {
+            Kind::OneOf(names) if p.key == FORM => Some(names[0]),
+            _ => None,
+        })
+        .unwrap_or("standard")
+}
+
+/// Six digits are more than any interval needs.
+fn rounded(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
+}
+
+/// What the flights covered, in one line.
+pub(crate) fn domain(diagnosis: &Diagnosis) -> String {
+    let mut text = String::new();
+    for covered in &diagnosis.domain {
+        let comma = if text.is_empty() { "" } else { ", " };
+        let _ = write!(text, "{comma}{} {:.2} to {:.2} {}", covered.name, covered.low, covered.high, covered.unit);
+    }
+    text
+}
+
+/// The lines that a patch adds, removes or changes, with `+` and `-` before them.
+pub fn difference(before: &str, after: &str) -> String {
+    let (old, new): (Vec<&str>, Vec<&str>) = (before.lines().collect(), after.lines().collect());
+    let mut text = String::new();
+    let (mut i, mut j) = (0, 0);
+    while i < old.len() || j < new.len() {
+        if i < old.len() && j < new.len() && old[i] == new[j] {
+            (i, j) = (i + 1, j + 1);
+        } else if let Some(ahead) = old.get(i).and_then(|line| new[j..].iter().position(|n| n == line)) {
+            // A line that comes again later: everything until then is new.
+            for line in &new[j..j + ahead] {
+                let _ = writeln!(text, "+ {line}");
+            }
+            j += ahead;
+        } else if i < old.len() {
+            let _ = writeln!(text, "- {}", old[i]);
+            i += 1;
+        } else {
+            let _ = writeln!(text, "+ {}", new[j]);
+            j += 1;
+        }
+    }
+    text
+}

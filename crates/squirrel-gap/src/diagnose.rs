@@ -1,0 +1,325 @@
+//! From flights to a verdict: check that the logs agree with themselves, name what is missing, prove it on other flights.
+
+use crate::GapError;
+use crate::compatibility;
+use crate::find::{self, Place};
+use crate::name::{Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis};
+use crate::predictor::{Hypothesis, Predictor};
+use crate::shrink::{self, Errors12};
+use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
+use crate::words;
+use squirrel_core::effects::{Effects, Kind as ParameterKind};
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::collections::BTreeMap;
+
+/// Part of what the nominal model leaves that a form which differs may leave; more is outside the catalogue.
+const FORM_SHARE: f64 = 0.35;
+/// How much more of the held-out gap the best other name must leave.
+const RIVAL_GAP: f64 = 3.0;
+/// More alternatives than this within the evidence of a name are no answer.
+const ALTERNATIVES_MAX: usize = 3;
+
+/// Everything that the workflow found out.
+pub struct Diagnosis {
+    /// The answer.
+    pub verdict: Verdict,
+    /// What the flights covered: name, low, high, unit.
+    pub domain: Vec<Covered>,
+    /// For the report.
+    pub(crate) details: Option<Details>,
+}
+
+/// A range of flight conditions that the flights covered, 2nd to 98th percentile.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Covered {
+    /// What: speed, height, tilt, voltage.
+    pub name: &'static str,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+}
+
+/// What the pictures are made of.
+pub(crate) struct Details {
+    pub(crate) evidence: Vec<(&'static str, f64)>,
+    pub(crate) confusability: (Vec<&'static str>, Vec<Vec<f64>>),
+    pub(crate) naming: Naming,
+    pub(crate) held_out: Option<HeldOut>,
+}
+
+/// Errors on held-out flights.
+pub(crate) struct HeldOut {
+    pub(crate) nominal: Errors12,
+    pub(crate) rival: Option<Errors12>,
+    pub(crate) fitted: Errors12,
+    pub(crate) floor: Errors12,
+}
+
+/// Looks at flights of a vehicle and says which effect its file lacks.
+///
+/// * `flights` - name and log of each, which the explanation is fitted to
+/// * `held_out` - flights that it never sees, for the proof; may be empty
+/// * `progress` - called with what is being done
+///
+/// # Errors
+/// [`GapError`]: a log or vehicle that nothing can be computed with. A log that contradicts itself is no error but the
+/// verdict [`Kind::DataProblem`].
+pub fn diagnose(
+    vehicle: &VehicleFile,
+    flights: &[(String, FlightLog)],
+    held_out: &[(String, FlightLog)],
+    progress: &dyn Fn(&str),
+) -> Result<Diagnosis, GapError> {
+    progress("reading");
+    let predictor = Predictor::new(vehicle, flights)?;
+    let catalogue = Catalogue::new(vehicle)?;
+    let unseen = if held_out.is_empty() { None } else { Some(Predictor::new(vehicle, held_out)?) };
+    progress("checking the data");
+    let domain = covered(&predictor);
+    let nominal = predictor.residual(&predictor.nominal())?;
+    let places = find::places(&predictor, &nominal)?;
+    if let Some(problem) = compatibility::problem(&predictor, unseen.as_ref(), flights, held_out)? {
+        let verdict = Verdict {
+            verdict: Kind::DataProblem,
+            effects: Vec::new(),
+            alternatives: Vec::new(),
+            places,
+            goes_with: Some(format!("{}: {}", problem.flight, problem.channel)),
+            fly_next: None,
+            gap: None,
+            model_patch: None,
+            words: problem.words,
+            notes: predictor.notes.clone(),
+        };
+        return Ok(Diagnosis { verdict, domain, details: None });
+    }
+    progress("naming");
+    let tick = || progress("naming");
+    let search =
+        Search { predictor: &predictor, catalogue: &catalogue, beta: crate::name::BETA, progress: &tick };
+    let naming = explain(&search)?;
+    let rivals = search.rivals(&naming.found)?;
+    progress("flying the held-out flights");
+    let proof = match &unseen {
+        Some(unseen) => prove(unseen, &search, &naming, rivals.first())?,
+        None => None,
+    };
+    let gap = proof.as_ref().map(|proof| gap(held_out, proof));
+    let verdict = decide(&search, &naming, &rivals, gap, places);
+    let details = Details {
+        evidence: search.single_evidence(&naming.found),
+        confusability: search.confusability(&naming.found.best),
+        naming,
+        held_out: proof,
+    };
+    Ok(Diagnosis { verdict, domain, details: Some(details) })
+}
+
+/// The one answer.
+fn decide(
+    search: &Search<'_>,
+    naming: &Naming,
+    rivals: &[Scored],
+    gap: Option<Gap>,
+    places: Vec<Place>,
+) -> Verdict {
+    let found = &naming.found;
+    let effects = named(search, naming);
+    let nats = |set: &Scored| set.log_evidence - found.null.log_evidence;
+    // Another name is as good if the evidence hardly tells them apart and held-out flights do not either.
+    let clearly_worse = gap.as_ref().is_some_and(|gap| {
+        gap.best_rival.is_some_and(|rival| rival - 1.0 >= RIVAL_GAP * (gap.after - 1.0).max(0.05))
+    });
+    let close: Vec<&Scored> = rivals
+        .iter()
+        .filter(|rival| rival.log_evidence > found.best.log_evidence - NATS_MIN && !clearly_worse)
+        .collect();
+    let leftover = &naming.leftover;
+    let blind = search.blind(&found.best);
+    let share = left_share(naming);
+    let kind = if naming.gust_m_s.is_some() {
+        Kind::Named
+    } else if effects.is_empty() {
+        match (leftover.is_real(), blind.is_empty()) {
+            (true, _) => Kind::OutsideCatalogue,
+            (false, false) => Kind::NotIdentifiable,
+            (false, true) => Kind::None,
+        }
+    } else if leftover.is_real() {
+        if share < FORM_SHARE { Kind::NamedFormDiffers } else { Kind::OutsideCatalogue }
+    } else if close.len() > ALTERNATIVES_MAX {
+        Kind::NotIdentifiable
+    } else if close.is_empty() {
+        Kind::Named
+    } else {
+        Kind::Ambiguous
+    };
+    let names = |set: &Scored| set.members.iter().map(|m| search.effect(m)).collect::<Vec<_>>();
+    let shown = rivals.iter().take(5);
+    let alternatives: Vec<Alternative> =
+        shown.map(|set| Alternative { effects: names(set), evidence_nats: nats(set) }).collect();
+    let goes_with = leftover.is_real().then(|| leftover.goes_with().unwrap_or_else(|| leftover.channels())).filter(|_| kind != Kind::Named);
+    let fly_next = match kind {
+        Kind::NotIdentifiable if effects.is_empty() => Some(words::fly_for(&blind)),
+        Kind::Ambiguous | Kind::NotIdentifiable => {
+            let mut all: Vec<&str> = effects.iter().map(|e| e.name).collect();
+            all.extend(close.iter().flat_map(|set| names(set)));
+            Some(words::fly_for(&all))
+        }
+        Kind::None if !blind.is_empty() => Some(words::fly_for(&blind)),
+        _ => None,
+    };
+    let mut verdict = Verdict {
+        verdict: kind,
+        effects,
+        alternatives,
+        places,
+        goes_with,
+        fly_next,
+        gap,
+        model_patch: None,
+        words: String::new(),
+        notes: search.predictor.notes.clone(),
+    };
+    verdict.words = words::paragraph(&verdict, &blind);
+    verdict
+}
+
+/// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too.
+fn left_share(naming: &Naming) -> f64 {
+    let excess = |slow: fn(&crate::leftover::Band) -> f64| {
+        naming.leftover.bands.iter().map(|b| (slow(b).powi(2) / b.slow_floor.powi(2) - 1.0).max(0.0)).sum::<f64>()
+    };
+    let before = excess(|b| b.slow_nominal);
+    if before > 0.0 { excess(|b| b.slow) / before } else { 1.0 }
+}
+
+/// The members of the explanation as the verdict writes them, the most certain first.
+fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {
+    let found = &naming.found;
+    let mut all: Vec<NamedEffect> = found
+        .best
+        .members
+        .iter()
+        .enumerate()
+        .map(|(index, member)| NamedEffect {
+            name: search.effect(member),
+            form: search.form(member),
+            evidence_nats: found.worth[index],
+            parameters: parameters(search, naming, index, member),
+        })
+        .collect();
+    if let Some(sigma) = naming.gust_m_s {
+        let number = Value::Number { value: sigma, low: 0.8 * sigma, high: 1.25 * sigma };
+        all.push(NamedEffect {
+            name: "gust",
+            form: "gauss_markov",
+            evidence_nats: naming.gust_nats(),
+            parameters: BTreeMap::from([("sigma_m_s", number)]),
+        });
+    }
+    all.sort_by(|a, b| b.evidence_nats.total_cmp(&a.evidence_nats));
+    all
+}
+
+/// 95 % of a normal distribution lies within this many standard deviations.
+const INTERVAL: f64 = 1.96;
+
+fn parameters(
+    search: &Search<'_>,
+    naming: &Naming,
+    index: usize,
+    member: &Member,
+) -> BTreeMap<&'static str, Value> {
+    let list = Effects::<f64>::parameters(search.effect(member)).unwrap_or_default();
+    let form = search.form(member);
+    let free = &naming.found.best.free;
+    list.iter()
+        .enumerate()
+        .filter(|(_, p)| p.key != squirrel_core::effects::FORM && p.exists_in(form))
+        .map(|(slot, parameter)| {
+            let value = member.values[slot];
+            let value = match parameter.kind {
+                ParameterKind::OneOf(names) => Value::Choice { value: names[value as usize] },
+                ParameterKind::Rotor => Value::Number { value, low: value, high: value },
+                ParameterKind::Size { .. } => {
+                    let column = free.iter().position(|f| *f == (index, slot));
+                    let sd = column.map_or(0.0, |column| naming.deviations[column]);
+                    Value::Number { value, low: value - INTERVAL * sd, high: value + INTERVAL * sd }
+                }
+            };
+            (parameter.key, value)
+        })
+        .collect()
+}
+
+/// Re-simulates the held-out flights as the vehicle was, with the explanation and with the best other name.
+fn prove(
+    unseen: &Predictor,
+    search: &Search<'_>,
+    naming: &Naming,
+    rival: Option<&Scored>,
+) -> Result<Option<HeldOut>, GapError> {
+    let at = |members: &[Member], base: &[f64]| -> Result<Hypothesis, GapError> {
+        // What floats inside its tolerance is shared; what the sensors of the other flights did is not.
+        let mut base = base[..search.catalogue.parameters.len()].to_vec();
+        base.resize(search.catalogue.columns(unseen), 0.0);
+        hypothesis(unseen, search.catalogue, &Point { members: members.to_vec(), base })
+    };
+    let fitted_at = at(&naming.point.members, &naming.point.base)?;
+    let Some(fitted) = shrink::errors(unseen, &fitted_at)? else { return Ok(None) };
+    let Some(nominal) = shrink::errors(unseen, &at(&[], &naming.point.base)?)? else { return Ok(None) };
+    let rival = match rival {
+        Some(rival) => shrink::errors(unseen, &at(&rival.members, &search.settled(rival).base)?)?,
+        None => None,
+    };
+    let floor = shrink::floor(unseen, &fitted_at, naming.gust_m_s.unwrap_or(TURBULENCE_M_S))?;
+    Ok(Some(HeldOut { nominal, rival, fitted, floor }))
+}
+
+fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
+    let before = proof.nominal.over(&proof.floor);
+    let after = proof.fitted.over(&proof.floor);
+    let best_rival = proof.rival.as_ref().map(|rival| rival.over(&proof.floor));
+    let removed = |left: f64| if before > 1.0 { 1.0 - (left - 1.0) / (before - 1.0) } else { 0.0 };
+    Gap {
+        held_out_flights: held_out.iter().map(|(name, _)| name.clone()).collect(),
+        before,
+        after,
+        best_rival,
+        removed_fraction: removed(after),
+        best_rival_removed_fraction: best_rival.map(removed),
+    }
+}
+
+/// What the flights covered.
+fn covered(predictor: &Predictor) -> Vec<Covered> {
+    let (mut speed, mut height, mut tilt, mut voltage) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    for (track, motion) in predictor.tracks.iter().zip(predictor.plain()) {
+        for (body, volt) in motion.body.iter().zip(&track.voltage_v).step_by(track.every) {
+            speed.push(body.velocity.vector.norm());
+            height.push(-body.position.vector.z);
+            let down = body.ned_from_body().quaternion.inverse() * nalgebra::Vector3::z();
+            tilt.push(down.z.clamp(-1.0, 1.0).acos().to_degrees());
+            voltage.push(*volt);
+        }
+    }
+    let logged = predictor.has_motion();
+    let mut all = Vec::new();
+    let mut push = |name, values: &mut Vec<f64>, unit, is_logged: bool| {
+        if is_logged && !values.is_empty() {
+            values.sort_unstable_by(f64::total_cmp);
+            let at = |share: f64| values[(share * (values.len() - 1) as f64) as usize];
+            all.push(Covered { name, low: at(0.02), high: at(0.98), unit });
+        }
+    };
+    push("speed", &mut speed, "m/s", logged);
+    push("height", &mut height, "m", logged);
+    push("tilt", &mut tilt, "deg", logged);
+    push("voltage", &mut voltage, "V", predictor.has_voltage());
+    all
+}

@@ -1,0 +1,172 @@
+//! What a leftover may go with: families of features of the flight, and how well each predicts it where it was not fitted.
+
+use crate::predictor::{Motion, Predictor, Track};
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// Rows that one block of cross-validation holds, s.
+const FOLDS: usize = 8;
+
+/// A family of features: what a leftover would be said to go with.
+pub(super) struct Family {
+    pub(super) name: &'static str,
+    /// One row a block of the leftover, in the order of tracks and time.
+    pub(super) rows: Vec<Vec<f64>>,
+}
+
+/// Where the vehicle was in one block of the leftover.
+pub(crate) struct Moment {
+    pub(crate) flight: usize,
+    pub(crate) time_s: f64,
+    pub(crate) duration_s: f64,
+    pub(crate) position: Vector3<f64>,
+    pub(crate) velocity_body: Vector3<f64>,
+    pub(crate) velocity_ned: Vector3<f64>,
+    pub(crate) omega: Vector3<f64>,
+    pub(crate) heading_rad: f64,
+    pub(crate) ned_from_body: nalgebra::Matrix3<f64>,
+    pub(crate) throttle: f64,
+    pub(crate) wings: f64,
+    pub(crate) voltage_v: f64,
+}
+
+/// Means over a block of rows of the residual.
+pub(crate) fn moment(
+    predictor: &Predictor,
+    track: &Track,
+    motion: &Motion,
+    first: usize,
+    rows: usize,
+) -> Moment {
+    let start = track.edge() + first * track.every;
+    let end = (start + rows * track.every).min(track.time_s.len());
+    let middle = usize::midpoint(start, end).min(track.time_s.len() - 1);
+    let body = &motion.body[middle];
+    let q = body.ned_from_body().quaternion;
+    let time_s = track.time_s[middle];
+    let (throttle, wings) = predictor.commanded(track.flight, time_s);
+    let last_s = track.time_s[track.time_s.len() - 1];
+    let horizontal = horizontal_position(track, time_s);
+    let velocity = body.velocity.vector;
+    let mean = |v: &[Vector3<f64>]| v[start..end].iter().sum::<Vector3<f64>>() / (end - start).max(1) as f64;
+    Moment {
+        flight: track.flight,
+        time_s: time_s - track.began_s,
+        duration_s: last_s - track.began_s,
+        position: Vector3::new(horizontal.x, horizontal.y, body.position.vector.z),
+        velocity_body: q.inverse() * velocity,
+        velocity_ned: velocity,
+        omega: mean(track.omega()),
+        heading_rad: q.euler_angles().2,
+        ned_from_body: q.to_rotation_matrix().into_inner(),
+        throttle,
+        wings,
+        voltage_v: track.voltage_v[middle],
+    }
+}
+
+fn horizontal_position(track: &Track, time_s: f64) -> Vector3<f64> {
+    let fixes = track.position();
+    let after = fixes.partition_point(|(t, _)| *t <= time_s);
+    match (fixes.get(after.wrapping_sub(1)), fixes.get(after)) {
+        (Some((t0, p0)), Some((t1, p1))) => p0 + (p1 - p0) * ((time_s - t0) / (t1 - t0)),
+        (Some((_, p)), None) | (None, Some((_, p))) => *p,
+        (None, None) => Vector3::zeros(),
+    }
+}
+
+/// Every family at the moments of the leftover.
+pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
+    let family = |name, row: &dyn Fn(&Moment) -> Vec<f64>| Family { name, rows: moments.iter().map(row).collect() };
+    let flights = moments.iter().map(|m| m.flight).max().map_or(0, |f| f + 1);
+    let down = |m: &Moment, v: Vector3<f64>| m.ned_from_body.tr_mul(&v);
+    vec![
+        family("time in flight", &|m| {
+            // Steps at eighths of the flight, and a line, for each flight by itself.
+            let mut row = vec![0.0; flights * 8];
+            for step in 0..7 {
+                row[m.flight * 8 + step] = f64::from(m.time_s > m.duration_s * (step + 1) as f64 / 8.0);
+            }
+            row[m.flight * 8 + 7] = m.time_s / m.duration_s;
+            row
+        }),
+        family("position", &|m| {
+            let p = m.position * 0.2;
+            let mut row = Vec::new();
+            for direction in [Vector3::x(), Vector3::y(), Vector3::z()] {
+                let d = down(m, direction).sum();
+                row.extend([p.x * d, p.y * d, p.z * d, d]);
+            }
+            row.extend([p.x, p.y, p.z, p.x * p.x, p.y * p.y, p.x * p.y, p.z * p.z]);
+            row
+        }),
+        family("velocity", &|m| {
+            let (v, w) = (m.velocity_body, m.velocity_ned);
+            let mut row: Vec<f64> = v.iter().copied().chain(w.iter().copied()).collect();
+            row.extend(v.iter().map(|x| x * x.abs()));
+            row.extend(v.iter().map(|x| x * x));
+            row.extend(v.iter().map(|x| x.powi(3)));
+            row.extend([v.x * v.y, v.y * v.z, v.x * v.z]);
+            row
+        }),
+        family("angular rates", &|m| {
+            let w = m.omega;
+            vec![w.x, w.y, w.z, w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.y * w.z, w.x * w.z, w.z.abs(), w.x.abs(), w.y.abs()]
+        }),
+        family("throttle", &|m| {
+            let u = m.throttle;
+            vec![u, u * u, u.powi(3)]
+        }),
+        family("wings", &|m| {
+            let (d, v) = (m.wings, m.velocity_body);
+            vec![d, d * v.x, d * v.y, d * v.z, d * v.norm(), d * v.x * v.x, d * v.z * v.z]
+        }),
+        family("heading", &|m| {
+            let (s, c) = m.heading_rad.sin_cos();
+            vec![s, c, s * c, c * c - s * s]
+        }),
+        family("battery voltage", &|m| vec![m.voltage_v, m.voltage_v * m.voltage_v]),
+    ]
+}
+
+/// Part of the variance of `y` that a family predicts in blocks that were left out, 0 to 1.
+pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
+    let n = y.len();
+    let k = family.rows.first().map_or(0, Vec::len) + 1;
+    if n < 4 * k || n < 4 * FOLDS {
+        return 0.0;
+    }
+    // Features in units of their spread, with a constant.
+    let mut x = DMatrix::from_element(n, k, 1.0);
+    for column in 1..k {
+        let values: Vec<f64> = family.rows.iter().map(|row| row[column - 1]).collect();
+        let mean = values.iter().sum::<f64>() / n as f64;
+        let spread = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
+        for (row, value) in values.iter().enumerate() {
+            x[(row, column)] = if spread > 1e-9 { (value - mean) / spread } else { 0.0 };
+        }
+    }
+    let (mut error, mut total) = (0.0, 0.0);
+    let size = n.div_ceil(FOLDS);
+    for fold in 0..FOLDS {
+        let held = fold * size..((fold + 1) * size).min(n);
+        let mut gram = DMatrix::identity(k, k) * (0.01 * n as f64);
+        gram[(0, 0)] = 1e-6;
+        let mut right = DVector::zeros(k);
+        for row in (0..n).filter(|row| !held.contains(row)) {
+            for i in 0..k {
+                right[i] += x[(row, i)] * y[row];
+                for j in 0..k {
+                    gram[(i, j)] += x[(row, i)] * x[(row, j)];
+                }
+            }
+        }
+        let Some(factor) = gram.cholesky() else { return 0.0 };
+        let theta = factor.solve(&right);
+        for row in held {
+            let predicted: f64 = (0..k).map(|i| x[(row, i)] * theta[i]).sum();
+            error += (y[row] - predicted).powi(2);
+            total += y[row] * y[row];
+        }
+    }
+    if total > 0.0 { (1.0 - error / total).clamp(0.0, 1.0) } else { 0.0 }
+}

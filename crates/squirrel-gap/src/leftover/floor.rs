@@ -1,0 +1,92 @@
+//! What sensor noise and turbulence leave of a residual, by simulation through the predictor's own filters.
+//!
+//! Noise is what this log shows: the deviation of the third difference of a raw channel, which motion hardly enters. It is
+//! drawn anew, filtered and decimated as the measurement was; turbulence of the tolerance of the wind acts through the
+//! predictor's own columns of `constant_wind`.
+
+use crate::flight::filter::{DERIVATIVE_REACH, derivative};
+use crate::predictor::{DYNAMIC, Predictor, Track};
+use nalgebra::{Vector3, Vector6};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+
+/// Correlation time of turbulence, s.
+pub(crate) const TURBULENCE_S: f64 = 1.5;
+/// What the smoothed GNSS velocity is off by, and for how long, m/s and s.
+const VELOCITY_ERROR_M_S: f64 = 0.03;
+const VELOCITY_ERROR_S: f64 = 0.5;
+
+/// Draws of the residual that noise alone would leave; only the rows of the dynamics are filled.
+pub(crate) fn draws(
+    predictor: &Predictor,
+    wind_columns: &[Vec<f64>; 2],
+    turbulence_m_s: f64,
+    count: usize,
+) -> Vec<Vec<f64>> {
+    (0..count)
+        .map(|draw| {
+            let mut rng = Pcg64Mcg::seed_from_u64(draw as u64 + 1);
+            let mut rows = vec![0.0; predictor.rows()];
+            for (piece, track) in predictor.tracks.iter().enumerate() {
+                let white = filtered_noise(track, &mut rng);
+                let mut winds = [Drift::new(TURBULENCE_S, &mut rng), Drift::new(VELOCITY_ERROR_S, &mut rng)];
+                let step_s = track.every as f64 * track.period_s;
+                let air: Vec<[f64; 2]> = (0..white.len())
+                    .map(|_| {
+                        for wind in &mut winds {
+                            wind.advance(step_s, &mut rng);
+                        }
+                        [0, 1].map(|axis| {
+                            winds[0].value[axis] * turbulence_m_s + winds[1].value[axis] * VELOCITY_ERROR_M_S
+                        })
+                    })
+                    .collect();
+                for segment in predictor.segments.iter().filter(|s| s.piece == piece && s.channel < DYNAMIC) {
+                    for (i, row) in segment.rows.clone().enumerate() {
+                        rows[row] = white[i][segment.channel]
+                            + wind_columns[0][row] * air[i][0]
+                            + wind_columns[1][row] * air[i][1];
+                    }
+                }
+            }
+            rows
+        })
+        .collect()
+}
+
+/// A Gauss-Markov process of unit variance on two axes.
+struct Drift {
+    value: [f64; 2],
+    time_constant_s: f64,
+}
+
+impl Drift {
+    fn new(time_constant_s: f64, rng: &mut Pcg64Mcg) -> Self {
+        Self { value: [0; 2].map(|_| StandardNormal.sample(rng)), time_constant_s }
+    }
+    fn advance(&mut self, dt_s: f64, rng: &mut Pcg64Mcg) {
+        let keep = (-dt_s / self.time_constant_s).exp();
+        for value in &mut self.value {
+            let noise: f64 = StandardNormal.sample(rng);
+            *value = *value * keep + noise * (1.0 - keep * keep).sqrt();
+        }
+    }
+}
+
+/// White noise of the accelerometer and the gyroscope of a track behind the filters.
+fn filtered_noise(track: &Track, rng: &mut Pcg64Mcg) -> Vec<Vector6<f64>> {
+    let [accelerometer, gyroscope] = track.imu_noise;
+    let mut draw = |sd: Vector3<f64>| -> Vec<Vector3<f64>> {
+        let mut one = || -> f64 { StandardNormal.sample(rng) };
+        (0..track.time_s.len()).map(|_| Vector3::new(sd.x * one(), sd.y * one(), sd.z * one())).collect()
+    };
+    let (force, rate) = (draw(accelerometer), draw(gyroscope));
+    let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..force.len() - DERIVATIVE_REACH)
+        .map(|k| {
+            let a = derivative(|k| rate[k], k, track.period_s);
+            Vector6::new(force[k].x, force[k].y, force[k].z, a.x, a.y, a.z)
+        })
+        .collect();
+    track.filter.apply(&raw, track.every)
+}

@@ -1,0 +1,192 @@
+//! What the best explanation leaves, against what noise alone would leave: is there something that no name accounts for?
+//!
+//! The leftover is looked at in blocks of about 0.27 s, which hold what is slower than 2 Hz, and as a whole. Noise is drawn
+//! from what the log itself shows and goes through the same filters; a leftover is real where it is above every draw
+//! by more than a model can be wrong in its last percent. What it goes with is the family of features that predicts it best
+//! where it was not fitted. A horizontal force that nothing predicts, without a moment, is a gust.
+
+mod features;
+pub(crate) mod floor;
+
+use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor};
+pub(crate) use features::{Moment, moment};
+use features::{families, predicted_share};
+
+/// Rows of the residual in one block: 0.27 s at 30 Hz.
+const BLOCK: usize = 8;
+/// Draws of the noise.
+const DRAWS: usize = 8;
+/// How far above the noise's mean a channel may be, slow and as a whole, in rms.
+const SLOW_RATIO: f64 = 1.6;
+const WHOLE_RATIO: f64 = 1.25;
+/// Part of what the model explains that it may get wrong without an effect being missing.
+const MODEL_ERROR: f64 = 0.02;
+/// Part of the variance that a family must predict for a leftover to go with it.
+const SHARE_MIN: f64 = 0.25;
+
+/// The leftover of one channel of one flight.
+#[derive(Debug, Clone)]
+pub(crate) struct Band {
+    pub(crate) flight: usize,
+    pub(crate) channel: usize,
+    /// Rms of what is slow and of the whole, in the unit of the channel.
+    pub(crate) slow: f64,
+    pub(crate) whole: f64,
+    /// The same of the noise.
+    pub(crate) slow_floor: f64,
+    /// The slow part of the vehicle as it was.
+    pub(crate) slow_nominal: f64,
+    pub(crate) whole_floor: f64,
+}
+
+/// What is left.
+#[derive(Debug, Clone)]
+pub(crate) struct Leftover {
+    pub(crate) bands: Vec<Band>,
+    /// Channels that stand out, worst first: channel and ratio to what is allowed.
+    pub(crate) excess: Vec<(usize, f64)>,
+    /// Families by the share of the variance they predict in the worst channel.
+    pub(crate) families: Vec<(&'static str, f64)>,
+    /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above 0.5 Hz.
+    pub(crate) line: Option<(f64, f64)>,
+}
+
+impl Leftover {
+    /// Whether something is there that no name accounts for.
+    pub(crate) fn is_real(&self) -> bool {
+        !self.excess.is_empty()
+    }
+
+    /// What the leftover goes with, in words; `None` where nothing predicts it.
+    pub(crate) fn goes_with(&self) -> Option<String> {
+        let (channel, _) = self.excess.first()?;
+        let channel = CHANNELS[*channel];
+        match (self.families.first(), self.line) {
+            (_, Some((hz, share))) if share > 0.5 => Some(format!("a line at {hz:.2} Hz in {channel}")),
+            (Some((name, share)), _) if *share >= SHARE_MIN => {
+                Some(format!("{name} ({:.0} % of {channel})", 100.0 * share))
+            }
+            _ => None,
+        }
+    }
+
+    /// The channels that stand out, in words.
+    pub(crate) fn channels(&self) -> String {
+        let names: Vec<&str> = self.excess.iter().map(|(channel, _)| CHANNELS[*channel]).collect();
+        format!("nothing that was tried; it stands out in {}", names.join(", "))
+    }
+
+    /// Whether only horizontal force stands out, and nothing predicts it.
+    pub(crate) fn looks_like_gust(&self) -> bool {
+        self.is_real()
+            && self.excess.iter().all(|(channel, _)| *channel < 2)
+            && self.goes_with().is_none()
+    }
+}
+
+/// Compares a leftover with what noise alone leaves.
+///
+/// * `left`, `nominal` - rows of the residual of the best explanation, and of the vehicle as it is
+/// * `motions` - of each piece, under the best explanation
+pub(crate) fn leftover(
+    predictor: &Predictor,
+    motions: &[Motion],
+    left: &[f64],
+    nominal: &[f64],
+    wind_columns: &[Vec<f64>; 2],
+    turbulence_m_s: f64,
+) -> Leftover {
+    let draws = floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS);
+    let mut bands = Vec::new();
+    let mut worst = [0.0_f64; DYNAMIC];
+    for segment in predictor.segments.iter().filter(|s| s.channel < DYNAMIC && s.rows.len() >= 4 * BLOCK) {
+        let rows = |all: &[f64]| all[segment.rows.clone()].to_vec();
+        let own = rows(left);
+        let explained: Vec<f64> = rows(nominal).iter().zip(&own).map(|(n, l)| n - l).collect();
+        let noise: Vec<Vec<f64>> = draws.iter().map(|d| rows(d)).collect();
+        let mean = |f: fn(&[f64]) -> f64| {
+            (noise.iter().map(|n| f(n).powi(2)).sum::<f64>() / noise.len() as f64).sqrt()
+        };
+        let band = Band {
+            flight: segment.flight,
+            channel: segment.channel,
+            slow: rms_of_means(&own),
+            whole: rms(&own),
+            slow_floor: mean(rms_of_means),
+            slow_nominal: rms_of_means(&rows(nominal)),
+            whole_floor: mean(rms),
+        };
+        let allowed = |floor: f64, ratio: f64, explained: f64| {
+            ((floor * ratio).powi(2) + (MODEL_ERROR * explained).powi(2)).sqrt()
+        };
+        let ratio = (band.slow / allowed(band.slow_floor, SLOW_RATIO, rms_of_means(&explained)))
+            .max(band.whole / allowed(band.whole_floor, WHOLE_RATIO, rms(&explained)));
+        worst[segment.channel] = worst[segment.channel].max(ratio);
+        bands.push(band);
+    }
+    let mut excess: Vec<(usize, f64)> =
+        worst.iter().copied().enumerate().filter(|(_, ratio)| *ratio > 1.0).collect();
+    excess.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let mut out = Leftover { bands, excess, families: Vec::new(), line: None };
+    if let Some(&(channel, _)) = out.excess.first() {
+        let (moments, y) = blocks(predictor, motions, left, channel);
+        out.families = families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
+        out.families.sort_by(|a, b| b.1.total_cmp(&a.1));
+        out.line = line(predictor, left, channel);
+    }
+    out
+}
+
+/// Moments and block means of one channel.
+fn blocks(
+    predictor: &Predictor,
+    motions: &[Motion],
+    left: &[f64],
+    channel: usize,
+) -> (Vec<Moment>, Vec<f64>) {
+    let (mut moments, mut y) = (Vec::new(), Vec::new());
+    for segment in predictor.segments.iter().filter(|s| s.channel == channel) {
+        let track = &predictor.tracks[segment.piece];
+        for (i, block) in left[segment.rows.clone()].chunks_exact(BLOCK).enumerate() {
+            moments.push(moment(predictor, track, &motions[segment.piece], i * BLOCK, BLOCK));
+            y.push(block.iter().sum::<f64>() / BLOCK as f64);
+        }
+    }
+    (moments, y)
+}
+
+fn rms(x: &[f64]) -> f64 {
+    (x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64).sqrt()
+}
+
+fn rms_of_means(x: &[f64]) -> f64 {
+    let means: Vec<f64> = x.chunks_exact(BLOCK).map(|b| b.iter().sum::<f64>() / BLOCK as f64).collect();
+    rms(&means)
+}
+
+/// The strongest line between 0.5 and 12 Hz, and its part of the power there, in the longest segment of a channel.
+fn line(predictor: &Predictor, left: &[f64], channel: usize) -> Option<(f64, f64)> {
+    let segment =
+        predictor.segments.iter().filter(|s| s.channel == channel).max_by_key(|s| s.rows.len())?;
+    let x = &left[segment.rows.clone()];
+    let n = x.len();
+    let duration_s = n as f64 * segment.step_s;
+    let bins = (0.5 * duration_s) as usize..(12.0_f64.min(0.45 / segment.step_s) * duration_s) as usize;
+    let power: Vec<f64> = bins
+        .clone()
+        .map(|bin| {
+            // Goertzel: one line of the spectrum by a recursion.
+            let w = std::f64::consts::TAU * bin as f64 / n as f64;
+            let (mut a, mut b) = (0.0, 0.0);
+            for value in x {
+                (a, b) = (value + 2.0 * w.cos() * a - b, a);
+            }
+            a * a + b * b - 2.0 * w.cos() * a * b
+        })
+        .collect();
+    let total: f64 = power.iter().sum();
+    let (at, _) = power.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    // A line that wanders a little spreads over neighbours.
+    let own: f64 = power[at.saturating_sub(2)..(at + 3).min(power.len())].iter().sum();
+    (total > 0.0).then(|| ((bins.start + at) as f64 / duration_s, own / total))
+}

@@ -1,0 +1,74 @@
+//! Which published form of a named effect the flights ask for.
+
+use super::linear::{Linear, Member};
+use super::search::{Scored, Search};
+use crate::GapError;
+use squirrel_core::effects::{Effects, FORM, Kind};
+
+/// What another form must be worth, nats.
+const FORM_NATS: f64 = 6.0;
+
+impl Search<'_> {
+    /// Tries the other forms of each member and keeps what has more evidence.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(super) fn choose_forms(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+        for index in 0..best.members.len() {
+            for form in self.other_forms(&best.members[index]) {
+                let mut members = best.members.clone();
+                members[index] = form;
+                let scored = self.score(linear, &members)?;
+                (self.progress)();
+                if scored.log_evidence > best.log_evidence + FORM_NATS && self.is_large(&scored) {
+                    *best = scored;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Name of a member's form; `standard` where there is one only.
+    pub(crate) fn form(&self, member: &Member) -> &'static str {
+        let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
+        let slot = list.iter().position(|p| p.key == FORM);
+        slot.map_or("standard", |slot| match list[slot].kind {
+            Kind::OneOf(names) => names[member.values[slot] as usize],
+            _ => "standard",
+        })
+    }
+
+    /// Slots of a member that are sizes in its form.
+    pub(super) fn free_slots(&self, member: &Member) -> Vec<usize> {
+        let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
+        let form = self.form(member);
+        (0..list.len())
+            .filter(|slot| matches!(list[*slot].kind, Kind::Size { .. }) && list[*slot].exists_in(form))
+            .collect()
+    }
+
+    /// The member in each of its other forms, with numbers to start from.
+    fn other_forms(&self, member: &Member) -> Vec<Member> {
+        let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
+        let Some(slot) = list.iter().position(|p| p.key == FORM) else { return Vec::new() };
+        let Kind::OneOf(names) = list[slot].kind else { return Vec::new() };
+        let now = names[member.values[slot] as usize];
+        (0..names.len())
+            .filter(|form| names[*form] != now)
+            .map(|form| {
+                let mut other = member.clone();
+                other.values[slot] = form as f64;
+                for (value, parameter) in other.values.iter_mut().zip(list) {
+                    let Kind::Size { smallest, largest, signed } = parameter.kind else { continue };
+                    match (parameter.exists_in(now), parameter.exists_in(names[form])) {
+                        (false, true) if signed => *value = 0.0,
+                        (false, true) => *value = (smallest * largest).sqrt(),
+                        (true, false) => *value = 0.0,
+                        _ => {}
+                    }
+                }
+                other
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,228 @@
+//! What can be named: every effect of the catalogue with its choices, and how far each parameter may be off without a name.
+//!
+//! A parameter has two priors, both Gaussian about what the vehicle file says: its **tolerance**, the declared standard
+//! deviation of the nominal number that the effect would change, and, where the effect is hypothesised, its **slab**, as wide
+//! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
+
+use crate::predictor::hooks::*;
+use crate::GapError;
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind};
+use squirrel_sim::plant::WingPlant;
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.
+const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
+/// Width of the slab over the largest plausible size.
+pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
+/// Lengths at which a payload is looked for, m: its frequency is not linear in anything.
+const PAYLOAD_LENGTHS_M: [f64; 5] = [0.3, 0.4, 0.52, 0.68, 0.9];
+
+/// One number of one effect.
+#[derive(Debug, Clone)]
+pub(crate) struct Parameter {
+    pub(crate) candidate: usize,
+    /// Place in the effect's list of parameters.
+    pub(crate) slot: usize,
+    pub(crate) key: &'static str,
+    pub(crate) smallest: f64,
+    pub(crate) largest: f64,
+    pub(crate) signed: bool,
+    /// Standard deviation of the spike.
+    pub(crate) tolerance: f64,
+    /// Standard deviation of the slab.
+    pub(crate) slab: f64,
+}
+
+/// One effect, with its choices made: which rotor, which axis, which side.
+#[derive(Debug, Clone)]
+pub(crate) struct Candidate {
+    pub(crate) effect: &'static str,
+    /// Slots with a fixed value, and slots where a search starts.
+    pub(crate) fixed: Vec<(usize, f64)>,
+    /// Indices of its parameters in [`Catalogue::parameters`] that act by themselves, from zero.
+    pub(crate) parameters: Vec<usize>,
+    /// Slots that only a refinement moves, with where they start.
+    pub(crate) shape: Vec<(usize, f64)>,
+}
+
+/// Everything that can be named on a vehicle.
+pub(crate) struct Catalogue {
+    pub(crate) candidates: Vec<Candidate>,
+    pub(crate) parameters: Vec<Parameter>,
+}
+
+impl Catalogue {
+    /// # Errors
+    /// The vehicle file lacks a tolerance that is needed.
+    pub(crate) fn new(vehicle: &VehicleFile) -> Result<Self, GapError> {
+        let mut all = Self { candidates: Vec::new(), parameters: Vec::new() };
+        for name in Effects::<f64>::NAMES {
+            if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
+                continue;
+            }
+            let list = Effects::<f64>::parameters(name).unwrap_or_default();
+            for fixed in choices(list, vehicle.vehicle.rotors().len()) {
+                if *name == "payload_swing" {
+                    for length_m in PAYLOAD_LENGTHS_M {
+                        all.add(vehicle, name, list, fixed.clone(), &[("length_m", length_m)])?;
+                    }
+                } else {
+                    all.add(vehicle, name, list, fixed, &[])?;
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    fn add(
+        &mut self,
+        vehicle: &VehicleFile,
+        effect: &'static str,
+        list: &'static [EffectParameter],
+        fixed: Vec<(usize, f64)>,
+        shape: &[(&str, f64)],
+    ) -> Result<(), GapError> {
+        let standard = list.iter().find_map(|p| match p.kind {
+            Kind::OneOf(names) if p.key == FORM => Some(names[0]),
+            _ => None,
+        });
+        let standard = standard.unwrap_or_default();
+        let (candidate, mut own, mut started) = (self.candidates.len(), Vec::new(), Vec::new());
+        for (slot, parameter) in list.iter().enumerate() {
+            let Kind::Size { smallest, largest, signed } = parameter.kind else { continue };
+            if !parameter.exists_in(standard) {
+                continue;
+            }
+            if let Some((_, start)) = shape.iter().find(|(key, _)| *key == parameter.key) {
+                started.push((slot, *start));
+                continue;
+            }
+            own.push(self.parameters.len());
+            self.parameters.push(Parameter {
+                candidate,
+                slot,
+                key: parameter.key,
+                smallest,
+                largest,
+                signed,
+                tolerance: tolerance(vehicle, effect, slot, &fixed, smallest)?,
+                slab: SLAB_OF_LARGEST * largest,
+            });
+        }
+        self.candidates.push(Candidate { effect, fixed, parameters: own, shape: started });
+        Ok(())
+    }
+}
+
+/// Every way in which the choices of an effect can be made.
+fn choices(list: &[EffectParameter], rotors: usize) -> Vec<Vec<(usize, f64)>> {
+    let mut all = vec![Vec::new()];
+    for (slot, parameter) in list.iter().enumerate() {
+        let values: Vec<f64> = match parameter.kind {
+            Kind::Rotor => (1..=rotors).map(|i| i as f64).collect(),
+            Kind::OneOf(_) if parameter.key == FORM => vec![0.0],
+            Kind::OneOf(names) => (0..names.len()).map(|i| i as f64).collect(),
+            Kind::Size { .. } => continue,
+        };
+        all = all
+            .into_iter()
+            .flat_map(|made: Vec<(usize, f64)>| {
+                values.iter().map(move |value| [made.clone(), vec![(slot, *value)]].concat())
+            })
+            .collect();
+    }
+    all
+}
+
+/// How far the number that an effect changes may be off, one standard deviation, in the unit of the effect's parameter.
+fn tolerance(
+    vehicle: &VehicleFile,
+    effect: &str,
+    slot: usize,
+    fixed: &[(usize, f64)],
+    smallest: f64,
+) -> Result<f64, GapError> {
+    let p = vehicle.vehicle.parameters();
+    let propulsion = &p.propulsion;
+    let none = SHARE_OF_SMALLEST * smallest;
+    let number = |field: &str, index: usize, value: f64| deviation(vehicle, field, index, value);
+    // The sd of a number that the file must give where the number is not zero, over that number.
+    let fraction = |field: &str, index: usize, value: f64| {
+        Ok(number(field, index, value)?.map_or(none, |sd| sd / value.abs().max(f64::MIN_POSITIVE)))
+    };
+    let declared = |field: &str, fallback: f64| Ok(sds(vehicle, field).map_or(fallback, |sd| sd[0]));
+    Ok(match effect {
+        "mass_error" => fraction("mass.mass_kg", 0, p.mass_kg)?,
+        "inertia_error" => {
+            let axis = fixed.first().map_or(0, |(_, axis)| *axis as usize);
+            fraction("mass.inertia_kg_m2", axis, p.inertia_kg_m2[(axis, axis)])?
+        }
+        "thrust_coefficient" | "weak_rotor" => {
+            fraction("propulsion.thrust_coefficient_n_s2", 0, propulsion.thrust_coefficient_n_s2)?
+        }
+        "yaw_torque_coeff" => {
+            fraction("propulsion.torque_coefficient_n_m_s2", 0, propulsion.torque_coefficient_n_m_s2)?
+        }
+        "motor_lag" => {
+            let single = sds(vehicle, "propulsion.time_constant_s");
+            match single {
+                Some(sd) => sd[0],
+                None if vehicle.provenance.iter().any(|(f, _)| f == "propulsion.time_constant_up_s") => {
+                    number("propulsion.time_constant_up_s", 0, propulsion.time_constant_up_s)?.unwrap_or(none)
+                }
+                None => {
+                    number("propulsion.time_constant_s", 0, propulsion.time_constant_up_s)?.unwrap_or(none)
+                }
+            }
+        }
+        "linear_drag" => number("drag.linear_n_s_per_m", 0, p.drag.linear_n_s_per_m.x)?.unwrap_or(none),
+        "quadratic_drag" => number("drag.area_m2", 0, p.drag.area_m2)?.unwrap_or(none),
+        "wing_membrane" if slot == 0 => match p.wing {
+            Some(wing) => fraction("wing.normal_force_slope", 0, wing.normal_force_slope)?,
+            None => none,
+        },
+        "wing_asymmetry" => match p.wing {
+            Some(wing) => fraction("wing.normal_force_slope", 0, wing.normal_force_slope)?,
+            None => none,
+        },
+        "wing_servo_lag" => match p.wing {
+            Some(wing) => number("wing.time_constant_s", 0, wing.time_constant_s)?.unwrap_or(none),
+            None => none,
+        },
+        "cg_offset" => {
+            let all: Vec<f64> = (0..vehicle.vehicle.rotors().len())
+                .filter_map(|i| sds(vehicle, &format!("rotor[{i}].position_body_m")))
+                .map(|sd| sd[slot.min(sd.len() - 1)])
+                .collect();
+            let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
+            mean.max(none)
+        }
+        "accel_bias" => declared("sensors.imu.accel_bias_m_s2", 0.02)?,
+        "heading_bias" => declared("sensors.attitude.bias_rad", 0.5_f64.to_radians())?,
+        "constant_wind" => 0.12,
+        _ => none,
+    })
+}
+
+/// The declared sd of a number; `None` where the number is zero and the file declares none.
+fn deviation(vehicle: &VehicleFile, field: &str, index: usize, value: f64) -> Result<Option<f64>, GapError> {
+    match sds(vehicle, field) {
+        Some(sd) => Ok(Some(sd[index.min(sd.len() - 1)])),
+        None if value == 0.0 => Ok(None),
+        None => Err(GapError::Tolerance { vehicle: vehicle.name.clone(), field: field.to_owned(), value }),
+    }
+}
+
+/// The declared sds of a field, as many as it has.
+fn sds(vehicle: &VehicleFile, field: &str) -> Option<Vec<f64>> {
+    let (_, provenance) = vehicle.provenance.iter().find(|(name, _)| name == field)?;
+    let text = provenance.sd.as_ref()?;
+    let numbers: Vec<f64> = text
+        .split(|c: char| "[], ".contains(c))
+        .filter(|part| !part.is_empty())
+        .filter_map(|part| part.parse().ok())
+        .collect();
+    // Of a full inertia matrix, the diagonal.
+    let numbers = if numbers.len() == 9 { vec![numbers[0], numbers[4], numbers[8]] } else { numbers };
+    (!numbers.is_empty()).then_some(numbers)
+}

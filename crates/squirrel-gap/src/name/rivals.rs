@@ -1,0 +1,113 @@
+//! Other explanations of the same flights, and what these flights cannot show at all.
+
+use super::evidence::BETA;
+use super::search::{Found, Scored, Search};
+use crate::GapError;
+
+/// Rivals that are refined for each named effect.
+const RIVALS: usize = 3;
+/// Squared size over variance from which an effect shows.
+const VISIBLE: f64 = 9.0;
+
+impl Search<'_> {
+    /// Sets in which one of the named effects is replaced by another, the best first.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn rivals(&self, found: &Found) -> Result<Vec<Scored>, GapError> {
+        let mut all: Vec<Scored> = Vec::new();
+        for i in 0..found.best.members.len() {
+            let mut rest = found.best.members.clone();
+            let out = rest.remove(i);
+            let without = self.score(&found.linear, &rest)?;
+            let mut names: Vec<&str> = Vec::new();
+            for (_, member) in self.ranked(&without, &[self.effect(&out)]) {
+                if names.contains(&self.effect(&member)) {
+                    continue;
+                }
+                names.push(self.effect(&member));
+                let members = [rest.as_slice(), &[member]].concat();
+                all.push(self.score(&found.linear, &members)?);
+                (self.progress)();
+                if names.len() == RIVALS {
+                    break;
+                }
+            }
+        }
+        all.retain(|rival| self.is_large(rival));
+        all.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        Ok(all)
+    }
+
+    /// Evidence that one effect alone has over none, by name, nats; linear, the refined value for what is in `best`.
+    pub(crate) fn single_evidence(&self, found: &Found) -> Vec<(&'static str, f64)> {
+        let mut all: Vec<(&'static str, f64)> = Vec::new();
+        for (log_evidence, member) in self.ranked(&found.null, &[]) {
+            let name = self.effect(&member);
+            let nats = log_evidence - found.null.log_evidence;
+            match all.iter_mut().find(|(other, _)| *other == name) {
+                Some((_, best)) => *best = best.max(nats),
+                None => all.push((name, nats)),
+            }
+        }
+        all
+    }
+
+    /// Effects that these flights do not show even at their largest plausible size, everything else floating.
+    pub(crate) fn blind(&self, set: &Scored) -> Vec<&'static str> {
+        let offset = set.free.len();
+        let mut all = Vec::new();
+        for candidate in &self.catalogue.candidates {
+            if all.contains(&candidate.effect) || set.members.iter().any(|m| self.effect(m) == candidate.effect) {
+                continue;
+            }
+            let mut prior = set.prior.clone();
+            for p in &candidate.parameters {
+                prior[offset + p] = self.catalogue.parameters[*p].slab;
+            }
+            let Some(posterior) = set.gram.posterior(&prior, BETA) else { continue };
+            let covariance = posterior.covariance();
+            let shows = candidate.parameters.iter().any(|p| {
+                let largest = self.catalogue.parameters[*p].largest;
+                largest * largest > VISIBLE * covariance[(offset + p, offset + p)]
+            });
+            if !shows {
+                all.push(candidate.effect);
+            }
+        }
+        all
+    }
+
+    /// How far the smallest size of one effect stands out while another floats freely: chi squared by row and column.
+    pub(crate) fn confusability(&self, set: &Scored) -> (Vec<&'static str>, Vec<Vec<f64>>) {
+        let offset = set.free.len();
+        let mut names: Vec<&'static str> = Vec::new();
+        let mut first = Vec::new();
+        for candidate in &self.catalogue.candidates {
+            if !names.contains(&candidate.effect) && !candidate.parameters.is_empty() {
+                names.push(candidate.effect);
+                first.push(candidate);
+            }
+        }
+        let rows = first
+            .iter()
+            .map(|own| {
+                let p = own.parameters[0];
+                first
+                    .iter()
+                    .map(|other| {
+                        let mut prior = set.prior.clone();
+                        for q in other.parameters.iter().chain(&own.parameters) {
+                            prior[offset + q] = self.catalogue.parameters[*q].slab;
+                        }
+                        set.gram.posterior(&prior, BETA).map_or(0.0, |posterior| {
+                            let variance = posterior.covariance()[(offset + p, offset + p)];
+                            self.catalogue.parameters[p].smallest.powi(2) / variance
+                        })
+                    })
+                    .collect()
+            })
+            .collect();
+        (names, rows)
+    }
+}

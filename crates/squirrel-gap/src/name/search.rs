@@ -1,0 +1,372 @@
+//! The search for the set of effects with the most evidence: forward, drop, swap, each step refined through the simulator.
+
+use crate::predictor::hooks::*;
+use super::evidence::{Gram, Posterior, dot};
+use super::linear::{Linear, Member, Point, hypothesis};
+use super::parameters::{Catalogue, SLAB_OF_LARGEST};
+use crate::GapError;
+use crate::predictor::{Hypothesis, Predictor};
+use nalgebra::DMatrix;
+
+/// What an effect must be worth to be named, nats.
+pub(crate) const NATS_MIN: f64 = 6.0;
+/// Part of the smallest size worth reporting that an effect must reach.
+const SIZE_MIN: f64 = 0.5;
+/// Candidates that are refined after each linear ranking.
+const REFINED: usize = 4;
+/// Most steps of a refinement.
+const STEPS_MAX: usize = 6;
+/// Most effects in a set.
+const MEMBERS_MAX: usize = 4;
+/// Most times that the predictor is linearised anew.
+const ROUNDS_MAX: usize = 3;
+
+/// A set of effects with its best numbers and its evidence.
+pub(crate) struct Scored {
+    pub(crate) members: Vec<Member>,
+    /// Relative to nothing in particular; differences within one [`Linear`] count.
+    pub(crate) log_evidence: f64,
+    /// Of the members' free numbers, then of all columns of the [`Linear`].
+    pub(crate) posterior: Posterior,
+    pub(crate) gram: Gram,
+    /// Prior deviations, in the order of the posterior.
+    pub(crate) prior: Vec<f64>,
+    /// Which number of which member each of the first columns is.
+    pub(crate) free: Vec<(usize, usize)>,
+    /// Whitened columns of the free numbers.
+    pub(crate) own: Vec<Vec<f64>>,
+    /// Whitened measurement, with the free numbers' part in it.
+    pub(crate) y: Vec<f64>,
+}
+
+/// The predictor and what can be named in it.
+pub(crate) struct Search<'a> {
+    pub(crate) predictor: &'a Predictor<'a>,
+    pub(crate) catalogue: &'a Catalogue,
+    /// Tempering of the likelihood.
+    pub(crate) beta: f64,
+    /// Called after each piece of work.
+    pub(crate) progress: &'a dyn Fn(),
+}
+
+/// What a search found.
+pub(crate) struct Found {
+    pub(crate) linear: Linear,
+    pub(crate) null: Scored,
+    pub(crate) best: Scored,
+    /// What each member is worth: evidence of the set over the set without it, nats.
+    pub(crate) worth: Vec<f64>,
+}
+
+impl Search<'_> {
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn run(&self) -> Result<Found, GapError> {
+        let mut point = Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] };
+        let mut round = 1;
+        loop {
+            let linear = Linear::about(self.predictor, self.catalogue, &point)?;
+            (self.progress)();
+            let null = self.score(&linear, &[])?;
+            let mut best = self.score(&linear, &point.members)?;
+            self.extend(&linear, &mut best)?;
+            self.drop_and_swap(&linear, &mut best)?;
+            let settled = round > 1 && self.same_set(&best.members, &point.members);
+            if settled || round == ROUNDS_MAX {
+                let worth = self.worth(&linear, &null, &best)?;
+                return Ok(Found { linear, null, best, worth });
+            }
+            point = self.settled(&best);
+            round += 1;
+        }
+    }
+
+    /// The point at which a set explains most: its members, and everything else where it most likely is.
+    pub(crate) fn settled(&self, set: &Scored) -> Point {
+        let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
+        for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
+            // These two are far from linear where they are small.
+            if ["ground_effect", "payload_swing"].contains(&self.catalogue.candidates[parameter.candidate].effect) {
+                *x = 0.0;
+            }
+        }
+        Point { members: set.members.clone(), base }
+    }
+
+    fn worth(&self, linear: &Linear, null: &Scored, best: &Scored) -> Result<Vec<f64>, GapError> {
+        (0..best.members.len())
+            .map(|i| {
+                let mut rest = best.members.clone();
+                rest.remove(i);
+                let without =
+                    if rest.is_empty() { null.log_evidence } else { self.score(linear, &rest)?.log_evidence };
+                Ok(best.log_evidence - without)
+            })
+            .collect()
+    }
+
+    fn same_set(&self, a: &[Member], b: &[Member]) -> bool {
+        let names = |list: &[Member]| {
+            let mut all: Vec<(usize, _)> = list
+                .iter()
+                .map(|m| {
+                    let candidate = &self.catalogue.candidates[m.candidate];
+                    (candidate.fixed.iter().map(|(_, v)| *v as usize).sum::<usize>(), candidate.effect)
+                })
+                .collect();
+            all.sort_unstable();
+            all
+        };
+        names(a) == names(b)
+    }
+
+    /// Adds effects as long as the evidence asks for them.
+    fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+        while best.members.len() < MEMBERS_MAX {
+            let Some(next) = self.best_addition(linear, best, &[])? else { break };
+            if next.log_evidence < best.log_evidence + NATS_MIN {
+                break;
+            }
+            *best = next;
+            // Before a second effect explains what the first leaves, the first may have another form.
+            self.choose_forms(linear, best)?;
+        }
+        Ok(())
+    }
+
+    /// The best set with one more effect that is large enough to report.
+    fn best_addition(
+        &self,
+        linear: &Linear,
+        set: &Scored,
+        except: &[&str],
+    ) -> Result<Option<Scored>, GapError> {
+        let mut best: Option<Scored> = None;
+        for member in self.ranked(set, except).into_iter().take(REFINED) {
+            let members = [set.members.as_slice(), &[member.1]].concat();
+            let scored = self.score(linear, &members)?;
+            (self.progress)();
+            if self.is_large(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
+                best = Some(scored);
+            }
+        }
+        Ok(best)
+    }
+
+    /// Whether each member is at least half the smallest size worth reporting.
+    pub(crate) fn is_large(&self, scored: &Scored) -> bool {
+        scored.members.iter().all(|member| {
+            let candidate = &self.catalogue.candidates[member.candidate];
+            candidate.parameters.iter().any(|p| {
+                let p = &self.catalogue.parameters[*p];
+                let size = member.values[p.slot];
+                (if p.signed { size.abs() } else { size }) >= SIZE_MIN * p.smallest
+            })
+        })
+    }
+
+    /// Candidates by the evidence that a linear model gives them beside a set, best first, with their linear numbers.
+    pub(crate) fn ranked(&self, set: &Scored, except: &[&str]) -> Vec<(f64, Member)> {
+        let offset = set.free.len();
+        let mut all = Vec::new();
+        for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
+            let in_set = set.members.iter().any(|m| self.effect(m) == candidate.effect);
+            if in_set || except.contains(&candidate.effect) {
+                continue;
+            }
+            let mut prior = set.prior.clone();
+            if candidate.effect == "payload_swing" {
+                for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
+                    if self.catalogue.candidates[parameter.candidate].effect == "payload_swing" {
+                        prior[offset + p] = 0.0;
+                    }
+                }
+            }
+            for p in &candidate.parameters {
+                prior[offset + p] = self.catalogue.parameters[*p].slab;
+            }
+            let Some(posterior) = set.gram.posterior(&prior, self.beta) else { continue };
+            let mut member = self.catalogue.absent(self.predictor, index);
+            let mut plausible = true;
+            for p in &candidate.parameters {
+                let parameter = &self.catalogue.parameters[*p];
+                let value = &mut member.values[parameter.slot];
+                *value += posterior.mean[offset + p];
+                plausible &= parameter.signed || *value > 0.0;
+                *value = value.clamp(-1.5 * parameter.largest, 1.5 * parameter.largest);
+            }
+            if plausible {
+                all.push((posterior.log_evidence, member));
+            }
+        }
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        // Of the several lines of a payload, the best two.
+        let mut payloads = 0;
+        all.retain(|(_, m)| {
+            payloads += usize::from(self.effect(m) == "payload_swing");
+            self.effect(m) != "payload_swing" || payloads <= 2
+        });
+        all
+    }
+
+    pub(crate) fn effect(&self, member: &Member) -> &'static str {
+        self.catalogue.candidates[member.candidate].effect
+    }
+
+    fn hypothesis(&self, point: &Point) -> Result<Hypothesis, GapError> {
+        hypothesis(self.predictor, self.catalogue, point)
+    }
+
+    fn drop_and_swap(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+        // Later members may have taken over what an early one was named for.
+        let mut changed = true;
+        let mut passes = 0;
+        while changed && passes < 3 {
+            changed = false;
+            passes += 1;
+            for i in (0..best.members.len()).rev() {
+                let mut rest = best.members.clone();
+                let out = rest.remove(i);
+                let without = self.score(linear, &rest)?;
+                if without.log_evidence > best.log_evidence - NATS_MIN {
+                    *best = without;
+                    changed = true;
+                    break;
+                }
+                if best.members.len() > 1
+                    && let Some(other) = self.best_addition(linear, &without, &[self.effect(&out)])?
+                    && other.log_evidence > best.log_evidence
+                {
+                    *best = other;
+                    self.extend(linear, best)?;
+                    changed = true;
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Refines the numbers of a set by Gauss-Newton through the simulator, everything else floating with its tolerance.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn score(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
+        let mut at = members.to_vec();
+        let mut best: Option<Scored> = None;
+        for _ in 0..STEPS_MAX {
+            let scored = self.evaluate(linear, &at)?;
+            let mut next = at.clone();
+            let mut moved: f64 = 0.0;
+            for (column, (member, slot)) in scored.free.iter().enumerate() {
+                let (smallest, largest, signed) = self.range(&at[*member], *slot);
+                let low = if signed { -2.0 * largest } else { 0.02 * smallest };
+                let value = &mut next[*member].values[*slot];
+                let target = scored.posterior.mean[column].clamp(low, 2.0 * largest);
+                moved = moved.max((target - *value).abs() / smallest);
+                *value = target;
+            }
+            let better = best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence);
+            if better {
+                best = Some(scored);
+            }
+            if moved < 0.01 || !better {
+                break;
+            }
+            at = next;
+        }
+        best.ok_or(GapError::NoFlights)
+    }
+
+    /// Range of a number of a member.
+    pub(crate) fn range(&self, member: &Member, slot: usize) -> (f64, f64, bool) {
+        use squirrel_core::effects::{Effects, Kind};
+        let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
+        match list[slot].kind {
+            Kind::Size { smallest, largest, signed } => (smallest, largest, signed),
+            _ => (1.0, 1.0, true),
+        }
+    }
+
+    /// Evidence of a set, linearised in its free numbers where they are.
+    fn evaluate(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
+        let segments = &self.predictor.segments;
+        let mut point = Point { members: members.to_vec(), base: linear.point.base.clone() };
+        let mut spikes = linear.tolerance.clone();
+        for member in members {
+            let candidate = &self.catalogue.candidates[member.candidate];
+            for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
+                let other = &self.catalogue.candidates[parameter.candidate];
+                // Another rotor may still be off by its tolerance; the payload is one thing at several lengths.
+                let same = parameter.candidate == member.candidate
+                    || (other.effect == candidate.effect && other.fixed == candidate.fixed);
+                if same {
+                    spikes[p] = 0.0;
+                    point.base[p] = 0.0;
+                }
+            }
+        }
+        let residual = self.predictor.residual(&self.hypothesis(&point)?)?;
+        let mut y = linear.whitener.apply(segments, &residual);
+        for (column, x) in linear.columns.iter().zip(&point.base) {
+            if *x != 0.0 {
+                add_scaled(&mut y, column, *x);
+            }
+        }
+        let (mut own, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, member) in members.iter().enumerate() {
+            for slot in self.free_slots(member) {
+                let (smallest, largest, _) = self.range(member, slot);
+                let step = 0.1 * smallest;
+                let mut moved = point.clone();
+                moved.members[index].values[slot] += step;
+                let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
+                let column: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
+                let column = linear.whitener.apply(segments, &column);
+                add_scaled(&mut y, &column, member.values[slot]);
+                own.push(column);
+                free.push((index, slot));
+                prior.push(SLAB_OF_LARGEST * largest);
+            }
+        }
+        let (k, n) = (own.len(), linear.columns.len());
+        let mut gram = Gram {
+            g: DMatrix::zeros(k + n, k + n),
+            b: nalgebra::DVector::zeros(k + n),
+            yy: dot(&y, &y),
+        };
+        gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram);
+        for i in 0..k {
+            for j in 0..k {
+                gram.g[(i, j)] = dot(&own[i], &own[j]);
+            }
+            for j in 0..n {
+                let x = dot(&own[i], &linear.columns[j]);
+                gram.g[(i, k + j)] = x;
+                gram.g[(k + j, i)] = x;
+            }
+            gram.b[i] = dot(&own[i], &y);
+        }
+        for j in 0..n {
+            gram.b[k + j] = dot(&linear.columns[j], &y);
+        }
+        prior.extend(spikes);
+        let posterior = gram.posterior(&prior, self.beta).ok_or(GapError::NoFlights)?;
+        Ok(Scored {
+            members: members.to_vec(),
+            log_evidence: posterior.log_evidence,
+            posterior,
+            gram,
+            prior,
+            free,
+            own,
+            y,
+        })
+    }
+}
+
+fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {
+    for (y, c) in y.iter_mut().zip(column) {
+        *y += c * x;
+    }
+}

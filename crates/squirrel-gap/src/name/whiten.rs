@@ -1,0 +1,110 @@
+//! Whitening: an autoregression of order 8 per channel, fitted to what the fullest model leaves.
+//!
+//! Residuals of flights are coloured by filters, turbulence and attitude errors. Seen through the same autoregression, the
+//! measurement and every column are as if the noise were white with variance 1, and sums of squares count evidence.
+
+use crate::predictor::{CHANNELS, Segment};
+use nalgebra::{DMatrix, DVector};
+
+/// Order of the autoregression.
+const ORDER: usize = 8;
+
+/// The filters of all channels.
+#[derive(Debug, Clone)]
+pub(crate) struct Whitener {
+    /// By channel: coefficients on the last samples, latest first, and the deviation of what they leave.
+    filters: Vec<Option<([f64; ORDER], f64)>>,
+    rows: usize,
+}
+
+impl Whitener {
+    /// Fits each channel over all its segments.
+    pub(crate) fn fit(segments: &[Segment], noise: &[f64]) -> Self {
+        let mut rows = 0;
+        let filters = (0..CHANNELS.len())
+            .map(|channel| {
+                let own: Vec<&[f64]> = segments
+                    .iter()
+                    .filter(|s| s.channel == channel && s.rows.len() > 3 * ORDER)
+                    .map(|s| &noise[s.rows.clone()])
+                    .collect();
+                rows += own.iter().map(|x| x.len() - ORDER).sum::<usize>();
+                autoregression(&own)
+            })
+            .collect();
+        Self { filters, rows }
+    }
+
+    /// Rows that are left.
+    pub(crate) fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// A column through the filters; each segment loses its first samples.
+    pub(crate) fn apply(&self, segments: &[Segment], column: &[f64]) -> Vec<f64> {
+        let mut out = Vec::with_capacity(self.rows);
+        for segment in segments {
+            let Some((coefficients, deviation)) = self.filters[segment.channel] else { continue };
+            if segment.rows.len() <= 3 * ORDER {
+                continue;
+            }
+            let x = &column[segment.rows.clone()];
+            let scale = 1.0 / deviation;
+            out.extend(x.windows(ORDER + 1).map(|w| {
+                let predicted: f64 = coefficients.iter().zip(w[..ORDER].iter().rev()).map(|(a, x)| a * x).sum();
+                (w[ORDER] - predicted) * scale
+            }));
+        }
+        out
+    }
+
+    /// Of each whitened row: its flight and time, s, and channel.
+    pub(crate) fn places(&self, segments: &[Segment]) -> Vec<(usize, f64, usize)> {
+        let mut out = Vec::with_capacity(self.rows);
+        for segment in segments {
+            if self.filters[segment.channel].is_some() && segment.rows.len() > 3 * ORDER {
+                out.extend(
+                    (ORDER..segment.rows.len())
+                        .map(|i| (segment.flight, segment.t0_s + i as f64 * segment.step_s, segment.channel)),
+                );
+            }
+        }
+        out
+    }
+}
+
+/// Least squares over several series; `None` where there is nothing to fit.
+fn autoregression(series: &[&[f64]]) -> Option<([f64; ORDER], f64)> {
+    let mut gram = DMatrix::zeros(ORDER, ORDER);
+    let mut right = DVector::zeros(ORDER);
+    let (mut total, mut n) = (0.0_f64, 0.0_f64);
+    for x in series {
+        for w in x.windows(ORDER + 1) {
+            for i in 0..ORDER {
+                let a = w[ORDER - 1 - i];
+                right[i] += a * w[ORDER];
+                for j in 0..=i {
+                    gram[(i, j)] += a * w[ORDER - 1 - j];
+                }
+            }
+            total += w[ORDER] * w[ORDER];
+            n += 1.0;
+        }
+    }
+    if n < 4.0 * ORDER as f64 || total <= 0.0 {
+        return None;
+    }
+    for i in 0..ORDER {
+        // A millionth of the power keeps a series that is a pure line from a singular fit.
+        gram[(i, i)] += 1e-6 * total;
+        for j in 0..i {
+            gram[(j, i)] = gram[(i, j)];
+        }
+    }
+    let a = gram.clone().cholesky()?.solve(&right);
+    let left: f64 = total - 2.0 * a.dot(&right) + a.dot(&(gram * &a));
+    let left = left.max(1e-12 * total);
+    let mut coefficients = [0.0; ORDER];
+    coefficients.copy_from_slice(a.as_slice());
+    Some((coefficients, (left / n).sqrt()))
+}

@@ -1,0 +1,86 @@
+//! The logged commands as the vehicle got them: held until the next one, late or on another clock where a hypothesis says so.
+
+use crate::predictor::hooks::*;
+use crate::flight::recording::Recording;
+use squirrel_core::effects::Effects;
+use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
+
+/// Commands closer than this to a sample act from that sample on, s.
+const SNAP_S: f64 = 1e-5;
+
+/// The commands of one flight.
+pub(crate) struct Commands {
+    rotor: Vec<(f64, PerRotor<f64>)>,
+    wing: Vec<(f64, [f64; 2])>,
+    began_s: f64,
+}
+
+impl Commands {
+    pub(crate) fn new(recording: &Recording) -> Self {
+        let rotor = recording.rotor.samples().map(|(t, u)| {
+            let mut all = [0.0; MAX_ROTORS];
+            all[..u.len()].copy_from_slice(u);
+            (t, all)
+        });
+        let wing = recording.wing.iter().flat_map(|w| w.samples()).map(|(t, c)| (t, [c[0], c[1]]));
+        Self { rotor: rotor.collect(), wing: wing.collect(), began_s: recording.pieces[0].0 }
+    }
+
+    pub(crate) fn has_wing(&self) -> bool {
+        !self.wing.is_empty()
+    }
+
+    /// The commands with the last stamps before a time.
+    pub(crate) fn at(&self, time_s: f64) -> (PerRotor<f64>, [f64; 2]) {
+        let rotor = self.rotor.partition_point(|(t, _)| *t <= time_s + SNAP_S).saturating_sub(1);
+        let wing = self.wing.partition_point(|(t, _)| *t <= time_s + SNAP_S);
+        let wing = wing.checked_sub(1).map_or([0.0; 2], |i| self.wing[i].1);
+        (self.rotor[rotor].1, wing)
+    }
+
+    /// A clock that runs forwards from a time.
+    pub(crate) fn clock(&self, effects: &Effects<f64>, time_s: f64) -> Clock<'_> {
+        // Stamps run as s = clock(t), a line through the beginning of the flight; a command acts a latency after its time.
+        let rate = effects.command_clock_s(1.0) - effects.command_clock_s(0.0);
+        let mut clock =
+            Clock { commands: self, rate, latency_s: effects.command_latency_s(), rotor: 0, wing: 0 };
+        clock.advance_to(time_s);
+        clock
+    }
+}
+
+/// Which command acts.
+pub(crate) struct Clock<'a> {
+    commands: &'a Commands,
+    rate: f64,
+    latency_s: f64,
+    rotor: usize,
+    wing: usize,
+}
+
+impl Clock<'_> {
+    /// When a command with a stamp acts, s.
+    fn acts_s(&self, stamp_s: f64) -> f64 {
+        self.commands.began_s + (stamp_s - self.commands.began_s) / self.rate + self.latency_s
+    }
+    pub(crate) fn advance_to(&mut self, time_s: f64) {
+        let until_s = time_s + SNAP_S;
+        while self.commands.rotor.get(self.rotor + 1).is_some_and(|(stamp, _)| self.acts_s(*stamp) <= until_s) {
+            self.rotor += 1;
+        }
+        while self.commands.wing.get(self.wing + 1).is_some_and(|(stamp, _)| self.acts_s(*stamp) <= until_s) {
+            self.wing += 1;
+        }
+    }
+    /// Time of the next change, s; infinite after the last.
+    pub(crate) fn next_change_s(&self) -> f64 {
+        let rotor = self.commands.rotor.get(self.rotor + 1).map_or(f64::INFINITY, |(s, _)| self.acts_s(*s));
+        let wing = self.commands.wing.get(self.wing + 1).map_or(f64::INFINITY, |(s, _)| self.acts_s(*s));
+        rotor.min(wing)
+    }
+    /// Rotor command in the vehicle's unit, and wing command, left and right, 0 to 1.
+    pub(crate) fn now(&self) -> (PerRotor<f64>, [f64; 2]) {
+        let wing = self.commands.wing.get(self.wing).map_or([0.0; 2], |(_, wing)| *wing);
+        (self.commands.rotor[self.rotor].1, wing)
+    }
+}

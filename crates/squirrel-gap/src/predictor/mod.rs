@@ -1,0 +1,356 @@
+//! What the simulator's own model predicts of the measurements of a set of flights, for any hypothesis about the vehicle.
+//!
+//! ```text
+//! dynamics     LP[f - f(plant)]  m/s^2      LP[D[w] - w'(plant)]  rad/s^2     12 Hz zero phase, every 1/30 s
+//! kinematics   v_GNSS - v_strapdown  m/s                                      every 0.1 s, mean of a piece removed
+//! ```
+//! The plant is led along the measured motion: rotors, servos and payload run under the logged commands at the measured
+//! voltage, while velocity, attitude and rates are what was measured. A hypothesis changes nothing but the vehicle's effects
+//! and what its sensors do, so that every effect that the simulator can fly can be tested against a log; no regressor is
+//! written twice. Forces show in the first family, sensors that lie in the second.
+
+mod commands;
+pub(crate) mod hooks;
+mod track;
+
+pub(crate) use track::{Motion, SensorErrors, Track};
+
+use crate::predictor::hooks::*;
+use crate::GapError;
+use crate::flight::filter::DERIVATIVE_REACH;
+use crate::flight::recording::Recording;
+use commands::Commands;
+use nalgebra::Vector6;
+use squirrel_core::dynamics::State;
+use squirrel_core::effects::Effects;
+use squirrel_core::vehicle::Vehicle;
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::plant::{Plant, PlantState};
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::ops::Range;
+
+/// The channels of a residual, in order: specific force, angular acceleration, velocity.
+pub(crate) const CHANNELS: [&str; 9] = [
+    "force_body_x_n",
+    "force_body_y_n",
+    "force_body_z_n",
+    "moment_body_x_n_m",
+    "moment_body_y_n_m",
+    "moment_body_z_n_m",
+    "gnss.velocity_north_m_s",
+    "gnss.velocity_east_m_s",
+    "gnss.velocity_down_m_s",
+];
+/// Channels of the dynamics; the rest are kinematic.
+pub(crate) const DYNAMIC: usize = 6;
+
+/// One channel of one piece of a flight within the list of rows.
+#[derive(Debug, Clone)]
+pub(crate) struct Segment {
+    pub(crate) flight: usize,
+    pub(crate) channel: usize,
+    pub(crate) rows: Range<usize>,
+    /// Piece and first time, s, and time between rows, s.
+    pub(crate) piece: usize,
+    pub(crate) t0_s: f64,
+    pub(crate) step_s: f64,
+}
+
+/// A hypothesis: the airframe, the effects that act, and what the sensors of each flight do.
+#[derive(Debug, Clone)]
+pub(crate) struct Hypothesis {
+    pub(crate) vehicle: Vehicle<f64>,
+    pub(crate) effects: Effects<f64>,
+    pub(crate) errors: Vec<SensorErrors>,
+}
+
+/// A set of flights of one vehicle, ready to be predicted again and again.
+pub(crate) struct Predictor<'a> {
+    pub(crate) vehicle: &'a VehicleFile,
+    pub(crate) names: Vec<&'a str>,
+    pub(crate) tracks: Vec<Track>,
+    pub(crate) segments: Vec<Segment>,
+    pub(crate) notes: Vec<String>,
+    commands: Vec<Commands>,
+    /// The motion of each track for the effects of the vehicle file and errorless sensors, which most hypotheses share.
+    plain: Vec<Motion>,
+}
+
+impl<'a> Predictor<'a> {
+    /// # Errors
+    /// What [`Recording::new`] says of a flight.
+    pub(crate) fn new(vehicle: &'a VehicleFile, flights: &'a [(String, FlightLog)]) -> Result<Self, GapError> {
+        if flights.is_empty() {
+            return Err(GapError::NoFlights);
+        }
+        let (mut tracks, mut commands, mut notes, mut names) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        for (index, (flight, log)) in flights.iter().enumerate() {
+            if names.contains(&flight.as_str()) {
+                return Err(GapError::SameName { flight: flight.clone() });
+            }
+            let recording = Recording::new(vehicle, flight, log)?;
+            tracks.extend(recording.pieces.iter().map(|piece| Track::new(index, &recording, *piece)));
+            commands.push(Commands::new(&recording));
+            notes.extend(recording.notes);
+            names.push(flight.as_str());
+        }
+        let plain: Vec<Motion> =
+            tracks.iter().map(|track| track.motion(&vehicle.effects, &SensorErrors::default())).collect();
+        let mut segments = Vec::new();
+        let mut start = 0;
+        for (piece, (track, motion)) in tracks.iter().zip(&plain).enumerate() {
+            let mut push = |channel, n: usize, t0_s, step_s| {
+                let rows = start..start + n;
+                start += n;
+                segments.push(Segment { flight: track.flight, channel, rows, piece, t0_s, step_s });
+            };
+            let step_s = track.every as f64 * track.period_s;
+            for channel in 0..DYNAMIC {
+                push(channel, track.measured.len(), track.residual_time_s(0), step_s);
+            }
+            if let Some((t0_s, _)) = motion.kinematic.first() {
+                let n = motion.kinematic.len();
+                let step_s = (motion.kinematic[n - 1].0 - t0_s) / (n - 1).max(1) as f64;
+                for channel in DYNAMIC..CHANNELS.len() {
+                    push(channel, n, *t0_s, step_s);
+                }
+            }
+        }
+        Ok(Self { vehicle, names, tracks, segments, notes, commands, plain })
+    }
+
+    /// Number of rows of a residual.
+    pub(crate) fn rows(&self) -> usize {
+        self.segments.last().map_or(0, |s| s.rows.end)
+    }
+
+    /// The hypothesis that the vehicle file is right.
+    pub(crate) fn nominal(&self) -> Hypothesis {
+        Hypothesis {
+            vehicle: self.vehicle.vehicle,
+            effects: self.vehicle.effects,
+            errors: vec![SensorErrors::default(); self.names.len()],
+        }
+    }
+
+    /// The motion of a piece under a hypothesis.
+    pub(crate) fn motion(&self, piece: usize, hypothesis: &Hypothesis) -> Motion {
+        let track = &self.tracks[piece];
+        track.motion(&hypothesis.effects, &hypothesis.errors[track.flight])
+    }
+
+    /// Measured minus predicted, row by row.
+    ///
+    /// # Errors
+    /// Effects that leave a vehicle which cannot be.
+    pub(crate) fn residual(&self, hypothesis: &Hypothesis) -> Result<Vec<f64>, GapError> {
+        let mut rows = vec![0.0; self.rows()];
+        self.residual_of(hypothesis, None, &mut rows)?;
+        Ok(rows)
+    }
+
+    /// As [`Self::residual`] for the pieces of one flight alone; the rows of the others stay as they are.
+    pub(crate) fn residual_of(
+        &self,
+        hypothesis: &Hypothesis,
+        flight: Option<usize>,
+        rows: &mut [f64],
+    ) -> Result<(), GapError> {
+        // The step matters to `step` alone; here the plant is only led.
+        let plant = self.plant_at(hypothesis, squirrel_sim::flight::PLANT_STEP_US as f64 * 1e-6)?;
+        let mut segments = self.segments.iter().peekable();
+        for (piece, track) in self.tracks.iter().enumerate() {
+            let skip = flight.is_some_and(|flight| flight != track.flight);
+            let own;
+            let motion = if skip || self.shares_motion(track, hypothesis) {
+                &self.plain[piece]
+            } else {
+                own = self.motion(piece, hypothesis);
+                &own
+            };
+            let dynamics = if skip { Vec::new() } else { self.dynamics(&plant, track, motion) };
+            while let Some(segment) = segments.next_if(|s| s.piece == piece) {
+                if skip {
+                    continue;
+                }
+                let out = &mut rows[segment.rows.clone()];
+                if segment.channel < DYNAMIC {
+                    for (row, value) in out.iter_mut().zip(&dynamics) {
+                        *row = value[segment.channel];
+                    }
+                } else {
+                    // A hypothesis that moves the fixes in time may lose one at an end.
+                    for (row, (_, value)) in out.iter_mut().zip(&motion.kinematic) {
+                        *row = value[segment.channel - DYNAMIC];
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Mean commanded rotor speed over top speed, and mean wing command, 0 to 1, at a time of a flight.
+    pub(crate) fn commanded(&self, flight: usize, time_s: f64) -> (f64, f64) {
+        let p = self.vehicle.vehicle.parameters();
+        let (rotor, wing) = self.commands[flight].at(time_s);
+        let speed: f64 = rotor[..p.rotor_count].iter().map(|u| p.propulsion.target_speed_rad_s(*u)).sum();
+        (speed / (p.rotor_count as f64 * p.propulsion.speed_max_rad_s), 0.5 * (wing[0] + wing[1]))
+    }
+
+    /// A hypothesis that the plant cannot be stepped with.
+    pub(crate) fn refused(&self, problem: String) -> GapError {
+        GapError::Vehicle { vehicle: self.vehicle.name.clone(), problem }
+    }
+
+    /// The motion of each piece for the effects of the vehicle file and errorless sensors.
+    pub(crate) fn plain(&self) -> &[Motion] {
+        &self.plain
+    }
+    /// Whether every flight has attitude and velocity.
+    pub(crate) fn has_motion(&self) -> bool {
+        self.tracks.iter().all(|t| t.attitude().is_some() && !t.velocity().is_empty())
+    }
+    /// Whether every flight has a height.
+    pub(crate) fn has_height(&self) -> bool {
+        self.tracks.iter().all(|t| t.attitude().is_some() && !t.altitude_m().is_empty())
+    }
+    /// Whether every flight has a battery voltage.
+    pub(crate) fn has_voltage(&self) -> bool {
+        self.tracks.iter().all(|t| t.has_voltage)
+    }
+    /// Whether the vehicle has wings and every flight their command.
+    pub(crate) fn has_wings(&self) -> bool {
+        self.commands.iter().all(Commands::has_wing)
+    }
+
+    /// What a metre per second of wind from the south and from the west changes in the rows.
+    ///
+    /// # Errors
+    /// As [`Self::residual`].
+    pub(crate) fn wind_columns(&self) -> Result<[Vec<f64>; 2], GapError> {
+        let still = self.residual(&self.nominal())?;
+        let column = |axis: usize| {
+            let mut moved = self.nominal();
+            if let Some(wind) = moved.effects.insert("constant_wind") {
+                wind.values[axis] += 1.0;
+            }
+            let after = self.residual(&moved)?;
+            Ok(still.iter().zip(&after).map(|(b, a)| b - a).collect())
+        };
+        Ok([column(0)?, column(1)?])
+    }
+
+    /// The plant of a hypothesis, without a battery, whose voltage is measured.
+    ///
+    /// # Errors
+    /// [`GapError::Vehicle`]: the plant cannot be stepped with these numbers.
+    pub(crate) fn plant_at(&self, hypothesis: &Hypothesis, dt_s: f64) -> Result<Plant, GapError> {
+        Plant::new(hypothesis.vehicle, hypothesis.effects, self.vehicle.wing.clone(), None, dt_s)
+            .map_err(|problem| self.refused(problem))
+    }
+
+    /// The commands of a flight as the vehicle got them, from a time on.
+    pub(crate) fn clock(&self, flight: usize, effects: &Effects<f64>, time_s: f64) -> commands::Clock<'_> {
+        self.commands[flight].clock(effects, time_s)
+    }
+
+    /// The plant's state at some samples of a piece, in order: led there along the measured motion.
+    pub(crate) fn led_states(
+        &self,
+        plant: &Plant,
+        piece: usize,
+        motion: &Motion,
+        samples: &[usize],
+    ) -> Vec<PlantState> {
+        let track = &self.tracks[piece];
+        let mut out = Vec::with_capacity(samples.len());
+        let (mut state, mut clock) = self.settled(plant, track, motion);
+        for k in 0..track.time_s.len() {
+            if samples.get(out.len()) == Some(&k) {
+                let body = State { rotor_speed_rad_s: state.body.rotor_speed_rad_s, ..motion.body[k] };
+                out.push(PlantState { body, ..state });
+            }
+            if out.len() == samples.len() {
+                break;
+            }
+            predict(plant, &mut state, &mut clock, track, motion, k);
+        }
+        out
+    }
+
+    /// The plant at the start of a piece, where its first sample has been held for a while.
+    fn settled<'b>(
+        &'b self,
+        plant: &Plant,
+        track: &Track,
+        motion: &Motion,
+    ) -> (PlantState, commands::Clock<'b>) {
+        let mut state = plant.initial_state(motion.body[0], 1.0);
+        let clock = self.clock(track.flight, plant.effects(), track.time_s[0]);
+        let (rotor, wing) = clock.now();
+        plant.lead(&mut state, &motion.body[0], &rotor, wing, track.voltage_v[0], SETTLE_S);
+        (state, clock)
+    }
+
+    /// Whether the sensors of a track do under the hypothesis what they do in the vehicle file.
+    fn shares_motion(&self, track: &Track, hypothesis: &Hypothesis) -> bool {
+        hypothesis.errors[track.flight] == SensorErrors::default()
+            && sensors(&hypothesis.effects) == sensors(&self.vehicle.effects)
+    }
+
+    /// Residual of the dynamics of a piece.
+    fn dynamics(&self, plant: &Plant, track: &Track, motion: &Motion) -> Vec<Vector6<f64>> {
+        let (mut state, mut clock) = self.settled(plant, track, motion);
+        let last = track.time_s.len() - 1;
+        let mut predicted = Vec::with_capacity(track.time_s.len());
+        for k in 0..=last {
+            let at = predict(plant, &mut state, &mut clock, track, motion, k);
+            predicted.push(at);
+        }
+        let reach = DERIVATIVE_REACH;
+        let filtered = track.filter.apply(&predicted[reach..predicted.len() - reach], track.every);
+        track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
+    }
+}
+
+/// What effects do to the sensors, in numbers; each is a line in time.
+fn sensors(effects: &Effects<f64>) -> [f64; 9] {
+    let [b0, b1] = [0.0, 1.0].map(|t| effects.specific_force_bias(t).vector);
+    let [h0, h1] = [0.0, 1.0].map(|t| effects.heading_bias_rad(t));
+    [b0.x, b0.y, b0.z, b1.x, b1.y, b1.z, h0, h1, effects.gnss_latency_s()]
+}
+
+/// How long the first sample of a piece is held before it, so that rotors and servos start settled, s.
+const SETTLE_S: f64 = 1.0;
+
+/// The prediction at sample `k`; the plant then moves to the next sample, command by command.
+fn predict(
+    plant: &Plant,
+    state: &mut PlantState,
+    clock: &mut commands::Clock<'_>,
+    track: &Track,
+    motion: &Motion,
+    k: usize,
+) -> Vector6<f64> {
+    let body = &motion.body[k];
+    let end_s = track.time_s[k] + track.period_s;
+    let mut at_s = track.time_s[k];
+    let mut first = None;
+    loop {
+        clock.advance_to(at_s);
+        let until_s = clock.next_change_s().min(end_s);
+        let (rotor, wing) = clock.now();
+        let led = plant.lead(state, body, &rotor, wing, track.voltage_v[k], until_s - at_s);
+        first.get_or_insert(led);
+        at_s = until_s;
+        if at_s >= end_s - 1e-9 {
+            break;
+        }
+    }
+    first.map_or(Vector6::zeros(), |led| {
+        let bias = plant.effects().specific_force_bias(track.time_s[k] - track.began_s).vector;
+        let f = led.specific_force.vector + bias;
+        let a = led.angular_acceleration.vector;
+        Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z)
+    })
+}

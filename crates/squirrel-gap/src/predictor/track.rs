@@ -1,0 +1,299 @@
+//! The motion of one piece of a flight from its sensors: strapdown integration, held by GNSS and barometer.
+//!
+//! ```text
+//! v_s' = R (f - b) + g          b, heading, GNSS latency, tilt: what a hypothesis says of the path of the sensors
+//! v    = v_s + S[v_GNSS - v_s]  S  local linear smoother, Gaussian weights of 0.5 s
+//! h    = h_s + S[h_baro - h_s]  h_s' = -v_z
+//! ```
+//! What the smoother takes away is the second family of residuals, `v_GNSS - v_s`: sensors that lie show there, forces that
+//! the model lacks do not.
+
+use crate::predictor::hooks::*;
+use crate::flight::filter::{DERIVATIVE_REACH, LowPass, derivative};
+use crate::flight::recording::Recording;
+use crate::flight::series::Span;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector6};
+use squirrel_core::dynamics::State;
+use squirrel_core::effects::Effects;
+use squirrel_core::frames::In;
+use squirrel_core::math::GRAVITY_M_S2;
+
+/// Fixes and barometer readings are averaged over this time, s.
+const BIN_S: f64 = 0.1;
+/// Width of the smoother's weights, s.
+const SMOOTHER_S: f64 = 0.5;
+/// Rate of the residual of the dynamics, Hz.
+const RATE_HZ: f64 = 30.0;
+
+/// What a hypothesis says of the sensors of one flight, beside its effects.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct SensorErrors {
+    /// Tilt of the attitude estimate about north and east, rad.
+    pub(crate) tilt_rad: [f64; 2],
+    /// What the barometer reads too high, m.
+    pub(crate) height_m: f64,
+}
+
+/// One piece of a flight on a uniform grid, as measured.
+pub(crate) struct Track {
+    /// Number of the flight.
+    pub(crate) flight: usize,
+    pub(crate) period_s: f64,
+    /// When the flight began, on the clock of its log, s.
+    pub(crate) began_s: f64,
+    pub(crate) time_s: Vec<f64>,
+    pub(crate) voltage_v: Vec<f64>,
+    pub(crate) has_voltage: bool,
+    /// White noise of accelerometer, m/s^2, and gyroscope, rad/s, one standard deviation.
+    pub(crate) imu_noise: [Vector3<f64>; 2],
+    /// Samples of the grid to one of the residual.
+    pub(crate) every: usize,
+    pub(crate) filter: LowPass,
+    /// Specific force and angular acceleration, filtered, at the times of the residual.
+    pub(crate) measured: Vec<Vector6<f64>>,
+    specific_force: Vec<Vector3<f64>>,
+    omega: Vec<Vector3<f64>>,
+    attitude: Option<Vec<Quaternion<f64>>>,
+    velocity: Vec<(f64, Vector3<f64>)>,
+    position: Vec<(f64, Vector3<f64>)>,
+    altitude_m: Vec<(f64, f64)>,
+}
+
+/// The motion under one hypothesis about the sensors.
+pub(crate) struct Motion {
+    /// On the grid; rotors are not measured.
+    pub(crate) body: Vec<State<f64>>,
+    /// Time, s, and GNSS velocity minus strapdown velocity, m/s, whose mean over the piece is removed.
+    pub(crate) kinematic: Vec<(f64, Vector3<f64>)>,
+}
+
+impl Track {
+    pub(crate) fn new(flight: usize, recording: &Recording, piece: Span) -> Self {
+        let samples = recording.grid(piece);
+        let period_s = recording.period_s;
+        let every = (1.0 / (RATE_HZ * period_s)).round().max(1.0) as usize;
+        let filter = LowPass::new(1.0 / period_s);
+        let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..samples.len() - DERIVATIVE_REACH)
+            .map(|k| {
+                let f = samples[k].specific_force;
+                let a = derivative(|k| samples[k].body.omega.vector, k, period_s);
+                Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z)
+            })
+            .collect();
+        let inside = |t: &f64| (piece.0..=piece.1).contains(t);
+        let vectors = |series: Option<&crate::flight::series::Series>| {
+            let all = series.into_iter().flat_map(|s| s.samples());
+            all.filter(|(t, _)| inside(t)).map(|(t, v)| (t, Vector3::from_column_slice(v))).collect()
+        };
+        let position: Vec<(f64, Vector3<f64>)> = vectors(recording.position.as_ref());
+        let altitude_m = match &recording.baro {
+            Some(baro) => baro.samples().filter(|(t, _)| inside(t)).map(|(t, h)| (t, h[0])).collect(),
+            None => position.iter().map(|(t, p)| (*t, -p.z)).collect(),
+        };
+        Self {
+            flight,
+            period_s,
+            began_s: recording.pieces[0].0,
+            has_voltage: recording.has_voltage(),
+            imu_noise: recording.imu_noise(),
+            every,
+            measured: filter.apply(&raw, every),
+            filter,
+            time_s: samples.iter().map(|s| s.time_s).collect(),
+            voltage_v: samples.iter().map(|s| s.voltage_v).collect(),
+            specific_force: samples.iter().map(|s| s.specific_force).collect(),
+            omega: samples.iter().map(|s| s.body.omega.vector).collect(),
+            attitude: recording.has_attitude().then(|| samples.iter().map(|s| s.body.attitude).collect()),
+            velocity: vectors(recording.velocity.as_ref()),
+            position,
+            altitude_m,
+        }
+    }
+
+    /// First sample of the grid that has a residual.
+    pub(crate) fn edge(&self) -> usize {
+        self.filter.reach() + DERIVATIVE_REACH
+    }
+    /// Time of a sample of the residual of the dynamics, s.
+    pub(crate) fn residual_time_s(&self, i: usize) -> f64 {
+        self.time_s[self.edge() + i * self.every]
+    }
+    /// Measured angular rates on the grid, rad/s.
+    pub(crate) fn omega(&self) -> &[Vector3<f64>] {
+        &self.omega
+    }
+    /// Specific force on the grid, m/s^2.
+    pub(crate) fn specific_force(&self) -> &[Vector3<f64>] {
+        &self.specific_force
+    }
+    /// GNSS velocities, m/s.
+    pub(crate) fn velocity(&self) -> &[(f64, Vector3<f64>)] {
+        &self.velocity
+    }
+    /// White noise of the GNSS velocity, m/s, one standard deviation, from differences of strapdown and fixes.
+    pub(crate) fn velocity_noise(&self) -> Vector3<f64> {
+        let plain = self.motion(&Effects::none(), &SensorErrors::default()).kinematic;
+        let n = plain.len().saturating_sub(3).max(1) as f64;
+        let sum: Vector3<f64> = plain
+            .windows(4)
+            .map(|w| w[3].1 - w[2].1 * 3.0 + w[1].1 * 3.0 - w[0].1)
+            .map(|d| d.component_mul(&d))
+            .sum();
+        (sum / (20.0 * n)).map(f64::sqrt)
+    }
+    /// GNSS positions, m.
+    pub(crate) fn position(&self) -> &[(f64, Vector3<f64>)] {
+        &self.position
+    }
+    /// Altitudes of the barometer, or of GNSS where there is none, m.
+    pub(crate) fn altitude_m(&self) -> &[(f64, f64)] {
+        &self.altitude_m
+    }
+    /// Measured attitudes on the grid, body to NED, if logged.
+    pub(crate) fn attitude(&self) -> Option<&[Quaternion<f64>]> {
+        self.attitude.as_deref()
+    }
+
+    /// The motion, with what a hypothesis says of the sensors taken off.
+    pub(crate) fn motion(&self, effects: &Effects<f64>, errors: &SensorErrors) -> Motion {
+        let n = self.time_s.len();
+        let at = |k: usize, velocity, position, attitude| State {
+            position: In::new(position),
+            velocity: In::new(velocity),
+            attitude,
+            omega: In::new(self.omega[k]),
+            ..State::at_rest()
+        };
+        let Some(attitude) = &self.attitude else {
+            let still = |k| at(k, Vector3::zeros(), Vector3::zeros(), Quaternion::identity());
+            return Motion { body: (0..n).map(still).collect(), kinematic: Vec::new() };
+        };
+        let [north, east] = errors.tilt_rad;
+        let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(-north, -east, 0.0));
+        let attitude: Vec<UnitQuaternion<f64>> = attitude
+            .iter()
+            .zip(&self.time_s)
+            .map(|(q, t)| {
+                let heading = effects.heading_bias_rad(t - self.began_s);
+                let turned = UnitQuaternion::new_unchecked(*q);
+                if heading == 0.0 && errors.tilt_rad == [0.0; 2] {
+                    turned
+                } else {
+                    UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, -heading)) * tilt * turned
+                }
+            })
+            .collect();
+        let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
+        let acceleration = |k: usize| {
+            let bias = effects.specific_force_bias(self.time_s[k] - self.began_s).vector;
+            attitude[k] * (self.specific_force[k] - bias) + gravity
+        };
+        let mut strapdown = Vec::with_capacity(n);
+        let (mut velocity, mut before) = (Vector3::zeros(), acceleration(0));
+        strapdown.push(velocity);
+        for k in 1..n {
+            let now = acceleration(k);
+            velocity += (before + now) * (0.5 * self.period_s);
+            before = now;
+            strapdown.push(velocity);
+        }
+        let latency_s = effects.gnss_latency_s();
+        let mut kinematic = binned(self.velocity.iter().map(|(stamp_s, v)| {
+            let (k, share) = self.place(stamp_s - latency_s);
+            (stamp_s - latency_s, v - (strapdown[k] + (strapdown[k + 1] - strapdown[k]) * share))
+        }));
+        if kinematic.is_empty() {
+            strapdown.fill(Vector3::zeros());
+        } else {
+            self.add(&mut strapdown, &smoothed(&kinematic));
+        }
+        let mut height_m = Vec::with_capacity(n);
+        let mut h = 0.0;
+        for k in 0..n {
+            height_m.push(Vector3::new(0.0, 0.0, h));
+            h -= strapdown[k].z * self.period_s;
+        }
+        let correction = binned(self.altitude_m.iter().map(|(t, altitude)| {
+            let (k, _) = self.place(*t);
+            (*t, Vector3::new(0.0, 0.0, altitude - errors.height_m - height_m[k].z))
+        }));
+        if !correction.is_empty() {
+            self.add(&mut height_m, &smoothed(&correction));
+        }
+        let body = (0..n)
+            .map(|k| at(k, strapdown[k], -height_m[k], attitude[k].into_inner()))
+            .collect();
+        let mean = kinematic.iter().map(|(_, e)| e).sum::<Vector3<f64>>() / kinematic.len().max(1) as f64;
+        for (_, e) in &mut kinematic {
+            *e -= mean;
+        }
+        Motion { body, kinematic }
+    }
+
+    /// The sample of the grid at or before a time, and the share of the way to the next; the ends beyond them.
+    fn place(&self, time_s: f64) -> (usize, f64) {
+        let last = self.time_s.len() - 2;
+        let steps = ((time_s - self.time_s[0]) / self.period_s).max(0.0);
+        let k = (steps as usize).min(last);
+        (k, (steps - k as f64).min(1.0))
+    }
+
+    /// Adds lines between points to a series on the grid, held beyond the ends.
+    fn add(&self, series: &mut [Vector3<f64>], points: &[(f64, Vector3<f64>)]) {
+        let mut i = 0;
+        for (value, t) in series.iter_mut().zip(&self.time_s) {
+            while i + 1 < points.len() && points[i + 1].0 <= *t {
+                i += 1;
+            }
+            let (t0, p0) = points[i];
+            let (t1, p1) = points[(i + 1).min(points.len() - 1)];
+            let share = if t1 > t0 { ((t - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 0.0 };
+            *value += p0 + (p1 - p0) * share;
+        }
+    }
+}
+
+/// Means over bins of [`BIN_S`], at the mean of their times.
+fn binned(points: impl Iterator<Item = (f64, Vector3<f64>)>) -> Vec<(f64, Vector3<f64>)> {
+    let mut bins: Vec<(f64, f64, Vector3<f64>, f64)> = Vec::new();
+    for (t, value) in points {
+        // The slack keeps fixes every 0.1 s apart whatever the rounding of their stamps.
+        match bins.last_mut() {
+            Some((start, time, sum, n)) if t - *start < BIN_S - 1e-3 => {
+                *time += t;
+                *sum += value;
+                *n += 1.0;
+            }
+            _ => bins.push((t, t, value, 1.0)),
+        }
+    }
+    bins.into_iter().map(|(_, time, sum, n)| (time / n, sum / n)).collect()
+}
+
+/// Local linear smoother at the points themselves.
+fn smoothed(points: &[(f64, Vector3<f64>)]) -> Vec<(f64, Vector3<f64>)> {
+    let reach = 3.0 * SMOOTHER_S;
+    let mut first = 0;
+    points
+        .iter()
+        .map(|(t, own)| {
+            while points[first].0 < t - reach {
+                first += 1;
+            }
+            let (mut w, mut wt, mut wtt) = (0.0, 0.0, 0.0);
+            let (mut wy, mut wty) = (Vector3::zeros(), Vector3::zeros());
+            for (u, y) in points[first..].iter().take_while(|(u, _)| *u <= t + reach) {
+                let d = u - t;
+                let weight = (-0.5 * (d / SMOOTHER_S).powi(2)).exp();
+                w += weight;
+                wt += weight * d;
+                wtt += weight * d * d;
+                wy += y * weight;
+                wty += y * (weight * d);
+            }
+            let determinant = w * wtt - wt * wt;
+            let value = if determinant > 1e-12 { (wy * wtt - wty * wt) / determinant } else { *own };
+            (*t, value)
+        })
+        .collect()
+}

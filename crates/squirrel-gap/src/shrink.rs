@@ -1,0 +1,296 @@
+//! The gap on flights that the fit never saw: the plant re-simulated in open loop under the logged commands.
+//!
+//! Every half second the plant is put where the vehicle was measured to be and flown for two seconds under the logged
+//! commands at the measured voltage. What the sensors should then have read, under the hypothesis, is compared with what
+//! they read, in bins of 0.1 s: velocity, attitude, angular rate and specific force, three channels each.
+//!
+//! ```text
+//! J = mean over channels of MSE(model) / MSE(floor), over the first second      1: nothing but noise
+//! removed = 1 - (J_after - 1) / (J_before - 1)
+//! ```
+//! The floor is the best model against itself, started and read with the noise of these sensors in turbulent air of the
+//! declared tolerance. All models share the numbers that float inside their tolerances, so that the gap is that of the effect.
+
+use crate::GapError;
+use crate::leftover::floor::TURBULENCE_S;
+use crate::predictor::{Hypothesis, Motion, Predictor};
+use nalgebra::{SVector, UnitQuaternion, Vector3};
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+use squirrel_core::frames::In;
+use squirrel_core::math::GRAVITY_M_S2;
+use squirrel_sim::plant::{Plant, PlantState};
+
+/// Channels of the comparison.
+pub(crate) const CHANNELS: [&str; 12] = [
+    "velocity_north_m_s",
+    "velocity_east_m_s",
+    "velocity_down_m_s",
+    "attitude_x_rad",
+    "attitude_y_rad",
+    "attitude_z_rad",
+    "omega_body_x_rad_s",
+    "omega_body_y_rad_s",
+    "omega_body_z_rad_s",
+    "specific_force_body_x_m_s2",
+    "specific_force_body_y_m_s2",
+    "specific_force_body_z_m_s2",
+];
+/// Bins of a segment, and how many of them count for the gap.
+pub(crate) const BINS: usize = 20;
+const COUNTED: usize = 10;
+/// Length of a bin and distance of segments, s.
+pub(crate) const BIN_S: f64 = 0.1;
+const RESTART_S: f64 = 0.5;
+/// Samples on each side over which a start state is averaged.
+const START_REACH: usize = 3;
+/// Errors of a start state that the log does not show by itself: smoothed velocity, m/s, and attitude, rad.
+const START_VELOCITY_M_S: f64 = 0.02;
+const START_ATTITUDE_RAD: f64 = 0.001;
+
+type Errors = SVector<f64, 12>;
+
+/// Mean squared errors by bin.
+#[derive(Debug, Clone)]
+pub(crate) struct Errors12 {
+    pub(crate) squared: [Errors; BINS],
+    pub(crate) count: [f64; BINS],
+}
+
+impl Errors12 {
+    fn new() -> Self {
+        Self { squared: [Errors::zeros(); BINS], count: [0.0; BINS] }
+    }
+    /// Root mean square error of a channel at a horizon.
+    pub(crate) fn rms(&self, channel: usize, bin: usize) -> f64 {
+        (self.squared[bin][channel] / self.count[bin].max(1.0)).sqrt()
+    }
+    /// Mean squared error by channel over the first second.
+    fn mse(&self) -> Errors {
+        let n: f64 = self.count[..COUNTED].iter().sum();
+        self.squared[..COUNTED].iter().sum::<Errors>() / n.max(1.0)
+    }
+    /// Mean over channels of the error over that of the floor; 1 is nothing but noise.
+    pub(crate) fn over(&self, floor: &Self) -> f64 {
+        let (own, floor) = (self.mse(), floor.mse());
+        let ratios: Vec<f64> =
+            own.iter().zip(floor.iter()).filter(|(_, f)| **f > 0.0).map(|(m, f)| (m / f).max(1.0)).collect();
+        ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+    }
+}
+
+/// What a plant reads in one bin.
+struct Reading {
+    velocity_ned: Vector3<f64>,
+    attitude: UnitQuaternion<f64>,
+    omega: Vector3<f64>,
+    specific_force: Vector3<f64>,
+}
+
+/// Errors of a hypothesis on flights; `None` where no flight has attitude and velocity.
+///
+/// # Errors
+/// A hypothesis that the plant cannot be stepped with.
+pub(crate) fn errors(predictor: &Predictor, hypothesis: &Hypothesis) -> Result<Option<Errors12>, GapError> {
+    let mut all = Errors12::new();
+    for piece in 0..predictor.tracks.len() {
+        let track = &predictor.tracks[piece];
+        let Some(measured_attitude) = track.attitude() else { continue };
+        if track.velocity().is_empty() {
+            continue;
+        }
+        let motion = predictor.motion(piece, hypothesis);
+        let latency_s = hypothesis.effects.gnss_latency_s();
+        fly(predictor, hypothesis, piece, &motion, None, |start, bin, reading| {
+            let Some(last) = (start + reading.last).checked_sub(1) else { return };
+            let (a, b) = (track.time_s[start + reading.first], track.time_s[last.min(track.time_s.len() - 1)]);
+            // The fix that speaks of this bin has its stamp a latency later.
+            let fixes = track.velocity();
+            let from = fixes.partition_point(|(t, _)| *t - latency_s < a - 1e-6);
+            let until = fixes.partition_point(|(t, _)| *t - latency_s <= b + 1e-6);
+            if from == until {
+                return;
+            }
+            let n = (until - from) as f64;
+            let velocity = fixes[from..until].iter().map(|(_, v)| v).sum::<Vector3<f64>>() / n;
+            let at = fixes[from..until].iter().map(|(t, _)| t - latency_s).sum::<f64>() / n;
+            let middle = start + usize::midpoint(reading.first, reading.last);
+            let range = start + reading.first..(start + reading.last).min(track.time_s.len());
+            let mean = |v: &[Vector3<f64>]| {
+                v[range.clone()].iter().sum::<Vector3<f64>>() / range.len().max(1) as f64
+            };
+            let q = UnitQuaternion::new_unchecked(measured_attitude[middle.min(measured_attitude.len() - 1)]);
+            let read = &reading.read;
+            let slope = reading.acceleration_ned;
+            let velocity_then = read.velocity_ned + slope * (at - 0.5 * (a + b));
+            let rotation = (read.attitude.inverse() * q).scaled_axis();
+            let rate = mean(track.omega()) - read.omega;
+            let force = mean(track.specific_force()) - read.specific_force;
+            let velocity = velocity - velocity_then;
+            let error = Errors::from_iterator(
+                velocity.iter().chain(rotation.iter()).chain(rate.iter()).chain(force.iter()).copied(),
+            );
+            if error.iter().all(|x| x.is_finite()) {
+                all.squared[bin] += error.component_mul(&error);
+                all.count[bin] += 1.0;
+            }
+        })?;
+    }
+    Ok((all.count[0] > 0.0).then_some(all))
+}
+
+/// Errors that a hypothesis would have if it were true: started, read and blown about with noise.
+///
+/// # Errors
+/// As [`errors`].
+pub(crate) fn floor(
+    predictor: &Predictor,
+    hypothesis: &Hypothesis,
+    turbulence_m_s: f64,
+) -> Result<Errors12, GapError> {
+    let mut all = Errors12::new();
+    for piece in 0..predictor.tracks.len() {
+        let track = &predictor.tracks[piece];
+        if track.attitude().is_none() || track.velocity().is_empty() {
+            continue;
+        }
+        let motion = predictor.motion(piece, hypothesis);
+        let mut clean = Vec::new();
+        fly(predictor, hypothesis, piece, &motion, None, |start, bin, reading| {
+            clean.push((start, bin, reading.read));
+        })?;
+        let mut rng = Pcg64Mcg::seed_from_u64(piece as u64 + 11);
+        let mut index = 0;
+        let [force_noise, rate_noise] = track.imu_noise;
+        let velocity_noise = track.velocity_noise();
+        let samples = BIN_S / track.period_s;
+        let mut noise = Pcg64Mcg::seed_from_u64(piece as u64 + 29);
+        let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise)) };
+        fly(predictor, hypothesis, piece, &motion, Some((turbulence_m_s, &mut rng)), |_, bin, reading| {
+            let (own, other) = (&clean[index].2, &reading.read);
+            index += 1;
+            let white = samples.max(1.0).sqrt();
+            let velocity = other.velocity_ned - own.velocity_ned + draw().component_mul(&velocity_noise);
+            let rotation = (own.attitude.inverse() * other.attitude).scaled_axis() + draw() * START_ATTITUDE_RAD;
+            let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
+            let force = other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
+            let error = Errors::from_iterator(
+                velocity.iter().chain(rotation.iter()).chain(rate.iter()).chain(force.iter()).copied(),
+            );
+            if error.iter().all(|x| x.is_finite()) {
+                all.squared[bin] += error.component_mul(&error);
+                all.count[bin] += 1.0;
+            }
+        })?;
+    }
+    Ok(all)
+}
+
+/// One bin of one segment.
+struct Bin {
+    /// Samples from the start of the segment.
+    first: usize,
+    last: usize,
+    read: Reading,
+    acceleration_ned: Vector3<f64>,
+}
+
+/// Flies every segment of a piece and hands over what the sensors would read, bin by bin.
+fn fly(
+    predictor: &Predictor,
+    hypothesis: &Hypothesis,
+    piece: usize,
+    motion: &Motion,
+    mut noise: Option<(f64, &mut Pcg64Mcg)>,
+    mut each: impl FnMut(usize, usize, Bin),
+) -> Result<(), GapError> {
+    let track = &predictor.tracks[piece];
+    let n = track.time_s.len();
+    let plant = predictor.plant_at(hypothesis, track.period_s)?;
+    let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
+    let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
+    let starts: Vec<usize> = (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();
+    let actuators = predictor.led_states(&plant, piece, motion, &starts);
+    for (start, state) in starts.into_iter().zip(actuators) {
+        segment(predictor, hypothesis, &plant, piece, motion, start, state, &mut noise, per_bin, &mut each);
+    }
+    Ok(())
+}
+
+#[allow(clippy::too_many_arguments, reason = "the inner loop of `fly`, apart to keep both readable")]
+fn segment(
+    predictor: &Predictor,
+    hypothesis: &Hypothesis,
+    plant: &Plant,
+    piece: usize,
+    motion: &Motion,
+    start: usize,
+    mut state: PlantState,
+    noise: &mut Option<(f64, &mut Pcg64Mcg)>,
+    per_bin: usize,
+    each: &mut impl FnMut(usize, usize, Bin),
+) {
+    let track = &predictor.tracks[piece];
+    let n = track.time_s.len();
+    let around = start.saturating_sub(START_REACH)..(start + START_REACH + 1).min(n);
+    let omega = around.clone().map(|k| motion.body[k].omega.vector).sum::<Vector3<f64>>() / around.len() as f64;
+    state.body.omega = In::new(omega);
+    let mut wind = Vector3::zeros();
+    let mut turbulence = 0.0;
+    if let Some((sigma, rng)) = noise {
+        let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(rng)) };
+        turbulence = *sigma;
+        wind = draw() * turbulence;
+        state.body.velocity = In::new(state.body.velocity.vector + draw() * START_VELOCITY_M_S);
+        let turn = UnitQuaternion::from_scaled_axis(draw() * START_ATTITUDE_RAD);
+        state.body.attitude = (state.body.ned_from_body().quaternion * turn).into_inner();
+        let [_, rate_noise] = track.imu_noise;
+        let share = 1.0 / (2.0 * START_REACH as f64 + 1.0).sqrt();
+        state.body.omega = In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * share);
+    }
+    let effects = &hypothesis.effects;
+    let mut clock = predictor.clock(track.flight, effects, track.time_s[start]);
+    let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
+    let keep = (-track.period_s / TURBULENCE_S).exp();
+    for bin in 0..BINS {
+        let first = bin * per_bin;
+        if start + first + per_bin >= n {
+            break;
+        }
+        let (mut velocity, mut rate, mut force) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
+        let mut middle = state.body.ned_from_body().quaternion;
+        let began = state.body.velocity.vector;
+        for k in first..first + per_bin {
+            if k == first + per_bin / 2 {
+                middle = state.body.ned_from_body().quaternion;
+            }
+            let sample = start + k;
+            // Half a sample ahead: the command that acts for most of the step.
+            clock.advance_to(track.time_s[sample] + 0.5 * track.period_s);
+            let (rotor, wing) = clock.now();
+            let before = state.body;
+            velocity += before.velocity.vector;
+            rate += before.omega.vector;
+            state.battery.voltage_v = track.voltage_v[sample];
+            plant.step(&mut state, &rotor, wing, In::new(wind));
+            let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
+            force += before.ned_from_body().quaternion.inverse() * (slope - gravity);
+            if let Some((_, rng)) = noise {
+                let fresh: Vector3<f64> = Vector3::from_fn(|_, _| StandardNormal.sample(rng));
+                wind = wind * keep + fresh * (turbulence * (1.0 - keep * keep).sqrt());
+            }
+        }
+        let samples = per_bin as f64;
+        let time_s = track.time_s[start + first + per_bin / 2] - track.began_s;
+        let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * effects.heading_bias_rad(time_s));
+        let read = Reading {
+            velocity_ned: velocity / samples,
+            attitude: heading * middle,
+            omega: rate / samples,
+            specific_force: force / samples + effects.specific_force_bias(time_s).vector,
+        };
+        let acceleration_ned = (state.body.velocity.vector - began) / (samples * track.period_s);
+        each(start, bin, Bin { first, last: first + per_bin, read, acceleration_ned });
+    }
+}

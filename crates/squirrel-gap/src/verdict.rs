@@ -1,0 +1,110 @@
+//! The answer of the workflow, in the words that files, tests and people share.
+
+use crate::find::Place;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// Exactly one of these is the answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// No effect above its tolerance.
+    None,
+    /// These effects, in these forms.
+    Named,
+    /// These effects, but none of their published forms accounts for all of it.
+    NamedFormDiffers,
+    /// One of several sets that these flights cannot tell apart.
+    Ambiguous,
+    /// Something is missing that the catalogue does not have.
+    OutsideCatalogue,
+    /// These flights do not show some effects at any plausible size.
+    NotIdentifiable,
+    /// The log contradicts itself; nothing is said about forces.
+    DataProblem,
+}
+
+/// A number with its 95 % interval; choices (an axis, a side) have a word and no interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Value {
+    /// A number in the unit of its key.
+    Number {
+        /// Most likely value.
+        value: f64,
+        /// Lower end of the 95 % interval.
+        low: f64,
+        /// Upper end.
+        high: f64,
+    },
+    /// A choice.
+    Choice {
+        /// As vehicle files write it.
+        value: &'static str,
+    },
+}
+
+/// One named effect.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NamedEffect {
+    /// Name in the catalogue.
+    pub name: &'static str,
+    /// Its published form; `standard` where there is one form only.
+    pub form: &'static str,
+    /// What it is worth: evidence of the set with it over the set without it, nats.
+    pub evidence_nats: f64,
+    /// By key, as vehicle files write them.
+    pub parameters: BTreeMap<&'static str, Value>,
+}
+
+/// Another explanation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Alternative {
+    /// Names of its effects.
+    pub effects: Vec<&'static str>,
+    /// Evidence over no effect at all, nats.
+    pub evidence_nats: f64,
+}
+
+/// What the explanation is worth on flights that it never saw.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Gap {
+    /// Names of the flights.
+    pub held_out_flights: Vec<String>,
+    /// Error over that of the noise floor, mean over channels, of the vehicle as it was; 1 is nothing but noise.
+    pub before: f64,
+    /// The same with the named effects.
+    pub after: f64,
+    /// The same with the best other name.
+    pub best_rival: Option<f64>,
+    /// Part of what was above the floor that the named effects remove.
+    pub removed_fraction: f64,
+    /// Part that the best other name removes.
+    pub best_rival_removed_fraction: Option<f64>,
+}
+
+/// The verdict on a set of flights.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    /// Which of the answers.
+    pub verdict: Kind,
+    /// What is missing, the most certain first.
+    pub effects: Vec<NamedEffect>,
+    /// Other sets, the best first.
+    pub alternatives: Vec<Alternative>,
+    /// Where the flights disagree with the vehicle as it was, the worst first.
+    #[serde(rename = "where")]
+    pub places: Vec<Place>,
+    /// What a leftover goes with.
+    pub goes_with: Option<String>,
+    /// What to fly to know more.
+    pub fly_next: Option<String>,
+    /// On held-out flights, if there are any.
+    pub gap: Option<Gap>,
+    /// Path of the vehicle file with the effects added.
+    pub model_patch: Option<String>,
+    /// One paragraph in plain words.
+    pub words: String,
+    /// What the logs lack, and what was taken instead.
+    pub notes: Vec<String>,
+}

@@ -1,0 +1,109 @@
+//! Plain words: what a verdict means, and what to fly next.
+
+use crate::verdict::{Kind, NamedEffect, Value, Verdict};
+use std::fmt::Write;
+
+/// The manoeuvre that shows an effect and tells it from those it is confused with.
+fn manoeuvre(effect: &str) -> &'static str {
+    match effect {
+        "linear_drag" | "quadratic_drag" | "flapping_moment" => "dashes at several speeds from 2 to 9 m/s, both ways",
+        "constant_wind" | "thrust_misalignment" | "accel_bias" => {
+            "hover through a full turn of yaw and at two or more headings, then dash at two headings"
+        }
+        "heading_bias" | "gnss_latency" => "hard horizontal accelerations along and across the heading",
+        "gust" => "the same flight again on another day",
+        "ground_effect" => "a ladder of hovers from 0.2 to 1.5 m above the ground, with a range finder if there is one",
+        "battery_sag" => "climbs at full thrust with a full and with a half empty battery, voltage logged",
+        "thrust_coefficient" | "mass_error" | "weak_rotor" | "cg_offset" => {
+            "roll and pitch doublets, yaw steps and thrust steps in hover; and weigh the vehicle"
+        }
+        "motor_lag" | "actuation_latency" | "angular_damping" => "a multisine from 0.3 to 6 Hz in roll and pitch",
+        "inertia_error" => "doublets about one axis at a time",
+        "translational_lift" => "dashes to 9 m/s at constant height with the wings folded",
+        "axial_inflow" | "added_mass" => "climbs and descents of 3 m/s with heave doublets, wings folded",
+        "rotor_gyro_torque" | "yaw_torque_coeff" => "yaw steps",
+        "clock_skew" => "a flight of more than a minute with doublets at its beginning and end",
+        "wing_membrane" | "wing_asymmetry" | "wing_servo_lag" => {
+            "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking"
+        }
+        "payload_swing" => "stop and go along one axis at 0.6 to 0.9 Hz, then hover",
+        _ => "the excite_rich scenario",
+    }
+}
+
+/// What to fly to see or to separate some effects.
+pub(crate) fn fly_for(effects: &[&str]) -> String {
+    let mut said: Vec<&str> = Vec::new();
+    let mut text = String::new();
+    for effect in effects {
+        let what = manoeuvre(effect);
+        if said.contains(&what) {
+            continue;
+        }
+        said.push(what);
+        let _ = write!(text, "{}{what} ({effect})", if text.is_empty() { "" } else { "; " });
+    }
+    text.push_str("; all of it is in `squirrel fly --scenario excite_rich`");
+    text
+}
+
+/// An effect with its numbers: `motor_lag (extra_time_constant_s 0.0531, 0.0522 to 0.0540)`.
+fn with_numbers(effect: &NamedEffect) -> String {
+    let numbers: Vec<String> = effect
+        .parameters
+        .iter()
+        .map(|(key, value)| match value {
+            Value::Choice { value } => format!("{key} {value}"),
+            Value::Number { value, low, high } if low == high => format!("{key} {value}"),
+            Value::Number { value, low, high } => format!("{key} {value:.3e}, {low:.3e} to {high:.3e}"),
+        })
+        .collect();
+    format!("{} ({})", effect.name, numbers.join("; "))
+}
+
+/// The verdict in one paragraph.
+pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str]) -> String {
+    let effects: Vec<String> = verdict.effects.iter().map(with_numbers).collect();
+    let effects = effects.join(" and ");
+    let others: Vec<String> = verdict.alternatives.iter().map(|a| a.effects.join(" + ")).collect();
+    let goes_with = verdict.goes_with.as_deref().unwrap_or("nothing that was tried");
+    let mut text = match verdict.verdict {
+        Kind::None => "No effect above its tolerance: what the flights disagree by is what noise and the declared tolerances explain.".to_owned(),
+        Kind::Named => format!("The vehicle file lacks {effects}."),
+        Kind::NamedFormDiffers => format!(
+            "The vehicle file lacks {effects}, but none of the published forms accounts for all of it; the rest goes with {goes_with}."
+        ),
+        Kind::Ambiguous => format!(
+            "The vehicle file lacks {effects}, or one of: {}. These flights do not tell them apart.",
+            others.join("; ")
+        ),
+        Kind::OutsideCatalogue => format!(
+            "Something is missing that the catalogue does not have; it goes with {goes_with}.{}",
+            if effects.is_empty() { String::new() } else { format!(" The nearest name, {effects}, does not account for it.") }
+        ),
+        Kind::NotIdentifiable if effects.is_empty() => format!(
+            "Nothing above its tolerance shows, but these flights would not show {} at any plausible size.",
+            blind.join(", ")
+        ),
+        Kind::NotIdentifiable => format!("Something is missing, and too many names explain it in these flights: {effects}, or {}.", others.join("; ")),
+        Kind::DataProblem => String::new(),
+    };
+    if let Some(gap) = &verdict.gap
+        && !verdict.effects.is_empty()
+    {
+        let _ = write!(
+            text,
+            " On held-out flights it removes {:.1} % of the error above the noise floor ({:.2} to {:.2} times the floor).",
+            100.0 * gap.removed_fraction,
+            gap.before,
+            gap.after
+        );
+    }
+    if !blind.is_empty() && verdict.verdict != Kind::NotIdentifiable {
+        let _ = write!(text, " These flights would not show: {}.", blind.join(", "));
+    }
+    if let Some(fly_next) = &verdict.fly_next {
+        let _ = write!(text, " Fly next: {fly_next}.");
+    }
+    text
+}

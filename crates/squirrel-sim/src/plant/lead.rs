@@ -1,0 +1,180 @@
+//! The plant led along a measured motion: what it says there, without integrating the rigid body.
+//!
+//! A residual of a flight compares what sensors measured with what the model says at the measured motion. Only what is not
+//! measured moves by itself here: rotors and wing servos by their exact solutions, the membrane by RK4 in steps that its own
+//! time constants allow. A call costs less than one RK4 step and may span any time.
+
+use super::{Plant, PlantState, WingPlant};
+use squirrel_core::dynamics::{self, RotorDrive, State, rk4};
+use squirrel_core::frames::{Body, In, Wrench};
+use squirrel_core::vehicle::PerRotor;
+
+/// What a led plant says at a measured motion.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Led {
+    /// Force and moment without gravity, N and N m.
+    pub wrench: Wrench<Body, f64>,
+    /// What the accelerometer reads, m/s^2.
+    pub specific_force: In<Body, f64>,
+    /// Angular acceleration, rad/s^2.
+    pub angular_acceleration: In<Body, f64>,
+}
+
+impl Plant {
+    /// What the plant says at a measured motion, in air that moves only by effects; then moves on what is not measured
+    /// (rotors, wing servos, membrane) under held commands. The battery is not stepped: its voltage is measured.
+    ///
+    /// * `motion` - measured; its rotor speeds are not looked at
+    /// * `rotor_command` - in the vehicle's unit; `wing_command` - left, right, 0..1
+    /// * `dt_s` - time until the next motion, of any length, not below 0
+    pub fn lead(
+        &self,
+        state: &mut PlantState,
+        motion: &State<f64>,
+        rotor_command: &PerRotor<f64>,
+        wing_command: [f64; 2],
+        battery_voltage_v: f64,
+        dt_s: f64,
+    ) -> Led {
+        let (vehicle, effects) = (&self.vehicle, &self.effects);
+        let drive = RotorDrive::new(vehicle, effects, rotor_command, battery_voltage_v);
+        state.body = State { rotor_speed_rad_s: state.body.rotor_speed_rad_s, ..*motion };
+        drive.settle(&mut state.body.rotor_speed_rad_s);
+        let wrench = self.wrench(state, In::zero());
+        let led = Led {
+            wrench,
+            specific_force: dynamics::specific_force(vehicle, effects, motion.omega, &wrench),
+            angular_acceleration: dynamics::angular_acceleration(vehicle, motion.omega, &wrench),
+        };
+        state.battery.voltage_v = battery_voltage_v;
+        if dt_s > 0.0 {
+            drive.lead(&mut state.body.rotor_speed_rad_s, dt_s);
+            self.lead_wings(state, wing_command, dt_s);
+        }
+        led
+    }
+
+    fn lead_wings(&self, state: &mut PlantState, command: [f64; 2], dt_s: f64) {
+        let (WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. }) = &self.wing else {
+            return;
+        };
+        let before = state.deployment();
+        let keep = (-dt_s / servo.time_constant_s).exp();
+        for (servo_state, command) in state.servo.iter_mut().zip(command) {
+            servo.lead(servo_state, command, dt_s, keep);
+        }
+        let WingPlant::Membrane { membrane, .. } = &self.wing else { return };
+        let after = state.deployment();
+        let deployment = [0, 1].map(|side| 0.5 * (before[side] + after[side]));
+        let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, In::zero()));
+        state.turn_wings(membrane.angle_of_attack(&air), dt_s);
+        // A quarter of the shortest lag is far inside what RK4 follows; after many of the longest the wing has settled.
+        let p = membrane.parameters();
+        let settled_s = 20.0 * (p.camber_time_constant_s + p.creep_time_constant_s + 4.0 * p.chord_m);
+        let span_s = dt_s.min(settled_s);
+        let steps = (4.0 * span_s / p.camber_time_constant_s).ceil();
+        for _ in 0..steps as usize {
+            state.membrane = rk4(state.membrane, span_s / steps, |s| {
+                membrane.evaluate(&air, state.wing_angle_rate_rad_s, deployment, s).1
+            });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vehicle_file::{SQUIRREL_TOML, VehicleFile};
+    use squirrel_core::nalgebra::Vector3;
+
+    const STEP_S: f64 = 1e-3;
+    const EFFECTS: &str = "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.1\n[effects.motor_lag]\n\
+        extra_time_constant_s = 0.02\n[effects.cg_offset]\ncg_x_m = 0.005\ncg_y_m = -0.004\n\
+        [effects.battery_sag]\nvoltage_exponent = 0.8\n";
+
+    fn plant(model: &str, effects: &str) -> Plant {
+        let text = match model {
+            "flat" => SQUIRREL_TOML.replace("model = \"membrane\"", "model = \"flat\""),
+            _ => SQUIRREL_TOML.to_owned(),
+        };
+        let file = VehicleFile::parse(&format!("{text}\n{effects}"), "test").unwrap();
+        let wing = if model == "none" { WingPlant::None } else { file.wing };
+        Plant::new(file.vehicle, file.effects, wing, None, STEP_S).unwrap()
+    }
+
+    /// Commands that change every 40 ms and open and close the wings.
+    fn command(step: usize) -> (PerRotor<f64>, [f64; 2]) {
+        let k = (step / 40) as f64;
+        let rotor = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| 0.5 + 0.01 * (k + 1.7 * f64::from(i)).sin());
+        (rotor, if (step / 200) % 2 == 0 { [1.0, 0.8] } else { [0.0, 0.1] })
+    }
+
+    /// Largest difference of force, N, and moment, N m, between a plant that steps and one led along it.
+    fn worst(plant: &Plant, stride: usize) -> (f64, f64) {
+        let mut start = State::at_rest();
+        start.velocity = In::new(Vector3::new(5.0, 1.0, 0.5));
+        start.rotor_speed_rad_s[..4].fill(1500.0);
+        let mut truth = plant.initial_state(start, 1.0);
+        let mut state = truth;
+        let (mut force, mut moment) = (0.0_f64, 0.0_f64);
+        for step in 0..600 {
+            let (rotor, wing) = command(step);
+            if step % stride == 0 {
+                let unmeasured = State { rotor_speed_rad_s: [f64::NAN; 8], ..truth.body };
+                let led = plant.lead(
+                    &mut state,
+                    &unmeasured,
+                    &rotor,
+                    wing,
+                    truth.battery.voltage_v,
+                    STEP_S * stride as f64,
+                );
+                let was = plant.wrench(&truth, In::zero());
+                force = force.max((led.wrench.force - was.force).vector.norm());
+                moment = moment.max((led.wrench.moment - was.moment).vector.norm());
+                let rate = plant.vehicle().inertia_inverse() * led.wrench.moment.vector;
+                let spin = plant.vehicle().parameters().inertia_kg_m2 * truth.body.omega.vector;
+                let gyroscopic = plant.vehicle().inertia_inverse() * truth.body.omega.vector.cross(&spin);
+                assert!((led.angular_acceleration.vector - (rate - gyroscopic)).norm() < 1e-9);
+            }
+            plant.step(&mut truth, &rotor, wing, In::zero());
+        }
+        (force, moment)
+    }
+
+    #[test]
+    fn leading_along_a_flight_gives_its_wrench() {
+        for effects in ["", EFFECTS] {
+            for model in ["none", "flat"] {
+                for stride in [1, 8, 40] {
+                    let (force, moment) = worst(&plant(model, effects), stride);
+                    assert!(force < 1e-6 && moment < 1e-7, "{model}, {stride}: {force:e} N, {moment:e} N m");
+                }
+            }
+            // Between samples the membrane does not see the air change.
+            for (stride, force_max) in [(1, 5e-3), (8, 0.03)] {
+                let (force, _) = worst(&plant("membrane", effects), stride);
+                assert!(force < force_max, "{stride}: {force:e} N");
+            }
+        }
+    }
+
+    #[test]
+    fn no_time_moves_nothing_and_long_times_settle() {
+        for model in ["none", "flat", "membrane"] {
+            let plant = plant(model, "");
+            let mut motion = State::at_rest();
+            motion.velocity = In::new(Vector3::new(4.0, 0.0, 1.0));
+            let start = plant.initial_state(motion, 1.0);
+            let mut state = start;
+            plant.lead(&mut state, &motion, &[0.5; 8], [1.0; 2], start.battery.voltage_v, 0.0);
+            assert_eq!(state, start, "{model}");
+            plant.lead(&mut state, &motion, &[0.5; 8], [1.0; 2], 14.8, 1e9);
+            plant.lead(&mut state, &motion, &[0.5; 8], [1.0; 2], 14.8, 1e9);
+            assert!((state.body.rotor_speed_rad_s[0] - 1500.0).abs() < 1e-9);
+            let spread = if model == "none" { [0.0; 2] } else { [1.0; 2] };
+            assert_eq!(state.deployment(), spread);
+            assert!(plant.wrench(&state, In::zero()).force.vector.iter().all(|x| x.is_finite()));
+        }
+    }
+}
