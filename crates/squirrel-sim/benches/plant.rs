@@ -44,29 +44,30 @@ fn plant_steps(c: &mut Criterion) {
 }
 
 fn leading(c: &mut Criterion) {
-    let file = VehicleFile::squirrel();
-    let plant = Plant::new(file.vehicle, file.effects, WingPlant::None, None, 1e-3).expect("sound");
-    let motion = start(&plant).body;
-    let command = [0.5, 0.501, 0.5, 0.499, 0.0, 0.0, 0.0, 0.0];
+    let mut file = VehicleFile::squirrel();
+    let none = file.effects;
+    for (name, size) in [("linear_drag", 0.1), ("motor_lag", 0.03), ("ground_effect", 0.3)] {
+        let found = file.effects.insert(name).expect("known");
+        found.values[0] = size;
+    }
     let mut group = c.benchmark_group("lead");
     let calls = 1000;
     group.throughput(Throughput::Elements(calls));
-    group.bench_function("without_wing", |b| {
-        b.iter(|| {
-            let mut state = start(&plant);
-            for _ in 0..calls {
-                black_box(plant.lead(
-                    &mut state,
-                    black_box(&motion),
-                    black_box(&command),
-                    [1.0; 2],
-                    14.8,
-                    0.01,
-                ));
-            }
-            state
+    for (name, effects) in [("without_wing", none), ("three_effects", file.effects)] {
+        let plant = Plant::new(file.vehicle, effects, WingPlant::None, None, 1e-3).expect("sound");
+        let motion = start(&plant).body;
+        let command = [0.5, 0.501, 0.5, 0.499, 0.0, 0.0, 0.0, 0.0];
+        group.bench_function(name, |b| {
+            b.iter(|| {
+                let mut state = start(&plant);
+                for _ in 0..calls {
+                    let (motion, command) = (black_box(&motion), black_box(&command));
+                    black_box(plant.lead(&mut state, motion, command, [1.0; 2], 14.8, 0.01));
+                }
+                state
+            });
         });
-    });
+    }
     group.finish();
 }
 

@@ -69,7 +69,8 @@ pub fn replay(log: &FlightLog, setup: &Setup) -> Result<Replay, String> {
     let rotors = stack.vehicle().rotors().len();
     for frame in &frames {
         let output = stack.step(&mut state, frame);
-        flight::record_output(&mut again, frame.time_us as f64 * 1e-6, &output, rotors, None);
+        let t = frame.time_us as f64 * 1e-6;
+        flight::record_output(&mut again, t, t, &output, rotors, None);
     }
     let mut replay = Replay { steps: frames.len(), values: 0, first_difference: None };
     for name in OUTPUT_SOURCES {

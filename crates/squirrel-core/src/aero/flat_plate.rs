@@ -20,17 +20,36 @@ pub fn force<F: Frame, T: Real>(velocity: In<F, T>, normal: In<F, T>, area_m2: T
     In::new(n * (-real::<T>(AIR_DENSITY_KG_M3) * area_m2 * v.norm() * n.dot(&v)))
 }
 
-/// Wrench of a left and a right plate: `N = 1/2 rho S c_N |v| w` along -z at `y = -+ arm`, with `w` the z component of the
-/// air's velocity at that side, so that roll is damped.
+/// Wrench of a left and a right plate, with [`normal_forces`].
 ///
 /// * `deployment` - left, right, 0..1
 #[inline(always)]
 pub fn wing_pair<T: Real>(wing: &Wing<T>, air: &Air<T>, deployment: [T; 2]) -> Wrench<Body, T> {
-    let scale =
-        real::<T>(0.5 * AIR_DENSITY_KG_M3) * wing.area_per_side_m2 * wing.normal_force_slope * air.speed;
+    pair_wrench(wing, normal_forces(wing, air, deployment))
+}
+
+/// Normal force of one spread side over the speed of the air along z, `1/2 rho S c_N |v|`, N s/m.
+#[inline(always)]
+pub fn normal_slope<T: Real>(wing: &Wing<T>, air: &Air<T>) -> T {
+    real::<T>(0.5 * AIR_DENSITY_KG_M3) * wing.area_per_side_m2 * wing.normal_force_slope * air.speed
+}
+
+/// Forces along -z of a left and a right plate, N: `N = 1/2 rho S c_N |v| w`, with `w` the z component of the air's velocity at
+/// that side, so that roll is damped.
+///
+/// * `deployment` - left, right, 0..1
+#[inline(always)]
+pub fn normal_forces<T: Real>(wing: &Wing<T>, air: &Air<T>, deployment: [T; 2]) -> [T; 2] {
+    let slope = normal_slope(wing, air);
     let roll_down = air.omega.vector.x * wing.lateral_arm_m;
-    let left = scale * (air.velocity.vector.z - roll_down) * deployment[0];
-    let right = scale * (air.velocity.vector.z + roll_down) * deployment[1];
+    let left = slope * (air.velocity.vector.z - roll_down) * deployment[0];
+    let right = slope * (air.velocity.vector.z + roll_down) * deployment[1];
+    [left, right]
+}
+
+/// Wrench of forces along -z at `y = -+ arm`, left and right, N.
+#[inline(always)]
+pub fn pair_wrench<T: Real>(wing: &Wing<T>, [left, right]: [T; 2]) -> Wrench<Body, T> {
     Wrench {
         force: In::new(Vector3::new(T::zero(), T::zero(), -(left + right))),
         // (0, -+arm, 0) x (0, 0, -N)

@@ -56,20 +56,34 @@ pub fn drag<T: Real>(vehicle: &Vehicle<T>, air: &Air<T>) -> In<Body, T> {
     In::new(-(drag.linear_n_s_per_m.component_mul(&v) + v * quadratic))
 }
 
+/// What is held over a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held<T: Real> {
+    /// Rotor targets and lags.
+    pub drive: RotorDrive<T>,
+    /// Wind velocity, m/s, without what effects add to it.
+    pub wind: In<Ned, T>,
+    /// Deployment of the left and the right wing, 0..1; for effects on wings.
+    pub deployment: [T; 2],
+    /// Pull of a load at the centre of mass, N; acts only where there are effects.
+    pub tether_force: In<Ned, T>,
+}
+
 /// Force and moment on the airframe without gravity, body frame.
 ///
 /// * `vehicle` - with what effects change once, see [`Effects::alter`]
-/// * `wind` - wind velocity, m/s, without what `effects` adds
 /// * `surfaces` - wrench of the wings for a given motion through the air
 #[inline(always)]
 pub fn wrench<T: Real>(
     vehicle: &Vehicle<T>,
     effects: &Effects<T>,
     state: &State<T>,
-    wind: In<Ned, T>,
+    held: &Held<T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> Wrench<Body, T> {
-    wrench_in(vehicle, effects, state, &air(state, total_wind(effects, wind)), surfaces)
+    let ned_from_body = rotation_matrix(state);
+    let air = air_in(state, total_wind(effects, state, held.wind), &ned_from_body);
+    wrench_in(vehicle, effects, state, held, &air, &ned_from_body, surfaces)
 }
 
 #[inline(always)]
@@ -77,53 +91,89 @@ fn wrench_in<T: Real>(
     vehicle: &Vehicle<T>,
     effects: &Effects<T>,
     state: &State<T>,
+    held: &Held<T>,
     air: &Air<T>,
+    ned_from_body: &Matrix3<T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> Wrench<Body, T> {
-    let mut rotors = rotors::wrench(vehicle, &state.rotor_speed_rad_s);
+    let rotors = rotors::wrench(vehicle, &state.rotor_speed_rad_s);
     let rest = Wrench::from_force(drag(vehicle, air)) + surfaces(air);
-    if !effects.any() {
-        return rotors + rest;
+    if effects.any() {
+        affected(vehicle, effects, state, held, air, ned_from_body, [rotors, rest])
+    } else {
+        rotors + rest
     }
+}
+
+/// The wrench of `[rotors, rest]` with everything that effects do to it.
+#[inline(never)]
+fn affected<T: Real>(
+    vehicle: &Vehicle<T>,
+    effects: &Effects<T>,
+    state: &State<T>,
+    held: &Held<T>,
+    air: &Air<T>,
+    ned_from_body: &Matrix3<T>,
+    [mut rotors, rest]: [Wrench<Body, T>; 2],
+) -> Wrench<Body, T> {
     let height_m = -state.position.vector.z;
     let factor = effects.thrust_factor(air, height_m);
     rotors.force = rotors.force * factor;
     rotors.moment.vector.x *= factor;
     rotors.moment.vector.y *= factor;
     let base = rotors + rest;
-    let thrust_n = -rotors.force.vector.z;
-    base + effects.wrench(&Situation { air, height_m, thrust_n, force: base.force })
+    let speed = &state.rotor_speed_rad_s;
+    let mut sum = base
+        + effects.wrench(&Situation {
+            air,
+            height_m,
+            thrust_n: -rotors.force.vector.z,
+            force: base.force,
+            rotor_spin_rad_s: rotors::spin(vehicle, speed),
+            rotor_spin_rate_rad_s2: rotors::spin(vehicle, &held.drive.rates(vehicle.rotor_blocks(), speed)),
+            wing: vehicle.parameters().wing.as_ref(),
+            deployment: held.deployment,
+        });
+    sum.force.vector += ned_from_body.tr_mul(&held.tether_force.vector);
+    let added_mass_kg = effects.added_mass_kg();
+    if added_mass_kg > T::zero() {
+        let force_z = &mut sum.force.vector.z;
+        let gravity_z = ned_from_body[(2, 2)] * real(GRAVITY_M_S2);
+        let turning = air.omega.vector.cross(&air.velocity.vector).z;
+        let rate = (*force_z * vehicle.inverse_mass() + gravity_z - turning)
+            / (T::one() + added_mass_kg * vehicle.inverse_mass());
+        *force_z -= added_mass_kg * rate;
+    }
+    sum
 }
 
-/// Wind with what effects add to it, m/s.
+/// Wind with what effects add to it where the vehicle is, m/s.
 #[inline(always)]
-pub fn total_wind<T: Real>(effects: &Effects<T>, wind: In<Ned, T>) -> In<Ned, T> {
-    if effects.any() { wind + effects.wind() } else { wind }
+pub fn total_wind<T: Real>(effects: &Effects<T>, state: &State<T>, wind: In<Ned, T>) -> In<Ned, T> {
+    if effects.any() { wind + effects.wind(-state.position.vector.z) } else { wind }
 }
 
 /// Time derivative of the state: each field of the result is the rate of the field of the same name.
 ///
-/// * `drive` - rotor targets and lags, held over the step
-/// * other arguments as in [`wrench`]
+/// * arguments as in [`wrench`]
 #[inline(always)]
 pub fn derivative<T: Real>(
     vehicle: &Vehicle<T>,
     effects: &Effects<T>,
     state: &State<T>,
-    drive: &RotorDrive<T>,
-    wind: In<Ned, T>,
+    held: &Held<T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> State<T> {
     let ned_from_body = rotation_matrix(state);
-    let air = air_in(state, total_wind(effects, wind), &ned_from_body);
-    let wrench = wrench_in(vehicle, effects, state, &air, surfaces);
+    let air = air_in(state, total_wind(effects, state, held.wind), &ned_from_body);
+    let wrench = wrench_in(vehicle, effects, state, held, &air, &ned_from_body, surfaces);
     let gravity_ned = Vector3::new(T::zero(), T::zero(), real(GRAVITY_M_S2));
     State {
         position: state.velocity,
         velocity: In::new(gravity_ned + ned_from_body * (wrench.force.vector * vehicle.inverse_mass())),
         attitude: state.attitude_rate(),
         omega: angular_acceleration(vehicle, state.omega, &wrench),
-        rotor_speed_rad_s: drive.rates(vehicle.rotor_blocks(), &state.rotor_speed_rad_s),
+        rotor_speed_rad_s: held.drive.rates(vehicle.rotor_blocks(), &state.rotor_speed_rad_s),
     }
 }
 
@@ -163,10 +213,15 @@ pub fn specific_force<T: Real>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vehicle::MAX_ROTORS;
     use crate::vehicle::fixtures::squirrel;
 
     fn no_surfaces(_: &Air<f64>) -> Wrench<Body, f64> {
         Wrench::zero()
+    }
+
+    fn still(drive: RotorDrive<f64>) -> Held<f64> {
+        Held { drive, wind: In::zero(), deployment: [0.0; 2], tether_force: In::zero() }
     }
 
     #[test]
@@ -178,9 +233,8 @@ mod tests {
         let mut state = State::at_rest();
         state.rotor_speed_rad_s = drive.target_rad_s;
         for _ in 0..1000 {
-            state = rk4(state, 1e-3, |s| {
-                derivative(&vehicle, &Effects::none(), s, &drive, In::zero(), no_surfaces)
-            });
+            state =
+                rk4(state, 1e-3, |s| derivative(&vehicle, &Effects::none(), s, &still(drive), no_surfaces));
         }
         assert!(state.position.vector.norm() < 1e-9 && state.omega.vector.norm() < 1e-9);
     }
@@ -200,10 +254,9 @@ mod tests {
         };
         let (energy, momentum_ned) = invariants(&state);
         for _ in 0..10_000 {
-            state = rk4(state, 1e-3, |s| {
-                derivative(&vehicle, &Effects::none(), s, &drive, In::zero(), no_surfaces)
-            })
-            .normalised();
+            state =
+                rk4(state, 1e-3, |s| derivative(&vehicle, &Effects::none(), s, &still(drive), no_surfaces))
+                    .normalised();
         }
         let (energy_end, momentum_end) = invariants(&state);
         assert!((energy_end / energy - 1.0).abs() < 1e-9, "energy drifted by {}", energy_end / energy - 1.0);
@@ -219,7 +272,7 @@ mod tests {
             let mut state = State { velocity: In::new(Vector3::new(3.0, -1.0, 0.5)), ..State::at_rest() };
             for _ in 0..steps {
                 state = rk4(state, 0.4 / steps as f64, |s| {
-                    derivative(&vehicle, &Effects::none(), s, &drive, In::zero(), no_surfaces)
+                    derivative(&vehicle, &Effects::none(), s, &still(drive), no_surfaces)
                 });
             }
             state.position.vector
@@ -235,7 +288,8 @@ mod tests {
         let mut state = State::at_rest();
         let speed = (vehicle.weight_n() / 4.0 / 6.0e-7).sqrt();
         state.rotor_speed_rad_s = [speed, speed, speed, speed, 0.0, 0.0, 0.0, 0.0];
-        let w = wrench(&vehicle, &Effects::none(), &state, In::zero(), no_surfaces);
+        let held = still(RotorDrive::holding(state.rotor_speed_rad_s));
+        let w = wrench(&vehicle, &Effects::none(), &state, &held, no_surfaces);
         let read = specific_force(&vehicle, &Effects::none(), state.omega, &w);
         assert!((read.vector - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).norm() < 1e-9);
     }
@@ -245,11 +299,64 @@ mod tests {
     fn an_accelerometer_off_the_centre_of_mass_feels_the_rotation() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
         let mut effects = Effects::none();
-        effects.insert("cg_offset").unwrap().values.copy_from_slice(&[0.01, 0.0]);
+        effects.insert("cg_offset").unwrap().values[0] = 0.01;
         let moment = In::new(Vector3::new(0.0, 4.68e-3 * 5.0, 0.0));
         let wrench = Wrench { force: In::zero(), moment };
         let read = specific_force(&vehicle, &effects, In::new(Vector3::new(0.0, 0.0, 3.0)), &wrench).vector;
         assert!((read - Vector3::new(0.09, 0.0, 0.05)).norm() < 1e-12, "{read}");
+    }
+
+    fn affected_by(name: &str, values: &[f64], state: &State<f64>, held: &Held<f64>) -> Wrench<Body, f64> {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let mut effects = Effects::none();
+        effects.insert(name).unwrap().values[..values.len()].copy_from_slice(values);
+        wrench(&vehicle, &effects, state, held, no_surfaces)
+    }
+
+    /// Dropped, all of `m + m_a` accelerates, but only `m` has weight: `w' = m g / (m + m_a)`, so `F_z = -m_a w'`.
+    #[test]
+    fn added_mass_is_carried_along_but_not_attracted() {
+        let mut state = State::at_rest();
+        let held = still(RotorDrive::holding([0.0; MAX_ROTORS]));
+        let fall = 0.548 * GRAVITY_M_S2 / (0.548 + 0.1);
+        let force = affected_by("added_mass", &[0.1], &state, &held).force.vector.z;
+        assert!((force + 0.1 * fall).abs() < 1e-12, "{force}");
+        // Rolling at 2 rad/s while slipping to the right at 3 m/s: the velocity along z grows by g - w_x v.
+        (state.omega.vector.x, state.velocity.vector.y) = (2.0, 3.0);
+        let drag =
+            wrench(&Vehicle::new(squirrel::<f64>()).unwrap(), &Effects::none(), &state, &held, no_surfaces);
+        let turned = affected_by("added_mass", &[0.1], &state, &held).force - drag.force;
+        let rate = (GRAVITY_M_S2 - 6.0) / (1.0 + 0.1 / 0.548);
+        assert!((turned.vector.z + 0.1 * rate).abs() < 1e-12, "{turned:?}");
+        // In hover nothing accelerates.
+        state = State::at_rest();
+        state.rotor_speed_rad_s[..4].fill((0.548 * GRAVITY_M_S2 / 4.0 / 6.0e-7_f64).sqrt());
+        let hover = affected_by("added_mass", &[0.1], &state, &held).force.vector.z;
+        assert!((hover + 0.548 * GRAVITY_M_S2).abs() < 1e-9);
+    }
+
+    /// Rotor 1 turns clockwise seen from above, positive about +z, so speeding it up turns the airframe to the left.
+    #[test]
+    fn rotors_that_speed_up_push_the_airframe_back() {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let drive =
+            RotorDrive::new(&vehicle, &Effects::none(), &[0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 14.8);
+        let mut state = State { omega: In::new(Vector3::new(0.5, -0.2, 0.0)), ..State::at_rest() };
+        state.rotor_speed_rad_s[0] = 900.0;
+        let base = wrench(&vehicle, &Effects::none(), &state, &still(drive), no_surfaces);
+        let more = affected_by("rotor_gyro_torque", &[1e-5], &state, &still(drive)).moment - base.moment;
+        let by_hand = Vector3::new(0.2 * 900.0, 0.5 * 900.0, -600.0 / 0.03) * 1e-5;
+        assert!((more.vector - by_hand).norm() < 1e-12, "{more:?}");
+    }
+
+    #[test]
+    fn a_tether_pulls_in_the_world() {
+        let mut state = State::at_rest();
+        state.attitude = *nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, core::f64::consts::FRAC_PI_2);
+        let mut held = still(RotorDrive::holding([0.0; MAX_ROTORS]));
+        held.tether_force = In::new(Vector3::new(1.0, 0.0, 2.0));
+        let pull = affected_by("payload_swing", &[0.1, 0.5], &state, &held).force.vector;
+        assert!((pull - Vector3::new(0.0, -1.0, 2.0)).norm() < 1e-12, "north is to the left: {pull}");
     }
 
     #[test]

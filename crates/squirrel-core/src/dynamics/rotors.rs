@@ -3,7 +3,7 @@
 //! `T_i = k_f Omega_i^2` along -z, `Q_i = yaw_sign_i k_m Omega_i^2` about +z, `Omega_i' = (target_i - Omega_i) / tau`
 //! with its own `tau` for speeding up and slowing down (docs/equations.md D.5).
 
-use crate::effects::Effects;
+use crate::effects::{Effects, Supply};
 use crate::frames::{Body, In, Wrench};
 use crate::math::Real;
 use crate::vehicle::{MAX_ROTORS, PerRotor, ROTOR_BLOCK, Vehicle};
@@ -30,20 +30,34 @@ impl<T: Real> RotorDrive<T> {
         battery_voltage_v: T,
     ) -> Self {
         let propulsion = &vehicle.parameters().propulsion;
-        let (mut ratio, mut extra) = (T::one(), T::zero());
-        if effects.any() {
-            ratio = effects.rotor_speed_ratio(battery_voltage_v, propulsion.reference_voltage_v);
-            extra = effects.rotor_extra_time_constant_s();
-        }
         let mut target_rad_s = [T::zero(); MAX_ROTORS];
         for (target, u) in target_rad_s.iter_mut().zip(command).take(vehicle.parameters().rotor_count) {
-            *target = propulsion.target_speed_rad_s(*u) * ratio;
+            *target = propulsion.target_speed_rad_s(*u);
+        }
+        let mut extra_s = [T::zero(); 2];
+        if effects.any() {
+            let supply = Supply {
+                voltage_v: battery_voltage_v,
+                reference_voltage_v: propulsion.reference_voltage_v,
+                speed_max_rad_s: propulsion.speed_max_rad_s,
+            };
+            effects.rotor_target(&mut target_rad_s, &supply);
+            extra_s = effects.rotor_extra_time_constant_s();
         }
         let inverse = |tau: T| if tau > T::zero() { T::one() / tau } else { T::zero() };
         Self {
             target_rad_s,
-            inverse_time_constant_up: inverse(propulsion.time_constant_up_s + extra),
-            inverse_time_constant_down: inverse(propulsion.time_constant_down_s + extra),
+            inverse_time_constant_up: inverse(propulsion.time_constant_up_s + extra_s[0]),
+            inverse_time_constant_down: inverse(propulsion.time_constant_down_s + extra_s[1]),
+        }
+    }
+
+    /// No change of these speeds, rad/s.
+    pub fn holding(speed_rad_s: PerRotor<T>) -> Self {
+        Self {
+            target_rad_s: speed_rad_s,
+            inverse_time_constant_up: T::zero(),
+            inverse_time_constant_down: T::zero(),
         }
     }
 
@@ -115,6 +129,13 @@ pub(super) fn wrench<T: Real>(vehicle: &Vehicle<T>, speed: &PerRotor<T>) -> Wren
         force: In::new(Vector3::new(T::zero(), T::zero(), -thrust)),
         moment: In::new(Vector3::new(roll, pitch, yaw)),
     }
+}
+
+/// Sum of the rotor speeds about +z, rad/s: a rotor spins against its reaction torque.
+#[inline(always)]
+pub(super) fn spin<T: Real>(vehicle: &Vehicle<T>, speed: &PerRotor<T>) -> T {
+    let pairs = vehicle.rotors().iter().zip(speed);
+    pairs.fold(T::zero(), |sum, (rotor, speed)| sum - rotor.yaw_sign * *speed)
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! Inertia about one axis off by a fraction: `J_ii (1 + e)`.
 
-use super::{Alteration, Effect, EffectParameter, Kind};
-use crate::math::{Real, real};
+use super::{Alteration, Effect, EffectParameter, Kind, is};
+use crate::math::Real;
 
 /// Which axis, and the fraction by which its inertia exceeds the nominal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,14 +10,14 @@ pub struct InertiaError<T>(pub(super) [T; 2]);
 impl<T: Real> Effect<T> for InertiaError<T> {
     const NAME: &'static str = "inertia_error";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter { key: "axis", kind: Kind::OneOf(&["x", "y", "z"]) },
+        EffectParameter::new("axis", Kind::OneOf(&["x", "y", "z"])),
         EffectParameter::signed("inertia_fraction", 0.12, 0.4),
     ];
 
     fn alter(&self, airframe: &mut Alteration<T>) {
         let [axis, fraction] = self.0;
         for i in 0..3 {
-            if axis == real(i as f64) {
+            if is(axis, i) {
                 airframe.inertia_kg_m2[(i, i)] *= T::one() + fraction;
             }
         }

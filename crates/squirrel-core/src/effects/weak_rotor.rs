@@ -1,7 +1,7 @@
 //! One rotor gives less: `T_i (1 - e)` and `Q_i (1 - e)`.
 
-use super::{Alteration, Effect, EffectParameter, Kind};
-use crate::math::{Real, real};
+use super::{Alteration, Effect, EffectParameter, Kind, is};
+use crate::math::Real;
 
 /// Which rotor, and the fraction that it lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,14 +10,14 @@ pub struct WeakRotor<T>(pub(super) [T; 2]);
 impl<T: Real> Effect<T> for WeakRotor<T> {
     const NAME: &'static str = "weak_rotor";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter { key: "rotor", kind: Kind::Rotor },
+        EffectParameter::new("rotor", Kind::Rotor),
         EffectParameter::size("thrust_loss_fraction", 0.05, 0.2),
     ];
 
     fn alter(&self, airframe: &mut Alteration<T>) {
         let [rotor, loss] = self.0;
         for (i, (thrust, torque)) in airframe.thrust.iter_mut().zip(&mut airframe.torque).enumerate() {
-            if rotor == real((i + 1) as f64) {
+            if is(rotor, i + 1) {
                 *thrust *= T::one() - loss;
                 *torque *= T::one() - loss;
             }

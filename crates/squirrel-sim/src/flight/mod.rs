@@ -3,6 +3,7 @@
 //! The plant steps at its own rate (1 kHz by default); the flight code runs at the first plant step at or after each
 //! 1/300 s, wind and sensors are sampled there. Everything random comes from the scenario's seed.
 
+mod commands;
 mod integrator;
 mod metrics;
 mod record;
@@ -14,12 +15,13 @@ pub use record::{INPUT_SOURCES, frames};
 
 use crate::arm::Arm;
 use crate::log::FlightLog;
-use crate::plant::{Plant, PlantState, Wind};
+use crate::plant::{Plant, PlantState, Wind, WindParameters};
 use crate::scenario::Scenario;
 use crate::sensors::{Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
+use commands::{Command, CommandLine};
 use integrator::Mover;
-use squirrel_core::dynamics::{State, specific_force};
+use squirrel_core::dynamics::{State, specific_force, total_wind};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::math::GRAVITY_M_S2;
@@ -120,21 +122,28 @@ impl Setup {
         let mut mover = Mover::new(self)?;
         let mut state = plant.initial_state(self.hovering(&plant), self.scenario.start_charge());
         let seed = self.scenario.seed;
-        let mut wind = Wind::new(self.scenario.wind(), seed ^ 0x5851_F42D_4C95_7F2D);
-        let mut sensors = Sensors::new(self.vehicle.sensors, seed);
+        let mut winds = vec![Wind::new(self.scenario.wind(), seed ^ 0x5851_F42D_4C95_7F2D)];
+        if let Some(gusts) = plant.effects().gust() {
+            winds.push(Wind::new(WindParameters::of_gusts(gusts), seed ^ 0x9E6C_63D0_876A_3F1B));
+        }
+        let mut air = velocity_of(&winds);
+        let mut sensors = Sensors::new(self.vehicle.sensors, plant.effects(), seed);
         let mut stack_state = StackState::default();
         let mut metrics = metrics::Meter::new(&self.scenario);
         let mut recorder = record.then(|| record::Recorder::new(self, plant.vehicle().rotors().len()));
-        let (mut rotor_command, mut wing_command) = ([0.0; MAX_ROTORS], [0.0; 2]);
+        let hover = Command { rotor: [hover_command(plant.vehicle()); MAX_ROTORS], wing: [0.0; 2] };
+        let mut commands = CommandLine::new(plant.effects().command_latency_s(), hover);
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
         let mut contact_specific_force: Option<In<Ned, f64>> = None;
         let steps = (self.scenario.duration_s / dt_s).round() as u64;
         for step in 0..=steps {
             let time_us = step * PLANT_STEP_US;
             if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
-                let through_air = state.body.velocity - wind.velocity() - plant.effects().wind();
-                wind.advance((time_us - last_tick_us) as f64 * 1e-6, through_air.vector.norm());
-                let air = wind.velocity();
+                let through_air = state.body.velocity - total_wind(plant.effects(), &state.body, air);
+                for wind in &mut winds {
+                    wind.advance((time_us - last_tick_us) as f64 * 1e-6, through_air.vector.norm());
+                }
+                air = velocity_of(&winds);
                 let mut truth = truth(&plant, &state, air);
                 if let Some(push) = contact_specific_force {
                     truth.specific_force = state.body.ned_from_body().inverse() * push;
@@ -152,8 +161,8 @@ impl Setup {
                         time_us as f64 * 1e-6
                     )));
                 }
-                rotor_command = output.rotor_command.map(f64::from);
-                wing_command = output.wing_command.map(f64::from);
+                let rotor = output.rotor_command.map(f64::from);
+                commands.send(time_us, Command { rotor, wing: output.wing_command.map(f64::from) });
                 metrics.tick(time_us, &state, &output, stack_state.mission.encounters);
                 if let Some(recorder) = &mut recorder {
                     recorder.tick(
@@ -161,7 +170,7 @@ impl Setup {
                         battery,
                         &output,
                         &state,
-                        air + plant.effects().wind(),
+                        total_wind(plant.effects(), &state.body, air),
                         plant.wing_force(&state, air, state.deployment()),
                     );
                 }
@@ -174,7 +183,8 @@ impl Setup {
                 (tick, last_tick_us) = (tick + 1, time_us);
             }
             let before = state.body.velocity;
-            let contact = mover.step(&plant, &mut state, &rotor_command, wing_command, wind.velocity())?;
+            let Command { rotor, wing } = commands.acting(time_us);
+            let contact = mover.step(&plant, &mut state, &rotor, wing, air)?;
             metrics.contact(contact);
             // While something pushes back, an accelerometer reads the whole change of velocity less gravity.
             contact_specific_force = (contact == integrator::Contact::Touching).then(|| {
@@ -190,9 +200,7 @@ impl Setup {
     /// At the start of the mission, level, rotors at hover speed.
     fn hovering(&self, plant: &Plant) -> State<f64> {
         let vehicle = plant.vehicle();
-        let share = vehicle.weight_n() / vehicle.rotors().len() as f64;
-        let propulsion = &vehicle.parameters().propulsion;
-        let speed = propulsion.target_speed_rad_s(propulsion.command_for_thrust(share));
+        let speed = vehicle.parameters().propulsion.target_speed_rad_s(hover_command(vehicle));
         let mut state = State::at_rest();
         state.position = In::new(Vector3::new(0.0, 0.0, -self.scenario.height_m));
         state.rotor_speed_rad_s[..vehicle.rotors().len()].fill(speed);
@@ -217,6 +225,17 @@ impl Setup {
             })
             .collect()
     }
+}
+
+/// The command of each rotor that carries the weight.
+fn hover_command(vehicle: &Vehicle<f64>) -> f64 {
+    let share = vehicle.weight_n() / vehicle.rotors().len() as f64;
+    vehicle.parameters().propulsion.command_for_thrust(share)
+}
+
+/// Velocity of the air, m/s.
+fn velocity_of(winds: &[Wind]) -> In<Ned, f64> {
+    winds.iter().fold(In::zero(), |sum, wind| sum + wind.velocity())
 }
 
 fn truth(plant: &Plant, state: &PlantState, air: In<Ned, f64>) -> Truth {

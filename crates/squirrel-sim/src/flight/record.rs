@@ -7,6 +7,7 @@ use super::Setup;
 use crate::log::FlightLog;
 use crate::plant::PlantState;
 use crate::sensors::BatteryReading;
+use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::nalgebra::Vector3;
@@ -20,6 +21,7 @@ const FORMAT: &str = "1";
 pub(super) struct Recorder {
     log: FlightLog,
     rotors: usize,
+    effects: Effects<f64>,
     last_obstacles: Vec<Obstacle>,
 }
 
@@ -49,7 +51,7 @@ impl Recorder {
         ] {
             log.metadata.insert(key.to_owned(), value);
         }
-        Self { log, rotors, last_obstacles: Vec::new() }
+        Self { log, rotors, effects: setup.vehicle.effects, last_obstacles: Vec::new() }
     }
 
     pub(super) fn tick(
@@ -67,7 +69,8 @@ impl Recorder {
             let rows: &[(&str, &[f64])] = &[("voltage_v", &[b.voltage_v]), ("current_a", &[b.current_a])];
             self.log.source_mut("battery").push(t, rows);
         }
-        record_output(&mut self.log, t, output, self.rotors, Some(state));
+        let stamp = self.effects.command_clock_s(t);
+        record_output(&mut self.log, t, stamp, output, self.rotors, Some(state));
         self.plant(t, state, air, wing_force);
     }
 
@@ -129,10 +132,12 @@ impl Recorder {
 
 /// Records every term of one step of the flight code.
 ///
+/// * `command_stamp` - what the clock of the commands shows at `t`, s
 /// * `plant` - what rotors and wings really did, where a plant flew
 pub(crate) fn record_output(
     log: &mut FlightLog,
     t: f64,
+    command_stamp: f64,
     output: &StackOutput,
     rotors: usize,
     plant: Option<&PlantState>,
@@ -146,8 +151,8 @@ pub(crate) fn record_output(
         rotor.push(("speed_rad_s", &plant.body.rotor_speed_rad_s[..rotors]));
         wing.push(("deployment", deployment));
     }
-    log.source_mut("rotor").push(t, &rotor);
-    log.source_mut("wing").push(t, &wing);
+    log.source_mut("rotor").push(command_stamp, &rotor);
+    log.source_mut("wing").push(command_stamp, &wing);
     let r = &output.reference;
     log.source_mut("reference").push(
         t,

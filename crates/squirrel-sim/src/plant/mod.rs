@@ -1,7 +1,7 @@
 //! The plant: what really flies. Rigid body and rotors by RK4, wings, battery, servos, wind. f64.
 //!
-//! One step holds the commands, the battery voltage and the wind, and integrates rigid body, rotor speeds and membrane
-//! together by RK4. Battery, servos and wind are stepped exactly beside it.
+//! One step holds the commands, the battery voltage, the wind and the pull of a slung load, and integrates rigid body, rotor
+//! speeds and membrane together by RK4. Battery, servos, load and wind are stepped exactly beside it.
 
 mod battery;
 mod fast_math;
@@ -13,13 +13,13 @@ mod wind;
 pub use battery::{BatteryParameters, BatteryState};
 pub use lead::Led;
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
-pub use servo::{ServoParameters, ServoState};
+pub use servo::{ServoLag, ServoParameters, ServoState};
 pub use wind::{GustModel, Wind, WindParameters};
 
 use squirrel_core::aero::Air;
 use squirrel_core::aero::flat_plate;
-use squirrel_core::dynamics::{self, RotorDrive, State, VectorSpace, rk4};
-use squirrel_core::effects::Effects;
+use squirrel_core::dynamics::{self, Held, RotorDrive, State, VectorSpace, rk4};
+use squirrel_core::effects::{Effects, Pendulum, PendulumState};
 use squirrel_core::frames::{Body, In, Ned, Wrench};
 use squirrel_core::vehicle::{PerRotor, Vehicle, Wing};
 
@@ -53,7 +53,8 @@ pub struct Plant {
     battery: Option<BatteryParameters>,
     dt_s: f64,
     battery_decay: f64,
-    servo_keep: f64,
+    servo_lag: Option<ServoLag>,
+    load: Option<Pendulum<f64>>,
 }
 
 /// Everything that changes.
@@ -70,6 +71,14 @@ pub struct PlantState {
     pub servo: [ServoState; 2],
     /// Battery; constant at the reference voltage for a vehicle without one.
     pub battery: BatteryState,
+    /// Time since the flight began, s: effects may drift.
+    pub time_s: f64,
+    /// The load under the vehicle; at rest without one.
+    pub load: PendulumState<f64>,
+    /// What the rotors were last told.
+    drive: RotorDrive<f64>,
+    /// Time from the body's motion to the next measured one, s; 0 unless the plant was led there.
+    led_s: f64,
 }
 
 impl PlantState {
@@ -118,10 +127,11 @@ impl Plant {
             return Err(format!("dt_s = {dt_s}: must be finite and > 0"));
         }
         let p = &vehicle.parameters().propulsion;
-        for (key, tau) in
-            [("time_constant_up_s", p.time_constant_up_s), ("time_constant_down_s", p.time_constant_down_s)]
-        {
-            let tau = tau + effects.rotor_extra_time_constant_s();
+        let [extra_up_s, extra_down_s] = effects.rotor_extra_time_constant_s();
+        for (key, tau) in [
+            ("time_constant_up_s", p.time_constant_up_s + extra_up_s),
+            ("time_constant_down_s", p.time_constant_down_s + extra_down_s),
+        ] {
             if tau > 0.0 && dt_s > 2.0 * tau {
                 return Err(format!(
                     "dt_s = {dt_s}: must be at most twice propulsion.{key} = {tau}, effects included"
@@ -129,15 +139,15 @@ impl Plant {
             }
         }
         let vehicle = effects.alter(&vehicle).map_err(|e| format!("with effects, {e}"))?;
-        let decay = |tau: f64| 1.0 - (-dt_s / tau).exp();
-        let servo_keep = match &wing {
-            WingPlant::None => 0.0,
+        let servo_lag = match &wing {
+            WingPlant::None => None,
             WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. } => {
-                (-dt_s / servo.time_constant_s).exp()
+                Some(servo.lag(effects.wing_extra_time_constant_s(), dt_s))
             }
         };
-        let battery_decay = battery.as_ref().map_or(1.0, |b| decay(b.tau1_s));
-        Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_keep })
+        let load = effects.pendulum();
+        let battery_decay = battery.as_ref().map_or(1.0, |b| 1.0 - (-dt_s / b.tau1_s).exp());
+        Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_lag, load })
     }
 
     /// The airframe, with what effects change of it.
@@ -173,6 +183,10 @@ impl Plant {
             wing_angle_rate_rad_s: [0.0; 2],
             servo: [ServoState::default(); 2],
             battery,
+            time_s: 0.0,
+            load: PendulumState::at_rest(),
+            drive: RotorDrive::holding(body.rotor_speed_rad_s),
+            led_s: 0.0,
         }
     }
 
@@ -186,8 +200,8 @@ impl Plant {
         wing_command: [f64; 2],
         wind: In<Ned, f64>,
     ) {
-        let drive = self.drive(state, rotor_command);
-        self.advance(state, &drive, wing_command, wind, |next| next);
+        self.drive(state, rotor_command);
+        self.advance(state, wing_command, wind, |next| next);
     }
 
     /// One step in which another integrator moves the rigid body: rotors and wings as in [`Self::step`], while `body` gets
@@ -203,27 +217,31 @@ impl Plant {
         wind: In<Ned, f64>,
         body: impl FnOnce(&State<f64>, &Wrench<Body, f64>) -> Result<State<f64>, E>,
     ) -> Result<(), E> {
-        let drive = self.drive(state, rotor_command);
+        self.drive(state, rotor_command);
         let wrench = self.wrench(state, wind);
         let moved = body(&state.body, &wrench)?;
-        self.advance(state, &drive, wing_command, wind, |next| State {
+        self.advance(state, wing_command, wind, |next| State {
             rotor_speed_rad_s: next.rotor_speed_rad_s,
             ..moved
         });
         Ok(())
     }
 
-    fn drive(&self, state: &mut PlantState, rotor_command: &PerRotor<f64>) -> RotorDrive<f64> {
-        let drive = RotorDrive::new(&self.vehicle, &self.effects, rotor_command, state.battery.voltage_v);
-        drive.settle(&mut state.body.rotor_speed_rad_s);
-        drive
+    fn drive(&self, state: &mut PlantState, rotor_command: &PerRotor<f64>) {
+        state.drive = RotorDrive::new(&self.vehicle, &self.effects, rotor_command, state.battery.voltage_v);
+        state.drive.settle(&mut state.body.rotor_speed_rad_s);
+    }
+
+    #[inline(always)]
+    fn held(&self, state: &PlantState, wind: In<Ned, f64>, deployment: [f64; 2]) -> Held<f64> {
+        let tether_force = self.load.map_or(In::zero(), |load| load.force(&state.load));
+        Held { drive: state.drive, wind, deployment, tether_force }
     }
 
     #[inline(always)]
     fn advance(
         &self,
         state: &mut PlantState,
-        drive: &RotorDrive<f64>,
         wing_command: [f64; 2],
         wind: In<Ned, f64>,
         body: impl FnOnce(State<f64>) -> State<f64>,
@@ -231,25 +249,28 @@ impl Plant {
         let (vehicle, effects, dt) = (&self.vehicle, &self.effects, self.dt_s);
         let before = state.body;
         let next = match &self.wing {
-            WingPlant::None => rk4(before, dt, |s| {
-                dynamics::derivative(vehicle, effects, s, drive, wind, |_| Wrench::zero())
-            }),
+            WingPlant::None => {
+                let held = self.held(state, wind, [0.0; 2]);
+                rk4(before, dt, |s| dynamics::derivative(vehicle, effects, s, &held, |_| Wrench::zero()))
+            }
             WingPlant::Flat { wing, servo } => {
                 let deployment = self.deploy(state, servo, wing_command);
+                let held = self.held(state, wind, deployment);
                 rk4(before, dt, |s| {
-                    dynamics::derivative(vehicle, effects, s, drive, wind, |air| {
+                    dynamics::derivative(vehicle, effects, s, &held, |air| {
                         flat_plate::wing_pair(wing, air, deployment)
                     })
                 })
             }
             WingPlant::Membrane { membrane, servo } => {
                 let deployment = self.deploy(state, servo, wing_command);
-                let air = dynamics::air(&before, dynamics::total_wind(effects, wind));
+                let held = self.held(state, wind, deployment);
+                let air = dynamics::air(&before, dynamics::total_wind(effects, &before, wind));
                 state.turn_wings(membrane.angle_of_attack(&air), dt);
                 let rate = state.wing_angle_rate_rad_s;
                 let moved = rk4(Moving { body: before, membrane: state.membrane }, dt, |s| {
                     let mut membrane_rate = s.membrane;
-                    let body = dynamics::derivative(vehicle, effects, &s.body, drive, wind, |air| {
+                    let body = dynamics::derivative(vehicle, effects, &s.body, &held, |air| {
                         let (wrench, change) = membrane.evaluate(air, rate, deployment, &s.membrane);
                         membrane_rate = change;
                         wrench
@@ -266,15 +287,22 @@ impl Plant {
             let power: f64 = before.rotor_speed_rad_s.iter().map(|w| k_m * w * w * w).sum();
             battery.step(&mut state.battery, power, dt, self.battery_decay);
         }
+        if let Some(load) = &self.load {
+            let acceleration = (state.body.velocity - before.velocity) * (1.0 / dt);
+            load.lead(&mut state.load, acceleration, dt);
+        }
+        state.time_s += dt;
+        state.led_s = 0.0;
     }
 
     /// Mean deployment over a step.
     #[inline(always)]
     fn deploy(&self, state: &mut PlantState, servo: &ServoParameters, command: [f64; 2]) -> [f64; 2] {
         let mut mean = [0.0; 2];
+        let Some(lag) = &self.servo_lag else { return mean };
         for side in 0..2 {
             let before = state.servo[side].deployment;
-            servo.lead(&mut state.servo[side], command[side], self.dt_s, self.servo_keep);
+            servo.lead(&mut state.servo[side], command[side], lag);
             mean[side] = 0.5 * (before + state.servo[side].deployment);
         }
         mean
@@ -294,14 +322,15 @@ impl Plant {
     /// Force and moment on the airframe now, without gravity.
     pub fn wrench(&self, state: &PlantState, wind: In<Ned, f64>) -> Wrench<Body, f64> {
         let deployment = state.deployment();
-        dynamics::wrench(&self.vehicle, &self.effects, &state.body, wind, |air| {
+        let held = self.held(state, wind, deployment);
+        dynamics::wrench(&self.vehicle, &self.effects, &state.body, &held, |air| {
             self.wing_wrench(state, air, deployment)
         })
     }
 
     /// Force of the wings at a deployment, left and right, N: [`PlantState::deployment`] for now, 1 for as if spread.
     pub fn wing_force(&self, state: &PlantState, wind: In<Ned, f64>, deployment: [f64; 2]) -> In<Body, f64> {
-        let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, wind));
+        let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, wind));
         self.wing_wrench(state, &air, deployment).force
     }
 }

@@ -21,6 +21,15 @@ pub struct ServoState {
     pending: Option<(f64, f64)>,
 }
 
+/// The lag of a servo over a step of one length; each pair is opening, closing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ServoLag {
+    dt_s: f64,
+    time_constant_s: [f64; 2],
+    /// What is left of a gap after a whole step.
+    keep: [f64; 2],
+}
+
 impl ServoParameters {
     pub(crate) fn check(&self) -> Result<(), String> {
         if !(0.0..=1.0).contains(&self.dead_time_s) {
@@ -32,46 +41,54 @@ impl ServoParameters {
         Ok(())
     }
 
-    /// Moves a servo exactly over a time of any length; a command that changes again within the dead time replaces the one
-    /// that waits.
+    /// The lag over a step.
     ///
-    /// * `keep` - `exp(-dt / time_constant)`, for a whole `dt_s` of lag
-    pub fn lead(&self, state: &mut ServoState, command: f64, dt_s: f64, keep: f64) {
+    /// * `extra_s` - added to the time constant, opening and closing
+    pub fn lag(&self, extra_s: [f64; 2], dt_s: f64) -> ServoLag {
+        let time_constant_s = extra_s.map(|extra| self.time_constant_s + extra);
+        ServoLag { dt_s, time_constant_s, keep: time_constant_s.map(|tau| (-dt_s / tau).exp()) }
+    }
+
+    /// Moves a servo exactly over a step of any length; a command that changes again within the dead time replaces the one
+    /// that waits.
+    pub fn lead(&self, state: &mut ServoState, command: f64, lag: &ServoLag) {
         let command = command.clamp(0.0, 1.0);
         let last_asked = state.pending.map_or(state.target, |(waiting, _)| waiting);
         if command != last_asked {
             state.pending = Some((command, self.dead_time_s));
         }
-        let mut left_s = dt_s;
+        let mut left_s = lag.dt_s;
         if let Some((waiting, wait_s)) = state.pending {
-            let before_s = wait_s.min(dt_s);
-            self.follow(state, before_s, dt_s, keep);
-            left_s = dt_s - before_s;
-            if wait_s <= dt_s {
+            let before_s = wait_s.min(lag.dt_s);
+            self.follow(state, before_s, lag);
+            left_s = lag.dt_s - before_s;
+            if wait_s <= lag.dt_s {
                 state.target = waiting;
                 state.pending = None;
             } else {
-                state.pending = Some((waiting, wait_s - dt_s));
+                state.pending = Some((waiting, wait_s - lag.dt_s));
             }
         }
-        self.follow(state, left_s, dt_s, keep);
+        self.follow(state, left_s, lag);
     }
 
     /// Towards the target for a part of a step: at the largest rate while further than `rate tau`, then by the lag.
-    fn follow(&self, state: &mut ServoState, time_s: f64, dt_s: f64, keep: f64) {
+    fn follow(&self, state: &mut ServoState, time_s: f64, lag: &ServoLag) {
         let gap = state.target - state.deployment;
         if gap == 0.0 || time_s <= 0.0 {
             return;
         }
+        let way = usize::from(gap < 0.0);
+        let time_constant_s = lag.time_constant_s[way];
         let mut lag_s = time_s;
-        let beyond = gap.abs() - self.rate_max_per_s * self.time_constant_s;
+        let beyond = gap.abs() - self.rate_max_per_s * time_constant_s;
         if beyond > 0.0 {
             let at_rate_s = (beyond / self.rate_max_per_s).min(time_s);
             state.deployment += (self.rate_max_per_s * at_rate_s).copysign(gap);
             lag_s -= at_rate_s;
         }
         if lag_s > 0.0 {
-            let keep = if lag_s == dt_s { keep } else { (-lag_s / self.time_constant_s).exp() };
+            let keep = if lag_s == lag.dt_s { lag.keep[way] } else { (-lag_s / time_constant_s).exp() };
             state.deployment = state.target - (state.target - state.deployment) * keep;
         }
     }
@@ -83,9 +100,9 @@ mod tests {
 
     fn opening_time(servo: &ServoParameters, to: f64) -> f64 {
         let mut state = ServoState::default();
-        let keep = (-1e-3 / servo.time_constant_s).exp();
+        let lag = servo.lag([0.0; 2], 1e-3);
         for step in 0..2000 {
-            servo.lead(&mut state, 1.0, 1e-3, keep);
+            servo.lead(&mut state, 1.0, &lag);
             if state.deployment >= to {
                 return f64::from(step + 1) * 1e-3;
             }
@@ -109,8 +126,8 @@ mod tests {
         let servo = ServoParameters { dead_time_s: 0.021, rate_max_per_s: 6.0, time_constant_s: 0.03 };
         let after = |steps: u32, command: f64, mut state: ServoState| {
             let dt_s = 0.21 / f64::from(steps);
-            (0..steps)
-                .for_each(|_| servo.lead(&mut state, command, dt_s, (-dt_s / servo.time_constant_s).exp()));
+            let lag = servo.lag([0.0; 2], dt_s);
+            (0..steps).for_each(|_| servo.lead(&mut state, command, &lag));
             state
         };
         let (long, short) = (after(1, 1.0, ServoState::default()), after(999, 1.0, ServoState::default()));
@@ -123,12 +140,25 @@ mod tests {
     }
 
     #[test]
+    fn opening_and_closing_may_lag_differently() {
+        let servo = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.1 };
+        let lag = servo.lag([0.1, 0.3], 0.2);
+        let mut state = ServoState::default();
+        servo.lead(&mut state, 1.0, &lag);
+        assert!((state.deployment - (1.0 - (-1.0_f64).exp())).abs() < 1e-12, "0.2 s to open");
+        let open = state.deployment;
+        servo.lead(&mut state, 0.0, &lag);
+        assert!((state.deployment - open * (-0.5_f64).exp()).abs() < 1e-12, "0.4 s to close");
+    }
+
+    #[test]
     fn deployment_stays_between_folded_and_spread() {
         let servo = ServoParameters { dead_time_s: 0.01, rate_max_per_s: 50.0, time_constant_s: 0.01 };
         let mut state = ServoState::default();
+        let lag = servo.lag([0.0; 2], 1e-3);
         let (mut least, mut most) = (1.0_f64, 0.0_f64);
         for k in 0..4000 {
-            servo.lead(&mut state, if k % 400 < 200 { 7.0 } else { -3.0 }, 1e-3, (-0.1_f64).exp());
+            servo.lead(&mut state, if k % 400 < 200 { 7.0 } else { -3.0 }, &lag);
             assert!((0.0..=1.0).contains(&state.deployment));
             most = most.max(state.deployment);
             if k > 400 {

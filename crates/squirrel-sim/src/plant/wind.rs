@@ -7,6 +7,7 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use squirrel_core::effects::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, GustSpectrum};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::nalgebra::Vector3;
 
@@ -34,6 +35,21 @@ pub struct WindParameters {
     pub gust_sigma_m_s: f64,
     /// Shape of the gusts.
     pub gust: GustModel,
+}
+
+impl WindParameters {
+    /// Gusts of an effect alone.
+    pub fn of_gusts(spectrum: GustSpectrum<f64>) -> Self {
+        let (gust_sigma_m_s, gust) = match spectrum {
+            GustSpectrum::GaussMarkov { sigma_m_s } => {
+                (sigma_m_s, GustModel::GaussMarkov { time_constant_s: GUST_TIME_CONSTANT_S })
+            }
+            GustSpectrum::Dryden { sigma_m_s } => {
+                (sigma_m_s, GustModel::Dryden { scale_length_m: GUST_SCALE_LENGTH_M })
+            }
+        };
+        Self { mean_ned_m_s: [0.0; 3], gust_sigma_m_s, gust }
+    }
 }
 
 /// The air at one place, moving in time.

@@ -2,7 +2,7 @@
 //!
 //! Each sensor has a rate, a latency, white noise, a constant bias and its own random stream, so that switching one sensor's
 //! noise on changes nothing in another's. A sample is taken at the sensor's rate and handed over when its latency has
-//! passed, never before.
+//! passed, never before. Effects on sensors (biases that a vehicle file hides from the flight code, more latency) act here.
 
 mod parameters;
 
@@ -13,6 +13,7 @@ pub use parameters::{
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::nalgebra::{UnitQuaternion, Vector3};
 use squirrel_core::stack::{Gnss, Imu, SensorFrame};
@@ -69,7 +70,7 @@ impl<S> Line<S> {
         if time_us >= due {
             let value = sample(&mut self.rng);
             let late = (self.timing.latency_s * 1e6).round() as u64;
-            self.waiting.push_back((time_us + late, value));
+            self.waiting.push_back((time_us.saturating_add(late), value));
             // Periods shorter than the polling interval do not pile up.
             self.taken = (self.taken + 1).max((time_us as f64 * 1e-6 * self.timing.rate_hz) as u64 + 1);
         }
@@ -85,6 +86,7 @@ impl<S> Line<S> {
 #[derive(Debug, Clone)]
 pub struct Sensors {
     parameters: SensorParameters,
+    effects: Effects<f64>,
     imu: Line<Imu>,
     attitude: Line<Rotation<Ned, Body, f32>>,
     gnss: Line<Gnss>,
@@ -98,9 +100,11 @@ fn noise(rng: &mut Pcg64Mcg, sd: f64) -> Vector3<f64> {
 
 impl Sensors {
     /// * `seed` - of the flight; a sensor with its own `seed` does not look at it
-    pub fn new(parameters: SensorParameters, seed: u64) -> Self {
+    pub fn new(mut parameters: SensorParameters, effects: &Effects<f64>, seed: u64) -> Self {
+        parameters.gnss.timing.latency_s += effects.gnss_latency_s();
         Self {
             parameters,
+            effects: *effects,
             imu: Line::new(parameters.imu.timing, seed, 1),
             attitude: Line::new(parameters.attitude.timing, seed, 2),
             gnss: Line::new(parameters.gnss.timing, seed, 3),
@@ -112,6 +116,10 @@ impl Sensors {
     /// What has arrived at a time, us. Times must not run backwards.
     pub fn poll(&mut self, time_us: u64, truth: &Truth) -> (SensorFrame, Option<BatteryReading>) {
         let p = &self.parameters;
+        let time_s = time_us as f64 * 1e-6;
+        let force_bias = self.effects.specific_force_bias(time_s);
+        let heading_bias =
+            Rotation::<Ned, Ned, f64>::from_euler(0.0, 0.0, self.effects.heading_bias_rad(time_s));
         let mut frame = SensorFrame::empty(time_us);
         frame.imu = self.imu.poll(time_us, |rng| Imu {
             omega: In::new(
@@ -122,6 +130,7 @@ impl Sensors {
             ),
             specific_force: In::new(
                 (truth.specific_force.vector
+                    + force_bias.vector
                     + Vector3::from(p.imu.accel_bias_m_s2)
                     + noise(rng, p.imu.accel_noise_m_s2))
                 .map(|x| x as f32),
@@ -129,7 +138,9 @@ impl Sensors {
         });
         frame.attitude = self.attitude.poll(time_us, |rng| {
             let error = Vector3::from(p.attitude.bias_rad) + noise(rng, p.attitude.noise_rad);
-            let estimate = truth.ned_from_body.quaternion * UnitQuaternion::from_scaled_axis(error);
+            let estimate = heading_bias.quaternion
+                * truth.ned_from_body.quaternion
+                * UnitQuaternion::from_scaled_axis(error);
             Rotation::new(UnitQuaternion::new_unchecked(estimate.into_inner().cast::<f32>()))
         });
         frame.gnss = self.gnss.poll(time_us, |rng| Gnss {
@@ -177,7 +188,7 @@ mod tests {
     fn each_sensor_speaks_at_its_rate_and_after_its_latency() {
         let mut p = SensorParameters::ideal();
         p.gnss.timing = Timing { rate_hz: 10.0, latency_s: 0.15, seed: None };
-        let mut sensors = Sensors::new(p, 1);
+        let mut sensors = Sensors::new(p, &Effects::none(), 1);
         let (mut imu, mut fixes) = (0_i32, Vec::new());
         for k in 0..3000u64 {
             let time_us = k * 1000 / 3;
@@ -199,7 +210,7 @@ mod tests {
 
     #[test]
     fn ideal_sensors_tell_the_truth() {
-        let (frame, battery) = Sensors::new(SensorParameters::ideal(), 1).poll(0, &truth());
+        let (frame, battery) = Sensors::new(SensorParameters::ideal(), &Effects::none(), 1).poll(0, &truth());
         assert_eq!(frame.gnss.unwrap().velocity.vector, Vector3::new(4.0, 5.0, 6.0));
         assert_eq!(frame.altitude_m, Some(3.0));
         assert_eq!(frame.imu.unwrap().omega.vector, Vector3::new(0.1, 0.2, 0.3));
@@ -212,7 +223,7 @@ mod tests {
         p.baro.noise_m = 0.2;
         p.baro.bias_m = 1.0;
         p.baro.timing.rate_hz = 1000.0;
-        let mut sensors = Sensors::new(p, 3);
+        let mut sensors = Sensors::new(p, &Effects::none(), 3);
         let n = 20_000u32;
         let errors: Vec<f64> = (0..n)
             .filter_map(|k| sensors.poll(u64::from(k) * 1000, &truth()).0.altitude_m)
@@ -229,7 +240,7 @@ mod tests {
         let gyro = |baro_noise: f64| {
             let mut p = SensorParameters::default();
             p.baro.noise_m = baro_noise;
-            let mut sensors = Sensors::new(p, 5);
+            let mut sensors = Sensors::new(p, &Effects::none(), 5);
             (0..100u64)
                 .filter_map(|k| sensors.poll(k * 3334, &truth()).0.imu)
                 .map(|i| i.omega.vector.x)

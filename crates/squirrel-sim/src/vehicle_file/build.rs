@@ -13,7 +13,7 @@ use squirrel_core::control::position::{AngleLaw, PositionGains};
 use squirrel_core::control::twcc::{ForceModel, Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
-use squirrel_core::effects::{Effects, Kind};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, forms};
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::stack::StackParameters;
@@ -209,17 +209,29 @@ fn effects(
             let known = Effects::<f64>::NAMES.join(", ");
             return Err(format!("effects.{name}: no such effect; known are {known}"));
         };
+        let names = forms(found.parameters);
+        // Keys may depend on the form, so it is looked at first; an impossible one is refused with its field below.
+        let form = match table.get(FORM) {
+            Some(EffectValue::Name(form)) => form.as_str(),
+            _ => names.first().copied().unwrap_or_default(),
+        };
         for (key, value) in &table {
             let field = format!("effects.{name}.{key} = {value}");
             let Some(i) = found.parameters.iter().position(|p| p.key == key) else {
                 let known: Vec<_> = found.parameters.iter().map(|p| p.key).collect();
                 return Err(format!("{field}: no such parameter; known are {}", known.join(", ")));
             };
+            if names.contains(&form) && !found.parameters[i].exists_in(form) {
+                let forms = found.parameters[i].forms.unwrap_or_default().join(", ");
+                return Err(format!("{field}: not in the form \"{form}\", only in {forms}"));
+            }
             found.values[i] = effect_value(value, found.parameters[i].kind, rotor_count)
                 .map_err(|reason| format!("{field}: {reason}"))?;
         }
-        if let Some(missing) = found.parameters.iter().find(|p| !table.contains_key(p.key)) {
-            return Err(format!("effects.{name}.{}: missing", missing.key));
+        let needed = |p: &&EffectParameter| p.key != FORM && p.exists_in(form) && !table.contains_key(p.key);
+        if let Some(missing) = found.parameters.iter().find(needed) {
+            let why = missing.forms.map_or(String::new(), |_| format!("; the form \"{form}\" needs it"));
+            return Err(format!("effects.{name}.{}: missing{why}", missing.key));
         }
     }
     Ok(effects)

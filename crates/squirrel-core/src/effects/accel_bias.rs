@@ -1,0 +1,35 @@
+//! Bias of the accelerometer: `f_measured = f + b`.
+//!
+//! Form `drifting`: `b + drift t`, `t` the time since the flight began.
+
+use super::{Effect, EffectParameter, is};
+use crate::frames::{Body, In};
+use crate::math::Real;
+use nalgebra::Vector3;
+
+const DRIFTING: usize = 1;
+
+/// Bias along the body axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AccelBias<T>(pub(super) [T; 7]);
+
+impl<T: Real> Effect<T> for AccelBias<T> {
+    const NAME: &'static str = "accel_bias";
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("bias_x_m_s2", 0.15, 0.6),
+        EffectParameter::signed("bias_y_m_s2", 0.15, 0.6),
+        EffectParameter::signed("bias_z_m_s2", 0.15, 0.6),
+        EffectParameter::signed("drift_x_m_s3", 3e-3, 0.03).only_in(&["drifting"]),
+        EffectParameter::signed("drift_y_m_s3", 3e-3, 0.03).only_in(&["drifting"]),
+        EffectParameter::signed("drift_z_m_s3", 3e-3, 0.03).only_in(&["drifting"]),
+        EffectParameter::form(&["constant", "drifting"]),
+    ];
+
+    #[inline(always)]
+    fn specific_force_bias(&self, time_s: T) -> In<Body, T> {
+        let [x, y, z, drift_x, drift_y, drift_z, form] = self.0;
+        let bias = Vector3::new(x, y, z);
+        let drift = Vector3::new(drift_x, drift_y, drift_z);
+        In::new(if is(form, DRIFTING) { bias + drift * time_s } else { bias })
+    }
+}

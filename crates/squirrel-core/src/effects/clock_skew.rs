@@ -1,0 +1,17 @@
+//! The clock that stamps commands runs fast: a command of the time `t` is stamped `t (1 + s)`.
+
+use super::{Effect, EffectParameter};
+use crate::math::{Real, real};
+
+/// How fast, in parts per million.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockSkew<T>(pub(super) [T; 1]);
+
+impl<T: Real> Effect<T> for ClockSkew<T> {
+    const NAME: &'static str = "clock_skew";
+    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed("skew_ppm", 400.0, 1500.0)];
+
+    fn command_clock_s(&self, time_s: T) -> T {
+        time_s * (T::one() + self.0[0] * real(1e-6))
+    }
+}

@@ -1,0 +1,26 @@
+//! Bias of the heading: the attitude is measured turned by `+b` about down, `psi_measured = psi + b`.
+//!
+//! Form `drifting`: `b + drift t`, `t` the time since the flight began.
+
+use super::{Effect, EffectParameter, is};
+use crate::math::Real;
+
+const DRIFTING: usize = 1;
+
+/// Heading error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HeadingBias<T>(pub(super) [T; 3]);
+
+impl<T: Real> Effect<T> for HeadingBias<T> {
+    const NAME: &'static str = "heading_bias";
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("bias_rad", 0.087, 0.35),
+        EffectParameter::signed("drift_rad_per_s", 2e-3, 0.01).only_in(&["drifting"]),
+        EffectParameter::form(&["constant", "drifting"]),
+    ];
+
+    fn heading_bias_rad(&self, time_s: T) -> T {
+        let [bias, drift, form] = self.0;
+        if is(form, DRIFTING) { bias + drift * time_s } else { bias }
+    }
+}

@@ -1,0 +1,332 @@
+//! Every effect of the catalogue, in every form.
+
+use super::*;
+use crate::vehicle::fixtures::squirrel;
+use crate::vehicle::{MAX_ROTORS, Vehicle};
+use nalgebra::Vector3;
+
+const HEIGHT_M: f64 = 0.3;
+const TIME_S: f64 = 10.0;
+
+fn air() -> Air<f64> {
+    Air::new(In::new(Vector3::new(3.0, -2.0, 1.0)), In::new(Vector3::new(0.4, -0.3, 0.2)))
+}
+const WING: Wing<f64> =
+    Wing { area_per_side_m2: 0.02, normal_force_slope: 2.0, lateral_arm_m: 0.1, time_constant_s: 0.1 };
+fn situation(air: &Air<f64>) -> Situation<'_, f64> {
+    Situation {
+        air,
+        height_m: HEIGHT_M,
+        thrust_n: 5.0,
+        force: In::new(Vector3::new(0.2, 0.1, -5.0)),
+        rotor_spin_rad_s: 100.0,
+        rotor_spin_rate_rad_s2: -4000.0,
+        wing: Some(&WING),
+        deployment: [1.0, 0.5],
+    }
+}
+fn vehicle() -> Vehicle<f64> {
+    Vehicle::new(squirrel()).unwrap()
+}
+/// Steady speeds of two rotors, asked for 1500 and 2100 rad/s of 3000 at 13 V of 14.8.
+fn targets(effects: &Effects<f64>) -> [f64; 2] {
+    let mut target = [0.0; MAX_ROTORS];
+    (target[0], target[1]) = (1500.0, 2100.0);
+    let supply = Supply { voltage_v: 13.0, reference_voltage_v: 14.8, speed_max_rad_s: 3000.0 };
+    effects.rotor_target(&mut target, &supply);
+    assert_eq!(target[2..], [0.0; MAX_ROTORS - 2]);
+    [target[0], target[1]]
+}
+/// Every way in which effects can act, as one list of numbers.
+fn actions(effects: &Effects<f64>) -> Vec<f64> {
+    let air = air();
+    let wrench = effects.wrench(&situation(&air));
+    let altered = effects.alter(&vehicle()).unwrap();
+    let rotors = altered.rotor_wrench_per_speed_squared();
+    let gust = match effects.gust() {
+        None => 0.0,
+        Some(GustSpectrum::GaussMarkov { sigma_m_s }) => sigma_m_s,
+        Some(GustSpectrum::Dryden { sigma_m_s }) => -sigma_m_s,
+    };
+    let load = effects.pendulum().map_or(Vector3::zeros(), |load| {
+        let mut state = PendulumState::at_rest();
+        load.lead(&mut state, In::new(Vector3::new(1.0, 0.0, 0.0)), 0.2);
+        load.force(&state).vector
+    });
+    let mut all = vec![
+        gust,
+        effects.command_latency_s(),
+        effects.command_clock_s(TIME_S),
+        effects.heading_bias_rad(TIME_S),
+        effects.gnss_latency_s(),
+        effects.added_mass_kg(),
+        effects.thrust_factor(&air, HEIGHT_M),
+        altered.inverse_mass(),
+    ];
+    all.extend(targets(effects));
+    all.extend(effects.rotor_extra_time_constant_s());
+    all.extend(effects.wing_extra_time_constant_s());
+    for list in [rotors.thrust, rotors.roll, rotors.pitch, rotors.yaw] {
+        all.extend(list);
+    }
+    all.extend(altered.inertia_inverse().iter());
+    for v in [
+        wrench.force.vector,
+        wrench.moment.vector,
+        effects.wind(HEIGHT_M).vector,
+        effects.specific_force_bias(TIME_S).vector,
+        effects.accelerometer_position().vector,
+        load,
+    ] {
+        all.extend(v.iter());
+    }
+    all
+}
+/// Names of all effects, each with the number of one of its forms.
+fn names_and_forms() -> Vec<(&'static str, usize)> {
+    let each = Effects::<f64>::NAMES.iter().flat_map(|name| {
+        let forms = forms(Effects::<f64>::parameters(name).unwrap()).len().max(1);
+        (0..forms).map(move |form| (*name, form))
+    });
+    each.collect()
+}
+fn sized(name: &str, form: usize, size: fn(f64, f64) -> f64) -> Effects<f64> {
+    let mut effects = Effects::none();
+    let found = effects.insert(name).unwrap();
+    for (value, parameter) in found.values.iter_mut().zip(found.parameters) {
+        *value = match parameter.kind {
+            Kind::Size { smallest, largest, .. } => size(smallest, largest),
+            Kind::Rotor => 2.0,
+            Kind::OneOf(_) if parameter.key == FORM => form as f64,
+            Kind::OneOf(_) => 1.0,
+        };
+    }
+    effects
+}
+/// An effect with its first parameters.
+fn with(name: &str, values: &[f64]) -> Effects<f64> {
+    let mut effects = Effects::<f64>::none();
+    effects.insert(name).unwrap().values[..values.len()].copy_from_slice(values);
+    effects
+}
+/// An effect with its first parameters in a form.
+fn formed(name: &str, form: &str, values: &[f64]) -> Effects<f64> {
+    let mut effects = with(name, values);
+    let found = effects.get_mut(name).unwrap();
+    let last = found.values.len() - 1;
+    found.values[last] = forms(found.parameters).iter().position(|f| *f == form).unwrap() as f64;
+    effects
+}
+fn close(a: f64, b: f64, what: &str) {
+    assert!((a - b).abs() < 1e-12 * b.abs().max(1.0), "{what}: {a} for {b}");
+}
+
+/// Zero means absent, for every effect of the catalogue.
+#[test]
+fn an_effect_of_size_zero_changes_nothing() {
+    for (name, form) in names_and_forms() {
+        assert_eq!(actions(&sized(name, form, |_, _| 0.0)), actions(&Effects::none()), "{name}, {form}");
+    }
+}
+
+/// A present effect acts somewhere, so that no file can name one that does nothing.
+#[test]
+fn every_effect_acts_at_its_smallest_size() {
+    for (name, form) in names_and_forms() {
+        let acts = actions(&sized(name, form, |smallest, _| smallest));
+        assert_ne!(acts, actions(&Effects::none()), "{name}, {form}");
+        if form > 0 {
+            assert_ne!(
+                acts,
+                actions(&sized(name, 0, |smallest, _| smallest)),
+                "{name}: form {form} is the standard"
+            );
+        }
+    }
+    assert!(Effects::<f64>::none().insert("phlogiston").is_none());
+}
+
+#[test]
+fn ranges_are_ranges_and_the_largest_sizes_are_flyable() {
+    for (name, form) in names_and_forms() {
+        let mut effects = sized(name, form, |_, largest| largest);
+        assert!(actions(&effects).iter().all(|x| x.is_finite()), "{name}");
+        for parameter in effects.get_mut(name).unwrap().parameters {
+            if let Kind::Size { smallest, largest, .. } = parameter.kind {
+                assert!(smallest > 0.0 && smallest < largest, "{name}.{}", parameter.key);
+            }
+        }
+    }
+}
+
+/// One number for each effect that makes a force or changes the airframe, worked out by hand from its equation.
+#[test]
+fn sizes_and_signs_by_hand() {
+    let air = air();
+    let wrench = |name: &str, values: &[f64]| with(name, values).wrench(&situation(&air));
+    let factor = |name: &str, values: &[f64]| with(name, values).thrust_factor(&air, HEIGHT_M);
+    let altered = |name: &str, values: &[f64]| with(name, values).alter(&vehicle()).unwrap();
+
+    let drag = wrench("linear_drag", &[0.1]).force.vector;
+    assert!((drag - Vector3::new(-0.3, 0.2, 0.0)).norm() < 1e-12);
+    close(
+        wrench("quadratic_drag", &[0.01]).force.vector.x,
+        -0.5 * 1.225 * 0.01 * 14.0_f64.sqrt() * 3.0,
+        "drag area",
+    );
+    // R = 0.4 m at 0.3 m: 1 / (1 - 0.16 / 1.44).
+    close(factor("ground_effect", &[0.4]), 1.125, "ground effect");
+    close(
+        with("ground_effect", &[0.4]).thrust_factor(&air, 0.0),
+        4.0 / 3.0,
+        "height floored at half the radius",
+    );
+    close(
+        factor("translational_lift", &[1e-3]),
+        1.0 + 1e-3 * 13.0 / (1.0 + 0.004 * 13.0),
+        "translational lift",
+    );
+    close(factor("axial_inflow", &[0.03]), 1.03, "descending air lifts");
+    // Centre of mass ahead: thrust acts behind it and pitches the nose down.
+    close(wrench("cg_offset", &[0.01, 0.0]).moment.vector.y, -0.05, "cg ahead");
+    close(wrench("cg_offset", &[0.0, 0.01]).moment.vector.x, 0.05, "cg to the right");
+    let tilted = wrench("thrust_misalignment", &[0.02, -0.01]).force.vector;
+    assert!((tilted - Vector3::new(-0.1, 0.05, 0.0)).norm() < 1e-12);
+    let flap = wrench("flapping_moment", &[2e-3]).moment.vector;
+    assert!((flap - Vector3::new(4e-3, 6e-3, 0.0)).norm() < 1e-12, "forward flight pitches up");
+    let damped = wrench("angular_damping", &[0.01]).moment.vector;
+    assert!((damped - Vector3::new(-4e-3, 3e-3, -1e-3)).norm() < 1e-12);
+
+    // L: w = 1 - 0.04, R: w = 1 + 0.04 at half deployment; 1/2 rho S c_N V = 0.0245 * sqrt(14).
+    let slope = 0.5 * 1.225 * 0.02 * 2.0 * 14.0_f64.sqrt();
+    let wing = wrench("wing_membrane", &[0.2, 0.0]);
+    close(wing.force.vector.z, -0.2 * slope * (0.96 + 0.52), "wing gain");
+    close(wing.moment.vector.x, 0.2 * slope * (0.96 - 0.52) * 0.1, "and its roll");
+    let wing = wrench("wing_membrane", &[0.2, 0.05]);
+    close(wing.force.vector.z, -slope * (0.2 * 1.48 + 1.2 * 0.05 * 3.0 * 1.5), "gain and angle of attack");
+    let weak = wrench("wing_asymmetry", &[0.0, 0.3]);
+    close(weak.force.vector.z, 0.3 * slope * 0.96, "the left wing lifts less");
+    close(weak.moment.vector.x, -0.3 * slope * 0.96 * 0.1, "so the vehicle rolls left");
+    close(wrench("wing_asymmetry", &[1.0, 0.3]).moment.vector.x, 0.3 * slope * 0.52 * 0.1, "or right");
+    let gyro = wrench("rotor_gyro_torque", &[1e-5]).moment.vector;
+    assert!((gyro - Vector3::new(0.3 * 1e-3, 0.4 * 1e-3, 0.04)).norm() < 1e-12, "{gyro}");
+
+    close(1.0 / altered("mass_error", &[0.1]).inverse_mass(), 0.548 * 1.1, "mass");
+    close(
+        1.0 / altered("inertia_error", &[1.0, 0.2]).inertia_inverse()[(1, 1)],
+        4.68e-3 * 1.2,
+        "inertia about y",
+    );
+    let nominal = *vehicle().rotor_wrench_per_speed_squared();
+    let strong = *altered("thrust_coefficient", &[0.1]).rotor_wrench_per_speed_squared();
+    close(strong.roll[0] / nominal.roll[0], 1.1, "thrust scales roll");
+    close(strong.yaw[0] / nominal.yaw[0], 1.0, "and not yaw");
+    let weak = *altered("weak_rotor", &[3.0, 0.2]).rotor_wrench_per_speed_squared();
+    close(weak.thrust[2] / nominal.thrust[2], 0.8, "the third rotor");
+    close(weak.yaw[2] / nominal.yaw[2], 0.8, "and its torque");
+    close(weak.thrust[1] / nominal.thrust[1], 1.0, "no other");
+    let twisted = *altered("yaw_torque_coeff", &[-0.3]).rotor_wrench_per_speed_squared();
+    close(twisted.yaw[1] / nominal.yaw[1], 0.7, "yaw torque");
+}
+
+#[test]
+fn an_impossible_alteration_is_refused() {
+    let mut effects = Effects::<f64>::none();
+    effects.insert("mass_error").unwrap().values[0] = -1.0;
+    assert!(effects.alter(&vehicle()).unwrap_err().to_string().starts_with("mass.mass_kg = 0"));
+}
+
+/// What acts on sensors, commands and servos, and the other forms, worked out by hand.
+#[test]
+fn the_other_forms_by_hand() {
+    let air = air();
+    let factor =
+        |name: &str, form: &str, values: &[f64]| formed(name, form, values).thrust_factor(&air, HEIGHT_M);
+    let wrench = |name: &str, form: &str, values: &[f64]| formed(name, form, values).wrench(&situation(&air));
+
+    let drag = wrench("linear_drag", "anisotropic", &[0.1, 0.2, 0.05]).force.vector;
+    assert!((drag - Vector3::new(-0.36, 0.16, -0.05)).norm() < 1e-12);
+    let drag = wrench("quadratic_drag", "anisotropic", &[0.02, -0.5, 0.03]).force.vector;
+    let pressure = 0.5 * 1.225 * 14.0_f64.sqrt();
+    assert!((drag - Vector3::new(-0.01 * 3.0, 0.03 * 2.0, -0.03) * pressure).norm() < 1e-12);
+    close(factor("ground_effect", "exponential", &[0.3, 0.2]), 1.0 + 0.2 * (-1.0_f64).exp(), "ground");
+    close(factor("translational_lift", "linear", &[0.0, 0.01]), 1.0 + 0.01 * 13.0_f64.sqrt(), "linear lift");
+    close(factor("translational_lift", "quadratic", &[1e-3]), 1.013, "quadratic lift");
+    close(factor("axial_inflow", "quadratic", &[0.03, -0.01]), 1.02, "inflow");
+    let damped = wrench("angular_damping", "quadratic", &[0.0, 0.01]).moment.vector;
+    assert!((damped - Vector3::new(-1.6e-3, 0.9e-3, -0.2e-3)).norm() < 1e-12, "{damped}");
+    let flap = wrench("flapping_moment", "saturating", &[2e-3, 13.0_f64.sqrt()]).moment.vector;
+    assert!((flap - Vector3::new(2e-3, 3e-3, 0.0)).norm() < 1e-12, "half at the scale");
+    let spatial = wrench("cg_offset", "spatial", &[0.0, 0.0, 0.01]).moment.vector;
+    assert!((spatial - Vector3::new(1e-3, -2e-3, 0.0)).norm() < 1e-12, "{spatial}");
+    let half = wrench("wing_membrane", "speed_dependent", &[0.2, 0.0, 2.0 * 14.0_f64.sqrt()]).force;
+    close(half.vector.z, with("wing_membrane", &[0.1, 0.0]).wrench(&situation(&air)).force.vector.z, "half");
+
+    let wind = formed("constant_wind", "log_profile", &[4.0, -2.0, 0.1]);
+    close(wind.wind(10.0).vector.x, 4.0, "the wind at 10 m");
+    close(wind.wind(1.0).vector.y, -1.0, "half of it at 1 m over 0.1 m");
+    close(wind.wind(-5.0).vector.x, 4.0 * 2.0_f64.ln() / 100.0_f64.ln(), "floored at twice the roughness");
+    let ratio = 13.0_f64 / 14.8;
+    let [slow, fast] = targets(&with("battery_sag", &[0.8]));
+    close(slow, 1500.0 * ratio.powf(0.8), "power law");
+    close(fast / slow, 1.4, "for all rotors");
+    close(
+        targets(&formed("battery_sag", "linear", &[0.8]))[0],
+        1500.0 * (1.0 + 0.8 * (ratio - 1.0)),
+        "linear",
+    );
+    let [slow, fast] = targets(&formed("battery_sag", "load_dependent", &[0.8, 1.0]));
+    close(slow, 1500.0 * ratio.powf(0.8), "at half speed as the power law");
+    close(fast, 2100.0 * ratio.powf(0.8 * 1.2), "and more above");
+
+    let lag = |effects: &Effects<f64>| {
+        [effects.rotor_extra_time_constant_s(), effects.wing_extra_time_constant_s()]
+    };
+    assert_eq!(lag(&with("motor_lag", &[0.04])), [[0.04, 0.04], [0.0, 0.0]]);
+    assert_eq!(lag(&formed("motor_lag", "asymmetric", &[0.04, 0.5])), [[0.02, 0.06], [0.0, 0.0]]);
+    assert_eq!(lag(&formed("motor_lag", "asymmetric", &[0.04, 2.0]))[0], [0.0, 0.12], "not below 0");
+    assert_eq!(lag(&formed("wing_servo_lag", "asymmetric", &[0.25, -0.5])), [[0.0, 0.0], [0.375, 0.125]]);
+
+    assert_eq!(with("actuation_latency", &[0.03]).command_latency_s(), 0.03);
+    assert_eq!(with("gnss_latency", &[0.2]).gnss_latency_s(), 0.2);
+    close(with("clock_skew", &[1000.0]).command_clock_s(40.0), 40.04, "a fast clock");
+    assert_eq!(with("added_mass", &[0.1]).added_mass_kg(), 0.1);
+    assert_eq!(with("heading_bias", &[0.2, 0.01]).heading_bias_rad(TIME_S), 0.2);
+    close(formed("heading_bias", "drifting", &[0.2, 0.01]).heading_bias_rad(TIME_S), 0.3, "drifting");
+    let bias = formed("accel_bias", "drifting", &[0.2, 0.3, 0.4, 0.01, 0.0, -0.02]);
+    assert!((bias.specific_force_bias(TIME_S).vector - Vector3::new(0.3, 0.3, 0.2)).norm() < 1e-12);
+    assert_eq!(with("gust", &[1.0]).gust(), Some(GustSpectrum::GaussMarkov { sigma_m_s: 1.0 }));
+    assert_eq!(formed("gust", "dryden", &[1.0]).gust(), Some(GustSpectrum::Dryden { sigma_m_s: 1.0 }));
+    let load = with("payload_swing", &[0.1, 0.5]).pendulum().unwrap();
+    assert_eq!(load, Pendulum { mass_kg: 0.1, length_m: 0.5, damping_per_s: 0.1 });
+    assert_eq!(formed("payload_swing", "damped", &[0.1, 0.5, 0.7]).pendulum().unwrap().damping_per_s, 0.7);
+}
+
+/// The standard form is the first and has the keys that vehicle files without `form` use.
+#[test]
+fn forms_choose_among_parameters() {
+    let keys = |name: &str, form: &str| -> Vec<&str> {
+        let parameters = Effects::<f64>::parameters(name).unwrap();
+        parameters.iter().filter(|p| p.exists_in(form) && p.key != FORM).map(|p| p.key).collect()
+    };
+    assert_eq!(
+        forms(Effects::<f64>::parameters("translational_lift").unwrap()),
+        ["saturating", "linear", "quadratic"]
+    );
+    assert_eq!(keys("translational_lift", "saturating"), ["gain_s2_per_m2"]);
+    assert_eq!(keys("translational_lift", "linear"), ["gain_s_per_m"]);
+    assert!(forms(Effects::<f64>::parameters("added_mass").unwrap()).is_empty());
+    assert_eq!(Effects::<f64>::NAMES.len(), 29);
+    for name in Effects::<f64>::NAMES {
+        let parameters = Effects::<f64>::parameters(name).unwrap();
+        let names = forms(parameters);
+        assert!(names.is_empty() || parameters.last().unwrap().key == FORM, "{name}: form comes last");
+        for parameter in parameters {
+            assert!(
+                parameter.forms.unwrap_or(&[]).iter().all(|f| names.contains(f)),
+                "{name}.{}",
+                parameter.key
+            );
+        }
+    }
+}

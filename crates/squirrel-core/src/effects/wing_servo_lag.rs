@@ -1,0 +1,27 @@
+//! Lag of the wing servos on top of the vehicle's own: `dep' = (command - dep) / (tau + extra)`.
+//!
+//! Form `asymmetric`: `extra (1 - e)` when opening and `extra (1 + e)` when closing.
+
+use super::{Effect, EffectParameter, is, up_and_down};
+use crate::math::Real;
+
+const ASYMMETRIC: usize = 1;
+
+/// Extra first-order lag of deployment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct WingServoLag<T>(pub(super) [T; 3]);
+
+impl<T: Real> Effect<T> for WingServoLag<T> {
+    const NAME: &'static str = "wing_servo_lag";
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::size("extra_time_constant_s", 0.12, 0.5),
+        EffectParameter::signed("asymmetry", 0.2, 0.8).only_in(&["asymmetric"]),
+        EffectParameter::form(&["symmetric", "asymmetric"]),
+    ];
+
+    #[inline(always)]
+    fn wing_extra_time_constant_s(&self) -> [T; 2] {
+        let [extra_s, asymmetry, form] = self.0;
+        up_and_down(extra_s, if is(form, ASYMMETRIC) { asymmetry } else { T::zero() })
+    }
+}
