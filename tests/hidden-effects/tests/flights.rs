@@ -26,7 +26,7 @@ fn edge_speeds(log: &FlightLog) -> Vec<f64> {
 #[test]
 fn rich_flights_go_fast_climb_and_open_the_wings_at_speed() {
     for index in 0..6 {
-        let case = Case::draw(Set::None, index, 3);
+        let case = Case::draw(Set::None, 2 * index, 3);
         let flights: Vec<_> = (0..3).map(|number| case.flight(number).unwrap()).collect();
         for log in &flights {
             let (north, east) =
@@ -49,7 +49,7 @@ fn rich_flights_go_fast_climb_and_open_the_wings_at_speed() {
 #[test]
 fn calm_flights_stay_slow_and_folded() {
     for index in 0..6 {
-        let log = Case::draw(Set::Calm, index, 3).flight(0).unwrap();
+        let log = Case::draw(Set::Calm, 2 * index, 3).flight(0).unwrap();
         let speeds = [0, 1].map(|axis| largest(&column(&log, "gnss.velocity_ned_m_s", axis)));
         // Noise of the receiver and its largest of 400 samples on top of 2 m/s.
         assert!(speeds[0].hypot(speeds[1]) < 2.9 && edge_speeds(&log).is_empty(), "{index}: {speeds:?}");
