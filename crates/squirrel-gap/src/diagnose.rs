@@ -49,6 +49,7 @@ pub(crate) struct Details {
     pub(crate) confusability: (Vec<&'static str>, Vec<Vec<f64>>),
     pub(crate) naming: Naming,
     pub(crate) held_out: Option<HeldOut>,
+    pub(crate) labels: Vec<String>,
 }
 
 /// Errors on held-out flights.
@@ -115,6 +116,7 @@ pub fn diagnose(
         confusability: search.confusability(&naming.found.best),
         naming,
         held_out: proof,
+        labels: catalogue.parameters.iter().map(|p| format!("{} {} {:?}", catalogue.candidates[p.candidate].effect, p.key, catalogue.candidates[p.candidate].fixed)).collect(),
     };
     Ok(Diagnosis { verdict, domain, details: Some(details) })
 }
@@ -322,4 +324,15 @@ fn covered(predictor: &Predictor) -> Vec<Covered> {
     push("tilt", &mut tilt, "deg", logged);
     push("voltage", &mut voltage, "V", predictor.has_voltage());
     all
+}
+
+impl Diagnosis {
+    #[doc(hidden)]
+    pub fn debug(&self) -> String {
+        let Some(d) = &self.details else { return String::new() };
+        let bands: Vec<String> = d.naming.leftover.bands.iter().map(|b| format!("{}{} {:.2} {:.2}", b.flight, b.channel, b.slow / b.slow_floor, b.whole / b.whole_floor)).collect();
+        let h: Vec<String> = d.held_out.iter().flat_map(|h| (0..12).map(|c| format!("{:.2}/{:.2}", (h.nominal.mse()[c] / h.floor.mse()[c]), (h.fitted.mse()[c] / h.floor.mse()[c])))).collect();
+        let sp: Vec<String> = d.naming.point.base.iter().enumerate().filter(|(i, x)| x.abs() > 0.7 * d.naming.found.linear.tolerance[*i]).map(|(i, x)| format!("{} {:.1}", d.labels.get(i).map_or("sensor", |s| s), x / d.naming.found.linear.tolerance[i])).collect();
+        format!("held {h:?}\n  spikes {sp:?}\n  {:?} {:?} {:?} {:?}", d.naming.leftover.excess, d.naming.leftover.families, d.naming.leftover.line, bands)
+    }
 }

@@ -67,7 +67,7 @@ impl Errors12 {
         (self.squared[bin][channel] / self.count[bin].max(1.0)).sqrt()
     }
     /// Mean squared error by channel over the first second.
-    fn mse(&self) -> Errors {
+    pub(crate) fn mse(&self) -> Errors {
         let n: f64 = self.count[..COUNTED].iter().sum();
         self.squared[..COUNTED].iter().sum::<Errors>() / n.max(1.0)
     }

@@ -12,7 +12,14 @@ fn explore() {
         let id = case.file_name().unwrap().to_str().unwrap().to_owned();
         if only.as_ref().is_some_and(|o| !id.starts_with(o.as_str())) { continue; }
         let flights: Vec<_> = ["flight00", "flight01"].iter().map(|f| ((*f).to_owned(), imported("practice.toml", &case.join("train").join(f)))).collect();
+        let held: Vec<_> = ["flight00"].iter().map(|f| (format!("held-{f}"), imported("practice.toml", &case.join("holdout").join(f)))).collect();
         println!("{id} {}", answers[&id]);
-        println!("{}", squirrel_gap::name::explore(&vehicle("practice.toml"), &flights));
+        let t0 = std::time::Instant::now();
+        let last = std::cell::Cell::new(0.0);
+        let d = squirrel_gap::diagnose(&vehicle("practice.toml"), &flights, &held, &|what| { let t = t0.elapsed().as_secs_f64(); if t - last.get() > 0.3 || what != "naming" { println!("    {t:.2} {what}"); last.set(t);} }).unwrap();
+        println!("  {:.2} s {:?} {}", t0.elapsed().as_secs_f64(), d.verdict.verdict, d.verdict.words);
+        println!("  {:?}", d.verdict.alternatives);
+        println!("  {:?}", d.verdict.gap);
+        println!("  {}", d.debug());
     }
 }

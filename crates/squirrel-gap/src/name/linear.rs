@@ -1,7 +1,7 @@
 //! The predictor linearised about a set of effects: one column a parameter, by difference of two predictions.
 
 use super::evidence::Gram;
-use super::parameters::{Candidate, Catalogue};
+use super::parameters::{Candidate, Catalogue, Parameter};
 use super::whiten::Whitener;
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
@@ -111,7 +111,7 @@ fn add(effects: &mut Effects<f64>, candidate: &Candidate, slot: usize, x: f64) {
     let present = effects.has(candidate.effect);
     if let Some(found) = effects.insert(candidate.effect) {
         if !present {
-            for (slot, value) in &candidate.fixed {
+            for (slot, value) in candidate.fixed.iter().chain(&candidate.shape) {
                 found.values[*slot] = *value;
             }
         }
@@ -123,6 +123,11 @@ impl Catalogue {
     /// Numbers beside the members in a [`Point`].
     pub(crate) fn columns(&self, predictor: &Predictor) -> usize {
         self.parameters.len() + SENSOR_COLUMNS * predictor.names.len()
+    }
+
+    /// Whether a parameter has no slope at zero, so that nothing linear holds near it.
+    pub(crate) fn starts_flat(&self, parameter: &Parameter) -> bool {
+        ["ground_effect", "payload_swing"].contains(&self.candidates[parameter.candidate].effect)
     }
 
     /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the same choices.
@@ -154,6 +159,7 @@ impl Linear {
     ) -> Result<Self, GapError> {
         let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
         let n = catalogue.columns(predictor);
+        let first = point.base.iter().all(|x| *x == 0.0) && point.members.is_empty();
         let (mut raw, mut tolerance, mut widest) = (Vec::new(), Vec::new(), Vec::new());
         for column in 0..n {
             let mut moved = point.clone();
@@ -162,16 +168,18 @@ impl Linear {
             let member = parameter.and_then(|p| {
                 moved.members.iter_mut().find(|m| m.candidate == p.candidate).map(|m| &mut m.values[p.slot])
             });
-            // From nothing, a secant to a typical size: some effects have no slope there. From a size, a small step.
+            // From nothing, a secant to a typical size: it ranks large effects well, and some have no slope there. Once what
+            // is large has a name, a step of the tolerance: what is left stays inside it.
             let step = match (parameter, member) {
                 (Some(p), Some(value)) => {
                     *value += 0.1 * p.smallest;
                     0.1 * p.smallest
                 }
                 (Some(p), None) => {
-                    let typical = (p.smallest * p.largest).sqrt();
-                    moved.base[column] += typical;
-                    typical
+                    let far = first || catalogue.starts_flat(p);
+                    let step = if far { (p.smallest * p.largest).sqrt() } else { p.tolerance.max(0.1 * p.smallest) };
+                    moved.base[column] += step;
+                    step
                 }
                 (None, _) => {
                     let sd = [TILT_RAD, TILT_RAD, HEIGHT_M][sensor % SENSOR_COLUMNS];

@@ -4,7 +4,6 @@
 //! deviation of the nominal number that the effect would change, and, where the effect is hypothesised, its **slab**, as wide
 //! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
 
-use crate::predictor::hooks::*;
 use crate::GapError;
 use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind};
 use squirrel_sim::plant::WingPlant;

@@ -1,6 +1,5 @@
 //! The search for the set of effects with the most evidence: forward, drop, swap, each step refined through the simulator.
 
-use crate::predictor::hooks::*;
 use super::evidence::{Gram, Posterior, dot};
 use super::linear::{Linear, Member, Point, hypothesis};
 use super::parameters::{Catalogue, SLAB_OF_LARGEST};
@@ -85,8 +84,7 @@ impl Search<'_> {
     pub(crate) fn settled(&self, set: &Scored) -> Point {
         let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
         for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
-            // These two are far from linear where they are small.
-            if ["ground_effect", "payload_swing"].contains(&self.catalogue.candidates[parameter.candidate].effect) {
+            if self.catalogue.starts_flat(parameter) {
                 *x = 0.0;
             }
         }
@@ -252,30 +250,36 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn score(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
-        let mut at = members.to_vec();
-        let mut best: Option<Scored> = None;
+        let mut best = self.evaluate(linear, members)?;
+        let mut share = 1.0;
         for _ in 0..STEPS_MAX {
-            let scored = self.evaluate(linear, &at)?;
-            let mut next = at.clone();
+            let mut next = best.members.clone();
             let mut moved: f64 = 0.0;
-            for (column, (member, slot)) in scored.free.iter().enumerate() {
-                let (smallest, largest, signed) = self.range(&at[*member], *slot);
+            for (column, (member, slot)) in best.free.iter().enumerate() {
+                let (smallest, largest, signed) = self.range(&next[*member], *slot);
                 let low = if signed { -2.0 * largest } else { 0.02 * smallest };
                 let value = &mut next[*member].values[*slot];
-                let target = scored.posterior.mean[column].clamp(low, 2.0 * largest);
-                moved = moved.max((target - *value).abs() / smallest);
-                *value = target;
+                let target = best.posterior.mean[column].clamp(low, 2.0 * largest);
+                let step = share * (target - *value);
+                moved = moved.max(step.abs() / smallest);
+                *value += step;
             }
-            let better = best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence);
-            if better {
-                best = Some(scored);
-            }
-            if moved < 0.01 || !better {
+            if moved < 0.01 {
                 break;
             }
-            at = next;
+            let scored = self.evaluate(linear, &next)?;
+            if std::env::var("GN").is_ok() { eprintln!("GN {:?} {:.2} -> {:?} {:.2} share {share}", best.members.iter().map(|m| (self.effect(m), m.values.clone())).collect::<Vec<_>>(), best.log_evidence, next.iter().map(|m| m.values.clone()).collect::<Vec<_>>(), scored.log_evidence); }
+            if scored.log_evidence > best.log_evidence {
+                best = scored;
+            } else {
+                // Too far for what the columns know: half the way.
+                share *= 0.5;
+                if share < 0.2 {
+                    break;
+                }
+            }
         }
-        best.ok_or(GapError::NoFlights)
+        Ok(best)
     }
 
     /// Range of a number of a member.

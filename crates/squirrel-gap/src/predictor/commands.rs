@@ -1,6 +1,5 @@
 //! The logged commands as the vehicle got them: held until the next one, late or on another clock where a hypothesis says so.
 
-use crate::predictor::hooks::*;
 use crate::flight::recording::Recording;
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};

@@ -10,12 +10,10 @@
 //! written twice. Forces show in the first family, sensors that lie in the second.
 
 mod commands;
-pub(crate) mod hooks;
 mod track;
 
 pub(crate) use track::{Motion, SensorErrors, Track};
 
-use crate::predictor::hooks::*;
 use crate::GapError;
 use crate::flight::filter::DERIVATIVE_REACH;
 use crate::flight::recording::Recording;
@@ -267,8 +265,9 @@ impl<'a> Predictor<'a> {
         let (mut state, mut clock) = self.settled(plant, track, motion);
         for k in 0..track.time_s.len() {
             if samples.get(out.len()) == Some(&k) {
-                let body = State { rotor_speed_rad_s: state.body.rotor_speed_rad_s, ..motion.body[k] };
-                out.push(PlantState { body, ..state });
+                let mut at = state;
+                at.body = State { rotor_speed_rad_s: state.body.rotor_speed_rad_s, ..motion.body[k] };
+                out.push(at);
             }
             if out.len() == samples.len() {
                 break;
@@ -289,6 +288,7 @@ impl<'a> Predictor<'a> {
         let clock = self.clock(track.flight, plant.effects(), track.time_s[0]);
         let (rotor, wing) = clock.now();
         plant.lead(&mut state, &motion.body[0], &rotor, wing, track.voltage_v[0], SETTLE_S);
+        state.time_s = track.time_s[0] - track.began_s;
         (state, clock)
     }
 
@@ -348,8 +348,7 @@ fn predict(
         }
     }
     first.map_or(Vector6::zeros(), |led| {
-        let bias = plant.effects().specific_force_bias(track.time_s[k] - track.began_s).vector;
-        let f = led.specific_force.vector + bias;
+        let f = led.specific_force.vector;
         let a = led.angular_acceleration.vector;
         Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z)
     })

@@ -8,7 +8,6 @@
 //! What the smoother takes away is the second family of residuals, `v_GNSS - v_s`: sensors that lie show there, forces that
 //! the model lacks do not.
 
-use crate::predictor::hooks::*;
 use crate::flight::filter::{DERIVATIVE_REACH, LowPass, derivative};
 use crate::flight::recording::Recording;
 use crate::flight::series::Span;
