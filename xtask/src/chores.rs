@@ -3,7 +3,7 @@
 //! Everything is built in the release profile: `clippy` and `doc` share the metadata of the dependencies and, with `test`,
 //! the build scripts and procedural macros; `test`, `bench` and the demo share the libraries.
 
-use crate::run::{Action, Step, call, cargo, root, run, succeeds};
+use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
 use crate::{python, thumb};
 use std::path::Path;
 use std::process::Command;
@@ -64,6 +64,14 @@ pub(crate) fn bench(arguments: &[String]) -> Result<(), String> {
         command.args(["--bench", &name]);
     }
     call(command.arg("--").args(arguments))
+}
+
+/// `cargo xtask gap-bench`: the blind bench of the gap workflow on the program as it is built now.
+pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
+    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli", "-p", "hidden-effects"]))?;
+    let built = target_directory()?.join("release");
+    let mut command = Command::new(built.join("hidden-effects"));
+    call(command.args(["bench", "--squirrel"]).arg(built.join("squirrel")).args(arguments))
 }
 
 /// The files in the crates' `benches` folders, without extension, in order.

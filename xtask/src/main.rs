@@ -14,10 +14,16 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 6] = [
+const CHORES: [Chore; 7] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
+    (
+        "gap-bench",
+        "--cases N|--full --seed S [--json FILE]",
+        "score the gap workflow on hidden effects; --set NAME for one set, --keep DIR for the cases",
+        chores::gap_bench,
+    ),
     ("thumb", "", "check that the flight code compiles for a Cortex-M7 without std", thumb::chore),
     ("report-png", "HTML [PNG [WIDTHxHEIGHT]]", "draw a report with a headless Chromium", png::chore),
     (

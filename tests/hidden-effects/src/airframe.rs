@@ -143,7 +143,7 @@ impl Airframe {
         // The axis across the longer arms has the larger moment.
         let wide = layout[0].0[0].abs() < layout[0].0[1].abs();
         let (roll, pitch) = if wide { (broad, slim) } else { (slim, broad) };
-        let inertia = [roll, pitch, round((roll + pitch) * draw.uniform(0.92, 0.98))];
+        let inertia = [roll, pitch, round((roll + pitch) * draw.uniform(0.9, 0.95))];
         let drag = about(draw, 0.08 * length * length, 0.15);
         Self {
             rotors: rotors.collect(),

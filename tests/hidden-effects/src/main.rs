@@ -1,12 +1,15 @@
-//! `hidden-effects make`: cases and their answers in a folder.
-#![allow(clippy::print_stderr, reason = "this is where the program speaks")]
+//! `hidden-effects make`: cases and their answers in a folder. `hidden-effects bench`: the program's score on them.
+#![allow(clippy::print_stderr, clippy::print_stdout, reason = "this is where the program speaks")]
 
+use hidden_effects::bench::{self, Plan};
 use hidden_effects::case::{Case, Set};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-const USAGE: &str = "hidden-effects make --set NAME --n N --seed S --out DIR";
+const USAGE: &str = "\
+hidden-effects make  --set NAME --n N --seed S --out DIR
+hidden-effects bench --squirrel PROGRAM --seed S (--full | --cases N [--set NAME]) [--json FILE] [--keep DIR]";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -20,32 +23,87 @@ fn main() -> ExitCode {
 }
 
 fn run(arguments: &[String]) -> Result<(), String> {
-    let Some((command, rest)) = arguments.split_first() else { return Err(USAGE.to_owned()) };
-    if command != "make" {
-        return Err(format!("no command '{command}'; {USAGE}"));
+    match arguments.split_first() {
+        Some((command, rest)) if command == "make" => {
+            make(&Options::new(rest, &["set", "n", "seed", "out"])?)
+        }
+        Some((command, rest)) if command == "bench" => {
+            score(&Options::new(rest, &["squirrel", "seed", "full", "cases", "set", "json", "keep"])?)
+        }
+        Some((command, _)) => Err(format!("no command '{command}'\n{USAGE}")),
+        None => Err(format!("which command?\n{USAGE}")),
     }
-    let options = options(rest)?;
-    let get = |key: &str| options.get(key).ok_or_else(|| format!("--{key}: missing; {USAGE}"));
-    let number = |key: &str| {
-        let text = get(key)?;
-        text.parse::<u64>().map_err(|_| format!("--{key} {text}: must be a number"))
-    };
-    let set = get("set")?;
-    let set = Set::from_name(set).ok_or_else(|| format!("--set {set}: no such set"))?;
-    for index in 0..number("n")? {
-        let case = Case::draw(set, index as usize, number("seed")?);
-        case.make(Path::new(get("out")?)).map_err(|error| error.to_string())?;
+}
+
+fn make(options: &Options) -> Result<(), String> {
+    let (set, seed) = (set(options.need("set")?)?, options.number("seed")?);
+    for index in 0..options.number("n")? {
+        let case = Case::draw(set, index as usize, seed);
+        case.make(Path::new(options.need("out")?)).map_err(|error| error.to_string())?;
     }
     Ok(())
 }
 
-fn options(arguments: &[String]) -> Result<BTreeMap<String, String>, String> {
-    let mut options = BTreeMap::new();
-    for pair in arguments.chunks(2) {
-        match pair {
-            [key, value] if key.starts_with("--") => options.insert(key[2..].to_owned(), value.clone()),
-            _ => return Err(format!("'{}' needs a value; {USAGE}", pair[0])),
-        };
+fn score(options: &Options) -> Result<(), String> {
+    let seed = options.number("seed")?;
+    let cases = match (options.get("full"), options.get("set")) {
+        (Some(_), _) => bench::full(),
+        (None, None) => bench::spread(options.number("cases")? as usize),
+        (None, Some(name)) => {
+            let set = set(name)?;
+            (0..options.number("cases")? as usize).map(|index| (set, index)).collect()
+        }
+    };
+    let keep = options.get("keep").map(PathBuf::from);
+    let temporary = std::env::temp_dir().join(format!("hidden-effects-{}", std::process::id()));
+    let plan = Plan {
+        squirrel: PathBuf::from(options.need("squirrel")?),
+        cases,
+        seed,
+        keep: keep.is_some(),
+        folder: keep.unwrap_or_else(|| temporary.clone()),
+    };
+    let outcomes = bench::run(&plan).map_err(|error| error.to_string());
+    if temporary.exists() {
+        std::fs::remove_dir_all(&temporary).map_err(|error| format!("{}: {error}", temporary.display()))?;
     }
-    Ok(options)
+    let summary = bench::summarise(seed, outcomes?);
+    print!("{}", summary.table());
+    if let Some(json) = options.get("json") {
+        hidden_effects::case::write_json(Path::new(json), &summary).map_err(|error| error.to_string())?;
+    }
+    Ok(())
+}
+
+/// `--key value` pairs.
+struct Options(BTreeMap<String, String>);
+
+impl Options {
+    fn new(arguments: &[String], known: &[&str]) -> Result<Self, String> {
+        let mut options = BTreeMap::new();
+        let mut left = arguments.iter();
+        while let Some(argument) = left.next() {
+            let key = argument.strip_prefix("--").filter(|key| known.contains(key));
+            let key = key.ok_or_else(|| format!("no option '{argument}'\n{USAGE}"))?;
+            let value = if key == "full" { Some("") } else { left.next().map(String::as_str) };
+            let value = value.ok_or_else(|| format!("--{key}: needs a value\n{USAGE}"))?;
+            options.insert(key.to_owned(), value.to_owned());
+        }
+        Ok(Self(options))
+    }
+    fn get(&self, key: &str) -> Option<&str> {
+        self.0.get(key).map(String::as_str)
+    }
+    fn need(&self, key: &str) -> Result<&str, String> {
+        self.get(key).ok_or_else(|| format!("--{key}: missing\n{USAGE}"))
+    }
+    fn number(&self, key: &str) -> Result<u64, String> {
+        let text = self.need(key)?;
+        text.parse().map_err(|_| format!("--{key} {text}: must be a whole number"))
+    }
+}
+
+fn set(name: &str) -> Result<Set, String> {
+    let known = || Set::ALL.map(|(set, _)| set.name()).join(", ");
+    Set::from_name(name).ok_or_else(|| format!("--set {name}: no such set; known are {}", known()))
 }

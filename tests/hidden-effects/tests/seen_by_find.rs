@@ -4,13 +4,13 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use hidden_effects::case::{Case, Set};
-use hidden_effects::catalogue::{CATALOGUE, Entry, HiddenEffect, Value};
+use hidden_effects::catalogue::{CATALOGUE, Entry, HiddenEffect};
 use hidden_effects::draw::Draw;
 use hidden_effects::independent::white;
 use hidden_effects::outside::Outside;
+use hidden_effects::squirrel_made::effect_table;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::fmt::Write as _;
 
 /// Residual of a flight against a vehicle file: force, N, and moment, N m.
 fn residual(vehicle_toml: &str, flight: FlightLog) -> [f64; 6] {
@@ -33,8 +33,8 @@ const PASSED: f64 = 0.283;
 
 #[test]
 fn without_an_effect_only_noise_and_tolerances_are_left() {
-    for seed in 0..8 {
-        let case = Case::draw(Set::None, seed as usize, 1);
+    for seed in 0..8usize {
+        let case = Case::draw(Set::None, 2 * seed, 1);
         let r = of(&case);
         let floor = case.nominal().mass_kg * white::ACCEL_M_S2 * PASSED;
         for axis in 0..3 {
@@ -127,14 +127,7 @@ fn an_effect_stated_in_the_vehicle_file_is_the_effect_that_flew() {
         for name in SHARED {
             let entry = CATALOGUE.iter().find(|e| e.name == name).unwrap();
             let effect = hidden(&none, entry, seed);
-            let mut toml = none.nominal().to_toml();
-            let _ = writeln!(toml, "\n[effects.{name}]");
-            for (key, value) in &effect.parameters {
-                let _ = match value {
-                    Value::Number(x) => writeln!(toml, "{key} = {x:e}"),
-                    Value::Name(x) => writeln!(toml, "{key} = \"{x}\""),
-                };
-            }
+            let toml = none.nominal().to_toml() + &effect_table(&effect);
             let mass_or_inertia = effect.number("mass_fraction") + effect.number("inertia_fraction");
             let case = none.hiding(vec![effect], None);
             let (without, with) = (of(&case), residual(&toml, case.flight(0).unwrap()));

@@ -38,7 +38,7 @@ impl Battery {
 
     fn open_circuit_v(&self) -> f64 {
         let c = self.charge;
-        CELLS * (3.62 + 0.35 * c + 0.25 * c.powi(4) - 0.4 * (-20.0 * c).exp())
+        CELLS * (3.68 + 0.35 * c + 0.25 * c.powi(4) - 0.4 * (-20.0 * c).exp())
     }
 
     /// One step under the rotors' mechanical power.

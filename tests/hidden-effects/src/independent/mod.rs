@@ -105,7 +105,6 @@ fn simulate(order: &Order<'_>, world: &World, stream: impl Fn(u64) -> Draw) -> R
     let mut controller = Controller::new(order.nominal);
     let mut air = Air::new(world.extras.gust, stream(1));
     let mut inertial = Inertial::new(order.errors, world.extras.heading_rad, order.noise, stream(2));
-    let mut commands: Vec<[f64; MAX_ROTORS]> = Vec::new();
     let mut followed = [order.real.hover_command(); MAX_ROTORS];
 
     let reference = programme.step(0.0, 0.0);
@@ -114,7 +113,7 @@ fn simulate(order: &Order<'_>, world: &World, stream: impl Fn(u64) -> Draw) -> R
     let mut battery = Battery::new(order.pack, order.charge, hover_power);
     let hover_current = battery.current_a;
     let ticks = (DURATION_S * IMU_HZ) as usize + MARGIN;
-    let mut truth = Vec::with_capacity(ticks);
+    let mut truth: Vec<Truth> = Vec::with_capacity(ticks);
     let mut input = Input {
         time_s: 0.0,
         rotor: followed,
@@ -129,7 +128,6 @@ fn simulate(order: &Order<'_>, world: &World, stream: impl Fn(u64) -> Draw) -> R
         let (gyro, attitude) = inertial.step(state.omega, state.attitude);
         let estimate = Estimate { position: state.position, velocity: state.velocity, attitude, omega: gyro };
         let rotor = controller.step(&estimate, &wanted, tick_s);
-        commands.push(rotor);
         input.time_s = time_s;
         let specific_force = world.rates(&state, &input, 0.0).specific_force;
         truth.push(Truth {
@@ -143,12 +141,11 @@ fn simulate(order: &Order<'_>, world: &World, stream: impl Fn(u64) -> Draw) -> R
             voltage_v: battery.voltage_v,
             current_a: battery.current_a,
         });
-        input.wing = wanted.wing;
         for step in 0..STEPS {
             input.time_s = time_s + step as f64 * dt_s;
             let sent = ((input.time_s - world.extras.latency_s) * IMU_HZ + 1e-9).max(0.0) as usize;
-            follow(&mut followed, &commands[sent], world.outside);
-            input.rotor = followed;
+            follow(&mut followed, &truth[sent].rotor, world.outside);
+            (input.rotor, input.wing) = (followed, truth[sent].wing);
             input.voltage_v = battery.voltage_v;
             input.current_ratio = battery.current_a / hover_current;
             input.moving_air = air.step(dt_s, state.velocity.norm());

@@ -109,15 +109,15 @@ fn open_wings_damp_roll_and_a_weak_side_rolls() {
 
 #[test]
 fn the_same_order_gives_the_same_flight_and_another_seed_another() {
-    let case = Case::draw(Set::Single, 3, 11);
-    assert_eq!(case.flight(0).unwrap(), Case::draw(Set::Single, 3, 11).flight(0).unwrap());
+    let case = Case::draw(Set::Single, 4, 11);
+    assert_eq!(case.flight(0).unwrap(), Case::draw(Set::Single, 4, 11).flight(0).unwrap());
     assert_ne!(case.flight(0).unwrap(), case.flight(1).unwrap());
-    assert_ne!(case.flight(0).unwrap(), Case::draw(Set::Single, 3, 12).flight(0).unwrap());
+    assert_ne!(case.flight(0).unwrap(), Case::draw(Set::Single, 4, 12).flight(0).unwrap());
 }
 
 #[test]
 fn logs_have_the_rates_and_the_noise_that_they_should() {
-    let case = Case::draw(Set::None, 1, 1);
+    let case = Case::draw(Set::None, 2, 1);
     let log = case.flight(0).unwrap();
     let sd = |name: &str, axis: usize| {
         // The fourth difference of white noise has 70 times its variance; of motion there is little left.
