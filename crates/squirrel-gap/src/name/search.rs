@@ -20,7 +20,7 @@ const STEP_NATS: f64 = 1.0;
 /// Most effects in a set.
 const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
-const ROUNDS_MAX: usize = 3;
+const ROUNDS_MAX: usize = 4;
 
 /// A set of effects with its best numbers and its evidence.
 pub(crate) struct Scored {
@@ -72,7 +72,7 @@ impl Search<'_> {
             let mut best = self.score(&linear, &point.members)?;
             self.extend(&linear, &mut best)?;
             self.drop_and_swap(&linear, &mut best)?;
-            let settled = round > 1 && self.same_set(&best.members, &point.members);
+            let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
                 let worth = self.worth(&linear, &null, &best)?;
                 return Ok(Found { linear, null, best, worth });
@@ -105,19 +105,22 @@ impl Search<'_> {
             .collect()
     }
 
-    fn same_set(&self, a: &[Member], b: &[Member]) -> bool {
-        let names = |list: &[Member]| {
-            let mut all: Vec<(usize, _)> = list
-                .iter()
-                .map(|m| {
-                    let candidate = &self.catalogue.candidates[m.candidate];
-                    (candidate.fixed.iter().map(|(_, v)| *v as usize).sum::<usize>(), candidate.effect)
+    /// Whether a set is the one that the predictor was linearised about, with numbers within a tenth of what they are.
+    fn has_settled(&self, set: &Scored, about: &[Member]) -> bool {
+        set.members.len() == about.len()
+            && set.members.iter().all(|member| {
+                let effect = self.effect(member);
+                about.iter().any(|other| {
+                    self.effect(other) == effect
+                        && self.catalogue.candidates[other.candidate].fixed
+                            == self.catalogue.candidates[member.candidate].fixed
+                        && self.form(other) == self.form(member)
+                        && self.free_slots(member).into_iter().all(|slot| {
+                            let moved = (member.values[slot] - other.values[slot]).abs();
+                            moved < 0.1 * self.range(member, slot).0
+                        })
                 })
-                .collect();
-            all.sort_unstable();
-            all
-        };
-        names(a) == names(b)
+            })
     }
 
     /// Adds effects as long as the evidence asks for them.

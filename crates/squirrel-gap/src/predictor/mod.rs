@@ -220,14 +220,14 @@ impl<'a> Predictor<'a> {
         self.commands.iter().all(Commands::has_wing)
     }
 
-    /// What a metre per second of wind from the south and from the west changes in the rows.
+    /// What a metre per second of wind from the south and from the west changes in the rows, under a hypothesis.
     ///
     /// # Errors
     /// As [`Self::residual`].
-    pub(crate) fn wind_columns(&self) -> Result<[Vec<f64>; 2], GapError> {
-        let still = self.residual(&self.nominal())?;
+    pub(crate) fn wind_columns(&self, hypothesis: &Hypothesis) -> Result<[Vec<f64>; 2], GapError> {
+        let still = self.residual(hypothesis)?;
         let column = |axis: usize| {
-            let mut moved = self.nominal();
+            let mut moved = hypothesis.clone();
             if let Some(wind) = moved.effects.insert("constant_wind") {
                 wind.values[axis] += 1.0;
             }
