@@ -135,6 +135,14 @@ fn fly_writes_log_report_and_figures() {
 }
 
 #[test]
+fn an_excitation_report_shows_the_pilots_card() {
+    let folder = Folder::new("card");
+    folder.succeeds(&["fly", "--arm", "pc", "--scenario", "excite_rich", "--report", "r.html"]);
+    let report = fs::read_to_string(folder.0.join("r.html")).unwrap();
+    assert!(report.contains("Pilot&#39;s card") && report.contains("wings open at"));
+}
+
+#[test]
 fn the_study_writes_its_table_for_machines() {
     let folder = Folder::new("study");
     let arguments =

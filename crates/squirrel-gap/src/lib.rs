@@ -14,6 +14,7 @@ mod compatibility;
 mod diagnose;
 mod name;
 mod predictor;
+pub mod report;
 mod shrink;
 mod verdict;
 mod words;

@@ -83,6 +83,24 @@ impl Page {
         self.paragraph("say", text);
     }
 
+    /// Adds a section that can be linked to, with a heading and a text, filled by `fill`.
+    pub fn panel(&mut self, id: &str, title: &str, text: &str, fill: impl FnOnce(&mut Self)) {
+        self.add(&format!("<section id=\"{}\">\n", escape(id)));
+        self.section(title, text);
+        fill(self);
+        self.add("</section>\n");
+    }
+
+    /// Adds a paragraph.
+    pub fn text(&mut self, text: &str) {
+        self.paragraph("text", text);
+    }
+
+    /// Says what is missing, and why.
+    pub fn missing(&mut self, text: &str) {
+        self.paragraph("missing", text);
+    }
+
     /// Adds text whose lines stay as they are.
     pub fn preformatted(&mut self, text: &str) {
         self.add(&format!("<pre>{}</pre>\n", escape(text)));

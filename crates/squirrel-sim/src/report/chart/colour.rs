@@ -41,6 +41,15 @@ impl Ink {
     }
 }
 
+/// Which colours a bar shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ramp {
+    /// From colour to colour, for lines.
+    Track,
+    /// From nothing to one colour, for areas.
+    Heat,
+}
+
 /// What colour measures in a chart: a label, a unit and the range shared by all charts that are compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
@@ -61,13 +70,18 @@ impl Values {
     }
 
     /// Draws the colour bar, its right end at `right`: title left of it, numbers below.
-    pub(super) fn bar(&self, canvas: &mut Canvas, right: f64, y: f64, width: f64) {
+    pub(super) fn bar(&self, canvas: &mut Canvas, ramp: Ramp, right: f64, y: f64, width: f64) {
         let left = right - width;
+        let prefix = match ramp {
+            Ramp::Track => "v",
+            Ramp::Heat => "h",
+        };
         for bin in 0..BINS {
             let step = width / BINS as f64;
             // Neighbours overlap by half a pixel: no hairline between them when the page is scaled.
-            let overlap = if bin + 1 < BINS { 0.5 } else { 0.0 };
-            canvas.rect(&format!("fill v{bin}"), left + step * bin as f64, y, step + overlap, 9.0);
+            // Where colours are transparent, an overlap would show.
+            let overlap = if bin + 1 < BINS && ramp == Ramp::Track { 0.5 } else { 0.0 };
+            canvas.rect(&format!("fill {prefix}{bin}"), left + step * bin as f64, y, step + overlap, 9.0);
         }
         for &tick in self.scale.ticks() {
             let x = left + width * self.scale.fraction(tick);

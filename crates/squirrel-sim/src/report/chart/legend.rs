@@ -45,6 +45,11 @@ impl Legend {
         self.x += width + 12.0;
     }
 
+    /// Whether nothing was added.
+    pub(super) fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
     /// Height of all rows, px.
     pub(super) fn height(&self) -> f64 {
         (self.row + 1) as f64 * ROW

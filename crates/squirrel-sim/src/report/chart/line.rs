@@ -38,6 +38,14 @@ impl Series {
         Self { step: true, ..Self::line(name, ink, x, y) }
     }
 
+    /// A vertical stroke from `low` to `high` at each `x`: the stems of a correlation from zero, the spread of a mean.
+    pub fn strokes(name: &str, ink: Ink, x: &[f64], low: &[f64], high: &[f64]) -> Self {
+        let places = x.iter().zip(low).zip(high);
+        let x = x.iter().flat_map(|x| [*x; 3]).collect();
+        let y = places.flat_map(|((_, low), high)| [*low, *high, f64::NAN]).collect();
+        Self::line(name, ink, x, y)
+    }
+
     fn class(&self) -> String {
         let dashed = if self.dashed { " dashed" } else { "" };
         let pale = if self.pale { " pale" } else { "" };

@@ -1,7 +1,8 @@
 //! A small chart toolkit: numbers in, inline SVG out.
 //!
 //! [`LineChart`] draws curves over a shared axis, [`TrackChart`] a track whose colour is a value, [`Scene`] the same
-//! track in three dimensions. NaN breaks a line. Curves are thinned to what the pixels can show, so a long flight
+//! track in three dimensions, [`RowChart`] bars, intervals and dots beside names, [`HeatMap`] numbers as colour over time,
+//! [`Matrix`] numbers between names. NaN breaks a line. Curves are thinned to what the pixels can show, so a long flight
 //! does not make a large file.
 //!
 //! ```
@@ -14,9 +15,11 @@
 //! ```
 mod axis;
 mod colour;
+mod heat;
 mod legend;
 mod line;
 mod plot;
+mod rows;
 mod scale;
 mod scene;
 mod svg;
@@ -26,7 +29,9 @@ mod track;
 pub(super) use axis::extent;
 pub use axis::{Axis, Range};
 pub use colour::{BINS, Ink, Values};
+pub use heat::{HeatGroup, HeatMap, Level, Matrix, Strip};
 pub use line::{Lane, Limit, LineChart, Series, Span};
+pub use rows::{ChartRow, Dot, Extent, RowChart};
 pub use scale::{LARGEST, Scale, drawable};
 pub use scene::{Cylinder, Scene, SceneTrack};
 pub use svg::{Svg, escape};

@@ -4,7 +4,7 @@
 //! only rotates; this file draws the first view with the same formulas, and the picture stands without the script.
 
 use super::axis::{Axis, extent};
-use super::colour::{Ink, Values};
+use super::colour::{Ink, Ramp, Values};
 use super::legend::{Key, Legend};
 use super::scale::{Scale, drawable};
 use super::svg::{Canvas, Path, Svg, escape, px};
@@ -196,7 +196,7 @@ impl Scene {
         }
         legend.draw(canvas, 16.0);
         if let Some(values) = &self.values {
-            values.bar(canvas, right, 6.0, 200.0);
+            values.bar(canvas, Ramp::Track, right, 6.0, 200.0);
         }
     }
 }

@@ -158,6 +158,16 @@ impl Canvas {
         );
     }
 
+    /// A text that rises to the right by 45 deg from its begin.
+    pub(super) fn slanted(&mut self, class: &str, at: [f64; 2], text: &str) {
+        let [x, y] = at.map(px);
+        let _ = write!(
+            self.body,
+            r#"<text class="{class}" transform="translate({x} {y}) rotate(-45)">{}</text>"#,
+            escape(text)
+        );
+    }
+
     /// The finished drawing; `attributes` goes into the `<svg>` tag and is already safe.
     pub(super) fn finish(self, class: &str, label: &str, attributes: &str) -> Svg {
         let (width, height, label) = (px(self.width), px(self.height), escape(label));

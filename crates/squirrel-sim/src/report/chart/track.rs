@@ -1,7 +1,7 @@
 //! Track plots: a path in a plane whose colour is a value, with obstacles, and equal scales where shape matters.
 
 use super::axis::{Axis, Range, extent};
-use super::colour::{Ink, Values};
+use super::colour::{Ink, Ramp, Values};
 use super::legend::{Key, Legend};
 use super::plot::Plot;
 use super::scale::Scale;
@@ -100,7 +100,7 @@ impl TrackChart {
         legend.draw(&mut canvas, plot.bottom + 33.0);
         if let Some(values) = &self.values {
             let free = right - 4.0 - text_width(&self.y.title()) - values.bar_title_width() - 14.0;
-            values.bar(&mut canvas, right - 4.0, 3.0, BAR.min(free.max(30.0)));
+            values.bar(&mut canvas, Ramp::Track, right - 4.0, 3.0, BAR.min(free.max(30.0)));
         }
         canvas.finish("chart", &self.label, "")
     }

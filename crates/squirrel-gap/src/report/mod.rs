@@ -1,0 +1,71 @@
+//! The gap report: where simulation and flights disagree, what explains it, and how far that can be trusted.
+//!
+//! One HTML file without network, the same bytes for the same data. The verdict comes first; each panel below answers one
+//! question and says in words when nothing was given for it. [`ReportData`] is everything that the page shows.
+//!
+//! | panel | question |
+//! |---|---|
+//! | `panel-h` | what is the answer, where does it hold, what changes in the vehicle file |
+//! | `panel-a` | when and where do simulation and flight disagree, before and after |
+//! | `panel-b` | how much better is the answer than its rivals |
+//! | `panel-c` | does the residual follow the quantity that is said to explain it |
+//! | `panel-d` | does the answer predict flights that it has not seen |
+//! | `panel-e` | is what is left noise |
+//! | `panel-f` | are the numbers plausible |
+//! | `panel-g` | which effects could these flights not tell apart, and what to fly |
+
+mod answer;
+mod data;
+mod proof;
+mod residual;
+
+pub use data::{
+    Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
+    HeldOutChannel, Horizon, InputCorrelation, ParameterRow, ReportData, Whiteness,
+};
+
+use squirrel_sim::report::chart::drawable;
+use squirrel_sim::report::page::Page;
+
+/// Identifiers of the panels in the order of the page.
+pub const PANELS: [&str; 8] =
+    ["panel-h", "panel-a", "panel-b", "panel-c", "panel-d", "panel-e", "panel-f", "panel-g"];
+
+/// Width of drawings that span the page, px: narrower than the page, so that their text can still be read on a small screen.
+const WIDTH: f64 = 900.0;
+
+/// The report as one HTML file.
+pub fn render(data: &ReportData) -> String {
+    let mut page = Page::new(&data.title, "");
+    answer::verdict(&mut page, data);
+    residual::over_time(&mut page, data);
+    answer::evidence(&mut page, data);
+    residual::against_regressors(&mut page, data);
+    proof::held_out(&mut page, data);
+    proof::whiteness(&mut page, data);
+    answer::parameters(&mut page, data);
+    answer::confusability(&mut page, data);
+    page.html()
+}
+
+/// A number with three significant digits, a dash for one that is unknown.
+fn figure(value: f64) -> String {
+    if !drawable(value) {
+        return "\u{2013}".to_owned();
+    }
+    let size = value.abs();
+    let text = if size == 0.0 {
+        "0".to_owned()
+    } else if (1e-4..1e6).contains(&size) {
+        let digits = (2 - size.log10().floor() as i32).max(0) as usize;
+        format!("{value:.digits$}")
+    } else {
+        format!("{value:.2e}")
+    };
+    text.replace('-', "\u{2212}")
+}
+
+/// A number with its unit.
+fn quantity(value: f64, unit: &str) -> String {
+    if unit.is_empty() { figure(value) } else { format!("{} {unit}", figure(value)) }
+}
