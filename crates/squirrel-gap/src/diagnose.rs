@@ -111,6 +111,7 @@ pub fn diagnose(
     };
     let gap = proof.as_ref().map(|proof| gap(held_out, proof));
     let verdict = decide(&search, &naming, &rivals, gap, places);
+    let mut verdict = verdict;
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.best),
@@ -118,7 +119,9 @@ pub fn diagnose(
         held_out: proof,
         labels: catalogue.parameters.iter().map(|p| format!("{} {} {:?}", catalogue.candidates[p.candidate].effect, p.key, catalogue.candidates[p.candidate].fixed)).collect(),
     };
-    Ok(Diagnosis { verdict, domain, details: Some(details) })
+    let mut d = Diagnosis { verdict: verdict.clone(), domain, details: Some(details) };
+    if std::env::var("GAPDEBUG").is_ok() { verdict.notes.push(format!("DEBUG {}", d.debug())); d.verdict = verdict; }
+    Ok(d)
 }
 
 /// The one answer.

@@ -2,7 +2,7 @@
 //!
 //! Noise is what this log shows: the deviation of the third difference of a raw channel, which motion hardly enters. It is
 //! drawn anew, filtered and decimated as the measurement was; turbulence of the tolerance of the wind acts through the
-//! predictor's own columns of `constant_wind`.
+//! predictor's own model.
 
 use crate::flight::filter::{DERIVATIVE_REACH, derivative};
 use crate::predictor::{DYNAMIC, Predictor, Track};
@@ -20,7 +20,7 @@ const VELOCITY_ERROR_S: f64 = 0.5;
 /// Draws of the residual that noise alone would leave; only the rows of the dynamics are filled.
 pub(crate) fn draws(
     predictor: &Predictor,
-    wind_columns: &[Vec<f64>; 2],
+    wind_columns: &[Vec<f64>; 3],
     turbulence_m_s: f64,
     count: usize,
 ) -> Vec<Vec<f64>> {
@@ -32,12 +32,12 @@ pub(crate) fn draws(
                 let white = filtered_noise(track, &mut rng);
                 let mut winds = [Drift::new(TURBULENCE_S, &mut rng), Drift::new(VELOCITY_ERROR_S, &mut rng)];
                 let step_s = track.every as f64 * track.period_s;
-                let air: Vec<[f64; 2]> = (0..white.len())
+                let air: Vec<[f64; 3]> = (0..white.len())
                     .map(|_| {
                         for wind in &mut winds {
                             wind.advance(step_s, &mut rng);
                         }
-                        [0, 1].map(|axis| {
+                        [0, 1, 2].map(|axis| {
                             winds[0].value[axis] * turbulence_m_s + winds[1].value[axis] * VELOCITY_ERROR_M_S
                         })
                     })
@@ -46,7 +46,8 @@ pub(crate) fn draws(
                     for (i, row) in segment.rows.clone().enumerate() {
                         rows[row] = white[i][segment.channel]
                             + wind_columns[0][row] * air[i][0]
-                            + wind_columns[1][row] * air[i][1];
+                            + wind_columns[1][row] * air[i][1]
+                            + wind_columns[2][row] * air[i][2];
                     }
                 }
             }
@@ -55,15 +56,15 @@ pub(crate) fn draws(
         .collect()
 }
 
-/// A Gauss-Markov process of unit variance on two axes.
+/// A Gauss-Markov process of unit variance on three axes.
 struct Drift {
-    value: [f64; 2],
+    value: [f64; 3],
     time_constant_s: f64,
 }
 
 impl Drift {
     fn new(time_constant_s: f64, rng: &mut Pcg64Mcg) -> Self {
-        Self { value: [0; 2].map(|_| StandardNormal.sample(rng)), time_constant_s }
+        Self { value: [0; 3].map(|_| StandardNormal.sample(rng)), time_constant_s }
     }
     fn advance(&mut self, dt_s: f64, rng: &mut Pcg64Mcg) {
         let keep = (-dt_s / self.time_constant_s).exp();

@@ -93,7 +93,7 @@ pub(crate) fn leftover(
     motions: &[Motion],
     left: &[f64],
     nominal: &[f64],
-    wind_columns: &[Vec<f64>; 2],
+    wind_columns: &[Vec<f64>; 3],
     turbulence_m_s: f64,
 ) -> Leftover {
     let draws = floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS);

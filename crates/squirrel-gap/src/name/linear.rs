@@ -206,8 +206,10 @@ impl Linear {
 
 /// The whitening of what the fullest model leaves: each pass fits every column, then the autoregression to the rest.
 fn whitener(predictor: &Predictor, columns: &[Vec<f64>], widest: &[f64], residual: &[f64]) -> Whitener {
-    let mut whitener = Whitener::fit(&predictor.segments, residual);
-    for _ in 0..2 {
+    // A first whitening by what changes from row to row: one fitted to the whole residual would take whatever is slow in it
+    // for noise and never give it back.
+    let mut whitener = Whitener::white(&predictor.segments, residual);
+    for _ in 0..3 {
         let white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = Gram::new(&white, &whitener.apply(&predictor.segments, residual));
         let Some(posterior) = gram.posterior(widest, 1.0) else { break };

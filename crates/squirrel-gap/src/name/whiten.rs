@@ -35,6 +35,25 @@ impl Whitener {
         Self { filters, rows }
     }
 
+    /// White noise of the size of what changes from one row to the next.
+    pub(crate) fn white(segments: &[Segment], rows: &[f64]) -> Self {
+        let mut changes = vec![0.0; rows.len()];
+        for segment in segments {
+            for row in segment.rows.clone().skip(1) {
+                changes[row] = (rows[row] - rows[row - 1]) * std::f64::consts::FRAC_1_SQRT_2;
+            }
+        }
+        let mut out = Self::fit(segments, &changes);
+        for (channel, filter) in out.filters.iter_mut().enumerate() {
+            let own = segments.iter().filter(|s| s.channel == channel).flat_map(|s| changes[s.rows.clone()].iter());
+            let (sum, n) = own.fold((0.0, 0.0), |(sum, n), x| (sum + x * x, n + 1.0));
+            if let Some(filter) = filter {
+                *filter = ([0.0; ORDER], f64::sqrt(sum / n));
+            }
+        }
+        out
+    }
+
     /// Rows that are left.
     pub(crate) fn rows(&self) -> usize {
         self.rows

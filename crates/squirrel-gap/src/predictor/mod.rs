@@ -220,21 +220,21 @@ impl<'a> Predictor<'a> {
         self.commands.iter().all(Commands::has_wing)
     }
 
-    /// What a metre per second of wind from the south and from the west changes in the rows, under a hypothesis.
+    /// What a metre per second of wind towards north, east and down changes in the rows, under a hypothesis.
     ///
     /// # Errors
     /// As [`Self::residual`].
-    pub(crate) fn wind_columns(&self, hypothesis: &Hypothesis) -> Result<[Vec<f64>; 2], GapError> {
+    pub(crate) fn wind_columns(&self, hypothesis: &Hypothesis) -> Result<[Vec<f64>; 3], GapError> {
         let still = self.residual(hypothesis)?;
         let column = |axis: usize| {
             let mut moved = hypothesis.clone();
-            if let Some(wind) = moved.effects.insert("constant_wind") {
-                wind.values[axis] += 1.0;
+            for errors in &mut moved.errors {
+                errors.air_ned_m_s[axis] += 1.0;
             }
             let after = self.residual(&moved)?;
             Ok(still.iter().zip(&after).map(|(b, a)| b - a).collect())
         };
-        Ok([column(0)?, column(1)?])
+        Ok([column(0)?, column(1)?, column(2)?])
     }
 
     /// The plant of a hypothesis, without a battery, whose voltage is measured.

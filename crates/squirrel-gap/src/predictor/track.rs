@@ -31,6 +31,8 @@ pub(crate) struct SensorErrors {
     pub(crate) tilt_rad: [f64; 2],
     /// What the barometer reads too high, m.
     pub(crate) height_m: f64,
+    /// By how much the velocity through the air is less than that over ground, m/s: moving air, or an error of velocity.
+    pub(crate) air_ned_m_s: [f64; 3],
 }
 
 /// One piece of a flight on a uniform grid, as measured.
@@ -219,8 +221,9 @@ impl Track {
         if !correction.is_empty() {
             self.add(&mut height_m, &smoothed(&correction));
         }
+        let air = Vector3::from(errors.air_ned_m_s);
         let body = (0..n)
-            .map(|k| at(k, strapdown[k], -height_m[k], attitude[k].into_inner()))
+            .map(|k| at(k, strapdown[k] - air, -height_m[k], attitude[k].into_inner()))
             .collect();
         let mean = kinematic.iter().map(|(_, e)| e).sum::<Vector3<f64>>() / kinematic.len().max(1) as f64;
         for (_, e) in &mut kinematic {
