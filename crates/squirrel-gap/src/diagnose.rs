@@ -146,9 +146,7 @@ fn decide(
     let leftover = &naming.leftover;
     let blind = search.blind(&found.best);
     let share = left_share(naming);
-    let kind = if naming.gust_m_s.is_some() {
-        Kind::Named
-    } else if effects.is_empty() {
+    let kind = if effects.is_empty() {
         match (leftover.is_real(), blind.is_empty()) {
             (true, _) => Kind::OutsideCatalogue,
             (false, false) => Kind::NotIdentifiable,
@@ -223,7 +221,7 @@ fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {
         all.push(NamedEffect {
             name: "gust",
             form: "gauss_markov",
-            evidence_nats: naming.gust_nats(),
+            evidence_nats: naming.gust_nats,
             parameters: BTreeMap::from([("sigma_m_s", number)]),
         });
     }

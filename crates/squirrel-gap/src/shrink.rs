@@ -51,6 +51,9 @@ const START_NOISE: f64 = 0.505;
 const START_VELOCITY_M_S: f64 = 0.02;
 const START_ATTITUDE_RAD: f64 = 0.001;
 
+/// Longest step of the plant, s.
+const STEP_MAX_S: f64 = 0.0012;
+
 type Errors = SVector<f64, 12>;
 
 /// Mean squared errors by bin.
@@ -209,7 +212,7 @@ fn fly(
 ) -> Result<(), GapError> {
     let track = &predictor.tracks[piece];
     let n = track.time_s.len();
-    let plant = predictor.plant_at(hypothesis, track.period_s)?;
+    let plant = predictor.plant_at(hypothesis, track.period_s / substeps(track.period_s) as f64)?;
     let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
     let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
     let starts: Vec<usize> = (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();
@@ -218,6 +221,11 @@ fn fly(
         segment(predictor, hypothesis, &plant, piece, motion, start, state, &mut noise, per_bin, &mut each);
     }
     Ok(())
+}
+
+/// Steps of the plant to a sample: commands may change between samples.
+fn substeps(period_s: f64) -> usize {
+    (period_s / STEP_MAX_S).ceil().max(1.0) as usize
 }
 
 #[allow(clippy::too_many_arguments, reason = "the inner loop of `fly`, apart to keep both readable")]
@@ -268,14 +276,16 @@ fn segment(
                 middle = state.body.ned_from_body().quaternion;
             }
             let sample = start + k;
-            // Half a sample ahead: the command that acts for most of the step.
-            clock.advance_to(track.time_s[sample] + 0.5 * track.period_s);
-            let (rotor, wing) = clock.now();
             let before = state.body;
             velocity += before.velocity.vector;
             rate += before.omega.vector;
             state.battery.voltage_v = track.voltage_v[sample];
-            plant.step(&mut state, &rotor, wing, In::new(wind));
+            for step in 0..substeps(track.period_s) {
+                // The command that acts in the middle of the step.
+                clock.advance_to(track.time_s[sample] + (step as f64 + 0.5) * plant.dt_s());
+                let (rotor, wing) = clock.now();
+                plant.step(&mut state, &rotor, wing, In::new(wind));
+            }
             let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
             force += before.ned_from_body().quaternion.inverse() * (slope - gravity);
             if let Some((_, rng)) = noise {

@@ -16,6 +16,11 @@ impl Pairs {
         }
     }
 
+    /// The first `n` pairs.
+    pub(super) fn first(&self, n: usize) -> Self {
+        Self(self.0[..n.min(self.0.len())].to_vec())
+    }
+
     fn means(&self) -> (Vector3<f64>, Vector3<f64>) {
         let n = self.0.len().max(1) as f64;
         self.0.iter().fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (x, y)| (a + x / n, b + y / n))

@@ -20,7 +20,7 @@ const DRAWS: usize = 8;
 const SLOW_RATIO: f64 = 1.6;
 const WHOLE_RATIO: f64 = 1.25;
 /// Part of what the model explains that it may get wrong without an effect being missing.
-const MODEL_ERROR: f64 = 0.02;
+const MODEL_ERROR: f64 = 0.015;
 /// Part of the variance that a family must predict for a leftover to go with it.
 const SHARE_MIN: f64 = 0.25;
 
@@ -75,13 +75,6 @@ impl Leftover {
         let names: Vec<&str> = self.excess.iter().map(|(channel, _)| CHANNELS[*channel]).collect();
         format!("nothing that was tried; it stands out in {}", names.join(", "))
     }
-
-    /// Whether only horizontal force stands out, and nothing predicts it.
-    pub(crate) fn looks_like_gust(&self) -> bool {
-        self.is_real()
-            && self.excess.iter().all(|(channel, _)| *channel < 2)
-            && self.goes_with().is_none()
-    }
 }
 
 /// Compares a leftover with what noise alone leaves.
@@ -102,7 +95,14 @@ pub(crate) fn leftover(
     for segment in predictor.segments.iter().filter(|s| s.channel < DYNAMIC && s.rows.len() >= 4 * BLOCK) {
         let rows = |all: &[f64]| all[segment.rows.clone()].to_vec();
         let own = rows(left);
-        let explained: Vec<f64> = rows(nominal).iter().zip(&own).map(|(n, l)| n - l).collect();
+        // What the model says in all: the measurement about its mean, and what the named effects add.
+        let track = &predictor.tracks[segment.piece];
+        let measured = track.measured.iter().map(|m| m[segment.channel]);
+        let mean = measured.clone().sum::<f64>() / own.len() as f64;
+        let explained: Vec<f64> = measured
+            .zip(rows(nominal).iter().zip(&own))
+            .map(|(m, (n, l))| (m - mean).abs().max((n - l).abs()))
+            .collect();
         let noise: Vec<Vec<f64>> = draws.iter().map(|d| rows(d)).collect();
         let mean = |f: fn(&[f64]) -> f64| {
             (noise.iter().map(|n| f(n).powi(2)).sum::<f64>() / noise.len() as f64).sqrt()
@@ -120,7 +120,7 @@ pub(crate) fn leftover(
             ((floor * ratio).powi(2) + (MODEL_ERROR * explained).powi(2)).sqrt()
         };
         let ratio = (band.slow / allowed(band.slow_floor, SLOW_RATIO, rms_of_means(&explained)))
-            .max(band.whole / allowed(band.whole_floor, WHOLE_RATIO, rms(&explained)));
+            .max(band.whole / allowed(band.whole_floor, WHOLE_RATIO, rms_of_means(&explained)));
         worst[segment.channel] = worst[segment.channel].max(ratio);
         bands.push(band);
     }

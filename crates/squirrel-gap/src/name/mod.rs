@@ -41,44 +41,37 @@ pub(crate) struct Naming {
     pub(crate) deviations: Vec<f64>,
     /// Deviation of gusts, m/s, where there are any.
     pub(crate) gust_m_s: Option<f64>,
+    /// What they are worth, nats.
+    pub(crate) gust_nats: f64,
 }
-
-impl Naming {
-    /// What gusts are worth: evidence of the slow horizontal force having the deviation that it has, over the noise's, nats.
-    pub(crate) fn gust_nats(&self) -> f64 {
-        let horizontal = self.leftover.bands.iter().filter(|b| b.channel < 2);
-        horizontal
-            .map(|b| {
-                let ratio = (b.slow / b.slow_floor).powi(2);
-                // Blocks overlap in what they know of a gust that lasts longer than a block.
-                0.5 * SLOW_BLOCKS * (ratio - 1.0 - ratio.ln())
-            })
-            .sum()
-    }
-}
-
-/// Independent blocks that a flight counts for in the evidence of gusts.
-const SLOW_BLOCKS: f64 = 20.0;
 
 /// Finds the best explanation.
 ///
 /// # Errors
 /// What the predictor says.
 pub(crate) fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
-    let found = search.run()?;
-    let naming = judge(search, found)?;
-    if !naming.leftover.looks_like_gust() {
+    let naming = judge(search, search.run()?)?;
+    if as_gust(search, &naming)?.is_none() {
         return Ok(naming);
     }
     // Gusts look like drag for a while: what is named beside them must be worth it in their noise, too.
     let calm = Search { beta: GUST_BETA, ..*search };
-    let mut naming = judge(&calm, calm.run()?)?;
-    naming.gust_m_s = gust(search, &naming)?;
-    Ok(naming)
+    let mut again = judge(&calm, calm.run()?)?;
+    match as_gust(search, &again)? {
+        Some((sigma, leftover)) => {
+            again.gust_m_s = Some(sigma);
+            again.gust_nats = gust_nats(&again.leftover);
+            again.leftover = leftover;
+            Ok(again)
+        }
+        None => Ok(naming),
+    }
 }
 
 /// Tempering where gusts blow.
 const GUST_BETA: f64 = 0.05;
+/// What floats may be off by this many tolerances before a leftover is a leftover.
+const LEFTOVER_TOLERANCES: f64 = 2.0;
 
 fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let (predictor, catalogue) = (search.predictor, search.catalogue);
@@ -88,28 +81,86 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let without = Point { members: Vec::new(), base: point.base.clone() };
     let nominal = predictor.residual(&hypothesis(predictor, catalogue, &without)?)?;
     let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
-    let leftover =
-        leftover(predictor, &motions, &left, &nominal, &predictor.wind_columns(&about)?, TURBULENCE_M_S);
+    let left = loosened(&found, &point, left);
+    let wind = predictor.wind_columns(&about)?;
+    let leftover = leftover(predictor, &motions, &left, &nominal, &wind, TURBULENCE_M_S);
     let deviations = interval::deviations(predictor, &found.linear, &found.best);
-    Ok(Naming { found, point, hypothesis: about, nominal, left, leftover, deviations, gust_m_s: None })
+    Ok(Naming {
+        found,
+        point,
+        hypothesis: about,
+        nominal,
+        left,
+        leftover,
+        deviations,
+        gust_m_s: None,
+        gust_nats: 0.0,
+    })
 }
 
-/// The deviation of gusts that makes the slow part of the horizontal force, m/s; `None` where the air hardly acts.
-fn gust(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError> {
-    let columns = search.predictor.wind_columns(&naming.hypothesis)?;
-    let (mut excess, mut slope) = (0.0, 0.0);
-    for segment in search.predictor.segments.iter().filter(|s| s.channel < 2) {
-        let rows = segment.rows.clone();
-        let floor: f64 = naming
-            .leftover
-            .bands
-            .iter()
-            .filter(|b| b.channel == segment.channel && b.flight == segment.flight)
-            .map(|b| b.whole_floor.powi(2) * rows.len() as f64)
-            .sum();
-        excess += rows.clone().map(|r| naming.left[r].powi(2)).sum::<f64>() - floor;
-        slope += rows.map(|r| columns[0][r].powi(2) + columns[1][r].powi(2)).sum::<f64>();
+/// The leftover with everything that floats where it fits best inside twice its tolerance: the tempered fit that names
+/// holds back, and what it holds back is no missing effect.
+fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
+    let best = &found.best;
+    let k = best.free.len();
+    let wide: Vec<f64> =
+        best.prior.iter().enumerate().map(|(i, sd)| if i < k { *sd } else { LEFTOVER_TOLERANCES * sd }).collect();
+    let Some(loose) = best.gram.posterior(&wide, 1.0) else { return left };
+    for (i, column) in best.own_raw.iter().chain(&found.linear.raw).enumerate() {
+        let now = match best.free.get(i) {
+            Some((member, slot)) => best.members[*member].values[*slot],
+            None => point.base[i - k],
+        };
+        let moved = if wide[i] > 0.0 { loose.mean[i] - now } else { 0.0 };
+        if moved != 0.0 {
+            for (value, c) in left.iter_mut().zip(column) {
+                *value -= c * moved;
+            }
+        }
     }
-    let sigma = (excess.max(0.0) / slope + TURBULENCE_M_S.powi(2)).sqrt();
-    Ok((sigma.is_finite() && sigma > 0.3).then_some(sigma))
+    left
+}
+
+/// Smallest deviation that is called a gust, m/s.
+const GUST_MIN_M_S: f64 = 0.4;
+
+/// The deviation of gusts that would make the leftover, m/s, and what they leave; `None` where they would not make it.
+fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover)>, GapError> {
+    if !naming.leftover.is_real() || naming.leftover.goes_with().is_some() {
+        return Ok(None);
+    }
+    let predictor = search.predictor;
+    let wind = predictor.wind_columns(&naming.hypothesis)?;
+    let motions: Vec<_> =
+        (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
+    let blown = |sigma: f64| leftover(predictor, &motions, &naming.left, &naming.nominal, &wind, sigma);
+    // The floor is noise and wind, squared; two floors tell them apart.
+    let (calm, windy) = (&naming.leftover, blown(TURBULENCE_M_S + 1.0));
+    let span = (TURBULENCE_M_S + 1.0).powi(2) - TURBULENCE_M_S.powi(2);
+    let (mut excess, mut unit) = (0.0, 0.0);
+    for (calm, windy) in calm.bands.iter().zip(&windy.bands).filter(|(b, _)| b.channel < 2) {
+        excess += calm.slow.powi(2) - calm.slow_floor.powi(2);
+        unit += (windy.slow_floor.powi(2) - calm.slow_floor.powi(2)) / span;
+    }
+    let sigma = (excess.max(0.0) / unit + TURBULENCE_M_S.powi(2)).sqrt();
+    if !(sigma.is_finite() && sigma > GUST_MIN_M_S) {
+        return Ok(None);
+    }
+    let left = blown(sigma);
+    Ok((!left.is_real()).then_some((sigma, left)))
+}
+
+/// Independent blocks that a flight counts for in the evidence of gusts: they last longer than a block.
+const SLOW_BLOCKS: f64 = 20.0;
+
+/// What gusts are worth: evidence of the slow horizontal force having the deviation that it has, over the noise's, nats.
+fn gust_nats(calm: &Leftover) -> f64 {
+    calm.bands
+        .iter()
+        .filter(|b| b.channel < 2)
+        .map(|b| {
+            let ratio = (b.slow / b.slow_floor).powi(2);
+            0.5 * SLOW_BLOCKS * (ratio - 1.0 - ratio.ln())
+        })
+        .sum()
 }

@@ -34,7 +34,8 @@ pub(crate) struct Scored {
     pub(crate) prior: Vec<f64>,
     /// Which number of which member each of the first columns is.
     pub(crate) free: Vec<(usize, usize)>,
-    /// Whitened columns of the free numbers.
+    /// Columns of the free numbers, as they are and whitened.
+    pub(crate) own_raw: Vec<Vec<f64>>,
     pub(crate) own: Vec<Vec<f64>>,
     /// Whitened measurement, with the free numbers' part in it.
     pub(crate) y: Vec<f64>,
@@ -74,6 +75,7 @@ impl Search<'_> {
             self.drop_and_swap(&linear, &mut best)?;
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
+                self.prune(&linear, &mut best)?;
                 let worth = self.worth(&linear, &null, &best)?;
                 return Ok(Found { linear, null, best, worth });
             }
@@ -91,6 +93,16 @@ impl Search<'_> {
             }
         }
         Point { members: set.members.clone(), base }
+    }
+
+    /// Drops members that refinement has made too small to report.
+    fn prune(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+        while let Some(small) = best.members.iter().position(|member| !self.is_large_enough(member)) {
+            let mut rest = best.members.clone();
+            rest.remove(small);
+            *best = self.score(linear, &rest)?;
+        }
+        Ok(())
     }
 
     fn worth(&self, linear: &Linear, null: &Scored, best: &Scored) -> Result<Vec<f64>, GapError> {
@@ -158,13 +170,14 @@ impl Search<'_> {
 
     /// Whether each member is at least half the smallest size worth reporting.
     pub(crate) fn is_large(&self, scored: &Scored) -> bool {
-        scored.members.iter().all(|member| {
-            let candidate = &self.catalogue.candidates[member.candidate];
-            candidate.parameters.iter().any(|p| {
-                let p = &self.catalogue.parameters[*p];
-                let size = member.values[p.slot];
-                (if p.signed { size.abs() } else { size }) >= SIZE_MIN * p.smallest
-            })
+        scored.members.iter().all(|member| self.is_large_enough(member))
+    }
+
+    fn is_large_enough(&self, member: &Member) -> bool {
+        self.catalogue.candidates[member.candidate].parameters.iter().any(|p| {
+            let p = &self.catalogue.parameters[*p];
+            let size = member.values[p.slot];
+            (if p.signed { size.abs() } else { size }) >= SIZE_MIN * p.smallest
         })
     }
 
@@ -322,7 +335,7 @@ impl Search<'_> {
                 add_scaled(&mut y, column, *x);
             }
         }
-        let (mut own, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut own, mut own_raw, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (index, member) in members.iter().enumerate() {
             for slot in self.free_slots(member) {
                 let (smallest, largest, _) = self.range(member, slot);
@@ -331,9 +344,10 @@ impl Search<'_> {
                 moved.members[index].values[slot] += step;
                 let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
                 let column: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
-                let column = linear.whitener.apply(segments, &column);
-                add_scaled(&mut y, &column, member.values[slot]);
-                own.push(column);
+                let white = linear.whitener.apply(segments, &column);
+                add_scaled(&mut y, &white, member.values[slot]);
+                own.push(white);
+                own_raw.push(column);
                 free.push((index, slot));
                 prior.push(SLAB_OF_LARGEST * largest);
             }
@@ -368,6 +382,7 @@ impl Search<'_> {
             gram,
             prior,
             free,
+            own_raw,
             own,
             y,
         })
