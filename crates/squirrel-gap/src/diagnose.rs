@@ -336,3 +336,15 @@ impl Diagnosis {
         format!("held {h:?}\n  spikes {sp:?}\n  {:?} {:?} {:?} {:?}", d.naming.leftover.excess, d.naming.leftover.families, d.naming.leftover.line, bands)
     }
 }
+#[doc(hidden)]
+pub fn scan(vehicle: &VehicleFile, flights: &[(String, FlightLog)], effect: &str, slot: usize, xs: &[f64]) {
+    let p = Predictor::new(vehicle, flights).unwrap();
+    for x in xs {
+        let mut h = p.nominal();
+        let f = h.effects.insert(effect).unwrap();
+        f.values[slot] = *x;
+        let r = p.residual(&h).unwrap();
+        let per: Vec<String> = (0..9).map(|c| { let (s, n) = p.segments.iter().filter(|s| s.channel == c).fold((0.0, 0), |(s, n), g| (s + r[g.rows.clone()].iter().map(|x| x * x).sum::<f64>(), n + g.rows.len())); format!("{:.5}", (s / n as f64).sqrt()) }).collect();
+        eprintln!("{x} {per:?}");
+    }
+}

@@ -19,7 +19,7 @@ mod verdict;
 mod words;
 
 pub use add::{add, difference};
-pub use diagnose::{Covered, Diagnosis, diagnose};
+pub use diagnose::{Covered, Diagnosis, diagnose, scan};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};

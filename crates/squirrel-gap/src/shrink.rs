@@ -43,8 +43,10 @@ const COUNTED: usize = 10;
 /// Length of a bin and distance of segments, s.
 pub(crate) const BIN_S: f64 = 0.1;
 const RESTART_S: f64 = 0.5;
-/// Samples on each side over which a start state is averaged.
-const START_REACH: usize = 3;
+/// Weights of a parabola through nine samples at its middle (Savitzky and Golay, 1964), and the noise that they pass.
+const START_WEIGHTS: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0];
+const START_SUM: f64 = 231.0;
+const START_NOISE: f64 = 0.505;
 /// Errors of a start state that the log does not show by itself: smoothed velocity, m/s, and attitude, rad.
 const START_VELOCITY_M_S: f64 = 0.02;
 const START_ATTITUDE_RAD: f64 = 0.001;
@@ -233,9 +235,10 @@ fn segment(
 ) {
     let track = &predictor.tracks[piece];
     let n = track.time_s.len();
-    let around = start.saturating_sub(START_REACH)..(start + START_REACH + 1).min(n);
-    let omega = around.clone().map(|k| motion.body[k].omega.vector).sum::<Vector3<f64>>() / around.len() as f64;
-    state.body.omega = In::new(omega);
+    if start >= 4 && start + 4 < n {
+        let weighted = START_WEIGHTS.iter().zip(&motion.body[start - 4..]);
+        state.body.omega = In::new(weighted.map(|(w, body)| body.omega.vector * (w / START_SUM)).sum());
+    }
     let mut wind = Vector3::zeros();
     let mut turbulence = 0.0;
     if let Some((sigma, rng)) = noise {
@@ -246,8 +249,7 @@ fn segment(
         let turn = UnitQuaternion::from_scaled_axis(draw() * START_ATTITUDE_RAD);
         state.body.attitude = (state.body.ned_from_body().quaternion * turn).into_inner();
         let [_, rate_noise] = track.imu_noise;
-        let share = 1.0 / (2.0 * START_REACH as f64 + 1.0).sqrt();
-        state.body.omega = In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * share);
+        state.body.omega = In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * START_NOISE);
     }
     let effects = &hypothesis.effects;
     let mut clock = predictor.clock(track.flight, effects, track.time_s[start]);

@@ -23,3 +23,11 @@ fn explore() {
         println!("  {}", d.debug());
     }
 }
+#[test]
+fn scan() {
+    let dir = shared("gap-practice/cases").unwrap();
+    let case = dir.join(std::env::var("CASE").unwrap());
+    let flights: Vec<_> = ["flight00", "flight01"].iter().map(|f| ((*f).to_owned(), imported("practice.toml", &case.join("train").join(f)))).collect();
+    for e in ["motor_lag", "actuation_latency"] { eprintln!("{e}");
+    squirrel_gap::scan(&vehicle("practice.toml"), &flights, e, 0, &[-0.01, -0.006, -0.004, -0.002, -0.001, 0.0, 0.001, 0.002, 0.004, 0.006, 0.01]); }
+}

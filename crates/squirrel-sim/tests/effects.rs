@@ -9,7 +9,7 @@ use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::{Quaternion, Vector3};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::flight::{Flight, Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::plant::Plant;
 use squirrel_sim::scenario::Scenario;
@@ -98,13 +98,19 @@ fn forms_that_cannot_be_are_refused() {
 }
 
 fn fly(effect: &str, arm: Arm, scenario: &str, duration_s: f64) -> FlightLog {
+    measured(effect, arm, scenario, duration_s).log.unwrap()
+}
+
+fn measured(effect: &str, arm: Arm, scenario: &str, duration_s: f64) -> Flight {
     let mut vehicle = parse(effect).unwrap();
     vehicle.sensors = SensorParameters::ideal();
     let mut scenario = Scenario::find(scenario).unwrap();
     scenario.duration_s = duration_s;
+    // Low enough for the ground to be felt.
+    scenario.height_m = 3.0;
     scenario.seed = 3;
     let setup = Setup { vehicle, arm, scenario, integrator: Integrator::Rk4 };
-    setup.fly(true, |_| {}).unwrap().log.unwrap()
+    setup.fly(true, |_| {}).unwrap()
 }
 
 /// Times and rows of a channel.
@@ -119,6 +125,23 @@ fn rows_at(log: &FlightLog, name: &str, i: usize) -> Vec<f64> {
 
 fn at(rows: &[(f64, Vec<f64>)], time_s: f64) -> &[f64] {
     &rows.iter().min_by(|a, b| (a.0 - time_s).abs().total_cmp(&(b.0 - time_s).abs())).unwrap().1
+}
+
+/// Every effect in every form flies at its smallest size, and leaves a trace in the log.
+#[test]
+fn every_effect_flies() {
+    let nominal = measured("", Arm::PcWingsOpen, "track", 12.0);
+    for name in Effects::<f64>::NAMES {
+        let names = forms(Effects::<f64>::parameters(name).unwrap());
+        for form in names.iter().copied().chain(names.is_empty().then_some("")) {
+            let flight = measured(&table(name, form), Arm::PcWingsOpen, "track", 12.0);
+            let (rmse_m, before_m) = (flight.metrics.rmse_m, nominal.metrics.rmse_m);
+            assert!(flight.metrics.contact_s.is_none(), "{name}, {form}");
+            assert!(rmse_m < 2.0 * before_m, "{name}, {form}: {rmse_m} m, without {before_m} m");
+            let traces = [&nominal, &flight].map(|f| &f.log.as_ref().unwrap().sources);
+            assert!(traces[0] != traces[1], "{name}, {form} leaves no trace");
+        }
+    }
 }
 
 #[test]

@@ -94,31 +94,6 @@ fn thrust_feels_the_battery_only_through_its_effect() {
     );
 }
 
-/// Every effect of the catalogue can be given to a vehicle, and flies at its smallest size.
-#[test]
-fn every_effect_flies() {
-    use squirrel_core::effects::{Effects, Kind};
-    use std::fmt::Write as _;
-    for name in Effects::<f64>::NAMES {
-        let mut effects = Effects::<f64>::none();
-        let mut table = format!("{}\n[effects.{name}]\n", squirrel_sim::vehicle_file::SQUIRREL_TOML);
-        for parameter in effects.insert(name).unwrap().parameters {
-            let value = match parameter.kind {
-                Kind::Size { smallest, .. } => format!("{smallest:?}"),
-                Kind::Rotor => "2".to_owned(),
-                Kind::OneOf(names) => format!("\"{}\"", names[0]),
-            };
-            let _ = writeln!(table, "{} = {value}", parameter.key);
-        }
-        let mut setup = setup(Arm::Pc, "track");
-        let nominal = fly(&setup);
-        setup.vehicle = VehicleFile::parse(&table, name).unwrap();
-        let metrics = fly(&setup);
-        assert!(metrics.contact_s.is_none() && metrics.rmse_m < 2.0 * nominal.rmse_m, "{name}: {metrics:?}");
-        assert_ne!(metrics.rmse_m, nominal.rmse_m, "{name} changes nothing");
-    }
-}
-
 #[cfg(feature = "rapier")]
 mod with_a_world {
     use super::*;

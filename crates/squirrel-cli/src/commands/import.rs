@@ -1,9 +1,12 @@
 //! `squirrel import`: foreign logs in, flight logs out.
 
 use crate::output::{self, say, talk};
-use squirrel_sim::import::{ImportMap, import};
+use squirrel_sim::import::{ImportMap, import_watched};
 use squirrel_sim::log::FlightLog;
 use std::path::PathBuf;
+
+/// Smaller files are read before a progress bar could be seen.
+const BAR_FROM_BYTES: u64 = 32 << 20;
 
 /// Options of an import.
 #[derive(Debug, clap::Args)]
@@ -14,7 +17,7 @@ pub(crate) struct Import {
     /// Save what is whole of a truncated flight log.
     #[arg(long, conflicts_with = "map")]
     recover: bool,
-    /// Files or folders of one flight.
+    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.
@@ -29,7 +32,15 @@ impl Import {
     pub(crate) fn run(&self) -> Result<(), String> {
         let Some(map) = &self.map else { return self.recover() };
         let map = ImportMap::load(map).map_err(|e| e.to_string())?;
-        let (log, report) = import(&map, &self.paths).map_err(|e| e.to_string())?;
+        let bar = output::progress(0, "bytes");
+        let imported = import_watched(&map, &self.paths, &|done, total| {
+            if total >= BAR_FROM_BYTES {
+                bar.set_length(total);
+                bar.set_position(done);
+            }
+        });
+        bar.finish_and_clear();
+        let (log, report) = imported.map_err(|e| e.to_string())?;
         log.write(&self.out).map_err(|e| e.to_string())?;
         say(report.to_string().trim_end());
         talk(&format!("wrote {}", self.out.display()));

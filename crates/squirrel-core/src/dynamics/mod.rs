@@ -98,11 +98,12 @@ fn wrench_in<T: Real>(
 ) -> Wrench<Body, T> {
     let rotors = rotors::wrench(vehicle, &state.rotor_speed_rad_s);
     let rest = Wrench::from_force(drag(vehicle, air)) + surfaces(air);
-    if effects.any() {
-        affected(vehicle, effects, state, held, air, ned_from_body, [rotors, rest])
-    } else {
-        rotors + rest
+    if !effects.any() {
+        return rotors + rest;
     }
+    // Copies, so that without effects nothing here needs an address and all of it stays in registers.
+    let (state, air, ned_from_body) = (*state, *air, *ned_from_body);
+    affected(vehicle, effects, &state, held, &air, &ned_from_body, [rotors, rest])
 }
 
 /// The wrench of `[rotors, rest]` with everything that effects do to it.

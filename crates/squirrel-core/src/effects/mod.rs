@@ -76,7 +76,7 @@ pub use yaw_torque_coeff::YawTorqueCoeff;
 
 use crate::aero::Air;
 use crate::frames::{Body, Frame, In, Ned, Wrench};
-use crate::math::{Real, real, upper};
+use crate::math::{Real, real};
 use crate::vehicle::{PerRotor, Wing};
 use nalgebra::{Matrix3, Vector3};
 
@@ -152,10 +152,11 @@ fn is<T: Real>(value: T, number: usize) -> bool {
     value == real(number as f64)
 }
 
-/// A lag, s, that is shorter upwards by a fraction and longer downwards; not below 0.
+/// A lag, s, that is shorter upwards by a fraction and longer downwards. A negative one shortens the base model's own: what
+/// the two leave below 0 is no lag.
 #[inline(always)]
 fn up_and_down<T: Real>(lag_s: T, asymmetry: T) -> [T; 2] {
-    [lag_s * (T::one() - asymmetry), lag_s * (T::one() + asymmetry)].map(|lag| upper(lag, T::zero()))
+    [lag_s * (T::one() - asymmetry), lag_s * (T::one() + asymmetry)]
 }
 
 /// What feeds the rotors.

@@ -89,14 +89,14 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let nominal = predictor.residual(&hypothesis(predictor, catalogue, &without)?)?;
     let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
     let leftover =
-        leftover(predictor, &motions, &left, &nominal, &predictor.wind_columns()?, TURBULENCE_M_S);
+        leftover(predictor, &motions, &left, &nominal, &predictor.wind_columns(&about)?, TURBULENCE_M_S);
     let deviations = interval::deviations(predictor, &found.linear, &found.best);
     Ok(Naming { found, point, hypothesis: about, nominal, left, leftover, deviations, gust_m_s: None })
 }
 
 /// The deviation of gusts that makes the slow part of the horizontal force, m/s; `None` where the air hardly acts.
 fn gust(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError> {
-    let columns = search.predictor.wind_columns()?;
+    let columns = search.predictor.wind_columns(&naming.hypothesis)?;
     let (mut excess, mut slope) = (0.0, 0.0);
     for segment in search.predictor.segments.iter().filter(|s| s.channel < 2) {
         let rows = segment.rows.clone();

@@ -15,10 +15,12 @@ const SIZE_MIN: f64 = 0.5;
 const REFINED: usize = 4;
 /// Most steps of a refinement.
 const STEPS_MAX: usize = 6;
+/// Evidence that a step towards the mode may cost, nats.
+const STEP_NATS: f64 = 1.0;
 /// Most effects in a set.
 const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
-const ROUNDS_MAX: usize = 3;
+const ROUNDS_MAX: usize = 4;
 
 /// A set of effects with its best numbers and its evidence.
 pub(crate) struct Scored {
@@ -70,7 +72,7 @@ impl Search<'_> {
             let mut best = self.score(&linear, &point.members)?;
             self.extend(&linear, &mut best)?;
             self.drop_and_swap(&linear, &mut best)?;
-            let settled = round > 1 && self.same_set(&best.members, &point.members);
+            let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
                 let worth = self.worth(&linear, &null, &best)?;
                 return Ok(Found { linear, null, best, worth });
@@ -103,19 +105,22 @@ impl Search<'_> {
             .collect()
     }
 
-    fn same_set(&self, a: &[Member], b: &[Member]) -> bool {
-        let names = |list: &[Member]| {
-            let mut all: Vec<(usize, _)> = list
-                .iter()
-                .map(|m| {
-                    let candidate = &self.catalogue.candidates[m.candidate];
-                    (candidate.fixed.iter().map(|(_, v)| *v as usize).sum::<usize>(), candidate.effect)
+    /// Whether a set is the one that the predictor was linearised about, with numbers within a tenth of what they are.
+    fn has_settled(&self, set: &Scored, about: &[Member]) -> bool {
+        set.members.len() == about.len()
+            && set.members.iter().all(|member| {
+                let effect = self.effect(member);
+                about.iter().any(|other| {
+                    self.effect(other) == effect
+                        && self.catalogue.candidates[other.candidate].fixed
+                            == self.catalogue.candidates[member.candidate].fixed
+                        && self.form(other) == self.form(member)
+                        && self.free_slots(member).into_iter().all(|slot| {
+                            let moved = (member.values[slot] - other.values[slot]).abs();
+                            moved < 0.1 * self.range(member, slot).0
+                        })
                 })
-                .collect();
-            all.sort_unstable();
-            all
-        };
-        names(a) == names(b)
+            })
     }
 
     /// Adds effects as long as the evidence asks for them.
@@ -268,8 +273,8 @@ impl Search<'_> {
                 break;
             }
             let scored = self.evaluate(linear, &next)?;
-            if std::env::var("GN").is_ok() { eprintln!("GN {:?} {:.2} -> {:?} {:.2} share {share}", best.members.iter().map(|m| (self.effect(m), m.values.clone())).collect::<Vec<_>>(), best.log_evidence, next.iter().map(|m| m.values.clone()).collect::<Vec<_>>(), scored.log_evidence); }
-            if scored.log_evidence > best.log_evidence {
+            // Where the model is linear, every point of it has the same evidence: the mode is where steps end.
+            if scored.log_evidence > best.log_evidence - STEP_NATS {
                 best = scored;
             } else {
                 // Too far for what the columns know: half the way.

@@ -154,8 +154,7 @@ impl<'a> Predictor<'a> {
         flight: Option<usize>,
         rows: &mut [f64],
     ) -> Result<(), GapError> {
-        // The step matters to `step` alone; here the plant is only led.
-        let plant = self.plant_at(hypothesis, squirrel_sim::flight::PLANT_STEP_US as f64 * 1e-6)?;
+        let plant = self.plant_at(hypothesis, LED_STEP_S)?;
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
             let skip = flight.is_some_and(|flight| flight != track.flight);
@@ -221,14 +220,14 @@ impl<'a> Predictor<'a> {
         self.commands.iter().all(Commands::has_wing)
     }
 
-    /// What a metre per second of wind from the south and from the west changes in the rows.
+    /// What a metre per second of wind from the south and from the west changes in the rows, under a hypothesis.
     ///
     /// # Errors
     /// As [`Self::residual`].
-    pub(crate) fn wind_columns(&self) -> Result<[Vec<f64>; 2], GapError> {
-        let still = self.residual(&self.nominal())?;
+    pub(crate) fn wind_columns(&self, hypothesis: &Hypothesis) -> Result<[Vec<f64>; 2], GapError> {
+        let still = self.residual(hypothesis)?;
         let column = |axis: usize| {
-            let mut moved = self.nominal();
+            let mut moved = hypothesis.clone();
             if let Some(wind) = moved.effects.insert("constant_wind") {
                 wind.values[axis] += 1.0;
             }
@@ -320,6 +319,8 @@ fn sensors(effects: &Effects<f64>) -> [f64; 9] {
     [b0.x, b0.y, b0.z, b1.x, b1.y, b1.z, h0, h1, effects.gnss_latency_s()]
 }
 
+/// The step of a plant that is only led matters to nothing; it is shorter than any lag.
+const LED_STEP_S: f64 = 1e-9;
 /// How long the first sample of a piece is held before it, so that rotors and servos start settled, s.
 const SETTLE_S: f64 = 1.0;
 

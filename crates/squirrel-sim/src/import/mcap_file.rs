@@ -5,6 +5,7 @@
 //! as a number is one, since JSON writes 64-bit integers and NaN as text.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write;
 
 use mcap::MAGIC;
 use mcap::read::{Options, RawMessageStream};
@@ -172,7 +173,8 @@ fn walk(value: &Value, path: &mut String, visit: &mut Visit<'_>) -> Result<(), I
         }
         Value::Array(items) => {
             for (i, inner) in items.iter().enumerate() {
-                path.push_str(&format!("[{i}]"));
+                // Writing to a string cannot fail.
+                let _ = write!(path, "[{i}]");
                 walk(inner, path, visit)?;
                 path.truncate(length);
             }

@@ -18,7 +18,7 @@ use squirrel_core::vehicle::PerRotor;
 pub struct Led {
     /// Force and moment without gravity, N and N m.
     pub wrench: Wrench<Body, f64>,
-    /// What the accelerometer reads, m/s^2.
+    /// What the accelerometer reads, m/s^2, its bias by effects included.
     pub specific_force: In<Body, f64>,
     /// Angular acceleration, rad/s^2.
     pub angular_acceleration: In<Body, f64>,
@@ -27,6 +27,9 @@ pub struct Led {
 impl Plant {
     /// What the plant says at a measured motion, in air that moves only by effects; then moves on what is not measured
     /// (rotors, wing servos, membrane, slung load) under held commands. The battery is not stepped: its voltage is measured.
+    ///
+    /// Of the effects on sensors only those on the accelerometer are in the answer; command latency, clocks and the other
+    /// sensors belong to whoever reads the measurements.
     ///
     /// * `motion` - measured; its rotor speeds are not looked at
     /// * `rotor_command` - in the vehicle's unit; `wing_command` - left, right, 0..1

@@ -30,6 +30,9 @@ pub struct ServoLag {
     keep: [f64; 2],
 }
 
+/// A lag that no step resolves, s.
+const SHORTEST_S: f64 = 1e-6;
+
 impl ServoParameters {
     pub(crate) fn check(&self) -> Result<(), String> {
         if !(0.0..=1.0).contains(&self.dead_time_s) {
@@ -45,7 +48,8 @@ impl ServoParameters {
     ///
     /// * `extra_s` - added to the time constant, opening and closing
     pub fn lag(&self, extra_s: [f64; 2], dt_s: f64) -> ServoLag {
-        let time_constant_s = extra_s.map(|extra| self.time_constant_s + extra);
+        // An effect may take away more than there is; what is left is then no lag.
+        let time_constant_s = extra_s.map(|extra| (self.time_constant_s + extra).max(SHORTEST_S));
         ServoLag { dt_s, time_constant_s, keep: time_constant_s.map(|tau| (-dt_s / tau).exp()) }
     }
 
