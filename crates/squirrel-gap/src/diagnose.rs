@@ -3,7 +3,7 @@
 use crate::GapError;
 use crate::compatibility;
 use crate::find::{self, Place};
-use crate::name::{Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis};
+use crate::name::{Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis, payload_lengths_m};
 use crate::predictor::{Hypothesis, Predictor};
 use crate::shrink::{self, Errors12};
 use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
@@ -77,7 +77,6 @@ pub fn diagnose(
 ) -> Result<Diagnosis, GapError> {
     progress("reading");
     let predictor = Predictor::new(vehicle, flights)?;
-    let catalogue = Catalogue::new(vehicle)?;
     let unseen = if held_out.is_empty() { None } else { Some(Predictor::new(vehicle, held_out)?) };
     progress("checking the data");
     let domain = covered(&predictor);
@@ -99,6 +98,7 @@ pub fn diagnose(
         return Ok(Diagnosis { verdict, domain, details: None });
     }
     progress("naming");
+    let catalogue = Catalogue::new(vehicle, &payload_lengths_m(&predictor, &nominal))?;
     let tick = || progress("naming");
     let search =
         Search { predictor: &predictor, catalogue: &catalogue, beta: crate::name::BETA, progress: &tick };

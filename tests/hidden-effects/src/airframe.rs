@@ -175,6 +175,7 @@ impl Airframe {
             rotor.torque_coefficient_n_m_s2 *= 1.0 + torque + draw.normal(0.5 * t::TORQUE);
         }
         real.rotor_time_constant_s = off(draw, self.rotor_time_constant_s, t::ROTOR_LAG);
+        // No airframe is driven by its drag.
         real.drag_n_s_per_m = self.drag_n_s_per_m.map(|d| (d + draw.normal(t::DRAG_N_S_PER_M)).max(0.0));
         real.drag_area_m2 = off(draw, self.drag_area_m2, t::DRAG_AREA);
         real.wing_area_m2 = off(draw, self.wing_area_m2, t::WING);

@@ -225,6 +225,30 @@ impl Case {
         Self { answer, nominal, seed }
     }
 
+    /// Draws a case and makes it in a folder, as [`Self::make`]; one that cannot be flown is drawn again.
+    ///
+    /// # Errors
+    /// [`CaseError`]
+    pub fn draw_and_make(
+        set: Set,
+        index: usize,
+        seed: u64,
+        folder: &Path,
+    ) -> Result<(Self, PathBuf), CaseError> {
+        let make = |seed| {
+            let case = Self::draw(set, index, seed);
+            case.make(folder).map(|path| (case, path))
+        };
+        let mut made = make(seed);
+        for again in 1..4 {
+            if !matches!(made, Err(CaseError::Flight { .. })) {
+                break;
+            }
+            made = make(mix(seed, again));
+        }
+        made
+    }
+
     /// The same vehicle and the same flights with something else hidden.
     #[must_use]
     pub fn hiding(&self, effects: Vec<HiddenEffect>, outside: Option<Outside>) -> Self {
@@ -241,14 +265,15 @@ impl Case {
     pub fn make(&self, folder: &Path) -> Result<PathBuf, CaseError> {
         let id = &self.answer.case;
         let (cases, answers) = (folder.join("cases"), folder.join("answers"));
+        let flights = [self.flight(0)?, self.flight(1)?, self.flight(2)?];
         let partial = cases.join(format!("{id}.partial"));
         for path in [&partial.join("train"), &partial.join("held-out"), &answers] {
             fs::create_dir_all(path).map_err(CaseError::io(path))?;
         }
         let vehicle = partial.join("vehicle.toml");
         fs::write(&vehicle, self.nominal.to_toml()).map_err(CaseError::io(&vehicle))?;
-        for (number, name) in FLIGHTS.iter().enumerate() {
-            self.flight(number)?.write(&partial.join(name))?;
+        for (flight, name) in flights.iter().zip(FLIGHTS) {
+            flight.write(&partial.join(name))?;
         }
         let whole = cases.join(id);
         if whole.exists() {

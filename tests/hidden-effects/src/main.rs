@@ -38,8 +38,8 @@ fn run(arguments: &[String]) -> Result<(), String> {
 fn make(options: &Options) -> Result<(), String> {
     let (set, seed) = (set(options.need("set")?)?, options.number("seed")?);
     for index in 0..options.number("n")? {
-        let case = Case::draw(set, index as usize, seed);
-        case.make(Path::new(options.need("out")?)).map_err(|error| error.to_string())?;
+        Case::draw_and_make(set, index as usize, seed, Path::new(options.need("out")?))
+            .map_err(|error| error.to_string())?;
     }
     Ok(())
 }

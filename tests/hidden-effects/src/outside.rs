@@ -41,7 +41,7 @@ pub enum Outside {
     MomentSwitch { roll_n_m: f64, pitch_n_m: f64, at_s: f64 },
     /// Suction of a wall.
     Wall { force_n: f64, reach_m: f64, distance_m: f64, direction_rad: f64 },
-    /// The left wing stops where it should not.
+    /// The wings stop where they should not.
     WingJam { deployment: f64, from_s: f64 },
 }
 
@@ -116,7 +116,7 @@ impl Outside {
                 distance_m: draw.uniform(0.5, 1.5),
                 direction_rad: draw.angle(),
             },
-            _ => Self::WingJam { deployment: draw.uniform(0.2, 0.4), from_s: draw.uniform(4.0, 8.0) },
+            _ => Self::WingJam { deployment: draw.uniform(0.3, 0.6), from_s: draw.uniform(4.0, 8.0) },
         }
     }
 }

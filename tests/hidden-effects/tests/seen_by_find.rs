@@ -99,8 +99,13 @@ fn every_effect_of_the_dynamics_shows_in_its_channels() {
 }
 
 /// Effects of squirrel's core whose standard equation is compared: the same name, number and sign give the same physics.
-/// `ground_effect` is not among them: `find` does not know the height.
-const SHARED: [&str; 16] = [
+/// `ground_effect` and `actuation_latency` are not among them: `find` knows neither height nor lateness.
+const SHARED: [&str; 21] = [
+    "added_mass",
+    "rotor_gyro_torque",
+    "wing_asymmetry",
+    "wing_membrane",
+    "wing_servo_lag",
     "angular_damping",
     "axial_inflow",
     "battery_sag",
@@ -126,21 +131,31 @@ fn an_effect_stated_in_the_vehicle_file_is_the_effect_that_flew() {
         let base = of(&none);
         for name in SHARED {
             let entry = CATALOGUE.iter().find(|e| e.name == name).unwrap();
-            let effect = hidden(&none, entry, seed);
-            let toml = none.nominal().to_toml() + &effect_table(&effect);
-            let mass_or_inertia = effect.number("mass_fraction") + effect.number("inertia_fraction");
-            let case = none.hiding(vec![effect], None);
-            let (without, with) = (of(&case), residual(&toml, case.flight(0).unwrap()));
-            for channel in 0..6 {
-                let (before, after) = (without[channel] / base[channel], with[channel] / base[channel]);
-                // A sensor's error enters through the effect, and noise of an acceleration is worth mass or inertia.
-                let heavier = 1.0 + mass_or_inertia.abs();
-                let most = heavier * (1.15 + 0.15 * (before - 1.0).max(0.0));
-                assert!(after < most, "{name}, channel {channel}: {before} without, {after} with it stated");
+            let forms = ["standard"].iter().chain(entry.forms).filter(|form| !UNSHARED_FORMS.contains(*form));
+            for form in forms {
+                let (mass_kg, rotors) = (none.nominal().mass_kg, none.nominal().rotors.len());
+                let effect = entry.draw(&mut Draw::new(seed), form, mass_kg, rotors);
+                let toml = none.nominal().to_toml() + &effect_table(&effect);
+                let mass_or_inertia = effect.number("mass_fraction") + effect.number("inertia_fraction");
+                let case = none.hiding(vec![effect], None);
+                let (without, with) = (of(&case), residual(&toml, case.flight(0).unwrap()));
+                for channel in 0..6 {
+                    let (before, after) = (without[channel] / base[channel], with[channel] / base[channel]);
+                    // A sensor's error enters through the effect, and noise of an acceleration is worth mass or inertia.
+                    let heavier = 1.0 + mass_or_inertia.abs();
+                    let most = heavier * (1.15 + 0.15 * (before - 1.0).max(0.0));
+                    assert!(
+                        after < most,
+                        "{name} {form}, channel {channel}: {before} without, {after} with it"
+                    );
+                }
             }
         }
     }
 }
+
+/// One takes the load from the current, the other from the rotor's speed; and `find` knows no height.
+const UNSHARED_FORMS: [&str; 2] = ["load_dependent", "log_profile"];
 
 #[test]
 fn every_kind_outside_the_catalogue_matters() {

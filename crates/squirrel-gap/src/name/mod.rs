@@ -11,6 +11,7 @@ mod forms;
 mod interval;
 mod linear;
 mod parameters;
+mod payload;
 mod rivals;
 mod search;
 mod whiten;
@@ -18,6 +19,7 @@ mod whiten;
 pub(crate) use evidence::BETA;
 pub(crate) use linear::{Member, Point, hypothesis};
 pub(crate) use parameters::Catalogue;
+pub(crate) use payload::payload_lengths_m;
 pub(crate) use search::{Found, NATS_MIN, Scored, Search};
 
 use crate::GapError;

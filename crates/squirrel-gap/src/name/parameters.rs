@@ -13,9 +13,6 @@ use squirrel_sim::vehicle_file::VehicleFile;
 const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
 /// Width of the slab over the largest plausible size.
 pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
-/// Lengths at which a payload is looked for, m: its frequency is not linear in anything.
-const PAYLOAD_LENGTHS_M: [f64; 5] = [0.3, 0.4, 0.52, 0.68, 0.9];
-
 /// One number of one effect.
 #[derive(Debug, Clone)]
 pub(crate) struct Parameter {
@@ -51,9 +48,11 @@ pub(crate) struct Catalogue {
 }
 
 impl Catalogue {
+    /// * `payload_lengths_m` - at which a slung load is looked for: its frequency is not linear in anything
+    ///
     /// # Errors
     /// The vehicle file lacks a tolerance that is needed.
-    pub(crate) fn new(vehicle: &VehicleFile) -> Result<Self, GapError> {
+    pub(crate) fn new(vehicle: &VehicleFile, payload_lengths_m: &[f64]) -> Result<Self, GapError> {
         let mut all = Self { candidates: Vec::new(), parameters: Vec::new() };
         for name in Effects::<f64>::NAMES {
             if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
@@ -62,8 +61,8 @@ impl Catalogue {
             let list = Effects::<f64>::parameters(name).unwrap_or_default();
             for fixed in choices(list, vehicle.vehicle.rotors().len()) {
                 if *name == "payload_swing" {
-                    for length_m in PAYLOAD_LENGTHS_M {
-                        all.add(vehicle, name, list, fixed.clone(), &[("length_m", length_m)])?;
+                    for length_m in payload_lengths_m {
+                        all.add(vehicle, name, list, fixed.clone(), &[("length_m", *length_m)])?;
                     }
                 } else {
                     all.add(vehicle, name, list, fixed, &[])?;

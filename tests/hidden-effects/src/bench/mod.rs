@@ -62,7 +62,7 @@ pub fn run(plan: &Plan) -> Result<Vec<Outcome>, CaseError> {
                 loop {
                     let number = next.fetch_add(1, Ordering::Relaxed);
                     let Some(&(set, index)) = plan.cases.get(number) else { return };
-                    let outcome = one(plan, &Case::draw(set, index, plan.seed));
+                    let outcome = one(plan, set, index);
                     let failed = outcome.is_err();
                     done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, outcome));
                     bar.inc(1);
@@ -80,8 +80,8 @@ pub fn run(plan: &Plan) -> Result<Vec<Outcome>, CaseError> {
     outcomes.into_iter().map(|(_, outcome)| outcome).collect()
 }
 
-fn one(plan: &Plan, case: &Case) -> Result<Outcome, CaseError> {
-    let folder = case.make(&plan.folder)?;
+fn one(plan: &Plan, set: Set, index: usize) -> Result<Outcome, CaseError> {
+    let (case, folder) = Case::draw_and_make(set, index, plan.seed, &plan.folder)?;
     let id = &case.answer.case;
     let results = plan.folder.join("results").join(id);
     let asked = ask::ask(&plan.squirrel, &folder, &results);

@@ -28,8 +28,8 @@ const VELOCITY_PER_S: [f64; 3] = [2.8, 2.8, 4.0];
 const INTEGRAL_PER_S3: [f64; 3] = [0.5, 0.5, 2.0];
 const INTEGRAL_MAX_M_S2: f64 = 4.0;
 const ACCELERATION_MAX_M_S2: f64 = 7.0;
-const ATTITUDE_PER_S2: [f64; 3] = [42.0, 42.0, 6.0];
-const RATE_PER_S: [f64; 3] = [11.0, 11.0, 4.0];
+const ATTITUDE_PER_S2: [f64; 3] = [30.0, 30.0, 6.0];
+const RATE_PER_S: [f64; 3] = [8.5, 8.5, 4.0];
 /// Share of a rotor's top thrust that a command may ask for.
 const THRUST_SHARE: [f64; 2] = [0.012, 0.95];
 

@@ -138,8 +138,7 @@ impl World {
         let half_density = 0.5 * AIR_DENSITY_KG_M3 * speed;
         force -= (a.drag_n_s_per_m + x.linear_drag).component_mul(&v);
         force -= half_density * (x.drag_area.add_scalar(a.drag_area_m2)).component_mul(&v);
-        let deployment =
-            unknown.left_wing.map_or(state.deployment, |left| Vector2::new(left, state.deployment.y));
+        let deployment = unknown.jammed_wings.map_or(state.deployment, Vector2::repeat);
         let (wing_force, wing_moment) = self.wings(v, omega.x, deployment);
         force.z += wing_force;
         moment.x += wing_moment;

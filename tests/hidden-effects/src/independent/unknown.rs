@@ -28,8 +28,8 @@ pub(super) struct Action {
     pub(super) mass_factor: f64,
     pub(super) weak_rotor: Option<usize>,
     pub(super) weak_loss: f64,
-    /// Deployment at which the left wing is held.
-    pub(super) left_wing: Option<f64>,
+    /// Deployment at which both wings are held.
+    pub(super) jammed_wings: Option<f64>,
     pub(super) memory_rate: Vector4<f64>,
 }
 
@@ -43,7 +43,7 @@ impl Default for Action {
             mass_factor: 1.0,
             weak_rotor: None,
             weak_loss: 0.0,
-            left_wing: None,
+            jammed_wings: None,
             memory_rate: Vector4::zeros(),
         }
     }
@@ -139,7 +139,7 @@ pub(super) fn act(outside: &Outside, motion: &Motion<'_>) -> Action {
             action.force_ned = normal * (force_n * (-gap / reach_m).exp());
         }
         Outside::WingJam { deployment, from_s } => {
-            action.left_wing = (time_s >= from_s).then_some(deployment);
+            action.jammed_wings = (time_s >= from_s).then_some(deployment);
         }
     }
     action

@@ -63,7 +63,7 @@ pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
         Excitation::Normal => "excite_normal",
         Excitation::Calm => "excite_calm",
     };
-    let mut scenario = Scenario::find(name).map_err(|error| error.to_string())?;
+    let mut scenario = Scenario::find(name)?;
     (scenario.seed, scenario.battery_charge) = (order.seed, order.charge);
     (scenario.wind.gust_sigma_m_s, scenario.wind.gust_time_constant_s) = TURBULENCE;
     if let MissionTable::Excite(table) = &mut scenario.mission {

@@ -5,27 +5,27 @@ use crate::catalogue::{HiddenEffect, Value};
 use crate::independent::white;
 use std::fmt::Write as _;
 
-/// Gains per second: they hold for every vehicle of the class.
+/// Gains per second: they hold for every vehicle of the class, and low enough for the largest lag and latency.
 const CONTROL: &str = "
 [control]
 thrust_min_n = 0.5
 [control.attitude]
 form = \"quaternion\"
-c1_per_s = [9.0, 9.0, 4.0]
-c2_per_s = [14.0, 14.0, 5.0]
-lambda_per_s2 = [8.0, 8.0, 2.0]
+c1_per_s = [6.0, 6.0, 3.0]
+c2_per_s = [9.0, 9.0, 4.0]
+lambda_per_s2 = [4.0, 4.0, 1.5]
 integral_max_rad_s = 0.1
 filter_frequency_rad_s = 20.0
 filter_damping = 1.0
 [control.position]
 angle_law = \"exact\"
-position_per_s = [1.6, 1.6, 0.8]
-velocity_per_s = [2.5, 2.5, 1.6]
-integral_per_s2 = [0.15, 0.15, 0.15]
+position_per_s = [1.6, 1.6, 2.2]
+velocity_per_s = [2.5, 2.5, 3.5]
+integral_per_s2 = [0.15, 0.15, 1.0]
 derivative = [0.05, 0.05, 0.05]
 velocity_feed_forward = 0.0
 acceleration_max_horizontal_m_s2 = 11.0
-acceleration_max_vertical_m_s2 = 3.0
+acceleration_max_vertical_m_s2 = 6.0
 integral_max_m = 2.0
 [control.wing]
 test = \"normal\"
