@@ -24,7 +24,7 @@ pub(crate) use search::{Found, NATS_MIN, Scored, Search};
 
 use crate::GapError;
 use crate::leftover::{Leftover, leftover};
-use crate::predictor::{Hypothesis, Predictor};
+use crate::predictor::Hypothesis;
 
 /// Deviation of the air's own motion that is no wind worth a name, m/s.
 pub(crate) const TURBULENCE_M_S: f64 = 0.12;
@@ -74,6 +74,8 @@ pub(crate) fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
 const GUST_BETA: f64 = 0.05;
 /// What floats may be off by this many tolerances before a leftover is a leftover.
 const LEFTOVER_TOLERANCES: f64 = 2.0;
+/// Most tolerances that anything may be off by in it.
+const LEFTOVER_MOST: f64 = 4.0;
 
 fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let (predictor, catalogue) = (search.predictor, search.catalogue);
@@ -113,7 +115,9 @@ fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
             Some((member, slot)) => best.members[*member].values[*slot],
             None => point.base[i - k],
         };
-        let moved = if wide[i] > 0.0 { loose.mean[i] - now } else { 0.0 };
+        // A leftover that asks for more than that stays one.
+        let most = if i < k { f64::INFINITY } else { LEFTOVER_MOST * best.prior[i] };
+        let moved = if wide[i] > 0.0 { loose.mean[i].clamp(-most, most) - now } else { 0.0 };
         if moved != 0.0 {
             for (value, c) in left.iter_mut().zip(column) {
                 *value -= c * moved;

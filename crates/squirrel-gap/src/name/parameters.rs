@@ -198,6 +198,8 @@ fn tolerance(
         "accel_bias" => declared("sensors.imu.accel_bias_m_s2", 0.02)?,
         "heading_bias" => declared("sensors.attitude.bias_rad", 0.5_f64.to_radians())?,
         "constant_wind" => 0.12,
+        // A vehicle carries a load or it does not.
+        "payload_swing" => 0.0,
         _ => none,
     })
 }
