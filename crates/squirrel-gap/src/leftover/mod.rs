@@ -81,6 +81,7 @@ impl Leftover {
 ///
 /// * `left`, `nominal` - rows of the residual of the best explanation, and of the vehicle as it is
 /// * `motions` - of each piece, under the best explanation
+/// * `lever_m` - how far beside their place forces may act
 pub(crate) fn leftover(
     predictor: &Predictor,
     motions: &[Motion],
@@ -88,7 +89,9 @@ pub(crate) fn leftover(
     nominal: &[f64],
     wind_columns: &[Vec<f64>; 3],
     turbulence_m_s: f64,
+    lever_m: f64,
 ) -> Leftover {
+    let inertia = predictor.vehicle.vehicle.parameters().inertia_kg_m2.diagonal();
     let draws = floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS);
     let mut bands = Vec::new();
     let mut worst = [0.0_f64; DYNAMIC];
@@ -116,8 +119,13 @@ pub(crate) fn leftover(
             slow_nominal: rms_of_means(&rows(nominal)),
             whole_floor: mean(rms),
         };
+        // Forces that act a little beside where they are thought to are moments.
+        let beside = match segment.channel {
+            3 | 4 => slow_force(predictor, segment.piece) * lever_m / inertia[segment.channel - 3],
+            _ => 0.0,
+        };
         let allowed = |floor: f64, ratio: f64, explained: f64| {
-            ((floor * ratio).powi(2) + (MODEL_ERROR * explained).powi(2)).sqrt()
+            ((floor * ratio).powi(2) + (MODEL_ERROR * explained).powi(2) + beside.powi(2)).sqrt()
         };
         let ratio = (band.slow / allowed(band.slow_floor, SLOW_RATIO, rms_of_means(&explained)))
             .max(band.whole / allowed(band.whole_floor, WHOLE_RATIO, rms_of_means(&explained)));
@@ -135,6 +143,14 @@ pub(crate) fn leftover(
         out.line = line(predictor, left, channel);
     }
     out
+}
+
+/// Rms of the slow part of the vertical force about its mean, N.
+fn slow_force(predictor: &Predictor, piece: usize) -> f64 {
+    let measured = &predictor.tracks[piece].measured;
+    let mean = measured.iter().map(|m| m[2]).sum::<f64>() / measured.len().max(1) as f64;
+    let force: Vec<f64> = measured.iter().map(|m| m[2] - mean).collect();
+    rms_of_means(&force) * predictor.vehicle.vehicle.parameters().mass_kg
 }
 
 /// Moments and block means of one channel.

@@ -72,6 +72,12 @@ impl Catalogue {
         Ok(all)
     }
 
+    /// Tolerance of where forces act, m.
+    pub(crate) fn lever_m(&self) -> f64 {
+        let lever = self.parameters.iter().find(|p| p.key == "cg_x_m");
+        lever.map_or(0.0, |p| p.tolerance)
+    }
+
     fn add(
         &mut self,
         vehicle: &VehicleFile,

@@ -192,7 +192,7 @@ impl Search<'_> {
         let offset = set.free.len();
         let mut all = Vec::new();
         for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
-            let in_set = set.members.iter().any(|m| self.effect(m) == candidate.effect);
+            let in_set = set.members.iter().any(|m| excludes(self.effect(m), candidate.effect));
             if in_set || except.contains(&candidate.effect) {
                 continue;
             }
@@ -393,6 +393,12 @@ impl Search<'_> {
             y,
         })
     }
+}
+
+/// Whether an effect leaves no room for another: itself, and of mass and thrust, of which flights show the ratio alone.
+fn excludes(named: &str, other: &str) -> bool {
+    let ratio = ["mass_error", "thrust_coefficient"];
+    named == other || (ratio.contains(&named) && ratio.contains(&other))
 }
 
 fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {
