@@ -130,7 +130,8 @@ fn what_is_added_leaves_the_file_as_it_was() {
     folder.succeeds(&["vehicle", "check", "out/squirrel.toml"]);
 
     // With it, the flights hold no gap any more.
-    let arguments = ["gap", "name", "--vehicle", "out/squirrel.toml", "--flights", "train", "--json", "w.json"];
+    let arguments =
+        ["gap", "name", "--vehicle", "out/squirrel.toml", "--flights", "train", "--json", "w.json"];
     folder.succeeds(&arguments);
     assert_eq!(json(&folder, "w.json")["verdict"], "none");
 }
@@ -138,7 +139,8 @@ fn what_is_added_leaves_the_file_as_it_was() {
 #[test]
 fn the_vehicle_file_is_never_overwritten() {
     let folder = with_flights("gap-overwrite");
-    folder.fails(&[&["gap", "add"], &FLIGHTS[..], &["--out", "."]].concat(), &["squirrel.toml", "overwritten"]);
+    folder
+        .fails(&[&["gap", "add"], &FLIGHTS[..], &["--out", "."]].concat(), &["squirrel.toml", "overwritten"]);
     assert_eq!(fs::read_to_string(folder.0.join("squirrel.toml")).unwrap(), SQUIRREL);
 }
 
@@ -152,10 +154,15 @@ fn the_same_flights_give_the_same_bytes() {
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())
             .collect();
         assert!(["squirrel.toml", "verdict.json"].iter().all(|file| files.contains(&(*file).to_owned())));
-        let mut all: Vec<_> =
-            files.iter().map(|file| (file.clone(), fs::read(folder.0.join("out").join(file)).unwrap())).collect();
+        let mut all: Vec<_> = files
+            .iter()
+            .map(|file| (file.clone(), fs::read(folder.0.join("out").join(file)).unwrap()))
+            .collect();
         all.sort();
-        assert_eq!(fs::read(folder.0.join("v.json")).unwrap(), fs::read(folder.0.join("out/verdict.json")).unwrap());
+        assert_eq!(
+            fs::read(folder.0.join("v.json")).unwrap(),
+            fs::read(folder.0.join("out/verdict.json")).unwrap()
+        );
         all
     };
     let (first, second) = (made("gap-twice-a"), made("gap-twice-b"));

@@ -92,12 +92,14 @@ fn late(log: &mut FlightLog, late_s: f64) {
 
 type Mistake = (&'static str, &'static str, fn(&mut FlightLog));
 
-const MISTAKES: [Mistake; 15] = [
+const MISTAKES: [Mistake; 19] = [
     ("gyroscope x and y swapped", OMEGA, |log| each(log, OMEGA, |w| w.swap(0, 1))),
     ("gyroscope y and z swapped", OMEGA, |log| each(log, OMEGA, |w| w.swap(1, 2))),
+    ("gyroscope forward-left-up", OMEGA, |log| each(log, OMEGA, |w| (w[1], w[2]) = (-w[1], -w[2]))),
     ("gyroscope in deg/s", OMEGA, |log| each(log, OMEGA, |w| w.iter_mut().for_each(|x| *x = x.to_degrees()))),
     ("accelerometer x and y swapped", FORCE, |log| each(log, FORCE, |f| f.swap(0, 1))),
     ("accelerometer x and z swapped", FORCE, |log| each(log, FORCE, |f| f.swap(0, 2))),
+    ("accelerometer y reversed", FORCE, |log| each(log, FORCE, |f| f[1] = -f[1])),
     ("accelerometer forward-left-up", FORCE, |log| {
         each(log, FORCE, |f| (f[1], f[2]) = (-f[1], -f[2]));
     }),
@@ -105,6 +107,8 @@ const MISTAKES: [Mistake; 15] = [
     ("velocity east-north-up", VELOCITY, |log| {
         each(log, VELOCITY, |v| (v[0], v[1], v[2]) = (v[1], v[0], -v[2]));
     }),
+    ("velocity up for down", VELOCITY, |log| each(log, VELOCITY, |v| v[2] = -v[2])),
+    ("velocity in cm/s", VELOCITY, |log| each(log, VELOCITY, |v| v.iter_mut().for_each(|x| *x *= 100.0))),
     ("velocity north and east swapped", VELOCITY, |log| each(log, VELOCITY, |v| v.swap(0, 1))),
     ("position north and east swapped", POSITION, |log| each(log, POSITION, |p| p.swap(0, 1))),
     ("voltage in mV", VOLTAGE, |log| each(log, VOLTAGE, |v| v[0] *= 1e3)),
@@ -154,6 +158,22 @@ fn a_mistake_in_foreign_logs_is_found_with_its_channel() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
+/// One log is enough, wherever it stands, and it is named.
+#[test]
+fn a_mistake_in_one_log_is_found_with_its_flight() {
+    let case = Case::flown_by(&VehicleFile::squirrel());
+    for (what, channel, mistake) in &MISTAKES[..4] {
+        let (mut second, mut held_out) = (case.clone(), case.clone());
+        mistake(&mut second.flights[1].1);
+        mistake(&mut held_out.held_out[0].1);
+        for (case, flight) in [(second, "second"), (held_out, "held-out")] {
+            let verdict = case.verdict();
+            assert_eq!(complaint(what, channel, &verdict), None);
+            assert!(verdict.words.contains(flight), "{what}: {}", verdict.words);
+        }
+    }
+}
+
 /// A flight that was fitted proves nothing, whole or in part, whatever it is called.
 #[test]
 fn a_training_flight_is_no_proof() {
@@ -186,7 +206,11 @@ fn late_commands_are_an_effect() {
     for late_s in [0.02, 0.04, 0.06] {
         let verdict = case.with(&|log| late(log, late_s)).verdict();
         println!("{late_s} s: {:?}: {}", verdict.verdict, verdict.words);
-        assert_eq!((verdict.verdict, names(&verdict)), (Kind::Named, vec!["actuation_latency"]), "{late_s} s");
+        assert_eq!(
+            (verdict.verdict, names(&verdict)),
+            (Kind::Named, vec!["actuation_latency"]),
+            "{late_s} s"
+        );
     }
 }
 

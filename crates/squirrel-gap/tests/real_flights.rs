@@ -15,7 +15,8 @@ type Flights = Vec<(String, FlightLog)>;
 /// Flights that train on a full battery and are held out on an emptier one; `None` without the logs.
 fn nanobench() -> Option<(Flights, Flights)> {
     let folder = shared("flights/nanobench")?;
-    let read = |name: &str| (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv"))));
+    let read =
+        |name: &str| (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv"))));
     let train = ["B8_star_slow_rep1", "B3_figure8_fast_rep1"].map(read);
     let held_out = ["B9_trefoil_slow_rep1", "B2_circle_medium_rep1"].map(read);
     Some((train.into(), held_out.into()))
@@ -44,8 +45,7 @@ fn thrust_sags_with_the_battery_of_a_crazyflie() {
     let names: Vec<String> = flights.iter().map(|(name, _)| name.clone()).collect();
     let text = add(&nominal, &diagnosis, &names).unwrap();
     let patched = VehicleFile::parse(&text, "patched").unwrap();
-    let vertical =
-        |vehicle: &VehicleFile| find(vehicle, &held_out).unwrap().residual.force_body_rms_n[2];
+    let vertical = |vehicle: &VehicleFile| find(vehicle, &held_out).unwrap().residual.force_body_rms_n[2];
     let (before, after) = (vertical(&nominal), vertical(&patched));
     println!("vertical force on the held-out flights: {before:.5} N, patched {after:.5} N");
     assert!(after <= 0.5 * before, "{after} N, without sag {before} N");
@@ -67,7 +67,8 @@ fn sag_and_a_free_thrust_curve_are_confounded() {
 fn rotors_lag_in_logs_that_hold_nothing_but_the_inertial_unit() {
     let Some(folder) = shared("flights/arpl-motorlag") else { return };
     let read = |name: &str| (name.to_owned(), imported("arpl.toml", &folder.join(format!("{name}.csv"))));
-    let verdict = diagnosed(&vehicle("crazyflie2_arpl.toml"), &vec![read("log10")], &vec![read("log16")]).verdict;
+    let verdict =
+        diagnosed(&vehicle("crazyflie2_arpl.toml"), &vec![read("log10")], &vec![read("log16")]).verdict;
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     assert_eq!(verdict.effects[0].name, "motor_lag");
     assert!(!verdict.notes.is_empty(), "what the logs lack is said");
