@@ -1,8 +1,8 @@
 //! Proof: errors on flights that were not used, and whether what is left is noise.
 
-use super::{Errors, HeldOut, ReportData, Whiteness, figure, quantity};
+use super::{Errors, HeldOut, Horizon, ReportData, Whiteness, figure, lacking, quantity};
 use squirrel_sim::report::chart::{
-    Axis, ChartRow, Dot, Extent, Ink, Limit, LineChart, Range, RowChart, Series, drawable,
+    Axis, ChartRow, Dot, Extent, Ink, Limit, LineChart, Range, RowChart, Series, Svg, drawable,
 };
 use squirrel_sim::report::page::{Columns, Figure, Page, Row};
 
@@ -27,7 +27,9 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
                 from the best rival: a wrong name also shrinks the gap, the right one shrinks it to the noise floor.";
     page.panel("panel-d", "Held-out flights", text, |page| {
         let Some(held_out) = &data.held_out else {
-            page.missing(
+            lacking(
+                page,
+                data,
                 "No held-out flight was given: nothing proves the answer on data that it has not seen.",
             );
             return;
@@ -39,7 +41,17 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
         if held_out.channels.is_empty() {
             return;
         }
-        let head = [vec!["RMSE".to_owned()], names(held_out).to_vec()].concat();
+        let each = held_out.channels.iter().filter(|c| !c.horizons.is_empty()).map(|c| {
+            let y = Axis::new("RMSE", &c.unit).with_range(Range::Including(0.0, 0.0));
+            // The legend stands above.
+            let names = [const { String::new() }; 4];
+            let drawings = vec![over_horizon(&c.name, names, &c.horizons, y, Columns::Three)];
+            Figure { title: c.name.clone(), drawings, ..Figure::default() }
+        });
+        page.figures(Columns::Three, &each.collect::<Vec<_>>());
+        let last = held_out.horizons.last();
+        let head = last.map_or_else(|| "RMSE".to_owned(), |h| format!("RMSE at {}", quantity(h.horizon_s, "s")));
+        let head = [vec![head], names(held_out).to_vec()].concat();
         let rows = held_out.channels.iter().map(|c| {
             let cells = parts(&c.errors).map(|x| quantity(x, &c.unit));
             Row { ink: None, cells: [vec![c.name.clone()], cells.to_vec()].concat() }
@@ -84,17 +96,23 @@ fn by_horizon(held_out: &HeldOut) -> Figure {
         return figure;
     }
     let y = Axis::new("RMSE over noise floor", "").with_range(Range::Including(0.0, 1.0));
-    let mut chart = LineChart::new("held-out error over horizon", Axis::new("horizon", "s"), y);
+    let label = "held-out error over horizon";
+    figure.drawings.push(over_horizon(label, names(held_out), &held_out.horizons, y, Columns::Two));
+    figure
+}
+
+fn over_horizon(label: &str, names: [String; 4], horizons: &[Horizon], y: Axis, columns: Columns) -> Svg {
+    let mut chart = LineChart::new(label, Axis::new("horizon", "s"), y);
+    chart.width = columns.width();
     chart.x.range = Range::Including(0.0, 0.0);
-    let at: Vec<f64> = held_out.horizons.iter().map(|h| h.horizon_s).collect();
-    for (i, (ink, name)) in INKS.into_iter().zip(names(held_out)).enumerate() {
-        let values: Vec<f64> = held_out.horizons.iter().map(|h| parts(&h.errors)[i]).collect();
+    let at: Vec<f64> = horizons.iter().map(|h| h.horizon_s).collect();
+    for (i, (ink, name)) in INKS.into_iter().zip(names).enumerate() {
+        let values: Vec<f64> = horizons.iter().map(|h| parts(&h.errors)[i]).collect();
         if values.iter().any(|x| drawable(*x)) {
             chart.series.push(Series::line(&name, ink, at.clone(), values));
         }
     }
-    figure.drawings.push(chart.svg());
-    figure
+    chart.svg()
 }
 
 pub(super) fn whiteness(page: &mut Page, data: &ReportData) {
@@ -103,7 +121,11 @@ pub(super) fn whiteness(page: &mut Page, data: &ReportData) {
                 noise alone gives an autocorrelation outside it.";
     page.panel("panel-e", "What is left", text, |page| {
         if data.whiteness.is_empty() {
-            page.missing("No residual after the fit was given: whether what is left is noise is not known.");
+            lacking(
+                page,
+                data,
+                "No residual after the fit was given: whether what is left is noise is not known.",
+            );
             return;
         }
         for w in &data.whiteness {
