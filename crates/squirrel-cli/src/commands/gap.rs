@@ -161,8 +161,13 @@ impl Flights {
     fn report(&self, found: &Found, patched: Option<&str>) -> Result<(), String> {
         let Some(folder) = &self.out else { return Ok(()) };
         output::folder(folder)?;
-        let flights = [found.flights.as_slice(), &found.held_out].concat();
-        let data = squirrel_gap::picture(&found.vehicle, &found.diagnosis, &flights, patched);
+        let data = squirrel_gap::picture(
+            &found.vehicle,
+            &found.diagnosis,
+            &found.flights,
+            &found.held_out,
+            patched,
+        );
         let path = folder.join("report.html");
         output::write_file(&path, squirrel_gap::report::render(&data).as_bytes())?;
         say(&format!("report: {}", path.display()));

@@ -122,17 +122,21 @@ pub(crate) fn seen(search: &Search<'_>, naming: &Naming, rivals: &[Scored]) -> R
 /// The data of the report of a diagnosis; the same for the same logs, and without absolute paths.
 ///
 /// * `vehicle` - what was diagnosed
-/// * `flights` - names of all logs as they were given to [`diagnose`](crate::diagnose()); of an absolute path, the report says
-///   the file's and its folder's name
+/// * `flights`, `held_out` - names of the logs as they were given to [`diagnose`](crate::diagnose()); of an absolute path, the
+///   report says the names of the file and its folder
 /// * `patched` - text of the vehicle file with the effects in it, where there is one
 pub fn picture(
     vehicle: &VehicleFile,
     diagnosis: &Diagnosis,
     flights: &[String],
+    held_out: &[String],
     patched: Option<&str>,
 ) -> ReportData {
     let verdict = &diagnosis.verdict;
-    let said = |text: &str| flights.iter().fold(text.to_owned(), |text, name| text.replace(name, &short(name)));
+    let said = |text: &str| {
+        let names = flights.iter().chain(held_out);
+        names.fold(text.to_owned(), |text, name| text.replace(name, &short(name)))
+    };
     let domain = diagnosis.domain.iter().map(|c| DomainRow {
         name: c.name.to_owned(),
         low: c.low,
@@ -162,9 +166,10 @@ pub fn picture(
     }
     data.evidence = evidence(details);
     data.conditional.clone_from(&seen.conditional);
-    let named = verdict.gap.as_ref().map(|gap| gap.held_out_flights.as_slice()).unwrap_or_default();
-    let named = named.iter().map(|name| short(name)).collect();
-    data.held_out = details.held_out.as_ref().map(|flown| held_out(flown, named, &seen.rival));
+    if !held_out.is_empty() {
+        let flights = held_out.iter().map(|name| short(name)).collect();
+        data.held_out = Some(proof(details.held_out.as_ref(), flights, &seen.rival));
+    }
     data.whiteness.clone_from(&seen.whiteness);
     data.parameters = verdict.effects.iter().flat_map(|e| parameters(e, &seen.tolerances)).collect();
     let (names, chi_square) = &details.confusability;
@@ -202,20 +207,25 @@ fn evidence(details: &Details) -> Vec<Evidence> {
     refined.chain(alone).collect()
 }
 
-fn held_out(flown: &Flown, flights: Vec<String>, rival: &str) -> HeldOut {
+fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
+    let Some(flown) = flown else {
+        return HeldOut { flights, rival: String::new(), channels: Vec::new(), horizons: Vec::new() };
+    };
     let at = |channel: usize, bin: usize| Errors {
         nominal: flown.nominal.rms(channel, bin),
         rival: flown.rival.as_ref().map_or(f64::NAN, |rival| rival.rms(channel, bin)),
         fitted: flown.fitted.rms(channel, bin),
         floor: flown.floor.rms(channel, bin),
     };
-    // A short flight has no segment of the full length.
-    let bins: Vec<usize> = (0..BINS).filter(|bin| flown.floor.count[*bin] > 0.0).collect();
+    // A short flight has no segment of the full length, and rare fixes may leave a horizon out.
+    let flown_at = |bin: &usize| flown.fitted.count[*bin] > 0.0 && flown.floor.count[*bin] > 0.0;
+    let bins: Vec<usize> = (0..BINS).filter(flown_at).collect();
     let horizon_s = |bin: usize| (bin + 1) as f64 * BIN_S;
     let last = bins.last().copied().unwrap_or(0);
     let channels = FLOWN_CHANNELS.iter().enumerate().map(|(channel, key)| {
         let unit = unit(key);
-        let name = UNITS.iter().find_map(|(end, _)| key.strip_suffix(end)).unwrap_or(key).replace('_', " ");
+        let name = UNITS.iter().find_map(|(end, _)| key.strip_suffix(end)).unwrap_or(key);
+        let name = name.replace("omega", "angular rate").replace("_body", "").replace('_', " ");
         let horizons = bins.iter().map(|bin| Horizon { horizon_s: horizon_s(*bin), errors: at(channel, *bin) });
         HeldOutChannel { name, unit: unit.to_owned(), errors: at(channel, last), horizons: horizons.collect() }
     });

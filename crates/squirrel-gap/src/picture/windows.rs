@@ -29,7 +29,7 @@ struct Windows {
 }
 
 impl Windows {
-    /// Means of what falls into each window, NaN where nothing does.
+    /// Means of what falls into each window, NaN where less than half as much does as into others.
     fn means(&self, values: impl Iterator<Item = (f64, f64)>) -> Vec<f64> {
         let mut all = vec![Mean::default(); self.count];
         for (time_s, value) in values {
@@ -37,7 +37,9 @@ impl Windows {
             all[window].sum += value;
             all[window].count += 1.0;
         }
-        all.into_iter().map(|m| m.sum / m.count).collect()
+        let full = all.iter().map(|m| m.count).fold(0.0, f64::max);
+        let mean = |m: &Mean| if 2.0 * m.count > full { m.sum / m.count } else { f64::NAN };
+        all.iter().map(mean).collect()
     }
 }
 

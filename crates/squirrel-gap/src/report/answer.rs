@@ -36,8 +36,8 @@ pub(super) fn verdict(page: &mut Page, data: &ReportData) {
 }
 
 pub(super) fn evidence(page: &mut Page, data: &ReportData) {
-    let text = "Log evidence over the vehicle as declared, in nats, of every effect by itself and of the answer. Look for the \
-                distance from the answer to the next name: evidence within 5 nats of it does not decide. Names without a bar \
+    let text = "Log evidence over the vehicle as declared, in nats, of every effect by itself and of what is named. Look \
+                for the distance from there to the next name: evidence within 5 nats does not decide. Names without a bar \
                 have no evidence: no plausible size of them explains anything, or the vehicle lacks the part.";
     page.panel("panel-b", "Evidence", text, |page| {
         let mut known: Vec<&Evidence> = data.evidence.iter().filter(|e| drawable(e.nats)).collect();
@@ -55,7 +55,7 @@ pub(super) fn evidence(page: &mut Page, data: &ReportData) {
         chart.x.range = Range::Exact(lowest, first.nats.max(1.0));
         for e in &known {
             let (ink, name) = match answer {
-                Some(_) if e.is_answer => (Ink::Series(0), "answer"),
+                Some(_) if e.is_answer => (Ink::Series(0), "named"),
                 Some(_) if e.nats >= best - RIVAL_NATS => (Ink::Highlight, "rival within 5 nats"),
                 _ => (Ink::Muted, ""),
             };

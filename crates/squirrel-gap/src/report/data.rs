@@ -78,7 +78,7 @@ pub struct Evidence {
     pub name: String,
     /// Log evidence over the vehicle as declared, nats.
     pub nats: f64,
-    /// Whether this is what the verdict names.
+    /// Whether this is what the verdict names, be it as the nearest name.
     pub is_answer: bool,
 }
 
@@ -121,7 +121,7 @@ pub struct HeldOut {
     pub flights: Vec<String>,
     /// The best rival's name; empty without one.
     pub rival: String,
-    /// One row a channel.
+    /// One row a channel; empty where the flights cannot be re-simulated.
     pub channels: Vec<HeldOutChannel>,
     /// All channels together, over the length of the re-simulation: each over its noise floor, mean over channels.
     pub horizons: Vec<Horizon>,

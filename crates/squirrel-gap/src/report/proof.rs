@@ -8,6 +8,8 @@ use squirrel_sim::report::page::{Columns, Figure, Page, Row};
 
 /// The models with their colours, in the order of [`parts`].
 const INKS: [Ink; 4] = [Ink::Series(1), Ink::Series(5), Ink::Series(0), Ink::Muted];
+/// Place of the rival among them.
+const RIVAL: usize = 1;
 
 fn parts(e: &Errors) -> [f64; 4] {
     [e.nominal, e.rival, e.fitted, e.floor]
@@ -37,6 +39,10 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
         if !held_out.flights.is_empty() {
             page.text(&format!("Flights: {}.", held_out.flights.join(", ")));
         }
+        if held_out.channels.is_empty() && held_out.horizons.is_empty() {
+            page.missing("These flights cannot be re-simulated: that needs attitude and velocity throughout.");
+            return;
+        }
         page.figures(Columns::Two, &[by_channel(held_out), by_horizon(held_out)]);
         if held_out.channels.is_empty() {
             return;
@@ -51,10 +57,15 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
         page.figures(Columns::Three, &each.collect::<Vec<_>>());
         let last = held_out.horizons.last();
         let head = last.map_or_else(|| "RMSE".to_owned(), |h| format!("RMSE at {}", quantity(h.horizon_s, "s")));
-        let head = [vec![head], names(held_out).to_vec()].concat();
+        // Without a rival there is no column for it.
+        let shown = |i: &usize| *i != RIVAL || !held_out.rival.is_empty();
+        let shown: Vec<usize> = (0..INKS.len()).filter(shown).collect();
+        let names = names(held_out);
+        let head = std::iter::once(head).chain(shown.iter().map(|i| names[*i].clone())).collect::<Vec<_>>();
         let rows = held_out.channels.iter().map(|c| {
-            let cells = parts(&c.errors).map(|x| quantity(x, &c.unit));
-            Row { ink: None, cells: [vec![c.name.clone()], cells.to_vec()].concat() }
+            let errors = parts(&c.errors);
+            let cells = shown.iter().map(|i| quantity(errors[*i], &c.unit));
+            Row { ink: None, cells: std::iter::once(c.name.clone()).chain(cells).collect() }
         });
         page.table(&head, &rows.collect::<Vec<_>>());
     });
@@ -178,7 +189,8 @@ fn with_inputs(w: &Whiteness) -> Figure {
         figure_of.notes.push("No inputs were given.".to_owned());
         return figure_of;
     }
-    let y = Axis::new("correlation", "").with_range(Range::Including(-0.2, 0.2));
+    // The title says what it is; the legend needs the line.
+    let y = Axis::new("", "").with_range(Range::Including(-0.2, 0.2));
     let mut chart = LineChart::new(&figure_of.title, Axis::new("lag of the input", "s"), y);
     let mut largest: Vec<String> = Vec::new();
     for (i, input) in w.inputs.iter().enumerate() {
