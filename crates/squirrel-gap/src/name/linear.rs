@@ -44,6 +44,9 @@ pub(crate) struct Linear {
     pub(crate) gram: DMatrix<f64>,
 }
 
+/// Part of what was measured that no model is trusted with.
+const DOUBT: f64 = 0.01;
+
 /// Numbers of a flight's sensors among the columns.
 const SENSOR_COLUMNS: usize = 3;
 
@@ -195,7 +198,13 @@ impl Linear {
             }
             raw.push(after);
             tolerance.push(parameter.map_or(step, |p| p.tolerance));
-            widest.push(parameter.map_or(step, |p| p.slab));
+            // At first anything may be large; about a point that explains the flights, only what has a name.
+            let named = parameter.is_some_and(|p| point.members.iter().any(|m| m.candidate == p.candidate));
+            widest.push(match parameter {
+                Some(p) if first || named => p.slab,
+                Some(p) => 3.0 * p.tolerance,
+                None => step,
+            });
         }
         let whitener = whitener(predictor, &raw, &widest, &residual);
         let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
@@ -208,13 +217,14 @@ impl Linear {
 fn whitener(predictor: &Predictor, columns: &[Vec<f64>], widest: &[f64], residual: &[f64]) -> Whitener {
     // A first whitening by what changes from row to row: one fitted to the whole residual would take whatever is slow in it
     // for noise and never give it back.
+    let doubt: Vec<f64> = predictor.measured().iter().map(|x| x * DOUBT).collect();
     let mut whitener = Whitener::white(&predictor.segments, residual);
     for _ in 0..3 {
         let white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = Gram::new(&white, &whitener.apply(&predictor.segments, residual));
         let Some(posterior) = gram.posterior(widest, 1.0) else { break };
         let left = subtract(residual, columns, &posterior.mean);
-        whitener = Whitener::fit(&predictor.segments, &left);
+        whitener = Whitener::fit(&predictor.segments, &left, &doubt);
     }
     whitener
 }

@@ -75,7 +75,7 @@ const GUST_BETA: f64 = 0.05;
 /// What floats may be off by this many tolerances before a leftover is a leftover.
 const LEFTOVER_TOLERANCES: f64 = 2.0;
 /// Most tolerances that anything may be off by in it.
-const LEFTOVER_MOST: f64 = 4.0;
+const LEFTOVER_MOST: f64 = 6.0;
 
 fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let (predictor, catalogue) = (search.predictor, search.catalogue);
@@ -110,14 +110,16 @@ fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
     let wide: Vec<f64> =
         best.prior.iter().enumerate().map(|(i, sd)| if i < k { *sd } else { LEFTOVER_TOLERANCES * sd }).collect();
     let Some(loose) = best.gram.posterior(&wide, 1.0) else { return left };
+    // A leftover that asks for more than that stays one.
+    if (k..wide.len()).any(|i| wide[i] > 0.0 && loose.mean[i].abs() > LEFTOVER_MOST * best.prior[i]) {
+        return left;
+    }
     for (i, column) in best.own_raw.iter().chain(&found.linear.raw).enumerate() {
         let now = match best.free.get(i) {
             Some((member, slot)) => best.members[*member].values[*slot],
             None => point.base[i - k],
         };
-        // A leftover that asks for more than that stays one.
-        let most = if i < k { f64::INFINITY } else { LEFTOVER_MOST * best.prior[i] };
-        let moved = if wide[i] > 0.0 { loose.mean[i].clamp(-most, most) - now } else { 0.0 };
+        let moved = if wide[i] > 0.0 { loose.mean[i] - now } else { 0.0 };
         if moved != 0.0 {
             for (value, c) in left.iter_mut().zip(column) {
                 *value -= c * moved;

@@ -73,6 +73,12 @@ impl Search<'_> {
             let mut best = self.score(&linear, &point.members)?;
             self.extend(&linear, &mut best)?;
             self.drop_and_swap(&linear, &mut best)?;
+            if std::env::var("GAPTRACE").is_ok() {
+                eprintln!("ROUND {round} null {:.1} best {:.1} {:?}", null.log_evidence, best.log_evidence, best.members.iter().map(|m| (self.effect(m), m.values.clone())).collect::<Vec<_>>());
+                let sp: Vec<String> = self.settled(&best).base.iter().enumerate().filter(|(i, x)| x.abs() > 1.5 * linear.tolerance[*i]).map(|(i, x)| format!("{} {:.1}", self.catalogue.parameters.get(i).map_or("sensor".to_owned(), |p| format!("{}{:?}", p.key, self.catalogue.candidates[p.candidate].fixed)), x / linear.tolerance[i])).collect();
+                eprintln!("   {sp:?}");
+                for (e, m) in self.ranked(&null, &[]).into_iter().take(4) { eprintln!("   rank {} {:.1} {:?}", self.effect(&m), e - null.log_evidence, m.values); }
+            }
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
                 self.prune(&linear, &mut best)?;

@@ -19,17 +19,18 @@ pub(crate) struct Whitener {
 
 impl Whitener {
     /// Fits each channel over all its segments.
-    pub(crate) fn fit(segments: &[Segment], noise: &[f64]) -> Self {
+    ///
+    /// * `noise` - what the fullest model leaves
+    /// * `doubt` - what no model can be trusted with: its power is added to that of the noise
+    pub(crate) fn fit(segments: &[Segment], noise: &[f64], doubt: &[f64]) -> Self {
         let mut rows = 0;
         let filters = (0..CHANNELS.len())
             .map(|channel| {
-                let own: Vec<&[f64]> = segments
-                    .iter()
-                    .filter(|s| s.channel == channel && s.rows.len() > 3 * ORDER)
-                    .map(|s| &noise[s.rows.clone()])
-                    .collect();
-                rows += own.iter().map(|x| x.len() - ORDER).sum::<usize>();
-                autoregression(&own)
+                let own: Vec<&Segment> =
+                    segments.iter().filter(|s| s.channel == channel && s.rows.len() > 3 * ORDER).collect();
+                rows += own.iter().map(|s| s.rows.len() - ORDER).sum::<usize>();
+                let of = |rows: &'_ [f64]| own.iter().map(|s| rows[s.rows.clone()].to_vec()).collect::<Vec<_>>();
+                autoregression(&of(noise), &of(doubt))
             })
             .collect();
         Self { filters, rows }
@@ -43,7 +44,7 @@ impl Whitener {
                 changes[row] = (rows[row] - rows[row - 1]) * std::f64::consts::FRAC_1_SQRT_2;
             }
         }
-        let mut out = Self::fit(segments, &changes);
+        let mut out = Self::fit(segments, &changes, &vec![0.0; rows.len()]);
         for (channel, filter) in out.filters.iter_mut().enumerate() {
             let own = segments.iter().filter(|s| s.channel == channel).flat_map(|s| changes[s.rows.clone()].iter());
             let (sum, n) = own.fold((0.0, 0.0), |(sum, n), x| (sum + x * x, n + 1.0));
@@ -92,12 +93,12 @@ impl Whitener {
     }
 }
 
-/// Least squares over several series; `None` where there is nothing to fit.
-fn autoregression(series: &[&[f64]]) -> Option<([f64; ORDER], f64)> {
+/// Least squares over several series, with the power of others added; `None` where there is nothing to fit.
+fn autoregression(series: &[Vec<f64>], doubt: &[Vec<f64>]) -> Option<([f64; ORDER], f64)> {
     let mut gram = DMatrix::zeros(ORDER, ORDER);
     let mut right = DVector::zeros(ORDER);
     let (mut total, mut n) = (0.0_f64, 0.0_f64);
-    for x in series {
+    for (x, counts) in series.iter().map(|x| (x, 1.0)).chain(doubt.iter().map(|x| (x, 0.0))) {
         for w in x.windows(ORDER + 1) {
             for i in 0..ORDER {
                 let a = w[ORDER - 1 - i];
@@ -107,7 +108,7 @@ fn autoregression(series: &[&[f64]]) -> Option<([f64; ORDER], f64)> {
                 }
             }
             total += w[ORDER] * w[ORDER];
-            n += 1.0;
+            n += counts;
         }
     }
     if n < 4.0 * ORDER as f64 || total <= 0.0 {

@@ -122,6 +122,19 @@ impl<'a> Predictor<'a> {
         self.segments.last().map_or(0, |s| s.rows.end)
     }
 
+    /// What was measured, row by row, about its mean; 0 for the kinematics.
+    pub(crate) fn measured(&self) -> Vec<f64> {
+        let mut rows = vec![0.0; self.rows()];
+        for segment in self.segments.iter().filter(|s| s.channel < DYNAMIC) {
+            let measured = &self.tracks[segment.piece].measured;
+            let mean = measured.iter().map(|m| m[segment.channel]).sum::<f64>() / measured.len() as f64;
+            for (row, m) in rows[segment.rows.clone()].iter_mut().zip(measured) {
+                *row = m[segment.channel] - mean;
+            }
+        }
+        rows
+    }
+
     /// The hypothesis that the vehicle file is right.
     pub(crate) fn nominal(&self) -> Hypothesis {
         Hypothesis {
