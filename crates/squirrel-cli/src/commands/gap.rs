@@ -161,13 +161,8 @@ impl Flights {
     fn report(&self, found: &Found, patched: Option<&str>) -> Result<(), String> {
         let Some(folder) = &self.out else { return Ok(()) };
         output::folder(folder)?;
-        let data = squirrel_gap::picture(
-            &found.vehicle,
-            &found.diagnosis,
-            &found.flights,
-            &found.held_out,
-            patched,
-        );
+        let data =
+            squirrel_gap::picture(&found.vehicle, &found.diagnosis, &found.flights, &found.held_out, patched);
         let path = folder.join("report.html");
         output::write_file(&path, squirrel_gap::report::render(&data).as_bytes())?;
         say(&format!("report: {}", path.display()));
@@ -175,7 +170,8 @@ impl Flights {
     }
 
     fn folder(&self) -> Result<&Path, String> {
-        let folder = self.out.as_deref().ok_or("--out: none given; a folder is needed for what is written")?;
+        let folder =
+            self.out.as_deref().ok_or("--out: none given; a folder is needed for what is written")?;
         output::folder(folder)?;
         Ok(folder)
     }
@@ -185,7 +181,10 @@ impl Flights {
         let file = self.vehicle.file_name().unwrap_or_default();
         let path = self.folder()?.join(file);
         if same_file(&path, &self.vehicle) {
-            return Err(format!("{}: --out is the folder of the vehicle file, which is never overwritten", path.display()));
+            return Err(format!(
+                "{}: --out is the folder of the vehicle file, which is never overwritten",
+                path.display()
+            ));
         }
         output::write_file(&path, text.as_bytes())?;
         verdict.model_patch = Some(path.display().to_string());

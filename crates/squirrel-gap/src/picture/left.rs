@@ -18,7 +18,8 @@ const BAND: f64 = 2.576;
 
 /// Of the leftover of each channel of the dynamics.
 pub(super) fn whiteness(predictor: &Predictor, naming: &Naming) -> Vec<Whiteness> {
-    let inputs: Vec<Vec<(&str, Vec<f64>)>> = (0..predictor.tracks.len()).map(|p| inputs(predictor, p)).collect();
+    let inputs: Vec<Vec<(&str, Vec<f64>)>> =
+        (0..predictor.tracks.len()).map(|p| inputs(predictor, p)).collect();
     (0..DYNAMIC).filter_map(|channel| of_channel(predictor, naming, channel, &inputs)).collect()
 }
 

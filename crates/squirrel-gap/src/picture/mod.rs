@@ -203,7 +203,8 @@ fn evidence(details: &Details) -> Vec<Evidence> {
         is_answer: i == 0 && details.seen.has_answer,
     });
     let alone = details.evidence.iter().filter(|(name, _)| sets.iter().all(|(other, _)| other != name));
-    let alone = alone.map(|(name, nats)| Evidence { name: (*name).to_owned(), nats: *nats, is_answer: false });
+    let alone =
+        alone.map(|(name, nats)| Evidence { name: (*name).to_owned(), nats: *nats, is_answer: false });
     refined.chain(alone).collect()
 }
 
@@ -226,8 +227,14 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
         let unit = unit(key);
         let name = UNITS.iter().find_map(|(end, _)| key.strip_suffix(end)).unwrap_or(key);
         let name = name.replace("omega", "angular rate").replace("_body", "").replace('_', " ");
-        let horizons = bins.iter().map(|bin| Horizon { horizon_s: horizon_s(*bin), errors: at(channel, *bin) });
-        HeldOutChannel { name, unit: unit.to_owned(), errors: at(channel, last), horizons: horizons.collect() }
+        let horizons =
+            bins.iter().map(|bin| Horizon { horizon_s: horizon_s(*bin), errors: at(channel, *bin) });
+        HeldOutChannel {
+            name,
+            unit: unit.to_owned(),
+            errors: at(channel, last),
+            horizons: horizons.collect(),
+        }
     });
     let horizons = bins.iter().map(|bin| {
         let over = |of: fn(&Errors) -> f64| {
@@ -259,7 +266,8 @@ fn parameters(effect: &NamedEffect, tolerances: &[(&str, &str, f64)]) -> Vec<Par
             (ParameterKind::Size { smallest, largest, .. }, Some(&Value::Number { value, low, high })) => {
                 let own = tolerances.iter().find(|(e, key, _)| *e == effect.name && *key == parameter.key);
                 let tolerance = own.map_or(f64::NAN, |(.., tolerance)| *tolerance);
-                let (effect, key, unit) = (String::new(), parameter.key.to_owned(), unit(parameter.key).to_owned());
+                let (effect, key, unit) =
+                    (String::new(), parameter.key.to_owned(), unit(parameter.key).to_owned());
                 rows.push(ParameterRow { effect, key, unit, value, low, high, smallest, largest, tolerance });
             }
             _ => {}
@@ -285,7 +293,9 @@ fn fly_next(verdict: Kind, asked: Option<&str>, confusability: Option<&Confusabi
     let marked = confusability.is_some_and(|c| c.chi_square.iter().flatten().any(|x| *x < SEPARATED));
     match asked {
         Some(asked) => next(format!("To decide: {asked}")),
-        None if marked && verdict != Kind::OutsideCatalogue => next("To separate the marked pairs".to_owned()),
+        None if marked && verdict != Kind::OutsideCatalogue => {
+            next("To separate the marked pairs".to_owned())
+        }
         None => Vec::new(),
     }
 }

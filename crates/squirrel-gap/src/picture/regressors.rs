@@ -90,7 +90,8 @@ fn of_effect(
         .filter(|(_, weight)| *weight > 0.0)
         .take(CHANNELS_EACH)
         .map(|(channel, _)| {
-            let rows = predictor.segments.iter().filter(|s| s.channel == channel).flat_map(|s| s.rows.clone());
+            let rows =
+                predictor.segments.iter().filter(|s| s.channel == channel).flat_map(|s| s.rows.clone());
             let sample = |i: usize| Sample { at: raw[i], before: naming.nominal[i], after: naming.left[i] };
             let (name, unit) = CHANNELS[channel];
             Conditional {
@@ -211,7 +212,9 @@ mod tests {
         let seen = bins(&line);
         assert_eq!(seen.len(), BINS);
         assert_eq!(seen.iter().map(|b| b.count).sum::<usize>(), 1000);
-        assert!(seen.iter().all(|b| (b.before_mean - 0.5 * b.at).abs() < 1e-9 && (b.after_sd - 0.5).abs() < 0.02));
+        assert!(
+            seen.iter().all(|b| (b.before_mean - 0.5 * b.at).abs() < 1e-9 && (b.after_sd - 0.5).abs() < 0.02)
+        );
         assert!(explained(&line, &seen) > 0.99);
         let still: Vec<Sample> = (0..1000).map(|i| sample(i, 3.0)).collect();
         assert!(bins(&still).is_empty() && bins(&[]).is_empty());

@@ -40,7 +40,9 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
             page.text(&format!("Flights: {}.", held_out.flights.join(", ")));
         }
         if held_out.channels.is_empty() && held_out.horizons.is_empty() {
-            page.missing("These flights cannot be re-simulated: that needs attitude and velocity throughout.");
+            page.missing(
+                "These flights cannot be re-simulated: that needs attitude and velocity throughout.",
+            );
             return;
         }
         page.figures(Columns::Two, &[by_channel(held_out), by_horizon(held_out)]);
@@ -56,7 +58,8 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
         });
         page.figures(Columns::Three, &each.collect::<Vec<_>>());
         let last = held_out.horizons.last();
-        let head = last.map_or_else(|| "RMSE".to_owned(), |h| format!("RMSE at {}", quantity(h.horizon_s, "s")));
+        let head =
+            last.map_or_else(|| "RMSE".to_owned(), |h| format!("RMSE at {}", quantity(h.horizon_s, "s")));
         // Without a rival there is no column for it.
         let shown = |i: &usize| *i != RIVAL || !held_out.rival.is_empty();
         let shown: Vec<usize> = (0..INKS.len()).filter(shown).collect();

@@ -91,11 +91,7 @@ pub(super) fn against_regressors(page: &mut Page, data: &ReportData) {
     page.panel("panel-c", "Against what explains it", text, |page| {
         let (drawn, empty): (Vec<_>, Vec<_>) = data.conditional.iter().partition(|c| !c.bins.is_empty());
         if drawn.is_empty() {
-            lacking(
-                page,
-                data,
-                "No regressor was given: nothing was named that could explain the residual.",
-            );
+            lacking(page, data, "No regressor was given: nothing was named that could explain the residual.");
         } else {
             page.figures(Columns::Two, &drawn.into_iter().map(conditional).collect::<Vec<_>>());
         }
