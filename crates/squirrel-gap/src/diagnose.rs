@@ -5,6 +5,7 @@ use crate::compatibility;
 use crate::find::{self, Place};
 use crate::name::{Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis, payload_lengths_m};
 use crate::predictor::{Hypothesis, Predictor};
+use crate::picture;
 use crate::shrink::{self, Errors12};
 use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
 use crate::words;
@@ -50,6 +51,7 @@ pub(crate) struct Details {
     pub(crate) naming: Naming,
     pub(crate) held_out: Option<HeldOut>,
     pub(crate) labels: Vec<String>,
+    pub(crate) seen: picture::Seen,
 }
 
 /// Errors on held-out flights.
@@ -115,6 +117,7 @@ pub fn diagnose(
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.best),
+        seen: picture::seen(&search, &naming, &rivals)?,
         naming,
         held_out: proof,
         labels: catalogue.parameters.iter().map(|p| format!("{} {} {:?}", catalogue.candidates[p.candidate].effect, p.key, catalogue.candidates[p.candidate].fixed)).collect(),
