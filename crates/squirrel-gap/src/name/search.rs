@@ -11,6 +11,8 @@ use nalgebra::DMatrix;
 pub(crate) const NATS_MIN: f64 = 6.0;
 /// Part of the smallest size worth reporting that an effect must reach.
 const SIZE_MIN: f64 = 0.5;
+/// How much larger than the largest plausible size a number may be.
+const PLAUSIBLE: f64 = 1.3;
 /// Candidates that are refined after each linear ranking.
 const REFINED: usize = 4;
 /// Most steps of a refinement.
@@ -73,12 +75,6 @@ impl Search<'_> {
             let mut best = self.score(&linear, &point.members)?;
             self.extend(&linear, &mut best)?;
             self.drop_and_swap(&linear, &mut best)?;
-            if std::env::var("GAPTRACE").is_ok() {
-                eprintln!("ROUND {round} null {:.1} best {:.1} {:?}", null.log_evidence, best.log_evidence, best.members.iter().map(|m| (self.effect(m), m.values.clone())).collect::<Vec<_>>());
-                let sp: Vec<String> = self.settled(&best).base.iter().enumerate().filter(|(i, x)| x.abs() > 1.5 * linear.tolerance[*i]).map(|(i, x)| format!("{} {:.1}", self.catalogue.parameters.get(i).map_or("sensor".to_owned(), |p| format!("{}{:?}", p.key, self.catalogue.candidates[p.candidate].fixed)), x / linear.tolerance[i])).collect();
-                eprintln!("   {sp:?}");
-                for (e, m) in self.ranked(&null, &[]).into_iter().take(4) { eprintln!("   rank {} {:.1} {:?}", self.effect(&m), e - null.log_evidence, m.values); }
-            }
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
                 self.prune(&linear, &mut best)?;
@@ -177,6 +173,16 @@ impl Search<'_> {
     /// Whether each member is at least half the smallest size worth reporting.
     pub(crate) fn is_large(&self, scored: &Scored) -> bool {
         scored.members.iter().all(|member| self.is_large_enough(member))
+    }
+
+    /// Whether no member is larger than anything plausible: what is forced into a name goes to its limit.
+    pub(crate) fn is_plausible(&self, scored: &Scored) -> bool {
+        scored.members.iter().all(|member| {
+            self.free_slots(member).into_iter().all(|slot| {
+                let (_, largest, _) = self.range(member, slot);
+                member.values[slot].abs() <= PLAUSIBLE * largest
+            })
+        })
     }
 
     fn is_large_enough(&self, member: &Member) -> bool {
