@@ -19,6 +19,8 @@ const REFINED: usize = 4;
 const STEPS_MAX: usize = 6;
 /// Evidence that a step towards the mode may cost, nats.
 const STEP_NATS: f64 = 1.0;
+/// Part of its tolerance by which a number must be off to act in the simulator's own model.
+const ACTS: f64 = 0.7;
 /// Most effects in a set.
 const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
@@ -68,8 +70,9 @@ impl Search<'_> {
     pub(crate) fn run(&self) -> Result<Found, GapError> {
         let mut point = Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] };
         let mut round = 1;
+        let mut before: Option<Linear> = None;
         loop {
-            let linear = Linear::about(self.predictor, self.catalogue, &point)?;
+            let linear = Linear::about(self.predictor, self.catalogue, &point, before.as_ref())?;
             (self.progress)();
             let null = self.score(&linear, &[])?;
             let mut best = self.score(&linear, &point.members)?;
@@ -82,6 +85,7 @@ impl Search<'_> {
                 return Ok(Found { linear, null, best, worth });
             }
             point = self.settled(&best);
+            before = Some(linear);
             round += 1;
         }
     }
@@ -90,7 +94,8 @@ impl Search<'_> {
     pub(crate) fn settled(&self, set: &Scored) -> Point {
         let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
         for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
-            if self.catalogue.starts_flat(parameter) {
+            // What is hardly off is left to the linear part: every effect that acts costs time.
+            if self.catalogue.starts_flat(parameter) || x.abs() < ACTS * parameter.tolerance {
                 *x = 0.0;
             }
         }
