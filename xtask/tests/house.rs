@@ -7,7 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Which of our crates a crate may depend on, top down.
-const ARROWS: [(&str, &[&str]); 6] = [
+const ARROWS: [(&str, &[&str]); 7] = [
+    ("squirrel-examples", &["squirrel-gap", "squirrel-sim"]),
     ("hidden-effects", &["squirrel-sim"]),
     ("squirrel-cli", &["squirrel-study", "squirrel-gap", "squirrel-sim", "squirrel-core"]),
     ("squirrel-study", &["squirrel-gap", "squirrel-sim", "squirrel-core"]),
@@ -131,10 +132,11 @@ fn every_crate_and_every_room_of_core_and_sim_is_on_the_page() {
 
 #[test]
 fn dependencies_point_downwards() {
-    let (crates, bench) = (root().join("crates"), root().join("tests/hidden-effects"));
+    let crates = root().join("crates");
+    let others = [("tests/hidden-effects", "hidden-effects"), ("examples", "squirrel-examples")];
     let packages = folders(&crates).into_iter().map(|name| (crates.join(&name), name));
     let wrong: Vec<String> = packages
-        .chain([(bench, "hidden-effects".to_owned())])
+        .chain(others.map(|(path, name)| (root().join(path), name.to_owned())))
         .flat_map(|(path, name)| upward_arrows(&name, &fs::read_to_string(path.join("Cargo.toml")).unwrap()))
         .collect();
     assert!(wrong.is_empty(), "{wrong:?}");

@@ -2,58 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+mod support;
+
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-/// A folder of its own for each test.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-        let _ = fs::remove_dir_all(&path);
-        fs::create_dir_all(&path).unwrap();
-        Self(path)
-    }
-    fn write(&self, name: &str, text: &str) -> String {
-        fs::write(self.0.join(name), text).unwrap();
-        name.to_owned()
-    }
-    fn run(&self, arguments: &[&str]) -> Output {
-        Command::new(env!("CARGO_BIN_EXE_squirrel")).args(arguments).current_dir(&self.0).output().unwrap()
-    }
-    fn files(&self) -> Vec<String> {
-        let mut names: Vec<String> =
-            fs::read_dir(&self.0).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-    /// Runs, expects exit code 0, returns stdout.
-    fn succeeds(&self, arguments: &[&str]) -> String {
-        let output = self.run(arguments);
-        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-        String::from_utf8(output.stdout).unwrap()
-    }
-    /// Runs, expects exit code 1 and one line on stderr that holds all `words`, and no new file.
-    fn fails(&self, arguments: &[&str], words: &[&str]) {
-        let before = self.files();
-        let output = self.run(arguments);
-        let stderr = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
-        assert_eq!(stderr.trim_end().lines().count(), 1, "{arguments:?}: {stderr}");
-        for word in words {
-            assert!(stderr.contains(word), "{arguments:?}: `{word}` is not in: {stderr}");
-        }
-        assert_eq!(self.files(), before, "{arguments:?} left something behind");
-    }
-}
-
-const SQUIRREL: &str = include_str!("../../../vehicles/squirrel.toml");
-
-fn json(folder: &Folder, name: &str) -> serde_json::Value {
-    serde_json::from_str(&fs::read_to_string(folder.0.join(name)).unwrap()).unwrap()
-}
+use support::{Folder, SQUIRREL, json};
 
 #[test]
 fn without_arguments_it_flies_the_demo() {

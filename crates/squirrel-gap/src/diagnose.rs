@@ -15,7 +15,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 
 /// Part of what the nominal model leaves that a form which differs may leave; more is outside the catalogue.
-const FORM_SHARE: f64 = 0.35;
+const FORM_SHARE: f64 = 0.1;
 /// How much more of the held-out gap the best other name must leave.
 const RIVAL_GAP: f64 = 3.0;
 /// More alternatives than this within the evidence of a name are no answer.
@@ -156,7 +156,7 @@ fn decide(
             (false, true) => Kind::None,
         }
     } else if leftover.is_real() {
-        if share < FORM_SHARE { Kind::NamedFormDiffers } else { Kind::OutsideCatalogue }
+        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) { Kind::NamedFormDiffers } else { Kind::OutsideCatalogue }
     } else if close.len() > ALTERNATIVES_MAX {
         Kind::NotIdentifiable
     } else if close.is_empty() {

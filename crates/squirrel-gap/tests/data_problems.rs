@@ -1,0 +1,247 @@
+//! Logs that contradict themselves: an axis, a frame, a unit, a clock or a rotor is not what the log says. The answer is
+//! that, with the channel, and never the name of an effect. Commands that are late as a link can be late are an effect.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+mod support;
+
+use squirrel_gap::{Kind, Verdict, diagnose};
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::scenario::Scenario;
+use squirrel_sim::vehicle_file::VehicleFile;
+use support::{imported, shared, vehicle, vehicle_with};
+
+type Flights = Vec<(String, FlightLog)>;
+
+const OMEGA: &str = "imu.omega_body_rad_s";
+const FORCE: &str = "imu.specific_force_body_m_s2";
+const VELOCITY: &str = "gnss.velocity_ned_m_s";
+const POSITION: &str = "gnss.position_ned_m";
+const VOLTAGE: &str = "battery.voltage_v";
+const COMMAND: &str = "rotor.command";
+/// Rate of commands in these logs, Hz.
+const COMMAND_HZ: f64 = 300.0;
+
+/// Two flights to fit and one held out, and the vehicle that flew them as its file has it.
+#[derive(Clone)]
+struct Case {
+    vehicle: VehicleFile,
+    flights: Flights,
+    held_out: Flights,
+}
+
+impl Case {
+    /// Flights of the simulator on an individual, diagnosed against the shipped squirrel.
+    fn flown_by(individual: &VehicleFile) -> Self {
+        let fly = |name: &str, seed| {
+            let mut scenario = Scenario::find("excite_rich").unwrap();
+            scenario.seed = seed;
+            let setup =
+                Setup { vehicle: individual.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+            (name.to_owned(), setup.fly(true, |_| {}).unwrap().log.unwrap())
+        };
+        Self {
+            vehicle: vehicle("squirrel.toml"),
+            flights: vec![fly("first", 1), fly("second", 2)],
+            held_out: vec![fly("held-out", 3)],
+        }
+    }
+
+    /// The practice case in which nothing is hidden; `None` where the shared folder is not.
+    fn practice() -> Option<Self> {
+        let case = shared("gap-practice/cases/ff290cd742")?;
+        let read = |part: &str| (part.to_owned(), imported("practice.toml", &case.join(part)));
+        Some(Self {
+            vehicle: vehicle("practice.toml"),
+            flights: vec![read("train/flight00"), read("train/flight01")],
+            held_out: vec![read("holdout/flight00")],
+        })
+    }
+
+    /// The same with a mistake in every log, as a wrong line of an import map makes it.
+    fn with(&self, mistake: &dyn Fn(&mut FlightLog)) -> Self {
+        let mut case = self.clone();
+        case.flights.iter_mut().chain(&mut case.held_out).for_each(|(_, log)| mistake(log));
+        case
+    }
+
+    fn verdict(&self) -> Verdict {
+        diagnose(&self.vehicle, &self.flights, &self.held_out, &|_| {}).unwrap().verdict
+    }
+}
+
+/// Changes every sample of a channel.
+fn each(log: &mut FlightLog, channel: &str, change: impl Fn(&mut [f64])) {
+    let (source, name) = channel.rsplit_once('.').unwrap();
+    let channel = log.sources.get_mut(source).unwrap().channels.get_mut(name).unwrap();
+    channel.values.chunks_exact_mut(channel.width).for_each(change);
+}
+
+/// Commands that act `late_s` after they stand in the log; before it, if negative.
+fn late(log: &mut FlightLog, late_s: f64) {
+    let by = (late_s * COMMAND_HZ).round() as isize;
+    for source in ["rotor", "wing"] {
+        let channel = log.sources.get_mut(source).unwrap().channels.get_mut("command").unwrap();
+        let width = channel.width;
+        let count = channel.values.len() / width;
+        let row = |k: usize| k.saturating_add_signed(by).min(count - 1);
+        channel.values = (0..count).flat_map(|k| channel.row(row(k)).to_vec()).collect();
+    }
+}
+
+type Mistake = (&'static str, &'static str, fn(&mut FlightLog));
+
+const MISTAKES: [Mistake; 19] = [
+    ("gyroscope x and y swapped", OMEGA, |log| each(log, OMEGA, |w| w.swap(0, 1))),
+    ("gyroscope y and z swapped", OMEGA, |log| each(log, OMEGA, |w| w.swap(1, 2))),
+    ("gyroscope forward-left-up", OMEGA, |log| each(log, OMEGA, |w| (w[1], w[2]) = (-w[1], -w[2]))),
+    ("gyroscope in deg/s", OMEGA, |log| each(log, OMEGA, |w| w.iter_mut().for_each(|x| *x = x.to_degrees()))),
+    ("accelerometer x and y swapped", FORCE, |log| each(log, FORCE, |f| f.swap(0, 1))),
+    ("accelerometer x and z swapped", FORCE, |log| each(log, FORCE, |f| f.swap(0, 2))),
+    ("accelerometer y reversed", FORCE, |log| each(log, FORCE, |f| f[1] = -f[1])),
+    ("accelerometer forward-left-up", FORCE, |log| {
+        each(log, FORCE, |f| (f[1], f[2]) = (-f[1], -f[2]));
+    }),
+    ("accelerometer in g", FORCE, |log| each(log, FORCE, |f| f.iter_mut().for_each(|x| *x /= 9.80665))),
+    ("velocity east-north-up", VELOCITY, |log| {
+        each(log, VELOCITY, |v| (v[0], v[1], v[2]) = (v[1], v[0], -v[2]));
+    }),
+    ("velocity up for down", VELOCITY, |log| each(log, VELOCITY, |v| v[2] = -v[2])),
+    ("velocity in cm/s", VELOCITY, |log| each(log, VELOCITY, |v| v.iter_mut().for_each(|x| *x *= 100.0))),
+    ("velocity north and east swapped", VELOCITY, |log| each(log, VELOCITY, |v| v.swap(0, 1))),
+    ("position north and east swapped", POSITION, |log| each(log, POSITION, |p| p.swap(0, 1))),
+    ("voltage in mV", VOLTAGE, |log| each(log, VOLTAGE, |v| v[0] *= 1e3)),
+    ("commands in percent", COMMAND, |log| each(log, COMMAND, |u| u.iter_mut().for_each(|x| *x *= 100.0))),
+    ("commands 40 ms after what they cause", COMMAND, |log| late(log, -0.04)),
+    ("commands 150 ms early", COMMAND, |log| late(log, 0.15)),
+    ("commands 250 ms early", COMMAND, |log| late(log, 0.25)),
+];
+
+/// What is wrong with the answer to a mistake; `None` if nothing is.
+fn complaint(what: &str, channel: &str, verdict: &Verdict) -> Option<String> {
+    let goes_with = verdict.goes_with.clone().unwrap_or_default();
+    let right = verdict.verdict == Kind::DataProblem
+        && verdict.effects.is_empty()
+        && goes_with.contains(channel)
+        && verdict.words.contains(channel);
+    println!("{what}: {:?}: {}", verdict.verdict, verdict.words);
+    (!right).then(|| format!("{what}: {:?}, goes with {goes_with:?}: {}", verdict.verdict, verdict.words))
+}
+
+fn complaints(case: &Case) -> Vec<String> {
+    let ask = |(what, channel, mistake): &Mistake| complaint(what, channel, &case.with(mistake).verdict());
+    let mut wrong: Vec<String> = MISTAKES.iter().filter_map(ask).collect();
+    // Rotors turn in pairs: some other orders are only a vehicle that is turned by half a turn.
+    for order in [[1, 0, 2, 3], [1, 2, 3, 0], [3, 2, 1, 0]] {
+        let permuted = case.with(&|log| {
+            each(log, COMMAND, |u| {
+                let old = [u[0], u[1], u[2], u[3]];
+                order.iter().zip(u).for_each(|(from, to): (&usize, &mut f64)| *to = old[*from]);
+            });
+        });
+        wrong.extend(complaint(&format!("rotors in the order {order:?}"), COMMAND, &permuted.verdict()));
+    }
+    wrong
+}
+
+#[test]
+fn a_mistake_in_simulated_logs_is_found_with_its_channel() {
+    let wrong = complaints(&Case::flown_by(&VehicleFile::squirrel()));
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn a_mistake_in_foreign_logs_is_found_with_its_channel() {
+    let Some(case) = Case::practice() else { return };
+    let wrong = complaints(&case);
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// One log is enough, wherever it stands, and it is named.
+#[test]
+fn a_mistake_in_one_log_is_found_with_its_flight() {
+    let case = Case::flown_by(&VehicleFile::squirrel());
+    for (what, channel, mistake) in &MISTAKES[..4] {
+        let (mut second, mut held_out) = (case.clone(), case.clone());
+        mistake(&mut second.flights[1].1);
+        mistake(&mut held_out.held_out[0].1);
+        for (case, flight) in [(second, "second"), (held_out, "held-out")] {
+            let verdict = case.verdict();
+            assert_eq!(complaint(what, channel, &verdict), None);
+            assert!(verdict.words.contains(flight), "{what}: {}", verdict.words);
+        }
+    }
+}
+
+/// A flight that was fitted proves nothing, whole or in part, whatever it is called.
+#[test]
+fn a_training_flight_is_no_proof() {
+    let case = Case::flown_by(&VehicleFile::squirrel());
+    let whole = case.flights[1].1.clone();
+    let mut half = whole.clone();
+    for source in half.sources.values_mut() {
+        let from = source.time_s.partition_point(|t| *t < 20.0);
+        source.time_s.drain(..from);
+        source.channels.values_mut().for_each(|channel| drop(channel.values.drain(..from * channel.width)));
+    }
+    for (what, log) in [("whole", whole), ("second half", half)] {
+        let repeated = Case { held_out: vec![("another-name".to_owned(), log)], ..case.clone() };
+        let verdict = repeated.verdict();
+        println!("{what}: {}", verdict.words);
+        assert_eq!(verdict.verdict, Kind::DataProblem, "{what}: {}", verdict.words);
+        for name in ["another-name", "second"] {
+            assert!(verdict.words.contains(name), "{what}: `{name}` is not in: {}", verdict.words);
+        }
+    }
+}
+
+fn names(verdict: &Verdict) -> Vec<&str> {
+    verdict.effects.iter().map(|effect| effect.name).collect()
+}
+
+#[test]
+fn late_commands_are_an_effect() {
+    let case = Case::flown_by(&VehicleFile::squirrel());
+    for late_s in [0.02, 0.04, 0.06] {
+        let verdict = case.with(&|log| late(log, late_s)).verdict();
+        println!("{late_s} s: {:?}: {}", verdict.verdict, verdict.words);
+        assert_eq!(
+            (verdict.verdict, names(&verdict)),
+            (Kind::Named, vec!["actuation_latency"]),
+            "{late_s} s"
+        );
+    }
+}
+
+/// Twice the noise may hide an effect; it does not make another one of it.
+#[test]
+fn noise_makes_no_other_name() {
+    let effects = [
+        ("motor_lag", "extra_time_constant_s = 0.03"),
+        ("thrust_coefficient", "thrust_fraction = -0.08"),
+        ("flapping_moment", "gain_n_m_s_per_m = 3e-3"),
+    ];
+    for (name, parameter) in effects {
+        let table = format!("[effects.{name}]\n{parameter}\n\n[limits]");
+        let mut individual = vehicle_with("squirrel.toml", &[("[limits]", &table)]);
+        let quiet = Case::flown_by(&individual).verdict();
+        assert_eq!((quiet.verdict, names(&quiet)), (Kind::Named, vec![name]), "{}", quiet.words);
+        let sensors = &mut individual.sensors;
+        for noise in [
+            &mut sensors.imu.gyro_noise_rad_s,
+            &mut sensors.imu.accel_noise_m_s2,
+            &mut sensors.attitude.noise_rad,
+            &mut sensors.gnss.position_noise_m,
+            &mut sensors.gnss.velocity_noise_m_s,
+            &mut sensors.baro.noise_m,
+        ] {
+            assert!(*noise > 0.0);
+            *noise *= 2.0;
+        }
+        let loud = Case::flown_by(&individual).verdict();
+        println!("{name}: {:?}: {}", loud.verdict, loud.words);
+        let refused = matches!(loud.verdict, Kind::NotIdentifiable | Kind::Ambiguous);
+        assert!(refused || names(&loud) == [name], "{name}: {:?}: {}", loud.verdict, loud.words);
+    }
+}

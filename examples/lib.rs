@@ -1,0 +1,1 @@
+//! Lessons, one a file: `cargo run --release -p squirrel-examples --example NAME`.
