@@ -21,7 +21,7 @@ const FLAGS: [&str; 9] = [
 ];
 
 /// What the gap report is drawn at: a desk's and a small screen.
-const GAP_SIZES: [&str; 2] = ["1280x8000", "800x14000"];
+const GAP_SIZES: [&str; 2] = ["1280x9000", "800x12000"];
 /// The hidden effect whose report is drawn.
 const GAP_CASE: [&str; 7] = ["make", "--set", "single", "--n", "1", "--seed", "5"];
 /// Panels of a gap report.

@@ -116,7 +116,7 @@ pub fn diagnose(
     let mut verdict = verdict;
     let details = Details {
         evidence: search.single_evidence(&naming.found),
-        confusability: search.confusability(&naming.found.best),
+        confusability: search.confusability(&naming.found.null),
         seen: picture::seen(&search, &naming, &rivals)?,
         naming,
         held_out: proof,

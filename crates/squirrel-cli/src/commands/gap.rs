@@ -11,26 +11,26 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Gap {
     /// Residual force and moment of measured flights against a vehicle, per channel and window, ranked.
-    Find(Flights),
+    Find(Given),
     /// Which effect the vehicle file lacks.
-    Name(Flights),
+    Name(Given),
     /// A new vehicle file with the missing effect in it.
     Add {
         #[command(flatten)]
-        flights: Flights,
+        flights: Given,
         /// Print the patch and write nothing.
         #[arg(long)]
         dry_run: bool,
     },
     /// What the missing effect is worth on held-out flights, re-simulated.
-    Shrink(Flights),
+    Shrink(Given),
     /// All of it, with a report.
-    Run(Flights),
+    Run(Given),
 }
 
-/// What every step looks at.
+/// What every step is given.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Flights {
+pub(crate) struct Given {
     /// Vehicle file.
     #[arg(long)]
     vehicle: PathBuf,
@@ -78,7 +78,7 @@ impl Gap {
     }
 }
 
-impl Flights {
+impl Given {
     fn read(&self) -> Result<(VehicleFile, Logs, Logs), String> {
         let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
         Ok((vehicle, logs(&self.flights)?, logs(&self.held_out)?))

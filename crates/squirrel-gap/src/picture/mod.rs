@@ -9,8 +9,7 @@ mod regressors;
 mod windows;
 
 use crate::GapError;
-use crate::diagnose::Diagnosis;
-use crate::diagnose::{Details, HeldOut as Flown};
+use crate::diagnose::{Details, Diagnosis, HeldOut as Flown};
 use crate::name::{Naming, Scored, Search, TURBULENCE_M_S};
 use crate::predictor::DYNAMIC;
 use crate::report::{
@@ -61,6 +60,10 @@ const UNITS: [(&str, &str); 19] = [
 const RICH: &str = "excite_rich";
 /// Chi-square below which a pair of effects is not separated: 3 standard deviations.
 const SEPARATED: f64 = 9.0;
+
+/// Why the panels of a data problem are empty.
+const CONTRADICTION: &str =
+    "Empty: the logs contradict themselves, and nothing is computed from such logs. The verdict says where.";
 
 /// What only the predictor and the search know.
 pub(crate) struct Seen {
@@ -152,9 +155,7 @@ pub fn picture(
         ..ReportData::default()
     };
     let Some(details) = &diagnosis.details else {
-        data.stopped = "Empty: the logs contradict themselves, and nothing is computed from such logs. The verdict says where."
-            .to_owned();
-        return data;
+        return ReportData { stopped: CONTRADICTION.to_owned(), ..data };
     };
     let seen = &details.seen;
     data.flights.clone_from(&seen.flights);

@@ -158,7 +158,7 @@ pub(super) fn confusability(page: &mut Page, data: &ReportData) {
             }
         }
         if data.fly_next.is_empty() && data.stopped.is_empty() {
-            page.text("Nothing needs to be flown for this answer.");
+            page.text("No further flight is asked for.");
         }
         for next in &data.fly_next {
             match pilot_card(&next.what) {
