@@ -37,7 +37,7 @@ impl Case {
         let fly = |name: &str, seed| {
             let mut scenario = Scenario::find("excite_rich").unwrap();
             scenario.seed = seed;
-            // A vehicle that is heavier than it thinks would touch the ground on the lowest rung.
+            // The lowest rung of the ladder is too near to the ground for a vehicle that lags.
             if let MissionTable::Excite(table) = &mut scenario.mission {
                 table.heights_m = vec![1.5, 1.0, 0.7];
             }
@@ -226,7 +226,7 @@ fn late_commands_are_an_effect() {
 fn noise_makes_no_other_name() {
     let effects = [
         ("motor_lag", "extra_time_constant_s = 0.03"),
-        ("thrust_coefficient", "thrust_fraction = -0.08"),
+        ("thrust_coefficient", "thrust_fraction = 0.08"),
         ("flapping_moment", "gain_n_m_s_per_m = 3e-3"),
     ];
     for (name, parameter) in effects {
