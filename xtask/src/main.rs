@@ -25,7 +25,12 @@ const CHORES: [Chore; 7] = [
         chores::gap_bench,
     ),
     ("thumb", "", "check that the flight code compiles for a Cortex-M7 without std", thumb::chore),
-    ("report-png", "HTML [PNG [WIDTHxHEIGHT]]", "draw a report with a headless Chromium", png::chore),
+    (
+        "report-png",
+        "[HTML [PNG [WIDTHxHEIGHT]]]",
+        "draw a report with a headless Chromium; without a file, the gap report of a hidden effect",
+        png::chore,
+    ),
     (
         "clean-fresh",
         "",

@@ -1,6 +1,7 @@
-//! A report as a picture, to look at it where there is no browser window.
+//! A report as a picture, to look at it where there is no browser window: any report, or that of a hidden effect which is
+//! made, flown and diagnosed for it.
 
-use crate::run::{call, succeeds};
+use crate::run::{call, cargo, succeeds, target_directory};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -19,17 +20,64 @@ const FLAGS: [&str; 9] = [
     "--hide-scrollbars",
 ];
 
-/// `cargo xtask report-png HTML [PNG [WIDTHxHEIGHT]]`.
+/// What the gap report is drawn at: a desk's and a small screen.
+const GAP_SIZES: [&str; 2] = ["1280x8000", "800x14000"];
+/// The hidden effect whose report is drawn.
+const GAP_CASE: [&str; 7] = ["make", "--set", "single", "--n", "1", "--seed", "5"];
+/// Panels of a gap report.
+const GAP_PANELS: std::ops::RangeInclusive<char> = 'a'..='h';
+
+/// `cargo xtask report-png [HTML [PNG [WIDTHxHEIGHT]]]`; without a file, the gap report of a hidden effect.
 pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     let (html, png, size) = match arguments {
+        [] => return gap_report(),
         [html] => (html, PathBuf::from(html).with_extension("png"), "1200x3000"),
         [html, png] => (html, PathBuf::from(png), "1200x3000"),
         [html, png, size] => (html, PathBuf::from(png), size.as_str()),
-        _ => return Err("usage: report-png HTML [PNG [WIDTHxHEIGHT]]".to_owned()),
+        _ => return Err("usage: report-png [HTML [PNG [WIDTHxHEIGHT]]]".to_owned()),
     };
+    draw(Path::new(html), &png, size)
+}
+
+/// Makes a case, has the program diagnose it, checks that the report has all panels, and draws it into `target/gap-report`.
+fn gap_report() -> Result<(), String> {
+    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli", "-p", "hidden-effects"]))?;
+    let (built, folder) = (target_directory()?.join("release"), target_directory()?.join("gap-report"));
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    }
+    call(Command::new(built.join("hidden-effects")).args(GAP_CASE).arg("--out").arg(&folder))?;
+    let cases = folder.join("cases");
+    let at = |error: std::io::Error| format!("{}: {error}", cases.display());
+    let case = std::fs::read_dir(&cases).map_err(at)?.next().ok_or("no case was made")?.map_err(at)?.path();
+    let mut run = Command::new(built.join("squirrel"));
+    run.current_dir(&case).args(["gap", "run", "--vehicle", "vehicle.toml", "--flights", "train"]);
+    call(run.args(["--held-out", "held-out", "--out"]).arg(&folder))?;
+    let html = folder.join("report.html");
+    let text = std::fs::read_to_string(&html).map_err(|error| format!("{}: {error}", html.display()))?;
+    if let Some(panel) = GAP_PANELS.into_iter().find(|panel| !holds_data(&text, *panel)) {
+        return Err(format!("{}: panel-{panel} is missing or lacks data", html.display()));
+    }
+    for size in GAP_SIZES {
+        draw(&html, &folder.join(format!("report-{size}.png")), size)?;
+    }
+    eprintln!("{}", folder.display());
+    Ok(())
+}
+
+/// Whether a panel is there and says of nothing that it is missing.
+fn holds_data(html: &str, panel: char) -> bool {
+    let begun = html.split_once(&format!("<section id=\"panel-{panel}\">"));
+    begun.and_then(|(_, rest)| rest.split_once("</section>")).is_some_and(|(text, _)| {
+        !text.contains("class=\"missing\"") && ["<svg", "<pre"].iter().any(|tag| text.contains(tag))
+    })
+}
+
+/// Draws a page with the first Chromium in the path.
+fn draw(html: &Path, png: &Path, size: &str) -> Result<(), String> {
     let (width, height) = parse_size(size)
         .ok_or_else(|| format!("size '{size}' is not WIDTHxHEIGHT with 1 to 16384 pixels"))?;
-    let page = Path::new(html).canonicalize().map_err(|error| format!("{html}: {error}"))?;
+    let page = html.canonicalize().map_err(|error| format!("{}: {error}", html.display()))?;
     let browser = BROWSERS
         .into_iter()
         .find(|name| succeeds(Command::new(name).arg("--version")))
@@ -47,7 +95,7 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     );
     let _ = std::fs::remove_dir_all(&profile);
     drawn?;
-    std::fs::rename(&unfinished, &png)
+    std::fs::rename(&unfinished, png)
         .map_err(|error| format!("{}: {browser} drew nothing: {error}", png.display()))
 }
 
@@ -66,7 +114,7 @@ fn parse_size(text: &str) -> Option<(u32, u32)> {
 
 #[cfg(test)]
 mod tests {
-    use super::parse_size;
+    use super::{holds_data, parse_size};
 
     #[test]
     fn sizes_are_checked() {
@@ -74,5 +122,14 @@ mod tests {
         for wrong in ["", "1200", "x", "0x10", "10x16385", "-1x5", "1e3x5"] {
             assert_eq!(parse_size(wrong), None, "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_panel_that_lacks_something_is_seen() {
+        let page = |inside: &str| format!("<section id=\"panel-a\">{inside}</section><svg></svg>");
+        assert!(holds_data(&page("<svg></svg>"), 'a'));
+        assert!(!holds_data(&page("<svg></svg>"), 'b'));
+        assert!(!holds_data(&page("<p>words</p>"), 'a'));
+        assert!(!holds_data(&page("<svg></svg><p class=\"missing\">No height.</p>"), 'a'));
     }
 }

@@ -5,6 +5,7 @@ use crate::compatibility;
 use crate::find::{self, Place};
 use crate::name::{Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis, payload_lengths_m};
 use crate::predictor::{Hypothesis, Predictor};
+use crate::picture;
 use crate::shrink::{self, Errors12};
 use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
 use crate::words;
@@ -14,7 +15,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 
 /// Part of what the nominal model leaves that a form which differs may leave; more is outside the catalogue.
-const FORM_SHARE: f64 = 0.35;
+const FORM_SHARE: f64 = 0.1;
 /// How much more of the held-out gap the best other name must leave.
 const RIVAL_GAP: f64 = 3.0;
 /// More alternatives than this within the evidence of a name are no answer.
@@ -50,6 +51,7 @@ pub(crate) struct Details {
     pub(crate) naming: Naming,
     pub(crate) held_out: Option<HeldOut>,
     pub(crate) labels: Vec<String>,
+    pub(crate) seen: picture::Seen,
 }
 
 /// Errors on held-out flights.
@@ -115,6 +117,7 @@ pub fn diagnose(
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.best),
+        seen: picture::seen(&search, &naming, &rivals)?,
         naming,
         held_out: proof,
         labels: catalogue.parameters.iter().map(|p| format!("{} {} {:?}", catalogue.candidates[p.candidate].effect, p.key, catalogue.candidates[p.candidate].fixed)).collect(),
@@ -153,7 +156,7 @@ fn decide(
             (false, true) => Kind::None,
         }
     } else if leftover.is_real() {
-        if share < FORM_SHARE { Kind::NamedFormDiffers } else { Kind::OutsideCatalogue }
+        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) { Kind::NamedFormDiffers } else { Kind::OutsideCatalogue }
     } else if close.len() > ALTERNATIVES_MAX {
         Kind::NotIdentifiable
     } else if close.is_empty() {

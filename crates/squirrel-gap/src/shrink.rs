@@ -113,7 +113,8 @@ pub(crate) fn errors(predictor: &Predictor, hypothesis: &Hypothesis) -> Result<O
             // The fix that speaks of this bin has its stamp a latency later.
             let fixes = track.velocity();
             let from = fixes.partition_point(|(t, _)| *t - latency_s < a - 1e-6);
-            let until = fixes.partition_point(|(t, _)| *t - latency_s <= b + 1e-6);
+            // Up to the next bin: a fix between two samples belongs to one of them.
+            let until = fixes.partition_point(|(t, _)| *t - latency_s < b + track.period_s - 1e-6);
             if from == until {
                 return;
             }

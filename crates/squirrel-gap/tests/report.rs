@@ -83,6 +83,7 @@ fn example() -> ReportData {
             1 => 1231.0,
             _ => 700.0 * f64::exp(-0.25 * i as f64) - 6.0,
         },
+        is_answer: i == 0,
     };
     let chi_square = |i: usize, j: usize| match (i, j) {
         _ if i == j => f64::NAN,
@@ -139,6 +140,7 @@ fn example() -> ReportData {
         tolerance: n[5],
     };
     ReportData {
+        stopped: String::new(),
         title: "Gap report: squirrel, three flights".to_owned(),
         verdict: "The vehicle file lacks linear_drag: a force against the motion of 0.085 N per m/s. On a flight that was \
                   not used to find it, the error of one second of re-simulation falls from 9.3 to 1.07 times the noise \
@@ -168,6 +170,7 @@ fn example() -> ReportData {
                     name: (*name).to_owned(),
                     unit: if i < 3 { "m/s" } else { "rad" }.to_owned(),
                     errors: errors(0.01 * (i + 1) as f64),
+                    horizons: vec![Horizon { horizon_s: 0.1, errors: errors(0.01) }],
                 })
                 .collect(),
             horizons: (1..=10)
@@ -291,7 +294,7 @@ fn what_is_missing_is_said_in_words() {
     let html = render(&partial);
     check(&html);
     assert!(panel(&html, "panel-a").contains("nothing was added to the model"));
-    assert!(panel(&html, "panel-b").contains(&format!("not tried: {untried}.")));
+    assert!(panel(&html, "panel-b").contains(untried), "at its place without a bar");
     assert!(panel(&html, "panel-c").contains("fx against forward airspeed: no samples"));
     assert!(panel(&html, "panel-d").contains("No horizons"));
     assert!(panel(&html, "panel-e").contains("No inputs"));

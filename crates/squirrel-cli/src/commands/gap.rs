@@ -3,6 +3,7 @@
 use crate::output::{self, Table, say, talk};
 use squirrel_gap::{Diagnosis, Kind, NamedEffect, Value, Verdict};
 use squirrel_sim::log::FlightLog;
+use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::{Path, PathBuf};
 
@@ -49,6 +50,22 @@ pub(crate) struct Flights {
 
 type Logs = Vec<(String, FlightLog)>;
 
+/// A diagnosis with what it is of.
+struct Found {
+    vehicle: VehicleFile,
+    flights: Vec<String>,
+    held_out: Vec<String>,
+    diagnosis: Diagnosis,
+}
+
+impl Found {
+    /// Text of the vehicle file with the named effects; `None` where the verdict has none that a file can take.
+    fn patched(&self) -> Result<Option<String>, String> {
+        let text = || squirrel_gap::add(&self.vehicle, &self.diagnosis, &self.flights);
+        nameable(&self.diagnosis.verdict).then(text).transpose()
+    }
+}
+
 impl Gap {
     pub(crate) fn run(&self) -> Result<(), String> {
         match self {
@@ -67,7 +84,7 @@ impl Flights {
         Ok((vehicle, logs(&self.flights)?, logs(&self.held_out)?))
     }
 
-    fn diagnose(&self) -> Result<(VehicleFile, Vec<String>, Diagnosis), String> {
+    fn diagnose(&self) -> Result<Found, String> {
         let (vehicle, flights, held_out) = self.read()?;
         let bar = output::spinner();
         let diagnosis = squirrel_gap::diagnose(&vehicle, &flights, &held_out, &|what| {
@@ -75,8 +92,9 @@ impl Flights {
             bar.inc(1);
         });
         bar.finish_and_clear();
-        let names = flights.into_iter().map(|(name, _)| name).collect();
-        Ok((vehicle, names, diagnosis.map_err(|e| e.to_string())?))
+        let names = |logs: Logs| logs.into_iter().map(|(name, _)| name).collect();
+        let diagnosis = diagnosis.map_err(|e| e.to_string())?;
+        Ok(Found { vehicle, flights: names(flights), held_out: names(held_out), diagnosis })
     }
 
     fn find(&self) -> Result<(), String> {
@@ -99,45 +117,61 @@ impl Flights {
     }
 
     fn name(&self) -> Result<(), String> {
-        let (_, _, diagnosis) = self.diagnose()?;
-        show(&diagnosis.verdict);
-        self.write(&diagnosis.verdict)
+        let found = self.diagnose()?;
+        show(&found.diagnosis.verdict);
+        self.write(&found.diagnosis.verdict)
     }
 
     fn shrink(&self) -> Result<(), String> {
         if self.held_out.is_empty() {
             return Err("--held-out: none given; shrink needs flights that the fit never sees".to_owned());
         }
-        self.name()
+        let found = self.diagnose()?;
+        show(&found.diagnosis.verdict);
+        self.report(&found, found.patched()?.as_deref())?;
+        self.write(&found.diagnosis.verdict)
     }
 
     fn add(&self, dry_run: bool) -> Result<(), String> {
-        let (vehicle, flights, mut diagnosis) = self.diagnose()?;
-        show(&diagnosis.verdict);
-        if !nameable(&diagnosis.verdict) {
-            return self.write(&diagnosis.verdict);
-        }
-        let text = squirrel_gap::add(&vehicle, &diagnosis, &flights)?;
+        let mut found = self.diagnose()?;
+        show(&found.diagnosis.verdict);
+        let Some(text) = found.patched()? else {
+            return self.write(&found.diagnosis.verdict);
+        };
         if dry_run {
-            say(&squirrel_gap::difference(&vehicle.text, &text));
-            return output::write_json(self.json.as_deref(), &diagnosis.verdict);
+            say(&squirrel_gap::difference(&found.vehicle.text, &text));
+            return output::write_json(self.json.as_deref(), &found.diagnosis.verdict);
         }
-        self.patch(&text, &mut diagnosis.verdict)?;
-        self.write(&diagnosis.verdict)
+        self.patch(&text, &mut found.diagnosis.verdict)?;
+        self.write(&found.diagnosis.verdict)
     }
 
     fn everything(&self) -> Result<(), String> {
-        let (vehicle, flights, mut diagnosis) = self.diagnose()?;
-        show(&diagnosis.verdict);
-        if nameable(&diagnosis.verdict) {
-            let text = squirrel_gap::add(&vehicle, &diagnosis, &flights)?;
-            self.patch(&text, &mut diagnosis.verdict)?;
+        let mut found = self.diagnose()?;
+        show(&found.diagnosis.verdict);
+        let text = found.patched()?;
+        if let Some(text) = &text {
+            self.patch(text, &mut found.diagnosis.verdict)?;
         }
-        self.write(&diagnosis.verdict)
+        self.report(&found, text.as_deref())?;
+        self.write(&found.diagnosis.verdict)
+    }
+
+    /// Writes the report, if there is a folder for it.
+    fn report(&self, found: &Found, patched: Option<&str>) -> Result<(), String> {
+        let Some(folder) = &self.out else { return Ok(()) };
+        output::folder(folder)?;
+        let data =
+            squirrel_gap::picture(&found.vehicle, &found.diagnosis, &found.flights, &found.held_out, patched);
+        let path = folder.join("report.html");
+        output::write_file(&path, squirrel_gap::report::render(&data).as_bytes())?;
+        say(&format!("report: {}", path.display()));
+        Ok(())
     }
 
     fn folder(&self) -> Result<&Path, String> {
-        let folder = self.out.as_deref().ok_or("--out: none given; a folder is needed for what is written")?;
+        let folder =
+            self.out.as_deref().ok_or("--out: none given; a folder is needed for what is written")?;
         output::folder(folder)?;
         Ok(folder)
     }
@@ -147,7 +181,10 @@ impl Flights {
         let file = self.vehicle.file_name().unwrap_or_default();
         let path = self.folder()?.join(file);
         if same_file(&path, &self.vehicle) {
-            return Err(format!("{}: --out is the folder of the vehicle file, which is never overwritten", path.display()));
+            return Err(format!(
+                "{}: --out is the folder of the vehicle file, which is never overwritten",
+                path.display()
+            ));
         }
         output::write_file(&path, text.as_bytes())?;
         verdict.model_patch = Some(path.display().to_string());
@@ -238,6 +275,11 @@ fn show(verdict: &Verdict) {
         say("");
     }
     places(&verdict.places);
+    if verdict.verdict == Kind::NotIdentifiable
+        && let Some(card) = pilot_card("excite_rich")
+    {
+        say(&format!("\nwhat to fly:\n{card}"));
+    }
     notes(&verdict.notes);
 }
 

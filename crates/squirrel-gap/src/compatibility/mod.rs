@@ -245,7 +245,7 @@ fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
         };
         return Some(("rotor.command", words));
     }
-    if let Some(axes) = moments.misnamed_axes(0.5) {
+    if let Some(axes) = moments.later_by((shift_s / step_s).round() as i64).misnamed_axes(0.5) {
         return Some(("rotor.command", format!("explains the moments better with their axes as {axes}; is the order of rotors that of the vehicle file?")));
     }
     let axes = forces.misnamed_axes(0.15)?;

@@ -5,6 +5,9 @@ use nalgebra::Vector3;
 /// How much better another naming of the axes must fit, in sums of three correlations.
 const MARGIN: f64 = 0.8;
 
+/// How well it must fit at all.
+const MATCH: f64 = 1.0;
+
 /// Pairs of what one source and another say.
 #[derive(Default)]
 pub(super) struct Pairs(Vec<(Vector3<f64>, Vector3<f64>)>);
@@ -14,6 +17,13 @@ impl Pairs {
         if own.iter().chain(other.iter()).all(|x| x.is_finite()) {
             self.0.push((own, other));
         }
+    }
+
+    /// Each first with the second of so many pairs before.
+    pub(super) fn later_by(&self, shift: i64) -> Self {
+        let n = self.0.len() as i64;
+        let pairs = (shift.max(0)..(n + shift.min(0))).map(|i| (self.0[i as usize].0, self.0[(i - shift) as usize].1));
+        Self(pairs.collect())
     }
 
     /// The first `n` pairs.
@@ -61,7 +71,7 @@ impl Pairs {
         let r = self.correlations(least);
         let (best, naming) = best_naming(&r);
         let own = r[0][0] + r[1][1] + r[2][2];
-        (best > own + MARGIN).then(|| {
+        (best > own + MARGIN && best > MATCH).then(|| {
             let names = naming.map(|(axis, sign)| {
                 format!("{}{}", if sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][axis])
             });

@@ -8,7 +8,7 @@
 mod features;
 pub(crate) mod floor;
 
-use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor};
+use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
 use features::{families, predicted_share};
 
@@ -70,6 +70,12 @@ impl Leftover {
         }
     }
 
+    /// Whether it goes with something that no form of any effect goes with: time, a place, a line in the spectrum.
+    pub(crate) fn is_foreign(&self) -> bool {
+        let strange = |(name, share): &(&str, f64)| ["time in flight", "position"].contains(name) && *share > 0.5;
+        self.families.first().is_some_and(strange) || self.line.is_some_and(|(_, share)| share > 0.5)
+    }
+
     /// The channels that stand out, in words.
     pub(crate) fn channels(&self) -> String {
         let names: Vec<&str> = self.excess.iter().map(|(channel, _)| CHANNELS[*channel]).collect();
@@ -81,6 +87,7 @@ impl Leftover {
 ///
 /// * `left`, `nominal` - rows of the residual of the best explanation, and of the vehicle as it is
 /// * `motions` - of each piece, under the best explanation
+/// * `slack` - tolerances that no column of the model stands for
 pub(crate) fn leftover(
     predictor: &Predictor,
     motions: &[Motion],
@@ -88,6 +95,7 @@ pub(crate) fn leftover(
     nominal: &[f64],
     wind_columns: &[Vec<f64>; 3],
     turbulence_m_s: f64,
+    slack: Slack,
 ) -> Leftover {
     let draws = floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS);
     let mut bands = Vec::new();
@@ -116,8 +124,9 @@ pub(crate) fn leftover(
             slow_nominal: rms_of_means(&rows(nominal)),
             whole_floor: mean(rms),
         };
+        let within = within_tolerance(predictor, &motions[segment.piece], segment, slack);
         let allowed = |floor: f64, ratio: f64, explained: f64| {
-            ((floor * ratio).powi(2) + (MODEL_ERROR * explained).powi(2)).sqrt()
+            ((floor * ratio).powi(2) + (MODEL_ERROR * explained).powi(2) + within.powi(2)).sqrt()
         };
         let ratio = (band.slow / allowed(band.slow_floor, SLOW_RATIO, rms_of_means(&explained)))
             .max(band.whole / allowed(band.whole_floor, WHOLE_RATIO, rms_of_means(&explained)));
@@ -135,6 +144,44 @@ pub(crate) fn leftover(
         out.line = line(predictor, left, channel);
     }
     out
+}
+
+/// Tolerances, one standard deviation, of what the catalogue has no single number for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Slack {
+    /// Where forces act, m.
+    pub(crate) lever_m: f64,
+    /// Drag along one axis, N s/m.
+    pub(crate) drag_n_s_per_m: f64,
+    /// Reaction torque of one rotor, as a fraction.
+    pub(crate) torque_fraction: f64,
+}
+
+/// What such tolerances leave in a channel, in its unit: forces that act a little beside their place are moments, drag
+/// differs from axis to axis, and rotors from each other.
+fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, slack: Slack) -> f64 {
+    let p = predictor.vehicle.vehicle.parameters();
+    let slow = |channel: usize| {
+        let measured = &predictor.tracks[segment.piece].measured;
+        let mean = measured.iter().map(|m| m[channel]).sum::<f64>() / measured.len().max(1) as f64;
+        let force: Vec<f64> = measured.iter().map(|m| m[channel] - mean).collect();
+        rms_of_means(&force) * p.mass_kg
+    };
+    match segment.channel {
+        0..=2 => {
+            let n = motion.body.len().max(1) as f64;
+            let speed = motion.body.iter().map(|b| b.velocity.vector.norm_squared()).sum::<f64>() / n;
+            slack.drag_n_s_per_m * speed.sqrt() / p.mass_kg
+        }
+        axis @ (3 | 4) => slack.lever_m * slow(2) / p.inertia_kg_m2[(axis - 3, axis - 3)],
+        _ => {
+            let beside = slack.lever_m * slow(0).hypot(slow(1));
+            let torque = p.propulsion.torque_coefficient_n_m_s2 / p.propulsion.thrust_coefficient_n_s2
+                * predictor.vehicle.vehicle.weight_n();
+            let uneven = slack.torque_fraction * torque / (p.rotor_count as f64).sqrt();
+            beside.hypot(uneven) / p.inertia_kg_m2[(2, 2)]
+        }
+    }
 }
 
 /// Moments and block means of one channel.

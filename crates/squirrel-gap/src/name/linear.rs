@@ -133,6 +133,12 @@ impl Catalogue {
         ["ground_effect", "payload_swing"].contains(&self.candidates[parameter.candidate].effect)
     }
 
+    /// Whether the slope of a parameter is another one after a few tolerances: lags and delays.
+    fn bends(&self, parameter: &Parameter) -> bool {
+        ["motor_lag", "actuation_latency", "clock_skew", "gnss_latency", "wing_servo_lag"]
+            .contains(&self.candidates[parameter.candidate].effect)
+    }
+
     /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the same choices.
     pub(crate) fn absent(&self, predictor: &Predictor, candidate: usize) -> Member {
         let own = &self.candidates[candidate];
@@ -153,13 +159,17 @@ impl Catalogue {
 impl Linear {
     /// Predicts every parameter once about a point, fits the whitening to what the fullest model leaves, and whitens.
     ///
+    /// * `before` - the same predictor about another point; where neither has members, columns that hardly bend are its
+    ///
     /// # Errors
     /// What the predictor says.
     pub(crate) fn about(
         predictor: &Predictor,
         catalogue: &Catalogue,
         point: &Point,
+        before: Option<&Self>,
     ) -> Result<Self, GapError> {
+        let before = before.filter(|b| b.point.members.is_empty() && point.members.is_empty());
         let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
         let n = catalogue.columns(predictor);
         let first = point.base.iter().all(|x| *x == 0.0) && point.members.is_empty();
@@ -190,13 +200,6 @@ impl Linear {
                     sd
                 }
             };
-            let flight = parameter.is_none().then_some(sensor / SENSOR_COLUMNS);
-            let mut after = residual.clone();
-            predictor.residual_of(&hypothesis(predictor, catalogue, &moved)?, flight, &mut after)?;
-            for (after, before) in after.iter_mut().zip(&residual) {
-                *after = (before - *after) / step;
-            }
-            raw.push(after);
             tolerance.push(parameter.map_or(step, |p| p.tolerance));
             // At first anything may be large; about a point that explains the flights, only what has a name.
             let named = parameter.is_some_and(|p| point.members.iter().any(|m| m.candidate == p.candidate));
@@ -205,6 +208,19 @@ impl Linear {
                 Some(p) => 3.0 * p.tolerance,
                 None => step,
             });
+            if let Some(before) = before
+                && parameter.is_none_or(|p| !catalogue.bends(p))
+            {
+                raw.push(before.raw[column].clone());
+                continue;
+            }
+            let flight = parameter.is_none().then_some(sensor / SENSOR_COLUMNS);
+            let mut after = residual.clone();
+            predictor.residual_of(&hypothesis(predictor, catalogue, &moved)?, flight, &mut after)?;
+            for (after, before) in after.iter_mut().zip(&residual) {
+                *after = (before - *after) / step;
+            }
+            raw.push(after);
         }
         let whitener = whitener(predictor, &raw, &widest, &residual);
         let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();

@@ -87,7 +87,7 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
     let left = loosened(&found, &point, left);
     let wind = predictor.wind_columns(&about)?;
-    let leftover = leftover(predictor, &motions, &left, &nominal, &wind, TURBULENCE_M_S);
+    let leftover = leftover(predictor, &motions, &left, &nominal, &wind, TURBULENCE_M_S, catalogue.slack());
     let deviations = interval::deviations(predictor, &found.linear, &found.best);
     Ok(Naming {
         found,
@@ -141,7 +141,7 @@ fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover
     let wind = predictor.wind_columns(&naming.hypothesis)?;
     let motions: Vec<_> =
         (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
-    let blown = |sigma: f64| leftover(predictor, &motions, &naming.left, &naming.nominal, &wind, sigma);
+    let blown = |sigma: f64| leftover(predictor, &motions, &naming.left, &naming.nominal, &wind, sigma, search.catalogue.slack());
     // The floor is noise and wind, squared; two floors tell them apart.
     let (calm, windy) = (&naming.leftover, blown(TURBULENCE_M_S + 1.0));
     let span = (TURBULENCE_M_S + 1.0).powi(2) - TURBULENCE_M_S.powi(2);

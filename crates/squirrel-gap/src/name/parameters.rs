@@ -5,6 +5,7 @@
 //! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
 
 use crate::GapError;
+use crate::leftover::Slack;
 use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind};
 use squirrel_sim::plant::WingPlant;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -70,6 +71,16 @@ impl Catalogue {
             }
         }
         Ok(all)
+    }
+
+    /// Tolerances of what has no number of its own.
+    pub(crate) fn slack(&self) -> Slack {
+        let of = |key: &str| self.parameters.iter().find(|p| p.key == key).map_or(0.0, |p| p.tolerance);
+        Slack {
+            lever_m: of("cg_x_m"),
+            drag_n_s_per_m: of("extra_drag_n_s_per_m"),
+            torque_fraction: of("torque_fraction"),
+        }
     }
 
     fn add(

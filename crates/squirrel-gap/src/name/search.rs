@@ -11,12 +11,16 @@ use nalgebra::DMatrix;
 pub(crate) const NATS_MIN: f64 = 6.0;
 /// Part of the smallest size worth reporting that an effect must reach.
 const SIZE_MIN: f64 = 0.5;
+/// How much larger than the largest plausible size a number may be.
+const PLAUSIBLE: f64 = 1.3;
 /// Candidates that are refined after each linear ranking.
 const REFINED: usize = 4;
 /// Most steps of a refinement.
 const STEPS_MAX: usize = 6;
 /// Evidence that a step towards the mode may cost, nats.
 const STEP_NATS: f64 = 1.0;
+/// Part of its tolerance by which a number must be off to act in the simulator's own model.
+const ACTS: f64 = 0.7;
 /// Most effects in a set.
 const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
@@ -66,19 +70,14 @@ impl Search<'_> {
     pub(crate) fn run(&self) -> Result<Found, GapError> {
         let mut point = Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] };
         let mut round = 1;
+        let mut before: Option<Linear> = None;
         loop {
-            let linear = Linear::about(self.predictor, self.catalogue, &point)?;
+            let linear = Linear::about(self.predictor, self.catalogue, &point, before.as_ref())?;
             (self.progress)();
             let null = self.score(&linear, &[])?;
             let mut best = self.score(&linear, &point.members)?;
             self.extend(&linear, &mut best)?;
             self.drop_and_swap(&linear, &mut best)?;
-            if std::env::var("GAPTRACE").is_ok() {
-                eprintln!("ROUND {round} null {:.1} best {:.1} {:?}", null.log_evidence, best.log_evidence, best.members.iter().map(|m| (self.effect(m), m.values.clone())).collect::<Vec<_>>());
-                let sp: Vec<String> = self.settled(&best).base.iter().enumerate().filter(|(i, x)| x.abs() > 1.5 * linear.tolerance[*i]).map(|(i, x)| format!("{} {:.1}", self.catalogue.parameters.get(i).map_or("sensor".to_owned(), |p| format!("{}{:?}", p.key, self.catalogue.candidates[p.candidate].fixed)), x / linear.tolerance[i])).collect();
-                eprintln!("   {sp:?}");
-                for (e, m) in self.ranked(&null, &[]).into_iter().take(4) { eprintln!("   rank {} {:.1} {:?}", self.effect(&m), e - null.log_evidence, m.values); }
-            }
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
                 self.prune(&linear, &mut best)?;
@@ -86,6 +85,7 @@ impl Search<'_> {
                 return Ok(Found { linear, null, best, worth });
             }
             point = self.settled(&best);
+            before = Some(linear);
             round += 1;
         }
     }
@@ -94,7 +94,8 @@ impl Search<'_> {
     pub(crate) fn settled(&self, set: &Scored) -> Point {
         let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
         for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
-            if self.catalogue.starts_flat(parameter) {
+            // What is hardly off is left to the linear part: every effect that acts costs time.
+            if self.catalogue.starts_flat(parameter) || x.abs() < ACTS * parameter.tolerance {
                 *x = 0.0;
             }
         }
@@ -179,6 +180,16 @@ impl Search<'_> {
         scored.members.iter().all(|member| self.is_large_enough(member))
     }
 
+    /// Whether no member is larger than anything plausible: what is forced into a name goes to its limit.
+    pub(crate) fn is_plausible(&self, scored: &Scored) -> bool {
+        scored.members.iter().all(|member| {
+            self.free_slots(member).into_iter().all(|slot| {
+                let (_, largest, _) = self.range(member, slot);
+                member.values[slot].abs() <= PLAUSIBLE * largest
+            })
+        })
+    }
+
     fn is_large_enough(&self, member: &Member) -> bool {
         self.catalogue.candidates[member.candidate].parameters.iter().any(|p| {
             let p = &self.catalogue.parameters[*p];
@@ -192,7 +203,7 @@ impl Search<'_> {
         let offset = set.free.len();
         let mut all = Vec::new();
         for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
-            let in_set = set.members.iter().any(|m| self.effect(m) == candidate.effect);
+            let in_set = set.members.iter().any(|m| excludes(self.effect(m), candidate.effect));
             if in_set || except.contains(&candidate.effect) {
                 continue;
             }
@@ -393,6 +404,12 @@ impl Search<'_> {
             y,
         })
     }
+}
+
+/// Whether an effect leaves no room for another: itself, and of mass and thrust, of which flights show the ratio alone.
+fn excludes(named: &str, other: &str) -> bool {
+    let ratio = ["mass_error", "thrust_coefficient"];
+    named == other || (ratio.contains(&named) && ratio.contains(&other))
 }
 
 fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {

@@ -1,6 +1,6 @@
 //! Verdict, evidence, parameters, and what could be confused.
 
-use super::{DomainRow, Evidence, ReportData, WIDTH, figure, quantity};
+use super::{DomainRow, Evidence, ReportData, WIDTH, figure, lacking, quantity};
 use squirrel_core::effects::Effects;
 use squirrel_sim::report::chart::{
     Axis, ChartRow, Dot, Extent, Ink, Level, Matrix, Range, RowChart, drawable,
@@ -36,29 +36,28 @@ pub(super) fn verdict(page: &mut Page, data: &ReportData) {
 }
 
 pub(super) fn evidence(page: &mut Page, data: &ReportData) {
-    let text = "Log evidence over the vehicle as declared, in nats. Look for the distance between the first and the second \
-                name: hypotheses within 5 nats of the best are not decided between.";
+    let text = "Log evidence over the vehicle as declared, in nats, of every effect by itself and of what is named. Look \
+                for the distance from there to the next name: evidence within 5 nats does not decide. Names without a bar \
+                have no evidence: no plausible size of them explains anything, or the vehicle lacks the part.";
     page.panel("panel-b", "Evidence", text, |page| {
         let mut known: Vec<&Evidence> = data.evidence.iter().filter(|e| drawable(e.nats)).collect();
         known.sort_by(|a, b| b.nats.total_cmp(&a.nats).then_with(|| a.name.cmp(&b.name)));
-        let tried = |name: &str| known.iter().any(|e| e.name == name);
-        let untried: Vec<&str> = Effects::<f64>::NAMES.iter().copied().filter(|n| !tried(n)).collect();
-        let Some(best) = known.first().map(|e| e.nats) else {
-            page.missing("No evidence was given: no hypothesis was tried.");
+        let Some(first) = known.first() else {
+            lacking(page, data, "No evidence was given: no hypothesis was tried.");
             return;
         };
+        let answer = known.iter().find(|e| e.is_answer);
+        let best = answer.unwrap_or(first).nats;
         let mut chart =
             RowChart::new("evidence of each hypothesis", WIDTH, Axis::new("log evidence", "nats"));
         // Ends where the data ends: the next tick below a small negative would squeeze what matters.
         let lowest = known.last().map_or(0.0, |e| e.nats.min(0.0));
-        chart.x.range = Range::Exact(lowest, best.max(1.0));
-        for (i, e) in known.iter().enumerate() {
-            let (ink, name) = if i == 0 {
-                (Ink::Series(0), "best")
-            } else if e.nats >= best - RIVAL_NATS {
-                (Ink::Highlight, "rival within 5 nats")
-            } else {
-                (Ink::Muted, "")
+        chart.x.range = Range::Exact(lowest, first.nats.max(1.0));
+        for e in &known {
+            let (ink, name) = match answer {
+                Some(_) if e.is_answer => (Ink::Series(0), "named"),
+                Some(_) if e.nats >= best - RIVAL_NATS => (Ink::Highlight, "rival within 5 nats"),
+                _ => (Ink::Muted, ""),
             };
             chart.rows.push(ChartRow {
                 label: e.name.clone(),
@@ -67,11 +66,14 @@ pub(super) fn evidence(page: &mut Page, data: &ReportData) {
                 ..ChartRow::default()
             });
         }
-        let mut figure = Figure { drawings: vec![chart.svg()], ..Figure::default() };
-        if !untried.is_empty() {
-            figure.notes.push(format!("Of the catalogue, not tried: {}.", untried.join(", ")));
+        for name in Effects::<f64>::NAMES.iter().filter(|name| known.iter().all(|e| e.name != **name)) {
+            chart.rows.push(ChartRow {
+                label: (*name).to_owned(),
+                note: "\u{2013}".to_owned(),
+                ..ChartRow::default()
+            });
         }
-        page.figures(Columns::One, &[figure]);
+        page.figures(Columns::One, &[Figure { drawings: vec![chart.svg()], ..Figure::default() }]);
     });
 }
 
@@ -80,7 +82,7 @@ pub(super) fn parameters(page: &mut Page, data: &ReportData) {
                 tolerance of the vehicle, or beyond 1.";
     page.panel("panel-f", "Parameters", text, |page| {
         if data.parameters.is_empty() {
-            page.missing("No parameters: no effect was named.");
+            lacking(page, data, "No parameters: no effect was named.");
             return;
         }
         let axis = Axis::new("size over largest plausible size", "").with_range(Range::Including(-0.2, 1.0));
@@ -129,8 +131,8 @@ pub(super) fn parameters(page: &mut Page, data: &ReportData) {
 }
 
 pub(super) fn confusability(page: &mut Page, data: &ReportData) {
-    let text = "Chi-square by which these flights separate the smallest reportable size of each pair. Marked pairs can be \
-                taken for each other here, whatever was named; a flight that separates them is below.";
+    let text = "Chi-square by which the smallest reportable size of the effect of a row stands out while that of the column \
+                floats. Marked pairs can be taken for each other in these flights, whatever was named.";
     page.panel("panel-g", "What could be confused, and what to fly", text, |page| {
         match &data.confusability {
             Some(c) if !c.names.is_empty() => {
@@ -148,13 +150,15 @@ pub(super) fn confusability(page: &mut Page, data: &ReportData) {
                 page.figures(Columns::One, &[Figure { drawings: vec![matrix.svg()], ..Figure::default() }]);
             }
             _ => {
-                page.missing(
+                lacking(
+                    page,
+                    data,
                     "No confusability was given: what these flights cannot tell apart is not known.",
                 );
             }
         }
-        if data.fly_next.is_empty() {
-            page.missing("Nothing to fly next was given.");
+        if data.fly_next.is_empty() && data.stopped.is_empty() {
+            page.text("Nothing needs to be flown for this answer.");
         }
         for next in &data.fly_next {
             match pilot_card(&next.what) {

@@ -11,6 +11,8 @@ pub struct ReportData {
     pub title: String,
     /// The verdict as one paragraph in plain words.
     pub verdict: String,
+    /// Why nothing could be computed and the panels are empty; empty where they are not.
+    pub stopped: String,
     /// Where the answer holds: what the flights covered.
     pub domain: Vec<DomainRow>,
     /// What changes in the vehicle file, as lines with `+` and `-`.
@@ -76,6 +78,8 @@ pub struct Evidence {
     pub name: String,
     /// Log evidence over the vehicle as declared, nats.
     pub nats: f64,
+    /// Whether this is what the verdict names, be it as the nearest name.
+    pub is_answer: bool,
 }
 
 /// The residual of a channel against the quantity that explains it.
@@ -117,9 +121,9 @@ pub struct HeldOut {
     pub flights: Vec<String>,
     /// The best rival's name; empty without one.
     pub rival: String,
-    /// One row a channel, at the longest horizon.
+    /// One row a channel; empty where the flights cannot be re-simulated.
     pub channels: Vec<HeldOutChannel>,
-    /// All channels together, over the length of the re-simulation.
+    /// All channels together, over the length of the re-simulation: each over its noise floor, mean over channels.
     pub horizons: Vec<Horizon>,
 }
 
@@ -130,16 +134,18 @@ pub struct HeldOutChannel {
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Errors.
+    /// Errors at the longest horizon.
     pub errors: Errors,
+    /// Errors over the length of the re-simulation, in the unit of the channel.
+    pub horizons: Vec<Horizon>,
 }
 
-/// Errors after re-simulating for some time, each over the noise floor of its channel, mean over channels.
+/// Errors after re-simulating for some time.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Horizon {
     /// Length of the re-simulation, s.
     pub horizon_s: f64,
-    /// Errors over the floor.
+    /// Errors.
     pub errors: Errors,
 }
 
@@ -209,12 +215,12 @@ pub struct ParameterRow {
     pub tolerance: f64,
 }
 
-/// Chi-square by which the flights separate the smallest reportable size of each pair.
+/// Chi-square by which the smallest reportable size of one effect stands out while another floats freely.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Confusability {
     /// Effects.
     pub names: Vec<String>,
-    /// One row an effect; the diagonal is NaN.
+    /// One row an effect, one column what floats; the diagonal is NaN.
     pub chi_square: Vec<Vec<f64>>,
 }
 

@@ -48,6 +48,11 @@ pub fn render(data: &ReportData) -> String {
     page.html()
 }
 
+/// Says why a panel is empty: what it lacks, or what kept everything from being computed.
+fn lacking(page: &mut Page, data: &ReportData, words: &str) {
+    page.missing(if data.stopped.is_empty() { words } else { &data.stopped });
+}
+
 /// A number with three significant digits, a dash for one that is unknown.
 fn figure(value: f64) -> String {
     if !drawable(value) {

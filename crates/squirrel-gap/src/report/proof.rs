@@ -1,13 +1,15 @@
 //! Proof: errors on flights that were not used, and whether what is left is noise.
 
-use super::{Errors, HeldOut, ReportData, Whiteness, figure, quantity};
+use super::{Errors, HeldOut, Horizon, ReportData, Whiteness, figure, lacking, quantity};
 use squirrel_sim::report::chart::{
-    Axis, ChartRow, Dot, Extent, Ink, Limit, LineChart, Range, RowChart, Series, drawable,
+    Axis, ChartRow, Dot, Extent, Ink, Limit, LineChart, Range, RowChart, Series, Svg, drawable,
 };
 use squirrel_sim::report::page::{Columns, Figure, Page, Row};
 
 /// The models with their colours, in the order of [`parts`].
 const INKS: [Ink; 4] = [Ink::Series(1), Ink::Series(5), Ink::Series(0), Ink::Muted];
+/// Place of the rival among them.
+const RIVAL: usize = 1;
 
 fn parts(e: &Errors) -> [f64; 4] {
     [e.nominal, e.rival, e.fitted, e.floor]
@@ -27,7 +29,9 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
                 from the best rival: a wrong name also shrinks the gap, the right one shrinks it to the noise floor.";
     page.panel("panel-d", "Held-out flights", text, |page| {
         let Some(held_out) = &data.held_out else {
-            page.missing(
+            lacking(
+                page,
+                data,
                 "No held-out flight was given: nothing proves the answer on data that it has not seen.",
             );
             return;
@@ -35,14 +39,36 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
         if !held_out.flights.is_empty() {
             page.text(&format!("Flights: {}.", held_out.flights.join(", ")));
         }
+        if held_out.channels.is_empty() && held_out.horizons.is_empty() {
+            page.missing(
+                "These flights cannot be re-simulated: that needs attitude and velocity throughout.",
+            );
+            return;
+        }
         page.figures(Columns::Two, &[by_channel(held_out), by_horizon(held_out)]);
         if held_out.channels.is_empty() {
             return;
         }
-        let head = [vec!["RMSE".to_owned()], names(held_out).to_vec()].concat();
+        let each = held_out.channels.iter().filter(|c| !c.horizons.is_empty()).map(|c| {
+            let y = Axis::new("RMSE", &c.unit).with_range(Range::Including(0.0, 0.0));
+            // The legend stands above.
+            let names = [const { String::new() }; 4];
+            let drawings = vec![over_horizon(&c.name, names, &c.horizons, y, Columns::Three)];
+            Figure { title: c.name.clone(), drawings, ..Figure::default() }
+        });
+        page.figures(Columns::Three, &each.collect::<Vec<_>>());
+        let last = held_out.horizons.last();
+        let head =
+            last.map_or_else(|| "RMSE".to_owned(), |h| format!("RMSE at {}", quantity(h.horizon_s, "s")));
+        // Without a rival there is no column for it.
+        let shown = |i: &usize| *i != RIVAL || !held_out.rival.is_empty();
+        let shown: Vec<usize> = (0..INKS.len()).filter(shown).collect();
+        let names = names(held_out);
+        let head = std::iter::once(head).chain(shown.iter().map(|i| names[*i].clone())).collect::<Vec<_>>();
         let rows = held_out.channels.iter().map(|c| {
-            let cells = parts(&c.errors).map(|x| quantity(x, &c.unit));
-            Row { ink: None, cells: [vec![c.name.clone()], cells.to_vec()].concat() }
+            let errors = parts(&c.errors);
+            let cells = shown.iter().map(|i| quantity(errors[*i], &c.unit));
+            Row { ink: None, cells: std::iter::once(c.name.clone()).chain(cells).collect() }
         });
         page.table(&head, &rows.collect::<Vec<_>>());
     });
@@ -84,17 +110,23 @@ fn by_horizon(held_out: &HeldOut) -> Figure {
         return figure;
     }
     let y = Axis::new("RMSE over noise floor", "").with_range(Range::Including(0.0, 1.0));
-    let mut chart = LineChart::new("held-out error over horizon", Axis::new("horizon", "s"), y);
+    let label = "held-out error over horizon";
+    figure.drawings.push(over_horizon(label, names(held_out), &held_out.horizons, y, Columns::Two));
+    figure
+}
+
+fn over_horizon(label: &str, names: [String; 4], horizons: &[Horizon], y: Axis, columns: Columns) -> Svg {
+    let mut chart = LineChart::new(label, Axis::new("horizon", "s"), y);
+    chart.width = columns.width();
     chart.x.range = Range::Including(0.0, 0.0);
-    let at: Vec<f64> = held_out.horizons.iter().map(|h| h.horizon_s).collect();
-    for (i, (ink, name)) in INKS.into_iter().zip(names(held_out)).enumerate() {
-        let values: Vec<f64> = held_out.horizons.iter().map(|h| parts(&h.errors)[i]).collect();
+    let at: Vec<f64> = horizons.iter().map(|h| h.horizon_s).collect();
+    for (i, (ink, name)) in INKS.into_iter().zip(names).enumerate() {
+        let values: Vec<f64> = horizons.iter().map(|h| parts(&h.errors)[i]).collect();
         if values.iter().any(|x| drawable(*x)) {
             chart.series.push(Series::line(&name, ink, at.clone(), values));
         }
     }
-    figure.drawings.push(chart.svg());
-    figure
+    chart.svg()
 }
 
 pub(super) fn whiteness(page: &mut Page, data: &ReportData) {
@@ -103,7 +135,11 @@ pub(super) fn whiteness(page: &mut Page, data: &ReportData) {
                 noise alone gives an autocorrelation outside it.";
     page.panel("panel-e", "What is left", text, |page| {
         if data.whiteness.is_empty() {
-            page.missing("No residual after the fit was given: whether what is left is noise is not known.");
+            lacking(
+                page,
+                data,
+                "No residual after the fit was given: whether what is left is noise is not known.",
+            );
             return;
         }
         for w in &data.whiteness {
@@ -156,7 +192,8 @@ fn with_inputs(w: &Whiteness) -> Figure {
         figure_of.notes.push("No inputs were given.".to_owned());
         return figure_of;
     }
-    let y = Axis::new("correlation", "").with_range(Range::Including(-0.2, 0.2));
+    // The title says what it is; the legend needs the line.
+    let y = Axis::new("", "").with_range(Range::Including(-0.2, 0.2));
     let mut chart = LineChart::new(&figure_of.title, Axis::new("lag of the input", "s"), y);
     let mut largest: Vec<String> = Vec::new();
     for (i, input) in w.inputs.iter().enumerate() {

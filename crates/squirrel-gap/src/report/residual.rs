@@ -1,6 +1,6 @@
 //! The residual over time and against what explains it.
 
-use super::{Conditional, FlightPanel, ReportData, WIDTH};
+use super::{Conditional, FlightPanel, ReportData, WIDTH, lacking};
 use squirrel_sim::report::chart::{
     Axis, HeatGroup, HeatMap, Ink, LineChart, Range, Series, Strip, Values, drawable,
 };
@@ -16,7 +16,7 @@ pub(super) fn over_time(page: &mut Page, data: &ReportData) {
                 for what the dark stretches share in the strips below, and for what is still dark after.";
     page.panel("panel-a", "Where and when", text, |page| {
         if data.flights.is_empty() {
-            page.missing("No flight was given.");
+            lacking(page, data, "No flight was given.");
             return;
         }
         let figures = data.flights.iter().map(|f| flight(f, &data.channels)).collect::<Vec<_>>();
@@ -85,12 +85,13 @@ fn merged(values: &[f64], each: usize, into: impl Fn(f64) -> f64, back: impl Fn(
 }
 
 pub(super) fn against_regressors(page: &mut Page, data: &ReportData) {
-    let text = "Mean residual in bins of the quantity that the named effect acts through; strokes are one standard deviation. \
-                Look for a slope before that is flat after.";
+    let text = "Mean residual in bins of what a unit of the named effect does to the channel, or of the quantity that a leftover \
+                follows; strokes are one standard deviation. Look for a slope before that is flat after: it is the size of the \
+                effect.";
     page.panel("panel-c", "Against what explains it", text, |page| {
         let (drawn, empty): (Vec<_>, Vec<_>) = data.conditional.iter().partition(|c| !c.bins.is_empty());
         if drawn.is_empty() {
-            page.missing("No regressor was given: nothing was named that could explain the residual.");
+            lacking(page, data, "No regressor was given: nothing was named that could explain the residual.");
         } else {
             page.figures(Columns::Two, &drawn.into_iter().map(conditional).collect::<Vec<_>>());
         }

@@ -77,7 +77,7 @@ pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
 }
 
 /// Lower than this the vehicle may touch the ground, whose forces are no flight, m.
-const CLEARANCE_M: f64 = 0.12;
+const CLEARANCE_M: f64 = 0.06;
 
 /// Refuses a flight that touches the ground or tumbles.
 fn stayed_up(log: &FlightLog) -> Result<(), String> {
