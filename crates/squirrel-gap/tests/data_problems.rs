@@ -8,7 +8,7 @@ use squirrel_gap::{Kind, Verdict, diagnose};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
-use squirrel_sim::scenario::Scenario;
+use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 use support::{imported, shared, vehicle, vehicle_with};
 
@@ -37,9 +37,16 @@ impl Case {
         let fly = |name: &str, seed| {
             let mut scenario = Scenario::find("excite_rich").unwrap();
             scenario.seed = seed;
+            // The lowest rung of the ladder is too near to the ground for a vehicle that lags.
+            if let MissionTable::Excite(table) = &mut scenario.mission {
+                table.heights_m = vec![1.5, 1.0, 0.7];
+            }
             let setup =
                 Setup { vehicle: individual.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
-            (name.to_owned(), setup.fly(true, |_| {}).unwrap().log.unwrap())
+            let log = setup.fly(true, |_| {}).unwrap().log.unwrap();
+            let (_, position) = log.channel("truth.position_ned_m").unwrap();
+            assert!(position.values.chunks(3).all(|p| -p[2] > 0.06), "{name}: touches the ground");
+            (name.to_owned(), log)
         };
         Self {
             vehicle: vehicle("squirrel.toml"),
@@ -219,7 +226,7 @@ fn late_commands_are_an_effect() {
 fn noise_makes_no_other_name() {
     let effects = [
         ("motor_lag", "extra_time_constant_s = 0.03"),
-        ("thrust_coefficient", "thrust_fraction = -0.08"),
+        ("thrust_coefficient", "thrust_fraction = 0.08"),
         ("flapping_moment", "gain_n_m_s_per_m = 3e-3"),
     ];
     for (name, parameter) in effects {
