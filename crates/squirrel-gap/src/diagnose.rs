@@ -276,11 +276,12 @@ fn prove(
         base.resize(search.catalogue.columns(unseen), 0.0);
         hypothesis(unseen, search.catalogue, &Point { members: members.to_vec(), base })
     };
-    let fitted_at = at(&naming.point.members, &naming.point.base)?;
+    let whole = search.whole(&naming.found.best);
+    let fitted_at = at(&whole.members, &whole.base)?;
     let Some(fitted) = shrink::errors(unseen, &fitted_at)? else { return Ok(None) };
-    let Some(nominal) = shrink::errors(unseen, &at(&[], &naming.point.base)?)? else { return Ok(None) };
+    let Some(nominal) = shrink::errors(unseen, &at(&[], &whole.base)?)? else { return Ok(None) };
     let rival = match rival {
-        Some(rival) => shrink::errors(unseen, &at(&rival.members, &search.settled(rival).base)?)?,
+        Some(rival) => shrink::errors(unseen, &at(&rival.members, &search.whole(rival).base)?)?,
         None => None,
     };
     let floor = shrink::floor(unseen, &fitted_at, naming.gust_m_s.unwrap_or(TURBULENCE_M_S))?;

@@ -24,6 +24,11 @@ const MODEL_ERROR: f64 = 0.015;
 /// Part of the variance that a family must predict for a leftover to go with it.
 const SHARE_MIN: f64 = 0.25;
 
+/// Part of the variance that a family may predict of gusts by chance.
+const GUST_SHARE_MAX: f64 = 0.45;
+/// Gusts are about normal; what acts at one place or time comes in bursts.
+const GUST_KURTOSIS_MAX: f64 = 5.5;
+
 /// The leftover of one channel of one flight.
 #[derive(Debug, Clone)]
 pub(crate) struct Band {
@@ -47,6 +52,8 @@ pub(crate) struct Leftover {
     pub(crate) excess: Vec<(usize, f64)>,
     /// Families by the share of the variance they predict in the worst channel.
     pub(crate) families: Vec<(&'static str, f64)>,
+    /// Fourth moment of the slow part of the worst channel over the square of its second: 3 for a normal distribution.
+    pub(crate) kurtosis: f64,
     /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above 0.5 Hz.
     pub(crate) line: Option<(f64, f64)>,
 }
@@ -68,6 +75,11 @@ impl Leftover {
             }
             _ => None,
         }
+    }
+
+    /// Whether a family predicts so much of it, or it comes in such bursts, that it cannot be gusts.
+    pub(crate) fn is_predicted(&self) -> bool {
+        self.families.first().is_some_and(|(_, share)| *share > GUST_SHARE_MAX) || self.kurtosis > GUST_KURTOSIS_MAX
     }
 
     /// Whether it goes with something that no form of any effect goes with: time, a place, a line in the spectrum.
@@ -136,11 +148,12 @@ pub(crate) fn leftover(
     let mut excess: Vec<(usize, f64)> =
         worst.iter().copied().enumerate().filter(|(_, ratio)| *ratio > 1.0).collect();
     excess.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut out = Leftover { bands, excess, families: Vec::new(), line: None };
+    let mut out = Leftover { bands, excess, families: Vec::new(), kurtosis: 3.0, line: None };
     if let Some(&(channel, _)) = out.excess.first() {
         let (moments, y) = blocks(predictor, motions, left, channel);
         out.families = families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
         out.families.sort_by(|a, b| b.1.total_cmp(&a.1));
+        out.kurtosis = kurtosis(&y);
         out.line = line(predictor, left, channel);
     }
     out
@@ -153,6 +166,8 @@ pub(crate) struct Slack {
     pub(crate) lever_m: f64,
     /// Drag along one axis, N s/m.
     pub(crate) drag_n_s_per_m: f64,
+    /// When commands act, s.
+    pub(crate) timing_s: f64,
     /// Reaction torque of one rotor, as a fraction.
     pub(crate) torque_fraction: f64,
 }
@@ -173,7 +188,14 @@ fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, s
             let speed = motion.body.iter().map(|b| b.velocity.vector.norm_squared()).sum::<f64>() / n;
             slack.drag_n_s_per_m * speed.sqrt() / p.mass_kg
         }
-        axis @ (3 | 4) => slack.lever_m * slow(2) / p.inertia_kg_m2[(axis - 3, axis - 3)],
+        axis @ (3 | 4) => {
+            // Commands that were logged on another clock are off by up to a sample.
+            let measured = &predictor.tracks[segment.piece].measured;
+            let change = measured.windows(2).map(|w| (w[1][axis] - w[0][axis]).powi(2)).sum::<f64>();
+            let rate = (change / measured.len().max(1) as f64).sqrt() / segment.step_s;
+            let beside = slack.lever_m * slow(2) / p.inertia_kg_m2[(axis - 3, axis - 3)];
+            beside.hypot(slack.timing_s * rate)
+        }
         _ => {
             let beside = slack.lever_m * slow(0).hypot(slow(1));
             let torque = p.propulsion.torque_coefficient_n_m_s2 / p.propulsion.thrust_coefficient_n_s2
@@ -200,6 +222,13 @@ fn blocks(
         }
     }
     (moments, y)
+}
+
+fn kurtosis(y: &[f64]) -> f64 {
+    let n = y.len().max(1) as f64;
+    let mean = y.iter().sum::<f64>() / n;
+    let moment = |power: i32| y.iter().map(|y| (y - mean).powi(power)).sum::<f64>() / n;
+    moment(4) / moment(2).powi(2).max(f64::MIN_POSITIVE)
 }
 
 fn rms(x: &[f64]) -> f64 {

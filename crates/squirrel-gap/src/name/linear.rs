@@ -139,6 +139,11 @@ impl Catalogue {
             .contains(&self.candidates[parameter.candidate].effect)
     }
 
+    /// Which column the height of a flight is.
+    pub(crate) fn height_column(&self, flight: usize) -> usize {
+        self.parameters.len() + SENSOR_COLUMNS * flight + 2
+    }
+
     /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the same choices.
     pub(crate) fn absent(&self, predictor: &Predictor, candidate: usize) -> Member {
         let own = &self.candidates[candidate];

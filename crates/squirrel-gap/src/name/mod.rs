@@ -23,7 +23,7 @@ pub(crate) use payload::payload_lengths_m;
 pub(crate) use search::{Found, NATS_MIN, Scored, Search};
 
 use crate::GapError;
-use crate::leftover::{Leftover, leftover};
+use crate::leftover::{Leftover, Slack, leftover};
 use crate::predictor::Hypothesis;
 
 /// Deviation of the air's own motion that is no wind worth a name, m/s.
@@ -87,7 +87,7 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
     let left = loosened(&found, &point, left);
     let wind = predictor.wind_columns(&about)?;
-    let leftover = leftover(predictor, &motions, &left, &nominal, &wind, TURBULENCE_M_S, catalogue.slack());
+    let leftover = leftover(predictor, &motions, &left, &nominal, &wind, TURBULENCE_M_S, slack(search, &found));
     let deviations = interval::deviations(predictor, &found.linear, &found.best);
     Ok(Naming {
         found,
@@ -100,6 +100,13 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
         gust_m_s: None,
         gust_nats: 0.0,
     })
+}
+
+/// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample more or less.
+fn slack(search: &Search<'_>, found: &Found) -> Slack {
+    let skewed = found.best.members.iter().any(|m| search.effect(m) == "clock_skew");
+    let period_s = search.predictor.tracks.first().map_or(0.0, |t| t.period_s);
+    search.catalogue.slack(if skewed { period_s } else { 0.0 })
 }
 
 /// The leftover with everything that floats where it fits best inside twice its tolerance: the tempered fit that names
@@ -134,14 +141,14 @@ const GUST_MIN_M_S: f64 = 0.4;
 
 /// The deviation of gusts that would make the leftover, m/s, and what they leave; `None` where they would not make it.
 fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover)>, GapError> {
-    if !naming.leftover.is_real() || naming.leftover.goes_with().is_some() {
+    if !naming.leftover.is_real() || naming.leftover.is_foreign() || naming.leftover.is_predicted() {
         return Ok(None);
     }
     let predictor = search.predictor;
     let wind = predictor.wind_columns(&naming.hypothesis)?;
     let motions: Vec<_> =
         (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
-    let blown = |sigma: f64| leftover(predictor, &motions, &naming.left, &naming.nominal, &wind, sigma, search.catalogue.slack());
+    let blown = |sigma: f64| leftover(predictor, &motions, &naming.left, &naming.nominal, &wind, sigma, slack(search, &naming.found));
     // The floor is noise and wind, squared; two floors tell them apart.
     let (calm, windy) = (&naming.leftover, blown(TURBULENCE_M_S + 1.0));
     let span = (TURBULENCE_M_S + 1.0).powi(2) - TURBULENCE_M_S.powi(2);

@@ -2,13 +2,16 @@
 
 use super::evidence::{Gram, Posterior, dot};
 use super::linear::{Linear, Member, Point, hypothesis};
-use super::parameters::{Catalogue, SLAB_OF_LARGEST};
+use super::parameters::{Candidate, Catalogue, SLAB_OF_LARGEST};
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 
 /// What an effect must be worth to be named, nats.
 pub(crate) const NATS_MIN: f64 = 6.0;
+/// What each further effect must be worth: a wrong first number leaves a little to explain.
+const FURTHER_NATS: f64 = 10.0;
 /// Part of the smallest size worth reporting that an effect must reach.
 const SIZE_MIN: f64 = 0.5;
 /// How much larger than the largest plausible size a number may be.
@@ -91,15 +94,25 @@ impl Search<'_> {
     }
 
     /// The point at which a set explains most: its members, and everything else where it most likely is.
-    pub(crate) fn settled(&self, set: &Scored) -> Point {
+    pub(crate) fn whole(&self, set: &Scored) -> Point {
         let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
         for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
-            // What is hardly off is left to the linear part: every effect that acts costs time.
-            if self.catalogue.starts_flat(parameter) || x.abs() < ACTS * parameter.tolerance {
+            if self.catalogue.starts_flat(parameter) {
                 *x = 0.0;
             }
         }
         Point { members: set.members.clone(), base }
+    }
+
+    /// The same without what is hardly off, which is left to the linear part: every effect that acts costs time.
+    pub(crate) fn settled(&self, set: &Scored) -> Point {
+        let mut point = self.whole(set);
+        for (x, parameter) in point.base.iter_mut().zip(&self.catalogue.parameters) {
+            if x.abs() < ACTS * parameter.tolerance {
+                *x = 0.0;
+            }
+        }
+        point
     }
 
     /// Drops members that refinement has made too small to report.
@@ -146,7 +159,8 @@ impl Search<'_> {
     fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
         while best.members.len() < MEMBERS_MAX {
             let Some(next) = self.best_addition(linear, best, &[])? else { break };
-            if next.log_evidence < best.log_evidence + NATS_MIN {
+            let needed = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
+            if next.log_evidence < best.log_evidence + needed {
                 break;
             }
             *best = next;
@@ -203,7 +217,7 @@ impl Search<'_> {
         let offset = set.free.len();
         let mut all = Vec::new();
         for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
-            let in_set = set.members.iter().any(|m| excludes(self.effect(m), candidate.effect));
+            let in_set = set.members.iter().any(|m| excludes(&self.catalogue.candidates[m.candidate], candidate));
             if in_set || except.contains(&candidate.effect) {
                 continue;
             }
@@ -317,6 +331,32 @@ impl Search<'_> {
         Ok(best)
     }
 
+    /// Whitened columns of the height of each flight, by index, where an effect of height acts that did not act where the
+    /// predictor was linearised: without it, height is worth nothing.
+    fn height_columns(
+        &self,
+        linear: &Linear,
+        point: &Point,
+        residual: &[f64],
+    ) -> Result<BTreeMap<usize, Vec<f64>>, GapError> {
+        let acts = |members: &[Member]| members.iter().any(|m| self.effect(m) == "ground_effect");
+        let mut all = BTreeMap::new();
+        if !acts(&point.members) || acts(&linear.point.members) {
+            return Ok(all);
+        }
+        for flight in 0..self.predictor.names.len() {
+            let column = self.catalogue.height_column(flight);
+            let step = linear.tolerance[column];
+            let mut moved = point.clone();
+            moved.base[column] += step;
+            let mut after = residual.to_vec();
+            self.predictor.residual_of(&self.hypothesis(&moved)?, Some(flight), &mut after)?;
+            let slope: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
+            all.insert(column, linear.whitener.apply(&self.predictor.segments, &slope));
+        }
+        Ok(all)
+    }
+
     /// Range of a number of a member.
     pub(crate) fn range(&self, member: &Member, slot: usize) -> (f64, f64, bool) {
         use squirrel_core::effects::{Effects, Kind};
@@ -347,9 +387,11 @@ impl Search<'_> {
         }
         let residual = self.predictor.residual(&self.hypothesis(&point)?)?;
         let mut y = linear.whitener.apply(segments, &residual);
-        for (column, x) in linear.columns.iter().zip(&point.base) {
+        let fresh = self.height_columns(linear, &point, &residual)?;
+        let column = |j: usize| fresh.get(&j).unwrap_or(&linear.columns[j]);
+        for (j, x) in point.base.iter().enumerate() {
             if *x != 0.0 {
-                add_scaled(&mut y, column, *x);
+                add_scaled(&mut y, column(j), *x);
             }
         }
         let (mut own, mut own_raw, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
@@ -381,14 +423,21 @@ impl Search<'_> {
                 gram.g[(i, j)] = dot(&own[i], &own[j]);
             }
             for j in 0..n {
-                let x = dot(&own[i], &linear.columns[j]);
+                let x = dot(&own[i], column(j));
                 gram.g[(i, k + j)] = x;
                 gram.g[(k + j, i)] = x;
             }
             gram.b[i] = dot(&own[i], &y);
         }
         for j in 0..n {
-            gram.b[k + j] = dot(&linear.columns[j], &y);
+            gram.b[k + j] = dot(column(j), &y);
+        }
+        for i in fresh.keys().copied() {
+            for j in 0..n {
+                let x = dot(column(i), column(j));
+                gram.g[(k + i, k + j)] = x;
+                gram.g[(k + j, k + i)] = x;
+            }
         }
         prior.extend(spikes);
         let posterior = gram.posterior(&prior, self.beta).ok_or(GapError::NoFlights)?;
@@ -406,10 +455,14 @@ impl Search<'_> {
     }
 }
 
-/// Whether an effect leaves no room for another: itself, and of mass and thrust, of which flights show the ratio alone.
-fn excludes(named: &str, other: &str) -> bool {
-    let ratio = ["mass_error", "thrust_coefficient"];
-    named == other || (ratio.contains(&named) && ratio.contains(&other))
+/// Whether an effect leaves no room for another: itself, and where flights show a ratio alone, what stands on its other side.
+fn excludes(named: &Candidate, other: &Candidate) -> bool {
+    const Z: f64 = 2.0;
+    let yaw = |c: &Candidate| {
+        c.effect == "yaw_torque_coeff" || (c.effect == "inertia_error" && c.fixed.iter().any(|(_, axis)| *axis == Z))
+    };
+    let thrust = |c: &Candidate| ["mass_error", "thrust_coefficient"].contains(&c.effect);
+    named.effect == other.effect || (thrust(named) && thrust(other)) || (yaw(named) && yaw(other))
 }
 
 fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {

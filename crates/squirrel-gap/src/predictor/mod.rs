@@ -350,6 +350,10 @@ fn predict(
     let end_s = track.time_s[k] + track.period_s;
     let mut at_s = track.time_s[k];
     let mut first = None;
+    // A rotor's acceleration jumps with its command: what a sample stands for lies half before and half after the jump.
+    let jumps = plant.effects().has("rotor_gyro_torque");
+    let (rotor, wing) = clock.now();
+    let before = jumps.then(|| plant.lead(state, body, &rotor, wing, track.voltage_v[k], 0.0).angular_acceleration);
     loop {
         clock.advance_to(at_s);
         let until_s = clock.next_change_s().min(end_s);
@@ -363,7 +367,7 @@ fn predict(
     }
     first.map_or(Vector6::zeros(), |led| {
         let f = led.specific_force.vector;
-        let a = led.angular_acceleration.vector;
+        let a = before.map_or(led.angular_acceleration, |b| (b + led.angular_acceleration) * 0.5).vector;
         Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z)
     })
 }
