@@ -31,7 +31,9 @@ pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> 
         let Some(table) = table.as_table_mut() else {
             return Err(format!("{}: effects.{}: must be a table", vehicle.name, effect.name));
         };
-        if effect.form != "standard" && (effect.form != standard_form(effect.name) || table.contains_key("form")) {
+        if effect.form != "standard"
+            && (effect.form != standard_form(effect.name) || table.contains_key("form"))
+        {
             table.insert("form", value(effect.form));
         }
         for (key, number) in &effect.parameters {
@@ -77,7 +79,11 @@ pub(crate) fn domain(diagnosis: &Diagnosis) -> String {
     let mut text = String::new();
     for covered in &diagnosis.domain {
         let comma = if text.is_empty() { "" } else { ", " };
-        let _ = write!(text, "{comma}{} {:.2} to {:.2} {}", covered.name, covered.low, covered.high, covered.unit);
+        let _ = write!(
+            text,
+            "{comma}{} {:.2} to {:.2} {}",
+            covered.name, covered.low, covered.high, covered.unit
+        );
     }
     text
 }

@@ -3,9 +3,12 @@
 use crate::GapError;
 use crate::compatibility;
 use crate::find::{self, Place};
-use crate::name::{Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis, payload_lengths_m};
-use crate::predictor::{Hypothesis, Predictor};
+use crate::name::{
+    Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis,
+    payload_lengths_m,
+};
 use crate::picture;
+use crate::predictor::{Hypothesis, Predictor};
 use crate::shrink::{self, Errors12};
 use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
 use crate::words;
@@ -22,6 +25,7 @@ const RIVAL_GAP: f64 = 3.0;
 const ALTERNATIVES_MAX: usize = 3;
 
 /// Everything that the workflow found out.
+#[derive(Debug)]
 pub struct Diagnosis {
     /// The answer.
     pub verdict: Verdict,
@@ -45,16 +49,16 @@ pub struct Covered {
 }
 
 /// What the pictures are made of.
+#[derive(Debug)]
 pub(crate) struct Details {
     pub(crate) evidence: Vec<(&'static str, f64)>,
     pub(crate) confusability: (Vec<&'static str>, Vec<Vec<f64>>),
-    pub(crate) naming: Naming,
     pub(crate) held_out: Option<HeldOut>,
-    pub(crate) labels: Vec<String>,
     pub(crate) seen: picture::Seen,
 }
 
 /// Errors on held-out flights.
+#[derive(Debug)]
 pub(crate) struct HeldOut {
     pub(crate) nominal: Errors12,
     pub(crate) rival: Option<Errors12>,
@@ -113,18 +117,13 @@ pub fn diagnose(
     };
     let gap = proof.as_ref().map(|proof| gap(held_out, proof));
     let verdict = decide(&search, &naming, &rivals, gap, places);
-    let mut verdict = verdict;
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.null),
         seen: picture::seen(&search, &naming, &rivals)?,
-        naming,
         held_out: proof,
-        labels: catalogue.parameters.iter().map(|p| format!("{} {} {:?}", catalogue.candidates[p.candidate].effect, p.key, catalogue.candidates[p.candidate].fixed)).collect(),
     };
-    let mut d = Diagnosis { verdict: verdict.clone(), domain, details: Some(details) };
-    if std::env::var("GAPDEBUG").is_ok() { verdict.notes.push(format!("DEBUG {}", d.debug())); d.verdict = verdict; }
-    Ok(d)
+    Ok(Diagnosis { verdict, domain, details: Some(details) })
 }
 
 /// The one answer.
@@ -156,7 +155,11 @@ fn decide(
             (false, true) => Kind::None,
         }
     } else if leftover.is_real() {
-        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) { Kind::NamedFormDiffers } else { Kind::OutsideCatalogue }
+        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) {
+            Kind::NamedFormDiffers
+        } else {
+            Kind::OutsideCatalogue
+        }
     } else if close.len() > ALTERNATIVES_MAX {
         Kind::NotIdentifiable
     } else if close.is_empty() {
@@ -168,7 +171,10 @@ fn decide(
     let shown = rivals.iter().take(5);
     let alternatives: Vec<Alternative> =
         shown.map(|set| Alternative { effects: names(set), evidence_nats: nats(set) }).collect();
-    let goes_with = leftover.is_real().then(|| leftover.goes_with().unwrap_or_else(|| leftover.channels())).filter(|_| kind != Kind::Named);
+    let goes_with = leftover
+        .is_real()
+        .then(|| leftover.goes_with().unwrap_or_else(|| leftover.channels()))
+        .filter(|_| kind != Kind::Named);
     let fly_next = match kind {
         Kind::NotIdentifiable if effects.is_empty() => Some(words::fly_for(&blind)),
         Kind::Ambiguous | Kind::NotIdentifiable => {
@@ -198,7 +204,12 @@ fn decide(
 /// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too.
 fn left_share(naming: &Naming) -> f64 {
     let excess = |slow: fn(&crate::leftover::Band) -> f64| {
-        naming.leftover.bands.iter().map(|b| (slow(b).powi(2) / b.slow_floor.powi(2) - 1.0).max(0.0)).sum::<f64>()
+        naming
+            .leftover
+            .bands
+            .iter()
+            .map(|b| (slow(b).powi(2) / b.slow_floor.powi(2) - 1.0).max(0.0))
+            .sum::<f64>()
     };
     let before = excess(|b| b.slow_nominal);
     if before > 0.0 { excess(|b| b.slow) / before } else { 1.0 }
@@ -329,27 +340,4 @@ fn covered(predictor: &Predictor) -> Vec<Covered> {
     push("tilt", &mut tilt, "deg", logged);
     push("voltage", &mut voltage, "V", predictor.has_voltage());
     all
-}
-
-impl Diagnosis {
-    #[doc(hidden)]
-    pub fn debug(&self) -> String {
-        let Some(d) = &self.details else { return String::new() };
-        let bands: Vec<String> = d.naming.leftover.bands.iter().map(|b| format!("{}{} {:.2} {:.2}", b.flight, b.channel, b.slow / b.slow_floor, b.whole / b.whole_floor)).collect();
-        let h: Vec<String> = d.held_out.iter().flat_map(|h| (0..12).map(|c| format!("{:.2}/{:.2}", (h.nominal.mse()[c] / h.floor.mse()[c]), (h.fitted.mse()[c] / h.floor.mse()[c])))).collect();
-        let sp: Vec<String> = d.naming.point.base.iter().enumerate().filter(|(i, x)| x.abs() > 0.7 * d.naming.found.linear.tolerance[*i]).map(|(i, x)| format!("{} {:.1}", d.labels.get(i).map_or("sensor", |s| s), x / d.naming.found.linear.tolerance[i])).collect();
-        format!("held {h:?}\n  spikes {sp:?}\n  {:?} {:?} {:?} {:?}", d.naming.leftover.excess, d.naming.leftover.families, d.naming.leftover.line, bands)
-    }
-}
-#[doc(hidden)]
-pub fn scan(vehicle: &VehicleFile, flights: &[(String, FlightLog)], effect: &str, slot: usize, xs: &[f64]) {
-    let p = Predictor::new(vehicle, flights).unwrap();
-    for x in xs {
-        let mut h = p.nominal();
-        let f = h.effects.insert(effect).unwrap();
-        f.values[slot] = *x;
-        let r = p.residual(&h).unwrap();
-        let per: Vec<String> = (0..9).map(|c| { let (s, n) = p.segments.iter().filter(|s| s.channel == c).fold((0.0, 0), |(s, n), g| (s + r[g.rows.clone()].iter().map(|x| x * x).sum::<f64>(), n + g.rows.len())); format!("{:.5}", (s / n as f64).sqrt()) }).collect();
-        eprintln!("{x} {per:?}");
-    }
 }

@@ -5,23 +5,23 @@
 //!
 //! The physics is that of the simulator; nothing of it is written here again.
 
+mod add;
+mod compatibility;
+mod diagnose;
 mod error;
 pub mod find;
 mod flight;
 mod leftover;
-mod add;
-mod compatibility;
-mod diagnose;
 mod name;
-mod predictor;
 mod picture;
+mod predictor;
 pub mod report;
 mod shrink;
 mod verdict;
 mod words;
 
 pub use add::{add, difference};
-pub use diagnose::{Covered, Diagnosis, diagnose, scan};
+pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::picture;

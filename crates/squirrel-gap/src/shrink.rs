@@ -109,7 +109,8 @@ pub(crate) fn errors(predictor: &Predictor, hypothesis: &Hypothesis) -> Result<O
         let latency_s = hypothesis.effects.gnss_latency_s();
         fly(predictor, hypothesis, piece, &motion, None, |start, bin, reading| {
             let Some(last) = (start + reading.last).checked_sub(1) else { return };
-            let (a, b) = (track.time_s[start + reading.first], track.time_s[last.min(track.time_s.len() - 1)]);
+            let (a, b) =
+                (track.time_s[start + reading.first], track.time_s[last.min(track.time_s.len() - 1)]);
             // The fix that speaks of this bin has its stamp a latency later.
             let fixes = track.velocity();
             let from = fixes.partition_point(|(t, _)| *t - latency_s < a - 1e-6);
@@ -178,9 +179,11 @@ pub(crate) fn floor(
             index += 1;
             let white = samples.max(1.0).sqrt();
             let velocity = other.velocity_ned - own.velocity_ned + draw().component_mul(&velocity_noise);
-            let rotation = (own.attitude.inverse() * other.attitude).scaled_axis() + draw() * START_ATTITUDE_RAD;
+            let rotation =
+                (own.attitude.inverse() * other.attitude).scaled_axis() + draw() * START_ATTITUDE_RAD;
             let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
-            let force = other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
+            let force =
+                other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
             let error = Errors::from_iterator(
                 velocity.iter().chain(rotation.iter()).chain(rate.iter()).chain(force.iter()).copied(),
             );

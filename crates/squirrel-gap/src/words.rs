@@ -6,18 +6,24 @@ use std::fmt::Write;
 /// The manoeuvre that shows an effect and tells it from those it is confused with.
 fn manoeuvre(effect: &str) -> &'static str {
     match effect {
-        "linear_drag" | "quadratic_drag" | "flapping_moment" => "dashes at several speeds from 2 to 9 m/s, both ways",
+        "linear_drag" | "quadratic_drag" | "flapping_moment" => {
+            "dashes at several speeds from 2 to 9 m/s, both ways"
+        }
         "constant_wind" | "thrust_misalignment" | "accel_bias" => {
             "hover through a full turn of yaw and at two or more headings, then dash at two headings"
         }
         "heading_bias" | "gnss_latency" => "hard horizontal accelerations along and across the heading",
         "gust" => "the same flight again on another day",
-        "ground_effect" => "a ladder of hovers from 0.2 to 1.5 m above the ground, with a range finder if there is one",
+        "ground_effect" => {
+            "a ladder of hovers from 0.2 to 1.5 m above the ground, with a range finder if there is one"
+        }
         "battery_sag" => "climbs at full thrust with a full and with a half empty battery, voltage logged",
         "thrust_coefficient" | "mass_error" | "weak_rotor" | "cg_offset" => {
             "roll and pitch doublets, yaw steps and thrust steps in hover; and weigh the vehicle"
         }
-        "motor_lag" | "actuation_latency" | "angular_damping" => "a multisine from 0.3 to 6 Hz in roll and pitch",
+        "motor_lag" | "actuation_latency" | "angular_damping" => {
+            "a multisine from 0.3 to 6 Hz in roll and pitch"
+        }
         "inertia_error" => "doublets about one axis at a time",
         "translational_lift" => "dashes to 9 m/s at constant height with the wings folded",
         "axial_inflow" | "added_mass" => "climbs and descents of 3 m/s with heave doublets, wings folded",

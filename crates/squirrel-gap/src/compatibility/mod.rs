@@ -84,7 +84,9 @@ fn repeated(flights: &[(String, FlightLog)], held_out: &[(String, FlightLog)]) -
                 return Some(Problem {
                     flight: other.clone(),
                     channel: CHANNEL,
-                    words: format!("{other}: {CHANNEL}: {share:.0} % of its samples are those of {name}; a flight proves nothing about itself"),
+                    words: format!(
+                        "{other}: {CHANNEL}: {share:.0} % of its samples are those of {name}; a flight proves nothing about itself"
+                    ),
                 });
             }
         }
@@ -97,7 +99,12 @@ fn voltage(predictor: &Predictor, track: &Track) -> Found {
     let mean = track.voltage_v.iter().sum::<f64>() / track.voltage_v.len() as f64;
     let ratio = mean / reference;
     (!(0.5..1.6).contains(&ratio)).then(|| {
-        ("battery.voltage_v", format!("its mean is {mean:.3} V where the vehicle's reference is {reference} V; is it in volts?"))
+        (
+            "battery.voltage_v",
+            format!(
+                "its mean is {mean:.3} V where the vehicle's reference is {reference} V; is it in volts?"
+            ),
+        )
     })
 }
 
@@ -105,13 +112,22 @@ fn voltage(predictor: &Predictor, track: &Track) -> Found {
 fn force_unit(track: &Track) -> Found {
     let f = track.specific_force();
     let mean = f.iter().sum::<Vector3<f64>>() / f.len() as f64;
-    let size = f.iter().map(|f| f.norm()).sum::<f64>() / f.len() as f64;
+    let size = f.iter().map(Vector3::norm).sum::<f64>() / f.len() as f64;
     let channel = "imu.specific_force_body_m_s2";
     if !(0.5..2.0).contains(&(size / GRAVITY_M_S2)) {
-        return Some((channel, format!("its mean size is {size:.3} m/s^2, must be near 9.81 in flight; is it in m/s^2?")));
+        return Some((
+            channel,
+            format!("its mean size is {size:.3} m/s^2, must be near 9.81 in flight; is it in m/s^2?"),
+        ));
     }
     if mean.z > -0.5 * size {
-        return Some((channel, format!("its mean is ({:.2}, {:.2}, {:.2}) m/s^2 where thrust points along -z; is it in the body frame, forward-right-down?", mean.x, mean.y, mean.z)));
+        return Some((
+            channel,
+            format!(
+                "its mean is ({:.2}, {:.2}, {:.2}) m/s^2 where thrust points along -z; is it in the body frame, forward-right-down?",
+                mean.x, mean.y, mean.z
+            ),
+        ));
     }
     None
 }
@@ -132,7 +148,8 @@ fn rates(track: &Track) -> Found {
         return Some((channel, format!("fits the attitude's rate better with its axes as {axes}")));
     }
     let scale = pairs.scale()?;
-    (!(0.6..1.7).contains(&scale)).then(|| (channel, format!("is {scale:.3e} times the attitude's rate; is it in rad/s?")))
+    (!(0.6..1.7).contains(&scale))
+        .then(|| (channel, format!("is {scale:.3e} times the attitude's rate; is it in rad/s?")))
 }
 
 /// Fixes against the accelerometer, and positions against velocities.
@@ -156,7 +173,13 @@ fn fixes(track: &Track) -> Found {
     };
     let mean = strapdown[strapdown.len() - 1] / (strapdown.len() as f64 * track.period_s);
     if mean.norm() > 3.0 {
-        return Some(("attitude.q_ned_from_body_wxyz", format!("turns the specific force into a mean acceleration of ({:.1}, {:.1}, {:.1}) m/s^2; is it body to NED?", mean.x, mean.y, mean.z)));
+        return Some((
+            "attitude.q_ned_from_body_wxyz",
+            format!(
+                "turns the specific force into a mean acceleration of ({:.1}, {:.1}, {:.1}) m/s^2; is it body to NED?",
+                mean.x, mean.y, mean.z
+            ),
+        ));
     }
     let pairs_at = |shift_s: f64| {
         let mut pairs = Pairs::default();
@@ -182,7 +205,10 @@ fn fixes(track: &Track) -> Found {
         return Some((channel, format!("fits the accelerometer better with its axes as {axes}")));
     }
     if fit[best] > 0.6 && !(GNSS_SHIFT_S.0..=GNSS_SHIFT_S.1).contains(&shifts[best]) {
-        return Some((channel, format!("fits the accelerometer best {:.2} s later than stamped", -shifts[best])));
+        return Some((
+            channel,
+            format!("fits the accelerometer best {:.2} s later than stamped", -shifts[best]),
+        ));
     }
     if let Some(scale) = pairs.scale_if(0.6)
         && !(0.5..2.0).contains(&scale)
@@ -195,7 +221,8 @@ fn fixes(track: &Track) -> Found {
         let from = velocity.partition_point(|(t, _)| *t < a.0);
         let until = velocity.partition_point(|(t, _)| *t <= b.0);
         if until > from && b.0 > a.0 {
-            let mean = velocity[from..until].iter().map(|(_, v)| v).sum::<Vector3<f64>>() / (until - from) as f64;
+            let mean =
+                velocity[from..until].iter().map(|(_, v)| v).sum::<Vector3<f64>>() / (until - from) as f64;
             moved.push((b.1 - a.1) / (b.0 - a.0), mean);
         }
     }
@@ -204,7 +231,8 @@ fn fixes(track: &Track) -> Found {
         return Some((channel, format!("fits the velocity better with its axes as {axes}")));
     }
     let scale = moved.scale_if(0.6)?;
-    (!(0.5..2.0).contains(&scale)).then(|| (channel, format!("moves {scale:.3e} times as fast as the velocity says; is it in m?")))
+    (!(0.5..2.0).contains(&scale))
+        .then(|| (channel, format!("moves {scale:.3e} times as fast as the velocity says; is it in m?")))
 }
 
 /// What the vehicle did against what its commands ask for.
@@ -229,15 +257,22 @@ fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
     }
     let ratio = forces.mean_ratio_z();
     if !(0.4..2.5).contains(&ratio) {
-        return Some(("rotor.command", format!("asks for {:.3e} times the thrust that was felt; are its unit and the vehicle's `propulsion.command` the same?", 1.0 / ratio)));
+        return Some((
+            "rotor.command",
+            format!(
+                "asks for {:.3e} times the thrust that was felt; are its unit and the vehicle's `propulsion.command` the same?",
+                1.0 / ratio
+            ),
+        ));
     }
     // A clock that runs off is late by more and more; what is late from the start is something else.
     let step_s = track.every as f64 * track.period_s;
-    let outside = |(shift_s, fit): (f64, f64)| {
-        fit > 0.4 && !(COMMAND_SHIFT_S.0..=COMMAND_SHIFT_S.1).contains(&shift_s)
-    };
+    let outside =
+        |(shift_s, fit): (f64, f64)| fit > 0.4 && !(COMMAND_SHIFT_S.0..=COMMAND_SHIFT_S.1).contains(&shift_s);
     let (shift_s, fit) = moments.best_shift(step_s, SHIFT_MAX_S);
-    if outside((shift_s, fit)) && outside(moments.first((n / 4).max((10.0 / step_s) as usize)).best_shift(step_s, SHIFT_MAX_S)) {
+    if outside((shift_s, fit))
+        && outside(moments.first((n / 4).max((10.0 / step_s) as usize)).best_shift(step_s, SHIFT_MAX_S))
+    {
         let words = if shift_s < 0.0 {
             format!("acts {:.0} ms before it is given", -1e3 * shift_s)
         } else {
@@ -246,7 +281,12 @@ fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
         return Some(("rotor.command", words));
     }
     if let Some(axes) = moments.later_by((shift_s / step_s).round() as i64).misnamed_axes(0.5) {
-        return Some(("rotor.command", format!("explains the moments better with their axes as {axes}; is the order of rotors that of the vehicle file?")));
+        return Some((
+            "rotor.command",
+            format!(
+                "explains the moments better with their axes as {axes}; is the order of rotors that of the vehicle file?"
+            ),
+        ));
     }
     let axes = forces.misnamed_axes(0.15)?;
     Some(("imu.specific_force_body_m_s2", format!("fits the model better with its axes as {axes}")))

@@ -21,8 +21,9 @@ impl Pairs {
 
     /// Each first with the second of so many pairs before.
     pub(super) fn later_by(&self, shift: i64) -> Self {
-        let n = self.0.len() as i64;
-        let pairs = (shift.max(0)..(n + shift.min(0))).map(|i| (self.0[i as usize].0, self.0[(i - shift) as usize].1));
+        let n = i64::try_from(self.0.len()).unwrap_or(i64::MAX);
+        let pairs = (shift.max(0)..(n + shift.min(0)))
+            .map(|i| (self.0[i as usize].0, self.0[(i - shift) as usize].1));
         Self(pairs.collect())
     }
 
@@ -113,11 +114,10 @@ impl Pairs {
     pub(super) fn best_shift(&self, step_s: f64, most_s: f64) -> (f64, f64) {
         let (a, b) = self.means();
         let most = (most_s / step_s) as i64;
-        let n = self.0.len() as i64;
-        let power = |f: fn(&(Vector3<f64>, Vector3<f64>)) -> Vector3<f64>, mean: Vector3<f64>| {
-            self.0.iter().map(|p| (f(p) - mean).component_mul(&(f(p) - mean))).sum::<Vector3<f64>>()
-        };
-        let (own, other) = (power(|p| p.0, a), power(|p| p.1, b));
+        let n = i64::try_from(self.0.len()).unwrap_or(i64::MAX);
+        let square = |v: Vector3<f64>| v.component_mul(&v);
+        let own: Vector3<f64> = self.0.iter().map(|p| square(p.0 - a)).sum();
+        let other: Vector3<f64> = self.0.iter().map(|p| square(p.1 - b)).sum();
         // Roll and pitch carry the timing; each counts by its own power.
         let at = |shift: i64| {
             let mut sum = Vector3::<f64>::zeros();
@@ -132,7 +132,8 @@ impl Pairs {
         }
         let all: Vec<f64> = (-most..=most).map(at).collect();
         let best = (0..all.len()).max_by(|i, j| all[*i].total_cmp(&all[*j])).unwrap_or(0);
-        let (before, now, after) = (all[best.saturating_sub(1)], all[best], all[(best + 1).min(all.len() - 1)]);
+        let (before, now, after) =
+            (all[best.saturating_sub(1)], all[best], all[(best + 1).min(all.len() - 1)]);
         // The top of the parabola through the three.
         let bend = before - 2.0 * now + after;
         let part = if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };

@@ -30,14 +30,14 @@ mod places;
 mod residual;
 
 use crate::GapError;
+use crate::flight::recording::Recording;
 use crate::predictor::Predictor;
 use nalgebra::Vector6;
-use crate::flight::recording::Recording;
+pub(crate) use places::places;
 use serde::Serialize;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
-pub(crate) use places::places;
 
 /// The channels of a residual, in order.
 pub const CHANNELS: [&str; 6] = [
@@ -142,8 +142,8 @@ pub fn find(vehicle: &VehicleFile, flights: &[(String, FlightLog)]) -> Result<Fi
         let mut sum = Sum::default();
         for piece in &recording.pieces {
             for residual in residual::residuals(vehicle, &recording, *piece)? {
-                total.add(&residual.value);
-                sum.add(&residual.value);
+                total.add(&residual);
+                sum.add(&residual);
             }
         }
         let (force_body_rms_n, moment_body_rms_n_m) = sum.rms();

@@ -69,7 +69,7 @@ fn condition(predictor: &Predictor, at: &Moment) -> String {
     // Adding zero turns -0.0 into 0.0.
     let mut part = |is_logged: bool, name: &str, value: f64, digits: usize, unit: &str| {
         if is_logged {
-            let scale = 10_f64.powi(digits as i32);
+            let scale = 10_f64.powf(digits as f64);
             let _ = write!(text, ", {name}{:.digits$}{unit}", (value * scale).round() / scale + 0.0);
         }
     };

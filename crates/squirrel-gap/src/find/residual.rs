@@ -3,10 +3,10 @@
 //! The model is the simulator's own plant, led along the measured motion: it propagates rotors, servos and membranes under
 //! the logged commands and gives force and moment, while velocity, attitude and rates are what was measured.
 
+use super::{CHANNELS, GapError};
 use crate::flight::filter::{DERIVATIVE_REACH, derivative};
 use crate::flight::recording::{Recording, Sample};
 use crate::flight::series::{Span, between};
-use super::{CHANNELS, GapError};
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{Body, In, Wrench};
@@ -20,26 +20,7 @@ const SETTLE_S: f64 = 1.0;
 /// Far beyond any vehicle, and its square still sums up, N or N m.
 const RESIDUAL_MAX: f64 = 1e100;
 
-/// The residual at one time.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Residual {
-    /// What was measured there.
-    pub(super) sample: Sample,
-    /// Deployment of the model's wings, left and right, 0 to 1.
-    pub(super) deployment: [f64; 2],
-    /// Force and moment, body frame, N and N m.
-    pub(super) value: Vector6<f64>,
-}
-
-/// What the model says at one time.
-struct Prediction {
-    /// Without gravity, body frame.
-    wrench: Wrench<Body, f64>,
-    /// Of the wings, left and right, 0 to 1.
-    deployment: [f64; 2],
-}
-
-/// Residuals of one piece, without the edges.
+/// Residual force, N, and moment, N m, body frame, of one piece, without the edges.
 ///
 /// # Errors
 /// A vehicle that the plant cannot step, or a residual that is not finite.
@@ -47,7 +28,7 @@ pub(super) fn residuals(
     vehicle: &VehicleFile,
     recording: &Recording,
     piece: Span,
-) -> Result<Vec<Residual>, GapError> {
+) -> Result<Vec<Vector6<f64>>, GapError> {
     let samples = recording.grid(piece);
     let model = model(vehicle, recording, &samples)?;
     // Effects on mass and inertia change what the measured motion is worth in newtons.
@@ -63,7 +44,7 @@ pub(super) fn residuals(
             let force = samples[k].specific_force * parameters.mass_kg;
             let moment =
                 parameters.inertia_kg_m2 * omega_dot + omega.cross(&(parameters.inertia_kg_m2 * omega));
-            let wrench = &model[k].wrench;
+            let wrench = &model[k];
             stack(force - wrench.force.vector, moment - wrench.moment.vector)
         })
         .collect();
@@ -72,14 +53,14 @@ pub(super) fn residuals(
         .filter
         .apply(&raw, 1)
         .into_iter()
-        .zip(samples[first..].iter().zip(&model[first..]))
-        .map(|(value, (sample, prediction))| {
+        .zip(&samples[first..])
+        .map(|(value, sample)| {
             if let Some(i) = value.iter().position(|x| x.is_nan() || x.abs() >= RESIDUAL_MAX) {
                 let (flight, time_s) = (recording.flight.to_owned(), sample.time_s);
                 let (channel, value) = (CHANNELS[i], value[i]);
                 return Err(GapError::TooLarge { flight, channel, time_s, value, most: RESIDUAL_MAX });
             }
-            Ok(Residual { sample: *sample, deployment: prediction.deployment, value })
+            Ok(value)
         })
         .collect()
 }
@@ -88,12 +69,12 @@ fn stack(force: Vector3<f64>, moment: Vector3<f64>) -> Vector6<f64> {
     Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
 }
 
-/// The model at each sample.
+/// Force and moment of the model without gravity, body frame, at each sample.
 fn model(
     vehicle: &VehicleFile,
     recording: &Recording,
     samples: &[Sample],
-) -> Result<Vec<Prediction>, GapError> {
+) -> Result<Vec<Wrench<Body, f64>>, GapError> {
     // No coarser than the simulator, and a whole number of steps to a sample.
     let step_max_s = PLANT_STEP_US as f64 * 1e-6;
     let steps = (recording.period_s / step_max_s - 1e-6).ceil().max(1.0) as usize;
@@ -123,7 +104,6 @@ fn model(
         .iter()
         .zip(samples.iter().skip(1).chain(samples.last()))
         .map(|(sample, next)| {
-            let deployment = state.servo.map(|servo| servo.deployment);
             let mut wrench = Wrench::zero();
             for step in 0..steps {
                 let at_s = sample.time_s + step as f64 * dt_s;
@@ -133,7 +113,7 @@ fn model(
                     wrench = now;
                 }
             }
-            Prediction { wrench, deployment }
+            wrench
         })
         .collect())
 }

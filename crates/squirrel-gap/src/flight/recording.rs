@@ -1,8 +1,8 @@
 //! What the residual needs of one flight: its channels, a uniform time grid, and the pieces of it without gaps.
 
-use crate::GapError;
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
 use super::series::{Series, Span, common};
+use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::In;
@@ -211,10 +211,6 @@ impl<'a> Recording<'a> {
         [self.specific_force.white_deviation(), self.omega.white_deviation()]
     }
 
-    /// Velocity over ground, m/s, if logged.
-    pub(crate) fn velocity_ned(&self, time_s: f64) -> Option<Vector3<f64>> {
-        self.velocity.as_ref().map(|v| v.vector(time_s))
-    }
     /// Whether the log has an attitude.
     pub(crate) fn has_attitude(&self) -> bool {
         self.attitude.is_some()
@@ -222,9 +218,5 @@ impl<'a> Recording<'a> {
     /// Whether the log has a battery voltage.
     pub(crate) fn has_voltage(&self) -> bool {
         self.voltage.is_some()
-    }
-    /// Whether the vehicle has wings and the log their command.
-    pub(crate) fn has_wing(&self) -> bool {
-        self.wing.is_some()
     }
 }

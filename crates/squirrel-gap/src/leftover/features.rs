@@ -76,7 +76,8 @@ fn horizontal_position(track: &Track, time_s: f64) -> Vector3<f64> {
 
 /// Every family at the moments of the leftover.
 pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
-    let family = |name, row: &dyn Fn(&Moment) -> Vec<f64>| Family { name, rows: moments.iter().map(row).collect() };
+    let family =
+        |name, row: &dyn Fn(&Moment) -> Vec<f64>| Family { name, rows: moments.iter().map(row).collect() };
     let flights = moments.iter().map(|m| m.flight).max().map_or(0, |f| f + 1);
     let down = |m: &Moment, v: Vector3<f64>| m.ned_from_body.tr_mul(&v);
     vec![
@@ -110,7 +111,20 @@ pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
         }),
         family("angular rates", &|m| {
             let w = m.omega;
-            vec![w.x, w.y, w.z, w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.y * w.z, w.x * w.z, w.z.abs(), w.x.abs(), w.y.abs()]
+            vec![
+                w.x,
+                w.y,
+                w.z,
+                w.x * w.x,
+                w.y * w.y,
+                w.z * w.z,
+                w.x * w.y,
+                w.y * w.z,
+                w.x * w.z,
+                w.z.abs(),
+                w.x.abs(),
+                w.y.abs(),
+            ]
         }),
         family("throttle", &|m| {
             let u = m.throttle;

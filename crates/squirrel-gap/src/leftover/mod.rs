@@ -32,7 +32,6 @@ const GUST_KURTOSIS_MAX: f64 = 5.5;
 /// The leftover of one channel of one flight.
 #[derive(Debug, Clone)]
 pub(crate) struct Band {
-    pub(crate) flight: usize,
     pub(crate) channel: usize,
     /// Rms of what is slow and of the whole, in the unit of the channel.
     pub(crate) slow: f64,
@@ -79,12 +78,14 @@ impl Leftover {
 
     /// Whether a family predicts so much of it, or it comes in such bursts, that it cannot be gusts.
     pub(crate) fn is_predicted(&self) -> bool {
-        self.families.first().is_some_and(|(_, share)| *share > GUST_SHARE_MAX) || self.kurtosis > GUST_KURTOSIS_MAX
+        self.families.first().is_some_and(|(_, share)| *share > GUST_SHARE_MAX)
+            || self.kurtosis > GUST_KURTOSIS_MAX
     }
 
     /// Whether it goes with something that no form of any effect goes with: time, a place, a line in the spectrum.
     pub(crate) fn is_foreign(&self) -> bool {
-        let strange = |(name, share): &(&str, f64)| ["time in flight", "position"].contains(name) && *share > 0.5;
+        let strange =
+            |(name, share): &(&str, f64)| ["time in flight", "position"].contains(name) && *share > 0.5;
         self.families.first().is_some_and(strange) || self.line.is_some_and(|(_, share)| share > 0.5)
     }
 
@@ -128,7 +129,6 @@ pub(crate) fn leftover(
             (noise.iter().map(|n| f(n).powi(2)).sum::<f64>() / noise.len() as f64).sqrt()
         };
         let band = Band {
-            flight: segment.flight,
             channel: segment.channel,
             slow: rms_of_means(&own),
             whole: rms(&own),
@@ -242,8 +242,7 @@ fn rms_of_means(x: &[f64]) -> f64 {
 
 /// The strongest line between 0.5 and 12 Hz, and its part of the power there, in the longest segment of a channel.
 fn line(predictor: &Predictor, left: &[f64], channel: usize) -> Option<(f64, f64)> {
-    let segment =
-        predictor.segments.iter().filter(|s| s.channel == channel).max_by_key(|s| s.rows.len())?;
+    let segment = predictor.segments.iter().filter(|s| s.channel == channel).max_by_key(|s| s.rows.len())?;
     let x = &left[segment.rows.clone()];
     let n = x.len();
     let duration_s = n as f64 * segment.step_s;

@@ -82,11 +82,12 @@ pub(crate) fn hypothesis(
         if let Some(found) = effects.insert(candidate.effect) {
             found.values.copy_from_slice(&alone.values);
         }
-        let altered = effects.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
-        if altered != all.vehicle {
-            all.vehicle = altered;
-        } else {
+        let altered =
+            effects.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
+        if altered == all.vehicle {
             add(&mut all.effects, candidate, parameter.slot, x);
+        } else {
+            all.vehicle = altered;
         }
     }
     // A loss on both sides is a change of the gain and a loss on one side.
@@ -103,7 +104,9 @@ pub(crate) fn hypothesis(
             add(&mut all.effects, membrane, 0, gain);
         }
     }
-    for (errors, x) in all.errors.iter_mut().zip(point.base[catalogue.parameters.len()..].chunks_exact(SENSOR_COLUMNS)) {
+    for (errors, x) in
+        all.errors.iter_mut().zip(point.base[catalogue.parameters.len()..].chunks_exact(SENSOR_COLUMNS))
+    {
         errors.tilt_rad = [x[0], x[1]];
         errors.height_m = x[2];
     }
@@ -195,7 +198,8 @@ impl Linear {
                 }
                 (Some(p), None) => {
                     let far = first || catalogue.starts_flat(p);
-                    let step = if far { (p.smallest * p.largest).sqrt() } else { p.tolerance.max(0.1 * p.smallest) };
+                    let step =
+                        if far { (p.smallest * p.largest).sqrt() } else { p.tolerance.max(0.1 * p.smallest) };
                     moved.base[column] += step;
                     step
                 }

@@ -32,8 +32,7 @@ pub(crate) const TURBULENCE_M_S: f64 = 0.12;
 /// The best explanation of a set of flights, and what it leaves.
 pub(crate) struct Naming {
     pub(crate) found: Found,
-    /// The point at which the explanation is best, everything else inside its tolerance, and its hypothesis.
-    pub(crate) point: Point,
+    /// The hypothesis at which the explanation is best, everything else inside its tolerance.
     pub(crate) hypothesis: Hypothesis,
     /// Rows of the residual: of the vehicle as it is with everything else where it most likely is, and of the explanation.
     pub(crate) nominal: Vec<f64>,
@@ -87,11 +86,11 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
     let left = loosened(&found, &point, left);
     let wind = predictor.wind_columns(&about)?;
-    let leftover = leftover(predictor, &motions, &left, &nominal, &wind, TURBULENCE_M_S, slack(search, &found));
+    let leftover =
+        leftover(predictor, &motions, &left, &nominal, &wind, TURBULENCE_M_S, slack(search, &found));
     let deviations = interval::deviations(predictor, &found.linear, &found.best);
     Ok(Naming {
         found,
-        point,
         hypothesis: about,
         nominal,
         left,
@@ -114,19 +113,21 @@ fn slack(search: &Search<'_>, found: &Found) -> Slack {
 fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
     let best = &found.best;
     let k = best.free.len();
-    let wide: Vec<f64> =
-        best.prior.iter().enumerate().map(|(i, sd)| if i < k { *sd } else { LEFTOVER_TOLERANCES * sd }).collect();
-    let Some(loose) = best.gram.posterior(&wide, 1.0) else { return left };
-    // A leftover that asks for more than that stays one.
-    if (k..wide.len()).any(|i| wide[i] > 0.0 && loose.mean[i].abs() > LEFTOVER_MOST * best.prior[i]) {
-        return left;
-    }
+    // A leftover that asks for more than that stays one; the tighter fit then says what is left.
+    let loose = [LEFTOVER_TOLERANCES, 1.0].into_iter().find_map(|times| {
+        let wide: Vec<f64> =
+            best.prior.iter().enumerate().map(|(i, sd)| if i < k { *sd } else { times * sd }).collect();
+        let loose = best.gram.posterior(&wide, 1.0)?;
+        let inside = (k..wide.len()).all(|i| loose.mean[i].abs() <= LEFTOVER_MOST * best.prior[i]);
+        (inside || times == 1.0).then_some(loose)
+    });
+    let Some(loose) = loose else { return left };
     for (i, column) in best.own_raw.iter().chain(&found.linear.raw).enumerate() {
         let now = match best.free.get(i) {
             Some((member, slot)) => best.members[*member].values[*slot],
             None => point.base[i - k],
         };
-        let moved = if wide[i] > 0.0 { loose.mean[i] - now } else { 0.0 };
+        let moved = if best.prior[i] > 0.0 { loose.mean[i] - now } else { 0.0 };
         if moved != 0.0 {
             for (value, c) in left.iter_mut().zip(column) {
                 *value -= c * moved;
@@ -148,7 +149,17 @@ fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover
     let wind = predictor.wind_columns(&naming.hypothesis)?;
     let motions: Vec<_> =
         (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
-    let blown = |sigma: f64| leftover(predictor, &motions, &naming.left, &naming.nominal, &wind, sigma, slack(search, &naming.found));
+    let blown = |sigma: f64| {
+        leftover(
+            predictor,
+            &motions,
+            &naming.left,
+            &naming.nominal,
+            &wind,
+            sigma,
+            slack(search, &naming.found),
+        )
+    };
     // The floor is noise and wind, squared; two floors tell them apart.
     let (calm, windy) = (&naming.leftover, blown(TURBULENCE_M_S + 1.0));
     let span = (TURBULENCE_M_S + 1.0).powi(2) - TURBULENCE_M_S.powi(2);

@@ -58,7 +58,9 @@ impl Search<'_> {
         let offset = set.free.len();
         let mut all = Vec::new();
         for candidate in &self.catalogue.candidates {
-            if all.contains(&candidate.effect) || set.members.iter().any(|m| self.effect(m) == candidate.effect) {
+            if all.contains(&candidate.effect)
+                || set.members.iter().any(|m| self.effect(m) == candidate.effect)
+            {
                 continue;
             }
             let mut prior = set.prior.clone();

@@ -71,7 +71,8 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn run(&self) -> Result<Found, GapError> {
-        let mut point = Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] };
+        let mut point =
+            Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] };
         let mut round = 1;
         let mut before: Option<Linear> = None;
         loop {
@@ -217,7 +218,8 @@ impl Search<'_> {
         let offset = set.free.len();
         let mut all = Vec::new();
         for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
-            let in_set = set.members.iter().any(|m| excludes(&self.catalogue.candidates[m.candidate], candidate));
+            let in_set =
+                set.members.iter().any(|m| excludes(&self.catalogue.candidates[m.candidate], candidate));
             if in_set || except.contains(&candidate.effect) {
                 continue;
             }
@@ -412,11 +414,8 @@ impl Search<'_> {
             }
         }
         let (k, n) = (own.len(), linear.columns.len());
-        let mut gram = Gram {
-            g: DMatrix::zeros(k + n, k + n),
-            b: nalgebra::DVector::zeros(k + n),
-            yy: dot(&y, &y),
-        };
+        let mut gram =
+            Gram { g: DMatrix::zeros(k + n, k + n), b: nalgebra::DVector::zeros(k + n), yy: dot(&y, &y) };
         gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram);
         for i in 0..k {
             for j in 0..k {
@@ -457,9 +456,9 @@ impl Search<'_> {
 
 /// Whether an effect leaves no room for another: itself, and where flights show a ratio alone, what stands on its other side.
 fn excludes(named: &Candidate, other: &Candidate) -> bool {
-    const Z: f64 = 2.0;
     let yaw = |c: &Candidate| {
-        c.effect == "yaw_torque_coeff" || (c.effect == "inertia_error" && c.fixed.iter().any(|(_, axis)| *axis == Z))
+        c.effect == "yaw_torque_coeff"
+            || (c.effect == "inertia_error" && c.fixed.iter().any(|(_, axis)| *axis as usize == 2))
     };
     let thrust = |c: &Candidate| ["mass_error", "thrust_coefficient"].contains(&c.effect);
     named.effect == other.effect || (thrust(named) && thrust(other)) || (yaw(named) && yaw(other))

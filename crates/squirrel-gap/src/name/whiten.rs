@@ -29,7 +29,8 @@ impl Whitener {
                 let own: Vec<&Segment> =
                     segments.iter().filter(|s| s.channel == channel && s.rows.len() > 3 * ORDER).collect();
                 rows += own.iter().map(|s| s.rows.len() - ORDER).sum::<usize>();
-                let of = |rows: &'_ [f64]| own.iter().map(|s| rows[s.rows.clone()].to_vec()).collect::<Vec<_>>();
+                let of =
+                    |rows: &'_ [f64]| own.iter().map(|s| rows[s.rows.clone()].to_vec()).collect::<Vec<_>>();
                 autoregression(&of(noise), &of(doubt))
             })
             .collect();
@@ -46,7 +47,8 @@ impl Whitener {
         }
         let mut out = Self::fit(segments, &changes, &vec![0.0; rows.len()]);
         for (channel, filter) in out.filters.iter_mut().enumerate() {
-            let own = segments.iter().filter(|s| s.channel == channel).flat_map(|s| changes[s.rows.clone()].iter());
+            let own =
+                segments.iter().filter(|s| s.channel == channel).flat_map(|s| changes[s.rows.clone()].iter());
             let (sum, n) = own.fold((0.0, 0.0), |(sum, n), x| (sum + x * x, n + 1.0));
             if let Some(filter) = filter {
                 *filter = ([0.0; ORDER], f64::sqrt(sum / n));
@@ -71,7 +73,8 @@ impl Whitener {
             let x = &column[segment.rows.clone()];
             let scale = 1.0 / deviation;
             out.extend(x.windows(ORDER + 1).map(|w| {
-                let predicted: f64 = coefficients.iter().zip(w[..ORDER].iter().rev()).map(|(a, x)| a * x).sum();
+                let predicted: f64 =
+                    coefficients.iter().zip(w[..ORDER].iter().rev()).map(|(a, x)| a * x).sum();
                 (w[ORDER] - predicted) * scale
             }));
         }

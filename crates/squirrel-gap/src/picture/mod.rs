@@ -66,6 +66,7 @@ const CONTRADICTION: &str =
     "Empty: the logs contradict themselves, and nothing is computed from such logs. The verdict says where.";
 
 /// What only the predictor and the search know.
+#[derive(Debug)]
 pub(crate) struct Seen {
     flights: Vec<FlightPanel>,
     conditional: Vec<Conditional>,

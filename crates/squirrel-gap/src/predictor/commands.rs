@@ -1,6 +1,7 @@
 //! The logged commands as the vehicle got them: held until the next one, late or on another clock where a hypothesis says so.
 
 use crate::flight::recording::Recording;
+use crate::flight::series::Series;
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
 
@@ -21,7 +22,7 @@ impl Commands {
             all[..u.len()].copy_from_slice(u);
             (t, all)
         });
-        let wing = recording.wing.iter().flat_map(|w| w.samples()).map(|(t, c)| (t, [c[0], c[1]]));
+        let wing = recording.wing.iter().flat_map(Series::samples).map(|(t, c)| (t, [c[0], c[1]]));
         Self { rotor: rotor.collect(), wing: wing.collect(), began_s: recording.pieces[0].0 }
     }
 
@@ -64,7 +65,8 @@ impl Clock<'_> {
     }
     pub(crate) fn advance_to(&mut self, time_s: f64) {
         let until_s = time_s + SNAP_S;
-        while self.commands.rotor.get(self.rotor + 1).is_some_and(|(stamp, _)| self.acts_s(*stamp) <= until_s) {
+        while self.commands.rotor.get(self.rotor + 1).is_some_and(|(stamp, _)| self.acts_s(*stamp) <= until_s)
+        {
             self.rotor += 1;
         }
         while self.commands.wing.get(self.wing + 1).is_some_and(|(stamp, _)| self.acts_s(*stamp) <= until_s) {

@@ -77,11 +77,15 @@ pub(crate) struct Predictor<'a> {
 impl<'a> Predictor<'a> {
     /// # Errors
     /// What [`Recording::new`] says of a flight.
-    pub(crate) fn new(vehicle: &'a VehicleFile, flights: &'a [(String, FlightLog)]) -> Result<Self, GapError> {
+    pub(crate) fn new(
+        vehicle: &'a VehicleFile,
+        flights: &'a [(String, FlightLog)],
+    ) -> Result<Self, GapError> {
         if flights.is_empty() {
             return Err(GapError::NoFlights);
         }
-        let (mut tracks, mut commands, mut notes, mut names) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut tracks, mut commands, mut notes, mut names) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (index, (flight, log)) in flights.iter().enumerate() {
             if names.contains(&flight.as_str()) {
                 return Err(GapError::SameName { flight: flight.clone() });
@@ -353,7 +357,8 @@ fn predict(
     // A rotor's acceleration jumps with its command: what a sample stands for lies half before and half after the jump.
     let jumps = plant.effects().has("rotor_gyro_torque");
     let (rotor, wing) = clock.now();
-    let before = jumps.then(|| plant.lead(state, body, &rotor, wing, track.voltage_v[k], 0.0).angular_acceleration);
+    let before =
+        jumps.then(|| plant.lead(state, body, &rotor, wing, track.voltage_v[k], 0.0).angular_acceleration);
     loop {
         clock.advance_to(at_s);
         let until_s = clock.next_change_s().min(end_s);

@@ -10,7 +10,7 @@
 
 use crate::flight::filter::{DERIVATIVE_REACH, LowPass, derivative};
 use crate::flight::recording::Recording;
-use crate::flight::series::Span;
+use crate::flight::series::{Series, Span};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector6};
 use squirrel_core::dynamics::State;
 use squirrel_core::effects::Effects;
@@ -82,8 +82,8 @@ impl Track {
             })
             .collect();
         let inside = |t: &f64| (piece.0..=piece.1).contains(t);
-        let vectors = |series: Option<&crate::flight::series::Series>| {
-            let all = series.into_iter().flat_map(|s| s.samples());
+        let vectors = |series: Option<&Series>| {
+            let all = series.into_iter().flat_map(Series::samples);
             all.filter(|(t, _)| inside(t)).map(|(t, v)| (t, Vector3::from_column_slice(v))).collect()
         };
         let position: Vec<(f64, Vector3<f64>)> = vectors(recording.position.as_ref());
@@ -222,9 +222,8 @@ impl Track {
             self.add(&mut height_m, &smoothed(&correction));
         }
         let air = Vector3::from(errors.air_ned_m_s);
-        let body = (0..n)
-            .map(|k| at(k, strapdown[k] - air, -height_m[k], attitude[k].into_inner()))
-            .collect();
+        let body =
+            (0..n).map(|k| at(k, strapdown[k] - air, -height_m[k], attitude[k].into_inner())).collect();
         let mean = kinematic.iter().map(|(_, e)| e).sum::<Vector3<f64>>() / kinematic.len().max(1) as f64;
         for (_, e) in &mut kinematic {
             *e -= mean;
