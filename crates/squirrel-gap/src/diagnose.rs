@@ -82,7 +82,7 @@ pub fn diagnose(
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, GapError> {
     progress("reading");
-    let predictor = Predictor::new(vehicle, flights)?;
+    let mut predictor = Predictor::new(vehicle, flights)?;
     let unseen = if held_out.is_empty() { None } else { Some(Predictor::new(vehicle, held_out)?) };
     progress("checking the data");
     let domain = covered(&predictor);
@@ -102,6 +102,9 @@ pub fn diagnose(
             notes: predictor.notes.clone(),
         };
         return Ok(Diagnosis { verdict, domain, details: None });
+    }
+    if !compatibility::moments_fit(&predictor, &nominal) {
+        predictor.leave_out_moments();
     }
     progress("naming");
     let catalogue = Catalogue::new(vehicle, &payload_lengths_m(&predictor, &nominal))?;
@@ -201,19 +204,24 @@ fn decide(
     verdict
 }
 
-/// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too.
+/// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too, in the channels that it
+/// explains; 1 where it explains none. What stands out in other channels is another thing.
 fn left_share(naming: &Naming) -> f64 {
-    let excess = |slow: fn(&crate::leftover::Band) -> f64| {
-        naming
-            .leftover
-            .bands
-            .iter()
-            .map(|b| (slow(b).powi(2) / b.slow_floor.powi(2) - 1.0).max(0.0))
-            .sum::<f64>()
-    };
-    let before = excess(|b| b.slow_nominal);
-    if before > 0.0 { excess(|b| b.slow) / before } else { 1.0 }
+    let excess = |slow: f64, floor: f64| (slow.powi(2) / floor.powi(2) - 1.0).max(0.0);
+    let (mut before, mut after) = (0.0, 0.0);
+    for band in &naming.leftover.bands {
+        let was = excess(band.slow_nominal, band.slow_floor);
+        let is = excess(band.slow, band.slow_floor);
+        if is < EXPLAINED * was && was > 1.0 {
+            before += was;
+            after += is;
+        }
+    }
+    if before > 0.0 { after / before } else { 1.0 }
 }
+
+/// Part of its excess that a channel may keep and still be explained.
+const EXPLAINED: f64 = 0.5;
 
 /// The members of the explanation as the verdict writes them, the most certain first.
 fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {

@@ -8,7 +8,7 @@
 mod pairs;
 
 use crate::GapError;
-use crate::predictor::{DYNAMIC, Predictor, Track};
+use crate::predictor::{Predictor, Segment, Track};
 use nalgebra::{UnitQuaternion, Vector3};
 use pairs::Pairs;
 use squirrel_core::math::GRAVITY_M_S2;
@@ -239,22 +239,7 @@ fn fixes(track: &Track) -> Found {
 fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
     let track = &predictor.tracks[piece];
     let n = track.measured.len();
-    let mut columns = vec![Vec::new(); DYNAMIC];
-    for segment in predictor.segments.iter().filter(|s| s.piece == piece && s.channel < DYNAMIC) {
-        columns[segment.channel] = residual[segment.rows.clone()].to_vec();
-    }
-    let pair = |i: usize, first: usize| {
-        let measured = Vector3::from_fn(|axis, _| track.measured[i][first + axis]);
-        let left = Vector3::from_fn(|axis, _| columns[first + axis][i]);
-        (measured, measured - left)
-    };
-    let (mut forces, mut moments) = (Pairs::default(), Pairs::default());
-    for i in 0..n {
-        let (measured, predicted) = pair(i, 0);
-        forces.push(measured, predicted);
-        let (measured, predicted) = pair(i, 3);
-        moments.push(measured, predicted);
-    }
+    let (forces, moments) = (pairs_of(predictor, piece, residual, 0), pairs_of(predictor, piece, residual, 3));
     let ratio = forces.mean_ratio_z();
     if !(0.4..2.5).contains(&ratio) {
         return Some((
@@ -280,7 +265,8 @@ fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
         };
         return Some(("rotor.command", words));
     }
-    if let Some(axes) = moments.later_by((shift_s / step_s).round() as i64).misnamed_axes(0.5) {
+    // Rotors may be late: each naming of the axes is taken where it fits best.
+    if let Some(axes) = moments.misnamed_axes_late(0.5, (COMMAND_SHIFT_S.1 / step_s) as i64) {
         return Some((
             "rotor.command",
             format!(
@@ -290,4 +276,40 @@ fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
     }
     let axes = forces.misnamed_axes(0.15)?;
     Some(("imu.specific_force_body_m_s2", format!("fits the model better with its axes as {axes}")))
+}
+
+/// Measured and predicted force or moment of a piece.
+fn pairs_of(predictor: &Predictor, piece: usize, residual: &[f64], first: usize) -> Pairs {
+    let mut pairs = Pairs::default();
+    let segments: Vec<_> = predictor
+        .segments
+        .iter()
+        .filter(|s| s.piece == piece && (first..first + 3).contains(&s.channel))
+        .collect();
+    let [x, y, z] = segments[..] else { return pairs };
+    for (i, m) in predictor.tracks[piece].measured.iter().enumerate() {
+        let measured = Vector3::from_fn(|axis, _| m[first + axis]);
+        let left = |s: &Segment| residual[s.rows.start + i];
+        let left = Vector3::new(left(x), left(y), left(z));
+        pairs.push(measured, measured - left);
+    }
+    pairs
+}
+
+/// Correlation of roll and pitch with their commands, however late, below which the model says nothing about moments.
+const MOMENT_FIT: f64 = 0.75;
+
+/// Whether the vehicle file's moments have to do with the measured ones; where they do not, nothing is named from them.
+pub(crate) fn moments_fit(predictor: &Predictor, residual: &[f64]) -> bool {
+    let fits: Vec<f64> = predictor
+        .tracks
+        .iter()
+        .enumerate()
+        .filter(|(_, track)| track.measured.len() > 300)
+        .map(|(piece, track)| {
+            let step_s = track.every as f64 * track.period_s;
+            pairs_of(predictor, piece, residual, 3).best_shift(step_s, 0.2).1
+        })
+        .collect();
+    fits.is_empty() || fits.iter().sum::<f64>() / fits.len() as f64 >= MOMENT_FIT
 }

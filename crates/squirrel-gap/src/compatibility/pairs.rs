@@ -80,6 +80,22 @@ impl Pairs {
         })
     }
 
+    /// As [`Self::misnamed_axes`], each naming at the shift of up to `most` pairs at which it fits best.
+    pub(super) fn misnamed_axes_late(&self, least: f64, most: i64) -> Option<String> {
+        let shifted: Vec<Self> = (0..=most).map(|shift| self.later_by(shift)).collect();
+        let own = shifted
+            .iter()
+            .map(|pairs| {
+                let r = pairs.correlations(least);
+                r[0][0] + r[1][1] + r[2][2]
+            })
+            .fold(f64::NEG_INFINITY, f64::max);
+        shifted.iter().find_map(|pairs| {
+            let (best, _) = best_naming(&pairs.correlations(least));
+            if best > own + MARGIN { pairs.misnamed_axes(least) } else { None }
+        })
+    }
+
     /// The first over the second, from all axes together about their means.
     pub(super) fn scale(&self) -> Option<f64> {
         let (a, b) = self.means();

@@ -126,6 +126,15 @@ impl<'a> Predictor<'a> {
         self.segments.last().map_or(0, |s| s.rows.end)
     }
 
+    /// Leaves the moments out of everything that follows.
+    pub(crate) fn leave_out_moments(&mut self) {
+        self.segments.retain(|s| !(3..DYNAMIC).contains(&s.channel));
+        self.notes.push(
+            "moments: the vehicle file explains next to nothing of the measured ones; effects are named from forces alone"
+                .to_owned(),
+        );
+    }
+
     /// What was measured, row by row, about its mean; 0 for the kinematics.
     pub(crate) fn measured(&self) -> Vec<f64> {
         let mut rows = vec![0.0; self.rows()];
