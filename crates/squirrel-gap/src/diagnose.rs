@@ -5,7 +5,7 @@ use crate::compatibility;
 use crate::find::{self, Place};
 use crate::name::{
     Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis,
-    payload_lengths_m,
+    payload_lengths_m, sds,
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
@@ -13,6 +13,7 @@ use crate::shrink::{self, Errors12};
 use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
 use crate::words;
 use squirrel_core::effects::{Effects, Kind as ParameterKind};
+use squirrel_core::vehicle::{ThrustCurve, Vehicle};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
@@ -103,11 +104,20 @@ pub fn diagnose(
         };
         return Ok(Diagnosis { verdict, domain, details: None });
     }
-    if !compatibility::moments_fit(&predictor, &nominal) {
+    if !predictor.has_motion() {
+        predictor.leave_out_drag();
+    }
+    if !(predictor.has_motion() && compatibility::moments_fit(&predictor, &nominal)) {
         predictor.leave_out_moments();
     }
+    let curve_hides_sag = curve_hides_sag(&predictor, &nominal)?;
+    if curve_hides_sag {
+        predictor.notes.push(
+            "propulsion.pwm_to_thrust_n: inside its sd the thrust curve does in these flights what battery_sag does".to_owned(),
+        );
+    }
     progress("naming");
-    let catalogue = Catalogue::new(vehicle, &payload_lengths_m(&predictor, &nominal))?;
+    let catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
     let tick = || progress("naming");
     let search =
         Search { predictor: &predictor, catalogue: &catalogue, beta: crate::name::BETA, progress: &tick };
@@ -119,7 +129,7 @@ pub fn diagnose(
         None => None,
     };
     let gap = proof.as_ref().map(|proof| gap(held_out, proof));
-    let verdict = decide(&search, &naming, &rivals, gap, places);
+    let verdict = decide(&search, &naming, &rivals, gap, places, curve_hides_sag);
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.null),
@@ -136,6 +146,7 @@ fn decide(
     rivals: &[Scored],
     gap: Option<Gap>,
     places: Vec<Place>,
+    curve_hides_sag: bool,
 ) -> Verdict {
     let found = &naming.found;
     let effects = named(search, naming);
@@ -149,7 +160,10 @@ fn decide(
         .filter(|rival| rival.log_evidence > found.best.log_evidence - NATS_MIN && !clearly_worse)
         .collect();
     let leftover = &naming.leftover;
-    let blind = search.blind(&found.best);
+    let mut blind = search.blind(&found.best);
+    if curve_hides_sag {
+        blind.push("battery_sag");
+    }
     let share = left_share(naming);
     let kind = if effects.is_empty() {
         match (leftover.is_real(), blind.is_empty()) {
@@ -320,6 +334,38 @@ fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
         removed_fraction: removed(after),
         best_rival_removed_fraction: best_rival.map(removed),
     }
+}
+
+/// Whether the thrust curve of the vehicle file, moved by its sd, changes the vertical force more than the smallest sag
+/// worth reporting: then nothing tells the two apart.
+fn curve_hides_sag(predictor: &Predictor, nominal: &[f64]) -> Result<bool, GapError> {
+    let vehicle = predictor.vehicle;
+    let mut p = *vehicle.vehicle.parameters();
+    let (Some(curve), Some(sd)) = (p.propulsion.thrust_curve, sds(vehicle, "propulsion.pwm_to_thrust_n"))
+    else {
+        return Ok(false);
+    };
+    let change = |hypothesis: &Hypothesis| -> Result<f64, GapError> {
+        let rows = predictor.residual(hypothesis)?;
+        let own = predictor.segments.iter().filter(|s| s.channel == 2).flat_map(|s| s.rows.clone());
+        Ok(own.map(|row| (rows[row] - nominal[row]).powi(2)).sum())
+    };
+    let mut sag = predictor.nominal();
+    if let Some(found) = sag.effects.insert("battery_sag") {
+        found.values[0] += 0.4;
+    }
+    let sag = change(&sag)?;
+    for (i, sd) in sd.iter().enumerate().take(4).filter(|(_, sd)| **sd > 0.0) {
+        let mut coefficients = curve.coefficients();
+        coefficients[i] += sd;
+        let Ok(moved) = ThrustCurve::new(coefficients, p.propulsion.reference_voltage_v) else { continue };
+        p.propulsion.thrust_curve = Some(moved);
+        let Ok(vehicle) = Vehicle::new(p) else { continue };
+        if change(&Hypothesis { vehicle, ..predictor.nominal() })? > sag {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// What the flights covered.

@@ -108,6 +108,9 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str]) -> String {
     if !blind.is_empty() && verdict.verdict != Kind::NotIdentifiable {
         let _ = write!(text, " These flights would not show: {}.", blind.join(", "));
     }
+    if verdict.notes.iter().any(|note| note.contains("thrust curve")) {
+        text.push_str(" Battery sag and the thrust curve are confounded in these flights: the curve's sd covers either.");
+    }
     if let Some(fly_next) = &verdict.fly_next {
         let _ = write!(text, " Fly next: {fly_next}.");
     }

@@ -239,7 +239,8 @@ fn fixes(track: &Track) -> Found {
 fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
     let track = &predictor.tracks[piece];
     let n = track.measured.len();
-    let (forces, moments) = (pairs_of(predictor, piece, residual, 0), pairs_of(predictor, piece, residual, 3));
+    let (forces, moments) =
+        (pairs_of(predictor, piece, residual, 0), pairs_of(predictor, piece, residual, 3));
     let ratio = forces.mean_ratio_z();
     if !(0.4..2.5).contains(&ratio) {
         return Some((
@@ -305,7 +306,7 @@ pub(crate) fn moments_fit(predictor: &Predictor, residual: &[f64]) -> bool {
         .tracks
         .iter()
         .enumerate()
-        .filter(|(_, track)| track.measured.len() > 300)
+        .filter(|(_, track)| track.measured.len() > 100)
         .map(|(piece, track)| {
             let step_s = track.every as f64 * track.period_s;
             pairs_of(predictor, piece, residual, 3).best_shift(step_s, 0.2).1

@@ -21,6 +21,10 @@ const SLOW_RATIO: f64 = 1.6;
 const WHOLE_RATIO: f64 = 1.25;
 /// Part of what the model explains that it may get wrong without an effect being missing.
 const MODEL_ERROR: f64 = 0.015;
+/// How far a line must stand above its neighbours, in power.
+const LINE_CONTRAST: f64 = 6.0;
+/// Part of the power that a line in the spectrum must have.
+const LINE_SHARE: f64 = 0.35;
 /// Part of the variance that a family must predict for a leftover to go with it.
 const SHARE_MIN: f64 = 0.25;
 
@@ -68,7 +72,9 @@ impl Leftover {
         let (channel, _) = self.excess.first()?;
         let channel = CHANNELS[*channel];
         match (self.families.first(), self.line) {
-            (_, Some((hz, share))) if share > 0.5 => Some(format!("a line at {hz:.2} Hz in {channel}")),
+            (_, Some((hz, share))) if share > LINE_SHARE => {
+                Some(format!("a line at {hz:.2} Hz in {channel}"))
+            }
             (Some((name, share)), _) if *share >= SHARE_MIN => {
                 Some(format!("{name} ({:.0} % of {channel})", 100.0 * share))
             }
@@ -86,7 +92,7 @@ impl Leftover {
     pub(crate) fn is_foreign(&self) -> bool {
         let strange =
             |(name, share): &(&str, f64)| ["time in flight", "position"].contains(name) && *share > 0.5;
-        self.families.first().is_some_and(strange) || self.line.is_some_and(|(_, share)| share > 0.5)
+        self.families.first().is_some_and(strange) || self.line.is_some_and(|(_, share)| share > LINE_SHARE)
     }
 
     /// The channels that stand out, in words.
@@ -261,7 +267,13 @@ fn line(predictor: &Predictor, left: &[f64], channel: usize) -> Option<(f64, f64
         .collect();
     let total: f64 = power.iter().sum();
     let (at, _) = power.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
-    // A line that wanders a little spreads over neighbours.
-    let own: f64 = power[at.saturating_sub(2)..(at + 3).min(power.len())].iter().sum();
+    // A line that wanders a little spreads over neighbours, and stands above those further off: slow noise does not.
+    let around = |reach: usize| at.saturating_sub(reach)..(at + reach + 1).min(power.len());
+    let own: f64 = power[around(2)].iter().sum();
+    let sides: f64 = power[around(8)].iter().sum::<f64>() - own;
+    let (own_bins, side_bins) = (around(2).len() as f64, (around(8).len() - around(2).len()).max(1) as f64);
+    if own / own_bins < LINE_CONTRAST * sides / side_bins {
+        return None;
+    }
     (total > 0.0).then(|| ((bins.start + at) as f64 / duration_s, own / total))
 }

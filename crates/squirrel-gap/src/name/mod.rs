@@ -18,7 +18,7 @@ mod whiten;
 
 pub(crate) use evidence::BETA;
 pub(crate) use linear::{Member, Point, hypothesis};
-pub(crate) use parameters::Catalogue;
+pub(crate) use parameters::{Catalogue, sds};
 pub(crate) use payload::payload_lengths_m;
 pub(crate) use search::{Found, NATS_MIN, Scored, Search};
 
@@ -140,6 +140,9 @@ fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
 /// Smallest deviation that is called a gust, m/s.
 const GUST_MIN_M_S: f64 = 0.4;
 
+/// How far above their mean the gusts of one flight may be.
+const GUST_SCATTER: f64 = 1.6;
+
 /// The deviation of gusts that would make the leftover, m/s, and what they leave; `None` where they would not make it.
 fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover)>, GapError> {
     if !naming.leftover.is_real() || naming.leftover.is_foreign() || naming.leftover.is_predicted() {
@@ -172,8 +175,11 @@ fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover
     if !(sigma.is_finite() && sigma > GUST_MIN_M_S) {
         return Ok(None);
     }
-    let left = blown(sigma);
-    Ok((!left.is_real()).then_some((sigma, left)))
+    let mut left = blown(sigma);
+    // A flight holds few gusts: their size scatters from one to the next.
+    let scatter = left.excess.iter().all(|(channel, ratio)| *channel < 3 && *ratio < GUST_SCATTER);
+    left.excess.clear();
+    Ok(scatter.then_some((sigma, left)))
 }
 
 /// Independent blocks that a flight counts for in the evidence of gusts: they last longer than a block.

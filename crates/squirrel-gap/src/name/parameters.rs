@@ -6,6 +6,7 @@
 
 use crate::GapError;
 use crate::leftover::Slack;
+use crate::predictor::Predictor;
 use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind};
 use squirrel_sim::plant::WingPlant;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -14,6 +15,27 @@ use squirrel_sim::vehicle_file::VehicleFile;
 const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
 /// Width of the slab over the largest plausible size.
 pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
+/// Effects that are known by their moments, and by what moving air does; without these channels nothing is said of them.
+const MOMENTS: [&str; 6] = [
+    "angular_damping",
+    "cg_offset",
+    "flapping_moment",
+    "inertia_error",
+    "rotor_gyro_torque",
+    "yaw_torque_coeff",
+];
+const DRAG: [&str; 9] = [
+    "accel_bias",
+    "added_mass",
+    "axial_inflow",
+    "constant_wind",
+    "linear_drag",
+    "payload_swing",
+    "quadratic_drag",
+    "thrust_misalignment",
+    "translational_lift",
+];
+
 /// One number of one effect.
 #[derive(Debug, Clone)]
 pub(crate) struct Parameter {
@@ -53,10 +75,18 @@ impl Catalogue {
     ///
     /// # Errors
     /// The vehicle file lacks a tolerance that is needed.
-    pub(crate) fn new(vehicle: &VehicleFile, payload_lengths_m: &[f64]) -> Result<Self, GapError> {
+    pub(crate) fn new(predictor: &Predictor, payload_lengths_m: &[f64]) -> Result<Self, GapError> {
+        let vehicle = predictor.vehicle;
+        let unseen = |name: &str| {
+            (MOMENTS.contains(&name) && !predictor.has_channel(3))
+                || (DRAG.contains(&name) && !predictor.has_channel(0))
+        };
         let mut all = Self { candidates: Vec::new(), parameters: Vec::new() };
         for name in Effects::<f64>::NAMES {
-            if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
+            if *name == "gust"
+                || unseen(name)
+                || (vehicle.wing == WingPlant::None && name.starts_with("wing_"))
+            {
                 continue;
             }
             let list = Effects::<f64>::parameters(name).unwrap_or_default();
@@ -228,7 +258,7 @@ fn deviation(vehicle: &VehicleFile, field: &str, index: usize, value: f64) -> Re
 }
 
 /// The declared sds of a field, as many as it has.
-fn sds(vehicle: &VehicleFile, field: &str) -> Option<Vec<f64>> {
+pub(crate) fn sds(vehicle: &VehicleFile, field: &str) -> Option<Vec<f64>> {
     let (_, provenance) = vehicle.provenance.iter().find(|(name, _)| name == field)?;
     let text = provenance.sd.as_ref()?;
     let numbers: Vec<f64> = text

@@ -135,6 +135,17 @@ impl<'a> Predictor<'a> {
         );
     }
 
+    /// Leaves the horizontal force out of everything that follows: without velocity and attitude nothing is known of drag.
+    pub(crate) fn leave_out_drag(&mut self) {
+        self.segments.retain(|s| !(0..2).contains(&s.channel));
+        self.notes
+            .push("force_body_x_n, force_body_y_n: left out; drag needs velocity and attitude".to_owned());
+    }
+    /// Whether a channel takes part.
+    pub(crate) fn has_channel(&self, channel: usize) -> bool {
+        self.segments.iter().any(|s| s.channel == channel)
+    }
+
     /// What was measured, row by row, about its mean; 0 for the kinematics.
     pub(crate) fn measured(&self) -> Vec<f64> {
         let mut rows = vec![0.0; self.rows()];
