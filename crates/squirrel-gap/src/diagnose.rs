@@ -186,8 +186,13 @@ fn decide(
     };
     let names = |set: &Scored| set.members.iter().map(|m| search.effect(m)).collect::<Vec<_>>();
     let shown = rivals.iter().take(5);
-    let alternatives: Vec<Alternative> =
+    let mut alternatives: Vec<Alternative> =
         shown.map(|set| Alternative { effects: names(set), evidence_nats: nats(set) }).collect();
+    if curve_hides_sag && effects.is_empty() {
+        let single = search.single_evidence(found).into_iter().find(|(name, _)| *name == "battery_sag");
+        let evidence_nats = single.map_or(0.0, |(_, nats)| nats);
+        alternatives.push(Alternative { effects: vec!["battery_sag"], evidence_nats });
+    }
     let goes_with = leftover
         .is_real()
         .then(|| leftover.goes_with().unwrap_or_else(|| leftover.channels()))

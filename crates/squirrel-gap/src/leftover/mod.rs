@@ -11,6 +11,7 @@ pub(crate) mod floor;
 use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
 use features::{families, predicted_share};
+use squirrel_core::math::GRAVITY_M_S2;
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
 const BLOCK: usize = 8;
@@ -65,6 +66,11 @@ impl Leftover {
     /// Whether something is there that no name accounts for.
     pub(crate) fn is_real(&self) -> bool {
         !self.excess.is_empty()
+    }
+
+    /// The largest ratio to what is allowed; 0 where nothing stands out.
+    pub(crate) fn worst(&self) -> f64 {
+        self.excess.first().map_or(0.0, |(_, ratio)| *ratio)
     }
 
     /// What the leftover goes with, in words; `None` where nothing predicts it.
@@ -172,6 +178,8 @@ pub(crate) struct Slack {
     pub(crate) lever_m: f64,
     /// Drag along one axis, N s/m.
     pub(crate) drag_n_s_per_m: f64,
+    /// Thrust over a flight, as a fraction.
+    pub(crate) thrust_fraction: f64,
     /// When commands act, s.
     pub(crate) timing_s: f64,
     /// Reaction torque of one rotor, as a fraction.
@@ -192,7 +200,8 @@ fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, s
         0..=2 => {
             let n = motion.body.len().max(1) as f64;
             let speed = motion.body.iter().map(|b| b.velocity.vector.norm_squared()).sum::<f64>() / n;
-            slack.drag_n_s_per_m * speed.sqrt() / p.mass_kg
+            let thrust = if segment.channel == 2 { slack.thrust_fraction * GRAVITY_M_S2 } else { 0.0 };
+            thrust.hypot(slack.drag_n_s_per_m * speed.sqrt() / p.mass_kg)
         }
         axis @ (3 | 4) => {
             // Commands that were logged on another clock are off by up to a sample.

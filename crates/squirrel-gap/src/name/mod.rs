@@ -84,10 +84,15 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let without = Point { members: Vec::new(), base: point.base.clone() };
     let nominal = predictor.residual(&hypothesis(predictor, catalogue, &without)?)?;
     let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
-    let left = loosened(&found, &point, left);
     let wind = predictor.wind_columns(&about)?;
-    let leftover =
-        leftover(predictor, &motions, &left, &nominal, &wind, TURBULENCE_M_S, slack(search, &found));
+    let slack = slack(search, &found);
+    let judged = |left: &[f64]| leftover(predictor, &motions, left, &nominal, &wind, TURBULENCE_M_S, slack);
+    // Where little is known, a looser fit of what is seen well may be a worse one of the rest.
+    let loose = loosened(&found, &point, left.clone());
+    let (left, leftover) = match (judged(&left), judged(&loose)) {
+        (as_it_is, looser) if as_it_is.worst() < looser.worst() => (left, as_it_is),
+        (_, looser) => (loose, looser),
+    };
     let deviations = interval::deviations(predictor, &found.linear, &found.best);
     Ok(Naming {
         found,
@@ -101,11 +106,16 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     })
 }
 
+/// How much thrust drifts about its mean while a battery empties whose voltage is not logged: a cell goes from 4.2 to 3.2 V,
+/// and thrust with its square.
+const UNLOGGED_SAG: f64 = 0.2;
+
 /// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample more or less.
 fn slack(search: &Search<'_>, found: &Found) -> Slack {
     let skewed = found.best.members.iter().any(|m| search.effect(m) == "clock_skew");
     let period_s = search.predictor.tracks.first().map_or(0.0, |t| t.period_s);
-    search.catalogue.slack(if skewed { period_s } else { 0.0 })
+    let drift = if search.predictor.has_voltage() { 0.0 } else { UNLOGGED_SAG };
+    search.catalogue.slack(if skewed { period_s } else { 0.0 }, drift)
 }
 
 /// The leftover with everything that floats where it fits best inside twice its tolerance: the tempered fit that names
