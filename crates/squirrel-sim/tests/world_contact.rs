@@ -4,7 +4,7 @@
 mod world_fixture;
 
 use proptest::prelude::*;
-use squirrel_core::dynamics::{RotorDrive, State, derivative, rk4};
+use squirrel_core::dynamics::{Held, RotorDrive, State, derivative, rk4};
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::math::GRAVITY_M_S2;
@@ -154,7 +154,8 @@ fn a_flight_that_changes_from_rk4_to_the_world_lands() {
     let drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.0; 8], 14.8);
     let free = |state: State<f64>| {
         rk4(state, 1e-3, |s| {
-            derivative(&vehicle, &Effects::none(), s, &drive, In::zero(), |_| Wrench::zero())
+            let held = Held { drive, wind: In::zero(), deployment: [0.0; 2], tether_force: In::zero() };
+            derivative(&vehicle, &Effects::none(), s, &held, |_| Wrench::zero())
         })
         .normalised()
     };

@@ -5,12 +5,16 @@
 mod world_fixture;
 
 use squirrel_core::aero::Air;
-use squirrel_core::dynamics::{RotorDrive, State, derivative, rk4, wrench};
+use squirrel_core::dynamics::{Held, RotorDrive, State, derivative, rk4, wrench};
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::nalgebra::Vector3;
 use squirrel_sim::world::{Contact, World};
 use world_fixture::{open_field, thrown, vehicle};
+
+fn in_still_air(drive: RotorDrive<f64>) -> Held<f64> {
+    Held { drive, wind: In::zero(), deployment: [0.0; 2], tether_force: In::zero() }
+}
 
 fn no_surfaces(_: &Air<f64>) -> Wrench<Body, f64> {
     Wrench::zero()
@@ -31,7 +35,7 @@ fn by_rk4(steps: usize) -> State<f64> {
     drive.target_rad_s = state.rotor_speed_rad_s;
     for _ in 0..steps {
         state = rk4(state, 1.0 / steps as f64, |s| {
-            derivative(&vehicle, &Effects::none(), s, &drive, In::zero(), no_surfaces)
+            derivative(&vehicle, &Effects::none(), s, &in_still_air(drive), no_surfaces)
         })
         .normalised();
     }
@@ -43,7 +47,8 @@ fn by_rapier(steps: usize) -> State<f64> {
     let mut world = World::new(&vehicle, &open_field()).expect("a possible world");
     let mut state = tumbling();
     for _ in 0..steps {
-        let held = wrench(&vehicle, &Effects::none(), &state, In::zero(), no_surfaces);
+        let drive = RotorDrive::holding(state.rotor_speed_rad_s);
+        let held = wrench(&vehicle, &Effects::none(), &state, &in_still_air(drive), no_surfaces);
         let (next, contact) = world.step(&state, &held, 1.0 / steps as f64).expect("a possible step");
         assert_eq!(contact, Contact::default());
         state = next;
