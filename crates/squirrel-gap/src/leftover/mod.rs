@@ -56,7 +56,9 @@ pub(crate) struct Leftover {
     pub(crate) excess: Vec<(usize, f64)>,
     /// Families by the share of the variance they predict in the worst channel.
     pub(crate) families: Vec<(&'static str, f64)>,
-    /// Fourth moment of the slow part of the worst channel over the square of its second: 3 for a normal distribution.
+    /// The largest share of the variance of the horizontal force that a family predicts.
+    pub(crate) horizontal_share: f64,
+    /// Fourth moment of the slow part of the horizontal force over the square of its second: 3 for a normal distribution.
     pub(crate) kurtosis: f64,
     /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above 0.5 Hz.
     pub(crate) line: Option<(f64, f64)>,
@@ -160,12 +162,18 @@ pub(crate) fn leftover(
     let mut excess: Vec<(usize, f64)> =
         worst.iter().copied().enumerate().filter(|(_, ratio)| *ratio > 1.0).collect();
     excess.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut out = Leftover { bands, excess, families: Vec::new(), kurtosis: 3.0, line: None };
+    let mut out =
+        Leftover { bands, excess, families: Vec::new(), horizontal_share: 0.0, kurtosis: 3.0, line: None };
     if let Some(&(channel, _)) = out.excess.first() {
         let (moments, y) = blocks(predictor, motions, left, channel);
         out.families = families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
         out.families.sort_by(|a, b| b.1.total_cmp(&a.1));
-        out.kurtosis = kurtosis(&y);
+        for channel in 0..2 {
+            let (moments, y) = blocks(predictor, motions, left, channel);
+            let shares = families(&moments).into_iter().map(|f| predicted_share(&f, &y));
+            out.horizontal_share = shares.fold(out.horizontal_share, f64::max);
+            out.kurtosis = kurtosis(&y).max(out.kurtosis);
+        }
         out.line = line(predictor, left, channel);
     }
     out

@@ -147,11 +147,11 @@ fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
     left
 }
 
-/// Smallest deviation that is called a gust, m/s.
-const GUST_MIN_M_S: f64 = 0.4;
+/// Smallest and largest deviation that is called a gust, m/s; what asks for more is no gust.
+const GUST_M_S: (f64, f64) = (0.4, 2.5);
 
 /// How far above their mean the gusts of one flight may be.
-const GUST_SCATTER: f64 = 1.6;
+const GUST_SCATTER: f64 = 2.0;
 
 /// The deviation of gusts that would make the leftover, m/s, and what they leave; `None` where they would not make it.
 fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover)>, GapError> {
@@ -182,7 +182,7 @@ fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover
         unit += (windy.slow_floor.powi(2) - calm.slow_floor.powi(2)) / span;
     }
     let sigma = (excess.max(0.0) / unit + TURBULENCE_M_S.powi(2)).sqrt();
-    if !(sigma.is_finite() && sigma > GUST_MIN_M_S) {
+    if !(GUST_M_S.0..=GUST_M_S.1).contains(&sigma) {
         return Ok(None);
     }
     let mut left = blown(sigma);
