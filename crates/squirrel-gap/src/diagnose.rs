@@ -89,7 +89,7 @@ pub fn diagnose(
     let domain = covered(&predictor);
     let nominal = predictor.residual(&predictor.nominal())?;
     let places = find::places(&predictor, &nominal)?;
-    if let Some(problem) = compatibility::problem(&predictor, unseen.as_ref(), flights, held_out)? {
+    if let Some(problem) = compatibility::problem(&predictor, &nominal, unseen.as_ref(), flights, held_out)? {
         let verdict = Verdict {
             verdict: Kind::DataProblem,
             effects: Vec::new(),

@@ -67,6 +67,14 @@ impl Errors12 {
     fn new() -> Self {
         Self { squared: [Errors::zeros(); BINS], count: [0.0; BINS] }
     }
+    /// Adds one comparison, if it is one: a plant that has run away has none.
+    fn add(&mut self, bin: usize, parts: [Vector3<f64>; 4]) {
+        let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
+        if error.iter().all(|x| x.is_finite()) {
+            self.squared[bin] += error.component_mul(&error);
+            self.count[bin] += 1.0;
+        }
+    }
     /// Root mean square error of a channel at a horizon.
     pub(crate) fn rms(&self, channel: usize, bin: usize) -> f64 {
         (self.squared[bin][channel] / self.count[bin].max(1.0)).sqrt()
@@ -135,13 +143,7 @@ pub(crate) fn errors(predictor: &Predictor, hypothesis: &Hypothesis) -> Result<O
             let rate = mean(track.omega()) - read.omega;
             let force = mean(track.specific_force()) - read.specific_force;
             let velocity = velocity - velocity_then;
-            let error = Errors::from_iterator(
-                velocity.iter().chain(rotation.iter()).chain(rate.iter()).chain(force.iter()).copied(),
-            );
-            if error.iter().all(|x| x.is_finite()) {
-                all.squared[bin] += error.component_mul(&error);
-                all.count[bin] += 1.0;
-            }
+            all.add(bin, [velocity, rotation, rate, force]);
         })?;
     }
     Ok((all.count[0] > 0.0).then_some(all))
@@ -184,13 +186,7 @@ pub(crate) fn floor(
             let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
             let force =
                 other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
-            let error = Errors::from_iterator(
-                velocity.iter().chain(rotation.iter()).chain(rate.iter()).chain(force.iter()).copied(),
-            );
-            if error.iter().all(|x| x.is_finite()) {
-                all.squared[bin] += error.component_mul(&error);
-                all.count[bin] += 1.0;
-            }
+            all.add(bin, [velocity, rotation, rate, force]);
         })?;
     }
     Ok(all)

@@ -34,10 +34,13 @@ const SHIFT_MAX_S: f64 = 1.0;
 
 /// The first problem of the flights, if there is one.
 ///
+/// * `nominal` - residual of `predictor`'s flights against the vehicle as it is
+///
 /// # Errors
 /// What the predictor says.
 pub(crate) fn problem(
     predictor: &Predictor,
+    nominal: &[f64],
     unseen: Option<&Predictor>,
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
@@ -45,14 +48,15 @@ pub(crate) fn problem(
     if let Some(problem) = repeated(flights, held_out) {
         return Ok(Some(problem));
     }
-    for predictor in std::iter::once(predictor).chain(unseen) {
-        let residual = predictor.residual(&predictor.nominal())?;
+    let of_unseen = unseen.map(|unseen| unseen.residual(&unseen.nominal())).transpose()?;
+    let others = unseen.zip(of_unseen.as_deref());
+    for (predictor, residual) in std::iter::once((predictor, nominal)).chain(others) {
         for (piece, track) in predictor.tracks.iter().enumerate() {
             let found = voltage(predictor, track)
                 .or_else(|| force_unit(track))
                 .or_else(|| rates(track))
                 .or_else(|| fixes(track))
-                .or_else(|| model(predictor, piece, &residual));
+                .or_else(|| model(predictor, piece, residual));
             if let Some((channel, words)) = found {
                 let flight = predictor.names[track.flight].to_owned();
                 let words = format!("{flight}: {channel}: {words}");
@@ -68,21 +72,21 @@ type Found = Option<(&'static str, String)>;
 /// A flight that is given twice, whole or in part.
 fn repeated(flights: &[(String, FlightLog)], held_out: &[(String, FlightLog)]) -> Option<Problem> {
     const CHANNEL: &str = "imu.specific_force_body_m_s2";
-    let rows = |log: &FlightLog| -> Vec<Vec<u64>> {
+    let rows = |log: &FlightLog| -> Vec<[u64; 6]> {
         let Some((_, forces)) = log.channel(CHANNEL) else { return Vec::new() };
         let Some((_, rates)) = log.channel("imu.omega_body_rad_s") else { return Vec::new() };
         let pairs = forces.values.chunks_exact(3).zip(rates.values.chunks_exact(3));
-        pairs.map(|(f, w)| f.iter().chain(w).map(|x| x.to_bits()).collect()).collect()
+        pairs.map(|(f, w)| [f[0], f[1], f[2], w[0], w[1], w[2]].map(f64::to_bits)).collect()
     };
-    for (index, (name, log)) in flights.iter().chain(held_out).enumerate() {
-        let own: HashSet<Vec<u64>> = rows(log).into_iter().collect();
-        for (other, log) in flights.iter().chain(held_out).skip(index + 1) {
-            let theirs = rows(log);
+    let all: Vec<_> = flights.iter().chain(held_out).map(|(name, log)| (name, rows(log))).collect();
+    for (index, (name, own)) in all.iter().enumerate() {
+        let own: HashSet<&[u64; 6]> = own.iter().collect();
+        for (other, theirs) in &all[index + 1..] {
             let same = theirs.iter().filter(|row| own.contains(*row)).count();
             if 2 * same > theirs.len() {
                 let share = 100.0 * same as f64 / theirs.len() as f64;
                 return Some(Problem {
-                    flight: other.clone(),
+                    flight: (*other).clone(),
                     channel: CHANNEL,
                     words: format!(
                         "{other}: {CHANNEL}: {share:.0} % of its samples are those of {name}; a flight proves nothing about itself"

@@ -110,21 +110,29 @@ impl Leftover {
     }
 }
 
+/// What sensor noise and turbulence leave, often enough for a mean.
+pub(crate) fn noise(
+    predictor: &Predictor,
+    wind_columns: &[Vec<f64>; 3],
+    turbulence_m_s: f64,
+) -> Vec<Vec<f64>> {
+    floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS)
+}
+
 /// Compares a leftover with what noise alone leaves.
 ///
 /// * `left`, `nominal` - rows of the residual of the best explanation, and of the vehicle as it is
 /// * `motions` - of each piece, under the best explanation
+/// * `draws` - what noise alone leaves, of [`noise`]
 /// * `slack` - tolerances that no column of the model stands for
 pub(crate) fn leftover(
     predictor: &Predictor,
     motions: &[Motion],
     left: &[f64],
     nominal: &[f64],
-    wind_columns: &[Vec<f64>; 3],
-    turbulence_m_s: f64,
+    draws: &[Vec<f64>],
     slack: Slack,
 ) -> Leftover {
-    let draws = floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS);
     let mut bands = Vec::new();
     let mut worst = [0.0_f64; DYNAMIC];
     for segment in predictor.segments.iter().filter(|s| s.channel < DYNAMIC && s.rows.len() >= 4 * BLOCK) {

@@ -23,7 +23,7 @@ pub(crate) use payload::payload_lengths_m;
 pub(crate) use search::{Found, NATS_MIN, Scored, Search};
 
 use crate::GapError;
-use crate::leftover::{Leftover, Slack, leftover};
+use crate::leftover::{Leftover, Slack, leftover, noise};
 use crate::predictor::Hypothesis;
 
 /// Deviation of the air's own motion that is no wind worth a name, m/s.
@@ -86,7 +86,8 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
     let wind = predictor.wind_columns(&about)?;
     let slack = slack(search, &found);
-    let judged = |left: &[f64]| leftover(predictor, &motions, left, &nominal, &wind, TURBULENCE_M_S, slack);
+    let draws = noise(predictor, &wind, TURBULENCE_M_S);
+    let judged = |left: &[f64]| leftover(predictor, &motions, left, &nominal, &draws, slack);
     // Where little is known, a looser fit of what is seen well may be a worse one of the rest.
     let loose = loosened(&found, &point, left.clone());
     let (left, leftover) = match (judged(&left), judged(&loose)) {
@@ -162,16 +163,10 @@ fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover
     let wind = predictor.wind_columns(&naming.hypothesis)?;
     let motions: Vec<_> =
         (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
+    let slack = slack(search, &naming.found);
     let blown = |sigma: f64| {
-        leftover(
-            predictor,
-            &motions,
-            &naming.left,
-            &naming.nominal,
-            &wind,
-            sigma,
-            slack(search, &naming.found),
-        )
+        let draws = noise(predictor, &wind, sigma);
+        leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, slack)
     };
     // The floor is noise and wind, squared; two floors tell them apart.
     let (calm, windy) = (&naming.leftover, blown(TURBULENCE_M_S + 1.0));
