@@ -4,7 +4,7 @@ use crate::GapError;
 use crate::compatibility;
 use crate::find::{self, Place};
 use crate::name::{
-    Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, hypothesis,
+    Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, heights, hypothesis,
     payload_lengths_m, sds,
 };
 use crate::picture;
@@ -64,7 +64,9 @@ pub(crate) struct HeldOut {
     pub(crate) nominal: Errors12,
     pub(crate) rival: Option<Errors12>,
     pub(crate) fitted: Errors12,
+    /// What the explanation leaves if it is true, and what is left in air without gusts.
     pub(crate) floor: Errors12,
+    pub(crate) calm: Errors12,
 }
 
 /// Looks at flights of a vehicle and says which effect its file lacks.
@@ -120,7 +122,7 @@ pub fn diagnose(
     let catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
     let tick = || progress("naming");
     let search =
-        Search { predictor: &predictor, catalogue: &catalogue, beta: crate::name::BETA, progress: &tick };
+        Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
     let naming = explain(&search)?;
     let rivals = search.rivals(&naming.found)?;
     progress("flying the held-out flights");
@@ -309,10 +311,13 @@ fn prove(
     rival: Option<&Scored>,
 ) -> Result<Option<HeldOut>, GapError> {
     let at = |members: &[Member], base: &[f64]| -> Result<Hypothesis, GapError> {
-        // What floats inside its tolerance is shared; what the sensors of the other flights did is not.
-        let mut base = base[..search.catalogue.parameters.len()].to_vec();
+        // What floats inside its tolerance is shared; what the sensors of other flights did is not. A barometer's own error is
+        // found from its flight.
+        let mut base = base[..search.catalogue.shared_columns()].to_vec();
         base.resize(search.catalogue.columns(unseen), 0.0);
-        hypothesis(unseen, search.catalogue, &Point { members: members.to_vec(), base })
+        let mut point = Point { members: members.to_vec(), base };
+        heights(unseen, search.catalogue, &naming.found.linear.whitener, &mut point)?;
+        hypothesis(unseen, search.catalogue, &point)
     };
     let whole = search.whole(&naming.found.best);
     let fitted_at = at(&whole.members, &whole.base)?;
@@ -322,14 +327,25 @@ fn prove(
         Some(rival) => shrink::errors(unseen, &at(&rival.members, &search.whole(rival).base)?)?,
         None => None,
     };
-    let floor = shrink::floor(unseen, &fitted_at, naming.gust_m_s.unwrap_or(TURBULENCE_M_S))?;
-    Ok(Some(HeldOut { nominal, rival, fitted, floor }))
+    let calm = shrink::floor(unseen, &fitted_at, TURBULENCE_M_S)?;
+    let floor = match naming.gust_m_s {
+        Some(sigma) => shrink::floor(unseen, &fitted_at, sigma)?,
+        None => calm.clone(),
+    };
+    Ok(Some(HeldOut { nominal, rival, fitted, floor, calm }))
 }
 
 fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
-    let before = proof.nominal.over(&proof.floor);
+    // Gusts are no force that could be foreseen: with them, errors are as large as expected, and without them larger.
+    let before = proof.nominal.over(&proof.calm);
     let after = proof.fitted.over(&proof.floor);
     let best_rival = proof.rival.as_ref().map(|rival| rival.over(&proof.floor));
+    if std::env::var("GAPDEBUG").is_ok() {
+        for (name, e) in [("nominal", &proof.nominal), ("fitted", &proof.fitted)] {
+            let r: Vec<String> = e.mse().iter().zip(proof.floor.mse().iter()).map(|(m, f)| format!("{:.2}", m / f)).collect();
+            eprintln!("DEBUG {name} {}", r.join(" "));
+        }
+    }
     let removed = |left: f64| if before > 1.0 { 1.0 - (left - 1.0) / (before - 1.0) } else { 0.0 };
     Gap {
         held_out_flights: held_out.iter().map(|(name, _)| name.clone()).collect(),

@@ -177,6 +177,9 @@ impl CaseError {
 
 const STANDARD: &str = "standard";
 
+/// A case whose vehicle does not stay up is drawn anew so often: an effect near its largest can make a low hover impossible.
+const REDRAWS: u64 = 12;
+
 impl Case {
     /// The case of a number in a set. The same arguments give the same case.
     pub fn draw(set: Set, index: usize, seed: u64) -> Self {
@@ -240,7 +243,7 @@ impl Case {
             case.make(folder).map(|path| (case, path))
         };
         let mut made = make(seed);
-        for again in 1..4 {
+        for again in 1..REDRAWS {
             if !matches!(made, Err(CaseError::Flight { .. })) {
                 break;
             }

@@ -211,6 +211,28 @@ impl<T: Real> Vehicle<T> {
         }
         Ok(out)
     }
+    /// The vehicle with one rotor beside its place and with another reaction torque: rotors of one make scatter. Out of the
+    /// range of [`Self::rotors`], the vehicle itself.
+    ///
+    /// * `moved` - of the hub, m
+    /// * `torque_factor` - over what the rotor had
+    pub fn with_rotor_off(&self, rotor: usize, moved: In<Body, T>, torque_factor: T) -> Self {
+        let mut out = *self;
+        if let Some(own) = out.parameters.rotors[..self.parameters.rotor_count].get_mut(rotor) {
+            own.position = own.position + moved;
+            let wrench = &mut out.per_speed_squared;
+            wrench.roll[rotor] = wrench.roll[rotor] - moved.vector.y * wrench.thrust[rotor];
+            wrench.pitch[rotor] = wrench.pitch[rotor] + moved.vector.x * wrench.thrust[rotor];
+            wrench.yaw[rotor] *= torque_factor;
+        }
+        out
+    }
+    /// The vehicle with more linear drag along its axes, N s/m: the declared number holds to its tolerance along each.
+    pub fn with_more_drag(&self, linear_n_s_per_m: Vector3<T>) -> Self {
+        let mut out = *self;
+        out.parameters.drag.linear_n_s_per_m += linear_n_s_per_m;
+        out
+    }
     /// The checked numbers.
     #[inline(always)]
     pub fn parameters(&self) -> &Parameters<T> {

@@ -260,8 +260,12 @@ fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
     let outside =
         |(shift_s, fit): (f64, f64)| fit > 0.4 && !(COMMAND_SHIFT_S.0..=COMMAND_SHIFT_S.1).contains(&shift_s);
     let (shift_s, fit) = moments.best_shift(step_s, SHIFT_MAX_S);
+    // Air that damps the rates makes moments look early; rates alone never make them look so.
+    let undamped = moments.with_damping(&rates_of(track));
+    let early = |(shift_s, _): (f64, f64)| shift_s < 0.0;
     if outside((shift_s, fit))
         && outside(moments.first((n / 4).max((10.0 / step_s) as usize)).best_shift(step_s, SHIFT_MAX_S))
+        && !(early((shift_s, fit)) && !outside(undamped.best_shift(step_s, SHIFT_MAX_S)))
     {
         let words = if shift_s < 0.0 {
             format!("acts {:.0} ms before it is given", -1e3 * shift_s)
@@ -281,6 +285,11 @@ fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
     }
     let axes = forces.misnamed_axes(0.15)?;
     Some(("imu.specific_force_body_m_s2", format!("fits the model better with its axes as {axes}")))
+}
+
+/// Angular rates at the rows of the residual, rad/s.
+fn rates_of(track: &Track) -> Vec<Vector3<f64>> {
+    (0..track.measured.len()).map(|i| track.omega()[track.edge() + i * track.every]).collect()
 }
 
 /// Measured and predicted force or moment of a piece.
@@ -313,7 +322,9 @@ pub(crate) fn moments_fit(predictor: &Predictor, residual: &[f64]) -> bool {
         .filter(|(_, track)| track.measured.len() > 100)
         .map(|(piece, track)| {
             let step_s = track.every as f64 * track.period_s;
-            pairs_of(predictor, piece, residual, 3).best_shift(step_s, 0.2).1
+            let moments = pairs_of(predictor, piece, residual, 3);
+            let undamped = moments.with_damping(&rates_of(track));
+            moments.best_shift(step_s, 0.2).1.max(undamped.best_shift(step_s, 0.2).1)
         })
         .collect();
     fits.is_empty() || fits.iter().sum::<f64>() / fits.len() as f64 >= MOMENT_FIT

@@ -32,6 +32,24 @@ impl Pairs {
         Self(self.0[..n.min(self.0.len())].to_vec())
     }
 
+    /// The same with as much damping taken from each axis of the first as the second lacks.
+    ///
+    /// * `rates` - of the same times
+    pub(super) fn with_damping(&self, rates: &[Vector3<f64>]) -> Self {
+        let mut damping = Vector3::<f64>::zeros();
+        for axis in 0..3 {
+            let (mut lost, mut square) = (0.0, f64::MIN_POSITIVE);
+            for ((own, other), rate) in self.0.iter().zip(rates) {
+                lost += (other[axis] - own[axis]) * rate[axis];
+                square += rate[axis] * rate[axis];
+            }
+            // What would drive the rates is no damping.
+            damping[axis] = (lost / square).max(0.0);
+        }
+        let pairs = self.0.iter().zip(rates);
+        Self(pairs.map(|((own, other), rate)| (own + damping.component_mul(rate), *other)).collect())
+    }
+
     fn means(&self) -> (Vector3<f64>, Vector3<f64>) {
         let n = self.0.len().max(1) as f64;
         self.0.iter().fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (x, y)| (a + x / n, b + y / n))

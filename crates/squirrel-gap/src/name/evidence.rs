@@ -29,7 +29,11 @@ pub(crate) struct Posterior {
     sd: DVector<f64>,
 }
 
+/// Inner product over as many rows as both have: a column without rows is one of zeros.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    if a.is_empty() || b.is_empty() {
+        return 0.0;
+    }
     // Four sums side by side let the compiler use wide registers; their order is fixed.
     let mut sums = [0.0; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));

@@ -1,6 +1,7 @@
 //! Which published form of a named effect the flights ask for.
 
-use super::linear::{Linear, Member};
+use super::linear::Linear;
+use super::point::Member;
 use super::search::{Scored, Search};
 use crate::GapError;
 use squirrel_core::effects::{Effects, FORM, Kind};

@@ -31,7 +31,7 @@ pub(super) fn deviations(predictor: &Predictor, linear: &Linear, set: &Scored) -
         let block = (flight, (time_s / BLOCK_S).floor() as i64);
         let sum = blocks.entry(block).or_insert_with(|| DVector::zeros(live.len()));
         for (slot, &i) in live.iter().enumerate() {
-            sum[slot] += columns[i][row] * left[row];
+            sum[slot] += columns[i].get(row).map_or(0.0, |c| c * left[row]);
         }
     }
     let n = live.len();

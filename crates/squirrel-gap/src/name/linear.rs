@@ -1,34 +1,15 @@
-//! The predictor linearised about a set of effects: one column a parameter, by difference of two predictions.
+//! The predictor linearised about a set of effects: one column a number, by difference of two predictions.
+//!
+//! A column without rows is one of zeros: heights, where no effect of height acts.
 
-use super::evidence::Gram;
-use super::parameters::{Candidate, Catalogue, Parameter};
+use super::evidence::{BETA, Gram};
+use super::parameters::Catalogue;
+use super::point::{Other, Point, hypothesis};
 use super::whiten::Whitener;
 use crate::GapError;
-use crate::predictor::{Hypothesis, Predictor};
+use crate::leftover::noise;
+use crate::predictor::{HEIGHT_KNOTS, Predictor};
 use nalgebra::{DMatrix, DVector};
-use squirrel_core::effects::Effects;
-
-/// Tolerance of the tilt of an attitude estimate, rad.
-const TILT_RAD: f64 = 0.006;
-/// Tolerance of the barometer's zero, m.
-const HEIGHT_M: f64 = 0.2;
-
-/// An effect with its numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Member {
-    /// Index of its candidate.
-    pub(crate) candidate: usize,
-    /// All parameters in the order of the effect.
-    pub(crate) values: Vec<f64>,
-}
-
-/// Where the predictor is asked: effects that are named, and everything else inside its tolerance.
-#[derive(Debug, Clone)]
-pub(crate) struct Point {
-    pub(crate) members: Vec<Member>,
-    /// One number a column: the catalogue's parameters, then tilt (north, east) and height of each flight's sensors.
-    pub(crate) base: Vec<f64>,
-}
 
 /// The predictor as a linear model about a point.
 pub(crate) struct Linear {
@@ -44,130 +25,16 @@ pub(crate) struct Linear {
     pub(crate) gram: DMatrix<f64>,
 }
 
+/// Channels of the force, which gusts blow on.
+const FORCES: usize = 3;
 /// Part of what was measured that no model is trusted with.
 const DOUBT: f64 = 0.01;
 
-/// Numbers of a flight's sensors among the columns.
-const SENSOR_COLUMNS: usize = 3;
-
-/// The hypothesis of a point, on top of the vehicle file.
-///
-/// # Errors
-/// A mass or inertia that no body has.
-pub(crate) fn hypothesis(
-    predictor: &Predictor,
-    catalogue: &Catalogue,
-    point: &Point,
-) -> Result<Hypothesis, GapError> {
-    let mut all = predictor.nominal();
-    for member in &point.members {
-        if let Some(found) = all.effects.insert(catalogue.candidates[member.candidate].effect) {
-            found.values.copy_from_slice(&member.values);
-        }
-    }
-    let mut sides = [0.0; 2];
-    for (parameter, &x) in catalogue.parameters.iter().zip(&point.base) {
-        if x == 0.0 {
-            continue;
-        }
-        let candidate = &catalogue.candidates[parameter.candidate];
-        if candidate.effect == "wing_asymmetry" {
-            sides[candidate.fixed[0].1 as usize] = x;
-            continue;
-        }
-        let mut alone = catalogue.absent(predictor, parameter.candidate);
-        alone.values[parameter.slot] += x;
-        // What changes the airframe's numbers does so in a row, so that two rotors can be weak; the rest adds up.
-        let mut effects = Effects::none();
-        if let Some(found) = effects.insert(candidate.effect) {
-            found.values.copy_from_slice(&alone.values);
-        }
-        let altered =
-            effects.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
-        if altered == all.vehicle {
-            add(&mut all.effects, candidate, parameter.slot, x);
-        } else {
-            all.vehicle = altered;
-        }
-    }
-    // A loss on both sides is a change of the gain and a loss on one side.
-    if sides != [0.0; 2] {
-        let of = |effect: &str| catalogue.candidates.iter().find(|c| c.effect == effect);
-        let gain = match of("wing_asymmetry") {
-            Some(left) if !all.effects.has("wing_asymmetry") => {
-                add(&mut all.effects, left, 1, sides[0] - sides[1]);
-                -sides[1]
-            }
-            _ => -0.5 * (sides[0] + sides[1]),
-        };
-        if let Some(membrane) = of("wing_membrane") {
-            add(&mut all.effects, membrane, 0, gain);
-        }
-    }
-    for (errors, x) in
-        all.errors.iter_mut().zip(point.base[catalogue.parameters.len()..].chunks_exact(SENSOR_COLUMNS))
-    {
-        errors.tilt_rad = [x[0], x[1]];
-        errors.height_m = x[2];
-    }
-    Ok(all)
-}
-
-fn add(effects: &mut Effects<f64>, candidate: &Candidate, slot: usize, x: f64) {
-    let present = effects.has(candidate.effect);
-    if let Some(found) = effects.insert(candidate.effect) {
-        if !present {
-            for (slot, value) in candidate.fixed.iter().chain(&candidate.shape) {
-                found.values[*slot] = *value;
-            }
-        }
-        found.values[slot] += x;
-    }
-}
-
-impl Catalogue {
-    /// Numbers beside the members in a [`Point`].
-    pub(crate) fn columns(&self, predictor: &Predictor) -> usize {
-        self.parameters.len() + SENSOR_COLUMNS * predictor.names.len()
-    }
-
-    /// Whether a parameter has no slope at zero, so that nothing linear holds near it.
-    pub(crate) fn starts_flat(&self, parameter: &Parameter) -> bool {
-        ["ground_effect", "payload_swing"].contains(&self.candidates[parameter.candidate].effect)
-    }
-
-    /// Whether the slope of a parameter is another one after a few tolerances: lags and delays.
-    fn bends(&self, parameter: &Parameter) -> bool {
-        ["motor_lag", "actuation_latency", "clock_skew", "gnss_latency", "wing_servo_lag"]
-            .contains(&self.candidates[parameter.candidate].effect)
-    }
-
-    /// Which column the height of a flight is.
-    pub(crate) fn height_column(&self, flight: usize) -> usize {
-        self.parameters.len() + SENSOR_COLUMNS * flight + 2
-    }
-
-    /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the same choices.
-    pub(crate) fn absent(&self, predictor: &Predictor, candidate: usize) -> Member {
-        let own = &self.candidates[candidate];
-        let mut effects = predictor.vehicle.effects;
-        let present = effects.has(own.effect);
-        let mut values = effects.insert(own.effect).map_or_else(Vec::new, |found| found.values.to_vec());
-        let same = own.fixed.iter().all(|(slot, value)| values[*slot] == *value);
-        if !(present && same) {
-            values.fill(0.0);
-        }
-        for (slot, value) in own.fixed.iter().chain(&own.shape) {
-            values[*slot] = *value;
-        }
-        Member { candidate, values }
-    }
-}
-
 impl Linear {
-    /// Predicts every parameter once about a point, fits the whitening to what the fullest model leaves, and whitens.
+    /// Predicts every number once about a point, fits the whitening to what the fullest model leaves, and whitens.
     ///
-    /// * `before` - the same predictor about another point; where neither has members, columns that hardly bend are its
+    /// * `before` - the same predictor about another point: columns that hardly bend are its
+    /// * `gust_m_s` - deviation of gusts that blow: the noise is then theirs, by simulation
     ///
     /// # Errors
     /// What the predictor says.
@@ -176,66 +43,168 @@ impl Linear {
         catalogue: &Catalogue,
         point: &Point,
         before: Option<&Self>,
+        gust_m_s: Option<f64>,
     ) -> Result<Self, GapError> {
-        let before = before.filter(|b| b.point.members.is_empty() && point.members.is_empty());
-        let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
-        let n = catalogue.columns(predictor);
-        let first = point.base.iter().all(|x| *x == 0.0) && point.members.is_empty();
+        let plain = |point: &Point| point.members.is_empty();
+        let alike = before.filter(|b| plain(&b.point) && plain(point));
+        let about = hypothesis(predictor, catalogue, point)?;
+        let residual = predictor.residual(&about)?;
+        let first = point.base.iter().all(|x| *x == 0.0) && plain(point);
         let (mut raw, mut tolerance, mut widest) = (Vec::new(), Vec::new(), Vec::new());
-        for column in 0..n {
-            let mut moved = point.clone();
-            let parameter = catalogue.parameters.get(column);
-            let sensor = column.wrapping_sub(catalogue.parameters.len());
-            let member = parameter.and_then(|p| {
-                moved.members.iter_mut().find(|m| m.candidate == p.candidate).map(|m| &mut m.values[p.slot])
-            });
-            // From nothing, a secant to a typical size: it ranks large effects well, and some have no slope there. Once what
-            // is large has a name, a step of the tolerance: what is left stays inside it.
-            let step = match (parameter, member) {
-                (Some(p), Some(value)) => {
-                    *value += 0.1 * p.smallest;
-                    0.1 * p.smallest
-                }
-                (Some(p), None) => {
-                    let far = first || catalogue.starts_flat(p);
-                    let step =
-                        if far { (p.smallest * p.largest).sqrt() } else { p.tolerance.max(0.1 * p.smallest) };
-                    moved.base[column] += step;
-                    step
-                }
-                (None, _) => {
-                    let sd = [TILT_RAD, TILT_RAD, HEIGHT_M][sensor % SENSOR_COLUMNS];
-                    moved.base[column] += sd;
-                    sd
-                }
-            };
-            tolerance.push(parameter.map_or(step, |p| p.tolerance));
-            // At first anything may be large; about a point that explains the flights, only what has a name.
-            let named = parameter.is_some_and(|p| point.members.iter().any(|m| m.candidate == p.candidate));
-            widest.push(match parameter {
-                Some(p) if first || named => p.slab,
-                Some(p) => 3.0 * p.tolerance,
-                None => step,
-            });
-            if let Some(before) = before
-                && parameter.is_none_or(|p| !catalogue.bends(p))
-            {
-                raw.push(before.raw[column].clone());
-                continue;
-            }
-            let flight = parameter.is_none().then_some(sensor / SENSOR_COLUMNS);
+        // A column is the change of the residual for a step, of one flight or of all.
+        let difference = |moved: &Point, step: f64, flight| -> Result<Vec<f64>, GapError> {
             let mut after = residual.clone();
-            predictor.residual_of(&hypothesis(predictor, catalogue, &moved)?, flight, &mut after)?;
+            predictor.residual_of(&hypothesis(predictor, catalogue, moved)?, flight, &mut after)?;
             for (after, before) in after.iter_mut().zip(&residual) {
                 *after = (before - *after) / step;
             }
-            raw.push(after);
+            Ok(after)
+        };
+        for (column, parameter) in catalogue.parameters.iter().enumerate() {
+            let mut moved = point.clone();
+            let member = moved.members.iter_mut().find(|m| m.candidate == parameter.candidate);
+            // At first anything may be large; about a point that explains the flights, only what has a name.
+            widest.push(if first || member.is_some() { parameter.slab } else { 3.0 * parameter.tolerance });
+            tolerance.push(parameter.tolerance);
+            // From nothing, a secant to a typical size: it ranks large effects well, and some have no slope there. Once what
+            // is large has a name, a step of the tolerance: what is left stays inside it.
+            let step = if let Some(member) = member {
+                member.values[parameter.slot] += 0.1 * parameter.smallest;
+                0.1 * parameter.smallest
+            } else {
+                let far = first || catalogue.starts_flat(parameter);
+                let near = parameter.tolerance.max(0.1 * parameter.smallest);
+                let step = if far { (parameter.smallest * parameter.largest).sqrt() } else { near };
+                moved.base[column] += step;
+                step
+            };
+            raw.push(match alike {
+                Some(before) if !catalogue.bends(parameter) => before.raw[column].clone(),
+                _ => {
+                    let ahead = difference(&moved, step, None)?;
+                    if first && parameter.signed && catalogue.bends(parameter) {
+                        // Far from nothing, the two sides are not alike: the one that explains more.
+                        moved.base[column] -= 2.0 * step;
+                        let back = difference(&moved, -step, None)?;
+                        let left = |c: &[f64], x: f64| -> f64 {
+                            residual.iter().zip(c).map(|(r, c)| (r - c * x).powi(2)).sum()
+                        };
+                        if left(&ahead, step) <= left(&back, -step) { ahead } else { back }
+                    } else {
+                        ahead
+                    }
+                }
+            });
         }
-        let whitener = whitener(predictor, &raw, &widest, &residual);
+        for column in raw.len()..catalogue.columns(predictor) {
+            let (other, sd) = catalogue.other(column);
+            widest.push(sd);
+            tolerance.push(sd);
+            raw.push(match (other, before) {
+                (Other::Height { .. }, _) => Vec::new(),
+                (_, Some(before)) => before.raw[column].clone(),
+                (other, None) => {
+                    let mut moved = point.clone();
+                    moved.base[column] += sd;
+                    let flight = if let Other::Tilt { flight } = other { Some(flight) } else { None };
+                    difference(&moved, sd, flight)?
+                }
+            });
+        }
+        for (column, height) in height_columns(predictor, catalogue, point, &residual)? {
+            raw[column] = height;
+        }
+        let mut whitener = whitener(predictor, &raw, &widest, &residual);
+        if let Some(sigma) = gust_m_s {
+            let draws = noise(predictor, &predictor.wind_columns(&about)?, sigma);
+            whitener.refit(&predictor.segments, &draws, FORCES);
+        }
         let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = Gram::new(&columns, &vec![0.0; whitener.rows()]).g;
         Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram })
     }
+}
+
+/// Columns of the heights, by index, where an effect of height acts.
+///
+/// # Errors
+/// What the predictor says.
+pub(super) fn height_columns(
+    predictor: &Predictor,
+    catalogue: &Catalogue,
+    point: &Point,
+    residual: &[f64],
+) -> Result<Vec<(usize, Vec<f64>)>, GapError> {
+    let mut all = Vec::new();
+    if !catalogue.feels_height(&point.members) {
+        return Ok(all);
+    }
+    let mut first = catalogue.shared_columns();
+    for flight in 0..predictor.names.len() {
+        let heights: Vec<usize> = (first..catalogue.columns(predictor))
+            .filter(|column| matches!(catalogue.other(*column).0, Other::Height { flight: f } if f == flight))
+            .collect();
+        let [lowest, ..] = heights[..] else { continue };
+        first = lowest + HEIGHT_KNOTS;
+        // The force feels the height of its own time alone: one change of the whole flight's height is shared out by time.
+        // Upwards: a vehicle that a barometer has near or below the ground feels no slope there.
+        let step = -0.5 * catalogue.other(lowest).1;
+        let mut moved = point.clone();
+        for column in &heights {
+            moved.base[*column] += step;
+        }
+        let mut after = residual.to_vec();
+        predictor.residual_of(&hypothesis(predictor, catalogue, &moved)?, Some(flight), &mut after)?;
+        for (knot, column) in heights.into_iter().enumerate() {
+            let mut slope = vec![0.0; residual.len()];
+            for segment in predictor.segments.iter().filter(|s| s.flight == flight) {
+                let track = &predictor.tracks[segment.piece];
+                for (i, row) in segment.rows.clone().enumerate() {
+                    let share = track.height_share(knot, segment.t0_s + i as f64 * segment.step_s);
+                    slope[row] = share * (residual[row] - after[row]) / step;
+                }
+            }
+            all.push((column, slope));
+        }
+    }
+    Ok(all)
+}
+
+/// Steps towards the heights of flights.
+const HEIGHT_STEPS: usize = 5;
+
+/// Puts the barometer's errors of flights where they fit best inside their tolerance, if anything acts that feels height.
+///
+/// # Errors
+/// What the predictor says.
+pub(crate) fn heights(
+    predictor: &Predictor,
+    catalogue: &Catalogue,
+    whitener: &Whitener,
+    point: &mut Point,
+) -> Result<(), GapError> {
+    for _ in 0..HEIGHT_STEPS {
+        let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
+        let (index, columns): (Vec<usize>, Vec<Vec<f64>>) =
+            height_columns(predictor, catalogue, point, &residual)?.into_iter().unzip();
+        if index.is_empty() {
+            break;
+        }
+        let segments = &predictor.segments;
+        let mut y = whitener.apply(segments, &residual);
+        let white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.apply(segments, c)).collect();
+        for (column, c) in index.iter().zip(&white) {
+            for (y, c) in y.iter_mut().zip(c) {
+                *y += c * point.base[*column];
+            }
+        }
+        let sd: Vec<f64> = index.iter().map(|column| catalogue.other(*column).1).collect();
+        let Some(posterior) = Gram::new(&white, &y).posterior(&sd, BETA) else { break };
+        for (column, x) in index.iter().zip(posterior.mean.iter()) {
+            point.base[*column] = *x;
+        }
+    }
+    Ok(())
 }
 
 /// The whitening of what the fullest model leaves: each pass fits every column, then the autoregression to the rest.
@@ -250,6 +219,12 @@ fn whitener(predictor: &Predictor, columns: &[Vec<f64>], widest: &[f64], residua
         let Some(posterior) = gram.posterior(widest, 1.0) else { break };
         let left = subtract(residual, columns, &posterior.mean);
         whitener = Whitener::fit(&predictor.segments, &left, &doubt);
+        if std::env::var("GAPDEBUG").is_ok() {
+            let seg: Vec<f64> = predictor.segments.iter().filter(|s| s.channel == 2).flat_map(|s| left[s.rows.clone()].to_vec()).collect();
+            let r: Vec<f64> = predictor.segments.iter().filter(|s| s.channel == 2).flat_map(|s| residual[s.rows.clone()].to_vec()).collect();
+            let bm = |x: &[f64]| { let mut v: Vec<f64> = x.chunks(8).map(|b| (b.iter().sum::<f64>() / 8.0).abs()).collect(); v.sort_by(f64::total_cmp); (v[v.len() / 2], v[v.len() * 9 / 10], v[v.len() - 1]) };
+            eprintln!("DEBUG white fz {} left blocks {:?} residual blocks {:?}", whitener.describe(2), bm(&seg), bm(&r));
+        }
     }
     whitener
 }

@@ -12,14 +12,15 @@ mod interval;
 mod linear;
 mod parameters;
 mod payload;
+mod point;
 mod rivals;
 mod search;
 mod whiten;
 
-pub(crate) use evidence::BETA;
-pub(crate) use linear::{Member, Point, hypothesis};
+pub(crate) use linear::heights;
 pub(crate) use parameters::{Catalogue, sds};
 pub(crate) use payload::payload_lengths_m;
+pub(crate) use point::{Member, Point, hypothesis};
 pub(crate) use search::{Found, NATS_MIN, Scored, Search};
 
 use crate::GapError;
@@ -52,25 +53,34 @@ pub(crate) struct Naming {
 /// What the predictor says.
 pub(crate) fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
     let naming = judge(search, search.run()?)?;
-    if as_gust(search, &naming)?.is_none() {
+    if !naming.leftover.is_real() {
         return Ok(naming);
     }
-    // Gusts look like drag for a while: what is named beside them must be worth it in their noise, too.
-    let calm = Search { beta: GUST_BETA, ..*search };
-    let mut again = judge(&calm, calm.run()?)?;
-    match as_gust(search, &again)? {
-        Some((sigma, leftover)) => {
-            again.gust_m_s = Some(sigma);
-            again.gust_nats = gust_nats(&again.leftover);
-            again.leftover = leftover;
-            Ok(again)
-        }
-        None => Ok(naming),
+    let Some(sigma) = gust_of(search, &naming)? else { return Ok(naming) };
+    // Gusts look like drag or wind for a while: what is named beside them must be worth it in their noise.
+    let windy = Search { gust_m_s: Some(sigma), ..*search };
+    let mut again = judge(&windy, windy.run()?)?;
+    let Some(sigma) = gust_of(&windy, &again)? else { return Ok(naming) };
+    let calm = blown(search, &again, TURBULENCE_M_S)?;
+    if calm.is_foreign() || calm.is_predicted() {
+        return Ok(naming);
     }
+    let mut left = blown(search, &again, sigma)?;
+    if std::env::var("GAPDEBUG").is_ok() {
+        let names: Vec<_> = again.found.best.members.iter().map(|m| (search.effect(m), m.values.clone())).collect();
+        eprintln!("DEBUG as_gust {sigma:.2} {:.2?} calm {:.2?} fam {:?} kurt {:.1} line {:?} {names:?} worth {:.0?}", left.excess, calm.excess, &calm.families[..2.min(calm.families.len())], calm.kurtosis, calm.line, again.found.worth);
+    }
+    // A flight holds few gusts: their size scatters from one to the next.
+    if left.excess.iter().any(|(channel, ratio)| *channel > 2 || *ratio >= GUST_SCATTER) {
+        return Ok(naming);
+    }
+    left.excess.clear();
+    again.gust_m_s = Some(sigma);
+    again.gust_nats = gust_nats(&calm);
+    again.leftover = left;
+    Ok(again)
 }
 
-/// Tempering where gusts blow.
-const GUST_BETA: f64 = 0.05;
 /// What floats may be off by this many tolerances before a leftover is a leftover.
 const LEFTOVER_TOLERANCES: f64 = 2.0;
 /// Most tolerances that anything may be off by in it.
@@ -86,7 +96,7 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
     let wind = predictor.wind_columns(&about)?;
     let slack = slack(search, &found);
-    let draws = noise(predictor, &wind, TURBULENCE_M_S);
+    let draws = noise(predictor, &wind, search.gust_m_s.unwrap_or(TURBULENCE_M_S));
     let judged = |left: &[f64]| leftover(predictor, &motions, left, &nominal, &draws, slack);
     // Where little is known, a looser fit of what is seen well may be a worse one of the rest.
     let loose = loosened(&found, &point, left.clone());
@@ -94,7 +104,10 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
         (as_it_is, looser) if as_it_is.worst() < looser.worst() => (left, as_it_is),
         (_, looser) => (loose, looser),
     };
-    let deviations = interval::deviations(predictor, &found.linear, &found.best);
+    let mut deviations = interval::deviations(predictor, &found.linear, &found.best);
+    for (sd, (member, slot)) in deviations.iter_mut().zip(&found.best.free) {
+        *sd = sd.hypot(catalogue.spread(&found.best.members[*member], *slot));
+    }
     Ok(Naming {
         found,
         hypothesis: about,
@@ -149,42 +162,36 @@ fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
 }
 
 /// Smallest and largest deviation that is called a gust, m/s; what asks for more is no gust.
-const GUST_M_S: (f64, f64) = (0.4, 2.5);
+const GUST_M_S: (f64, f64) = (0.4, 3.2);
 
 /// How far above their mean the gusts of one flight may be.
 const GUST_SCATTER: f64 = 2.0;
 
-/// The deviation of gusts that would make the leftover, m/s, and what they leave; `None` where they would not make it.
-fn as_gust(search: &Search<'_>, naming: &Naming) -> Result<Option<(f64, Leftover)>, GapError> {
-    if !naming.leftover.is_real() || naming.leftover.is_foreign() || naming.leftover.is_predicted() {
-        return Ok(None);
-    }
+/// What an explanation leaves if gusts of a deviation blow.
+fn blown(search: &Search<'_>, naming: &Naming, sigma: f64) -> Result<Leftover, GapError> {
     let predictor = search.predictor;
     let wind = predictor.wind_columns(&naming.hypothesis)?;
     let motions: Vec<_> =
         (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
+    let draws = noise(predictor, &wind, sigma);
     let slack = slack(search, &naming.found);
-    let blown = |sigma: f64| {
-        let draws = noise(predictor, &wind, sigma);
-        leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, slack)
-    };
+    Ok(leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, slack))
+}
+
+/// The deviation of gusts that would make the leftover of the horizontal force, m/s, if it is one of gusts.
+fn gust_of(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError> {
     // The floor is noise and wind, squared; two floors tell them apart.
-    let (calm, windy) = (&naming.leftover, blown(TURBULENCE_M_S + 1.0));
-    let span = (TURBULENCE_M_S + 1.0).powi(2) - TURBULENCE_M_S.powi(2);
+    let assumed = search.gust_m_s.unwrap_or(TURBULENCE_M_S);
+    let (now, windier) = (&naming.leftover, blown(search, naming, assumed + 1.0)?);
+    let span = (assumed + 1.0).powi(2) - assumed.powi(2);
     let (mut excess, mut unit) = (0.0, 0.0);
-    for (calm, windy) in calm.bands.iter().zip(&windy.bands).filter(|(b, _)| b.channel < 2) {
-        excess += calm.slow.powi(2) - calm.slow_floor.powi(2);
-        unit += (windy.slow_floor.powi(2) - calm.slow_floor.powi(2)) / span;
+    for (now, windier) in now.bands.iter().zip(&windier.bands).filter(|(b, _)| b.channel < 2) {
+        excess += now.slow.powi(2) - now.slow_floor.powi(2);
+        unit += (windier.slow_floor.powi(2) - now.slow_floor.powi(2)) / span;
     }
-    let sigma = (excess.max(0.0) / unit + TURBULENCE_M_S.powi(2)).sqrt();
-    if !(GUST_M_S.0..=GUST_M_S.1).contains(&sigma) {
-        return Ok(None);
-    }
-    let mut left = blown(sigma);
-    // A flight holds few gusts: their size scatters from one to the next.
-    let scatter = left.excess.iter().all(|(channel, ratio)| *channel < 3 && *ratio < GUST_SCATTER);
-    left.excess.clear();
-    Ok(scatter.then_some((sigma, left)))
+    let sigma = (excess / unit + assumed.powi(2)).max(0.0).sqrt();
+    if std::env::var("GAPDEBUG").is_ok() { eprintln!("DEBUG gust_of {sigma:.2}"); }
+    Ok((GUST_M_S.0..=GUST_M_S.1).contains(&sigma).then_some(sigma))
 }
 
 /// Independent blocks that a flight counts for in the evidence of gusts: they last longer than a block.

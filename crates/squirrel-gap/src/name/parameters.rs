@@ -4,6 +4,7 @@
 //! deviation of the nominal number that the effect would change, and, where the effect is hypothesised, its **slab**, as wide
 //! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
 
+use super::point::{Airframe, Member};
 use crate::GapError;
 use crate::leftover::Slack;
 use crate::predictor::Predictor;
@@ -13,6 +14,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.
 const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
+/// Part of a sample to which times are known, one standard deviation: it is held for all of it.
+const SAMPLE_SHARE: f64 = 0.29;
 /// Width of the slab over the largest plausible size.
 pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
 /// Effects that are known by their moments, and by what moving air does; without these channels nothing is said of them.
@@ -50,6 +53,8 @@ pub(crate) struct Parameter {
     pub(crate) tolerance: f64,
     /// Standard deviation of the slab.
     pub(crate) slab: f64,
+    /// By how much the number that the effect adds to is off by itself, one standard deviation: flights show only the sum.
+    pub(crate) spread: f64,
 }
 
 /// One effect, with its choices made: which rotor, which axis, which side.
@@ -68,6 +73,8 @@ pub(crate) struct Candidate {
 pub(crate) struct Catalogue {
     pub(crate) candidates: Vec<Candidate>,
     pub(crate) parameters: Vec<Parameter>,
+    /// Numbers of the airframe beside them, with their tolerances.
+    pub(crate) airframe: Vec<(Airframe, f64)>,
 }
 
 impl Catalogue {
@@ -81,7 +88,8 @@ impl Catalogue {
             (MOMENTS.contains(&name) && !predictor.has_channel(3))
                 || (DRAG.contains(&name) && !predictor.has_channel(0))
         };
-        let mut all = Self { candidates: Vec::new(), parameters: Vec::new() };
+        let mut all =
+            Self { candidates: Vec::new(), parameters: Vec::new(), airframe: airframe(predictor) };
         for name in Effects::<f64>::NAMES {
             if *name == "gust"
                 || unseen(name)
@@ -100,7 +108,22 @@ impl Catalogue {
                 }
             }
         }
+        for parameter in &mut all.parameters {
+            let effect = all.candidates[parameter.candidate].effect;
+            parameter.spread = match timing_s(predictor, effect) {
+                Some(spread) => spread,
+                // What has no declared number has none to be off.
+                None if parameter.tolerance == SHARE_OF_SMALLEST * parameter.smallest => 0.0,
+                None => parameter.tolerance,
+            };
+        }
         Ok(all)
+    }
+
+    /// By how much the number that a member's slot adds to is off by itself, one standard deviation.
+    pub(crate) fn spread(&self, member: &Member, slot: usize) -> f64 {
+        let own = |p: &&Parameter| p.candidate == member.candidate && p.slot == slot;
+        self.parameters.iter().find(own).map_or(0.0, |p| p.spread)
     }
 
     /// Tolerances of what has no number of its own.
@@ -113,8 +136,6 @@ impl Catalogue {
             lever_m: of("cg_x_m"),
             timing_s,
             thrust_fraction,
-            drag_n_s_per_m: of("extra_drag_n_s_per_m"),
-            torque_fraction: of("torque_fraction"),
         }
     }
 
@@ -151,11 +172,49 @@ impl Catalogue {
                 signed,
                 tolerance: tolerance(vehicle, effect, slot, &fixed, smallest)?,
                 slab: SLAB_OF_LARGEST * largest,
+                spread: 0.0,
             });
         }
         self.candidates.push(Candidate { effect, fixed, parameters: own, shape: started });
         Ok(())
     }
+}
+
+/// How well a log tells when things happen, in the unit of an effect that is about time: a part of a sample, a clock's over
+/// its flight.
+fn timing_s(predictor: &Predictor, effect: &str) -> Option<f64> {
+    let track = predictor.tracks.first()?;
+    let sample_s = SAMPLE_SHARE * track.period_s;
+    match effect {
+        "actuation_latency" | "gnss_latency" => Some(sample_s),
+        "clock_skew" => Some(1e6 * sample_s / (track.period_s * track.time_s.len() as f64)),
+        _ => None,
+    }
+}
+
+/// Numbers of the airframe that have a declared tolerance, where flights show them.
+fn airframe(predictor: &Predictor) -> Vec<(Airframe, f64)> {
+    let vehicle = predictor.vehicle;
+    let p = vehicle.vehicle.parameters();
+    let mut all = Vec::new();
+    if predictor.has_channel(3) {
+        let torque = p.propulsion.torque_coefficient_n_m_s2;
+        for rotor in 0..p.rotor_count {
+            let arm = sds(vehicle, &format!("rotor[{rotor}].position_body_m"));
+            for axis in 0..2 {
+                all.extend(arm.as_ref().map(|sd| (Airframe::Arm { rotor, axis }, sd[axis.min(sd.len() - 1)])));
+            }
+            let sd = sds(vehicle, "propulsion.torque_coefficient_n_m_s2");
+            all.extend(sd.filter(|_| torque > 0.0).map(|sd| (Airframe::Torque { rotor }, sd[0] / torque)));
+        }
+    }
+    if predictor.has_channel(0) {
+        let drag = sds(vehicle, "drag.linear_n_s_per_m");
+        for axis in 1..3 {
+            all.extend(drag.as_ref().map(|sd| (Airframe::Drag { axis }, sd[axis.min(sd.len() - 1)])));
+        }
+    }
+    all
 }
 
 /// Every way in which the choices of an effect can be made.
@@ -244,8 +303,8 @@ fn tolerance(
         "accel_bias" => declared("sensors.imu.accel_bias_m_s2", 0.02)?,
         "heading_bias" => declared("sensors.attitude.bias_rad", 0.5_f64.to_radians())?,
         "constant_wind" => 0.12,
-        // A vehicle carries a load or it does not.
-        "payload_swing" => 0.0,
+        // A vehicle carries a load or it does not; a ground effect of a small radius is none.
+        "payload_swing" | "ground_effect" => 0.0,
         _ => none,
     })
 }

@@ -1,8 +1,9 @@
 //! The search for the set of effects with the most evidence: forward, drop, swap, each step refined through the simulator.
 
-use super::evidence::{Gram, Posterior, dot};
-use super::linear::{Linear, Member, Point, hypothesis};
+use super::evidence::{BETA, Gram, Posterior, dot};
+use super::linear::{Linear, height_columns};
 use super::parameters::{Candidate, Catalogue, SLAB_OF_LARGEST};
+use super::point::{Member, Other, Point, hypothesis};
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
 use nalgebra::DMatrix;
@@ -12,6 +13,8 @@ use std::collections::BTreeMap;
 pub(crate) const NATS_MIN: f64 = 6.0;
 /// What each further effect must be worth: a wrong first number leaves a little to explain.
 const FURTHER_NATS: f64 = 10.0;
+/// What an effect must be worth beside gusts, which blow harder at times than at others.
+const BESIDE_GUSTS_NATS: f64 = 20.0;
 /// Part of the smallest size worth reporting that an effect must reach.
 const SIZE_MIN: f64 = 0.5;
 /// How much larger than the largest plausible size a number may be.
@@ -19,9 +22,11 @@ const PLAUSIBLE: f64 = 1.3;
 /// Candidates that are refined after each linear ranking.
 const REFINED: usize = 4;
 /// Most steps of a refinement.
-const STEPS_MAX: usize = 6;
+const STEPS_MAX: usize = 10;
 /// Evidence that a step towards the mode may cost, nats.
 const STEP_NATS: f64 = 1.0;
+/// Part of the smallest size worth reporting below which a step is the last.
+const CONVERGED: f64 = 0.01;
 /// Part of its tolerance by which a number must be off to act in the simulator's own model.
 const ACTS: f64 = 0.7;
 /// Most effects in a set.
@@ -52,8 +57,8 @@ pub(crate) struct Scored {
 pub(crate) struct Search<'a> {
     pub(crate) predictor: &'a Predictor<'a>,
     pub(crate) catalogue: &'a Catalogue,
-    /// Tempering of the likelihood.
-    pub(crate) beta: f64,
+    /// Deviation of gusts that are taken for noise, m/s, if any blow.
+    pub(crate) gust_m_s: Option<f64>,
     /// Called after each piece of work.
     pub(crate) progress: &'a dyn Fn(),
 }
@@ -76,7 +81,8 @@ impl Search<'_> {
         let mut round = 1;
         let mut before: Option<Linear> = None;
         loop {
-            let linear = Linear::about(self.predictor, self.catalogue, &point, before.as_ref())?;
+            let linear =
+                Linear::about(self.predictor, self.catalogue, &point, before.as_ref(), self.gust_m_s)?;
             (self.progress)();
             let null = self.score(&linear, &[])?;
             let mut best = self.score(&linear, &point.members)?;
@@ -85,6 +91,7 @@ impl Search<'_> {
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
                 self.prune(&linear, &mut best)?;
+                self.finish(&mut best);
                 let worth = self.worth(&linear, &null, &best)?;
                 return Ok(Found { linear, null, best, worth });
             }
@@ -126,6 +133,17 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// The last step of a refinement that has converged, too short to be worth another look.
+    fn finish(&self, best: &mut Scored) {
+        for (column, (member, slot)) in best.free.iter().enumerate() {
+            let (smallest, ..) = self.range(&best.members[*member], *slot);
+            let step = best.posterior.mean[column] - best.members[*member].values[*slot];
+            if step.abs() < CONVERGED * smallest {
+                best.members[*member].values[*slot] += step;
+            }
+        }
+    }
+
     fn worth(&self, linear: &Linear, null: &Scored, best: &Scored) -> Result<Vec<f64>, GapError> {
         (0..best.members.len())
             .map(|i| {
@@ -160,7 +178,11 @@ impl Search<'_> {
     fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
         while best.members.len() < MEMBERS_MAX {
             let Some(next) = self.best_addition(linear, best, &[])? else { break };
-            let needed = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
+            let needed = match (self.gust_m_s, best.members.is_empty()) {
+                (Some(_), _) => BESIDE_GUSTS_NATS,
+                (None, true) => NATS_MIN,
+                (None, false) => FURTHER_NATS,
+            };
             if next.log_evidence < best.log_evidence + needed {
                 break;
             }
@@ -180,8 +202,11 @@ impl Search<'_> {
     ) -> Result<Option<Scored>, GapError> {
         let mut best: Option<Scored> = None;
         for member in self.ranked(set, except).into_iter().take(REFINED) {
-            let members = [set.members.as_slice(), &[member.1]].concat();
+            let members = [set.members.as_slice(), &[member.1.clone()]].concat();
             let scored = self.score(linear, &members)?;
+            if std::env::var("GAPDEBUG").is_ok() {
+                eprintln!("DEBUG add {} lin {:.1} {:?} -> {:.1} {:?} (now {:.1})", self.effect(&member.1), member.0, member.1.values, scored.log_evidence, scored.members.last().map(|m| &m.values), set.log_evidence);
+            }
             (self.progress)();
             if self.is_large(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
                 best = Some(scored);
@@ -234,7 +259,7 @@ impl Search<'_> {
             for p in &candidate.parameters {
                 prior[offset + p] = self.catalogue.parameters[*p].slab;
             }
-            let Some(posterior) = set.gram.posterior(&prior, self.beta) else { continue };
+            let Some(posterior) = set.gram.posterior(&prior, BETA) else { continue };
             let mut member = self.catalogue.absent(self.predictor, index);
             let mut plausible = true;
             for p in &candidate.parameters {
@@ -243,6 +268,10 @@ impl Search<'_> {
                 *value += posterior.mean[offset + p];
                 plausible &= parameter.signed || *value > 0.0;
                 *value = value.clamp(-1.5 * parameter.largest, 1.5 * parameter.largest);
+                // What starts flat is not found from below.
+                if self.catalogue.starts_flat(parameter) {
+                    *value = value.max(parameter.smallest);
+                }
             }
             if plausible {
                 all.push((posterior.log_evidence, member));
@@ -301,7 +330,13 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn score(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
-        let mut best = self.evaluate(linear, members)?;
+        let mut base = linear.point.base.clone();
+        let along = self.moving_along(linear, members);
+        // A lag that is new explains what others were taken to be off for: they start at nothing.
+        for (column, _) in along.iter().filter(|(column, _)| *column < self.catalogue.parameters.len()) {
+            base[*column] = 0.0;
+        }
+        let mut best = self.evaluate(linear, members, &base)?;
         let mut share = 1.0;
         for _ in 0..STEPS_MAX {
             let mut next = best.members.clone();
@@ -315,15 +350,26 @@ impl Search<'_> {
                 moved = moved.max(step.abs() / smallest);
                 *value += step;
             }
-            if moved < 0.01 {
+            let before = base.clone();
+            for (column, sd) in &along {
+                let target = best.posterior.mean[best.free.len() + column].clamp(-3.0 * sd, 3.0 * sd);
+                let step = share * (target - base[*column]);
+                moved = moved.max(0.1 * step.abs() / sd);
+                base[*column] += step;
+            }
+            if moved < CONVERGED {
                 break;
             }
-            let scored = self.evaluate(linear, &next)?;
+            let scored = self.evaluate(linear, &next, &base)?;
+            if std::env::var("GAPDEBUG").is_ok() && self.catalogue.feels_height(members) {
+                eprintln!("DEBUG gn {:.1} -> {:.1} share {share} values {:?} heights {:.2?}", best.log_evidence, scored.log_evidence, next[0].values, &base[self.catalogue.shared_columns()..]);
+            }
             // Where the model is linear, every point of it has the same evidence: the mode is where steps end.
             if scored.log_evidence > best.log_evidence - STEP_NATS {
                 best = scored;
             } else {
                 // Too far for what the columns know: half the way.
+                base = before;
                 share *= 0.5;
                 if share < 0.2 {
                     break;
@@ -333,30 +379,32 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Whitened columns of the height of each flight, by index, where an effect of height acts that did not act where the
-    /// predictor was linearised: without it, height is worth nothing.
-    fn height_columns(
-        &self,
-        linear: &Linear,
-        point: &Point,
-        residual: &[f64],
-    ) -> Result<BTreeMap<usize, Vec<f64>>, GapError> {
-        let acts = |members: &[Member]| members.iter().any(|m| self.effect(m) == "ground_effect");
-        let mut all = BTreeMap::new();
-        if !acts(&point.members) || acts(&linear.point.members) {
-            return Ok(all);
+    /// Columns that bend so much beside some members that they are refined with them, with their tolerances: heights where
+    /// thrust feels them, and lags and delays beside one of them that is new.
+    fn moving_along(&self, linear: &Linear, members: &[Member]) -> Vec<(usize, f64)> {
+        let catalogue = self.catalogue;
+        let bends = |m: &Member| {
+            catalogue.candidates[m.candidate]
+                .parameters
+                .iter()
+                .any(|p| catalogue.bends(&catalogue.parameters[*p]))
+        };
+        let is_new = |m: &Member| !linear.point.members.iter().any(|other| other.candidate == m.candidate);
+        let mut all = Vec::new();
+        if members.iter().any(|m| bends(m) && is_new(m)) {
+            let own = |p: usize| members.iter().any(|m| m.candidate == p);
+            let free = catalogue.parameters.iter().enumerate();
+            let bending = free.filter(|(_, p)| catalogue.bends(p) && !own(p.candidate) && p.tolerance > 0.0);
+            all.extend(bending.map(|(column, p)| (column, p.tolerance)));
         }
-        for flight in 0..self.predictor.names.len() {
-            let column = self.catalogue.height_column(flight);
-            let step = linear.tolerance[column];
-            let mut moved = point.clone();
-            moved.base[column] += step;
-            let mut after = residual.to_vec();
-            self.predictor.residual_of(&self.hypothesis(&moved)?, Some(flight), &mut after)?;
-            let slope: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
-            all.insert(column, linear.whitener.apply(&self.predictor.segments, &slope));
+        if catalogue.feels_height(members) {
+            let sensors = catalogue.shared_columns()..linear.point.base.len();
+            all.extend(sensors.filter_map(|column| match catalogue.other(column) {
+                (Other::Height { .. }, sd) => Some((column, sd)),
+                _ => None,
+            }));
         }
-        Ok(all)
+        all
     }
 
     /// Range of a number of a member.
@@ -370,9 +418,9 @@ impl Search<'_> {
     }
 
     /// Evidence of a set, linearised in its free numbers where they are.
-    fn evaluate(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
+    fn evaluate(&self, linear: &Linear, members: &[Member], base: &[f64]) -> Result<Scored, GapError> {
         let segments = &self.predictor.segments;
-        let mut point = Point { members: members.to_vec(), base: linear.point.base.clone() };
+        let mut point = Point { members: members.to_vec(), base: base.to_vec() };
         let mut spikes = linear.tolerance.clone();
         for member in members {
             let candidate = &self.catalogue.candidates[member.candidate];
@@ -389,7 +437,18 @@ impl Search<'_> {
         }
         let residual = self.predictor.residual(&self.hypothesis(&point)?)?;
         let mut y = linear.whitener.apply(segments, &residual);
-        let fresh = self.height_columns(linear, &point, &residual)?;
+        // Height matters where an effect of it acts, and as much as it acts.
+        if !self.catalogue.feels_height(members) {
+            for (column, spike) in spikes.iter_mut().enumerate().skip(self.catalogue.shared_columns()) {
+                if matches!(self.catalogue.other(column).0, Other::Height { .. }) {
+                    *spike = 0.0;
+                }
+            }
+        }
+        let mut fresh = BTreeMap::new();
+        for (index, column) in height_columns(self.predictor, self.catalogue, &point, &residual)? {
+            fresh.insert(index, linear.whitener.apply(segments, &column));
+        }
         let column = |j: usize| fresh.get(&j).unwrap_or(&linear.columns[j]);
         for (j, x) in point.base.iter().enumerate() {
             if *x != 0.0 {
@@ -439,7 +498,7 @@ impl Search<'_> {
             }
         }
         prior.extend(spikes);
-        let posterior = gram.posterior(&prior, self.beta).ok_or(GapError::NoFlights)?;
+        let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NoFlights)?;
         Ok(Scored {
             members: members.to_vec(),
             log_evidence: posterior.log_evidence,

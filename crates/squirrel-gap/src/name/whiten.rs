@@ -8,6 +8,10 @@ use nalgebra::{DMatrix, DVector};
 
 /// Order of the autoregression.
 const ORDER: usize = 8;
+/// Rows of a block that is looked at as a whole, and how many robust deviations of all blocks its mean may be off: a burst
+/// that no column explains is no noise.
+const BLOCK: usize = 8;
+const BURST: f64 = 4.0;
 
 /// The filters of all channels.
 #[derive(Debug, Clone)]
@@ -31,10 +35,22 @@ impl Whitener {
                 rows += own.iter().map(|s| s.rows.len() - ORDER).sum::<usize>();
                 let of =
                     |rows: &'_ [f64]| own.iter().map(|s| rows[s.rows.clone()].to_vec()).collect::<Vec<_>>();
-                autoregression(&of(noise), &of(doubt))
+                autoregression(&calm(&of(noise)), &of(doubt))
             })
             .collect();
         Self { filters, rows }
+    }
+
+    /// Fits the first channels anew, to draws of the noise.
+    pub(crate) fn refit(&mut self, segments: &[Segment], draws: &[Vec<f64>], channels: usize) {
+        for (channel, filter) in self.filters.iter_mut().enumerate().take(channels) {
+            let own = segments.iter().filter(|s| s.channel == channel && s.rows.len() > 3 * ORDER);
+            let series: Vec<Vec<f64>> =
+                own.flat_map(|s| draws.iter().map(|draw| draw[s.rows.clone()].to_vec())).collect();
+            if filter.is_some() {
+                *filter = autoregression(&series, &[]);
+            }
+        }
     }
 
     /// White noise of the size of what changes from one row to the next.
@@ -57,13 +73,19 @@ impl Whitener {
         out
     }
 
+    pub(crate) fn describe(&self, channel: usize) -> String {
+        self.filters[channel].map_or(String::new(), |(a, d)| format!("dc gain {:.3} sd {:.4}", (1.0 - a.iter().sum::<f64>()) / d, d))
+    }
     /// Rows that are left.
     pub(crate) fn rows(&self) -> usize {
         self.rows
     }
 
-    /// A column through the filters; each segment loses its first samples.
+    /// A column through the filters; each segment loses its first samples. No rows stay none.
     pub(crate) fn apply(&self, segments: &[Segment], column: &[f64]) -> Vec<f64> {
+        if column.is_empty() {
+            return Vec::new();
+        }
         let mut out = Vec::with_capacity(self.rows);
         for segment in segments {
             let Some((coefficients, deviation)) = self.filters[segment.channel] else { continue };
@@ -94,6 +116,31 @@ impl Whitener {
         }
         out
     }
+}
+
+/// The stretches of series without bursts.
+fn calm(series: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mean = |block: &[f64]| (block.iter().sum::<f64>() / block.len() as f64).abs();
+    let mut means: Vec<f64> = series.iter().flat_map(|x| x.chunks(BLOCK).map(mean)).collect();
+    if means.is_empty() {
+        return Vec::new();
+    }
+    let middle = means.len() / 2;
+    // The median of the magnitude of a normal deviate is 0.6745.
+    let limit = BURST * *means.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.6745;
+    let mut out = Vec::new();
+    for x in series {
+        let mut run = Vec::new();
+        for block in x.chunks(BLOCK) {
+            if mean(block) <= limit {
+                run.extend_from_slice(block);
+            } else if !run.is_empty() {
+                out.push(std::mem::take(&mut run));
+            }
+        }
+        out.push(run);
+    }
+    out
 }
 
 /// Least squares over several series, with the power of others added; `None` where there is nothing to fit.

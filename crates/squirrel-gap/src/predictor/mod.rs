@@ -12,7 +12,7 @@
 mod commands;
 mod track;
 
-pub(crate) use track::{Motion, SensorErrors, Track};
+pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
 use crate::flight::filter::DERIVATIVE_REACH;

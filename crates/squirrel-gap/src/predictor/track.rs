@@ -24,13 +24,18 @@ const SMOOTHER_S: f64 = 0.5;
 /// Rate of the residual of the dynamics, Hz.
 const RATE_HZ: f64 = 30.0;
 
+/// Times of a flight at which a hypothesis says how far the barometer is off: its zero wanders.
+pub(crate) const HEIGHT_KNOTS: usize = 8;
+/// Below this height it may matter, m.
+const LOW_M: f64 = 2.0;
+
 /// What a hypothesis says of the sensors of one flight, beside its effects.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct SensorErrors {
     /// Tilt of the attitude estimate about north and east, rad.
     pub(crate) tilt_rad: [f64; 2],
-    /// What the barometer reads too high, m.
-    pub(crate) height_m: f64,
+    /// What the barometer reads too high, m, on lines between the knots of the flight.
+    pub(crate) height_m: [f64; HEIGHT_KNOTS],
     /// By how much the velocity through the air is less than that over ground, m/s: moving air, or an error of velocity.
     pub(crate) air_ned_m_s: [f64; 3],
 }
@@ -58,6 +63,8 @@ pub(crate) struct Track {
     velocity: Vec<(f64, Vector3<f64>)>,
     position: Vec<(f64, Vector3<f64>)>,
     altitude_m: Vec<(f64, f64)>,
+    /// Times of the height errors, s.
+    knots_s: [f64; HEIGHT_KNOTS],
 }
 
 /// The motion under one hypothesis about the sensors.
@@ -108,7 +115,21 @@ impl Track {
             velocity: vectors(recording.velocity.as_ref()),
             position,
             altitude_m,
+            knots_s: knots_s(recording),
         }
+    }
+
+    /// The part of a height knot at a time: 1 at its own, 0 at its neighbours, constant beyond the ends.
+    pub(crate) fn height_share(&self, knot: usize, time_s: f64) -> f64 {
+        let at = |i: usize| self.knots_s[i];
+        let line = |from: f64, to: f64| ((time_s - from) / (to - from)).clamp(0.0, 1.0);
+        let after = if knot == 0 { 1.0 } else { line(at(knot - 1), at(knot)) };
+        let before = if knot + 1 == HEIGHT_KNOTS { 0.0 } else { line(at(knot), at(knot + 1)) };
+        after - before
+    }
+
+    fn height_error_m(&self, errors: &SensorErrors, time_s: f64) -> f64 {
+        errors.height_m.iter().enumerate().map(|(knot, x)| x * self.height_share(knot, time_s)).sum()
     }
 
     /// First sample of the grid that has a residual.
@@ -214,9 +235,11 @@ impl Track {
             height_m.push(Vector3::new(0.0, 0.0, h));
             h -= strapdown[k].z * self.period_s;
         }
+        let off = errors.height_m != [0.0; HEIGHT_KNOTS];
         let correction = binned(self.altitude_m.iter().map(|(t, altitude)| {
             let (k, _) = self.place(*t);
-            (*t, Vector3::new(0.0, 0.0, altitude - errors.height_m - height_m[k].z))
+            let error_m = if off { self.height_error_m(errors, *t) } else { 0.0 };
+            (*t, Vector3::new(0.0, 0.0, altitude - error_m - height_m[k].z))
         }));
         if !correction.is_empty() {
             self.add(&mut height_m, &smoothed(&correction));
@@ -252,6 +275,32 @@ impl Track {
             *value += p0 + (p1 - p0) * share;
         }
     }
+}
+
+/// Where the barometer's error is asked for: spread over the time that a flight is low, or over all of it.
+fn knots_s(recording: &Recording) -> [f64; HEIGHT_KNOTS] {
+    let (start_s, end_s) = (recording.pieces[0].0, recording.pieces[recording.pieces.len() - 1].1);
+    let heights: Vec<(f64, f64)> = match (&recording.baro, &recording.position) {
+        (Some(baro), _) => baro.samples().map(|(t, h)| (t, h[0])).collect(),
+        (None, Some(position)) => position.samples().map(|(t, p)| (t, -p[2])).collect(),
+        (None, None) => Vec::new(),
+    };
+    let low: Vec<f64> = heights
+        .iter()
+        .filter(|(t, h)| *h < LOW_M && (start_s..=end_s).contains(t))
+        .map(|(t, _)| *t)
+        .collect();
+    let mut before = f64::NEG_INFINITY;
+    std::array::from_fn(|knot| {
+        let share = knot as f64 / (HEIGHT_KNOTS - 1) as f64;
+        let at = match low[..] {
+            [] => start_s + share * (end_s - start_s),
+            _ => low[(share * (low.len() - 1) as f64) as usize],
+        };
+        // Knots never coincide, however short the time.
+        before = at.max(before + 1e-3);
+        before
+    })
 }
 
 /// Means over bins of [`BIN_S`], at the mean of their times.

@@ -1,0 +1,205 @@
+//! Where the predictor is asked: effects with a name, and everything else that may be off by its tolerance.
+//!
+//! What may be off beside the catalogue: where each rotor sits and what torque it has, since rotors of one make scatter; drag
+//! along y and z beside that along x; and in each flight the tilt of the attitude estimate and the zero of the barometer,
+//! which wanders.
+
+use super::parameters::{Candidate, Catalogue, Parameter};
+use crate::GapError;
+use crate::predictor::{HEIGHT_KNOTS, Hypothesis, Predictor};
+use nalgebra::Vector3;
+use squirrel_core::effects::Effects;
+use squirrel_core::frames::In;
+use squirrel_core::vehicle::Vehicle;
+
+/// Tolerance of the tilt of an attitude estimate, rad.
+const TILT_RAD: f64 = 0.006;
+/// Tolerance of the barometer's zero, m.
+const HEIGHT_M: f64 = 0.2;
+/// Numbers of a flight's sensors: tilt about north and east, then heights.
+const SENSORS: usize = 2 + HEIGHT_KNOTS;
+
+/// An effect with its numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Member {
+    /// Index of its candidate.
+    pub(crate) candidate: usize,
+    /// All parameters in the order of the effect.
+    pub(crate) values: Vec<f64>,
+}
+
+/// Where the predictor is asked: effects that are named, and everything else inside its tolerance.
+#[derive(Debug, Clone)]
+pub(crate) struct Point {
+    pub(crate) members: Vec<Member>,
+    /// One number a column: the catalogue's parameters, those of its airframe, then the sensors of each flight.
+    pub(crate) base: Vec<f64>,
+}
+
+/// A number of the airframe that no effect changes by itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Airframe {
+    /// Place of a rotor along an axis, m.
+    Arm { rotor: usize, axis: usize },
+    /// Reaction torque of a rotor, as a fraction.
+    Torque { rotor: usize },
+    /// Linear drag along an axis, N s/m.
+    Drag { axis: usize },
+}
+
+impl Airframe {
+    fn act(self, vehicle: &Vehicle<f64>, x: f64) -> Vehicle<f64> {
+        let along = |axis: usize| {
+            let mut v = Vector3::zeros();
+            v[axis] = x;
+            v
+        };
+        match self {
+            Self::Arm { rotor, axis } => vehicle.with_rotor_off(rotor, In::new(along(axis)), 1.0),
+            Self::Torque { rotor } => vehicle.with_rotor_off(rotor, In::zero(), 1.0 + x),
+            Self::Drag { axis } => vehicle.with_more_drag(along(axis)),
+        }
+    }
+}
+
+/// What a column of a [`Point`] beside the catalogue's parameters stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Other {
+    Airframe,
+    Tilt { flight: usize },
+    Height { flight: usize },
+}
+
+/// The hypothesis of a point, on top of the vehicle file.
+///
+/// # Errors
+/// A mass or inertia that no body has.
+pub(crate) fn hypothesis(
+    predictor: &Predictor,
+    catalogue: &Catalogue,
+    point: &Point,
+) -> Result<Hypothesis, GapError> {
+    let mut all = predictor.nominal();
+    for member in &point.members {
+        if let Some(found) = all.effects.insert(catalogue.candidates[member.candidate].effect) {
+            found.values.copy_from_slice(&member.values);
+        }
+    }
+    let mut sides = [0.0; 2];
+    for (parameter, &x) in catalogue.parameters.iter().zip(&point.base) {
+        if x == 0.0 {
+            continue;
+        }
+        let candidate = &catalogue.candidates[parameter.candidate];
+        if candidate.effect == "wing_asymmetry" {
+            sides[candidate.fixed[0].1 as usize] = x;
+            continue;
+        }
+        let mut alone = catalogue.absent(predictor, parameter.candidate);
+        alone.values[parameter.slot] += x;
+        // What changes the airframe's numbers does so in a row, so that two rotors can be weak; the rest adds up.
+        let mut effects = Effects::none();
+        if let Some(found) = effects.insert(candidate.effect) {
+            found.values.copy_from_slice(&alone.values);
+        }
+        let altered =
+            effects.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
+        if altered == all.vehicle {
+            add(&mut all.effects, candidate, parameter.slot, x);
+        } else {
+            all.vehicle = altered;
+        }
+    }
+    // A loss on both sides is a change of the gain and a loss on one side.
+    if sides != [0.0; 2] {
+        let of = |effect: &str| catalogue.candidates.iter().find(|c| c.effect == effect);
+        let gain = match of("wing_asymmetry") {
+            Some(left) if !all.effects.has("wing_asymmetry") => {
+                add(&mut all.effects, left, 1, sides[0] - sides[1]);
+                -sides[1]
+            }
+            _ => -0.5 * (sides[0] + sides[1]),
+        };
+        if let Some(membrane) = of("wing_membrane") {
+            add(&mut all.effects, membrane, 0, gain);
+        }
+    }
+    let others = &point.base[catalogue.parameters.len()..];
+    for ((number, _), &x) in catalogue.airframe.iter().zip(others) {
+        if x != 0.0 {
+            all.vehicle = number.act(&all.vehicle, x);
+        }
+    }
+    for (errors, x) in all.errors.iter_mut().zip(others[catalogue.airframe.len()..].chunks_exact(SENSORS)) {
+        errors.tilt_rad = [x[0], x[1]];
+        errors.height_m.copy_from_slice(&x[2..]);
+    }
+    Ok(all)
+}
+
+fn add(effects: &mut Effects<f64>, candidate: &Candidate, slot: usize, x: f64) {
+    let present = effects.has(candidate.effect);
+    if let Some(found) = effects.insert(candidate.effect) {
+        if !present {
+            for (slot, value) in candidate.fixed.iter().chain(&candidate.shape) {
+                found.values[*slot] = *value;
+            }
+        }
+        found.values[slot] += x;
+    }
+}
+
+impl Catalogue {
+    /// Columns that are the same for every set of flights: all but those of sensors.
+    pub(crate) fn shared_columns(&self) -> usize {
+        self.parameters.len() + self.airframe.len()
+    }
+
+    /// Numbers beside the members in a [`Point`].
+    pub(crate) fn columns(&self, predictor: &Predictor) -> usize {
+        self.shared_columns() + SENSORS * predictor.names.len()
+    }
+
+    /// What a column behind those of the parameters is, and its tolerance.
+    pub(crate) fn other(&self, column: usize) -> (Other, f64) {
+        let index = column - self.parameters.len();
+        if let Some((_, tolerance)) = self.airframe.get(index) {
+            return (Other::Airframe, *tolerance);
+        }
+        let sensor = index - self.airframe.len();
+        let flight = sensor / SENSORS;
+        if sensor % SENSORS < 2 { (Other::Tilt { flight }, TILT_RAD) } else { (Other::Height { flight }, HEIGHT_M) }
+    }
+
+    /// Whether a parameter has no slope at zero, so that nothing linear holds near it.
+    pub(crate) fn starts_flat(&self, parameter: &Parameter) -> bool {
+        ["ground_effect", "payload_swing"].contains(&self.candidates[parameter.candidate].effect)
+    }
+
+    /// Whether the slope of a parameter is another one after a few tolerances: lags and delays.
+    pub(super) fn bends(&self, parameter: &Parameter) -> bool {
+        ["motor_lag", "actuation_latency", "clock_skew", "gnss_latency", "wing_servo_lag"]
+            .contains(&self.candidates[parameter.candidate].effect)
+    }
+
+    /// Whether height is worth something: an effect of it acts.
+    pub(super) fn feels_height(&self, members: &[Member]) -> bool {
+        members.iter().any(|member| self.candidates[member.candidate].effect == "ground_effect")
+    }
+
+    /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the same choices.
+    pub(crate) fn absent(&self, predictor: &Predictor, candidate: usize) -> Member {
+        let own = &self.candidates[candidate];
+        let mut effects = predictor.vehicle.effects;
+        let present = effects.has(own.effect);
+        let mut values = effects.insert(own.effect).map_or_else(Vec::new, |found| found.values.to_vec());
+        let same = own.fixed.iter().all(|(slot, value)| values[*slot] == *value);
+        if !(present && same) {
+            values.fill(0.0);
+        }
+        for (slot, value) in own.fixed.iter().chain(&own.shape) {
+            values[*slot] = *value;
+        }
+        Member { candidate, values }
+    }
+}
