@@ -9,7 +9,7 @@ use crate::name::{
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
-use crate::shrink::{self, Errors12};
+use crate::shrink::{self, Errors12, Floor};
 use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
 use crate::words;
 use squirrel_core::effects::{Effects, Kind as ParameterKind};
@@ -65,8 +65,8 @@ pub(crate) struct HeldOut {
     pub(crate) rival: Option<Errors12>,
     pub(crate) fitted: Errors12,
     /// What the explanation leaves if it is true, and what is left in air without gusts.
-    pub(crate) floor: Errors12,
-    pub(crate) calm: Errors12,
+    pub(crate) floor: Floor,
+    pub(crate) calm: Floor,
 }
 
 /// Looks at flights of a vehicle and says which effect its file lacks.
@@ -121,8 +121,7 @@ pub fn diagnose(
     progress("naming");
     let catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
     let tick = || progress("naming");
-    let search =
-        Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
+    let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
     let naming = explain(&search)?;
     let rivals = search.rivals(&naming.found)?;
     progress("flying the held-out flights");
@@ -337,15 +336,10 @@ fn prove(
 
 fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
     // Gusts are no force that could be foreseen: with them, errors are as large as expected, and without them larger.
-    let before = proof.nominal.over(&proof.calm);
-    let after = proof.fitted.over(&proof.floor);
-    let best_rival = proof.rival.as_ref().map(|rival| rival.over(&proof.floor));
-    if std::env::var("GAPDEBUG").is_ok() {
-        for (name, e) in [("nominal", &proof.nominal), ("fitted", &proof.fitted)] {
-            let r: Vec<String> = e.mse().iter().zip(proof.floor.mse().iter()).map(|(m, f)| format!("{:.2}", m / f)).collect();
-            eprintln!("DEBUG {name} {}", r.join(" "));
-        }
-    }
+    let before = proof.nominal.over(&proof.calm.of(&proof.fitted));
+    let floor = proof.floor.of(&proof.fitted);
+    let after = proof.fitted.over(&floor);
+    let best_rival = proof.rival.as_ref().map(|rival| rival.over(&floor));
     let removed = |left: f64| if before > 1.0 { 1.0 - (left - 1.0) / (before - 1.0) } else { 0.0 };
     Gap {
         held_out_flights: held_out.iter().map(|(name, _)| name.clone()).collect(),

@@ -9,7 +9,9 @@
 //! removed = 1 - (J_after - 1) / (J_before - 1)
 //! ```
 //! The floor is the best model against itself, started and read with the noise of these sensors in turbulent air of the
-//! declared tolerance. All models share the numbers that float inside their tolerances, so that the gap is that of the effect.
+//! declared tolerance. One flight's noise is not the mean flight's: where the best model is inside two standard deviations
+//! of what noise leaves from flight to flight, the floor of these flights is taken to be where it is. All models share the
+//! numbers that float inside their tolerances, so that the gap is that of the effect.
 
 use crate::GapError;
 use crate::leftover::floor::TURBULENCE_S;
@@ -47,14 +49,18 @@ const RESTART_S: f64 = 0.5;
 const START_WEIGHTS: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0];
 const START_SUM: f64 = 231.0;
 const START_NOISE: f64 = 0.505;
-/// Errors of a start state that the log does not show by itself: smoothed velocity, m/s, and attitude, rad.
-const START_VELOCITY_M_S: f64 = 0.02;
-const START_ATTITUDE_RAD: f64 = 0.001;
 
 /// Longest step of the plant, s.
 const STEP_MAX_S: f64 = 0.0012;
 
-type Errors = SVector<f64, 12>;
+pub(crate) type Errors = SVector<f64, 12>;
+
+/// Flights of noise that the floor is the mean of.
+const DRAWS: u64 = 3;
+/// Standard deviations of the scatter of a flight's noise that still are noise, and the least part of the mean that a lucky
+/// flight has.
+const SCATTER: f64 = 2.0;
+const LUCK: f64 = 0.5;
 
 /// Mean squared errors by bin.
 #[derive(Debug, Clone)]
@@ -84,12 +90,34 @@ impl Errors12 {
         let n: f64 = self.count[..COUNTED].iter().sum();
         self.squared[..COUNTED].iter().sum::<Errors>() / n.max(1.0)
     }
-    /// Mean over channels of the error over that of the floor; 1 is nothing but noise.
-    pub(crate) fn over(&self, floor: &Self) -> f64 {
-        let (own, floor) = (self.mse(), floor.mse());
+    /// Mean over channels of the error over a floor; 1 is nothing but noise, and less is no better.
+    pub(crate) fn over(&self, floor: &Errors) -> f64 {
+        let own = self.mse();
         let ratios: Vec<f64> =
-            own.iter().zip(floor.iter()).filter(|(_, f)| **f > 0.0).map(|(m, f)| (m / f).max(1.0)).collect();
-        ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
+            own.iter().zip(floor.iter()).filter(|(_, f)| **f > 0.0).map(|(m, f)| m / f).collect();
+        (ratios.iter().sum::<f64>() / ratios.len().max(1) as f64).max(1.0)
+    }
+}
+
+/// What noise leaves: errors of the mean flight, and by how much those of one flight scatter.
+#[derive(Debug, Clone)]
+pub(crate) struct Floor {
+    pub(crate) mean: Errors12,
+    /// Standard deviation of [`Errors12::mse`].
+    deviation: Errors,
+}
+
+impl Floor {
+    /// The floor of these very flights, by channel: a flight is lucky or not, and what a model leaves inside the scatter of
+    /// noise is noise.
+    pub(crate) fn of(&self, model: &Errors12) -> Errors {
+        let reach = self.deviation * SCATTER;
+        let mean = self.mean.mse();
+        let lucky = mean * LUCK;
+        model
+            .mse()
+            .zip_zip_map(&mean, &reach, |own, mean, reach| own.clamp((mean - reach).max(0.0), mean + reach))
+            .sup(&lucky)
     }
 }
 
@@ -157,9 +185,13 @@ pub(crate) fn floor(
     predictor: &Predictor,
     hypothesis: &Hypothesis,
     turbulence_m_s: f64,
-) -> Result<Errors12, GapError> {
+) -> Result<Floor, GapError> {
     let mut all = Errors12::new();
-    for piece in 0..predictor.tracks.len() {
+    // Mean errors of each segment over the first second.
+    let mut segments: Vec<Errors> = Vec::new();
+    for (draw, piece) in
+        (0..DRAWS).flat_map(|draw| (0..predictor.tracks.len()).map(move |piece| (draw, piece)))
+    {
         let track = &predictor.tracks[piece];
         if track.attitude().is_none() || track.velocity().is_empty() {
             continue;
@@ -169,27 +201,55 @@ pub(crate) fn floor(
         fly(predictor, hypothesis, piece, &motion, None, |start, bin, reading| {
             clean.push((start, bin, reading.read));
         })?;
-        let mut rng = Pcg64Mcg::seed_from_u64(piece as u64 + 11);
+        let mut rng = Pcg64Mcg::seed_from_u64(1000 * draw + piece as u64 + 11);
         let mut index = 0;
         let [force_noise, rate_noise] = track.imu_noise;
         let velocity_noise = track.velocity_noise();
+        let attitude_noise = track.attitude_noise();
         let samples = BIN_S / track.period_s;
-        let mut noise = Pcg64Mcg::seed_from_u64(piece as u64 + 29);
+        let mut noise = Pcg64Mcg::seed_from_u64(1000 * draw + piece as u64 + 29);
         let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise)) };
-        fly(predictor, hypothesis, piece, &motion, Some((turbulence_m_s, &mut rng)), |_, bin, reading| {
+        let noise = Noise {
+            turbulence_m_s,
+            velocity_m_s: velocity_noise * track.velocity_smoothing(),
+            attitude_rad: attitude_noise,
+            rng: &mut rng,
+        };
+        fly(predictor, hypothesis, piece, &motion, Some(noise), |_, bin, reading| {
             let (own, other) = (&clean[index].2, &reading.read);
             index += 1;
             let white = samples.max(1.0).sqrt();
             let velocity = other.velocity_ned - own.velocity_ned + draw().component_mul(&velocity_noise);
-            let rotation =
-                (own.attitude.inverse() * other.attitude).scaled_axis() + draw() * START_ATTITUDE_RAD;
+            let rotation = (own.attitude.inverse() * other.attitude).scaled_axis()
+                + draw().component_mul(&attitude_noise);
             let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
             let force =
                 other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
-            all.add(bin, [velocity, rotation, rate, force]);
+            let parts = [velocity, rotation, rate, force];
+            if bin == 0 {
+                segments.push(Errors::zeros());
+            }
+            if let Some(segment) = segments.last_mut().filter(|_| bin < COUNTED) {
+                let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
+                *segment += error.component_mul(&error) / COUNTED as f64;
+            }
+            all.add(bin, parts);
         })?;
     }
-    Ok(all)
+    let n = segments.len().max(1) as f64;
+    let mean = segments.iter().sum::<Errors>() / n;
+    let square: Errors = segments.iter().map(|s| (s - mean).component_mul(&(s - mean))).sum::<Errors>() / n;
+    // Segments overlap by half: each counts for half in the mean of one flight.
+    let deviation = (square * (2.0 * DRAWS as f64 / n)).map(f64::sqrt);
+    Ok(Floor { mean: all, deviation })
+}
+
+/// What a flight is blown about with, and what its start state is off by.
+struct Noise<'a> {
+    turbulence_m_s: f64,
+    velocity_m_s: Vector3<f64>,
+    attitude_rad: Vector3<f64>,
+    rng: &'a mut Pcg64Mcg,
 }
 
 /// One bin of one segment.
@@ -207,7 +267,7 @@ fn fly(
     hypothesis: &Hypothesis,
     piece: usize,
     motion: &Motion,
-    mut noise: Option<(f64, &mut Pcg64Mcg)>,
+    mut noise: Option<Noise<'_>>,
     mut each: impl FnMut(usize, usize, Bin),
 ) -> Result<(), GapError> {
     let track = &predictor.tracks[piece];
@@ -237,7 +297,7 @@ fn segment(
     motion: &Motion,
     start: usize,
     mut state: PlantState,
-    noise: &mut Option<(f64, &mut Pcg64Mcg)>,
+    noise: &mut Option<Noise<'_>>,
     per_bin: usize,
     each: &mut impl FnMut(usize, usize, Bin),
 ) {
@@ -249,12 +309,12 @@ fn segment(
     }
     let mut wind = Vector3::zeros();
     let mut turbulence = 0.0;
-    if let Some((sigma, rng)) = noise {
-        let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(rng)) };
-        turbulence = *sigma;
+    if let Some(noise) = noise {
+        let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng)) };
+        turbulence = noise.turbulence_m_s;
         wind = draw() * turbulence;
-        state.body.velocity = In::new(state.body.velocity.vector + draw() * START_VELOCITY_M_S);
-        let turn = UnitQuaternion::from_scaled_axis(draw() * START_ATTITUDE_RAD);
+        state.body.velocity = In::new(state.body.velocity.vector + draw().component_mul(&noise.velocity_m_s));
+        let turn = UnitQuaternion::from_scaled_axis(draw().component_mul(&noise.attitude_rad));
         state.body.attitude = (state.body.ned_from_body().quaternion * turn).into_inner();
         let [_, rate_noise] = track.imu_noise;
         state.body.omega = In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * START_NOISE);
@@ -288,8 +348,8 @@ fn segment(
             }
             let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
             force += before.ned_from_body().quaternion.inverse() * (slope - gravity);
-            if let Some((_, rng)) = noise {
-                let fresh: Vector3<f64> = Vector3::from_fn(|_, _| StandardNormal.sample(rng));
+            if let Some(noise) = noise {
+                let fresh: Vector3<f64> = Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng));
                 wind = wind * keep + fresh * (turbulence * (1.0 - keep * keep).sqrt());
             }
         }
@@ -304,5 +364,30 @@ fn segment(
         };
         let acceleration_ned = (state.body.velocity.vector - began) / (samples * track.period_s);
         each(start, bin, Bin { first, last: first + per_bin, read, acceleration_ned });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flight(square: f64) -> Errors12 {
+        let mut errors = Errors12::new();
+        errors.squared[..COUNTED].fill(Errors::repeat(4.0 * square));
+        errors.count[..COUNTED].fill(4.0);
+        errors
+    }
+
+    #[test]
+    fn a_lucky_or_unlucky_flight_is_at_the_floor_and_a_wrong_model_is_not() {
+        let floor = Floor { mean: flight(1.0), deviation: Errors::repeat(0.1) };
+        for inside in [0.85, 1.0, 1.15] {
+            assert!((flight(inside).over(&floor.of(&flight(inside))) - 1.0).abs() < 1e-12);
+        }
+        let wrong = flight(3.0);
+        assert!((wrong.over(&floor.of(&wrong)) - 3.0 / 1.2).abs() < 1e-12);
+        // Another model is held against the floor of the best one, and nothing is below it.
+        assert!((wrong.over(&floor.of(&flight(0.9))) - 3.0 / 0.9).abs() < 1e-12);
+        assert_eq!(flight(0.1).over(&floor.of(&flight(1.0))), 1.0);
     }
 }

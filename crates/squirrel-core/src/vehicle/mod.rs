@@ -216,18 +216,20 @@ impl<T: Real> Vehicle<T> {
     ///
     /// * `moved` - of the hub, m
     /// * `torque_factor` - over what the rotor had
+    #[must_use]
     pub fn with_rotor_off(&self, rotor: usize, moved: In<Body, T>, torque_factor: T) -> Self {
         let mut out = *self;
         if let Some(own) = out.parameters.rotors[..self.parameters.rotor_count].get_mut(rotor) {
             own.position = own.position + moved;
             let wrench = &mut out.per_speed_squared;
-            wrench.roll[rotor] = wrench.roll[rotor] - moved.vector.y * wrench.thrust[rotor];
-            wrench.pitch[rotor] = wrench.pitch[rotor] + moved.vector.x * wrench.thrust[rotor];
+            wrench.roll[rotor] -= moved.vector.y * wrench.thrust[rotor];
+            wrench.pitch[rotor] += moved.vector.x * wrench.thrust[rotor];
             wrench.yaw[rotor] *= torque_factor;
         }
         out
     }
     /// The vehicle with more linear drag along its axes, N s/m: the declared number holds to its tolerance along each.
+    #[must_use]
     pub fn with_more_drag(&self, linear_n_s_per_m: Vector3<T>) -> Self {
         let mut out = *self;
         out.parameters.drag.linear_n_s_per_m += linear_n_s_per_m;
@@ -402,7 +404,29 @@ pub(crate) mod fixtures {
 
 #[cfg(test)]
 mod tests {
+    use super::fixtures::squirrel;
     use super::*;
+
+    #[test]
+    fn a_rotor_that_is_off_is_one_that_was_declared_there() {
+        let moved = Vector3::new(0.01, -0.02, 0.0);
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let off = vehicle.with_rotor_off(1, In::new(moved), 1.1);
+        let mut p = squirrel();
+        p.rotors[1].position = p.rotors[1].position + In::new(moved);
+        let declared = Vehicle::new(p).unwrap();
+        let (a, b) = (off.rotor_wrench_per_speed_squared(), declared.rotor_wrench_per_speed_squared());
+        for i in 0..4 {
+            assert!((a.roll[i] - b.roll[i]).abs() < 1e-20 && (a.pitch[i] - b.pitch[i]).abs() < 1e-20);
+            let factor = if i == 1 { 1.1 } else { 1.0 };
+            assert!((a.yaw[i] - factor * b.yaw[i]).abs() < 1e-20);
+        }
+        assert_eq!(off.rotors(), declared.rotors());
+        // There is no rotor 5 to be off.
+        assert_eq!(vehicle.with_rotor_off(5, In::new(moved), 1.1), vehicle);
+        let dragged = vehicle.with_more_drag(Vector3::new(0.0, 0.1, 0.2));
+        assert_eq!(dragged.parameters().drag.linear_n_s_per_m, Vector3::new(0.0, 0.1, 0.2));
+    }
 
     #[test]
     fn command_and_thrust_are_inverse_for_every_kind() {

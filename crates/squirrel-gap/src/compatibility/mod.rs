@@ -262,10 +262,9 @@ fn model(predictor: &Predictor, piece: usize, residual: &[f64]) -> Found {
     let (shift_s, fit) = moments.best_shift(step_s, SHIFT_MAX_S);
     // Air that damps the rates makes moments look early; rates alone never make them look so.
     let undamped = moments.with_damping(&rates_of(track));
-    let early = |(shift_s, _): (f64, f64)| shift_s < 0.0;
     if outside((shift_s, fit))
         && outside(moments.first((n / 4).max((10.0 / step_s) as usize)).best_shift(step_s, SHIFT_MAX_S))
-        && !(early((shift_s, fit)) && !outside(undamped.best_shift(step_s, SHIFT_MAX_S)))
+        && (shift_s > 0.0 || outside(undamped.best_shift(step_s, SHIFT_MAX_S)))
     {
         let words = if shift_s < 0.0 {
             format!("acts {:.0} ms before it is given", -1e3 * shift_s)

@@ -32,7 +32,7 @@ const SHARE_MIN: f64 = 0.25;
 /// Part of the variance that a family may predict of gusts by chance.
 const GUST_SHARE_MAX: f64 = 0.45;
 /// Gusts are about normal; what acts at one place or time comes in bursts.
-const GUST_KURTOSIS_MAX: f64 = 5.5;
+const GUST_KURTOSIS_MAX: f64 = 7.0;
 
 /// The leftover of one channel of one flight.
 #[derive(Debug, Clone)]
@@ -218,9 +218,7 @@ fn within_tolerance(predictor: &Predictor, segment: &Segment, slack: Slack) -> f
             let beside = slack.lever_m * slow(2) / p.inertia_kg_m2[(axis - 3, axis - 3)];
             beside.hypot(slack.timing_s * rate)
         }
-        _ => {
-            slack.lever_m * slow(0).hypot(slow(1)) / p.inertia_kg_m2[(2, 2)]
-        }
+        _ => slack.lever_m * slow(0).hypot(slow(1)) / p.inertia_kg_m2[(2, 2)],
     }
 }
 

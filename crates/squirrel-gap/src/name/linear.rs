@@ -219,12 +219,6 @@ fn whitener(predictor: &Predictor, columns: &[Vec<f64>], widest: &[f64], residua
         let Some(posterior) = gram.posterior(widest, 1.0) else { break };
         let left = subtract(residual, columns, &posterior.mean);
         whitener = Whitener::fit(&predictor.segments, &left, &doubt);
-        if std::env::var("GAPDEBUG").is_ok() {
-            let seg: Vec<f64> = predictor.segments.iter().filter(|s| s.channel == 2).flat_map(|s| left[s.rows.clone()].to_vec()).collect();
-            let r: Vec<f64> = predictor.segments.iter().filter(|s| s.channel == 2).flat_map(|s| residual[s.rows.clone()].to_vec()).collect();
-            let bm = |x: &[f64]| { let mut v: Vec<f64> = x.chunks(8).map(|b| (b.iter().sum::<f64>() / 8.0).abs()).collect(); v.sort_by(f64::total_cmp); (v[v.len() / 2], v[v.len() * 9 / 10], v[v.len() - 1]) };
-            eprintln!("DEBUG white fz {} left blocks {:?} residual blocks {:?}", whitener.describe(2), bm(&seg), bm(&r));
-        }
     }
     whitener
 }

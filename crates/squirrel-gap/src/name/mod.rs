@@ -66,10 +66,6 @@ pub(crate) fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
         return Ok(naming);
     }
     let mut left = blown(search, &again, sigma)?;
-    if std::env::var("GAPDEBUG").is_ok() {
-        let names: Vec<_> = again.found.best.members.iter().map(|m| (search.effect(m), m.values.clone())).collect();
-        eprintln!("DEBUG as_gust {sigma:.2} {:.2?} calm {:.2?} fam {:?} kurt {:.1} line {:?} {names:?} worth {:.0?}", left.excess, calm.excess, &calm.families[..2.min(calm.families.len())], calm.kurtosis, calm.line, again.found.worth);
-    }
     // A flight holds few gusts: their size scatters from one to the next.
     if left.excess.iter().any(|(channel, ratio)| *channel > 2 || *ratio >= GUST_SCATTER) {
         return Ok(naming);
@@ -190,7 +186,6 @@ fn gust_of(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError
         unit += (windier.slow_floor.powi(2) - now.slow_floor.powi(2)) / span;
     }
     let sigma = (excess / unit + assumed.powi(2)).max(0.0).sqrt();
-    if std::env::var("GAPDEBUG").is_ok() { eprintln!("DEBUG gust_of {sigma:.2}"); }
     Ok((GUST_M_S.0..=GUST_M_S.1).contains(&sigma).then_some(sigma))
 }
 

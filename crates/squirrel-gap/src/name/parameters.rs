@@ -88,8 +88,7 @@ impl Catalogue {
             (MOMENTS.contains(&name) && !predictor.has_channel(3))
                 || (DRAG.contains(&name) && !predictor.has_channel(0))
         };
-        let mut all =
-            Self { candidates: Vec::new(), parameters: Vec::new(), airframe: airframe(predictor) };
+        let mut all = Self { candidates: Vec::new(), parameters: Vec::new(), airframe: airframe(predictor) };
         for name in Effects::<f64>::NAMES {
             if *name == "gust"
                 || unseen(name)
@@ -132,11 +131,7 @@ impl Catalogue {
     /// * `thrust_fraction` - by how much thrust may drift in a flight
     pub(crate) fn slack(&self, timing_s: f64, thrust_fraction: f64) -> Slack {
         let of = |key: &str| self.parameters.iter().find(|p| p.key == key).map_or(0.0, |p| p.tolerance);
-        Slack {
-            lever_m: of("cg_x_m"),
-            timing_s,
-            thrust_fraction,
-        }
+        Slack { lever_m: of("cg_x_m"), timing_s, thrust_fraction }
     }
 
     fn add(
@@ -202,7 +197,9 @@ fn airframe(predictor: &Predictor) -> Vec<(Airframe, f64)> {
         for rotor in 0..p.rotor_count {
             let arm = sds(vehicle, &format!("rotor[{rotor}].position_body_m"));
             for axis in 0..2 {
-                all.extend(arm.as_ref().map(|sd| (Airframe::Arm { rotor, axis }, sd[axis.min(sd.len() - 1)])));
+                all.extend(
+                    arm.as_ref().map(|sd| (Airframe::Arm { rotor, axis }, sd[axis.min(sd.len() - 1)])),
+                );
             }
             let sd = sds(vehicle, "propulsion.torque_coefficient_n_m_s2");
             all.extend(sd.filter(|_| torque > 0.0).map(|sd| (Airframe::Torque { rotor }, sd[0] / torque)));

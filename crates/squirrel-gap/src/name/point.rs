@@ -168,7 +168,11 @@ impl Catalogue {
         }
         let sensor = index - self.airframe.len();
         let flight = sensor / SENSORS;
-        if sensor % SENSORS < 2 { (Other::Tilt { flight }, TILT_RAD) } else { (Other::Height { flight }, HEIGHT_M) }
+        if sensor % SENSORS < 2 {
+            (Other::Tilt { flight }, TILT_RAD)
+        } else {
+            (Other::Height { flight }, HEIGHT_M)
+        }
     }
 
     /// Whether a parameter has no slope at zero, so that nothing linear holds near it.

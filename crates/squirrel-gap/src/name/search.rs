@@ -202,11 +202,8 @@ impl Search<'_> {
     ) -> Result<Option<Scored>, GapError> {
         let mut best: Option<Scored> = None;
         for member in self.ranked(set, except).into_iter().take(REFINED) {
-            let members = [set.members.as_slice(), &[member.1.clone()]].concat();
+            let members = [set.members.as_slice(), &[member.1]].concat();
             let scored = self.score(linear, &members)?;
-            if std::env::var("GAPDEBUG").is_ok() {
-                eprintln!("DEBUG add {} lin {:.1} {:?} -> {:.1} {:?} (now {:.1})", self.effect(&member.1), member.0, member.1.values, scored.log_evidence, scored.members.last().map(|m| &m.values), set.log_evidence);
-            }
             (self.progress)();
             if self.is_large(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
                 best = Some(scored);
@@ -361,9 +358,6 @@ impl Search<'_> {
                 break;
             }
             let scored = self.evaluate(linear, &next, &base)?;
-            if std::env::var("GAPDEBUG").is_ok() && self.catalogue.feels_height(members) {
-                eprintln!("DEBUG gn {:.1} -> {:.1} share {share} values {:?} heights {:.2?}", best.log_evidence, scored.log_evidence, next[0].values, &base[self.catalogue.shared_columns()..]);
-            }
             // Where the model is linear, every point of it has the same evidence: the mode is where steps end.
             if scored.log_evidence > best.log_evidence - STEP_NATS {
                 best = scored;

@@ -73,9 +73,6 @@ impl Whitener {
         out
     }
 
-    pub(crate) fn describe(&self, channel: usize) -> String {
-        self.filters[channel].map_or(String::new(), |(a, d)| format!("dc gain {:.3} sd {:.4}", (1.0 - a.iter().sum::<f64>()) / d, d))
-    }
     /// Rows that are left.
     pub(crate) fn rows(&self) -> usize {
         self.rows
@@ -177,4 +174,62 @@ fn autoregression(series: &[Vec<f64>], doubt: &[Vec<f64>]) -> Option<([f64; ORDE
     let mut coefficients = [0.0; ORDER];
     coefficients.copy_from_slice(a.as_slice());
     Some((coefficients, (left / n).sqrt()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A segment of one channel with `n` rows.
+    fn segment(n: usize) -> Segment {
+        Segment { flight: 0, channel: 2, rows: 0..n, piece: 0, t0_s: 0.0, step_s: 1.0 / 30.0 }
+    }
+    /// Noise of unit size without memory, the same on every run.
+    fn noise(n: usize) -> Vec<f64> {
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        (0..n).map(|_| (0..12).map(|_| uniform()).sum()).collect()
+    }
+    fn mean_square(x: &[f64]) -> f64 {
+        x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64
+    }
+
+    #[test]
+    fn coloured_noise_comes_out_white() {
+        let mut x = noise(4000);
+        for i in 1..x.len() {
+            x[i] += 0.9 * x[i - 1];
+        }
+        let segments = [segment(x.len())];
+        let white = Whitener::fit(&segments, &x, &vec![0.0; x.len()]).apply(&segments, &x);
+        assert!((mean_square(&white) - 1.0).abs() < 0.01);
+        let neighbours = white.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / white.len() as f64;
+        assert!(neighbours.abs() < 0.03, "{neighbours}");
+    }
+
+    /// A force of a few seconds that no column explains must not count as noise: it is what is to be found.
+    #[test]
+    fn a_burst_does_not_make_the_noise_larger() {
+        let quiet = noise(2400);
+        let mut loud = quiet.clone();
+        for value in &mut loud[900..1050] {
+            *value += 20.0;
+        }
+        let segments = [segment(quiet.len())];
+        let seen = |x: &[f64]| {
+            let whitener = Whitener::fit(&segments, x, &vec![0.0; x.len()]);
+            mean_square(&whitener.apply(&segments, &quiet))
+        };
+        assert!((seen(&loud) / seen(&quiet) - 1.0).abs() < 0.05);
+    }
+
+    #[test]
+    fn no_rows_stay_none() {
+        let x = noise(300);
+        let segments = [segment(x.len())];
+        assert!(Whitener::fit(&segments, &x, &x).apply(&segments, &[]).is_empty());
+    }
 }

@@ -218,10 +218,10 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
         nominal: flown.nominal.rms(channel, bin),
         rival: flown.rival.as_ref().map_or(f64::NAN, |rival| rival.rms(channel, bin)),
         fitted: flown.fitted.rms(channel, bin),
-        floor: flown.floor.rms(channel, bin),
+        floor: flown.floor.mean.rms(channel, bin),
     };
     // A short flight has no segment of the full length, and rare fixes may leave a horizon out.
-    let flown_at = |bin: &usize| flown.fitted.count[*bin] > 0.0 && flown.floor.count[*bin] > 0.0;
+    let flown_at = |bin: &usize| flown.fitted.count[*bin] > 0.0 && flown.floor.mean.count[*bin] > 0.0;
     let bins: Vec<usize> = (0..BINS).filter(flown_at).collect();
     let horizon_s = |bin: usize| (bin + 1) as f64 * BIN_S;
     let last = bins.last().copied().unwrap_or(0);

@@ -16,11 +16,14 @@ use squirrel_core::dynamics::State;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
+use std::f64::consts::PI;
 
 /// Fixes and barometer readings are averaged over this time, s.
 const BIN_S: f64 = 0.1;
 /// Width of the smoother's weights, s.
 const SMOOTHER_S: f64 = 0.5;
+/// Over which the gyroscope tells the noise of attitudes, s.
+const ATTITUDE_LAG_S: f64 = 0.5;
 /// Rate of the residual of the dynamics, Hz.
 const RATE_HZ: f64 = 30.0;
 
@@ -162,6 +165,35 @@ impl Track {
             .map(|d| d.component_mul(&d))
             .sum();
         (sum / (20.0 * n)).map(f64::sqrt)
+    }
+    /// What smoothing leaves of it: a local linear fit with Gaussian weights, over fixes at their rate.
+    pub(crate) fn velocity_smoothing(&self) -> f64 {
+        let n = self.velocity.len();
+        let (Some(first), Some(last)) = (self.velocity.first(), self.velocity.last()) else { return 1.0 };
+        let step_s = ((last.0 - first.0) / (n - 1).max(1) as f64).max(BIN_S);
+        (step_s / (2.0 * PI.sqrt() * SMOOTHER_S)).sqrt().min(1.0)
+    }
+    /// By how much attitudes are off against each other over half a second, rad, one standard deviation of each: what the
+    /// gyroscope does not say of their change.
+    pub(crate) fn attitude_noise(&self) -> Vector3<f64> {
+        let Some(attitude) = &self.attitude else { return Vector3::zeros() };
+        let lag = (ATTITUDE_LAG_S / self.period_s).round().max(1.0) as usize;
+        let (mut square, mut n) = (Vector3::zeros(), 0.0);
+        for start in (0..attitude.len().saturating_sub(lag)).step_by(lag) {
+            let [from, to] = [start, start + lag].map(|k| UnitQuaternion::new_unchecked(attitude[k]));
+            let turned = (start..start + lag).fold(UnitQuaternion::identity(), |q, k| {
+                // The mean of two samples is the rate between them.
+                q * UnitQuaternion::from_scaled_axis(
+                    (self.omega[k] + self.omega[k + 1]) * (0.5 * self.period_s),
+                )
+            });
+            let error = ((from * turned).inverse() * to).scaled_axis();
+            square += error.component_mul(&error);
+            n += 1.0;
+        }
+        let [_, rate] = self.imu_noise;
+        let gyroscope = rate.component_mul(&rate) * (self.period_s * self.period_s * lag as f64);
+        ((square / f64::max(n, 1.0) - gyroscope) * 0.5).map(|x| x.max(0.0).sqrt())
     }
     /// GNSS positions, m.
     pub(crate) fn position(&self) -> &[(f64, Vector3<f64>)] {

@@ -71,15 +71,15 @@ pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
     }
     let setup = Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
     let flight = setup.fly(true, |_| {}).map_err(|error| error.to_string())?;
+    if let Some(time_s) = flight.metrics.contact_s {
+        return Err(format!("touched the ground at {time_s:.2} s"));
+    }
     let log = flight.log.ok_or("the flight has no log")?;
     stayed_up(&log)?;
     Ok(on_board(&log))
 }
 
-/// Lower than this the vehicle may touch the ground, whose forces are no flight, m.
-const CLEARANCE_M: f64 = 0.06;
-
-/// Refuses a flight that touches the ground or tumbles.
+/// Refuses a flight that tumbles or goes below the ground.
 fn stayed_up(log: &FlightLog) -> Result<(), String> {
     let (Some((time_s, position)), Some((_, omega))) =
         (log.channel("truth.position_ned_m"), log.channel("truth.omega_body_rad_s"))
@@ -88,7 +88,7 @@ fn stayed_up(log: &FlightLog) -> Result<(), String> {
     };
     for (k, time_s) in time_s.iter().enumerate() {
         let (height_m, rate) = (-position.row(k)[2], omega.row(k).iter().map(|w| w * w).sum::<f64>().sqrt());
-        if !(height_m > CLEARANCE_M && rate < 25.0) {
+        if !(height_m > 0.0 && rate < 25.0) {
             return Err(format!("lost at {time_s:.2} s: height {height_m:.2} m, rate {rate:.1} rad/s"));
         }
     }
