@@ -86,7 +86,7 @@ pub fn diagnose(
 ) -> Result<Diagnosis, GapError> {
     progress("reading");
     let mut predictor = Predictor::new(vehicle, flights)?;
-    let unseen = if held_out.is_empty() { None } else { Some(Predictor::new(vehicle, held_out)?) };
+    let mut unseen = if held_out.is_empty() { None } else { Some(Predictor::new(vehicle, held_out)?) };
     progress("checking the data");
     let domain = covered(&predictor);
     let nominal = predictor.residual(&predictor.nominal())?;
@@ -111,6 +111,9 @@ pub fn diagnose(
     }
     if !(predictor.has_motion() && compatibility::moments_fit(&predictor, &nominal)) {
         predictor.leave_out_moments();
+        if let Some(unseen) = &mut unseen {
+            unseen.leave_out_moments();
+        }
     }
     let curve_hides_sag = curve_hides_sag(&predictor, &nominal)?;
     if curve_hides_sag {

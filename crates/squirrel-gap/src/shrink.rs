@@ -11,7 +11,8 @@
 //! The floor is the best model against itself, started and read with the noise of these sensors in turbulent air of the
 //! declared tolerance. One flight's noise is not the mean flight's: where the best model is inside two standard deviations
 //! of what noise leaves from flight to flight, the floor of these flights is taken to be where it is. All models share the
-//! numbers that float inside their tolerances, so that the gap is that of the effect.
+//! numbers that float inside their tolerances, so that the gap is that of the effect. Where moments are left out of what is
+//! explained, the attitude is the measured one and only velocity and specific force are compared.
 
 use crate::GapError;
 use crate::leftover::floor::TURBULENCE_S;
@@ -171,7 +172,7 @@ pub(crate) fn errors(predictor: &Predictor, hypothesis: &Hypothesis) -> Result<O
             let rate = mean(track.omega()) - read.omega;
             let force = mean(track.specific_force()) - read.specific_force;
             let velocity = velocity - velocity_then;
-            all.add(bin, [velocity, rotation, rate, force]);
+            all.add(bin, compared(predictor, [velocity, rotation, rate, force]));
         })?;
     }
     Ok((all.count[0] > 0.0).then_some(all))
@@ -225,7 +226,7 @@ pub(crate) fn floor(
             let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
             let force =
                 other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
-            let parts = [velocity, rotation, rate, force];
+            let parts = compared(predictor, [velocity, rotation, rate, force]);
             if bin == 0 {
                 segments.push(Errors::zeros());
             }
@@ -250,6 +251,18 @@ struct Noise<'a> {
     velocity_m_s: Vector3<f64>,
     attitude_rad: Vector3<f64>,
     rng: &'a mut Pcg64Mcg,
+}
+
+/// The parts that are compared; the others are zero.
+fn compared(
+    predictor: &Predictor,
+    [velocity, rotation, rate, force]: [Vector3<f64>; 4],
+) -> [Vector3<f64>; 4] {
+    if predictor.has_channel(3) {
+        [velocity, rotation, rate, force]
+    } else {
+        [velocity, Vector3::zeros(), Vector3::zeros(), force]
+    }
 }
 
 /// One bin of one segment.
@@ -319,6 +332,7 @@ fn segment(
         let [_, rate_noise] = track.imu_noise;
         state.body.omega = In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * START_NOISE);
     }
+    let is_led = !predictor.has_channel(3);
     let effects = &hypothesis.effects;
     let mut clock = predictor.clock(track.flight, effects, track.time_s[start]);
     let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
@@ -336,6 +350,10 @@ fn segment(
                 middle = state.body.ned_from_body().quaternion;
             }
             let sample = start + k;
+            if is_led {
+                state.body.attitude = motion.body[sample].attitude;
+                state.body.omega = motion.body[sample].omega;
+            }
             let before = state.body;
             velocity += before.velocity.vector;
             rate += before.omega.vector;

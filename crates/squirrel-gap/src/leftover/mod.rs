@@ -158,7 +158,7 @@ pub(crate) fn leftover(
             slow_nominal: rms_of_means(&rows(nominal)),
             whole_floor: mean(rms),
         };
-        let within = within_tolerance(predictor, segment, slack);
+        let within = within_tolerance(predictor, &motions[segment.piece], segment, slack);
         let allowed = |floor: f64, ratio: f64, explained: f64| {
             ((floor * ratio).powi(2) + (MODEL_ERROR * explained).powi(2) + within.powi(2)).sqrt()
         };
@@ -192,14 +192,17 @@ pub(crate) fn leftover(
 pub(crate) struct Slack {
     /// Where forces act, m.
     pub(crate) lever_m: f64,
+    /// Drag along one axis, N s/m.
+    pub(crate) drag_n_s_per_m: f64,
     /// Thrust over a flight, as a fraction.
     pub(crate) thrust_fraction: f64,
     /// When commands act, s.
     pub(crate) timing_s: f64,
 }
 
-/// What such tolerances leave in a channel, in its unit: forces that act a little beside their place are moments.
-fn within_tolerance(predictor: &Predictor, segment: &Segment, slack: Slack) -> f64 {
+/// What such tolerances leave in a channel, in its unit: forces that act a little beside their place are moments, and no drag
+/// is a straight line.
+fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, slack: Slack) -> f64 {
     let p = predictor.vehicle.vehicle.parameters();
     let slow = |channel: usize| {
         let measured = &predictor.tracks[segment.piece].measured;
@@ -208,8 +211,12 @@ fn within_tolerance(predictor: &Predictor, segment: &Segment, slack: Slack) -> f
         rms_of_means(&force) * p.mass_kg
     };
     match segment.channel {
-        0 | 1 => 0.0,
-        2 => slack.thrust_fraction * GRAVITY_M_S2,
+        0..=2 => {
+            let n = motion.body.len().max(1) as f64;
+            let speed = motion.body.iter().map(|b| b.velocity.vector.norm_squared()).sum::<f64>() / n;
+            let thrust = if segment.channel == 2 { slack.thrust_fraction * GRAVITY_M_S2 } else { 0.0 };
+            thrust.hypot(slack.drag_n_s_per_m * speed.sqrt() / p.mass_kg)
+        }
         axis @ (3 | 4) => {
             // Commands that were logged on another clock are off by up to a sample.
             let measured = &predictor.tracks[segment.piece].measured;

@@ -131,7 +131,7 @@ impl Catalogue {
     /// * `thrust_fraction` - by how much thrust may drift in a flight
     pub(crate) fn slack(&self, timing_s: f64, thrust_fraction: f64) -> Slack {
         let of = |key: &str| self.parameters.iter().find(|p| p.key == key).map_or(0.0, |p| p.tolerance);
-        Slack { lever_m: of("cg_x_m"), timing_s, thrust_fraction }
+        Slack { lever_m: of("cg_x_m"), timing_s, thrust_fraction, drag_n_s_per_m: of("extra_drag_n_s_per_m") }
     }
 
     fn add(
