@@ -20,6 +20,8 @@ use std::collections::BTreeMap;
 
 /// Part of what the nominal model leaves that a form which differs may leave; more is outside the catalogue.
 const FORM_SHARE: f64 = 0.1;
+/// Part of the held-out gap that a name in another form must remove.
+const FORM_REMOVED: f64 = 0.6;
 /// How much more of the held-out gap the best other name must leave.
 const RIVAL_GAP: f64 = 3.0;
 /// More alternatives than this within the evidence of a name are no answer.
@@ -176,7 +178,8 @@ fn decide(
             (false, true) => Kind::None,
         }
     } else if leftover.is_real() {
-        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) {
+        let shrinks = gap.as_ref().is_none_or(|gap| gap.removed_fraction > FORM_REMOVED);
+        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) && shrinks {
             Kind::NamedFormDiffers
         } else {
             Kind::OutsideCatalogue

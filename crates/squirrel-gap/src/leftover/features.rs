@@ -142,6 +142,39 @@ pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
     ]
 }
 
+/// Distance over which a place has one force, m, and time after which one comes back to it and does not linger, s.
+const PLACE_M: f64 = 1.5;
+const AWAY_S: f64 = 5.0;
+
+/// Part of the variance of a horizontal force in the world that the force at the same place at other times predicts, 0 to 1:
+/// moving air forgets a place, and what is fixed to one does not.
+///
+/// * `force` - body x and y, a number a moment
+pub(super) fn place_share(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
+    let ned: Vec<Vector3<f64>> = moments
+        .iter()
+        .zip(force[0].iter().zip(force[1]))
+        .map(|(m, (x, y))| {
+            let turned = m.ned_from_body * Vector3::new(*x, *y, 0.0);
+            Vector3::new(turned.x, turned.y, 0.0)
+        })
+        .collect();
+    let (mut error, mut total) = (0.0, 0.0);
+    for (own, force) in moments.iter().zip(&ned) {
+        let (mut sum, mut weight) = (Vector3::zeros(), 1.0);
+        for (other, theirs) in moments.iter().zip(&ned) {
+            if own.flight != other.flight || (own.time_s - other.time_s).abs() > AWAY_S {
+                let w = (-0.5 * (own.position - other.position).norm_squared() / (PLACE_M * PLACE_M)).exp();
+                sum += theirs * w;
+                weight += w;
+            }
+        }
+        error += (force - sum / weight).norm_squared();
+        total += force.norm_squared();
+    }
+    if total > 0.0 { (1.0 - error / total).clamp(0.0, 1.0) } else { 0.0 }
+}
+
 /// Part of the variance of `y` that a family predicts in blocks that were left out, 0 to 1.
 pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
     let n = y.len();

@@ -10,7 +10,7 @@ pub(crate) mod floor;
 
 use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
-use features::{families, predicted_share};
+use features::{families, place_share, predicted_share};
 use squirrel_core::math::GRAVITY_M_S2;
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
@@ -31,6 +31,7 @@ const SHARE_MIN: f64 = 0.25;
 
 /// Part of the variance that a family may predict of gusts by chance.
 const GUST_SHARE_MAX: f64 = 0.45;
+const PLACE_SHARE_MAX: f64 = 0.2;
 /// Gusts are about normal; what acts at one place or time comes in bursts.
 const GUST_KURTOSIS_MAX: f64 = 7.0;
 
@@ -56,8 +57,8 @@ pub(crate) struct Leftover {
     pub(crate) excess: Vec<(usize, f64)>,
     /// Families by the share of the variance they predict in the worst channel.
     pub(crate) families: Vec<(&'static str, f64)>,
-    /// The largest share of the variance of the horizontal force that a family predicts.
-    pub(crate) horizontal_share: f64,
+    /// Part of the variance of the horizontal force that its place predicts.
+    pub(crate) place_share: f64,
     /// Fourth moment of the slow part of the horizontal force over the square of its second: 3 for a normal distribution.
     pub(crate) kurtosis: f64,
     /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above 0.5 Hz.
@@ -93,6 +94,7 @@ impl Leftover {
     /// Whether a family predicts so much of it, or it comes in such bursts, that it cannot be gusts.
     pub(crate) fn is_predicted(&self) -> bool {
         self.families.first().is_some_and(|(_, share)| *share > GUST_SHARE_MAX)
+            || self.place_share > PLACE_SHARE_MAX
             || self.kurtosis > GUST_KURTOSIS_MAX
     }
 
@@ -171,17 +173,17 @@ pub(crate) fn leftover(
         worst.iter().copied().enumerate().filter(|(_, ratio)| *ratio > 1.0).collect();
     excess.sort_by(|a, b| b.1.total_cmp(&a.1));
     let mut out =
-        Leftover { bands, excess, families: Vec::new(), horizontal_share: 0.0, kurtosis: 3.0, line: None };
+        Leftover { bands, excess, families: Vec::new(), place_share: 0.0, kurtosis: 3.0, line: None };
     if let Some(&(channel, _)) = out.excess.first() {
         let (moments, y) = blocks(predictor, motions, left, channel);
         out.families = families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
-        out.families.sort_by(|a, b| b.1.total_cmp(&a.1));
-        for channel in 0..2 {
-            let (moments, y) = blocks(predictor, motions, left, channel);
-            let shares = families(&moments).into_iter().map(|f| predicted_share(&f, &y));
-            out.horizontal_share = shares.fold(out.horizontal_share, f64::max);
-            out.kurtosis = kurtosis(&y).max(out.kurtosis);
+        let [(moments, x), (_, y)] = [0, 1].map(|channel| blocks(predictor, motions, left, channel));
+        out.place_share = place_share(&moments, [&x, &y]);
+        if channel < 2 {
+            out.families.push(("position", out.place_share));
         }
+        out.families.sort_by(|a, b| b.1.total_cmp(&a.1));
+        out.kurtosis = kurtosis(&x).max(kurtosis(&y));
         out.line = line(predictor, left, channel);
     }
     out

@@ -13,8 +13,11 @@ use std::collections::BTreeMap;
 pub(crate) const NATS_MIN: f64 = 6.0;
 /// What each further effect must be worth: a wrong first number leaves a little to explain.
 const FURTHER_NATS: f64 = 10.0;
-/// What an effect must be worth beside gusts, which blow harder at times than at others.
-const BESIDE_GUSTS_NATS: f64 = 20.0;
+/// What an effect must be worth beside gusts, which blow harder at times than at others; and per squared m/s of their
+/// deviation, if it acts through moving air, as gusts on average do.
+const BESIDE_GUSTS_NATS: f64 = 12.0;
+const BLOWN_NATS: f64 = 40.0;
+const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
 /// Part of the smallest size worth reporting that an effect must reach.
 const SIZE_MIN: f64 = 0.5;
 /// How much larger than the largest plausible size a number may be.
@@ -123,6 +126,15 @@ impl Search<'_> {
         point
     }
 
+    /// What a member must be worth, nats.
+    fn needed(&self, member: &Member) -> f64 {
+        match self.gust_m_s {
+            None => NATS_MIN,
+            Some(sigma) if BLOWN.contains(&self.effect(member)) => BLOWN_NATS * (sigma * sigma).max(1.0),
+            Some(_) => BESIDE_GUSTS_NATS,
+        }
+    }
+
     /// Drops members that refinement has made too small to report.
     fn prune(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
         while let Some(small) = best.members.iter().position(|member| !self.is_large_enough(member)) {
@@ -178,11 +190,8 @@ impl Search<'_> {
     fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
         while best.members.len() < MEMBERS_MAX {
             let Some(next) = self.best_addition(linear, best, &[])? else { break };
-            let needed = match (self.gust_m_s, best.members.is_empty()) {
-                (Some(_), _) => BESIDE_GUSTS_NATS,
-                (None, true) => NATS_MIN,
-                (None, false) => FURTHER_NATS,
-            };
+            let kept = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
+            let needed = next.members.last().map_or(kept, |member| self.needed(member).max(kept));
             if next.log_evidence < best.log_evidence + needed {
                 break;
             }
@@ -303,7 +312,7 @@ impl Search<'_> {
                 let mut rest = best.members.clone();
                 let out = rest.remove(i);
                 let without = self.score(linear, &rest)?;
-                if without.log_evidence > best.log_evidence - NATS_MIN {
+                if without.log_evidence > best.log_evidence - self.needed(&out) {
                     *best = without;
                     changed = true;
                     break;
@@ -333,7 +342,7 @@ impl Search<'_> {
         for (column, _) in along.iter().filter(|(column, _)| *column < self.catalogue.parameters.len()) {
             base[*column] = 0.0;
         }
-        let mut best = self.evaluate(linear, members, &base)?;
+        let mut best = self.evaluate(linear, members, &base, None)?;
         let mut share = 1.0;
         for _ in 0..STEPS_MAX {
             let mut next = best.members.clone();
@@ -357,7 +366,7 @@ impl Search<'_> {
             if moved < CONVERGED {
                 break;
             }
-            let scored = self.evaluate(linear, &next, &base)?;
+            let scored = self.evaluate(linear, &next, &base, Some(&best))?;
             // Where the model is linear, every point of it has the same evidence: the mode is where steps end.
             if scored.log_evidence > best.log_evidence - STEP_NATS {
                 best = scored;
@@ -401,6 +410,14 @@ impl Search<'_> {
         all
     }
 
+    /// Whether a number of a member has one slope all along: it is in the catalogue's linear part and no lag.
+    fn keeps_slope(&self, member: &Member, slot: usize) -> bool {
+        let own = &self.catalogue.candidates[member.candidate].parameters;
+        own.iter()
+            .map(|p| &self.catalogue.parameters[*p])
+            .any(|p| p.slot == slot && !self.catalogue.bends(p) && !self.catalogue.starts_flat(p))
+    }
+
     /// Range of a number of a member.
     pub(crate) fn range(&self, member: &Member, slot: usize) -> (f64, f64, bool) {
         use squirrel_core::effects::{Effects, Kind};
@@ -412,7 +429,15 @@ impl Search<'_> {
     }
 
     /// Evidence of a set, linearised in its free numbers where they are.
-    fn evaluate(&self, linear: &Linear, members: &[Member], base: &[f64]) -> Result<Scored, GapError> {
+    ///
+    /// * `before` - the same set with other numbers: columns that hardly bend are its
+    fn evaluate(
+        &self,
+        linear: &Linear,
+        members: &[Member],
+        base: &[f64],
+        before: Option<&Scored>,
+    ) -> Result<Scored, GapError> {
         let segments = &self.predictor.segments;
         let mut point = Point { members: members.to_vec(), base: base.to_vec() };
         let mut spikes = linear.tolerance.clone();
@@ -453,12 +478,21 @@ impl Search<'_> {
         for (index, member) in members.iter().enumerate() {
             for slot in self.free_slots(member) {
                 let (smallest, largest, _) = self.range(member, slot);
-                let step = 0.1 * smallest;
-                let mut moved = point.clone();
-                moved.members[index].values[slot] += step;
-                let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
-                let column: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
-                let white = linear.whitener.apply(segments, &column);
+                let (column, white) = match before {
+                    Some(before) if self.keeps_slope(member, slot) => {
+                        (before.own_raw[own.len()].clone(), before.own[own.len()].clone())
+                    }
+                    _ => {
+                        let step = 0.1 * smallest;
+                        let mut moved = point.clone();
+                        moved.members[index].values[slot] += step;
+                        let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
+                        let column: Vec<f64> =
+                            residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
+                        let white = linear.whitener.apply(segments, &column);
+                        (column, white)
+                    }
+                };
                 add_scaled(&mut y, &white, member.values[slot]);
                 own.push(white);
                 own_raw.push(column);
