@@ -69,7 +69,8 @@ fn rotors_lag_in_logs_that_hold_nothing_but_the_inertial_unit() {
     let read = |name: &str| (name.to_owned(), imported("arpl.toml", &folder.join(format!("{name}.csv"))));
     let verdict =
         diagnosed(&vehicle("crazyflie2_arpl.toml"), &vec![read("log10")], &vec![read("log16")]).verdict;
-    // The battery is not logged: its slow drift of thrust stays, and whether that is an effect these logs cannot tell.
+    // The battery is not logged: its slow drift of thrust stays, and is no other effect.
+    assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     let names: Vec<_> = verdict.effects.iter().map(|e| e.name).collect();
     assert_eq!(names, ["motor_lag"], "{}", verdict.words);
     assert!(!verdict.notes.is_empty(), "what the logs lack is said");

@@ -18,6 +18,7 @@ mod search;
 mod whiten;
 
 pub(crate) use linear::heights;
+use parameters::unlogged_sag;
 pub(crate) use parameters::{Catalogue, sds};
 pub(crate) use payload::payload_lengths_m;
 pub(crate) use point::{Member, Point, hypothesis};
@@ -26,7 +27,6 @@ pub(crate) use search::{Found, NATS_MIN, Scored, Search};
 use crate::GapError;
 use crate::leftover::{Leftover, Slack, leftover, noise};
 use crate::predictor::Hypothesis;
-use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Deviation of the air's own motion that is no wind worth a name, m/s.
 pub(crate) const TURBULENCE_M_S: f64 = 0.12;
@@ -117,26 +117,11 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     })
 }
 
-/// Voltage of a full cell, of one at rest, and of an empty one under load, V.
-const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
-
-/// By how much thrust may be off, as a fraction, where the battery's voltage is not logged: it is anywhere between full and
-/// empty, the voltage at which the vehicle's numbers hold is known to its sd, and thrust goes with the square of both.
-fn unlogged_sag(vehicle: &VehicleFile) -> f64 {
-    let reference_v = vehicle.vehicle.parameters().propulsion.reference_voltage_v;
-    let [full, rest, empty] = CELL_V;
-    let cells = (reference_v / rest).round().max(1.0);
-    let thrust = |cell_v: f64| (cell_v * cells / reference_v).powi(2);
-    let sd_v = sds(vehicle, "propulsion.reference_voltage_v").map_or(0.0, |sd| sd[0]);
-    (1.0 - thrust(empty)).abs().max((thrust(full) - 1.0).abs()).hypot(2.0 * sd_v / reference_v)
-}
-
 /// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample more or less.
 fn slack(search: &Search<'_>, found: &Found) -> Slack {
     let skewed = found.best.members.iter().any(|m| search.effect(m) == "clock_skew");
     let period_s = search.predictor.tracks.first().map_or(0.0, |t| t.period_s);
-    let drift = if search.predictor.has_voltage() { 0.0 } else { unlogged_sag(search.predictor.vehicle) };
-    search.catalogue.slack(if skewed { period_s } else { 0.0 }, drift)
+    search.catalogue.slack(if skewed { period_s } else { 0.0 }, unlogged_sag(search.predictor))
 }
 
 /// The leftover with everything that floats where it fits best inside twice its tolerance: the tempered fit that names

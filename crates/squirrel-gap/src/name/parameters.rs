@@ -187,6 +187,24 @@ fn timing_s(predictor: &Predictor, effect: &str) -> Option<f64> {
     }
 }
 
+/// Voltage of a full cell, of one at rest, and of an empty one under load, V.
+const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
+
+/// By how much thrust may be off, as a fraction, where the battery's voltage is not logged: it is anywhere between full and
+/// empty, the voltage at which the vehicle's numbers hold may be two of its sd off, and thrust goes with the square of both.
+pub(super) fn unlogged_sag(predictor: &Predictor) -> f64 {
+    if predictor.has_voltage() {
+        return 0.0;
+    }
+    let vehicle = predictor.vehicle;
+    let reference_v = vehicle.vehicle.parameters().propulsion.reference_voltage_v;
+    let [full, rest, empty] = CELL_V;
+    let cells = (reference_v / rest).round().max(1.0);
+    let thrust = |cell_v: f64| (cell_v * cells / reference_v).powi(2);
+    let sd_v = sds(vehicle, "propulsion.reference_voltage_v").map_or(0.0, |sd| sd[0]);
+    (1.0 - thrust(empty)).abs().max((thrust(full) - 1.0).abs()).hypot(2.0 * 2.0 * sd_v / reference_v)
+}
+
 /// Numbers of the airframe that have a declared tolerance, where flights show them.
 fn airframe(predictor: &Predictor) -> Vec<(Airframe, f64)> {
     let vehicle = predictor.vehicle;
