@@ -2,7 +2,8 @@
 
 use super::linear::Linear;
 use super::point::Member;
-use super::search::{Scored, Search};
+use super::refine::Scored;
+use super::search::Search;
 use crate::GapError;
 use squirrel_core::effects::{Effects, FORM, Kind};
 

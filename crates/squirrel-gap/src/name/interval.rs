@@ -6,7 +6,7 @@
 
 use super::evidence::BETA;
 use super::linear::Linear;
-use super::search::Scored;
+use super::refine::Scored;
 use crate::predictor::Predictor;
 use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;

@@ -1,9 +1,9 @@
 //! Which effect is missing: evidence under declared tolerances, every hypothesis flown by the simulator's own model.
 //!
 //! 1. The predictor is linearised in every number of the catalogue ([`linear`]), whitened ([`whiten`]), and everything
-//!    floats inside its tolerance ([`parameters`], [`evidence`]).
-//! 2. Sets of effects grow, shrink and swap by evidence; each is refined through the simulator ([`search`]), in each of its
-//!    published forms ([`forms`]).
+//!    floats inside its tolerance ([`parameters`], [`tolerance`], [`point`], [`evidence`]).
+//! 2. Sets of effects grow, shrink and swap by evidence ([`search`]); each is refined through the simulator ([`refine`]), in
+//!    each of its published forms ([`forms`]).
 //! 3. What is left is held against what noise leaves ([`crate::leftover`]); intervals come from blocks ([`interval`]).
 
 mod evidence;
@@ -13,16 +13,20 @@ mod linear;
 mod parameters;
 mod payload;
 mod point;
+mod refine;
 mod rivals;
 mod search;
+mod tolerance;
 mod whiten;
 
 pub(crate) use linear::heights;
-use parameters::unlogged_sag;
-pub(crate) use parameters::{Catalogue, sds};
+pub(crate) use parameters::Catalogue;
 pub(crate) use payload::payload_lengths_m;
 pub(crate) use point::{Member, Point, hypothesis};
-pub(crate) use search::{Found, NATS_MIN, Scored, Search};
+pub(crate) use refine::Scored;
+pub(crate) use search::{Found, NATS_MIN, Search};
+pub(crate) use tolerance::sds;
+use tolerance::unlogged_sag;
 
 use crate::GapError;
 use crate::leftover::{Leftover, Slack, leftover, noise};

@@ -1,7 +1,8 @@
 //! Other explanations of the same flights, and what these flights cannot show at all.
 
 use super::evidence::BETA;
-use super::search::{Found, Scored, Search};
+use super::refine::Scored;
+use super::search::{Found, Search};
 use crate::GapError;
 
 /// Rivals that are refined for each named effect.

@@ -1,13 +1,12 @@
 //! The search for the set of effects with the most evidence: forward, drop, swap, each step refined through the simulator.
 
-use super::evidence::{BETA, Gram, Posterior, dot};
-use super::linear::{Linear, height_columns};
-use super::parameters::{Candidate, Catalogue, SLAB_OF_LARGEST};
-use super::point::{Member, Other, Point, hypothesis};
+use super::evidence::BETA;
+use super::linear::Linear;
+use super::parameters::{Candidate, Catalogue};
+use super::point::{Member, Point, hypothesis};
+use super::refine::Scored;
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
-use nalgebra::DMatrix;
-use std::collections::BTreeMap;
 
 /// What an effect must be worth to be named, nats.
 pub(crate) const NATS_MIN: f64 = 6.0;
@@ -24,37 +23,12 @@ const SIZE_MIN: f64 = 0.5;
 const PLAUSIBLE: f64 = 1.3;
 /// Candidates that are refined after each linear ranking.
 const REFINED: usize = 4;
-/// Most steps of a refinement.
-const STEPS_MAX: usize = 10;
-/// Evidence that a step towards the mode may cost, nats.
-const STEP_NATS: f64 = 1.0;
-/// Part of the smallest size worth reporting below which a step is the last.
-const CONVERGED: f64 = 0.01;
 /// Part of its tolerance by which a number must be off to act in the simulator's own model.
 const ACTS: f64 = 0.7;
 /// Most effects in a set.
 const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
 const ROUNDS_MAX: usize = 4;
-
-/// A set of effects with its best numbers and its evidence.
-pub(crate) struct Scored {
-    pub(crate) members: Vec<Member>,
-    /// Relative to nothing in particular; differences within one [`Linear`] count.
-    pub(crate) log_evidence: f64,
-    /// Of the members' free numbers, then of all columns of the [`Linear`].
-    pub(crate) posterior: Posterior,
-    pub(crate) gram: Gram,
-    /// Prior deviations, in the order of the posterior.
-    pub(crate) prior: Vec<f64>,
-    /// Which number of which member each of the first columns is.
-    pub(crate) free: Vec<(usize, usize)>,
-    /// Columns of the free numbers, as they are and whitened.
-    pub(crate) own_raw: Vec<Vec<f64>>,
-    pub(crate) own: Vec<Vec<f64>>,
-    /// Whitened measurement, with the free numbers' part in it.
-    pub(crate) y: Vec<f64>,
-}
 
 /// The predictor and what can be named in it.
 pub(crate) struct Search<'a> {
@@ -143,17 +117,6 @@ impl Search<'_> {
             *best = self.score(linear, &rest)?;
         }
         Ok(())
-    }
-
-    /// The last step of a refinement that has converged, too short to be worth another look.
-    fn finish(&self, best: &mut Scored) {
-        for (column, (member, slot)) in best.free.iter().enumerate() {
-            let (smallest, ..) = self.range(&best.members[*member], *slot);
-            let step = best.posterior.mean[column] - best.members[*member].values[*slot];
-            if step.abs() < CONVERGED * smallest {
-                best.members[*member].values[*slot] += step;
-            }
-        }
     }
 
     fn worth(&self, linear: &Linear, null: &Scored, best: &Scored) -> Result<Vec<f64>, GapError> {
@@ -297,7 +260,7 @@ impl Search<'_> {
         self.catalogue.candidates[member.candidate].effect
     }
 
-    fn hypothesis(&self, point: &Point) -> Result<Hypothesis, GapError> {
+    pub(super) fn hypothesis(&self, point: &Point) -> Result<Hypothesis, GapError> {
         hypothesis(self.predictor, self.catalogue, point)
     }
 
@@ -330,215 +293,6 @@ impl Search<'_> {
         }
         Ok(())
     }
-
-    /// Refines the numbers of a set by Gauss-Newton through the simulator, everything else floating with its tolerance.
-    ///
-    /// # Errors
-    /// What the predictor says.
-    pub(crate) fn score(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
-        let mut base = linear.point.base.clone();
-        let along = self.moving_along(linear, members);
-        // A lag that is new explains what others were taken to be off for: they start at nothing.
-        for (column, _) in along.iter().filter(|(column, _)| *column < self.catalogue.parameters.len()) {
-            base[*column] = 0.0;
-        }
-        let mut best = self.evaluate(linear, members, &base, None)?;
-        let mut share = 1.0;
-        for _ in 0..STEPS_MAX {
-            let mut next = best.members.clone();
-            let mut moved: f64 = 0.0;
-            for (column, (member, slot)) in best.free.iter().enumerate() {
-                let (smallest, largest, signed) = self.range(&next[*member], *slot);
-                let low = if signed { -2.0 * largest } else { 0.02 * smallest };
-                let value = &mut next[*member].values[*slot];
-                let target = best.posterior.mean[column].clamp(low, 2.0 * largest);
-                let step = share * (target - *value);
-                moved = moved.max(step.abs() / smallest);
-                *value += step;
-            }
-            let before = base.clone();
-            for (column, sd) in &along {
-                let target = best.posterior.mean[best.free.len() + column].clamp(-3.0 * sd, 3.0 * sd);
-                let step = share * (target - base[*column]);
-                moved = moved.max(0.1 * step.abs() / sd);
-                base[*column] += step;
-            }
-            if moved < CONVERGED {
-                break;
-            }
-            let scored = self.evaluate(linear, &next, &base, Some(&best))?;
-            // Where the model is linear, every point of it has the same evidence: the mode is where steps end.
-            if scored.log_evidence > best.log_evidence - STEP_NATS {
-                best = scored;
-            } else {
-                // Too far for what the columns know: half the way.
-                base = before;
-                share *= 0.5;
-                if share < 0.2 {
-                    break;
-                }
-            }
-        }
-        Ok(best)
-    }
-
-    /// Columns that bend so much beside some members that they are refined with them, with their tolerances: heights where
-    /// thrust feels them, and lags and delays beside one of them that is new.
-    fn moving_along(&self, linear: &Linear, members: &[Member]) -> Vec<(usize, f64)> {
-        let catalogue = self.catalogue;
-        let bends = |m: &Member| {
-            catalogue.candidates[m.candidate]
-                .parameters
-                .iter()
-                .any(|p| catalogue.bends(&catalogue.parameters[*p]))
-        };
-        let is_new = |m: &Member| !linear.point.members.iter().any(|other| other.candidate == m.candidate);
-        let mut all = Vec::new();
-        if members.iter().any(|m| bends(m) && is_new(m)) {
-            let own = |p: usize| members.iter().any(|m| m.candidate == p);
-            let free = catalogue.parameters.iter().enumerate();
-            let bending = free.filter(|(_, p)| catalogue.bends(p) && !own(p.candidate) && p.tolerance > 0.0);
-            all.extend(bending.map(|(column, p)| (column, p.tolerance)));
-        }
-        if catalogue.feels_height(members) {
-            let sensors = catalogue.shared_columns()..linear.point.base.len();
-            all.extend(sensors.filter_map(|column| match catalogue.other(column) {
-                (Other::Height { .. }, sd) => Some((column, sd)),
-                _ => None,
-            }));
-        }
-        all
-    }
-
-    /// Whether a number of a member has one slope all along: it is in the catalogue's linear part and no lag.
-    fn keeps_slope(&self, member: &Member, slot: usize) -> bool {
-        let own = &self.catalogue.candidates[member.candidate].parameters;
-        own.iter()
-            .map(|p| &self.catalogue.parameters[*p])
-            .any(|p| p.slot == slot && !self.catalogue.bends(p) && !self.catalogue.starts_flat(p))
-    }
-
-    /// Range of a number of a member.
-    pub(crate) fn range(&self, member: &Member, slot: usize) -> (f64, f64, bool) {
-        use squirrel_core::effects::{Effects, Kind};
-        let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
-        match list[slot].kind {
-            Kind::Size { smallest, largest, signed } => (smallest, largest, signed),
-            _ => (1.0, 1.0, true),
-        }
-    }
-
-    /// Evidence of a set, linearised in its free numbers where they are.
-    ///
-    /// * `before` - the same set with other numbers: columns that hardly bend are its
-    fn evaluate(
-        &self,
-        linear: &Linear,
-        members: &[Member],
-        base: &[f64],
-        before: Option<&Scored>,
-    ) -> Result<Scored, GapError> {
-        let segments = &self.predictor.segments;
-        let mut point = Point { members: members.to_vec(), base: base.to_vec() };
-        let mut spikes = linear.tolerance.clone();
-        for member in members {
-            let candidate = &self.catalogue.candidates[member.candidate];
-            for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
-                let other = &self.catalogue.candidates[parameter.candidate];
-                // Another rotor may still be off by its tolerance; the payload is one thing at several lengths.
-                let same = parameter.candidate == member.candidate
-                    || (other.effect == candidate.effect && other.fixed == candidate.fixed);
-                if same {
-                    spikes[p] = 0.0;
-                    point.base[p] = 0.0;
-                }
-            }
-        }
-        let residual = self.predictor.residual(&self.hypothesis(&point)?)?;
-        let mut y = linear.whitener.apply(segments, &residual);
-        // Height matters where an effect of it acts, and as much as it acts.
-        if !self.catalogue.feels_height(members) {
-            for (column, spike) in spikes.iter_mut().enumerate().skip(self.catalogue.shared_columns()) {
-                if matches!(self.catalogue.other(column).0, Other::Height { .. }) {
-                    *spike = 0.0;
-                }
-            }
-        }
-        let mut fresh = BTreeMap::new();
-        for (index, column) in height_columns(self.predictor, self.catalogue, &point, &residual)? {
-            fresh.insert(index, linear.whitener.apply(segments, &column));
-        }
-        let column = |j: usize| fresh.get(&j).unwrap_or(&linear.columns[j]);
-        for (j, x) in point.base.iter().enumerate() {
-            if *x != 0.0 {
-                add_scaled(&mut y, column(j), *x);
-            }
-        }
-        let (mut own, mut own_raw, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for (index, member) in members.iter().enumerate() {
-            for slot in self.free_slots(member) {
-                let (smallest, largest, _) = self.range(member, slot);
-                let (column, white) = match before {
-                    Some(before) if self.keeps_slope(member, slot) => {
-                        (before.own_raw[own.len()].clone(), before.own[own.len()].clone())
-                    }
-                    _ => {
-                        let step = 0.1 * smallest;
-                        let mut moved = point.clone();
-                        moved.members[index].values[slot] += step;
-                        let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
-                        let column: Vec<f64> =
-                            residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
-                        let white = linear.whitener.apply(segments, &column);
-                        (column, white)
-                    }
-                };
-                add_scaled(&mut y, &white, member.values[slot]);
-                own.push(white);
-                own_raw.push(column);
-                free.push((index, slot));
-                prior.push(SLAB_OF_LARGEST * largest);
-            }
-        }
-        let (k, n) = (own.len(), linear.columns.len());
-        let mut gram =
-            Gram { g: DMatrix::zeros(k + n, k + n), b: nalgebra::DVector::zeros(k + n), yy: dot(&y, &y) };
-        gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram);
-        for i in 0..k {
-            for j in 0..k {
-                gram.g[(i, j)] = dot(&own[i], &own[j]);
-            }
-            for j in 0..n {
-                let x = dot(&own[i], column(j));
-                gram.g[(i, k + j)] = x;
-                gram.g[(k + j, i)] = x;
-            }
-            gram.b[i] = dot(&own[i], &y);
-        }
-        for j in 0..n {
-            gram.b[k + j] = dot(column(j), &y);
-        }
-        for i in fresh.keys().copied() {
-            for j in 0..n {
-                let x = dot(column(i), column(j));
-                gram.g[(k + i, k + j)] = x;
-                gram.g[(k + j, k + i)] = x;
-            }
-        }
-        prior.extend(spikes);
-        let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NoFlights)?;
-        Ok(Scored {
-            members: members.to_vec(),
-            log_evidence: posterior.log_evidence,
-            posterior,
-            gram,
-            prior,
-            free,
-            own_raw,
-            own,
-            y,
-        })
-    }
 }
 
 /// Whether an effect leaves no room for another: itself, and where flights show a ratio alone, what stands on its other side.
@@ -549,10 +303,4 @@ fn excludes(named: &Candidate, other: &Candidate) -> bool {
     };
     let thrust = |c: &Candidate| ["mass_error", "thrust_coefficient"].contains(&c.effect);
     named.effect == other.effect || (thrust(named) && thrust(other)) || (yaw(named) && yaw(other))
-}
-
-fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {
-    for (y, c) in y.iter_mut().zip(column) {
-        *y += c * x;
-    }
 }

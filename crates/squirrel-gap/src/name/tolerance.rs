@@ -1,0 +1,162 @@
+//! How far each number may be off without a name: what the vehicle file declares, and what is known of sensors and batteries.
+
+use super::point::Airframe;
+use crate::GapError;
+use crate::predictor::Predictor;
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.
+pub(super) const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
+/// Part of a sample to which times are known, one standard deviation: it is held for all of it.
+const SAMPLE_SHARE: f64 = 0.29;
+/// Voltage of a full cell, of one at rest, and of an empty one under load, V.
+const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
+
+/// How far the number that an effect changes may be off, one standard deviation, in the unit of the effect's parameter.
+pub(super) fn tolerance(
+    vehicle: &VehicleFile,
+    effect: &str,
+    slot: usize,
+    fixed: &[(usize, f64)],
+    smallest: f64,
+) -> Result<f64, GapError> {
+    let p = vehicle.vehicle.parameters();
+    let propulsion = &p.propulsion;
+    let none = SHARE_OF_SMALLEST * smallest;
+    let number = |field: &str, index: usize, value: f64| deviation(vehicle, field, index, value);
+    // The sd of a number that the file must give where the number is not zero, over that number.
+    let fraction = |field: &str, index: usize, value: f64| {
+        Ok(number(field, index, value)?.map_or(none, |sd| sd / value.abs().max(f64::MIN_POSITIVE)))
+    };
+    let declared = |field: &str, fallback: f64| Ok(sds(vehicle, field).map_or(fallback, |sd| sd[0]));
+    Ok(match effect {
+        "mass_error" => fraction("mass.mass_kg", 0, p.mass_kg)?,
+        "inertia_error" => {
+            let axis = fixed.first().map_or(0, |(_, axis)| *axis as usize);
+            fraction("mass.inertia_kg_m2", axis, p.inertia_kg_m2[(axis, axis)])?
+        }
+        "thrust_coefficient" | "weak_rotor" => {
+            fraction("propulsion.thrust_coefficient_n_s2", 0, propulsion.thrust_coefficient_n_s2)?
+        }
+        "yaw_torque_coeff" => {
+            fraction("propulsion.torque_coefficient_n_m_s2", 0, propulsion.torque_coefficient_n_m_s2)?
+        }
+        "motor_lag" => {
+            let single = sds(vehicle, "propulsion.time_constant_s");
+            match single {
+                Some(sd) => sd[0],
+                None if vehicle.provenance.iter().any(|(f, _)| f == "propulsion.time_constant_up_s") => {
+                    number("propulsion.time_constant_up_s", 0, propulsion.time_constant_up_s)?.unwrap_or(none)
+                }
+                None => {
+                    number("propulsion.time_constant_s", 0, propulsion.time_constant_up_s)?.unwrap_or(none)
+                }
+            }
+        }
+        "linear_drag" => number("drag.linear_n_s_per_m", 0, p.drag.linear_n_s_per_m.x)?.unwrap_or(none),
+        "quadratic_drag" => number("drag.area_m2", 0, p.drag.area_m2)?.unwrap_or(none),
+        "wing_membrane" if slot == 0 => match p.wing {
+            Some(wing) => fraction("wing.normal_force_slope", 0, wing.normal_force_slope)?,
+            None => none,
+        },
+        "wing_asymmetry" => match p.wing {
+            Some(wing) => fraction("wing.normal_force_slope", 0, wing.normal_force_slope)?,
+            None => none,
+        },
+        "wing_servo_lag" => match p.wing {
+            Some(wing) => number("wing.time_constant_s", 0, wing.time_constant_s)?.unwrap_or(none),
+            None => none,
+        },
+        "cg_offset" => {
+            let all: Vec<f64> = (0..vehicle.vehicle.rotors().len())
+                .filter_map(|i| sds(vehicle, &format!("rotor[{i}].position_body_m")))
+                .map(|sd| sd[slot.min(sd.len() - 1)])
+                .collect();
+            let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
+            mean.max(none)
+        }
+        "accel_bias" => declared("sensors.imu.accel_bias_m_s2", 0.02)?,
+        "heading_bias" => declared("sensors.attitude.bias_rad", 0.5_f64.to_radians())?,
+        "constant_wind" => 0.12,
+        // A vehicle carries a load or it does not; a ground effect of a small radius is none.
+        "payload_swing" | "ground_effect" => 0.0,
+        _ => none,
+    })
+}
+
+/// The declared sd of a number; `None` where the number is zero and the file declares none.
+fn deviation(vehicle: &VehicleFile, field: &str, index: usize, value: f64) -> Result<Option<f64>, GapError> {
+    match sds(vehicle, field) {
+        Some(sd) => Ok(Some(sd[index.min(sd.len() - 1)])),
+        None if value == 0.0 => Ok(None),
+        None => Err(GapError::Tolerance { vehicle: vehicle.name.clone(), field: field.to_owned(), value }),
+    }
+}
+
+/// The declared sds of a field, as many as it has.
+pub(crate) fn sds(vehicle: &VehicleFile, field: &str) -> Option<Vec<f64>> {
+    let (_, provenance) = vehicle.provenance.iter().find(|(name, _)| name == field)?;
+    let text = provenance.sd.as_ref()?;
+    let numbers: Vec<f64> = text
+        .split(|c: char| "[], ".contains(c))
+        .filter(|part| !part.is_empty())
+        .filter_map(|part| part.parse().ok())
+        .collect();
+    // Of a full inertia matrix, the diagonal.
+    let numbers = if numbers.len() == 9 { vec![numbers[0], numbers[4], numbers[8]] } else { numbers };
+    (!numbers.is_empty()).then_some(numbers)
+}
+
+/// How well a log tells when things happen, in the unit of an effect that is about time: a part of a sample, a clock's over
+/// its flight.
+pub(super) fn timing_s(predictor: &Predictor, effect: &str) -> Option<f64> {
+    let track = predictor.tracks.first()?;
+    let sample_s = SAMPLE_SHARE * track.period_s;
+    match effect {
+        "actuation_latency" | "gnss_latency" => Some(sample_s),
+        "clock_skew" => Some(1e6 * sample_s / (track.period_s * track.time_s.len() as f64)),
+        _ => None,
+    }
+}
+
+/// By how much thrust may be off, as a fraction, where the battery's voltage is not logged: it is anywhere between full and
+/// empty, the voltage at which the vehicle's numbers hold may be two of its sd off, and thrust goes with the square of both.
+pub(super) fn unlogged_sag(predictor: &Predictor) -> f64 {
+    if predictor.has_voltage() {
+        return 0.0;
+    }
+    let vehicle = predictor.vehicle;
+    let reference_v = vehicle.vehicle.parameters().propulsion.reference_voltage_v;
+    let [full, rest, empty] = CELL_V;
+    let cells = (reference_v / rest).round().max(1.0);
+    let thrust = |cell_v: f64| (cell_v * cells / reference_v).powi(2);
+    let sd_v = sds(vehicle, "propulsion.reference_voltage_v").map_or(0.0, |sd| sd[0]);
+    (1.0 - thrust(empty)).abs().max((thrust(full) - 1.0).abs()).hypot(2.0 * 2.0 * sd_v / reference_v)
+}
+
+/// Numbers of the airframe that have a declared tolerance, where flights show them.
+pub(super) fn airframe(predictor: &Predictor) -> Vec<(Airframe, f64)> {
+    let vehicle = predictor.vehicle;
+    let p = vehicle.vehicle.parameters();
+    let mut all = Vec::new();
+    if predictor.has_channel(3) {
+        let torque = p.propulsion.torque_coefficient_n_m_s2;
+        for rotor in 0..p.rotor_count {
+            let arm = sds(vehicle, &format!("rotor[{rotor}].position_body_m"));
+            for axis in 0..2 {
+                all.extend(
+                    arm.as_ref().map(|sd| (Airframe::Arm { rotor, axis }, sd[axis.min(sd.len() - 1)])),
+                );
+            }
+            let sd = sds(vehicle, "propulsion.torque_coefficient_n_m_s2");
+            all.extend(sd.filter(|_| torque > 0.0).map(|sd| (Airframe::Torque { rotor }, sd[0] / torque)));
+        }
+    }
+    if predictor.has_channel(0) {
+        let drag = sds(vehicle, "drag.linear_n_s_per_m");
+        for axis in 1..3 {
+            all.extend(drag.as_ref().map(|sd| (Airframe::Drag { axis }, sd[axis.min(sd.len() - 1)])));
+        }
+    }
+    all
+}
