@@ -26,3 +26,4 @@ pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::picture;
 pub use verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
+pub use words::significant;

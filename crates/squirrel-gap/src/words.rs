@@ -3,6 +3,19 @@
 use crate::verdict::{Kind, NamedEffect, Value, Verdict};
 use std::fmt::Write;
 
+/// A number with so many significant digits: plain where people read it so, with an exponent where it is tiny or huge.
+pub fn significant(value: f64, digits: u8) -> String {
+    let size = value.abs();
+    if size == 0.0 {
+        "0".to_owned()
+    } else if (1e-4..1e6).contains(&size) {
+        let places = (i32::from(digits) - 1 - size.log10().floor() as i32).max(0) as usize;
+        format!("{value:.places$}")
+    } else {
+        format!("{value:.*e}", usize::from(digits.max(1)) - 1)
+    }
+}
+
 /// The manoeuvre that shows an effect and tells it from those it is confused with.
 fn manoeuvre(effect: &str) -> &'static str {
     match effect {
@@ -61,7 +74,10 @@ fn with_numbers(effect: &NamedEffect) -> String {
         .map(|(key, value)| match value {
             Value::Choice { value } => format!("{key} {value}"),
             Value::Number { value, low, high } if low == high => format!("{key} {value}"),
-            Value::Number { value, low, high } => format!("{key} {value:.3e}, {low:.3e} to {high:.3e}"),
+            Value::Number { value, low, high } => {
+                let [value, low, high] = [value, low, high].map(|x| significant(*x, 3));
+                format!("{key} {value}, {low} to {high}")
+            }
         })
         .collect();
     format!("{} ({})", effect.name, numbers.join("; "))
@@ -115,4 +131,24 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str]) -> String {
         let _ = write!(text, " Fly next: {fly_next}.");
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_as_people_write_them() {
+        for (value, text) in [
+            (0.0, "0"),
+            (0.053_12, "0.0531"),
+            (-0.000_123_4, "-0.000123"),
+            (651.3, "651"),
+            (1.0, "1.00"),
+            (1.66e-5, "1.66e-5"),
+            (-2.5e7, "-2.50e7"),
+        ] {
+            assert_eq!(significant(value, 3), text);
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! `squirrel gap`: where simulation and measurement disagree, what is missing, and what adding it is worth.
 
 use crate::output::{self, Table, say, talk};
-use squirrel_gap::{Diagnosis, Kind, NamedEffect, Value, Verdict};
+use squirrel_gap::{Diagnosis, Kind, NamedEffect, Value, Verdict, significant};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -289,7 +289,7 @@ fn effects(effects: &[NamedEffect]) {
         for (key, value) in &effect.parameters {
             let numbers = match value {
                 Value::Choice { value } => [(*value).to_owned(), "-".to_owned(), "-".to_owned()],
-                Value::Number { value, low, high } => [value, low, high].map(|x| format!("{x:.4e}")),
+                Value::Number { value, low, high } => [value, low, high].map(|x| significant(*x, 4)),
             };
             let mut row = vec![
                 effect.name.to_owned(),

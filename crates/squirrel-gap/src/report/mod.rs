@@ -24,6 +24,7 @@ pub use data::{
     HeldOutChannel, Horizon, InputCorrelation, ParameterRow, ReportData, Whiteness,
 };
 
+use crate::words::significant;
 use squirrel_sim::report::chart::drawable;
 use squirrel_sim::report::page::Page;
 
@@ -58,16 +59,7 @@ fn figure(value: f64) -> String {
     if !drawable(value) {
         return "\u{2013}".to_owned();
     }
-    let size = value.abs();
-    let text = if size == 0.0 {
-        "0".to_owned()
-    } else if (1e-4..1e6).contains(&size) {
-        let digits = (2 - size.log10().floor() as i32).max(0) as usize;
-        format!("{value:.digits$}")
-    } else {
-        format!("{value:.2e}")
-    };
-    text.replace('-', "\u{2212}")
+    significant(value, 3).replace('-', "\u{2212}")
 }
 
 /// A number with its unit.
