@@ -46,7 +46,9 @@ impl Linear {
         gust_m_s: Option<f64>,
     ) -> Result<Self, GapError> {
         let plain = |point: &Point| point.members.is_empty();
-        let alike = before.filter(|b| plain(&b.point) && plain(point));
+        let alike = before.filter(|b| {
+            !b.point.members.iter().chain(&point.members).any(|member| catalogue.changes_slopes(member))
+        });
         let about = hypothesis(predictor, catalogue, point)?;
         let residual = predictor.residual(&about)?;
         let first = point.base.iter().all(|x| *x == 0.0) && plain(point);
@@ -63,8 +65,9 @@ impl Linear {
         for (column, parameter) in catalogue.parameters.iter().enumerate() {
             let mut moved = point.clone();
             let member = moved.members.iter_mut().find(|m| m.candidate == parameter.candidate);
+            let is_named = member.is_some();
             // At first anything may be large; about a point that explains the flights, only what has a name.
-            widest.push(if first || member.is_some() { parameter.slab } else { 3.0 * parameter.tolerance });
+            widest.push(if first || is_named { parameter.slab } else { 3.0 * parameter.tolerance });
             tolerance.push(parameter.tolerance);
             // From nothing, a secant to a typical size: it ranks large effects well, and some have no slope there. Once what
             // is large has a name, a step of the tolerance: what is left stays inside it.
@@ -79,7 +82,7 @@ impl Linear {
                 step
             };
             raw.push(match alike {
-                Some(before) if !catalogue.bends(parameter) => before.raw[column].clone(),
+                Some(before) if !(is_named || catalogue.bends(parameter)) => before.raw[column].clone(),
                 _ => {
                     let ahead = difference(&moved, step, None)?;
                     if first && parameter.signed && catalogue.bends(parameter) {
@@ -114,7 +117,7 @@ impl Linear {
         for (column, height) in height_columns(predictor, catalogue, point, &residual)? {
             raw[column] = height;
         }
-        let mut whitener = whitener(predictor, &raw, &widest, &residual);
+        let mut whitener = whitener(predictor, &raw, &widest, &residual, before.map(|b| &b.whitener));
         if let Some(sigma) = gust_m_s {
             let draws = noise(predictor, &predictor.wind_columns(&about)?, sigma);
             whitener.refit(&predictor.segments, &draws, FORCES);
@@ -208,12 +211,23 @@ pub(crate) fn heights(
 }
 
 /// The whitening of what the fullest model leaves: each pass fits every column, then the autoregression to the rest.
-fn whitener(predictor: &Predictor, columns: &[Vec<f64>], widest: &[f64], residual: &[f64]) -> Whitener {
+///
+/// * `before` - of another point, where there was one
+fn whitener(
+    predictor: &Predictor,
+    columns: &[Vec<f64>],
+    widest: &[f64],
+    residual: &[f64],
+    before: Option<&Whitener>,
+) -> Whitener {
     // A first whitening by what changes from row to row: one fitted to the whole residual would take whatever is slow in it
     // for noise and never give it back.
     let doubt: Vec<f64> = predictor.measured().iter().map(|x| x * DOUBT).collect();
-    let mut whitener = Whitener::white(&predictor.segments, residual);
-    for _ in 0..3 {
+    let (mut whitener, passes) = match before {
+        Some(before) => (before.clone(), 1),
+        None => (Whitener::white(&predictor.segments, residual), 3),
+    };
+    for _ in 0..passes {
         let white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = Gram::new(&white, &whitener.apply(&predictor.segments, residual));
         let Some(posterior) = gram.posterior(widest, 1.0) else { break };
