@@ -85,9 +85,12 @@ impl Gram {
 }
 
 impl Posterior {
-    /// Posterior covariance.
-    pub(crate) fn covariance(&self) -> DMatrix<f64> {
-        let inverse = self.factor.inverse();
-        DMatrix::from_fn(inverse.nrows(), inverse.ncols(), |i, j| self.sd[i] * inverse[(i, j)] * self.sd[j])
+    /// Posterior variance of one parameter: `s_i^2 |L^-1 e_i|^2` where `A = L L'`.
+    pub(crate) fn variance(&self, i: usize) -> f64 {
+        let mut column = DVector::zeros(self.sd.len());
+        column[i] = 1.0;
+        // The factor of a positive definite matrix has no zero on its diagonal.
+        self.factor.l_dirty().solve_lower_triangular_unchecked_mut(&mut column);
+        self.sd[i] * self.sd[i] * column.norm_squared()
     }
 }

@@ -1,6 +1,7 @@
 //! Other explanations of the same flights, and what these flights cannot show at all.
 
 use super::evidence::BETA;
+use super::parameters::Candidate;
 use super::refine::Scored;
 use super::search::{Found, Search};
 use crate::GapError;
@@ -69,10 +70,9 @@ impl Search<'_> {
                 prior[offset + p] = self.catalogue.parameters[*p].slab;
             }
             let Some(posterior) = set.gram.posterior(&prior, BETA) else { continue };
-            let covariance = posterior.covariance();
             let shows = candidate.parameters.iter().any(|p| {
                 let largest = self.catalogue.parameters[*p].largest;
-                largest * largest > VISIBLE * covariance[(offset + p, offset + p)]
+                largest * largest > VISIBLE * posterior.variance(offset + p)
             });
             if !shows {
                 all.push(candidate.effect);
@@ -92,25 +92,23 @@ impl Search<'_> {
                 first.push(candidate);
             }
         }
-        let rows = first
-            .iter()
-            .map(|own| {
-                let p = own.parameters[0];
-                first
-                    .iter()
-                    .map(|other| {
-                        let mut prior = set.prior.clone();
-                        for q in other.parameters.iter().chain(&own.parameters) {
-                            prior[offset + q] = self.catalogue.parameters[*q].slab;
-                        }
-                        set.gram.posterior(&prior, BETA).map_or(0.0, |posterior| {
-                            let variance = posterior.covariance()[(offset + p, offset + p)];
-                            self.catalogue.parameters[p].smallest.powi(2) / variance
-                        })
-                    })
-                    .collect()
-            })
-            .collect();
+        let mut rows = vec![vec![0.0; first.len()]; first.len()];
+        // Two effects that both float are one posterior, whichever is asked for.
+        for i in 0..first.len() {
+            for j in 0..=i {
+                let mut prior = set.prior.clone();
+                for q in first[i].parameters.iter().chain(&first[j].parameters) {
+                    prior[offset + q] = self.catalogue.parameters[*q].slab;
+                }
+                let Some(posterior) = set.gram.posterior(&prior, BETA) else { continue };
+                let stands_out = |candidate: &Candidate| {
+                    let p = candidate.parameters[0];
+                    self.catalogue.parameters[p].smallest.powi(2) / posterior.variance(offset + p)
+                };
+                rows[i][j] = stands_out(first[i]);
+                rows[j][i] = stands_out(first[j]);
+            }
+        }
         (names, rows)
     }
 }
