@@ -54,7 +54,9 @@ pub(crate) fn clip(gradient: &mut [f32], longest: f64) {
     let square: f64 = gradient.iter().map(|g| f64::from(*g) * f64::from(*g)).sum();
     if square > longest * longest {
         let scale = (longest / square.sqrt()) as f32;
-        gradient.iter_mut().for_each(|g| *g *= scale);
+        for g in gradient {
+            *g *= scale;
+        }
     }
 }
 

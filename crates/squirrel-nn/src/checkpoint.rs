@@ -60,15 +60,12 @@ impl Trainer {
             ("validation_hash", &validation_hash, hash_text(validation.hash())),
         ] {
             if *then != now {
-                return Err(contents.field(field, then, format!("the windows at hand have {now}")));
+                return Err(contents.field(field, then, &format!("the windows at hand have {now}")));
             }
         }
         if best_epoch > history.len() || history.len() > settings.epochs {
-            return Err(contents.field(
-                "best_epoch",
-                best_epoch,
-                format!("there were {} epochs", history.len()),
-            ));
+            let reason = format!("there were {} epochs", history.len());
+            return Err(contents.field("best_epoch", &best_epoch, &reason));
         }
         let mut take = |prefix| take_named(&mut contents, card.model, prefix);
         let (parameters, best) = (take(PARAMETERS)?, take(BEST)?);

@@ -124,9 +124,10 @@ impl Model {
         let bound = 1.0 / (HIDDEN as f32).sqrt();
         let mut parameters = Vec::with_capacity(self.parameters());
         for (name, shape) in self.tensors() {
+            let is_bias = shape.len() == 1;
             let bound = match name {
                 "output.weight" => 0.1 * bound,
-                name if name.ends_with(".bias") => 0.0,
+                _ if is_bias => 0.0,
                 _ => bound,
             };
             let count = shape.iter().product();

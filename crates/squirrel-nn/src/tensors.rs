@@ -8,6 +8,7 @@ use safetensors::{Dtype, SafeTensors};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 
 const RECORD: &str = "squirrel";
@@ -118,8 +119,8 @@ impl Contents {
     }
 
     /// A field of the record that cannot be.
-    pub(crate) fn field(&self, field: &'static str, value: impl ToString, reason: impl ToString) -> NnError {
-        let (value, reason) = (value.to_string(), reason.to_string());
+    pub(crate) fn field(&self, field: &'static str, value: &dyn Display, reason: &str) -> NnError {
+        let (value, reason) = (value.to_string(), reason.to_owned());
         NnError::Field { file: self.file.clone(), field, value, reason }
     }
 }

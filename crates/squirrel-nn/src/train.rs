@@ -202,16 +202,15 @@ impl Trainer {
         let order = shuffled(self.training.len(), settings.seed, number);
         let steps_an_epoch = order.len().div_ceil(settings.batch);
         let steps = (settings.epochs * steps_an_epoch) as u64;
-        let mut step = ((number - 1) * steps_an_epoch) as u64;
+        let first_step = ((number - 1) * steps_an_epoch) as u64;
         let mut gradient = vec![0.0; parameters.len()];
         let mut sum = 0.0;
-        for members in order.chunks(settings.batch) {
+        for (step, members) in (first_step..).zip(order.chunks(settings.batch)) {
             let (area, samples) = (self.card.area_m2, &self.training);
             let loss = model.gradient(self.path, parameters, area, samples, members, &mut gradient);
             sum += loss * members.len() as f64;
             clip(&mut gradient, settings.clip);
             adam.step(parameters, &gradient, cosine(settings.rate, step, steps));
-            step += 1;
         }
         sum / order.len() as f64
     }

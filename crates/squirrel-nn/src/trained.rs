@@ -92,18 +92,18 @@ impl Card {
     pub(crate) fn check(&self, contents: &Contents) -> Result<(), NnError> {
         let scale = self.normalisation.speed_scale_m_s;
         if self.format != FORMAT {
-            return Err(contents.field("format", self.format, format!("this version reads {FORMAT}")));
+            return Err(contents.field("format", &self.format, &format!("this version reads {FORMAT}")));
         }
-        if scale != SPEED_SCALE_M_S {
+        if scale.to_bits() != SPEED_SCALE_M_S.to_bits() {
             let reason = format!("the flight code divides by {SPEED_SCALE_M_S}");
-            return Err(contents.field("normalisation.speed_scale_m_s", scale, reason));
+            return Err(contents.field("normalisation.speed_scale_m_s", &scale, &reason));
         }
         if self.normalisation.rows != WINDOW {
             let reason = format!("the flight code keeps {WINDOW}");
-            return Err(contents.field("normalisation.rows", self.normalisation.rows, reason));
+            return Err(contents.field("normalisation.rows", &self.normalisation.rows, &reason));
         }
         if !(self.area_m2 > 0.0 && self.area_m2.is_finite()) {
-            return Err(contents.field("area_m2", self.area_m2, "must be positive"));
+            return Err(contents.field("area_m2", &self.area_m2, "must be positive"));
         }
         Ok(())
     }

@@ -1,4 +1,5 @@
 //! Weights survive the file bit for bit, and what is wrong with a file is said in one line that names it.
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 mod support;
 

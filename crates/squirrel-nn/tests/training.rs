@@ -1,4 +1,5 @@
 //! Training finds what is there, stops when it should, and gives the same bits however it is run.
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 mod support;
 
@@ -118,7 +119,9 @@ fn another_seed_gives_other_weights() {
 fn training_stops_where_the_validation_gets_no_better() {
     let (training, _) = sets();
     let mut turned = flight(9.0, 100, cambered);
-    turned.iter_mut().for_each(|w| w.label_body_n = w.label_body_n.map(|f| -f));
+    for window in &mut turned {
+        window.label_body_n = window.label_body_n.map(|f| -f);
+    }
     let mut validation = Windows::new();
     validation.push("turned", &turned).unwrap();
     let settings = Settings { epochs: 50, patience: 4, ..SHORT };

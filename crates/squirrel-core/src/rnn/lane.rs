@@ -35,9 +35,9 @@ impl<T: Real + Lane<Weight = T>> NetScalar for T {}
 /// Where [`tanh`] is held constant: the true value is within 5 ulp of 1 from here on.
 const SATURATION: f32 = 7.9;
 /// Numerator over x, powers of x^2 upwards; minimax in relative error on [0, 7.9], last bits chosen by the error in `f32`.
-const NUMERATOR: [f32; 5] = [1.966_426_0, 0.264_496_68, 7.037_843e-3, 4.330_742e-5, 3.033_843_4e-8];
+const NUMERATOR: [f32; 5] = [1.966_426, 0.264_496_68, 7.037_843e-3, 4.330_742e-5, 3.033_843_4e-8];
 /// Denominator, powers of x^2 upwards. All coefficients are positive: no cancellation.
-const DENOMINATOR: [f32; 5] = [1.966_426_0, 0.919_971_9, 5.150_518_2e-2, 6.732_387_7e-4, 1.690_905_6e-6];
+const DENOMINATOR: [f32; 5] = [1.966_426, 0.919_971_9, 5.150_518_2e-2, 6.732_387_7e-4, 1.690_905_6e-6];
 
 /// Hyperbolic tangent as a quotient of polynomials: within 6 ulp of the true value for every `f32`, odd, never beyond 1.
 /// -tanh(7.9) for NaN, so that nothing that comes in can make a hidden state NaN.

@@ -165,7 +165,7 @@ fn reduce<L: Lanes, const OUT: usize>(sums: &[Net<L, OUT>]) -> Net<L::Weight, OU
             let mut half = BLOCK / 2;
             while half > 0 {
                 for c in 0..half {
-                    columns[c] = columns[c] + columns[c + half];
+                    columns[c] += columns[c + half];
                 }
                 half /= 2;
             }
