@@ -1,9 +1,9 @@
 //! Networks over many windows at once: forward, and exact gradients by backpropagation through time.
 //!
-//! Windows lie side by side in registers ([`simd::Lanes`]); the forward pass is that of `squirrel-core`, on registers. What the
-//! backward pass needs is kept on a [`tape::Tape`]. Sums over windows have one order whatever the width of the registers:
-//! window `k` of a batch goes to column `k mod 16`, a column takes its windows in order and each window its ticks in order,
-//! and the sixteen columns are added as a tree at the end.
+//! Windows lie side by side in registers ([`simd`]); the forward pass is that of `squirrel-core`, on registers. What the
+//! backward pass needs is kept on a tape. Sums over windows have one order whatever the width of the registers: window `k`
+//! of a batch goes to column `k mod 16`, a column takes its windows in order and each window its ticks in order, and the
+//! sixteen columns are added as a tree at the end.
 
 pub mod simd;
 mod tape;

@@ -1,11 +1,11 @@
 //! Registers of windows, and the one place that asks the processor what it can do.
 //!
-//! A [`Lanes`] holds one number of each of [`Lanes::WIDTH`] windows. Code that is generic over it implements [`Kernel`] and is
-//! run by [`Path::run`] on the widest registers there are, without being compiled for one machine. All operations are
-//! rounded the same way on every path and there is no fused multiply-add, so the paths differ in speed only.
+//! A register (`Lanes`) holds one number of each of several windows. Work that is generic over it (`Kernel`) is run on the
+//! widest registers there are, without being compiled for one machine. All operations are rounded the same way on every
+//! path and there is no fused multiply-add, so the paths differ in speed only.
 //!
 //! This is the only module with `unsafe`: intrinsics may run only where the processor has them. The types of a path are
-//! private to this module and are handed out by [`Path::run`] alone, and a [`Path`] that the processor lacks cannot be made.
+//! private to this module and only `Paths::run` hands them out, and a [`Path`] that the processor lacks cannot be made.
 
 use core::ops::{Add, Div, Mul, Sub};
 use squirrel_core::rnn::lane::{Lane, NetScalar, tanh};
