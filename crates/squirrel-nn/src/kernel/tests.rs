@@ -127,7 +127,10 @@ fn the_forward_pass_has_the_bits_of_the_flight_code() {
     let mut draw = Draw::new(12);
     let (samples, parameters) = (draw.samples::<f32>(100), draw.parameters::<f32>(Model::Parnn));
     let net = network::<f32, 2>(&parameters);
-    let rows: Vec<_> = samples.iter().map(|sample| sample.rows).collect();
+    let mut rows: Vec<_> = samples.iter().map(|sample| sample.rows).collect();
+    for (k, x) in [f32::NAN, f32::INFINITY, f32::MAX, -1e-40, -0.0].into_iter().enumerate() {
+        rows[11 * k][k] = [x, -x];
+    }
     for path in Path::available() {
         let outputs = super::forward::<WINDOW, 2, _>(path, &net, &rows);
         for (output, rows) in outputs.iter().zip(&rows) {
