@@ -71,7 +71,13 @@ impl Trainer {
         let (parameters, best) = (take(PARAMETERS)?, take(BEST)?);
         let adam = Adam { mean: take(MEAN)?, square: take(SQUARE)?, decay };
         contents.finish()?;
-        let mut trainer = Self::new(card.model, &card.vehicle, card.area_m2, training, validation, settings)?;
+        let trainer = Self::new(card.model, &card.vehicle, card.area_m2, training, validation, settings);
+        let mut trainer = trainer.map_err(|error| match error {
+            NnError::Setting { field, value, reason } => {
+                NnError::Field { file: path.display().to_string(), field, value, reason: reason.to_owned() }
+            }
+            other => other,
+        })?;
         trainer.card = card;
         trainer.state = State { parameters, adam, best, best_epoch, history };
         Ok(trainer)

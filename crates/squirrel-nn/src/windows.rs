@@ -118,7 +118,8 @@ impl Windows {
         Ok((kept, out))
     }
 
-    /// Of all numbers and names, in order; tells in a weights file which data it was trained on. FNV-1a.
+    /// Of all that a model can learn from, in order, and of the flights' names; tells in a weights file which data it was trained
+    /// on. FNV-1a.
     pub fn hash(&self) -> u64 {
         let mut hash = Fnv::new();
         for (name, windows) in self.flights() {

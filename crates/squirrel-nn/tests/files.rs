@@ -175,6 +175,13 @@ fn a_checkpoint_is_no_weights_file_and_the_other_way_round() {
     assert!(Trained::load(&checkpoint).unwrap_err().to_string().contains("metadata squirrel: "));
     let error = Trainer::resume(&weights, &training, &validation).unwrap_err().to_string();
     assert!(error.contains("w.safetensors: metadata squirrel: "), "{error}");
+    let bytes = fs::read(&checkpoint).unwrap();
+    let (from, to) = (br#"\"batch\":256"#, br#"\"batch\":  0"#);
+    let at = bytes.windows(from.len()).position(|w| w == from).unwrap();
+    let changed = [&bytes[..at], to, &bytes[at + from.len()..]].concat();
+    fs::write(&weights, changed).unwrap();
+    let error = Trainer::resume(&weights, &training, &validation).unwrap_err().to_string();
+    assert!(error.ends_with("w.safetensors: batch = 0: must be at least 1"), "{error}");
     // One from before the first epoch goes on as well.
     let mut resumed = Trainer::resume(&checkpoint, &training, &validation).unwrap();
     resumed.epoch().unwrap();

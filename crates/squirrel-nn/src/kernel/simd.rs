@@ -45,20 +45,30 @@ enum Width {
     Avx512,
 }
 
+impl Width {
+    const ALL: &[Self] = &[
+        Self::Portable,
+        #[cfg(target_arch = "x86_64")]
+        Self::Avx2,
+        #[cfg(target_arch = "x86_64")]
+        Self::Avx512,
+    ];
+
+    fn is_there(self) -> bool {
+        match self {
+            Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => std::arch::is_x86_feature_detected!("avx512f"),
+        }
+    }
+}
+
 impl Path {
     /// What this processor has, slowest first. The first needs nothing and is always there.
     pub fn available() -> Vec<Self> {
-        let mut paths = vec![Self(Width::Portable)];
-        #[cfg(target_arch = "x86_64")]
-        {
-            if std::arch::is_x86_feature_detected!("avx2") {
-                paths.push(Self(Width::Avx2));
-            }
-            if std::arch::is_x86_feature_detected!("avx512f") {
-                paths.push(Self(Width::Avx512));
-            }
-        }
-        paths
+        Width::ALL.iter().filter(|width| width.is_there()).map(|width| Self(*width)).collect()
     }
 
     /// The fastest that this processor has.
