@@ -5,6 +5,7 @@
 //! - [`stack`]: the whole flight code as one function of (state, sensor frame); 300 Hz inside, 10 Hz outside.
 //! - [`guidance`]: what to follow: reference trajectories, obstacle sensing.
 //! - [`control`]: how to follow it: position control, wing decisions, thrust-wing coordination, attitude, mixer.
+//! - [`rnn`]: small networks, and the paper's learned wing force.
 //! - [`effects`]: physics that a vehicle may have on top of the base model, one file an effect.
 //! - [`aero`], [`dynamics`]: the base model: plate, rotors, drag, rigid body, RK4. Generic over the scalar.
 //! - [`vehicle`]: the numbers of one airframe, checked once.
@@ -23,6 +24,7 @@ pub mod effects;
 pub mod frames;
 pub mod guidance;
 pub mod math;
+pub mod rnn;
 pub mod stack;
 pub mod vehicle;
 

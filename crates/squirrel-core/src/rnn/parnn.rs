@@ -1,0 +1,150 @@
+//! The paper's force model: a recurrent network that sees speed and angle of attack corrects the flat plate.
+
+use super::elman::Elman;
+use super::head::{Correction, Flow, TurnedNormal, force};
+use crate::aero::angle_of_attack;
+use crate::frames::{Body, In};
+use crate::math::all_finite;
+
+/// Rows of a window; at 10 Hz one second.
+pub const WINDOW: usize = 10;
+/// Inputs of a row.
+pub const INPUTS: usize = 2;
+/// Neurons of a layer.
+pub const HIDDEN: usize = 8;
+/// The network sees speed in this unit, m/s.
+pub const SPEED_SCALE_M_S: f32 = 10.0;
+
+/// What the network sees of a moment: `|v| / 10 m/s` and the angle of attack in rad.
+///
+/// * `velocity` - velocity relative to the air, m/s; on a vehicle without airspeed sensor that over ground
+pub fn features(velocity: In<Body, f32>) -> [f32; INPUTS] {
+    [velocity.vector.norm() / SPEED_SCALE_M_S, angle_of_attack(velocity)]
+}
+
+/// The last rows, oldest first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct History {
+    rows: [[f32; INPUTS]; WINDOW],
+    seen: usize,
+}
+
+impl History {
+    /// Nothing seen yet.
+    pub const fn new() -> Self {
+        Self { rows: [[0.0; INPUTS]; WINDOW], seen: 0 }
+    }
+
+    /// The oldest row makes room for this one.
+    pub fn push(&mut self, row: [f32; INPUTS]) {
+        self.rows.rotate_left(1);
+        self.rows[WINDOW - 1] = row;
+        self.seen = (self.seen + 1).min(WINDOW);
+    }
+
+    /// The window; `None` before it is full, because the network has not been trained on less.
+    pub fn window(&self) -> Option<&[[f32; INPUTS]; WINDOW]> {
+        (self.seen == WINDOW).then_some(&self.rows)
+    }
+}
+
+impl Default for History {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Weights and plate of one vehicle. Plain data, so that it can be a `const`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parnn {
+    /// The network; its outputs are those of [`Correction::from_outputs`].
+    pub net: Elman<INPUTS, HIDDEN, 2>,
+    /// Area of the flat plate that is corrected, m^2.
+    pub area_m2: f32,
+}
+
+/// What [`Parnn`] makes of a window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Force of the air on the spread wings, N.
+    pub force: In<Body, f32>,
+    /// The network's word.
+    pub correction: Correction<f32>,
+    /// Angle of attack that the wing seems to have, rad.
+    pub alpha_est_rad: f32,
+}
+
+impl Parnn {
+    /// The force at the last row of a window.
+    ///
+    /// * `rows` - [`features`], oldest first: [`WINDOW`] of them, or as many as the network was trained on
+    /// * `velocity` - at the last row, as for [`features`]
+    pub fn estimate(&self, rows: &[[f32; INPUTS]], velocity: In<Body, f32>) -> Estimate {
+        let correction = Correction::from_outputs(self.net.window(rows));
+        let flow = Flow::new(velocity);
+        let force = force(&flow, correction, self.area_m2);
+        // Only weights of absurd size come here; the caller must get a force that can be subtracted all the same.
+        let force = if all_finite(&force.vector) { force } else { In::zero() };
+        Estimate {
+            force,
+            correction,
+            alpha_est_rad: TurnedNormal::new(&flow, correction.alpha_w_rad).alpha_est_rad(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::aero::flat_plate;
+    use nalgebra::Vector3;
+
+    /// A network that says nothing: `alpha_w = 0`, `gamma = 1`.
+    fn silent() -> Parnn {
+        let mut net = Elman::filled(0.0);
+        net.output.bias = [0.0, 0.541_324_85];
+        Parnn { net, area_m2: 0.04 }
+    }
+
+    #[test]
+    fn a_silent_network_flies_the_flat_plate() {
+        for velocity in [[7.0, 1.0, 3.0], [0.3, 0.0, 0.1], [0.0, 0.0, 9.0], [-4.0, 2.0, -5.0]] {
+            let velocity = In::new(Vector3::from(velocity));
+            let estimate = silent().estimate(&[features(velocity); WINDOW], velocity);
+            let plate = flat_plate::force(velocity, In::new(Vector3::z()), 0.04);
+            let difference = (estimate.force - plate).vector.norm();
+            assert!(difference <= 2e-7 * plate.vector.norm(), "{estimate:?} {plate:?}");
+            assert!((estimate.alpha_est_rad - angle_of_attack(velocity)).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn a_standing_vehicle_has_no_wing_force() {
+        for velocity in [[0.0; 3], [0.1, 0.2, -0.1], [f32::NAN, 1.0, 1.0], [f32::INFINITY, 0.0, 0.0]] {
+            let velocity = In::new(Vector3::from(velocity));
+            let estimate = silent().estimate(&[features(velocity); WINDOW], velocity);
+            assert_eq!(estimate.force.vector.norm(), 0.0, "{velocity:?}");
+            assert!(estimate.alpha_est_rad.is_finite());
+        }
+    }
+
+    #[test]
+    fn absurd_weights_give_no_force() {
+        let absurd = Parnn { net: Elman::filled(f32::MAX), area_m2: 0.04 };
+        let velocity = In::new(Vector3::new(5.0, 0.0, 2.0));
+        let estimate = absurd.estimate(&[features(velocity); WINDOW], velocity);
+        assert!(all_finite(&estimate.force.vector), "{estimate:?}");
+    }
+
+    #[test]
+    fn a_history_speaks_when_it_is_full_and_forgets_the_oldest() {
+        let mut history = History::new();
+        for k in 0..WINDOW {
+            assert_eq!(history.window(), None, "{k}");
+            history.push([k as f32, 0.5]);
+        }
+        history.push([10.0, 0.5]);
+        let speeds = history.window().expect("full").map(|row| row[0]);
+        assert_eq!(speeds, core::array::from_fn(|k| k as f32 + 1.0));
+    }
+}

@@ -1,0 +1,145 @@
+//! Why a network cannot be trained, saved or loaded.
+
+/// What is wrong; one line that names the file or flight, the field and the value.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum NnError {
+    /// The disk refuses.
+    #[error("{file}: {error}")]
+    Io {
+        /// Path of the file.
+        file: String,
+        /// What the system says.
+        error: std::io::Error,
+    },
+    /// Not a safetensors file, or a damaged one.
+    #[error("{file}: not a whole safetensors file: {problem}")]
+    Format {
+        /// Path of the file.
+        file: String,
+        /// What its reader says.
+        problem: String,
+    },
+    /// The metadata record is absent or does not read.
+    #[error("{file}: metadata squirrel: {problem}")]
+    Metadata {
+        /// Path of the file.
+        file: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A field of the metadata that cannot be what it says.
+    #[error("{file}: {field} = {value}: {reason}")]
+    Field {
+        /// Path of the file.
+        file: String,
+        /// Name of the field.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// Why not.
+        reason: String,
+    },
+    /// A tensor that the model needs is not there.
+    #[error("{file}: tensor {tensor}: missing")]
+    Missing {
+        /// Path of the file.
+        file: String,
+        /// Name of the tensor.
+        tensor: String,
+    },
+    /// A tensor that the model does not have.
+    #[error("{file}: tensor {tensor}: unknown to this model")]
+    Unknown {
+        /// Path of the file.
+        file: String,
+        /// Name of the tensor.
+        tensor: String,
+    },
+    /// A tensor of another shape.
+    #[error("{file}: tensor {tensor}: shape {found:?}, must be {needed:?}")]
+    Shape {
+        /// Path of the file.
+        file: String,
+        /// Name of the tensor.
+        tensor: String,
+        /// Shape in the file.
+        found: Vec<usize>,
+        /// Shape that the model has.
+        needed: Vec<usize>,
+    },
+    /// A tensor of other numbers than `f32`.
+    #[error("{file}: tensor {tensor}: numbers of type {found}, must be F32")]
+    Type {
+        /// Path of the file.
+        file: String,
+        /// Name of the tensor.
+        tensor: String,
+        /// Type in the file.
+        found: String,
+    },
+    /// A number that is none.
+    #[error("{file}: tensor {tensor}[{index}] = {value}: must be finite")]
+    NotFinite {
+        /// Path of the file.
+        file: String,
+        /// Name of the tensor.
+        tensor: String,
+        /// Place in the tensor, row by row.
+        index: usize,
+        /// The value.
+        value: f32,
+    },
+    /// A window that nothing can be learned from.
+    #[error("{flight}: window {window}: {field} = {value:?}: {reason}")]
+    Window {
+        /// Name of the flight.
+        flight: String,
+        /// Place of the window in the flight, from 0.
+        window: usize,
+        /// The field.
+        field: &'static str,
+        /// Its numbers.
+        value: Vec<f32>,
+        /// Why not.
+        reason: &'static str,
+    },
+    /// Two flights have one name, so that a split by flight could mean either.
+    #[error("{flight}: two flights have this name")]
+    SameName {
+        /// The name.
+        flight: String,
+    },
+    /// A flight that is asked for and not there.
+    #[error("{flight}: no flight has this name")]
+    NoFlight {
+        /// The name.
+        flight: String,
+    },
+    /// Nothing to learn from or to judge by.
+    #[error("{set}: has no windows, at least one is needed")]
+    Empty {
+        /// Which set.
+        set: &'static str,
+    },
+    /// A setting out of range.
+    #[error("{field} = {value}: {reason}")]
+    Setting {
+        /// Name of the setting.
+        field: &'static str,
+        /// Its value.
+        value: String,
+        /// What it must be.
+        reason: &'static str,
+    },
+    /// Training left what numbers can hold.
+    #[error("{model}: loss = {loss} in epoch {epoch}: training diverged; a smaller rate may help")]
+    Diverged {
+        /// Name of the model.
+        model: &'static str,
+        /// Epoch, from 1.
+        epoch: usize,
+        /// Mean squared error, N^2.
+        loss: f64,
+    },
+}
