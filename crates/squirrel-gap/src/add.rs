@@ -38,7 +38,7 @@ pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> 
         }
         for (key, number) in &effect.parameters {
             let item = match *number {
-                Value::Choice { value: name } => value(name),
+                Value::Choice { value: name, .. } => value(name),
                 Value::Number { value: x, low, high } if low == high => value(x as i64),
                 Value::Number { value: x, low, high } => {
                     let mut inline = InlineTable::new();

@@ -167,7 +167,7 @@ fn decide(
         .collect();
     let leftover = &naming.leftover;
     let mut blind = search.blind(&found.best);
-    if curve_hides_sag {
+    if curve_hides_sag && !blind.contains(&"battery_sag") && effects.iter().all(|e| e.name != "battery_sag") {
         blind.push("battery_sag");
     }
     let share = left_share(naming);
@@ -211,7 +211,6 @@ fn decide(
             all.extend(close.iter().flat_map(|set| names(set)));
             Some(words::fly_for(&all))
         }
-        Kind::None if !blind.is_empty() => Some(words::fly_for(&blind)),
         _ => None,
     };
     let mut verdict = Verdict {
@@ -226,7 +225,7 @@ fn decide(
         words: String::new(),
         notes: search.predictor.notes.clone(),
     };
-    verdict.words = words::paragraph(&verdict, &blind);
+    verdict.words = words::paragraph(&verdict, &blind, curve_hides_sag);
     verdict
 }
 
@@ -295,7 +294,10 @@ fn parameters(
         .map(|(slot, parameter)| {
             let value = member.values[slot];
             let value = match parameter.kind {
-                ParameterKind::OneOf(names) => Value::Choice { value: names[value as usize] },
+                ParameterKind::OneOf(names) => {
+                    let value = names[value as usize];
+                    Value::Choice { value, low: value, high: value }
+                }
                 ParameterKind::Rotor => Value::Number { value, low: value, high: value },
                 ParameterKind::Size { .. } => {
                     let column = free.iter().position(|f| *f == (index, slot));
@@ -360,6 +362,9 @@ fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
 /// Whether the thrust curve of the vehicle file, moved by its sd, changes the vertical force more than the smallest sag
 /// worth reporting: then nothing tells the two apart.
 fn curve_hides_sag(predictor: &Predictor, nominal: &[f64]) -> Result<bool, GapError> {
+    if !predictor.has_voltage() {
+        return Ok(false);
+    }
     let vehicle = predictor.vehicle;
     let mut p = *vehicle.vehicle.parameters();
     let (Some(curve), Some(sd)) = (p.propulsion.thrust_curve, sds(vehicle, "propulsion.pwm_to_thrust_n"))

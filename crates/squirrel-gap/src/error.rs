@@ -135,6 +135,11 @@ pub enum GapError {
         /// Smallest usable time, s.
         least_s: f64,
     },
+    /// Numbers of the flights or of the vehicle that are too large for the linear algebra.
+    #[error(
+        "flights: their residual under some hypothesis is not finite; `squirrel gap find` shows where it is large"
+    )]
+    NotFinite,
     /// A residual that nothing can be computed with.
     #[error(
         "{flight}: {channel}: the residual at {time_s:.3} s is {value:e}, must be finite and below {most:e}"

@@ -24,7 +24,7 @@ pub enum Kind {
     DataProblem,
 }
 
-/// A number with its 95 % interval; choices (an axis, a side) have a word and no interval.
+/// A number with its 95 % interval; choices (an axis, a side) have a word, at both ends, too.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Value {
@@ -41,6 +41,10 @@ pub enum Value {
     Choice {
         /// As vehicle files write it.
         value: &'static str,
+        /// The same.
+        low: &'static str,
+        /// The same.
+        high: &'static str,
     },
 }
 

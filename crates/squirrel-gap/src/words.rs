@@ -62,7 +62,7 @@ pub(crate) fn fly_for(effects: &[&str]) -> String {
         said.push(what);
         let _ = write!(text, "{}{what} ({effect})", if text.is_empty() { "" } else { "; " });
     }
-    text.push_str("; all of it is in `squirrel fly --scenario excite_rich`");
+    text.push_str("; `squirrel fly --scenario excite_rich` flies most of it");
     text
 }
 
@@ -72,7 +72,7 @@ fn with_numbers(effect: &NamedEffect) -> String {
         .parameters
         .iter()
         .map(|(key, value)| match value {
-            Value::Choice { value } => format!("{key} {value}"),
+            Value::Choice { value, .. } => format!("{key} {value}"),
             Value::Number { value, low, high } if low == high => format!("{key} {value}"),
             Value::Number { value, low, high } => {
                 let [value, low, high] = [value, low, high].map(|x| significant(*x, 3));
@@ -84,7 +84,10 @@ fn with_numbers(effect: &NamedEffect) -> String {
 }
 
 /// The verdict in one paragraph.
-pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str]) -> String {
+///
+/// * `blind` - effects that these flights do not show
+/// * `curve_hides_sag` - the thrust curve may be off by as much as a battery sags
+pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool) -> String {
     let effects: Vec<String> = verdict.effects.iter().map(with_numbers).collect();
     let effects = effects.join(" and ");
     let others: Vec<String> = verdict.alternatives.iter().map(|a| a.effects.join(" + ")).collect();
@@ -124,7 +127,7 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str]) -> String {
     if !blind.is_empty() && verdict.verdict != Kind::NotIdentifiable {
         let _ = write!(text, " These flights would not show: {}.", blind.join(", "));
     }
-    if verdict.notes.iter().any(|note| note.contains("thrust curve")) {
+    if curve_hides_sag {
         text.push_str(" Battery sag and the thrust curve are confounded in these flights: the curve's sd covers either.");
     }
     if let Some(fly_next) = &verdict.fly_next {

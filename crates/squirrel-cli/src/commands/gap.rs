@@ -133,20 +133,27 @@ impl Given {
     }
 
     fn add(&self, dry_run: bool) -> Result<(), String> {
+        if !dry_run {
+            self.patch_path()?;
+        }
         let mut found = self.diagnose()?;
         show(&found.diagnosis.verdict);
-        let Some(text) = found.patched()? else {
-            return self.write(&found.diagnosis.verdict);
-        };
+        let text = found.patched()?;
         if dry_run {
-            say(&squirrel_gap::difference(&found.vehicle.text, &text));
+            if let Some(text) = &text {
+                say(&squirrel_gap::difference(&found.vehicle.text, text));
+            }
             return output::write_json(self.json.as_deref(), &found.diagnosis.verdict);
         }
+        let Some(text) = text else {
+            return self.write(&found.diagnosis.verdict);
+        };
         self.patch(&text, &mut found.diagnosis.verdict)?;
         self.write(&found.diagnosis.verdict)
     }
 
     fn everything(&self) -> Result<(), String> {
+        self.patch_path()?;
         let mut found = self.diagnose()?;
         show(&found.diagnosis.verdict);
         let text = found.patched()?;
@@ -169,22 +176,25 @@ impl Given {
         Ok(())
     }
 
-    fn folder(&self) -> Result<&Path, String> {
+    /// Where the patched vehicle file goes; asked for before the work, which it would be a pity to lose.
+    fn patch_path(&self) -> Result<PathBuf, String> {
         let folder =
             self.out.as_deref().ok_or("--out: none given; a folder is needed for what is written")?;
-        output::folder(folder)?;
-        Ok(folder)
-    }
-
-    /// Writes the patched vehicle file.
-    fn patch(&self, text: &str, verdict: &mut Verdict) -> Result<(), String> {
-        let file = self.vehicle.file_name().unwrap_or_default();
-        let path = self.folder()?.join(file);
+        let path = folder.join(self.vehicle.file_name().unwrap_or_default());
         if same_file(&path, &self.vehicle) {
             return Err(format!(
                 "{}: --out is the folder of the vehicle file, which is never overwritten",
                 path.display()
             ));
+        }
+        Ok(path)
+    }
+
+    /// Writes the patched vehicle file.
+    fn patch(&self, text: &str, verdict: &mut Verdict) -> Result<(), String> {
+        let path = self.patch_path()?;
+        if let Some(folder) = &self.out {
+            output::folder(folder)?;
         }
         output::write_file(&path, text.as_bytes())?;
         verdict.model_patch = Some(path.display().to_string());
@@ -288,7 +298,7 @@ fn effects(effects: &[NamedEffect]) {
     for effect in effects {
         for (key, value) in &effect.parameters {
             let numbers = match value {
-                Value::Choice { value } => [(*value).to_owned(), "-".to_owned(), "-".to_owned()],
+                Value::Choice { value, .. } => [(*value).to_owned(), "-".to_owned(), "-".to_owned()],
                 Value::Number { value, low, high } => [value, low, high].map(|x| significant(*x, 4)),
             };
             let mut row = vec![

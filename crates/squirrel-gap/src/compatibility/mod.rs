@@ -29,6 +29,8 @@ const GNSS_WINDOW_S: f64 = 0.3;
 /// Time shifts of commands and of GNSS that effects can explain, s.
 const COMMAND_SHIFT_S: (f64, f64) = (-0.015, 0.13);
 const GNSS_SHIFT_S: (f64, f64) = (-0.08, 0.5);
+/// Shorter pieces of a flight than this are not checked by themselves, s.
+const PIECE_S: f64 = 5.0;
 /// Longest shift that is looked for, s.
 const SHIFT_MAX_S: f64 = 1.0;
 
@@ -51,7 +53,7 @@ pub(crate) fn problem(
     let of_unseen = unseen.map(|unseen| unseen.residual(&unseen.nominal())).transpose()?;
     let others = unseen.zip(of_unseen.as_deref());
     for (predictor, residual) in std::iter::once((predictor, nominal)).chain(others) {
-        for (piece, track) in predictor.tracks.iter().enumerate() {
+        for (piece, track) in predictor.tracks.iter().enumerate().filter(|(_, t)| is_long(predictor, t)) {
             let found = voltage(predictor, track)
                 .or_else(|| force_unit(track))
                 .or_else(|| rates(track))
@@ -69,6 +71,13 @@ pub(crate) fn problem(
 
 type Found = Option<(&'static str, String)>;
 
+/// Whether a piece says something about a flight's data: a dash between two gaps is no mean of anything.
+fn is_long(predictor: &Predictor, track: &Track) -> bool {
+    let duration_s = |t: &Track| t.period_s * t.time_s.len() as f64;
+    let others = predictor.tracks.iter().filter(|t| t.flight == track.flight);
+    duration_s(track) >= PIECE_S.min(others.map(duration_s).fold(0.0, f64::max))
+}
+
 /// A flight that is given twice, whole or in part.
 fn repeated(flights: &[(String, FlightLog)], held_out: &[(String, FlightLog)]) -> Option<Problem> {
     const CHANNEL: &str = "imu.specific_force_body_m_s2";
@@ -76,14 +85,17 @@ fn repeated(flights: &[(String, FlightLog)], held_out: &[(String, FlightLog)]) -
         let Some((_, forces)) = log.channel(CHANNEL) else { return Vec::new() };
         let Some((_, rates)) = log.channel("imu.omega_body_rad_s") else { return Vec::new() };
         let pairs = forces.values.chunks_exact(3).zip(rates.values.chunks_exact(3));
-        pairs.map(|(f, w)| [f[0], f[1], f[2], w[0], w[1], w[2]].map(f64::to_bits)).collect()
+        let rows = pairs.map(|(f, w)| [f[0], f[1], f[2], w[0], w[1], w[2]]);
+        rows.filter(|row| row.iter().all(|x| x.is_finite())).map(|row| row.map(f64::to_bits)).collect()
     };
     let all: Vec<_> = flights.iter().chain(held_out).map(|(name, log)| (name, rows(log))).collect();
     for (index, (name, own)) in all.iter().enumerate() {
-        let own: HashSet<&[u64; 6]> = own.iter().collect();
+        let rows: HashSet<&[u64; 6]> = own.iter().collect();
         for (other, theirs) in &all[index + 1..] {
-            let same = theirs.iter().filter(|row| own.contains(*row)).count();
-            if 2 * same > theirs.len() {
+            let same = theirs.iter().filter(|row| rows.contains(*row)).count();
+            // The shorter flight may lie in the longer one, whichever is given first.
+            let least = own.len().min(theirs.len());
+            if 2 * same > least {
                 let share = 100.0 * same as f64 / theirs.len() as f64;
                 return Some(Problem {
                     flight: (*other).clone(),

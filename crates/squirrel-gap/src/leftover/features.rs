@@ -3,7 +3,7 @@
 use crate::predictor::{Motion, Predictor, Track};
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Rows that one block of cross-validation holds, s.
+/// Parts of all flights, each left out once.
 const FOLDS: usize = 8;
 
 /// A family of features: what a leftover would be said to go with.
@@ -145,6 +145,8 @@ pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
 /// Distance over which a place has one force, m, and time after which one comes back to it and does not linger, s.
 const PLACE_M: f64 = 1.5;
 const AWAY_S: f64 = 5.0;
+/// Moments of all flights that are compared with each other.
+const MOMENTS_MAX: usize = 1500;
 
 /// Part of the variance of a horizontal force in the world that the force at the same place at other times predicts, 0 to 1:
 /// moving air forgets a place, and what is fixed to one does not.
@@ -160,9 +162,11 @@ pub(super) fn place_share(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
         })
         .collect();
     let (mut error, mut total) = (0.0, 0.0);
-    for (own, force) in moments.iter().zip(&ned) {
+    // Long flights come to a place often enough in every so-manieth moment.
+    let every = moments.len().div_ceil(MOMENTS_MAX).max(1);
+    for (own, force) in moments.iter().zip(&ned).step_by(every) {
         let (mut sum, mut weight) = (Vector3::zeros(), 1.0);
-        for (other, theirs) in moments.iter().zip(&ned) {
+        for (other, theirs) in moments.iter().zip(&ned).step_by(every) {
             if own.flight != other.flight || (own.time_s - other.time_s).abs() > AWAY_S {
                 let w = (-0.5 * (own.position - other.position).norm_squared() / (PLACE_M * PLACE_M)).exp();
                 sum += theirs * w;

@@ -1,8 +1,8 @@
 //! What the best explanation leaves, against what noise alone would leave: is there something that no name accounts for?
 //!
 //! The leftover is looked at in blocks of about 0.27 s, which hold what is slower than 2 Hz, and as a whole. Noise is drawn
-//! from what the log itself shows and goes through the same filters; a leftover is real where it is above every draw
-//! by more than a model can be wrong in its last percent. What it goes with is the family of features that predicts it best
+//! from what the log itself shows and goes through the same filters; a leftover is real where it is well above their mean,
+//! by more than a model can be wrong in its last percent and than what floats may be off. What it goes with is the family of features that predicts it best
 //! where it was not fitted. A horizontal force that nothing predicts, without a moment, is a gust.
 
 mod features;

@@ -15,7 +15,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Width of the slab over the largest plausible size.
 pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
-/// Effects that are known by their moments, and by what moving air does; without these channels nothing is said of them.
+/// Effects that are known by their moments, and by the horizontal force; without these channels nothing is said of them.
 const MOMENTS: [&str; 6] = [
     "angular_damping",
     "cg_offset",
@@ -24,7 +24,7 @@ const MOMENTS: [&str; 6] = [
     "rotor_gyro_torque",
     "yaw_torque_coeff",
 ];
-const DRAG: [&str; 9] = [
+const HORIZONTAL: [&str; 9] = [
     "accel_bias",
     "added_mass",
     "axial_inflow",
@@ -70,6 +70,8 @@ pub(crate) struct Candidate {
 pub(crate) struct Catalogue {
     pub(crate) candidates: Vec<Candidate>,
     pub(crate) parameters: Vec<Parameter>,
+    /// Effects that are not among them because these flights lack the channels that show them.
+    pub(crate) unseen: Vec<&'static str>,
     /// Numbers of the airframe beside them, with their tolerances.
     pub(crate) airframe: Vec<(Airframe, f64)>,
 }
@@ -83,14 +85,20 @@ impl Catalogue {
         let vehicle = predictor.vehicle;
         let unseen = |name: &str| {
             (MOMENTS.contains(&name) && !predictor.has_channel(3))
-                || (DRAG.contains(&name) && !predictor.has_channel(0))
+                || (HORIZONTAL.contains(&name) && !predictor.has_channel(0))
         };
-        let mut all = Self { candidates: Vec::new(), parameters: Vec::new(), airframe: airframe(predictor) };
+        let mut all = Self {
+            candidates: Vec::new(),
+            parameters: Vec::new(),
+            unseen: Vec::new(),
+            airframe: airframe(predictor),
+        };
         for name in Effects::<f64>::NAMES {
-            if *name == "gust"
-                || unseen(name)
-                || (vehicle.wing == WingPlant::None && name.starts_with("wing_"))
-            {
+            if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
+                continue;
+            }
+            if unseen(name) {
+                all.unseen.push(*name);
                 continue;
             }
             let list = Effects::<f64>::parameters(name).unwrap_or_default();

@@ -95,13 +95,18 @@ pub(crate) fn hypothesis(
             sides[candidate.fixed[0].1 as usize] = x;
             continue;
         }
-        let mut alone = catalogue.absent(predictor, parameter.candidate);
-        alone.values[parameter.slot] += x;
-        // What changes the airframe's numbers does so in a row, so that two rotors can be weak; the rest adds up.
-        let mut effects = Effects::none();
-        if let Some(found) = effects.insert(candidate.effect) {
-            found.values.copy_from_slice(&alone.values);
+        // What changes the airframe's numbers does so in a row, so that two rotors can be weak; the rest adds up, and so does
+        // what acts already.
+        let same = all.effects.has(candidate.effect)
+            && all.effects.insert(candidate.effect).is_some_and(|found| {
+                candidate.fixed.iter().all(|(slot, value)| found.values[*slot] == *value)
+            });
+        if same {
+            add(&mut all.effects, candidate, parameter.slot, x);
+            continue;
         }
+        let mut effects = Effects::none();
+        add(&mut effects, candidate, parameter.slot, x);
         let altered =
             effects.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
         if altered == all.vehicle {

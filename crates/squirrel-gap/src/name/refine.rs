@@ -231,7 +231,7 @@ impl Search<'_> {
             }
         }
         prior.extend(spikes);
-        let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NoFlights)?;
+        let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NotFinite)?;
         Ok(Scored {
             members: members.to_vec(),
             log_evidence: posterior.log_evidence,

@@ -41,7 +41,7 @@ impl Search<'_> {
         Ok(all)
     }
 
-    /// Evidence that one effect alone has over none, by name, nats; linear, the refined value for what is in `best`.
+    /// Evidence that one effect alone has over none, by name, nats; linear.
     pub(crate) fn single_evidence(&self, found: &Found) -> Vec<(&'static str, f64)> {
         let mut all: Vec<(&'static str, f64)> = Vec::new();
         for (log_evidence, member) in self.ranked(&found.null, &[]) {
@@ -58,7 +58,7 @@ impl Search<'_> {
     /// Effects that these flights do not show even at their largest plausible size, everything else floating.
     pub(crate) fn blind(&self, set: &Scored) -> Vec<&'static str> {
         let offset = set.free.len();
-        let mut all = Vec::new();
+        let mut all = self.catalogue.unseen.clone();
         for candidate in &self.catalogue.candidates {
             if all.contains(&candidate.effect)
                 || set.members.iter().any(|m| self.effect(m) == candidate.effect)

@@ -28,7 +28,9 @@ pub(super) fn tolerance(
     let fraction = |field: &str, index: usize, value: f64| {
         Ok(number(field, index, value)?.map_or(none, |sd| sd / value.abs().max(f64::MIN_POSITIVE)))
     };
-    let declared = |field: &str, fallback: f64| Ok(sds(vehicle, field).map_or(fallback, |sd| sd[0]));
+    let declared = |field: &str, fallback: f64| {
+        Ok(sds(vehicle, field).map_or(fallback, |sd| sd[slot.min(sd.len() - 1)]))
+    };
     Ok(match effect {
         "mass_error" => fraction("mass.mass_kg", 0, p.mass_kg)?,
         "inertia_error" => {
@@ -110,11 +112,13 @@ pub(crate) fn sds(vehicle: &VehicleFile, field: &str) -> Option<Vec<f64>> {
 /// How well a log tells when things happen, in the unit of an effect that is about time: a part of a sample, a clock's over
 /// its flight.
 pub(super) fn timing_s(predictor: &Predictor, effect: &str) -> Option<f64> {
-    let track = predictor.tracks.first()?;
-    let sample_s = SAMPLE_SHARE * track.period_s;
+    let period_s = predictor.tracks.iter().map(|track| track.period_s).fold(0.0, f64::max);
+    let span_s =
+        predictor.tracks.iter().map(|t| t.time_s[t.time_s.len() - 1] - t.began_s).fold(0.0, f64::max);
+    let sample_s = SAMPLE_SHARE * period_s;
     match effect {
         "actuation_latency" | "gnss_latency" => Some(sample_s),
-        "clock_skew" => Some(1e6 * sample_s / (track.period_s * track.time_s.len() as f64)),
+        "clock_skew" => Some(1e6 * sample_s / span_s),
         _ => None,
     }
 }

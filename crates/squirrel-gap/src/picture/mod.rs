@@ -263,7 +263,7 @@ fn parameters(effect: &NamedEffect, tolerances: &[(&str, &str, f64)]) -> Vec<Par
     let mut rows = Vec::new();
     for parameter in list {
         match (parameter.kind, effect.parameters.get(parameter.key)) {
-            (_, Some(Value::Choice { value })) => name = format!("{name} {value}"),
+            (_, Some(Value::Choice { value, .. })) => name = format!("{name} {value}"),
             (ParameterKind::Rotor, Some(Value::Number { value, .. })) => name = format!("{name} {value}"),
             (ParameterKind::Size { smallest, largest, .. }, Some(&Value::Number { value, low, high })) => {
                 let own = tolerances.iter().find(|(e, key, _)| *e == effect.name && *key == parameter.key);
