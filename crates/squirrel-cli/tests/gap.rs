@@ -80,7 +80,7 @@ fn what_cannot_be_read_is_one_line_and_leaves_nothing() {
             folder.fails(&unseen, &words);
         }
         let twice = ["gap", step, "--vehicle", "squirrel.toml", "--flights", "f.mcap", "f.mcap"];
-        let twice = [&twice[..], &["--held-out", "g.mcap"]].concat();
+        let twice = [&twice[..], &["--held-out", "g.mcap", "--out", "out"]].concat();
         folder.fails(&twice, &["f.mcap", "two flights have this name"]);
     }
 }

@@ -200,10 +200,13 @@ impl Search<'_> {
     }
 
     fn is_large_enough(&self, member: &Member) -> bool {
+        // Beside what the vehicle file has of it already.
+        let before = self.catalogue.absent(self.predictor, member.candidate).values;
         self.catalogue.candidates[member.candidate].parameters.iter().any(|p| {
             let p = &self.catalogue.parameters[*p];
-            let size = member.values[p.slot];
-            (if p.signed { size.abs() } else { size }) >= SIZE_MIN * p.smallest
+            let size = member.values[p.slot] - before[p.slot];
+            let may_shrink = p.signed || before[p.slot] != 0.0;
+            (if may_shrink { size.abs() } else { size }) >= SIZE_MIN * p.smallest
         })
     }
 
