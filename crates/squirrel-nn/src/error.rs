@@ -4,6 +4,46 @@
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NnError {
+    /// A flight log lacks a channel that labels are made of.
+    #[error("{flight}: {channel}: missing; {needed_for}")]
+    Channel {
+        /// The flight.
+        flight: String,
+        /// Name of the channel.
+        channel: &'static str,
+        /// What it is needed for.
+        needed_for: &'static str,
+    },
+    /// A channel that cannot be what its name says.
+    #[error("{flight}: {channel}: {problem}")]
+    Samples {
+        /// The flight.
+        flight: String,
+        /// Name of the channel.
+        channel: &'static str,
+        /// What is wrong.
+        problem: String,
+    },
+    /// A flight in which the wings are never spread for a window.
+    #[error(
+        "{flight}: wing.command: never above {spread} on both sides for {window_s} s in the air; nothing to learn from"
+    )]
+    Folded {
+        /// The flight.
+        flight: String,
+        /// Command of a spread wing.
+        spread: f64,
+        /// Length of a window, s.
+        window_s: f64,
+    },
+    /// A vehicle without wings, or one that the plant refuses.
+    #[error("{vehicle}: {problem}")]
+    Vehicle {
+        /// Name of the vehicle.
+        vehicle: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// The disk refuses.
     #[error("{file}: {error}")]
     Io {

@@ -1,5 +1,6 @@
 //! Learned models of the force on spread wings: the paper's network and its rivals, trained by exact gradients.
 //!
+//! - [`labels`]: windows from a flight log.
 //! - [`windows`]: what models learn from, split by flight.
 //! - [`model`]: the models behind one interface.
 //! - [`train`]: Adam, cosine, early stopping, seeds; a checkpoint resumes to the same bits.
@@ -40,6 +41,7 @@ mod checkpoint;
 pub mod error;
 mod heads;
 pub mod kernel;
+pub mod labels;
 pub mod model;
 mod tensors;
 pub mod train;
