@@ -117,7 +117,7 @@ impl Linear {
         for (column, height) in height_columns(predictor, catalogue, point, &residual)? {
             raw[column] = height;
         }
-        let mut whitener = whitener(predictor, &raw, &widest, &residual, before.map(|b| &b.whitener));
+        let mut whitener = whitener(predictor, &raw, &widest, &residual);
         if let Some(sigma) = gust_m_s {
             let draws = noise(predictor, &predictor.wind_columns(&about)?, sigma);
             whitener.refit(&predictor.segments, &draws, FORCES);
@@ -211,23 +211,12 @@ pub(crate) fn heights(
 }
 
 /// The whitening of what the fullest model leaves: each pass fits every column, then the autoregression to the rest.
-///
-/// * `before` - of another point, where there was one
-fn whitener(
-    predictor: &Predictor,
-    columns: &[Vec<f64>],
-    widest: &[f64],
-    residual: &[f64],
-    before: Option<&Whitener>,
-) -> Whitener {
+fn whitener(predictor: &Predictor, columns: &[Vec<f64>], widest: &[f64], residual: &[f64]) -> Whitener {
     // A first whitening by what changes from row to row: one fitted to the whole residual would take whatever is slow in it
     // for noise and never give it back.
     let doubt: Vec<f64> = predictor.measured().iter().map(|x| x * DOUBT).collect();
-    let (mut whitener, passes) = match before {
-        Some(before) => (before.clone(), 1),
-        None => (Whitener::white(&predictor.segments, residual), 3),
-    };
-    for _ in 0..passes {
+    let mut whitener = Whitener::white(&predictor.segments, residual);
+    for _ in 0..3 {
         let white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = Gram::new(&white, &whitener.apply(&predictor.segments, residual));
         let Some(posterior) = gram.posterior(widest, 1.0) else { break };

@@ -200,13 +200,19 @@ impl Search<'_> {
     }
 
     fn is_large_enough(&self, member: &Member) -> bool {
-        // Beside what the vehicle file has of it already.
+        // Beside what the vehicle file has of it already; by the numbers of the standard form, unless this form has others.
         let before = self.catalogue.absent(self.predictor, member.candidate).values;
-        self.catalogue.candidates[member.candidate].parameters.iter().any(|p| {
-            let p = &self.catalogue.parameters[*p];
-            let size = member.values[p.slot] - before[p.slot];
-            let may_shrink = p.signed || before[p.slot] != 0.0;
-            (if may_shrink { size.abs() } else { size }) >= SIZE_MIN * p.smallest
+        let own = &self.catalogue.candidates[member.candidate].parameters;
+        let standard: Vec<usize> = own.iter().map(|p| self.catalogue.parameters[*p].slot).collect();
+        let mut slots = self.free_slots(member);
+        if slots.iter().any(|slot| standard.contains(slot)) {
+            slots.retain(|slot| standard.contains(slot));
+        }
+        slots.into_iter().any(|slot| {
+            let (smallest, _, signed) = self.range(member, slot);
+            let size = member.values[slot] - before[slot];
+            let may_shrink = signed || before[slot] != 0.0;
+            (if may_shrink { size.abs() } else { size }) >= SIZE_MIN * smallest
         })
     }
 
