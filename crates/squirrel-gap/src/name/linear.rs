@@ -33,7 +33,8 @@ const DOUBT: f64 = 0.01;
 impl Linear {
     /// Predicts every number once about a point, fits the whitening to what the fullest model leaves, and whitens.
     ///
-    /// * `before` - the same predictor about another point: columns that hardly bend are its
+    /// * `before` - the same predictor about another point: what floats beside the catalogue is its, and where neither has
+    ///   members, columns that hardly bend
     /// * `gust_m_s` - deviation of gusts that blow: the noise is then theirs, by simulation
     ///
     /// # Errors
@@ -46,9 +47,7 @@ impl Linear {
         gust_m_s: Option<f64>,
     ) -> Result<Self, GapError> {
         let plain = |point: &Point| point.members.is_empty();
-        let alike = before.filter(|b| {
-            !b.point.members.iter().chain(&point.members).any(|member| catalogue.changes_slopes(member))
-        });
+        let alike = before.filter(|b| plain(&b.point) && plain(point));
         let about = hypothesis(predictor, catalogue, point)?;
         let residual = predictor.residual(&about)?;
         let first = point.base.iter().all(|x| *x == 0.0) && plain(point);

@@ -191,15 +191,6 @@ impl Catalogue {
             .contains(&self.candidates[parameter.candidate].effect)
     }
 
-    /// Whether other effects do something else beside a member: it moves the air, the measured motion or the commands. What only
-    /// adds a force leaves them as they are.
-    pub(super) fn changes_slopes(&self, member: &Member) -> bool {
-        let own = &self.candidates[member.candidate];
-        ["accel_bias", "constant_wind", "ground_effect", "heading_bias", "payload_swing"]
-            .contains(&own.effect)
-            || own.parameters.iter().any(|p| self.bends(&self.parameters[*p]))
-    }
-
     /// Whether height is worth something: an effect of it acts.
     pub(super) fn feels_height(&self, members: &[Member]) -> bool {
         members.iter().any(|member| self.candidates[member.candidate].effect == "ground_effect")
