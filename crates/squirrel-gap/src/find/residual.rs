@@ -51,7 +51,7 @@ pub(super) fn residuals(
     let first = recording.edge();
     recording
         .filter
-        .apply(&raw, 1)
+        .apply(&raw, recording.filter.reach(), 1)
         .into_iter()
         .zip(&samples[first..])
         .map(|(value, sample)| {

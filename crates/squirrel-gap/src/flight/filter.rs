@@ -22,6 +22,9 @@ const HALF_LENGTH_S: f64 = 0.2;
 /// Samples on each side of a derivative that it looks at.
 pub(crate) const DERIVATIVE_REACH: usize = 2;
 
+/// Lowest rate at which a model is asked: what aliases from above it has come through a lag of rotors and this filter.
+const MODEL_RATE_HZ: f64 = 140.0;
+
 /// The taps at one rate, from the middle outwards.
 pub(crate) struct LowPass {
     taps: Vec<f64>,
@@ -47,15 +50,21 @@ impl LowPass {
         Self { taps }
     }
 
+    /// The same filter for a signal of which one sample of `stride` is known.
+    pub(crate) fn thinned(&self, stride: usize) -> Self {
+        let taps: Vec<f64> = self.taps.iter().step_by(stride).copied().collect();
+        let sum = 2.0 * taps.iter().sum::<f64>() - taps[0];
+        Self { taps: taps.iter().map(|tap| tap / sum).collect() }
+    }
+
     /// Samples that the filter costs at each end.
     pub(crate) fn reach(&self) -> usize {
         self.taps.len() - 1
     }
 
-    /// One filtered sample of `every`, without the edges: sample 0 of the result is sample [`Self::reach`] of `x`.
-    pub(crate) fn apply(&self, x: &[Vector6<f64>], every: usize) -> Vec<Vector6<f64>> {
-        let (reach, end) = (self.reach(), x.len().saturating_sub(self.reach()));
-        (reach..end)
+    /// One filtered sample of `every`, the first at sample `first`, which must be [`Self::reach`] from the beginning.
+    pub(crate) fn apply(&self, x: &[Vector6<f64>], first: usize, every: usize) -> Vec<Vector6<f64>> {
+        (first..x.len().saturating_sub(self.reach()))
             .step_by(every)
             .map(|k| {
                 let pairs = self.taps.iter().enumerate().skip(1);
@@ -63,6 +72,12 @@ impl LowPass {
             })
             .collect()
     }
+}
+
+/// How many samples apart a model is asked whose answer is filtered and then read every so many samples.
+pub(crate) fn model_stride(period_s: f64, every: usize) -> usize {
+    let fits = |stride: &usize| every.is_multiple_of(*stride) && *stride as f64 * period_s * MODEL_RATE_HZ <= 1.0;
+    (1..=every).rev().find(fits).unwrap_or(1)
 }
 
 /// Five-point derivative of `x` at sample `k`, per second; `k` must be [`DERIVATIVE_REACH`] away from the ends.
@@ -83,7 +98,7 @@ mod tests {
         let n = filter.reach();
         let wave = |k: usize| (TAU * frequency_hz * (k as f64 - n as f64) / rate_hz).cos();
         let x: Vec<_> = (0..=2 * n).map(|k| Vector6::repeat(wave(k))).collect();
-        let y = filter.apply(&x, 1);
+        let y = filter.apply(&x, n, 1);
         assert_eq!(y.len(), 1, "one sample has no edge");
         y[0][3]
     }
@@ -102,8 +117,28 @@ mod tests {
 
     #[test]
     fn a_series_shorter_than_the_filter_gives_nothing() {
-        assert!(LowPass::new(100.0).apply(&[Vector6::zeros(); 40], 1).is_empty());
-        assert!(LowPass::new(100.0).apply(&[], 1).is_empty());
+        assert!(LowPass::new(100.0).apply(&[Vector6::zeros(); 40], 20, 1).is_empty());
+        assert!(LowPass::new(100.0).apply(&[], 20, 1).is_empty());
+    }
+
+    #[test]
+    fn a_thinned_model_passes_what_the_measurement_passes() {
+        let (rate_hz, every) = (300.0, 10);
+        assert_eq!(model_stride(1.0 / rate_hz, every), 2);
+        assert_eq!((model_stride(0.001, 33), model_stride(0.01, 3), model_stride(0.02, 2)), (3, 1, 1));
+        let filter = LowPass::new(rate_hz);
+        let wave = |frequency_hz: f64| -> Vec<_> {
+            (0..400).map(|k| Vector6::repeat((TAU * frequency_hz * f64::from(k) / rate_hz).cos())).collect()
+        };
+        for (frequency_hz, off) in [(0.0, 1e-12), (2.0, 1e-3), (6.0, 1e-3), (12.0, 2e-3), (20.0, 2e-3), (60.0, 2e-3)] {
+            let full = wave(frequency_hz);
+            let thin: Vec<_> = full.iter().step_by(2).copied().collect();
+            let (all, few) = (filter.apply(&full, 62, every), filter.thinned(2).apply(&thin, 31, every / 2));
+            assert!(all.len() >= 27);
+            for (a, b) in all.iter().zip(&few) {
+                assert!((a - b).amax() < off, "{frequency_hz} Hz: {} and {}", a[0], b[0]);
+            }
+        }
     }
 
     #[test]

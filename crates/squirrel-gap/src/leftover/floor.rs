@@ -89,5 +89,5 @@ fn filtered_noise(track: &Track, rng: &mut Pcg64Mcg) -> Vec<Vector6<f64>> {
             Vector6::new(force[k].x, force[k].y, force[k].z, a.x, a.y, a.z)
         })
         .collect();
-    track.filter.apply(&raw, track.every)
+    track.filter.apply(&raw, track.filter.reach(), track.every)
 }

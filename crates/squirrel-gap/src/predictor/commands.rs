@@ -6,7 +6,7 @@ use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
 
 /// Commands closer than this to a sample act from that sample on, s.
-const SNAP_S: f64 = 1e-5;
+pub(super) const SNAP_S: f64 = 1e-5;
 
 /// The commands of one flight.
 pub(crate) struct Commands {

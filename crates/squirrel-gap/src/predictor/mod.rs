@@ -9,17 +9,17 @@
 //! and what its sensors do, so that every effect that the simulator can fly can be tested against a log; no regressor is
 //! written twice. Forces show in the first family, sensors that lie in the second.
 
+mod actuators;
 mod commands;
 mod track;
 
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
-use crate::flight::filter::DERIVATIVE_REACH;
 use crate::flight::recording::Recording;
+use actuators::{Moment, Paths, stride};
 use commands::Commands;
 use nalgebra::Vector6;
-use squirrel_core::dynamics::State;
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::log::FlightLog;
@@ -72,6 +72,7 @@ pub(crate) struct Predictor<'a> {
     commands: Vec<Commands>,
     /// The motion of each track for the effects of the vehicle file and errorless sensors, which most hypotheses share.
     plain: Vec<Motion>,
+    paths: Paths,
 }
 
 impl<'a> Predictor<'a> {
@@ -118,7 +119,7 @@ impl<'a> Predictor<'a> {
                 }
             }
         }
-        Ok(Self { vehicle, names, tracks, segments, notes, commands, plain })
+        Ok(Self { vehicle, names, tracks, segments, notes, commands, plain, paths: Paths::default() })
     }
 
     /// Number of rows of a residual.
@@ -192,6 +193,7 @@ impl<'a> Predictor<'a> {
         rows: &mut [f64],
     ) -> Result<(), GapError> {
         let plant = self.plant_at(hypothesis, LED_STEP_S)?;
+        let paths = self.paths.of(&plant, &self.tracks, &self.commands, |t| stride(plant.effects(), t));
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
             let skip = flight.is_some_and(|flight| flight != track.flight);
@@ -202,7 +204,7 @@ impl<'a> Predictor<'a> {
                 own = self.motion(piece, hypothesis);
                 &own
             };
-            let dynamics = if skip { Vec::new() } else { self.dynamics(&plant, track, motion) };
+            let dynamics = if skip { Vec::new() } else { dynamics(&plant, track, motion, &paths[piece]) };
             while let Some(segment) = segments.next_if(|s| s.piece == piece) {
                 if skip {
                     continue;
@@ -297,55 +299,20 @@ impl<'a> Predictor<'a> {
         samples: &[usize],
     ) -> Vec<PlantState> {
         let track = &self.tracks[piece];
+        let paths = self.paths.of(plant, &self.tracks, &self.commands, |_| 1);
         let mut out = Vec::with_capacity(samples.len());
-        let (mut state, mut clock) = self.settled(plant, track, motion);
-        for k in 0..track.time_s.len() {
+        lead(plant, track, motion, &paths[piece], |k, state| {
             if samples.get(out.len()) == Some(&k) {
-                let mut at = state;
-                at.body = State { rotor_speed_rad_s: state.body.rotor_speed_rad_s, ..motion.body[k] };
-                out.push(at);
+                out.push(*state);
             }
-            if out.len() == samples.len() {
-                break;
-            }
-            predict(plant, &mut state, &mut clock, track, motion, k);
-        }
+        });
         out
-    }
-
-    /// The plant at the start of a piece, where its first sample has been held for a while.
-    fn settled<'b>(
-        &'b self,
-        plant: &Plant,
-        track: &Track,
-        motion: &Motion,
-    ) -> (PlantState, commands::Clock<'b>) {
-        let mut state = plant.initial_state(motion.body[0], 1.0);
-        let clock = self.clock(track.flight, plant.effects(), track.time_s[0]);
-        let (rotor, wing) = clock.now();
-        plant.lead(&mut state, &motion.body[0], &rotor, wing, track.voltage_v[0], SETTLE_S);
-        state.time_s = track.time_s[0] - track.began_s;
-        (state, clock)
     }
 
     /// Whether the sensors of a track do under the hypothesis what they do in the vehicle file.
     fn shares_motion(&self, track: &Track, hypothesis: &Hypothesis) -> bool {
         hypothesis.errors[track.flight] == SensorErrors::default()
             && sensors(&hypothesis.effects) == sensors(&self.vehicle.effects)
-    }
-
-    /// Residual of the dynamics of a piece.
-    fn dynamics(&self, plant: &Plant, track: &Track, motion: &Motion) -> Vec<Vector6<f64>> {
-        let (mut state, mut clock) = self.settled(plant, track, motion);
-        let last = track.time_s.len() - 1;
-        let mut predicted = Vec::with_capacity(track.time_s.len());
-        for k in 0..=last {
-            let at = predict(plant, &mut state, &mut clock, track, motion, k);
-            predicted.push(at);
-        }
-        let reach = DERIVATIVE_REACH;
-        let filtered = track.filter.apply(&predicted[reach..predicted.len() - reach], track.every);
-        track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
     }
 }
 
@@ -361,38 +328,51 @@ const LED_STEP_S: f64 = 1e-9;
 /// How long the first sample of a piece is held before it, so that rotors and servos start settled, s.
 const SETTLE_S: f64 = 1.0;
 
-/// The prediction at sample `k`; the plant then moves to the next sample, command by command.
-fn predict(
+/// Leads the plant along a piece and shows its state at each moment of the path, with the sample of the grid.
+fn lead(
     plant: &Plant,
-    state: &mut PlantState,
-    clock: &mut commands::Clock<'_>,
     track: &Track,
     motion: &Motion,
-    k: usize,
-) -> Vector6<f64> {
-    let body = &motion.body[k];
-    let end_s = track.time_s[k] + track.period_s;
-    let mut at_s = track.time_s[k];
-    let mut first = None;
-    // A rotor's acceleration jumps with its command: what a sample stands for lies half before and half after the jump.
-    let jumps = plant.effects().has("rotor_gyro_torque");
-    let (rotor, wing) = clock.now();
-    let before =
-        jumps.then(|| plant.lead(state, body, &rotor, wing, track.voltage_v[k], 0.0).angular_acceleration);
-    loop {
-        clock.advance_to(at_s);
-        let until_s = clock.next_change_s().min(end_s);
-        let (rotor, wing) = clock.now();
-        let led = plant.lead(state, body, &rotor, wing, track.voltage_v[k], until_s - at_s);
-        first.get_or_insert(led);
-        at_s = until_s;
-        if at_s >= end_s - 1e-9 {
-            break;
-        }
+    path: &[Moment],
+    mut each: impl FnMut(usize, &PlantState),
+) {
+    let stride = track.time_s.len().div_ceil(path.len());
+    let first = track.edge() % stride;
+    let Some(Moment { now, .. }) = path.first() else { return };
+    let mut state = plant.initial_state(motion.body[first], 1.0);
+    plant.meet(&mut state, &motion.body[first], now);
+    plant.pass(&mut state, now.deployment(), now.deployment(), SETTLE_S);
+    state.time_s = track.time_s[first] - track.began_s;
+    let dt_s = stride as f64 * track.period_s;
+    for (i, moment) in path.iter().enumerate() {
+        let k = first + i * stride;
+        let now = moment.now.deployment();
+        plant.meet(&mut state, &motion.body[k], &moment.now);
+        state.battery.voltage_v = track.voltage_v[k];
+        each(k, &state);
+        let after = path.get(i + 1).map_or(now, |next| next.now.deployment());
+        plant.pass(&mut state, now, after, dt_s);
     }
-    first.map_or(Vector6::zeros(), |led| {
-        let f = led.specific_force.vector;
-        let a = before.map_or(led.angular_acceleration, |b| (b + led.angular_acceleration) * 0.5).vector;
-        Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z)
-    })
+}
+
+/// Residual of the dynamics of a piece.
+fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &[Moment]) -> Vec<Vector6<f64>> {
+    let stride = stride(plant.effects(), track);
+    let filter = if stride == 1 { &track.filter } else { &track.model_filter };
+    let jumps = plant.effects().has("rotor_gyro_torque");
+    let mut predicted = Vec::with_capacity(path.len());
+    lead(plant, track, motion, path, |k, state| {
+        let led = plant.led(state);
+        let mut a = led.angular_acceleration;
+        // A rotor's acceleration jumps with its command: what a sample stands for lies half before and half after the jump.
+        if let (true, Some(before)) = (jumps, &path[predicted.len()].before) {
+            let mut earlier = *state;
+            plant.meet(&mut earlier, &motion.body[k], before);
+            a = (a + plant.led(&earlier).angular_acceleration) * 0.5;
+        }
+        let (f, a) = (led.specific_force.vector, a.vector);
+        predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
+    });
+    let filtered = filter.apply(&predicted, track.edge() / stride, track.every / stride);
+    track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
 }

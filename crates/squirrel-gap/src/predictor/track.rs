@@ -8,7 +8,7 @@
 //! What the smoother takes away is the second family of residuals, `v_GNSS - v_s`: sensors that lie show there, forces that
 //! the model lacks do not.
 
-use crate::flight::filter::{DERIVATIVE_REACH, LowPass, derivative};
+use crate::flight::filter::{DERIVATIVE_REACH, LowPass, derivative, model_stride};
 use crate::flight::recording::Recording;
 use crate::flight::series::{Series, Span};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector6};
@@ -57,6 +57,9 @@ pub(crate) struct Track {
     pub(crate) imu_noise: [Vector3<f64>; 2],
     /// Samples of the grid to one of the residual.
     pub(crate) every: usize,
+    /// Samples of the grid from one prediction to the next, and the filter of predictions.
+    pub(crate) stride: usize,
+    pub(crate) model_filter: LowPass,
     pub(crate) filter: LowPass,
     /// Specific force and angular acceleration, filtered, at the times of the residual.
     pub(crate) measured: Vec<Vector6<f64>>,
@@ -83,6 +86,7 @@ impl Track {
         let samples = recording.grid(piece);
         let period_s = recording.period_s;
         let every = (1.0 / (RATE_HZ * period_s)).round().max(1.0) as usize;
+        let stride = model_stride(period_s, every);
         let filter = LowPass::new(1.0 / period_s);
         let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..samples.len() - DERIVATIVE_REACH)
             .map(|k| {
@@ -108,7 +112,9 @@ impl Track {
             has_voltage: recording.has_voltage(),
             imu_noise: recording.imu_noise(),
             every,
-            measured: filter.apply(&raw, every),
+            measured: filter.apply(&raw, filter.reach(), every),
+            stride,
+            model_filter: filter.thinned(stride),
             filter,
             time_s: samples.iter().map(|s| s.time_s).collect(),
             voltage_v: samples.iter().map(|s| s.voltage_v).collect(),

@@ -8,8 +8,8 @@
 //! is the mean acceleration that the load of the flying plant felt too, so that a perfect log gives the same swing, while
 //! the model's own prediction would feed each of its errors to the load. It is known when the next motion arrives.
 
-use super::{Plant, PlantState, WingPlant};
-use squirrel_core::dynamics::{self, State, rk4};
+use super::{Membrane, Plant, PlantState, ServoState, WingPlant};
+use squirrel_core::dynamics::{self, RotorDrive, State, rk4};
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::vehicle::PerRotor;
 
@@ -22,6 +22,22 @@ pub struct Led {
     pub specific_force: In<Body, f64>,
     /// Angular acceleration, rad/s^2.
     pub angular_acceleration: In<Body, f64>,
+}
+
+/// Rotors and wing servos at one moment of a led flight: what depends on commands, voltage and their lags alone, so that
+/// plants which share those can be led along the same ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Actuators {
+    rotor_speed_rad_s: PerRotor<f64>,
+    drive: RotorDrive<f64>,
+    servo: [ServoState; 2],
+}
+
+impl Actuators {
+    /// Deployment of the left and the right wing, 0..1.
+    pub fn deployment(&self) -> [f64; 2] {
+        self.servo.map(|servo| servo.deployment)
+    }
 }
 
 impl Plant {
@@ -43,48 +59,88 @@ impl Plant {
         battery_voltage_v: f64,
         dt_s: f64,
     ) -> Led {
-        let (vehicle, effects) = (&self.vehicle, &self.effects);
+        let now = self.tell(state, rotor_command, battery_voltage_v);
+        self.meet(state, motion, &now);
+        let led = self.led(state);
+        self.lead_actuators(state, wing_command, dt_s);
+        self.pass(state, now.deployment(), state.deployment(), dt_s);
+        led
+    }
+
+    /// Tells the rotors of a state a command; the actuators as they are then.
+    ///
+    /// * arguments as in [`Self::lead`]
+    pub fn tell(
+        &self,
+        state: &mut PlantState,
+        rotor_command: &PerRotor<f64>,
+        battery_voltage_v: f64,
+    ) -> Actuators {
+        state.battery.voltage_v = battery_voltage_v;
+        self.drive(state, rotor_command);
+        let PlantState { body, drive, servo, .. } = *state;
+        Actuators { rotor_speed_rad_s: body.rotor_speed_rad_s, drive, servo }
+    }
+
+    /// Moves rotors and wing servos alone, under the command that they were told.
+    ///
+    /// * arguments as in [`Self::lead`]
+    pub fn lead_actuators(&self, state: &mut PlantState, wing_command: [f64; 2], dt_s: f64) {
+        if dt_s > 0.0 {
+            let drive = state.drive;
+            drive.lead(&mut state.body.rotor_speed_rad_s, dt_s);
+            let (WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. }) = &self.wing else {
+                return;
+            };
+            let lag = servo.lag(self.effects.wing_extra_time_constant_s(), dt_s);
+            for (servo_state, command) in state.servo.iter_mut().zip(wing_command) {
+                servo.lead(servo_state, command, &lag);
+            }
+        }
+    }
+
+    /// Puts a state into a measured motion with actuators as they are there; a slung load has swung until then.
+    pub fn meet(&self, state: &mut PlantState, motion: &State<f64>, actuators: &Actuators) {
         if let Some(load) = &self.load
             && state.led_s > 0.0
         {
             let acceleration = (motion.velocity - state.body.velocity) * (1.0 / state.led_s);
             load.lead(&mut state.load, acceleration, state.led_s);
         }
-        state.body = State { rotor_speed_rad_s: state.body.rotor_speed_rad_s, ..*motion };
-        state.battery.voltage_v = battery_voltage_v;
-        self.drive(state, rotor_command);
-        let wrench = self.wrench(state, In::zero());
-        let mut specific_force = dynamics::specific_force(vehicle, effects, motion.omega, &wrench);
-        if effects.any() {
-            specific_force = specific_force + effects.specific_force_bias(state.time_s);
-        }
-        let led = Led {
-            wrench,
-            specific_force,
-            angular_acceleration: dynamics::angular_acceleration(vehicle, motion.omega, &wrench),
-        };
-        state.led_s = dt_s;
-        state.time_s += dt_s;
-        if dt_s > 0.0 {
-            let drive = state.drive;
-            drive.lead(&mut state.body.rotor_speed_rad_s, dt_s);
-            self.lead_wings(state, wing_command, dt_s);
-        }
-        led
+        state.body = State { rotor_speed_rad_s: actuators.rotor_speed_rad_s, ..*motion };
+        (state.drive, state.servo) = (actuators.drive, actuators.servo);
     }
 
-    fn lead_wings(&self, state: &mut PlantState, command: [f64; 2], dt_s: f64) {
-        let (WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. }) = &self.wing else {
-            return;
-        };
-        let before = state.deployment();
-        let lag = servo.lag(self.effects.wing_extra_time_constant_s(), dt_s);
-        for (servo_state, command) in state.servo.iter_mut().zip(command) {
-            servo.lead(servo_state, command, &lag);
+    /// What the plant says at the motion that a state has met.
+    pub fn led(&self, state: &PlantState) -> Led {
+        let wrench = self.wrench(state, In::zero());
+        let mut specific_force =
+            dynamics::specific_force(&self.vehicle, &self.effects, state.body.omega, &wrench);
+        if self.effects.any() {
+            specific_force = specific_force + self.effects.specific_force_bias(state.time_s);
         }
-        let WingPlant::Membrane { membrane, .. } = &self.wing else { return };
-        let after = state.deployment();
-        let deployment = [0, 1].map(|side| 0.5 * (before[side] + after[side]));
+        Led {
+            wrench,
+            specific_force,
+            angular_acceleration: dynamics::angular_acceleration(&self.vehicle, state.body.omega, &wrench),
+        }
+    }
+
+    /// Lets time pass until the next motion: what is neither measured nor an actuator moves on.
+    ///
+    /// * `before`, `after` - deployment of the wings, left and right, at the beginning and the end
+    pub fn pass(&self, state: &mut PlantState, before: [f64; 2], after: [f64; 2], dt_s: f64) {
+        state.led_s = dt_s;
+        state.time_s += dt_s;
+        if dt_s > 0.0
+            && let WingPlant::Membrane { membrane, .. } = &self.wing
+        {
+            let deployment = [0, 1].map(|side| 0.5 * (before[side] + after[side]));
+            self.lead_membrane(state, membrane, deployment, dt_s);
+        }
+    }
+
+    fn lead_membrane(&self, state: &mut PlantState, membrane: &Membrane, deployment: [f64; 2], dt_s: f64) {
         let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, In::zero()));
         state.turn_wings(membrane.angle_of_attack(&air), dt_s);
         // A quarter of the shortest lag is far inside what RK4 follows; after many of the longest the wing has settled.

@@ -11,7 +11,7 @@ mod servo;
 mod wind;
 
 pub use battery::{BatteryParameters, BatteryState};
-pub use lead::Led;
+pub use lead::{Actuators, Led};
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
 pub use servo::{ServoLag, ServoParameters, ServoState};
 pub use wind::{GustModel, Wind, WindParameters};

@@ -1,0 +1,131 @@
+//! Rotors and wing servos along the flights, under the logged commands: the same for every hypothesis that does not touch
+//! them, which most do not, so they are kept.
+
+use super::commands::Commands;
+use super::{SETTLE_S, Track};
+use squirrel_core::dynamics::RotorDrive;
+use squirrel_core::effects::Effects;
+use squirrel_sim::plant::{Actuators, Plant};
+use std::cell::RefCell;
+use std::rc::Rc;
+
+/// One moment of a piece.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Moment {
+    pub(crate) now: Actuators,
+    /// The same just before the command that came then, if one did.
+    pub(crate) before: Option<Actuators>,
+}
+
+/// The moments of a piece, one a stride.
+pub(crate) type Path = Vec<Moment>;
+
+/// Paths that are kept: of the hypothesis that others are compared with, and of the last.
+const KEPT: usize = 2;
+/// Samples of a piece at which two plants are asked whether their rotors would do the same.
+const PROBES: usize = 7;
+
+/// Everything that paths depend on: what rotors are told at some samples, how commands arrive, how servos lag.
+#[derive(Debug, Clone, PartialEq)]
+struct Key {
+    stride: Vec<usize>,
+    drives: Vec<RotorDrive<f64>>,
+    clock: [f64; 5],
+}
+
+/// Paths of a set of flights.
+#[derive(Default)]
+pub(crate) struct Paths {
+    kept: RefCell<Vec<(Key, Rc<Vec<Path>>)>>,
+}
+
+impl Paths {
+    /// The paths of all pieces under a plant.
+    ///
+    /// * `stride` - samples from one moment to the next, by piece
+    pub(crate) fn of(
+        &self,
+        plant: &Plant,
+        tracks: &[Track],
+        commands: &[Commands],
+        stride: impl Fn(&Track) -> usize,
+    ) -> Rc<Vec<Path>> {
+        let key = Key::new(plant, tracks, commands, &stride);
+        let mut kept = self.kept.borrow_mut();
+        let paths = match kept.iter().position(|(other, _)| *other == key) {
+            Some(index) => kept.remove(index).1,
+            None => Rc::new(
+                tracks
+                    .iter()
+                    .map(|track| path(plant, track, &commands[track.flight], stride(track)))
+                    .collect(),
+            ),
+        };
+        kept.truncate(KEPT - 1);
+        kept.insert(0, (key, Rc::clone(&paths)));
+        paths
+    }
+}
+
+impl Key {
+    fn new(
+        plant: &Plant,
+        tracks: &[Track],
+        commands: &[Commands],
+        stride: &impl Fn(&Track) -> usize,
+    ) -> Self {
+        let effects = plant.effects();
+        let drives = tracks.iter().flat_map(|track| {
+            (0..PROBES).map(move |i| {
+                let k = i * (track.time_s.len() - 1) / (PROBES - 1);
+                let (rotor, _) = commands[track.flight].at(track.time_s[k]);
+                RotorDrive::new(plant.vehicle(), effects, &rotor, track.voltage_v[k])
+            })
+        });
+        let [opening, closing] = effects.wing_extra_time_constant_s();
+        let clock = [
+            effects.command_latency_s(),
+            effects.command_clock_s(0.0),
+            effects.command_clock_s(1.0),
+            opening,
+            closing,
+        ];
+        Self { stride: tracks.iter().map(stride).collect(), drives: drives.collect(), clock }
+    }
+}
+
+/// Rotors and servos along one piece, whose first sample has been held for a while.
+fn path(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Path {
+    let first = track.edge() % stride;
+    let mut clock = commands.clock(plant.effects(), track.time_s[first]);
+    let (rotor, wing) = clock.now();
+    let mut state = plant.initial_state(squirrel_core::dynamics::State::at_rest(), 1.0);
+    plant.tell(&mut state, &rotor, track.voltage_v[first]);
+    plant.lead_actuators(&mut state, wing, SETTLE_S);
+    let mut path = Vec::with_capacity((track.time_s.len() - first).div_ceil(stride));
+    for k in (first..track.time_s.len()).step_by(stride) {
+        let (start_s, voltage_v) = (track.time_s[k], track.voltage_v[k]);
+        let end_s = start_s + stride as f64 * track.period_s;
+        let before = plant.tell(&mut state, &clock.now().0, voltage_v);
+        let comes = clock.next_change_s() <= start_s + super::commands::SNAP_S;
+        clock.advance_to(start_s);
+        let now = plant.tell(&mut state, &clock.now().0, voltage_v);
+        path.push(Moment { now, before: comes.then_some(before) });
+        let mut at_s = start_s;
+        while at_s < end_s - 1e-9 {
+            let until_s = clock.next_change_s().clamp(at_s, end_s);
+            plant.lead_actuators(&mut state, clock.now().1, until_s - at_s);
+            at_s = until_s;
+            if at_s < end_s - 1e-9 {
+                clock.advance_to(at_s);
+                plant.tell(&mut state, &clock.now().0, voltage_v);
+            }
+        }
+    }
+    path
+}
+
+/// What jumps with the commands has no bandwidth: it is asked for as often as it was measured.
+pub(crate) fn stride(effects: &Effects<f64>, track: &Track) -> usize {
+    if effects.has("rotor_gyro_torque") { 1 } else { track.stride }
+}
