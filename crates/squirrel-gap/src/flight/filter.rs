@@ -76,7 +76,8 @@ impl LowPass {
 
 /// How many samples apart a model is asked whose answer is filtered and then read every so many samples.
 pub(crate) fn model_stride(period_s: f64, every: usize) -> usize {
-    let fits = |stride: &usize| every.is_multiple_of(*stride) && *stride as f64 * period_s * MODEL_RATE_HZ <= 1.0;
+    let fits =
+        |stride: &usize| every.is_multiple_of(*stride) && *stride as f64 * period_s * MODEL_RATE_HZ <= 1.0;
     (1..=every).rev().find(fits).unwrap_or(1)
 }
 
@@ -130,7 +131,9 @@ mod tests {
         let wave = |frequency_hz: f64| -> Vec<_> {
             (0..400).map(|k| Vector6::repeat((TAU * frequency_hz * f64::from(k) / rate_hz).cos())).collect()
         };
-        for (frequency_hz, off) in [(0.0, 1e-12), (2.0, 1e-3), (6.0, 1e-3), (12.0, 2e-3), (20.0, 2e-3), (60.0, 2e-3)] {
+        for (frequency_hz, off) in
+            [(0.0, 1e-12), (2.0, 1e-3), (6.0, 1e-3), (12.0, 2e-3), (20.0, 2e-3), (60.0, 2e-3)]
+        {
             let full = wave(frequency_hz);
             let thin: Vec<_> = full.iter().step_by(2).copied().collect();
             let (all, few) = (filter.apply(&full, 62, every), filter.thinned(2).apply(&thin, 31, every / 2));

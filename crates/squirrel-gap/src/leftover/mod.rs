@@ -12,6 +12,7 @@ use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
 use features::{families, place_share, predicted_share};
 use squirrel_core::math::GRAVITY_M_S2;
+use std::rc::Rc;
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
 const BLOCK: usize = 8;
@@ -129,7 +130,7 @@ pub(crate) fn noise(
 /// * `slack` - tolerances that no column of the model stands for
 pub(crate) fn leftover(
     predictor: &Predictor,
-    motions: &[Motion],
+    motions: &[Rc<Motion>],
     left: &[f64],
     nominal: &[f64],
     draws: &[Vec<f64>],
@@ -234,7 +235,7 @@ fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, s
 /// Moments and block means of one channel.
 fn blocks(
     predictor: &Predictor,
-    motions: &[Motion],
+    motions: &[Rc<Motion>],
     left: &[f64],
     channel: usize,
 ) -> (Vec<Moment>, Vec<f64>) {

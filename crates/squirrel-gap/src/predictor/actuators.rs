@@ -2,11 +2,11 @@
 //! them, which most do not, so they are kept.
 
 use super::commands::Commands;
+use super::kept::Kept;
 use super::{SETTLE_S, Track};
 use squirrel_core::dynamics::RotorDrive;
 use squirrel_core::effects::Effects;
 use squirrel_sim::plant::{Actuators, Plant};
-use std::cell::RefCell;
 use std::rc::Rc;
 
 /// One moment of a piece.
@@ -17,11 +17,14 @@ pub(crate) struct Moment {
     pub(crate) before: Option<Actuators>,
 }
 
-/// The moments of a piece, one a stride.
-pub(crate) type Path = Vec<Moment>;
+/// The moments of a piece.
+pub(crate) struct Path {
+    /// Samples of the grid from one to the next, and that of the first.
+    pub(crate) stride: usize,
+    pub(crate) first: usize,
+    pub(crate) moments: Vec<Moment>,
+}
 
-/// Paths that are kept: of the hypothesis that others are compared with, and of the last.
-const KEPT: usize = 2;
 /// Samples of a piece at which two plants are asked whether their rotors would do the same.
 const PROBES: usize = 7;
 
@@ -35,9 +38,7 @@ struct Key {
 
 /// Paths of a set of flights.
 #[derive(Default)]
-pub(crate) struct Paths {
-    kept: RefCell<Vec<(Key, Rc<Vec<Path>>)>>,
-}
+pub(crate) struct Paths(Kept<Key, Vec<Path>>);
 
 impl Paths {
     /// The paths of all pieces under a plant.
@@ -50,20 +51,9 @@ impl Paths {
         commands: &[Commands],
         stride: impl Fn(&Track) -> usize,
     ) -> Rc<Vec<Path>> {
-        let key = Key::new(plant, tracks, commands, &stride);
-        let mut kept = self.kept.borrow_mut();
-        let paths = match kept.iter().position(|(other, _)| *other == key) {
-            Some(index) => kept.remove(index).1,
-            None => Rc::new(
-                tracks
-                    .iter()
-                    .map(|track| path(plant, track, &commands[track.flight], stride(track)))
-                    .collect(),
-            ),
-        };
-        kept.truncate(KEPT - 1);
-        kept.insert(0, (key, Rc::clone(&paths)));
-        paths
+        self.0.get(Key::new(plant, tracks, commands, &stride), || {
+            tracks.iter().map(|t| path(plant, t, &commands[t.flight], stride(t))).collect()
+        })
     }
 }
 
@@ -102,7 +92,7 @@ fn path(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Pat
     let mut state = plant.initial_state(squirrel_core::dynamics::State::at_rest(), 1.0);
     plant.tell(&mut state, &rotor, track.voltage_v[first]);
     plant.lead_actuators(&mut state, wing, SETTLE_S);
-    let mut path = Vec::with_capacity((track.time_s.len() - first).div_ceil(stride));
+    let mut moments = Vec::with_capacity((track.time_s.len() - first).div_ceil(stride));
     for k in (first..track.time_s.len()).step_by(stride) {
         let (start_s, voltage_v) = (track.time_s[k], track.voltage_v[k]);
         let end_s = start_s + stride as f64 * track.period_s;
@@ -110,7 +100,7 @@ fn path(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Pat
         let comes = clock.next_change_s() <= start_s + super::commands::SNAP_S;
         clock.advance_to(start_s);
         let now = plant.tell(&mut state, &clock.now().0, voltage_v);
-        path.push(Moment { now, before: comes.then_some(before) });
+        moments.push(Moment { now, before: comes.then_some(before) });
         let mut at_s = start_s;
         while at_s < end_s - 1e-9 {
             let until_s = clock.next_change_s().clamp(at_s, end_s);
@@ -122,7 +112,7 @@ fn path(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Pat
             }
         }
     }
-    path
+    Path { stride, first, moments }
 }
 
 /// What jumps with the commands has no bandwidth: it is asked for as often as it was measured.

@@ -11,14 +11,16 @@
 
 mod actuators;
 mod commands;
+mod kept;
 mod track;
 
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
 use crate::flight::recording::Recording;
-use actuators::{Moment, Paths, stride};
+use actuators::{Path, Paths, stride};
 use commands::Commands;
+use kept::Kept;
 use nalgebra::Vector6;
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::Vehicle;
@@ -26,6 +28,7 @@ use squirrel_sim::log::FlightLog;
 use squirrel_sim::plant::{Plant, PlantState};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::ops::Range;
+use std::rc::Rc;
 
 /// The channels of a residual, in order: specific force, angular acceleration, velocity.
 pub(crate) const CHANNELS: [&str; 9] = [
@@ -71,7 +74,9 @@ pub(crate) struct Predictor<'a> {
     pub(crate) notes: Vec<String>,
     commands: Vec<Commands>,
     /// The motion of each track for the effects of the vehicle file and errorless sensors, which most hypotheses share.
-    plain: Vec<Motion>,
+    plain: Vec<Rc<Motion>>,
+    /// Of each track, the last motions under other errors.
+    motions: Vec<Kept<([f64; 9], SensorErrors), Motion>>,
     paths: Paths,
 }
 
@@ -97,8 +102,10 @@ impl<'a> Predictor<'a> {
             notes.extend(recording.notes);
             names.push(flight.as_str());
         }
-        let plain: Vec<Motion> =
-            tracks.iter().map(|track| track.motion(&vehicle.effects, &SensorErrors::default())).collect();
+        let plain: Vec<Rc<Motion>> = tracks
+            .iter()
+            .map(|track| Rc::new(track.motion(&vehicle.effects, &SensorErrors::default())))
+            .collect();
         let mut segments = Vec::new();
         let mut start = 0;
         for (piece, (track, motion)) in tracks.iter().zip(&plain).enumerate() {
@@ -119,7 +126,9 @@ impl<'a> Predictor<'a> {
                 }
             }
         }
-        Ok(Self { vehicle, names, tracks, segments, notes, commands, plain, paths: Paths::default() })
+        let motions = tracks.iter().map(|_| Kept::default()).collect();
+        let paths = Paths::default();
+        Ok(Self { vehicle, names, tracks, segments, notes, commands, plain, motions, paths })
     }
 
     /// Number of rows of a residual.
@@ -170,9 +179,14 @@ impl<'a> Predictor<'a> {
     }
 
     /// The motion of a piece under a hypothesis.
-    pub(crate) fn motion(&self, piece: usize, hypothesis: &Hypothesis) -> Motion {
+    pub(crate) fn motion(&self, piece: usize, hypothesis: &Hypothesis) -> Rc<Motion> {
         let track = &self.tracks[piece];
-        track.motion(&hypothesis.effects, &hypothesis.errors[track.flight])
+        let (effects, errors) = (&hypothesis.effects, &hypothesis.errors[track.flight]);
+        let path = sensors(effects);
+        if *errors == SensorErrors::default() && path == sensors(&self.vehicle.effects) {
+            return Rc::clone(&self.plain[piece]);
+        }
+        self.motions[piece].get((path, *errors), || track.motion(effects, errors))
     }
 
     /// Measured minus predicted, row by row.
@@ -197,18 +211,13 @@ impl<'a> Predictor<'a> {
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
             let skip = flight.is_some_and(|flight| flight != track.flight);
-            let own;
-            let motion = if skip || self.shares_motion(track, hypothesis) {
-                &self.plain[piece]
-            } else {
-                own = self.motion(piece, hypothesis);
-                &own
-            };
-            let dynamics = if skip { Vec::new() } else { dynamics(&plant, track, motion, &paths[piece]) };
+            if skip {
+                while segments.next_if(|s| s.piece == piece).is_some() {}
+                continue;
+            }
+            let motion = self.motion(piece, hypothesis);
+            let dynamics = dynamics(&plant, track, &motion, &paths[piece]);
             while let Some(segment) = segments.next_if(|s| s.piece == piece) {
-                if skip {
-                    continue;
-                }
                 let out = &mut rows[segment.rows.clone()];
                 if segment.channel < DYNAMIC {
                     for (row, value) in out.iter_mut().zip(&dynamics) {
@@ -239,7 +248,7 @@ impl<'a> Predictor<'a> {
     }
 
     /// The motion of each piece for the effects of the vehicle file and errorless sensors.
-    pub(crate) fn plain(&self) -> &[Motion] {
+    pub(crate) fn plain(&self) -> &[Rc<Motion>] {
         &self.plain
     }
     /// Whether every flight has attitude and velocity.
@@ -308,12 +317,6 @@ impl<'a> Predictor<'a> {
         });
         out
     }
-
-    /// Whether the sensors of a track do under the hypothesis what they do in the vehicle file.
-    fn shares_motion(&self, track: &Track, hypothesis: &Hypothesis) -> bool {
-        hypothesis.errors[track.flight] == SensorErrors::default()
-            && sensors(&hypothesis.effects) == sensors(&self.vehicle.effects)
-    }
 }
 
 /// What effects do to the sensors, in numbers; each is a line in time.
@@ -333,39 +336,37 @@ fn lead(
     plant: &Plant,
     track: &Track,
     motion: &Motion,
-    path: &[Moment],
+    path: &Path,
     mut each: impl FnMut(usize, &PlantState),
 ) {
-    let stride = track.time_s.len().div_ceil(path.len());
-    let first = track.edge() % stride;
-    let Some(Moment { now, .. }) = path.first() else { return };
-    let mut state = plant.initial_state(motion.body[first], 1.0);
-    plant.meet(&mut state, &motion.body[first], now);
-    plant.pass(&mut state, now.deployment(), now.deployment(), SETTLE_S);
-    state.time_s = track.time_s[first] - track.began_s;
-    let dt_s = stride as f64 * track.period_s;
-    for (i, moment) in path.iter().enumerate() {
+    let Path { stride, first, moments } = path;
+    let mut state = plant.initial_state(motion.body[*first], 1.0);
+    plant.meet(&mut state, &motion.body[*first], &moments[0].now);
+    let settled = moments[0].now.deployment();
+    plant.pass(&mut state, settled, settled, SETTLE_S);
+    state.time_s = track.time_s[*first] - track.began_s;
+    let dt_s = *stride as f64 * track.period_s;
+    for (i, moment) in moments.iter().enumerate() {
         let k = first + i * stride;
         let now = moment.now.deployment();
         plant.meet(&mut state, &motion.body[k], &moment.now);
         state.battery.voltage_v = track.voltage_v[k];
         each(k, &state);
-        let after = path.get(i + 1).map_or(now, |next| next.now.deployment());
+        let after = moments.get(i + 1).map_or(now, |next| next.now.deployment());
         plant.pass(&mut state, now, after, dt_s);
     }
 }
 
 /// Residual of the dynamics of a piece.
-fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &[Moment]) -> Vec<Vector6<f64>> {
-    let stride = stride(plant.effects(), track);
-    let filter = if stride == 1 { &track.filter } else { &track.model_filter };
+fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<Vector6<f64>> {
+    let filter = if path.stride == 1 { &track.filter } else { &track.model_filter };
     let jumps = plant.effects().has("rotor_gyro_torque");
-    let mut predicted = Vec::with_capacity(path.len());
+    let mut predicted = Vec::with_capacity(path.moments.len());
     lead(plant, track, motion, path, |k, state| {
         let led = plant.led(state);
         let mut a = led.angular_acceleration;
         // A rotor's acceleration jumps with its command: what a sample stands for lies half before and half after the jump.
-        if let (true, Some(before)) = (jumps, &path[predicted.len()].before) {
+        if let (true, Some(before)) = (jumps, &path.moments[predicted.len()].before) {
             let mut earlier = *state;
             plant.meet(&mut earlier, &motion.body[k], before);
             a = (a + plant.led(&earlier).angular_acceleration) * 0.5;
@@ -373,6 +374,6 @@ fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &[Moment]) -> V
         let (f, a) = (led.specific_force.vector, a.vector);
         predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
     });
-    let filtered = filter.apply(&predicted, track.edge() / stride, track.every / stride);
+    let filtered = filter.apply(&predicted, track.edge() / path.stride, track.every / path.stride);
     track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
 }
