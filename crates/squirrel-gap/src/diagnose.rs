@@ -108,6 +108,12 @@ pub fn diagnose(
         };
         return Ok(Diagnosis { verdict, domain, details: None });
     }
+    let nominal = if let Some(parts) = predictor.in_parts(flights)? {
+        predictor = parts;
+        predictor.residual(&predictor.nominal())?
+    } else {
+        nominal
+    };
     if !predictor.has_motion() {
         predictor.leave_out_drag();
     }

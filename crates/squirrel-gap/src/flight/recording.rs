@@ -175,7 +175,8 @@ impl<'a> Recording<'a> {
         (0..self.samples(piece)).map(|k| self.sample(piece.0 + k as f64 * self.period_s)).collect()
     }
 
-    fn sample(&self, time_s: f64) -> Sample {
+    /// The measured sample at a time.
+    pub(crate) fn sample(&self, time_s: f64) -> Sample {
         let attitude = self.attitude.as_ref().map(|q| q.rotation(time_s));
         // Without both, the velocity through the air in the body frame is not known.
         let velocity = attitude.and(self.velocity.as_ref()).map_or(Vector3::zeros(), |v| v.vector(time_s));

@@ -15,6 +15,8 @@ pub(crate) struct Moment {
     pub(crate) now: Actuators,
     /// The same just before the command that came then, if one did.
     pub(crate) before: Option<Actuators>,
+    /// The wings are folded for longer than they remember.
+    pub(crate) idle: bool,
 }
 
 /// The moments of a piece.
@@ -100,7 +102,7 @@ fn path(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Pat
         let comes = clock.next_change_s() <= start_s + super::commands::SNAP_S;
         clock.advance_to(start_s);
         let now = plant.tell(&mut state, &clock.now().0, voltage_v);
-        moments.push(Moment { now, before: comes.then_some(before) });
+        moments.push(Moment { now, before: comes.then_some(before), idle: false });
         let mut at_s = start_s;
         while at_s < end_s - 1e-9 {
             let until_s = clock.next_change_s().clamp(at_s, end_s);
@@ -111,6 +113,12 @@ fn path(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Pat
                 plant.tell(&mut state, &clock.now().0, voltage_v);
             }
         }
+    }
+    let memory = (plant.wing_memory_s() / (stride as f64 * track.period_s)).ceil() as usize;
+    let mut folded = usize::MAX;
+    for moment in moments.iter_mut().rev() {
+        folded = if moment.now.deployment() == [0.0; 2] { folded.saturating_add(1) } else { 0 };
+        moment.idle = folded > memory;
     }
     Path { stride, first, moments }
 }

@@ -12,6 +12,7 @@
 mod actuators;
 mod commands;
 mod kept;
+mod spread;
 mod track;
 
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
@@ -87,6 +88,36 @@ impl<'a> Predictor<'a> {
         vehicle: &'a VehicleFile,
         flights: &'a [(String, FlightLog)],
     ) -> Result<Self, GapError> {
+        Self::build(vehicle, flights, |_| f64::INFINITY)
+    }
+
+    /// The same flights by parts of them, if all would take long.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn in_parts(&self, flights: &'a [(String, FlightLog)]) -> Result<Option<Self>, GapError> {
+        let mut duration_s = vec![0.0; flights.len()];
+        for track in &self.tracks {
+            duration_s[track.flight] += track.time_s.len() as f64 * track.period_s;
+        }
+        let total_s: f64 = duration_s.iter().sum();
+        if total_s <= LOOKED_AT_S {
+            return Ok(None);
+        }
+        let mut parts =
+            Self::build(self.vehicle, flights, |flight| LOOKED_AT_S * duration_s[flight] / total_s)?;
+        parts.notes.push(format!(
+            "of {total_s:.0} s of flight, names come from {LOOKED_AT_S:.0} s: parts spread evenly, and parts with much movement"
+        ));
+        Ok(Some(parts))
+    }
+
+    /// * `limit_s` - about how much of each flight is looked at
+    fn build(
+        vehicle: &'a VehicleFile,
+        flights: &'a [(String, FlightLog)],
+        limit_s: impl Fn(usize) -> f64,
+    ) -> Result<Self, GapError> {
         if flights.is_empty() {
             return Err(GapError::NoFlights);
         }
@@ -97,7 +128,8 @@ impl<'a> Predictor<'a> {
                 return Err(GapError::SameName { flight: flight.clone() });
             }
             let recording = Recording::new(vehicle, flight, log)?;
-            tracks.extend(recording.pieces.iter().map(|piece| Track::new(index, &recording, *piece)));
+            let spans = spread::spread(&recording, limit_s(index));
+            tracks.extend(spans.into_iter().map(|span| Track::new(index, &recording, span)));
             commands.push(Commands::new(&recording));
             notes.extend(recording.notes);
             names.push(flight.as_str());
@@ -326,6 +358,8 @@ fn sensors(effects: &Effects<f64>) -> [f64; 9] {
     [b0.x, b0.y, b0.z, b1.x, b1.y, b1.z, h0, h1, effects.gnss_latency_s()]
 }
 
+/// Flight time from which on only parts are looked at, s.
+const LOOKED_AT_S: f64 = 480.0;
 /// The step of a plant that is only led matters to nothing; it is shorter than any lag.
 const LED_STEP_S: f64 = 1e-9;
 /// How long the first sample of a piece is held before it, so that rotors and servos start settled, s.
@@ -343,7 +377,7 @@ fn lead(
     let mut state = plant.initial_state(motion.body[*first], 1.0);
     plant.meet(&mut state, &motion.body[*first], &moments[0].now);
     let settled = moments[0].now.deployment();
-    plant.pass(&mut state, settled, settled, SETTLE_S);
+    plant.pass(&mut state, Some([settled; 2]), SETTLE_S);
     state.time_s = track.time_s[*first] - track.began_s;
     let dt_s = *stride as f64 * track.period_s;
     for (i, moment) in moments.iter().enumerate() {
@@ -353,7 +387,7 @@ fn lead(
         state.battery.voltage_v = track.voltage_v[k];
         each(k, &state);
         let after = moments.get(i + 1).map_or(now, |next| next.now.deployment());
-        plant.pass(&mut state, now, after, dt_s);
+        plant.pass(&mut state, (!moment.idle).then_some([now, after]), dt_s);
     }
 }
 

@@ -63,7 +63,7 @@ impl Plant {
         self.meet(state, motion, &now);
         let led = self.led(state);
         self.lead_actuators(state, wing_command, dt_s);
-        self.pass(state, now.deployment(), state.deployment(), dt_s);
+        self.pass(state, Some([now.deployment(), state.deployment()]), dt_s);
         led
     }
 
@@ -126,14 +126,23 @@ impl Plant {
         }
     }
 
+    /// Time after which nothing is left of what the wings went through, s.
+    pub fn wing_memory_s(&self) -> f64 {
+        let WingPlant::Membrane { membrane, .. } = &self.wing else { return 0.0 };
+        let p = membrane.parameters();
+        8.0 * (p.camber_time_constant_s + p.creep_time_constant_s + 4.0 * p.chord_m)
+    }
+
     /// Lets time pass until the next motion: what is neither measured nor an actuator moves on.
     ///
-    /// * `before`, `after` - deployment of the wings, left and right, at the beginning and the end
-    pub fn pass(&self, state: &mut PlantState, before: [f64; 2], after: [f64; 2], dt_s: f64) {
+    /// * `deployment` - of the wings, left and right, at the beginning and the end; `None` if they are folded and stay so for
+    ///   longer than [`Self::wing_memory_s`], which saves most of the time
+    pub fn pass(&self, state: &mut PlantState, deployment: Option<[[f64; 2]; 2]>, dt_s: f64) {
         state.led_s = dt_s;
         state.time_s += dt_s;
         if dt_s > 0.0
             && let WingPlant::Membrane { membrane, .. } = &self.wing
+            && let Some([before, after]) = deployment
         {
             let deployment = [0, 1].map(|side| 0.5 * (before[side] + after[side]));
             self.lead_membrane(state, membrane, deployment, dt_s);
@@ -144,10 +153,8 @@ impl Plant {
         let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, In::zero()));
         state.turn_wings(membrane.angle_of_attack(&air), dt_s);
         // A quarter of the shortest lag is far inside what RK4 follows; after many of the longest the wing has settled.
-        let p = membrane.parameters();
-        let settled_s = 20.0 * (p.camber_time_constant_s + p.creep_time_constant_s + 4.0 * p.chord_m);
-        let span_s = dt_s.min(settled_s);
-        let steps = (4.0 * span_s / p.camber_time_constant_s).ceil();
+        let span_s = dt_s.min(self.wing_memory_s());
+        let steps = (4.0 * span_s / membrane.parameters().camber_time_constant_s).ceil();
         for _ in 0..steps as usize {
             state.membrane = rk4(state.membrane, span_s / steps, |s| {
                 membrane.evaluate(&air, state.wing_angle_rate_rad_s, deployment, s).1
