@@ -5,7 +5,7 @@ use crate::compatibility;
 use crate::find::{self, Place};
 use crate::name::{
     Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, heights, hypothesis,
-    payload_lengths_m, sds,
+    payload_lengths_m, sds, silent_tolerances,
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
@@ -102,6 +102,7 @@ pub fn diagnose(
             goes_with: Some(format!("{}: {}", problem.flight, problem.channel)),
             fly_next: None,
             gap: None,
+            closed_loop: Vec::new(),
             model_patch: None,
             words: problem.words,
             notes: predictor.notes.clone(),
@@ -129,6 +130,7 @@ pub fn diagnose(
             "propulsion.pwm_to_thrust_n: inside its sd the thrust curve does in these flights what battery_sag does".to_owned(),
         );
     }
+    predictor.notes.extend(silent_tolerances(vehicle));
     progress("naming");
     let catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
     let tick = || progress("naming");
@@ -227,6 +229,7 @@ fn decide(
         goes_with,
         fly_next,
         gap,
+        closed_loop: Vec::new(),
         model_patch: None,
         words: String::new(),
         notes: search.predictor.notes.clone(),

@@ -2,10 +2,13 @@
 //! worth on flights that were not used to find it.
 //!
 //! - [`find`](mod@find) measures the disagreement: residual force and moment of flights against a vehicle.
+//! - [`diagnose()`] names what is missing and proves it on held-out flights in open loop.
+//! - [`add()`] writes the vehicle file with it; [`closed_loop()`] flies held-out flights again with both.
 //!
 //! The physics is that of the simulator; nothing of it is written here again.
 
 mod add;
+mod closed_loop;
 mod compatibility;
 mod diagnose;
 mod error;
@@ -21,6 +24,7 @@ mod verdict;
 mod words;
 
 pub use add::{add, difference};
+pub use closed_loop::{ClosedLoop, closed_loop};
 pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};

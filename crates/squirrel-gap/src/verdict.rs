@@ -1,5 +1,6 @@
 //! The answer of the workflow, in the words that files, tests and people share.
 
+use crate::closed_loop::ClosedLoop;
 use crate::find::Place;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -105,6 +106,8 @@ pub struct Verdict {
     pub fly_next: Option<String>,
     /// On held-out flights, if there are any.
     pub gap: Option<Gap>,
+    /// Held-out flights of our own flight code, flown again; empty until somebody does, and for those of other autopilots.
+    pub closed_loop: Vec<ClosedLoop>,
     /// Path of the vehicle file with the effects added.
     pub model_patch: Option<String>,
     /// One paragraph in plain words.

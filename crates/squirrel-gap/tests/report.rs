@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use squirrel_core::effects::Effects;
+use squirrel_gap::ClosedLoop;
 use squirrel_gap::report::{
     Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
     HeldOutChannel, Horizon, InputCorrelation, PANELS, ParameterRow, ReportData, Whiteness, render,
@@ -160,6 +161,11 @@ fn example() -> ReportData {
             conditional("fx", "forward airspeed"),
             conditional("fy", "sideways airspeed"),
         ],
+        closed_loop: vec![ClosedLoop {
+            flight: "avoid 4".to_owned(),
+            before_ned_m: [0.31, 0.22, 1.74],
+            after_ned_m: [0.12, 0.11, 0.23],
+        }],
         held_out: Some(HeldOut {
             flights: vec!["normal 4".to_owned()],
             rival: "quadratic_drag".to_owned(),
@@ -284,7 +290,9 @@ fn what_is_missing_is_said_in_words() {
     ] {
         assert!(panel(&html, id).contains(words), "{id}");
     }
+    assert!(panel(&render(&example()), "panel-d").contains("flown again in closed loop"));
     let mut partial = example();
+    partial.closed_loop.clear();
     partial.flights[0].after.clear();
     let untried = Effects::<f64>::NAMES[0];
     partial.evidence.retain(|e| e.name != untried);
@@ -297,6 +305,7 @@ fn what_is_missing_is_said_in_words() {
     assert!(panel(&html, "panel-b").contains(untried), "at its place without a bar");
     assert!(panel(&html, "panel-c").contains("fx against forward airspeed: no samples"));
     assert!(panel(&html, "panel-d").contains("No horizons"));
+    assert!(!panel(&html, "panel-d").contains("closed loop"));
     assert!(panel(&html, "panel-e").contains("No inputs"));
 }
 

@@ -87,10 +87,19 @@ impl<'a> Recording<'a> {
                 ));
             }
         }
-        if voltage.is_none() && vehicle.effects.has("battery_sag") {
+        if voltage.is_none() {
             let reference = parameters.propulsion.reference_voltage_v;
+            notes.push(if vehicle.effects.has("battery_sag") {
+                format!(
+                    "{flight}: battery.voltage_v: missing; battery_sag is that of the reference voltage, {reference} V"
+                )
+            } else {
+                format!("{flight}: battery.voltage_v: missing; thrust may be that of any charge")
+            });
+        }
+        if baro.is_none() && position.is_none() {
             notes.push(format!(
-                "{flight}: battery.voltage_v: missing; battery_sag is that of the reference voltage, {reference} V"
+                "{flight}: baro.altitude_m, gnss.position_ned_m: missing; what depends on height cannot be seen"
             ));
         }
         if has_wings && wing.is_none() {

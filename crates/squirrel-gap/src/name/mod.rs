@@ -25,8 +25,8 @@ pub(crate) use payload::payload_lengths_m;
 pub(crate) use point::{Member, Point, hypothesis};
 pub(crate) use refine::Scored;
 pub(crate) use search::{Found, NATS_MIN, Search};
-pub(crate) use tolerance::sds;
 use tolerance::unlogged_sag;
+pub(crate) use tolerance::{notes as silent_tolerances, sds};
 
 use crate::GapError;
 use crate::leftover::{Leftover, Slack, leftover, noise};

@@ -3,6 +3,7 @@
 use super::point::Airframe;
 use crate::GapError;
 use crate::predictor::Predictor;
+use crate::words::significant;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.
@@ -11,6 +12,25 @@ pub(super) const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
 const SAMPLE_SHARE: f64 = 0.29;
 /// Voltage of a full cell, of one at rest, and of an empty one under load, V.
 const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
+
+/// What sensors may be off by where the vehicle file does not say: m/s^2, and half a degree in rad.
+const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.02, "m/s^2");
+const HEADING: (&str, f64, &str) = ("sensors.attitude.bias_rad", 0.5_f64.to_radians(), "rad");
+
+/// What the vehicle file does not say and is taken instead.
+pub(crate) fn notes(vehicle: &VehicleFile) -> Vec<String> {
+    let silent = |field: &str| sds(vehicle, field).is_none();
+    let mut notes: Vec<String> = [ACCEL_BIAS, HEADING]
+        .iter()
+        .filter(|(field, ..)| silent(field))
+        .map(|(field, sd, unit)| format!("{field}: has no sd; {} {unit} is taken", significant(*sd, 2)))
+        .collect();
+    let mut rotors = (0..vehicle.vehicle.rotors().len()).map(|i| format!("rotor[{i}].position_body_m"));
+    if let Some(field) = rotors.find(|field| silent(field)) {
+        notes.push(format!("{field}: has no sd; the rotor is taken to be where the file says"));
+    }
+    notes
+}
 
 /// How far the number that an effect changes may be off, one standard deviation, in the unit of the effect's parameter.
 pub(super) fn tolerance(
@@ -77,8 +97,8 @@ pub(super) fn tolerance(
             let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
             mean.max(none)
         }
-        "accel_bias" => declared("sensors.imu.accel_bias_m_s2", 0.02)?,
-        "heading_bias" => declared("sensors.attitude.bias_rad", 0.5_f64.to_radians())?,
+        "accel_bias" => declared(ACCEL_BIAS.0, ACCEL_BIAS.1)?,
+        "heading_bias" => declared(HEADING.0, HEADING.1)?,
         "constant_wind" => 0.12,
         // A vehicle carries a load or it does not; a ground effect of a small radius is none.
         "payload_swing" | "ground_effect" => 0.0,

@@ -8,6 +8,7 @@ mod left;
 mod regressors;
 mod windows;
 
+use crate::ClosedLoop;
 use crate::GapError;
 use crate::diagnose::{Details, Diagnosis, HeldOut as Flown};
 use crate::name::{Naming, Scored, Search, TURBULENCE_M_S};
@@ -172,6 +173,8 @@ pub fn picture(
         let flights = held_out.iter().map(|name| short(name)).collect();
         data.held_out = Some(proof(details.held_out.as_ref(), flights, &seen.rival));
     }
+    let again = verdict.closed_loop.iter().cloned();
+    data.closed_loop = again.map(|flight| ClosedLoop { flight: short(&flight.flight), ..flight }).collect();
     data.whiteness.clone_from(&seen.whiteness);
     data.parameters = verdict.effects.iter().flat_map(|e| parameters(e, &seen.tolerances)).collect();
     let (names, chi_square) = &details.confusability;

@@ -2,6 +2,7 @@
 //!
 //! Numbers that are unknown are NaN; they are drawn as gaps and written as null. Lists that are empty say so on the page.
 
+use crate::ClosedLoop;
 use serde::Serialize;
 
 /// Everything on one page.
@@ -27,6 +28,8 @@ pub struct ReportData {
     pub conditional: Vec<Conditional>,
     /// Errors on flights that were not used.
     pub held_out: Option<HeldOut>,
+    /// Held-out flights that were flown again in closed loop.
+    pub closed_loop: Vec<ClosedLoop>,
     /// Whether what is left is noise.
     pub whiteness: Vec<Whiteness>,
     /// Parameters of the answer.

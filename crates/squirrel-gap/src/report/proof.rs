@@ -71,7 +71,28 @@ pub(super) fn held_out(page: &mut Page, data: &ReportData) {
             Row { ink: None, cells: std::iter::once(c.name.clone()).chain(cells).collect() }
         });
         page.table(&head, &rows.collect::<Vec<_>>());
+        closed_loop(page, data);
     });
+}
+
+/// Flights that the flight code flew again, in a table.
+fn closed_loop(page: &mut Page, data: &ReportData) {
+    if data.closed_loop.is_empty() {
+        return;
+    }
+    page.text(
+        "The same flights flown again in closed loop by the flight code of the log: root mean square of simulated less \
+         measured position over the whole flight.",
+    );
+    let axes = ["north", "east", "down"];
+    let columns = axes.iter().flat_map(|axis| ["nominal", "fitted"].map(|model| format!("{axis}, {model}")));
+    let head: Vec<String> = std::iter::once("flight".to_owned()).chain(columns).collect();
+    let rows = data.closed_loop.iter().map(|again| {
+        let pairs = again.before_ned_m.iter().zip(&again.after_ned_m);
+        let cells = pairs.flat_map(|(before, after)| [before, after].map(|x| quantity(*x, "m")));
+        Row { ink: None, cells: std::iter::once(again.flight.clone()).chain(cells).collect() }
+    });
+    page.table(&head, &rows.collect::<Vec<_>>());
 }
 
 fn by_channel(held_out: &HeldOut) -> Figure {
