@@ -1,7 +1,9 @@
 //! The experiments: arms against each other on paired seeds, with intervals.
 //!
 //! - [`thrust`]: what wings are worth as a function of the effective thrust-to-weight ratio.
+//! - [`wing_flights`]: random flights with spread wings, to learn from and to be judged by.
 //! - [`statistics`]: means, and intervals by a paired bootstrap.
 
 pub mod statistics;
 pub mod thrust;
+pub mod wing_flights;
