@@ -122,16 +122,8 @@ impl Default for WindTable {
 }
 
 /// Names of the built-in scenarios.
-pub const BUILT_IN: [&str; 8] = [
-    "hover",
-    "avoid",
-    "steer",
-    "track",
-    "excite_calm",
-    "excite_normal",
-    "excite_rich",
-    "wings_open_random",
-];
+pub const BUILT_IN: [&str; 8] =
+    ["hover", "avoid", "steer", "track", "excite_calm", "excite_normal", "excite_rich", "wings_open_random"];
 
 impl Scenario {
     /// A built-in scenario by name, or a TOML file by path.

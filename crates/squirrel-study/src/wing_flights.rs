@@ -11,9 +11,11 @@
 //! Networks see ground speed, as in the paper (docs/equations.md T6), so that wind is an error of what they see. All of it is what
 //! `squirrel fly --arm pc_wings_open --scenario wings_open_random` flies, with the scenario's numbers changed.
 
+use squirrel_core::frames::{In, Ned, Rotation};
+use squirrel_core::nalgebra::Vector3;
 use squirrel_nn::NnError;
 use squirrel_nn::labels;
-use squirrel_nn::windows::{Window, Windows};
+use squirrel_nn::windows::Window;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Integrator, Setup};
 use squirrel_sim::scenario::{MissionTable, Scenario};
@@ -21,12 +23,16 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Length of each flight, s.
 pub const FLIGHT_S: u32 = 30;
-/// Top speed of the reference in `t1`, m/s; training has that of the built-in scenario.
-const FAST_M_S: f64 = 14.0;
+/// Top speed of the reference in training, m/s, so that flights come to the paper's 8 m/s.
+const TRAINED_M_S: f64 = 8.0;
+/// Top speed of the reference in `t1`, m/s, so that flights come to the paper's 10.7 m/s.
+const FAST_M_S: f64 = 11.0;
 /// Top speed of the reference in `t4`, m/s.
 const SLOW_M_S: f64 = 4.0;
 /// Mean wind where there is wind, m/s, in a direction of the seed's.
 const WIND_M_S: f64 = 2.0;
+/// Between the winds of two seeds.
+const GOLDEN_ANGLE_RAD: f64 = 2.399_963;
 /// Standard deviation of gusts where there is wind, m/s.
 const GUST_M_S: f64 = 0.5;
 
@@ -93,16 +99,17 @@ impl Kind {
         scenario.seed = seed;
         scenario.duration_s = f64::from(FLIGHT_S);
         if let MissionTable::Runs(runs) = &mut scenario.mission {
-            match self {
-                Self::T1 => runs.speed_m_s = FAST_M_S,
-                Self::T4 => runs.speed_m_s = SLOW_M_S,
-                Self::Training | Self::T2 | Self::T3 => {}
-            }
+            runs.speed_m_s = match self {
+                Self::T1 => FAST_M_S,
+                Self::T4 => SLOW_M_S,
+                Self::Training | Self::T2 | Self::T3 => TRAINED_M_S,
+            };
         }
         if matches!(self, Self::T1 | Self::T3) {
-            // The golden angle: seeds one after the other blow from all sides.
-            let (sin, cos) = (2.399_963 * (seed % 1024) as f64).sin_cos();
-            scenario.wind.mean_ned_m_s = [WIND_M_S * cos, WIND_M_S * sin, 0.0];
+            // Of flights one after the other the wind comes from all sides.
+            let side =
+                Rotation::<Ned, Ned, f64>::from_euler(0.0, 0.0, GOLDEN_ANGLE_RAD * (seed % 1024) as f64);
+            scenario.wind.mean_ned_m_s = (side * In::new(Vector3::x() * WIND_M_S)).vector.into();
             scenario.wind.gust_sigma_m_s = GUST_M_S;
         }
         Ok(scenario)
@@ -114,12 +121,8 @@ impl Kind {
     /// A vehicle that cannot fly or has no wings.
     pub fn fly(self, vehicle: &VehicleFile, seed: u64) -> Result<Vec<Window>, WingFlightError> {
         let scenario = self.scenario(seed)?;
-        let setup = Setup {
-            vehicle: vehicle.clone(),
-            arm: Arm::PcWingsOpen,
-            scenario,
-            integrator: Integrator::Rk4,
-        };
+        let setup =
+            Setup { vehicle: vehicle.clone(), arm: Arm::PcWingsOpen, scenario, integrator: Integrator::Rk4 };
         let name = format!("{} {seed}", self.name());
         let log = setup.fly(true, |_| {})?.log.unwrap_or_default();
         Ok(labels::windows(vehicle, &name, &log)?)

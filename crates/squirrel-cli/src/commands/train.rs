@@ -243,7 +243,8 @@ fn table(sets: &[Judged]) -> Rows {
     let head = ["set", "flights", "windows", "RMSE to labels N", "x", "y", "z", "to truth N", "flat plate N"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for judged in sets {
-        let mut row = vec![judged.set.to_owned(), judged.flights.len().to_string(), judged.windows.to_string()];
+        let mut row =
+            vec![judged.set.to_owned(), judged.flights.len().to_string(), judged.windows.to_string()];
         let [x, y, z] = judged.axis_rmse_to_labels_n;
         row.extend([judged.rmse_to_labels_n, x, y, z].map(|n| format!("{n:.4}")));
         row.push(judged.rmse_to_truth_n.map_or_else(|| "-".to_owned(), |n| format!("{n:.4}")));
@@ -260,7 +261,8 @@ fn curve(history: &[Epoch]) -> Rows {
     let mut rows = vec![["epoch", "training N", "validation N"].map(str::to_owned).to_vec()];
     for number in shown {
         let epoch = history[number - 1];
-        let validation = epoch.validation.map_or_else(|| "-".to_owned(), |loss| format!("{:.4}", loss.sqrt()));
+        let validation =
+            epoch.validation.map_or_else(|| "-".to_owned(), |loss| format!("{:.4}", loss.sqrt()));
         rows.push(vec![number.to_string(), format!("{:.4}", epoch.training.sqrt()), validation]);
     }
     rows
@@ -308,8 +310,10 @@ fn page(best: &Trained, history: &[Epoch], table: &Rows) -> String {
         let validation = history.iter().map(|epoch| epoch.validation.map_or(f64::NAN, f64::sqrt)).collect();
         chart.series.push(Series::line("validation", Ink::Series(1), epochs, validation));
     }
-    let caption = "Training is the mean over an epoch while the weights moved, validation is after it.".to_owned();
-    let figure = Figure { title: "Over epochs".to_owned(), caption, drawings: vec![chart.svg()], notes: Vec::new() };
+    let caption =
+        "Training is the mean over an epoch while the weights moved, validation is after it.".to_owned();
+    let figure =
+        Figure { title: "Over epochs".to_owned(), caption, drawings: vec![chart.svg()], notes: Vec::new() };
     page.figures(Columns::One, &[figure]);
     page.html()
 }
