@@ -121,6 +121,11 @@ pub fn windows(vehicle: &VehicleFile, flight: &str, log: &FlightLog) -> Result<V
     Ok(all)
 }
 
+/// Area of the flat plate that models correct: of both wings, m^2; 0 for a vehicle without any.
+pub fn plate_area_m2(vehicle: &VehicleFile) -> f32 {
+    vehicle.vehicle.parameters().wing.map_or(0.0, |wing| 2.0 * wing.area_per_side_m2) as f32
+}
+
 /// A channel that can be asked at any time.
 struct Line {
     time_s: Vec<f64>,

@@ -87,7 +87,7 @@ impl Train {
         let held_out: Vec<&str> = self.validation.iter().map(String::as_str).collect();
         let (training, validation) = windows.split(&held_out).map_err(|e| format!("--validation: {e}"))?;
         let settings = Settings { epochs: self.epochs, seed: self.seed, ..Settings::default() };
-        let area_m2 = plate_area_m2(&vehicle);
+        let area_m2 = labels::plate_area_m2(&vehicle);
         let new = |model| Trainer::new(model, &vehicle.name, area_m2, &training, &validation, settings);
         let checkpoint = self.out.with_extension("checkpoint.safetensors");
         let mut trainer = if self.resume {
@@ -181,11 +181,6 @@ impl Train {
         }
         Ok(trainer)
     }
-}
-
-/// Area of the plate that models correct.
-fn plate_area_m2(vehicle: &VehicleFile) -> f32 {
-    vehicle.vehicle.parameters().wing.map_or(0.0, |wing| 2.0 * wing.area_per_side_m2) as f32
 }
 
 /// All epochs that are left, with a checkpoint every now and then.
