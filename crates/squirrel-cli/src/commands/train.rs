@@ -86,6 +86,9 @@ impl Train {
         let windows = self.windows(&vehicle)?;
         let held_out: Vec<&str> = self.validation.iter().map(String::as_str).collect();
         let (training, validation) = windows.split(&held_out).map_err(|e| format!("--validation: {e}"))?;
+        if training.all().is_empty() {
+            return Err(format!("--validation: {}: none is left to train on", self.validation.join(",")));
+        }
         let settings = Settings { epochs: self.epochs, seed: self.seed, ..Settings::default() };
         let area_m2 = labels::plate_area_m2(&vehicle);
         let new = |model| Trainer::new(model, &vehicle.name, area_m2, &training, &validation, settings);

@@ -29,6 +29,8 @@ const TRAINING_FLIGHTS: [u32; 3] = [1, 4, 10];
 const TEST_FLIGHTS: u32 = 4;
 /// Slower than this, m/s, angles of attack are not compared.
 const ALPHA_FROM_M_S: f32 = 3.0;
+/// 10 deg.
+const LARGE_ALPHA_RAD: f32 = 0.174_532_93;
 
 /// What to run.
 #[derive(Debug, Clone)]
@@ -91,7 +93,8 @@ pub struct Set {
     pub speed_m_s: [f64; 2],
     /// The true force, root mean square, N.
     pub force_rms_n: Spread,
-    /// Labels against truth, root mean square, N: no model can come below it on labels, but by luck.
+    /// Labels against truth, root mean square, N: what the true force would have on labels. In wind it holds the drag of the
+    /// airframe, which a log without airspeed cannot tell from the wings'.
     pub label_noise_n: Spread,
 }
 
@@ -104,6 +107,8 @@ pub struct Word {
     pub set: &'static str,
     /// Share of them in which the angle of attack that the wing seems to have is larger than the one it has.
     pub alpha_larger_share: Spread,
+    /// The same where it is beyond 10 deg: below, the wing may still be bulged by the flow of a moment before.
+    pub alpha_larger_share_beyond_10_deg: Spread,
     /// Median of how much stronger the flow seems to act.
     pub gamma_median: Spread,
 }
@@ -139,8 +144,8 @@ struct Trial {
 struct Judged {
     to_labels: Vec<ForceError>,
     to_truth: Vec<ForceError>,
-    /// Share and median of [`Word`]; empty where the model is not paRNN.
-    words: Vec<[f64; 2]>,
+    /// Shares and median of [`Word`]; empty where the model is not paRNN.
+    words: Vec<[f64; 3]>,
 }
 
 /// Number of flights and trainings that [`run`] will do.
@@ -192,8 +197,13 @@ pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Table2, WingFlight
                 rows.push(Row { training_s, set: kind.name(), model, to_labels, to_truth });
             }
             let word = |n: usize| spread(&of(0).map(|j| j.words[set][n]).collect::<Vec<f64>>());
-            let (alpha_larger_share, gamma_median) = (word(0), word(1));
-            words.push(Word { training_s, set: kind.name(), alpha_larger_share, gamma_median });
+            words.push(Word {
+                training_s,
+                set: kind.name(),
+                alpha_larger_share: word(0),
+                alpha_larger_share_beyond_10_deg: word(1),
+                gamma_median: word(2),
+            });
         }
     }
     Ok(Table2 {
@@ -290,20 +300,26 @@ fn truths_of(windows: &[Window]) -> Vec<[f32; 3]> {
     windows.iter().filter_map(|w| w.truth_body_n).collect()
 }
 
-/// Share of larger angles of attack, median gamma; zero where nothing is fast enough.
-fn words(trained: &Trained, windows: &[Window]) -> [f64; 2] {
-    let Some(parnn) = trained.parnn() else { return [0.0; 2] };
-    let fast = windows.iter().filter(|w| w.rows[WINDOW - 1][0] * SPEED_SCALE_M_S > ALPHA_FROM_M_S);
-    let (mut larger, mut gammas) = (0_u32, Vec::new());
-    for window in fast {
-        let velocity = In::new(Vector3::from(window.velocity_body_m_s));
-        let estimate = parnn.estimate(&window.rows, velocity);
-        larger += u32::from(estimate.alpha_est_rad.abs() > window.rows[WINDOW - 1][1].abs());
+/// Shares of larger angles of attack, of all and of the large ones, and median gamma; zero where nothing is fast enough.
+fn words(trained: &Trained, windows: &[Window]) -> [f64; 3] {
+    let Some(parnn) = trained.parnn() else { return [0.0; 3] };
+    let (mut all, mut large, mut gammas) = (Vec::new(), Vec::new(), Vec::new());
+    for window in windows {
+        let [speed, alpha_rad] = window.rows[WINDOW - 1];
+        if speed * SPEED_SCALE_M_S <= ALPHA_FROM_M_S {
+            continue;
+        }
+        let estimate = parnn.estimate(&window.rows, In::new(Vector3::from(window.velocity_body_m_s)));
+        let is_larger = f64::from(u8::from(estimate.alpha_est_rad.abs() > alpha_rad.abs()));
+        all.push(is_larger);
+        if alpha_rad.abs() > LARGE_ALPHA_RAD {
+            large.push(is_larger);
+        }
         gammas.push(f64::from(estimate.correction.gamma));
     }
     gammas.sort_unstable_by(f64::total_cmp);
-    let median = gammas.get(gammas.len() / 2).copied().unwrap_or(0.0);
-    [f64::from(larger) / gammas.len().max(1) as f64, median]
+    let share = |of: &[f64]| if of.is_empty() { 0.0 } else { mean(of) };
+    [share(&all), share(&large), gammas.get(gammas.len() / 2).copied().unwrap_or(0.0)]
 }
 
 fn describe(kind: Kind, place: usize, trials: &[Trial]) -> Set {

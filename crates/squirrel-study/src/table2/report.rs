@@ -68,8 +68,9 @@ fn head(names: &[&str]) -> Vec<String> {
 fn sets(page: &mut Page, study: &Table2) {
     page.section(
         "Flights",
-        "Label noise is the distance of labels from the truth. The last columns are paRNN's own words after the longest \
-         training, above 3 m/s: how often the angle of attack seems larger than it is, and how much stronger the flow acts.",
+        "Label noise is the distance of labels from the truth; in wind it holds the drag of the airframe. The last columns are \
+         paRNN's own words after the longest training, above 3 m/s: how often the angle of attack seems larger than it is, of \
+         all and of those beyond 10 deg, and how much stronger the flow acts.",
     );
     let names = [
         "set",
@@ -79,6 +80,7 @@ fn sets(page: &mut Page, study: &Table2) {
         "force N",
         "label noise N",
         "|alpha_est| > |alpha| %",
+        "beyond 10 deg %",
         "median gamma",
     ];
     let rows: Vec<page::Row> = study
@@ -99,6 +101,7 @@ fn sets(page: &mut Page, study: &Table2) {
                 plus_minus(set.force_rms_n, 1.0, 3),
                 plus_minus(set.label_noise_n, 1.0, 4),
                 said(|w| w.alpha_larger_share, 100.0, 1),
+                said(|w| w.alpha_larger_share_beyond_10_deg, 100.0, 1),
                 said(|w| w.gamma_median, 1.0, 2),
             ])
         })
@@ -118,7 +121,8 @@ fn by_model(study: &Table2, set: &str, training_s: u32) -> Svg {
             |from: f64, to: f64, ink: Ink, name: &str| Extent { from, to, ink, name: name.to_owned() };
         chart.rows.push(ChartRow {
             label: found.model.name().to_owned(),
-            note: format!("{:+.0} %", 100.0 * found.to_truth.over_parnn.mean),
+            // Plus zero turns a rounded minus zero round.
+            note: format!("{:+.0} %", (100.0 * found.to_truth.over_parnn.mean).round() + 0.0),
             bands: vec![extent(0.0, noise, Ink::Muted, "label noise")],
             intervals: vec![extent(mean - sd, mean + sd, ink, "")],
             dots: vec![Dot { at: mean, ink, name: String::new() }],

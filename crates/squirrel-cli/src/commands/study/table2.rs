@@ -109,6 +109,7 @@ fn sets(study: &Table2) {
         "force N",
         "label noise N",
         "|alpha_est| > |alpha| %",
+        "beyond 10 deg %",
         "median gamma",
     ]);
     for set in &study.sets {
@@ -124,6 +125,7 @@ fn sets(study: &Table2) {
             newtons(set.force_rms_n),
             newtons(set.label_noise_n),
             word.map(|w| plus_minus(w.alpha_larger_share, 100.0, 1)).unwrap_or_default(),
+            word.map(|w| plus_minus(w.alpha_larger_share_beyond_10_deg, 100.0, 1)).unwrap_or_default(),
             word.map(|w| plus_minus(w.gamma_median, 1.0, 2)).unwrap_or_default(),
         ]);
     }
