@@ -1,4 +1,4 @@
-//! Windows from a flight log: what the air did to the spread wings, by the accelerometer (E9, T21).
+//! Windows from a flight log: what the air did to the spread wings, by the accelerometer (docs/equations.md T21).
 //!
 //! ```text
 //! f_a = m f_measured - m f_model      body frame, N; the model is the vehicle without wings

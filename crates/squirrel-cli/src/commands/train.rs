@@ -2,6 +2,7 @@
 
 use super::{log_files, vehicle};
 use crate::output::{self, Table, say, talk};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use squirrel_nn::NnError;
 use squirrel_nn::labels;
@@ -22,7 +23,8 @@ const CHECKPOINT_EPOCHS: usize = 50;
 /// Options of a training.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Train {
-    /// parnn, `parnn_window_1`, vanilla, `vanilla_body`, `vanilla_plane`, `flat_plate`, `scaled_flat_plate`.
+    /// What to train.
+    #[arg(value_parser = PossibleValuesParser::new(Model::ALL.map(Model::name)).try_map(|name| name.parse::<Model>()))]
     model: Model,
     /// Flight logs, or folders of them. A flight's name is that of its file.
     #[arg(long, required = true, num_args = 1..)]

@@ -80,6 +80,12 @@ pub struct Row {
     pub to_truth: Error,
 }
 
+/// An error of a row.
+pub type ErrorOf = fn(&Row) -> &Error;
+/// The errors of a row with their words in tables.
+pub const ERRORS: [(&str, ErrorOf); 2] =
+    [("to labels", |row| &row.to_labels), ("to truth", |row| &row.to_truth)];
+
 /// What the flights of a set are like.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Set {

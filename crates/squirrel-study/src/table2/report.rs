@@ -1,15 +1,11 @@
 //! The study as one HTML file: what a model is worth, how much data it needs, and every number.
 
-use super::{Error, Row, Spread, Table2};
+use super::{ERRORS, Spread, Table2};
 use squirrel_nn::model::Model;
 use squirrel_sim::report::chart::{
     Axis, ChartRow, Dot, Extent, Ink, LineChart, Range, RowChart, Series, Svg,
 };
 use squirrel_sim::report::page::{self, Columns, Figure, Page};
-
-/// A reference of errors, by its words.
-type Reference = (&'static str, fn(&Row) -> &Error);
-const REFERENCES: [Reference; 2] = [("to labels", |row| &row.to_labels), ("to truth", |row| &row.to_truth)];
 
 /// The study as a page without network, the same bytes for the same study.
 pub fn render(study: &Table2) -> String {
@@ -149,7 +145,7 @@ fn numbers(page: &mut Page, study: &Table2) {
     let names = ["training s", "set", "model", "error", "RMSE N", "x", "y", "z", "over paRNN %"];
     let mut rows = Vec::new();
     for found in &study.rows {
-        for (words, error) in REFERENCES {
+        for (words, error) in ERRORS {
             let error = error(found);
             let mut cells =
                 vec![found.training_s.to_string(), found.set.to_owned(), found.model.name().to_owned()];

@@ -4,7 +4,7 @@ use crate::commands::vehicle;
 use crate::output::{self, Table, say, talk};
 use squirrel_nn::model::Model;
 use squirrel_nn::train::Settings;
-use squirrel_study::table2::{self, Error, Plan, Row, Spread, Table2};
+use squirrel_study::table2::{self, ERRORS, Error, Plan, Row, Spread, Table2};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
@@ -81,10 +81,8 @@ fn show(study: &Table2) {
         }
         table.print();
     }
-    let references: [(&str, fn(&Row) -> &Error); 2] =
-        [("labels", |row| &row.to_labels), ("truth", |row| &row.to_truth)];
-    for (reference, error) in references {
-        say(&format!("\nRMSE to {reference} over that of paRNN, minus 1, in %"));
+    for (words, error) in ERRORS {
+        say(&format!("\nRMSE {words} over that of paRNN, minus 1, in %"));
         let names: Vec<&str> = study.sets.iter().map(|set| set.set).collect();
         let mut table = Table::new(&[&["training s", "model"][..], &names].concat());
         for training_s in &lengths {
