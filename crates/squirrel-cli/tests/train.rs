@@ -250,6 +250,11 @@ fn table_two_writes_the_same_bytes_twice_and_holds_every_model() {
     let width = csv.lines().next().unwrap().split(',').count();
     assert_eq!(csv.lines().count(), 1 + 3 * 5 * 7);
     assert!(csv.lines().all(|line| line.split(',').count() == width));
+    for set in ["training", "t1", "t2", "t3", "t4"] {
+        let scenario = format!("one/{set}.toml");
+        folder.succeeds(&["fly", "--arm", "pc_wings_open", "--scenario", &scenario, "--json", "f.json"]);
+        assert_eq!(json(&folder, "f.json")["scenario"], set);
+    }
     folder.fails(&["study", "table2", "--trials", "0"], &["trials = 0"]);
     folder.fails(&["study", "table2", "--epochs", "0"], &["epochs = 0"]);
 }

@@ -21,6 +21,7 @@ use squirrel_nn::trained::{ForceError, Trained};
 use squirrel_nn::windows::{Window, Windows};
 use squirrel_nn::{NnError, labels};
 use squirrel_sim::flight::FlightError;
+use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Flights to learn from: 30, 120 and 300 s.
@@ -240,6 +241,24 @@ fn summary(errors: &[ForceError], parnn: &[f64]) -> Error {
     }
 }
 
+/// The scenario of the first flight of each kind, to fly it or its kin by hand; with another seed the wind keeps its direction.
+///
+/// # Errors
+/// As [`Kind::scenario`].
+pub fn scenarios(plan: &Plan) -> Result<Vec<Scenario>, FlightError> {
+    let named = |kind: Kind| {
+        let scenario = kind.scenario(first_seed(plan, 0, kind))?;
+        Ok(Scenario { name: kind.name().to_owned(), ..scenario })
+    };
+    Kind::ALL.into_iter().map(named).collect()
+}
+
+/// Of the flights of a kind in a trial, which count up from it: a hundred a kind, a thousand a trial.
+fn first_seed(plan: &Plan, trial: usize, kind: Kind) -> u64 {
+    let place = Kind::ALL.iter().position(|other| *other == kind).unwrap_or_default() as u64;
+    trial_seed(plan, trial).wrapping_mul(1000).wrapping_add(100 * place)
+}
+
 fn trial_seed(plan: &Plan, trial: usize) -> u64 {
     plan.seed.wrapping_mul(1_000_003).wrapping_add(trial as u64)
 }
@@ -248,10 +267,9 @@ fn trial_seed(plan: &Plan, trial: usize) -> u64 {
 fn fly(plan: &Plan, progress: &(impl Fn() + Sync)) -> Result<Vec<Trial>, WingFlightError> {
     let mut tasks = Vec::new();
     for trial in 0..plan.trials as usize {
-        for (k, kind) in Kind::ALL.into_iter().enumerate() {
+        for kind in Kind::ALL {
             let flights = if kind == Kind::Training { TRAINING_FLIGHTS[2] } else { TEST_FLIGHTS };
-            // A hundred seeds a kind, a thousand a trial.
-            let first = trial_seed(plan, trial).wrapping_mul(1000).wrapping_add(100 * k as u64);
+            let first = first_seed(plan, trial, kind);
             tasks.extend((0..u64::from(flights)).map(|flight| (kind, first.wrapping_add(flight))));
         }
     }

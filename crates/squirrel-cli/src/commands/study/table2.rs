@@ -23,7 +23,7 @@ pub(crate) struct Options {
     /// Vehicle file; the shipped squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// Folder for table2.csv, table2.json and report.html.
+    /// Folder for table2.csv, table2.json, report.html and the scenarios of the flights, for `squirrel fly`.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Write the figures here as JSON.
@@ -52,6 +52,10 @@ impl Options {
         if let Some(folder) = &self.out {
             output::write_file(&folder.join("table2.csv"), csv(&study).as_bytes())?;
             output::write_json(Some(&folder.join("table2.json")), &study)?;
+            for scenario in table2::scenarios(&plan).map_err(|e| e.to_string())? {
+                let file = folder.join(format!("{}.toml", scenario.name));
+                output::write_file(&file, scenario.to_toml().as_bytes())?;
+            }
             output::write_file(&folder.join("report.html"), table2::render(&study).as_bytes())?;
             talk(&format!("wrote {}", folder.join("report.html").display()));
         }
