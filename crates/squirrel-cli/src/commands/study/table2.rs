@@ -43,6 +43,9 @@ impl Options {
             output::folder(folder)?;
             output::writable(&folder.join("table2.csv"))?;
         }
+        if let Some(path) = &self.json {
+            output::writable(path)?;
+        }
         let bar = output::progress(table2::steps(&plan), "flights and trainings");
         let study = table2::run(&plan, || bar.inc(1));
         bar.finish_and_clear();
