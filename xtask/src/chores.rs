@@ -4,7 +4,7 @@
 //! the build scripts and procedural macros; `test`, `bench` and the demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
-use crate::{python, thumb};
+use crate::{python, thumb, weights};
 use std::path::Path;
 use std::process::Command;
 
@@ -33,7 +33,7 @@ const LINT: [Step; 4] = [
     },
 ];
 
-const TEST: [Step; 5] = [
+const TEST: [Step; 6] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
@@ -42,6 +42,7 @@ const TEST: [Step; 5] = [
         name: "demo",
         action: Action::Cargo(&["run", "--release", "--locked", "--", "demo", "--out", "target/demo"]),
     },
+    Step { name: "weights", action: Action::Function(weights::check) },
 ];
 
 /// `cargo xtask lint`.

@@ -8,13 +8,14 @@ mod png;
 mod python;
 mod run;
 mod thumb;
+mod weights;
 
 use std::process::ExitCode;
 
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 7] = [
+const CHORES: [Chore; 8] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
@@ -25,6 +26,12 @@ const CHORES: [Chore; 7] = [
         chores::gap_bench,
     ),
     ("thumb", "", "check that the flight code compiles for a Cortex-M7 without std", thumb::chore),
+    (
+        "weights",
+        "[--write]",
+        "fly and train the shipped paRNN again, compare its bytes; --write takes the new ones",
+        weights::chore,
+    ),
     (
         "report-png",
         "[HTML [PNG [WIDTHxHEIGHT]]]",

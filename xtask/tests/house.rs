@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 const ARROWS: [(&str, &[&str]); 8] = [
     ("squirrel-examples", &["squirrel-gap", "squirrel-sim"]),
     ("hidden-effects", &["squirrel-sim"]),
-    ("squirrel-cli", &["squirrel-study", "squirrel-gap", "squirrel-sim", "squirrel-core"]),
-    ("squirrel-study", &["squirrel-gap", "squirrel-sim", "squirrel-core"]),
+    ("squirrel-cli", &["squirrel-study", "squirrel-gap", "squirrel-nn", "squirrel-sim", "squirrel-core"]),
+    ("squirrel-study", &["squirrel-gap", "squirrel-nn", "squirrel-sim", "squirrel-core"]),
     ("squirrel-gap", &["squirrel-sim", "squirrel-core"]),
     ("squirrel-nn", &["squirrel-sim", "squirrel-core"]),
     ("squirrel-sim", &["squirrel-core"]),

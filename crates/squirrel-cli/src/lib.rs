@@ -27,6 +27,8 @@ enum Command {
     /// Run an experiment with many flights.
     #[command(subcommand)]
     Study(commands::study::Study),
+    /// Train a model of the wing force on flight logs.
+    Train(commands::train::Train),
     /// Run a log's inputs through the flight code again and compare every bit.
     Replay(commands::replay::Replay),
     /// Turn a foreign log into a flight log, or recover a truncated one.
@@ -54,6 +56,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Demo(demo) => demo.run(),
         Command::Fly(fly) => fly.run(),
         Command::Study(study) => study.run(),
+        Command::Train(train) => train.run(),
         Command::Replay(replay) => replay.run(),
         Command::Import(import) => import.run(),
         Command::Gap(gap) => gap.run(),

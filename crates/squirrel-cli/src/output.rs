@@ -85,14 +85,29 @@ impl Table {
 
 /// Writes a file under a temporary name beside it, then renames: a reader never sees half of it.
 pub(crate) fn write_file(path: &Path, content: &[u8]) -> Result<(), String> {
-    let fail = |e: std::io::Error| format!("{}: {e}", path.display());
-    let mut name = path.file_name().ok_or_else(|| format!("{}: not a file name", path.display()))?.to_owned();
-    name.push(".partial");
-    let partial: PathBuf = path.with_file_name(name);
+    let partial = partial(path)?;
     std::fs::write(&partial, content).and_then(|()| std::fs::rename(&partial, path)).map_err(|e| {
         let _ = std::fs::remove_file(&partial);
-        fail(e)
+        format!("{}: {e}", path.display())
     })
+}
+
+/// Asks before long work whether its result could be written.
+pub(crate) fn writable(path: &Path) -> Result<(), String> {
+    if path.is_dir() {
+        return Err(format!("{}: is a folder, must be a file", path.display()));
+    }
+    let partial = partial(path)?;
+    std::fs::write(&partial, [])
+        .and_then(|()| std::fs::remove_file(&partial))
+        .map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// The temporary name.
+fn partial(path: &Path) -> Result<PathBuf, String> {
+    let mut name = path.file_name().ok_or_else(|| format!("{}: not a file name", path.display()))?.to_owned();
+    name.push(".partial");
+    Ok(path.with_file_name(name))
 }
 
 /// Writes a result as JSON where `--json` asks for it.

@@ -1,8 +1,10 @@
 //! Scenarios: what to fly, in which air, among which obstacles. A TOML file or one of the built-in ones.
 
 mod excite;
+mod runs;
 
 pub use excite::ExciteTable;
+pub use runs::RunsTable;
 
 use crate::plant::{GustModel, WindParameters};
 use serde::{Deserialize, Serialize};
@@ -90,6 +92,8 @@ pub enum MissionTable {
     },
     /// Manoeuvres for identification.
     Excite(ExciteTable),
+    /// Random runs with spread wings.
+    Runs(RunsTable),
 }
 
 /// Moving air.
@@ -118,8 +122,8 @@ impl Default for WindTable {
 }
 
 /// Names of the built-in scenarios.
-pub const BUILT_IN: [&str; 7] =
-    ["hover", "avoid", "steer", "track", "excite_calm", "excite_normal", "excite_rich"];
+pub const BUILT_IN: [&str; 8] =
+    ["hover", "avoid", "steer", "track", "excite_calm", "excite_normal", "excite_rich", "wings_open_random"];
 
 impl Scenario {
     /// A built-in scenario by name, or a TOML file by path.
@@ -191,6 +195,9 @@ impl Scenario {
             }
             // The paper's simulated study: R_d 5 m, one angle.
             "steer" => Some(Self::turn("steer", 7.0, 5.0, 120.0, 120.0)),
+            "wings_open_random" => {
+                Some(Self::base(name, runs::DURATION_S, MissionTable::Runs(RunsTable::built_in())))
+            }
             _ => {
                 let (height_m, table) = ExciteTable::built_in(name)?;
                 let mission = MissionTable::Excite(table);
@@ -262,8 +269,10 @@ impl Scenario {
                 return Err(format!("{field} = {x}: must be finite and > 0"));
             }
         }
-        if let MissionTable::Excite(table) = &self.mission {
-            table.check().map_err(|e| format!("mission.{e}"))?;
+        match &self.mission {
+            MissionTable::Excite(table) => table.check().map_err(|e| format!("mission.{e}"))?,
+            MissionTable::Runs(table) => table.check().map_err(|e| format!("mission.{e}"))?,
+            _ => {}
         }
         let mission = self.mission().map_err(|e| format!("mission.{e}"))?;
         mission.check().map_err(|e| format!("mission.{e}"))
@@ -331,6 +340,7 @@ impl Scenario {
                 speed_m_s: speed_m_s as f32,
             },
             MissionTable::Excite(ref table) => Mission::Excite(table.programme(self.height_m, self.seed)?),
+            MissionTable::Runs(ref table) => Mission::Excite(table.programme(self.height_m, self.seed)?),
         };
         Ok(mission)
     }

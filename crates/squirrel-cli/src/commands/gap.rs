@@ -1,5 +1,6 @@
 //! `squirrel gap`: where simulation and measurement disagree, what is missing, and what adding it is worth.
 
+use super::log_files;
 use crate::output::{self, Table, say, talk};
 use squirrel_gap::{Diagnosis, Kind, NamedEffect, Value, Verdict, significant};
 use squirrel_sim::log::FlightLog;
@@ -221,29 +222,9 @@ fn nameable(verdict: &Verdict) -> bool {
         && matches!(verdict.verdict, Kind::Named | Kind::NamedFormDiffers | Kind::Ambiguous)
 }
 
-/// Logs by path; a folder stands for the logs in it, in the order of their names.
+/// Logs by path; a folder stands for the logs in it.
 fn logs(paths: &[PathBuf]) -> Result<Logs, String> {
-    let mut files = Vec::new();
-    for path in paths {
-        if !path.is_dir() {
-            files.push(path.clone());
-            continue;
-        }
-        let at = |e: std::io::Error| format!("{}: {e}", path.display());
-        let mut inside = Vec::new();
-        for entry in std::fs::read_dir(path).map_err(at)? {
-            let file = entry.map_err(at)?.path();
-            if file.extension().is_some_and(|e| e == "mcap") {
-                inside.push(file);
-            }
-        }
-        if inside.is_empty() {
-            return Err(format!("{}: no .mcap file in this folder", path.display()));
-        }
-        inside.sort();
-        files.extend(inside);
-    }
-    files
+    log_files(paths)?
         .iter()
         .map(|path| Ok((path.display().to_string(), FlightLog::read(path).map_err(|e| e.to_string())?)))
         .collect()

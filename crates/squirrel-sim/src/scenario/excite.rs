@@ -225,8 +225,8 @@ pub(super) fn card(programme: &Programme, height_m: f64) -> String {
 }
 
 /// Draws of one seed, by their number.
-struct Draw {
-    seed: u32,
+pub(super) struct Draw {
+    pub(super) seed: u32,
 }
 
 impl Draw {
@@ -240,7 +240,7 @@ impl Draw {
         if self.coin(n) { 1.0 } else { -1.0 }
     }
     /// 0 to 1.
-    fn share(&self, n: u32) -> f32 {
+    pub(super) fn share(&self, n: u32) -> f32 {
         (self.bits(n) >> 8) as f32 / (1u32 << 24) as f32
     }
 }
