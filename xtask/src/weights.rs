@@ -58,7 +58,7 @@ fn make() -> Result<PathBuf, String> {
     for seed in 1..=FLIGHTS {
         let log = flights.join(format!("wings-{seed:02}.mcap"));
         let mut fly = Command::new(&squirrel);
-        fly.args(["fly", "--arm", "pc_wings_open", "--scenario", "wings_open_random"]);
+        fly.args(["fly", "--arm", "pc_wings_open", "--scenario", "random_spread"]);
         fly.args([OsStr::new("--seed"), OsStr::new(&seed.to_string()), OsStr::new("--out"), log.as_os_str()]);
         // Two dozen tables of tracking errors are of no use here.
         call(fly.stdout(Stdio::null()).stderr(Stdio::null()))?;

@@ -16,7 +16,7 @@ use support::{Folder, json};
 /// A folder with short flights `f/a.mcap`, `f/b.mcap`, ... of spread wings.
 fn with_flights(name: &str, flights: &[&str]) -> Folder {
     let folder = Folder::new(name);
-    let scenario = Scenario { duration_s: 8.0, ..Scenario::find("wings_open_random").unwrap() };
+    let scenario = Scenario { duration_s: 8.0, ..Scenario::find("random_spread").unwrap() };
     folder.write("short.toml", &scenario.to_toml());
     fs::create_dir(folder.0.join("f")).unwrap();
     for (seed, flight) in flights.iter().enumerate() {

@@ -56,7 +56,7 @@ fn a_label_is_the_force_on_the_wings_but_for_noise() {
 #[test]
 fn the_label_in_ned_is_what_is_left_of_the_papers_balance_of_forces() {
     let vehicle = VehicleFile::squirrel();
-    let scenario = Scenario { duration_s: 12.0, ..Scenario::find("wings_open_random").unwrap() };
+    let scenario = Scenario { duration_s: 12.0, ..Scenario::find("random_spread").unwrap() };
     let arm = Arm::PcWingsOpen;
     let setup = Setup { vehicle: vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 };
     let log = setup.fly(true, |_| {}).unwrap().log.unwrap();

@@ -123,7 +123,7 @@ impl Default for WindTable {
 
 /// Names of the built-in scenarios.
 pub const BUILT_IN: [&str; 8] =
-    ["hover", "avoid", "steer", "track", "excite_calm", "excite_normal", "excite_rich", "wings_open_random"];
+    ["hover", "avoid", "steer", "track", "excite_calm", "excite_normal", "excite_rich", "random_spread"];
 
 impl Scenario {
     /// A built-in scenario by name, or a TOML file by path.
@@ -195,7 +195,7 @@ impl Scenario {
             }
             // The paper's simulated study: R_d 5 m, one angle.
             "steer" => Some(Self::turn("steer", 7.0, 5.0, 120.0, 120.0)),
-            "wings_open_random" => {
+            "random_spread" => {
                 Some(Self::base(name, runs::DURATION_S, MissionTable::Runs(RunsTable::built_in())))
             }
             _ => {

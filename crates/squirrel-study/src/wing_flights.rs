@@ -9,7 +9,7 @@
 //! | `t4` | slowly |
 //!
 //! Networks see ground speed, as in the paper (docs/equations.md T6), so that wind is an error of what they see. All of it is what
-//! `squirrel fly --arm pc_wings_open --scenario wings_open_random` flies, with the scenario's numbers changed.
+//! `squirrel fly --arm pc_wings_open --scenario random_spread` flies, with the scenario's numbers changed.
 
 use squirrel_core::frames::{In, Ned, Rotation};
 use squirrel_core::nalgebra::Vector3;
@@ -95,7 +95,7 @@ impl Kind {
     /// # Errors
     /// Never in a program that has the built-in scenario.
     pub fn scenario(self, seed: u64) -> Result<Scenario, FlightError> {
-        let mut scenario = Scenario::find("wings_open_random").map_err(FlightError)?;
+        let mut scenario = Scenario::find("random_spread").map_err(FlightError)?;
         scenario.seed = seed;
         scenario.duration_s = f64::from(FLIGHT_S);
         if let MissionTable::Runs(runs) = &mut scenario.mission {

@@ -2,7 +2,7 @@
 
 use super::log_files;
 use crate::output::{self, Table, say, talk};
-use squirrel_gap::{Diagnosis, Kind, NamedEffect, Value, Verdict, significant};
+use squirrel_gap::{ClosedLoop, Diagnosis, Kind, NamedEffect, Value, Verdict, significant};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -55,7 +55,7 @@ type Logs = Vec<(String, FlightLog)>;
 struct Found {
     vehicle: VehicleFile,
     flights: Vec<String>,
-    held_out: Vec<String>,
+    held_out: Logs,
     diagnosis: Diagnosis,
 }
 
@@ -64,6 +64,20 @@ impl Found {
     fn patched(&self) -> Result<Option<String>, String> {
         let text = || squirrel_gap::add(&self.vehicle, &self.diagnosis, &self.flights);
         nameable(&self.diagnosis.verdict).then(text).transpose()
+    }
+
+    /// Flies held-out flights again with the effects added.
+    fn fly_again(&mut self, patched: &str) -> Result<(), String> {
+        let patched = VehicleFile::parse(patched, &self.vehicle.name).map_err(|e| e.to_string())?;
+        let bar = output::spinner();
+        bar.set_message("flying in closed loop");
+        let flown = squirrel_gap::closed_loop(&self.vehicle, &patched, &self.held_out);
+        bar.finish_and_clear();
+        let (flown, notes) = flown.map_err(|e| e.to_string())?;
+        let verdict = &mut self.diagnosis.verdict;
+        verdict.closed_loop = flown;
+        verdict.notes.extend(notes);
+        Ok(())
     }
 }
 
@@ -93,9 +107,9 @@ impl Given {
             bar.inc(1);
         });
         bar.finish_and_clear();
-        let names = |logs: Logs| logs.into_iter().map(|(name, _)| name).collect();
         let diagnosis = diagnosis.map_err(|e| e.to_string())?;
-        Ok(Found { vehicle, flights: names(flights), held_out: names(held_out), diagnosis })
+        let flights = flights.into_iter().map(|(name, _)| name).collect();
+        Ok(Found { vehicle, flights, held_out, diagnosis })
     }
 
     fn find(&self) -> Result<(), String> {
@@ -127,9 +141,13 @@ impl Given {
         if self.held_out.is_empty() {
             return Err("--held-out: none given; shrink needs flights that the fit never sees".to_owned());
         }
-        let found = self.diagnose()?;
+        let mut found = self.diagnose()?;
+        let text = found.patched()?;
+        if let Some(text) = &text {
+            found.fly_again(text)?;
+        }
         show(&found.diagnosis.verdict);
-        self.report(&found, found.patched()?.as_deref())?;
+        self.report(&found, text.as_deref())?;
         self.write(&found.diagnosis.verdict)
     }
 
@@ -156,8 +174,11 @@ impl Given {
     fn everything(&self) -> Result<(), String> {
         self.patch_path()?;
         let mut found = self.diagnose()?;
-        show(&found.diagnosis.verdict);
         let text = found.patched()?;
+        if let Some(text) = &text {
+            found.fly_again(text)?;
+        }
+        show(&found.diagnosis.verdict);
         if let Some(text) = &text {
             self.patch(text, &mut found.diagnosis.verdict)?;
         }
@@ -169,8 +190,9 @@ impl Given {
     fn report(&self, found: &Found, patched: Option<&str>) -> Result<(), String> {
         let Some(folder) = &self.out else { return Ok(()) };
         output::folder(folder)?;
+        let held_out: Vec<String> = found.held_out.iter().map(|(name, _)| name.clone()).collect();
         let data =
-            squirrel_gap::picture(&found.vehicle, &found.diagnosis, &found.flights, &found.held_out, patched);
+            squirrel_gap::picture(&found.vehicle, &found.diagnosis, &found.flights, &held_out, patched);
         let path = folder.join("report.html");
         output::write_file(&path, squirrel_gap::report::render(&data).as_bytes())?;
         say(&format!("report: {}", path.display()));
@@ -266,12 +288,30 @@ fn show(verdict: &Verdict) {
         say("");
     }
     places(&verdict.places);
+    if !verdict.closed_loop.is_empty() {
+        say("");
+        closed_loop(&verdict.closed_loop);
+    }
     if verdict.verdict == Kind::NotIdentifiable
         && let Some(card) = pilot_card("excite_rich")
     {
         say(&format!("\nwhat to fly:\n{card}"));
     }
     notes(&verdict.notes);
+}
+
+/// Root mean square of simulated less measured position.
+fn closed_loop(flights: &[ClosedLoop]) {
+    let head = ["flown again", "model", "north m", "east m", "down m"];
+    let mut table = Table::new(&head);
+    for flight in flights {
+        for (model, error) in [("nominal", flight.before_ned_m), ("with the effects", flight.after_ned_m)] {
+            let mut row = vec![flight.flight.clone(), model.to_owned()];
+            row.extend(error.map(|x| significant(x, 3)));
+            table.row(row);
+        }
+    }
+    table.print();
 }
 
 fn effects(effects: &[NamedEffect]) {

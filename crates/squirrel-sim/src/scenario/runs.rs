@@ -39,7 +39,7 @@ pub struct RunsTable {
 }
 
 impl RunsTable {
-    /// The table of `wings_open_random`.
+    /// The table of `random_spread`.
     pub(super) fn built_in() -> Self {
         Self { speed_m_s: 10.0, climb_m_s: 4.0, sway_rad: 0.01 }
     }
