@@ -74,7 +74,10 @@ impl Plant {
     }
 
     fn lead_wings(&self, state: &mut PlantState, command: [f64; 2], dt_s: f64) {
-        let (WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. }) = &self.wing else {
+        let (WingPlant::Flat { servo, .. }
+        | WingPlant::Membrane { servo, .. }
+        | WingPlant::Parnn { servo, .. }) = &self.wing
+        else {
             return;
         };
         let before = state.deployment();
@@ -82,10 +85,16 @@ impl Plant {
         for (servo_state, command) in state.servo.iter_mut().zip(command) {
             servo.lead(servo_state, command, &lag);
         }
+        if let WingPlant::Flat { .. } = &self.wing {
+            return;
+        }
+        let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, In::zero()));
+        if let WingPlant::Parnn { parnn, .. } = &self.wing {
+            parnn.pass(&mut state.parnn, &air, dt_s);
+        }
         let WingPlant::Membrane { membrane, .. } = &self.wing else { return };
         let after = state.deployment();
         let deployment = [0, 1].map(|side| 0.5 * (before[side] + after[side]));
-        let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, In::zero()));
         state.turn_wings(membrane.angle_of_attack(&air), dt_s);
         // A quarter of the shortest lag is far inside what RK4 follows; after many of the longest the wing has settled.
         let p = membrane.parameters();
