@@ -74,7 +74,7 @@ impl Arm {
             Self::Phantom | Self::TwccFlat | Self::TwccParnn | Self::TwccOracle => WingPolicy::Coordinated,
         };
         twcc.force_model = match (self, weights) {
-            (Self::TwccParnn, Some(weights)) => ForceModel::Parnn(weights.parnn),
+            (Self::TwccParnn, Some(weights)) => ForceModel::Parnn(*weights.parnn()),
             (Self::TwccParnn, None) => {
                 let name = self.name();
                 return Err(format!(

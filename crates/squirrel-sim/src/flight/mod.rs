@@ -77,7 +77,7 @@ impl Setup {
             )));
         };
         self.arm
-            .configure(&mut parameters.twcc, self.vehicle.parnn.as_ref())
+            .configure(&mut parameters.twcc, self.vehicle.weights.as_ref())
             .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
         Stack::new(vehicle, parameters, self.scenario.mission().map_err(fail)?).map_err(fail)

@@ -55,7 +55,7 @@ impl Recorder {
         ] {
             log.metadata.insert(key.to_owned(), value);
         }
-        if let Some(weights) = &setup.vehicle.parnn {
+        if let Some(weights) = &setup.vehicle.weights {
             log.metadata.insert(PARNN_WEIGHTS.to_owned(), weights.to_hex());
         }
         Self { log, rotors, effects: setup.vehicle.effects, last_obstacles: Vec::new() }

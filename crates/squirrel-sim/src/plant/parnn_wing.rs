@@ -96,7 +96,7 @@ mod tests {
 
     fn wing() -> ParnnWing {
         let file = VehicleFile::squirrel();
-        ParnnWing::new(file.parnn.unwrap().parnn, &file.vehicle.parameters().wing.unwrap())
+        ParnnWing::new(*file.weights.unwrap().parnn(), &file.vehicle.parameters().wing.unwrap())
     }
 
     fn air(k: u32) -> Air<f64> {

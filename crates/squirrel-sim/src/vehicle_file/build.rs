@@ -29,22 +29,22 @@ type Problem = String;
 /// Weights may be trained on one individual and flown on another; beyond this share of the area it is another wing.
 const AREA_DEVIATION: f64 = 0.1;
 
-/// * `weights` - those of a name in the file, where they can be had
+/// * `find` - the weights of a name in the file, where they are at hand
 pub(super) fn build(
     t: VehicleTable,
-    weights: impl FnOnce(&str) -> Result<Option<ParnnWeights>, Problem>,
+    find: impl FnOnce(&str) -> Result<Option<ParnnWeights>, Problem>,
 ) -> Result<VehicleFile, Problem> {
     let mut rotors = [Rotor::unused(); MAX_ROTORS];
     for (place, rotor) in rotors.iter_mut().zip(&t.rotor) {
         let position = In::new(Vector3::from(rotor.position_body_m.0));
         *place = Rotor { position, yaw_sign: rotor.yaw_sign.0 };
     }
-    let parnn = match t.wing.as_ref().and_then(|table| table.parnn_weights.as_deref()) {
-        Some(name) => weights(name)?,
+    let weights = match t.wing.as_ref().and_then(|table| table.parnn_weights.as_deref()) {
+        Some(name) => find(name)?,
         None => None,
     };
     let (wing, wing_plant) = match &t.wing {
-        Some(table) => wing(table, parnn.as_ref())?,
+        Some(table) => wing(table, weights.as_ref())?,
         None => (None, WingPlant::None),
     };
     let parameters = Parameters {
@@ -89,7 +89,7 @@ pub(super) fn build(
         vehicle,
         size_body_m,
         wing: wing_plant,
-        parnn,
+        weights,
         battery: t.battery.map(battery).transpose()?,
         control,
         sensors: t.sensors,
@@ -133,7 +133,7 @@ fn propulsion(t: &PropulsionTable) -> Result<Propulsion<f64>, Problem> {
     })
 }
 
-fn wing(t: &WingTable, parnn: Option<&ParnnWeights>) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
+fn wing(t: &WingTable, weights: Option<&ParnnWeights>) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
     let given = [
         ("area_per_side_m2", &t.area_per_side_m2),
         ("normal_force_slope", &t.normal_force_slope),
@@ -175,15 +175,7 @@ fn wing(t: &WingTable, parnn: Option<&ParnnWeights>) -> Result<(Option<Wing<f64>
         time_constant_s: wing.time_constant_s,
     };
     servo.check()?;
-    if let (Some(weights), Some(name)) = (parnn, &t.parnn_weights) {
-        let (theirs, ours) = (f64::from(weights.parnn.area_m2), 2.0 * wing.area_per_side_m2);
-        if !((theirs - ours).abs() <= AREA_DEVIATION * ours) {
-            return Err(format!(
-                "wing.parnn_weights = {name}: area_m2 = {}: is that of another wing, wing.area_per_side_m2 gives {ours}",
-                weights.parnn.area_m2
-            ));
-        }
-    }
+    let parnn = parnn_wing(t, weights, &wing)?;
     let no_membrane = |model: &str| match t.membrane.first_key_value() {
         Some((key, q)) => Err(format!("wing.membrane.{key} = {}: given, but wing.model is \"{model}\"", q.0)),
         None => Ok(()),
@@ -195,24 +187,35 @@ fn wing(t: &WingTable, parnn: Option<&ParnnWeights>) -> Result<(Option<Wing<f64>
         }
         WingName::Parnn => {
             no_membrane("parnn")?;
-            let parnn = match (parnn, &t.parnn_weights) {
-                (Some(weights), _) => Box::new(ParnnWing::new(weights.parnn, &wing)),
-                (None, Some(name)) => {
-                    return Err(format!(
-                        "wing.parnn_weights = {name}: not at hand; load the vehicle from its file"
-                    ));
+            let parnn = parnn.ok_or_else(|| match &t.parnn_weights {
+                Some(name) => {
+                    format!("wing.parnn_weights = {name}: not at hand; load the vehicle from its file")
                 }
-                (None, None) => {
-                    return Err("wing.parnn_weights: missing; wing.model = \"parnn\" needs it".to_owned());
-                }
-            };
-            WingPlant::Parnn { parnn, servo }
+                None => "wing.parnn_weights: missing; wing.model = \"parnn\" needs it".to_owned(),
+            })?;
+            WingPlant::Parnn { parnn: Box::new(parnn), servo }
         }
         WingName::None | WingName::Membrane => {
             WingPlant::Membrane { membrane: Box::new(membrane(&t.membrane, &wing)?), servo }
         }
     };
     Ok((Some(wing), plant))
+}
+
+/// The network as a wing of this vehicle, where its weights are at hand.
+fn parnn_wing(
+    t: &WingTable,
+    weights: Option<&ParnnWeights>,
+    wing: &Wing<f64>,
+) -> Result<Option<ParnnWing>, Problem> {
+    let (Some(weights), Some(name)) = (weights, &t.parnn_weights) else { return Ok(None) };
+    let (theirs, ours) = (weights.parnn().area_m2, 2.0 * wing.area_per_side_m2);
+    if !((f64::from(theirs) - ours).abs() <= AREA_DEVIATION * ours) {
+        return Err(format!(
+            "wing.parnn_weights = {name}: area_m2 = {theirs}: trained on another wing; wing.area_per_side_m2 makes {ours}"
+        ));
+    }
+    Ok(Some(ParnnWing::new(*weights.parnn(), wing)))
 }
 
 /// Overrides of the membrane model's defaults.

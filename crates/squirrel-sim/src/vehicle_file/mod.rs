@@ -41,7 +41,7 @@ pub struct VehicleFile {
     /// How the wing behaves in the simulator.
     pub wing: WingPlant,
     /// The network that `wing.parnn_weights` names; `None` where it names none, or one that was not at hand.
-    pub parnn: Option<ParnnWeights>,
+    pub weights: Option<ParnnWeights>,
     /// Battery; without one the voltage stays at the reference.
     pub battery: Option<BatteryParameters>,
     /// Gains; a vehicle that is only analysed needs none.

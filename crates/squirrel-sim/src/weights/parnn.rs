@@ -25,8 +25,7 @@ const TENSORS: [(&str, &[usize]); 8] = [
 /// A trained paRNN and the bytes of the file that it is from, which a flight log carries along.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParnnWeights {
-    /// What flies.
-    pub parnn: Parnn,
+    parnn: Parnn,
     bytes: Vec<u8>,
 }
 
@@ -66,6 +65,11 @@ impl ParnnWeights {
         let parnn = Parnn { net, area_m2: card.area_m2, domain: card.domain };
         parnn.check().map_err(|problem| WeightsError::Parameter { file: file.to_owned(), problem })?;
         Ok(Self { parnn, bytes })
+    }
+
+    /// What flies.
+    pub fn parnn(&self) -> &Parnn {
+        &self.parnn
     }
 
     /// The file as text, two hexadecimal digits a byte.
