@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 /// Where the estimate of the wing force comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(
+#[expect(
     clippy::large_enum_variant,
     reason = "no allocation in flight code; there is one of these in a stack"
 )]
@@ -146,10 +146,10 @@ mod tests {
     const NOSE_UP: [f32; 3] = [6.0, 0.5, 2.0];
 
     /// The estimates of a model for velocities in the body frame, one a tenth of a second.
-    fn estimates(parnn: Parnn, velocities: &[[f32; 3]]) -> Vec<(In<Ned, f32>, ParnnTerms)> {
+    fn estimates(parnn: &Parnn, velocities: &[[f32; 3]]) -> Vec<(In<Ned, f32>, ParnnTerms)> {
         let mut history = History::new();
         let attitude = Rotation::from_euler(0.2, 0.4, 1.0);
-        let model = ForceModel::Parnn(parnn);
+        let model = ForceModel::Parnn(*parnn);
         let ask = |v: &[f32; 3]| {
             model.estimate(&mut history, &attitude, In::new(Vector3::from(*v)), None, 0.04, STEP_S)
         };
@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn the_flat_plate_stands_in_while_the_window_fills() {
-        let all = estimates(loud(), &[NOSE_UP; WINDOW + 1]);
+        let all = estimates(&loud(), &[NOSE_UP; WINDOW + 1]);
         for (k, (force, terms)) in all.iter().enumerate() {
             if k + 1 < WINDOW {
                 assert_eq!(*terms, ParnnTerms { guard: Guard::WindowNotFull, estimate: None }, "{k}");
@@ -196,7 +196,7 @@ mod tests {
         ] {
             let mut velocities = [NOSE_UP; 2 * WINDOW + 1];
             velocities[WINDOW] = outside;
-            let all = estimates(loud(), &velocities);
+            let all = estimates(&loud(), &velocities);
             assert_eq!(all[WINDOW - 1].1.guard, Guard::Inside);
             for k in WINDOW..2 * WINDOW {
                 assert_eq!(all[k].1.guard, reason, "{k}: {outside:?}");

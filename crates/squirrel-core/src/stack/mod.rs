@@ -260,10 +260,10 @@ mod tests {
     use proptest::prelude::*;
 
     fn stack(form: AttitudeForm) -> Stack {
-        stack_that_believes(ForceModel::FlatPlate, form)
+        stack_that_believes(&ForceModel::FlatPlate, form)
     }
 
-    fn stack_that_believes(force_model: ForceModel, form: AttitudeForm) -> Stack {
+    fn stack_that_believes(force_model: &ForceModel, form: AttitudeForm) -> Stack {
         let attitude = AttitudeGains {
             form,
             c1_per_s: Vector3::new(9.0, 9.0, 4.0),
@@ -273,7 +273,7 @@ mod tests {
             filter_frequency_rad_s: 20.0,
             filter_damping: 1.0,
         };
-        let twcc = TwccParameters { force_model, ..twcc::fixtures::parameters() };
+        let twcc = TwccParameters { force_model: *force_model, ..twcc::fixtures::parameters() };
         let parameters = StackParameters { attitude, twcc };
         Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, Mission::Hover { position: In::zero() })
             .unwrap()
@@ -325,7 +325,7 @@ mod tests {
     #[test]
     fn a_frozen_state_continues_bit_for_bit() {
         let (stack, mut state) =
-            (stack_that_believes(ForceModel::Parnn(loud()), AttitudeForm::Euler), StackState::default());
+            (stack_that_believes(&ForceModel::Parnn(loud()), AttitudeForm::Euler), StackState::default());
         let frame = |k: u64| {
             let mut f = level(k * 3333);
             f.attitude = Some(Rotation::from_euler(0.01 * (k as f32).sin(), 0.02, 0.0));
@@ -354,7 +354,7 @@ mod tests {
     /// A receiver that loses its velocity neither reaches the network nor makes it forget.
     #[test]
     fn a_velocity_that_is_no_number_never_leaves_the_frame() {
-        let stack = stack_that_believes(ForceModel::Parnn(loud()), AttitudeForm::Quaternion);
+        let stack = stack_that_believes(&ForceModel::Parnn(loud()), AttitudeForm::Quaternion);
         let mut state = StackState::default();
         let mut guards = std::vec::Vec::new();
         for k in 0..20u64 {
@@ -414,7 +414,7 @@ mod tests {
         ) {
             let form = if euler { AttitudeForm::Euler } else { AttitudeForm::Quaternion };
             let model = if learned { ForceModel::Parnn(loud()) } else { ForceModel::FlatPlate };
-            let stack = stack_that_believes(model, form);
+            let stack = stack_that_believes(&model, form);
             let mut state = StackState::default();
             for frame in frames {
                 let output = stack.step(&mut state, &frame);

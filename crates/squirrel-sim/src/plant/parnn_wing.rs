@@ -47,8 +47,8 @@ fn single(velocity: In<Body, f64>) -> In<Body, f32> {
 
 impl ParnnWing {
     /// The wings of a vehicle with this network.
-    pub(crate) fn new(parnn: Parnn, wing: &Wing<f64>) -> Self {
-        Self { parnn, lateral_arm_m: wing.lateral_arm_m }
+    pub(crate) fn new(parnn: &Parnn, wing: &Wing<f64>) -> Self {
+        Self { parnn: *parnn, lateral_arm_m: wing.lateral_arm_m }
     }
 
     /// Time passes in this air, s: rows that are due are taken from it, and the network speaks.
@@ -96,7 +96,7 @@ mod tests {
 
     fn wing() -> ParnnWing {
         let file = VehicleFile::squirrel();
-        ParnnWing::new(*file.weights.unwrap().parnn(), &file.vehicle.parameters().wing.unwrap())
+        ParnnWing::new(file.weights.unwrap().parnn(), &file.vehicle.parameters().wing.unwrap())
     }
 
     fn air(k: u32) -> Air<f64> {

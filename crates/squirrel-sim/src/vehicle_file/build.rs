@@ -215,7 +215,7 @@ fn parnn_wing(
             "wing.parnn_weights = {name}: area_m2 = {theirs}: trained on another wing; wing.area_per_side_m2 makes {ours}"
         ));
     }
-    Ok(Some(ParnnWing::new(*weights.parnn(), wing)))
+    Ok(Some(ParnnWing::new(weights.parnn(), wing)))
 }
 
 /// Overrides of the membrane model's defaults.
