@@ -130,8 +130,11 @@ fn an_arm_or_a_wing_without_its_weights_says_so() {
     assert_eq!(error, "file: wing.parnn_weights: missing; wing.model = \"parnn\" needs it");
     let error = VehicleFile::parse(&text_with("parnn"), "file").unwrap_err().to_string();
     assert!(error.starts_with("file: wing.parnn_weights = own.safetensors: not at hand"), "{error}");
-    let wingless = VehicleFile::parse("[wing]\nparnn_weights = \"a\"", "file");
-    assert!(wingless.is_err());
+    let (head, wing) = SQUIRREL_TOML.split_once("[wing]").unwrap();
+    let (_, tail) = wing.split_once("[battery]").unwrap();
+    let wingless = format!("{head}[wing]\nparnn_weights = \"a\"\n[battery]{tail}");
+    let error = VehicleFile::parse(&wingless, "file").unwrap_err().to_string();
+    assert_eq!(error, "file: wing.parnn_weights = a: given, but wing.model names no wing");
     let paper = SQUIRREL_TOML.replace("model = \"membrane\"", "model = \"parnn\"");
     let paper = VehicleFile::parse(&paper, "file").unwrap();
     assert!(matches!(paper.wing, WingPlant::Parnn { .. }), "{:?}", paper.wing);
