@@ -1,4 +1,4 @@
-//! Windows from a flight log: what the air did to the spread wings, by the accelerometer (E9, T21).
+//! Windows from a flight log: what the air did to the spread wings, by the accelerometer (docs/equations.md T21).
 //!
 //! ```text
 //! f_a = m f_measured - m f_model      body frame, N; the model is the vehicle without wings
@@ -119,6 +119,11 @@ pub fn windows(vehicle: &VehicleFile, flight: &str, log: &FlightLog) -> Result<V
         });
     }
     Ok(all)
+}
+
+/// Area of the flat plate that models correct: of both wings, m^2; 0 for a vehicle without any.
+pub fn plate_area_m2(vehicle: &VehicleFile) -> f32 {
+    vehicle.vehicle.parameters().wing.map_or(0.0, |wing| 2.0 * wing.area_per_side_m2) as f32
 }
 
 /// A channel that can be asked at any time.

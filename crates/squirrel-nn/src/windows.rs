@@ -48,7 +48,9 @@ impl Window {
         UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
     }
 
-    pub(crate) fn label_ned_n(&self) -> [f32; 3] {
+    /// The label as the paper has it, `m a - m g e3 + U n` in NED, N (docs/equations.md T21): that of the body frame turned by the
+    /// measured attitude, whose error comes with it. The paper's rival of paRNN learns it, nothing else needs it.
+    pub fn label_ned_n(&self) -> [f32; 3] {
         (self.ned_from_body() * Vector3::from(self.label_body_n)).into()
     }
 }

@@ -1,5 +1,7 @@
 //! `squirrel study`: experiments with many flights.
 
+mod table2;
+
 use super::vehicle;
 use crate::output::{self, Table, say, talk};
 use squirrel_sim::arm::Arm;
@@ -10,6 +12,8 @@ use std::path::PathBuf;
 /// The experiments.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Study {
+    /// What models of the wing force predict, the paper's Table II: to labels and to truth, 30 to 300 s of training.
+    Table2(table2::Options),
     /// What wings are worth as a function of the thrust-to-weight ratio.
     Thrust(Options),
 }
@@ -40,6 +44,7 @@ pub(crate) struct Options {
 impl Study {
     pub(crate) fn run(&self) -> Result<(), String> {
         match self {
+            Self::Table2(options) => options.run(),
             Self::Thrust(options) => options.thrust(),
         }
     }

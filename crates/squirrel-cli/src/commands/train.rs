@@ -2,6 +2,7 @@
 
 use super::{log_files, vehicle};
 use crate::output::{self, Table, say, talk};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use squirrel_nn::NnError;
 use squirrel_nn::labels;
@@ -22,7 +23,8 @@ const CHECKPOINT_EPOCHS: usize = 50;
 /// Options of a training.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Train {
-    /// parnn, `parnn_window_1`, vanilla, `vanilla_body`, `vanilla_plane`, `flat_plate`, `scaled_flat_plate`.
+    /// What to train.
+    #[arg(value_parser = PossibleValuesParser::new(Model::ALL.map(Model::name)).try_map(|name| name.parse::<Model>()))]
     model: Model,
     /// Flight logs, or folders of them. A flight's name is that of its file.
     #[arg(long, required = true, num_args = 1..)]
@@ -86,8 +88,11 @@ impl Train {
         let windows = self.windows(&vehicle)?;
         let held_out: Vec<&str> = self.validation.iter().map(String::as_str).collect();
         let (training, validation) = windows.split(&held_out).map_err(|e| format!("--validation: {e}"))?;
+        if training.all().is_empty() {
+            return Err(format!("--validation: {}: none is left to train on", self.validation.join(",")));
+        }
         let settings = Settings { epochs: self.epochs, seed: self.seed, ..Settings::default() };
-        let area_m2 = plate_area_m2(&vehicle);
+        let area_m2 = labels::plate_area_m2(&vehicle);
         let new = |model| Trainer::new(model, &vehicle.name, area_m2, &training, &validation, settings);
         let checkpoint = self.out.with_extension("checkpoint.safetensors");
         let mut trainer = if self.resume {
@@ -181,11 +186,6 @@ impl Train {
         }
         Ok(trainer)
     }
-}
-
-/// Area of the plate that models correct.
-fn plate_area_m2(vehicle: &VehicleFile) -> f32 {
-    vehicle.vehicle.parameters().wing.map_or(0.0, |wing| 2.0 * wing.area_per_side_m2) as f32
 }
 
 /// All epochs that are left, with a checkpoint every now and then.

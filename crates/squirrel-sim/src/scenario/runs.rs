@@ -92,6 +92,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn numbers_that_cannot_be_flown_are_refused_by_name() {
+        let good = RunsTable::built_in();
+        for (broken, field) in [
+            (RunsTable { speed_m_s: f64::NAN, ..good.clone() }, "speed_m_s = NaN"),
+            (RunsTable { climb_m_s: 0.0, ..good.clone() }, "climb_m_s = 0"),
+            (RunsTable { sway_rad: 0.06, ..good.clone() }, "sway_rad = 0.06"),
+        ] {
+            assert!(broken.check().unwrap_err().starts_with(field), "{broken:?}");
+        }
+    }
+
+    #[test]
     fn runs_stay_in_their_numbers_and_differ_from_seed_to_seed() {
         let table = RunsTable::built_in();
         for seed in 0..50 {
