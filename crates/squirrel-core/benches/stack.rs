@@ -7,16 +7,19 @@ use airframe::{PAPER_SIGNS, PAPER_X, vehicle};
 use criterion::{Criterion, criterion_group, criterion_main};
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
 use squirrel_core::control::position::{AngleLaw, PositionGains};
-use squirrel_core::control::twcc::{ForceModel, Trigger, TwccParameters, WingPolicy};
+use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
+use squirrel_core::control::wing_force::ForceModel;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
 use squirrel_core::frames::{In, Rotation};
 use squirrel_core::guidance::mission::Mission;
 use squirrel_core::nalgebra::Vector3;
+use squirrel_core::rnn::elman::Elman;
+use squirrel_core::rnn::parnn::{Domain, Parnn, WINDOW};
 use squirrel_core::stack::{Gnss, Imu, OUTER_PERIOD_US, SensorFrame, Stack, StackParameters, StackState};
 use std::hint::black_box;
 
-fn stack(form: AttitudeForm) -> Stack {
+fn stack(form: AttitudeForm, force_model: &ForceModel) -> Stack {
     let vehicle = vehicle(&PAPER_X, &PAPER_SIGNS);
     let attitude = AttitudeGains {
         form,
@@ -42,7 +45,7 @@ fn stack(form: AttitudeForm) -> Stack {
         wing_events: WingEvents { test: WingTest::Normal, open_above_n: 0.1, close_below_n: 0.05 },
         thrust_law: ThrustLaw::Exact,
         trigger: Trigger::Angle,
-        force_model: ForceModel::FlatPlate,
+        force_model: *force_model,
         policy: WingPolicy::Coordinated,
         dwell_s: 0.3,
         thrust_min_n: 0.5,
@@ -66,20 +69,32 @@ fn frame(time_us: u64) -> SensorFrame {
 }
 
 fn steps(c: &mut Criterion) {
-    for (name, form) in [("euler", AttitudeForm::Euler), ("quaternion", AttitudeForm::Quaternion)] {
-        let stack = stack(form);
+    // What a weight is does not change the time.
+    let domain = Domain { speed_m_s: [0.0, 10.0], alpha_rad: [-1.0, 1.0] };
+    let parnn = ForceModel::Parnn(Parnn { net: Elman::filled(0.1), area_m2: 0.04, domain });
+    let plate = ForceModel::FlatPlate;
+    for (name, form, model) in [
+        ("euler", AttitudeForm::Euler, &plate),
+        ("quaternion", AttitudeForm::Quaternion, &plate),
+        ("quaternion_parnn", AttitudeForm::Quaternion, &parnn),
+    ] {
+        let stack = stack(form, model);
         let mut ready = StackState::default();
-        stack.step(&mut ready, &frame(0));
+        // Until the network's window is full.
+        for tick in 0..WINDOW as u64 {
+            stack.step(&mut ready, &frame(tick * OUTER_PERIOD_US));
+        }
+        let now_us = WINDOW as u64 * OUTER_PERIOD_US;
         c.bench_function(&format!("inner_step_{name}"), |b| {
             b.iter(|| {
                 let mut state = ready;
-                stack.step(&mut state, black_box(&frame(3333)))
+                stack.step(&mut state, black_box(&frame(now_us - 96_667)))
             });
         });
         c.bench_function(&format!("inner_and_outer_step_{name}"), |b| {
             b.iter(|| {
                 let mut state = ready;
-                stack.step(&mut state, black_box(&frame(OUTER_PERIOD_US)))
+                stack.step(&mut state, black_box(&frame(now_us)))
             });
         });
     }

@@ -2,11 +2,12 @@
 
 use crate::adam::{Adam, Decay};
 use crate::error::NnError;
-use crate::tensors::{self, Contents};
+use crate::tensors;
 use crate::train::{Epoch, Settings, State, Trainer};
 use crate::trained::{Card, hash_text, named, take_named};
 use crate::windows::Windows;
 use serde::{Deserialize, Serialize};
+use squirrel_sim::weights::{Contents, WeightsError};
 use std::path::Path;
 
 const PARAMETERS: &str = "last.";
@@ -60,12 +61,12 @@ impl Trainer {
             ("validation_hash", &validation_hash, hash_text(validation.hash())),
         ] {
             if *then != now {
-                return Err(contents.field(field, then, &format!("the windows at hand have {now}")));
+                return Err(contents.field(field, then, &format!("the windows at hand have {now}")).into());
             }
         }
         if best_epoch > history.len() || history.len() > settings.epochs {
             let reason = format!("there were {} epochs", history.len());
-            return Err(contents.field("best_epoch", &best_epoch, &reason));
+            return Err(contents.field("best_epoch", &best_epoch, &reason).into());
         }
         let mut take = |prefix| take_named(&mut contents, card.model, prefix);
         let (parameters, best) = (take(PARAMETERS)?, take(BEST)?);
@@ -74,7 +75,8 @@ impl Trainer {
         let trainer = Self::new(card.model, &card.vehicle, card.area_m2, training, validation, settings);
         let mut trainer = trainer.map_err(|error| match error {
             NnError::Setting { field, value, reason } => {
-                NnError::Field { file: path.display().to_string(), field, value, reason: reason.to_owned() }
+                let (file, reason) = (path.display().to_string(), reason.to_owned());
+                WeightsError::Field { file, field, value, reason }.into()
             }
             other => other,
         })?;

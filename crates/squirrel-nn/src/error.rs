@@ -1,5 +1,7 @@
 //! Why a network cannot be trained, saved or loaded.
 
+use squirrel_sim::weights::WeightsError;
+
 /// What is wrong; one line that names the file or flight, the field and the value.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -44,92 +46,9 @@ pub enum NnError {
         /// What is wrong.
         problem: String,
     },
-    /// The disk refuses.
-    #[error("{file}: {error}")]
-    Io {
-        /// Path of the file.
-        file: String,
-        /// What the system says.
-        error: std::io::Error,
-    },
-    /// Not a safetensors file, or a damaged one.
-    #[error("{file}: not a whole safetensors file: {problem}")]
-    Format {
-        /// Path of the file.
-        file: String,
-        /// What its reader says.
-        problem: String,
-    },
-    /// The metadata record is absent or does not read.
-    #[error("{file}: metadata squirrel: {problem}")]
-    Metadata {
-        /// Path of the file.
-        file: String,
-        /// What is wrong.
-        problem: String,
-    },
-    /// A field of the metadata that cannot be what it says.
-    #[error("{file}: {field} = {value}: {reason}")]
-    Field {
-        /// Path of the file.
-        file: String,
-        /// Name of the field.
-        field: &'static str,
-        /// Its value.
-        value: String,
-        /// Why not.
-        reason: String,
-    },
-    /// A tensor that the model needs is not there.
-    #[error("{file}: tensor {tensor}: missing")]
-    Missing {
-        /// Path of the file.
-        file: String,
-        /// Name of the tensor.
-        tensor: String,
-    },
-    /// A tensor that the model does not have.
-    #[error("{file}: tensor {tensor}: unknown to this model")]
-    Unknown {
-        /// Path of the file.
-        file: String,
-        /// Name of the tensor.
-        tensor: String,
-    },
-    /// A tensor of another shape.
-    #[error("{file}: tensor {tensor}: shape {found:?}, must be {needed:?}")]
-    Shape {
-        /// Path of the file.
-        file: String,
-        /// Name of the tensor.
-        tensor: String,
-        /// Shape in the file.
-        found: Vec<usize>,
-        /// Shape that the model has.
-        needed: Vec<usize>,
-    },
-    /// A tensor of other numbers than `f32`.
-    #[error("{file}: tensor {tensor}: numbers of type {found}, must be F32")]
-    Type {
-        /// Path of the file.
-        file: String,
-        /// Name of the tensor.
-        tensor: String,
-        /// Type in the file.
-        found: String,
-    },
-    /// A number that is none.
-    #[error("{file}: tensor {tensor}[{index}] = {value}: must be finite")]
-    NotFinite {
-        /// Path of the file.
-        file: String,
-        /// Name of the tensor.
-        tensor: String,
-        /// Place in the tensor, row by row.
-        index: usize,
-        /// The value.
-        value: f32,
-    },
+    /// A file of weights.
+    #[error(transparent)]
+    Weights(#[from] WeightsError),
     /// A window that nothing can be learned from.
     #[error("{flight}: window {window}: {field} = {value:?}: {reason}")]
     Window {

@@ -4,109 +4,33 @@ use crate::error::NnError;
 use crate::heads::Sample;
 use crate::kernel::simd;
 use crate::model::{Model, network};
-use crate::tensors::{self, Contents, Tensor};
+use crate::tensors::{self, Tensor};
 use crate::windows::{Window, Windows};
 use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
-use squirrel_core::rnn::parnn::{Parnn, SPEED_SCALE_M_S, WINDOW};
-use std::collections::BTreeMap;
+use squirrel_core::rnn::parnn::{Domain, Parnn, SPEED_SCALE_M_S};
+use squirrel_sim::weights::{self, Contents, TrainedOn, WeightsError};
 use std::path::Path;
 
-/// Of the metadata; counts up when a field changes its meaning.
-const FORMAT: u32 = 1;
-
-/// What the inputs are in.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Normalisation {
-    /// The first input is speed over this, m/s. The second is the angle of attack in rad, as it is.
-    pub speed_scale_m_s: f32,
-    /// Rows of a window of the data, 10 a second.
-    pub rows: usize,
-}
-
-/// What was flown in training; beyond it a network guesses.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Domain {
-    /// Lowest and highest speed, m/s.
-    pub speed_m_s: [f32; 2],
-    /// Lowest and highest angle of attack, rad.
-    pub alpha_rad: [f32; 2],
-}
-
-impl Domain {
-    /// Of all rows of some windows; zero if there are none.
-    pub(crate) fn of(windows: &[Window]) -> Self {
-        let mut ranges: Option<[[f32; 2]; 2]> = None;
-        for row in windows.iter().flat_map(|window| &window.rows) {
-            let ranges = ranges.get_or_insert([[row[0]; 2], [row[1]; 2]]);
-            for (range, x) in ranges.iter_mut().zip(row) {
-                *range = [range[0].min(*x), range[1].max(*x)];
-            }
-        }
-        let [speed, alpha_rad] = ranges.unwrap_or_default();
-        Self { speed_m_s: speed.map(|s| s * SPEED_SCALE_M_S), alpha_rad }
-    }
-}
-
 /// Where weights come from: the metadata of their file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Card {
-    format: u32,
-    /// What the weights are of.
-    pub model: Model,
-    /// Name of the vehicle that flew.
-    pub vehicle: String,
-    /// Area of the flat plate, m^2.
-    pub area_m2: f32,
-    /// What the inputs are in.
-    pub normalisation: Normalisation,
-    /// What was flown in training.
-    pub domain: Domain,
-    /// [`Windows::hash`] of what it was trained on, hexadecimal.
-    pub data_hash: String,
-    /// Of first weights and order of windows.
-    pub seed: u64,
-    /// What came of it, by name with unit; finite.
-    pub figures: BTreeMap<String, f64>,
+pub type Card = weights::Card<Model>;
+
+impl From<&Windows> for TrainedOn {
+    fn from(windows: &Windows) -> Self {
+        Self { domain: domain(windows.all()), data_hash: hash_text(windows.hash()) }
+    }
 }
 
-impl Card {
-    pub(crate) fn new(model: Model, vehicle: &str, area_m2: f32, data: &Windows, seed: u64) -> Self {
-        Self {
-            format: FORMAT,
-            model,
-            vehicle: vehicle.to_owned(),
-            area_m2,
-            normalisation: Normalisation { speed_scale_m_s: SPEED_SCALE_M_S, rows: WINDOW },
-            domain: Domain::of(data.all()),
-            data_hash: hash_text(data.hash()),
-            seed,
-            figures: BTreeMap::new(),
+/// Of all rows of some windows; zero if there are none.
+fn domain(windows: &[Window]) -> Domain {
+    let mut ranges: Option<[[f32; 2]; 2]> = None;
+    for row in windows.iter().flat_map(|window| &window.rows) {
+        let ranges = ranges.get_or_insert([[row[0]; 2], [row[1]; 2]]);
+        for (range, x) in ranges.iter_mut().zip(row) {
+            *range = [range[0].min(*x), range[1].max(*x)];
         }
     }
-
-    /// The code can do what the card says.
-    pub(crate) fn check(&self, contents: &Contents) -> Result<(), NnError> {
-        let scale = self.normalisation.speed_scale_m_s;
-        if self.format != FORMAT {
-            return Err(contents.field("format", &self.format, &format!("this version reads {FORMAT}")));
-        }
-        if scale.to_bits() != SPEED_SCALE_M_S.to_bits() {
-            let reason = format!("the flight code divides by {SPEED_SCALE_M_S}");
-            return Err(contents.field("normalisation.speed_scale_m_s", &scale, &reason));
-        }
-        if self.normalisation.rows != WINDOW {
-            let reason = format!("the flight code keeps {WINDOW}");
-            return Err(contents.field("normalisation.rows", &self.normalisation.rows, &reason));
-        }
-        if !(self.area_m2 > 0.0 && self.area_m2.is_finite()) {
-            return Err(contents.field("area_m2", &self.area_m2, "must be positive"));
-        }
-        Ok(())
-    }
+    let [speed, alpha_rad] = ranges.unwrap_or_default();
+    Domain { speed_m_s: speed.map(|s| s * SPEED_SCALE_M_S), alpha_rad }
 }
 
 /// A model with its parameters.
@@ -138,8 +62,12 @@ impl Trained {
 
     /// What flies, where the model is paRNN: to be asked with the last [`Model::window`] rows.
     pub fn parnn(&self) -> Option<Parnn> {
-        matches!(self.card.model, Model::Parnn | Model::ParnnWindow1)
-            .then(|| Parnn { net: network(&self.parameters), area_m2: self.card.area_m2 })
+        let Card { area_m2, domain, .. } = self.card;
+        matches!(self.card.model, Model::Parnn | Model::ParnnWindow1).then(|| Parnn {
+            net: network(&self.parameters),
+            area_m2,
+            domain,
+        })
     }
 
     /// Writes a safetensors file: tensors by [`Model::tensors`], the card as JSON in the metadata record `squirrel`. Equal
@@ -149,12 +77,9 @@ impl Trained {
     /// A parameter or figure is not finite, or the disk refuses.
     pub fn save(&self, path: &Path) -> Result<(), NnError> {
         if let Some((name, value)) = self.card.figures.iter().find(|(_, value)| !value.is_finite()) {
-            return Err(NnError::Field {
-                file: path.display().to_string(),
-                field: "figures",
-                value: format!("{name}: {value}"),
-                reason: "must be finite".to_owned(),
-            });
+            let (file, value) = (path.display().to_string(), format!("{name}: {value}"));
+            let reason = "must be finite".to_owned();
+            return Err(WeightsError::Field { file, field: "figures", value, reason }.into());
         }
         tensors::write(path, &self.card, &named(self.card.model, "", &self.parameters))
     }
@@ -191,7 +116,11 @@ pub(crate) fn named<'a>(model: Model, prefix: &str, parameters: &'a [f32]) -> Ve
 }
 
 /// The other way.
-pub(crate) fn take_named(contents: &mut Contents, model: Model, prefix: &str) -> Result<Vec<f32>, NnError> {
+pub(crate) fn take_named(
+    contents: &mut Contents,
+    model: Model,
+    prefix: &str,
+) -> Result<Vec<f32>, WeightsError> {
     let mut parameters = Vec::with_capacity(model.parameters());
     for (name, shape) in model.tensors() {
         parameters.extend(contents.take(&format!("{prefix}{name}"), &shape)?);

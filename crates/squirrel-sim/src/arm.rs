@@ -1,7 +1,9 @@
 //! Arms: who flies. Each pairs a controller with a plant, so that what a gain comes from can be told apart.
 
 use crate::plant::WingPlant;
-use squirrel_core::control::twcc::{ForceModel, TwccParameters, WingPolicy};
+use crate::weights::ParnnWeights;
+use squirrel_core::control::twcc::{TwccParameters, WingPolicy};
+use squirrel_core::control::wing_force::ForceModel;
 
 /// A controller and what it flies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -16,14 +18,23 @@ pub enum Arm {
     Phantom,
     /// TWCC that believes in the flat plate.
     TwccFlat,
+    /// TWCC that believes in the paper's network.
+    TwccParnn,
     /// TWCC that is told what the plant's wing would do.
     TwccOracle,
 }
 
 impl Arm {
     /// All arms.
-    pub const ALL: [Self; 6] =
-        [Self::Pc, Self::PcWingsOpen, Self::WiicNoWings, Self::Phantom, Self::TwccFlat, Self::TwccOracle];
+    pub const ALL: [Self; 7] = [
+        Self::Pc,
+        Self::PcWingsOpen,
+        Self::WiicNoWings,
+        Self::Phantom,
+        Self::TwccFlat,
+        Self::TwccParnn,
+        Self::TwccOracle,
+    ];
 
     /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
@@ -33,6 +44,7 @@ impl Arm {
             Self::WiicNoWings => "wiic_no_wings",
             Self::Phantom => "phantom",
             Self::TwccFlat => "twcc_flat",
+            Self::TwccParnn => "twcc_parnn",
             Self::TwccOracle => "twcc_oracle",
         }
     }
@@ -49,14 +61,30 @@ impl Arm {
     }
 
     /// Gives the flight code this arm's policy.
-    pub fn configure(self, twcc: &mut TwccParameters) {
+    ///
+    /// * `weights` - of the vehicle's network; [`Arm::TwccParnn`] needs them
+    ///
+    /// # Errors
+    /// One line where they are needed and there are none.
+    pub fn configure(self, twcc: &mut TwccParameters, weights: Option<&ParnnWeights>) -> Result<(), String> {
         twcc.policy = match self {
             Self::Pc => WingPolicy::Folded,
             Self::PcWingsOpen => WingPolicy::Open,
             Self::WiicNoWings => WingPolicy::CoordinatedWithoutWings,
-            Self::Phantom | Self::TwccFlat | Self::TwccOracle => WingPolicy::Coordinated,
+            Self::Phantom | Self::TwccFlat | Self::TwccParnn | Self::TwccOracle => WingPolicy::Coordinated,
         };
-        twcc.force_model = if self.is_told_the_force() { ForceModel::Given } else { ForceModel::FlatPlate };
+        twcc.force_model = match (self, weights) {
+            (Self::TwccParnn, Some(weights)) => ForceModel::Parnn(*weights.parnn()),
+            (Self::TwccParnn, None) => {
+                let name = self.name();
+                return Err(format!(
+                    "arm = {name}: needs weights; wing.parnn_weights of the vehicle names none that were read"
+                ));
+            }
+            (arm, _) if arm.is_told_the_force() => ForceModel::Given,
+            _ => ForceModel::FlatPlate,
+        };
+        Ok(())
     }
 
     /// The wing that the plant of this arm has.

@@ -2,7 +2,7 @@
 //!
 //! - [`flight`] closes the loop: [`plant`] (and [`world`] near contact) moves, [`sensors`] measure, the flight code of
 //!   `squirrel-core` commands, the log records. [`replay`] runs the flight code again on a log's inputs.
-//! - [`vehicle_file`] and [`scenario`] read what to fly; [`arm`] says who flies.
+//! - [`vehicle_file`], [`weights`] and [`scenario`] read what to fly; [`arm`] says who flies.
 //! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it.
 
 pub mod arm;
@@ -16,5 +16,6 @@ pub mod scenario;
 pub mod sensors;
 mod toml_text;
 pub mod vehicle_file;
+pub mod weights;
 #[cfg(feature = "rapier")]
 pub mod world;

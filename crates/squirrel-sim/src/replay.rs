@@ -8,11 +8,20 @@ use crate::flight::{self, Integrator, Setup};
 use crate::log::FlightLog;
 use crate::scenario::Scenario;
 use crate::vehicle_file::VehicleFile;
+use crate::weights::ParnnWeights;
 use squirrel_core::stack::StackState;
 
 /// Sources that the flight code writes, causes before consequences: of two that differ at one time, the first is named.
-pub const OUTPUT_SOURCES: [&str; 7] =
-    ["control.status", "reference", "control.excitation", "control.outer", "control.inner", "wing", "rotor"];
+pub const OUTPUT_SOURCES: [&str; 8] = [
+    "control.status",
+    "reference",
+    "control.excitation",
+    "control.parnn",
+    "control.outer",
+    "control.inner",
+    "wing",
+    "rotor",
+];
 
 /// The first output that differs.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -50,8 +59,12 @@ pub fn setup(log: &FlightLog) -> Result<Setup, String> {
             .get(key)
             .ok_or_else(|| format!("metadata {key}: missing; the log was not recorded by squirrel fly"))
     };
+    let weights = log.metadata.get(flight::PARNN_WEIGHTS).map(|hex| {
+        ParnnWeights::from_hex(&format!("metadata {}", flight::PARNN_WEIGHTS), hex).map_err(|e| e.to_string())
+    });
     let vehicle =
-        VehicleFile::parse(text("vehicle_toml")?, "metadata vehicle_toml").map_err(|e| e.to_string())?;
+        VehicleFile::parse_with(text("vehicle_toml")?, "metadata vehicle_toml", weights.transpose()?)
+            .map_err(|e| e.to_string())?;
     let scenario = Scenario::parse(text("scenario_toml")?, "metadata scenario_toml")?;
     let integrator = Integrator::parse(text("integrator")?)?;
     Ok(Setup { vehicle, arm: Arm::parse(text("arm")?)?, scenario, integrator })

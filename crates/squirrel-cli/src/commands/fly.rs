@@ -15,7 +15,7 @@ pub(crate) struct Fly {
     /// Vehicle file; the shipped squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_oracle.
+    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_parnn, twcc_oracle.
     #[arg(long, default_value = "twcc_flat")]
     arm: String,
     /// hover, avoid, steer, track, excite_calm, excite_normal, excite_rich, or a scenario file (.toml).

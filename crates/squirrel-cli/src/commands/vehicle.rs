@@ -42,6 +42,13 @@ impl VehicleCommand {
             v.weight_n() / v.rotor_thrust_max_n() / v.rotors().len() as f64,
             v.parameters().limits.thrust_max_n / v.weight_n(),
         ));
+        if let Some(weights) = &vehicle.weights {
+            let [slow, fast] = weights.parnn().domain.speed_m_s;
+            let [low, high] = weights.parnn().domain.alpha_rad;
+            say(&format!(
+                "twcc_parnn flies: its weights were trained at {slow:.2} to {fast:.2} m/s and angles of attack of {low:.2} to {high:.2} rad\n"
+            ));
+        }
         let mut table = Table::new(&["field", "value", "sd", "source"]);
         for (field, p) in &vehicle.provenance {
             let text = |x: &Option<String>| x.clone().unwrap_or_else(|| "-".to_owned());

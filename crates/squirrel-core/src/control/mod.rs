@@ -1,8 +1,9 @@
 //! Control: from a reference to rotor commands.
 //!
-//! Outer loop, 10 Hz ([`twcc`]): [`position`] (the paper's PC) asks for angles and thrust, [`woeg`] says whether the wings
-//! would help, [`wiic`] takes over where the angles are at their limit. Inner loop, 300 Hz: [`command_filter`] smooths the
-//! 10 Hz steps, [`backstepping`] turns attitude error into torque, [`mixer`] turns thrust and torque into rotor thrusts.
+//! Outer loop, 10 Hz ([`twcc`]): [`position`] (the paper's PC) asks for angles and thrust, [`wing_force`] estimates what
+//! spread wings would do, [`woeg`] says whether that would help, [`wiic`] takes over where the angles are at their limit.
+//! Inner loop, 300 Hz: [`command_filter`] smooths the 10 Hz steps, [`backstepping`] turns attitude error into torque,
+//! [`mixer`] turns thrust and torque into rotor thrusts.
 
 pub mod backstepping;
 pub mod command_filter;
@@ -10,6 +11,7 @@ pub mod mixer;
 pub mod position;
 pub mod twcc;
 pub mod wiic;
+pub mod wing_force;
 pub mod woeg;
 
 use crate::frames::{In, Ned};

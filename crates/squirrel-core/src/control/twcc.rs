@@ -11,11 +11,13 @@
 
 use super::position::{Motion, PositionGains, PositionState, PositionTerms, heading_frame};
 use super::wiic::{self, Envelope, ThrustLaw};
+use super::wing_force::{ForceModel, ParnnTerms};
 use super::woeg::{WingEvents, WingFlag};
 use super::{AttitudeThrust, Reference};
-use crate::aero::flat_plate;
+use crate::aero::angle_of_attack;
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::limit;
+use crate::rnn::parnn::History;
 use crate::vehicle::ParameterError;
 use nalgebra::Vector3;
 
@@ -33,15 +35,6 @@ pub enum WingPolicy {
     Coordinated,
     /// TWCC's thrust law with a force of zero and the flag up: what the law does without wings.
     CoordinatedWithoutWings,
-}
-
-/// Where the estimate of the wing force comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ForceModel {
-    /// The paper's flat plate.
-    FlatPlate,
-    /// Given from outside: what the simulator's wing would do.
-    Given,
 }
 
 /// What takes the lead from PC.
@@ -119,6 +112,8 @@ pub struct TwccState {
     pub mode_age_s: Option<f32>,
     /// The last command was clamped.
     pub clamped: bool,
+    /// What the network of [`ForceModel::Parnn`] saw; empty for the other models.
+    pub history: History,
 }
 
 /// Every term of one outer tick.
@@ -128,6 +123,8 @@ pub struct TwccTerms {
     pub position: PositionTerms,
     /// Wing force estimate as if spread, N.
     pub wing_force: In<Ned, f32>,
+    /// What is behind it where the model is [`ForceModel::Parnn`].
+    pub parnn: Option<ParnnTerms>,
     /// Angle of attack from the ground velocity, rad.
     pub angle_of_attack_rad: f32,
     /// Flag and the force behind it.
@@ -172,13 +169,16 @@ impl TwccParameters {
             let reason = "must be > 0 and below limits.thrust_max_n";
             return Err(ParameterError::of("control.thrust_min_n", self.thrust_min_n, reason));
         }
+        if let ForceModel::Parnn(parnn) = &self.force_model {
+            parnn.check()?;
+        }
         Ok(())
     }
 
     /// One tick.
     ///
     /// * `ned_from_body` - attitude estimate
-    /// * `given_force` - wing force as if spread, N, for [`ForceModel::Given`]; the flat plate stands in while there is none
+    /// * `given_force` - wing force as if spread, N, for [`ForceModel::Given`]
     /// * `dt_s` - time since the last tick
     #[allow(
         clippy::too_many_arguments,
@@ -198,10 +198,13 @@ impl TwccParameters {
         let position =
             self.position.update(&mut state.position, airframe.mass_kg, motion, reference, hold, dt_s);
         let normal = *ned_from_body * In::new(Vector3::z());
-        let wing_force = match (self.policy, self.force_model, given_force) {
-            (WingPolicy::CoordinatedWithoutWings, ..) => In::zero(),
-            (_, ForceModel::Given, Some(force)) => force,
-            _ => flat_plate::force(motion.velocity, normal, airframe.wing_area_m2),
+        let velocity_body = ned_from_body.inverse() * motion.velocity;
+        let (wing_force, parnn) = if self.policy == WingPolicy::CoordinatedWithoutWings {
+            (In::zero(), None)
+        } else {
+            let area_m2 = airframe.wing_area_m2;
+            let history = &mut state.history;
+            self.force_model.estimate(history, ned_from_body, velocity_body, given_force, area_m2, dt_s)
         };
         let mut wing = self.wing_events.evaluate(wing_force, normal, position.acceleration, state.flag);
         wing.flag |= self.policy == WingPolicy::CoordinatedWithoutWings;
@@ -236,12 +239,11 @@ impl TwccParameters {
         };
         let clamped = command != *request || position.acceleration != position.acceleration_demand;
         state.clamped = clamped;
-        let velocity_body = ned_from_body.inverse() * motion.velocity;
-        let angle_of_attack_rad = crate::aero::angle_of_attack(velocity_body);
         TwccTerms {
             position,
             wing_force,
-            angle_of_attack_rad,
+            parnn,
+            angle_of_attack_rad: angle_of_attack(velocity_body),
             wing,
             mode,
             reason,

@@ -5,9 +5,12 @@ use super::head::{Correction, Flow, TurnedNormal, force};
 use crate::aero::angle_of_attack;
 use crate::frames::{Body, In};
 use crate::math::all_finite;
+use crate::vehicle::{ParameterError, positive};
 
-/// Rows of a window; at 10 Hz one second.
+/// Rows of a window.
 pub const WINDOW: usize = 10;
+/// Time between rows, s: the period of the outer loop.
+pub const STEP_S: f32 = 0.1;
 /// Inputs of a row.
 pub const INPUTS: usize = 2;
 /// Neurons of a layer.
@@ -54,6 +57,15 @@ impl Default for History {
     }
 }
 
+/// What was flown in training; beyond it a network guesses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Domain {
+    /// Lowest and highest speed, m/s.
+    pub speed_m_s: [f32; 2],
+    /// Lowest and highest angle of attack, rad.
+    pub alpha_rad: [f32; 2],
+}
+
 /// Weights and plate of one vehicle. Plain data, so that it can be a `const`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parnn {
@@ -61,6 +73,8 @@ pub struct Parnn {
     pub net: Elman<INPUTS, HIDDEN, 2>,
     /// Area of the flat plate that is corrected, m^2.
     pub area_m2: f32,
+    /// What the network was trained on.
+    pub domain: Domain,
 }
 
 /// What [`Parnn`] makes of a window.
@@ -75,6 +89,24 @@ pub struct Estimate {
 }
 
 impl Parnn {
+    /// # Errors
+    /// A weight that is not finite, an area that is none, a range that runs backwards.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        if let Some(weight) = self.net.tensors().into_iter().flatten().find(|w| !w.is_finite()) {
+            return Err(ParameterError::of("parnn.net", *weight, "every weight must be finite"));
+        }
+        positive("parnn.area_m2", self.area_m2)?;
+        for (field, [low, high]) in
+            [("domain.speed_m_s", self.domain.speed_m_s), ("domain.alpha_rad", self.domain.alpha_rad)]
+        {
+            if !(low.is_finite() && high.is_finite() && low <= high) {
+                let wrong = if low.is_finite() { high } else { low };
+                return Err(ParameterError::of(field, wrong, "must be two finite numbers, the lower first"));
+            }
+        }
+        Ok(())
+    }
+
     /// The force at the last row of a window.
     ///
     /// * `rows` - [`features`], oldest first: [`WINDOW`] of them, or as many as the network was trained on
@@ -99,11 +131,13 @@ mod tests {
     use crate::aero::flat_plate;
     use nalgebra::Vector3;
 
+    const DOMAIN: Domain = Domain { speed_m_s: [0.0, 8.0], alpha_rad: [-1.0, 1.0] };
+
     /// A network that says nothing: `alpha_w = 0`, `gamma = 1`.
     fn silent() -> Parnn {
         let mut net = Elman::filled(0.0);
         net.output.bias = [0.0, 0.541_324_85];
-        Parnn { net, area_m2: 0.04 }
+        Parnn { net, area_m2: 0.04, domain: DOMAIN }
     }
 
     #[test]
@@ -130,10 +164,25 @@ mod tests {
 
     #[test]
     fn absurd_weights_give_no_force() {
-        let absurd = Parnn { net: Elman::filled(f32::MAX), area_m2: 0.04 };
+        let absurd = Parnn { net: Elman::filled(f32::MAX), ..silent() };
         let velocity = In::new(Vector3::new(5.0, 0.0, 2.0));
         let estimate = absurd.estimate(&[features(velocity); WINDOW], velocity);
         assert!(all_finite(&estimate.force.vector), "{estimate:?}");
+    }
+
+    #[test]
+    fn what_cannot_fly_is_named() {
+        silent().check().unwrap();
+        let says = |change: &dyn Fn(&mut Parnn)| {
+            let mut parnn = silent();
+            change(&mut parnn);
+            parnn.check().unwrap_err().to_string()
+        };
+        let error = says(&|p| p.net.second.hidden[3][5] = f32::NAN);
+        assert_eq!(error, "parnn.net = NaN: every weight must be finite");
+        assert!(says(&|p| p.area_m2 = 0.0).starts_with("parnn.area_m2 = 0: "));
+        assert!(says(&|p| p.domain.speed_m_s = [2.0, 1.0]).starts_with("domain.speed_m_s = 1: "));
+        assert!(says(&|p| p.domain.alpha_rad[0] = f32::NAN).starts_with("domain.alpha_rad = NaN: "));
     }
 
     #[test]

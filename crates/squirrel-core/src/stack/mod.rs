@@ -254,11 +254,16 @@ mod tests {
     use super::*;
     use crate::control::backstepping::AttitudeForm;
     use crate::control::twcc;
+    use crate::control::wing_force::{ForceModel, Guard, fixtures::loud};
     use crate::guidance::sensing::Obstacle;
     use crate::vehicle::fixtures::squirrel;
     use proptest::prelude::*;
 
     fn stack(form: AttitudeForm) -> Stack {
+        stack_that_believes(&ForceModel::FlatPlate, form)
+    }
+
+    fn stack_that_believes(force_model: &ForceModel, form: AttitudeForm) -> Stack {
         let attitude = AttitudeGains {
             form,
             c1_per_s: Vector3::new(9.0, 9.0, 4.0),
@@ -268,7 +273,8 @@ mod tests {
             filter_frequency_rad_s: 20.0,
             filter_damping: 1.0,
         };
-        let parameters = StackParameters { attitude, twcc: twcc::fixtures::parameters() };
+        let twcc = TwccParameters { force_model: *force_model, ..twcc::fixtures::parameters() };
+        let parameters = StackParameters { attitude, twcc };
         Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, Mission::Hover { position: In::zero() })
             .unwrap()
     }
@@ -315,22 +321,55 @@ mod tests {
         assert!(output.inner.is_none() && output.outer.is_none());
     }
 
-    /// A thawed copy continues as the original: the state hides nothing.
+    /// A thawed copy continues as the original: the state hides nothing, not even what the network saw.
     #[test]
     fn a_frozen_state_continues_bit_for_bit() {
-        let (stack, mut state) = (stack(AttitudeForm::Euler), StackState::default());
+        let (stack, mut state) =
+            (stack_that_believes(&ForceModel::Parnn(loud()), AttitudeForm::Euler), StackState::default());
         let frame = |k: u64| {
             let mut f = level(k * 3333);
             f.attitude = Some(Rotation::from_euler(0.01 * (k as f32).sin(), 0.02, 0.0));
+            let velocity = In::new(Vector3::new(5.0 + (0.01 * k as f32).sin(), 0.5, 1.0));
+            f.gnss = Some(Gnss { position: In::zero(), velocity });
             f
         };
-        for k in 0..100 {
+        for k in 0..450 {
             stack.step(&mut state, &frame(k));
         }
         let mut thawed = state;
-        for k in 100..200 {
-            assert_eq!(stack.step(&mut state, &frame(k)), stack.step(&mut thawed, &frame(k)));
+        let (mut asked, mut forgetful) = (0, 0);
+        for k in 450..900 {
+            let output = stack.step(&mut state, &frame(k));
+            assert_eq!(output, stack.step(&mut thawed, &frame(k)));
+            let Some(terms) = output.outer.and_then(|outer| outer.parnn) else { continue };
+            asked += i32::from(terms.guard == Guard::Inside);
+            // One without memory would not know its window.
+            let mut blank = StackState { twcc: TwccState::default(), outer_index: None, ..state };
+            let again = stack.step(&mut blank, &frame(k)).outer.unwrap().parnn.unwrap();
+            forgetful += i32::from(again.guard == Guard::WindowNotFull);
         }
+        assert!(asked == 15 && forgetful == 15, "{asked}, {forgetful}");
+    }
+
+    /// A receiver that loses its velocity neither reaches the network nor makes it forget.
+    #[test]
+    fn a_velocity_that_is_no_number_never_leaves_the_frame() {
+        let stack = stack_that_believes(&ForceModel::Parnn(loud()), AttitudeForm::Quaternion);
+        let mut state = StackState::default();
+        let mut guards = std::vec::Vec::new();
+        for k in 0..20u64 {
+            let mut f = level(k * OUTER_PERIOD_US);
+            let x = if k == 15 { f32::NAN } else { 6.0 };
+            f.gnss = Some(Gnss { position: In::zero(), velocity: In::new(Vector3::new(x, 0.0, 2.0)) });
+            let output = stack.step(&mut state, &f);
+            let outer = output.outer.unwrap();
+            assert!(crate::math::all_finite(&outer.wing_force.vector), "{k}: {outer:?}");
+            assert!(output.rotor_command.iter().all(|u| u.is_finite()), "{k}: {output:?}");
+            guards.push(outer.parnn.unwrap().guard);
+        }
+        assert_eq!(state.rejected, 1);
+        assert!(guards[..9].iter().all(|g| *g == Guard::WindowNotFull), "{guards:?}");
+        assert!(guards[9..].iter().all(|g| *g == Guard::Inside), "{guards:?}");
     }
 
     /// Mostly plausible, sometimes anything, so that single sensors fail while the others fly on.
@@ -371,8 +410,11 @@ mod tests {
         fn state_and_outputs_stay_finite_and_inside_limits(
             frames in proptest::collection::vec(frame(), 60),
             euler in any::<bool>(),
+            learned in any::<bool>(),
         ) {
-            let stack = stack(if euler { AttitudeForm::Euler } else { AttitudeForm::Quaternion });
+            let form = if euler { AttitudeForm::Euler } else { AttitudeForm::Quaternion };
+            let model = if learned { ForceModel::Parnn(loud()) } else { ForceModel::FlatPlate };
+            let stack = stack_that_believes(&model, form);
             let mut state = StackState::default();
             for frame in frames {
                 let output = stack.step(&mut state, &frame);
@@ -389,6 +431,7 @@ mod tests {
                     state.twcc.position.last_error.unwrap_or_default(),
                 ];
                 prop_assert!(remembered.iter().all(crate::math::all_finite), "{remembered:?}");
+                prop_assert!(state.twcc.history.window().into_iter().flatten().flatten().all(|x| x.is_finite()));
                 if let Some(inner) = &output.inner {
                     let demand = inner.demand;
                     prop_assert!(demand.thrust_n.is_finite() && crate::math::all_finite(&demand.torque_n_m), "{demand:?}");

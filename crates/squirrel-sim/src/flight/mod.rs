@@ -10,8 +10,8 @@ mod record;
 
 pub use integrator::Integrator;
 pub use metrics::Metrics;
-pub(crate) use record::record_output;
 pub use record::{INPUT_SOURCES, frames};
+pub(crate) use record::{PARNN_WEIGHTS, record_output};
 
 use crate::arm::Arm;
 use crate::log::FlightLog;
@@ -76,7 +76,9 @@ impl Setup {
                 self.vehicle.name
             )));
         };
-        self.arm.configure(&mut parameters.twcc);
+        self.arm
+            .configure(&mut parameters.twcc, self.vehicle.weights.as_ref())
+            .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
         Stack::new(vehicle, parameters, self.scenario.mission().map_err(fail)?).map_err(fail)
     }

@@ -7,14 +7,18 @@ use super::Setup;
 use crate::log::FlightLog;
 use crate::plant::PlantState;
 use crate::sensors::BatteryReading;
+use squirrel_core::control::wing_force::ParnnTerms;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::nalgebra::Vector3;
+use squirrel_core::rnn::parnn::Estimate;
 use squirrel_core::stack::{Gnss, Imu, MAX_OBSTACLES, SensorFrame, StackOutput};
 
 /// Sources that the flight code reads. `frame` has a sample for each step of the flight code.
 pub const INPUT_SOURCES: [&str; 7] = ["frame", "imu", "attitude", "gnss", "baro", "obstacle", "wing_force"];
+/// Metadata: the weights that the vehicle's text names, so that a log replays without them at hand.
+pub(crate) const PARNN_WEIGHTS: &str = "parnn_weights_hex";
 /// Version of the log's content.
 const FORMAT: &str = "1";
 
@@ -50,6 +54,9 @@ impl Recorder {
             ("obstacles_json", format!("[{}]", obstacles.join(","))),
         ] {
             log.metadata.insert(key.to_owned(), value);
+        }
+        if let Some(weights) = &setup.vehicle.weights {
+            log.metadata.insert(PARNN_WEIGHTS.to_owned(), weights.to_hex());
         }
         Self { log, rotors, effects: setup.vehicle.effects, last_obstacles: Vec::new() }
     }
@@ -165,6 +172,9 @@ pub(crate) fn record_output(
     );
     log.source_mut("control.status").push(t, &[("rejected", &[f64::from(output.rejected)])]);
     if let Some(outer) = &output.outer {
+        if let Some(terms) = &outer.parnn {
+            record_parnn(log, t, terms);
+        }
         let p = &outer.position;
         let angles = |roll: f32, pitch: f32| [f64::from(roll), f64::from(pitch)];
         log.source_mut("control.outer").push(
@@ -224,6 +234,22 @@ pub(crate) fn record_output(
             ],
         );
     }
+}
+
+/// What the network said, also where the flat plate stood in for it; NaN before its window was full.
+fn record_parnn(log: &mut FlightLog, t: f64, terms: &ParnnTerms) {
+    let said = |of: fn(&Estimate) -> f32| terms.estimate.as_ref().map_or(f64::NAN, |e| f64::from(of(e)));
+    let force = [said(|e| e.force.vector.x), said(|e| e.force.vector.y), said(|e| e.force.vector.z)];
+    log.source_mut("control.parnn").push(
+        t,
+        &[
+            ("guard", &[f64::from(terms.guard as u8)]),
+            ("alpha_w_rad", &[said(|e| e.correction.alpha_w_rad)]),
+            ("gamma", &[said(|e| e.correction.gamma)]),
+            ("alpha_est_rad", &[said(|e| e.alpha_est_rad)]),
+            ("force_body_n", &force),
+        ],
+    );
 }
 
 /// Walks one input source in step with the frames.

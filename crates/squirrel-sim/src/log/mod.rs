@@ -44,7 +44,8 @@ pub struct Source {
 /// A flight in memory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FlightLog {
-    /// Free text that describes the flight: `vehicle_toml`, `arm`, `scenario_toml`, `seed`, `version`, `git`.
+    /// Free text that describes the flight: `vehicle_toml`, `parnn_weights_hex`, `arm`, `scenario_toml`, `seed`,
+    /// `version`, `git`.
     pub metadata: BTreeMap<String, String>,
     /// Sources by name (`imu`, `control.inner`).
     pub sources: BTreeMap<String, Source>,

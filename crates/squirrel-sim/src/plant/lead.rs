@@ -9,8 +9,10 @@
 //! the model's own prediction would feed each of its errors to the load. It is known when the next motion arrives.
 
 use super::{Membrane, Plant, PlantState, ServoState, WingPlant};
+use squirrel_core::aero::Air;
 use squirrel_core::dynamics::{self, RotorDrive, State, rk4};
 use squirrel_core::frames::{Body, In, Wrench};
+use squirrel_core::rnn::parnn::{STEP_S, WINDOW};
 use squirrel_core::vehicle::PerRotor;
 
 /// What a led plant says at a measured motion.
@@ -89,7 +91,10 @@ impl Plant {
         if dt_s > 0.0 {
             let drive = state.drive;
             drive.lead(&mut state.body.rotor_speed_rad_s, dt_s);
-            let (WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. }) = &self.wing else {
+            let (WingPlant::Flat { servo, .. }
+            | WingPlant::Membrane { servo, .. }
+            | WingPlant::Parnn { servo, .. }) = &self.wing
+            else {
                 return;
             };
             let lag = servo.lag(self.effects.wing_extra_time_constant_s(), dt_s);
@@ -128,9 +133,14 @@ impl Plant {
 
     /// Time after which nothing is left of what the wings went through, s.
     pub fn wing_memory_s(&self) -> f64 {
-        let WingPlant::Membrane { membrane, .. } = &self.wing else { return 0.0 };
-        let p = membrane.parameters();
-        8.0 * (p.camber_time_constant_s + p.creep_time_constant_s + 4.0 * p.chord_m)
+        match &self.wing {
+            WingPlant::None | WingPlant::Flat { .. } => 0.0,
+            WingPlant::Membrane { membrane, .. } => {
+                let p = membrane.parameters();
+                8.0 * (p.camber_time_constant_s + p.creep_time_constant_s + 4.0 * p.chord_m)
+            }
+            WingPlant::Parnn { .. } => WINDOW as f64 * f64::from(STEP_S),
+        }
     }
 
     /// Lets time pass until the next motion: what is neither measured nor an actuator moves on.
@@ -140,24 +150,37 @@ impl Plant {
     pub fn pass(&self, state: &mut PlantState, deployment: Option<[[f64; 2]; 2]>, dt_s: f64) {
         state.led_s = dt_s;
         state.time_s += dt_s;
-        if dt_s > 0.0
-            && let WingPlant::Membrane { membrane, .. } = &self.wing
-            && let Some([before, after]) = deployment
-        {
-            let deployment = [0, 1].map(|side| 0.5 * (before[side] + after[side]));
-            self.lead_membrane(state, membrane, deployment, dt_s);
+        let Some([before, after]) = deployment.filter(|_| dt_s > 0.0) else { return };
+        let air = || dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, In::zero()));
+        match &self.wing {
+            WingPlant::None | WingPlant::Flat { .. } => {}
+            WingPlant::Membrane { membrane, .. } => {
+                let deployment = [0, 1].map(|side| 0.5 * (before[side] + after[side]));
+                let air = air();
+                self.lead_membrane(state, membrane, &air, deployment, dt_s);
+            }
+            WingPlant::Parnn { parnn, .. } => {
+                let air = air();
+                parnn.pass(&mut state.parnn, &air, dt_s);
+            }
         }
     }
 
-    fn lead_membrane(&self, state: &mut PlantState, membrane: &Membrane, deployment: [f64; 2], dt_s: f64) {
-        let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, In::zero()));
-        state.turn_wings(membrane.angle_of_attack(&air), dt_s);
+    fn lead_membrane(
+        &self,
+        state: &mut PlantState,
+        membrane: &Membrane,
+        air: &Air<f64>,
+        deployment: [f64; 2],
+        dt_s: f64,
+    ) {
+        state.turn_wings(membrane.angle_of_attack(air), dt_s);
         // A quarter of the shortest lag is far inside what RK4 follows; after many of the longest the wing has settled.
         let span_s = dt_s.min(self.wing_memory_s());
         let steps = (4.0 * span_s / membrane.parameters().camber_time_constant_s).ceil();
         for _ in 0..steps as usize {
             state.membrane = rk4(state.membrane, span_s / steps, |s| {
-                membrane.evaluate(&air, state.wing_angle_rate_rad_s, deployment, s).1
+                membrane.evaluate(air, state.wing_angle_rate_rad_s, deployment, s).1
             });
         }
     }

@@ -7,12 +7,14 @@ mod battery;
 mod fast_math;
 mod lead;
 mod membrane;
+mod parnn_wing;
 mod servo;
 mod wind;
 
 pub use battery::{BatteryParameters, BatteryState};
 pub use lead::{Actuators, Led};
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
+pub use parnn_wing::{ParnnWing, ParnnWingState};
 pub use servo::{ServoLag, ServoParameters, ServoState};
 pub use wind::{GustModel, Wind, WindParameters};
 
@@ -42,6 +44,13 @@ pub enum WingPlant {
         /// What moves them.
         servo: ServoParameters,
     },
+    /// The paper's network, as in the paper's simulations.
+    Parnn {
+        /// The wings.
+        parnn: Box<ParnnWing>,
+        /// What moves them.
+        servo: ServoParameters,
+    },
 }
 
 /// Everything of the plant that does not change in flight.
@@ -64,6 +73,8 @@ pub struct PlantState {
     pub body: State<f64>,
     /// Membrane, left and right.
     pub membrane: MembraneState,
+    /// What the network saw, where it is the wing.
+    pub parnn: ParnnWingState,
     /// Angle of attack of each side at the last step, rad.
     wing_angle_rad: [f64; 2],
     wing_angle_rate_rad_s: [f64; 2],
@@ -141,9 +152,9 @@ impl Plant {
         let vehicle = effects.alter(&vehicle).map_err(|e| format!("with effects, {e}"))?;
         let servo_lag = match &wing {
             WingPlant::None => None,
-            WingPlant::Flat { servo, .. } | WingPlant::Membrane { servo, .. } => {
-                Some(servo.lag(effects.wing_extra_time_constant_s(), dt_s))
-            }
+            WingPlant::Flat { servo, .. }
+            | WingPlant::Membrane { servo, .. }
+            | WingPlant::Parnn { servo, .. } => Some(servo.lag(effects.wing_extra_time_constant_s(), dt_s)),
         };
         let load = effects.pendulum();
         let battery_decay = battery.as_ref().map_or(1.0, |b| 1.0 - (-dt_s / b.tau1_s).exp());
@@ -179,6 +190,7 @@ impl Plant {
         PlantState {
             body,
             membrane: MembraneState::at_rest(),
+            parnn: ParnnWingState::new(),
             wing_angle_rad: [0.0; 2],
             wing_angle_rate_rad_s: [0.0; 2],
             servo: [ServoState::default(); 2],
@@ -280,8 +292,22 @@ impl Plant {
                 state.membrane = moved.membrane;
                 moved.body
             }
+            WingPlant::Parnn { parnn, servo } => {
+                let deployment = self.deploy(state, servo, wing_command);
+                let held = self.held(state, wind, deployment);
+                let said = &state.parnn;
+                rk4(before, dt, |s| {
+                    dynamics::derivative(vehicle, effects, s, &held, |air| {
+                        parnn.wrench(said, air, deployment)
+                    })
+                })
+            }
         };
         state.body = body(next).normalised();
+        if let WingPlant::Parnn { parnn, .. } = &self.wing {
+            let air = dynamics::air(&state.body, dynamics::total_wind(effects, &state.body, wind));
+            parnn.pass(&mut state.parnn, &air, dt);
+        }
         if let Some(battery) = &self.battery {
             let k_m = vehicle.parameters().propulsion.torque_coefficient_n_m_s2;
             let power: f64 = before.rotor_speed_rad_s.iter().map(|w| k_m * w * w * w).sum();
@@ -316,6 +342,7 @@ impl Plant {
             WingPlant::Membrane { membrane, .. } => {
                 membrane.evaluate(air, state.wing_angle_rate_rad_s, deployment, &state.membrane).0
             }
+            WingPlant::Parnn { parnn, .. } => parnn.wrench(&state.parnn, air, deployment),
         }
     }
 

@@ -7,11 +7,13 @@ use super::tables::{
     InertiaValue, PositionTable, PropulsionTable, ThrustLawName, TriggerName, VehicleTable, WingControlTable,
     WingName, WingTable, WingTestName,
 };
-use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ServoParameters, WingPlant};
+use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ParnnWing, ServoParameters, WingPlant};
+use crate::weights::ParnnWeights;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
 use squirrel_core::control::position::{AngleLaw, PositionGains};
-use squirrel_core::control::twcc::{ForceModel, Trigger, TwccParameters, WingPolicy};
+use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
+use squirrel_core::control::wing_force::ForceModel;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
 use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, forms};
 use squirrel_core::frames::In;
@@ -24,14 +26,25 @@ use std::collections::BTreeMap;
 
 type Problem = String;
 
-pub(super) fn build(t: VehicleTable) -> Result<VehicleFile, Problem> {
+/// Weights may be trained on one individual and flown on another; beyond this share of the area it is another wing.
+const AREA_DEVIATION: f64 = 0.1;
+
+/// * `find` - the weights of a name in the file, where they are at hand
+pub(super) fn build(
+    t: VehicleTable,
+    find: impl FnOnce(&str) -> Result<Option<ParnnWeights>, Problem>,
+) -> Result<VehicleFile, Problem> {
     let mut rotors = [Rotor::unused(); MAX_ROTORS];
     for (place, rotor) in rotors.iter_mut().zip(&t.rotor) {
         let position = In::new(Vector3::from(rotor.position_body_m.0));
         *place = Rotor { position, yaw_sign: rotor.yaw_sign.0 };
     }
+    let weights = match t.wing.as_ref().and_then(|table| table.parnn_weights.as_deref()) {
+        Some(name) => find(name)?,
+        None => None,
+    };
     let (wing, wing_plant) = match &t.wing {
-        Some(table) => wing(table)?,
+        Some(table) => wing(table, weights.as_ref())?,
         None => (None, WingPlant::None),
     };
     let parameters = Parameters {
@@ -76,6 +89,7 @@ pub(super) fn build(t: VehicleTable) -> Result<VehicleFile, Problem> {
         vehicle,
         size_body_m,
         wing: wing_plant,
+        weights,
         battery: t.battery.map(battery).transpose()?,
         control,
         sensors: t.sensors,
@@ -119,7 +133,7 @@ fn propulsion(t: &PropulsionTable) -> Result<Propulsion<f64>, Problem> {
     })
 }
 
-fn wing(t: &WingTable) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
+fn wing(t: &WingTable, weights: Option<&ParnnWeights>) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
     let given = [
         ("area_per_side_m2", &t.area_per_side_m2),
         ("normal_force_slope", &t.normal_force_slope),
@@ -129,10 +143,13 @@ fn wing(t: &WingTable) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
         ("rate_max_per_s", &t.rate_max_per_s),
     ];
     let model = match t.model {
-        Some(model @ (WingName::Flat | WingName::Membrane)) => model,
+        Some(model @ (WingName::Flat | WingName::Membrane | WingName::Parnn)) => model,
         Some(WingName::None) | None => {
             if let Some((key, Some(q))) = given.iter().find(|(_, q)| q.is_some()) {
                 return Err(format!("wing.{key} = {}: given, but wing.model names no wing", q.0));
+            }
+            if let Some(name) = &t.parnn_weights {
+                return Err(format!("wing.parnn_weights = {name}: given, but wing.model names no wing"));
             }
             return match t.membrane.first_key_value() {
                 Some((key, q)) => {
@@ -158,14 +175,47 @@ fn wing(t: &WingTable) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
         time_constant_s: wing.time_constant_s,
     };
     servo.check()?;
-    if model == WingName::Flat {
-        if let Some((key, q)) = t.membrane.first_key_value() {
-            return Err(format!("wing.membrane.{key} = {}: given, but wing.model is \"flat\"", q.0));
+    let parnn = parnn_wing(t, weights, &wing)?;
+    let no_membrane = |model: &str| match t.membrane.first_key_value() {
+        Some((key, q)) => Err(format!("wing.membrane.{key} = {}: given, but wing.model is \"{model}\"", q.0)),
+        None => Ok(()),
+    };
+    let plant = match model {
+        WingName::Flat => {
+            no_membrane("flat")?;
+            WingPlant::Flat { wing, servo }
         }
-        return Ok((Some(wing), WingPlant::Flat { wing, servo }));
+        WingName::Parnn => {
+            no_membrane("parnn")?;
+            let parnn = parnn.ok_or_else(|| match &t.parnn_weights {
+                Some(name) => {
+                    format!("wing.parnn_weights = {name}: not at hand; load the vehicle from its file")
+                }
+                None => "wing.parnn_weights: missing; wing.model = \"parnn\" needs it".to_owned(),
+            })?;
+            WingPlant::Parnn { parnn: Box::new(parnn), servo }
+        }
+        WingName::None | WingName::Membrane => {
+            WingPlant::Membrane { membrane: Box::new(membrane(&t.membrane, &wing)?), servo }
+        }
+    };
+    Ok((Some(wing), plant))
+}
+
+/// The network as a wing of this vehicle, where its weights are at hand.
+fn parnn_wing(
+    t: &WingTable,
+    weights: Option<&ParnnWeights>,
+    wing: &Wing<f64>,
+) -> Result<Option<ParnnWing>, Problem> {
+    let (Some(weights), Some(name)) = (weights, &t.parnn_weights) else { return Ok(None) };
+    let (theirs, ours) = (weights.parnn().area_m2, 2.0 * wing.area_per_side_m2);
+    if !((f64::from(theirs) - ours).abs() <= AREA_DEVIATION * ours) {
+        return Err(format!(
+            "wing.parnn_weights = {name}: area_m2 = {theirs}: trained on another wing; wing.area_per_side_m2 makes {ours}"
+        ));
     }
-    let membrane = membrane(&t.membrane, &wing)?;
-    Ok((Some(wing), WingPlant::Membrane { membrane: Box::new(membrane), servo }))
+    Ok(Some(ParnnWing::new(weights.parnn(), wing)))
 }
 
 /// Overrides of the membrane model's defaults.

@@ -12,13 +12,20 @@ pub(crate) use quantity::plain;
 
 use crate::plant::{BatteryParameters, WingPlant};
 use crate::sensors::SensorParameters;
+use crate::weights::{ParnnWeights, WeightsError};
 use squirrel_core::effects::Effects;
 use squirrel_core::stack::StackParameters;
 use squirrel_core::vehicle::Vehicle;
+use std::io;
 use std::path::Path;
 
 /// The squirrel of the paper, as shipped.
 pub const SQUIRREL_TOML: &str = include_str!("../../../../vehicles/squirrel.toml");
+
+/// Its weights, under the name that its file gives them. They are part of the program: a copy or a patch of the file finds
+/// them wherever it lies.
+const SQUIRREL_PARNN: (&str, &[u8]) =
+    ("squirrel-parnn.safetensors", include_bytes!("../../../../vehicles/squirrel-parnn.safetensors"));
 
 /// Everything that a vehicle file says.
 #[derive(Debug, Clone)]
@@ -33,6 +40,8 @@ pub struct VehicleFile {
     pub size_body_m: [f64; 3],
     /// How the wing behaves in the simulator.
     pub wing: WingPlant,
+    /// The network that `wing.parnn_weights` names; `None` where it names none, or one that was not at hand.
+    pub weights: Option<ParnnWeights>,
     /// Battery; without one the voltage stays at the reference.
     pub battery: Option<BatteryParameters>,
     /// Gains; a vehicle that is only analysed needs none.
@@ -80,25 +89,54 @@ pub enum VehicleFileError {
 }
 
 impl VehicleFile {
-    /// Reads and checks a file.
+    /// Reads and checks a file, and the weights that it names: a path relative to the file's folder.
     ///
     /// # Errors
-    /// One line that names the file, the field and the value.
+    /// One line that names the file, the field or tensor, and the value.
     pub fn load(path: &Path) -> Result<Self, VehicleFileError> {
         let file = path.display().to_string();
-        match std::fs::read_to_string(path) {
-            Ok(text) => Self::parse(&text, &file),
-            Err(source) => Err(VehicleFileError::Read { file, source }),
-        }
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(source) => return Err(VehicleFileError::Read { file, source }),
+        };
+        Self::read(&text, &file, |name| {
+            let beside = path.with_file_name("").join(name);
+            match (ParnnWeights::load(&beside), shipped(name)) {
+                // The shipped ones stand in for a file that is not there, not for one that is damaged.
+                (Err(WeightsError::Io { error, .. }), Some(weights))
+                    if error.kind() == io::ErrorKind::NotFound =>
+                {
+                    weights.map(Some)
+                }
+                (read, _) => read.map(Some),
+            }
+        })
     }
 
-    /// Checks the text of a file.
+    /// Checks the text of a file. A text lies in no folder, so of weights only the shipped ones are at hand.
     ///
     /// * `file` - what errors call it
     ///
     /// # Errors
     /// As [`Self::load`].
     pub fn parse(text: &str, file: &str) -> Result<Self, VehicleFileError> {
+        Self::read(text, file, |name| shipped(name).transpose())
+    }
+
+    /// As [`Self::parse`], with the weights that came with the text.
+    pub(crate) fn parse_with(
+        text: &str,
+        file: &str,
+        weights: Option<ParnnWeights>,
+    ) -> Result<Self, VehicleFileError> {
+        Self::read(text, file, |_| Ok(weights))
+    }
+
+    fn read(
+        text: &str,
+        file: &str,
+        weights: impl FnOnce(&str) -> Result<Option<ParnnWeights>, WeightsError>,
+    ) -> Result<Self, VehicleFileError> {
         let syntax = |error: &toml::de::Error| {
             let place = crate::toml_text::place(text, error);
             VehicleFileError::Syntax {
@@ -110,7 +148,9 @@ impl VehicleFile {
         };
         let tables: tables::VehicleTable = toml::from_str(text).map_err(|e| syntax(&e))?;
         let raw: toml::Table = text.parse().map_err(|e| syntax(&e))?;
-        let built = build::build(tables);
+        let built = build::build(tables, |name| {
+            weights(name).map_err(|error| format!("wing.parnn_weights = {name}: {error}"))
+        });
         let mut built =
             built.map_err(|problem| VehicleFileError::Field { file: file.to_owned(), problem })?;
         text.clone_into(&mut built.text);
@@ -132,4 +172,10 @@ impl VehicleFile {
         let bare = |p: &Provenance| p.source.is_none();
         self.provenance.iter().filter(move |(_, p)| bare(p)).map(|(field, _)| field.as_str())
     }
+}
+
+/// The shipped weights, where this is their name.
+fn shipped(name: &str) -> Option<Result<ParnnWeights, WeightsError>> {
+    let (own, bytes) = SQUIRREL_PARNN;
+    (name == own).then(|| ParnnWeights::parse(own, bytes.to_vec()))
 }

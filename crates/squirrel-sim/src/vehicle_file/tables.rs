@@ -102,6 +102,7 @@ pub(super) enum WingName {
     None,
     Flat,
     Membrane,
+    Parnn,
 }
 
 #[derive(Deserialize)]
@@ -114,6 +115,7 @@ pub(super) struct WingTable {
     pub(super) time_constant_s: Option<Number>,
     pub(super) dead_time_s: Option<Number>,
     pub(super) rate_max_per_s: Option<Number>,
+    pub(super) parnn_weights: Option<String>,
     #[serde(default)]
     pub(super) membrane: BTreeMap<String, Number>,
 }
