@@ -52,13 +52,17 @@ impl Study {
 
 impl Options {
     fn thrust(&self) -> Result<(), String> {
-        let arms = if self.arms.is_empty() {
+        let vehicle = vehicle(self.vehicle.as_deref())?;
+        let mut arms = if self.arms.is_empty() {
             Arm::ALL.to_vec()
         } else {
             self.arms.iter().map(|name| Arm::parse(name)).collect::<Result<_, _>>()?
         };
-        let plan =
-            Plan { vehicle: vehicle(self.vehicle.as_deref())?, arms, trials: self.trials, seed: self.seed };
+        if self.arms.is_empty() && vehicle.weights.is_none() {
+            arms.retain(|arm| *arm != Arm::TwccParnn);
+            talk(&format!("{} names no parnn_weights: twcc_parnn is left out", vehicle.name));
+        }
+        let plan = Plan { vehicle, arms, trials: self.trials, seed: self.seed };
         let bar = output::progress(thrust::flights(&plan), "flights");
         let study = thrust::run(&plan, || bar.inc(1));
         bar.finish_and_clear();
