@@ -64,7 +64,8 @@ pub(crate) struct Details {
 #[derive(Debug)]
 pub(crate) struct HeldOut {
     pub(crate) nominal: Errors12,
-    pub(crate) rival: Option<Errors12>,
+    /// Of the best other name and of all that the evidence hardly tells from the answer, the best first.
+    pub(crate) rivals: Vec<Errors12>,
     pub(crate) fitted: Errors12,
     /// What the explanation leaves if it is true, and what is left in air without gusts.
     pub(crate) floor: Floor,
@@ -137,13 +138,15 @@ pub fn diagnose(
     let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
     let naming = explain(&search)?;
     let rivals = search.rivals(&naming.found)?;
+    let best = naming.found.best.log_evidence;
+    let close = rivals.iter().filter(|rival| rival.log_evidence > best - NATS_MIN).count();
     progress("flying the held-out flights");
     let proof = match &unseen {
-        Some(unseen) => prove(unseen, &search, &naming, rivals.first())?,
+        Some(unseen) => prove(unseen, &search, &naming, &rivals[..rivals.len().min(1.max(close))])?,
         None => None,
     };
     let gap = proof.as_ref().map(|proof| gap(held_out, proof));
-    let verdict = decide(&search, &naming, &rivals, gap, places, curve_hides_sag);
+    let verdict = decide(&search, &naming, &rivals, proof.as_ref(), gap, places, curve_hides_sag);
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.null),
@@ -158,6 +161,7 @@ fn decide(
     search: &Search<'_>,
     naming: &Naming,
     rivals: &[Scored],
+    proof: Option<&HeldOut>,
     gap: Option<Gap>,
     places: Vec<Place>,
     curve_hides_sag: bool,
@@ -166,12 +170,16 @@ fn decide(
     let effects = named(search, naming);
     let nats = |set: &Scored| set.log_evidence - found.null.log_evidence;
     // Another name is as good if the evidence hardly tells them apart and held-out flights do not either.
-    let clearly_worse = gap.as_ref().is_some_and(|gap| {
-        gap.best_rival.is_some_and(|rival| rival - 1.0 >= RIVAL_GAP * (gap.after - 1.0).max(0.05))
-    });
+    let clearly_worse = |rival: usize| {
+        let (Some(proof), Some(gap)) = (proof, &gap) else { return false };
+        let left = proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
+        left.is_some_and(|left| left - 1.0 >= RIVAL_GAP * (gap.after - 1.0).max(0.05))
+    };
     let close: Vec<&Scored> = rivals
         .iter()
-        .filter(|rival| rival.log_evidence > found.best.log_evidence - NATS_MIN && !clearly_worse)
+        .enumerate()
+        .filter(|(i, rival)| rival.log_evidence > found.best.log_evidence - NATS_MIN && !clearly_worse(*i))
+        .map(|(_, rival)| rival)
         .collect();
     let leftover = &naming.leftover;
     let mut blind = search.blind(&found.best);
@@ -319,12 +327,12 @@ fn parameters(
         .collect()
 }
 
-/// Re-simulates the held-out flights as the vehicle was, with the explanation and with the best other name.
+/// Re-simulates the held-out flights as the vehicle was, with the explanation and with other names.
 fn prove(
     unseen: &Predictor,
     search: &Search<'_>,
     naming: &Naming,
-    rival: Option<&Scored>,
+    others: &[Scored],
 ) -> Result<Option<HeldOut>, GapError> {
     let at = |members: &[Member], base: &[f64]| -> Result<Hypothesis, GapError> {
         // What floats inside its tolerance is shared; what the sensors of other flights did is not. A barometer's own error is
@@ -339,16 +347,16 @@ fn prove(
     let fitted_at = at(&whole.members, &whole.base)?;
     let Some(fitted) = shrink::errors(unseen, &fitted_at)? else { return Ok(None) };
     let Some(nominal) = shrink::errors(unseen, &at(&[], &whole.base)?)? else { return Ok(None) };
-    let rival = match rival {
-        Some(rival) => shrink::errors(unseen, &at(&rival.members, &search.whole(rival).base)?)?,
-        None => None,
-    };
+    let mut rivals = Vec::with_capacity(others.len());
+    for rival in others {
+        rivals.extend(shrink::errors(unseen, &at(&rival.members, &search.whole(rival).base)?)?);
+    }
     let calm = shrink::floor(unseen, &fitted_at, TURBULENCE_M_S)?;
     let floor = match naming.gust_m_s {
         Some(sigma) => shrink::floor(unseen, &fitted_at, sigma)?,
         None => calm.clone(),
     };
-    Ok(Some(HeldOut { nominal, rival, fitted, floor, calm }))
+    Ok(Some(HeldOut { nominal, rivals, fitted, floor, calm }))
 }
 
 fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
@@ -356,7 +364,7 @@ fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
     let before = proof.nominal.over(&proof.calm.of(&proof.fitted));
     let floor = proof.floor.of(&proof.fitted);
     let after = proof.fitted.over(&floor);
-    let best_rival = proof.rival.as_ref().map(|rival| rival.over(&floor));
+    let best_rival = proof.rivals.iter().map(|rival| rival.over(&floor)).reduce(f64::min);
     let removed = |left: f64| if before > 1.0 { 1.0 - (left - 1.0) / (before - 1.0) } else { 0.0 };
     Gap {
         held_out_flights: held_out.iter().map(|(name, _)| name.clone()).collect(),

@@ -190,52 +190,47 @@ pub(crate) fn floor(
     let mut all = Errors12::new();
     // Mean errors of each segment over the first second.
     let mut segments: Vec<Errors> = Vec::new();
-    for (draw, piece) in
-        (0..DRAWS).flat_map(|draw| (0..predictor.tracks.len()).map(move |piece| (draw, piece)))
-    {
-        let track = &predictor.tracks[piece];
+    for (piece, track) in predictor.tracks.iter().enumerate() {
         if track.attitude().is_none() || track.velocity().is_empty() {
             continue;
         }
         let motion = predictor.motion(piece, hypothesis);
         let mut clean = Vec::new();
-        fly(predictor, hypothesis, piece, &motion, None, |start, bin, reading| {
-            clean.push((start, bin, reading.read));
-        })?;
-        let mut rng = Pcg64Mcg::seed_from_u64(1000 * draw + piece as u64 + 11);
-        let mut index = 0;
+        fly(predictor, hypothesis, piece, &motion, None, |_, _, reading| clean.push(reading.read))?;
         let [force_noise, rate_noise] = track.imu_noise;
         let velocity_noise = track.velocity_noise();
         let attitude_noise = track.attitude_noise();
-        let samples = BIN_S / track.period_s;
-        let mut noise = Pcg64Mcg::seed_from_u64(1000 * draw + piece as u64 + 29);
-        let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise)) };
-        let noise = Noise {
-            turbulence_m_s,
-            velocity_m_s: velocity_noise * track.velocity_smoothing(),
-            attitude_rad: attitude_noise,
-            rng: &mut rng,
-        };
-        fly(predictor, hypothesis, piece, &motion, Some(noise), |_, bin, reading| {
-            let (own, other) = (&clean[index].2, &reading.read);
-            index += 1;
-            let white = samples.max(1.0).sqrt();
-            let velocity = other.velocity_ned - own.velocity_ned + draw().component_mul(&velocity_noise);
-            let rotation = (own.attitude.inverse() * other.attitude).scaled_axis()
-                + draw().component_mul(&attitude_noise);
-            let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
-            let force =
-                other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
-            let parts = compared(predictor, [velocity, rotation, rate, force]);
-            if bin == 0 {
-                segments.push(Errors::zeros());
-            }
-            if let Some(segment) = segments.last_mut().filter(|_| bin < COUNTED) {
-                let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
-                *segment += error.component_mul(&error) / COUNTED as f64;
-            }
-            all.add(bin, parts);
-        })?;
+        let white = (BIN_S / track.period_s).max(1.0).sqrt();
+        for draw in 0..DRAWS {
+            let mut rng = Pcg64Mcg::seed_from_u64(1000 * draw + piece as u64 + 11);
+            let mut noise = Pcg64Mcg::seed_from_u64(1000 * draw + piece as u64 + 29);
+            let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise)) };
+            let noise = Noise {
+                turbulence_m_s,
+                velocity_m_s: velocity_noise * track.velocity_smoothing(),
+                attitude_rad: attitude_noise,
+                rng: &mut rng,
+            };
+            let mut still = clean.iter();
+            fly(predictor, hypothesis, piece, &motion, Some(noise), |_, bin, reading| {
+                let (Some(own), other) = (still.next(), &reading.read) else { return };
+                let velocity = other.velocity_ned - own.velocity_ned + draw().component_mul(&velocity_noise);
+                let rotation = (own.attitude.inverse() * other.attitude).scaled_axis()
+                    + draw().component_mul(&attitude_noise);
+                let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
+                let force =
+                    other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
+                let parts = compared(predictor, [velocity, rotation, rate, force]);
+                if bin == 0 {
+                    segments.push(Errors::zeros());
+                }
+                if let Some(segment) = segments.last_mut().filter(|_| bin < COUNTED) {
+                    let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
+                    *segment += error.component_mul(&error) / COUNTED as f64;
+                }
+                all.add(bin, parts);
+            })?;
+        }
     }
     let n = segments.len().max(1) as f64;
     let mean = segments.iter().sum::<Errors>() / n;

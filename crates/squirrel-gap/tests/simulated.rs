@@ -67,11 +67,11 @@ fn wings_and_effects_of_the_own_vehicle_leave_noise() {
     let sagging = squirrel_with(&[("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]")]);
     let draggy =
         squirrel_with(&[("[limits]", "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.2\n\n[limits]")]);
-    for vehicle in [VehicleFile::squirrel(), flat, sagging, draggy] {
-        let log = fly(&vehicle, "avoid", Arm::TwccFlat);
+    for vehicle in [&VehicleFile::squirrel(), &flat, &sagging, &draggy] {
+        let log = fly(vehicle, "avoid", Arm::TwccFlat);
         let (_, wing) = log.channel("wing.command").unwrap();
         assert!(wing.values.iter().any(|c| *c > 0.5), "the wings open");
-        assert_noise(&vehicle, &found(&vehicle, log));
+        assert_noise(vehicle, &found(vehicle, log));
     }
 }
 

@@ -219,7 +219,7 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
     };
     let at = |channel: usize, bin: usize| Errors {
         nominal: flown.nominal.rms(channel, bin),
-        rival: flown.rival.as_ref().map_or(f64::NAN, |rival| rival.rms(channel, bin)),
+        rival: flown.rivals.first().map_or(f64::NAN, |rival| rival.rms(channel, bin)),
         fitted: flown.fitted.rms(channel, bin),
         floor: flown.floor.mean.rms(channel, bin),
     };
@@ -255,7 +255,7 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
         };
         Horizon { horizon_s: horizon_s(*bin), errors }
     });
-    let rival = if flown.rival.is_some() { rival.to_owned() } else { String::new() };
+    let rival = if flown.rivals.is_empty() { String::new() } else { rival.to_owned() };
     HeldOut { flights, rival, channels: channels.collect(), horizons: horizons.collect() }
 }
 
