@@ -176,3 +176,29 @@ fn the_same_flights_give_the_same_bytes() {
     }
     assert_eq!(first.len(), second.len());
 }
+
+/// Under the controller that flew it, the simulated drone goes where the measured one went once the name is in the file; a
+/// flight of another autopilot cannot be flown again, and a note says so.
+#[test]
+fn held_out_flights_are_flown_again_in_closed_loop() {
+    let folder = with_flights("gap-closed-loop");
+    let flight = ["fly", "--vehicle", "individual.toml", "--arm", "pc", "--scenario", "excite_rich"];
+    folder.succeeds(&[&flight[..], &["--seed", "4", "--out", "d.mcap"]].concat());
+    let mut foreign = FlightLog::read(&folder.0.join("d.mcap")).unwrap();
+    foreign.metadata.clear();
+    foreign.write(&folder.0.join("held-out/d.mcap")).unwrap();
+    folder.succeeds(&[&["gap", "shrink"], &FLIGHTS[..], &["--json", "v.json"]].concat());
+    let verdict = json(&folder, "v.json");
+    let flown = verdict["closed_loop"].as_array().unwrap();
+    assert_eq!(flown.len(), 1, "{flown:?}");
+    assert_eq!(flown[0]["flight"], "held-out/c.mcap");
+    let norm = |key: &str| {
+        let axes = flown[0][key].as_array().unwrap();
+        axes.iter().map(|x| x.as_f64().unwrap().powi(2)).sum::<f64>().sqrt()
+    };
+    assert!(norm("after_ned_m") < 0.2 * norm("before_ned_m"), "{flown:?}");
+    let notes = verdict["notes"].as_array().unwrap();
+    let said =
+        |note: &serde_json::Value| note.as_str().unwrap().starts_with("held-out/d.mcap: not flown again");
+    assert!(notes.iter().any(said), "{notes:?}");
+}
