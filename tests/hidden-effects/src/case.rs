@@ -180,6 +180,11 @@ const STANDARD: &str = "standard";
 /// A case whose vehicle does not stay up is drawn anew so often: an effect near its largest can make a low hover impossible.
 const REDRAWS: u64 = 12;
 
+/// Seeds of a case: its own, and those that are tried where the vehicle fell.
+pub(crate) fn seeds(seed: u64) -> impl Iterator<Item = u64> {
+    std::iter::once(seed).chain((1..REDRAWS).map(move |again| mix(seed, again)))
+}
+
 impl Case {
     /// The case of a number in a set. The same arguments give the same case.
     pub fn draw(set: Set, index: usize, seed: u64) -> Self {
@@ -243,11 +248,11 @@ impl Case {
             case.make(folder).map(|path| (case, path))
         };
         let mut made = make(seed);
-        for again in 1..REDRAWS {
+        for seed in seeds(seed).skip(1) {
             if !matches!(made, Err(CaseError::Flight { .. })) {
                 break;
             }
-            made = make(mix(seed, again));
+            made = make(seed);
         }
         made
     }

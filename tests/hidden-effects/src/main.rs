@@ -9,7 +9,8 @@ use std::process::ExitCode;
 
 const USAGE: &str = "\
 hidden-effects make  --set NAME --n N --seed S --out DIR
-hidden-effects bench --squirrel PROGRAM --seed S (--full | --cases N [--set NAME]) [--json FILE] [--keep DIR]";
+hidden-effects bench --squirrel PROGRAM --seed S (--full | --cases N [--set NAME]) [--json FILE] [--keep DIR]
+                     [--score-again]: what --keep has from an earlier run, without asking again";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -27,9 +28,10 @@ fn run(arguments: &[String]) -> Result<(), String> {
         Some((command, rest)) if command == "make" => {
             make(&Options::new(rest, &["set", "n", "seed", "out"])?)
         }
-        Some((command, rest)) if command == "bench" => {
-            score(&Options::new(rest, &["squirrel", "seed", "full", "cases", "set", "json", "keep"])?)
-        }
+        Some((command, rest)) if command == "bench" => score(&Options::new(
+            rest,
+            &["squirrel", "seed", "full", "cases", "set", "json", "keep", "score-again"],
+        )?),
         Some((command, _)) => Err(format!("no command '{command}'\n{USAGE}")),
         None => Err(format!("which command?\n{USAGE}")),
     }
@@ -63,7 +65,8 @@ fn score(options: &Options) -> Result<(), String> {
         keep: keep.is_some(),
         folder: keep.unwrap_or_else(|| temporary.clone()),
     };
-    let outcomes = bench::run(&plan).map_err(|error| error.to_string());
+    let run = if options.get("score-again").is_some() { bench::score_again } else { bench::run };
+    let outcomes = run(&plan).map_err(|error| error.to_string());
     if temporary.exists() {
         std::fs::remove_dir_all(&temporary).map_err(|error| format!("{}: {error}", temporary.display()))?;
     }
@@ -85,7 +88,11 @@ impl Options {
         while let Some(argument) = left.next() {
             let key = argument.strip_prefix("--").filter(|key| known.contains(key));
             let key = key.ok_or_else(|| format!("no option '{argument}'\n{USAGE}"))?;
-            let value = if key == "full" { Some("") } else { left.next().map(String::as_str) };
+            let value = if ["full", "score-again"].contains(&key) {
+                Some("")
+            } else {
+                left.next().map(String::as_str)
+            };
             let value = value.ok_or_else(|| format!("--{key}: needs a value\n{USAGE}"))?;
             options.insert(key.to_owned(), value.to_owned());
         }

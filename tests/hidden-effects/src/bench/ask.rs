@@ -62,7 +62,8 @@ fn wait(mut child: Child, start: Instant) -> Result<(), String> {
     }
 }
 
-fn read(json: &Path) -> Result<Verdict, String> {
+/// The verdict in a file.
+pub(super) fn read(json: &Path) -> Result<Verdict, String> {
     let text = std::fs::read_to_string(json).map_err(|error| format!("verdict: {error}"))?;
     serde_json::from_str(&text).map_err(|error| format!("verdict: {error}"))
 }

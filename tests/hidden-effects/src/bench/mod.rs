@@ -11,7 +11,7 @@ pub use score::Outcome;
 pub use summary::{Summary, summarise};
 pub use verdict::Verdict;
 
-use crate::case::{Answer, Case, CaseError, Set};
+use crate::case::{Answer, Case, CaseError, Set, seeds};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -80,13 +80,39 @@ pub fn run(plan: &Plan) -> Result<Vec<Outcome>, CaseError> {
     outcomes.into_iter().map(|(_, outcome)| outcome).collect()
 }
 
+/// Scores what an earlier run of a plan kept, without asking again: how cases are scored may change.
+///
+/// # Errors
+/// An answer or the time that a case took cannot be read.
+pub fn score_again(plan: &Plan) -> Result<Vec<Outcome>, CaseError> {
+    let mut outcomes = Vec::with_capacity(plan.cases.len());
+    for &(set, index) in &plan.cases {
+        let (answers, results) = (plan.folder.join("answers"), plan.folder.join("results"));
+        let mut ids = seeds(plan.seed).map(|seed| Case::draw(set, index, seed).answer.case);
+        let file = |id: &String| answers.join(format!("{id}.json"));
+        let kept = ids.find(|id| file(id).exists());
+        let id = kept.unwrap_or_else(|| Case::draw(set, index, plan.seed).answer.case);
+        let answer = read(&file(&id))?;
+        let before: Kept = read(&results.join(format!("{id}.score.json")))?;
+        let verdict = ask::read(&results.join(&id).join("verdict.json"));
+        outcomes.push(score::score(&answer, ask::Asked { verdict, seconds: before.seconds }));
+    }
+    Ok(outcomes)
+}
+
+/// What is not in a verdict.
+#[derive(serde::Deserialize)]
+struct Kept {
+    seconds: f64,
+}
+
 fn one(plan: &Plan, set: Set, index: usize) -> Result<Outcome, CaseError> {
     let (case, folder) = Case::draw_and_make(set, index, plan.seed, &plan.folder)?;
     let id = &case.answer.case;
     let results = plan.folder.join("results").join(id);
     let asked = ask::ask(&plan.squirrel, &folder, &results);
     let answer = plan.folder.join("answers").join(format!("{id}.json"));
-    let outcome = score::score(&read(&answer)?, asked);
+    let outcome = score::score(&read::<Answer>(&answer)?, asked);
     if plan.keep {
         crate::case::write_json(&plan.folder.join("results").join(format!("{id}.score.json")), &outcome)?;
     } else {
@@ -100,7 +126,7 @@ fn one(plan: &Plan, set: Set, index: usize) -> Result<Outcome, CaseError> {
     Ok(outcome)
 }
 
-fn read(path: &Path) -> Result<Answer, CaseError> {
+fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, CaseError> {
     let bytes = fs::read(path).map_err(CaseError::io(path))?;
     serde_json::from_slice(&bytes)
         .map_err(|error| CaseError::Io { file: path.display().to_string(), source: error.into() })

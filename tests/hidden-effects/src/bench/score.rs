@@ -115,7 +115,7 @@ fn sizes(answer: &Answer, verdict: &Verdict, outcome: &mut Outcome) {
         let Some(parameter) = named.and_then(|named| named.parameters.get(key)) else { continue };
         let Some(value) = parameter.value.as_f64() else { continue };
         outcome.parameter_errors.insert(effect.name.clone(), ((value - size) / size).abs());
-        if let (Some(low), Some(high)) = (parameter.low, parameter.high) {
+        if let (Some(low), Some(high)) = (parameter.low.as_f64(), parameter.high.as_f64()) {
             outcome.parameter_covered.insert(effect.name.clone(), (low..=high).contains(&size));
         }
     }

@@ -31,10 +31,12 @@ pub enum Word {
 pub struct Parameter {
     /// A number, or a name.
     pub value: serde_json::Value,
-    /// Lower end of its 95 % interval.
-    pub low: Option<f64>,
+    /// Lower end of its 95 % interval; of a name, the name.
+    #[serde(default)]
+    pub low: serde_json::Value,
     /// Upper end.
-    pub high: Option<f64>,
+    #[serde(default)]
+    pub high: serde_json::Value,
 }
 
 /// A named effect.
@@ -126,7 +128,8 @@ mod tests {
             "effects": [{"name": "motor_lag", "form": "standard", "evidence_nats": 12.0,
                          "parameters": {"extra_time_constant_s": {"value": 0.03, "low": 0.02, "high": 0.04}}},
                         {"name": "weak_rotor", "evidence_nats": 40.5,
-                         "parameters": {"rotor": {"value": 2, "low": null, "high": null}}}],
+                         "parameters": {"rotor": {"value": 2, "low": null, "high": null},
+                                        "axis": {"value": "z", "low": "z", "high": "z"}}}],
             "alternatives": [{"effects": [{"name": "cg_offset"}], "evidence_nats": 11.0},
                              {"effects": ["clock_skew"], "evidence_nats": 9.0}],
             "where": [], "goes_with": null, "fly_next": "multisine",
