@@ -23,6 +23,7 @@ fn hover(seconds: f64) -> FlightLog {
         log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &[1.0, 0.0, 0.0, 0.0])]);
         log.source_mut("gnss").push(t, &[("velocity_ned_m_s", &[0.0; 3])]);
         log.source_mut("battery").push(t, &[("voltage_v", &[14.8])]);
+        log.source_mut("baro").push(t, &[("altitude_m", &[30.0])]);
         log.source_mut("rotor").push(t, &[("command", &[command; 4])]);
         log.source_mut("wing").push(t, &[("command", &[0.0; 2])]);
     }
@@ -113,11 +114,13 @@ fn what_the_log_lacks_is_noted() {
     assert!(note("battery", "voltage_v").ends_with("battery_sag is that of the reference voltage, 14.8 V"));
     assert_eq!(note("wing", "command"), "f: wing.command: missing; the wings are taken as folded");
 
-    // The voltage is not missed where nothing feels it.
+    assert!(note("baro", "altitude_m").ends_with("missing; what depends on height cannot be seen"));
+
+    // Where no effect of the file feels the voltage, thrust may still lack it.
     let mut log = hover(3.0);
     log.sources.remove("battery");
     let finding = run(&VehicleFile::squirrel(), &log).unwrap();
-    assert!(finding.notes.is_empty());
+    assert_eq!(finding.notes, ["f: battery.voltage_v: missing; thrust may be that of any charge"]);
     assert!(finding.places.iter().all(|place| !place.condition.contains(" V")), "{:?}", finding.places);
 }
 
@@ -236,13 +239,13 @@ fn a_vehicle_that_the_plant_cannot_step_is_refused() {
     );
 }
 
-/// Other vehicles and scales: a flight of a Crazyflie without attitude, position and battery.
+/// Other vehicles and scales: a flight of a Crazyflie without attitude, velocity, height and battery, each of which is said.
 #[test]
 fn a_log_of_motors_and_imu_alone_is_enough() {
     let Some(folder) = support::shared("flights/arpl-motorlag") else { return };
     let log = support::imported("arpl.toml", &folder.join("log10.csv"));
     let finding = run(&vehicle("crazyflie21_brushed.toml"), &log).unwrap();
     println!("{:?}\n{:?}\n{:?}", finding.residual, finding.notes, finding.places[0]);
-    assert_eq!(finding.notes.len(), 2);
+    assert_eq!(finding.notes.len(), 4);
     assert!(finding.places[0].condition.starts_with("throttle 0."), "{}", finding.places[0].condition);
 }
