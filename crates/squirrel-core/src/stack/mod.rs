@@ -10,6 +10,7 @@
 //! not finite is rejected and the last valid one kept.
 
 mod frame;
+pub mod wire;
 
 pub use frame::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
 
@@ -250,7 +251,7 @@ impl Stack {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::control::backstepping::AttitudeForm;
     use crate::control::twcc;
@@ -264,6 +265,14 @@ mod tests {
     }
 
     fn stack_that_believes(force_model: &ForceModel, form: AttitudeForm) -> Stack {
+        flying(force_model, form, Mission::Hover { position: In::zero() })
+    }
+
+    pub(crate) fn stack_on(force_model: &ForceModel, mission: Mission) -> Stack {
+        flying(force_model, AttitudeForm::Quaternion, mission)
+    }
+
+    fn flying(force_model: &ForceModel, form: AttitudeForm, mission: Mission) -> Stack {
         let attitude = AttitudeGains {
             form,
             c1_per_s: Vector3::new(9.0, 9.0, 4.0),
@@ -275,11 +284,10 @@ mod tests {
         };
         let twcc = TwccParameters { force_model: *force_model, ..twcc::fixtures::parameters() };
         let parameters = StackParameters { attitude, twcc };
-        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, Mission::Hover { position: In::zero() })
-            .unwrap()
+        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, mission).unwrap()
     }
 
-    fn level(time_us: u64) -> SensorFrame {
+    pub(crate) fn level(time_us: u64) -> SensorFrame {
         let mut frame = SensorFrame::empty(time_us);
         frame.imu =
             Some(Imu { omega: In::zero(), specific_force: In::new(Vector3::new(0.0, 0.0, -9.80665)) });
