@@ -1,6 +1,7 @@
 //! One file a command.
 
 pub(crate) mod demo;
+pub(crate) mod export_vectors;
 pub(crate) mod fly;
 pub(crate) mod gap;
 pub(crate) mod import;
