@@ -13,6 +13,7 @@ use crate::guidance::excite::Excitation;
 use crate::guidance::sensing::Obstacle;
 use crate::rnn::head::Correction;
 use crate::rnn::parnn::Estimate;
+use crate::stack::failsafe::{Failsafe, FailsafeMode, FailsafeReason};
 use crate::stack::{Gnss, Imu, InnerTerms, SensorFrame, StackOutput};
 
 /// Obstacles as a count and as many obstacles.
@@ -50,7 +51,8 @@ wire_struct! {
     Imu { omega, specific_force }
     Gnss { position, velocity }
     Obstacle { id, north_m, east_m }
-    StackOutput { rotor_command, wing_command, reference, rejected, outer, inner }
+    StackOutput { rotor_command, wing_command, reference, rejected, failsafe, outer, inner }
+    Failsafe { mode, reason }
     Reference { position, velocity, acceleration, yaw_rad }
     TwccTerms {
         position, wing_force, parnn, angle_of_attack_rad, wing, mode, reason, command, wing_command, clamped,
@@ -73,6 +75,10 @@ wire_struct! {
 }
 
 wire_enum! {
+    FailsafeMode { Off, Level, Cut }
+    FailsafeReason {
+        None, ClockStuck, ImuLost, ImuStuck, AttitudeLost, AttitudeStuck, GnssLost, GnssStuck, AltitudeLost,
+    }
     Mode { Primary, Wiic, FullThrust }
     Reason { InsideLimits, WingsWouldNotHelp, RollLimit, PitchLimit, ThrustLimit, Dwell, PolicyFixed }
     Guard { Inside, WindowNotFull, Speed, AngleOfAttack }
