@@ -8,6 +8,7 @@ use crate::output::{self, Table, talk};
 use serde::Serialize;
 use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Record, Wire, Writer, hash};
 use squirrel_core::stack::{SensorFrame, Stack, StackState};
+use squirrel_sim::faults::Fault;
 use squirrel_sim::flight;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay;
@@ -19,6 +20,12 @@ pub(crate) struct ExportVectors {
     /// Flight logs recorded by `squirrel fly`, or folders of them.
     #[arg(required = true)]
     flights: Vec<PathBuf>,
+    /// Instead of each flight as it was, this many pieces of it with a sensor fault each.
+    #[arg(long, default_value_t = 0)]
+    faults: u32,
+    /// Seed of the faults.
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
     /// File of vectors to write.
     #[arg(long)]
     out: PathBuf,
@@ -32,6 +39,8 @@ pub(crate) struct ExportVectors {
 struct Sequence {
     flight: String,
     arm: &'static str,
+    /// The whole flight, or the fault in a piece of it.
+    what: String,
     steps: u32,
     /// Of all outputs, 16 hexadecimal digits.
     hash: String,
@@ -55,24 +64,32 @@ impl ExportVectors {
             }
             let stack = setup.stack().map_err(|e| at(e.to_string()))?;
             let frames = flight::frames(&log).map_err(at)?;
-            let hash = append(&mut records, &stack, &frames).map_err(at)?;
-            let steps = frames.len() as u32;
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            sequences.push(Sequence {
-                flight: name,
-                arm: setup.arm.name(),
-                steps,
-                hash: format!("{hash:016x}"),
-            });
+            let mut add = |what: String, frames: &[SensorFrame]| {
+                let hash = format!("{:016x}", append(&mut records, &stack, frames)?);
+                let (flight, steps) = (name.clone(), frames.len() as u32);
+                sequences.push(Sequence { flight, arm: setup.arm.name(), what, steps, hash });
+                Ok::<_, String>(())
+            };
+            if self.faults == 0 {
+                add("whole".to_owned(), &frames).map_err(at)?;
+            }
+            for k in 0..self.faults {
+                let (fault, broken) = Fault::draw(&frames, self.seed.wrapping_add(k)).map_err(at)?;
+                let Fault { sensor, kind, start_us, end_us } = fault;
+                let length_s = (end_us - start_us) as f64 * 1e-6;
+                add(format!("{sensor:?} {kind:?} {length_s:.2} s"), &broken).map_err(at)?;
+            }
         }
         let frames = sequences.iter().map(|s| s.steps).sum();
         let header = Header { sequences: sequences.len() as u32, frames };
         let mut bytes = wire(&header)?;
         bytes.append(&mut records);
         output::write_file(&self.out, &bytes)?;
-        let mut table = Table::new(&["flight", "arm", "steps", "hash of the outputs"]);
+        let mut table = Table::new(&["flight", "arm", "what", "steps", "hash of the outputs"]);
         for s in &sequences {
-            table.row(vec![s.flight.clone(), s.arm.to_owned(), s.steps.to_string(), s.hash.clone()]);
+            let steps = s.steps.to_string();
+            table.row(vec![s.flight.clone(), s.arm.to_owned(), s.what.clone(), steps, s.hash.clone()]);
         }
         table.print();
         talk(&format!("wrote {}, {} bytes", self.out.display(), bytes.len()));

@@ -13,7 +13,8 @@
 //!
 //! When all is well again for [`RECOVERY_US`], control resumes without any memory of the time before.
 
-use super::{Known, SensorFrame};
+use super::Known;
+use super::frame::{Heard, Merged};
 use nalgebra::Vector3;
 
 /// The inertial unit is lost after this time, us.
@@ -97,11 +98,11 @@ struct Watch {
 }
 
 impl Watch {
-    /// Whether there was a reading that was taken over, and what it was before.
-    fn look<T: PartialEq>(&mut self, time_us: u64, reading: Option<&T>, before: Option<&T>, now: Option<&T>) {
-        if reading.is_some() && reading == now {
-            self.heard_us = Some(time_us);
-            self.repeats = if reading == before { self.repeats.saturating_add(1) } else { 0 };
+    fn look(&mut self, time_us: u64, heard: Heard) {
+        match heard {
+            Heard::Nothing => {}
+            Heard::Same => (self.heard_us, self.repeats) = (Some(time_us), self.repeats.saturating_add(1)),
+            Heard::New => (self.heard_us, self.repeats) = (Some(time_us), 0),
         }
         // Time that runs backwards does not make a reading younger than now.
         self.heard_us = self.heard_us.map(|heard| heard.min(time_us));
@@ -135,35 +136,22 @@ pub struct FailsafeState {
 }
 
 impl FailsafeState {
-    /// Looks at a frame after it was taken over.
+    /// Looks at what came of a frame.
     ///
-    /// * `before`, `known` - measurements before and after
-    /// * `elapsed_us` - time since the last frame, 0 if it did not go on
+    /// * `elapsed_us` - time since the last frame, `None` for the first, 0 if it did not go on
     pub(super) fn update(
         &mut self,
-        frame: &SensorFrame,
-        before: &Known,
+        time_us: u64,
+        elapsed_us: Option<u64>,
+        merged: &Merged,
         known: &Known,
-        elapsed_us: u64,
-        is_first: bool,
     ) -> Failsafe {
-        let time_us = frame.time_us;
-        self.standing = if elapsed_us > 0 || is_first { 0 } else { self.standing.saturating_add(1) };
-        self.imu.look(time_us, frame.imu.as_ref(), before.imu.as_ref(), known.imu.as_ref());
-        self.attitude.look(
-            time_us,
-            frame.attitude.as_ref(),
-            before.attitude.as_ref(),
-            known.attitude.as_ref(),
-        );
-        self.gnss.look(time_us, frame.gnss.as_ref(), before.gnss.as_ref(), known.gnss.as_ref());
-        self.altitude.look(
-            time_us,
-            frame.altitude_m.as_ref(),
-            before.altitude_m.as_ref(),
-            known.altitude_m.as_ref(),
-        );
-        let dt_s = elapsed_us.min(IMU_LIMIT_US) as u32 as f32 * 1e-6;
+        self.standing = if elapsed_us == Some(0) { self.standing.saturating_add(1) } else { 0 };
+        self.imu.look(time_us, merged.imu);
+        self.attitude.look(time_us, merged.attitude);
+        self.gnss.look(time_us, merged.gnss);
+        self.altitude.look(time_us, merged.altitude);
+        let dt_s = elapsed_us.unwrap_or(0).min(IMU_LIMIT_US) as u32 as f32 * 1e-6;
         let omega = known.imu.map_or(Vector3::zeros(), |imu| imu.omega.vector);
         let climb_m_s = known.gnss.map_or(0.0, |gnss| -gnss.velocity.vector.z);
         self.turned_rad =
@@ -225,7 +213,7 @@ mod tests {
     use crate::frames::{In, Rotation};
     use crate::guidance::mission::Mission;
     use crate::stack::tests::{level, stack_on};
-    use crate::stack::{Gnss, Stack, StackOutput, StackState};
+    use crate::stack::{Gnss, SensorFrame, Stack, StackOutput, StackState};
 
     const STEP_US: u64 = 3333;
 

@@ -168,13 +168,12 @@ impl Stack {
 
     /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any frame.
     pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
-        let elapsed_us = state.time_us.map_or(0, |last| frame.time_us.saturating_sub(last));
-        let is_first = state.time_us.is_none();
+        let elapsed_us = state.time_us.map(|last| frame.time_us.saturating_sub(last));
         state.time_us = Some(frame.time_us);
-        let before = state.known;
-        state.rejected = state.rejected.saturating_add(frame.merge_into(&mut state.known));
+        let merged = frame.merge_into(&mut state.known);
+        state.rejected = state.rejected.saturating_add(merged.rejected);
         let was = state.failsafe.active.mode;
-        let failsafe = state.failsafe.update(frame, &before, &state.known, elapsed_us, is_first);
+        let failsafe = state.failsafe.update(frame.time_us, elapsed_us, &merged, &state.known);
         if failsafe.mode != was || failsafe.mode != FailsafeMode::Off {
             self.forget(state, was);
         }
@@ -189,7 +188,7 @@ impl Stack {
             if failsafe.mode == FailsafeMode::Off { self.outer(state, frame, dt_s) } else { None }
         };
         let reference = self.mission.reference(&state.mission, frame.time_us);
-        let dt_s = lower(elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
+        let dt_s = lower(elapsed_us.unwrap_or(0) as f32 * 1e-6, INNER_STEP_MAX_S);
         let inner = if failsafe.mode == FailsafeMode::Cut {
             None
         } else {
