@@ -18,7 +18,7 @@ struct Frame {
 /// # Errors
 /// One line where there is no bound, or no such function.
 pub(crate) fn worst_case(elf: &Elf, function: &str) -> Result<(u32, Vec<String>), String> {
-    let start = elf.symbols.iter().find(|s| s.is_function && s.name == function);
+    let start = elf.symbols.iter().find(|s| s.is_function && plain(&s.name).ends_with(function));
     let start = start.ok_or_else(|| format!("{function}: no such function in the image"))?;
     deepest(elf, start.address, &mut Vec::new(), &mut BTreeMap::new())
 }
@@ -40,10 +40,10 @@ fn deepest(
         return Ok(done.clone());
     }
     if above.contains(&symbol.address) {
-        return Err(format!("{}: calls itself, its stack has no bound", symbol.name));
+        return Err(format!("{}: calls itself, its stack has no bound", plain(&symbol.name)));
     }
-    let frame = frame(&code(elf, symbol.address, symbol.size), symbol.address)
-        .map_err(|e| format!("{}: {e}", symbol.name))?;
+    let frame = frame(&code(elf, symbol.address, symbol.size))
+        .map_err(|e| format!("{}: {e}", plain(&symbol.name)))?;
     above.push(symbol.address);
     let mut worst = (0, Vec::new());
     for callee in frame.callees {
@@ -54,9 +54,25 @@ fn deepest(
     }
     above.pop();
     worst.0 += frame.own_bytes;
-    worst.1.insert(0, symbol.name.clone());
+    worst.1.insert(0, plain(&symbol.name));
     known.insert(symbol.address, worst.clone());
     Ok(worst)
+}
+
+/// `a::b::c` of `_ZN1a1b1c17h0123456789abcdefE`; another name as it is.
+fn plain(name: &str) -> String {
+    let mut parts = Vec::new();
+    let mut rest = name.strip_prefix("_ZN").unwrap_or_default();
+    while let Some((length, after)) =
+        rest.split_once(|c: char| !c.is_ascii_digit()).map(|(n, _)| (n, &rest[n.len()..]))
+    {
+        let Some(part) = length.parse().ok().and_then(|n: usize| after.get(..n)) else { break };
+        parts.push(part);
+        rest = &after[part.len()..];
+    }
+    // The last part is a hash.
+    parts.pop();
+    if parts.is_empty() { name.to_owned() } else { parts.join("::") }
 }
 
 /// The half-words of a function with their addresses; data between instructions is left out.
@@ -73,17 +89,18 @@ fn code(elf: &Elf, start: u32, size: u32) -> Vec<(u32, u16)> {
     for section in &elf.sections {
         for at in (start..start + size).step_by(2) {
             let offset = at.wrapping_sub(section.address) as usize;
-            if let (true, Some([low, high])) = (section.address > 0, section.bytes.get(offset..offset + 2)) {
-                if is_code(at) {
-                    found.push((at, u16::from_le_bytes([*low, *high])));
-                }
+            if let Some([low, high]) = section.bytes.get(offset..offset.saturating_add(2))
+                && section.address > 0
+                && is_code(at)
+            {
+                found.push((at, u16::from_le_bytes([*low, *high])));
             }
         }
     }
     found
 }
 
-fn frame(code: &[(u32, u16)], function: u32) -> Result<Frame, String> {
+fn frame(code: &[(u32, u16)]) -> Result<Frame, String> {
     let mut frame = Frame::default();
     let mut words = code.iter().copied();
     while let Some((at, first)) = words.next() {
@@ -94,7 +111,6 @@ fn frame(code: &[(u32, u16)], function: u32) -> Result<Frame, String> {
             long(&mut frame, at, first, u32::from(second))?;
         }
     }
-    let _ = function;
     Ok(frame)
 }
 
@@ -205,6 +221,12 @@ mod tests {
         let elf = image(&[("top", &top), ("small", &small), ("deep", &deep)]);
         let chain = vec!["top".to_owned(), "deep".to_owned()];
         assert_eq!(worst_case(&elf, "top"), Ok((8 + 16 + 16 + 1544 + 8, chain)));
+    }
+
+    #[test]
+    fn names_lose_their_hash() {
+        assert_eq!(plain("_ZN4step13squirrel_step17h0123456789abcdefE"), "step::squirrel_step");
+        assert_eq!(plain("__aeabi_memcpy"), "__aeabi_memcpy");
     }
 
     #[test]

@@ -143,7 +143,7 @@ impl FailsafeState {
         &mut self,
         time_us: u64,
         elapsed_us: Option<u64>,
-        merged: &Merged,
+        merged: Merged,
         known: &Known,
     ) -> Failsafe {
         self.standing = if elapsed_us == Some(0) { self.standing.saturating_add(1) } else { 0 };
@@ -226,14 +226,15 @@ mod tests {
         }
         frame.attitude = Some(Rotation::from_euler(0.5 / 3.0 * (3.0 * t).sin(), 0.0, 0.0));
         let velocity = In::new(Vector3::new(3.0, 0.0, -2.0 + 0.01 * t));
-        frame.gnss =
-            (k % 30 == 0).then(|| Gnss { position: In::new(Vector3::new(3.0 * t, 0.0, -2.0 * t)), velocity });
-        frame.altitude_m = (k % 6 == 0).then_some(2.0 * t);
+        frame.gnss = k
+            .is_multiple_of(30)
+            .then(|| Gnss { position: In::new(Vector3::new(3.0 * t, 0.0, -2.0 * t)), velocity });
+        frame.altitude_m = k.is_multiple_of(6).then_some(2.0 * t);
         frame
     }
 
     fn stack() -> Stack {
-        stack_on(&ForceModel::FlatPlate, Mission::Hover { position: In::zero() })
+        stack_on(&ForceModel::FlatPlate, &Mission::Hover { position: In::zero() })
     }
 
     /// Two seconds well, three with a fault, two well again; the failsafe of every step.

@@ -173,7 +173,7 @@ impl Stack {
         let merged = frame.merge_into(&mut state.known);
         state.rejected = state.rejected.saturating_add(merged.rejected);
         let was = state.failsafe.active.mode;
-        let failsafe = state.failsafe.update(frame.time_us, elapsed_us, &merged, &state.known);
+        let failsafe = state.failsafe.update(frame.time_us, elapsed_us, merged, &state.known);
         if failsafe.mode != was || failsafe.mode != FailsafeMode::Off {
             self.forget(state, was);
         }
@@ -300,14 +300,14 @@ pub(crate) mod tests {
     }
 
     fn stack_that_believes(force_model: &ForceModel, form: AttitudeForm) -> Stack {
-        flying(force_model, form, Mission::Hover { position: In::zero() })
+        flying(force_model, form, &Mission::Hover { position: In::zero() })
     }
 
-    pub(crate) fn stack_on(force_model: &ForceModel, mission: Mission) -> Stack {
+    pub(crate) fn stack_on(force_model: &ForceModel, mission: &Mission) -> Stack {
         flying(force_model, AttitudeForm::Quaternion, mission)
     }
 
-    fn flying(force_model: &ForceModel, form: AttitudeForm, mission: Mission) -> Stack {
+    fn flying(force_model: &ForceModel, form: AttitudeForm, mission: &Mission) -> Stack {
         let attitude = AttitudeGains {
             form,
             c1_per_s: Vector3::new(9.0, 9.0, 4.0),
@@ -319,7 +319,7 @@ pub(crate) mod tests {
         };
         let twcc = TwccParameters { force_model: *force_model, ..twcc::fixtures::parameters() };
         let parameters = StackParameters { attitude, twcc };
-        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, mission).unwrap()
+        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, *mission).unwrap()
     }
 
     pub(crate) fn level(time_us: u64) -> SensorFrame {

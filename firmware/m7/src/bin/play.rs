@@ -33,9 +33,9 @@ struct Sequence {
 }
 
 impl Sequence {
-    fn new(stack: Stack) -> Self {
+    fn new(stack: &Stack) -> Self {
         Self {
-            stack,
+            stack: *stack,
             state: StackState::default(),
             steps: 0,
             hash: HASH_START,
@@ -47,11 +47,8 @@ impl Sequence {
 
     fn step(&mut self, counter: &mut Counter, frame: &SensorFrame, expected: u64) -> Option<()> {
         let (output, count) = counter.of(|| one_step(&self.stack, &mut self.state, frame));
-        if output.outer.is_some() {
-            self.outer.add(count)
-        } else {
-            self.inner.add(count)
-        }
+        let counts = if output.outer.is_some() { &mut self.outer } else { &mut self.inner };
+        counts.add(count);
         let mut buffer = [0; RECORD_MAX];
         let mut writer = Writer::new(&mut buffer);
         output.put(&mut writer);
@@ -104,7 +101,7 @@ fn play(counter: &mut Counter) -> Option<bool> {
         match Record::take(&mut Reader::new(record))? {
             Record::Setup(stack) => {
                 finish(&sequence)?;
-                sequence = Some(Sequence::new(stack));
+                sequence = Some(Sequence::new(&stack));
                 sequences += 1;
             }
             Record::Frame(frame, expected) => {

@@ -22,8 +22,7 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 
 static STACK: Option<Stack> = None;
 
-/// The name that the stack analysis starts from.
-#[unsafe(no_mangle)]
+/// The stack analysis starts here.
 #[inline(never)]
 fn squirrel_step(stack: &Stack, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
     if cfg!(feature = "may-panic") {

@@ -210,8 +210,8 @@ macro_rules! wire_enum {
     ($($name:ident { $($variant:ident),* $(,)? })*) => {$(
         impl Wire for $name {
             fn put(&self, to: &mut Writer<'_>) {
-                match self { $(Self::$variant => {})* }
                 const ALL: &[$name] = &[$($name::$variant),*];
+                match self { $(Self::$variant => {})* }
                 let place = ALL.iter().position(|one| one == self).unwrap_or(0);
                 (place as u8).put(to);
             }

@@ -27,7 +27,7 @@ fn programme() -> Mission {
 fn setups_frames_and_outputs_come_back() {
     let hover = Mission::Hover { position: In::zero() };
     for (model, mission) in [(ForceModel::FlatPlate, programme()), (ForceModel::Parnn(loud()), hover)] {
-        let stack = stack_on(&model, mission);
+        let stack = stack_on(&model, &mission);
         let there = bytes(&Record::Setup(stack));
         assert_eq!(back::<Record>(&there), Some(Record::Setup(stack)));
         let mut state = StackState::default();
@@ -43,7 +43,7 @@ fn setups_frames_and_outputs_come_back() {
 
 #[test]
 fn truncated_or_wrong_bytes_are_none() {
-    let stack = stack_on(&ForceModel::FlatPlate, programme());
+    let stack = stack_on(&ForceModel::FlatPlate, &programme());
     for whole in [bytes(&Record::Setup(stack)), bytes(&Record::Frame(level(0), 1))] {
         for end in 0..whole.len() {
             assert_eq!(back::<Record>(&whole[..end]), None, "{end}");
