@@ -63,7 +63,7 @@ fn ten_thousand_faults_are_survived_and_named() {
                 );
             }
             // A receiver speaks ten times a second, so its age may reach up to a period beyond the fault.
-            let well = at < fault.start_us || at > fault.end_us + 100_000 + RECOVERY_US + 10_000;
+            let well = at < fault.start_us || at > fault.end_us + 100_000 + u64::from(RECOVERY_US) + 10_000;
             if well {
                 assert_eq!(output.failsafe, Failsafe::default(), "{seed}: {fault:?}: {at}");
             }

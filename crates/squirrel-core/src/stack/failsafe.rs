@@ -18,15 +18,15 @@ use super::frame::{Heard, Merged};
 use nalgebra::Vector3;
 
 /// The inertial unit is lost after this time, us.
-pub const IMU_LIMIT_US: u64 = 100_000;
+pub const IMU_LIMIT_US: u32 = 100_000;
 /// The attitude is lost after this time, us.
-pub const ATTITUDE_LIMIT_US: u64 = 250_000;
+pub const ATTITUDE_LIMIT_US: u32 = 250_000;
 /// Position and velocity are lost after this time, us: a receiver at 1 Hz may be late by half a second.
-pub const GNSS_LIMIT_US: u64 = 1_500_000;
+pub const GNSS_LIMIT_US: u32 = 1_500_000;
 /// The altitude is lost after this time, us.
-pub const ALTITUDE_LIMIT_US: u64 = 1_000_000;
+pub const ALTITUDE_LIMIT_US: u32 = 1_000_000;
 /// A sensor must be well for this time before it is believed again, us.
-pub const RECOVERY_US: u64 = 200_000;
+pub const RECOVERY_US: u32 = 200_000;
 /// Thrust over weight of [`FailsafeMode::Level`]: the vehicle sinks, slowly at first.
 pub const LEVEL_THRUST_SHARE: f32 = 0.95;
 
@@ -90,26 +90,25 @@ pub struct Failsafe {
     pub reason: FailsafeReason,
 }
 
-/// When one sensor spoke last, and how often it said the same.
+/// How long one sensor has been silent, and how often it said the same.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Watch {
-    heard_us: Option<u64>,
+    /// Since the last valid reading, us; `None` before the first.
+    age_us: Option<u32>,
     repeats: u16,
 }
 
 impl Watch {
-    fn look(&mut self, time_us: u64, heard: Heard) {
+    fn look(&mut self, elapsed_us: u32, heard: Heard) {
         match heard {
-            Heard::Nothing => {}
-            Heard::Same => (self.heard_us, self.repeats) = (Some(time_us), self.repeats.saturating_add(1)),
-            Heard::New => (self.heard_us, self.repeats) = (Some(time_us), 0),
+            Heard::Nothing => self.age_us = self.age_us.map(|age| age.saturating_add(elapsed_us)),
+            Heard::Same => (self.age_us, self.repeats) = (Some(0), self.repeats.saturating_add(1)),
+            Heard::New => (self.age_us, self.repeats) = (Some(0), 0),
         }
-        // Time that runs backwards does not make a reading younger than now.
-        self.heard_us = self.heard_us.map(|heard| heard.min(time_us));
     }
 
-    fn is_lost(&self, time_us: u64, limit_us: u64) -> bool {
-        self.heard_us.is_some_and(|heard| time_us.saturating_sub(heard) > limit_us)
+    fn is_lost(&self, limit_us: u32) -> bool {
+        self.age_us.is_some_and(|age| age > limit_us)
     }
 }
 
@@ -131,27 +130,22 @@ pub struct FailsafeState {
     /// It should have changed since then; holds until it does.
     attitude_hangs: bool,
     altitude_hangs: bool,
-    /// When things were last as bad as `active` says, us.
-    bad_us: u64,
+    /// Since things were as bad as `active` says, us.
+    better_us: u32,
 }
 
 impl FailsafeState {
     /// Looks at what came of a frame.
     ///
     /// * `elapsed_us` - time since the last frame, `None` for the first, 0 if it did not go on
-    pub(super) fn update(
-        &mut self,
-        time_us: u64,
-        elapsed_us: Option<u64>,
-        merged: Merged,
-        known: &Known,
-    ) -> Failsafe {
+    pub(super) fn update(&mut self, elapsed_us: Option<u64>, merged: Merged, known: &Known) -> Failsafe {
         self.standing = if elapsed_us == Some(0) { self.standing.saturating_add(1) } else { 0 };
-        self.imu.look(time_us, merged.imu);
-        self.attitude.look(time_us, merged.attitude);
-        self.gnss.look(time_us, merged.gnss);
-        self.altitude.look(time_us, merged.altitude);
-        let dt_s = elapsed_us.unwrap_or(0).min(IMU_LIMIT_US) as u32 as f32 * 1e-6;
+        let elapsed_us = elapsed_us.map_or(0, |us| u32::try_from(us).unwrap_or(u32::MAX));
+        self.imu.look(elapsed_us, merged.imu);
+        self.attitude.look(elapsed_us, merged.attitude);
+        self.gnss.look(elapsed_us, merged.gnss);
+        self.altitude.look(elapsed_us, merged.altitude);
+        let dt_s = elapsed_us.min(IMU_LIMIT_US) as f32 * 1e-6;
         let omega = known.imu.map_or(Vector3::zeros(), |imu| imu.omega.vector);
         let climb_m_s = known.gnss.map_or(0.0, |gnss| -gnss.velocity.vector.z);
         self.turned_rad =
@@ -162,18 +156,16 @@ impl FailsafeState {
         self.altitude_hangs = self.altitude.repeats >= ALTITUDE_REPEATS
             && (self.altitude_hangs || self.climbed_m.abs() > CLIMBED_M);
 
-        let judged = self.judge(time_us, known);
-        self.bad_us = self.bad_us.min(time_us);
-        if judged.mode >= self.active.mode && judged.mode != FailsafeMode::Off {
-            self.bad_us = time_us;
-        }
-        if judged.mode >= self.active.mode || time_us - self.bad_us >= RECOVERY_US {
+        let judged = self.judge(known);
+        self.better_us =
+            if judged.mode < self.active.mode { self.better_us.saturating_add(elapsed_us) } else { 0 };
+        if judged.mode >= self.active.mode || self.better_us >= RECOVERY_US {
             self.active = judged;
         }
         self.active
     }
 
-    fn judge(&self, time_us: u64, known: &Known) -> Failsafe {
+    fn judge(&self, known: &Known) -> Failsafe {
         use {FailsafeMode as M, FailsafeReason as R};
         let turning = |omega: &Vector3<f32>| omega.norm_squared() > TURNING_RAD_S * TURNING_RAD_S;
         let imu_stuck = self.imu.repeats >= IMU_REPEATS
@@ -185,19 +177,19 @@ impl FailsafeState {
             && known.gnss.is_some_and(|g| g.velocity.vector.norm_squared() > MOVING_M_S * MOVING_M_S);
         let (mode, reason) = if self.standing >= CLOCK_REPEATS {
             (M::Cut, R::ClockStuck)
-        } else if self.imu.is_lost(time_us, IMU_LIMIT_US) {
+        } else if self.imu.is_lost(IMU_LIMIT_US) {
             (M::Cut, R::ImuLost)
         } else if imu_stuck {
             (M::Cut, R::ImuStuck)
-        } else if self.attitude.is_lost(time_us, ATTITUDE_LIMIT_US) {
+        } else if self.attitude.is_lost(ATTITUDE_LIMIT_US) {
             (M::Cut, R::AttitudeLost)
         } else if self.attitude_hangs {
             (M::Cut, R::AttitudeStuck)
-        } else if self.gnss.is_lost(time_us, GNSS_LIMIT_US) {
+        } else if self.gnss.is_lost(GNSS_LIMIT_US) {
             (M::Level, R::GnssLost)
         } else if gnss_stuck {
             (M::Level, R::GnssStuck)
-        } else if self.altitude.is_lost(time_us, ALTITUDE_LIMIT_US) || self.altitude_hangs {
+        } else if self.altitude.is_lost(ALTITUDE_LIMIT_US) || self.altitude_hangs {
             (M::Off, R::AltitudeLost)
         } else {
             (M::Off, R::None)

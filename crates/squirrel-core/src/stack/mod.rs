@@ -173,7 +173,7 @@ impl Stack {
         let merged = frame.merge_into(&mut state.known);
         state.rejected = state.rejected.saturating_add(merged.rejected);
         let was = state.failsafe.active.mode;
-        let failsafe = state.failsafe.update(frame.time_us, elapsed_us, merged, &state.known);
+        let failsafe = state.failsafe.update(elapsed_us, merged, &state.known);
         if failsafe.mode != was || failsafe.mode != FailsafeMode::Off {
             self.forget(state, was);
         }
