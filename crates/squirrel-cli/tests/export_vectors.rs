@@ -1,4 +1,5 @@
-//! `squirrel export-vectors`: the same bytes again, and only from logs that fly again bit for bit.
+//! `squirrel export-vectors`: the same bytes again, and only from logs that fly again bit for bit; `fly --hil` without its image.
+//! With it: `cargo xtask firmware`.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod support;
@@ -54,4 +55,13 @@ fn what_cannot_be_exported_is_named() {
     folder.fails(&["export-vectors", "broken.mcap", "--out", "v.bin"], &["broken.mcap"]);
     folder.fails(&["export-vectors", "f.mcap", "--out", "no/v.bin"], &["no/v.bin"]);
     folder.fails(&["export-vectors", ".", "--out", "v.bin"], &["broken.mcap"]);
+}
+
+#[test]
+fn an_emulator_without_its_image_is_named_before_anything_is_written() {
+    let folder = Folder::new("hil-errors");
+    folder.fails(
+        &["fly", "--hil", "qemu", "--hil-image", "none.elf", "--out", "f.mcap"],
+        &["none.elf: no such image", "cargo xtask firmware"],
+    );
 }

@@ -230,7 +230,7 @@ impl Played {
             let words: Vec<&str> = line.split(' ').collect();
             keep_largest("inner step, mean of the worst arm, instructions", number(&words, 6)?);
             keep_largest("inner step, worst, instructions", number(&words, 7)?);
-            // In the order of names: the learned force comes last but one.
+            // Sequences are in the order of `ARMS`.
             if i == LEARNED {
                 keep_largest("inner and outer step with paRNN, mean, instructions", number(&words, 10)?);
                 keep_largest("inner and outer step with paRNN, worst, instructions", number(&words, 11)?);
