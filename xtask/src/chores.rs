@@ -4,7 +4,7 @@
 //! the build scripts and procedural macros; `test`, `bench` and the demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
-use crate::{python, thumb, weights};
+use crate::{firmware, python, thumb, weights};
 use std::path::Path;
 use std::process::Command;
 
@@ -33,10 +33,11 @@ const LINT: [Step; 4] = [
     },
 ];
 
-const TEST: [Step; 6] = [
+const TEST: [Step; 7] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
+    Step { name: "firmware", action: Action::Function(firmware::check) },
     Step { name: "deny", action: Action::Function(deny) },
     Step {
         name: "demo",

@@ -3,6 +3,7 @@
 //! No dependency, so that the first command on a fresh machine starts within seconds. Talk goes to stderr.
 
 mod chores;
+mod firmware;
 mod fresh;
 mod png;
 mod python;
@@ -15,7 +16,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 8] = [
+const CHORES: [Chore; 9] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
@@ -26,6 +27,12 @@ const CHORES: [Chore; 8] = [
         chores::gap_bench,
     ),
     ("thumb", "", "check that the flight code compiles for a Cortex-M7 without std", thumb::chore),
+    (
+        "firmware",
+        "[--write]",
+        "the flight code on an emulated Cortex-M7: same bits, size, instructions; --write takes new figures",
+        firmware::chore,
+    ),
     (
         "weights",
         "[--write]",

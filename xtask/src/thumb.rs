@@ -8,9 +8,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const TARGET: &str = "thumbv7em-none-eabihf";
+/// The firmware's workspace, below the root.
+const FIRMWARE: &str = "firmware";
 const PACKAGE: [&str; 5] =
     ["check", "--release", "--locked", "--package=squirrel-core", "--no-default-features"];
-const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
+const DEBIAN_PACKAGES: [&str; 4] = ["rustc-web", "cargo-web", "rust-web-src", "lld"];
 const DEBIAN_SOURCES: &str = "/usr/lib/rustlib/src/rust/library/core";
 
 #[derive(Debug, PartialEq)]
@@ -51,6 +53,45 @@ pub(crate) fn check() -> Result<String, String> {
             Ok("core built from Debian's sources".to_owned())
         }
     }
+}
+
+/// Builds in the firmware's workspace for the target; the child's status, and its errors where they are kept.
+///
+/// # Errors
+/// No route on this machine.
+pub(crate) fn build(arguments: &[&str], keep_errors: bool) -> Result<std::process::Output, String> {
+    let route = choose(has_target, add_target, has_debian)?;
+    let mut command = match route {
+        Route::Plain => clean("cargo")?,
+        Route::Debian => clean("/usr/bin/cargo")?,
+    };
+    command.current_dir(root()?.join(FIRMWARE)).args(["build", "--release", "--locked"]);
+    command.arg("--target-dir").arg(folder(&route)?);
+    if route == Route::Debian {
+        command.envs([("RUSTC", "/usr/bin/rustc"), ("RUSTC_BOOTSTRAP", "1")]);
+        // The target names rust-lld, which Debian calls otherwise.
+        command.env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", "ld.lld").arg("-Zbuild-std=core");
+    }
+    command.args(arguments);
+    if !keep_errors {
+        command.stderr(std::process::Stdio::inherit());
+    }
+    command.output().map_err(|error| format!("cargo: {error}"))
+}
+
+/// Where [`build`] puts the images.
+///
+/// # Errors
+/// As [`root`].
+pub(crate) fn images() -> Result<PathBuf, String> {
+    let route = choose(has_target, || false, || true)?;
+    Ok(folder(&route)?.join(TARGET).join("release"))
+}
+
+/// A folder for each route: cargo does not notice that core comes from elsewhere.
+fn folder(route: &Route) -> Result<PathBuf, String> {
+    let target = root()?.join(FIRMWARE).join("target");
+    Ok(if *route == Route::Plain { target } else { target.join("debian") })
 }
 
 /// The first route that works; later ones are not tried.
@@ -131,7 +172,7 @@ mod tests {
     fn without_a_route_both_commands_are_named() {
         let error = choose(|| false, || false, || false).unwrap_err();
         assert!(error.contains("rustup target add thumbv7em-none-eabihf"), "{error}");
-        assert!(error.contains("apt install rustc-web cargo-web rust-web-src"), "{error}");
+        assert!(error.contains("apt install rustc-web cargo-web rust-web-src lld"), "{error}");
     }
 
     #[test]

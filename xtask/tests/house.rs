@@ -186,3 +186,12 @@ fn paths_are_told_from_code() {
     let expected = [("", "crates/a"), ("crates/a", "src/x/"), ("", ""), ("", "lib.rs")];
     assert_eq!(found, expected.map(|(base, path)| (base.to_owned(), path.to_owned())));
 }
+
+#[test]
+fn the_port_that_is_shown_is_the_port_that_is_compiled() {
+    let read = |path: &str| fs::read_to_string(root().join(path)).unwrap();
+    let (guide, source) = (read("docs/embedding.md"), read("firmware/m7/src/bin/port.rs"));
+    let shown = guide.split("```rust\n").nth(1).and_then(|rest| rest.split("\n```").next()).unwrap();
+    assert!(source.contains(shown), "docs/embedding.md shows another port than firmware/m7/src/bin/port.rs");
+    assert!(shown.lines().count() <= 32, "{} lines", shown.lines().count());
+}

@@ -31,6 +31,8 @@ enum Command {
     Train(commands::train::Train),
     /// Run a log's inputs through the flight code again and compare every bit.
     Replay(commands::replay::Replay),
+    /// Write the sensor frames of flights, and the hash of every output, for a target without files.
+    ExportVectors(commands::export_vectors::ExportVectors),
     /// Turn a foreign log into a flight log, or recover a truncated one.
     Import(commands::import::Import),
     /// Find where simulation and measurement disagree.
@@ -58,6 +60,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Study(study) => study.run(),
         Command::Train(train) => train.run(),
         Command::Replay(replay) => replay.run(),
+        Command::ExportVectors(export) => export.run(),
         Command::Import(import) => import.run(),
         Command::Gap(gap) => gap.run(),
         Command::Vehicle(vehicle) => vehicle.run(),

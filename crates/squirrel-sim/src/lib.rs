@@ -2,10 +2,12 @@
 //!
 //! - [`flight`] closes the loop: [`plant`] (and [`world`] near contact) moves, [`sensors`] measure, the flight code of
 //!   `squirrel-core` commands, the log records. [`replay`] runs the flight code again on a log's inputs.
-//! - [`vehicle_file`], [`weights`] and [`scenario`] read what to fly; [`arm`] says who flies.
+//! - [`vehicle_file`], [`weights`] and [`scenario`] read what to fly; [`arm`] says who flies; [`faults`] breaks sensors in
+//!   recorded frames.
 //! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it.
 
 pub mod arm;
+pub mod faults;
 pub mod flight;
 pub mod import;
 pub mod log;

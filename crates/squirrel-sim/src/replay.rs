@@ -12,8 +12,9 @@ use crate::weights::ParnnWeights;
 use squirrel_core::stack::StackState;
 
 /// Sources that the flight code writes, causes before consequences: of two that differ at one time, the first is named.
-pub const OUTPUT_SOURCES: [&str; 8] = [
+pub const OUTPUT_SOURCES: [&str; 9] = [
     "control.status",
+    "control.failsafe",
     "reference",
     "control.excitation",
     "control.parnn",

@@ -1,5 +1,6 @@
 //! `squirrel fly`: one scenario, one arm, one log.
 
+use super::hil::EmulatedM7;
 use super::{facts, figures, vehicle, view, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
@@ -30,6 +31,12 @@ pub(crate) struct Fly {
     /// rk4 (rapier near contact), or rapier throughout (first order).
     #[arg(long, default_value = "rk4")]
     integrator: String,
+    /// Run the flight code elsewhere: qemu, an emulated Cortex-M7.
+    #[arg(long)]
+    hil: Option<Hil>,
+    /// Image for --hil, as `cargo xtask firmware` builds it.
+    #[arg(long, default_value = "firmware/target/thumbv7em-none-eabihf/release/link")]
+    hil_image: PathBuf,
     /// Flight log to write.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -39,6 +46,12 @@ pub(crate) struct Fly {
     /// Write the figures here as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
+}
+
+/// Where the flight code may run instead of here.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+enum Hil {
+    Qemu,
 }
 
 #[derive(Serialize)]
@@ -69,13 +82,19 @@ impl Fly {
             scenario,
             integrator: Integrator::parse(&self.integrator)?,
         };
-        setup.stack().map_err(|e| match &self.vehicle {
+        let stack = setup.stack().map_err(|e| match &self.vehicle {
             Some(file) => format!("{}: {e}", file.display()),
             None => e.to_string(),
         })?;
         let record = self.out.is_some() || self.report.is_some();
         let bar = output::progress((setup.scenario.duration_s * 10.0) as u64, "x 0.1 s");
-        let flown = setup.fly(record, |t| bar.set_position((t * 10.0) as u64));
+        let progress = |t: f64| bar.set_position((t * 10.0) as u64);
+        let flown = match self.hil {
+            None => setup.fly(record, progress),
+            Some(Hil::Qemu) => {
+                setup.fly_on(&mut EmulatedM7::start(&self.hil_image, &stack)?, record, progress)
+            }
+        };
         bar.finish_and_clear();
         let mut flight = flown.map_err(|e| e.to_string())?;
         let ratio = setup.thrust_to_weight();

@@ -1,8 +1,10 @@
 //! One file a command.
 
 pub(crate) mod demo;
+pub(crate) mod export_vectors;
 pub(crate) mod fly;
 pub(crate) mod gap;
+pub(crate) mod hil;
 pub(crate) mod import;
 pub(crate) mod replay;
 pub(crate) mod study;

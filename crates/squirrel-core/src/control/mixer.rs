@@ -170,7 +170,7 @@ impl Mixer {
         let torque = demand.torque_n_m.map(finite);
         let yaw = if self.yaw_unit_n_m > 0.0 { torque.z / self.yaw_unit_n_m } else { 0.0 };
         let mut tilt = [0.0; MAX_ROTORS];
-        for i in 0..self.count {
+        for i in 0..self.rotors() {
             tilt[i] = self.roll[i] * torque.x + self.pitch[i] * torque.y;
         }
         let (mut s, mut u, mut y) = (1.0, thrust, yaw);
@@ -186,12 +186,17 @@ impl Mixer {
         self.terms(&tilt, s, u, y, saturated)
     }
 
+    /// Number of rotors, with the bound that [`Vehicle`] keeps: here the compiler sees that no loop leaves an array.
+    fn rotors(&self) -> usize {
+        self.count.min(MAX_ROTORS)
+    }
+
     fn rotor_thrust(&self, tilt: &PerRotor<f32>, i: usize, s: f32, u: f32, y: f32) -> f32 {
         s * tilt[i] + u * self.collective[i] + y * self.yaw[i]
     }
 
     fn fits(&self, tilt: &PerRotor<f32>, s: f32, u: f32, y: f32) -> bool {
-        (0..self.count).all(|i| {
+        (0..self.rotors()).all(|i| {
             let f = self.rotor_thrust(tilt, i, s, u, y);
             f >= 0.0 && f <= self.thrust_max_n
         })
@@ -200,7 +205,7 @@ impl Mixer {
     /// Yaw values that keep every rotor within its limits at a given share and thrust.
     fn yaw_interval(&self, tilt: &PerRotor<f32>, s: f32, u: f32) -> Interval {
         let mut range = Interval::ALL;
-        for i in 0..self.count {
+        for i in 0..self.rotors() {
             let rest = self.rotor_thrust(tilt, i, s, u, 0.0);
             if self.yaw[i].abs() <= FLAT {
                 if rest < -1e-5 || rest > self.thrust_max_n + 1e-5 {
@@ -224,7 +229,7 @@ impl Mixer {
                 used += 1;
             }
         };
-        for i in 0..self.count {
+        for i in 0..self.rotors() {
             let (a, b, c) = (tilt[i], self.collective[i], self.yaw[i]);
             if c.abs() <= FLAT {
                 add(HalfPlane { slope_s: a, slope_u: b, bound: self.thrust_max_n });
@@ -232,7 +237,7 @@ impl Mixer {
                 continue;
             }
             let floor = if c > 0.0 { 0.0 } else { self.thrust_max_n };
-            for j in 0..self.count {
+            for j in 0..self.rotors() {
                 if i == j || self.yaw[j].abs() <= FLAT {
                     continue;
                 }
@@ -246,7 +251,7 @@ impl Mixer {
                 });
             }
         }
-        let planes = &planes[..used];
+        let planes = planes.get(..used).unwrap_or(&[]);
         let at_share = |s: f32| {
             let mut range = Interval::ALL;
             for p in planes {
@@ -262,7 +267,7 @@ impl Mixer {
     fn terms(&self, tilt: &PerRotor<f32>, s: f32, u: f32, y: f32, saturated: bool) -> MixerTerms {
         let mut rotor_thrust_n = [0.0; MAX_ROTORS];
         let mut sum = [0.0; 4];
-        for i in 0..self.count {
+        for i in 0..self.rotors() {
             let f = limit(self.rotor_thrust(tilt, i, s, u, y), 0.0, self.thrust_max_n);
             rotor_thrust_n[i] = f;
             for (total, row) in sum.iter_mut().zip(&self.effectiveness) {

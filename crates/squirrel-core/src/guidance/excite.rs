@@ -101,17 +101,17 @@ pub struct Excitation {
 
 /// One sine.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Line {
-    frequency_hz: f32,
-    amplitude: f32,
+pub(crate) struct Line {
+    pub(crate) frequency_hz: f32,
+    pub(crate) amplitude: f32,
     /// In turns.
-    phase: f32,
+    pub(crate) phase: f32,
 }
 
 /// Sums of sines on roll, pitch, yaw and thrust.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Multisine {
-    lines: [[Line; LINES]; 4],
+    pub(crate) lines: [[Line; LINES]; 4],
 }
 
 impl Multisine {
@@ -197,7 +197,7 @@ impl Multisine {
 /// Legs and a multisine on top.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Programme {
-    start: In<Ned, f32>,
+    pub(crate) start: In<Ned, f32>,
     legs: [Leg; MAX_LEGS],
     count: usize,
     multisine: Multisine,

@@ -78,42 +78,68 @@ impl SensorFrame {
         }
     }
 
-    /// Takes over what is valid; returns how many measurements were rejected.
-    pub(super) fn merge_into(&self, known: &mut Known) -> u32 {
+    /// Takes over what is valid, and says what came of it.
+    pub(super) fn merge_into(&self, known: &mut Known) -> Merged {
         let mut rejected = 0;
         let mut accept = |valid: bool| {
             rejected += u32::from(!valid);
             valid
         };
-        if let Some(imu) = self.imu {
+        let imu = self.imu.filter(|imu| {
             let rate_ok = imu.omega.vector.iter().all(|x| x.abs() <= RATE_MAX_RAD_S);
-            if accept(rate_ok && all_finite(&imu.specific_force.vector)) {
-                known.imu = Some(imu);
-            }
-        }
-        if let Some(attitude) = self.attitude {
-            let norm = attitude.quaternion.norm_squared();
-            if accept((norm - 1.0).abs() < 1e-3) {
-                known.attitude = Some(attitude);
-            }
-        }
-        if let Some(gnss) = self.gnss {
+            accept(rate_ok && all_finite(&imu.specific_force.vector))
+        });
+        let attitude = self.attitude.filter(|q| accept((q.quaternion.norm_squared() - 1.0).abs() < 1e-3));
+        let gnss = self.gnss.filter(|gnss| {
             let position_ok = gnss.position.vector.iter().all(|x| x.abs() <= POSITION_MAX_M);
             let velocity_ok = gnss.velocity.vector.iter().all(|x| x.abs() <= VELOCITY_MAX_M_S);
-            if accept(position_ok && velocity_ok) {
-                known.gnss = Some(gnss);
-            }
-        }
-        if let Some(altitude) = self.altitude_m
-            && accept(altitude.abs() <= POSITION_MAX_M)
-        {
-            known.altitude_m = Some(altitude);
-        }
+            accept(position_ok && velocity_ok)
+        });
+        let altitude_m = self.altitude_m.filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
         if let Some(force) = self.wing_force
             && accept(all_finite(&force.vector))
         {
             known.wing_force = Some(force);
         }
-        rejected
+        Merged {
+            imu: Heard::replace(&mut known.imu, imu),
+            attitude: Heard::replace(&mut known.attitude, attitude),
+            gnss: Heard::replace(&mut known.gnss, gnss),
+            altitude: Heard::replace(&mut known.altitude_m, altitude_m),
+            rejected,
+        }
     }
+}
+
+/// What a frame brought of one sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Heard {
+    /// Nothing, or nothing valid.
+    Nothing,
+    /// What was known already, bit for bit.
+    Same,
+    /// A new reading.
+    New,
+}
+
+impl Heard {
+    fn replace<T: PartialEq>(known: &mut Option<T>, reading: Option<T>) -> Self {
+        if reading.is_none() {
+            return Self::Nothing;
+        }
+        let heard = if reading == *known { Self::Same } else { Self::New };
+        *known = reading;
+        heard
+    }
+}
+
+/// What came of a frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Merged {
+    pub(super) imu: Heard,
+    pub(super) attitude: Heard,
+    pub(super) gnss: Heard,
+    pub(super) altitude: Heard,
+    /// Measurements that were not finite, or larger than any flight.
+    pub(super) rejected: u32,
 }

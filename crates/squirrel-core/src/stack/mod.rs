@@ -5,11 +5,13 @@
 //!   10 Hz:  guidance -> TWCC (PC, WOEG, WIIC) -> roll, pitch, thrust, wings
 //!   300 Hz: command filter (+ excitation) -> integral backstepping -> mixer -> rotor commands
 //! ```
-//! [`Stack`] is constant in flight; [`StackState`] is everything that changes, one plain struct that can be frozen, logged
+//! When a sensor is gone or hangs, [`failsafe`] levels or cuts. [`Stack`] is constant in flight; [`StackState`] is everything that changes, one plain struct that can be frozen, logged
 //! and thawed. Time comes in with the frame. A step never panics, allocates or loops without bound; a measurement that is
 //! not finite is rejected and the last valid one kept.
 
+pub mod failsafe;
 mod frame;
+pub mod wire;
 
 pub use frame::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
 
@@ -25,6 +27,7 @@ use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
 use crate::math::lower;
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
+use failsafe::{Failsafe, FailsafeMode, FailsafeReason, FailsafeState, LEVEL_THRUST_SHARE};
 use nalgebra::Vector3;
 
 /// Period of the outer loop, us.
@@ -73,6 +76,8 @@ pub struct StackState {
     pub time_us: Option<u64>,
     /// Number of the outer period that was handled last.
     pub outer_index: Option<u64>,
+    /// Which sensors can be believed.
+    pub failsafe: FailsafeState,
     /// Guidance.
     pub mission: MissionState,
     /// Outer loop.
@@ -102,9 +107,11 @@ pub struct StackOutput {
     pub reference: Reference,
     /// Measurements rejected so far.
     pub rejected: u32,
+    /// Whether the mission flies, or what instead, and why.
+    pub failsafe: Failsafe,
     /// The outer loop, where it ran in this step.
     pub outer: Option<TwccTerms>,
-    /// The inner loop, once attitude and rate are known; rotors stand still before that. Until the first fix it asks for no
+    /// The inner loop, once attitude and rate are known; rotors stand still before that and while the failsafe cuts. Until the first fix it asks for no
     /// thrust, and rotors only turn as far as levelling takes.
     pub inner: Option<InnerTerms>,
 }
@@ -161,9 +168,15 @@ impl Stack {
 
     /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any frame.
     pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
-        let elapsed_us = state.time_us.map_or(0, |last| frame.time_us.saturating_sub(last));
+        let elapsed_us = state.time_us.map(|last| frame.time_us.saturating_sub(last));
         state.time_us = Some(frame.time_us);
-        state.rejected = state.rejected.saturating_add(frame.merge_into(&mut state.known));
+        let merged = frame.merge_into(&mut state.known);
+        state.rejected = state.rejected.saturating_add(merged.rejected);
+        let was = state.failsafe.active.mode;
+        let failsafe = state.failsafe.update(elapsed_us, merged, &state.known);
+        if failsafe.mode != was || failsafe.mode != FailsafeMode::Off {
+            self.forget(state, was);
+        }
 
         let outer_index = frame.time_us / OUTER_PERIOD_US;
         let outer = if state.outer_index == Some(outer_index) {
@@ -171,11 +184,16 @@ impl Stack {
         } else {
             let periods = state.outer_index.map_or(1, |last| outer_index.saturating_sub(last));
             state.outer_index = Some(outer_index);
-            self.outer(state, frame, lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6)
+            let dt_s = lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6;
+            if failsafe.mode == FailsafeMode::Off { self.outer(state, frame, dt_s) } else { None }
         };
         let reference = self.mission.reference(&state.mission, frame.time_us);
-        let dt_s = lower(elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
-        let inner = self.inner(state, frame.time_us, reference.yaw_rad, dt_s);
+        let dt_s = lower(elapsed_us.unwrap_or(0) as f32 * 1e-6, INNER_STEP_MAX_S);
+        let inner = if failsafe.mode == FailsafeMode::Cut {
+            None
+        } else {
+            self.inner(state, frame.time_us, reference.yaw_rad, dt_s)
+        };
         let mut rotor_command = [0.0; MAX_ROTORS];
         let propulsion = &self.vehicle.parameters().propulsion;
         for (i, command) in rotor_command.iter_mut().take(self.vehicle.rotors().len()).enumerate() {
@@ -187,15 +205,33 @@ impl Stack {
             wing_command: [state.wing_command; 2],
             reference,
             rejected: state.rejected,
+            failsafe,
             outer,
             inner,
+        }
+    }
+
+    /// What flies while the failsafe acts, and what control resumes from afterwards.
+    fn forget(&self, state: &mut StackState, was: FailsafeMode) {
+        let thrust_n = LEVEL_THRUST_SHARE * self.vehicle.weight_n();
+        state.command = AttitudeThrust { thrust_n, ..AttitudeThrust::default() };
+        state.wing_command = 0.0;
+        state.twcc = TwccState::default();
+        if was == FailsafeMode::Cut {
+            // It may have turned over meanwhile; the filter leads back from there.
+            let (roll, pitch, yaw) = state.known.attitude.map_or((0.0, 0.0, 0.0), |a| a.euler());
+            state.filter =
+                EulerReference { angle: Vector3::new(roll, pitch, yaw), ..EulerReference::default() };
+            state.attitude = AttitudeState::default();
         }
     }
 
     fn outer(&self, state: &mut StackState, frame: &SensorFrame, dt_s: f32) -> Option<TwccTerms> {
         let (Some(gnss), Some(ned_from_body)) = (state.known.gnss, state.known.attitude) else { return None };
         let mut position = gnss.position;
-        if let Some(altitude) = state.known.altitude_m {
+        if let Some(altitude) = state.known.altitude_m
+            && state.failsafe.active.reason != FailsafeReason::AltitudeLost
+        {
             position.vector.z = -altitude;
         }
         self.mission.sense(&mut state.mission, frame.time_us, position, gnss.velocity, frame.obstacles());
@@ -250,7 +286,7 @@ impl Stack {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::control::backstepping::AttitudeForm;
     use crate::control::twcc;
@@ -264,6 +300,14 @@ mod tests {
     }
 
     fn stack_that_believes(force_model: &ForceModel, form: AttitudeForm) -> Stack {
+        flying(force_model, form, &Mission::Hover { position: In::zero() })
+    }
+
+    pub(crate) fn stack_on(force_model: &ForceModel, mission: &Mission) -> Stack {
+        flying(force_model, AttitudeForm::Quaternion, mission)
+    }
+
+    fn flying(force_model: &ForceModel, form: AttitudeForm, mission: &Mission) -> Stack {
         let attitude = AttitudeGains {
             form,
             c1_per_s: Vector3::new(9.0, 9.0, 4.0),
@@ -275,11 +319,10 @@ mod tests {
         };
         let twcc = TwccParameters { force_model: *force_model, ..twcc::fixtures::parameters() };
         let parameters = StackParameters { attitude, twcc };
-        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, Mission::Hover { position: In::zero() })
-            .unwrap()
+        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, *mission).unwrap()
     }
 
-    fn level(time_us: u64) -> SensorFrame {
+    pub(crate) fn level(time_us: u64) -> SensorFrame {
         let mut frame = SensorFrame::empty(time_us);
         frame.imu =
             Some(Imu { omega: In::zero(), specific_force: In::new(Vector3::new(0.0, 0.0, -9.80665)) });
@@ -360,7 +403,8 @@ mod tests {
         for k in 0..20u64 {
             let mut f = level(k * OUTER_PERIOD_US);
             let x = if k == 15 { f32::NAN } else { 6.0 };
-            f.gnss = Some(Gnss { position: In::zero(), velocity: In::new(Vector3::new(x, 0.0, 2.0)) });
+            let position = In::new(Vector3::new(0.6 * k as f32, 0.0, 0.0));
+            f.gnss = Some(Gnss { position, velocity: In::new(Vector3::new(x, 0.0, 2.0)) });
             let output = stack.step(&mut state, &f);
             let outer = output.outer.unwrap();
             assert!(crate::math::all_finite(&outer.wing_force.vector), "{k}: {outer:?}");

@@ -252,7 +252,7 @@ impl<T: Real> Vehicle<T> {
     }
     /// The rotors in command order.
     pub fn rotors(&self) -> &[Rotor<T>] {
-        &self.parameters.rotors[..self.parameters.rotor_count]
+        self.parameters.rotors.get(..self.parameters.rotor_count).unwrap_or(&[])
     }
     /// Number of blocks of [`ROTOR_BLOCK`] that hold all rotors.
     #[inline(always)]

@@ -58,6 +58,11 @@ impl<T: Real> ThrustCurve<T> {
         self.a
     }
 
+    /// Top of the fitted range, V.
+    pub fn voltage_max_v(&self) -> T {
+        self.voltage_max_v
+    }
+
     /// Thrust at an applied voltage, N, not below 0.
     pub fn thrust_n(&self, voltage_v: T) -> T {
         crate::math::upper(self.raw(voltage_v), T::zero())

@@ -26,7 +26,7 @@ use squirrel_core::frames::{In, Ned};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::Vector3;
-use squirrel_core::stack::{MAX_OBSTACLES, Stack, StackState};
+use squirrel_core::stack::{MAX_OBSTACLES, SensorFrame, Stack, StackOutput, StackState};
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
 
 /// Rate of the flight code, Hz (paper, section III.A).
@@ -62,6 +62,27 @@ pub struct Flight {
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub struct FlightError(pub String);
+
+/// Where the flight code runs: in this process, or somewhere that takes frames and gives outputs.
+pub trait FlightComputer {
+    /// One step: its output, and how many obstacles were met so far.
+    ///
+    /// # Errors
+    /// Where the computer does not answer.
+    fn step(&mut self, frame: &SensorFrame) -> Result<(StackOutput, u32), FlightError>;
+}
+
+struct InProcess {
+    stack: Stack,
+    state: StackState,
+}
+
+impl FlightComputer for InProcess {
+    fn step(&mut self, frame: &SensorFrame) -> Result<(StackOutput, u32), FlightError> {
+        let output = self.stack.step(&mut self.state, frame);
+        Ok((output, self.state.mission.encounters))
+    }
+}
 
 impl Setup {
     /// The flight code of this setup.
@@ -109,9 +130,23 @@ impl Setup {
     ///
     /// # Errors
     /// A setup that cannot be used, or a plant that left the finite numbers.
-    pub fn fly(&self, record: bool, mut progress: impl FnMut(f64)) -> Result<Flight, FlightError> {
+    pub fn fly(&self, record: bool, progress: impl FnMut(f64)) -> Result<Flight, FlightError> {
         self.scenario.check().map_err(FlightError)?;
-        let stack = self.stack()?;
+        let mut here = InProcess { stack: self.stack()?, state: StackState::default() };
+        self.fly_on(&mut here, record, progress)
+    }
+
+    /// As [`Setup::fly`], with the flight code on `computer`, which has this setup's [`Setup::stack`].
+    ///
+    /// # Errors
+    /// As [`Setup::fly`], and where the computer does not answer.
+    pub fn fly_on(
+        &self,
+        computer: &mut dyn FlightComputer,
+        record: bool,
+        mut progress: impl FnMut(f64),
+    ) -> Result<Flight, FlightError> {
+        self.scenario.check().map_err(FlightError)?;
         let dt_s = PLANT_STEP_US as f64 * 1e-6;
         let plant = Plant::new(
             self.vehicle.vehicle,
@@ -130,7 +165,6 @@ impl Setup {
         }
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.vehicle.sensors, plant.effects(), seed);
-        let mut stack_state = StackState::default();
         let mut metrics = metrics::Meter::new(&self.scenario);
         let mut recorder = record.then(|| record::Recorder::new(self, plant.vehicle().rotors().len()));
         let hover = Command { rotor: [hover_command(plant.vehicle()); MAX_ROTORS], wing: [0.0; 2] };
@@ -156,7 +190,7 @@ impl Setup {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
-                let output = stack.step(&mut stack_state, &frame);
+                let (output, encounters) = computer.step(&frame)?;
                 if !state.body.is_finite() {
                     return Err(FlightError(format!(
                         "at {:.3} s the vehicle's state is not finite",
@@ -165,7 +199,7 @@ impl Setup {
                 }
                 let rotor = output.rotor_command.map(f64::from);
                 commands.send(time_us, Command { rotor, wing: output.wing_command.map(f64::from) });
-                metrics.tick(time_us, &state, &output, stack_state.mission.encounters);
+                metrics.tick(time_us, &state, &output, encounters);
                 if let Some(recorder) = &mut recorder {
                     recorder.tick(
                         &frame,

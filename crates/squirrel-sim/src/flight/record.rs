@@ -13,6 +13,7 @@ use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::rnn::parnn::Estimate;
+use squirrel_core::stack::failsafe::Failsafe;
 use squirrel_core::stack::{Gnss, Imu, MAX_OBSTACLES, SensorFrame, StackOutput};
 
 /// Sources that the flight code reads. `frame` has a sample for each step of the flight code.
@@ -171,6 +172,13 @@ pub(crate) fn record_output(
         ],
     );
     log.source_mut("control.status").push(t, &[("rejected", &[f64::from(output.rejected)])]);
+    // A source of its own, so that a flight without a fault has the log that it always had.
+    if output.failsafe != Failsafe::default() {
+        let Failsafe { mode, reason } = output.failsafe;
+        let rows: &[(&str, &[f64])] =
+            &[("mode", &[f64::from(mode as u8)]), ("reason", &[f64::from(reason as u8)])];
+        log.source_mut("control.failsafe").push(t, rows);
+    }
     if let Some(outer) = &output.outer {
         if let Some(terms) = &outer.parnn {
             record_parnn(log, t, terms);
