@@ -37,7 +37,7 @@ const TEST: [Step; 7] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
-    Step { name: "firmware", action: Action::Function(firmware::check) },
+    Step { name: "firmware", action: Action::Function(firmware::step) },
     Step { name: "deny", action: Action::Function(deny) },
     Step {
         name: "demo",

@@ -114,7 +114,11 @@ fn sag_that_the_model_lacks_grows_as_the_voltage_falls() {
 #[test]
 fn a_wrong_wing_shows_where_it_is_open() {
     let vehicle = VehicleFile::squirrel();
-    let model = squirrel_with(&[("value = 0.02, sd = 0.0002", "value = 0.04, sd = 0.0002")]);
+    // Weights of another area are refused.
+    let model = squirrel_with(&[
+        ("value = 0.02, sd = 0.0002", "value = 0.04, sd = 0.0002"),
+        ("parnn_weights = \"squirrel-parnn.safetensors\"", ""),
+    ]);
     let log = fly(&vehicle, "avoid", Arm::TwccFlat);
     let (time_s, wing) = log.channel("wing.command").unwrap();
     let opens = (0..time_s.len()).find(|&i| wing.row(i)[0] > 0.5).map(|i| time_s[i]).unwrap();
