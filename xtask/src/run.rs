@@ -20,6 +20,15 @@ pub(crate) enum Action {
     Function(fn() -> Result<String, String>),
 }
 
+/// Installs Debian's packages where nobody can be asked, on CI as root; whether it did.
+pub(crate) fn installed_on_ci(packages: &[&str]) -> bool {
+    let apt = |arguments: &[&str]| succeeds(Command::new("apt-get").arg("--quiet").args(arguments));
+    std::env::var_os("CI").is_some()
+        && output(Command::new("id").arg("-u")).as_deref() == Some("0")
+        && apt(&["update"])
+        && apt(&[&["install", "--yes", "--no-install-recommends"], packages].concat())
+}
+
 /// Runs the steps until the first that fails.
 ///
 /// # Errors

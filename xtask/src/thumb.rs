@@ -3,7 +3,7 @@
 //! The target's core library comes from rustup, or, where rustup cannot download, from the library sources that Debian
 //! packages; Debian's own compiler must then compile them, for sources and compiler have to be of one version.
 
-use crate::run::{call, output, root, succeeds, target_directory};
+use crate::run::{call, installed_on_ci, output, root, target_directory};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -143,14 +143,7 @@ fn has_debian() -> bool {
         Path::new(DEBIAN_SOURCES).is_dir()
             && ["/usr/bin/cargo", "/usr/bin/rustc"].iter().all(|path| Path::new(path).exists())
     };
-    let root_on_ci =
-        || std::env::var_os("CI").is_some() && output(Command::new("id").arg("-u")).as_deref() == Some("0");
-    let apt = |arguments: &[&str]| succeeds(Command::new("apt-get").arg("--quiet").args(arguments));
-    let install = || {
-        apt(&["update"])
-            && apt(&[&["install", "--yes", "--no-install-recommends"], &DEBIAN_PACKAGES[..]].concat())
-    };
-    there() || (root_on_ci() && install() && there())
+    there() || (installed_on_ci(&DEBIAN_PACKAGES) && there())
 }
 
 #[cfg(test)]

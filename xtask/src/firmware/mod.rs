@@ -10,7 +10,7 @@
 mod elf;
 mod stack;
 
-use crate::run::{call, cargo, output, root, succeeds, target_directory};
+use crate::run::{call, cargo, installed_on_ci, root, succeeds, target_directory};
 use crate::thumb;
 use elf::Elf;
 use std::collections::BTreeMap;
@@ -136,11 +136,7 @@ fn measure() -> Result<Figures, String> {
 /// Looks for the emulator. Where nobody can be asked, on CI as root, it is installed.
 fn emulator() -> Result<(), String> {
     let there = || succeeds(Command::new(QEMU).arg("--version"));
-    let apt = |arguments: &[&str]| succeeds(Command::new("apt-get").arg("--quiet").args(arguments));
-    let root_on_ci =
-        || std::env::var_os("CI").is_some() && output(Command::new("id").arg("-u")).as_deref() == Some("0");
-    let install = || apt(&["update"]) && apt(&["install", "--yes", "--no-install-recommends", QEMU]);
-    if there() || (root_on_ci() && install() && there()) {
+    if there() || (installed_on_ci(&[QEMU]) && there()) {
         return Ok(());
     }
     Err(format!("no {QEMU}; install it by\n    apt install {QEMU}"))

@@ -242,8 +242,7 @@ impl<'a> Predictor<'a> {
         let paths = self.paths.of(&plant, &self.tracks, &self.commands, |t| stride(plant.effects(), t));
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
-            let skip = flight.is_some_and(|flight| flight != track.flight);
-            if skip {
+            if flight.is_some_and(|flight| flight != track.flight) {
                 while segments.next_if(|s| s.piece == piece).is_some() {}
                 continue;
             }
