@@ -6,6 +6,7 @@
 //! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it.
 
 pub mod arm;
+pub mod batch;
 pub mod flight;
 pub mod import;
 pub mod log;

@@ -1,0 +1,3 @@
+//! Many vehicles at once: the registers that they lie in.
+
+pub mod simd;
