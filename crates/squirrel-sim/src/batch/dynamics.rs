@@ -22,7 +22,7 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Advance<'_, S, ROTORS> {
     #[inline(always)]
     fn run<L: Lanes<Weight = S>>(self) {
         let dt = self.dt_s;
-        let zero = dt - dt;
+        let zero = real(0.0);
         match self.scheme {
             Scheme::Euler => advance::<L, ROTORS, 1>(self.blocks, self.steps, [[zero, dt]]),
             Scheme::Rk4 => {
