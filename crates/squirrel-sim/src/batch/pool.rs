@@ -10,9 +10,10 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 
-/// Looks at the ticket before a thread parks or the caller yields: about a millisecond, longer than what usually happens
-/// between two steps.
+/// Looks at the ticket before a thread parks: about a millisecond, longer than what usually happens between two steps.
 const SPINS: usize = 20_000;
+/// Looks of the caller at what is left before it yields: who still holds a chunk may need this very core.
+const CALLER_SPINS: usize = 500;
 
 /// Chunks `C`, and threads that do jobs `J` on them.
 #[derive(Debug)]
@@ -137,7 +138,7 @@ impl<C: Send + 'static, J: Copy + Send + 'static> Pool<C, J> {
         let mut spins = 0;
         while self.shared.done.load(Ordering::Acquire) < self.shared.chunks.len() {
             spins += 1;
-            if spins < SPINS { spin_loop() } else { thread::yield_now() }
+            if spins < CALLER_SPINS { spin_loop() } else { thread::yield_now() }
         }
     }
 
