@@ -12,7 +12,7 @@
 //!
 //! let vehicle = VehicleFile::squirrel().vehicle.cast::<f32>()?;
 //! let mut batch: Batch<f32> = Batch::new(&[vehicle; 100], Settings::default())?;
-//! batch.command(&[0.5; 100 * 4])?; // four rotors each, in the unit that the vehicle declares
+//! batch.command(&[0.8; 100 * 4])?; // four rotors each, in the unit that the vehicle declares
 //! batch.step(1000);
 //! assert!(batch.state(7)?.position.vector.z < 0.0, "climbs");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
