@@ -22,6 +22,8 @@ fn settings_that_cannot_work() {
     for (dt_s, text) in [(0.0, "0"), (-1.0, "-1"), (f64::NAN, "NaN"), (f64::INFINITY, "inf")] {
         assert_eq!(refused(1, |s| s.dt_s = dt_s), format!("dt_s = {text}: must be finite and > 0"));
     }
+    let text = refused(1, |s| s.dt_s = 1e-60);
+    assert!(text.ends_with("must be finite and > 0"), "nothing in f32: {text}");
     let text = refused(2, |s| s.dt_s = 0.5);
     assert!(
         text.starts_with("vehicles[0]: dt_s = 0.5 must be at most twice propulsion.time_constant_"),
@@ -44,7 +46,7 @@ fn states_that_are_none() {
     state.attitude.w = 0.5;
     let text = batch.reset(1, &state).unwrap_err().to_string();
     assert_eq!(text, "attitude of vehicle 1: norm 0.5, must be 1 to within 1e-3");
-    let text = batch.wind(2, In::new(Vector3::new(0.0, f32::INFINITY, 0.0))).unwrap_err().to_string();
+    let text = batch.set_wind(2, In::new(Vector3::new(0.0, f32::INFINITY, 0.0))).unwrap_err().to_string();
     assert_eq!(text, "wind of vehicle 2: not finite");
     assert_eq!(batch.state(1).unwrap(), before, "what is refused changes nothing");
 }
@@ -68,7 +70,7 @@ fn a_command_that_is_none_stops_the_rotor() {
     for number in [0, 1] {
         batch.replace(number, &thrown.vehicles[0]).unwrap();
         batch.reset(number, &State::at_rest()).unwrap();
-        batch.wind(number, In::zero()).unwrap();
+        batch.set_wind(number, In::zero()).unwrap();
     }
     batch.step(100);
     assert_eq!(batch.state(0).unwrap(), batch.state(1).unwrap());

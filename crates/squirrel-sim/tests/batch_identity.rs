@@ -151,7 +151,7 @@ fn places_without_a_rotor_are_still() {
         let mut state = thrown.states[number];
         state.rotor_speed_rad_s[4..].fill(900.0);
         wide.reset(number, &state).unwrap();
-        wide.wind(number, In::new(Vector3::from(thrown.winds[number]))).unwrap();
+        wide.set_wind(number, In::new(Vector3::from(thrown.winds[number]))).unwrap();
     }
     let commands: Vec<f32> =
         thrown.commands.chunks(4).flat_map(|c| [c[0], c[1], c[2], c[3], 1.0, f32::NAN, 0.5, -1.0]).collect();

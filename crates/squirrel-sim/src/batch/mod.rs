@@ -110,7 +110,9 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     pub fn new(vehicles: &[Vehicle<T>], settings: Settings) -> Result<Self, BatchError> {
         const { assert!(ROTORS >= 1 && ROTORS <= MAX_ROTORS) };
         let dt_s = settings.dt_s;
-        if !(dt_s.is_finite() && dt_s > 0.0) {
+        // In the scalar of the batch: what is positive in f64 may be nothing in f32.
+        let dt = convert::<f64, T>(dt_s);
+        if !(dt.is_finite() && dt > convert(0.0)) {
             return Err(BatchError::Step { dt_s });
         }
         if vehicles.is_empty() {
@@ -241,7 +243,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     ///
     /// # Errors
     /// A number that is not finite, no such vehicle.
-    pub fn wind(&mut self, number: usize, wind: In<Ned, T>) -> Result<(), BatchError> {
+    pub fn set_wind(&mut self, number: usize, wind: In<Ned, T>) -> Result<(), BatchError> {
         self.check(number)?;
         if !wind.vector.iter().all(T::is_finite) {
             return Err(BatchError::NotFinite { what: "wind", vehicle: number });

@@ -61,7 +61,7 @@ impl<T: Paths> Thrown<T> {
         let mut batch = Batch::new(&self.vehicles, settings).unwrap();
         for (number, (state, wind)) in self.states.iter().zip(&self.winds).enumerate() {
             batch.reset(number, state).unwrap();
-            batch.wind(number, In::new(Vector3::from(*wind))).unwrap();
+            batch.set_wind(number, In::new(Vector3::from(*wind))).unwrap();
         }
         batch.command(&self.commands).unwrap();
         batch
