@@ -4,9 +4,11 @@
 //!   `squirrel-core` commands, the log records. [`replay`] runs the flight code again on a log's inputs.
 //! - [`vehicle_file`], [`weights`] and [`scenario`] read what to fly; [`arm`] says who flies; [`faults`] breaks sensors in
 //!   recorded frames.
+//! - [`batch`] flies thousands of vehicles at once on wide registers.
 //! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it.
 
 pub mod arm;
+pub mod batch;
 pub mod faults;
 pub mod flight;
 pub mod import;

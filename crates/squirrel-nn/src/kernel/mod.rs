@@ -5,7 +5,7 @@
 //! of a batch goes to column `k mod 16`, a column takes its windows in order and each window its ticks in order, and the
 //! sixteen columns are added as a tree at the end.
 
-pub mod simd;
+pub use squirrel_sim::batch::simd;
 mod tape;
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,285 @@
+//! How vehicles lie in memory: sixteen side by side, one row a number.
+//!
+//! Each structure is used twice: on rows, of [`BLOCK`] vehicles in memory, and on registers, of as many as one of them holds.
+
+use super::BODY_NUMBERS;
+use super::simd::{BLOCK, Lanes, Paths};
+use nalgebra::{Matrix3, Quaternion, Vector3};
+use squirrel_core::dynamics::State;
+use squirrel_core::frames::{In, Ned};
+use squirrel_core::math::{AIR_DENSITY_KG_M3, real};
+use squirrel_core::rnn::lane::Lane;
+use squirrel_core::vehicle::{MAX_ROTORS, Propulsion, Vehicle};
+
+/// One number of each vehicle of a block.
+pub(super) type Row<S> = [S; BLOCK];
+
+/// Rigid body and rotor speeds, in the units and frames of [`State`]; as a rate, the derivative of each.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Motion<L, const ROTORS: usize> {
+    pub(super) position: [L; 3],
+    pub(super) velocity: [L; 3],
+    /// w x y z.
+    pub(super) attitude: [L; 4],
+    pub(super) omega: [L; 3],
+    pub(super) rotor_speed: [L; ROTORS],
+}
+
+/// What does not change in flight, SI.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Airframe<L, const ROTORS: usize> {
+    pub(super) inverse_mass: L,
+    /// By columns, as its inverse.
+    pub(super) inertia: [[L; 3]; 3],
+    pub(super) inertia_inverse: [[L; 3]; 3],
+    pub(super) linear_drag: [L; 3],
+    /// `1/2 rho C_d A`.
+    pub(super) quadratic_drag: L,
+    /// Over speed squared.
+    pub(super) thrust: L,
+    pub(super) roll: [L; ROTORS],
+    pub(super) pitch: [L; ROTORS],
+    pub(super) yaw: [L; ROTORS],
+    /// Inverse time constants of rotor speed, 1/s; 0 for no lag.
+    pub(super) speeding_up: L,
+    pub(super) slowing_down: L,
+}
+
+/// What is held from call to call.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Held<L, const ROTORS: usize> {
+    pub(super) wind: [L; 3],
+    pub(super) target_speed: [L; ROTORS],
+}
+
+/// How one vehicle's commands become rotor speeds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Drive<S> {
+    propulsion: Propulsion<S>,
+    rotors: usize,
+}
+
+impl<S: Paths> Drive<S> {
+    pub(super) fn new(vehicle: &Vehicle<S>) -> Self {
+        let p = vehicle.parameters();
+        Self { propulsion: p.propulsion, rotors: p.rotor_count }
+    }
+
+    /// `number` where rotor `i` is one, zero where it is not.
+    fn only(&self, i: usize, number: S) -> S {
+        if i < self.rotors { number } else { <S as Lane>::zero() }
+    }
+}
+
+/// Sixteen vehicles. Aligned so that no load of a row touches two lines of the cache.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+pub(super) struct Block<S, const ROTORS: usize> {
+    pub(super) motion: Motion<Row<S>, ROTORS>,
+    pub(super) airframe: Airframe<Row<S>, ROTORS>,
+    pub(super) held: Held<Row<S>, ROTORS>,
+    /// Some rotors have no lag.
+    pub(super) lagless: bool,
+}
+
+/// Registers from columns `start` and on of rows.
+#[inline(always)]
+fn load<L: Lanes, const N: usize>(rows: &[Row<L::Weight>; N], start: usize) -> [L; N] {
+    let mut registers = [L::zero(); N];
+    for n in 0..N {
+        registers[n] = L::load(&rows[n][start..]);
+    }
+    registers
+}
+
+#[inline(always)]
+fn load_columns<L: Lanes>(rows: &[[Row<L::Weight>; 3]; 3], start: usize) -> [[L; 3]; 3] {
+    [load(&rows[0], start), load(&rows[1], start), load(&rows[2], start)]
+}
+
+#[inline(always)]
+fn store<L: Lanes, const N: usize>(registers: &[L; N], rows: &mut [Row<L::Weight>; N], start: usize) {
+    for n in 0..N {
+        registers[n].store(&mut rows[n][start..]);
+    }
+}
+
+/// Puts numbers into column `lane`.
+fn put<S: Copy, const N: usize>(rows: &mut [Row<S>; N], lane: usize, numbers: [S; N]) {
+    for n in 0..N {
+        rows[n][lane] = numbers[n];
+    }
+}
+
+/// The numbers in column `lane`.
+fn take<S: Copy, const N: usize>(rows: &[Row<S>; N], lane: usize) -> [S; N] {
+    core::array::from_fn(|n| rows[n][lane])
+}
+
+impl<L: Lanes, const ROTORS: usize> Motion<L, ROTORS> {
+    #[inline(always)]
+    pub(super) fn load(rows: &Motion<Row<L::Weight>, ROTORS>, start: usize) -> Self {
+        Self {
+            position: load(&rows.position, start),
+            velocity: load(&rows.velocity, start),
+            attitude: load(&rows.attitude, start),
+            omega: load(&rows.omega, start),
+            rotor_speed: load(&rows.rotor_speed, start),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn store(&self, rows: &mut Motion<Row<L::Weight>, ROTORS>, start: usize) {
+        store(&self.position, &mut rows.position, start);
+        store(&self.velocity, &mut rows.velocity, start);
+        store(&self.attitude, &mut rows.attitude, start);
+        store(&self.omega, &mut rows.omega, start);
+        store(&self.rotor_speed, &mut rows.rotor_speed, start);
+    }
+}
+
+impl<L: Lanes, const ROTORS: usize> Airframe<L, ROTORS> {
+    #[inline(always)]
+    pub(super) fn load(rows: &Airframe<Row<L::Weight>, ROTORS>, start: usize) -> Self {
+        Self {
+            inverse_mass: L::load(&rows.inverse_mass[start..]),
+            inertia: load_columns(&rows.inertia, start),
+            inertia_inverse: load_columns(&rows.inertia_inverse, start),
+            linear_drag: load(&rows.linear_drag, start),
+            quadratic_drag: L::load(&rows.quadratic_drag[start..]),
+            thrust: L::load(&rows.thrust[start..]),
+            roll: load(&rows.roll, start),
+            pitch: load(&rows.pitch, start),
+            yaw: load(&rows.yaw, start),
+            speeding_up: L::load(&rows.speeding_up[start..]),
+            slowing_down: L::load(&rows.slowing_down[start..]),
+        }
+    }
+}
+
+impl<L: Lanes, const ROTORS: usize> Held<L, ROTORS> {
+    #[inline(always)]
+    pub(super) fn load(rows: &Held<Row<L::Weight>, ROTORS>, start: usize) -> Self {
+        Self { wind: load(&rows.wind, start), target_speed: load(&rows.target_speed, start) }
+    }
+}
+
+impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
+    /// Columns without a vehicle: nothing moves, nothing pulls, and no number ever becomes slow or infinite.
+    pub(super) fn empty() -> Self {
+        let none = [<S as Lane>::zero(); BLOCK];
+        let one = [real::<S>(1.0); BLOCK];
+        Self {
+            motion: Motion {
+                position: [none; 3],
+                velocity: [none; 3],
+                attitude: [one, none, none, none],
+                omega: [none; 3],
+                rotor_speed: [none; ROTORS],
+            },
+            airframe: Airframe {
+                inverse_mass: none,
+                inertia: [[none; 3]; 3],
+                inertia_inverse: [[none; 3]; 3],
+                linear_drag: [none; 3],
+                quadratic_drag: none,
+                thrust: none,
+                roll: [none; ROTORS],
+                pitch: [none; ROTORS],
+                yaw: [none; ROTORS],
+                speeding_up: one,
+                slowing_down: one,
+            },
+            held: Held { wind: [none; 3], target_speed: [none; ROTORS] },
+            lagless: false,
+        }
+    }
+
+    /// Another airframe in column `lane`.
+    pub(super) fn put_vehicle(&mut self, lane: usize, vehicle: &Vehicle<S>) {
+        let p = vehicle.parameters();
+        let inverse = |tau: S| if tau > <S as Lane>::zero() { real::<S>(1.0) / tau } else { tau };
+        let columns = |m: &Matrix3<S>| -> [[S; 3]; 3] { (*m).into() };
+        let k_f = p.propulsion.thrust_coefficient_n_s2;
+        let rows = &mut self.airframe;
+        rows.inverse_mass[lane] = vehicle.inverse_mass();
+        let (inertia, inverse_inertia) = (columns(&p.inertia_kg_m2), columns(vehicle.inertia_inverse()));
+        for c in 0..3 {
+            put(&mut rows.inertia[c], lane, inertia[c]);
+            put(&mut rows.inertia_inverse[c], lane, inverse_inertia[c]);
+        }
+        put(&mut rows.linear_drag, lane, p.drag.linear_n_s_per_m.into());
+        rows.quadratic_drag[lane] = real::<S>(0.5 * AIR_DENSITY_KG_M3) * p.drag.area_m2;
+        rows.thrust[lane] = k_f;
+        for i in 0..ROTORS {
+            // r x (0, 0, -T); places without a rotor are at the origin and have no sign.
+            let rotor = vehicle.rotors().get(i);
+            let zero = <S as Lane>::zero();
+            rows.roll[i][lane] = rotor.map_or(zero, |r| -r.position.vector.y * k_f);
+            rows.pitch[i][lane] = rotor.map_or(zero, |r| r.position.vector.x * k_f);
+            rows.yaw[i][lane] = rotor.map_or(zero, |r| r.yaw_sign * p.propulsion.torque_coefficient_n_m_s2);
+        }
+        rows.speeding_up[lane] = inverse(p.propulsion.time_constant_up_s);
+        rows.slowing_down[lane] = inverse(p.propulsion.time_constant_down_s);
+        let all = rows.speeding_up.iter().chain(&rows.slowing_down);
+        self.lagless = all.copied().any(|rate| rate == <S as Lane>::zero());
+        for i in p.rotor_count..ROTORS {
+            self.motion.rotor_speed[i][lane] = <S as Lane>::zero();
+            self.held.target_speed[i][lane] = <S as Lane>::zero();
+        }
+    }
+
+    /// The motion in column `lane`, rotors only where there are any.
+    pub(super) fn put_state(&mut self, lane: usize, state: &State<S>, drive: &Drive<S>) {
+        let q = &state.attitude;
+        let rows = &mut self.motion;
+        put(&mut rows.position, lane, state.position.vector.into());
+        put(&mut rows.velocity, lane, state.velocity.vector.into());
+        put(&mut rows.attitude, lane, [q.w, q.i, q.j, q.k]);
+        put(&mut rows.omega, lane, state.omega.vector.into());
+        put(&mut rows.rotor_speed, lane, core::array::from_fn(|i| drive.only(i, state.rotor_speed_rad_s[i])));
+    }
+
+    /// The motion in column `lane`.
+    pub(super) fn state(&self, lane: usize) -> State<S> {
+        let rows = &self.motion;
+        let [w, x, y, z] = take(&rows.attitude, lane);
+        let mut rotor_speed_rad_s = [<S as Lane>::zero(); MAX_ROTORS];
+        rotor_speed_rad_s[..ROTORS].copy_from_slice(&take(&rows.rotor_speed, lane));
+        State {
+            position: In::new(Vector3::from(take(&rows.position, lane))),
+            velocity: In::new(Vector3::from(take(&rows.velocity, lane))),
+            attitude: Quaternion::new(w, x, y, z),
+            omega: In::new(Vector3::from(take(&rows.omega, lane))),
+            rotor_speed_rad_s,
+        }
+    }
+
+    /// Motions of the first vehicles, one after the other, as [`super::Batch::write_states`] orders them.
+    pub(super) fn write_states(&self, rows: &mut [S]) {
+        let motion = &self.motion;
+        for (lane, row) in rows.chunks_exact_mut(BODY_NUMBERS + ROTORS).enumerate() {
+            let (body, rotors) = row.split_at_mut(BODY_NUMBERS);
+            body[..3].copy_from_slice(&take(&motion.position, lane));
+            body[3..6].copy_from_slice(&take(&motion.velocity, lane));
+            body[6..10].copy_from_slice(&take(&motion.attitude, lane));
+            body[10..].copy_from_slice(&take(&motion.omega, lane));
+            rotors.copy_from_slice(&take(&motion.rotor_speed, lane));
+        }
+    }
+
+    /// Targets of the rotors of the first vehicles from their commands, one vehicle after the other.
+    pub(super) fn command(&mut self, commands: &[S], drives: &[Drive<S>]) {
+        for (lane, (commands, drive)) in commands.chunks_exact(ROTORS).zip(drives).enumerate() {
+            for i in 0..ROTORS {
+                let target = drive.propulsion.target_speed_rad_s(commands[i]);
+                self.held.target_speed[i][lane] = drive.only(i, target);
+            }
+        }
+    }
+
+    /// Velocity of the air about the vehicle in column `lane`, m/s.
+    pub(super) fn put_wind(&mut self, lane: usize, wind: In<Ned, S>) {
+        put(&mut self.held.wind, lane, wind.vector.into());
+    }
+}

@@ -1,0 +1,369 @@
+//! Registers, and the one place that asks the processor what it can do.
+//!
+//! A register ([`Lanes`]) holds one number of each of several vehicles, or of several windows of a network. Work that is
+//! generic over it ([`Kernel`]) is run on the widest registers there are, without being compiled for one machine. All
+//! operations are rounded the same way on every path and there is no fused multiply-add, so the paths differ in speed only.
+//!
+//! This is the only module with `unsafe`: intrinsics may run only where the processor has them. The types of a path are
+//! private to this module and only [`Paths::run`] hands them out, and a [`Path`] that the processor lacks cannot be made.
+
+use core::ops::{Add, Div, Mul, Sub};
+use squirrel_core::rnn::lane::{Lane, NetScalar, tanh};
+
+/// Vehicles, or windows, that are held side by side. Fixed, because the order of a sum over them decides its bits.
+pub const BLOCK: usize = 16;
+
+/// A register.
+pub trait Lanes: Lane<Weight: NetScalar> {
+    /// Numbers in it; a divisor of [`BLOCK`].
+    const WIDTH: usize;
+    /// From the first [`Self::WIDTH`] numbers.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    fn load(from: &[Self::Weight]) -> Self;
+    /// To the first [`Self::WIDTH`] numbers.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    fn store(self, to: &mut [Self::Weight]);
+    /// Square root.
+    #[must_use]
+    fn root(self) -> Self;
+    /// `then` where a number is above zero, `otherwise` where it is not or is NaN.
+    #[must_use]
+    fn where_positive(self, then: Self, otherwise: Self) -> Self;
+}
+
+/// Work that is the same on registers of any width.
+pub trait Kernel<S> {
+    /// What comes out; the same bits for every `L`.
+    type Output;
+    /// The work. To be marked `inline(always)`, as all that it calls in its inner loops: code is compiled for the features of
+    /// the function that it ends up in.
+    fn run<L: Lanes<Weight = S>>(self) -> Self::Output;
+}
+
+/// Registers that the processor has. All give the same bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Path(Width);
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Width {
+    Scalar,
+    Portable,
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Width {
+    const ALL: &[Self] = &[
+        Self::Scalar,
+        Self::Portable,
+        #[cfg(target_arch = "x86_64")]
+        Self::Avx2,
+        #[cfg(target_arch = "x86_64")]
+        Self::Avx512,
+    ];
+
+    fn is_there(self) -> bool {
+        match self {
+            Self::Scalar | Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => std::arch::is_x86_feature_detected!("avx2"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => std::arch::is_x86_feature_detected!("avx512f"),
+        }
+    }
+}
+
+impl Path {
+    /// What this processor has, slowest first. The first two need nothing and are always there.
+    pub fn available() -> Vec<Self> {
+        Width::ALL.iter().filter(|width| width.is_there()).map(|width| Self(*width)).collect()
+    }
+
+    /// The fastest that this processor has.
+    pub fn best() -> Self {
+        Self::available().pop().unwrap_or(Self(Width::Portable))
+    }
+
+    /// `scalar` (one number), `portable` (four), `avx2` (32 bytes) or `avx512` (64 bytes).
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Width::Scalar => "scalar",
+            Width::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx512 => "avx512",
+        }
+    }
+}
+
+/// Scalars that have paths.
+pub trait Paths: NetScalar {
+    /// Runs a kernel on the registers of a path.
+    fn run<K: Kernel<Self>>(path: Path, kernel: K) -> K::Output;
+}
+
+macro_rules! paths {
+    ($scalar:ty, $avx2:ident, $avx512:ident) => {
+        impl Paths for $scalar {
+            fn run<K: Kernel<Self>>(path: Path, kernel: K) -> K::Output {
+                match path.0 {
+                    Width::Scalar => kernel.run::<Self>(),
+                    Width::Portable => kernel.run::<Portable<Self>>(),
+                    #[cfg(target_arch = "x86_64")]
+                    Width::Avx2 => x86::$avx2(kernel),
+                    #[cfg(target_arch = "x86_64")]
+                    Width::Avx512 => x86::$avx512(kernel),
+                }
+            }
+        }
+
+        /// One number: what wider registers are compared with.
+        impl Lanes for $scalar {
+            const WIDTH: usize = 1;
+            #[inline(always)]
+            fn load(from: &[Self]) -> Self {
+                from[0]
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [Self]) {
+                to[0] = self;
+            }
+            #[inline(always)]
+            fn root(self) -> Self {
+                self.sqrt()
+            }
+            #[inline(always)]
+            fn where_positive(self, then: Self, otherwise: Self) -> Self {
+                if self > 0.0 { then } else { otherwise }
+            }
+        }
+    };
+}
+paths!(f32, avx2_f32, avx512_f32);
+paths!(f64, avx2_f64, avx512_f64);
+
+/// Four numbers in plain Rust; compilers make SSE2 or NEON of it.
+#[derive(Clone, Copy)]
+struct Portable<S>([S; 4]);
+
+macro_rules! portable {
+    ($scalar:ty, $activation:expr) => {
+        portable!(@operator $scalar, Add add +, Sub sub -, Mul mul *, Div div /);
+
+        impl Lane for Portable<$scalar> {
+            type Weight = $scalar;
+            #[inline(always)]
+            fn splat(weight: $scalar) -> Self {
+                Self([weight; 4])
+            }
+            #[inline(always)]
+            fn zero() -> Self {
+                Self([0.0; 4])
+            }
+            #[inline(always)]
+            fn lower(self, bound: Self) -> Self {
+                let ([a, b, c, d], [e, f, g, h]) = (self.0, bound.0);
+                Self([a.lower(e), b.lower(f), c.lower(g), d.lower(h)])
+            }
+            #[inline(always)]
+            fn upper(self, bound: Self) -> Self {
+                let ([a, b, c, d], [e, f, g, h]) = (self.0, bound.0);
+                Self([a.upper(e), b.upper(f), c.upper(g), d.upper(h)])
+            }
+            #[inline(always)]
+            fn activation(self) -> Self {
+                $activation(self)
+            }
+        }
+
+        impl Lanes for Portable<$scalar> {
+            const WIDTH: usize = 4;
+            #[inline(always)]
+            fn load(from: &[$scalar]) -> Self {
+                Self([from[0], from[1], from[2], from[3]])
+            }
+            #[inline(always)]
+            fn store(self, to: &mut [$scalar]) {
+                to[..4].copy_from_slice(&self.0);
+            }
+            #[inline(always)]
+            fn root(self) -> Self {
+                let [a, b, c, d] = self.0;
+                Self([a.root(), b.root(), c.root(), d.root()])
+            }
+            #[inline(always)]
+            fn where_positive(self, then: Self, otherwise: Self) -> Self {
+                let ([a, b, c, d], [e, f, g, h], [i, j, k, l]) = (self.0, then.0, otherwise.0);
+                Self([
+                    a.where_positive(e, i),
+                    b.where_positive(f, j),
+                    c.where_positive(g, k),
+                    d.where_positive(h, l),
+                ])
+            }
+        }
+    };
+    (@operator $scalar:ty, $($trait:ident $method:ident $operator:tt),*) => {$(
+        impl $trait for Portable<$scalar> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
+                Self([a $operator e, b $operator f, c $operator g, d $operator h])
+            }
+        }
+    )*};
+}
+portable!(f32, tanh);
+portable!(f64, |x: Self| Self(x.0.map(Lane::activation)));
+
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "intrinsics; each use says why the processor has them")]
+mod x86 {
+    use super::{Add, BLOCK, Div, Kernel, Lane, Lanes, Mul, Sub, tanh};
+    use core::arch::x86_64 as intrinsic;
+
+    macro_rules! register {
+        (
+            $entry:ident $feature:literal $register:ident($inner:ident) [$scalar:ident; $width:literal]
+            $splat:ident $zero:ident $lower:ident $upper:ident $load:ident $store:ident $root:ident
+            $($trait:ident $method:ident $operation:ident),*;
+            $activation:expr;
+            ($zeros:ident, $x:ident, $then:ident, $otherwise:ident) => $select:expr
+        ) => {
+            /// A value of this type exists only inside of the entry beside it.
+            #[derive(Clone, Copy)]
+            struct $register(intrinsic::$inner);
+
+            pub(super) fn $entry<K: Kernel<$scalar>>(kernel: K) -> K::Output {
+                #[target_feature(enable = $feature)]
+                fn inside<K: Kernel<$scalar>>(kernel: K) -> K::Output {
+                    kernel.run::<$register>()
+                }
+                // SAFETY: only `Paths::run` calls this, with a `Path` that was made after the processor said that it has this
+                // feature.
+                unsafe { inside(kernel) }
+            }
+
+            $(impl $trait for $register {
+                type Output = Self;
+                #[inline(always)]
+                fn $method(self, other: Self) -> Self {
+                    // SAFETY: values of this type exist only where the processor has its instructions.
+                    Self(unsafe { intrinsic::$operation(self.0, other.0) })
+                }
+            })*
+
+            impl Lane for $register {
+                type Weight = $scalar;
+                #[inline(always)]
+                fn splat(weight: $scalar) -> Self {
+                    // SAFETY: called by kernels only, and those run on this type only inside of its entry.
+                    Self(unsafe { intrinsic::$splat(weight) })
+                }
+                #[inline(always)]
+                fn zero() -> Self {
+                    // SAFETY: as for `splat`.
+                    Self(unsafe { intrinsic::$zero() })
+                }
+                #[inline(always)]
+                fn lower(self, bound: Self) -> Self {
+                    // The second operand where one is NaN, as `math::lower` does.
+                    // SAFETY: values of this type exist only where the processor has its instructions.
+                    Self(unsafe { intrinsic::$lower(self.0, bound.0) })
+                }
+                #[inline(always)]
+                fn upper(self, bound: Self) -> Self {
+                    // SAFETY: as for `lower`.
+                    Self(unsafe { intrinsic::$upper(self.0, bound.0) })
+                }
+                #[inline(always)]
+                fn activation(self) -> Self {
+                    $activation(self)
+                }
+            }
+
+            impl Lanes for $register {
+                const WIDTH: usize = $width;
+                #[inline(always)]
+                fn load(from: &[$scalar]) -> Self {
+                    let from = &from[..$width];
+                    // SAFETY: the slice has as many numbers as are read, alignment is not needed; else as for `splat`.
+                    Self(unsafe { intrinsic::$load(from.as_ptr()) })
+                }
+                #[inline(always)]
+                fn store(self, to: &mut [$scalar]) {
+                    let to = &mut to[..$width];
+                    // SAFETY: the slice has as many numbers as are written, alignment is not needed; else as for `lower`.
+                    unsafe { intrinsic::$store(to.as_mut_ptr(), self.0) };
+                }
+                #[inline(always)]
+                fn root(self) -> Self {
+                    // SAFETY: as for `lower`.
+                    Self(unsafe { intrinsic::$root(self.0) })
+                }
+                #[inline(always)]
+                fn where_positive(self, then: Self, otherwise: Self) -> Self {
+                    let ($zeros, $x, $then, $otherwise) = (Self::zero().0, self.0, then.0, otherwise.0);
+                    // SAFETY: as for `lower`.
+                    Self(unsafe { $select })
+                }
+            }
+        };
+    }
+
+    /// The exact activation, one number after the other: gradient checks have time.
+    #[inline(always)]
+    fn one_by_one<L: Lanes<Weight = f64>>(x: L) -> L {
+        let mut numbers = [0.0; BLOCK];
+        x.store(&mut numbers);
+        for number in &mut numbers[..L::WIDTH] {
+            *number = number.activation();
+        }
+        L::load(&numbers)
+    }
+
+    register!(
+        avx2_f32 "avx2" Avx2F32(__m256) [f32; 8]
+        _mm256_set1_ps _mm256_setzero_ps _mm256_min_ps _mm256_max_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_sqrt_ps
+        Add add _mm256_add_ps, Sub sub _mm256_sub_ps, Mul mul _mm256_mul_ps, Div div _mm256_div_ps;
+        tanh;
+        (zero, x, then, otherwise) => intrinsic::_mm256_blendv_ps(
+            otherwise, then, intrinsic::_mm256_cmp_ps::<{ intrinsic::_CMP_GT_OQ }>(x, zero)
+        )
+    );
+    register!(
+        avx2_f64 "avx2" Avx2F64(__m256d) [f64; 4]
+        _mm256_set1_pd _mm256_setzero_pd _mm256_min_pd _mm256_max_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_sqrt_pd
+        Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd;
+        one_by_one;
+        (zero, x, then, otherwise) => intrinsic::_mm256_blendv_pd(
+            otherwise, then, intrinsic::_mm256_cmp_pd::<{ intrinsic::_CMP_GT_OQ }>(x, zero)
+        )
+    );
+    register!(
+        avx512_f32 "avx512f" Avx512F32(__m512) [f32; 16]
+        _mm512_set1_ps _mm512_setzero_ps _mm512_min_ps _mm512_max_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_sqrt_ps
+        Add add _mm512_add_ps, Sub sub _mm512_sub_ps, Mul mul _mm512_mul_ps, Div div _mm512_div_ps;
+        tanh;
+        (zero, x, then, otherwise) => intrinsic::_mm512_mask_blend_ps(
+            intrinsic::_mm512_cmp_ps_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero), otherwise, then
+        )
+    );
+    register!(
+        avx512_f64 "avx512f" Avx512F64(__m512d) [f64; 8]
+        _mm512_set1_pd _mm512_setzero_pd _mm512_min_pd _mm512_max_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_sqrt_pd
+        Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd;
+        one_by_one;
+        (zero, x, then, otherwise) => intrinsic::_mm512_mask_blend_pd(
+            intrinsic::_mm512_cmp_pd_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero), otherwise, then
+        )
+    );
+}
