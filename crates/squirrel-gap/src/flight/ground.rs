@@ -124,7 +124,10 @@ mod tests {
         let (pieces, notes) = pieces(&flight(5.0, 7.0));
         assert_eq!(pieces.len(), 2, "{pieces:?}");
         assert!((pieces[0].1 - 6.0).abs() < 0.05 && (pieces[1].0 - 8.0).abs() < 0.05, "{pieces:?}");
-        assert!(notes.iter().any(|n| n.starts_with("f: touches the ground; left out: 6.00 to 7.97 s")), "{notes:?}");
+        assert!(
+            notes.iter().any(|n| n.starts_with("f: touches the ground; left out: 6.00 to 7.97 s")),
+            "{notes:?}"
+        );
     }
 
     #[test]
