@@ -20,6 +20,7 @@ const BLOCK: usize = 8;
 const NEIGHBOURS: usize = 2;
 /// Draws of the noise.
 const DRAWS: usize = 8;
+const GUST_DRAWS: usize = 40;
 /// How far above the noise's mean a channel may be, slow and as a whole, in rms.
 const SLOW_RATIO: f64 = 1.6;
 const WHOLE_RATIO: f64 = 1.25;
@@ -125,12 +126,19 @@ pub(crate) fn noise(
     floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS)
 }
 
+/// What gusts leave, often enough for their size at each moment.
+///
+/// * arguments as of [`noise`]
+pub(crate) fn gusts(predictor: &Predictor, wind_columns: &[Vec<f64>; 3], sigma_m_s: f64) -> Vec<Vec<f64>> {
+    floor::draws(predictor, wind_columns, sigma_m_s, GUST_DRAWS)
+}
+
 /// Compares a leftover with what noise alone leaves.
 ///
 /// * `left`, `nominal` - rows of the residual of the best explanation, and of the vehicle as it is
 /// * `motions` - of each piece, under the best explanation
 /// * `draws` - what noise alone leaves, of [`noise`]
-/// * `gusts` - what gusts would leave, also of [`noise`], where they are in question: bursts and places are looked for in
+/// * `gusts` - what gusts would leave, of [`gusts`], where they are in question: bursts and places are looked for in
 ///   units of their size at each moment, as spread wings feel many times the gust that folded ones do
 /// * `slack` - tolerances that no column of the model stands for
 pub(crate) fn leftover(

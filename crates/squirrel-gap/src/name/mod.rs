@@ -29,7 +29,7 @@ use tolerance::unlogged_sag;
 pub(crate) use tolerance::{notes as silent_tolerances, sds};
 
 use crate::GapError;
-use crate::leftover::{Leftover, Slack, leftover, noise};
+use crate::leftover::{Leftover, Slack, gusts, leftover, noise};
 use crate::predictor::Hypothesis;
 
 /// Deviation of the air's own motion that is no wind worth a name, m/s.
@@ -180,7 +180,7 @@ fn blown(search: &Search<'_>, naming: &Naming, sigma: f64, sizes: f64) -> Result
     let wind = predictor.wind_columns(&naming.hypothesis)?;
     let motions: Vec<_> =
         (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
-    let [draws, gusts] = [sigma, sizes].map(|sigma| noise(predictor, &wind, sigma));
+    let (draws, gusts) = (noise(predictor, &wind, sigma), gusts(predictor, &wind, sizes));
     let slack = slack(search, &naming.found);
     Ok(leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, Some(&gusts), slack))
 }
