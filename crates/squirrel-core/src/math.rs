@@ -48,6 +48,9 @@ pub fn limit_norm<T: Real>(v: Vector3<T>, max: T) -> Vector3<T> {
 /// Angle wrapped into (-pi, pi], rad, to within the rounding of the angle. Total: a non-finite angle gives 0.
 pub fn wrap_angle(angle: f32) -> f32 {
     use core::f32::consts::PI;
+    if angle > -PI && angle <= PI {
+        return angle;
+    }
     if !angle.is_finite() {
         return 0.0;
     }

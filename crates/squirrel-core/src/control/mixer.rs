@@ -12,8 +12,10 @@
 //!
 //! `F_max` is the vehicle's limit at the reference voltage; it does not follow the measured battery voltage.
 //!
-//! Along `T^+` the rotor thrusts are `s a_i + u b_i + y c_i`, so each step is an interval after eliminating the variables
-//! of the later steps (Fourier-Motzkin): no iteration, at most `n^2` inequalities in the common saturated case.
+//! Along `T^+` the rotor thrusts are `f_i = s a_i + u b_i + y c_i`. A weighted sum of them lies between the thrust limit times its
+//! negative weights and times its positive ones. Weights that take `u` and `y` out of the sum bound `s`, and weights that take
+//! `y` out bound `u`. It is enough to look at sums of the fewest rotors: three, or two with the same `b : c`, for `s`, and two for
+//! `u` (they are the extreme rays of the weights, so that the bounds are exact). No iteration; for four rotors at most six sums.
 
 use crate::math::{limit, lower, upper};
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
@@ -21,8 +23,6 @@ use nalgebra::{Matrix4, SMatrix, Vector3};
 
 /// Slopes below this count as zero; all slopes are of order one by scaling.
 const FLAT: f32 = 1e-4;
-/// Half-planes in (s, u) that pairs of rotors can give, and those of rotors without yaw.
-const MAX_HALF_PLANES: usize = MAX_ROTORS * MAX_ROTORS + 2 * MAX_ROTORS;
 
 /// Collective thrust and torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,14 +59,6 @@ pub struct Mixer {
     /// Newton metres of yaw torque per unit of the scaled yaw variable.
     yaw_unit_n_m: f32,
     effectiveness: [PerRotor<f32>; 4],
-}
-
-/// `slope_s * s + slope_u * u <= bound`.
-#[derive(Clone, Copy)]
-struct HalfPlane {
-    slope_s: f32,
-    slope_u: f32,
-    bound: f32,
 }
 
 /// A closed interval; empty where `low > high`.
@@ -221,47 +213,61 @@ impl Mixer {
 
     /// Steps 1 and 2: the largest share, then the nearest thrust.
     fn share_and_thrust(&self, tilt: &PerRotor<f32>, thrust: f32) -> (f32, f32) {
-        let mut planes = [HalfPlane { slope_s: 0.0, slope_u: 0.0, bound: 0.0 }; MAX_HALF_PLANES];
-        let mut used = 0;
-        let mut add = |plane: HalfPlane| {
-            if let Some(place) = planes.get_mut(used) {
-                *place = plane;
-                used += 1;
+        let share = self.largest_share(tilt);
+        let range = self.thrust_interval(tilt, share);
+        (share, limit(thrust, range.low, upper(range.low, range.high)))
+    }
+
+    /// The largest `s` in [0, 1] that some thrust and yaw allow: sums of rotors that neither of them changes limit it.
+    fn largest_share(&self, tilt: &PerRotor<f32>) -> f32 {
+        let (n, b) = (self.rotors(), &self.collective);
+        let cross = |i: usize, j: usize| b[i] * self.yaw[j] - b[j] * self.yaw[i];
+        let mut share = 1.0;
+        let mut cut = |slope: f32, above: f32, below: f32| {
+            let bound = self.thrust_max_n * if slope > 0.0 { above } else { below };
+            // No division where it would not bind.
+            if slope.abs() * share > bound {
+                share = bound / slope.abs();
             }
         };
-        for i in 0..self.rotors() {
-            let (a, b, c) = (tilt[i], self.collective[i], self.yaw[i]);
-            if c.abs() <= FLAT {
-                add(HalfPlane { slope_s: a, slope_u: b, bound: self.thrust_max_n });
-                add(HalfPlane { slope_s: -a, slope_u: -b, bound: 0.0 });
-                continue;
-            }
-            let floor = if c > 0.0 { 0.0 } else { self.thrust_max_n };
-            for j in 0..self.rotors() {
-                if i == j || self.yaw[j].abs() <= FLAT {
+        for i in 0..n {
+            for j in i + 1..n {
+                let w_k = cross(i, j);
+                if w_k.abs() <= FLAT * b[i] * b[j] {
+                    cut(b[j] * tilt[i] - b[i] * tilt[j], b[j], b[i]);
                     continue;
                 }
-                // Yaw must lie above what rotor i needs and below what rotor j allows.
-                let c_j = self.yaw[j];
-                let ceiling = if c_j > 0.0 { self.thrust_max_n } else { 0.0 };
-                add(HalfPlane {
-                    slope_s: tilt[j] / c_j - a / c,
-                    slope_u: self.collective[j] / c_j - b / c,
-                    bound: ceiling / c_j - floor / c,
-                });
+                for k in j + 1..n {
+                    let (w_i, w_j) = (cross(j, k), cross(k, i));
+                    let [above, below] = positive_and_negative([w_i, w_j, w_k]);
+                    cut(w_i * tilt[i] + w_j * tilt[j] + w_k * tilt[k], above, below);
+                }
             }
         }
-        let planes = planes.get(..used).unwrap_or(&[]);
-        let at_share = |s: f32| {
-            let mut range = Interval::ALL;
-            for p in planes {
-                range.cut(p.slope_u, p.bound - s * p.slope_s);
+        share
+    }
+
+    /// Thrusts that some yaw allows at a given share: single rotors without yaw, and pairs whose sum yaw does not change.
+    fn thrust_interval(&self, tilt: &PerRotor<f32>, s: f32) -> Interval {
+        let (n, b, c) = (self.rotors(), &self.collective, &self.yaw);
+        let mut range = Interval::ALL;
+        for i in 0..n {
+            if c[i].abs() <= FLAT {
+                range.cut(b[i], self.thrust_max_n - s * tilt[i]);
+                range.cut(-b[i], s * tilt[i]);
+                continue;
             }
-            range
-        };
-        let share = largest_share(planes);
-        let range = at_share(share);
-        (share, limit(thrust, range.low, upper(range.low, range.high)))
+            for j in i + 1..n {
+                if c[j].abs() <= FLAT {
+                    continue;
+                }
+                let [above, below] = positive_and_negative([c[j], -c[i]]);
+                let (slope, rest) = (c[j] * b[i] - c[i] * b[j], s * (c[j] * tilt[i] - c[i] * tilt[j]));
+                range.cut(slope, self.thrust_max_n * above - rest);
+                range.cut(-slope, self.thrust_max_n * below + rest);
+            }
+        }
+        range
     }
 
     fn terms(&self, tilt: &PerRotor<f32>, s: f32, u: f32, y: f32, saturated: bool) -> MixerTerms {
@@ -279,21 +285,14 @@ impl Mixer {
     }
 }
 
-/// The largest `s` in [0, 1] for which some `u` satisfies all half-planes, by eliminating `u`.
-fn largest_share(planes: &[HalfPlane]) -> f32 {
-    let mut share = Interval { low: 0.0, high: 1.0 };
-    for p in planes {
-        if p.slope_u.abs() <= FLAT {
-            share.cut(p.slope_s, p.bound);
-        }
+/// Sum of the positive weights, and of the negative ones without their sign.
+#[inline(always)]
+fn positive_and_negative<const N: usize>(weights: [f32; N]) -> [f32; 2] {
+    let mut sums = [0.0; 2];
+    for w in weights {
+        sums[usize::from(w < 0.0)] += w.abs();
     }
-    for above in planes.iter().filter(|p| p.slope_u > FLAT) {
-        for below in planes.iter().filter(|p| p.slope_u < -FLAT) {
-            let slope = above.slope_s / above.slope_u - below.slope_s / below.slope_u;
-            share.cut(slope, above.bound / above.slope_u - below.bound / below.slope_u);
-        }
-    }
-    limit(share.high, 0.0, 1.0)
+    sums
 }
 
 /// `T^T (T T^T)^-1`; a yaw row of zeros is left out.

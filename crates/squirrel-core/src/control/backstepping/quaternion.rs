@@ -10,7 +10,7 @@
 //! ```
 //! The sign is kept while `|eta| < 0.1`, so that noise at 180 deg does not make it chatter.
 
-use super::{body_rate_matrix, body_rate_matrix_derivative};
+use super::Tilt;
 use crate::math::{Real, real};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
@@ -54,11 +54,11 @@ pub struct Answer<T: Real> {
 impl<T: Real> Target<T> {
     /// From Euler angles and their derivatives.
     pub fn from_euler(angle: &Vector3<T>, rate: &Vector3<T>, acceleration: &Vector3<T>) -> Self {
-        let e = body_rate_matrix(angle);
+        let tilt = Tilt::of(angle);
         Self {
             attitude: UnitQuaternion::from_euler_angles(angle.x, angle.y, angle.z),
-            omega: e * rate,
-            omega_dot: e * acceleration + body_rate_matrix_derivative(angle, rate) * rate,
+            omega: tilt.body_rate(rate),
+            omega_dot: tilt.body_acceleration(rate, acceleration),
         }
     }
 }
