@@ -12,10 +12,11 @@
 //!
 //! `F_max` is the vehicle's limit at the reference voltage; it does not follow the measured battery voltage.
 //!
-//! Along `T^+` the rotor thrusts are `f_i = s a_i + u b_i + y c_i`. A weighted sum of them lies between the thrust limit times its
-//! negative weights and times its positive ones. Weights that take `u` and `y` out of the sum bound `s`, and weights that take
-//! `y` out bound `u`. It is enough to look at sums of the fewest rotors: three, or two with the same `b : c`, for `s`, and two for
-//! `u` (they are the extreme rays of the weights, so that the bounds are exact). No iteration; for four rotors at most six sums.
+//! Along `T^+` the rotor thrusts are `f_i = s a_i + u b_i + y c_i`, with `b_i > 0`; the code works with `f_i / b_i`. A weighted sum
+//! of them lies between what the negative weights take at the thrust limit and what the positive ones give. Weights that take
+//! `u` and `y` out of the sum bound `s`, and weights that take `y` out bound `u`. The shortest such sums are enough, because all
+//! others are sums of these with positive factors: for `s` three rotors, or two with the same `c_i / b_i`; for `u` two, or one
+//! without yaw. No iteration; for four rotors at most six sums each.
 
 use crate::math::{limit, lower, upper};
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
@@ -56,6 +57,9 @@ pub struct Mixer {
     roll: PerRotor<f32>,
     pitch: PerRotor<f32>,
     yaw: PerRotor<f32>,
+    /// Scaled yaw and the thrust limit, each over the rotor's part of the collective.
+    yaw_share: PerRotor<f32>,
+    full_share_n: PerRotor<f32>,
     /// Newton metres of yaw torque per unit of the scaled yaw variable.
     yaw_unit_n_m: f32,
     effectiveness: [PerRotor<f32>; 4],
@@ -70,13 +74,15 @@ struct Interval {
 
 impl Interval {
     const ALL: Self = Self { low: f32::NEG_INFINITY, high: f32::INFINITY };
-    /// Keeps the part where `slope * x <= bound`.
+    /// Keeps the part where `low <= slope * x <= high`.
     #[inline(always)]
-    fn cut(&mut self, slope: f32, bound: f32) {
+    fn keep(&mut self, slope: f32, low: f32, high: f32) {
         if slope > FLAT {
-            self.high = lower(self.high, bound / slope);
+            self.low = upper(self.low, low / slope);
+            self.high = lower(self.high, high / slope);
         } else if slope < -FLAT {
-            self.low = upper(self.low, bound / slope);
+            self.low = upper(self.low, high / slope);
+            self.high = lower(self.high, low / slope);
         }
     }
     fn is_empty(self) -> bool {
@@ -138,13 +144,21 @@ impl Mixer {
             }
             out
         };
+        let yaw = yaw_raw.map(|c| c * yaw_unit_n_m);
+        let thrust_max_n = vehicle.rotor_thrust_max_n();
+        let (mut yaw_share, mut full_share_n) = ([0.0; MAX_ROTORS], [0.0; MAX_ROTORS]);
+        for (i, b) in collective[..count].iter().enumerate() {
+            (yaw_share[i], full_share_n[i]) = (yaw[i] / b, thrust_max_n / b);
+        }
         Ok(Self {
             count,
-            thrust_max_n: vehicle.rotor_thrust_max_n(),
+            thrust_max_n,
             collective,
             roll: column(1),
             pitch: column(2),
-            yaw: yaw_raw.map(|c| c * yaw_unit_n_m),
+            yaw,
+            yaw_share,
+            full_share_n,
             yaw_unit_n_m,
             effectiveness: [row(0), row(1), row(2), row(3)],
         })
@@ -205,26 +219,28 @@ impl Mixer {
                 }
                 continue;
             }
-            range.cut(self.yaw[i], self.thrust_max_n - rest);
-            range.cut(-self.yaw[i], rest);
+            range.keep(self.yaw[i], -rest, self.thrust_max_n - rest);
         }
         if range.low == f32::NEG_INFINITY { Interval { low: 0.0, high: 0.0 } } else { range }
     }
 
     /// Steps 1 and 2: the largest share, then the nearest thrust.
     fn share_and_thrust(&self, tilt: &PerRotor<f32>, thrust: f32) -> (f32, f32) {
-        let share = self.largest_share(tilt);
-        let range = self.thrust_interval(tilt, share);
+        let mut tilt_share = [0.0; MAX_ROTORS];
+        for i in 0..self.rotors() {
+            tilt_share[i] = tilt[i] / self.collective[i];
+        }
+        let share = self.largest_share(&tilt_share);
+        let range = self.thrust_interval(&tilt_share, share);
         (share, limit(thrust, range.low, upper(range.low, range.high)))
     }
 
     /// The largest `s` in [0, 1] that some thrust and yaw allow: sums of rotors that neither of them changes limit it.
-    fn largest_share(&self, tilt: &PerRotor<f32>) -> f32 {
-        let (n, b) = (self.rotors(), &self.collective);
-        let cross = |i: usize, j: usize| b[i] * self.yaw[j] - b[j] * self.yaw[i];
+    fn largest_share(&self, tilt_share: &PerRotor<f32>) -> f32 {
+        let (n, a, c, max) = (self.rotors(), tilt_share, &self.yaw_share, &self.full_share_n);
         let mut share = 1.0;
         let mut cut = |slope: f32, above: f32, below: f32| {
-            let bound = self.thrust_max_n * if slope > 0.0 { above } else { below };
+            let bound = if slope > 0.0 { above } else { below };
             // No division where it would not bind.
             if slope.abs() * share > bound {
                 share = bound / slope.abs();
@@ -232,15 +248,18 @@ impl Mixer {
         };
         for i in 0..n {
             for j in i + 1..n {
-                let w_k = cross(i, j);
-                if w_k.abs() <= FLAT * b[i] * b[j] {
-                    cut(b[j] * tilt[i] - b[i] * tilt[j], b[j], b[i]);
+                let w_k = c[i] - c[j];
+                if w_k.abs() <= FLAT {
+                    cut(a[i] - a[j], max[i], max[j]);
                     continue;
                 }
                 for k in j + 1..n {
-                    let (w_i, w_j) = (cross(j, k), cross(k, i));
-                    let [above, below] = positive_and_negative([w_i, w_j, w_k]);
-                    cut(w_i * tilt[i] + w_j * tilt[j] + w_k * tilt[k], above, below);
+                    let (w_i, w_j) = (c[j] - c[k], c[k] - c[i]);
+                    // Else two of them make a shorter sum, which has its turn.
+                    if w_i.abs() > FLAT && w_j.abs() > FLAT {
+                        let [above, below] = sums([w_i * max[i], w_j * max[j], w_k * max[k]]);
+                        cut(w_i * a[i] + w_j * a[j] + w_k * a[k], above, below);
+                    }
                 }
             }
         }
@@ -248,23 +267,21 @@ impl Mixer {
     }
 
     /// Thrusts that some yaw allows at a given share: single rotors without yaw, and pairs whose sum yaw does not change.
-    fn thrust_interval(&self, tilt: &PerRotor<f32>, s: f32) -> Interval {
-        let (n, b, c) = (self.rotors(), &self.collective, &self.yaw);
+    fn thrust_interval(&self, tilt_share: &PerRotor<f32>, s: f32) -> Interval {
+        let (n, a, c, max) = (self.rotors(), tilt_share, &self.yaw_share, &self.full_share_n);
         let mut range = Interval::ALL;
         for i in 0..n {
             if c[i].abs() <= FLAT {
-                range.cut(b[i], self.thrust_max_n - s * tilt[i]);
-                range.cut(-b[i], s * tilt[i]);
+                range.keep(1.0, -s * a[i], max[i] - s * a[i]);
                 continue;
             }
             for j in i + 1..n {
-                if c[j].abs() <= FLAT {
-                    continue;
+                let slope = c[j] - c[i];
+                if c[j].abs() > FLAT && slope.abs() > FLAT {
+                    let [above, below] = sums([c[j] * max[i], -c[i] * max[j]]);
+                    let rest = s * (c[j] * a[i] - c[i] * a[j]);
+                    range.keep(slope, -below - rest, above - rest);
                 }
-                let [above, below] = positive_and_negative([c[j], -c[i]]);
-                let (slope, rest) = (c[j] * b[i] - c[i] * b[j], s * (c[j] * tilt[i] - c[i] * tilt[j]));
-                range.cut(slope, self.thrust_max_n * above - rest);
-                range.cut(-slope, self.thrust_max_n * below + rest);
             }
         }
         range
@@ -285,12 +302,12 @@ impl Mixer {
     }
 }
 
-/// Sum of the positive weights, and of the negative ones without their sign.
+/// Sum of the positive terms, and of the negative ones without their sign.
 #[inline(always)]
-fn positive_and_negative<const N: usize>(weights: [f32; N]) -> [f32; 2] {
+fn sums<const N: usize>(terms: [f32; N]) -> [f32; 2] {
     let mut sums = [0.0; 2];
-    for w in weights {
-        sums[usize::from(w < 0.0)] += w.abs();
+    for term in terms {
+        sums[usize::from(term < 0.0)] += term.abs();
     }
     sums
 }
