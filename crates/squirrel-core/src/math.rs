@@ -59,6 +59,40 @@ pub fn wrap_angle(angle: f32) -> f32 {
     if wrapped <= -PI { PI } else { wrapped }
 }
 
+/// The square root as IEEE 754 rounds it, as `libm` gives it too. Where an f32 has an instruction for it that the standard library
+/// keeps for itself, that instruction: one instead of sixty.
+#[inline(always)]
+pub fn sqrt<T: Real>(x: T) -> T {
+    #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+    {
+        use core::any::Any;
+        // Both are known at compile time; nothing of this is left in the code.
+        let single = <dyn Any>::downcast_ref::<f32>(&x).map(|x| vsqrt(*x));
+        if let Some(root) = single.as_ref().and_then(|root| <dyn Any>::downcast_ref::<T>(root)) {
+            return *root;
+        }
+    }
+    x.sqrt()
+}
+
+/// The instruction of Arm's floating-point units.
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+#[allow(unsafe_code, reason = "core has no square root on stable Rust")]
+#[inline(always)]
+fn vsqrt(x: f32) -> f32 {
+    let root: f32;
+    // SAFETY: a function of its operand alone, and every processor with this calling convention has it.
+    unsafe {
+        core::arch::asm!(
+            "vsqrt.f32 {root}, {x}",
+            root = lateout(sreg) root,
+            x = in(sreg) x,
+            options(pure, nomem, nostack, preserves_flags),
+        );
+    }
+    root
+}
+
 /// True where every component is finite.
 pub fn all_finite(v: &Vector3<f32>) -> bool {
     v.iter().all(|x| x.is_finite())

@@ -168,7 +168,11 @@ impl Stack {
 
     /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any frame.
     pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
-        let elapsed_us = state.time_us.map(|last| frame.time_us.saturating_sub(last));
+        // A gap of an hour is as long as any longer one.
+        let elapsed_us = state.time_us.map(|last| {
+            let elapsed_us = frame.time_us.saturating_sub(last);
+            u32::try_from(elapsed_us).unwrap_or(u32::MAX)
+        });
         state.time_us = Some(frame.time_us);
         let merged = frame.merge_into(&mut state.known);
         state.rejected = state.rejected.saturating_add(merged.rejected);
@@ -197,7 +201,7 @@ impl Stack {
         let mut rotor_command = [0.0; MAX_ROTORS];
         let propulsion = &self.vehicle.parameters().propulsion;
         for (i, command) in rotor_command.iter_mut().take(self.vehicle.rotors().len()).enumerate() {
-            let thrust = inner.map_or(0.0, |terms| terms.mixer.rotor_thrust_n[i]);
+            let thrust = inner.as_ref().map_or(0.0, |terms| terms.mixer.rotor_thrust_n[i]);
             *command = propulsion.command_for_thrust(thrust);
         }
         StackOutput {
