@@ -62,7 +62,8 @@ pub struct Mixer {
     full_share_n: PerRotor<f32>,
     /// Newton metres of yaw torque per unit of the scaled yaw variable.
     yaw_unit_n_m: f32,
-    effectiveness: [PerRotor<f32>; 4],
+    /// Thrust, roll, pitch and yaw torque of one newton of each rotor.
+    effectiveness: [[f32; 4]; MAX_ROTORS],
 }
 
 /// A closed interval; empty where `low > high`.
@@ -77,12 +78,10 @@ impl Interval {
     /// Keeps the part where `low <= slope * x <= high`.
     #[inline(always)]
     fn keep(&mut self, slope: f32, low: f32, high: f32) {
-        if slope > FLAT {
-            self.low = upper(self.low, low / slope);
-            self.high = lower(self.high, high / slope);
-        } else if slope < -FLAT {
-            self.low = upper(self.low, high / slope);
-            self.high = lower(self.high, low / slope);
+        if slope.abs() > FLAT {
+            let (a, b) = (low / slope, high / slope);
+            self.low = upper(self.low, lower(a, b));
+            self.high = lower(self.high, upper(a, b));
         }
     }
     fn is_empty(self) -> bool {
@@ -137,13 +136,12 @@ impl Mixer {
         let largest = |c: &PerRotor<f32>| c.iter().fold(0.0, |m, x| upper(m, x.abs()));
         let (yaw_size, collective_size) = (largest(&yaw_raw), largest(&collective));
         let yaw_unit_n_m = if yaw_size > 0.0 { collective_size / yaw_size } else { 0.0 };
-        let row = |k: usize| {
-            let mut out = [0.0; MAX_ROTORS];
-            for (i, x) in out.iter_mut().enumerate() {
+        let mut effectiveness = [[0.0; 4]; MAX_ROTORS];
+        for (i, rotor) in effectiveness.iter_mut().enumerate() {
+            for (k, x) in rotor.iter_mut().enumerate() {
                 *x = t[(k, i)];
             }
-            out
-        };
+        }
         let yaw = yaw_raw.map(|c| c * yaw_unit_n_m);
         let thrust_max_n = vehicle.rotor_thrust_max_n();
         let (mut yaw_share, mut full_share_n) = ([0.0; MAX_ROTORS], [0.0; MAX_ROTORS]);
@@ -160,7 +158,7 @@ impl Mixer {
             yaw_share,
             full_share_n,
             yaw_unit_n_m,
-            effectiveness: [row(0), row(1), row(2), row(3)],
+            effectiveness,
         })
     }
 
@@ -293,8 +291,8 @@ impl Mixer {
         for i in 0..self.rotors() {
             let f = limit(self.rotor_thrust(tilt, i, s, u, y), 0.0, self.thrust_max_n);
             rotor_thrust_n[i] = f;
-            for (total, row) in sum.iter_mut().zip(&self.effectiveness) {
-                *total += row[i] * f;
+            for (total, part) in sum.iter_mut().zip(&self.effectiveness[i]) {
+                *total += part * f;
             }
         }
         let achieved = ThrustTorque { thrust_n: sum[0], torque_n_m: Vector3::new(sum[1], sum[2], sum[3]) };
@@ -305,11 +303,12 @@ impl Mixer {
 /// Sum of the positive terms, and of the negative ones without their sign.
 #[inline(always)]
 fn sums<const N: usize>(terms: [f32; N]) -> [f32; 2] {
-    let mut sums = [0.0; 2];
+    let (mut sum, mut size) = (0.0, 0.0);
     for term in terms {
-        sums[usize::from(term < 0.0)] += term.abs();
+        sum += term;
+        size += term.abs();
     }
-    sums
+    [0.5 * (size + sum), 0.5 * (size - sum)]
 }
 
 /// `T^T (T T^T)^-1`; a yaw row of zeros is left out.

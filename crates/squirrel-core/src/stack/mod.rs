@@ -182,10 +182,15 @@ impl Stack {
             self.forget(state, was);
         }
 
-        let outer_index = frame.time_us / OUTER_PERIOD_US;
-        let outer = if state.outer_index == Some(outer_index) {
+        // In most steps the period is the last one still; a processor without 64-bit division sees that sooner.
+        let is_same_period = state.outer_index.is_some_and(|last| {
+            let begin_us = last.wrapping_mul(OUTER_PERIOD_US);
+            (begin_us..begin_us.saturating_add(OUTER_PERIOD_US)).contains(&frame.time_us)
+        });
+        let outer = if is_same_period {
             None
         } else {
+            let outer_index = frame.time_us / OUTER_PERIOD_US;
             let periods = state.outer_index.map_or(1, |last| outer_index.saturating_sub(last));
             state.outer_index = Some(outer_index);
             let dt_s = lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6;
