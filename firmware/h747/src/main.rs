@@ -43,6 +43,7 @@ use squirrel_h747::gnss::{Fix, Receiver};
 use squirrel_h747::log::{LINE_MAX, stuff};
 use squirrel_h747::sensors::Sensors;
 use squirrel_h747::setup;
+use static_cell::StaticCell;
 
 const STEP: Duration = Duration::from_hz(300);
 const ARMING_STEP: Duration = Duration::from_hz(10);
@@ -58,6 +59,9 @@ static FIX: Signal<CriticalSectionRawMutex, (Fix, u64)> = Signal::new();
 static PRESSURE_PA: Signal<CriticalSectionRawMutex, (f32, u64)> = Signal::new();
 /// 0.2 s of log, or a setup.
 static LOG: Pipe<CriticalSectionRawMutex, 8192> = Pipe::new();
+
+/// The bus of the IMU, which tasks borrow for as long as the program runs.
+static BUS: StaticCell<Mutex<NoopRawMutex, Spi<'static, Async, spi::mode::Master>>> = StaticCell::new();
 
 type Imu = ICM42688<
     SpiDevice<'static, NoopRawMutex, Spi<'static, Async, spi::mode::Master>, Output<'static>>,
@@ -78,12 +82,8 @@ fn or_reset<T, E>(result: Result<T, E>) -> T {
 async fn main(spawner: Spawner) {
     let Some(board) = board::start() else { SCB::sys_reset() };
     let Board { actuators, imu, imu_select, gnss, barometer, log, switch, lamp, watchdog } = board;
-    // The executor's main task never ends, so that what lives here lives as long as the program.
-    static BUS: static_cell::StaticCell<Mutex<NoopRawMutex, Spi<'static, Async, spi::mode::Master>>> =
-        static_cell::StaticCell::new();
     let device = SpiDevice::new(&*BUS.init(Mutex::new(imu)), imu_select);
-    let mut config = icm426xx::Config::default();
-    config.rate = icm426xx::OutputDataRate::Hz1000;
+    let config = icm426xx::Config { rate: icm426xx::OutputDataRate::Hz1000, ..Default::default() };
     let imu = ICM42688::new(device).initialize(Delay, config).await;
     let flight = setup::read(board::setup()).and_then(Flight::new);
     let (Ok(imu), Some(flight)) = (imu, flight) else { return cannot_fly(lamp).await };

@@ -32,9 +32,14 @@ pub fn dshot_value(kind: CommandKind, command: f32) -> Option<u16> {
     if !(fraction > 0.0) {
         return Some(STOP);
     }
-    let range = f32::from(THROTTLE_MAX - THROTTLE_MIN);
-    // The cast cuts what is above at the limit.
-    Some(THROTTLE_MIN + ((fraction * range + 0.5) as u16).min(THROTTLE_MAX - THROTTLE_MIN))
+    let range = THROTTLE_MAX - THROTTLE_MIN;
+    Some(THROTTLE_MIN + rounded(fraction * f32::from(range)).min(range))
+}
+
+/// To the nearest; what is above the range is cut at its end.
+#[allow(clippy::cast_sign_loss, reason = "asked with what is not below 0")]
+fn rounded(x: f32) -> u16 {
+    (x + 0.5) as u16
 }
 
 /// The sixteen bits of a frame without telemetry.
@@ -66,7 +71,7 @@ pub fn dshot_waveform(values: [u16; ROTORS], period: u16) -> Waveform {
 pub fn servo_pulses_us(wings: [f32; 2]) -> [u32; 2] {
     let turned = wings.map(|wing| {
         let wing = if wing > 0.0 { wing.min(1.0) } else { 0.0 };
-        (wing * 1000.0 + 0.5) as u32
+        u32::from(rounded(wing * 1000.0))
     });
     [1000 + turned[0], 2000 - turned[1]]
 }

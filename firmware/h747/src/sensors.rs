@@ -24,8 +24,8 @@ struct Reading<T> {
 }
 
 impl<T: Copy> Reading<T> {
-    fn new(value: T, time_us: u64) -> Option<Self> {
-        Some(Self { value, time_us, is_new: true })
+    fn new(value: T, time_us: u64) -> Self {
+        Self { value, time_us, is_new: true }
     }
 
     fn take(slot: &mut Option<Self>) -> Option<T> {
@@ -70,18 +70,18 @@ impl Sensors {
         } else {
             self.attitude.in_flight(&sample, dt_s);
         }
-        self.imu = Reading::new(sample, time_us);
+        self.imu = Some(Reading::new(sample, time_us));
     }
 
     /// A satellite fix.
     pub fn fix(&mut self, fix: Fix, time_us: u64) {
-        self.fix = Reading::new(fix, time_us);
+        self.fix = Some(Reading::new(fix, time_us));
     }
 
     /// A pressure, Pa. What no barometer can say is no reading.
     pub fn pressure(&mut self, pressure_pa: f32, time_us: u64) {
         if (10_000.0..150_000.0).contains(&pressure_pa) {
-            self.pressure_pa = Reading::new(pressure_pa, time_us);
+            self.pressure_pa = Some(Reading::new(pressure_pa, time_us));
         }
     }
 

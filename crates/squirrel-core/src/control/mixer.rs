@@ -60,6 +60,8 @@ pub struct Mixer {
     /// Scaled yaw and the thrust limit, each over the rotor's part of the collective.
     yaw_share: PerRotor<f32>,
     full_share_n: PerRotor<f32>,
+    /// Three rotors differ in `yaw_share`: not where all turn one way or the other with equal strength.
+    has_three_kinds: bool,
     /// Newton metres of yaw torque per unit of the scaled yaw variable.
     yaw_unit_n_m: f32,
     /// Thrust, roll, pitch and yaw torque of one newton of each rotor.
@@ -148,6 +150,9 @@ impl Mixer {
         for (i, b) in collective[..count].iter().enumerate() {
             (yaw_share[i], full_share_n[i]) = (yaw[i] / b, thrust_max_n / b);
         }
+        let differ = |i: usize, j: usize| (yaw_share[i] - yaw_share[j]).abs() > FLAT;
+        let has_three_kinds =
+            (0..count).any(|i| (0..i).any(|j| differ(i, j) && (0..j).any(|k| differ(i, k) && differ(j, k))));
         Ok(Self {
             count,
             thrust_max_n,
@@ -157,6 +162,7 @@ impl Mixer {
             yaw,
             yaw_share,
             full_share_n,
+            has_three_kinds,
             yaw_unit_n_m,
             effectiveness,
         })
@@ -251,7 +257,8 @@ impl Mixer {
                     cut(a[i] - a[j], max[i], max[j]);
                     continue;
                 }
-                for k in j + 1..n {
+                let last = if self.has_three_kinds { n } else { j + 1 };
+                for k in j + 1..last {
                     let (w_i, w_j) = (c[j] - c[k], c[k] - c[i]);
                     // Else two of them make a shorter sum, which has its turn.
                     if w_i.abs() > FLAT && w_j.abs() > FLAT {
