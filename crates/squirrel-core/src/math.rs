@@ -60,7 +60,7 @@ pub fn wrap_angle(angle: f32) -> f32 {
 }
 
 /// The square root as IEEE 754 rounds it, as `libm` gives it too. Where an f32 has an instruction for it that the standard library
-/// keeps for itself, that instruction: one instead of sixty.
+/// keeps for itself, that instruction.
 #[inline(always)]
 pub fn sqrt<T: Real>(x: T) -> T {
     #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
