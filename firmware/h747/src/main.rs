@@ -203,11 +203,14 @@ async fn listen(gnss: UartRx<'static, Async>) {
     let mut receiver = Receiver::default();
     let mut bytes = [0; 128];
     loop {
-        // An error of the line is over with the next byte; the parser finds its way.
-        if let Ok(count) = gnss.read(&mut bytes).await
-            && let Some(fix) = receiver.read(bytes.get(..count).unwrap_or(&[]))
-        {
-            FIX.signal((fix, Instant::now().as_micros()));
+        match gnss.read(&mut bytes).await {
+            Ok(count) => {
+                if let Some(fix) = receiver.read(bytes.get(..count).unwrap_or(&[])) {
+                    FIX.signal((fix, Instant::now().as_micros()));
+                }
+            }
+            // The parser finds its way; a line of noise must not keep the others from running.
+            Err(_) => Timer::after_millis(1).await,
         }
     }
 }

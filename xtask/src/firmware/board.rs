@@ -2,17 +2,18 @@
 
 use super::elf::Elf;
 use super::{Figures, build};
-use crate::run::{call, output};
+use crate::run::{call, output, root};
 use crate::thumb;
 use std::process::Command;
 
 const PACKAGE: &str = "--package=squirrel-h747";
 
-/// Lints the firmware's workspace and tests the parts of the image that need no hardware.
+/// Checks format and lints of the firmware's workspace, and tests the parts of the image that need no hardware.
 ///
 /// # Errors
 /// What clippy or a test says.
 pub(super) fn check() -> Result<(), String> {
+    call(Command::new("cargo").args(["fmt", "--all", "--check"]).current_dir(root()?.join("firmware")))?;
     let host = output(Command::new("rustc").arg("-vV"));
     let host = host.as_deref().and_then(host_of).ok_or("rustc -vV: names no host")?;
     for arguments in [

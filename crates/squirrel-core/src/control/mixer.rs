@@ -257,8 +257,10 @@ impl Mixer {
                     cut(a[i] - a[j], max[i], max[j]);
                     continue;
                 }
-                let last = if self.has_three_kinds { n } else { j + 1 };
-                for k in j + 1..last {
+                if !self.has_three_kinds {
+                    continue;
+                }
+                for k in j + 1..n {
                     let (w_i, w_j) = (c[j] - c[k], c[k] - c[i]);
                     // Else two of them make a shorter sum, which has its turn.
                     if w_i.abs() > FLAT && w_j.abs() > FLAT {
