@@ -1,0 +1,81 @@
+//! Python bindings: `import squirrel`.
+//!
+//! The functions of the crates below as Python sees them, batched over the first axis of NumPy arrays; nothing is computed
+//! here. Arrays are checked where they come in ([`arguments`]), errors are squirrel's own lines as Python's exceptions
+//! ([`error`]), and whatever takes long runs without the interpreter's lock.
+
+#![allow(clippy::needless_pass_by_value, reason = "arguments come from Python, which hands them over")]
+#![allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
+#![allow(clippy::unnecessary_wraps, reason = "what Python calls may raise")]
+
+mod arguments;
+mod batch;
+mod control;
+mod dynamics;
+mod error;
+mod flight;
+mod gap;
+mod log;
+mod nn;
+mod stack;
+mod state;
+mod terms;
+mod vehicle;
+
+use pyo3::prelude::*;
+use pyo3_stub_gen::derive::gen_stub_pyfunction;
+use std::ffi::OsString;
+
+/// A result as Python's own objects, by way of JSON.
+fn json<'py>(py: Python<'py>, result: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(result).map_err(error::value)?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
+/// Run the command line.
+///
+/// Parameters
+/// ----------
+/// arguments : list of str
+///     The first is the name of the program.
+///
+/// Returns
+/// -------
+/// int
+///     Exit code: 0 done, 1 failed, 2 wrong usage.
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+fn program(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| squirrel_cli::run(arguments))
+}
+
+/// The compiled part of squirrel; import `squirrel` instead.
+#[pymodule]
+mod _squirrel {
+    #[pymodule_export]
+    use super::batch::{Batch, rollout};
+    #[pymodule_export]
+    use super::control::{Backstepping, Twcc};
+    #[pymodule_export]
+    use super::dynamics::{derivative, rk4_step};
+    #[pymodule_export]
+    use super::flight::simulate;
+    #[pymodule_export]
+    use super::gap::{gap_diagnose, gap_find};
+    #[pymodule_export]
+    use super::log::FlightLog;
+    #[pymodule_export]
+    use super::nn::{Model, forward, load, train, windows};
+    #[pymodule_export]
+    use super::program;
+    #[pymodule_export]
+    use super::stack::Stack;
+    #[pymodule_export]
+    use super::vehicle::Vehicle;
+
+    #[pymodule_export]
+    #[allow(non_upper_case_globals, reason = "Python's name")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}
+
+pyo3_stub_gen::define_stub_info_gatherer!(stub_info);
