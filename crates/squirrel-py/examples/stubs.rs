@@ -14,6 +14,8 @@ mod stubs {
     fn text() -> PyResult<String> {
         let info = _squirrel::stub_info().map_err(|e| PyValueError::new_err(e.to_string()))?;
         let module = info.modules.get("squirrel._squirrel");
-        module.map(ToString::to_string).ok_or_else(|| PyValueError::new_err("squirrel._squirrel is not there"))
+        module
+            .map(ToString::to_string)
+            .ok_or_else(|| PyValueError::new_err("squirrel._squirrel is not there"))
     }
 }

@@ -112,7 +112,7 @@ pub(crate) fn rows<'py, T: Float>(
     let fits = array.ndim() == shape.len()
         && array.shape().iter().zip(shape).all(|(has, must)| must.is_none_or(|must| *has == must));
     if !fits {
-        return Err(value(format!("{}, got shape {:?}", expected(), python_shape(array.shape()))));
+        return Err(value(format!("{}, got shape {}", expected(), python_shape(array.shape()))));
     }
     let array = array.try_readonly().map_err(|error| value(format!("{name}: {error}")))?;
     let copy = array.as_slice().is_err().then(|| array.as_array().iter().copied().collect());
@@ -129,14 +129,18 @@ pub(crate) fn rows<'py, T: Float>(
 
 /// Whether an array is of `float32`; not so where it is something else altogether.
 pub(crate) fn is_32(object: &Bound<'_, PyAny>) -> bool {
-    object.cast::<PyUntypedArray>().is_ok_and(|array| array.dtype().num() == numpy::dtype::<f32>(object.py()).num())
+    object
+        .cast::<PyUntypedArray>()
+        .is_ok_and(|array| array.dtype().num() == numpy::dtype::<f32>(object.py()).num())
 }
 
 /// What an object is, for an error.
 fn kind(object: &Bound<'_, PyAny>) -> String {
     match object.cast::<PyUntypedArray>() {
         Ok(array) => format!("{} of shape {}", array.dtype(), python_shape(array.shape())),
-        Err(_) => object.get_type().name().map_or_else(|_| "something else".to_owned(), |name| name.to_string()),
+        Err(_) => {
+            object.get_type().name().map_or_else(|_| "something else".to_owned(), |name| name.to_string())
+        }
     }
 }
 
@@ -177,6 +181,7 @@ fn python_shape(shape: &[usize]) -> String {
 
 /// As Python writes a tuple; `n` where any length will do.
 fn shape_text(shape: &[Option<usize>]) -> String {
-    let lengths: Vec<String> = shape.iter().map(|n| n.map_or_else(|| "n".to_owned(), |n| n.to_string())).collect();
+    let lengths: Vec<String> =
+        shape.iter().map(|n| n.map_or_else(|| "n".to_owned(), |n| n.to_string())).collect();
     format!("({}{})", lengths.join(", "), if lengths.len() == 1 { "," } else { "" })
 }

@@ -6,7 +6,7 @@ use crate::log::table;
 use crate::state::{check_attitudes, state};
 use crate::vehicle::Vehicle;
 use nalgebra::Vector3;
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -94,7 +94,9 @@ fn flock(vehicles: &[Bound<'_, Vehicle>], settings: Settings, in_32: bool) -> Py
     let rotors = airframes.first().map_or(0, |first| first.rotors().len());
     if let Some(at) = airframes.iter().position(|one| one.rotors().len() != rotors) {
         let others = airframes[at].rotors().len();
-        return Err(value(format!("vehicles[{at}]: {others} rotors, vehicles[0] has {rotors}; a batch holds one kind")));
+        return Err(value(format!(
+            "vehicles[{at}]: {others} rotors, vehicles[0] has {rotors}; a batch holds one kind"
+        )));
     }
     match rotors {
         // An empty list is the batch's to refuse.
@@ -105,12 +107,20 @@ fn flock(vehicles: &[Bound<'_, Vehicle>], settings: Settings, in_32: bool) -> Py
     }
 }
 
-fn of_rotors<const ROTORS: usize>(airframes: &[Airframe<f64>], settings: Settings, in_32: bool) -> PyResult<Box<dyn AnyFlock>> {
+fn of_rotors<const ROTORS: usize>(
+    airframes: &[Airframe<f64>],
+    settings: Settings,
+    in_32: bool,
+) -> PyResult<Box<dyn AnyFlock>> {
     if in_32 { of::<f32, ROTORS>(airframes, settings) } else { of::<f64, ROTORS>(airframes, settings) }
 }
 
-fn of<T: Paths + Float, const ROTORS: usize>(airframes: &[Airframe<f64>], settings: Settings) -> PyResult<Box<dyn AnyFlock>> {
-    let airframes = airframes.iter().map(|one| one.cast::<T>().map_err(value)).collect::<PyResult<Vec<_>>>()?;
+fn of<T: Paths + Float, const ROTORS: usize>(
+    airframes: &[Airframe<f64>],
+    settings: Settings,
+) -> PyResult<Box<dyn AnyFlock>> {
+    let airframes =
+        airframes.iter().map(|one| one.cast::<T>().map_err(value)).collect::<PyResult<Vec<_>>>()?;
     Ok(Box::new(Flock::<T, ROTORS>::new(&airframes, settings).map_err(value)?))
 }
 
@@ -400,12 +410,17 @@ pub(crate) fn rollout<'py>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let in_32 = is_32(&state.0);
     let settings = settings(dt_s, scheme, threads)?;
-    let batch = Batch { flock: Mutex::new(flock(&vehicles, settings, in_32)?), vehicles: vehicles.len(), settings };
+    let batch =
+        Batch { flock: Mutex::new(flock(&vehicles, settings, in_32)?), vehicles: vehicles.len(), settings };
     batch.reset(py, state, None)?;
     if let Some(wind) = wind_ned_m_s {
         batch.set_wind(py, wind)?;
     }
-    if in_32 { periods::<f32>(py, &batch, &command, steps_per_command) } else { periods::<f64>(py, &batch, &command, steps_per_command) }
+    if in_32 {
+        periods::<f32>(py, &batch, &command, steps_per_command)
+    } else {
+        periods::<f64>(py, &batch, &command, steps_per_command)
+    }
 }
 
 /// The motions of all periods.

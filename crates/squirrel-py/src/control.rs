@@ -23,14 +23,20 @@ use squirrel_sim::arm::Arm;
 use std::sync::{Mutex, MutexGuard};
 
 /// The memory of a law, one for each vehicle.
-pub(crate) fn lock<'a, T: Clone>(memory: &'a Mutex<Vec<T>>, py: Python<'_>) -> PyResult<MutexGuard<'a, Vec<T>>> {
-    memory.lock_py_attached(py).map_err(|_| PyRuntimeError::new_err("a call on this object has panicked; make a new one"))
+pub(crate) fn lock<'a, T: Clone>(
+    memory: &'a Mutex<Vec<T>>,
+    py: Python<'_>,
+) -> PyResult<MutexGuard<'a, Vec<T>>> {
+    memory
+        .lock_py_attached(py)
+        .map_err(|_| PyRuntimeError::new_err("a call on this object has panicked; make a new one"))
 }
 
 /// Gains of a vehicle that has them.
 pub(crate) fn gains(vehicle: &Bound<'_, Vehicle>) -> PyResult<StackParameters> {
     let file = &vehicle.get().file;
-    file.control.ok_or_else(|| value(format!("vehicle: {}: [control] is missing; control needs gains", file.name)))
+    file.control
+        .ok_or_else(|| value(format!("vehicle: {}: [control] is missing; control needs gains", file.name)))
 }
 
 /// The vehicle as the flight code knows it.
@@ -40,11 +46,19 @@ pub(crate) fn single(vehicle: &Bound<'_, Vehicle>) -> PyResult<Checked<f32>> {
 
 /// Refuses what is no step.
 pub(crate) fn step_s(dt_s: f32) -> PyResult<f32> {
-    if dt_s > 0.0 && dt_s.is_finite() { Ok(dt_s) } else { Err(value(format!("dt_s = {dt_s}: must be finite and > 0"))) }
+    if dt_s > 0.0 && dt_s.is_finite() {
+        Ok(dt_s)
+    } else {
+        Err(value(format!("dt_s = {dt_s}: must be finite and > 0")))
+    }
 }
 
 /// Rows that may be left out, and are zero then.
-fn optional<'py>(name: &str, array: Option<&Array32<'py>>, n: usize) -> PyResult<impl Fn(usize) -> Vector3<f32> + use<'py>> {
+fn optional<'py>(
+    name: &str,
+    array: Option<&Array32<'py>>,
+    n: usize,
+) -> PyResult<impl Fn(usize) -> Vector3<f32> + use<'py>> {
     let rows: Option<Rows<'py, f32>> =
         array.map(|array| rows(name, &array.0, &[Some(n), Some(3)], Numbers::Finite)).transpose()?;
     Ok(move |i| rows.as_ref().map_or_else(Vector3::zeros, |rows| Vector3::from(rows.row::<3>(i))))
@@ -125,7 +139,8 @@ impl Backstepping {
         let n = memory.len();
         let three = [Some(n), Some(3)];
         let name = "q_ned_from_body_wxyz";
-        let attitudes = rotations(name, &rows(name, &q_ned_from_body_wxyz.0, &[Some(n), Some(4)], Numbers::Finite)?)?;
+        let attitudes =
+            rotations(name, &rows(name, &q_ned_from_body_wxyz.0, &[Some(n), Some(4)], Numbers::Finite)?)?;
         let omega = rows::<f32>("omega_body_rad_s", &omega_body_rad_s.0, &three, Numbers::Finite)?;
         let angle = rows::<f32>("angle_rad", &angle_rad.0, &three, Numbers::Finite)?;
         let rate = optional("rate_rad_s", rate_rad_s.as_ref(), n)?;
@@ -134,8 +149,11 @@ impl Backstepping {
         let inertia = &self.vehicle.parameters().inertia_kg_m2;
         let mut terms = Terms::default();
         for (i, state) in memory.iter_mut().enumerate() {
-            let wanted =
-                EulerReference { angle: Vector3::from(angle.row(i)), rate: rate(i), acceleration: acceleration(i) };
+            let wanted = EulerReference {
+                angle: Vector3::from(angle.row(i)),
+                rate: rate(i),
+                acceleration: acceleration(i),
+            };
             let omega = Vector3::from(omega.row(i));
             let out = self.gains.update(state, inertia, &attitudes[i], &omega, &wanted, hold_integral, dt_s);
             terms.push("angle_error_rad", out.angle_error.as_slice());
@@ -242,8 +260,10 @@ impl Twcc {
         let position = rows::<f32>("position_ned_m", &position_ned_m.0, &three, Numbers::Finite)?;
         let velocity = rows::<f32>("velocity_ned_m_s", &velocity_ned_m_s.0, &three, Numbers::Finite)?;
         let name = "q_ned_from_body_wxyz";
-        let attitudes = rotations(name, &rows(name, &q_ned_from_body_wxyz.0, &[Some(n), Some(4)], Numbers::Finite)?)?;
-        let wanted = rows::<f32>("reference_position_ned_m", &reference_position_ned_m.0, &three, Numbers::Finite)?;
+        let attitudes =
+            rotations(name, &rows(name, &q_ned_from_body_wxyz.0, &[Some(n), Some(4)], Numbers::Finite)?)?;
+        let wanted =
+            rows::<f32>("reference_position_ned_m", &reference_position_ned_m.0, &three, Numbers::Finite)?;
         let wanted_velocity = optional("reference_velocity_ned_m_s", reference_velocity_ned_m_s.as_ref(), n)?;
         let wanted_acceleration =
             optional("reference_acceleration_ned_m_s2", reference_acceleration_ned_m_s2.as_ref(), n)?;
@@ -269,7 +289,15 @@ impl Twcc {
                 yaw_rad: reference_yaw_rad,
             };
             let given = wing_force_ned_n.is_some().then(|| In::new(force(i)));
-            let out = self.parameters.update(state, &self.airframe, &motion, &attitudes[i], given, &reference, dt_s);
+            let out = self.parameters.update(
+                state,
+                &self.airframe,
+                &motion,
+                &attitudes[i],
+                given,
+                &reference,
+                dt_s,
+            );
             outer(&mut terms, &out);
         }
         terms.arrays(py)

@@ -44,7 +44,9 @@ impl<'py> Model<'py> {
         check_attitudes("state", states.numbers(), width, 6)?;
         let n = Some(states.numbers().len() / width);
         let commands = rows("command", &command.0, &[n, Some(rotors)], Numbers::Finite)?;
-        let winds = wind_ned_m_s.map(|wind| rows("wind_ned_m_s", &wind.0, &[n, Some(3)], Numbers::Finite)).transpose()?;
+        let winds = wind_ned_m_s
+            .map(|wind| rows("wind_ned_m_s", &wind.0, &[n, Some(3)], Numbers::Finite))
+            .transpose()?;
         let voltage_v = voltage_v.unwrap_or(file.vehicle.parameters().propulsion.reference_voltage_v);
         if !voltage_v.is_finite() {
             return Err(value(format!("voltage_v = {voltage_v}: must be finite")));
@@ -69,7 +71,11 @@ impl<'py> Model<'py> {
     }
 
     /// A row of results for each motion.
-    fn map(&self, py: Python<'py>, result: impl Fn(State<f64>, &Held<f64>) -> PyResult<State<f64>>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    fn map(
+        &self,
+        py: Python<'py>,
+        result: impl Fn(State<f64>, &Held<f64>) -> PyResult<State<f64>>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let width = BODY_NUMBERS + self.rotors;
         let mut out = Vec::with_capacity(self.states.numbers().len());
         for (i, row) in self.states.numbers().chunks_exact(width).enumerate() {

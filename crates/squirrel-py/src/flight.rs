@@ -26,7 +26,7 @@ impl FlightComputer for Interruptible {
     fn step(&mut self, frame: &SensorFrame) -> Result<(StackOutput, u32), FlightError> {
         self.steps = self.steps.wrapping_add(1);
         if self.steps.is_multiple_of(STEPS_A_LOOK)
-            && let Err(signal) = Python::attach(|py| py.check_signals())
+            && let Err(signal) = Python::attach(Python::check_signals)
         {
             self.signal = Some(signal);
             return Err(FlightError("interrupted".to_owned()));

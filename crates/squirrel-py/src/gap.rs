@@ -15,7 +15,12 @@ use std::path::{Path, PathBuf};
 /// Names and logs in the order of the dictionary.
 pub(crate) fn logs(argument: &str, flights: &Bound<'_, PyDict>) -> PyResult<Vec<(String, log::FlightLog)>> {
     let named = flights.iter().map(|(name, log)| {
-        let wrong = || value(format!("{argument}: expected names (str) and FlightLogs, got {name} of {}", log.get_type()));
+        let wrong = || {
+            value(format!(
+                "{argument}: expected names (str) and FlightLogs, got {name} of {}",
+                log.get_type()
+            ))
+        };
         let name: String = name.extract().map_err(|_| wrong())?;
         let log = log.cast::<FlightLog>().map_err(|_| wrong())?;
         Ok((name, log.get().log.clone()))
@@ -54,7 +59,8 @@ pub(crate) fn gap_diagnose<'py>(
 ) -> PyResult<(Bound<'py, PyAny>, Option<Vehicle>)> {
     let vehicle = &vehicle.get().file;
     let (flights, held_out) = (logs("flights", flights)?, logs("held_out", held_out)?);
-    let (verdict, patched) = py.detach(|| diagnose(vehicle, &flights, &held_out, fly_again, out.as_deref()))?;
+    let (verdict, patched) =
+        py.detach(|| diagnose(vehicle, &flights, &held_out, fly_again, out.as_deref()))?;
     Ok((json(py, &verdict)?, patched.map(|file| Vehicle { file })))
 }
 
@@ -71,7 +77,10 @@ fn diagnose(
     let names = |logs: &Logs| logs.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     let is_file = matches!(diagnosis.verdict.verdict, Kind::Named | Kind::NamedFormDiffers | Kind::Ambiguous)
         && !diagnosis.verdict.effects.is_empty();
-    let text = is_file.then(|| squirrel_gap::add(vehicle, &diagnosis, &names(flights))).transpose().map_err(value)?;
+    let text = is_file
+        .then(|| squirrel_gap::add(vehicle, &diagnosis, &names(flights)))
+        .transpose()
+        .map_err(value)?;
     let patched = text
         .as_ref()
         .map(|text| VehicleFile::parse_with(text, &vehicle.name, vehicle.weights.clone()))
@@ -90,7 +99,8 @@ fn diagnose(
             write_file(&path, text.as_bytes())?;
             diagnosis.verdict.model_patch = Some(path.display().to_string());
         }
-        let picture = squirrel_gap::picture(vehicle, &diagnosis, &names(flights), &names(held_out), text.as_deref());
+        let picture =
+            squirrel_gap::picture(vehicle, &diagnosis, &names(flights), &names(held_out), text.as_deref());
         write_file(&folder.join("report.html"), squirrel_gap::report::render(&picture).as_bytes())?;
     }
     Ok((diagnosis.verdict, patched))

@@ -4,9 +4,9 @@
 //! here. Arrays are checked where they come in ([`arguments`]), errors are squirrel's own lines as Python's exceptions
 //! ([`error`]), and whatever takes long runs without the interpreter's lock.
 
+#![allow(clippy::doc_link_with_quotes, reason = "examples in docstrings are Python")]
 #![allow(clippy::needless_pass_by_value, reason = "arguments come from Python, which hands them over")]
 #![allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
-#![allow(clippy::unnecessary_wraps, reason = "what Python calls may raise")]
 
 mod arguments;
 mod batch;

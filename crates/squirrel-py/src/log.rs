@@ -219,7 +219,11 @@ impl FlightLog {
 }
 
 /// Rows of equal width as an array.
-pub(crate) fn table<T: numpy::Element>(py: Python<'_>, numbers: Vec<T>, width: usize) -> PyResult<Bound<'_, PyArray2<T>>> {
+pub(crate) fn table<T: numpy::Element>(
+    py: Python<'_>,
+    numbers: Vec<T>,
+    width: usize,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
     let rows = numbers.len() / width;
     PyArray1::from_vec(py, numbers).reshape([rows, width])
 }

@@ -88,7 +88,9 @@ impl Model {
         }
         let mut parameters = Vec::new();
         for (name, shape) in named {
-            let Some(array) = tensors.get(name) else { return Err(value(format!("tensors: {name}: missing"))) };
+            let Some(array) = tensors.get(name) else {
+                return Err(value(format!("tensors: {name}: missing")));
+            };
             let shape: Vec<_> = shape.into_iter().map(Some).collect();
             parameters.extend_from_slice(rows::<f32>(name, &array.0, &shape, Numbers::Finite)?.numbers());
         }
@@ -114,7 +116,12 @@ impl Model {
 
     fn __repr__(&self) -> String {
         let card = &self.trained.card;
-        format!("<Model {} of {}: {} parameters>", card.model.name(), card.vehicle, self.trained.parameters().len())
+        format!(
+            "<Model {} of {}: {} parameters>",
+            card.model.name(),
+            card.vehicle,
+            self.trained.parameters().len()
+        )
     }
 }
 
@@ -176,7 +183,8 @@ pub(crate) fn forward<'py>(
     let trained = &model.get().trained;
     let seen = self::rows::<f32>("rows", &rows.0, &[None, Some(WINDOW), Some(INPUTS)], Numbers::Finite)?;
     let n = Some(seen.numbers().len() / (WINDOW * INPUTS));
-    let velocity = self::rows::<f32>("velocity_body_m_s", &velocity_body_m_s.0, &[n, Some(3)], Numbers::Finite)?;
+    let velocity =
+        self::rows::<f32>("velocity_body_m_s", &velocity_body_m_s.0, &[n, Some(3)], Numbers::Finite)?;
     let name = "q_ned_from_body_wxyz";
     let attitude = q_ned_from_body_wxyz
         .map(|q| self::rows::<f32>(name, &q.0, &[n, Some(4)], Numbers::Finite))
@@ -245,9 +253,18 @@ pub(crate) fn windows<'py>(
     };
     let n = all.len();
     let out = PyDict::new(py);
-    out.set_item("rows", array(all.iter().flat_map(|w| w.rows.into_iter().flatten()).collect(), &[n, WINDOW, INPUTS])?)?;
-    out.set_item("velocity_body_m_s", array(all.iter().flat_map(|w| w.velocity_body_m_s).collect(), &[n, 3])?)?;
-    out.set_item("q_ned_from_body_wxyz", array(all.iter().flat_map(|w| w.q_ned_from_body_wxyz).collect(), &[n, 4])?)?;
+    out.set_item(
+        "rows",
+        array(all.iter().flat_map(|w| w.rows.into_iter().flatten()).collect(), &[n, WINDOW, INPUTS])?,
+    )?;
+    out.set_item(
+        "velocity_body_m_s",
+        array(all.iter().flat_map(|w| w.velocity_body_m_s).collect(), &[n, 3])?,
+    )?;
+    out.set_item(
+        "q_ned_from_body_wxyz",
+        array(all.iter().flat_map(|w| w.q_ned_from_body_wxyz).collect(), &[n, 4])?,
+    )?;
     out.set_item("label_body_n", array(all.iter().flat_map(|w| w.label_body_n).collect(), &[n, 3])?)?;
     let truth = all.iter().flat_map(|w| w.truth_body_n.unwrap_or([f32::NAN; 3]));
     out.set_item("truth_body_n", array(truth.collect(), &[n, 3])?)?;
@@ -303,7 +320,8 @@ pub(crate) fn train(
     let (training, validation) = split.map_err(|e| value(format!("validation: {e}")))?;
     let settings = Settings { epochs, batch, rate, clip, patience, seed };
     let area_m2 = labels::plate_area_m2(&vehicle);
-    let mut trainer = Trainer::new(kind, &vehicle.name, area_m2, &training, &validation, settings).map_err(fail)?;
+    let mut trainer =
+        Trainer::new(kind, &vehicle.name, area_m2, &training, &validation, settings).map_err(fail)?;
     while py.detach(|| trainer.epoch()).map_err(fail)?.is_some() {
         py.check_signals()?;
     }

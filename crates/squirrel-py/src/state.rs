@@ -40,12 +40,21 @@ pub(crate) fn push<T: Real>(rows: &mut Vec<T>, state: &State<T>, rotors: usize) 
 /// Refuses rows whose attitude is no rotation.
 ///
 /// * `at` - column of the first of its four numbers
-pub(crate) fn check_attitudes<T: Float + Real>(name: &str, numbers: &[T], width: usize, at: usize) -> PyResult<()> {
+pub(crate) fn check_attitudes<T: Float + Real>(
+    name: &str,
+    numbers: &[T],
+    width: usize,
+    at: usize,
+) -> PyResult<()> {
     for (i, row) in numbers.chunks_exact(width).enumerate() {
-        let square: f64 = row[at..at + 4].iter().map(|x| nalgebra::try_convert(*x).unwrap_or(f64::NAN).powi(2)).sum();
+        let square: f64 =
+            row[at..at + 4].iter().map(|x| nalgebra::try_convert(*x).unwrap_or(f64::NAN).powi(2)).sum();
         if !((square.sqrt() - 1.0).abs() < NORM_SLACK) {
             let norm = square.sqrt();
-            return Err(value(format!("{name}[{i}, {at}:{}]: norm {norm}, must be 1 to within {NORM_SLACK}", at + 4)));
+            return Err(value(format!(
+                "{name}[{i}, {at}:{}]: norm {norm}, must be 1 to within {NORM_SLACK}",
+                at + 4
+            )));
         }
     }
     Ok(())

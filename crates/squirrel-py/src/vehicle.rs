@@ -275,7 +275,9 @@ fn table_of<'a, 'k>(
             return Ok((table, part));
         }
         let (name, index) = match part.strip_suffix(']').and_then(|part| part.split_once('[')) {
-            Some((name, index)) => (name, Some(index.parse::<usize>().map_err(|_| format!("no table {part}"))?)),
+            Some((name, index)) => {
+                (name, Some(index.parse::<usize>().map_err(|_| format!("no table {part}"))?))
+            }
             None => (part, None),
         };
         if make && index.is_none() && table.get(name).is_none() {
@@ -301,7 +303,8 @@ fn set(document: &mut DocumentMut, key: &str, new: Option<Value>) -> Result<(), 
     let Some(new) = new else {
         return table.remove(name).map(|_| ()).ok_or_else(|| "not there".to_owned());
     };
-    let long = table.get_mut(name).and_then(Item::as_table_like_mut).filter(|long| long.contains_key("value"));
+    let long =
+        table.get_mut(name).and_then(Item::as_table_like_mut).filter(|long| long.contains_key("value"));
     if let Some(long) = long {
         long.insert("value", Item::Value(new));
         // It told where the old number was from.
@@ -326,9 +329,16 @@ fn to_toml(key: &str, object: &Bound<'_, PyAny>) -> PyResult<Value> {
         return Ok(number.into());
     }
     if let Ok(list) = object.extract::<Vec<Bound<'_, PyAny>>>() {
-        return Ok(list.iter().map(|inner| to_toml(key, inner)).collect::<PyResult<toml_edit::Array>>()?.into());
+        return Ok(list
+            .iter()
+            .map(|inner| to_toml(key, inner))
+            .collect::<PyResult<toml_edit::Array>>()?
+            .into());
     }
-    Err(error::value(format!("{key}: expected a number, text, truth value or list, got {}", object.get_type().name()?)))
+    Err(error::value(format!(
+        "{key}: expected a number, text, truth value or list, got {}",
+        object.get_type().name()?
+    )))
 }
 
 fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
@@ -339,6 +349,8 @@ fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>>
         Value::Array(list) => {
             PyList::new(py, list.iter().map(|x| to_python(py, x)).collect::<PyResult<Vec<_>>>()?)?.into_any()
         }
-        other => other.as_str().map_or_else(|| other.to_string(), str::to_owned).into_pyobject(py)?.into_any(),
+        other => {
+            other.as_str().map_or_else(|| other.to_string(), str::to_owned).into_pyobject(py)?.into_any()
+        }
     })
 }
