@@ -26,7 +26,7 @@ impl FlightComputer for Interruptible {
     fn step(&mut self, frame: &SensorFrame) -> Result<(StackOutput, u32), FlightError> {
         self.steps = self.steps.wrapping_add(1);
         if self.steps.is_multiple_of(STEPS_A_LOOK)
-            && let Err(signal) = Python::attach(Python::check_signals)
+            && let Err(signal) = signalled()
         {
             self.signal = Some(signal);
             return Err(FlightError("interrupted".to_owned()));
@@ -34,6 +34,12 @@ impl FlightComputer for Interruptible {
         let output = self.stack.step(&mut self.state, frame);
         Ok((output, self.state.mission.encounters))
     }
+}
+
+/// What Python's own handler of a signal raises.
+#[allow(clippy::redundant_closure_for_method_calls, reason = "the method's lifetime is too narrow")]
+fn signalled() -> PyResult<()> {
+    Python::attach(|py| py.check_signals())
 }
 
 /// A scenario by name or file, with what the call says of it.
