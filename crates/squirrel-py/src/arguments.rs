@@ -115,7 +115,8 @@ pub(crate) fn rows<'py, T: Float>(
         return Err(value(format!("{}, got shape {}", expected(), python_shape(array.shape()))));
     }
     let array = array.try_readonly().map_err(|error| value(format!("{name}: {error}")))?;
-    let copy = array.as_slice().is_err().then(|| array.as_array().iter().copied().collect());
+    // A slice of an array in Fortran's order would be columns.
+    let copy = (!array.is_c_contiguous()).then(|| array.as_array().iter().copied().collect());
     let rows = Rows { array, copy };
     if numbers == Numbers::Finite
         && let Some(at) = rows.numbers().iter().position(|x| !x.is_finite())

@@ -6,7 +6,7 @@ use crate::log::table;
 use crate::state::{check_attitudes, state};
 use crate::vehicle::Vehicle;
 use nalgebra::Vector3;
-use numpy::{PyArray1, PyArrayDyn, PyArrayMethods};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -58,6 +58,9 @@ impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Flock<T, ROTORS> {
         let shape = [Some(self.len()), Some(BODY_NUMBERS + ROTORS)];
         rows::<T>("out", out, &shape, Numbers::Any)?;
         let out = out.cast::<PyArrayDyn<T>>()?;
+        if !out.is_c_contiguous() {
+            return Err(value("out: must be contiguous, row after row"));
+        }
         let mut out = out.try_readwrite().map_err(|error| value(format!("out: {error}")))?;
         let numbers = out.as_slice_mut().map_err(|error| value(format!("out: {error}")))?;
         self.write_states(numbers).map_err(value)

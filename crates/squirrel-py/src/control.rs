@@ -33,21 +33,21 @@ pub(crate) fn lock<'a, T: Clone>(
 }
 
 /// Gains of a vehicle that has them.
-pub(crate) fn gains(vehicle: &Bound<'_, Vehicle>) -> PyResult<StackParameters> {
+fn gains(vehicle: &Bound<'_, Vehicle>) -> PyResult<StackParameters> {
     let file = &vehicle.get().file;
     file.control
         .ok_or_else(|| value(format!("vehicle: {}: [control] is missing; control needs gains", file.name)))
 }
 
 /// The vehicle as the flight code knows it.
-pub(crate) fn single(vehicle: &Bound<'_, Vehicle>) -> PyResult<Checked<f32>> {
+fn single(vehicle: &Bound<'_, Vehicle>) -> PyResult<Checked<f32>> {
     vehicle.get().file.vehicle.cast().map_err(value)
 }
 
 /// Refuses what is no step.
-pub(crate) fn step_s(dt_s: f32) -> PyResult<f32> {
+fn step_s(dt_s: f64) -> PyResult<f32> {
     if dt_s > 0.0 && dt_s.is_finite() {
-        Ok(dt_s)
+        Ok(dt_s as f32)
     } else {
         Err(value(format!("dt_s = {dt_s}: must be finite and > 0")))
     }
@@ -130,7 +130,7 @@ impl Backstepping {
         q_ned_from_body_wxyz: Array32<'py>,
         omega_body_rad_s: Array32<'py>,
         angle_rad: Array32<'py>,
-        dt_s: f32,
+        dt_s: f64,
         rate_rad_s: Option<Array32<'py>>,
         acceleration_rad_s2: Option<Array32<'py>>,
         hold_integral: bool,
@@ -252,7 +252,7 @@ impl Twcc {
         reference_acceleration_ned_m_s2: Option<Array32<'py>>,
         reference_yaw_rad: f32,
         wing_force_ned_n: Option<Array32<'py>>,
-        dt_s: f32,
+        dt_s: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         let mut memory = lock(&self.memory, py)?;
         let n = memory.len();

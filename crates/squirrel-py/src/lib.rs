@@ -24,7 +24,9 @@ mod vehicle;
 
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
+use pyo3_stub_gen::pyproject::StubGenConfig;
 use std::ffi::OsString;
+use std::path::PathBuf;
 
 /// A result as Python's own objects, by way of JSON.
 fn json<'py>(py: Python<'py>, result: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
@@ -78,4 +80,18 @@ mod _squirrel {
     const __version__: &str = env!("CARGO_PKG_VERSION");
 }
 
-pyo3_stub_gen::define_stub_info_gatherer!(stub_info);
+pyo3_stub_gen::module_variable!("squirrel._squirrel", "__version__", String);
+
+/// What the stubs of this module are made of. Here, because only the crate that declares them finds its own declarations.
+///
+/// # Errors
+/// The declarations contradict each other.
+pub fn stub_info() -> pyo3_stub_gen::Result<pyo3_stub_gen::StubInfo> {
+    let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    pyo3_stub_gen::StubInfo::from_project_root(
+        "squirrel._squirrel".to_owned(),
+        here,
+        true,
+        StubGenConfig::default(),
+    )
+}

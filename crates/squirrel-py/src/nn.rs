@@ -281,7 +281,7 @@ pub(crate) fn windows<'py>(
 ///     ``parnn`` (the paper's), ``parnn_window_1``, ``vanilla``, ``vanilla_body``, ``vanilla_plane``, ``flat_plate`` or ``scaled_flat_plate``.
 /// vehicle : Vehicle, optional
 ///     That flew; the paper's squirrel if left out.
-/// validation : sequence of str
+/// validation : sequence of str, optional
 ///     Names of flights that are not trained on: the weights of the epoch that is best on them are kept, and training stops when they
 ///     get no better for `patience` epochs.
 /// epochs, batch, rate, clip, patience, seed
@@ -298,13 +298,13 @@ pub(crate) fn windows<'py>(
 ///     One line that names the argument, the flight or the channel.
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
-#[pyo3(signature = (flights, *, model = "parnn", vehicle = None, validation = Vec::new(), epochs = 800, batch = 256, rate = 3e-3, clip = 5.0, patience = 200, seed = 0))]
+#[pyo3(signature = (flights, *, model = "parnn", vehicle = None, validation = None, epochs = 800, batch = 256, rate = 3e-3, clip = 5.0, patience = 200, seed = 0))]
 pub(crate) fn train(
     py: Python<'_>,
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'_, PyDict>,
     model: &str,
     vehicle: Option<&Bound<'_, Vehicle>>,
-    validation: Vec<String>,
+    validation: Option<Vec<String>>,
     epochs: usize,
     batch: usize,
     rate: f64,
@@ -315,6 +315,7 @@ pub(crate) fn train(
     let fail = |e: NnError| error::nn(&e);
     let kind: Kind = model.parse().map_err(fail)?;
     let vehicle = or_squirrel(vehicle);
+    let validation = validation.unwrap_or_default();
     let held_out: Vec<&str> = validation.iter().map(String::as_str).collect();
     let split = windows_of(&vehicle, flights)?.split(&held_out);
     let (training, validation) = split.map_err(|e| value(format!("validation: {e}")))?;

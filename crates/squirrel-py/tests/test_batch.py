@@ -114,9 +114,9 @@ def test_states_are_written_where_told(vehicle: squirrel.Vehicle) -> None:
 
 def test_rows_may_lie_anywhere_in_memory(vehicle: squirrel.Vehicle) -> None:
     state, command = thrown(4)
-    wide = np.asfortranarray(np.repeat(state, 2, axis=0))[::2]
     expected = squirrel.dynamics.derivative(vehicle, state=state, command=command)
-    np.testing.assert_array_equal(squirrel.dynamics.derivative(vehicle, state=wide, command=command), expected)
+    for other in (np.asfortranarray(state), np.repeat(state, 2, axis=0)[::2], state[::-1].copy()[::-1]):
+        np.testing.assert_array_equal(squirrel.dynamics.derivative(vehicle, state=other, command=command), expected)
 
 
 def command(value: object) -> Callable[[squirrel.Batch], None]:
@@ -153,7 +153,7 @@ def test_a_bad_array_is_named(call: Callable[[squirrel.Batch], None], line: str,
         ({"vehicles": []}, "vehicles: none given"),
         ({"dt_s": 0.0}, "dt_s = 0: must be finite and > 0"),
         ({"dt_s": float("nan")}, "dt_s = NaN: must be finite and > 0"),
-        ({"dt_s": 1.0}, "dt_s = 1 must be at most twice propulsion.time_constant_up_s = 0.04"),
+        ({"dt_s": 1.0}, "dt_s = 1 must be at most twice propulsion.time_constant_up_s = 0.0"),
         ({"scheme": "heun"}, "scheme = heun: must be rk4 or euler"),
         ({"dtype": "float16"}, "dtype = float16: must be float32 or float64"),
         ({"threads": 0}, "threads = 0: must be at least 1"),

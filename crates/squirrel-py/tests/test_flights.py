@@ -91,7 +91,7 @@ def test_files_that_cannot_be_are_refused(tmp_path: Path) -> None:
 
 LONG = """
 import sys, squirrel
-scenario = "name = 'long'\\nduration_s = 1e6\\nheight_m = 10.0\\n[mission]\\nkind = 'hover'\\n"
+scenario = "name = 'long'\\nduration_s = 1e5\\nheight_m = 10.0\\n[mission]\\nkind = 'hover'\\n"
 open("long.toml", "w").write(scenario)
 print("flies", flush=True)
 squirrel.simulate(scenario="long.toml")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.patches import Circle
 
 from squirrel._squirrel import forward, windows
 
@@ -43,7 +44,7 @@ def track(log: FlightLog, *, ax: Axes | None = None) -> Axes:
         ax.plot(wanted[:, 1], wanted[:, 0], "--", label="reference")
     ax.plot(flown[:, 1], flown[:, 0], label="flown")
     for north_m, east_m, radius_m in json.loads(log.metadata.get("obstacles_json", "[]")):
-        ax.add_patch(plt.Circle((east_m, north_m), radius_m, alpha=0.3))
+        ax.add_patch(Circle((east_m, north_m), radius_m, alpha=0.3))
     ax.set(xlabel="east m", ylabel="north m", aspect="equal")
     ax.legend()
     return ax
