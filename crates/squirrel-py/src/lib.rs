@@ -81,6 +81,7 @@ mod _squirrel {
 }
 
 pyo3_stub_gen::module_variable!("squirrel._squirrel", "__version__", String);
+pyo3_stub_gen::export_verbatim!("squirrel._squirrel", "__version__");
 
 /// What the stubs of this module are made of. Here, because only the crate that declares them finds its own declarations.
 ///

@@ -15,6 +15,7 @@ __all__ = [
     "Stack",
     "Twcc",
     "Vehicle",
+    "__version__",
     "derivative",
     "forward",
     "gap_diagnose",
@@ -28,6 +29,7 @@ __all__ = [
     "windows",
 ]
 
+__version__: builtins.str
 @typing.final
 class Backstepping:
     r"""
@@ -511,7 +513,7 @@ class Twcc:
         The vehicle has no gains, or not the weights that the arm needs.
     """
     def __new__(cls, vehicle: Vehicle, *, arm: builtins.str = 'twcc_flat', count: builtins.int = 1) -> Twcc: ...
-    def step(self, *, position_ned_m: numpy.typing.NDArray[numpy.float32], velocity_ned_m_s: numpy.typing.NDArray[numpy.float32], q_ned_from_body_wxyz: numpy.typing.NDArray[numpy.float32], reference_position_ned_m: numpy.typing.NDArray[numpy.float32], reference_velocity_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, reference_acceleration_ned_m_s2: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, reference_yaw_rad: builtins.float = 0.0, wing_force_ned_n: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, dt_s: builtins.float = 0.10000000149011612) -> dict[str, numpy.typing.NDArray[numpy.float32]]:
+    def step(self, *, position_ned_m: numpy.typing.NDArray[numpy.float32], velocity_ned_m_s: numpy.typing.NDArray[numpy.float32], q_ned_from_body_wxyz: numpy.typing.NDArray[numpy.float32], reference_position_ned_m: numpy.typing.NDArray[numpy.float32], reference_velocity_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, reference_acceleration_ned_m_s2: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, reference_yaw_rad: builtins.float = 0.0, wing_force_ned_n: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, dt_s: builtins.float = 0.1) -> dict[str, numpy.typing.NDArray[numpy.float32]]:
         r"""
         One tick of each vehicle.
         
@@ -931,7 +933,7 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
     3
     """
 
-def train(flights: dict[str, FlightLog], *, model: builtins.str = 'parnn', vehicle: typing.Optional[Vehicle] = None, validation: typing.Sequence[builtins.str] = [], epochs: builtins.int = 800, batch: builtins.int = 256, rate: builtins.float = 0.003, clip: builtins.float = 5.0, patience: builtins.int = 200, seed: builtins.int = 0) -> Model:
+def train(flights: dict[str, FlightLog], *, model: builtins.str = 'parnn', vehicle: typing.Optional[Vehicle] = None, validation: typing.Optional[typing.Sequence[builtins.str]] = None, epochs: builtins.int = 800, batch: builtins.int = 256, rate: builtins.float = 0.003, clip: builtins.float = 5.0, patience: builtins.int = 200, seed: builtins.int = 0) -> Model:
     r"""
     Train a model of the wing force on flights. Ctrl-C ends it between two epochs.
     
@@ -943,7 +945,7 @@ def train(flights: dict[str, FlightLog], *, model: builtins.str = 'parnn', vehic
         ``parnn`` (the paper's), ``parnn_window_1``, ``vanilla``, ``vanilla_body``, ``vanilla_plane``, ``flat_plate`` or ``scaled_flat_plate``.
     vehicle : Vehicle, optional
         That flew; the paper's squirrel if left out.
-    validation : sequence of str
+    validation : sequence of str, optional
         Names of flights that are not trained on: the weights of the epoch that is best on them are kept, and training stops when they
         get no better for `patience` epochs.
     epochs, batch, rate, clip, patience, seed
