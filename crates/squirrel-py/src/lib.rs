@@ -1,8 +1,8 @@
 //! Python bindings: `import squirrel`.
 //!
 //! The functions of the crates below as Python sees them, batched over the first axis of NumPy arrays; nothing is computed
-//! here. Arrays are checked where they come in ([`arguments`]), errors are squirrel's own lines as Python's exceptions
-//! ([`error`]), and whatever takes long runs without the interpreter's lock.
+//! here. Arrays are checked where they come in (`arguments`), errors are squirrel's own lines as Python's exceptions
+//! (`error`), and whatever takes long runs without the interpreter's lock.
 
 #![allow(clippy::doc_link_with_quotes, reason = "examples in docstrings are Python")]
 #![allow(clippy::needless_pass_by_value, reason = "arguments come from Python, which hands them over")]
