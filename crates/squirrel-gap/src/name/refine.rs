@@ -1,12 +1,12 @@
 //! The numbers of one set of effects: Gauss-Newton through the simulator, everything else floating with its tolerance.
 
-use super::evidence::{BETA, Gram, Posterior, dot};
+use super::evidence::{BETA, Gram, Posterior, products};
 use super::linear::{Linear, height_columns};
 use super::parameters::SLAB_OF_LARGEST;
 use super::point::{Member, Other, Point};
 use super::search::Search;
 use crate::GapError;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
 /// Most steps of a refinement.
@@ -206,28 +206,18 @@ impl Search<'_> {
             }
         }
         let (k, n) = (own.len(), linear.columns.len());
-        let mut gram =
-            Gram { g: DMatrix::zeros(k + n, k + n), b: nalgebra::DVector::zeros(k + n), yy: dot(&y, &y) };
+        let all: Vec<&[f64]> =
+            own.iter().map(Vec::as_slice).chain((0..n).map(|j| column(j).as_slice())).collect();
+        let mut gram = Gram {
+            g: DMatrix::zeros(k + n, k + n),
+            b: DVector::from_vec(products(&y, &all)),
+            yy: products(&y, &[&y])[0],
+        };
         gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram);
-        for i in 0..k {
-            for j in 0..k {
-                gram.g[(i, j)] = dot(&own[i], &own[j]);
-            }
-            for j in 0..n {
-                let x = dot(&own[i], column(j));
-                gram.g[(i, k + j)] = x;
-                gram.g[(k + j, i)] = x;
-            }
-            gram.b[i] = dot(&own[i], &y);
-        }
-        for j in 0..n {
-            gram.b[k + j] = dot(column(j), &y);
-        }
-        for i in fresh.keys().copied() {
-            for j in 0..n {
-                let x = dot(column(i), column(j));
-                gram.g[(k + i, k + j)] = x;
-                gram.g[(k + j, k + i)] = x;
+        for i in (0..k).chain(fresh.keys().map(|i| k + i)) {
+            for (j, x) in products(all[i], &all).into_iter().enumerate() {
+                gram.g[(i, j)] = x;
+                gram.g[(j, i)] = x;
             }
         }
         prior.extend(spikes);
