@@ -1,6 +1,6 @@
 //! Many vehicles at once: `squirrel_sim::batch` behind one class for both scalars and all numbers of rotors.
 
-use crate::arguments::{ArrayAny, Float, Numbers, is_32, rows};
+use crate::arguments::{ArrayAny, Float, Indices, Numbers, is_32, rows};
 use crate::error::value;
 use crate::log::table;
 use crate::state::{check_attitudes, state};
@@ -277,7 +277,7 @@ impl Batch {
     /// ----------
     /// state : ndarray of the batch's dtype, shape (n, 13 + rotors)
     ///     As `states` gives them.
-    /// vehicles : sequence of int, optional
+    /// vehicles : iterable of int, optional
     ///     Which; all in their order if left out.
     ///
     /// Raises
@@ -287,8 +287,8 @@ impl Batch {
     /// ValueError
     ///     Another dtype or shape, a number that is not finite, an attitude that is no rotation.
     #[pyo3(signature = (state, *, vehicles = None))]
-    fn reset(&self, py: Python<'_>, state: ArrayAny<'_>, vehicles: Option<Vec<usize>>) -> PyResult<()> {
-        let vehicles = vehicles.unwrap_or_else(|| (0..self.vehicles).collect());
+    fn reset(&self, py: Python<'_>, state: ArrayAny<'_>, vehicles: Option<Indices>) -> PyResult<()> {
+        let vehicles = vehicles.map_or_else(|| (0..self.vehicles).collect(), |given| given.0);
         vehicles.iter().try_for_each(|vehicle| self.check(*vehicle))?;
         self.lock(py)?.reset(&state.0, &vehicles)
     }

@@ -95,7 +95,7 @@ fn diagnose(
         let fail = |e: std::io::Error| crate::error::system(e.kind(), format!("{}: {e}", folder.display()));
         std::fs::create_dir_all(folder).map_err(fail)?;
         if let Some(text) = &text {
-            let path = folder.join(format!("{}.toml", vehicle.name));
+            let path = folder.join("vehicle.toml");
             write_file(&path, text.as_bytes())?;
             diagnosis.verdict.model_patch = Some(path.display().to_string());
         }

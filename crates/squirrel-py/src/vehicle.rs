@@ -3,7 +3,7 @@
 use crate::error;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyList};
+use pyo3::types::{PyBool, PyDict, PyList};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
@@ -114,7 +114,7 @@ impl Vehicle {
     /// Parameters
     /// ----------
     /// changes : dict of str to object
-    ///     By key: number, text, truth value or (nested) list; None takes the key out. A number that has a deviation keeps it
+    ///     By key: number, text, truth value or (nested) list or array; None takes the key out. A number that has a deviation keeps it
     ///     and loses its source.
     ///
     /// Returns
@@ -328,12 +328,9 @@ fn to_toml(key: &str, object: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(number) = object.extract::<f64>() {
         return Ok(number.into());
     }
-    if let Ok(list) = object.extract::<Vec<Bound<'_, PyAny>>>() {
-        return Ok(list
-            .iter()
-            .map(|inner| to_toml(key, inner))
-            .collect::<PyResult<toml_edit::Array>>()?
-            .into());
+    if let (false, Ok(list)) = (object.is_instance_of::<PyDict>(), object.try_iter()) {
+        let list = list.map(|inner| to_toml(key, &inner?));
+        return Ok(list.collect::<PyResult<toml_edit::Array>>()?.into());
     }
     Err(error::value(format!(
         "{key}: expected a number, text, truth value or list, got {}",

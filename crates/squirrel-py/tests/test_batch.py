@@ -86,7 +86,7 @@ def test_single_vehicles_are_reset(vehicle: squirrel.Vehicle) -> None:
     batch.step(100)
     start = squirrel.Batch(vehicles=[vehicle] * 2).states()
     falling = batch.states()
-    batch.reset(start, vehicles=[3, 17])
+    batch.reset(start, vehicles=np.array([3, 17]))
     now = batch.states()
     np.testing.assert_array_equal(now[[3, 17]], start)
     others = [k for k in range(20) if k not in (3, 17)]
@@ -195,3 +195,14 @@ def test_two_threads_may_call_at_once(vehicle: squirrel.Vehicle) -> None:
     alone.command(np.full((100, 4), 0.5))
     alone.step(1000)
     np.testing.assert_array_equal(batch.states(), alone.states())
+
+
+def test_other_threads_run_while_a_batch_steps(vehicle: squirrel.Vehicle) -> None:
+    batch = squirrel.Batch(vehicles=[vehicle] * 1000, threads=1)
+    worker = threading.Thread(target=batch.step, args=[100_000])
+    worker.start()
+    turns = 0
+    while worker.is_alive():
+        turns += 1
+    # A thread that holds the interpreter's lock would let this one look a few times at most.
+    assert turns > 1000

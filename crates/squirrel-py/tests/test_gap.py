@@ -43,7 +43,7 @@ def test_run_names_what_is_missing(
     assert verdict.patched is not None and verdict.model_patch is not None
     assert squirrel.Vehicle.load(verdict.model_patch).text == verdict.patched.text
     assert verdict.patched["effects.battery_sag.voltage_exponent"] == pytest.approx(exponent.value, rel=1e-3)
-    assert sorted(file.name for file in (tmp_path / "gap").iterdir()) == ["report.html", "squirrel.toml"]
+    assert sorted(file.name for file in (tmp_path / "gap").iterdir()) == ["report.html", "vehicle.toml"]
 
 
 def test_a_bad_argument_is_named(vehicle: squirrel.Vehicle) -> None:

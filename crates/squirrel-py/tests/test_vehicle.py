@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from conftest import ROOT
 
@@ -37,6 +38,8 @@ def test_an_edit_is_checked_and_keeps_the_text(vehicle: squirrel.Vehicle) -> Non
     assert "mass.mass_kg" in edited.validate()
     assert vehicle["mass.mass_kg"] == 0.548
     assert "[effects.battery_sag]" in edited.text
+    moments = np.array([3.3e-3, 4.7e-3, 7.7e-3])
+    assert edited.edited({"mass.inertia_kg_m2": moments})["mass.inertia_kg_m2"] == list(moments)
     assert edited.text.splitlines()[0] == vehicle.text.splitlines()[0]
     without = edited.edited({"effects.battery_sag": None, "wing.model": "flat"})
     assert without["wing.model"] == "flat"
@@ -51,6 +54,7 @@ def test_an_edit_is_checked_and_keeps_the_text(vehicle: squirrel.Vehicle) -> Non
         ({"mass.mass_kg": float("nan")}, "squirrel: mass.mass_kg = NaN"),
         ({"mass.weight_kg": 1.0}, "weight_kg"),
         ({"mass.mass_kg": object()}, "mass.mass_kg: expected a number, text, truth value or list, got object"),
+        ({"mass.mass_kg": {"value": 1.0}}, "mass.mass_kg: expected a number, text, truth value or list, got dict"),
         ({"mass.weight_kg": None}, "mass.weight_kg: not there"),
         ({"rotor[7].yaw_sign": 1}, r"rotor\[7\].yaw_sign: no table rotor\[7\]"),
         ({"name.first": 1}, "name.first: name is not a table"),

@@ -338,7 +338,7 @@ def run(
     held_out : dict of str to FlightLog, optional
         For the proof.
     out : str or os.PathLike, optional
-        Folder for ``report.html`` and the patched vehicle file; nothing is written if left out.
+        Folder for ``report.html`` and the patched ``vehicle.toml``; nothing is written if left out.
 
     Returns
     -------
