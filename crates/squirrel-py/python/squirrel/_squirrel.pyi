@@ -181,7 +181,7 @@ class Batch:
         ValueError
             `out` has another dtype, shape or order, or cannot be written to.
         """
-    def reset(self, state: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], *, vehicles: typing.Optional[typing.Sequence[builtins.int]] = None) -> None:
+    def reset(self, state: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], *, vehicles: typing.Optional[typing.Iterable[typing.SupportsIndex]] = None) -> None:
         r"""
         Put vehicles somewhere else; their commands and their wind stay.
         
@@ -189,7 +189,7 @@ class Batch:
         ----------
         state : ndarray of the batch's dtype, shape (n, 13 + rotors)
             As `states` gives them.
-        vehicles : sequence of int, optional
+        vehicles : iterable of int, optional
             Which; all in their order if left out.
         
         Raises
@@ -654,7 +654,7 @@ class Vehicle:
         Parameters
         ----------
         changes : dict of str to object
-            By key: number, text, truth value or (nested) list; None takes the key out. A number that has a deviation keeps it
+            By key: number, text, truth value or (nested) list or array; None takes the key out. A number that has a deviation keeps it
             and loses its source.
         
         Returns
