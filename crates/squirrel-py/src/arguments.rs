@@ -136,6 +136,9 @@ pub(crate) fn rows<'py, T: Float>(
     if !fits {
         return Err(value(format!("{}, got shape {}", expected(), python_shape(array.shape()))));
     }
+    if !array.data().is_aligned() {
+        return Err(value(format!("{name}: its numbers lie at odd addresses; hand in a copy")));
+    }
     let array = array.try_readonly().map_err(|error| value(format!("{name}: {error}")))?;
     // A slice of an array in Fortran's order would be columns.
     let copy = (!array.is_c_contiguous()).then(|| array.as_array().iter().copied().collect());

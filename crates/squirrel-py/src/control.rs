@@ -22,6 +22,15 @@ use squirrel_core::vehicle::Vehicle as Checked;
 use squirrel_sim::arm::Arm;
 use std::sync::{Mutex, MutexGuard};
 
+/// An empty memory for each vehicle.
+pub(crate) fn memory<T: Clone + Default>(count: usize) -> PyResult<Mutex<Vec<T>>> {
+    if count == 0 {
+        Err(value("count = 0: must be at least 1"))
+    } else {
+        Ok(Mutex::new(vec![T::default(); count]))
+    }
+}
+
 /// The memory of a law, one for each vehicle.
 pub(crate) fn lock<'a, T: Clone>(
     memory: &'a Mutex<Vec<T>>,
@@ -91,8 +100,7 @@ impl Backstepping {
     #[new]
     #[pyo3(signature = (vehicle, *, count = 1))]
     fn new(vehicle: &Bound<'_, Vehicle>, count: usize) -> PyResult<Self> {
-        let memory = Mutex::new(vec![AttitudeState::default(); count]);
-        Ok(Self { gains: gains(vehicle)?.attitude, vehicle: single(vehicle)?, memory })
+        Ok(Self { gains: gains(vehicle)?.attitude, vehicle: single(vehicle)?, memory: memory(count)? })
     }
 
     /// One step of each vehicle.
@@ -207,7 +215,7 @@ impl Twcc {
         Arm::parse(arm).and_then(|arm| arm.configure(&mut parameters, weights)).map_err(value)?;
         parameters.check(limits.thrust_max_n).map_err(value)?;
         let airframe = Airframe::new(&airframe, parameters.thrust_min_n, limits.tilt_max_rad);
-        Ok(Self { parameters, airframe, memory: Mutex::new(vec![TwccState::default(); count]) })
+        Ok(Self { parameters, airframe, memory: memory(count)? })
     }
 
     /// One tick of each vehicle.

@@ -1,7 +1,7 @@
 //! The whole flight code, step by step, for many vehicles.
 
 use crate::arguments::{Array32, Numbers, Rows, rows};
-use crate::control::lock;
+use crate::control::{lock, memory};
 use crate::error::value;
 use crate::flight::scenario;
 use crate::terms::Terms;
@@ -59,8 +59,7 @@ impl Stack {
             scenario: self::scenario(scenario, seed, thrust_to_weight)?,
             integrator: Integrator::Rk4,
         };
-        let memory = Mutex::new(vec![StackState::default(); count]);
-        Ok(Self { stack: setup.stack().map_err(value)?, memory })
+        Ok(Self { stack: setup.stack().map_err(value)?, memory: memory(count)? })
     }
 
     /// One step of each vehicle.

@@ -119,6 +119,13 @@ def test_rows_may_lie_anywhere_in_memory(vehicle: squirrel.Vehicle) -> None:
         np.testing.assert_array_equal(squirrel.dynamics.derivative(vehicle, state=other, command=command), expected)
 
 
+def test_memory_at_odd_addresses_is_refused(vehicle: squirrel.Vehicle) -> None:
+    odd = np.frombuffer(bytearray(8 * 4 + 1), np.float64, offset=1).reshape(1, 4)
+    assert not odd.flags.aligned
+    with pytest.raises(ValueError, match="command: its numbers lie at odd addresses"):
+        squirrel.Batch(vehicles=[vehicle], dtype="float64").command(odd)
+
+
 def command(value: object) -> Callable[[squirrel.Batch], None]:
     return lambda batch: batch.command(value)  # type: ignore[arg-type]
 

@@ -106,8 +106,10 @@ def test_twcc_holds_a_hover() -> None:
     assert terms["wing_command"][0] == 0 and terms["mode"][0] == 0
 
 
-def test_control_needs_gains() -> None:
+def test_control_needs_gains_and_vehicles() -> None:
     bare = squirrel.Vehicle.bundled("crazyflie2_arpl")
     for make in (squirrel.control.Backstepping, squirrel.control.Twcc, squirrel.Stack):
         with pytest.raises(ValueError, match=r"\[control\] is missing"):
             make(bare)
+        with pytest.raises(ValueError, match="count = 0: must be at least 1"):
+            make(squirrel.Vehicle.bundled("squirrel"), count=0)
