@@ -41,6 +41,21 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn score(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
+        self.score_towards(linear, members, f64::NEG_INFINITY)
+    }
+
+    /// As [`Self::score`], given up where the first step does not come near what the set must reach.
+    ///
+    /// * `near` - evidence that the first step must lead to, nats
+    ///
+    /// # Errors
+    /// As [`Self::score`].
+    pub(super) fn score_towards(
+        &self,
+        linear: &Linear,
+        members: &[Member],
+        near: f64,
+    ) -> Result<Scored, GapError> {
         let mut base = linear.point.base.clone();
         let along = self.moving_along(linear, members);
         // A lag that is new explains what others were taken to be off for: they start at nothing.
@@ -82,6 +97,9 @@ impl Search<'_> {
                 if share < 0.2 {
                     break;
                 }
+            }
+            if best.log_evidence < near {
+                break;
             }
         }
         Ok(best)
