@@ -20,7 +20,6 @@ use crate::control::command_filter::{self, EulerReference};
 use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
 use crate::control::position::Motion;
 use crate::control::twcc::{Airframe, TwccParameters, TwccState, TwccTerms};
-use crate::control::wiic::Envelope;
 use crate::control::{AttitudeThrust, Reference};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
@@ -148,16 +147,7 @@ impl Stack {
             let reason = "must be above what the mission's multisine adds";
             return Err(ParameterError::of("limits.tilt_max_rad", p.limits.tilt_max_rad, reason));
         }
-        let airframe = Airframe {
-            mass_kg: p.mass_kg,
-            // Two sides; the flat plate's own slope is 2.
-            wing_area_m2: p.wing.map_or(0.0, |w| w.area_per_side_m2 * w.normal_force_slope),
-            envelope: Envelope {
-                tilt_max_rad,
-                thrust_min_n: parameters.twcc.thrust_min_n,
-                thrust_max_n: p.limits.thrust_max_n,
-            },
-        };
+        let airframe = Airframe::new(&vehicle, parameters.twcc.thrust_min_n, tilt_max_rad);
         Ok(Self { mixer: Mixer::new(&vehicle)?, vehicle, airframe, parameters, mission })
     }
 
