@@ -101,7 +101,7 @@ fn send(record: &Record, log: &mut impl FnMut(&[u8])) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::log::{LINE_MAX, Unstuff, stuff};
+    use crate::log::{LINE_MAX, framed};
     use crate::sensors::tests::{fix, rest};
     use crate::setup::{self, tests::SETUP};
     use squirrel_core::stack::wire::Reader;
@@ -138,7 +138,7 @@ mod tests {
                 }
                 let line = &mut self.line;
                 outputs = self.flight.step(arming, &mut self.sensors, self.now_us, |record| {
-                    line.extend(stuff(record, &mut [0; LINE_MAX]).unwrap());
+                    line.extend(framed(record, &mut [0; LINE_MAX]).unwrap());
                 });
             }
             outputs
@@ -174,10 +174,10 @@ mod tests {
         let mut bench = Bench::new();
         bench.steps(300, State::Disarmed, true);
         bench.steps(600, State::Armed { since_us: bench.now_us }, true);
-        let (mut unstuff, mut flight, mut frames) = (Unstuff::default(), None, 0);
-        for byte in &bench.line {
-            let Some(record) = unstuff.push(*byte) else { continue };
-            match Record::take(&mut Reader::new(record)).unwrap() {
+        let (mut flight, mut frames) = (None, 0);
+        for sent in bench.line.split(|byte| *byte == 0).filter(|sent| !sent.is_empty()) {
+            let record = cobs::decode_vec(sent).unwrap();
+            match Record::take(&mut Reader::new(&record)).unwrap() {
                 Record::Setup(stack) => flight = Some((stack, StackState::default(), HASH_START)),
                 Record::Frame(frame, expected) => {
                     let (stack, state, seen) = flight.as_mut().unwrap();

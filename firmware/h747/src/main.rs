@@ -40,7 +40,7 @@ use squirrel_core::stack::failsafe::FailsafeMode;
 use squirrel_h747::arming::{Arming, Inputs, State};
 use squirrel_h747::flight::Flight;
 use squirrel_h747::gnss::{Fix, Receiver};
-use squirrel_h747::log::{LINE_MAX, stuff};
+use squirrel_h747::log::{LINE_MAX, framed};
 use squirrel_h747::sensors::Sensors;
 use squirrel_h747::setup;
 use static_cell::StaticCell;
@@ -162,7 +162,7 @@ async fn samples(imu: &mut Imu) -> Option<(In<Body, f32>, In<Body, f32>)> {
 /// Puts a record on the line, whole or not at all: where the line cannot follow, the host misses records and sees it.
 fn keep(record: &[u8]) {
     let mut line = [0; LINE_MAX];
-    if let Some(bytes) = stuff(record, &mut line)
+    if let Some(bytes) = framed(record, &mut line)
         && LOG.free_capacity() >= bytes.len()
     {
         let mut rest = bytes;

@@ -11,7 +11,7 @@ mod record;
 pub use integrator::Integrator;
 pub use metrics::Metrics;
 pub use record::{INPUT_SOURCES, frames};
-pub(crate) use record::{PARNN_WEIGHTS, record_output};
+pub(crate) use record::{FORMAT, Inputs, PARNN_WEIGHTS, record_output};
 
 use crate::arm::Arm;
 use crate::log::FlightLog;
