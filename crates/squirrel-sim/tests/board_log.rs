@@ -20,9 +20,9 @@ fn wire(value: &impl Wire) -> Vec<u8> {
 
 /// A flight, and each of its records as a board would send it: the setup first.
 fn flown() -> (FlightLog, Vec<Vec<u8>>) {
-    let scenario = Scenario { duration_s: 3.0, ..Scenario::find("steer").unwrap() };
+    let scenario = Scenario { duration_s: 4.0, ..Scenario::find("random_spread").unwrap() };
     let setup =
-        Setup { vehicle: VehicleFile::squirrel(), arm: Arm::TwccParnn, scenario, integrator: Integrator::Rk4 };
+        Setup { vehicle: VehicleFile::squirrel(), arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
     let log = setup.fly(true, |_| {}).unwrap().log.unwrap();
     let stack: Stack = setup.stack().unwrap();
     let sent = |record: &Record| {

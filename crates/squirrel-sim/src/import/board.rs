@@ -112,7 +112,9 @@ impl std::fmt::Display for BoardReport {
         write!(f, "{}: {} frames, {from_s:.3} to {to_s:.3} s; ", self.file, self.frames)?;
         match self.outputs_until_s {
             Some(t) if t == to_s => write!(f, "every output is the board's to the bit")?,
-            Some(t) => write!(f, "outputs are the board's to the bit up to {t:.3} s and left out from there")?,
+            Some(t) => {
+                write!(f, "outputs are the board's to the bit up to {t:.3} s and left out from there")?
+            }
             None => write!(f, "no output is the board's; they are left out")?,
         }
         if self.lost_records > 0 {
