@@ -110,13 +110,11 @@ impl std::fmt::Display for BoardReport {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let [from_s, to_s] = self.time_s;
         write!(f, "{}: {} frames, {from_s:.3} to {to_s:.3} s; ", self.file, self.frames)?;
-        match self.outputs_until_s {
-            Some(t) if t == to_s => write!(f, "every output is the board's to the bit")?,
-            Some(t) => {
-                write!(f, "outputs are the board's to the bit up to {t:.3} s and left out from there")?
-            }
-            None => write!(f, "no output is the board's; they are left out")?,
-        }
+        f.write_str(&match self.outputs_until_s {
+            Some(t) if t == to_s => "every output is the board's to the bit".to_owned(),
+            Some(t) => format!("outputs are the board's to the bit up to {t:.3} s and left out from there"),
+            None => "no output is the board's; they are left out".to_owned(),
+        })?;
         if self.lost_records > 0 {
             write!(f, "; {} records lost", self.lost_records)?;
         }
