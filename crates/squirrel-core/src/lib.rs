@@ -16,7 +16,7 @@
 
 #![cfg_attr(not(test), no_std)]
 #![deny(unsafe_code)]
-#![cfg_attr(not(target_arch = "arm"), forbid(unsafe_code))]
+#![cfg_attr(not(feature = "vfp"), forbid(unsafe_code))]
 
 pub mod aero;
 pub mod control;

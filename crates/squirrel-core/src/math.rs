@@ -63,7 +63,7 @@ pub fn wrap_angle(angle: f32) -> f32 {
 /// keeps for itself, that instruction.
 #[inline(always)]
 pub fn sqrt<T: Real>(x: T) -> T {
-    #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+    #[cfg(all(target_arch = "arm", feature = "vfp"))]
     {
         use core::any::Any;
         // Both are known at compile time; nothing of this is left in the code.
@@ -76,12 +76,12 @@ pub fn sqrt<T: Real>(x: T) -> T {
 }
 
 /// The instruction of Arm's floating-point units.
-#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+#[cfg(all(target_arch = "arm", feature = "vfp"))]
 #[allow(unsafe_code, reason = "core has no square root on stable Rust")]
 #[inline(always)]
 fn vsqrt(x: f32) -> f32 {
     let root: f32;
-    // SAFETY: a function of its operand alone, and every processor with this calling convention has it.
+    // SAFETY: a function of its operand alone, and the feature says that the processor has it.
     unsafe {
         core::arch::asm!(
             "vsqrt.f32 {root}, {x}",
