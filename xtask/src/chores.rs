@@ -4,7 +4,7 @@
 //! the build scripts and procedural macros; `test`, `bench` and the demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
-use crate::{firmware, python, thumb, weights};
+use crate::{firmware, python, thumb, weights, wheel};
 use std::path::Path;
 use std::process::Command;
 
@@ -33,7 +33,7 @@ const LINT: [Step; 4] = [
     },
 ];
 
-const TEST: [Step; 7] = [
+const TEST: [Step; 8] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
@@ -44,6 +44,7 @@ const TEST: [Step; 7] = [
         action: Action::Cargo(&["run", "--release", "--locked", "--", "demo", "--out", "target/demo"]),
     },
     Step { name: "weights", action: Action::Function(weights::check) },
+    Step { name: "wheel", action: Action::Function(wheel::step) },
 ];
 
 /// `cargo xtask lint`.

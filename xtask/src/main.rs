@@ -10,13 +10,14 @@ mod python;
 mod run;
 mod thumb;
 mod weights;
+mod wheel;
 
 use std::process::ExitCode;
 
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 9] = [
+const CHORES: [Chore; 10] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
@@ -38,6 +39,12 @@ const CHORES: [Chore; 9] = [
         "[--write]",
         "fly and train the shipped paRNN again, compare its bytes; --write takes the new ones",
         weights::chore,
+    ),
+    (
+        "wheel",
+        "[ARGUMENT...]",
+        "build the Python package, install it, run its tests; arguments go to pytest",
+        wheel::chore,
     ),
     (
         "report-png",

@@ -1,10 +1,10 @@
-//! The tests' Python: a virtual environment of its own in the target directory, packages pinned.
+//! Python for tests: virtual environments of their own in the target directory, packages pinned.
 
 use crate::run::{call, output, target_directory};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What the tests import; the venv is made anew when this text changes.
+/// What the Rust tests import.
 const PACKAGES: &str = "numpy==2.4.6";
 
 /// Oldest Python, as the README says.
@@ -13,27 +13,36 @@ const OLDEST: (u32, u32) = (3, 11);
 /// Newest first would pick a pre-release; what the user calls `python3` is what he expects.
 const CANDIDATES: [&str; 6] = ["python3", "python3.14", "python3.13", "python3.12", "python3.11", "python"];
 
-/// The interpreter of the virtual environment, whether it exists yet or not.
+/// The interpreter of the Rust tests' environment, whether it exists yet or not.
 ///
 /// # Errors
 /// As [`target_directory`].
 pub(crate) fn interpreter() -> Result<PathBuf, String> {
-    Ok(venv()?.join(if cfg!(windows) { "Scripts/python.exe" } else { "bin/python" }))
+    Ok(program(&target_directory()?.join("venv"), "python"))
 }
 
-fn venv() -> Result<PathBuf, String> {
-    Ok(target_directory()?.join("venv"))
+/// A program of a virtual environment.
+pub(crate) fn program(venv: &Path, name: &str) -> PathBuf {
+    venv.join(if cfg!(windows) { format!("Scripts/{name}.exe") } else { format!("bin/{name}") })
 }
 
-/// Makes the virtual environment unless it is there.
+/// The environment of the Rust tests.
+///
+/// # Errors
+/// As [`environment`].
+pub(crate) fn prepare() -> Result<String, String> {
+    environment(&target_directory()?.join("venv"), PACKAGES)
+}
+
+/// Makes a virtual environment unless it is there with these packages, and says what it did.
 ///
 /// # Errors
 /// No Python that is new enough, or venv or pip failed.
-pub(crate) fn prepare() -> Result<String, String> {
-    let (venv, python) = (venv()?, interpreter()?);
+pub(crate) fn environment(venv: &Path, packages: &str) -> Result<String, String> {
+    let python = program(venv, "python");
     // Written last: an environment that was broken off half-way has none.
     let stamp = venv.join("squirrel-packages.txt");
-    let made = std::fs::read_to_string(&stamp).is_ok_and(|text| text == PACKAGES);
+    let made = std::fs::read_to_string(&stamp).is_ok_and(|text| text == packages);
     if made && output(Command::new(&python).arg("--version")).is_some() {
         return Ok(String::new());
     }
@@ -41,14 +50,14 @@ pub(crate) fn prepare() -> Result<String, String> {
         .into_iter()
         .find(|name| version(name).is_some_and(|version| version >= OLDEST))
         .ok_or_else(|| format!("no Python {}.{} or newer in PATH", OLDEST.0, OLDEST.1))?;
-    call(Command::new(base).args(["-m", "venv", "--clear"]).arg(&venv))
+    call(Command::new(base).args(["-m", "venv", "--clear"]).arg(venv))
         .map_err(|error| format!("{error} (on Debian: apt install python3-venv)"))?;
     call(
         Command::new(&python)
             .args(["-m", "pip", "install", "--quiet", "--only-binary=:all:"])
-            .args(PACKAGES.split(' ')),
+            .args(packages.split(' ')),
     )?;
-    std::fs::write(&stamp, PACKAGES).map_err(|error| format!("{}: {error}", stamp.display()))?;
+    std::fs::write(&stamp, packages).map_err(|error| format!("{}: {error}", stamp.display()))?;
     Ok(format!("made with {base}"))
 }
 

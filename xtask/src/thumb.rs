@@ -79,6 +79,20 @@ pub(crate) fn build(arguments: &[&str], keep_errors: bool) -> Result<std::proces
     command.output().map_err(|error| format!("cargo: {error}"))
 }
 
+/// Another command of cargo in the firmware's workspace, by the toolchain that has the target; `None` where there is none.
+///
+/// # Errors
+/// As [`root`].
+pub(crate) fn plain(arguments: &[&str]) -> Result<Option<Command>, String> {
+    if choose(has_target, || false, || true)? != Route::Plain {
+        return Ok(None);
+    }
+    let mut command = clean("cargo")?;
+    command.current_dir(root()?.join(FIRMWARE)).args(arguments).args(["--release", "--locked"]);
+    command.arg("--target-dir").arg(folder(&Route::Plain)?);
+    Ok(Some(command))
+}
+
 /// Where [`build`] puts the images.
 ///
 /// # Errors

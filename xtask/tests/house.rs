@@ -7,9 +7,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Which of our crates a crate may depend on, top down.
-const ARROWS: [(&str, &[&str]); 8] = [
+const ARROWS: [(&str, &[&str]); 9] = [
     ("squirrel-examples", &["squirrel-gap", "squirrel-sim"]),
     ("hidden-effects", &["squirrel-sim"]),
+    (
+        "squirrel-py",
+        &["squirrel-cli", "squirrel-study", "squirrel-gap", "squirrel-nn", "squirrel-sim", "squirrel-core"],
+    ),
     ("squirrel-cli", &["squirrel-study", "squirrel-gap", "squirrel-nn", "squirrel-sim", "squirrel-core"]),
     ("squirrel-study", &["squirrel-gap", "squirrel-nn", "squirrel-sim", "squirrel-core"]),
     ("squirrel-gap", &["squirrel-sim", "squirrel-core"]),

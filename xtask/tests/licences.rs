@@ -1,5 +1,5 @@
 //! What cargo-deny would say about licences, for machines that do not have it: every package in the lock file must be
-//! usable under the licences that `deny.toml` allows.
+//! usable under the licences that `deny.toml` allows. The firmware is a workspace of its own, with a lock file of its own.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
@@ -54,18 +54,24 @@ fn every_package_has_an_allowed_licence() {
     let allow: Vec<&str> =
         deny["licenses"]["allow"].as_array().unwrap().iter().map(|l| l.as_str().unwrap()).collect();
 
-    let metadata = Command::new(env!("CARGO"))
-        .args(["metadata", "--format-version=1", "--locked"])
-        .current_dir(root)
-        .output()
-        .unwrap();
-    assert!(metadata.status.success(), "{}", String::from_utf8_lossy(&metadata.stderr));
-    let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).unwrap();
-    let packages = metadata["packages"].as_array().unwrap();
-    assert!(packages.len() > 50, "only {} packages", packages.len());
-    for package in packages {
-        let (name, licence) = (&package["name"], package["license"].as_str().unwrap_or("none"));
-        assert_eq!(is_allowed(licence, &|one| allow.contains(&one)), Some(true), "{name}: licence {licence}");
+    for workspace in [root.to_owned(), root.join("firmware")] {
+        let metadata = Command::new(env!("CARGO"))
+            .args(["metadata", "--format-version=1", "--locked"])
+            .current_dir(&workspace)
+            .output()
+            .unwrap();
+        assert!(metadata.status.success(), "{}", String::from_utf8_lossy(&metadata.stderr));
+        let metadata: serde_json::Value = serde_json::from_slice(&metadata.stdout).unwrap();
+        let packages = metadata["packages"].as_array().unwrap();
+        assert!(packages.len() > 50, "only {} packages in {}", packages.len(), workspace.display());
+        for package in packages {
+            let (name, licence) = (&package["name"], package["license"].as_str().unwrap_or("none"));
+            assert_eq!(
+                is_allowed(licence, &|one| allow.contains(&one)),
+                Some(true),
+                "{name}: licence {licence}"
+            );
+        }
     }
 }
 

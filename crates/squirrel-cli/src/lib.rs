@@ -8,7 +8,6 @@ mod output;
 
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
-use std::process::ExitCode;
 
 /// A flight stack for multirotors that change shape: fly it, log it, replay it, compare it with measured flights.
 #[derive(Debug, Parser)]
@@ -43,15 +42,15 @@ enum Command {
     Vehicle(commands::vehicle::VehicleCommand),
 }
 
-/// Runs the program on arguments, the first of which is its name.
-pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+/// Runs the program on arguments, the first of which is its name, and says its exit code: Python's front end needs the number.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,
         Err(usage) => {
             // Help and version are results; anything else is wrong usage, exit code 2.
             let code = usage.exit_code();
             let _ = usage.print();
-            return ExitCode::from(u8::try_from(code).unwrap_or(2));
+            return u8::try_from(code).unwrap_or(2);
         }
     };
     let done = match cli.command.unwrap_or_else(|| Command::Demo(commands::demo::Demo::default())) {
@@ -66,10 +65,10 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Command::Vehicle(vehicle) => vehicle.run(),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(()) => 0,
         Err(problem) => {
             output::talk(&format!("error: {}", problem.replace('\n', " ")));
-            ExitCode::FAILURE
+            1
         }
     }
 }

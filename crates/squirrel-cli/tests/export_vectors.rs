@@ -15,11 +15,16 @@ const FLY: [&str; 7] = ["fly", "--arm", "twcc_parnn", "--scenario", "hover", "--
 fn the_file_plays_as_a_target_would_play_it() {
     let folder = Folder::new("export-vectors");
     folder.succeeds(&FLY);
-    for out in ["a.bin", "b.bin"] {
+    for out in ["a", "b/c"] {
         folder.succeeds(&["export-vectors", "f.mcap", "f.mcap", "--out", out, "--json", "v.json"]);
     }
-    let bytes = fs::read(folder.0.join("a.bin")).unwrap();
-    assert_eq!(bytes, fs::read(folder.0.join("b.bin")).unwrap());
+    let bytes = fs::read(folder.0.join("a/vectors.bin")).unwrap();
+    assert_eq!(bytes, fs::read(folder.0.join("b/c/vectors.bin")).unwrap());
+    let setup = fs::read(folder.0.join("a/setup-1.bin")).unwrap();
+    assert_eq!(setup, fs::read(folder.0.join("a/setup-0.bin")).unwrap());
+    let alone = Header::take(&mut Reader::new(&setup)).unwrap();
+    assert_eq!(alone, Header { sequences: 1, frames: 0 });
+    assert!(bytes[Header::LENGTH..].starts_with(&setup[Header::LENGTH..]), "the setup is the first record");
     let said = json(&folder, "v.json");
     let mut reader = Reader::new(&bytes);
     let header = Header::take(&mut reader).unwrap();
@@ -52,9 +57,9 @@ fn what_cannot_be_exported_is_named() {
     let folder = Folder::new("export-vectors-errors");
     folder.succeeds(&FLY);
     folder.write("broken.mcap", "no log");
-    folder.fails(&["export-vectors", "broken.mcap", "--out", "v.bin"], &["broken.mcap"]);
-    folder.fails(&["export-vectors", "f.mcap", "--out", "no/v.bin"], &["no/v.bin"]);
-    folder.fails(&["export-vectors", ".", "--out", "v.bin"], &["broken.mcap"]);
+    folder.fails(&["export-vectors", "broken.mcap", "--out", "v"], &["broken.mcap"]);
+    folder.fails(&["export-vectors", "f.mcap", "--out", "broken.mcap"], &["broken.mcap"]);
+    folder.fails(&["export-vectors", ".", "--out", "v"], &["broken.mcap"]);
 }
 
 #[test]

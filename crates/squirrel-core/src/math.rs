@@ -48,12 +48,49 @@ pub fn limit_norm<T: Real>(v: Vector3<T>, max: T) -> Vector3<T> {
 /// Angle wrapped into (-pi, pi], rad, to within the rounding of the angle. Total: a non-finite angle gives 0.
 pub fn wrap_angle(angle: f32) -> f32 {
     use core::f32::consts::PI;
+    if angle > -PI && angle <= PI {
+        return angle;
+    }
     if !angle.is_finite() {
         return 0.0;
     }
     let turns = libm::floorf((angle + PI) / (2.0 * PI));
     let wrapped = angle - turns * 2.0 * PI;
     if wrapped <= -PI { PI } else { wrapped }
+}
+
+/// The square root as IEEE 754 rounds it, as `libm` gives it too. Where an f32 has an instruction for it that the standard library
+/// keeps for itself, that instruction.
+#[inline(always)]
+pub fn sqrt<T: Real>(x: T) -> T {
+    #[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+    {
+        use core::any::Any;
+        // Both are known at compile time; nothing of this is left in the code.
+        let single = <dyn Any>::downcast_ref::<f32>(&x).map(|x| vsqrt(*x));
+        if let Some(root) = single.as_ref().and_then(|root| <dyn Any>::downcast_ref::<T>(root)) {
+            return *root;
+        }
+    }
+    x.sqrt()
+}
+
+/// The instruction of Arm's floating-point units.
+#[cfg(all(target_arch = "arm", target_abi = "eabihf"))]
+#[allow(unsafe_code, reason = "core has no square root on stable Rust")]
+#[inline(always)]
+fn vsqrt(x: f32) -> f32 {
+    let root: f32;
+    // SAFETY: a function of its operand alone, and every processor with this calling convention has it.
+    unsafe {
+        core::arch::asm!(
+            "vsqrt.f32 {root}, {x}",
+            root = lateout(sreg) root,
+            x = in(sreg) x,
+            options(pure, nomem, nostack, preserves_flags),
+        );
+    }
+    root
 }
 
 /// True where every component is finite.

@@ -131,6 +131,58 @@ fn saturated_answers_match_the_oracle_on_a_thousand_random_demands() {
     assert!(saturated > 500, "only {saturated} demands saturate");
 }
 
+/// With more rotors than axes the mixer stays on `T^+`: thrusts `s a + u b + y c`. Its share is the largest there.
+#[test]
+fn the_share_of_six_and_eight_rotors_is_the_largest() {
+    let mut draw = Draw(4);
+    let mut limited = 0;
+    for n in 0..400 {
+        let count = 6 + 2 * (n % 2);
+        let (mut positions, mut signs) = (Vec::new(), Vec::new());
+        for i in 0..count {
+            let angle =
+                core::f64::consts::TAU * (f64::from(i) + draw.within(-0.1, 0.1)) / f64::from(count) + 0.3;
+            let arm = draw.within(0.12, 0.2);
+            positions.push([arm * angle.cos(), arm * angle.sin()]);
+            signs.push(if i % 2 == 0 { 1.0 } else { -1.0 });
+        }
+        let Ok(mixer) = Mixer::new(&vehicle(&positions, &signs)) else { continue };
+        let thrusts = |u: f32, torque: [f32; 3]| {
+            let answer = mixer.allocate(&ThrustTorque { thrust_n: u, torque_n_m: Vector3::from(torque) });
+            assert!(!answer.saturated);
+            answer.rotor_thrust_n.map(f64::from)
+        };
+        // The columns of `T^+`, from small demands around a hover.
+        let hover = thrusts(15.0, [0.0; 3]);
+        let column = |torque: [f32; 3]| {
+            let f = thrusts(15.0, torque);
+            (0..8).map(|i| (f[i] - hover[i]) / 0.01).collect::<Vec<f64>>()
+        };
+        let (roll, pitch, yaw) =
+            (column([0.01, 0.0, 0.0]), column([0.0, 0.01, 0.0]), column([0.0, 0.0, 0.01]));
+        let torque = [draw.within(-3.0, 3.0), draw.within(-3.0, 3.0), draw.within(-0.1, 0.1)];
+        let mut bounds = vec![(vec![1.0, 0.0, 0.0], 1.0), (vec![-1.0, 0.0, 0.0], 0.0)];
+        for i in 0..usize::try_from(count).unwrap() {
+            let row = vec![roll[i] * torque[0] + pitch[i] * torque[1], hover[i] / 15.0, 0.1 * yaw[i]];
+            bounds.push((row.iter().map(|x| -x).collect(), 0.0));
+            bounds.push((row, f64::from(mixer.rotor_thrust_max_n())));
+        }
+        let largest = solve(&[0.0; 3], &[-1.0, 0.0, 0.0], &[], &bounds)[0];
+        let demand = ThrustTorque {
+            thrust_n: draw.within(5.0, 40.0) as f32,
+            torque_n_m: Vector3::from(torque.map(|x| x as f32)),
+        };
+        let answer = mixer.allocate(&demand);
+        limited += usize::from(answer.roll_pitch_share < 1.0);
+        let gap = (f64::from(answer.roll_pitch_share) - largest).abs();
+        assert!(gap < 2e-3, "case {n}: {} for {largest}", answer.roll_pitch_share);
+        // And no rotor has to be cut for it.
+        let reached = f64::from(answer.achieved.torque_n_m.x) - largest * torque[0];
+        assert!(reached.abs() < 5e-3, "case {n}: {answer:?} for {torque:?}");
+    }
+    assert!(limited > 150, "only {limited} demands are beyond the limits");
+}
+
 #[test]
 fn round_trip_for_random_layouts() {
     let mut draw = Draw(2);

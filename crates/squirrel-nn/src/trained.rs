@@ -47,6 +47,21 @@ impl Trained {
         &self.parameters
     }
 
+    /// The same model with other parameters, as somebody else trained them.
+    ///
+    /// # Errors
+    /// Another number of parameters than the model has, or one that is not finite.
+    pub fn with_parameters(&self, parameters: Vec<f32>) -> Result<Self, NnError> {
+        let refuse = |value: String, reason| Err(NnError::Setting { field: "parameters", value, reason });
+        if parameters.len() != self.parameters.len() {
+            return refuse(format!("{} numbers", parameters.len()), "must be as many as the model has");
+        }
+        if let Some(number) = parameters.iter().find(|number| !number.is_finite()) {
+            return refuse(number.to_string(), "must be finite");
+        }
+        Ok(Self { card: self.card.clone(), parameters })
+    }
+
     /// Force of the air on the wings at the end of each window, N, body frame.
     pub fn forces_body_n(&self, windows: &[Window]) -> Vec<[f32; 3]> {
         let model = self.card.model;

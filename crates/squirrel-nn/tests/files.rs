@@ -71,6 +71,19 @@ fn every_model_survives_its_file() {
 }
 
 #[test]
+fn parameters_from_elsewhere_take_the_place_of_our_own() {
+    let own = trained(Model::Parnn);
+    let mut parameters = own.parameters().to_vec();
+    assert_eq!(own.with_parameters(parameters.clone()).unwrap(), own);
+    parameters[3] = f32::NAN;
+    let error = own.with_parameters(parameters.clone()).unwrap_err().to_string();
+    assert!(error.contains("parameters = NaN: must be finite"), "{error}");
+    parameters.pop();
+    let error = own.with_parameters(parameters).unwrap_err().to_string();
+    assert!(error.ends_with("numbers: must be as many as the model has"), "{error}");
+}
+
+#[test]
 fn the_card_says_where_weights_come_from() {
     let (training, _) = sets();
     let card = trained(Model::Parnn).card;

@@ -4,9 +4,11 @@
 //!    a hundred pieces of flight in which a sensor fails.
 //! 2. A flight with the flight code in QEMU must leave the same log, byte for byte, as one without.
 //! 3. Negative controls: another mass by one bit must change the hashes, a step that may panic must not link.
-//! 4. Instructions of a step, size of the image that holds nothing but the step, its worst-case stack, against
+//! 4. The workspace is linted; the image for the real part is built and sized, and what of it needs no hardware is tested.
+//! 5. Instructions of a step, size of the image that holds nothing but the step, its worst-case stack, against
 //!    `firmware/figures.txt`; `--write` takes the new ones.
 
+mod board;
 mod elf;
 mod stack;
 
@@ -94,10 +96,11 @@ fn measure() -> Result<Figures, String> {
     call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli"]))?;
     let squirrel = Squirrel { program: target_directory()?.join("release/squirrel"), folder };
 
-    // Both negative controls first: the real images take their places.
+    board::check()?;
     squirrel.record()?;
+    // Both negative controls first: the real images take their places.
     build(&["--package=squirrel-m7", "--bin", "play", "--features", "changed-constant"])?;
-    let changed = squirrel.play("flights.bin")?;
+    let changed = squirrel.play("flights")?;
     if changed.lines.iter().any(|line| line.contains(" same ")) || changed.well {
         return Err("another mass by one bit: the emulated outputs did not change".to_owned());
     }
@@ -110,8 +113,8 @@ fn measure() -> Result<Figures, String> {
 
     let images = build(&["--package=squirrel-m7"])?;
     eprintln!("no panic can be reached from the step: its image links");
-    let flights = squirrel.play("flights.bin")?;
-    let faults = squirrel.play("faults.bin")?;
+    let flights = squirrel.play("flights")?;
+    let faults = squirrel.play("faults")?;
     if !flights.well || !faults.well {
         let lines = flights.lines.iter().chain(&faults.lines);
         let differs: Vec<&str> = lines.filter(|l| !l.contains(" same ")).map(String::as_str).collect();
@@ -130,6 +133,7 @@ fn measure() -> Result<Figures, String> {
     let (bytes, chain) = stack::worst_case(&elf, "squirrel_step")?;
     eprintln!("deepest chain of calls: {}", chain.join(" > "));
     figures.insert("step: stack, worst case, B", bytes.into());
+    board::size(&mut figures)?;
     Ok(figures)
 }
 
@@ -169,17 +173,17 @@ impl Squirrel {
         for (arm, log) in ARMS.iter().zip(&logs) {
             self.run(&["fly", "--arm", arm, "--scenario", "avoid", "--out", log])?;
         }
-        let mut export = vec!["export-vectors", "--out", "flights.bin"];
+        let mut export = vec!["export-vectors", "--out", "flights"];
         export.extend(logs.iter().map(String::as_str));
         self.run(&export)?;
-        self.run(&["export-vectors", "--out", "faults.bin", "--faults", FAULTS, &logs[LEARNED]])
+        self.run(&["export-vectors", "--out", "faults", "--faults", FAULTS, &logs[LEARNED]])
     }
 
     fn play(&self, vectors: &str) -> Result<Played, String> {
         let mut command = Command::new(QEMU);
         command.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-nographic", "-monitor", "none"]);
         command.args(["-serial", "none", "-icount", "shift=6", "-semihosting-config"]);
-        command.arg(format!("enable=on,target=native,arg=play,arg={vectors}"));
+        command.arg(format!("enable=on,target=native,arg=play,arg={vectors}/vectors.bin"));
         let done =
             command.arg("-kernel").arg(thumb::images()?.join("play")).current_dir(&self.folder).output();
         let done = done.map_err(|error| format!("{QEMU}: {error}"))?;

@@ -1,7 +1,8 @@
 //! `squirrel export-vectors`: the sensor frames of flights for a target without files, with the hash of every output.
 //!
-//! The bytes are those of [`squirrel_core::stack::wire`]: a header, then for each flight its setup and its frames. Before
-//! anything is written the host flies them again: vectors whose outputs are not the log's would test nothing.
+//! The bytes are those of [`squirrel_core::stack::wire`]: `vectors.bin` is a header, then for each flight its setup and its frames;
+//! `setup-K.bin` is the setup of flight K alone, a file of vectors without frames, for a board to fly with. Before anything
+//! is written the host flies all of them again: vectors whose outputs are not the log's would test nothing.
 
 use super::log_files;
 use crate::output::{self, Table, talk};
@@ -26,7 +27,7 @@ pub(crate) struct ExportVectors {
     /// Seed of the faults.
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// File of vectors to write.
+    /// Folder for `vectors.bin` and, of each flight, `setup-0.bin` and so on; made where it is missing.
     #[arg(long)]
     out: PathBuf,
     /// Write the result here as JSON.
@@ -38,6 +39,8 @@ pub(crate) struct ExportVectors {
 #[derive(Serialize)]
 struct Sequence {
     flight: String,
+    /// File of its setup.
+    setup: String,
     arm: &'static str,
     /// The whole flight, or the fault in a piece of it.
     what: String,
@@ -48,7 +51,7 @@ struct Sequence {
 
 impl ExportVectors {
     pub(crate) fn run(&self) -> Result<(), String> {
-        output::writable(&self.out)?;
+        let mut setups = Vec::new();
         let mut sequences = Vec::new();
         let mut records = Vec::new();
         for path in log_files(&self.flights)? {
@@ -64,11 +67,15 @@ impl ExportVectors {
             }
             let stack = setup.stack().map_err(|e| at(e.to_string()))?;
             let frames = flight::frames(&log).map_err(at)?;
+            let setup_file = format!("setup-{}.bin", setups.len());
+            let alone = Header { sequences: 1, frames: 0 };
+            setups.push([wire(&alone)?, record(&Record::Setup(stack))?].concat());
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
             let mut add = |what: String, frames: &[SensorFrame]| {
                 let hash = format!("{:016x}", append(&mut records, &stack, frames)?);
                 let (flight, steps) = (name.clone(), frames.len() as u32);
-                sequences.push(Sequence { flight, arm: setup.arm.name(), what, steps, hash });
+                let (setup, arm) = (setup_file.clone(), setup.arm.name());
+                sequences.push(Sequence { flight, setup, arm, what, steps, hash });
                 Ok::<_, String>(())
             };
             if self.faults == 0 {
@@ -85,14 +92,20 @@ impl ExportVectors {
         let header = Header { sequences: sequences.len() as u32, frames };
         let mut bytes = wire(&header)?;
         bytes.append(&mut records);
-        output::write_file(&self.out, &bytes)?;
-        let mut table = Table::new(&["flight", "arm", "what", "steps", "hash of the outputs"]);
+        output::folder(&self.out)?;
+        for (k, setup) in setups.iter().enumerate() {
+            output::write_file(&self.out.join(format!("setup-{k}.bin")), setup)?;
+        }
+        let vectors = self.out.join("vectors.bin");
+        output::write_file(&vectors, &bytes)?;
+        let mut table = Table::new(&["flight", "setup", "arm", "what", "steps", "hash of the outputs"]);
         for s in &sequences {
             let steps = s.steps.to_string();
-            table.row(vec![s.flight.clone(), s.arm.to_owned(), s.what.clone(), steps, s.hash.clone()]);
+            let (flight, setup, arm) = (s.flight.clone(), s.setup.clone(), s.arm.to_owned());
+            table.row(vec![flight, setup, arm, s.what.clone(), steps, s.hash.clone()]);
         }
         table.print();
-        talk(&format!("wrote {}, {} bytes", self.out.display(), bytes.len()));
+        talk(&format!("wrote {}, {} bytes", vectors.display(), bytes.len()));
         output::write_json(self.json.as_deref(), &sequences)
     }
 }

@@ -1,9 +1,9 @@
 //! `squirrel import`: foreign logs in, flight logs out.
 
 use crate::output::{self, say, talk};
-use squirrel_sim::import::{ImportMap, import_watched};
+use squirrel_sim::import::{ImportMap, import_board, import_watched};
 use squirrel_sim::log::FlightLog;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Smaller files are read before a progress bar could be seen.
 const BAR_FROM_BYTES: u64 = 32 << 20;
@@ -12,12 +12,15 @@ const BAR_FROM_BYTES: u64 = 32 << 20;
 #[derive(Debug, clap::Args)]
 pub(crate) struct Import {
     /// Map from columns to channels (TOML).
-    #[arg(long, required_unless_present = "recover")]
+    #[arg(long, required_unless_present_any = ["recover", "board"])]
     map: Option<PathBuf>,
     /// Save what is whole of a truncated flight log.
     #[arg(long, conflicts_with = "map")]
     recover: bool,
-    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages.
+    /// Fly what a board wrote down its serial line again: inputs and outputs of its flight code.
+    #[arg(long, conflicts_with_all = ["map", "recover"])]
+    board: bool,
+    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages; with --board what the board wrote.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.
@@ -30,7 +33,9 @@ pub(crate) struct Import {
 
 impl Import {
     pub(crate) fn run(&self) -> Result<(), String> {
-        let Some(map) = &self.map else { return self.recover() };
+        let Some(map) = &self.map else {
+            return if self.board { self.board() } else { self.recover() };
+        };
         let map = ImportMap::load(map).map_err(|e| e.to_string())?;
         let bar = output::progress(0, "bytes");
         let imported = import_watched(&map, &self.paths, &|done, total| {
@@ -47,10 +52,23 @@ impl Import {
         output::write_json(self.json.as_deref(), &report)
     }
 
+    fn one_path(&self, option: &str) -> Result<&Path, String> {
+        match self.paths.as_slice() {
+            [path] => Ok(path),
+            all => Err(format!("PATH: {option} takes one file, got {}", all.len())),
+        }
+    }
+
+    fn board(&self) -> Result<(), String> {
+        let (log, report) = import_board(self.one_path("--board")?).map_err(|e| e.to_string())?;
+        log.write(&self.out).map_err(|e| e.to_string())?;
+        say(&report.to_string());
+        talk(&format!("wrote {}", self.out.display()));
+        output::write_json(self.json.as_deref(), &report)
+    }
+
     fn recover(&self) -> Result<(), String> {
-        let [path] = self.paths.as_slice() else {
-            return Err(format!("PATH: --recover takes one flight log, got {}", self.paths.len()));
-        };
+        let path = self.one_path("--recover")?;
         let (log, recovery) = FlightLog::recover(path).map_err(|e| e.to_string())?;
         log.write(&self.out).map_err(|e| e.to_string())?;
         say(&format!(

@@ -12,8 +12,11 @@
 //!
 //! `F_max` is the vehicle's limit at the reference voltage; it does not follow the measured battery voltage.
 //!
-//! Along `T^+` the rotor thrusts are `s a_i + u b_i + y c_i`, so each step is an interval after eliminating the variables
-//! of the later steps (Fourier-Motzkin): no iteration, at most `n^2` inequalities in the common saturated case.
+//! Along `T^+` the rotor thrusts are `f_i = s a_i + u b_i + y c_i`, with `b_i > 0`; the code works with `f_i / b_i`. A weighted sum
+//! of them lies between what the negative weights take at the thrust limit and what the positive ones give. Weights that take
+//! `u` and `y` out of the sum bound `s`, and weights that take `y` out bound `u`. The shortest such sums are enough, because all
+//! others are sums of these with positive factors: for `s` three rotors, or two with the same `c_i / b_i`; for `u` two, or one
+//! without yaw. No iteration; for four rotors at most six sums each.
 
 use crate::math::{limit, lower, upper};
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
@@ -21,8 +24,6 @@ use nalgebra::{Matrix4, SMatrix, Vector3};
 
 /// Slopes below this count as zero; all slopes are of order one by scaling.
 const FLAT: f32 = 1e-4;
-/// Half-planes in (s, u) that pairs of rotors can give, and those of rotors without yaw.
-const MAX_HALF_PLANES: usize = MAX_ROTORS * MAX_ROTORS + 2 * MAX_ROTORS;
 
 /// Collective thrust and torque.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,17 +57,15 @@ pub struct Mixer {
     roll: PerRotor<f32>,
     pitch: PerRotor<f32>,
     yaw: PerRotor<f32>,
+    /// Scaled yaw and the thrust limit, each over the rotor's part of the collective.
+    yaw_share: PerRotor<f32>,
+    full_share_n: PerRotor<f32>,
+    /// Three rotors differ in `yaw_share`: not where all turn one way or the other with equal strength.
+    has_three_kinds: bool,
     /// Newton metres of yaw torque per unit of the scaled yaw variable.
     yaw_unit_n_m: f32,
-    effectiveness: [PerRotor<f32>; 4],
-}
-
-/// `slope_s * s + slope_u * u <= bound`.
-#[derive(Clone, Copy)]
-struct HalfPlane {
-    slope_s: f32,
-    slope_u: f32,
-    bound: f32,
+    /// Thrust, roll, pitch and yaw torque of one newton of each rotor.
+    effectiveness: [[f32; 4]; MAX_ROTORS],
 }
 
 /// A closed interval; empty where `low > high`.
@@ -78,13 +77,13 @@ struct Interval {
 
 impl Interval {
     const ALL: Self = Self { low: f32::NEG_INFINITY, high: f32::INFINITY };
-    /// Keeps the part where `slope * x <= bound`.
+    /// Keeps the part where `low <= slope * x <= high`.
     #[inline(always)]
-    fn cut(&mut self, slope: f32, bound: f32) {
-        if slope > FLAT {
-            self.high = lower(self.high, bound / slope);
-        } else if slope < -FLAT {
-            self.low = upper(self.low, bound / slope);
+    fn keep(&mut self, slope: f32, low: f32, high: f32) {
+        if slope.abs() > FLAT {
+            let (a, b) = (low / slope, high / slope);
+            self.low = upper(self.low, lower(a, b));
+            self.high = lower(self.high, upper(a, b));
         }
     }
     fn is_empty(self) -> bool {
@@ -139,22 +138,33 @@ impl Mixer {
         let largest = |c: &PerRotor<f32>| c.iter().fold(0.0, |m, x| upper(m, x.abs()));
         let (yaw_size, collective_size) = (largest(&yaw_raw), largest(&collective));
         let yaw_unit_n_m = if yaw_size > 0.0 { collective_size / yaw_size } else { 0.0 };
-        let row = |k: usize| {
-            let mut out = [0.0; MAX_ROTORS];
-            for (i, x) in out.iter_mut().enumerate() {
+        let mut effectiveness = [[0.0; 4]; MAX_ROTORS];
+        for (i, rotor) in effectiveness.iter_mut().enumerate() {
+            for (k, x) in rotor.iter_mut().enumerate() {
                 *x = t[(k, i)];
             }
-            out
-        };
+        }
+        let yaw = yaw_raw.map(|c| c * yaw_unit_n_m);
+        let thrust_max_n = vehicle.rotor_thrust_max_n();
+        let (mut yaw_share, mut full_share_n) = ([0.0; MAX_ROTORS], [0.0; MAX_ROTORS]);
+        for (i, b) in collective[..count].iter().enumerate() {
+            (yaw_share[i], full_share_n[i]) = (yaw[i] / b, thrust_max_n / b);
+        }
+        let differ = |i: usize, j: usize| (yaw_share[i] - yaw_share[j]).abs() > FLAT;
+        let has_three_kinds =
+            (0..count).any(|i| (0..i).any(|j| differ(i, j) && (0..j).any(|k| differ(i, k) && differ(j, k))));
         Ok(Self {
             count,
-            thrust_max_n: vehicle.rotor_thrust_max_n(),
+            thrust_max_n,
             collective,
             roll: column(1),
             pitch: column(2),
-            yaw: yaw_raw.map(|c| c * yaw_unit_n_m),
+            yaw,
+            yaw_share,
+            full_share_n,
+            has_three_kinds,
             yaw_unit_n_m,
-            effectiveness: [row(0), row(1), row(2), row(3)],
+            effectiveness,
         })
     }
 
@@ -213,55 +223,75 @@ impl Mixer {
                 }
                 continue;
             }
-            range.cut(self.yaw[i], self.thrust_max_n - rest);
-            range.cut(-self.yaw[i], rest);
+            range.keep(self.yaw[i], -rest, self.thrust_max_n - rest);
         }
         if range.low == f32::NEG_INFINITY { Interval { low: 0.0, high: 0.0 } } else { range }
     }
 
     /// Steps 1 and 2: the largest share, then the nearest thrust.
     fn share_and_thrust(&self, tilt: &PerRotor<f32>, thrust: f32) -> (f32, f32) {
-        let mut planes = [HalfPlane { slope_s: 0.0, slope_u: 0.0, bound: 0.0 }; MAX_HALF_PLANES];
-        let mut used = 0;
-        let mut add = |plane: HalfPlane| {
-            if let Some(place) = planes.get_mut(used) {
-                *place = plane;
-                used += 1;
+        let mut tilt_share = [0.0; MAX_ROTORS];
+        for i in 0..self.rotors() {
+            tilt_share[i] = tilt[i] / self.collective[i];
+        }
+        let share = self.largest_share(&tilt_share);
+        let range = self.thrust_interval(&tilt_share, share);
+        (share, limit(thrust, range.low, upper(range.low, range.high)))
+    }
+
+    /// The largest `s` in [0, 1] that some thrust and yaw allow: sums of rotors that neither of them changes limit it.
+    fn largest_share(&self, tilt_share: &PerRotor<f32>) -> f32 {
+        let (n, a, c, max) = (self.rotors(), tilt_share, &self.yaw_share, &self.full_share_n);
+        let mut share = 1.0;
+        let mut cut = |slope: f32, above: f32, below: f32| {
+            let bound = if slope > 0.0 { above } else { below };
+            // No division where it would not bind.
+            if slope.abs() * share > bound {
+                share = bound / slope.abs();
             }
         };
-        for i in 0..self.rotors() {
-            let (a, b, c) = (tilt[i], self.collective[i], self.yaw[i]);
-            if c.abs() <= FLAT {
-                add(HalfPlane { slope_s: a, slope_u: b, bound: self.thrust_max_n });
-                add(HalfPlane { slope_s: -a, slope_u: -b, bound: 0.0 });
-                continue;
-            }
-            let floor = if c > 0.0 { 0.0 } else { self.thrust_max_n };
-            for j in 0..self.rotors() {
-                if i == j || self.yaw[j].abs() <= FLAT {
+        for i in 0..n {
+            for j in i + 1..n {
+                let w_k = c[i] - c[j];
+                if w_k.abs() <= FLAT {
+                    cut(a[i] - a[j], max[i], max[j]);
                     continue;
                 }
-                // Yaw must lie above what rotor i needs and below what rotor j allows.
-                let c_j = self.yaw[j];
-                let ceiling = if c_j > 0.0 { self.thrust_max_n } else { 0.0 };
-                add(HalfPlane {
-                    slope_s: tilt[j] / c_j - a / c,
-                    slope_u: self.collective[j] / c_j - b / c,
-                    bound: ceiling / c_j - floor / c,
-                });
+                if !self.has_three_kinds {
+                    continue;
+                }
+                for k in j + 1..n {
+                    let (w_i, w_j) = (c[j] - c[k], c[k] - c[i]);
+                    // Else two of them make a shorter sum, which has its turn.
+                    if w_i.abs() > FLAT && w_j.abs() > FLAT {
+                        let [above, below] = sums([w_i * max[i], w_j * max[j], w_k * max[k]]);
+                        cut(w_i * a[i] + w_j * a[j] + w_k * a[k], above, below);
+                    }
+                }
             }
         }
-        let planes = planes.get(..used).unwrap_or(&[]);
-        let at_share = |s: f32| {
-            let mut range = Interval::ALL;
-            for p in planes {
-                range.cut(p.slope_u, p.bound - s * p.slope_s);
+        share
+    }
+
+    /// Thrusts that some yaw allows at a given share: single rotors without yaw, and pairs whose sum yaw does not change.
+    fn thrust_interval(&self, tilt_share: &PerRotor<f32>, s: f32) -> Interval {
+        let (n, a, c, max) = (self.rotors(), tilt_share, &self.yaw_share, &self.full_share_n);
+        let mut range = Interval::ALL;
+        for i in 0..n {
+            if c[i].abs() <= FLAT {
+                range.keep(1.0, -s * a[i], max[i] - s * a[i]);
+                continue;
             }
-            range
-        };
-        let share = largest_share(planes);
-        let range = at_share(share);
-        (share, limit(thrust, range.low, upper(range.low, range.high)))
+            for j in i + 1..n {
+                let slope = c[j] - c[i];
+                if c[j].abs() > FLAT && slope.abs() > FLAT {
+                    let [above, below] = sums([c[j] * max[i], -c[i] * max[j]]);
+                    let rest = s * (c[j] * a[i] - c[i] * a[j]);
+                    range.keep(slope, -below - rest, above - rest);
+                }
+            }
+        }
+        range
     }
 
     fn terms(&self, tilt: &PerRotor<f32>, s: f32, u: f32, y: f32, saturated: bool) -> MixerTerms {
@@ -270,8 +300,8 @@ impl Mixer {
         for i in 0..self.rotors() {
             let f = limit(self.rotor_thrust(tilt, i, s, u, y), 0.0, self.thrust_max_n);
             rotor_thrust_n[i] = f;
-            for (total, row) in sum.iter_mut().zip(&self.effectiveness) {
-                *total += row[i] * f;
+            for (total, part) in sum.iter_mut().zip(&self.effectiveness[i]) {
+                *total += part * f;
             }
         }
         let achieved = ThrustTorque { thrust_n: sum[0], torque_n_m: Vector3::new(sum[1], sum[2], sum[3]) };
@@ -279,21 +309,15 @@ impl Mixer {
     }
 }
 
-/// The largest `s` in [0, 1] for which some `u` satisfies all half-planes, by eliminating `u`.
-fn largest_share(planes: &[HalfPlane]) -> f32 {
-    let mut share = Interval { low: 0.0, high: 1.0 };
-    for p in planes {
-        if p.slope_u.abs() <= FLAT {
-            share.cut(p.slope_s, p.bound);
-        }
+/// Sum of the positive terms, and of the negative ones without their sign.
+#[inline(always)]
+fn sums<const N: usize>(terms: [f32; N]) -> [f32; 2] {
+    let (mut sum, mut size) = (0.0, 0.0);
+    for term in terms {
+        sum += term;
+        size += term.abs();
     }
-    for above in planes.iter().filter(|p| p.slope_u > FLAT) {
-        for below in planes.iter().filter(|p| p.slope_u < -FLAT) {
-            let slope = above.slope_s / above.slope_u - below.slope_s / below.slope_u;
-            share.cut(slope, above.bound / above.slope_u - below.bound / below.slope_u);
-        }
-    }
-    limit(share.high, 0.0, 1.0)
+    [0.5 * (size + sum), 0.5 * (size - sum)]
 }
 
 /// `T^T (T T^T)^-1`; a yaw row of zeros is left out.

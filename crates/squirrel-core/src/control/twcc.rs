@@ -18,7 +18,7 @@ use crate::aero::angle_of_attack;
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::limit;
 use crate::rnn::parnn::History;
-use crate::vehicle::ParameterError;
+use crate::vehicle::{ParameterError, Vehicle};
 use nalgebra::Vector3;
 
 /// Share of the angle limit below which WIIC lets go.
@@ -150,6 +150,21 @@ pub struct Airframe {
     pub wing_area_m2: f32,
     /// Limits of angle and thrust.
     pub envelope: Envelope,
+}
+
+impl Airframe {
+    /// Of a vehicle.
+    ///
+    /// * `tilt_max_rad` - what the outer loop may ask for of the vehicle's limit
+    pub fn new(vehicle: &Vehicle<f32>, thrust_min_n: f32, tilt_max_rad: f32) -> Self {
+        let p = vehicle.parameters();
+        Self {
+            mass_kg: p.mass_kg,
+            // Two sides; the flat plate's own slope is 2.
+            wing_area_m2: p.wing.map_or(0.0, |w| w.area_per_side_m2 * w.normal_force_slope),
+            envelope: Envelope { tilt_max_rad, thrust_min_n, thrust_max_n: p.limits.thrust_max_n },
+        }
+    }
 }
 
 impl TwccParameters {

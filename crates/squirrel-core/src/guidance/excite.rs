@@ -174,7 +174,7 @@ impl Multisine {
                 let turns = line.frequency_hz * t + line.phase;
                 let angle = TAU * (turns - libm::floorf(turns));
                 let rate = TAU * line.frequency_hz;
-                let (s, c) = (libm::sinf(angle), libm::cosf(angle));
+                let (s, c) = libm::sincosf(angle);
                 sum[0] += line.amplitude * s;
                 sum[1] += line.amplitude * rate * c;
                 sum[2] -= line.amplitude * rate * rate * s;

@@ -24,7 +24,8 @@ pub struct Trajectory {
 impl Trajectory {
     /// Unit vector of the direction.
     pub fn direction(&self) -> In<Ned, f32> {
-        In::new(Vector3::new(libm::cosf(self.course_rad), libm::sinf(self.course_rad), 0.0))
+        let (s, c) = libm::sincosf(self.course_rad);
+        In::new(Vector3::new(c, s, 0.0))
     }
 
     /// Reference at time `t_s` after the start; the start before that.

@@ -138,9 +138,9 @@ impl FailsafeState {
     /// Looks at what came of a frame.
     ///
     /// * `elapsed_us` - time since the last frame, `None` for the first, 0 if it did not go on
-    pub(super) fn update(&mut self, elapsed_us: Option<u64>, merged: Merged, known: &Known) -> Failsafe {
+    pub(super) fn update(&mut self, elapsed_us: Option<u32>, merged: Merged, known: &Known) -> Failsafe {
         self.standing = if elapsed_us == Some(0) { self.standing.saturating_add(1) } else { 0 };
-        let elapsed_us = elapsed_us.map_or(0, |us| u32::try_from(us).unwrap_or(u32::MAX));
+        let elapsed_us = elapsed_us.unwrap_or(0);
         self.imu.look(elapsed_us, merged.imu);
         self.attitude.look(elapsed_us, merged.attitude);
         self.gnss.look(elapsed_us, merged.gnss);

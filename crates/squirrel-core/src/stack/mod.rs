@@ -20,7 +20,6 @@ use crate::control::command_filter::{self, EulerReference};
 use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
 use crate::control::position::Motion;
 use crate::control::twcc::{Airframe, TwccParameters, TwccState, TwccTerms};
-use crate::control::wiic::Envelope;
 use crate::control::{AttitudeThrust, Reference};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
@@ -148,16 +147,7 @@ impl Stack {
             let reason = "must be above what the mission's multisine adds";
             return Err(ParameterError::of("limits.tilt_max_rad", p.limits.tilt_max_rad, reason));
         }
-        let airframe = Airframe {
-            mass_kg: p.mass_kg,
-            // Two sides; the flat plate's own slope is 2.
-            wing_area_m2: p.wing.map_or(0.0, |w| w.area_per_side_m2 * w.normal_force_slope),
-            envelope: Envelope {
-                tilt_max_rad,
-                thrust_min_n: parameters.twcc.thrust_min_n,
-                thrust_max_n: p.limits.thrust_max_n,
-            },
-        };
+        let airframe = Airframe::new(&vehicle, parameters.twcc.thrust_min_n, tilt_max_rad);
         Ok(Self { mixer: Mixer::new(&vehicle)?, vehicle, airframe, parameters, mission })
     }
 
@@ -168,7 +158,11 @@ impl Stack {
 
     /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any frame.
     pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
-        let elapsed_us = state.time_us.map(|last| frame.time_us.saturating_sub(last));
+        // A gap of an hour is as long as any longer one.
+        let elapsed_us = state.time_us.map(|last| {
+            let elapsed_us = frame.time_us.saturating_sub(last);
+            u32::try_from(elapsed_us).unwrap_or(u32::MAX)
+        });
         state.time_us = Some(frame.time_us);
         let merged = frame.merge_into(&mut state.known);
         state.rejected = state.rejected.saturating_add(merged.rejected);
@@ -178,10 +172,15 @@ impl Stack {
             self.forget(state, was);
         }
 
-        let outer_index = frame.time_us / OUTER_PERIOD_US;
-        let outer = if state.outer_index == Some(outer_index) {
+        // In most steps the period is the last one still; a processor without 64-bit division sees that sooner.
+        let is_same_period = state.outer_index.is_some_and(|last| {
+            let begin_us = last.wrapping_mul(OUTER_PERIOD_US);
+            (begin_us..begin_us.saturating_add(OUTER_PERIOD_US)).contains(&frame.time_us)
+        });
+        let outer = if is_same_period {
             None
         } else {
+            let outer_index = frame.time_us / OUTER_PERIOD_US;
             let periods = state.outer_index.map_or(1, |last| outer_index.saturating_sub(last));
             state.outer_index = Some(outer_index);
             let dt_s = lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6;
@@ -197,7 +196,7 @@ impl Stack {
         let mut rotor_command = [0.0; MAX_ROTORS];
         let propulsion = &self.vehicle.parameters().propulsion;
         for (i, command) in rotor_command.iter_mut().take(self.vehicle.rotors().len()).enumerate() {
-            let thrust = inner.map_or(0.0, |terms| terms.mixer.rotor_thrust_n[i]);
+            let thrust = inner.as_ref().map_or(0.0, |terms| terms.mixer.rotor_thrust_n[i]);
             *command = propulsion.command_for_thrust(thrust);
         }
         StackOutput {

@@ -354,7 +354,7 @@ impl<T: Real> Propulsion<T> {
     }
     #[inline(always)]
     fn speed_for_thrust(&self, thrust_n: T) -> T {
-        (crate::math::upper(thrust_n, T::zero()) / self.thrust_coefficient_n_s2).sqrt()
+        crate::math::sqrt(crate::math::upper(thrust_n, T::zero()) / self.thrust_coefficient_n_s2)
     }
 }
 

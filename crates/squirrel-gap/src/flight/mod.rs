@@ -1,5 +1,6 @@
 //! A logged flight as the gap workflow sees it: channels as series, a uniform grid, and what was flown where.
 
 pub(crate) mod filter;
+mod ground;
 pub(crate) mod recording;
 pub(crate) mod series;

@@ -1,6 +1,7 @@
 //! What the residual needs of one flight: its channels, a uniform time grid, and the pieces of it without gaps.
 
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
+use super::ground;
 use super::series::{Series, Span, common};
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
@@ -31,9 +32,9 @@ pub(crate) struct Recording<'a> {
     pub(crate) velocity: Option<Series>,
     pub(crate) position: Option<Series>,
     pub(crate) baro: Option<Series>,
-    specific_force: Series,
-    omega: Series,
-    attitude: Option<Series>,
+    pub(super) specific_force: Series,
+    pub(super) omega: Series,
+    pub(super) attitude: Option<Series>,
     voltage: Option<Series>,
     reference_voltage_v: f64,
 }
@@ -130,6 +131,12 @@ impl<'a> Recording<'a> {
             reference_voltage_v: parameters.propulsion.reference_voltage_v,
         };
         recording.pieces = recording.usable()?;
+        let touches = ground::touches(&recording, Vector3::from(vehicle.size_body_m));
+        if !touches.is_empty() {
+            let free = ground::outside(&touches);
+            recording.pieces = recording.usable_with(&recording.pieces, "time off the ground", &free)?;
+            recording.notes.push(ground::note(flight, &touches));
+        }
         Ok(recording)
     }
 
@@ -163,6 +170,15 @@ impl<'a> Recording<'a> {
             return Err(GapError::TooShort { flight, channel, usable_s, least_s: USABLE_MIN_S });
         }
         Ok(left)
+    }
+
+    /// Height over ground at a time, m, by barometer or else by position; `None` if the log has neither.
+    pub(super) fn height_m(&self, time_s: f64) -> Option<f64> {
+        match (&self.baro, &self.position) {
+            (Some(baro), _) => Some(baro.number(time_s)),
+            (None, Some(position)) => Some(-position.vector(time_s).z),
+            (None, None) => None,
+        }
     }
 
     /// Samples at each end of a piece that have no residual.

@@ -16,8 +16,11 @@ use std::rc::Rc;
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
 const BLOCK: usize = 8;
+/// Blocks on each side that size is averaged over: a second and a half in all.
+const NEIGHBOURS: usize = 2;
 /// Draws of the noise.
 const DRAWS: usize = 8;
+const GUST_DRAWS: usize = 40;
 /// How far above the noise's mean a channel may be, slow and as a whole, in rms.
 const SLOW_RATIO: f64 = 1.6;
 const WHOLE_RATIO: f64 = 1.25;
@@ -60,7 +63,8 @@ pub(crate) struct Leftover {
     pub(crate) families: Vec<(&'static str, f64)>,
     /// Part of the variance of the horizontal force that its place predicts.
     pub(crate) place_share: f64,
-    /// Fourth moment of the slow part of the horizontal force over the square of its second: 3 for a normal distribution.
+    /// Fourth moment of the slow part of the horizontal force, in units of its size by noise, over the square of its second: 3
+    /// for a normal distribution.
     pub(crate) kurtosis: f64,
     /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above 0.5 Hz.
     pub(crate) line: Option<(f64, f64)>,
@@ -122,11 +126,20 @@ pub(crate) fn noise(
     floor::draws(predictor, wind_columns, turbulence_m_s, DRAWS)
 }
 
+/// What gusts leave, often enough for their size at each moment.
+///
+/// * arguments as of [`noise`]
+pub(crate) fn gusts(predictor: &Predictor, wind_columns: &[Vec<f64>; 3], sigma_m_s: f64) -> Vec<Vec<f64>> {
+    floor::draws(predictor, wind_columns, sigma_m_s, GUST_DRAWS)
+}
+
 /// Compares a leftover with what noise alone leaves.
 ///
 /// * `left`, `nominal` - rows of the residual of the best explanation, and of the vehicle as it is
 /// * `motions` - of each piece, under the best explanation
 /// * `draws` - what noise alone leaves, of [`noise`]
+/// * `gusts` - what gusts would leave, of [`gusts`], where they are in question: bursts and places are looked for in
+///   units of their size at each moment, as spread wings feel many times the gust that folded ones do
 /// * `slack` - tolerances that no column of the model stands for
 pub(crate) fn leftover(
     predictor: &Predictor,
@@ -134,6 +147,7 @@ pub(crate) fn leftover(
     left: &[f64],
     nominal: &[f64],
     draws: &[Vec<f64>],
+    gusts: Option<&[Vec<f64>]>,
     slack: Slack,
 ) -> Leftover {
     let mut bands = Vec::new();
@@ -176,10 +190,15 @@ pub(crate) fn leftover(
     let mut out =
         Leftover { bands, excess, families: Vec::new(), place_share: 0.0, kurtosis: 3.0, line: None };
     if let Some(&(channel, _)) = out.excess.first() {
-        let (moments, y) = blocks(predictor, motions, left, channel);
+        let y = means(predictor, left, channel);
+        let moments = moments_of(predictor, motions, channel);
         out.families = families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
-        let [(moments, x), (_, y)] = [0, 1].map(|channel| blocks(predictor, motions, left, channel));
-        out.place_share = place_share(&moments, [&x, &y]);
+        let gusts = gusts.unwrap_or(draws);
+        let [x, y] = [0, 1].map(|channel| -> Vec<f64> {
+            let sizes = sizes(predictor, gusts, channel);
+            means(predictor, left, channel).iter().zip(sizes).map(|(force, size)| force / size).collect()
+        });
+        out.place_share = place_share(&moments_of(predictor, motions, 0), [&x, &y]);
         if channel < 2 {
             out.families.push(("position", out.place_share));
         }
@@ -232,22 +251,37 @@ fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, s
     }
 }
 
-/// Moments and block means of one channel.
-fn blocks(
-    predictor: &Predictor,
-    motions: &[Rc<Motion>],
-    left: &[f64],
-    channel: usize,
-) -> (Vec<Moment>, Vec<f64>) {
-    let (mut moments, mut y) = (Vec::new(), Vec::new());
+/// The moments of the blocks of one channel.
+fn moments_of(predictor: &Predictor, motions: &[Rc<Motion>], channel: usize) -> Vec<Moment> {
+    let mut moments = Vec::new();
     for segment in predictor.segments.iter().filter(|s| s.channel == channel) {
         let track = &predictor.tracks[segment.piece];
-        for (i, block) in left[segment.rows.clone()].chunks_exact(BLOCK).enumerate() {
+        for i in 0..segment.rows.len() / BLOCK {
             moments.push(moment(predictor, track, &motions[segment.piece], i * BLOCK, BLOCK));
-            y.push(block.iter().sum::<f64>() / BLOCK as f64);
         }
     }
-    (moments, y)
+    moments
+}
+
+/// Block means of one channel.
+fn means(predictor: &Predictor, rows: &[f64], channel: usize) -> Vec<f64> {
+    let own = predictor.segments.iter().filter(|s| s.channel == channel);
+    own.flat_map(|s| rows[s.rows.clone()].chunks_exact(BLOCK))
+        .map(|block| block.iter().sum::<f64>() / BLOCK as f64)
+        .collect()
+}
+
+/// How large draws are at each block of one channel: the rms of a block and its neighbours over all of them.
+fn sizes(predictor: &Predictor, draws: &[Vec<f64>], channel: usize) -> Vec<f64> {
+    let all: Vec<Vec<f64>> = draws.iter().map(|draw| means(predictor, draw, channel)).collect();
+    let n = all.first().map_or(0, Vec::len);
+    (0..n)
+        .map(|block| {
+            let around = block.saturating_sub(NEIGHBOURS)..(block + NEIGHBOURS + 1).min(n);
+            let sum: f64 = all.iter().flat_map(|m| &m[around.clone()]).map(|x| x * x).sum();
+            (sum / (all.len() * around.len()) as f64).sqrt().max(f64::MIN_POSITIVE)
+        })
+        .collect()
 }
 
 fn kurtosis(y: &[f64]) -> f64 {

@@ -8,7 +8,7 @@ use super::point::{Other, Point, hypothesis};
 use super::whiten::Whitener;
 use crate::GapError;
 use crate::leftover::noise;
-use crate::predictor::{HEIGHT_KNOTS, Predictor};
+use crate::predictor::{DYNAMIC, HEIGHT_KNOTS, Predictor};
 use nalgebra::{DMatrix, DVector};
 
 /// The predictor as a linear model about a point.
@@ -25,8 +25,6 @@ pub(crate) struct Linear {
     pub(crate) gram: DMatrix<f64>,
 }
 
-/// Channels of the force, which gusts blow on.
-const FORCES: usize = 3;
 /// Part of what was measured that no model is trusted with.
 const DOUBT: f64 = 0.01;
 
@@ -119,7 +117,7 @@ impl Linear {
         let mut whitener = whitener(predictor, &raw, &widest, &residual);
         if let Some(sigma) = gust_m_s {
             let draws = noise(predictor, &predictor.wind_columns(&about)?, sigma);
-            whitener.refit(&predictor.segments, &draws, FORCES);
+            whitener.refit(&predictor.segments, &draws, DYNAMIC);
         }
         let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = Gram::new(&columns, &vec![0.0; whitener.rows()]).g;

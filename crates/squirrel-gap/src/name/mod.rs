@@ -29,7 +29,7 @@ use tolerance::unlogged_sag;
 pub(crate) use tolerance::{notes as silent_tolerances, sds};
 
 use crate::GapError;
-use crate::leftover::{Leftover, Slack, leftover, noise};
+use crate::leftover::{Leftover, Slack, gusts, leftover, noise};
 use crate::predictor::Hypothesis;
 
 /// Deviation of the air's own motion that is no wind worth a name, m/s.
@@ -66,13 +66,19 @@ pub(crate) fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
     let windy = Search { gust_m_s: Some(sigma), ..*search };
     let mut again = judge(&windy, windy.run()?)?;
     let Some(sigma) = gust_of(&windy, &again)? else { return Ok(naming) };
-    let calm = blown(search, &again, TURBULENCE_M_S)?;
+    let calm = blown(search, &again, TURBULENCE_M_S, sigma)?;
     if calm.is_foreign() || calm.is_predicted() {
         return Ok(naming);
     }
-    let mut left = blown(search, &again, sigma)?;
+    let mut left = blown(search, &again, sigma, sigma)?;
     // A flight holds few gusts: their size scatters from one to the next.
-    if left.excess.iter().any(|(channel, ratio)| *channel > 2 || *ratio >= GUST_SCATTER) {
+    // Where they hardly act, a leftover is not theirs.
+    let blown_on = |channel: usize| {
+        let floors = calm.bands.iter().zip(&left.bands).filter(|(b, _)| b.channel == channel);
+        floors.map(|(calm, windy)| windy.slow_floor / calm.slow_floor).fold(f64::INFINITY, f64::min)
+            >= GUST_SHARE
+    };
+    if left.excess.iter().any(|(channel, ratio)| *ratio >= GUST_SCATTER || !blown_on(*channel)) {
         return Ok(naming);
     }
     left.excess.clear();
@@ -98,7 +104,7 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let wind = predictor.wind_columns(&about)?;
     let slack = slack(search, &found);
     let draws = noise(predictor, &wind, search.gust_m_s.unwrap_or(TURBULENCE_M_S));
-    let judged = |left: &[f64]| leftover(predictor, &motions, left, &nominal, &draws, slack);
+    let judged = |left: &[f64]| leftover(predictor, &motions, left, &nominal, &draws, None, slack);
     // Where little is known, a looser fit of what is seen well may be a worse one of the rest.
     let loose = loosened(&found, &point, left.clone());
     let (left, leftover) = match (judged(&left), judged(&loose)) {
@@ -163,22 +169,27 @@ const GUST_M_S: (f64, f64) = (0.4, 3.2);
 /// How far above their mean the gusts of one flight may be.
 const GUST_SCATTER: f64 = 2.0;
 
+/// How many times the calm noise the noise of a channel must be for gusts to act on it.
+const GUST_SHARE: f64 = 2.0;
+
 /// What an explanation leaves if gusts of a deviation blow.
-fn blown(search: &Search<'_>, naming: &Naming, sigma: f64) -> Result<Leftover, GapError> {
+///
+/// * `sizes` - deviation of the gusts in whose units it is looked at, m/s
+fn blown(search: &Search<'_>, naming: &Naming, sigma: f64, sizes: f64) -> Result<Leftover, GapError> {
     let predictor = search.predictor;
     let wind = predictor.wind_columns(&naming.hypothesis)?;
     let motions: Vec<_> =
         (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
-    let draws = noise(predictor, &wind, sigma);
+    let (draws, gusts) = (noise(predictor, &wind, sigma), gusts(predictor, &wind, sizes));
     let slack = slack(search, &naming.found);
-    Ok(leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, slack))
+    Ok(leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, Some(&gusts), slack))
 }
 
 /// The deviation of gusts that would make the leftover of the horizontal force, m/s, if it is one of gusts.
 fn gust_of(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError> {
     // The floor is noise and wind, squared; two floors tell them apart.
     let assumed = search.gust_m_s.unwrap_or(TURBULENCE_M_S);
-    let (now, windier) = (&naming.leftover, blown(search, naming, assumed + 1.0)?);
+    let (now, windier) = (&naming.leftover, blown(search, naming, assumed + 1.0, assumed + 1.0)?);
     let span = (assumed + 1.0).powi(2) - assumed.powi(2);
     let (mut excess, mut unit) = (0.0, 0.0);
     for (now, windier) in now.bands.iter().zip(&windier.bands).filter(|(b, _)| b.channel < 2) {

@@ -1,12 +1,12 @@
 //! The numbers of one set of effects: Gauss-Newton through the simulator, everything else floating with its tolerance.
 
-use super::evidence::{BETA, Gram, Posterior, dot};
+use super::evidence::{BETA, Gram, Posterior, products};
 use super::linear::{Linear, height_columns};
 use super::parameters::SLAB_OF_LARGEST;
 use super::point::{Member, Other, Point};
 use super::search::Search;
 use crate::GapError;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use std::collections::BTreeMap;
 
 /// Most steps of a refinement.
@@ -41,6 +41,21 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn score(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
+        self.score_towards(linear, members, f64::NEG_INFINITY)
+    }
+
+    /// As [`Self::score`], given up where the first step does not come near what the set must reach.
+    ///
+    /// * `near` - evidence that the first step must lead to, nats
+    ///
+    /// # Errors
+    /// As [`Self::score`].
+    pub(super) fn score_towards(
+        &self,
+        linear: &Linear,
+        members: &[Member],
+        near: f64,
+    ) -> Result<Scored, GapError> {
         let mut base = linear.point.base.clone();
         let along = self.moving_along(linear, members);
         // A lag that is new explains what others were taken to be off for: they start at nothing.
@@ -82,6 +97,9 @@ impl Search<'_> {
                 if share < 0.2 {
                     break;
                 }
+            }
+            if best.log_evidence < near {
+                break;
             }
         }
         Ok(best)
@@ -206,28 +224,18 @@ impl Search<'_> {
             }
         }
         let (k, n) = (own.len(), linear.columns.len());
-        let mut gram =
-            Gram { g: DMatrix::zeros(k + n, k + n), b: nalgebra::DVector::zeros(k + n), yy: dot(&y, &y) };
+        let all: Vec<&[f64]> =
+            own.iter().map(Vec::as_slice).chain((0..n).map(|j| column(j).as_slice())).collect();
+        let mut gram = Gram {
+            g: DMatrix::zeros(k + n, k + n),
+            b: DVector::from_vec(products(&y, &all)),
+            yy: products(&y, &[&y])[0],
+        };
         gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram);
-        for i in 0..k {
-            for j in 0..k {
-                gram.g[(i, j)] = dot(&own[i], &own[j]);
-            }
-            for j in 0..n {
-                let x = dot(&own[i], column(j));
-                gram.g[(i, k + j)] = x;
-                gram.g[(k + j, i)] = x;
-            }
-            gram.b[i] = dot(&own[i], &y);
-        }
-        for j in 0..n {
-            gram.b[k + j] = dot(column(j), &y);
-        }
-        for i in fresh.keys().copied() {
-            for j in 0..n {
-                let x = dot(column(i), column(j));
-                gram.g[(k + i, k + j)] = x;
-                gram.g[(k + j, k + i)] = x;
+        for i in (0..k).chain(fresh.keys().map(|i| k + i)) {
+            for (j, x) in products(all[i], &all).into_iter().enumerate() {
+                gram.g[(i, j)] = x;
+                gram.g[(j, i)] = x;
             }
         }
         prior.extend(spikes);

@@ -23,6 +23,9 @@ const SIZE_MIN: f64 = 0.5;
 const PLAUSIBLE: f64 = 1.3;
 /// Candidates that are refined after each linear ranking.
 const REFINED: usize = 4;
+/// A candidate is given up if its first step leaves more than this part of what must be explained, and this much, nats.
+const GIVEN_UP: f64 = 0.5;
+const GIVEN_UP_NATS: f64 = 30.0;
 /// Part of its tolerance by which a number must be off to act in the simulator's own model.
 const ACTS: f64 = 0.7;
 /// Most effects in a set.
@@ -152,7 +155,7 @@ impl Search<'_> {
     /// Adds effects as long as the evidence asks for them.
     fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
         while best.members.len() < MEMBERS_MAX {
-            let Some(next) = self.best_addition(linear, best, &[])? else { break };
+            let Some(next) = self.best_addition(linear, best, &[], f64::NEG_INFINITY)? else { break };
             let kept = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
             let needed = next.members.last().map_or(kept, |member| self.needed(member).max(kept));
             if next.log_evidence < best.log_evidence + needed {
@@ -166,18 +169,23 @@ impl Search<'_> {
     }
 
     /// The best set with one more effect that is large enough to report.
+    ///
+    /// * `beats` - evidence that it must have to matter, nats
     fn best_addition(
         &self,
         linear: &Linear,
         set: &Scored,
         except: &[&str],
+        mut beats: f64,
     ) -> Result<Option<Scored>, GapError> {
         let mut best: Option<Scored> = None;
         for member in self.ranked(set, except).into_iter().take(REFINED) {
             let members = [set.members.as_slice(), &[member.1]].concat();
-            let scored = self.score(linear, &members)?;
+            let near = beats - GIVEN_UP * (beats - set.log_evidence).max(0.0) - GIVEN_UP_NATS;
+            let scored = self.score_towards(linear, &members, near)?;
             (self.progress)();
             if self.is_large(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
+                beats = beats.max(scored.log_evidence);
                 best = Some(scored);
             }
         }
@@ -290,7 +298,8 @@ impl Search<'_> {
                     break;
                 }
                 if best.members.len() > 1
-                    && let Some(other) = self.best_addition(linear, &without, &[self.effect(&out)])?
+                    && let Some(other) =
+                        self.best_addition(linear, &without, &[self.effect(&out)], best.log_evidence)?
                     && other.log_evidence > best.log_evidence
                 {
                     *best = other;

@@ -13,8 +13,6 @@ use std::rc::Rc;
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Moment {
     pub(crate) now: Actuators,
-    /// The same just before the command that came then, if one did.
-    pub(crate) before: Option<Actuators>,
     /// The wings are folded for longer than they remember.
     pub(crate) idle: bool,
 }
@@ -25,6 +23,8 @@ pub(crate) struct Path {
     pub(crate) stride: usize,
     pub(crate) first: usize,
     pub(crate) moments: Vec<Moment>,
+    /// The actuators just before the command that came at a moment, by its index, where that matters.
+    pub(crate) before: Vec<(usize, Actuators)>,
 }
 
 /// Samples of a piece at which two plants are asked whether their rotors would do the same.
@@ -34,6 +34,7 @@ const PROBES: usize = 7;
 #[derive(Debug, Clone, PartialEq)]
 struct Key {
     stride: Vec<usize>,
+    jumps: bool,
     drives: Vec<RotorDrive<f64>>,
     clock: [f64; 5],
 }
@@ -82,7 +83,12 @@ impl Key {
             opening,
             closing,
         ];
-        Self { stride: tracks.iter().map(stride).collect(), drives: drives.collect(), clock }
+        Self {
+            stride: tracks.iter().map(stride).collect(),
+            jumps: jumps(effects),
+            drives: drives.collect(),
+            clock,
+        }
     }
 }
 
@@ -95,14 +101,16 @@ fn path(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Pat
     plant.tell(&mut state, &rotor, track.voltage_v[first]);
     plant.lead_actuators(&mut state, wing, SETTLE_S);
     let mut moments = Vec::with_capacity((track.time_s.len() - first).div_ceil(stride));
+    let (jumps, mut before) = (jumps(plant.effects()), Vec::new());
     for k in (first..track.time_s.len()).step_by(stride) {
         let (start_s, voltage_v) = (track.time_s[k], track.voltage_v[k]);
         let end_s = start_s + stride as f64 * track.period_s;
-        let before = plant.tell(&mut state, &clock.now().0, voltage_v);
-        let comes = clock.next_change_s() <= start_s + super::commands::SNAP_S;
+        if jumps && clock.next_change_s() <= start_s + super::commands::SNAP_S {
+            before.push((moments.len(), plant.tell(&mut state, &clock.now().0, voltage_v)));
+        }
         clock.advance_to(start_s);
         let now = plant.tell(&mut state, &clock.now().0, voltage_v);
-        moments.push(Moment { now, before: comes.then_some(before), idle: false });
+        moments.push(Moment { now, idle: false });
         let mut at_s = start_s;
         while at_s < end_s - 1e-9 {
             let until_s = clock.next_change_s().clamp(at_s, end_s);
@@ -120,10 +128,15 @@ fn path(plant: &Plant, track: &Track, commands: &Commands, stride: usize) -> Pat
         folded = if moment.now.deployment() == [0.0; 2] { folded.saturating_add(1) } else { 0 };
         moment.idle = folded > memory;
     }
-    Path { stride, first, moments }
+    Path { stride, first, moments, before }
 }
 
 /// What jumps with the commands has no bandwidth: it is asked for as often as it was measured.
 pub(crate) fn stride(effects: &Effects<f64>, track: &Track) -> usize {
-    if effects.has("rotor_gyro_torque") { 1 } else { track.stride }
+    if jumps(effects) { 1 } else { track.stride }
+}
+
+/// Whether moments jump with the rotors' acceleration, and that with their commands.
+pub(crate) fn jumps(effects: &Effects<f64>) -> bool {
+    effects.has("rotor_gyro_torque")
 }

@@ -372,7 +372,7 @@ fn lead(
     path: &Path,
     mut each: impl FnMut(usize, &PlantState),
 ) {
-    let Path { stride, first, moments } = path;
+    let Path { stride, first, moments, .. } = path;
     let mut state = plant.initial_state(motion.body[*first], 1.0);
     plant.meet(&mut state, &motion.body[*first], &moments[0].now);
     let settled = moments[0].now.deployment();
@@ -393,13 +393,13 @@ fn lead(
 /// Residual of the dynamics of a piece.
 fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<Vector6<f64>> {
     let filter = if path.stride == 1 { &track.filter } else { &track.model_filter };
-    let jumps = plant.effects().has("rotor_gyro_torque");
+    let mut jumps = path.before.iter().filter(|_| actuators::jumps(plant.effects())).peekable();
     let mut predicted = Vec::with_capacity(path.moments.len());
     lead(plant, track, motion, path, |k, state| {
         let led = plant.led(state);
         let mut a = led.angular_acceleration;
         // A rotor's acceleration jumps with its command: what a sample stands for lies half before and half after the jump.
-        if let (true, Some(before)) = (jumps, &path.moments[predicted.len()].before) {
+        if let Some((_, before)) = jumps.next_if(|(moment, _)| *moment == predicted.len()) {
             let mut earlier = *state;
             plant.meet(&mut earlier, &motion.body[k], before);
             a = (a + plant.led(&earlier).angular_acceleration) * 0.5;

@@ -21,13 +21,13 @@ pub const INPUT_SOURCES: [&str; 7] = ["frame", "imu", "attitude", "gnss", "baro"
 /// Metadata: the weights that the vehicle's text names, so that a log replays without them at hand.
 pub(crate) const PARNN_WEIGHTS: &str = "parnn_weights_hex";
 /// Version of the log's content.
-const FORMAT: &str = "1";
+pub(crate) const FORMAT: &str = "1";
 
 pub(super) struct Recorder {
     log: FlightLog,
     rotors: usize,
     effects: Effects<f64>,
-    last_obstacles: Vec<Obstacle>,
+    inputs: Inputs,
 }
 
 fn wide(v: &Vector3<f32>) -> [f64; 3] {
@@ -59,7 +59,7 @@ impl Recorder {
         if let Some(weights) = &setup.vehicle.weights {
             log.metadata.insert(PARNN_WEIGHTS.to_owned(), weights.to_hex());
         }
-        Self { log, rotors, effects: setup.vehicle.effects, last_obstacles: Vec::new() }
+        Self { log, rotors, effects: setup.vehicle.effects, inputs: Inputs::default() }
     }
 
     pub(super) fn tick(
@@ -72,7 +72,7 @@ impl Recorder {
         wing_force: In<Body, f64>,
     ) {
         let t = frame.time_us as f64 * 1e-6;
-        self.inputs(t, frame);
+        self.inputs.record(&mut self.log, t, frame);
         if let Some(b) = battery {
             let rows: &[(&str, &[f64])] = &[("voltage_v", &[b.voltage_v]), ("current_a", &[b.current_a])];
             self.log.source_mut("battery").push(t, rows);
@@ -80,40 +80,6 @@ impl Recorder {
         let stamp = self.effects.command_clock_s(t);
         record_output(&mut self.log, t, stamp, output, self.rotors, Some(state));
         self.plant(t, state, air, wing_force);
-    }
-
-    fn inputs(&mut self, t: f64, frame: &SensorFrame) {
-        let log = &mut self.log;
-        log.source_mut("frame").push(t, &[("time_us", &[frame.time_us as f64])]);
-        if let Some(imu) = frame.imu {
-            let omega = wide(&imu.omega.vector);
-            let force = wide(&imu.specific_force.vector);
-            log.source_mut("imu")
-                .push(t, &[("omega_body_rad_s", &omega), ("specific_force_body_m_s2", &force)]);
-        }
-        if let Some(attitude) = frame.attitude {
-            log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude.wxyz().map(f64::from))]);
-        }
-        if let Some(gnss) = frame.gnss {
-            let position = wide(&gnss.position.vector);
-            let velocity = wide(&gnss.velocity.vector);
-            log.source_mut("gnss").push(t, &[("position_ned_m", &position), ("velocity_ned_m_s", &velocity)]);
-        }
-        if let Some(altitude) = frame.altitude_m {
-            log.source_mut("baro").push(t, &[("altitude_m", &[f64::from(altitude)])]);
-        }
-        if frame.obstacles() != self.last_obstacles {
-            self.last_obstacles = frame.obstacles().to_vec();
-            // An id of -1 marks a place without an obstacle.
-            let mut rows = [-1.0, 0.0, 0.0].repeat(MAX_OBSTACLES);
-            for (row, o) in rows.chunks_exact_mut(3).zip(frame.obstacles()) {
-                row.copy_from_slice(&[f64::from(o.id), f64::from(o.north_m), f64::from(o.east_m)]);
-            }
-            log.source_mut("obstacle").push(t, &[("id_north_m_east_m", &rows)]);
-        }
-        if let Some(force) = frame.wing_force {
-            log.source_mut("wing_force").push(t, &[("as_if_spread_ned_n", &wide(&force.vector))]);
-        }
     }
 
     fn plant(&mut self, t: f64, state: &PlantState, air: In<Ned, f64>, wing_force: In<Body, f64>) {
@@ -135,6 +101,48 @@ impl Recorder {
 
     pub(super) fn finish(self) -> FlightLog {
         self.log
+    }
+}
+
+/// Records what the flight code was given.
+#[derive(Default)]
+pub(crate) struct Inputs {
+    /// Those of the last frame: a log has them where they change.
+    obstacles: Vec<Obstacle>,
+}
+
+impl Inputs {
+    pub(crate) fn record(&mut self, log: &mut FlightLog, t: f64, frame: &SensorFrame) {
+        log.source_mut("frame").push(t, &[("time_us", &[frame.time_us as f64])]);
+        if let Some(imu) = frame.imu {
+            let omega = wide(&imu.omega.vector);
+            let force = wide(&imu.specific_force.vector);
+            log.source_mut("imu")
+                .push(t, &[("omega_body_rad_s", &omega), ("specific_force_body_m_s2", &force)]);
+        }
+        if let Some(attitude) = frame.attitude {
+            log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude.wxyz().map(f64::from))]);
+        }
+        if let Some(gnss) = frame.gnss {
+            let position = wide(&gnss.position.vector);
+            let velocity = wide(&gnss.velocity.vector);
+            log.source_mut("gnss").push(t, &[("position_ned_m", &position), ("velocity_ned_m_s", &velocity)]);
+        }
+        if let Some(altitude) = frame.altitude_m {
+            log.source_mut("baro").push(t, &[("altitude_m", &[f64::from(altitude)])]);
+        }
+        if frame.obstacles() != self.obstacles {
+            self.obstacles = frame.obstacles().to_vec();
+            // An id of -1 marks a place without an obstacle.
+            let mut rows = [-1.0, 0.0, 0.0].repeat(MAX_OBSTACLES);
+            for (row, o) in rows.chunks_exact_mut(3).zip(frame.obstacles()) {
+                row.copy_from_slice(&[f64::from(o.id), f64::from(o.north_m), f64::from(o.east_m)]);
+            }
+            log.source_mut("obstacle").push(t, &[("id_north_m_east_m", &rows)]);
+        }
+        if let Some(force) = frame.wing_force {
+            log.source_mut("wing_force").push(t, &[("as_if_spread_ned_n", &wide(&force.vector))]);
+        }
     }
 }
 

@@ -17,6 +17,14 @@ pub enum ImportError {
         /// What the system said.
         source: io::Error,
     },
+    /// What a board wrote is no flight.
+    #[error("{file}: {problem}")]
+    Board {
+        /// Path as given.
+        file: String,
+        /// What is wrong.
+        problem: String,
+    },
     /// The map is not TOML, or not a map: syntax, unknown key, wrong type, unknown unit or frame.
     #[error("{map}, line {line}: {message} (in `{text}`)")]
     MapSyntax {

@@ -44,6 +44,7 @@
 //! - Empty cells, nulls and `nan` are NaN in the log and counted in the report.
 //! - The earliest kept time over all files is time zero; metadata `time_zero_s` has it in the foreign clock.
 
+mod board;
 mod build;
 mod csv_file;
 mod error;
@@ -63,6 +64,7 @@ mod ulog_format;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+pub use board::{BoardReport, import_board};
 pub use error::ImportError;
 pub use map::ImportMap;
 pub use report::{ChannelReport, FileReport, ImportReport};

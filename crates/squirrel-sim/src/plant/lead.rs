@@ -37,6 +37,7 @@ pub struct Actuators {
 
 impl Actuators {
     /// Deployment of the left and the right wing, 0..1.
+    #[inline]
     pub fn deployment(&self) -> [f64; 2] {
         self.servo.map(|servo| servo.deployment)
     }
@@ -97,6 +98,10 @@ impl Plant {
             else {
                 return;
             };
+            // Mostly both are, and an exponential is dear.
+            if state.servo.iter().zip(wing_command).all(|(state, command)| servo.rests(state, command)) {
+                return;
+            }
             let lag = servo.lag(self.effects.wing_extra_time_constant_s(), dt_s);
             for (servo_state, command) in state.servo.iter_mut().zip(wing_command) {
                 servo.lead(servo_state, command, &lag);

@@ -44,6 +44,11 @@ impl ServoParameters {
         Ok(())
     }
 
+    /// Whether a command leaves a servo where it is, for any time.
+    pub fn rests(&self, state: &ServoState, command: f64) -> bool {
+        state.pending.is_none() && state.deployment == state.target && command.clamp(0.0, 1.0) == state.target
+    }
+
     /// The lag over a step.
     ///
     /// * `extra_s` - added to the time constant, opening and closing

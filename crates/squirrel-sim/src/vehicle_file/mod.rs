@@ -124,7 +124,10 @@ impl VehicleFile {
     }
 
     /// As [`Self::parse`], with the weights that came with the text.
-    pub(crate) fn parse_with(
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn parse_with(
         text: &str,
         file: &str,
         weights: Option<ParnnWeights>,

@@ -11,7 +11,7 @@
 //! V = 1/2 (lambda chi^2 + e1^2 + e2^2),   V' = -c1 e1^2 - c2 e2^2
 //! ```
 
-use super::{body_rate_matrix, body_rate_matrix_derivative, euler_rate};
+use super::Tilt;
 use crate::math::{Real, real};
 use nalgebra::{Matrix3, Vector3};
 
@@ -53,7 +53,8 @@ impl<T: Real> Law<T> {
         acceleration_d: &Vector3<T>,
         chi: &Vector3<T>,
     ) -> Answer<T> {
-        let rate = euler_rate(angle, omega);
+        let tilt = Tilt::of(angle);
+        let rate = tilt.euler_rate(omega);
         let mut e1 = angle_d - angle;
         e1.z = wrap(e1.z);
         let e2 = self.c1.component_mul(&e1) + rate_d + self.lambda.component_mul(chi) - rate;
@@ -62,7 +63,7 @@ impl<T: Real> Law<T> {
             let (c1, c2, l) = (self.c1[i], self.c2[i], self.lambda[i]);
             nu[i] += (T::one() - c1 * c1 + l) * e1[i] + (c1 + c2) * e2[i] - c1 * l * chi[i];
         }
-        let omega_dot = body_rate_matrix(angle) * nu + body_rate_matrix_derivative(angle, &rate) * rate;
+        let omega_dot = tilt.body_acceleration(&rate, &nu);
         Answer { e1, e2, torque: omega.cross(&(inertia * omega)) + inertia * omega_dot }
     }
 }

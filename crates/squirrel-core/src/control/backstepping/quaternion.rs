@@ -10,9 +10,9 @@
 //! ```
 //! The sign is kept while `|eta| < 0.1`, so that noise at 180 deg does not make it chatter.
 
-use super::{body_rate_matrix, body_rate_matrix_derivative};
+use super::Tilt;
 use crate::math::{Real, real};
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// Gains; diagonal matrices as vectors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,11 +54,20 @@ pub struct Answer<T: Real> {
 impl<T: Real> Target<T> {
     /// From Euler angles and their derivatives.
     pub fn from_euler(angle: &Vector3<T>, rate: &Vector3<T>, acceleration: &Vector3<T>) -> Self {
-        let e = body_rate_matrix(angle);
+        let half = |angle: T| (angle * real(0.5)).sin_cos();
+        let (roll, pitch, yaw) = (half(angle.x), half(angle.y), half(angle.z));
+        let tilt = Tilt::of_halves(roll, pitch);
+        let ((sr, cr), (sp, cp), (sy, cy)) = (roll, pitch, yaw);
+        let attitude = Quaternion::new(
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        );
         Self {
-            attitude: UnitQuaternion::from_euler_angles(angle.x, angle.y, angle.z),
-            omega: e * rate,
-            omega_dot: e * acceleration + body_rate_matrix_derivative(angle, rate) * rate,
+            attitude: UnitQuaternion::new_unchecked(attitude),
+            omega: tilt.body_rate(rate),
+            omega_dot: tilt.body_acceleration(rate, acceleration),
         }
     }
 }
@@ -129,6 +138,22 @@ mod tests {
             &Vector3::from_fn(|i, _| a[i] * w[i] * (w[i] * t).cos()),
             &Vector3::from_fn(|i, _| -a[i] * w[i] * w[i] * (w[i] * t).sin()),
         )
+    }
+
+    #[test]
+    fn a_target_is_the_attitude_of_its_angles_and_its_rates_are_derivatives() {
+        let h = 1e-6;
+        for t in [0.1, 0.7, 1.9] {
+            let (a, w) = (Vector3::new(0.4_f64, -0.3, 0.8), Vector3::new(2.0_f64, 3.0, 1.0));
+            let angle = Vector3::from_fn(|i, _| a[i] * (w[i] * t).sin());
+            let expected = UnitQuaternion::from_euler_angles(angle.x, angle.y, angle.z);
+            assert!(target(t).attitude.angle_to(&expected) < 1e-12);
+            let turned =
+                (target(t - h).attitude.inverse() * target(t + h).attitude).scaled_axis() / (2.0 * h);
+            assert!((turned - target(t).omega).norm() < 1e-8, "{turned}");
+            let slope = (target(t + h).omega - target(t - h).omega) / (2.0 * h);
+            assert!((slope - target(t).omega_dot).norm() < 1e-8, "{slope}");
+        }
     }
 
     /// The start's sign is held: the error starts within 170 deg and `V` falls, so `eta` does not change sign again.

@@ -1,0 +1,401 @@
+"""What a model lacks: where flights and vehicle file disagree, which effect is missing, and what it is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from squirrel._squirrel import gap_diagnose, gap_find
+
+if TYPE_CHECKING:
+    import os
+
+    from squirrel._squirrel import FlightLog, Vehicle
+
+__all__ = [
+    "Alternative",
+    "ClosedLoop",
+    "Finding",
+    "FlightResidual",
+    "Gap",
+    "NamedEffect",
+    "Parameter",
+    "Place",
+    "Residual",
+    "Verdict",
+    "find",
+    "name",
+    "run",
+    "shrink",
+]
+
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A second of a flight in which a channel disagrees.
+
+    Attributes
+    ----------
+    flight : str
+    t0_s, t1_s : float
+        Start and end in the flight.
+    channel : str
+        Of the residual: ``force_body_z_n``.
+    condition : str
+        What flew there.
+    share : float
+        Part of the channel's squared residual over all flights.
+    noise : float
+        Root mean square of the residual here over what noise alone would leave.
+    """
+
+    flight: str
+    t0_s: float
+    t1_s: float
+    channel: str
+    condition: str
+    share: float
+    noise: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlightResidual:
+    """Root mean square of measured less modelled force (N) and moment (N m) of one flight, body frame.
+
+    Attributes
+    ----------
+    force_body_rms_n, moment_body_rms_n_m : tuple of float
+    samples : int
+        That have a residual.
+    duration_s : float
+        What they amount to.
+    """
+
+    force_body_rms_n: Vector
+    moment_body_rms_n_m: Vector
+    samples: int
+    duration_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Residual:
+    """Root mean square of measured less modelled force (N) and moment (N m), body frame.
+
+    Attributes
+    ----------
+    force_body_rms_n, moment_body_rms_n_m : tuple of float
+        Over all flights.
+    per_flight : dict of str to FlightResidual
+    """
+
+    force_body_rms_n: Vector
+    moment_body_rms_n_m: Vector
+    per_flight: dict[str, FlightResidual]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """Where and by how much flights disagree with a vehicle.
+
+    Attributes
+    ----------
+    residual : Residual
+    where : tuple of Place
+        The worst first.
+    notes : tuple of str
+        What the logs lack, and what was taken instead.
+    """
+
+    residual: Residual
+    where: tuple[Place, ...]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """A number with its 95 % interval; a choice (an axis, a side) has its word at both ends.
+
+    Attributes
+    ----------
+    value, low, high : float or str
+    """
+
+    value: float | str
+    low: float | str
+    high: float | str
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedEffect:
+    """An effect that the vehicle file lacks.
+
+    Attributes
+    ----------
+    name : str
+        In the catalogue.
+    form : str
+        Which published form of it.
+    evidence_nats : float
+        Of the set with it over the set without it.
+    parameters : dict of str to Parameter
+        By key, as vehicle files write them.
+    """
+
+    name: str
+    form: str
+    evidence_nats: float
+    parameters: dict[str, Parameter]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Alternative:
+    """Another explanation.
+
+    Attributes
+    ----------
+    effects : tuple of str
+    evidence_nats : float
+        Over no effect at all.
+    """
+
+    effects: tuple[str, ...]
+    evidence_nats: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gap:
+    """What the explanation is worth on flights that it never saw.
+
+    Attributes
+    ----------
+    held_out_flights : tuple of str
+    before, after : float
+        Error over that of the noise floor, without and with the named effects; 1 is nothing but noise.
+    best_rival : float or None
+        The same with the best other name.
+    removed_fraction : float
+        Part of what was above the floor that the named effects remove.
+    best_rival_removed_fraction : float or None
+    """
+
+    held_out_flights: tuple[str, ...]
+    before: float
+    after: float
+    best_rival: float | None
+    removed_fraction: float
+    best_rival_removed_fraction: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClosedLoop:
+    """A held-out flight of squirrel's own flight code, flown again.
+
+    Attributes
+    ----------
+    flight : str
+    before_ned_m, after_ned_m : tuple of float
+        Root mean square of simulated less measured position, without and with the effects.
+    """
+
+    flight: str
+    before_ned_m: Vector
+    after_ned_m: Vector
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verdict:
+    """The answer of the workflow.
+
+    Attributes
+    ----------
+    verdict : str
+        Exactly one of the answers.
+    effects : tuple of NamedEffect
+        What is missing, the most certain first.
+    alternatives : tuple of Alternative
+        The best first.
+    where : tuple of Place
+        Where the flights disagree with the vehicle as it was, the worst first.
+    goes_with, fly_next : str or None
+        What a leftover goes with; what to fly to know more.
+    gap : Gap or None
+        On held-out flights.
+    closed_loop : tuple of ClosedLoop
+    model_patch : str or None
+        Path of the vehicle file with the effects, where one was written.
+    words : str
+        All of it in plain words.
+    notes : tuple of str
+    patched : Vehicle or None
+        The vehicle with the effects in it; None where there are none that a file can take.
+    """
+
+    verdict: Literal[
+        "none", "named", "named_form_differs", "ambiguous", "outside_catalogue", "not_identifiable", "data_problem"
+    ]
+    effects: tuple[NamedEffect, ...]
+    alternatives: tuple[Alternative, ...]
+    where: tuple[Place, ...]
+    goes_with: str | None
+    fly_next: str | None
+    gap: Gap | None
+    closed_loop: tuple[ClosedLoop, ...]
+    model_patch: str | None
+    words: str
+    notes: tuple[str, ...]
+    patched: Vehicle | None
+
+
+def find(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Finding:
+    """Say where and by how much flights disagree with a vehicle.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What is believed.
+    flights : dict of str to FlightLog
+        By name.
+
+    Returns
+    -------
+    Finding
+
+    Raises
+    ------
+    ValueError
+        One line that names the flight, the channel and the value.
+    """
+    found = gap_find(vehicle, flights)
+    return Finding(residual=_residual(found["residual"]), where=_places(found["where"]), notes=tuple(found["notes"]))
+
+
+def name(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Verdict:
+    """Say which effect a vehicle file lacks.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What is believed; its numbers have tolerances.
+    flights : dict of str to FlightLog
+        That the explanation is fitted to.
+
+    Returns
+    -------
+    Verdict
+
+    Raises
+    ------
+    ValueError
+        One line that names the flight or the field, and the value.
+    """
+    return _verdict(*gap_diagnose(vehicle, flights, {}, False, None))
+
+
+def shrink(*, vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog]) -> Verdict:
+    """Say what the missing effect is worth on flights that the fit never sees.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What is believed; its numbers have tolerances.
+    flights : dict of str to FlightLog
+        That the explanation is fitted to.
+    held_out : dict of str to FlightLog
+        For the proof, in open and in closed loop.
+
+    Returns
+    -------
+    Verdict
+        With `Verdict.gap`.
+
+    Raises
+    ------
+    ValueError
+        One line that names the flight or the field, and the value.
+    """
+    if not held_out:
+        raise ValueError("held_out: none given; shrink needs flights that the fit never sees")
+    return _verdict(*gap_diagnose(vehicle, flights, held_out, True, None))
+
+
+def run(
+    *,
+    vehicle: Vehicle,
+    flights: dict[str, FlightLog],
+    held_out: dict[str, FlightLog] | None = None,
+    out: str | os.PathLike[str] | None = None,
+) -> Verdict:
+    """Find, name, add and shrink.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What is believed; its numbers have tolerances.
+    flights : dict of str to FlightLog
+        That the explanation is fitted to.
+    held_out : dict of str to FlightLog, optional
+        For the proof.
+    out : str or os.PathLike, optional
+        Folder for ``report.html`` and the patched ``vehicle.toml``; nothing is written if left out.
+
+    Returns
+    -------
+    Verdict
+
+    Raises
+    ------
+    OSError
+        The folder cannot be written to.
+    ValueError
+        One line that names the flight or the field, and the value.
+    """
+    return _verdict(*gap_diagnose(vehicle, flights, held_out or {}, True, out))
+
+
+def _places(places: list[dict[str, Any]]) -> tuple[Place, ...]:
+    return tuple(Place(**place) for place in places)
+
+
+def _rms(residual: dict[str, Any]) -> dict[str, Any]:
+    return residual | {key: tuple(residual[key]) for key in ("force_body_rms_n", "moment_body_rms_n_m")}
+
+
+def _residual(residual: dict[str, Any]) -> Residual:
+    per_flight = {flight: FlightResidual(**_rms(of)) for flight, of in residual["per_flight"].items()}
+    return Residual(**_rms(residual) | {"per_flight": per_flight})
+
+
+def _effect(effect: dict[str, Any]) -> NamedEffect:
+    parameters = {key: Parameter(**number) for key, number in effect.pop("parameters").items()}
+    return NamedEffect(parameters=parameters, **effect)
+
+
+def _gap(gap: dict[str, Any]) -> Gap:
+    return Gap(held_out_flights=tuple(gap.pop("held_out_flights")), **gap)
+
+
+def _flown(flown: dict[str, Any]) -> ClosedLoop:
+    before, after = tuple(flown["before_ned_m"]), tuple(flown["after_ned_m"])
+    return ClosedLoop(flight=flown["flight"], before_ned_m=before, after_ned_m=after)
+
+
+def _verdict(verdict: dict[str, Any], patched: Vehicle | None) -> Verdict:
+    return Verdict(
+        verdict=verdict["verdict"],
+        effects=tuple(_effect(effect) for effect in verdict["effects"]),
+        alternatives=tuple(
+            Alternative(effects=tuple(other["effects"]), evidence_nats=other["evidence_nats"])
+            for other in verdict["alternatives"]
+        ),
+        where=_places(verdict["where"]),
+        goes_with=verdict["goes_with"],
+        fly_next=verdict["fly_next"],
+        gap=_gap(verdict["gap"]) if verdict["gap"] else None,
+        closed_loop=tuple(_flown(flown) for flown in verdict["closed_loop"]),
+        model_patch=verdict["model_patch"],
+        words=verdict["words"],
+        notes=tuple(verdict["notes"]),
+        patched=patched,
+    )

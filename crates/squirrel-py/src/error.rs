@@ -1,0 +1,44 @@
+//! Errors of the crates below as Python's: what a file or system refused is an `OSError`, everything else a `ValueError`; the
+//! text is squirrel's own line.
+
+use pyo3::PyErr;
+use pyo3::exceptions::PyValueError;
+use squirrel_nn::NnError;
+use squirrel_sim::log::LogError;
+use squirrel_sim::vehicle_file::VehicleFileError;
+use squirrel_sim::weights::WeightsError;
+use std::io;
+
+/// A `ValueError` with this line.
+pub(crate) fn value(line: impl ToString) -> PyErr {
+    PyValueError::new_err(line.to_string())
+}
+
+/// The `OSError` of this kind (`FileNotFoundError`, `PermissionError`, ...) with this line.
+pub(crate) fn system(kind: io::ErrorKind, line: impl ToString) -> PyErr {
+    io::Error::new(kind, line.to_string()).into()
+}
+
+/// Of a vehicle file.
+pub(crate) fn vehicle(error: &VehicleFileError) -> PyErr {
+    match error {
+        VehicleFileError::Read { source, .. } => system(source.kind(), error),
+        _ => value(error),
+    }
+}
+
+/// Of a flight log.
+pub(crate) fn log(error: &LogError) -> PyErr {
+    match error {
+        LogError::Io { error: cause, .. } => system(cause.kind(), error),
+        _ => value(error),
+    }
+}
+
+/// Of training and weights.
+pub(crate) fn nn(error: &NnError) -> PyErr {
+    match error {
+        NnError::Weights(WeightsError::Io { error: cause, .. }) => system(cause.kind(), error),
+        _ => value(error),
+    }
+}

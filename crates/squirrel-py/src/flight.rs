@@ -1,0 +1,122 @@
+//! One flight in closed loop.
+
+use crate::error;
+use crate::log::FlightLog;
+use crate::vehicle::{Vehicle, or_squirrel};
+use pyo3::prelude::*;
+use pyo3_stub_gen::derive::gen_stub_pyfunction;
+use squirrel_core::stack::{SensorFrame, Stack, StackOutput, StackState};
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Setup};
+use squirrel_sim::scenario::Scenario;
+use std::path::Path;
+
+/// Steps of the flight code between two looks at Ctrl-C: some milliseconds.
+const STEPS_A_LOOK: u32 = 1024;
+
+/// The flight code in this process; Ctrl-C ends the flight.
+struct Interruptible {
+    stack: Stack,
+    state: StackState,
+    steps: u32,
+    signal: Option<PyErr>,
+}
+
+impl FlightComputer for Interruptible {
+    fn step(&mut self, frame: &SensorFrame) -> Result<(StackOutput, u32), FlightError> {
+        self.steps = self.steps.wrapping_add(1);
+        if self.steps.is_multiple_of(STEPS_A_LOOK)
+            && let Err(signal) = signalled()
+        {
+            self.signal = Some(signal);
+            return Err(FlightError("interrupted".to_owned()));
+        }
+        let output = self.stack.step(&mut self.state, frame);
+        Ok((output, self.state.mission.encounters))
+    }
+}
+
+/// What Python's own handler of a signal raises.
+#[allow(clippy::redundant_closure_for_method_calls, reason = "the method's lifetime is too narrow")]
+fn signalled() -> PyResult<()> {
+    Python::attach(|py| py.check_signals())
+}
+
+/// A scenario by name or file, with what the call says of it.
+pub(crate) fn scenario(name: &str, seed: Option<u64>, thrust_to_weight: Option<f64>) -> PyResult<Scenario> {
+    if Path::new(name).extension().is_some_and(|e| e == "toml")
+        && let Err(e) = std::fs::metadata(name)
+    {
+        return Err(error::system(e.kind(), format!("{name}: {e}")));
+    }
+    let mut scenario = Scenario::find(name).map_err(error::value)?;
+    scenario.seed = seed.unwrap_or(scenario.seed);
+    scenario.thrust_to_weight = thrust_to_weight.or(scenario.thrust_to_weight);
+    scenario.check().map_err(|e| error::value(format!("scenario {name}: {e}")))?;
+    Ok(scenario)
+}
+
+/// Fly one scenario in closed loop: plant, sensors and flight code.
+///
+/// Parameters
+/// ----------
+/// vehicle : Vehicle, optional
+///     What flies; the paper's squirrel if left out.
+/// scenario : str
+///     ``hover``, ``avoid``, ``steer``, ``track``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
+///     the path of a scenario file (.toml).
+/// arm : str
+///     Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``.
+/// seed : int, optional
+///     Of everything random; the scenario's own if left out.
+/// thrust_to_weight : float, optional
+///     Largest collective thrust over weight; overrides vehicle and scenario.
+/// integrator : str
+///     ``rk4`` (rapier near contact) or ``rapier`` (throughout, first order).
+///
+/// Returns
+/// -------
+/// FlightLog
+///     With `FlightLog.metrics`. Equal arguments give equal bits.
+///
+/// Raises
+/// ------
+/// OSError
+///     The scenario file cannot be read.
+/// ValueError
+///     One line that names the argument or field, and the value.
+///
+/// Examples
+/// --------
+/// >>> import squirrel
+/// >>> log = squirrel.simulate(scenario="avoid", arm="twcc_flat", seed=3)
+/// >>> log["truth.position_ned_m"].shape[1]
+/// 3
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+#[pyo3(signature = (*, vehicle = None, scenario = "avoid", arm = "twcc_flat", seed = None, thrust_to_weight = None, integrator = "rk4"))]
+pub(crate) fn simulate(
+    py: Python<'_>,
+    vehicle: Option<&Bound<'_, Vehicle>>,
+    scenario: &str,
+    arm: &str,
+    seed: Option<u64>,
+    thrust_to_weight: Option<f64>,
+    integrator: &str,
+) -> PyResult<FlightLog> {
+    let setup = Setup {
+        vehicle: or_squirrel(vehicle),
+        arm: Arm::parse(arm).map_err(error::value)?,
+        scenario: self::scenario(scenario, seed, thrust_to_weight)?,
+        integrator: Integrator::parse(integrator).map_err(error::value)?,
+    };
+    let stack = setup.stack().map_err(error::value)?;
+    let mut computer = Interruptible { stack, state: StackState::default(), steps: 0, signal: None };
+    let flown = py.detach(|| setup.fly_on(&mut computer, true, |_| {}));
+    if let Some(signal) = computer.signal {
+        return Err(signal);
+    }
+    let flight = flown.map_err(error::value)?;
+    let log = flight.log.ok_or_else(|| error::value("the flight was not logged"))?;
+    Ok(FlightLog::new(log, Some(flight.metrics)))
+}

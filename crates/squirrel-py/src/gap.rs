@@ -1,0 +1,107 @@
+//! The gap workflow: its steps on logs in memory. `squirrel/gap.py` makes dataclasses of what comes back.
+
+use crate::error::value;
+use crate::json;
+use crate::log::FlightLog;
+use crate::vehicle::{Vehicle, write_file};
+use pyo3::prelude::*;
+use pyo3::types::{PyAny, PyDict};
+use pyo3_stub_gen::derive::gen_stub_pyfunction;
+use squirrel_gap::Kind;
+use squirrel_sim::log;
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::{Path, PathBuf};
+
+/// Names and logs in the order of the dictionary.
+pub(crate) fn logs(argument: &str, flights: &Bound<'_, PyDict>) -> PyResult<Vec<(String, log::FlightLog)>> {
+    let named = flights.iter().map(|(name, log)| {
+        let wrong = || {
+            value(format!(
+                "{argument}: expected names (str) and FlightLogs, got {name} of {}",
+                log.get_type()
+            ))
+        };
+        let name: String = name.extract().map_err(|_| wrong())?;
+        let log = log.cast::<FlightLog>().map_err(|_| wrong())?;
+        Ok((name, log.get().log.clone()))
+    });
+    named.collect()
+}
+
+/// Where flights disagree with a vehicle, as the JSON of ``squirrel gap find``.
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+#[gen_stub(override_return_type(type_repr = "dict[str, typing.Any]", imports = ("typing")))]
+pub(crate) fn gap_find<'py>(
+    py: Python<'py>,
+    vehicle: &Bound<'py, Vehicle>,
+    #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let (vehicle, flights) = (&vehicle.get().file, logs("flights", flights)?);
+    let finding = py.detach(|| squirrel_gap::find(vehicle, &flights)).map_err(value)?;
+    json(py, &finding)
+}
+
+/// What a vehicle lacks, as the JSON of ``squirrel gap run``, and the vehicle with it.
+///
+/// * `out` - folder for the report and the patched vehicle file
+/// * `fly_again` - whether held-out flights are flown again in closed loop
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+#[gen_stub(override_return_type(type_repr = "tuple[dict[str, typing.Any], Vehicle | None]", imports = ("typing")))]
+pub(crate) fn gap_diagnose<'py>(
+    py: Python<'py>,
+    vehicle: &Bound<'py, Vehicle>,
+    #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'py, PyDict>,
+    #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] held_out: &Bound<'py, PyDict>,
+    fly_again: bool,
+    out: Option<PathBuf>,
+) -> PyResult<(Bound<'py, PyAny>, Option<Vehicle>)> {
+    let vehicle = &vehicle.get().file;
+    let (flights, held_out) = (logs("flights", flights)?, logs("held_out", held_out)?);
+    let (verdict, patched) =
+        py.detach(|| diagnose(vehicle, &flights, &held_out, fly_again, out.as_deref()))?;
+    Ok((json(py, &verdict)?, patched.map(|file| Vehicle { file })))
+}
+
+type Logs = [(String, log::FlightLog)];
+
+fn diagnose(
+    vehicle: &VehicleFile,
+    flights: &Logs,
+    held_out: &Logs,
+    fly_again: bool,
+    out: Option<&Path>,
+) -> PyResult<(squirrel_gap::Verdict, Option<VehicleFile>)> {
+    let mut diagnosis = squirrel_gap::diagnose(vehicle, flights, held_out, &|_| {}).map_err(value)?;
+    let names = |logs: &Logs| logs.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    let is_file = matches!(diagnosis.verdict.verdict, Kind::Named | Kind::NamedFormDiffers | Kind::Ambiguous)
+        && !diagnosis.verdict.effects.is_empty();
+    let text = is_file
+        .then(|| squirrel_gap::add(vehicle, &diagnosis, &names(flights)))
+        .transpose()
+        .map_err(value)?;
+    let patched = text
+        .as_ref()
+        .map(|text| VehicleFile::parse_with(text, &vehicle.name, vehicle.weights.clone()))
+        .transpose()
+        .map_err(|e| crate::error::vehicle(&e))?;
+    if fly_again && let Some(patched) = &patched {
+        let (flown, notes) = squirrel_gap::closed_loop(vehicle, patched, held_out).map_err(value)?;
+        diagnosis.verdict.closed_loop = flown;
+        diagnosis.verdict.notes.extend(notes);
+    }
+    if let Some(folder) = out {
+        let fail = |e: std::io::Error| crate::error::system(e.kind(), format!("{}: {e}", folder.display()));
+        std::fs::create_dir_all(folder).map_err(fail)?;
+        if let Some(text) = &text {
+            let path = folder.join("vehicle.toml");
+            write_file(&path, text.as_bytes())?;
+            diagnosis.verdict.model_patch = Some(path.display().to_string());
+        }
+        let picture =
+            squirrel_gap::picture(vehicle, &diagnosis, &names(flights), &names(held_out), text.as_deref());
+        write_file(&folder.join("report.html"), squirrel_gap::report::render(&picture).as_bytes())?;
+    }
+    Ok((diagnosis.verdict, patched))
+}

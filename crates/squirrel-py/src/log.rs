@@ -1,0 +1,229 @@
+//! Flight logs as arrays.
+
+use crate::error;
+use crate::json;
+use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
+use squirrel_sim::flight::Metrics;
+use squirrel_sim::log;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their channels as arrays.
+///
+/// Examples
+/// --------
+/// >>> import squirrel
+/// >>> log = squirrel.simulate(scenario="hover")
+/// >>> log["imu.omega_body_rad_s"].shape == (log.time_s("imu").size, 3)
+/// True
+#[gen_stub_pyclass]
+#[pyclass(frozen, module = "squirrel._squirrel", mapping)]
+#[derive(Debug)]
+pub(crate) struct FlightLog {
+    pub(crate) log: log::FlightLog,
+    metrics: Option<Metrics>,
+}
+
+impl FlightLog {
+    pub(crate) fn new(log: log::FlightLog, metrics: Option<Metrics>) -> Self {
+        Self { log, metrics }
+    }
+
+    fn source(&self, name: &str) -> PyResult<&log::Source> {
+        self.log.sources.get(name).ok_or_else(|| {
+            let names: Vec<&str> = self.log.sources.keys().map(String::as_str).collect();
+            PyKeyError::new_err(format!("source {name}: not in this log, which has {}", names.join(", ")))
+        })
+    }
+}
+
+#[gen_stub_pymethods]
+#[pymethods]
+impl FlightLog {
+    /// Read a flight log.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     MCAP file that squirrel wrote; ``squirrel import`` makes one of other logs.
+    ///
+    /// Returns
+    /// -------
+    /// FlightLog
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     The file cannot be read.
+    /// ValueError
+    ///     One line that names the file and what is wrong with it: not a flight log, truncated, changed since it was written.
+    #[staticmethod]
+    fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let log = py.detach(|| log::FlightLog::read(&path)).map_err(|e| error::log(&e))?;
+        Ok(Self::new(log, None))
+    }
+
+    /// Write the log as MCAP; the file appears under its name only when it is whole.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     File to write.
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     The disk refuses.
+    fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        py.detach(|| self.log.write(&path)).map_err(|e| error::log(&e))
+    }
+
+    /// Full names of all channels.
+    ///
+    /// Returns
+    /// -------
+    /// list of str
+    fn keys(&self) -> Vec<String> {
+        let channels = |(source, of): (&String, &log::Source)| {
+            of.channels.keys().map(|channel| format!("{source}.{channel}")).collect::<Vec<_>>()
+        };
+        self.log.sources.iter().flat_map(channels).collect()
+    }
+
+    /// Names of the sources, each of which has a time axis.
+    #[getter]
+    fn sources(&self) -> Vec<String> {
+        self.log.sources.keys().cloned().collect()
+    }
+
+    /// Times of the samples of a source.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : str
+    ///     One of `sources`.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float64, shape (samples,)
+    ///     s, increasing.
+    ///
+    /// Raises
+    /// ------
+    /// KeyError
+    ///     The log lacks the source.
+    fn time_s<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(PyArray1::from_slice(py, &self.source(source)?.time_s))
+    }
+
+    fn __getitem__<'py>(&self, py: Python<'py>, channel: &str) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let Some((time_s, found)) = self.log.channel(channel) else {
+            return Err(PyKeyError::new_err(format!("{channel}: not in this log")));
+        };
+        let numbers = PyArray1::from_slice(py, &found.values);
+        if found.width == 1 {
+            return Ok(numbers.to_dyn().clone());
+        }
+        Ok(numbers.reshape([time_s.len(), found.width])?.to_dyn().clone())
+    }
+
+    fn __contains__(&self, channel: &str) -> bool {
+        self.log.channel(channel).is_some()
+    }
+
+    fn __len__(&self) -> usize {
+        self.log.sources.values().map(|source| source.channels.len()).sum()
+    }
+
+    /// What the log says of the flight: vehicle, arm, scenario, seed, version.
+    #[getter]
+    fn metadata(&self) -> BTreeMap<String, String> {
+        self.log.metadata.clone()
+    }
+
+    /// What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was read.
+    #[getter]
+    #[gen_stub(override_return_type(type_repr = "dict[str, float | None] | None"))]
+    fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        self.metrics.as_ref().map(|metrics| json(py, metrics)).transpose()
+    }
+
+    /// A source as a pandas data frame, which must be installed.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : str
+    ///     One of `sources`.
+    ///
+    /// Returns
+    /// -------
+    /// pandas.DataFrame
+    ///     Index ``time_s``; a channel of several numbers a sample has a column each: ``omega_body_rad_s_0``.
+    ///
+    /// Raises
+    /// ------
+    /// KeyError
+    ///     The log lacks the source.
+    #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
+    fn to_pandas<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyAny>> {
+        let frame = py.import("pandas")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))?;
+        frame.call_method1("set_index", ("time_s",))
+    }
+
+    /// A source as a polars data frame, which must be installed.
+    ///
+    /// Parameters
+    /// ----------
+    /// source : str
+    ///     One of `sources`.
+    ///
+    /// Returns
+    /// -------
+    /// polars.DataFrame
+    ///     Columns as for pandas, ``time_s`` the first of them.
+    ///
+    /// Raises
+    /// ------
+    /// KeyError
+    ///     The log lacks the source.
+    #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
+    fn to_polars<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyAny>> {
+        py.import("polars")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))
+    }
+
+    fn __repr__(&self) -> String {
+        let of = |key: &str| self.log.metadata.get(key).map_or("unknown", String::as_str);
+        format!("<FlightLog of {}, arm {}: {} channels>", of("vehicle"), of("arm"), self.__len__())
+    }
+}
+
+impl FlightLog {
+    /// One-dimensional columns by name, `time_s` first.
+    fn columns<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
+        let source = self.source(name)?;
+        let columns = PyDict::new(py);
+        columns.set_item("time_s", PyArray1::from_slice(py, &source.time_s))?;
+        for (channel, found) in &source.channels {
+            for k in 0..found.width {
+                let label = if found.width == 1 { channel.clone() } else { format!("{channel}_{k}") };
+                let numbers = found.values.iter().skip(k).step_by(found.width).copied();
+                columns.set_item(label, PyArray1::from_iter(py, numbers))?;
+            }
+        }
+        Ok(columns)
+    }
+}
+
+/// Rows of equal width as an array.
+pub(crate) fn table<T: numpy::Element>(
+    py: Python<'_>,
+    numbers: Vec<T>,
+    width: usize,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let rows = numbers.len() / width;
+    PyArray1::from_vec(py, numbers).reshape([rows, width])
+}

@@ -1,0 +1,353 @@
+//! Vehicles: what flies, as a file says it.
+
+use crate::error;
+use pyo3::exceptions::PyKeyError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyList};
+use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+
+/// Vehicle files that are part of the package.
+const BUNDLED: [(&str, &str); 4] = [
+    ("squirrel", squirrel_sim::vehicle_file::SQUIRREL_TOML),
+    ("crazyflie21_brushed", include_str!("../../../vehicles/crazyflie21_brushed.toml")),
+    ("crazyflie21_brushed_curve", include_str!("../../../vehicles/crazyflie21_brushed_curve.toml")),
+    ("crazyflie2_arpl", include_str!("../../../vehicles/crazyflie2_arpl.toml")),
+];
+
+/// A vehicle: airframe, rotors, wings, battery, gains, sensors and effects, checked when it is made and never changed.
+///
+/// Keys are those of vehicle files, with the unit in the name: ``mass.mass_kg``, ``rotor[0].position_body_m``,
+/// ``effects.battery_sag.voltage_exponent``.
+///
+/// Examples
+/// --------
+/// >>> import squirrel
+/// >>> vehicle = squirrel.Vehicle.bundled("squirrel")
+/// >>> vehicle["mass.mass_kg"]
+/// 0.548
+/// >>> heavier = vehicle.edited({"mass.mass_kg": 0.6})
+#[gen_stub_pyclass]
+#[pyclass(frozen, module = "squirrel._squirrel")]
+#[derive(Debug)]
+pub(crate) struct Vehicle {
+    pub(crate) file: VehicleFile,
+}
+
+#[gen_stub_pymethods]
+#[pymethods]
+impl Vehicle {
+    /// Read and check a vehicle file, and the weights that it names.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     Vehicle file (TOML).
+    ///
+    /// Returns
+    /// -------
+    /// Vehicle
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     The file cannot be read.
+    /// ValueError
+    ///     One line that names the file, the field and the value.
+    #[staticmethod]
+    fn load(path: PathBuf) -> PyResult<Self> {
+        Ok(Self { file: VehicleFile::load(&path).map_err(|e| error::vehicle(&e))? })
+    }
+
+    /// A vehicle that comes with the package.
+    ///
+    /// Parameters
+    /// ----------
+    /// name : str
+    ///     ``squirrel`` (the paper's), ``crazyflie21_brushed``, ``crazyflie21_brushed_curve`` or ``crazyflie2_arpl``.
+    ///
+    /// Returns
+    /// -------
+    /// Vehicle
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     There is none of this name.
+    #[staticmethod]
+    fn bundled(name: &str) -> PyResult<Self> {
+        let Some((name, text)) = BUNDLED.iter().find(|(own, _)| *own == name) else {
+            let names = BUNDLED.map(|(own, _)| own).join(", ");
+            return Err(error::value(format!("name = {name}: no such vehicle; known are {names}")));
+        };
+        Self::parse(text, name)
+    }
+
+    /// Check the text of a vehicle file.
+    ///
+    /// Parameters
+    /// ----------
+    /// text : str
+    ///     TOML.
+    /// name : str
+    ///     What errors call it.
+    ///
+    /// Returns
+    /// -------
+    /// Vehicle
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     One line that names the field and the value.
+    #[staticmethod]
+    #[pyo3(signature = (text, name = "text"))]
+    pub(crate) fn parse(text: &str, name: &str) -> PyResult<Self> {
+        Ok(Self { file: VehicleFile::parse(text, name).map_err(|e| error::vehicle(&e))? })
+    }
+
+    /// The vehicle with other numbers, checked anew; comments and order of the text stay.
+    ///
+    /// Parameters
+    /// ----------
+    /// changes : dict of str to object
+    ///     By key: number, text, truth value or (nested) list or array; None takes the key out. A number that has a deviation keeps it
+    ///     and loses its source.
+    ///
+    /// Returns
+    /// -------
+    /// Vehicle
+    ///     The old one stays as it was.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     One line that names the field and the value.
+    fn edited(&self, changes: BTreeMap<String, Bound<'_, PyAny>>) -> PyResult<Self> {
+        let mut document = self.document()?;
+        for (key, new) in &changes {
+            let new = if new.is_none() { None } else { Some(to_toml(key, new)?) };
+            set(&mut document, key, new).map_err(|why| error::value(format!("{key}: {why}")))?;
+        }
+        let weights = self.file.weights.clone();
+        let file = VehicleFile::parse_with(&document.to_string(), &self.file.name, weights);
+        Ok(Self { file: file.map_err(|e| error::vehicle(&e))? })
+    }
+
+    /// Write the vehicle file; it appears under its name only when it is whole.
+    ///
+    /// Weights that are not the package's own are not copied beside it.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : str or os.PathLike
+    ///     File to write.
+    ///
+    /// Raises
+    /// ------
+    /// OSError
+    ///     The disk refuses.
+    fn save(&self, path: PathBuf) -> PyResult<()> {
+        write_file(&path, self.file.text.as_bytes())
+    }
+
+    /// What a careful reader still wants to know of a vehicle whose numbers are all sound, as every vehicle's are.
+    ///
+    /// Returns
+    /// -------
+    /// list of str
+    ///     Keys of numbers that the file gives without a source.
+    fn validate(&self) -> Vec<String> {
+        self.file.without_source().map(str::to_owned).collect()
+    }
+
+    /// Keys of all numbers.
+    ///
+    /// Returns
+    /// -------
+    /// list of str
+    fn keys(&self) -> Vec<String> {
+        self.file.provenance.iter().map(|(field, _)| field.clone()).collect()
+    }
+
+    /// Where a number comes from.
+    ///
+    /// Parameters
+    /// ----------
+    /// key : str
+    ///     One of `keys()`.
+    ///
+    /// Returns
+    /// -------
+    /// str or None
+    ///     None where the file does not say.
+    ///
+    /// Raises
+    /// ------
+    /// KeyError
+    ///     The file has no number of this key.
+    fn source(&self, key: &str) -> PyResult<Option<String>> {
+        let found = self.file.provenance.iter().find(|(field, _)| field == key);
+        found.map(|(_, p)| p.source.clone()).ok_or_else(|| PyKeyError::new_err(key.to_owned()))
+    }
+
+    #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
+    fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+        let mut document = self.document()?;
+        let missing = || PyKeyError::new_err(key.to_owned());
+        let (table, name) = table_of(&mut document, key, false).map_err(|_| missing())?;
+        let item = table.get(name).ok_or_else(missing)?;
+        let own = item.as_table_like().and_then(|long| long.get("value")).unwrap_or(item);
+        own.as_value().map_or_else(|| Err(missing()), |own| to_python(py, own))
+    }
+
+    /// Name of the vehicle.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.file.name
+    }
+
+    /// Text of its file.
+    #[getter]
+    fn text(&self) -> &str {
+        &self.file.text
+    }
+
+    /// Number of rotors.
+    #[getter]
+    fn rotor_count(&self) -> usize {
+        self.file.vehicle.rotors().len()
+    }
+
+    /// The command of each rotor that carries the weight, in the unit of the vehicle's commands.
+    #[getter]
+    fn hover_command(&self) -> f64 {
+        let vehicle = &self.file.vehicle;
+        let share_n = vehicle.weight_n() / vehicle.rotors().len() as f64;
+        vehicle.parameters().propulsion.command_for_thrust(share_n)
+    }
+
+    fn __repr__(&self) -> String {
+        let vehicle = &self.file.vehicle;
+        let (name, rotors) = (&self.file.name, vehicle.rotors().len());
+        format!("<Vehicle {name}: {} kg, {rotors} rotors>", vehicle.parameters().mass_kg)
+    }
+}
+
+impl Vehicle {
+    fn document(&self) -> PyResult<DocumentMut> {
+        self.file.text.parse().map_err(error::value)
+    }
+}
+
+/// The vehicle of an argument that may be left out: the paper's.
+pub(crate) fn or_squirrel(vehicle: Option<&Bound<'_, Vehicle>>) -> VehicleFile {
+    vehicle.map_or_else(VehicleFile::squirrel, |given| given.get().file.clone())
+}
+
+/// Writes a file under a temporary name beside it, then renames.
+pub(crate) fn write_file(path: &Path, content: &[u8]) -> PyResult<()> {
+    let fail = |e: &std::io::Error| error::system(e.kind(), format!("{}: {e}", path.display()));
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".partial");
+    let partial = path.with_file_name(name);
+    std::fs::write(&partial, content).and_then(|()| std::fs::rename(&partial, path)).map_err(|e| {
+        let _ = std::fs::remove_file(&partial);
+        fail(&e)
+    })
+}
+
+/// The table that holds a key, and the last part of the key.
+///
+/// * `make` - tables that are missing
+fn table_of<'a, 'k>(
+    document: &'a mut DocumentMut,
+    key: &'k str,
+    make: bool,
+) -> Result<(&'a mut dyn TableLike, &'k str), String> {
+    let mut table: &mut dyn TableLike = document.as_table_mut();
+    let mut parts = key.split('.').peekable();
+    while let Some(part) = parts.next() {
+        if parts.peek().is_none() {
+            return Ok((table, part));
+        }
+        let (name, index) = match part.strip_suffix(']').and_then(|part| part.split_once('[')) {
+            Some((name, index)) => {
+                (name, Some(index.parse::<usize>().map_err(|_| format!("no table {part}"))?))
+            }
+            None => (part, None),
+        };
+        if make && index.is_none() && table.get(name).is_none() {
+            let mut new = Table::new();
+            // Only the headers of tables with numbers show.
+            new.set_implicit(true);
+            table.insert(name, Item::Table(new));
+        }
+        let inner = table.get_mut(name).ok_or_else(|| format!("no table {part}"))?;
+        table = match index {
+            None => inner.as_table_like_mut().ok_or_else(|| format!("{part} is not a table"))?,
+            Some(index) => inner
+                .as_array_of_tables_mut()
+                .and_then(|tables| tables.get_mut(index))
+                .ok_or_else(|| format!("no table {part}"))?,
+        };
+    }
+    Err("empty".to_owned())
+}
+
+fn set(document: &mut DocumentMut, key: &str, new: Option<Value>) -> Result<(), String> {
+    let (table, name) = table_of(document, key, true)?;
+    let Some(new) = new else {
+        return table.remove(name).map(|_| ()).ok_or_else(|| "not there".to_owned());
+    };
+    let long =
+        table.get_mut(name).and_then(Item::as_table_like_mut).filter(|long| long.contains_key("value"));
+    if let Some(long) = long {
+        long.insert("value", Item::Value(new));
+        // It told where the old number was from.
+        long.remove("source");
+    } else {
+        table.insert(name, Item::Value(new));
+    }
+    Ok(())
+}
+
+fn to_toml(key: &str, object: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if object.is_instance_of::<PyBool>() {
+        return Ok(object.extract::<bool>()?.into());
+    }
+    if let Ok(text) = object.extract::<String>() {
+        return Ok(text.into());
+    }
+    if let Ok(number) = object.extract::<i64>() {
+        return Ok(number.into());
+    }
+    if let Ok(number) = object.extract::<f64>() {
+        return Ok(number.into());
+    }
+    if let (false, Ok(list)) = (object.is_instance_of::<PyDict>(), object.try_iter()) {
+        let list = list.map(|inner| to_toml(key, &inner?));
+        return Ok(list.collect::<PyResult<toml_edit::Array>>()?.into());
+    }
+    Err(error::value(format!(
+        "{key}: expected a number, text, truth value or list, got {}",
+        object.get_type().name()?
+    )))
+}
+
+fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match value {
+        Value::Integer(x) => x.value().into_pyobject(py)?.into_any(),
+        Value::Float(x) => x.value().into_pyobject(py)?.into_any(),
+        Value::Boolean(x) => x.value().into_pyobject(py)?.to_owned().into_any(),
+        Value::Array(list) => {
+            PyList::new(py, list.iter().map(|x| to_python(py, x)).collect::<PyResult<Vec<_>>>()?)?.into_any()
+        }
+        other => {
+            other.as_str().map_or_else(|| other.to_string(), str::to_owned).into_pyobject(py)?.into_any()
+        }
+    })
+}

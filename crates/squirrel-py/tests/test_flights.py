@@ -1,0 +1,121 @@
+"""Flights and their logs."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import squirrel
+
+
+def test_equal_arguments_give_equal_bits(tmp_path: Path) -> None:
+    one, two = (squirrel.simulate(scenario="avoid", arm="twcc_flat", seed=3) for _ in range(2))
+    one.write(tmp_path / "one.mcap")
+    two.write(tmp_path / "two.mcap")
+    assert (tmp_path / "one.mcap").read_bytes() == (tmp_path / "two.mcap").read_bytes()
+    other = squirrel.simulate(scenario="avoid", arm="twcc_flat", seed=4)
+    assert (other["truth.position_ned_m"] != one["truth.position_ned_m"]).any()
+
+
+def test_a_log_comes_back_from_its_file(tmp_path: Path) -> None:
+    flown = squirrel.simulate(scenario="hover", arm="pc")
+    assert flown.metrics is not None
+    assert flown.metrics["rmse_m"] is not None and 0.0 < flown.metrics["rmse_m"] < 1.0
+    flown.write(tmp_path / "hover.mcap")
+    read = squirrel.FlightLog.read(tmp_path / "hover.mcap")
+    assert read.metrics is None
+    assert read.keys() == flown.keys() and len(read) == len(read.keys())
+    assert read.metadata["arm"] == "pc"
+    for channel in read.keys():
+        np.testing.assert_array_equal(read[channel], flown[channel])
+    assert read["imu.omega_body_rad_s"].shape == (read.time_s("imu").size, 3)
+    assert read["baro.altitude_m"].shape == read.time_s("baro").shape
+    assert "imu.omega_body_rad_s" in read and "imu.omega" not in read
+    with pytest.raises(KeyError, match=r"imu.omega: not in this log"):
+        read["imu.omega"]
+    with pytest.raises(KeyError, match=r"source sonar: not in this log, which has attitude"):
+        read.time_s("sonar")
+
+
+def test_arrays_are_the_callers_own() -> None:
+    log = squirrel.simulate(scenario="hover")
+    log["truth.position_ned_m"][:] = 0.0
+    assert (log["truth.position_ned_m"] != 0.0).any()
+
+
+def test_data_frames() -> None:
+    pandas, polars = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    log = squirrel.simulate(scenario="hover")
+    one, two = log.to_pandas("imu"), log.to_polars("imu")
+    assert isinstance(one, pandas.DataFrame) and isinstance(two, polars.DataFrame)
+    assert one.index.name == "time_s" and two.columns[0] == "time_s"
+    np.testing.assert_array_equal(one["omega_body_rad_s_2"], log["imu.omega_body_rad_s"][:, 2])
+    np.testing.assert_array_equal(two["omega_body_rad_s_2"], log["imu.omega_body_rad_s"][:, 2])
+    np.testing.assert_array_equal(log.to_pandas("baro")["altitude_m"], log["baro.altitude_m"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        ({"arm": "hawk"}, "arm = hawk: no such arm; known are pc, "),
+        ({"scenario": "loop"}, "scenario = loop: no such scenario; known are hover, "),
+        ({"integrator": "leapfrog"}, "integrator = leapfrog"),
+        ({"thrust_to_weight": -1.0}, "thrust_to_weight = -1"),
+        ({"thrust_to_weight": float("nan")}, "thrust_to_weight = NaN"),
+        ({"vehicle": squirrel.Vehicle.bundled("crazyflie2_arpl")}, r"\[control\] is missing; a flight needs gains"),
+    ],
+)
+def test_a_bad_argument_is_named(arguments: dict[str, object], line: str) -> None:
+    with pytest.raises(ValueError, match=line):
+        squirrel.simulate(**arguments)  # type: ignore[arg-type]
+
+
+def test_files_that_cannot_be_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no.toml"):
+        squirrel.simulate(scenario=str(tmp_path / "no.toml"))
+    with pytest.raises(FileNotFoundError, match="no.mcap"):
+        squirrel.FlightLog.read(tmp_path / "no.mcap")
+    (tmp_path / "text.mcap").write_text("not a log")
+    with pytest.raises(ValueError, match="text.mcap: not an MCAP file"):
+        squirrel.FlightLog.read(tmp_path / "text.mcap")
+    squirrel.simulate(scenario="hover").write(tmp_path / "whole.mcap")
+    (tmp_path / "cut.mcap").write_bytes((tmp_path / "whole.mcap").read_bytes()[:-5000])
+    with pytest.raises(ValueError, match="cut.mcap: truncated at byte"):
+        squirrel.FlightLog.read(tmp_path / "cut.mcap")
+
+
+LONG = """
+import sys, squirrel
+scenario = "name = 'long'\\nduration_s = 1e5\\nheight_m = 10.0\\n[mission]\\nkind = 'hover'\\n"
+open("long.toml", "w").write(scenario)
+print("flies", flush=True)
+squirrel.simulate(scenario="long.toml")
+"""
+
+ROLLOUT = """
+import numpy as np, squirrel
+batch = squirrel.Batch(vehicles=[squirrel.Vehicle.bundled("squirrel")] * 1000, threads=1)
+print("flies", flush=True)
+batch.step(10**9)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGINT")
+@pytest.mark.parametrize("program", [LONG, ROLLOUT])
+def test_ctrl_c_ends_a_long_call_within_a_second(program: str, tmp_path: Path) -> None:
+    with subprocess.Popen(
+        [sys.executable, "-c", program], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as child:
+        assert child.stdout is not None and child.stderr is not None
+        assert child.stdout.readline() == "flies\n"
+        time.sleep(0.3)
+        assert child.poll() is None, child.stderr.read()
+        start = time.monotonic()
+        child.send_signal(signal.SIGINT)
+        child.wait(timeout=20.0)
+        assert time.monotonic() - start < 1.0
+        assert "KeyboardInterrupt" in child.stderr.read()

@@ -1,0 +1,55 @@
+"""The gap workflow."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+
+import squirrel
+
+
+@pytest.fixture(scope="module")
+def sagging(vehicle: squirrel.Vehicle) -> dict[str, squirrel.FlightLog]:
+    """Flights whose rotors slow down with the battery, which the bundled vehicle file does not know."""
+    flown = vehicle.edited({"effects.battery_sag.voltage_exponent": 0.9})
+    fly = squirrel.simulate
+    return {f"f{k}": fly(vehicle=flown, scenario="excite_rich", arm="pc", seed=k) for k in (1, 2, 3)}
+
+
+def test_find_says_where(vehicle: squirrel.Vehicle, sagging: dict[str, squirrel.FlightLog]) -> None:
+    finding = squirrel.gap.find(vehicle=vehicle, flights=sagging)
+    assert list(finding.residual.per_flight) == ["f1", "f2", "f3"]
+    assert finding.residual.force_body_rms_n[2] > 5 * finding.residual.force_body_rms_n[1]
+    noise = [place.noise for place in finding.where]
+    assert noise == sorted(noise, reverse=True) and {place.flight for place in finding.where} <= set(sagging)
+    assert "force_body_z_n" in {place.channel for place in finding.where}
+
+
+def test_run_names_what_is_missing(
+    vehicle: squirrel.Vehicle, sagging: dict[str, squirrel.FlightLog], tmp_path: Path
+) -> None:
+    held_out = {"f3": sagging["f3"]}
+    flights = {name: log for name, log in sagging.items() if name not in held_out}
+    verdict = squirrel.gap.run(vehicle=vehicle, flights=flights, held_out=held_out, out=tmp_path / "gap")
+    assert verdict.verdict == "named" and [effect.name for effect in verdict.effects] == ["battery_sag"]
+    exponent = verdict.effects[0].parameters["voltage_exponent"]
+    assert isinstance(exponent.low, float) and exponent.low < 0.9 < exponent.high
+    assert verdict.gap is not None and verdict.gap.removed_fraction > 0.99
+    (flown,) = verdict.closed_loop
+    assert flown.flight == "f3" and flown.after_ned_m[2] < 0.1 * flown.before_ned_m[2]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        verdict.words = ""  # type: ignore[misc]
+
+    assert verdict.patched is not None and verdict.model_patch is not None
+    assert squirrel.Vehicle.load(verdict.model_patch).text == verdict.patched.text
+    assert verdict.patched["effects.battery_sag.voltage_exponent"] == pytest.approx(exponent.value, rel=1e-3)
+    assert sorted(file.name for file in (tmp_path / "gap").iterdir()) == ["report.html", "vehicle.toml"]
+
+
+def test_a_bad_argument_is_named(vehicle: squirrel.Vehicle) -> None:
+    with pytest.raises(ValueError, match="flights: none given"):
+        squirrel.gap.name(vehicle=vehicle, flights={})
+    with pytest.raises(ValueError, match="held_out: none given"):
+        squirrel.gap.shrink(vehicle=vehicle, flights={}, held_out={})
+    with pytest.raises(ValueError, match="flights: expected names .* got 1 of"):
+        squirrel.gap.find(vehicle=vehicle, flights={1: None})  # type: ignore[dict-item]

@@ -1,0 +1,132 @@
+"""The package as it is installed: command line, import, types, stubs, README, examples."""
+
+import doctest
+import importlib.machinery
+import importlib.util
+import os
+import re
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+import squirrel
+from squirrel import _squirrel
+
+PYTHON = Path(squirrel.__file__).parent
+EXAMPLES = sorted((ROOT / "examples/python").glob("*.py"))
+
+
+def run(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(list(map(str, arguments)), cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_the_installed_package_is_tested() -> None:
+    assert "site-packages" in PYTHON.parts
+
+
+def test_the_module_is_the_command_line(tmp_path: Path) -> None:
+    script = Path(sys.executable).parent / ("squirrel.exe" if os.name == "nt" else "squirrel")
+    for program in ([sys.executable, "-m", "squirrel"], [script]):
+        flown = run(*program, "fly", "--scenario", "hover", "--out", "hover.mcap", cwd=tmp_path)
+        assert flown.returncode == 0 and flown.stdout.startswith("squirrel flies hover with twcc_flat"), flown
+        assert squirrel.FlightLog.read(tmp_path / "hover.mcap").metadata["scenario_toml"]
+        failed = run(*program, "replay", "no.mcap", cwd=tmp_path)
+        assert failed.returncode == 1 and failed.stderr.startswith("error: no.mcap: "), failed
+        usage = run(*program, "hover")
+        assert usage.returncode == 2 and "Usage: squirrel" in usage.stderr, usage
+        assert run(*program, "--version").stdout == f"squirrel {squirrel.__version__}\n"
+
+
+def test_the_import_is_quick() -> None:
+    clock = "import time; start = time.process_time(); import squirrel; print(time.process_time() - start)"
+    seconds = min(float(run(sys.executable, "-c", clock).stdout) for _ in range(5))
+    assert seconds <= 0.1, f"import squirrel took {seconds:.3f} s of processor time"
+
+
+@pytest.mark.skipif("SQUIRREL_WHEEL" not in os.environ, reason="cargo xtask wheel says where the wheel is")
+def test_an_install_pulls_numpy_alone(tmp_path: Path) -> None:
+    wheel = os.environ["SQUIRREL_WHEEL"]
+    venv.create(tmp_path, with_pip=False)
+    bare = tmp_path / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    install = run(sys.executable, "-m", "pip", "--python", bare, "install", "--quiet", "--only-binary=:all:", wheel)
+    assert install.returncode == 0, install.stderr
+    listed = run(sys.executable, "-m", "pip", "--python", bare, "list", "--format=freeze").stdout
+    assert {line.partition("==")[0] for line in listed.split()} == {"numpy", "squirrel-flight"}
+    flown = run(bare, "-c", "import squirrel; print(squirrel.simulate(scenario='hover')['imu.omega_body_rad_s'].shape)")
+    assert flown.stdout.endswith(", 3)\n"), flown.stderr
+
+
+@pytest.mark.skipif("SQUIRREL_STUBS" not in os.environ, reason="cargo xtask wheel says where the stubs' module is")
+def test_the_stubs_are_those_of_the_code() -> None:
+    """`SQUIRREL_STUBS_WRITE=1 cargo xtask wheel -k stubs_are` takes the new ones."""
+    loader = importlib.machinery.ExtensionFileLoader("stubs", os.environ["SQUIRREL_STUBS"])
+    spec = importlib.util.spec_from_loader("stubs", loader)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    kept = ROOT / "crates/squirrel-py/python/squirrel/_squirrel.pyi"
+    if "SQUIRREL_STUBS_WRITE" in os.environ:
+        kept.write_text(module.text())
+    assert kept.read_text() == module.text()
+
+
+def test_the_stubs_fit_what_is_installed(tmp_path: Path) -> None:
+    allowed = tmp_path / "allowed.txt"
+    # The generator does not know that the operators of Python take their operand by place alone.
+    allowed.write_text(r"squirrel\._squirrel\..*\.__(getitem|contains)__")
+    checked = run(sys.executable, "-m", "mypy.stubtest", "squirrel._squirrel", "--allowlist", allowed, cwd=tmp_path)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+def test_types_are_right(tmp_path: Path) -> None:
+    # All but squirrel.torch, which would need PyTorch.
+    modules = ["squirrel", "squirrel.__main__", "squirrel.gap", "squirrel.plot"]
+    packages = [argument for module in modules for argument in ("-m", module)]
+    for what in (EXAMPLES, packages):
+        checked = run(sys.executable, "-m", "mypy", "--strict", *what, cwd=tmp_path)
+        assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+def test_everything_public_is_documented() -> None:
+    modules = [squirrel, squirrel.control, squirrel.dynamics, squirrel.gap, squirrel.nn]
+    bare = []
+    for module in modules:
+        for name in module.__all__:
+            thing = getattr(module, name)
+            if isinstance(thing, str):
+                continue
+            parts = {name: thing} | {f"{name}.{k}": v for k, v in getattr(thing, "__dict__", {}).items() if not k.startswith("_")}
+            is_module = thing in modules
+            bare += [k for k, v in parts.items() if not is_module and callable(v) and not (v.__doc__ or "").strip()]
+    assert not bare
+
+
+def test_examples_in_docstrings_run() -> None:
+    parser, runner = doctest.DocTestParser(), doctest.DocTestRunner()
+    documented = {name: thing.__doc__ for name, thing in vars(_squirrel).items() if ">>>" in (thing.__doc__ or "")}
+    for name, text in documented.items():
+        runner.run(parser.get_doctest(text, {}, name, None, 0))
+    assert {"Batch", "FlightLog", "Vehicle", "simulate"} <= set(documented)
+    assert runner.failures == 0
+
+
+def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    assert blocks
+    done = run(sys.executable, "-W", "error", "-c", "\n".join(blocks), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_run(example: Path, tmp_path: Path) -> None:
+    done = run(sys.executable, "-W", "error", example, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout
+
+
+def test_there_are_examples() -> None:
+    assert len(EXAMPLES) >= 2

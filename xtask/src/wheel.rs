@@ -1,0 +1,76 @@
+//! `cargo xtask wheel`: the Python package, built as it is shipped and tested as it is installed.
+//!
+//! The wheel is built in the release profile and the target folder of everything else, and installed into a virtual
+//! environment of its own. The tests then see nothing but that environment: they check arguments, bits, threads, types and
+//! stubs, run the lines of the README and the examples, and install the wheel once more where nothing is.
+
+use crate::python;
+use crate::run::{call, cargo, root, target_directory};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What builds and tests the wheel, and what it can use where it is there.
+const PACKAGES: &str =
+    "numpy==2.4.6 maturin==1.16.0 pytest==9.2.0 mypy==2.4.1 matplotlib==3.11.2 pandas==3.1.1 polars==2.1.0";
+/// Largest wheel.
+const BYTES_MAX: u64 = 6_000_000;
+
+/// `cargo xtask wheel`; arguments go to pytest.
+pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
+    run(arguments).map(|note| eprintln!("{note}"))
+}
+
+/// The step of `cargo xtask test`.
+pub(crate) fn step() -> Result<String, String> {
+    run(&[])
+}
+
+fn run(arguments: &[String]) -> Result<String, String> {
+    let folder = target_directory()?.join("wheel");
+    let venv = folder.join("venv");
+    python::environment(&venv, PACKAGES)?;
+    let package = root()?.join("crates/squirrel-py");
+    let wheel = build(&venv, &package, &folder.join("dist"))?;
+    let bytes = std::fs::metadata(&wheel).map_err(|error| format!("{}: {error}", wheel.display()))?.len();
+    let size = format!("{:.2} MB", bytes as f64 / 1e6);
+    if bytes > BYTES_MAX {
+        return Err(format!("{}: {size}, must be at most {} MB", wheel.display(), BYTES_MAX / 1_000_000));
+    }
+    let python = python::program(&venv, "python");
+    let pip = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"];
+    call(Command::new(&python).args(pip).arg(&wheel))?;
+    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-py", "--example", "stubs"]))?;
+    let stubs = target_directory()?.join("release/examples").join(library("stubs"));
+    call(
+        Command::new(&python)
+            .current_dir(&package)
+            .env("SQUIRREL_WHEEL", &wheel)
+            .env("SQUIRREL_STUBS", &stubs)
+            // Drawing needs no screen, and the repository stays as it is.
+            .env("MPLBACKEND", "agg")
+            .env("PYTHONDONTWRITEBYTECODE", "1")
+            .args(["-m", "pytest", "-q", "-p", "no:cacheprovider"])
+            .args(arguments),
+    )?;
+    Ok(size)
+}
+
+/// Builds the wheel, the only one in its folder.
+fn build(venv: &Path, package: &Path, dist: &Path) -> Result<PathBuf, String> {
+    let at = |error: std::io::Error| format!("{}: {error}", dist.display());
+    if dist.exists() {
+        std::fs::remove_dir_all(dist).map_err(at)?;
+    }
+    // The release profile and the target folder are cargo's own, so that nothing is compiled that is compiled already.
+    let mut maturin = Command::new(python::program(venv, "maturin"));
+    maturin.current_dir(root()?).args(["build", "--release", "--locked", "--quiet", "--manifest-path"]);
+    call(maturin.arg(package.join("Cargo.toml")).arg("--out").arg(dist))?;
+    let mut wheels = std::fs::read_dir(dist).map_err(at)?;
+    let wheel = wheels.next().ok_or_else(|| format!("{}: maturin has left no wheel", dist.display()))?;
+    Ok(wheel.map_err(at)?.path())
+}
+
+/// File name of a dynamic library.
+fn library(name: &str) -> String {
+    format!("{}{name}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
+}
