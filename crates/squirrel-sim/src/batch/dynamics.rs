@@ -5,7 +5,7 @@
 
 use super::Scheme;
 use super::battery::{Charge, Pack};
-use super::effects::{Load, Present, Situation, Sizes};
+use super::effects::{Payload, Present, Situation, Sizes};
 use super::rows::{Airframe, Block, Held, Motion, load, store};
 use super::servo::{Deployment, Servo};
 use super::simd::{BLOCK, Kernel, Lanes, Paths};
@@ -53,7 +53,9 @@ impl<S: Paths, const ROTORS: usize> Advance<'_, S, ROTORS> {
                     None => plain::<L, ROTORS, STAGES>(block, steps, stages),
                     Some((NONE, _)) => fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, stages, dt),
                     Some((FLAT, _)) => fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, stages, dt),
-                    Some((_, false)) => fitted::<L, ROTORS, STAGES, MEMBRANE, false>(block, steps, stages, dt),
+                    Some((_, false)) => {
+                        fitted::<L, ROTORS, STAGES, MEMBRANE, false>(block, steps, stages, dt);
+                    }
                     Some((_, true)) => fitted::<L, ROTORS, STAGES, MEMBRANE, true>(block, steps, stages, dt),
                 }
             }
@@ -103,7 +105,7 @@ struct Whole<L, const ROTORS: usize> {
     present: Present,
     sizes: Sizes<L>,
     spin: [L; ROTORS],
-    load: Load<L>,
+    load: Payload<L>,
     /// Mean over the step.
     deployment: [L; 2],
     angle_rate: [L; 2],
@@ -132,7 +134,7 @@ fn fitted<L: Lanes, const ROTORS: usize, const STAGES: usize, const WING: u8, co
             present: extra.present,
             sizes: Sizes::load(&extra.sizes, start),
             spin: load(&extra.spin, start),
-            load: Load::load(&extra.load, start),
+            load: Payload::load(&extra.load, start),
             deployment: [L::zero(); 2],
             angle_rate: [L::zero(); 2],
         };
@@ -166,7 +168,8 @@ fn fitted<L: Lanes, const ROTORS: usize, const STAGES: usize, const WING: u8, co
             }
             let (mut stage, mut next, mut sides_stage, mut sides_next) = (state, state, sides, sides);
             for k in 0..STAGES {
-                let (rate, sides_rate) = whole_derivative::<L, ROTORS, WING, EFFECTS>(&whole, &stage, &sides_stage);
+                let (rate, sides_rate) =
+                    whole_derivative::<L, ROTORS, WING, EFFECTS>(&whole, &stage, &sides_stage);
                 let [ahead, weight] = stages[k];
                 if k + 1 < STAGES {
                     stage = plus_scaled(&state, L::splat(ahead), &rate);
@@ -258,7 +261,8 @@ fn whole_derivative<L: Lanes, const ROTORS: usize, const WING: u8, const EFFECTS
         let mut spin = [none; 2];
         if whole.present.rotor_gyro_torque {
             for i in 0..ROTORS {
-                spin = [spin[0] + whole.spin[i] * state.rotor_speed[i], spin[1] + whole.spin[i] * rotor_rate[i]];
+                spin =
+                    [spin[0] + whole.spin[i] * state.rotor_speed[i], spin[1] + whole.spin[i] * rotor_rate[i]];
             }
         }
         let at = Situation {

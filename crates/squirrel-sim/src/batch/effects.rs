@@ -47,7 +47,7 @@ rows! {
 
 rows! {
     /// Where the load hangs, north and east of the vehicle.
-    Load { offset [2], velocity [2] }
+    Payload { offset [2], velocity [2] }
 }
 
 /// Which effects some vehicle of a batch has, where they act in every step.
@@ -115,7 +115,8 @@ impl Found {
         let mut copy = *effects;
         let found = copy.get_mut(name)?;
         let names = forms(found.parameters);
-        let chosen = found.parameters.iter().position(|p| p.key == FORM).map_or(0, |i| found.values[i] as usize);
+        let chosen =
+            found.parameters.iter().position(|p| p.key == FORM).map_or(0, |i| found.values[i] as usize);
         let form = names.get(chosen).copied().unwrap_or("");
         let exists = |p: &squirrel_core::effects::EffectParameter| form.is_empty() || p.exists_in(form);
         // A size that the form does not have is zero.
@@ -294,7 +295,7 @@ pub(super) struct Situation<'a, L> {
     pub(super) spin: [L; 2],
     pub(super) plate: &'a Plate<L>,
     pub(super) deployment: &'a [L; 2],
-    pub(super) load: &'a Load<L>,
+    pub(super) load: &'a Payload<L>,
 }
 
 impl<L: Lanes> Sizes<L> {
@@ -343,7 +344,8 @@ impl<L: Lanes> Sizes<L> {
         }
         if present.translational_lift {
             let across = u * u + v * v;
-            let rise = self.lift * across / (one + across * self.lift_limit) + self.lift_linear * across.root();
+            let rise =
+                self.lift * across / (one + across * self.lift_limit) + self.lift_linear * across.root();
             factor = factor * (one + rise);
         }
         factor
@@ -414,7 +416,8 @@ impl<L: Lanes> Sizes<L> {
             let turned = at.plate.per_speed * air.speed * u * self.wing_offset * (one + gain);
             let mut more = flat;
             for side in 0..2 {
-                more[side] = flat[side] * gain + turned * at.deployment[side] - flat[side] * self.wing_loss[side];
+                more[side] =
+                    flat[side] * gain + turned * at.deployment[side] - flat[side] * self.wing_loss[side];
             }
             let wrench = at.plate.wrench(more);
             force[2] = force[2] + wrench.force[2];
@@ -432,7 +435,8 @@ impl<L: Lanes> Sizes<L> {
         if present.added_mass {
             let turning = p * v - q * u;
             let gravity = at.columns[2][2] * all(GRAVITY_M_S2);
-            let rate = (force[2] * at.inverse_mass + gravity - turning) / (one + self.added_mass * at.inverse_mass);
+            let rate =
+                (force[2] * at.inverse_mass + gravity - turning) / (one + self.added_mass * at.inverse_mass);
             force[2] = force[2] - self.added_mass * rate;
         }
         Wrench { force, moment }
@@ -440,7 +444,7 @@ impl<L: Lanes> Sizes<L> {
 
     /// Moves the load on by a step, in which the vehicle accelerates evenly.
     #[inline(always)]
-    pub(super) fn swing(&self, load: &mut Load<L>, acceleration: [L; 2]) {
+    pub(super) fn swing(&self, load: &mut Payload<L>, acceleration: [L; 2]) {
         for i in 0..2 {
             let trail = acceleration[i] * self.load_trail;
             let (x, v) = (load.offset[i] - trail, load.velocity[i]);

@@ -37,7 +37,9 @@ pub enum BatchError {
         vehicle: usize,
     },
     /// Something that no vehicle had when the batch was made.
-    #[error("vehicles[{vehicle}]: {what}: the batch was made without; what there is, is decided by the first vehicles")]
+    #[error(
+        "vehicles[{vehicle}]: {what}: the batch was made without; what there is, is decided by the first vehicles"
+    )]
     NotFitted {
         /// Which.
         vehicle: usize,

@@ -5,7 +5,7 @@
 
 use super::battery::Packs;
 use super::craft::Fitted;
-use super::effects::{Load, Present, Sizes};
+use super::effects::{Payload, Present, Sizes};
 use super::rows::{Block, Row, put, take};
 use super::servo::{Deployment, Servo};
 use super::simd::{BLOCK, Paths};
@@ -51,7 +51,7 @@ pub(super) struct Extra<S: Copy, const ROTORS: usize> {
     pub(super) sizes: Sizes<Row<S>>,
     /// Signs of the rotors' spin about +z.
     pub(super) spin: [Row<S>; ROTORS],
-    pub(super) load: Load<Row<S>>,
+    pub(super) load: Payload<Row<S>>,
     pub(super) latency_steps: [u64; BLOCK],
     late: VecDeque<Late<S, ROTORS>>,
     /// Steps that the block has taken.
@@ -76,9 +76,14 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
             deployment: Deployment::all(none),
             packs: (fitted.stretches > 0).then(|| Packs::empty(fitted.stretches)),
             present: fitted.present,
-            sizes: Sizes { per_reference_voltage: one, per_speed_max: one, ground_floor: one, ..Sizes::all(none) },
+            sizes: Sizes {
+                per_reference_voltage: one,
+                per_speed_max: one,
+                ground_floor: one,
+                ..Sizes::all(none)
+            },
             spin: [none; ROTORS],
-            load: Load::all(none),
+            load: Payload::all(none),
             latency_steps: [0; BLOCK],
             late: VecDeque::new(),
             clock: 0,
@@ -94,7 +99,7 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
     pub(super) fn rest(&mut self, lane: usize, charge: S) {
         self.sides.put(lane, &Sides::at_rest());
         self.deployment.put(lane, &Deployment::at_rest());
-        self.load.put(lane, &Load::all(real(0.0)));
+        self.load.put(lane, &Payload::all(real(0.0)));
         put(&mut self.wing_angle, lane, [real(0.0); 2]);
         self.late.retain(|late| late.lane != lane);
         if let Some(packs) = &mut self.packs {
@@ -160,7 +165,8 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 let passed_s = (extra.clock - extra.gust_clock) as f64 * dt_s;
                 for lane in 0..BLOCK {
                     if !extra.airs[lane].is_empty() {
-                        let through = through_air(&take(&self.motion.velocity, lane), &take(&self.held.wind, lane));
+                        let through =
+                            through_air(&take(&self.motion.velocity, lane), &take(&self.held.wind, lane));
                         let height = real::<S>(0.0) - self.motion.position[2][lane];
                         let [north, east] = extra.sizes.take(lane).wind_at(extra.present, height);
                         let through = through - Vector3::new(north, east, 0.0);

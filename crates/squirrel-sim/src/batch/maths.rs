@@ -142,7 +142,10 @@ mod tests {
                 let truth = truth(nalgebra::try_convert(*x).unwrap());
                 for (number, (row, truth)) in rows.iter().zip(truth).enumerate() {
                     let y: f64 = nalgebra::try_convert(row[i]).unwrap();
-                    assert!((y - truth).abs() < tolerance * truth.abs().max(0.1), "{number} at {x}: {y} for {truth}");
+                    assert!(
+                        (y - truth).abs() < tolerance * truth.abs().max(0.1),
+                        "{number} at {x}: {y} for {truth}"
+                    );
                 }
             }
         }

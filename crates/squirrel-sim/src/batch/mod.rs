@@ -172,7 +172,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         let mut block = Block::empty();
         block.extra = (!fitted.is_plain()).then(|| Box::new(Extra::empty(&fitted)));
         let chunks = drives.chunks(BLOCK * CHUNK);
-        let chunks = chunks.map(|drives| vec![block.clone(); drives.len().div_ceil(BLOCK)].into_boxed_slice());
+        let chunks =
+            chunks.map(|drives| vec![block.clone(); drives.len().div_ceil(BLOCK)].into_boxed_slice());
         let pool = Pool::new(chunks.collect(), settings.threads, work)?;
         Ok(Self { pool, drives, fitted, settings })
     }
@@ -220,7 +221,11 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             WingPlant::None | WingPlant::Parnn { .. } => (own, None, &still),
         };
         // Without wings in the plant there is nothing that air could push, but effects still see the declared wing.
-        let plate = if self.fitted.wing == wing::FLAT && matches!(craft.wing, WingPlant::None) { None } else { plate };
+        let plate = if self.fitted.wing == wing::FLAT && matches!(craft.wing, WingPlant::None) {
+            None
+        } else {
+            plate
+        };
         extra.plate.put(lane, &Plate::new(plate));
         let gain = if membrane.is_some() { 1.0 } else { 0.0 };
         let membrane = membrane.unwrap_or_else(|| MembraneParameters::new(0.01, 0.1));

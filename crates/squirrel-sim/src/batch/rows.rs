@@ -22,10 +22,11 @@ pub(super) type Row<S> = [S; BLOCK];
 macro_rules! rows {
     ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $field:ident $([$n:literal])?),* $(,)? }) => {
         $(#[$about])*
+        #[allow(clippy::struct_field_names, reason = "a charge is a part of the state of charge")]
         pub(super) struct $name<X> { $($(#[$doc])* pub(super) $field: rows!(@type X $($n)?)),* }
 
-        // By hand: `derive` does not look into the types of fields.
         impl<X: Copy> Copy for $name<X> {}
+        #[allow(clippy::expl_impl_clone_on_copy, reason = "`derive` does not look into the types of fields")]
         impl<X: Copy> Clone for $name<X> {
             #[inline(always)]
             fn clone(&self) -> Self {
@@ -239,7 +240,11 @@ fn load_columns<L: Lanes>(rows: &[[Row<L::Weight>; 3]; 3], start: usize) -> [[L;
 }
 
 #[inline(always)]
-pub(super) fn store<L: Lanes, const N: usize>(registers: &[L; N], rows: &mut [Row<L::Weight>; N], start: usize) {
+pub(super) fn store<L: Lanes, const N: usize>(
+    registers: &[L; N],
+    rows: &mut [Row<L::Weight>; N],
+    start: usize,
+) {
     for n in 0..N {
         registers[n].store(&mut rows[n][start..]);
     }

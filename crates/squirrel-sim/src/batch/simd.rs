@@ -194,7 +194,7 @@ paths!(f64, avx2_f64, avx512_f64, 52, 1023.0, |x: f64| {
 });
 
 /// Bits of the guess of a power -1/3, as a number, for 1: four thirds of the exponent's bias.
-const THIRDS_F32: f32 = 1_419_967_116.0;
+const THIRDS_F32: f32 = 1_419_967_100.0;
 const THIRD_F32: f32 = 1.0 / 3.0;
 
 /// Four numbers in plain Rust; compilers make SSE2 or NEON of it.
@@ -402,13 +402,13 @@ mod x86 {
         (
             $power:ident $guess:ident $split:ident $feature:literal $register:ident
             $to:ident $from:ident $left:ident $right:ident $and:ident $or:ident $add:ident $sub:ident $splat:ident $set:ident
-            $mantissa:literal $integer:ty, $scalar:ty, $bias:literal;
+            $mantissa:literal $scalar:ty, $bias:literal;
             ($bits:ident) => $guessed:expr
         ) => {
             #[target_feature(enable = $feature)]
             #[inline]
             fn $power(x: intrinsic::$register) -> intrinsic::$register {
-                let one = intrinsic::$splat((1.0 as $scalar).to_bits() as $integer);
+                let one = intrinsic::$splat((1.0 as $scalar).to_bits().cast_signed());
                 intrinsic::$from(intrinsic::$add(intrinsic::$left::<$mantissa>(intrinsic::$to(x)), one))
             }
             #[target_feature(enable = $feature)]
@@ -421,11 +421,11 @@ mod x86 {
             #[inline]
             fn $split(x: intrinsic::$register) -> (intrinsic::$register, intrinsic::$register) {
                 let round = <$scalar as super::Bits>::ROUND / 1.5;
-                let one = intrinsic::$splat((1.0 as $scalar).to_bits() as $integer);
+                let one = intrinsic::$splat((1.0 as $scalar).to_bits().cast_signed());
                 let low = intrinsic::$splat((1 << $mantissa) - 1);
                 let bits = intrinsic::$to(x);
                 let mantissa = intrinsic::$or(intrinsic::$and(bits, low), one);
-                let whole = intrinsic::$splat(round.to_bits() as $integer);
+                let whole = intrinsic::$splat(round.to_bits().cast_signed());
                 let whole = intrinsic::$from(intrinsic::$or(whole, intrinsic::$right::<$mantissa>(bits)));
                 (intrinsic::$from(mantissa), intrinsic::$sub(whole, intrinsic::$set(round + $bias)))
             }
@@ -434,7 +434,7 @@ mod x86 {
     bits!(
         avx2_power_f32 avx2_guess_f32 avx2_split_f32 "avx2" __m256
         _mm256_castps_si256 _mm256_castsi256_ps _mm256_slli_epi32 _mm256_srli_epi32 _mm256_and_si256 _mm256_or_si256
-        _mm256_add_epi32 _mm256_sub_ps _mm256_set1_epi32 _mm256_set1_ps 23 i32, f32, 127.0;
+        _mm256_add_epi32 _mm256_sub_ps _mm256_set1_epi32 _mm256_set1_ps 23 f32, 127.0;
         (bits) => {
             let third = intrinsic::_mm256_mul_ps(intrinsic::_mm256_cvtepi32_ps(bits), intrinsic::_mm256_set1_ps(super::THIRD_F32));
             intrinsic::_mm256_cvttps_epi32(intrinsic::_mm256_sub_ps(intrinsic::_mm256_set1_ps(super::THIRDS_F32), third))
@@ -443,7 +443,7 @@ mod x86 {
     bits!(
         avx512_power_f32 avx512_guess_f32 avx512_split_f32 "avx512f" __m512
         _mm512_castps_si512 _mm512_castsi512_ps _mm512_slli_epi32 _mm512_srli_epi32 _mm512_and_si512 _mm512_or_si512
-        _mm512_add_epi32 _mm512_sub_ps _mm512_set1_epi32 _mm512_set1_ps 23 i32, f32, 127.0;
+        _mm512_add_epi32 _mm512_sub_ps _mm512_set1_epi32 _mm512_set1_ps 23 f32, 127.0;
         (bits) => {
             let third = intrinsic::_mm512_mul_ps(intrinsic::_mm512_cvtepi32_ps(bits), intrinsic::_mm512_set1_ps(super::THIRD_F32));
             intrinsic::_mm512_cvttps_epi32(intrinsic::_mm512_sub_ps(intrinsic::_mm512_set1_ps(super::THIRDS_F32), third))
@@ -452,7 +452,7 @@ mod x86 {
     bits!(
         avx2_power_f64 avx2_guess_f64 avx2_split_f64 "avx2" __m256d
         _mm256_castpd_si256 _mm256_castsi256_pd _mm256_slli_epi64 _mm256_srli_epi64 _mm256_and_si256 _mm256_or_si256
-        _mm256_add_epi64 _mm256_sub_pd _mm256_set1_epi64x _mm256_set1_pd 52 i64, f64, 1023.0;
+        _mm256_add_epi64 _mm256_sub_pd _mm256_set1_epi64x _mm256_set1_pd 52 f64, 1023.0;
         (bits) => {
             let third = intrinsic::_mm256_mul_epu32(intrinsic::_mm256_srli_epi64::<32>(bits), intrinsic::_mm256_set1_epi64x(0x5555_5556));
             let third = intrinsic::_mm256_srli_epi64::<32>(third);
@@ -462,7 +462,7 @@ mod x86 {
     bits!(
         avx512_power_f64 avx512_guess_f64 avx512_split_f64 "avx512f" __m512d
         _mm512_castpd_si512 _mm512_castsi512_pd _mm512_slli_epi64 _mm512_srli_epi64 _mm512_and_si512 _mm512_or_si512
-        _mm512_add_epi64 _mm512_sub_pd _mm512_set1_epi64 _mm512_set1_pd 52 i64, f64, 1023.0;
+        _mm512_add_epi64 _mm512_sub_pd _mm512_set1_epi64 _mm512_set1_pd 52 f64, 1023.0;
         (bits) => {
             let third = intrinsic::_mm512_mul_epu32(intrinsic::_mm512_srli_epi64::<32>(bits), intrinsic::_mm512_set1_epi64(0x5555_5556));
             let third = intrinsic::_mm512_srli_epi64::<32>(third);

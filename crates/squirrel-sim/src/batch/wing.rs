@@ -119,10 +119,7 @@ impl<L: Lanes> Plate<L> {
     #[inline(always)]
     pub(super) fn wrench(&self, [left, right]: [L; 2]) -> Wrench<L> {
         let none = L::zero();
-        Wrench {
-            force: [none, none, none - (left + right)],
-            moment: [(left - right) * self.arm, none, none],
-        }
+        Wrench { force: [none, none, none - (left + right)], moment: [(left - right) * self.arm, none, none] }
     }
 }
 
@@ -201,12 +198,14 @@ impl<L: Lanes> Membrane<L> {
             let normal_separated = self.normal_drag * flow.sine / (all::<L>(0.56) + all::<L>(0.44) * sine)
                 * (one + all::<L>(1.5) * (camber * sign).upper(none));
             let normal = normal_separated + attached * (normal_attached - normal_separated);
-            let tangential = self.tangential_zero * flow.cosine + self.tangential_camber * size(camber * normal);
+            let tangential =
+                self.tangential_zero * flow.cosine + self.tangential_camber * size(camber * normal);
 
             let pressure = (none - self.force_scale) * flow.speed_squared * deployment[side];
             let per_slip = one / flow.in_plane_speed.upper(all(SLIP_SPEED_M_S));
             let along = [flow.velocity[0] * per_slip, flow.velocity[1] * per_slip];
-            let force = [pressure * tangential * along[0], pressure * tangential * along[1], pressure * normal];
+            let force =
+                [pressure * tangential * along[0], pressure * tangential * along[1], pressure * normal];
             let ahead_m = self.ahead_m * (one - sine);
             let point = [ahead_m * along[0], ahead_m * along[1] + y];
             forces[side] = force;
