@@ -69,6 +69,11 @@ pub(crate) fn bench(arguments: &[String]) -> Result<(), String> {
     call(command.arg("--").args(arguments))
 }
 
+/// `cargo xtask batch-gate`.
+pub(crate) fn batch_gate(_: &[String]) -> Result<(), String> {
+    call(cargo()?.args(["run", "--release", "--locked", "-p", "squirrel-sim", "--example", "batch_gate"]))
+}
+
 /// `cargo xtask gap-bench`: the blind bench of the gap workflow on the program as it is built now.
 pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
     call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli", "-p", "hidden-effects"]))?;

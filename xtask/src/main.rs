@@ -17,7 +17,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 10] = [
+const CHORES: [Chore; 11] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
@@ -26,6 +26,12 @@ const CHORES: [Chore; 10] = [
         "--cases N|--full --seed S [--json FILE]",
         "score the gap workflow on hidden effects; --set NAME for one set, --keep DIR for the cases",
         chores::gap_bench,
+    ),
+    (
+        "batch-gate",
+        "",
+        "what wide registers are worth to batches; fails below 5 (AVX2) or 7 times (AVX-512)",
+        chores::batch_gate,
     ),
     ("thumb", "", "check that the flight code compiles for a Cortex-M7 without std", thumb::chore),
     (

@@ -1,5 +1,5 @@
 //! Vehicle-steps of batches: 10 000 and 100 vehicles, RK4 and Euler, one step and 100 steps a call, all threads; and what a
-//! reinforcement-learning loop does besides: commands in, motions out. One core and each path: `tests/batch_speed.rs`.
+//! reinforcement-learning loop does besides: commands in, motions out. One core and each path: `cargo xtask batch-gate`.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use squirrel_sim::batch::simd::{Path, Paths};

@@ -4,12 +4,16 @@
 //! alone. No closures and no iterators in here: code must end up in the function that was compiled for the registers.
 
 use super::Scheme;
-use super::rows::{Airframe, Block, Held, Motion};
+use super::battery::{Charge, Pack};
+use super::effects::{Payload, Present, Situation, Sizes};
+use super::rows::{Airframe, Block, Held, Motion, load, store};
+use super::servo::{Deployment, Servo};
 use super::simd::{BLOCK, Kernel, Lanes, Paths};
+use super::wing::{Air, FLAT, MEMBRANE, Membrane, NONE, Plate, Sides, Wrench};
 use squirrel_core::math::{GRAVITY_M_S2, real};
 
 /// Some steps of some blocks. Each block takes all of its steps before the next one takes its first.
-pub(super) struct Advance<'a, S, const ROTORS: usize> {
+pub(super) struct Advance<'a, S: Copy, const ROTORS: usize> {
     pub(super) blocks: &'a mut [Block<S, ROTORS>],
     pub(super) scheme: Scheme,
     pub(super) dt_s: S,
@@ -24,49 +28,257 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Advance<'_, S, ROTORS> {
         let dt = self.dt_s;
         let zero = real(0.0);
         match self.scheme {
-            Scheme::Euler => advance::<L, ROTORS, 1>(self.blocks, self.steps, [[zero, dt]]),
+            Scheme::Euler => self.with::<L, 1>([[zero, dt]]),
             Scheme::Rk4 => {
                 let (half, sixth, third) = (dt * real(0.5), dt * real(1.0 / 6.0), dt * real(1.0 / 3.0));
-                let stages = [[half, sixth], [half, third], [dt, third], [zero, sixth]];
-                advance::<L, ROTORS, 4>(self.blocks, self.steps, stages);
+                self.with::<L, 4>([[half, sixth], [half, third], [dt, third], [zero, sixth]]);
             }
         }
     }
 }
 
-/// * `stages` - for each rate that is taken: time ahead to where the next one is, and weight in the step, both s
-#[inline(always)]
-fn advance<L: Lanes, const ROTORS: usize, const STAGES: usize>(
-    blocks: &mut [Block<L::Weight, ROTORS>],
-    steps: usize,
-    stages: [[L::Weight; 2]; STAGES],
-) {
-    for block in blocks {
-        let lagless = block.lagless;
-        for group in 0..BLOCK / L::WIDTH {
-            let start = group * L::WIDTH;
-            let airframe = Airframe::<L, ROTORS>::load(&block.airframe, start);
-            let held = Held::<L, ROTORS>::load(&block.held, start);
-            let mut state = Motion::<L, ROTORS>::load(&block.motion, start);
-            for _ in 0..steps {
-                if lagless {
-                    settle(&airframe, &held, &mut state);
-                }
-                let (mut stage, mut next) = (state, state);
-                for k in 0..STAGES {
-                    let rate = derivative(&airframe, &held, &stage);
-                    let [ahead, weight] = stages[k];
-                    if k + 1 < STAGES {
-                        stage = plus_scaled(&state, L::splat(ahead), &rate);
+impl<S: Paths, const ROTORS: usize> Advance<'_, S, ROTORS> {
+    /// * `stages` - for each rate that is taken: time ahead to where the next one is, and weight in the step, both s
+    #[inline(always)]
+    fn with<L: Lanes<Weight = S>, const STAGES: usize>(self, stages: [[S; 2]; STAGES]) {
+        let dt = self.dt_s;
+        let wanted_dt_s: f64 = nalgebra::try_convert(dt).unwrap_or(f64::NAN);
+        for block in self.blocks {
+            let kind = block.extra.as_ref().map(|extra| (extra.wing, extra.present.any_in_steps()));
+            let mut left = self.steps as u64;
+            while left > 0 {
+                let steps = block.between(left, wanted_dt_s);
+                left -= steps;
+                match kind {
+                    None => plain::<L, ROTORS, STAGES>(block, steps, stages),
+                    Some((NONE, _)) => fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, stages, dt),
+                    Some((FLAT, _)) => fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, stages, dt),
+                    Some((_, false)) => {
+                        fitted::<L, ROTORS, STAGES, MEMBRANE, false>(block, steps, stages, dt);
                     }
-                    next = plus_scaled(&next, L::splat(weight), &rate);
+                    Some((_, true)) => fitted::<L, ROTORS, STAGES, MEMBRANE, true>(block, steps, stages, dt),
                 }
-                next.attitude = unit(&next.attitude);
-                state = next;
             }
-            state.store(&mut block.motion, start);
         }
     }
+}
+
+/// Steps of the base model.
+#[inline(always)]
+fn plain<L: Lanes, const ROTORS: usize, const STAGES: usize>(
+    block: &mut Block<L::Weight, ROTORS>,
+    steps: u64,
+    stages: [[L::Weight; 2]; STAGES],
+) {
+    let lagless = block.lagless;
+    for group in 0..BLOCK / L::WIDTH {
+        let start = group * L::WIDTH;
+        let airframe = Airframe::<L, ROTORS>::load(&block.airframe, start);
+        let held = Held::<L, ROTORS>::load(&block.held, start);
+        let mut state = Motion::<L, ROTORS>::load(&block.motion, start);
+        for _ in 0..steps {
+            if lagless {
+                settle(&airframe, &held, &mut state);
+            }
+            let (mut stage, mut next) = (state, state);
+            for k in 0..STAGES {
+                let rate = derivative(&airframe, &held, &stage);
+                let [ahead, weight] = stages[k];
+                if k + 1 < STAGES {
+                    stage = plus_scaled(&state, L::splat(ahead), &rate);
+                }
+                next = plus_scaled(&next, L::splat(weight), &rate);
+            }
+            next.attitude = unit(&next.attitude);
+            state = next;
+        }
+        state.store(&mut block.motion, start);
+    }
+}
+
+/// What the derivative looks at of a vehicle that has more than the base model.
+struct Whole<L, const ROTORS: usize> {
+    airframe: Airframe<L, ROTORS>,
+    held: Held<L, ROTORS>,
+    plate: Plate<L>,
+    membrane: Membrane<L>,
+    present: Present,
+    sizes: Sizes<L>,
+    spin: [L; ROTORS],
+    load: Payload<L>,
+    /// Mean over the step.
+    deployment: [L; 2],
+    angle_rate: [L; 2],
+}
+
+/// Steps of blocks that have more than the base model, in the order of `crate::plant::Plant::step`.
+#[inline(always)]
+fn fitted<L: Lanes, const ROTORS: usize, const STAGES: usize, const WING: u8, const EFFECTS: bool>(
+    block: &mut Block<L::Weight, ROTORS>,
+    steps: u64,
+    stages: [[L::Weight; 2]; STAGES],
+    dt_s: L::Weight,
+) {
+    let Some(extra) = &mut block.extra else { return };
+    let (lagless, dt) = (block.lagless, L::splat(dt_s));
+    let per_step = L::splat(real::<L::Weight>(1.0) / dt_s);
+    for group in 0..BLOCK / L::WIDTH {
+        let start = group * L::WIDTH;
+        let held = Held::<L, ROTORS>::load(&block.held, start);
+        let asked = held.target_speed;
+        let mut whole = Whole {
+            airframe: Airframe::load(&block.airframe, start),
+            held,
+            plate: Plate::load(&extra.plate, start),
+            membrane: Membrane::load(&extra.membrane, start),
+            present: extra.present,
+            sizes: Sizes::load(&extra.sizes, start),
+            spin: load(&extra.spin, start),
+            load: Payload::load(&extra.load, start),
+            deployment: [L::zero(); 2],
+            angle_rate: [L::zero(); 2],
+        };
+        let servo = Servo::<L>::load(&extra.servo, start);
+        let mut deployment = Deployment::<L>::load(&extra.deployment, start);
+        let mut angle = load(&extra.wing_angle, start);
+        let mut sides = Sides::<L>::load(&extra.sides, start);
+        let mut charge = extra.packs.as_ref().map(|packs| Charge::<L>::load(&packs.charge, start));
+        let mut state = Motion::<L, ROTORS>::load(&block.motion, start);
+        for _ in 0..steps {
+            if EFFECTS
+                && whole.present.battery_sag
+                && let Some(charge) = &charge
+            {
+                whole.held.target_speed = whole.sizes.sag(&asked, charge.voltage_v);
+            }
+            if lagless {
+                settle(&whole.airframe, &whole.held, &mut state);
+            }
+            if WING != NONE {
+                whole.deployment = servo.lead(&mut deployment, dt);
+            }
+            if WING == MEMBRANE {
+                let columns = rotation_columns(&state.attitude);
+                let air = air::<L, ROTORS, EFFECTS>(&whole, &state, &columns);
+                let now = whole.membrane.angle_of_attack(&air);
+                for side in 0..2 {
+                    whole.angle_rate[side] = (now[side] - angle[side]) * per_step;
+                }
+                angle = now;
+            }
+            let (mut stage, mut next, mut sides_stage, mut sides_next) = (state, state, sides, sides);
+            for k in 0..STAGES {
+                let (rate, sides_rate) =
+                    whole_derivative::<L, ROTORS, WING, EFFECTS>(&whole, &stage, &sides_stage);
+                let [ahead, weight] = stages[k];
+                if k + 1 < STAGES {
+                    stage = plus_scaled(&state, L::splat(ahead), &rate);
+                    if WING == MEMBRANE {
+                        sides_stage = sides.plus_scaled(L::splat(ahead), &sides_rate);
+                    }
+                }
+                next = plus_scaled(&next, L::splat(weight), &rate);
+                if WING == MEMBRANE {
+                    sides_next = sides_next.plus_scaled(L::splat(weight), &sides_rate);
+                }
+            }
+            next.attitude = unit(&next.attitude);
+            sides = sides_next;
+            if let (Some(packs), Some(charge)) = (&extra.packs, &mut charge) {
+                let pack = Pack::load(&packs.pack, start);
+                pack.step(charge, &packs.table, start, &state.rotor_speed, dt);
+            }
+            if EFFECTS && whole.present.payload_swing {
+                let gained = minus(&next.velocity, &state.velocity);
+                whole.sizes.swing(&mut whole.load, [gained[0] * per_step, gained[1] * per_step]);
+            }
+            state = next;
+        }
+        state.store(&mut block.motion, start);
+        whole.load.store(&mut extra.load, start);
+        deployment.store(&mut extra.deployment, start);
+        store(&angle, &mut extra.wing_angle, start);
+        sides.store(&mut extra.sides, start);
+        if let (Some(packs), Some(charge)) = (&mut extra.packs, &charge) {
+            charge.store(&mut packs.charge, start);
+        }
+    }
+}
+
+/// Motion through the air.
+#[inline(always)]
+fn air<L: Lanes, const ROTORS: usize, const EFFECTS: bool>(
+    whole: &Whole<L, ROTORS>,
+    state: &Motion<L, ROTORS>,
+    columns: &[[L; 3]; 3],
+) -> Air<L> {
+    let mut wind = whole.held.wind;
+    if EFFECTS && whole.present.constant_wind {
+        let [north, east] = whole.sizes.wind(whole.present, L::zero() - state.position[2]);
+        (wind[0], wind[1]) = (wind[0] + north, wind[1] + east);
+    }
+    let relative = minus(&state.velocity, &wind);
+    Air {
+        velocity: [dot(&columns[0], &relative), dot(&columns[1], &relative), dot(&columns[2], &relative)],
+        speed: dot(&relative, &relative).root(),
+        omega: state.omega,
+    }
+}
+
+/// `squirrel_core::dynamics::derivative` with wings and effects.
+#[inline(always)]
+fn whole_derivative<L: Lanes, const ROTORS: usize, const WING: u8, const EFFECTS: bool>(
+    whole: &Whole<L, ROTORS>,
+    state: &Motion<L, ROTORS>,
+    sides: &Sides<L>,
+) -> (Motion<L, ROTORS>, Sides<L>) {
+    let none = L::zero();
+    let columns = rotation_columns(&state.attitude);
+    let air = air::<L, ROTORS, EFFECTS>(whole, state, &columns);
+    let airframe = &whole.airframe;
+    let (thrust, torque) = rotors(airframe, &state.rotor_speed);
+    let rotors = Wrench { force: [none, none, none - thrust], moment: torque };
+
+    let mut sides_rate = *sides;
+    let mut rest = Wrench { force: [none; 3], moment: [none; 3] };
+    if WING == FLAT {
+        rest = whole.plate.wrench(whole.plate.normal_forces(&air, &whole.deployment));
+    }
+    if WING == MEMBRANE {
+        (rest, sides_rate) = whole.membrane.evaluate(&air, &whole.angle_rate, &whole.deployment, sides);
+    }
+    let quadratic = airframe.quadratic_drag * air.speed;
+    for i in 0..3 {
+        let drag = airframe.linear_drag[i] * air.velocity[i] + air.velocity[i] * quadratic;
+        rest.force[i] = rest.force[i] - drag;
+    }
+    let rotor_rate = rotor_rates(airframe, &whole.held, &state.rotor_speed);
+    let mut sum = Wrench {
+        force: [rest.force[0], rest.force[1], rotors.force[2] + rest.force[2]],
+        moment: [torque[0] + rest.moment[0], torque[1] + rest.moment[1], torque[2] + rest.moment[2]],
+    };
+    if EFFECTS {
+        let mut spin = [none; 2];
+        if whole.present.rotor_gyro_torque {
+            for i in 0..ROTORS {
+                spin =
+                    [spin[0] + whole.spin[i] * state.rotor_speed[i], spin[1] + whole.spin[i] * rotor_rate[i]];
+            }
+        }
+        let at = Situation {
+            air: &air,
+            columns: &columns,
+            height: none - state.position[2],
+            inverse_mass: airframe.inverse_mass,
+            spin,
+            plate: &whole.plate,
+            deployment: &whole.deployment,
+            load: &whole.load,
+        };
+        sum = whole.sizes.act(whole.present, &rotors, &rest, &at);
+    }
+    let rate = body_rate(airframe, state, &columns, sum.force, &sum.moment, rotor_rate);
+    (rate, sides_rate)
 }
 
 /// A rotor without lag is at its target at once.
@@ -95,34 +307,66 @@ fn derivative<L: Lanes, const ROTORS: usize>(
     let speed = dot(&relative, &relative).root();
     let air = [dot(&columns[0], &relative), dot(&columns[1], &relative), dot(&columns[2], &relative)];
 
-    let square = state.rotor_speed[0] * state.rotor_speed[0];
-    let mut thrust = square * airframe.thrust;
+    let (thrust, moment) = rotors(airframe, &state.rotor_speed);
+    let quadratic = airframe.quadratic_drag * speed;
+    let mut force = [L::zero(), L::zero(), L::zero() - thrust];
+    for i in 0..3 {
+        let drag = airframe.linear_drag[i] * air[i] + air[i] * quadratic;
+        force[i] = force[i] - drag;
+    }
+    let rotor_rate = rotor_rates(airframe, held, &state.rotor_speed);
+    body_rate(airframe, state, &columns, force, &moment, rotor_rate)
+}
+
+/// Thrust and moment of all rotors.
+#[inline(always)]
+fn rotors<L: Lanes, const ROTORS: usize>(airframe: &Airframe<L, ROTORS>, speed: &[L; ROTORS]) -> (L, [L; 3]) {
+    let square = speed[0] * speed[0];
+    let mut thrust = square * airframe.thrust[0];
     let mut moment = [square * airframe.roll[0], square * airframe.pitch[0], square * airframe.yaw[0]];
     for i in 1..ROTORS {
-        let square = state.rotor_speed[i] * state.rotor_speed[i];
-        thrust = thrust + square * airframe.thrust;
+        let square = speed[i] * speed[i];
+        thrust = thrust + square * airframe.thrust[i];
         moment[0] = moment[0] + square * airframe.roll[i];
         moment[1] = moment[1] + square * airframe.pitch[i];
         moment[2] = moment[2] + square * airframe.yaw[i];
     }
+    (thrust, moment)
+}
 
-    let quadratic = airframe.quadratic_drag * speed;
-    let mut specific_force = [L::zero(), L::zero(), L::zero() - thrust];
-    for i in 0..3 {
-        let drag = airframe.linear_drag[i] * air[i] + air[i] * quadratic;
-        specific_force[i] = (specific_force[i] - drag) * airframe.inverse_mass;
+#[inline(always)]
+fn rotor_rates<L: Lanes, const ROTORS: usize>(
+    airframe: &Airframe<L, ROTORS>,
+    held: &Held<L, ROTORS>,
+    speed: &[L; ROTORS],
+) -> [L; ROTORS] {
+    let mut rate = *speed;
+    for i in 0..ROTORS {
+        let gap = held.target_speed[i] - speed[i];
+        rate[i] = gap * gap.where_positive(airframe.speeding_up, airframe.slowing_down);
     }
-    let mut acceleration = times(&columns, &specific_force);
+    rate
+}
+
+/// What force and moment, body frame, make of the motion.
+#[inline(always)]
+fn body_rate<L: Lanes, const ROTORS: usize>(
+    airframe: &Airframe<L, ROTORS>,
+    state: &Motion<L, ROTORS>,
+    columns: &[[L; 3]; 3],
+    force: [L; 3],
+    moment: &[L; 3],
+    rotor_rate: [L; ROTORS],
+) -> Motion<L, ROTORS> {
+    let mut specific_force = force;
+    for i in 0..3 {
+        specific_force[i] = force[i] * airframe.inverse_mass;
+    }
+    let mut acceleration = times(columns, &specific_force);
     acceleration[2] = L::splat(real(GRAVITY_M_S2)) + acceleration[2];
 
     let gyroscopic = cross(&state.omega, &times(&airframe.inertia, &state.omega));
-    let omega_rate = times(&airframe.inertia_inverse, &minus(&moment, &gyroscopic));
-
-    let mut rotor_rate = state.rotor_speed;
-    for i in 0..ROTORS {
-        let gap = held.target_speed[i] - state.rotor_speed[i];
-        rotor_rate[i] = gap * gap.where_positive(airframe.speeding_up, airframe.slowing_down);
-    }
+    let omega_rate = times(&airframe.inertia_inverse, &minus(moment, &gyroscopic));
     Motion {
         position: state.velocity,
         velocity: acceleration,

@@ -16,6 +16,52 @@ pub enum BatchError {
         /// Rotors that the batch holds.
         places: usize,
     },
+    /// An effect that acts on sensors only.
+    #[error("vehicles[{vehicle}]: effects.{effect}: acts on sensors or stamps only, a batch has none")]
+    Effect {
+        /// Which.
+        vehicle: usize,
+        /// Name of the effect.
+        effect: &'static str,
+    },
+    /// Wings that are a network.
+    #[error("vehicles[{vehicle}]: wing.model = parnn: a batch flies none, flat and membrane")]
+    Network {
+        /// Which.
+        vehicle: usize,
+    },
+    /// Two kinds of wings.
+    #[error("vehicles[{vehicle}]: wing.model: flat and membrane do not fly in one batch")]
+    Wings {
+        /// Which.
+        vehicle: usize,
+    },
+    /// Something that no vehicle had when the batch was made.
+    #[error(
+        "vehicles[{vehicle}]: {what}: the batch was made without; what there is, is decided by the first vehicles"
+    )]
+    NotFitted {
+        /// Which.
+        vehicle: usize,
+        /// What it has.
+        what: &'static str,
+    },
+    /// Effects that leave an airframe that cannot be, or one that cannot be in the batch's scalar.
+    #[error("vehicles[{vehicle}]: with effects, {problem}")]
+    Airframe {
+        /// Which.
+        vehicle: usize,
+        /// `field = value: reason`.
+        problem: squirrel_core::vehicle::ParameterError,
+    },
+    /// A charge that is none.
+    #[error("charge of vehicle {vehicle}: {charge}, must be 0 to 1")]
+    Charge {
+        /// Which.
+        vehicle: usize,
+        /// The charge.
+        charge: f64,
+    },
     /// A step that no integrator can take.
     #[error("dt_s = {dt_s}: must be finite and > 0")]
     Step {

@@ -1,10 +1,16 @@
-//! Many vehicles at once: rigid body, rotors with lag, drag, wind; each vehicle with numbers of its own.
+//! Many vehicles at once: rigid body, rotors with lag, drag, wind; wings, battery, gusts and effects where vehicles have them;
+//! each vehicle with numbers of its own.
 //!
 //! Sixteen vehicles lie side by side (`rows`), and the equations of `squirrel_core::dynamics` run on registers of them
 //! ([`simd`], `dynamics`), on as many threads as asked for (`pool`). All steps of a call are done block by block, so that a
 //! block stays in the processor for all of them. What a vehicle does depends on nothing but itself: the same bits in a batch
 //! of any size, at any place in it, on any registers, on any number of threads, in one call or in many, and the numbers of
 //! `squirrel_core::dynamics` in the same scalar.
+//!
+//! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles ([`Craft`]): flat wings and
+//! membranes (`wing`) with their servos (`servo`), batteries (`battery`), effects (`effects`), gusts and late commands (`extra`),
+//! with the equations of [`crate::plant::Plant`]. What no vehicle of the batch has is not computed. A wing that is a network, and
+//! effects that act on sensors or stamps (accel_bias, clock_skew, gnss_latency, heading_bias), are refused.
 //!
 //! ```
 //! use squirrel_sim::batch::{Batch, Settings};
@@ -18,22 +24,34 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod battery;
+mod craft;
 mod dynamics;
+mod effects;
 mod error;
+mod extra;
+mod maths;
 mod pool;
 mod rows;
+mod servo;
 pub mod simd;
+mod wing;
 
+pub use craft::Craft;
 pub use error::BatchError;
 
+use crate::plant::{MembraneParameters, ServoParameters, Wind, WindParameters, WingPlant};
+use craft::Fitted;
 use dynamics::Advance;
+use extra::{Command, Extra};
 use nalgebra::convert;
 use pool::Pool;
-use rows::{Block, Drive};
+use rows::{Block, Drive, Tuning};
 use simd::{BLOCK, Path, Paths};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
+use wing::{Membrane, Plate};
 
 /// Blocks that a thread takes at once: little enough to share out evenly, enough to be worth claiming.
 const CHUNK: usize = 4;
@@ -77,6 +95,7 @@ impl Default for Settings {
 pub struct Batch<T: Paths, const ROTORS: usize = 4> {
     pool: Pool<Box<[Block<T, ROTORS>]>, Job>,
     drives: Vec<Drive<T>>,
+    fitted: Fitted,
     settings: Settings,
 }
 
@@ -108,6 +127,35 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// No vehicle, one with more than `ROTORS` rotors, a step that is not positive or longer than twice a rotor time constant,
     /// no threads.
     pub fn new(vehicles: &[Vehicle<T>], settings: Settings) -> Result<Self, BatchError> {
+        let drives: Vec<Drive<T>> = vehicles.iter().map(Drive::new).collect();
+        let mut batch = Self::empty(drives, Fitted::all(&[])?, settings)?;
+        for (number, vehicle) in vehicles.iter().enumerate() {
+            batch.put(number, vehicle, &Tuning::none())?;
+        }
+        Ok(batch)
+    }
+
+    /// As [`Self::new`], of whole vehicles: wings folded, batteries full, loads hanging. What the batch has a place for is what
+    /// any of them has.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; a wing that is a network, flat wings beside membranes, an effect that does not act in a batch, effects
+    /// that leave no airframe.
+    pub fn with(crafts: &[Craft], settings: Settings) -> Result<Self, BatchError> {
+        let fitted = Fitted::all(crafts)?;
+        let mut drives = Vec::with_capacity(crafts.len());
+        for (number, craft) in crafts.iter().enumerate() {
+            drives.push(Drive::new(&airframe(number, craft)?.0));
+        }
+        let mut batch = Self::empty(drives, fitted, settings)?;
+        for (number, craft) in crafts.iter().enumerate() {
+            batch.refit(number, craft)?;
+            batch.reset(number, &State::at_rest())?;
+        }
+        Ok(batch)
+    }
+
+    fn empty(drives: Vec<Drive<T>>, fitted: Fitted, settings: Settings) -> Result<Self, BatchError> {
         const { assert!(ROTORS >= 1 && ROTORS <= MAX_ROTORS) };
         let dt_s = settings.dt_s;
         // In the scalar of the batch: what is positive in f64 may be nothing in f32.
@@ -115,22 +163,19 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         if !(dt.is_finite() && dt > convert(0.0)) {
             return Err(BatchError::Step { dt_s });
         }
-        if vehicles.is_empty() {
+        if drives.is_empty() {
             return Err(BatchError::Empty);
         }
         if settings.threads == 0 {
             return Err(BatchError::NoThreads);
         }
-        let chunks = vehicles.chunks(BLOCK * CHUNK);
+        let mut block = Block::empty();
+        block.extra = (!fitted.is_plain()).then(|| Box::new(Extra::empty(&fitted)));
+        let chunks = drives.chunks(BLOCK * CHUNK);
         let chunks =
-            chunks.map(|vehicles| vec![Block::empty(); vehicles.len().div_ceil(BLOCK)].into_boxed_slice());
+            chunks.map(|drives| vec![block.clone(); drives.len().div_ceil(BLOCK)].into_boxed_slice());
         let pool = Pool::new(chunks.collect(), settings.threads, work)?;
-        let drives = vehicles.iter().map(Drive::new).collect();
-        let mut batch = Self { pool, drives, settings };
-        for (number, vehicle) in vehicles.iter().enumerate() {
-            batch.replace(number, vehicle)?;
-        }
-        Ok(batch)
+        Ok(Self { pool, drives, fitted, settings })
     }
 
     /// Vehicles in it.
@@ -144,20 +189,70 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         &self.settings
     }
 
-    /// Another airframe for one vehicle; it keeps its motion, and its rotors their targets.
+    /// Another airframe for one vehicle; it keeps its motion, its rotors their targets, and its wings, battery and effects.
     ///
     /// # Errors
     /// As [`Self::new`]; or there is no such vehicle.
     pub fn replace(&mut self, number: usize, vehicle: &Vehicle<T>) -> Result<(), BatchError> {
         self.check(number)?;
+        self.put(number, vehicle, &Tuning::none())
+    }
+
+    /// Another vehicle in the place of one; it keeps its motion, and its rotors and servos their targets. Its battery is not
+    /// charged and its air does not change before [`Self::reset`] and [`Self::set_air`].
+    ///
+    /// # Errors
+    /// As [`Self::with`]; something that the batch has no place for; no such vehicle.
+    pub fn refit(&mut self, number: usize, craft: &Craft) -> Result<(), BatchError> {
+        self.check(number)?;
+        self.fitted.fits(craft, number)?;
+        let (vehicle, whole) = airframe::<T>(number, craft)?;
+        let effects = &craft.effects;
+        self.put(number, &vehicle, &Tuning::between(&craft.vehicle, &whole, effects))?;
+        let (chunk, block, lane) = place(number);
+        let dt_s = self.settings.dt_s;
+        let mut blocks = self.pool.chunk(chunk);
+        let Some(extra) = &mut blocks[block].extra else { return Ok(()) };
+        let own = whole.parameters().wing;
+        let still = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.0 };
+        let (plate, membrane, servo) = match &craft.wing {
+            WingPlant::Flat { wing, servo } => (Some(*wing), None, servo),
+            WingPlant::Membrane { membrane, servo } => (own, Some(*membrane.parameters()), servo),
+            WingPlant::None | WingPlant::Parnn { .. } => (own, None, &still),
+        };
+        // Without wings in the plant there is nothing that air could push, but effects still see the declared wing.
+        let plate = if self.fitted.wing == wing::FLAT && matches!(craft.wing, WingPlant::None) {
+            None
+        } else {
+            plate
+        };
+        extra.plate.put(lane, &Plate::new(plate));
+        let gain = if membrane.is_some() { 1.0 } else { 0.0 };
+        let membrane = membrane.unwrap_or_else(|| MembraneParameters::new(0.01, 0.1));
+        extra.membrane.put(lane, &Membrane::new(&membrane, gain));
+        extra.servo.put(lane, &servo::Servo::new(servo, effects.wing_extra_time_constant_s(), dt_s));
+        extra.sizes.put(lane, &effects::Sizes::new(effects, &whole, dt_s));
+        for (i, row) in extra.spin.iter_mut().enumerate() {
+            row[lane] = convert(whole.rotors().get(i).map_or(0.0, |rotor| -rotor.yaw_sign));
+        }
+        extra.latency_steps[lane] = (effects.command_latency_s() / dt_s).round() as u64;
+        if let Some(packs) = &mut extra.packs {
+            let p = &whole.parameters().propulsion;
+            let torque = convert(p.torque_coefficient_n_m_s2);
+            packs.put(lane, craft.battery.as_ref(), p.reference_voltage_v, torque, dt_s);
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, number: usize, vehicle: &Vehicle<T>, tuning: &Tuning<T>) -> Result<(), BatchError> {
         let p = vehicle.parameters();
         if p.rotor_count > ROTORS {
             return Err(BatchError::Rotors { vehicle: number, rotors: p.rotor_count, places: ROTORS });
         }
         let dt_s = self.settings.dt_s;
         for (key, tau) in [
-            ("time_constant_up_s", p.propulsion.time_constant_up_s),
-            ("time_constant_down_s", p.propulsion.time_constant_down_s),
+            ("time_constant_up_s", p.propulsion.time_constant_up_s + tuning.lag_s[0]),
+            ("time_constant_down_s", p.propulsion.time_constant_down_s + tuning.lag_s[1]),
         ] {
             let time_constant_s = nalgebra::try_convert(tau).unwrap_or(f64::NAN);
             if time_constant_s > 0.0 && dt_s > 2.0 * time_constant_s {
@@ -166,11 +261,12 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         }
         self.drives[number] = Drive::new(vehicle);
         let (chunk, block, lane) = place(number);
-        self.pool.chunk(chunk)[block].put_vehicle(lane, vehicle);
+        self.pool.chunk(chunk)[block].put_vehicle(lane, vehicle, tuning);
         Ok(())
     }
 
-    /// Puts one vehicle somewhere else. Its command and its wind stay.
+    /// Puts one vehicle somewhere else: wings folded, battery full, load hanging. Its command and its wind stay; commands on their
+    /// way are lost.
     ///
     /// * `state` - rotor speeds only where the vehicle has rotors
     ///
@@ -186,8 +282,54 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             return Err(BatchError::Attitude { vehicle: number, norm });
         }
         let (chunk, block, lane) = place(number);
-        self.pool.chunk(chunk)[block].put_state(lane, state, &self.drives[number]);
+        let mut blocks = self.pool.chunk(chunk);
+        blocks[block].put_state(lane, state, &self.drives[number]);
+        if let Some(extra) = &mut blocks[block].extra {
+            extra.rest(lane, convert(1.0));
+        }
         Ok(())
+    }
+
+    /// Rests the battery of one vehicle at a charge, 0..1; nothing where it has none.
+    ///
+    /// # Errors
+    /// A charge out of range, no such vehicle.
+    pub fn set_charge(&mut self, number: usize, charge: f64) -> Result<(), BatchError> {
+        self.check(number)?;
+        if !(0.0..=1.0).contains(&charge) {
+            return Err(BatchError::Charge { vehicle: number, charge });
+        }
+        let (chunk, block, lane) = place(number);
+        let mut blocks = self.pool.chunk(chunk);
+        if let Some(packs) = blocks[block].extra.as_mut().and_then(|extra| extra.packs.as_mut()) {
+            packs.rest(lane, convert(charge));
+        }
+        Ok(())
+    }
+
+    /// Charge (0..1), terminal voltage (V) and current (A) of one vehicle's battery; `None` where no vehicle has one.
+    ///
+    /// # Errors
+    /// No such vehicle.
+    pub fn battery(&self, number: usize) -> Result<Option<[T; 3]>, BatchError> {
+        self.check(number)?;
+        let (chunk, block, lane) = place(number);
+        let blocks = self.pool.chunk(chunk);
+        let packs = blocks[block].extra.as_ref().and_then(|extra| extra.packs.as_ref());
+        Ok(packs.map(|packs| {
+            let now = packs.charge.take(lane);
+            [now.charge, now.voltage_v, now.current_a]
+        }))
+    }
+
+    /// Deployment of one vehicle's wings, left and right, 0 folded to 1 spread.
+    ///
+    /// # Errors
+    /// No such vehicle.
+    pub fn deployment(&self, number: usize) -> Result<[T; 2], BatchError> {
+        self.check(number)?;
+        let (chunk, block, lane) = place(number);
+        Ok(self.pool.chunk(chunk)[block].deployment(lane))
     }
 
     /// Motion of one vehicle.
@@ -239,7 +381,68 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         Ok(())
     }
 
-    /// Velocity of the air about one vehicle from now on, m/s.
+    /// Tells the wings what to do from now on; nothing where no vehicle has any.
+    ///
+    /// * `commands` - a row of two for each vehicle, left and right, 0 folded to 1 spread; limited, and 0 for NaN
+    ///
+    /// # Errors
+    /// A length that is not twice [`Self::len`].
+    pub fn command_wings(&mut self, commands: &[T]) -> Result<(), BatchError> {
+        shape("wing commands", commands.len(), self.len() * 2)?;
+        for (chunk, commands) in commands.chunks(2 * BLOCK * CHUNK).enumerate() {
+            let mut blocks = self.pool.chunk(chunk);
+            for (block, commands) in blocks.iter_mut().zip(commands.chunks(2 * BLOCK)) {
+                let Some(extra) = &mut block.extra else { return Ok(()) };
+                for (lane, command) in commands.chunks_exact(2).enumerate() {
+                    let limited = |x| squirrel_core::math::limit(x, convert(0.0), convert(1.0));
+                    let wings = [limited(command[0]), limited(command[1])];
+                    if extra.latency_steps[lane] > 0 {
+                        extra.send(lane, Command::Wings(wings));
+                    } else {
+                        extra.ask_wings(lane, wings);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Moving air about one vehicle from now on, as in a flight with this wind and seed: steady wind, its gusts, and those of the
+    /// vehicle's `gust` effect. Gusts move at the rate of the flight code, 300 Hz.
+    ///
+    /// * `craft` - the vehicle, for its effect
+    ///
+    /// # Errors
+    /// A number that is not finite, a batch of the base model alone, no such vehicle.
+    pub fn set_air(
+        &mut self,
+        number: usize,
+        craft: &Craft,
+        wind: WindParameters,
+        seed: u64,
+    ) -> Result<(), BatchError> {
+        self.check(number)?;
+        if !wind.mean_ned_m_s.iter().chain([&wind.gust_sigma_m_s]).all(|x| x.is_finite()) {
+            return Err(BatchError::NotFinite { what: "wind", vehicle: number });
+        }
+        let mut airs = vec![Wind::new(wind, seed ^ 0x5851_F42D_4C95_7F2D)];
+        if let Some(gusts) = craft.effects.gust() {
+            airs.push(Wind::new(WindParameters::of_gusts(gusts), seed ^ 0x9E6C_63D0_876A_3F1B));
+        }
+        let (chunk, block, lane) = place(number);
+        let mut blocks = self.pool.chunk(chunk);
+        let block = &mut blocks[block];
+        let Some(extra) = &mut block.extra else {
+            return Err(BatchError::NotFitted { vehicle: number, what: "gust" });
+        };
+        extra.put_air(lane, airs);
+        if let Some(air) = extra.air(lane) {
+            block.put_wind(lane, air);
+        }
+        Ok(())
+    }
+
+    /// Velocity of the air about one vehicle from now on, m/s; it does not move any more.
     ///
     /// # Errors
     /// A number that is not finite, no such vehicle.
@@ -249,7 +452,11 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             return Err(BatchError::NotFinite { what: "wind", vehicle: number });
         }
         let (chunk, block, lane) = place(number);
-        self.pool.chunk(chunk)[block].put_wind(lane, wind);
+        let mut blocks = self.pool.chunk(chunk);
+        blocks[block].put_wind(lane, wind);
+        if let Some(extra) = &mut blocks[block].extra {
+            extra.put_air(lane, Vec::new());
+        }
         Ok(())
     }
 
@@ -267,6 +474,14 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         let vehicles = self.len();
         if vehicle < vehicles { Ok(()) } else { Err(BatchError::NoVehicle { vehicle, vehicles }) }
     }
+}
+
+/// The airframe with what effects change once, in the batch's scalar and as it is.
+fn airframe<T: Paths>(number: usize, craft: &Craft) -> Result<(Vehicle<T>, Vehicle<f64>), BatchError> {
+    let fail = |problem| BatchError::Airframe { vehicle: number, problem };
+    let altered = craft.effects.alter(&craft.vehicle).map_err(fail)?;
+    // A cast declares the vehicle anew, without what effects did to its rotors: `Tuning` has that.
+    Ok((altered.cast().map_err(fail)?, altered))
 }
 
 fn shape(what: &'static str, given: usize, needed: usize) -> Result<(), BatchError> {

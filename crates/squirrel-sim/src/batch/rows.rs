@@ -3,16 +3,108 @@
 //! Each structure is used twice: on rows, of [`BLOCK`] vehicles in memory, and on registers, of as many as one of them holds.
 
 use super::BODY_NUMBERS;
+use super::extra::{Command, Extra};
 use super::simd::{BLOCK, Lanes, Paths};
 use nalgebra::{Matrix3, Quaternion, Vector3};
-use squirrel_core::dynamics::State;
-use squirrel_core::frames::{In, Ned};
+use squirrel_core::dynamics::{self, RotorDrive, State};
+use squirrel_core::effects::Effects;
+use squirrel_core::frames::{Body, In, Ned, Wrench};
 use squirrel_core::math::{AIR_DENSITY_KG_M3, real};
 use squirrel_core::rnn::lane::Lane;
 use squirrel_core::vehicle::{MAX_ROTORS, Propulsion, Vehicle};
 
 /// One number of each vehicle of a block.
 pub(super) type Row<S> = [S; BLOCK];
+
+/// A structure of numbers of a vehicle: once as they are, once as rows of a block, once as registers.
+///
+/// `[n]` behind a name makes it an array of `n` numbers.
+macro_rules! rows {
+    ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $field:ident $([$n:literal])?),* $(,)? }) => {
+        $(#[$about])*
+        #[allow(clippy::struct_field_names, reason = "a charge is a part of the state of charge")]
+        pub(super) struct $name<X> { $($(#[$doc])* pub(super) $field: rows!(@type X $($n)?)),* }
+
+        impl<X: Copy> Copy for $name<X> {}
+        #[allow(clippy::expl_impl_clone_on_copy, reason = "`derive` does not look into the types of fields")]
+        impl<X: Copy> Clone for $name<X> {
+            #[inline(always)]
+            fn clone(&self) -> Self {
+                *self
+            }
+        }
+        impl<X: core::fmt::Debug> core::fmt::Debug for $name<X> {
+            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                f.debug_struct(stringify!($name))$(.field(stringify!($field), &self.$field))*.finish()
+            }
+        }
+
+        #[allow(dead_code, reason = "not every structure needs every way")]
+        impl<X: Copy> $name<X> {
+            /// The same everywhere.
+            pub(super) fn all(x: X) -> Self {
+                Self { $($field: rows!(@all x $($n)?)),* }
+            }
+        }
+
+        #[allow(dead_code, reason = "not every structure needs every way")]
+        impl $name<f64> {
+            /// The same numbers in another scalar.
+            pub(super) fn cast<S: crate::batch::simd::Paths>(&self) -> $name<S> {
+                $name { $($field: rows!(@cast self $field $($n)?)),* }
+            }
+        }
+
+        #[allow(dead_code, reason = "not every structure needs every way")]
+        impl<S: crate::batch::simd::Paths> $name<crate::batch::rows::Row<S>> {
+            /// Puts the numbers of a vehicle into column `lane`.
+            pub(super) fn put(&mut self, lane: usize, numbers: &$name<S>) {
+                $(rows!(@put self numbers $field lane $($n)?);)*
+            }
+            /// The numbers in column `lane`.
+            pub(super) fn take(&self, lane: usize) -> $name<S> {
+                $name { $($field: rows!(@take self $field lane $($n)?)),* }
+            }
+        }
+
+        #[allow(dead_code, reason = "not every structure needs every way")]
+        impl<L: crate::batch::simd::Lanes> $name<L> {
+            /// Registers from column `start` and on.
+            #[inline(always)]
+            pub(super) fn load(rows: &$name<crate::batch::rows::Row<L::Weight>>, start: usize) -> Self {
+                Self { $($field: rows!(@load rows $field start $($n)?)),* }
+            }
+            /// Registers to column `start` and on.
+            #[inline(always)]
+            pub(super) fn store(&self, rows: &mut $name<crate::batch::rows::Row<L::Weight>>, start: usize) {
+                $(rows!(@store self rows $field start $($n)?);)*
+            }
+        }
+    };
+    (@type $x:ident) => { $x };
+    (@type $x:ident $n:literal) => { [$x; $n] };
+    (@all $x:ident) => { $x };
+    (@all $x:ident $n:literal) => { [$x; $n] };
+    (@cast $self:ident $field:ident) => { squirrel_core::math::real($self.$field) };
+    (@cast $self:ident $field:ident $n:literal) => { $self.$field.map(squirrel_core::math::real) };
+    (@put $self:ident $numbers:ident $field:ident $lane:ident) => { $self.$field[$lane] = $numbers.$field };
+    (@put $self:ident $numbers:ident $field:ident $lane:ident $n:literal) => {
+        crate::batch::rows::put(&mut $self.$field, $lane, $numbers.$field)
+    };
+    (@take $self:ident $field:ident $lane:ident) => { $self.$field[$lane] };
+    (@take $self:ident $field:ident $lane:ident $n:literal) => { crate::batch::rows::take(&$self.$field, $lane) };
+    (@load $rows:ident $field:ident $start:ident) => { L::load(&$rows.$field[$start..]) };
+    (@load $rows:ident $field:ident $start:ident $n:literal) => {
+        crate::batch::rows::load(&$rows.$field, $start)
+    };
+    (@store $self:ident $rows:ident $field:ident $start:ident) => {
+        $self.$field.store(&mut $rows.$field[$start..])
+    };
+    (@store $self:ident $rows:ident $field:ident $start:ident $n:literal) => {
+        crate::batch::rows::store(&$self.$field, &mut $rows.$field, $start)
+    };
+}
+pub(super) use rows;
 
 /// Rigid body and rotor speeds, in the units and frames of [`State`]; as a rate, the derivative of each.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +128,7 @@ pub(super) struct Airframe<L, const ROTORS: usize> {
     /// `1/2 rho C_d A`.
     pub(super) quadratic_drag: L,
     /// Over speed squared.
-    pub(super) thrust: L,
+    pub(super) thrust: [L; ROTORS],
     pub(super) roll: [L; ROTORS],
     pub(super) pitch: [L; ROTORS],
     pub(super) yaw: [L; ROTORS],
@@ -65,26 +157,76 @@ impl<S: Paths> Drive<S> {
         Self { propulsion: p.propulsion, rotors: p.rotor_count }
     }
 
+    /// Steady rotor speeds of a command.
+    pub(super) fn targets<const ROTORS: usize>(&self, command: &[S]) -> [S; ROTORS] {
+        core::array::from_fn(|i| self.only(i, self.propulsion.target_speed_rad_s(command[i])))
+    }
+
     /// `number` where rotor `i` is one, zero where it is not.
-    fn only(&self, i: usize, number: S) -> S {
+    pub(super) fn only(&self, i: usize, number: S) -> S {
         if i < self.rotors { number } else { <S as Lane>::zero() }
     }
+}
+
+/// What effects change of the rotors once.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tuning<S> {
+    /// Added to the lag, speeding up and slowing down.
+    pub(super) lag_s: [S; 2],
+    /// Factors on thrust and on torque of each rotor.
+    pub(super) rotor: [[S; 2]; MAX_ROTORS],
+}
+
+impl<S: Paths> Tuning<S> {
+    /// Nothing.
+    pub(super) fn none() -> Self {
+        Self { lag_s: [real(0.0); 2], rotor: [[real(1.0); 2]; MAX_ROTORS] }
+    }
+
+    /// What is between a vehicle as declared and with its effects.
+    pub(super) fn between(declared: &Vehicle<f64>, altered: &Vehicle<f64>, effects: &Effects<f64>) -> Self {
+        let mut out = Self { lag_s: effects.rotor_extra_time_constant_s().map(real), ..Self::none() };
+        for (i, factors) in out.rotor.iter_mut().enumerate().take(declared.rotors().len()) {
+            let (now, before) = (rotor_alone(altered, i), rotor_alone(declared, i));
+            let ratio = |now: f64, before: f64| real(if before == 0.0 { 1.0 } else { now / before });
+            *factors = [
+                ratio(now.force.vector.z, before.force.vector.z),
+                ratio(now.moment.vector.z, before.moment.vector.z),
+            ];
+        }
+        out
+    }
+}
+
+/// What rotor `i` gives over speed squared, whatever was changed of it since the vehicle was declared.
+fn rotor_alone<S: Paths>(vehicle: &Vehicle<S>, i: usize) -> Wrench<Body, S> {
+    let mut state = State::at_rest();
+    state.rotor_speed_rad_s[i] = real(1.0);
+    let held = dynamics::Held {
+        drive: RotorDrive::holding(state.rotor_speed_rad_s),
+        wind: In::zero(),
+        deployment: [real(0.0); 2],
+        tether_force: In::zero(),
+    };
+    dynamics::wrench(vehicle, &Effects::none(), &state, &held, |_| Wrench::zero())
 }
 
 /// Sixteen vehicles. Aligned so that no load of a row touches two lines of the cache.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
-pub(super) struct Block<S, const ROTORS: usize> {
+pub(super) struct Block<S: Copy, const ROTORS: usize> {
     pub(super) motion: Motion<Row<S>, ROTORS>,
     pub(super) airframe: Airframe<Row<S>, ROTORS>,
     pub(super) held: Held<Row<S>, ROTORS>,
     /// Some rotors have no lag.
     pub(super) lagless: bool,
+    /// What is not part of the base model, where the batch has any of it.
+    pub(super) extra: Option<Box<Extra<S, ROTORS>>>,
 }
 
 /// Registers from columns `start` and on of rows.
 #[inline(always)]
-fn load<L: Lanes, const N: usize>(rows: &[Row<L::Weight>; N], start: usize) -> [L; N] {
+pub(super) fn load<L: Lanes, const N: usize>(rows: &[Row<L::Weight>; N], start: usize) -> [L; N] {
     let mut registers = [L::zero(); N];
     for n in 0..N {
         registers[n] = L::load(&rows[n][start..]);
@@ -98,21 +240,25 @@ fn load_columns<L: Lanes>(rows: &[[Row<L::Weight>; 3]; 3], start: usize) -> [[L;
 }
 
 #[inline(always)]
-fn store<L: Lanes, const N: usize>(registers: &[L; N], rows: &mut [Row<L::Weight>; N], start: usize) {
+pub(super) fn store<L: Lanes, const N: usize>(
+    registers: &[L; N],
+    rows: &mut [Row<L::Weight>; N],
+    start: usize,
+) {
     for n in 0..N {
         registers[n].store(&mut rows[n][start..]);
     }
 }
 
 /// Puts numbers into column `lane`.
-fn put<S: Copy, const N: usize>(rows: &mut [Row<S>; N], lane: usize, numbers: [S; N]) {
+pub(super) fn put<S: Copy, const N: usize>(rows: &mut [Row<S>; N], lane: usize, numbers: [S; N]) {
     for n in 0..N {
         rows[n][lane] = numbers[n];
     }
 }
 
 /// The numbers in column `lane`.
-fn take<S: Copy, const N: usize>(rows: &[Row<S>; N], lane: usize) -> [S; N] {
+pub(super) fn take<S: Copy, const N: usize>(rows: &[Row<S>; N], lane: usize) -> [S; N] {
     core::array::from_fn(|n| rows[n][lane])
 }
 
@@ -147,7 +293,7 @@ impl<L: Lanes, const ROTORS: usize> Airframe<L, ROTORS> {
             inertia_inverse: load_columns(&rows.inertia_inverse, start),
             linear_drag: load(&rows.linear_drag, start),
             quadratic_drag: L::load(&rows.quadratic_drag[start..]),
-            thrust: L::load(&rows.thrust[start..]),
+            thrust: load(&rows.thrust, start),
             roll: load(&rows.roll, start),
             pitch: load(&rows.pitch, start),
             yaw: load(&rows.yaw, start),
@@ -183,7 +329,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 inertia_inverse: [[none; 3]; 3],
                 linear_drag: [none; 3],
                 quadratic_drag: none,
-                thrust: none,
+                thrust: [none; ROTORS],
                 roll: [none; ROTORS],
                 pitch: [none; ROTORS],
                 yaw: [none; ROTORS],
@@ -192,15 +338,18 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
             },
             held: Held { wind: [none; 3], target_speed: [none; ROTORS] },
             lagless: false,
+            extra: None,
         }
     }
 
     /// Another airframe in column `lane`.
-    pub(super) fn put_vehicle(&mut self, lane: usize, vehicle: &Vehicle<S>) {
+    ///
+    /// * `extra` - what it adds to the vehicle
+    pub(super) fn put_vehicle(&mut self, lane: usize, vehicle: &Vehicle<S>, extra: &Tuning<S>) {
         let p = vehicle.parameters();
-        let inverse = |tau: S| if tau > <S as Lane>::zero() { real::<S>(1.0) / tau } else { tau };
+        let zero = <S as Lane>::zero();
+        let inverse = |tau: S| if tau > zero { real::<S>(1.0) / tau } else { zero };
         let columns = |m: &Matrix3<S>| -> [[S; 3]; 3] { (*m).into() };
-        let k_f = p.propulsion.thrust_coefficient_n_s2;
         let rows = &mut self.airframe;
         rows.inverse_mass[lane] = vehicle.inverse_mass();
         let (inertia, inverse_inertia) = (columns(&p.inertia_kg_m2), columns(vehicle.inertia_inverse()));
@@ -210,22 +359,21 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         }
         put(&mut rows.linear_drag, lane, p.drag.linear_n_s_per_m.into());
         rows.quadratic_drag[lane] = real::<S>(0.5 * AIR_DENSITY_KG_M3) * p.drag.area_m2;
-        rows.thrust[lane] = k_f;
         for i in 0..ROTORS {
-            // r x (0, 0, -T); places without a rotor are at the origin and have no sign.
-            let rotor = vehicle.rotors().get(i);
-            let zero = <S as Lane>::zero();
-            rows.roll[i][lane] = rotor.map_or(zero, |r| -r.position.vector.y * k_f);
-            rows.pitch[i][lane] = rotor.map_or(zero, |r| r.position.vector.x * k_f);
-            rows.yaw[i][lane] = rotor.map_or(zero, |r| r.yaw_sign * p.propulsion.torque_coefficient_n_m_s2);
+            let Wrench { force, moment } = rotor_alone(vehicle, i);
+            let [thrust, torque] = extra.rotor[i];
+            rows.thrust[i][lane] = (zero - force.vector.z) * thrust;
+            rows.roll[i][lane] = moment.vector.x * thrust;
+            rows.pitch[i][lane] = moment.vector.y * thrust;
+            rows.yaw[i][lane] = moment.vector.z * torque;
         }
-        rows.speeding_up[lane] = inverse(p.propulsion.time_constant_up_s);
-        rows.slowing_down[lane] = inverse(p.propulsion.time_constant_down_s);
+        rows.speeding_up[lane] = inverse(p.propulsion.time_constant_up_s + extra.lag_s[0]);
+        rows.slowing_down[lane] = inverse(p.propulsion.time_constant_down_s + extra.lag_s[1]);
         let all = rows.speeding_up.iter().chain(&rows.slowing_down);
-        self.lagless = all.copied().any(|rate| rate == <S as Lane>::zero());
+        self.lagless = all.copied().any(|rate| rate == zero);
         for i in p.rotor_count..ROTORS {
-            self.motion.rotor_speed[i][lane] = <S as Lane>::zero();
-            self.held.target_speed[i][lane] = <S as Lane>::zero();
+            self.motion.rotor_speed[i][lane] = zero;
+            self.held.target_speed[i][lane] = zero;
         }
     }
 
@@ -271,9 +419,10 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
     /// Targets of the rotors of the first vehicles from their commands, one vehicle after the other.
     pub(super) fn command(&mut self, commands: &[S], drives: &[Drive<S>]) {
         for (lane, (commands, drive)) in commands.chunks_exact(ROTORS).zip(drives).enumerate() {
-            for i in 0..ROTORS {
-                let target = drive.propulsion.target_speed_rad_s(commands[i]);
-                self.held.target_speed[i][lane] = drive.only(i, target);
+            let targets = drive.targets(commands);
+            match &mut self.extra {
+                Some(extra) if extra.latency_steps[lane] > 0 => extra.send(lane, Command::Rotors(targets)),
+                _ => put(&mut self.held.target_speed, lane, targets),
             }
         }
     }

@@ -14,7 +14,7 @@ use squirrel_core::rnn::lane::{Lane, NetScalar, tanh};
 pub const BLOCK: usize = 16;
 
 /// A register.
-pub trait Lanes: Lane<Weight: NetScalar> {
+pub trait Lanes: Lane<Weight: NetScalar + Bits> {
     /// Numbers in it; a divisor of [`BLOCK`].
     const WIDTH: usize;
     /// From the first [`Self::WIDTH`] numbers.
@@ -33,6 +33,27 @@ pub trait Lanes: Lane<Weight: NetScalar> {
     /// `then` where a number is above zero, `otherwise` where it is not or is NaN.
     #[must_use]
     fn where_positive(self, then: Self, otherwise: Self) -> Self;
+    /// `2^n` from [`Bits::ROUND`]` + n`, for whole `n` of normal numbers: its low bits are those of `n`.
+    #[must_use]
+    fn power_of_two(self) -> Self;
+    /// A third of the exponent and the leading bits of a positive normal number: its power -1/3 to 4 %.
+    #[must_use]
+    fn inverse_cube_root_guess(self) -> Self;
+    /// Of a positive normal number `m 2^e` with `m` in `[1, 2)`: `m` and `e`.
+    #[must_use]
+    fn mantissa_and_exponent(self) -> (Self, Self);
+}
+
+/// Scalars whose bits `Lanes` looks at.
+pub trait Bits: Sized {
+    /// 1.5 times the number whose last bit is one: adding it rounds to an integer.
+    const ROUND: Self;
+}
+impl Bits for f32 {
+    const ROUND: Self = 12_582_912.0;
+}
+impl Bits for f64 {
+    const ROUND: Self = 6_755_399_441_055_744.0;
 }
 
 /// Work that is the same on registers of any width.
@@ -104,13 +125,13 @@ impl Path {
 }
 
 /// Scalars that have paths.
-pub trait Paths: NetScalar {
+pub trait Paths: NetScalar + Bits + Lanes<Weight = Self> {
     /// Runs a kernel on the registers of a path.
     fn run<K: Kernel<Self>>(path: Path, kernel: K) -> K::Output;
 }
 
 macro_rules! paths {
-    ($scalar:ty, $avx2:ident, $avx512:ident) => {
+    ($scalar:ty, $avx2:ident, $avx512:ident, $mantissa:literal, $bias:literal, $guess:expr) => {
         impl Paths for $scalar {
             fn run<K: Kernel<Self>>(path: Path, kernel: K) -> K::Output {
                 match path.0 {
@@ -143,11 +164,38 @@ macro_rules! paths {
             fn where_positive(self, then: Self, otherwise: Self) -> Self {
                 if self > 0.0 { then } else { otherwise }
             }
+            #[inline(always)]
+            fn power_of_two(self) -> Self {
+                Self::from_bits((self.to_bits() << $mantissa).wrapping_add((1.0 as $scalar).to_bits()))
+            }
+            #[inline(always)]
+            fn inverse_cube_root_guess(self) -> Self {
+                $guess(self)
+            }
+            #[inline(always)]
+            fn mantissa_and_exponent(self) -> (Self, Self) {
+                let one = (1.0 as $scalar).to_bits();
+                let bits = self.to_bits();
+                let mantissa = Self::from_bits((bits & ((1 << $mantissa) - 1)) | one);
+                // An integer in the low bits of a number whose last bit is one.
+                let whole = (Self::ROUND / 1.5).to_bits() | (bits >> $mantissa);
+                (mantissa, Self::from_bits(whole) - (Self::ROUND / 1.5 + $bias))
+            }
         }
     };
 }
-paths!(f32, avx2_f32, avx512_f32);
-paths!(f64, avx2_f64, avx512_f64);
+paths!(f32, avx2_f32, avx512_f32, 23, 127.0, |x: f32| {
+    // By numbers instead of integers: registers have no product of 32 bits by 32 bits to shift down.
+    f32::from_bits((THIRDS_F32 - x.to_bits().cast_signed() as f32 * THIRD_F32) as i32 as u32)
+});
+paths!(f64, avx2_f64, avx512_f64, 52, 1023.0, |x: f64| {
+    let third = ((x.to_bits() >> 32) * 0x5555_5556) >> 32;
+    f64::from_bits(0x553e_eaa8_u64.wrapping_sub(third) << 32)
+});
+
+/// Bits of the guess of a power -1/3, as a number, for 1: four thirds of the exponent's bias.
+const THIRDS_F32: f32 = 1_419_967_100.0;
+const THIRD_F32: f32 = 1.0 / 3.0;
 
 /// Four numbers in plain Rust; compilers make SSE2 or NEON of it.
 #[derive(Clone, Copy)]
@@ -208,6 +256,19 @@ macro_rules! portable {
                     d.where_positive(h, l),
                 ])
             }
+            #[inline(always)]
+            fn power_of_two(self) -> Self {
+                Self(self.0.map(Lanes::power_of_two))
+            }
+            #[inline(always)]
+            fn inverse_cube_root_guess(self) -> Self {
+                Self(self.0.map(Lanes::inverse_cube_root_guess))
+            }
+            #[inline(always)]
+            fn mantissa_and_exponent(self) -> (Self, Self) {
+                let [(a, e), (b, f), (c, g), (d, h)] = self.0.map(Lanes::mantissa_and_exponent);
+                (Self([a, b, c, d]), Self([e, f, g, h]))
+            }
         }
     };
     (@operator $scalar:ty, $($trait:ident $method:ident $operator:tt),*) => {$(
@@ -236,7 +297,8 @@ mod x86 {
             $splat:ident $zero:ident $lower:ident $upper:ident $load:ident $store:ident $root:ident
             $($trait:ident $method:ident $operation:ident),*;
             $activation:expr;
-            ($zeros:ident, $x:ident, $then:ident, $otherwise:ident) => $select:expr
+            ($zeros:ident, $x:ident, $then:ident, $otherwise:ident) => $select:expr;
+            $power:expr; $guess:expr; $split:expr
         ) => {
             /// A value of this type exists only inside of the entry beside it.
             #[derive(Clone, Copy)]
@@ -315,9 +377,98 @@ mod x86 {
                     // SAFETY: as for `lower`.
                     Self(unsafe { $select })
                 }
+                #[inline(always)]
+                fn power_of_two(self) -> Self {
+                    // SAFETY: as for `lower`.
+                    Self(unsafe { $power(self.0) })
+                }
+                #[inline(always)]
+                fn inverse_cube_root_guess(self) -> Self {
+                    // SAFETY: as for `lower`.
+                    Self(unsafe { $guess(self.0) })
+                }
+                #[inline(always)]
+                fn mantissa_and_exponent(self) -> (Self, Self) {
+                    // SAFETY: as for `lower`.
+                    let (mantissa, exponent) = unsafe { $split(self.0) };
+                    (Self(mantissa), Self(exponent))
+                }
             }
         };
     }
+
+    /// The functions on bits, in the integers of a register.
+    macro_rules! bits {
+        (
+            $power:ident $guess:ident $split:ident $feature:literal $register:ident
+            $to:ident $from:ident $left:ident $right:ident $and:ident $or:ident $add:ident $sub:ident $splat:ident $set:ident
+            $mantissa:literal $scalar:ty, $bias:literal;
+            ($bits:ident) => $guessed:expr
+        ) => {
+            #[target_feature(enable = $feature)]
+            #[inline]
+            fn $power(x: intrinsic::$register) -> intrinsic::$register {
+                let one = intrinsic::$splat((1.0 as $scalar).to_bits().cast_signed());
+                intrinsic::$from(intrinsic::$add(intrinsic::$left::<$mantissa>(intrinsic::$to(x)), one))
+            }
+            #[target_feature(enable = $feature)]
+            #[inline]
+            fn $guess(x: intrinsic::$register) -> intrinsic::$register {
+                let $bits = intrinsic::$to(x);
+                intrinsic::$from($guessed)
+            }
+            #[target_feature(enable = $feature)]
+            #[inline]
+            fn $split(x: intrinsic::$register) -> (intrinsic::$register, intrinsic::$register) {
+                let round = <$scalar as super::Bits>::ROUND / 1.5;
+                let one = intrinsic::$splat((1.0 as $scalar).to_bits().cast_signed());
+                let low = intrinsic::$splat((1 << $mantissa) - 1);
+                let bits = intrinsic::$to(x);
+                let mantissa = intrinsic::$or(intrinsic::$and(bits, low), one);
+                let whole = intrinsic::$splat(round.to_bits().cast_signed());
+                let whole = intrinsic::$from(intrinsic::$or(whole, intrinsic::$right::<$mantissa>(bits)));
+                (intrinsic::$from(mantissa), intrinsic::$sub(whole, intrinsic::$set(round + $bias)))
+            }
+        };
+    }
+    bits!(
+        avx2_power_f32 avx2_guess_f32 avx2_split_f32 "avx2" __m256
+        _mm256_castps_si256 _mm256_castsi256_ps _mm256_slli_epi32 _mm256_srli_epi32 _mm256_and_si256 _mm256_or_si256
+        _mm256_add_epi32 _mm256_sub_ps _mm256_set1_epi32 _mm256_set1_ps 23 f32, 127.0;
+        (bits) => {
+            let third = intrinsic::_mm256_mul_ps(intrinsic::_mm256_cvtepi32_ps(bits), intrinsic::_mm256_set1_ps(super::THIRD_F32));
+            intrinsic::_mm256_cvttps_epi32(intrinsic::_mm256_sub_ps(intrinsic::_mm256_set1_ps(super::THIRDS_F32), third))
+        }
+    );
+    bits!(
+        avx512_power_f32 avx512_guess_f32 avx512_split_f32 "avx512f" __m512
+        _mm512_castps_si512 _mm512_castsi512_ps _mm512_slli_epi32 _mm512_srli_epi32 _mm512_and_si512 _mm512_or_si512
+        _mm512_add_epi32 _mm512_sub_ps _mm512_set1_epi32 _mm512_set1_ps 23 f32, 127.0;
+        (bits) => {
+            let third = intrinsic::_mm512_mul_ps(intrinsic::_mm512_cvtepi32_ps(bits), intrinsic::_mm512_set1_ps(super::THIRD_F32));
+            intrinsic::_mm512_cvttps_epi32(intrinsic::_mm512_sub_ps(intrinsic::_mm512_set1_ps(super::THIRDS_F32), third))
+        }
+    );
+    bits!(
+        avx2_power_f64 avx2_guess_f64 avx2_split_f64 "avx2" __m256d
+        _mm256_castpd_si256 _mm256_castsi256_pd _mm256_slli_epi64 _mm256_srli_epi64 _mm256_and_si256 _mm256_or_si256
+        _mm256_add_epi64 _mm256_sub_pd _mm256_set1_epi64x _mm256_set1_pd 52 f64, 1023.0;
+        (bits) => {
+            let third = intrinsic::_mm256_mul_epu32(intrinsic::_mm256_srli_epi64::<32>(bits), intrinsic::_mm256_set1_epi64x(0x5555_5556));
+            let third = intrinsic::_mm256_srli_epi64::<32>(third);
+            intrinsic::_mm256_slli_epi64::<32>(intrinsic::_mm256_sub_epi64(intrinsic::_mm256_set1_epi64x(0x553e_eaa8), third))
+        }
+    );
+    bits!(
+        avx512_power_f64 avx512_guess_f64 avx512_split_f64 "avx512f" __m512d
+        _mm512_castpd_si512 _mm512_castsi512_pd _mm512_slli_epi64 _mm512_srli_epi64 _mm512_and_si512 _mm512_or_si512
+        _mm512_add_epi64 _mm512_sub_pd _mm512_set1_epi64 _mm512_set1_pd 52 f64, 1023.0;
+        (bits) => {
+            let third = intrinsic::_mm512_mul_epu32(intrinsic::_mm512_srli_epi64::<32>(bits), intrinsic::_mm512_set1_epi64(0x5555_5556));
+            let third = intrinsic::_mm512_srli_epi64::<32>(third);
+            intrinsic::_mm512_slli_epi64::<32>(intrinsic::_mm512_sub_epi64(intrinsic::_mm512_set1_epi64(0x553e_eaa8), third))
+        }
+    );
 
     /// The exact activation, one number after the other: gradient checks have time.
     #[inline(always)]
@@ -337,7 +488,8 @@ mod x86 {
         tanh;
         (zero, x, then, otherwise) => intrinsic::_mm256_blendv_ps(
             otherwise, then, intrinsic::_mm256_cmp_ps::<{ intrinsic::_CMP_GT_OQ }>(x, zero)
-        )
+        );
+        avx2_power_f32; avx2_guess_f32; avx2_split_f32
     );
     register!(
         avx2_f64 "avx2" Avx2F64(__m256d) [f64; 4]
@@ -346,7 +498,8 @@ mod x86 {
         one_by_one;
         (zero, x, then, otherwise) => intrinsic::_mm256_blendv_pd(
             otherwise, then, intrinsic::_mm256_cmp_pd::<{ intrinsic::_CMP_GT_OQ }>(x, zero)
-        )
+        );
+        avx2_power_f64; avx2_guess_f64; avx2_split_f64
     );
     register!(
         avx512_f32 "avx512f" Avx512F32(__m512) [f32; 16]
@@ -355,7 +508,8 @@ mod x86 {
         tanh;
         (zero, x, then, otherwise) => intrinsic::_mm512_mask_blend_ps(
             intrinsic::_mm512_cmp_ps_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero), otherwise, then
-        )
+        );
+        avx512_power_f32; avx512_guess_f32; avx512_split_f32
     );
     register!(
         avx512_f64 "avx512f" Avx512F64(__m512d) [f64; 8]
@@ -364,6 +518,7 @@ mod x86 {
         one_by_one;
         (zero, x, then, otherwise) => intrinsic::_mm512_mask_blend_pd(
             intrinsic::_mm512_cmp_pd_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero), otherwise, then
-        )
+        );
+        avx512_power_f64; avx512_guess_f64; avx512_split_f64
     );
 }
