@@ -20,43 +20,63 @@ pub(super) struct Advance<'a, S: Copy, const ROTORS: usize> {
     pub(super) steps: usize,
 }
 
+/// [`Advance`] of blocks that have more than the base model: a kernel of its own, because one function with all variants has
+/// a frame that overflows the stack where the compiler does not optimise.
+pub(super) struct AdvanceWhole<'a, S: Copy, const ROTORS: usize>(pub(super) Advance<'a, S, ROTORS>);
+
+/// For each rate that is taken: time ahead to where the next one is, and weight in the step, both s.
+#[inline(always)]
+fn runge_kutta<S: Paths>(dt: S) -> [[S; 2]; 4] {
+    let (half, sixth, third) = (dt * real(0.5), dt * real(1.0 / 6.0), dt * real(1.0 / 3.0));
+    [[half, sixth], [half, third], [dt, third], [real(0.0), sixth]]
+}
+
 impl<S: Paths, const ROTORS: usize> Kernel<S> for Advance<'_, S, ROTORS> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes<Weight = S>>(self) {
-        let dt = self.dt_s;
-        let zero = real(0.0);
-        match self.scheme {
-            Scheme::Euler => self.with::<L, 1>([[zero, dt]]),
-            Scheme::Rk4 => {
-                let (half, sixth, third) = (dt * real(0.5), dt * real(1.0 / 6.0), dt * real(1.0 / 3.0));
-                self.with::<L, 4>([[half, sixth], [half, third], [dt, third], [zero, sixth]]);
+        for block in self.blocks {
+            match self.scheme {
+                Scheme::Euler => plain::<L, ROTORS, 1>(block, self.steps as u64, [[real(0.0), self.dt_s]]),
+                Scheme::Rk4 => plain::<L, ROTORS, 4>(block, self.steps as u64, runge_kutta(self.dt_s)),
             }
         }
     }
 }
 
-impl<S: Paths, const ROTORS: usize> Advance<'_, S, ROTORS> {
-    /// * `stages` - for each rate that is taken: time ahead to where the next one is, and weight in the step, both s
+impl<S: Paths, const ROTORS: usize> Kernel<S> for AdvanceWhole<'_, S, ROTORS> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<Weight = S>>(self) {
+        let dt = self.0.dt_s;
+        match self.0.scheme {
+            Scheme::Euler => self.with::<L, 1>([[real(0.0), dt]]),
+            Scheme::Rk4 => self.with::<L, 4>(runge_kutta(dt)),
+        }
+    }
+}
+
+impl<S: Paths, const ROTORS: usize> AdvanceWhole<'_, S, ROTORS> {
     #[inline(always)]
     fn with<L: Lanes<Weight = S>, const STAGES: usize>(self, stages: [[S; 2]; STAGES]) {
-        let dt = self.dt_s;
+        let Advance { blocks, dt_s: dt, steps, .. } = self.0;
         let wanted_dt_s: f64 = nalgebra::try_convert(dt).unwrap_or(f64::NAN);
-        for block in self.blocks {
-            let kind = block.extra.as_ref().map(|extra| (extra.wing, extra.present.any_in_steps()));
-            let mut left = self.steps as u64;
+        for block in blocks {
+            let Some(kind) = block.extra.as_ref().map(|extra| (extra.wing, extra.present.any_in_steps()))
+            else {
+                continue;
+            };
+            let mut left = steps as u64;
             while left > 0 {
                 let steps = block.between(left, wanted_dt_s);
                 left -= steps;
                 match kind {
-                    None => plain::<L, ROTORS, STAGES>(block, steps, stages),
-                    Some((NONE, _)) => fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, stages, dt),
-                    Some((FLAT, _)) => fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, stages, dt),
-                    Some((_, false)) => {
-                        fitted::<L, ROTORS, STAGES, MEMBRANE, false>(block, steps, stages, dt);
-                    }
-                    Some((_, true)) => fitted::<L, ROTORS, STAGES, MEMBRANE, true>(block, steps, stages, dt),
+                    (NONE, _) => fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, stages, dt),
+                    (FLAT, _) => fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, stages, dt),
+                    (_, false) => fitted::<L, ROTORS, STAGES, MEMBRANE, false>(block, steps, stages, dt),
+                    (_, true) => fitted::<L, ROTORS, STAGES, MEMBRANE, true>(block, steps, stages, dt),
                 }
             }
         }

@@ -42,7 +42,7 @@ pub use error::BatchError;
 
 use crate::plant::{MembraneParameters, ServoParameters, Wind, WindParameters, WingPlant};
 use craft::Fitted;
-use dynamics::Advance;
+use dynamics::{Advance, AdvanceWhole};
 use extra::{Command, Extra};
 use nalgebra::convert;
 use pool::Pool;
@@ -109,7 +109,9 @@ struct Job {
 /// Takes the steps of a call.
 fn work<T: Paths, const ROTORS: usize>(blocks: &mut Box<[Block<T, ROTORS>]>, job: Job) {
     let Settings { dt_s, scheme, path, .. } = job.settings;
-    T::run(path, Advance { blocks, scheme, dt_s: convert(dt_s), steps: job.steps });
+    let is_whole = blocks.first().is_some_and(|block| block.extra.is_some());
+    let advance = Advance { blocks, scheme, dt_s: convert(dt_s), steps: job.steps };
+    if is_whole { T::run(path, AdvanceWhole(advance)) } else { T::run(path, advance) }
 }
 
 /// Where a vehicle is: chunk, block in it, column.

@@ -10,6 +10,9 @@ use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 
+/// Stack of a thread: an optimised step needs a few kilobytes, one that is not some megabytes.
+const STACK_BYTES: usize = 16 << 20;
+
 /// Looks at the ticket before a thread parks: about a millisecond, longer than what usually happens between two steps.
 const SPINS: usize = 20_000;
 /// Looks of the caller at what is left before it yields: who still holds a chunk may need this very core.
@@ -115,8 +118,8 @@ impl<C: Send + 'static, J: Copy + Send + 'static> Pool<C, J> {
         let mut pool = Self { shared, threads: Vec::new() };
         for _ in 0..helpers {
             let shared = Arc::clone(&pool.shared);
-            pool.threads
-                .push(thread::Builder::new().name("squirrel-batch".into()).spawn(move || shared.serve())?);
+            let thread = thread::Builder::new().name("squirrel-batch".into()).stack_size(STACK_BYTES);
+            pool.threads.push(thread.spawn(move || shared.serve())?);
         }
         Ok(pool)
     }
