@@ -109,9 +109,16 @@ struct Job {
 /// Takes the steps of a call.
 fn work<T: Paths, const ROTORS: usize>(blocks: &mut Box<[Block<T, ROTORS>]>, job: Job) {
     let Settings { dt_s, scheme, path, .. } = job.settings;
-    let is_whole = blocks.first().is_some_and(|block| block.extra.is_some());
-    let advance = Advance { blocks, scheme, dt_s: convert(dt_s), steps: job.steps };
-    if is_whole { T::run(path, AdvanceWhole(advance)) } else { T::run(path, advance) }
+    T::run(path, Advance { blocks, scheme, dt_s: convert(dt_s), steps: job.steps });
+}
+
+/// The same for whole vehicles: a function of its own, so that programs without them do not carry it.
+fn work_whole<T: Paths, const ROTORS: usize>(blocks: &mut Box<[Block<T, ROTORS>]>, job: Job) {
+    if blocks.first().is_none_or(|block| block.extra.is_none()) {
+        return work(blocks, job);
+    }
+    let Settings { dt_s, scheme, path, .. } = job.settings;
+    T::run(path, AdvanceWhole(Advance { blocks, scheme, dt_s: convert(dt_s), steps: job.steps }));
 }
 
 /// Where a vehicle is: chunk, block in it, column.
@@ -130,7 +137,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// no threads.
     pub fn new(vehicles: &[Vehicle<T>], settings: Settings) -> Result<Self, BatchError> {
         let drives: Vec<Drive<T>> = vehicles.iter().map(Drive::new).collect();
-        let mut batch = Self::empty(drives, Fitted::all(&[])?, settings)?;
+        let mut batch = Self::empty(drives, Fitted::all(&[])?, settings, work)?;
         for (number, vehicle) in vehicles.iter().enumerate() {
             batch.put(number, vehicle, &Tuning::none())?;
         }
@@ -149,7 +156,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         for (number, craft) in crafts.iter().enumerate() {
             drives.push(Drive::new(&airframe(number, craft)?.0));
         }
-        let mut batch = Self::empty(drives, fitted, settings)?;
+        let mut batch = Self::empty(drives, fitted, settings, work_whole)?;
         for (number, craft) in crafts.iter().enumerate() {
             batch.refit(number, craft)?;
             batch.reset(number, &State::at_rest())?;
@@ -157,7 +164,12 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         Ok(batch)
     }
 
-    fn empty(drives: Vec<Drive<T>>, fitted: Fitted, settings: Settings) -> Result<Self, BatchError> {
+    fn empty(
+        drives: Vec<Drive<T>>,
+        fitted: Fitted,
+        settings: Settings,
+        work: fn(&mut Box<[Block<T, ROTORS>]>, Job),
+    ) -> Result<Self, BatchError> {
         const { assert!(ROTORS >= 1 && ROTORS <= MAX_ROTORS) };
         let dt_s = settings.dt_s;
         // In the scalar of the batch: what is positive in f64 may be nothing in f32.
