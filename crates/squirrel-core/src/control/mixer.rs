@@ -173,6 +173,14 @@ impl Mixer {
         self.thrust_max_n
     }
 
+    /// What rotor `i` gives of a demand that no limit is in the way of: per newton of thrust, and per newton metre of roll, pitch
+    /// and yaw. Zeros beyond the last rotor.
+    pub fn rotor_of_demand(&self, i: usize) -> [f32; 4] {
+        let yaw = |y: f32| if self.yaw_unit_n_m > 0.0 { y / self.yaw_unit_n_m } else { 0.0 };
+        let at = |column: &PerRotor<f32>| column.get(i).copied().unwrap_or(0.0);
+        [at(&self.collective), at(&self.roll), at(&self.pitch), yaw(at(&self.yaw))]
+    }
+
     /// Rotor thrusts for a demand. Total: non-finite demands count as zero.
     pub fn allocate(&self, demand: &ThrustTorque) -> MixerTerms {
         let finite = |x: f32| if x.is_finite() { x } else { 0.0 };

@@ -440,7 +440,7 @@ fn dot<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> L {
 }
 
 #[inline(always)]
-fn cross<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
+pub(super) fn cross<L: Lanes>(a: &[L; 3], b: &[L; 3]) -> [L; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

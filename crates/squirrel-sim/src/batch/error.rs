@@ -110,6 +110,12 @@ pub enum BatchError {
         /// Length of the quaternion.
         norm: f64,
     },
+    /// Set points where nothing flies the vehicles.
+    #[error("set points: the batch has no autopilot")]
+    NoAutopilot,
+    /// An autopilot that never acts.
+    #[error("period_steps = 0: must be at least 1")]
+    Period,
     /// Too few numbers, or too many.
     #[error("{what}: {given} numbers, must be {needed}")]
     Shape {

@@ -3,7 +3,7 @@
 //! The operations and their order are those of the plant's own functions, so that in f64 the bits are the plant's, too.
 
 use super::simd::{Bits, Lanes};
-use core::f64::consts::{FRAC_PI_2, LN_2, LOG2_E, SQRT_2};
+use core::f64::consts::{FRAC_PI_2, LN_2, LOG2_E, SQRT_2, TAU};
 use squirrel_core::math::real;
 
 /// A number that stands on all places of a register.
@@ -97,26 +97,60 @@ pub(super) fn cbrt<L: Lanes>(x: L) -> L {
     x * r * r
 }
 
+/// An angle in [-pi, pi], rad, as [`squirrel_core::math::wrap_angle`] but for the sign of half a turn.
+#[inline(always)]
+pub(super) fn wrap<L: Lanes>(x: L) -> L {
+    let round = L::splat(<L::Weight as Bits>::ROUND);
+    let turns = (x * all(1.0 / TAU) + round) - round;
+    x - turns * all(TAU)
+}
+
+/// Sine and cosine of an angle in [-pi/2, pi/2], absolute error below 6e-8 or, in f32, 2e-7.
+#[inline(always)]
+pub(super) fn half_turn_sine_and_cosine<L: Lanes>(x: L) -> (L, L) {
+    let t = x * x;
+    let (mut sine, mut cosine) = (all::<L>(1.0), all::<L>(1.0));
+    let mut n = 6;
+    while n > 0 {
+        let k = 2.0 * f64::from(n);
+        // Taylor's series from its far end: 13 and 12 terms' powers.
+        sine = all::<L>(1.0) - sine * t * all(1.0 / (k * (k + 1.0)));
+        cosine = all::<L>(1.0) - cosine * t * all(1.0 / (k * (k - 1.0)));
+        n -= 1;
+    }
+    (x * sine, cosine)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::batch::simd::{BLOCK, Kernel, Path, Paths};
+    use core::f64::consts::PI;
 
     /// Results of every function, a row each, for sixteen arguments.
     struct Table<S>([S; BLOCK]);
 
     impl<S: Paths> Kernel<S> for Table<S> {
-        type Output = [[S; BLOCK]; 5];
+        type Output = [[S; BLOCK]; 8];
 
         #[inline(always)]
         fn run<L: Lanes<Weight = S>>(self) -> Self::Output {
-            let mut out = [self.0; 5];
+            let mut out = [self.0; 8];
             for start in (0..BLOCK).step_by(L::WIDTH) {
                 let x = L::load(&self.0[start..]);
                 let fraction = x / (x + all(1.0));
                 let cosine = (all::<L>(1.0) - fraction * fraction).root();
-                let results =
-                    [exp(L::zero() - x), ln(x), tanh(x - all(3.0)), angle(fraction, cosine), cbrt(x)];
+                let (half_sine, half_cosine) = half_turn_sine_and_cosine((fraction - all(0.5)) * all(PI));
+                let results = [
+                    exp(L::zero() - x),
+                    ln(x),
+                    tanh(x - all(3.0)),
+                    angle(fraction, cosine),
+                    cbrt(x),
+                    half_sine,
+                    half_cosine,
+                    wrap(x - all(20.0)),
+                ];
                 for (row, result) in out.iter_mut().zip(results) {
                     result.store(&mut row[start..]);
                 }
@@ -125,8 +159,19 @@ mod tests {
         }
     }
 
-    fn truth(x: f64) -> [f64; 5] {
-        [(-x).exp(), x.ln(), (x - 3.0).tanh(), (x / (x + 1.0)).asin(), x.cbrt()]
+    fn truth(x: f64) -> [f64; 8] {
+        let half = (x / (x + 1.0) - 0.5) * PI;
+        let turned = x - 20.0;
+        [
+            (-x).exp(),
+            x.ln(),
+            (x - 3.0).tanh(),
+            (x / (x + 1.0)).asin(),
+            x.cbrt(),
+            half.sin(),
+            half.cos(),
+            turned - (turned / TAU).round() * TAU,
+        ]
     }
 
     fn every_function<S: Paths>(tolerance: f64) {

@@ -24,6 +24,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod autopilot;
 mod battery;
 mod craft;
 mod dynamics;
@@ -37,6 +38,7 @@ mod servo;
 pub mod simd;
 mod wing;
 
+pub use autopilot::{Autopilot, SetPoint, Tuned};
 pub use craft::Craft;
 pub use error::BatchError;
 
@@ -93,32 +95,54 @@ impl Default for Settings {
 /// Vehicles of up to `ROTORS` rotors that fly side by side.
 #[derive(Debug)]
 pub struct Batch<T: Paths, const ROTORS: usize = 4> {
-    pool: Pool<Box<[Block<T, ROTORS>]>, Job>,
+    pool: Pool<Box<[Block<T, ROTORS>]>, Job<T, ROTORS>>,
     drives: Vec<Drive<T>>,
     fitted: Fitted,
     settings: Settings,
+    work: Work<T, ROTORS>,
+    autopilot: Option<(Flown<T, ROTORS>, Autopilot)>,
 }
 
 /// What a call asks for.
 #[derive(Debug, Clone, Copy)]
-struct Job {
+struct Call {
     settings: Settings,
     steps: usize,
 }
 
-/// Takes the steps of a call.
-fn work<T: Paths, const ROTORS: usize>(blocks: &mut Box<[Block<T, ROTORS>]>, job: Job) {
-    let Settings { dt_s, scheme, path, .. } = job.settings;
-    T::run(path, Advance { blocks, scheme, dt_s: convert(dt_s), steps: job.steps });
+/// Takes the steps of a call. Pointers, so that programs do not carry what they do not fly.
+type Work<T, const ROTORS: usize> = fn(&mut [Block<T, ROTORS>], Call);
+/// The same, with an autopilot in between.
+type Flown<T, const ROTORS: usize> = fn(&mut [Block<T, ROTORS>], Work<T, ROTORS>, Call, Autopilot);
+
+/// A call, and who takes its steps.
+#[derive(Debug, Clone, Copy)]
+struct Job<T: Copy, const ROTORS: usize> {
+    call: Call,
+    work: Work<T, ROTORS>,
+    autopilot: Option<(Flown<T, ROTORS>, Autopilot)>,
 }
 
-/// The same for whole vehicles: a function of its own, so that programs without them do not carry it.
-fn work_whole<T: Paths, const ROTORS: usize>(blocks: &mut Box<[Block<T, ROTORS>]>, job: Job) {
-    if blocks.first().is_none_or(|block| block.extra.is_none()) {
-        return work(blocks, job);
+fn do_job<T: Paths, const ROTORS: usize>(blocks: &mut Box<[Block<T, ROTORS>]>, job: Job<T, ROTORS>) {
+    match job.autopilot {
+        None => (job.work)(blocks, job.call),
+        Some((flown, autopilot)) => flown(blocks, job.work, job.call, autopilot),
     }
-    let Settings { dt_s, scheme, path, .. } = job.settings;
-    T::run(path, AdvanceWhole(Advance { blocks, scheme, dt_s: convert(dt_s), steps: job.steps }));
+}
+
+/// Steps of the base model.
+fn plain<T: Paths, const ROTORS: usize>(blocks: &mut [Block<T, ROTORS>], call: Call) {
+    let Settings { dt_s, scheme, path, .. } = call.settings;
+    T::run(path, Advance { blocks, scheme, dt_s: convert(dt_s), steps: call.steps });
+}
+
+/// Steps of whole vehicles.
+fn whole<T: Paths, const ROTORS: usize>(blocks: &mut [Block<T, ROTORS>], call: Call) {
+    if blocks.first().is_none_or(|block| block.extra.is_none()) {
+        return plain(blocks, call);
+    }
+    let Settings { dt_s, scheme, path, .. } = call.settings;
+    T::run(path, AdvanceWhole(Advance { blocks, scheme, dt_s: convert(dt_s), steps: call.steps }));
 }
 
 /// Where a vehicle is: chunk, block in it, column.
@@ -137,7 +161,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// no threads.
     pub fn new(vehicles: &[Vehicle<T>], settings: Settings) -> Result<Self, BatchError> {
         let drives: Vec<Drive<T>> = vehicles.iter().map(Drive::new).collect();
-        let mut batch = Self::empty(drives, Fitted::all(&[])?, settings, work)?;
+        let mut batch = Self::empty(drives, Fitted::all(&[])?, settings, plain)?;
         for (number, vehicle) in vehicles.iter().enumerate() {
             batch.put(number, vehicle, &Tuning::none())?;
         }
@@ -156,7 +180,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         for (number, craft) in crafts.iter().enumerate() {
             drives.push(Drive::new(&airframe(number, craft)?.0));
         }
-        let mut batch = Self::empty(drives, fitted, settings, work_whole)?;
+        let mut batch = Self::empty(drives, fitted, settings, whole)?;
         for (number, craft) in crafts.iter().enumerate() {
             batch.refit(number, craft)?;
             batch.reset(number, &State::at_rest())?;
@@ -168,7 +192,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         drives: Vec<Drive<T>>,
         fitted: Fitted,
         settings: Settings,
-        work: fn(&mut Box<[Block<T, ROTORS>]>, Job),
+        work: Work<T, ROTORS>,
     ) -> Result<Self, BatchError> {
         const { assert!(ROTORS >= 1 && ROTORS <= MAX_ROTORS) };
         let dt_s = settings.dt_s;
@@ -188,8 +212,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         let chunks = drives.chunks(BLOCK * CHUNK);
         let chunks =
             chunks.map(|drives| vec![block.clone(); drives.len().div_ceil(BLOCK)].into_boxed_slice());
-        let pool = Pool::new(chunks.collect(), settings.threads, work)?;
-        Ok(Self { pool, drives, fitted, settings })
+        let pool = Pool::new(chunks.collect(), settings.threads, do_job)?;
+        Ok(Self { pool, drives, fitted, settings, work, autopilot: None })
     }
 
     /// Vehicles in it.
@@ -300,6 +324,9 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         blocks[block].put_state(lane, state, &self.drives[number]);
         if let Some(extra) = &mut blocks[block].extra {
             extra.rest(lane, convert(1.0));
+        }
+        if let Some(autopilots) = &mut blocks[block].autopilots {
+            autopilots.rest(lane, autopilot::euler(state));
         }
         Ok(())
     }
@@ -476,7 +503,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
 
     /// Flies on, commands and wind held. A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it.
     pub fn step(&mut self, steps: usize) {
-        let job = Job { settings: self.settings, steps };
+        let call = Call { settings: self.settings, steps };
+        let job = Job { call, work: self.work, autopilot: self.autopilot };
         if self.len().saturating_mul(steps) < WORTH_THREADS {
             self.pool.run_alone(job);
         } else {

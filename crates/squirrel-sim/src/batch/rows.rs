@@ -3,6 +3,7 @@
 //! Each structure is used twice: on rows, of [`BLOCK`] vehicles in memory, and on registers, of as many as one of them holds.
 
 use super::BODY_NUMBERS;
+use super::autopilot::Autopilots;
 use super::extra::{Command, Extra};
 use super::simd::{BLOCK, Lanes, Paths};
 use nalgebra::{Matrix3, Quaternion, Vector3};
@@ -222,6 +223,8 @@ pub(super) struct Block<S: Copy, const ROTORS: usize> {
     pub(super) lagless: bool,
     /// What is not part of the base model, where the batch has any of it.
     pub(super) extra: Option<Box<Extra<S, ROTORS>>>,
+    /// Where something flies the vehicles.
+    pub(super) autopilots: Option<Box<Autopilots<S, ROTORS>>>,
 }
 
 /// Registers from columns `start` and on of rows.
@@ -339,6 +342,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
             held: Held { wind: [none; 3], target_speed: [none; ROTORS] },
             lagless: false,
             extra: None,
+            autopilots: None,
         }
     }
 
@@ -424,6 +428,17 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 Some(extra) if extra.latency_steps[lane] > 0 => extra.send(lane, Command::Rotors(targets)),
                 _ => put(&mut self.held.target_speed, lane, targets),
             }
+        }
+    }
+
+    /// What was just asked of the rotors comes later where commands are late.
+    ///
+    /// * `before` - what was asked before
+    pub(super) fn delay(&mut self, before: &[Row<S>; ROTORS]) {
+        let Some(extra) = &mut self.extra else { return };
+        for lane in (0..BLOCK).filter(|lane| extra.latency_steps[*lane] > 0).collect::<Vec<_>>() {
+            extra.send(lane, Command::Rotors(take(&self.held.target_speed, lane)));
+            put(&mut self.held.target_speed, lane, take(before, lane));
         }
     }
 
