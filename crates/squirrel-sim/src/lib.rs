@@ -4,7 +4,7 @@
 //!   `squirrel-core` commands, the log records. [`replay`] runs the flight code again on a log's inputs.
 //! - [`vehicle_file`], [`weights`] and [`scenario`] read what to fly; [`arm`] says who flies; [`faults`] breaks sensors in
 //!   recorded frames.
-//! - [`batch`] flies thousands of vehicles at once on wide registers.
+//! - [`batch`] flies thousands of vehicles at once on wide registers, [`task`] makes environments of it in which policies learn.
 //! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it.
 
 pub mod arm;
@@ -18,6 +18,7 @@ pub mod replay;
 pub mod report;
 pub mod scenario;
 pub mod sensors;
+pub mod task;
 mod toml_text;
 pub mod vehicle_file;
 pub mod weights;

@@ -45,7 +45,10 @@ fn it_flies_as_the_flight_code() {
         (EulerReference::default(), AttitudeState::default(), false);
     let (mut largest, mut tilted) = (0.0_f32, 0.0_f32);
     for step in 0..2000 {
-        let [roll, pitch, yaw, thrust_n] = set_point(1, step / 250);
+        // Smooth, so that no rotor is at its limit: there the mixers differ.
+        let t = step as f32 * 2e-3;
+        let [roll, pitch, yaw] = [0.5 * (2.0 * t).sin(), 0.4 * (1.5 * t).sin(), 0.3 * (0.7 * t).sin()];
+        let thrust_n = 5.4 + 1.5 * (1.1 * t).sin();
         let target = Vector3::new(roll, pitch, yaw);
         let state = plant.state(0).unwrap();
         let (frequency, damping) = (tuned.gains.filter_frequency_rad_s, tuned.gains.filter_damping);
@@ -61,6 +64,7 @@ fn it_flies_as_the_flight_code() {
         );
         let mixed = mixer.allocate(&ThrustTorque { thrust_n, torque_n_m: terms.torque_n_m });
         saturated = mixed.saturated;
+        assert!(!saturated, "step {step}");
         let propulsion = &tuned.vehicle.parameters().propulsion;
         let commands: Vec<f32> =
             mixed.rotor_thrust_n[..4].iter().map(|f| propulsion.command_for_thrust(*f)).collect();
@@ -74,7 +78,7 @@ fn it_flies_as_the_flight_code() {
         tilted = tilted.max(one.ned_from_body().euler().0.abs());
     }
     assert!(tilted > 0.4, "{tilted}");
-    assert!(largest < 2e-3, "{largest}");
+    assert!(largest < 1e-4, "{largest}");
 }
 
 fn flown<const N: usize>(
@@ -112,7 +116,7 @@ fn bits_depend_on_nothing_but_the_vehicle() {
         assert!(flown(100, best, [1], level) == expected, "one step a call");
         assert!(flown(100, best, [7, 2, 30], level) == expected, "any pattern");
         assert!(flown(1, best, [100], level)[0] == expected[0], "alone");
-        assert!(flown(5000, best, [100], level)[..100] == expected[..], "among many");
+        assert!(flown(1000, best, [100], level)[..100] == expected[..], "among many");
     }
 }
 
@@ -140,8 +144,8 @@ fn limits_hold_and_tilt_comes_first() {
     batch.engage(attitudes(1), &[tuned.clone()]).unwrap();
     let most = Mixer::new(&tuned.vehicle).unwrap().rotor_thrust_max_n();
     let k = tuned.vehicle.parameters().propulsion.thrust_coefficient_n_s2;
-    batch.set_points(&[0.6, 0.0, 2.5, 1e3]).unwrap();
-    for _ in 0..400 {
+    batch.set_points(&[0.6, 0.0, 0.5, 1e3]).unwrap();
+    for _ in 0..1000 {
         batch.step(1);
         let speeds = batch.state(0).unwrap().rotor_speed_rad_s;
         assert!(speeds.iter().all(|speed| (0.0..=(most / k).sqrt() * 1.0001).contains(speed)), "{speeds:?}");

@@ -439,16 +439,31 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             }
         }
         for (number, (one, mixer)) in tuned.iter().zip(&mixers).enumerate() {
-            let (chunk, block, lane) = place(number);
-            let mut blocks = self.pool.chunk(chunk);
-            let block = &mut blocks[block];
-            let angle = euler(&block.state(lane));
-            let Some(autopilots) = &mut block.autopilots else { continue };
-            autopilots.fit(lane, &one.vehicle, &one.gains, mixer);
-            autopilots.rest(lane, angle);
+            self.fit(number, one, mixer);
         }
         self.autopilot = Some((flown, autopilot));
         Ok(())
+    }
+
+    /// Another inner loop for one vehicle; it starts anew from where the vehicle is.
+    ///
+    /// # Errors
+    /// As [`Self::engage`]; no such vehicle.
+    pub fn retune(&mut self, number: usize, tuned: &Tuned) -> Result<(), BatchError> {
+        self.check(number)?;
+        self.fit(number, tuned, &tuned.mixer(number)?);
+        Ok(())
+    }
+
+    fn fit(&mut self, number: usize, tuned: &Tuned, mixer: &Mixer) {
+        let (chunk, block, lane) = place(number);
+        let mut blocks = self.pool.chunk(chunk);
+        let block = &mut blocks[block];
+        let angle = euler(&block.state(lane));
+        if let Some(autopilots) = &mut block.autopilots {
+            autopilots.fit(lane, &tuned.vehicle, &tuned.gains, mixer);
+            autopilots.rest(lane, angle);
+        }
     }
 
     /// Tells the loops what to do from now on.

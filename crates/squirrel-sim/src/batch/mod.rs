@@ -175,13 +175,22 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// As [`Self::new`]; a wing that is a network, flat wings beside membranes, an effect that does not act in a batch, effects
     /// that leave no airframe.
     pub fn with(crafts: &[Craft], settings: Settings) -> Result<Self, BatchError> {
+        Self::with_room(crafts.len(), crafts, settings)
+    }
+
+    /// As [`Self::with`], of `count` vehicles, in turn those of `crafts`; there is room for any of these at any place.
+    ///
+    /// # Errors
+    /// As [`Self::with`].
+    pub fn with_room(count: usize, crafts: &[Craft], settings: Settings) -> Result<Self, BatchError> {
         let fitted = Fitted::all(crafts)?;
-        let mut drives = Vec::with_capacity(crafts.len());
+        let mut kinds = Vec::with_capacity(crafts.len());
         for (number, craft) in crafts.iter().enumerate() {
-            drives.push(Drive::new(&airframe(number, craft)?.0));
+            kinds.push(Drive::new(&airframe(number, craft)?.0));
         }
+        let drives = kinds.iter().copied().cycle().take(count).collect();
         let mut batch = Self::empty(drives, fitted, settings, whole)?;
-        for (number, craft) in crafts.iter().enumerate() {
+        for (number, craft) in crafts.iter().cycle().take(count).enumerate() {
             batch.refit(number, craft)?;
             batch.reset(number, &State::at_rest())?;
         }

@@ -38,6 +38,12 @@ pub struct WindParameters {
 }
 
 impl WindParameters {
+    /// Air that does not move.
+    pub fn calm() -> Self {
+        let gust = GustModel::GaussMarkov { time_constant_s: GUST_TIME_CONSTANT_S };
+        Self { mean_ned_m_s: [0.0; 3], gust_sigma_m_s: 0.0, gust }
+    }
+
     /// Gusts of an effect alone.
     pub fn of_gusts(spectrum: GustSpectrum<f64>) -> Self {
         let (gust_sigma_m_s, gust) = match spectrum {

@@ -1,0 +1,74 @@
+//! What the numbers of an action are. Each is limited to [-1, 1]; NaN counts as -1. The last one is for both wings, from -1
+//! folded to 1 spread.
+
+use crate::batch::SetPoint;
+use squirrel_core::math::{limit, lower};
+use squirrel_core::policy::{ACTION, Span};
+use squirrel_core::vehicle::Vehicle;
+
+/// Largest body rates about roll, pitch and yaw, rad/s.
+pub const RATE_MAX_RAD_S: [f32; 3] = [6.0, 6.0, 3.0];
+
+/// Level of actions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Thrust of each rotor, from none to all that it has, and wings.
+    Motor,
+    /// Rates of roll, pitch and yaw in [`RATE_MAX_RAD_S`], thrust in weights above hover, and wings.
+    BodyRate,
+    /// As [`Span::command`]: roll, pitch, thrust and wings; heading is held north. What [`squirrel_core::policy`] flies.
+    AttitudeWing,
+}
+
+/// What an action tells.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Told {
+    /// Set point or rotor commands.
+    pub(super) rotors: [f32; 4],
+    /// Both wings, 0..1.
+    pub(super) wing: f32,
+}
+
+impl Level {
+    /// Numbers of an action.
+    pub fn numbers(self) -> usize {
+        match self {
+            Self::Motor | Self::BodyRate => 5,
+            Self::AttitudeWing => ACTION,
+        }
+    }
+
+    /// What the autopilot is told; none where rotors are.
+    pub(super) fn set_point(self) -> Option<SetPoint> {
+        match self {
+            Self::Motor => None,
+            Self::BodyRate => Some(SetPoint::BodyRate),
+            Self::AttitudeWing => Some(SetPoint::Attitude),
+        }
+    }
+
+    /// * `action` - [`Self::numbers`] long
+    pub(super) fn told(self, action: &[f32], span: &Span, vehicle: &Vehicle<f32>) -> Told {
+        let number = |i: usize| limit(action.get(i).copied().unwrap_or(f32::NAN), -1.0, 1.0);
+        let wing = 0.5 * (1.0 + number(4));
+        match self {
+            Self::Motor => {
+                let most = vehicle.rotor_thrust_max_n();
+                let propulsion = &vehicle.parameters().propulsion;
+                let rotor = |i| propulsion.command_for_thrust(0.5 * (1.0 + number(i)) * most);
+                Told { rotors: [rotor(0), rotor(1), rotor(2), rotor(3)], wing }
+            }
+            Self::BodyRate => {
+                let [roll, pitch, yaw] = RATE_MAX_RAD_S;
+                let thrust = lower((1.0 + number(3)) * span.weight_n, span.thrust_max_n);
+                Told { rotors: [number(0) * roll, number(1) * pitch, number(2) * yaw, thrust], wing }
+            }
+            Self::AttitudeWing => {
+                let command = span.command(&[number(0), number(1), number(2), number(3)]);
+                let attitude = command.attitude;
+                let rotors = [attitude.roll_rad, attitude.pitch_rad, 0.0, attitude.thrust_n];
+                Told { rotors, wing: command.wing }
+            }
+        }
+    }
+}
