@@ -127,12 +127,16 @@ fn of<T: Paths + Float, const ROTORS: usize>(
     Ok(Box::new(Flock::<T, ROTORS>::new(&airframes, settings).map_err(value)?))
 }
 
+pub(crate) fn scheme(scheme: &str) -> PyResult<Scheme> {
+    match scheme {
+        "rk4" => Ok(Scheme::Rk4),
+        "euler" => Ok(Scheme::Euler),
+        other => Err(value(format!("scheme = {other}: must be rk4 or euler"))),
+    }
+}
+
 fn settings(dt_s: f64, scheme: &str, threads: Option<usize>) -> PyResult<Settings> {
-    let scheme = match scheme {
-        "rk4" => Scheme::Rk4,
-        "euler" => Scheme::Euler,
-        other => return Err(value(format!("scheme = {other}: must be rk4 or euler"))),
-    };
+    let scheme = self::scheme(scheme)?;
     let all = Settings::default();
     Ok(Settings { dt_s, scheme, threads: threads.unwrap_or(all.threads), path: Path::best() })
 }

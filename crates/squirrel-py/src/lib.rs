@@ -19,6 +19,7 @@ mod log;
 mod nn;
 mod stack;
 mod state;
+mod task;
 mod terms;
 mod vehicle;
 
@@ -72,6 +73,8 @@ mod _squirrel {
     use super::program;
     #[pymodule_export]
     use super::stack::Stack;
+    #[pymodule_export]
+    use super::task::Tasks;
     #[pymodule_export]
     use super::vehicle::Vehicle;
 

@@ -102,7 +102,7 @@ fn who_follows_is_paid_and_who_falls_is_lost() {
     let mut tasks = Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
     let good = fly(&mut tasks, 499, |observation| lean(observation).to_vec());
     let total: f32 = good.iter().flat_map(|seen| &seen.reward).sum::<f32>() / 50.0;
-    assert!(total > 7.0, "{total}");
+    assert!(total > 6.0, "{total}");
     let mut tasks = Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
     let bad = fly(&mut tasks, 200, |_| vec![0.0, 0.0, -1.0, -1.0]);
     let lost = (0..50).filter(|k| bad.iter().any(|seen| seen.terminated[*k])).count();
@@ -148,7 +148,7 @@ fn what_cannot_be_learned_is_named() {
     };
     assert_eq!(bad(&vehicles(), 0, 1.0), "num_envs = 0: must be at least 1");
     assert_eq!(bad(&vehicles(), 1, f64::NAN), "episode_s = NaN: must be at least 0.02 and finite");
-    assert!(bad(&[], 1, 1.0).contains("no vehicle"), "{}", bad(&[], 1, 1.0));
+    assert!(bad(&[], 1, 1.0).contains("none given"), "{}", bad(&[], 1, 1.0));
     let mut uncontrolled = vehicles();
     uncontrolled[1].control = None;
     assert!(bad(&uncontrolled, 1, 1.0).starts_with("vehicles[1]: [control] is missing"));

@@ -124,8 +124,17 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
         }
     }
 
-    /// Other air about a vehicle.
-    pub(super) fn put_air(&mut self, lane: usize, airs: Vec<Wind>) {
+    /// Other air about a vehicle. The first that moves finds the clock of gusts where it were if there had always been some.
+    pub(super) fn put_air(&mut self, lane: usize, airs: Vec<Wind>, dt_s: f64) {
+        if self.airs.iter().all(Vec::is_empty) && self.clock > 0 {
+            let per_step = gusts_per_step(dt_s);
+            let mut tick = (self.clock as f64 * per_step + 1e-6) as u64;
+            while tick > 0 && gust_due(tick, per_step) >= self.clock {
+                tick -= 1;
+            }
+            self.gust_clock = gust_due(tick, per_step);
+            self.gust_ticks = (self.gust_clock as f64 * per_step + 1e-6) as u64 + 1;
+        }
         self.airs[lane] = airs;
     }
 
@@ -158,10 +167,8 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
             }
         }
         if extra.airs.iter().any(|airs| !airs.is_empty()) {
-            // At the first step at or after each period of the flight code, as in a flight.
-            let per_step = dt_s * CONTROL_RATE_HZ as f64;
-            let due = |ticks: u64| ((ticks as f64 - 1e-6) / per_step).ceil().max(0.0) as u64;
-            if due(extra.gust_ticks) <= extra.clock {
+            let per_step = gusts_per_step(dt_s);
+            if gust_due(extra.gust_ticks, per_step) <= extra.clock {
                 let passed_s = (extra.clock - extra.gust_clock) as f64 * dt_s;
                 for lane in 0..BLOCK {
                     if !extra.airs[lane].is_empty() {
@@ -181,7 +188,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 extra.gust_ticks = (extra.clock as f64 * per_step + 1e-6) as u64 + 1;
                 extra.gust_clock = extra.clock;
             }
-            until = until.min(due(extra.gust_ticks).max(extra.clock + 1));
+            until = until.min(gust_due(extra.gust_ticks, per_step).max(extra.clock + 1));
         }
         let steps = until - extra.clock;
         extra.clock = until;
@@ -192,6 +199,16 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
     pub(super) fn deployment(&self, lane: usize) -> [S; 2] {
         self.extra.as_ref().map_or([real(0.0); 2], |extra| take(&extra.deployment.now, lane))
     }
+}
+
+/// Gusts move at the rate of the flight code.
+fn gusts_per_step(dt_s: f64) -> f64 {
+    dt_s * CONTROL_RATE_HZ as f64
+}
+
+/// The first step at or after a move of the gusts, as in a flight.
+fn gust_due(tick: u64, per_step: f64) -> u64 {
+    ((tick as f64 - 1e-6) / per_step).ceil().max(0.0) as u64
 }
 
 /// Velocity through the air, m/s.

@@ -485,7 +485,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         let Some(extra) = &mut block.extra else {
             return Err(BatchError::NotFitted { vehicle: number, what: "gust" });
         };
-        extra.put_air(lane, airs);
+        extra.put_air(lane, airs, self.settings.dt_s);
         if let Some(air) = extra.air(lane) {
             block.put_wind(lane, air);
         }
@@ -505,7 +505,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         let mut blocks = self.pool.chunk(chunk);
         blocks[block].put_wind(lane, wind);
         if let Some(extra) = &mut blocks[block].extra {
-            extra.put_air(lane, Vec::new());
+            extra.put_air(lane, Vec::new(), self.settings.dt_s);
         }
         Ok(())
     }

@@ -209,8 +209,8 @@ impl Tasks {
             set_points: vec![0.0; count * 4],
             wings: vec![0.0; count * 2],
         };
-        tasks.seed(seed);
         for number in 0..count {
+            tasks.seed(number, seed.wrapping_add(number as u64))?;
             tasks.begin(number)?;
         }
         Ok(tasks)
@@ -246,11 +246,14 @@ impl Tasks {
         Ok(obstacles.iter().map(|o| [o.north_m, o.east_m, course::TRUNK_RADIUS_M]).collect())
     }
 
-    /// New streams: environment k draws from `seed + k` from its next episode on.
-    pub fn seed(&mut self, seed: u64) {
-        for (k, episode) in self.episodes.iter_mut().enumerate() {
-            episode.rng = Pcg64Mcg::seed_from_u64(seed.wrapping_add(k as u64));
-        }
+    /// A new stream for one environment, from its next episode on.
+    ///
+    /// # Errors
+    /// No such environment.
+    pub fn seed(&mut self, number: usize, seed: u64) -> Result<(), TaskError> {
+        self.batch.state(number)?;
+        self.episodes[number].rng = Pcg64Mcg::seed_from_u64(seed);
+        Ok(())
     }
 
     /// Starts a new episode in every environment that `which` says, and hands out what all of them see.
@@ -350,8 +353,9 @@ impl Tasks {
         }
         let seed = course::draw(&mut episode.rng);
         if chosen.craft.effects.gust().is_some() {
-            let calm = WindParameters::calm();
-            self.batch.set_air(number, &chosen.craft, calm, seed)?;
+            self.batch.set_air(number, &chosen.craft, WindParameters::calm(), seed)?;
+        } else {
+            self.batch.set_wind(number, In::zero())?;
         }
         let sensors = self.settings.sensors.then(|| {
             let sensors = Sensors::new(chosen.sensors, &Effects::none(), seed);

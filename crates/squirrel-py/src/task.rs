@@ -1,0 +1,297 @@
+//! Environments: `squirrel_sim::task` as arrays. `squirrel.envs` makes Gymnasium's classes of it.
+
+use crate::arguments::{Array32, Numbers, rows};
+use crate::batch::scheme;
+use crate::error::value;
+use crate::log::table;
+use crate::vehicle::Vehicle;
+use numpy::{PyArray1, PyArray2};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError};
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
+use squirrel_core::policy::OBSERVATION;
+use squirrel_sim::batch::Settings;
+use squirrel_sim::task::course::Kind;
+use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks as Environments};
+use std::sync::{Mutex, MutexGuard};
+
+/// Environments to learn in, side by side: what the classes of `squirrel.envs` are made of.
+///
+/// An action is 20 ms of flight. An episode that has ended is followed by a new one in the next step, whose action is not looked at.
+/// Environment k draws from ``seed + k``: what happens in it does not depend on how many there are, nor on threads.
+///
+/// Parameters
+/// ----------
+/// task : str
+///     ``avoid``: follow a straight run of 4 to 8 m/s past trunks that are seen from 5 m; ``track``: follow a curve.
+/// vehicles : sequence of Vehicle
+///     Each episode takes one of them, with its wings, battery and effects: domain randomisation is a list of vehicles. All have four
+///     rotors and ``[control]``.
+/// num_envs : int
+///     How many environments.
+/// action : str
+///     ``motor``: thrust of each rotor from none to all, and wings. ``body_rate``: rates of roll, pitch, yaw (6, 6, 3 rad/s), thrust in
+///     weights above hover, and wings. ``attitude_wing``: roll and pitch in the vehicle's largest tilt, thrust in weights above
+///     hover, wings. All in [-1, 1]; wings are folded at -1 and spread at 1.
+/// seed : int
+///     Of everything random.
+/// episode_s : float
+///     Length of an episode.
+/// sensors : bool
+///     Observations come from the vehicle's sensors, with their rates, delays and noise, instead of the true state.
+/// scheme : str
+///     ``rk4`` or ``euler``, of steps of 2 ms.
+/// threads : int, optional
+///     That work, the caller among them; as many as there are cores if left out.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Names the argument, what was expected and what came.
+#[gen_stub_pyclass]
+#[pyclass(frozen, module = "squirrel._squirrel")]
+pub(crate) struct Tasks {
+    environments: Mutex<Environments>,
+    count: usize,
+    level: Level,
+}
+
+impl Tasks {
+    fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Environments>> {
+        let broken = |_| PyRuntimeError::new_err("a call on these environments has panicked; make new ones");
+        self.environments.lock_py_attached(py).map_err(broken)
+    }
+
+    fn check(&self, index: usize) -> PyResult<()> {
+        let all = self.count;
+        let missing = || PyIndexError::new_err(format!("environment {index}: there are {all}"));
+        if index < all { Ok(()) } else { Err(missing()) }
+    }
+}
+
+#[gen_stub_pymethods]
+#[pymethods]
+impl Tasks {
+    #[new]
+    #[pyo3(signature = (
+        *,
+        task,
+        vehicles,
+        num_envs = 1,
+        action = "attitude_wing",
+        seed = 0,
+        episode_s = 10.0,
+        sensors = false,
+        scheme = "rk4",
+        threads = None,
+    ))]
+    fn new(
+        task: &str,
+        vehicles: Vec<Bound<'_, Vehicle>>,
+        num_envs: usize,
+        action: &str,
+        seed: u64,
+        episode_s: f64,
+        sensors: bool,
+        scheme: &str,
+        threads: Option<usize>,
+    ) -> PyResult<Self> {
+        let kind = match task {
+            "avoid" => Kind::Avoid,
+            "track" => Kind::Track,
+            other => return Err(value(format!("task = {other}: must be avoid or track"))),
+        };
+        let level = match action {
+            "motor" => Level::Motor,
+            "body_rate" => Level::BodyRate,
+            "attitude_wing" => Level::AttitudeWing,
+            other => {
+                return Err(value(format!("action = {other}: must be motor, body_rate or attitude_wing")));
+            }
+        };
+        let all = Settings::default();
+        let settings = TaskSettings {
+            kind,
+            level,
+            episode_s,
+            sensors,
+            scheme: self::scheme(scheme)?,
+            threads: threads.unwrap_or(all.threads),
+            path: all.path,
+        };
+        let files: Vec<_> = vehicles.iter().map(|vehicle| vehicle.get().file.clone()).collect();
+        let environments = Environments::new(&files, num_envs, seed, settings).map_err(value)?;
+        Ok(Self { environments: Mutex::new(environments), count: num_envs, level })
+    }
+
+    /// New streams of random numbers, from the next episodes on.
+    ///
+    /// Parameters
+    /// ----------
+    /// index : int
+    ///     Which environment, from 0.
+    /// seed : int
+    ///     Its seed.
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     There is no such environment.
+    fn seed(&self, py: Python<'_>, index: usize, seed: u64) -> PyResult<()> {
+        self.check(index)?;
+        self.lock(py)?.seed(index, seed).map_err(value)
+    }
+
+    /// Start new episodes.
+    ///
+    /// Parameters
+    /// ----------
+    /// mask : sequence of bool, optional
+    ///     In which environments; in all if left out.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float32, shape (num_envs, 25)
+    ///     What all of them see.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A mask of another length.
+    #[pyo3(signature = (mask = None))]
+    #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[numpy.float32]", imports = ("numpy.typing", "numpy")))]
+    fn reset<'py>(&self, py: Python<'py>, mask: Option<Vec<bool>>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        if let Some(mask) = &mask
+            && mask.len() != self.count
+        {
+            return Err(value(format!("mask: {} values, must be {}", mask.len(), self.count)));
+        }
+        let mut seen = vec![0.0; self.count * OBSERVATION];
+        let which = |k: usize| mask.as_ref().is_none_or(|mask| mask[k]);
+        self.lock(py)?.reset(which, &mut seen).map_err(value)?;
+        table(py, seen, OBSERVATION)
+    }
+
+    /// Fly on for 20 ms.
+    ///
+    /// Parameters
+    /// ----------
+    /// actions : ndarray of float32, shape (num_envs, 4 or 5)
+    ///     Limited to [-1, 1].
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray
+    ///     Observations, float32, shape (num_envs, 25); rewards, float32; terminated and truncated, bool, shape (num_envs,).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Another dtype or shape, a number that is not finite.
+    #[gen_stub(override_return_type(
+        type_repr = "tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.bool_]]",
+        imports = ("numpy.typing", "numpy")
+    ))]
+    fn step<'py>(&self, py: Python<'py>, actions: Array32<'py>) -> PyResult<Stepped<'py>> {
+        let shape = [Some(self.count), Some(self.level.numbers())];
+        let actions = rows::<f32>("actions", &actions.0, &shape, Numbers::Finite)?;
+        let n = self.count;
+        let (mut observation, mut reward) = (vec![0.0; n * OBSERVATION], vec![0.0; n]);
+        let (mut terminated, mut truncated) = (vec![false; n], vec![false; n]);
+        let outcome = Outcome {
+            observation: &mut observation,
+            reward: &mut reward,
+            terminated: &mut terminated,
+            truncated: &mut truncated,
+        };
+        let actions = actions.numbers();
+        let mut guard = self.lock(py)?;
+        let environments: &mut Environments = &mut guard;
+        py.detach(|| environments.step(actions, outcome)).map_err(value)?;
+        drop(guard);
+        Ok((
+            table(py, observation, OBSERVATION)?,
+            PyArray1::from_vec(py, reward),
+            PyArray1::from_vec(py, terminated),
+            PyArray1::from_vec(py, truncated),
+        ))
+    }
+
+    /// Motions of all vehicles and what they should follow.
+    ///
+    /// Returns
+    /// -------
+    /// tuple of ndarray
+    ///     States, float32, shape (num_envs, 17), as `Batch.states` has them; positions that the references have, NED, m, shape
+    ///     (num_envs, 3).
+    #[gen_stub(override_return_type(
+        type_repr = "tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]",
+        imports = ("numpy.typing", "numpy")
+    ))]
+    fn states<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
+        let environments = self.lock(py)?;
+        let (mut states, mut references) = (Vec::new(), Vec::new());
+        for index in 0..self.count {
+            let (state, reference) = environments.state(index).map_err(value)?;
+            let q = &state.attitude;
+            states.extend(state.position.vector.iter());
+            states.extend(state.velocity.vector.iter());
+            states.extend([q.w, q.i, q.j, q.k]);
+            states.extend(state.omega.vector.iter());
+            states.extend(&state.rotor_speed_rad_s[..4]);
+            references.extend(reference.position.vector.iter());
+        }
+        Ok((table(py, states, 17)?, table(py, references, 3)?))
+    }
+
+    /// Trunks of one environment.
+    ///
+    /// Parameters
+    /// ----------
+    /// index : int
+    ///     Which, from 0.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of float32, shape (n, 3)
+    ///     North, east, radius, m.
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     There is no such environment.
+    #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[numpy.float32]", imports = ("numpy.typing", "numpy")))]
+    fn obstacles<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        self.check(index)?;
+        let obstacles = self.lock(py)?.obstacles(index).map_err(value)?;
+        table(py, obstacles.concat(), 3)
+    }
+
+    /// Numbers of an observation.
+    #[getter]
+    fn observation_numbers(&self) -> usize {
+        OBSERVATION
+    }
+
+    /// Numbers of an action.
+    #[getter]
+    fn action_numbers(&self) -> usize {
+        self.level.numbers()
+    }
+
+    fn __len__(&self) -> usize {
+        self.count
+    }
+}
+
+/// Observations, rewards, terminated, truncated.
+type Stepped<'py> = (
+    Bound<'py, PyArray2<f32>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<bool>>,
+    Bound<'py, PyArray1<bool>>,
+);
