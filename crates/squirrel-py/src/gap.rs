@@ -76,7 +76,8 @@ fn diagnose(
     out: Option<&Path>,
     stop: &Stop,
 ) -> PyResult<(squirrel_gap::Verdict, Option<VehicleFile>)> {
-    let mut diagnosis = squirrel_gap::diagnose(vehicle, flights, held_out, &|_| stop.check()).map_err(value)?;
+    let mut diagnosis =
+        squirrel_gap::diagnose(vehicle, flights, held_out, &|_| stop.check()).map_err(value)?;
     let names = |logs: &Logs| logs.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     let is_file = matches!(diagnosis.verdict.verdict, Kind::Named | Kind::NamedFormDiffers | Kind::Ambiguous)
         && !diagnosis.verdict.effects.is_empty();

@@ -110,9 +110,9 @@ impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
     }
     fn set_air(&mut self, number: usize, craft: &Craft, air: WindParameters, seed: u64) -> PyResult<()> {
         Self::set_air(self, number, craft, air, seed).map_err(|error| match error {
-            BatchError::NotFitted { .. } => value(
-                "gust_sigma_m_s: the base model has no gusts; set_wind between steps moves its air",
-            ),
+            BatchError::NotFitted { .. } => {
+                value("gust_sigma_m_s: the base model has no gusts; set_wind between steps moves its air")
+            }
             error => value(error),
         })
     }
