@@ -5,7 +5,7 @@
 mod support;
 
 use squirrel_core::stack::StackState;
-use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Reader, Record, Wire, Writer, hash};
+use squirrel_core::stack::wire::{HASH_START, Header, Reader, Record, Wire, hash, written};
 use std::fs;
 use support::{Folder, json};
 
@@ -30,7 +30,6 @@ fn the_file_plays_as_a_target_would_play_it() {
     let header = Header::take(&mut reader).unwrap();
     assert_eq!(header.sequences, 2);
     let (mut flight, mut frames, mut outputs) = (None, 0, 0);
-    let mut buffer = [0; RECORD_MAX];
     while !reader.is_empty() {
         u16::take(&mut reader).unwrap();
         match Record::take(&mut reader).unwrap() {
@@ -40,9 +39,7 @@ fn the_file_plays_as_a_target_would_play_it() {
             }
             Record::Frame(frame, expected) => {
                 let (stack, state) = flight.as_mut().unwrap();
-                let mut writer = Writer::new(&mut buffer);
-                stack.step(state, &frame).put(&mut writer);
-                outputs = hash(outputs, writer.bytes().unwrap());
+                outputs = written(&stack.step(state, &frame), |bytes| hash(outputs, bytes)).unwrap();
                 assert_eq!(outputs, expected, "step {frames}");
                 frames += 1;
             }

@@ -25,6 +25,7 @@ pub mod effects;
 pub mod frames;
 pub mod guidance;
 pub mod math;
+pub mod policy;
 pub mod rnn;
 pub mod stack;
 pub mod vehicle;

@@ -1,7 +1,7 @@
 //! What a board sends down its serial line becomes the flight log of the same flight.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use squirrel_core::stack::wire::{HASH_START, RECORD_MAX, Record, Wire, Writer, hash};
+use squirrel_core::stack::wire::{HASH_START, Record, Wire, hash, written};
 use squirrel_core::stack::{Stack, StackState};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup, frames};
@@ -12,10 +12,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::PathBuf;
 
 fn wire(value: &impl Wire) -> Vec<u8> {
-    let mut buffer = [0; RECORD_MAX];
-    let mut writer = Writer::new(&mut buffer);
-    value.put(&mut writer);
-    writer.bytes().unwrap().to_vec()
+    written(value, <[u8]>::to_vec).unwrap()
 }
 
 /// A flight, and each of its records as a board would send it: the setup first.

@@ -4,7 +4,7 @@ use crate::arming::State;
 use crate::outputs::{ROTORS, dshot_value, servo_pulses_us};
 use crate::sensors::Sensors;
 use squirrel_core::stack::failsafe::FailsafeMode;
-use squirrel_core::stack::wire::{HASH_START, RECORD_MAX, Record, Wire, Writer, hash};
+use squirrel_core::stack::wire::{HASH_START, Record, hash, written};
 use squirrel_core::stack::{Stack, StackState};
 
 /// What the motor controllers and servos are told.
@@ -85,14 +85,6 @@ impl Flight {
     }
 }
 
-/// What a function makes of a value's bytes; `None` where they do not fit a record.
-fn written<T>(value: &impl Wire, then: impl FnOnce(&[u8]) -> T) -> Option<T> {
-    let mut buffer = [0; RECORD_MAX];
-    let mut writer = Writer::new(&mut buffer);
-    value.put(&mut writer);
-    writer.bytes().map(then)
-}
-
 fn send(record: &Record, log: &mut impl FnMut(&[u8])) {
     // Every record fits: RECORD_MAX says so, and a test.
     let _ = written(record, |bytes| log(bytes));
@@ -104,7 +96,7 @@ mod tests {
     use crate::log::{LINE_MAX, framed};
     use crate::sensors::tests::{fix, rest};
     use crate::setup::{self, tests::SETUP};
-    use squirrel_core::stack::wire::Reader;
+    use squirrel_core::stack::wire::{Reader, Wire};
 
     /// A board on the bench: sensors at rest, each at its rate, until `silent_from_us`.
     struct Bench {

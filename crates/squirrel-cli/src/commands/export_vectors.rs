@@ -7,7 +7,7 @@
 use super::log_files;
 use crate::output::{self, Table, talk};
 use serde::Serialize;
-use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Record, Wire, Writer, hash};
+use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Record, Wire, hash, written};
 use squirrel_core::stack::{SensorFrame, Stack, StackState};
 use squirrel_sim::faults::Fault;
 use squirrel_sim::flight;
@@ -112,10 +112,7 @@ impl ExportVectors {
 
 /// What a value is on the wire.
 pub(crate) fn wire(value: &impl Wire) -> Result<Vec<u8>, String> {
-    let mut buffer = [0; RECORD_MAX];
-    let mut writer = Writer::new(&mut buffer);
-    value.put(&mut writer);
-    writer.bytes().map(<[u8]>::to_vec).ok_or_else(|| format!("a record is longer than {RECORD_MAX} bytes"))
+    written(value, <[u8]>::to_vec).ok_or_else(|| format!("a record is longer than {RECORD_MAX} bytes"))
 }
 
 /// A record behind its length.

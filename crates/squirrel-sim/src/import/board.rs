@@ -8,7 +8,7 @@ use super::ImportError;
 use crate::flight::{FORMAT, Inputs, record_output};
 use crate::log::FlightLog;
 use serde::Serialize;
-use squirrel_core::stack::wire::{HASH_START, RECORD_MAX, Reader, Record, Wire, Writer, hash};
+use squirrel_core::stack::wire::{HASH_START, Reader, Record, Wire, hash, written};
 use squirrel_core::stack::{Stack, StackState};
 use std::path::Path;
 
@@ -69,10 +69,7 @@ pub fn import_board(path: &Path) -> Result<(FlightLog, BoardReport), ImportError
         inputs.record(&mut log, t, frame);
         if proved {
             let output = flight.stack.step(&mut state, frame);
-            let mut buffer = [0; RECORD_MAX];
-            let mut writer = Writer::new(&mut buffer);
-            output.put(&mut writer);
-            outputs = writer.bytes().map_or(outputs, |bytes| hash(outputs, bytes));
+            outputs = written(&output, |bytes| hash(outputs, bytes)).unwrap_or(outputs);
             proved = outputs == *expected;
             if proved {
                 record_output(&mut log, t, t, &output, rotors, None);

@@ -8,7 +8,9 @@
 
 use core::fmt::Write;
 use cortex_m_rt::entry;
-use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Reader, Record, SETUP, Wire, Writer, hash};
+use squirrel_core::stack::wire::{
+    HASH_START, Header, RECORD_MAX, Reader, Record, SETUP, Wire, hash, written,
+};
 use squirrel_core::stack::{SensorFrame, Stack, StackOutput, StackState};
 use squirrel_m7::host::{File, argument, exit};
 use squirrel_m7::instructions::{Counter, Counts};
@@ -49,10 +51,7 @@ impl Sequence {
         let (output, count) = counter.of(|| one_step(&self.stack, &mut self.state, frame));
         let counts = if output.outer.is_some() { &mut self.outer } else { &mut self.inner };
         counts.add(count);
-        let mut buffer = [0; RECORD_MAX];
-        let mut writer = Writer::new(&mut buffer);
-        output.put(&mut writer);
-        self.hash = hash(self.hash, writer.bytes()?);
+        self.hash = written(&output, |bytes| hash(self.hash, bytes))?;
         if self.hash != expected && self.differs_at.is_none() {
             self.differs_at = Some(self.steps);
         }

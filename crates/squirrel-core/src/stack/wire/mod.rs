@@ -82,6 +82,14 @@ pub fn hash(before: u64, bytes: &[u8]) -> u64 {
     bytes.iter().fold(before, |h, byte| (h ^ u64::from(*byte)).wrapping_mul(0x0000_0100_0000_01B3))
 }
 
+/// What a function makes of a value's bytes; `None` where they do not fit a record.
+pub fn written<T>(value: &impl Wire, then: impl FnOnce(&[u8]) -> T) -> Option<T> {
+    let mut buffer = [0; RECORD_MAX];
+    let mut writer = Writer::new(&mut buffer);
+    value.put(&mut writer);
+    writer.bytes().map(then)
+}
+
 /// The hash of no bytes.
 pub const HASH_START: u64 = 0xCBF2_9CE4_8422_2325;
 
