@@ -1,6 +1,7 @@
 //! The gap workflow: its steps on logs in memory. `squirrel/gap.py` makes dataclasses of what comes back.
 
 use crate::error::value;
+use crate::interrupt::{Stop, interruptible};
 use crate::json;
 use crate::log::FlightLog;
 use crate::vehicle::{Vehicle, write_file};
@@ -37,8 +38,8 @@ pub(crate) fn gap_find<'py>(
     vehicle: &Bound<'py, Vehicle>,
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'py, PyDict>,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let (vehicle, flights) = (&vehicle.get().file, logs("flights", flights)?);
-    let finding = py.detach(|| squirrel_gap::find(vehicle, &flights)).map_err(value)?;
+    let (vehicle, flights) = (vehicle.get().file.clone(), logs("flights", flights)?);
+    let finding = interruptible(py, move |_| squirrel_gap::find(&vehicle, &flights))?.map_err(value)?;
     json(py, &finding)
 }
 
@@ -57,10 +58,11 @@ pub(crate) fn gap_diagnose<'py>(
     fly_again: bool,
     out: Option<PathBuf>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<Vehicle>)> {
-    let vehicle = &vehicle.get().file;
+    let vehicle = vehicle.get().file.clone();
     let (flights, held_out) = (logs("flights", flights)?, logs("held_out", held_out)?);
-    let (verdict, patched) =
-        py.detach(|| diagnose(vehicle, &flights, &held_out, fly_again, out.as_deref()))?;
+    let (verdict, patched) = interruptible(py, move |stop| {
+        diagnose(&vehicle, &flights, &held_out, fly_again, out.as_deref(), stop)
+    })??;
     Ok((json(py, &verdict)?, patched.map(|file| Vehicle { file })))
 }
 
@@ -72,8 +74,10 @@ fn diagnose(
     held_out: &Logs,
     fly_again: bool,
     out: Option<&Path>,
+    stop: &Stop,
 ) -> PyResult<(squirrel_gap::Verdict, Option<VehicleFile>)> {
-    let mut diagnosis = squirrel_gap::diagnose(vehicle, flights, held_out, &|_| {}).map_err(value)?;
+    let mut diagnosis =
+        squirrel_gap::diagnose(vehicle, flights, held_out, &|_| stop.check()).map_err(value)?;
     let names = |logs: &Logs| logs.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     let is_file = matches!(diagnosis.verdict.verdict, Kind::Named | Kind::NamedFormDiffers | Kind::Ambiguous)
         && !diagnosis.verdict.effects.is_empty();
@@ -87,10 +91,12 @@ fn diagnose(
         .transpose()
         .map_err(|e| crate::error::vehicle(&e))?;
     if fly_again && let Some(patched) = &patched {
+        stop.check();
         let (flown, notes) = squirrel_gap::closed_loop(vehicle, patched, held_out).map_err(value)?;
         diagnosis.verdict.closed_loop = flown;
         diagnosis.verdict.notes.extend(notes);
     }
+    stop.check();
     if let Some(folder) = out {
         let fail = |e: std::io::Error| crate::error::system(e.kind(), format!("{}: {e}", folder.display()));
         std::fs::create_dir_all(folder).map_err(fail)?;

@@ -15,6 +15,7 @@ mod dynamics;
 mod error;
 mod flight;
 mod gap;
+mod interrupt;
 mod log;
 mod nn;
 mod stack;
@@ -56,7 +57,9 @@ fn program(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 #[pymodule]
 mod _squirrel {
     #[pymodule_export]
-    use super::batch::{Batch, rollout};
+    use super::batch::Batch;
+    #[pymodule_export]
+    use super::batch::rollout::rollout;
     #[pymodule_export]
     use super::control::{Backstepping, Twcc};
     #[pymodule_export]

@@ -14,6 +14,9 @@ use std::path::PathBuf;
 
 /// A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their channels as arrays.
 ///
+/// An array is the caller's own, one copy of a column of the log. Files hold their samples row by row, compressed, so that there is
+/// nothing in them to look at in place.
+///
 /// Examples
 /// --------
 /// >>> import squirrel

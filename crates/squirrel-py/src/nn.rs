@@ -208,11 +208,12 @@ pub(crate) fn forward<'py>(
     table(py, forces.into_flattened(), 3)
 }
 
-/// Windows of all flights.
-fn windows_of(vehicle: &VehicleFile, flights: &Bound<'_, PyDict>) -> PyResult<Windows> {
+/// Windows of all flights; Ctrl-C ends it between two of them.
+fn windows_of(py: Python<'_>, vehicle: &VehicleFile, flights: &Bound<'_, PyDict>) -> PyResult<Windows> {
     let mut all = Windows::new();
     for (name, log) in logs("flights", flights)? {
-        let found = labels::windows(vehicle, &name, &log).map_err(|e| error::nn(&e))?;
+        py.check_signals()?;
+        let found = py.detach(|| labels::windows(vehicle, &name, &log)).map_err(|e| error::nn(&e))?;
         all.push(&name, &found).map_err(|e| error::nn(&e))?;
     }
     Ok(all)
@@ -246,7 +247,7 @@ pub(crate) fn windows<'py>(
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'py, PyDict>,
     vehicle: Option<&Bound<'py, Vehicle>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let windows = windows_of(&or_squirrel(vehicle), flights)?;
+    let windows = windows_of(py, &or_squirrel(vehicle), flights)?;
     let all = windows.all();
     let array = |numbers: Vec<f32>, shape: &[usize]| -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         PyArray1::from_vec(py, numbers).reshape(shape)
@@ -317,7 +318,7 @@ pub(crate) fn train(
     let vehicle = or_squirrel(vehicle);
     let validation = validation.unwrap_or_default();
     let held_out: Vec<&str> = validation.iter().map(String::as_str).collect();
-    let split = windows_of(&vehicle, flights)?.split(&held_out);
+    let split = windows_of(py, &vehicle, flights)?.split(&held_out);
     let (training, validation) = split.map_err(|e| value(format!("validation: {e}")))?;
     let settings = Settings { epochs, batch, rate, clip, patience, seed };
     let area_m2 = labels::plate_area_m2(&vehicle);

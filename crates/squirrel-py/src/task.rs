@@ -1,7 +1,7 @@
 //! Environments: `squirrel_sim::task` as arrays. `squirrel.envs` makes Gymnasium's classes of it.
 
 use crate::arguments::{Array32, Numbers, rows};
-use crate::batch::scheme;
+use crate::batch::settings;
 use crate::error::value;
 use crate::log::table;
 use crate::vehicle::Vehicle;
@@ -44,6 +44,8 @@ use std::sync::{Mutex, MutexGuard};
 ///     ``rk4`` or ``euler``, of steps of 2 ms.
 /// threads : int, optional
 ///     That work, the caller among them; as many as there are cores if left out.
+/// registers : str, optional
+///     As in `Batch`.
 ///
 /// Raises
 /// ------
@@ -85,6 +87,7 @@ impl Tasks {
         sensors = false,
         scheme = "rk4",
         threads = None,
+        registers = None,
     ))]
     fn new(
         task: &str,
@@ -96,6 +99,7 @@ impl Tasks {
         sensors: bool,
         scheme: &str,
         threads: Option<usize>,
+        registers: Option<&str>,
     ) -> PyResult<Self> {
         let kind = match task {
             "avoid" => Kind::Avoid,
@@ -110,16 +114,9 @@ impl Tasks {
                 return Err(value(format!("action = {other}: must be motor, body_rate or attitude_wing")));
             }
         };
-        let all = Settings::default();
-        let settings = TaskSettings {
-            kind,
-            level,
-            episode_s,
-            sensors,
-            scheme: self::scheme(scheme)?,
-            threads: threads.unwrap_or(all.threads),
-            path: all.path,
-        };
+        // The length of a step is the task's.
+        let Settings { scheme, threads, path, .. } = settings(2e-3, scheme, threads, registers)?;
+        let settings = TaskSettings { kind, level, episode_s, sensors, scheme, threads, path };
         let files: Vec<_> = vehicles.iter().map(|vehicle| vehicle.get().file.clone()).collect();
         let environments = Environments::new(&files, num_envs, seed, settings).map_err(value)?;
         Ok(Self { environments: Mutex::new(environments), count: num_envs, level })

@@ -1,4 +1,4 @@
-"""Batches and the base model: bits, threads, refusals."""
+"""Batches of the base model, and what all batches have: bits, threads, refusals. `test_batch_whole.py` has the rest."""
 
 import threading
 from collections.abc import Callable
@@ -12,7 +12,7 @@ import squirrel
 
 def flown(n: int, dtype: str, steps: list[int], threads: int = 1) -> np.ndarray:
     state, command = thrown(n, dtype)
-    batch = squirrel.Batch(vehicles=[squirrel.Vehicle.bundled("squirrel")] * n, dtype=dtype, threads=threads)
+    batch = squirrel.Batch(vehicles=[squirrel.Vehicle.bundled("squirrel")] * n, whole=False, dtype=dtype, threads=threads)
     batch.reset(state)
     batch.command(command)
     batch.set_wind(state[:, :3])
@@ -205,7 +205,7 @@ def test_two_threads_may_call_at_once(vehicle: squirrel.Vehicle) -> None:
 
 
 def test_other_threads_run_while_a_batch_steps(vehicle: squirrel.Vehicle) -> None:
-    batch = squirrel.Batch(vehicles=[vehicle] * 1000, threads=1)
+    batch = squirrel.Batch(vehicles=[vehicle] * 1000, whole=False, threads=1)
     worker = threading.Thread(target=batch.step, args=[100_000])
     worker.start()
     turns = 0

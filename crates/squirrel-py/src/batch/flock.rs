@@ -1,0 +1,200 @@
+//! A batch of any scalar and any number of rotors behind one trait, and how vehicles become one.
+
+use crate::arguments::{Float, Numbers, rows};
+use crate::error::value;
+use crate::log::table;
+use crate::state::{check_attitudes, state};
+use crate::vehicle::Vehicle;
+use nalgebra::{Vector3, convert};
+use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use squirrel_core::effects::GUST_TIME_CONSTANT_S;
+use squirrel_core::frames::In;
+use squirrel_core::vehicle::Vehicle as Airframe;
+use squirrel_sim::batch::simd::Paths;
+use squirrel_sim::batch::{BODY_NUMBERS, Batch, BatchError, Craft, Settings};
+use squirrel_sim::plant::{GustModel, WindParameters, WingPlant};
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// A batch of any scalar and any number of rotors.
+pub(super) trait AnyFlock: Send {
+    fn advance(&mut self, steps: usize);
+    fn is_32(&self) -> bool;
+    fn rotors(&self) -> usize;
+    fn command(&mut self, command: &Bound<'_, PyAny>) -> PyResult<()>;
+    fn command_wings(&mut self, command: &Bound<'_, PyAny>) -> PyResult<()>;
+    fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
+    fn states_into(&self, out: &Bound<'_, PyAny>) -> PyResult<()>;
+    fn deployments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
+    fn battery<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
+    fn reset(&mut self, states: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()>;
+    fn set_charge(&mut self, charge: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()>;
+    fn set_wind(&mut self, wind: &Bound<'_, PyAny>) -> PyResult<()>;
+    fn set_air(&mut self, number: usize, craft: &Craft, air: WindParameters, seed: u64) -> PyResult<()>;
+    fn replace(&mut self, number: usize, airframe: &Airframe<f64>) -> PyResult<()>;
+    fn refit(&mut self, number: usize, craft: &Craft) -> PyResult<()>;
+}
+
+impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
+    fn advance(&mut self, steps: usize) {
+        self.step(steps);
+    }
+    fn is_32(&self) -> bool {
+        size_of::<T>() == size_of::<f32>()
+    }
+    fn rotors(&self) -> usize {
+        ROTORS
+    }
+    fn command(&mut self, command: &Bound<'_, PyAny>) -> PyResult<()> {
+        let shape = [Some(self.len()), Some(ROTORS)];
+        let command = rows::<T>("command", command, &shape, Numbers::Finite)?;
+        Self::command(self, command.numbers()).map_err(value)
+    }
+    fn command_wings(&mut self, command: &Bound<'_, PyAny>) -> PyResult<()> {
+        let command = rows::<T>("command", command, &[Some(self.len()), Some(2)], Numbers::Finite)?;
+        Self::command_wings(self, command.numbers()).map_err(value)
+    }
+    fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let width = BODY_NUMBERS + ROTORS;
+        let mut numbers = vec![convert(0.0); self.len() * width];
+        self.write_states(&mut numbers).map_err(value)?;
+        Ok(table::<T>(py, numbers, width)?.into_any())
+    }
+    fn states_into(&self, out: &Bound<'_, PyAny>) -> PyResult<()> {
+        let shape = [Some(self.len()), Some(BODY_NUMBERS + ROTORS)];
+        rows::<T>("out", out, &shape, Numbers::Any)?;
+        let out = out.cast::<PyArrayDyn<T>>()?;
+        if !out.is_c_contiguous() {
+            return Err(value("out: must be contiguous, row after row"));
+        }
+        let mut out = out.try_readwrite().map_err(|error| value(format!("out: {error}")))?;
+        let numbers = out.as_slice_mut().map_err(|error| value(format!("out: {error}")))?;
+        self.write_states(numbers).map_err(value)
+    }
+    fn deployments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let rows = (0..self.len()).map(|number| self.deployment(number).map_err(value));
+        Ok(table(py, rows.collect::<PyResult<Vec<_>>>()?.into_flattened(), 2)?.into_any())
+    }
+    fn battery<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let none = [convert(f64::NAN); 3];
+        let rows = (0..self.len()).map(|number| Ok(self.battery(number).map_err(value)?.unwrap_or(none)));
+        Ok(table(py, rows.collect::<PyResult<Vec<_>>>()?.into_flattened(), 3)?.into_any())
+    }
+    fn reset(&mut self, states: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()> {
+        let width = BODY_NUMBERS + ROTORS;
+        let rows = rows::<T>("state", states, &[Some(vehicles.len()), Some(width)], Numbers::Finite)?;
+        check_attitudes("state", rows.numbers(), width, 6)?;
+        for (vehicle, row) in vehicles.iter().zip(rows.numbers().chunks_exact(width)) {
+            Self::reset(self, *vehicle, &state(row)).map_err(value)?;
+        }
+        Ok(())
+    }
+    fn set_charge(&mut self, charge: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()> {
+        let charges = rows::<T>("charge", charge, &[Some(vehicles.len())], Numbers::Finite)?;
+        let charges: Vec<f64> =
+            charges.numbers().iter().map(|x| nalgebra::try_convert(*x).unwrap_or(f64::NAN)).collect();
+        if let Some(at) = charges.iter().position(|charge| !(0.0..=1.0).contains(charge)) {
+            return Err(value(format!("charge[{at}] = {}: must be 0 to 1", charges[at])));
+        }
+        for (vehicle, charge) in vehicles.iter().zip(charges) {
+            Self::set_charge(self, *vehicle, charge).map_err(value)?;
+        }
+        Ok(())
+    }
+    fn set_wind(&mut self, wind: &Bound<'_, PyAny>) -> PyResult<()> {
+        let wind = rows::<T>("wind_ned_m_s", wind, &[Some(self.len()), Some(3)], Numbers::Finite)?;
+        for vehicle in 0..self.len() {
+            Self::set_wind(self, vehicle, In::new(Vector3::from(wind.row(vehicle)))).map_err(value)?;
+        }
+        Ok(())
+    }
+    fn set_air(&mut self, number: usize, craft: &Craft, air: WindParameters, seed: u64) -> PyResult<()> {
+        Self::set_air(self, number, craft, air, seed).map_err(|error| match error {
+            BatchError::NotFitted { .. } => {
+                value("gust_sigma_m_s: the base model has no gusts; set_wind between steps moves its air")
+            }
+            error => value(error),
+        })
+    }
+    fn replace(&mut self, number: usize, airframe: &Airframe<f64>) -> PyResult<()> {
+        Self::replace(self, number, &airframe.cast().map_err(value)?).map_err(value)
+    }
+    fn refit(&mut self, number: usize, craft: &Craft) -> PyResult<()> {
+        Self::refit(self, number, craft).map_err(refused)
+    }
+}
+
+/// A batch that cannot be, and what can.
+fn refused(error: BatchError) -> PyErr {
+    match error {
+        BatchError::Effect { .. } | BatchError::Network { .. } | BatchError::Wings { .. } => {
+            value(format!("{error}; whole=False flies the base model"))
+        }
+        error => value(error),
+    }
+}
+
+/// Steady air with gusts as a scenario has them where it does not say otherwise.
+pub(super) fn air(mean_ned_m_s: [f64; 3], gust_sigma_m_s: f64) -> WindParameters {
+    let gust = GustModel::GaussMarkov { time_constant_s: GUST_TIME_CONSTANT_S };
+    WindParameters { mean_ned_m_s, gust_sigma_m_s, gust }
+}
+
+/// Makes a batch.
+///
+/// * `whole` - with wings, batteries and effects; otherwise the airframes alone
+pub(super) fn flock(
+    vehicles: &[Bound<'_, Vehicle>],
+    settings: Settings,
+    in_32: bool,
+    whole: bool,
+) -> PyResult<Box<dyn AnyFlock>> {
+    let files: Vec<&VehicleFile> = vehicles.iter().map(|vehicle| &vehicle.get().file).collect();
+    let rotors = files.first().map_or(0, |first| first.vehicle.rotors().len());
+    if let Some(at) = files.iter().position(|one| one.vehicle.rotors().len() != rotors) {
+        let others = files[at].vehicle.rotors().len();
+        return Err(value(format!(
+            "vehicles[{at}]: {others} rotors, vehicles[0] has {rotors}; a batch holds one kind"
+        )));
+    }
+    match rotors {
+        // An empty list is the batch's to refuse.
+        0 | 4 if whole => {
+            let crafts: Vec<Craft> = files.into_iter().map(Craft::from).collect();
+            if in_32 { of_crafts::<f32>(&crafts, settings) } else { of_crafts::<f64>(&crafts, settings) }
+        }
+        0 | 4 => of_airframes::<4>(&files, settings, in_32),
+        6 | 8 if whole && files.iter().any(|file| !is_base(file)) => Err(value(format!(
+            "vehicles: {rotors} rotors; wings, batteries and effects fly in batches of 4 rotors only; whole=False flies the base model"
+        ))),
+        6 => of_airframes::<6>(&files, settings, in_32),
+        8 => of_airframes::<8>(&files, settings, in_32),
+        _ => Err(value(format!("vehicles: {rotors} rotors, a batch holds vehicles of 4, 6 or 8"))),
+    }
+}
+
+/// Whether the base model is all that a vehicle has.
+fn is_base(file: &VehicleFile) -> bool {
+    matches!(file.wing, WingPlant::None) && file.battery.is_none() && !file.effects.any()
+}
+
+fn of_crafts<T: Paths + Float>(crafts: &[Craft], settings: Settings) -> PyResult<Box<dyn AnyFlock>> {
+    Ok(Box::new(Batch::<T, 4>::with(crafts, settings).map_err(refused)?))
+}
+
+fn of_airframes<const ROTORS: usize>(
+    files: &[&VehicleFile],
+    settings: Settings,
+    in_32: bool,
+) -> PyResult<Box<dyn AnyFlock>> {
+    if in_32 { of::<f32, ROTORS>(files, settings) } else { of::<f64, ROTORS>(files, settings) }
+}
+
+fn of<T: Paths + Float, const ROTORS: usize>(
+    files: &[&VehicleFile],
+    settings: Settings,
+) -> PyResult<Box<dyn AnyFlock>> {
+    let airframes =
+        files.iter().map(|file| file.vehicle.cast::<T>().map_err(value)).collect::<PyResult<Vec<_>>>()?;
+    Ok(Box::new(Batch::<T, ROTORS>::new(&airframes, settings).map_err(value)?))
+}

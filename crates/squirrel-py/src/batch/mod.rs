@@ -1,0 +1,480 @@
+//! Many vehicles at once: `squirrel_sim::batch` behind one class for both scalars and all numbers of rotors.
+
+mod flock;
+pub(crate) mod rollout;
+
+use crate::arguments::{Array64, ArrayAny, Float, Indices, Numbers, rows};
+use crate::error::value;
+use crate::vehicle::Vehicle;
+use flock::{AnyFlock, air, flock};
+use pyo3::exceptions::{PyIndexError, PyRuntimeError};
+use pyo3::prelude::*;
+use pyo3::sync::MutexExt;
+use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
+use squirrel_sim::batch::simd::Path;
+use squirrel_sim::batch::{Craft, Scheme, Settings};
+use squirrel_sim::plant::WingPlant;
+use std::sync::{Mutex, MutexGuard};
+
+/// Vehicle steps between two looks at Ctrl-C: a hundredth of a second, or some tenths where everything is slow.
+const STEPS_A_LOOK: usize = 1_000_000;
+
+pub(crate) fn settings(
+    dt_s: f64,
+    scheme: &str,
+    threads: Option<usize>,
+    registers: Option<&str>,
+) -> PyResult<Settings> {
+    let scheme = match scheme {
+        "rk4" => Scheme::Rk4,
+        "euler" => Scheme::Euler,
+        other => return Err(value(format!("scheme = {other}: must be rk4 or euler"))),
+    };
+    let path = match registers {
+        None => Path::best(),
+        Some(name) => Path::available().into_iter().find(|path| path.name() == name).ok_or_else(|| {
+            let names: Vec<&str> = Path::available().into_iter().map(Path::name).collect();
+            value(format!("registers = {name}: this processor has {}", names.join(", ")))
+        })?,
+    };
+    let all = Settings::default();
+    Ok(Settings { dt_s, scheme, threads: threads.unwrap_or(all.threads), path })
+}
+
+/// Many vehicles at once, each with numbers of its own.
+///
+/// All have rigid body, rotors with lag, drag and wind; wings with their servos, batteries and effects fly where a vehicle has them,
+/// as they do in `simulate`, and what no vehicle of the batch has costs nothing. The base model alone, ``whole=False``, is about three
+/// times as fast as a vehicle with wings and battery.
+///
+/// Vehicles start at rest at the origin, level, rotors stopped, wings folded, batteries full. What a vehicle does depends on nothing
+/// but itself: the same bits in a batch of any size, at any place in it, on any number of threads and any registers, in one call or
+/// in many. Several threads may call at once; they wait for each other.
+///
+/// Parameters
+/// ----------
+/// vehicles : sequence of Vehicle
+///     ``[vehicle] * 1000`` for a thousand that are alike. All have 4, 6 or 8 rotors; wings, batteries and effects need 4. Refused
+///     are wings that are a network, flat wings beside membranes, and effects that act on sensors, which a batch lacks.
+/// whole : bool
+///     Whether wings, batteries and effects fly, or the base model alone: rigid body, rotors, drag, and wind as `set_wind` says.
+/// dt_s : float
+///     Step.
+/// scheme : str
+///     ``rk4``, or ``euler``: a quarter of the work, first order.
+/// dtype : str
+///     ``float32`` or ``float64``.
+/// threads : int, optional
+///     That work, the caller among them; as many as there are cores if left out.
+/// registers : str, optional
+///     ``avx512``, ``avx2``, ``portable`` or ``scalar``; the widest that the processor has if left out. For comparisons: they differ in
+///     speed alone.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Names the argument, what was expected and what came.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> import squirrel
+/// >>> vehicle = squirrel.Vehicle.bundled("squirrel")
+/// >>> batch = squirrel.Batch(vehicles=[vehicle] * 100)
+/// >>> batch.command(np.full((100, 4), 0.8, np.float32))
+/// >>> batch.command_wings(np.ones((100, 2), np.float32))
+/// >>> batch.step(1000)
+/// >>> bool((batch.states()[:, 2] < 0).all()), batch.deployments()[0].tolist()
+/// (True, [1.0, 1.0])
+#[gen_stub_pyclass]
+#[pyclass(frozen, module = "squirrel._squirrel")]
+pub(crate) struct Batch {
+    fleet: Mutex<Fleet>,
+    vehicles: usize,
+    settings: Settings,
+    whole: bool,
+    /// What any vehicle had when the batch was made.
+    has_wings: bool,
+    has_battery: bool,
+}
+
+/// What the lock is for.
+struct Fleet {
+    flock: Box<dyn AnyFlock>,
+    /// Whose gusts `set_air` asks for.
+    vehicles: Vec<Py<Vehicle>>,
+}
+
+impl Batch {
+    fn make(
+        vehicles: Vec<Bound<'_, Vehicle>>,
+        settings: Settings,
+        in_32: bool,
+        whole: bool,
+    ) -> PyResult<Self> {
+        let mut flock = flock(&vehicles, settings, in_32, whole)?;
+        let any = |has: fn(&Vehicle) -> bool| whole && vehicles.iter().any(|vehicle| has(vehicle.get()));
+        let has_wings = any(|vehicle| !matches!(vehicle.file.wing, WingPlant::None));
+        let has_battery = any(|vehicle| vehicle.file.battery.is_some());
+        for (number, vehicle) in vehicles.iter().enumerate() {
+            let file = &vehicle.get().file;
+            if whole && file.effects.gust().is_some() {
+                flock.set_air(number, &Craft::from(file), air([0.0; 3], 0.0), number as u64)?;
+            }
+        }
+        let count = vehicles.len();
+        let vehicles = vehicles.into_iter().map(Bound::unbind).collect();
+        let fleet = Mutex::new(Fleet { flock, vehicles });
+        Ok(Self { fleet, vehicles: count, settings, whole, has_wings, has_battery })
+    }
+
+    fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Fleet>> {
+        let broken = |_| PyRuntimeError::new_err("a call on this batch has panicked; make a new one");
+        self.fleet.lock_py_attached(py).map_err(broken)
+    }
+
+    /// The vehicles that a call is about: those it names, or all.
+    ///
+    /// # Errors
+    /// One that is not there.
+    fn numbers(&self, vehicles: Option<Indices>) -> PyResult<Vec<usize>> {
+        let numbers = vehicles.map_or_else(|| (0..self.vehicles).collect(), |given| given.0);
+        numbers.iter().try_for_each(|vehicle| self.check(*vehicle))?;
+        Ok(numbers)
+    }
+
+    fn check(&self, vehicle: usize) -> PyResult<()> {
+        let all = self.vehicles;
+        let missing = || PyIndexError::new_err(format!("vehicle {vehicle}: the batch has {all}"));
+        if vehicle < all { Ok(()) } else { Err(missing()) }
+    }
+
+    /// Refuses a call about something that no vehicle has, which would do nothing.
+    fn needs(&self, is_there: bool, what: &str) -> PyResult<()> {
+        let why = if self.whole { "no vehicle of it has any" } else { "it was made with whole=False" };
+        if is_there { Ok(()) } else { Err(value(format!("the batch has no {what}: {why}"))) }
+    }
+}
+
+#[gen_stub_pymethods]
+#[pymethods]
+impl Batch {
+    #[new]
+    #[pyo3(signature = (*, vehicles, whole = true, dt_s = 1e-3, scheme = "rk4", dtype = "float32", threads = None, registers = None))]
+    fn new(
+        vehicles: Vec<Bound<'_, Vehicle>>,
+        whole: bool,
+        dt_s: f64,
+        scheme: &str,
+        dtype: &str,
+        threads: Option<usize>,
+        registers: Option<&str>,
+    ) -> PyResult<Self> {
+        let in_32 = match dtype {
+            "float32" => true,
+            "float64" => false,
+            other => return Err(value(format!("dtype = {other}: must be float32 or float64"))),
+        };
+        Self::make(vehicles, settings(dt_s, scheme, threads, registers)?, in_32, whole)
+    }
+
+    /// Tell the rotors what to do from now on.
+    ///
+    /// Parameters
+    /// ----------
+    /// command : ndarray of the batch's dtype, shape (n, rotors)
+    ///     In the unit that each vehicle declares; limited to its range.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Another dtype or shape, a number that is not finite.
+    fn command(&self, py: Python<'_>, command: ArrayAny<'_>) -> PyResult<()> {
+        self.lock(py)?.flock.command(&command.0)
+    }
+
+    /// Tell the wings what to do from now on.
+    ///
+    /// Parameters
+    /// ----------
+    /// command : ndarray of the batch's dtype, shape (n, 2)
+    ///     Left and right, 0 folded to 1 spread; limited. Without effect where a vehicle has no wings.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Another dtype or shape, a number that is not finite, a batch without wings.
+    fn command_wings(&self, py: Python<'_>, command: ArrayAny<'_>) -> PyResult<()> {
+        self.needs(self.has_wings, "wings")?;
+        self.lock(py)?.flock.command_wings(&command.0)
+    }
+
+    /// Fly on, commands held.
+    ///
+    /// A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it. Ctrl-C ends the call between two steps.
+    ///
+    /// Parameters
+    /// ----------
+    /// steps : int
+    ///     How many steps of `dt_s`.
+    #[pyo3(signature = (steps = 1))]
+    fn step(&self, py: Python<'_>, steps: usize) -> PyResult<()> {
+        let mut guard = self.lock(py)?;
+        let flock: &mut dyn AnyFlock = &mut *guard.flock;
+        let chunk = (STEPS_A_LOOK / self.vehicles).max(1);
+        let mut left = steps;
+        while left > chunk {
+            py.detach(|| flock.advance(chunk));
+            py.check_signals()?;
+            left -= chunk;
+        }
+        py.detach(|| flock.advance(left));
+        Ok(())
+    }
+
+    /// Motions of all vehicles.
+    ///
+    /// Parameters
+    /// ----------
+    /// out : ndarray of the batch's dtype, shape (n, 13 + rotors), optional
+    ///     To write into; contiguous. A new array if left out.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of the batch's dtype, shape (n, 13 + rotors)
+    ///     Position (NED, m), velocity (NED, m/s), attitude (body to NED, w x y z), angular rate (body, rad/s), rotor speeds (rad/s).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     `out` has another dtype, shape or order, or cannot be written to.
+    #[pyo3(signature = (out = None))]
+    #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
+    fn states<'py>(&self, py: Python<'py>, out: Option<ArrayAny<'py>>) -> PyResult<Bound<'py, PyAny>> {
+        let fleet = self.lock(py)?;
+        let Some(out) = out else { return fleet.flock.states(py) };
+        fleet.flock.states_into(&out.0)?;
+        Ok(out.0)
+    }
+
+    /// How far the wings of all vehicles are open.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of the batch's dtype, shape (n, 2)
+    ///     Left and right, 0 folded to 1 spread.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A batch without wings.
+    #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
+    fn deployments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.needs(self.has_wings, "wings")?;
+        self.lock(py)?.flock.deployments(py)
+    }
+
+    /// Batteries of all vehicles.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of the batch's dtype, shape (n, 3)
+    ///     Charge (0 to 1), terminal voltage (V), current (A). A vehicle without a battery stays at its reference voltage.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A batch without batteries.
+    #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
+    fn battery<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.needs(self.has_battery, "battery")?;
+        self.lock(py)?.flock.battery(py)
+    }
+
+    /// Put vehicles somewhere else: wings folded, batteries full. Their air stays and so does what their rotors are told; commands on
+    /// their way are lost.
+    ///
+    /// Parameters
+    /// ----------
+    /// state : ndarray of the batch's dtype, shape (n, 13 + rotors)
+    ///     As `states` gives them.
+    /// vehicles : iterable of int, optional
+    ///     Which; all in their order if left out.
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     There is no such vehicle.
+    /// ValueError
+    ///     Another dtype or shape, a number that is not finite, an attitude that is no rotation.
+    #[pyo3(signature = (state, *, vehicles = None))]
+    fn reset(&self, py: Python<'_>, state: ArrayAny<'_>, vehicles: Option<Indices>) -> PyResult<()> {
+        let vehicles = self.numbers(vehicles)?;
+        self.lock(py)?.flock.reset(&state.0, &vehicles)
+    }
+
+    /// Rest batteries at a charge.
+    ///
+    /// Parameters
+    /// ----------
+    /// charge : ndarray of the batch's dtype, shape (n,)
+    ///     0 to 1. Without effect where a vehicle has no battery.
+    /// vehicles : iterable of int, optional
+    ///     Which; all in their order if left out.
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     There is no such vehicle.
+    /// ValueError
+    ///     Another dtype or shape, a charge out of range, a batch without batteries.
+    #[pyo3(signature = (charge, *, vehicles = None))]
+    fn set_charge(&self, py: Python<'_>, charge: ArrayAny<'_>, vehicles: Option<Indices>) -> PyResult<()> {
+        self.needs(self.has_battery, "battery")?;
+        let vehicles = self.numbers(vehicles)?;
+        self.lock(py)?.flock.set_charge(&charge.0, &vehicles)
+    }
+
+    /// Velocity of the air about each vehicle from now on; gusts end, those of the effect ``gust`` too.
+    ///
+    /// Parameters
+    /// ----------
+    /// wind_ned_m_s : ndarray of the batch's dtype, shape (n, 3)
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Another dtype or shape, a number that is not finite.
+    fn set_wind(&self, py: Python<'_>, wind_ned_m_s: ArrayAny<'_>) -> PyResult<()> {
+        self.lock(py)?.flock.set_wind(&wind_ned_m_s.0)
+    }
+
+    /// Moving air about vehicles from now on, as a flight of `simulate` with the same seed has it.
+    ///
+    /// Gusts are a Gauss-Markov process of 1.5 s per axis that moves at 300 Hz. Those of the effect ``gust`` blow on top of them; where
+    /// nothing was set, with the number of the vehicle as seed.
+    ///
+    /// Parameters
+    /// ----------
+    /// wind_ned_m_s : ndarray of float64, shape (n, 3)
+    ///     Steady part.
+    /// gust_sigma_m_s : ndarray of float64, shape (n,), optional
+    ///     Standard deviation of the gusts per axis; 0 if left out.
+    /// seed : iterable of int, optional
+    ///     Of each vehicle's gusts; its number in the batch if left out.
+    /// vehicles : iterable of int, optional
+    ///     Which; all in their order if left out.
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     There is no such vehicle.
+    /// ValueError
+    ///     Another dtype or shape, a number that is not finite, a deviation below 0, a batch of the base model.
+    #[pyo3(signature = (wind_ned_m_s, *, gust_sigma_m_s = None, seed = None, vehicles = None))]
+    fn set_air(
+        &self,
+        py: Python<'_>,
+        wind_ned_m_s: Array64<'_>,
+        gust_sigma_m_s: Option<Array64<'_>>,
+        seed: Option<Indices>,
+        vehicles: Option<Indices>,
+    ) -> PyResult<()> {
+        let vehicles = self.numbers(vehicles)?;
+        let n = vehicles.len();
+        let wind = rows::<f64>("wind_ned_m_s", &wind_ned_m_s.0, &[Some(n), Some(3)], Numbers::Finite)?;
+        let name = "gust_sigma_m_s";
+        let sigma = gust_sigma_m_s.map(|sigma| rows::<f64>(name, &sigma.0, &[Some(n)], Numbers::Finite));
+        let sigma = sigma.transpose()?.map_or_else(|| vec![0.0; n], |sigma| sigma.numbers().to_vec());
+        if let Some(at) = sigma.iter().position(|sigma| *sigma < 0.0) {
+            return Err(value(format!("{name}[{at}] = {}: must be >= 0", sigma[at])));
+        }
+        let seeds = seed.map_or_else(|| vehicles.clone(), |given| given.0);
+        if seeds.len() != n {
+            return Err(value(format!("seed: expected {n}, got {}", seeds.len())));
+        }
+        let mut fleet = self.lock(py)?;
+        let Fleet { flock, vehicles: fitted } = &mut *fleet;
+        for (i, number) in vehicles.into_iter().enumerate() {
+            let craft = Craft::from(&fitted[number].get().file);
+            flock.set_air(number, &craft, air(wind.row(i), sigma[i]), seeds[i] as u64)?;
+        }
+        Ok(())
+    }
+
+    /// Another vehicle in the place of one, as for a domain that is drawn anew; motion, air, charge of the battery, and what rotors
+    /// and wings are told stay.
+    ///
+    /// Parameters
+    /// ----------
+    /// index : int
+    ///     Which, from 0.
+    /// vehicle : Vehicle
+    ///     With as many rotors, and no wings, battery or effect of a kind that no vehicle had when the batch was made.
+    ///
+    /// Raises
+    /// ------
+    /// IndexError
+    ///     There is no such vehicle.
+    /// ValueError
+    ///     Another number of rotors, rotors too quick for the step, something that the batch has no place for.
+    fn replace(&self, py: Python<'_>, index: usize, vehicle: &Bound<'_, Vehicle>) -> PyResult<()> {
+        self.check(index)?;
+        let file = &vehicle.get().file;
+        let mut fleet = self.lock(py)?;
+        let (has, must) = (file.vehicle.rotors().len(), fleet.flock.rotors());
+        if has != must {
+            return Err(value(format!("vehicle: {has} rotors, this batch holds vehicles of {must}")));
+        }
+        if self.whole {
+            fleet.flock.refit(index, &Craft::from(file))?;
+        } else {
+            fleet.flock.replace(index, &file.vehicle)?;
+        }
+        fleet.vehicles[index] = vehicle.clone().unbind();
+        Ok(())
+    }
+
+    /// Step, s.
+    #[getter]
+    fn dt_s(&self) -> f64 {
+        self.settings.dt_s
+    }
+
+    /// Threads that work, the caller among them.
+    #[getter]
+    fn threads(&self) -> usize {
+        self.settings.threads
+    }
+
+    /// What the processor works with: ``avx512``, ``avx2``, ``portable`` or ``scalar``.
+    #[getter]
+    fn registers(&self) -> &'static str {
+        self.settings.path.name()
+    }
+
+    /// ``float32`` or ``float64``.
+    #[getter]
+    fn dtype(&self, py: Python<'_>) -> PyResult<&'static str> {
+        Ok(if self.lock(py)?.flock.is_32() { f32::NAME } else { f64::NAME })
+    }
+
+    fn __len__(&self) -> usize {
+        self.vehicles
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let (scalar, n) = (self.dtype(py)?, self.vehicles);
+        let with = match (self.has_wings, self.has_battery) {
+            (true, true) => ", wings and battery",
+            (true, false) => ", wings",
+            (false, true) => ", battery",
+            (false, false) => "",
+        };
+        let scheme = match self.settings.scheme {
+            Scheme::Rk4 => "rk4",
+            Scheme::Euler => "euler",
+        };
+        Ok(format!("<Batch of {n}{with}: {scheme} at {} s, {scalar}>", self.settings.dt_s))
+    }
+}
