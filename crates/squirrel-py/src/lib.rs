@@ -17,6 +17,7 @@ mod flight;
 mod gap;
 mod log;
 mod nn;
+mod policy;
 mod stack;
 mod state;
 mod terms;
@@ -68,6 +69,8 @@ mod _squirrel {
     use super::log::FlightLog;
     #[pymodule_export]
     use super::nn::{Model, forward, load, train, windows};
+    #[pymodule_export]
+    use super::policy::Policy;
     #[pymodule_export]
     use super::program;
     #[pymodule_export]

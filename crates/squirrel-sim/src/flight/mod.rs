@@ -74,9 +74,18 @@ pub trait FlightComputer {
     fn step(&mut self, frame: &SensorFrame) -> Result<(StackOutput, u32), FlightError>;
 }
 
-struct InProcess {
+/// The flight code in this process.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InProcess {
     stack: Stack,
     state: StackState,
+}
+
+impl InProcess {
+    /// Before the first step.
+    pub fn new(stack: Stack) -> Self {
+        Self { stack, state: StackState::default() }
+    }
 }
 
 impl FlightComputer for InProcess {
@@ -134,8 +143,7 @@ impl Setup {
     /// A setup that cannot be used, or a plant that left the finite numbers.
     pub fn fly(&self, record: bool, progress: impl FnMut(f64)) -> Result<Flight, FlightError> {
         self.scenario.check().map_err(FlightError)?;
-        let mut here = InProcess { stack: self.stack()?, state: StackState::default() };
-        self.fly_on(&mut here, None, record, progress)
+        self.fly_on(&mut InProcess::new(self.stack()?), None, record, progress)
     }
 
     /// As [`Setup::fly`], with the flight code on `computer`, which has this setup's [`Setup::stack`].
