@@ -4,6 +4,9 @@
 
 mod support;
 
+use squirrel_core::policy::Policy;
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::weights::PolicyWeights;
 use std::fs;
 use support::{Folder, SQUIRREL, json};
 
@@ -84,6 +87,39 @@ fn fly_writes_log_report_and_figures() {
     let figures = json(&folder, "f.json");
     assert_eq!(figures["arm"], "twcc_flat");
     assert!(figures["rmse_m"].as_f64().unwrap() > 1.0 && figures["thrust_to_weight"] == 1.3);
+}
+
+#[test]
+fn a_policy_from_its_file_flies_and_its_flight_replays_without_it() {
+    let folder = Folder::new("policy");
+    // Level at hover thrust, wings half open: weights of zero.
+    PolicyWeights::save(&Policy::filled(0.0), &folder.0.join("p.safetensors")).unwrap();
+    let table = folder.succeeds(&[
+        "fly",
+        "--scenario",
+        "hover",
+        "--policy",
+        "p.safetensors",
+        "--out",
+        "f.mcap",
+        "--report",
+        "r.html",
+        "--json",
+        "f.json",
+    ]);
+    assert!(table.contains("squirrel flies hover with policy p.safetensors over pc"), "{table}");
+    let figures = json(&folder, "f.json");
+    let hash = figures["policy"].as_str().unwrap();
+    assert_eq!((figures["arm"].as_str(), hash.len()), (Some("pc"), 16));
+    assert!(fs::read_to_string(folder.0.join("r.html")).unwrap().contains("policy p.safetensors"));
+    fs::remove_file(folder.0.join("p.safetensors")).unwrap();
+    assert!(folder.succeeds(&["replay", "f.mcap"]).contains("every bit identical"));
+    let log = FlightLog::read(&folder.0.join("f.mcap")).unwrap();
+    assert_eq!(log.metadata["policy_hash"], hash);
+    let arguments = ["fly", "--policy", "p.safetensors", "--out", "g.mcap"];
+    folder.fails(&arguments, &["p.safetensors: "]);
+    fs::write(folder.0.join("p.safetensors"), "nonsense").unwrap();
+    folder.fails(&arguments, &["p.safetensors: not a whole safetensors file"]);
 }
 
 #[test]

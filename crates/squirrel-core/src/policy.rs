@@ -20,6 +20,7 @@ use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::sensing::{Obstacle, Sensing};
 use crate::math::{limit, lower};
 use crate::rnn::mlp::Mlp;
+use crate::vehicle::{Limits, Vehicle};
 use nalgebra::{Vector2, Vector3};
 
 /// Numbers that a policy sees.
@@ -100,6 +101,12 @@ pub struct Span {
 }
 
 impl Span {
+    /// Of a vehicle.
+    pub fn of(vehicle: &Vehicle<f32>) -> Self {
+        let Limits { tilt_max_rad, thrust_max_n, .. } = vehicle.parameters().limits;
+        Self { weight_n: vehicle.weight_n(), thrust_max_n, tilt_max_rad }
+    }
+
     /// What an action means: roll and pitch as shares of the largest tilt, thrust in weights above hover, wings from -1 folded
     /// to 1 spread. Each number is limited to [-1, 1]; what is no number counts as -1.
     pub fn command(&self, action: &[f32; ACTION]) -> PilotCommand {

@@ -2,12 +2,11 @@
 
 use crate::adam::{Adam, Decay};
 use crate::error::NnError;
-use crate::tensors;
 use crate::train::{Epoch, Settings, State, Trainer};
 use crate::trained::{Card, hash_text, named, take_named};
 use crate::windows::Windows;
 use serde::{Deserialize, Serialize};
-use squirrel_sim::weights::{Contents, WeightsError};
+use squirrel_sim::weights::{self, Contents, WeightsError};
 use std::path::Path;
 
 const PARAMETERS: &str = "last.";
@@ -44,7 +43,7 @@ impl Trainer {
         let parts = [(PARAMETERS, parameters), (BEST, best), (MEAN, &adam.mean), (SQUARE, &adam.square)];
         let tensors: Vec<_> =
             parts.into_iter().flat_map(|(prefix, numbers)| named(self.card.model, prefix, numbers)).collect();
-        tensors::write(path, &record, &tensors)
+        Ok(weights::write(path, &record, &tensors)?)
     }
 
     /// Goes on where [`Trainer::save`] was called, on the same windows.

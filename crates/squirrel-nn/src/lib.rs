@@ -43,7 +43,6 @@ mod heads;
 pub mod kernel;
 pub mod labels;
 pub mod model;
-mod tensors;
 pub mod train;
 pub mod trained;
 pub mod windows;

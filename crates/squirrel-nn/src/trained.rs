@@ -4,11 +4,10 @@ use crate::error::NnError;
 use crate::heads::Sample;
 use crate::kernel::simd;
 use crate::model::{Model, network};
-use crate::tensors::{self, Tensor};
 use crate::windows::{Window, Windows};
 use nalgebra::Vector3;
 use squirrel_core::rnn::parnn::{Domain, Parnn, SPEED_SCALE_M_S};
-use squirrel_sim::weights::{self, Contents, TrainedOn, WeightsError};
+use squirrel_sim::weights::{self, Contents, Tensor, TrainedOn, WeightsError};
 use std::path::Path;
 
 /// Where weights come from: the metadata of their file.
@@ -96,7 +95,7 @@ impl Trained {
             let reason = "must be finite".to_owned();
             return Err(WeightsError::Field { file, field: "figures", value, reason }.into());
         }
-        tensors::write(path, &self.card, &named(self.card.model, "", &self.parameters))
+        Ok(weights::write(path, &self.card, &named(self.card.model, "", &self.parameters))?)
     }
 
     /// Reads what [`Trained::save`] wrote.

@@ -35,10 +35,18 @@ pub(crate) fn log(error: &LogError) -> PyErr {
     }
 }
 
-/// Of training and weights.
+/// Of training.
 pub(crate) fn nn(error: &NnError) -> PyErr {
     match error {
-        NnError::Weights(WeightsError::Io { error: cause, .. }) => system(cause.kind(), error),
+        NnError::Weights(error) => weights(error),
+        _ => value(error),
+    }
+}
+
+/// Of weights.
+pub(crate) fn weights(error: &WeightsError) -> PyErr {
+    match error {
+        WeightsError::Io { error: cause, .. } => system(cause.kind(), error),
         _ => value(error),
     }
 }

@@ -2,12 +2,13 @@
 
 use crate::error;
 use crate::log::FlightLog;
+use crate::policy::Policy;
 use crate::vehicle::{Vehicle, or_squirrel};
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_core::stack::{SensorFrame, Stack, StackOutput, StackState};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Setup};
+use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Pilot, Setup};
 use squirrel_sim::scenario::Scenario;
 use std::path::Path;
 
@@ -65,14 +66,17 @@ pub(crate) fn scenario(name: &str, seed: Option<u64>, thrust_to_weight: Option<f
 /// scenario : str
 ///     ``hover``, ``avoid``, ``steer``, ``track``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
 ///     the path of a scenario file (.toml).
-/// arm : str
-///     Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``.
+/// arm : str, optional
+///     Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``; if left out,
+///     ``twcc_flat``, or ``pc`` with a policy.
 /// seed : int, optional
 ///     Of everything random; the scenario's own if left out.
 /// thrust_to_weight : float, optional
 ///     Largest collective thrust over weight; overrides vehicle and scenario.
 /// integrator : str
 ///     ``rk4`` (rapier near contact) or ``rapier`` (throughout, first order).
+/// policy : Policy, optional
+///     Flies instead of the arm's outer loop: asked 50 times a second, its commands go to the flight code as an offboard computer's.
 ///
 /// Returns
 /// -------
@@ -94,25 +98,29 @@ pub(crate) fn scenario(name: &str, seed: Option<u64>, thrust_to_weight: Option<f
 /// 3
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
-#[pyo3(signature = (*, vehicle = None, scenario = "avoid", arm = "twcc_flat", seed = None, thrust_to_weight = None, integrator = "rk4"))]
+#[pyo3(signature = (*, vehicle = None, scenario = "avoid", arm = None, seed = None, thrust_to_weight = None, integrator = "rk4", policy = None))]
 pub(crate) fn simulate(
     py: Python<'_>,
     vehicle: Option<&Bound<'_, Vehicle>>,
     scenario: &str,
-    arm: &str,
+    arm: Option<&str>,
     seed: Option<u64>,
     thrust_to_weight: Option<f64>,
     integrator: &str,
+    policy: Option<&Bound<'_, Policy>>,
 ) -> PyResult<FlightLog> {
+    let by_default = if policy.is_some() { Arm::Pc } else { Arm::TwccFlat };
     let setup = Setup {
         vehicle: or_squirrel(vehicle),
-        arm: Arm::parse(arm).map_err(error::value)?,
+        arm: arm.map_or(Ok(by_default), Arm::parse).map_err(error::value)?,
         scenario: self::scenario(scenario, seed, thrust_to_weight)?,
         integrator: Integrator::parse(integrator).map_err(error::value)?,
     };
     let stack = setup.stack().map_err(error::value)?;
+    let pilot = policy.map(|policy| Pilot::new(policy.get().weights.clone(), &setup, &stack));
+    let pilot = pilot.transpose().map_err(error::value)?;
     let mut computer = Interruptible { stack, state: StackState::default(), steps: 0, signal: None };
-    let flown = py.detach(|| setup.fly_on(&mut computer, true, |_| {}));
+    let flown = py.detach(|| setup.fly_on(&mut computer, pilot, true, |_| {}));
     if let Some(signal) = computer.signal {
         return Err(signal);
     }

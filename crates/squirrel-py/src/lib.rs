@@ -18,6 +18,7 @@ mod gap;
 mod interrupt;
 mod log;
 mod nn;
+mod policy;
 mod stack;
 mod state;
 mod task;
@@ -72,6 +73,8 @@ mod _squirrel {
     use super::log::FlightLog;
     #[pymodule_export]
     use super::nn::{Model, forward, load, train, windows};
+    #[pymodule_export]
+    use super::policy::Policy;
     #[pymodule_export]
     use super::program;
     #[pymodule_export]

@@ -1,7 +1,7 @@
 //! The flight code on a Cortex-M7: built, played against the host bit for bit, measured, compared with recorded figures.
 //!
-//! 1. Every arm flies the avoidance manoeuvre here; QEMU plays the recorded frames and must say the same hashes. So it must for
-//!    a hundred pieces of flight in which a sensor fails.
+//! 1. Every arm flies the avoidance manoeuvre here, and a policy commands one; QEMU plays the recorded frames and must say the
+//!    same hashes. So it must for a hundred pieces of flight in which a sensor fails.
 //! 2. A flight with the flight code in QEMU must leave the same log, byte for byte, as one without.
 //! 3. Negative controls: another mass by one bit must change the hashes, a step that may panic must not link.
 //! 4. The workspace is linted; the image for the real part is built and sized, and what of it needs no hardware is tested.
@@ -10,6 +10,7 @@
 
 mod board;
 mod elf;
+mod policy;
 mod stack;
 
 use crate::run::{call, cargo, installed_on_ci, root, succeeds, target_directory};
@@ -120,7 +121,8 @@ fn measure() -> Result<Figures, String> {
         let differs: Vec<&str> = lines.filter(|l| !l.contains(" same ")).map(String::as_str).collect();
         return Err(format!("outputs on the M7 are not the host's: {}", differs.join("; ")));
     }
-    eprintln!("{} flights and {FAULTS} faults: every output of the M7 is the host's", ARMS.len());
+    let flown = flights.lines.len() - 1;
+    eprintln!("{flown} flights and {FAULTS} faults: every output of the M7 is the host's");
     squirrel.hardware_in_the_loop(&images)?;
     eprintln!("fly --hil qemu: the same log, byte for byte");
 
@@ -167,14 +169,18 @@ impl Squirrel {
         if done.status.success() { Ok(()) } else { Err(format!("{}: {}", arguments.join(" "), said.trim())) }
     }
 
-    /// Flies all arms; vectors of the flights, and of faults in one of them.
+    /// Flies all arms, and one by commands of a policy; vectors of the flights, and of faults in one of them.
     fn record(&self) -> Result<(), String> {
         let logs = ARMS.map(|arm| format!("{arm}.mcap"));
         for (arm, log) in ARMS.iter().zip(&logs) {
             self.run(&["fly", "--arm", arm, "--scenario", "avoid", "--out", log])?;
         }
+        let path = self.folder.join("policy.safetensors");
+        std::fs::write(&path, policy::file()).map_err(|error| format!("{}: {error}", path.display()))?;
+        let commanded = "policy.mcap";
+        self.run(&["fly", "--policy", "policy.safetensors", "--scenario", "track", "--out", commanded])?;
         let mut export = vec!["export-vectors", "--out", "flights"];
-        export.extend(logs.iter().map(String::as_str));
+        export.extend(logs.iter().map(String::as_str).chain([commanded]));
         self.run(&export)?;
         self.run(&["export-vectors", "--out", "faults", "--faults", FAULTS, &logs[LEARNED]])
     }
@@ -245,7 +251,7 @@ impl Played {
             let words: Vec<&str> = line.split(' ').collect();
             keep_largest("inner step, mean of the worst arm, instructions", number(&words, 6)?);
             keep_largest("inner step, worst, instructions", number(&words, 7)?);
-            // Sequences are in the order of `ARMS`.
+            // Sequences are in the order of `ARMS`, the policy's behind them.
             if i == LEARNED {
                 keep_largest("inner and outer step with paRNN, mean, instructions", number(&words, 10)?);
                 keep_largest("inner and outer step with paRNN, worst, instructions", number(&words, 11)?);

@@ -5,9 +5,10 @@ use super::{facts, figures, vehicle, view, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{Integrator, Metrics, Setup};
+use squirrel_sim::flight::{InProcess, Integrator, Metrics, Pilot, Setup};
 use squirrel_sim::report::flight::{Heading, render};
 use squirrel_sim::scenario::Scenario;
+use squirrel_sim::weights::PolicyWeights;
 use std::path::PathBuf;
 
 /// Options of a flight.
@@ -16,9 +17,13 @@ pub(crate) struct Fly {
     /// Vehicle file; the shipped squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_parnn, twcc_oracle.
-    #[arg(long, default_value = "twcc_flat")]
-    arm: String,
+    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_parnn, twcc_oracle; if left
+    /// out, twcc_flat, or pc with a policy.
+    #[arg(long)]
+    arm: Option<String>,
+    /// Policy that flies instead of the arm's outer loop (.safetensors); the arm takes over where its commands cease.
+    #[arg(long)]
+    policy: Option<PathBuf>,
     /// hover, avoid, steer, track, excite_calm, excite_normal, excite_rich, or a scenario file (.toml).
     #[arg(long, default_value = "avoid")]
     scenario: String,
@@ -58,6 +63,8 @@ enum Hil {
 struct Flown {
     vehicle: String,
     arm: &'static str,
+    /// Hash of the policy's weights.
+    policy: Option<String>,
     scenario: String,
     seed: u64,
     thrust_to_weight: f64,
@@ -74,11 +81,12 @@ impl Fly {
         if self.thrust_to_weight.is_some() {
             scenario.thrust_to_weight = self.thrust_to_weight;
         }
+        let by_default = if self.policy.is_some() { Arm::Pc } else { Arm::TwccFlat };
         // What the options changed is the scenario's, and so are errors in it; the rest is the vehicle's.
         scenario.check().map_err(|e| format!("scenario {}: {e}", self.scenario))?;
         let setup = Setup {
             vehicle: vehicle(self.vehicle.as_deref())?,
-            arm: Arm::parse(&self.arm)?,
+            arm: self.arm.as_deref().map_or(Ok(by_default), Arm::parse)?,
             scenario,
             integrator: Integrator::parse(&self.integrator)?,
         };
@@ -86,24 +94,32 @@ impl Fly {
             Some(file) => format!("{}: {e}", file.display()),
             None => e.to_string(),
         })?;
+        let pilot = self.policy.as_deref().map(|path| {
+            let weights = PolicyWeights::load(path).map_err(|e| e.to_string())?;
+            Pilot::new(weights, &setup, &stack).map_err(|e| e.to_string())
+        });
+        let pilot = pilot.transpose()?;
+        // What flies, in words.
+        let who = match &pilot {
+            Some(pilot) => format!("policy {} over {}", pilot.weights().name, setup.arm.name()),
+            None => setup.arm.name().to_owned(),
+        };
+        let policy = pilot.as_ref().map(|pilot| pilot.weights().hash());
         let record = self.out.is_some() || self.report.is_some();
         let bar = output::progress((setup.scenario.duration_s * 10.0) as u64, "x 0.1 s");
         let progress = |t: f64| bar.set_position((t * 10.0) as u64);
         let flown = match self.hil {
-            None => setup.fly(record, progress),
+            None => setup.fly_on(&mut InProcess::new(stack), pilot, record, progress),
             Some(Hil::Qemu) => {
-                setup.fly_on(&mut EmulatedM7::start(&self.hil_image, &stack)?, record, progress)
+                setup.fly_on(&mut EmulatedM7::start(&self.hil_image, &stack)?, pilot, record, progress)
             }
         };
         bar.finish_and_clear();
         let mut flight = flown.map_err(|e| e.to_string())?;
         let ratio = setup.thrust_to_weight();
         say(&format!(
-            "{} flies {} with {}, seed {}, effective thrust-to-weight {ratio:.2}\n",
-            setup.vehicle.name,
-            setup.scenario.name,
-            setup.arm.name(),
-            setup.scenario.seed,
+            "{} flies {} with {who}, seed {}, effective thrust-to-weight {ratio:.2}\n",
+            setup.vehicle.name, setup.scenario.name, setup.scenario.seed,
         ));
         let cells = figures(&flight.metrics);
         let mut table = Table::new(&cells.iter().map(|(n, _)| n.as_str()).collect::<Vec<_>>());
@@ -116,7 +132,7 @@ impl Fly {
             }
             if let Some(path) = &self.report {
                 let heading = Heading {
-                    title: format!("{}: {}", setup.scenario.name, setup.arm.name()),
+                    title: format!("{}: {who}", setup.scenario.name),
                     lead: String::new(),
                     facts: facts(&setup),
                     card: setup.scenario.pilot_card().map_err(|e| e.to_string())?.unwrap_or_default(),
@@ -128,6 +144,7 @@ impl Fly {
         let result = Flown {
             vehicle: setup.vehicle.name.clone(),
             arm: setup.arm.name(),
+            policy,
             scenario: setup.scenario.name.clone(),
             seed: setup.scenario.seed,
             thrust_to_weight: ratio,

@@ -16,7 +16,6 @@ use super::woeg::{WingEvents, WingFlag};
 use super::{AttitudeThrust, Reference};
 use crate::aero::angle_of_attack;
 use crate::frames::{Body, In, Ned, Rotation};
-use crate::math::limit;
 use crate::rnn::parnn::History;
 use crate::vehicle::{ParameterError, Vehicle};
 use nalgebra::Vector3;
@@ -228,11 +227,7 @@ impl TwccParameters {
         let (mode, reason) = self.decide(state, &airframe.envelope, &position.request, wing.flag, dt_s);
         let request = &position.request;
         let envelope = &airframe.envelope;
-        let primary = AttitudeThrust {
-            roll_rad: limit(request.roll_rad, -envelope.tilt_max_rad, envelope.tilt_max_rad),
-            pitch_rad: limit(request.pitch_rad, -envelope.tilt_max_rad, envelope.tilt_max_rad),
-            thrust_n: limit(request.thrust_n, envelope.thrust_min_n, envelope.thrust_max_n),
-        };
+        let primary = envelope.limit(request);
         // WIIC's law belongs to a request beyond the limits. While only the dwell time keeps the wings open, PC flies; and on
         // thrust alone PC's thrust is at its limit already.
         let command = if mode == Mode::Wiic && reason != Reason::Dwell {

@@ -10,6 +10,7 @@
 //! | angular rate, attitude, the clock | [`FailsafeMode::Cut`]: rotors stop, wings fold |
 //! | position and velocity | [`FailsafeMode::Level`]: level, a little less thrust than weight, wings folded |
 //! | altitude | none; the height is that of the satellite fix, and the reason is reported |
+//! | commands from outside | the outer loop flies again, without any memory; the reason is reported |
 //!
 //! When all is well again for [`RECOVERY_US`], control resumes without any memory of the time before.
 
@@ -25,6 +26,8 @@ pub const ATTITUDE_LIMIT_US: u32 = 250_000;
 pub const GNSS_LIMIT_US: u32 = 1_500_000;
 /// The altitude is lost after this time, us.
 pub const ALTITUDE_LIMIT_US: u32 = 1_000_000;
+/// Commands from outside are lost after this time, us: 25 of them at [`crate::policy::RATE_HZ`].
+pub const COMMAND_LIMIT_US: u32 = 500_000;
 /// A sensor must be well for this time before it is believed again, us.
 pub const RECOVERY_US: u32 = 200_000;
 /// Thrust over weight of [`FailsafeMode::Level`]: the vehicle sinks, slowly at first.
@@ -79,6 +82,8 @@ pub enum FailsafeReason {
     GnssStuck = 7,
     /// No altitude, or one that repeats itself.
     AltitudeLost = 8,
+    /// No valid command from outside any more.
+    CommandLost = 9,
 }
 
 /// What flies, and why.
@@ -121,6 +126,8 @@ pub struct FailsafeState {
     attitude: Watch,
     gnss: Watch,
     altitude: Watch,
+    /// Since the last command, us; `None` before the first.
+    command_age_us: Option<u32>,
     /// Frames since time went on.
     standing: u16,
     /// Turned since the attitude changed, rad.
@@ -145,6 +152,11 @@ impl FailsafeState {
         self.attitude.look(elapsed_us, merged.attitude);
         self.gnss.look(elapsed_us, merged.gnss);
         self.altitude.look(elapsed_us, merged.altitude);
+        self.command_age_us = if merged.commanded {
+            Some(0)
+        } else {
+            self.command_age_us.map(|age| age.saturating_add(elapsed_us))
+        };
         let dt_s = elapsed_us.min(IMU_LIMIT_US) as f32 * 1e-6;
         let omega = known.imu.map_or(Vector3::zeros(), |imu| imu.omega.vector);
         let climb_m_s = known.gnss.map_or(0.0, |gnss| -gnss.velocity.vector.z);
@@ -163,6 +175,11 @@ impl FailsafeState {
             self.active = judged;
         }
         self.active
+    }
+
+    /// Commands came, and come no more.
+    pub(super) fn command_is_lost(&self) -> bool {
+        self.command_age_us.is_some_and(|age| age > COMMAND_LIMIT_US)
     }
 
     fn judge(&self, known: &Known) -> Failsafe {
@@ -191,6 +208,8 @@ impl FailsafeState {
             (M::Level, R::GnssStuck)
         } else if self.altitude.is_lost(ALTITUDE_LIMIT_US) || self.altitude_hangs {
             (M::Off, R::AltitudeLost)
+        } else if self.command_is_lost() {
+            (M::Off, R::CommandLost)
         } else {
             (M::Off, R::None)
         };

@@ -4,6 +4,7 @@ use super::Known;
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::sensing::Obstacle;
 use crate::math::all_finite;
+use crate::policy::PilotCommand;
 
 /// Most obstacles that one frame carries: the nearest ones.
 pub const MAX_OBSTACLES: usize = 4;
@@ -45,6 +46,8 @@ pub struct SensorFrame {
     pub altitude_m: Option<f32>,
     /// Wing force as if spread, N, where something outside the flight code knows it.
     pub wing_force: Option<In<Ned, f32>>,
+    /// What to fly instead of the outer loop's command.
+    pub command: Option<PilotCommand>,
     obstacles: [Obstacle; MAX_OBSTACLES],
     obstacle_count: usize,
 }
@@ -59,6 +62,7 @@ impl SensorFrame {
             gnss: None,
             altitude_m: None,
             wing_force: None,
+            command: None,
             obstacles: [Obstacle { id: 0, north_m: 0.0, east_m: 0.0 }; MAX_OBSTACLES],
             obstacle_count: 0,
         }
@@ -101,11 +105,20 @@ impl SensorFrame {
         {
             known.wing_force = Some(force);
         }
+        let mut commanded = false;
+        if let Some(PilotCommand { attitude: a, wing }) = self.command
+            // Finite where all of them are.
+            && accept((a.roll_rad + a.pitch_rad + a.thrust_n + wing).is_finite())
+        {
+            known.command = self.command;
+            commanded = true;
+        }
         Merged {
             imu: Heard::replace(&mut known.imu, imu),
             attitude: Heard::replace(&mut known.attitude, attitude),
             gnss: Heard::replace(&mut known.gnss, gnss),
             altitude: Heard::replace(&mut known.altitude_m, altitude_m),
+            commanded,
             rejected,
         }
     }
@@ -140,6 +153,8 @@ pub(super) struct Merged {
     pub(super) attitude: Heard,
     pub(super) gnss: Heard,
     pub(super) altitude: Heard,
+    /// A command came from outside.
+    pub(super) commanded: bool,
     /// Measurements that were not finite, or larger than any flight.
     pub(super) rejected: u32,
 }

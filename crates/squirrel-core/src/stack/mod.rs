@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! frame -> latest valid measurements
-//!   10 Hz:  guidance -> TWCC (PC, WOEG, WIIC) -> roll, pitch, thrust, wings
+//!   10 Hz:  guidance -> TWCC (PC, WOEG, WIIC) -> roll, pitch, thrust, wings; or a command from outside
 //!   300 Hz: command filter (+ excitation) -> integral backstepping -> mixer -> rotor commands
 //! ```
 //! When a sensor is gone or hangs, [`failsafe`] levels or cuts. [`Stack`] is constant in flight; [`StackState`] is everything that changes, one plain struct that can be frozen, logged
@@ -24,7 +24,8 @@ use crate::control::{AttitudeThrust, Reference};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
-use crate::math::lower;
+use crate::math::{limit, lower};
+use crate::policy::PilotCommand;
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
 use failsafe::{Failsafe, FailsafeMode, FailsafeReason, FailsafeState, LEVEL_THRUST_SHARE};
 use nalgebra::Vector3;
@@ -64,6 +65,15 @@ pub struct Known {
     pub altitude_m: Option<f32>,
     /// Wing force as if spread, N.
     pub wing_force: Option<In<Ned, f32>>,
+    /// Command from outside, until it is lost.
+    pub command: Option<PilotCommand>,
+}
+
+impl Known {
+    /// Takes over what is valid in a frame.
+    pub fn take_over(&mut self, frame: &SensorFrame) {
+        frame.merge_into(self);
+    }
 }
 
 /// Everything that changes in flight.
@@ -85,7 +95,7 @@ pub struct StackState {
     pub filter: EulerReference,
     /// Inner loop.
     pub attitude: AttitudeState,
-    /// What the outer loop asked for last.
+    /// What the outer loop, or a command from outside, asked for last.
     pub command: AttitudeThrust,
     /// Wing command asked for last.
     pub wing_command: f32,
@@ -108,10 +118,10 @@ pub struct StackOutput {
     pub rejected: u32,
     /// Whether the mission flies, or what instead, and why.
     pub failsafe: Failsafe,
-    /// The outer loop, where it ran in this step.
+    /// The outer loop, where it ran in this step; it does not while commands come from outside.
     pub outer: Option<TwccTerms>,
-    /// The inner loop, once attitude and rate are known; rotors stand still before that and while the failsafe cuts. Until the first fix it asks for no
-    /// thrust, and rotors only turn as far as levelling takes.
+    /// The inner loop, once attitude and rate are known; rotors stand still before that and while the failsafe cuts. Until the first fix or command it
+    /// asks for no thrust, and rotors only turn as far as levelling takes.
     pub inner: Option<InnerTerms>,
 }
 
@@ -168,7 +178,9 @@ impl Stack {
         state.rejected = state.rejected.saturating_add(merged.rejected);
         let was = state.failsafe.active.mode;
         let failsafe = state.failsafe.update(elapsed_us, merged, &state.known);
-        if failsafe.mode != was || failsafe.mode != FailsafeMode::Off {
+        let is_well = failsafe.mode == FailsafeMode::Off;
+        let alone = state.failsafe.command_is_lost() && state.known.command.take().is_some();
+        if failsafe.mode != was || !is_well || alone {
             self.forget(state, was);
         }
 
@@ -184,8 +196,12 @@ impl Stack {
             let periods = state.outer_index.map_or(1, |last| outer_index.saturating_sub(last));
             state.outer_index = Some(outer_index);
             let dt_s = lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6;
-            if failsafe.mode == FailsafeMode::Off { self.outer(state, frame, dt_s) } else { None }
+            if is_well && state.known.command.is_none() { self.outer(state, frame, dt_s) } else { None }
         };
+        if let Some(command) = state.known.command.filter(|_| is_well) {
+            state.command = self.airframe.envelope.limit(&command.attitude);
+            state.wing_command = limit(command.wing, 0.0, 1.0);
+        }
         let reference = self.mission.reference(&state.mission, frame.time_us);
         let dt_s = lower(elapsed_us.unwrap_or(0) as f32 * 1e-6, INNER_STEP_MAX_S);
         let inner = if failsafe.mode == FailsafeMode::Cut {
@@ -210,7 +226,7 @@ impl Stack {
         }
     }
 
-    /// What flies while the failsafe acts, and what control resumes from afterwards.
+    /// What flies while the failsafe acts or until the outer loop's next tick, and what control resumes from afterwards.
     fn forget(&self, state: &mut StackState, was: FailsafeMode) {
         let thrust_n = LEVEL_THRUST_SHARE * self.vehicle.weight_n();
         state.command = AttitudeThrust { thrust_n, ..AttitudeThrust::default() };
@@ -285,217 +301,4 @@ impl Stack {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
-    use super::*;
-    use crate::control::backstepping::AttitudeForm;
-    use crate::control::twcc;
-    use crate::control::wing_force::{ForceModel, Guard, fixtures::loud};
-    use crate::guidance::sensing::Obstacle;
-    use crate::vehicle::fixtures::squirrel;
-    use proptest::prelude::*;
-
-    fn stack(form: AttitudeForm) -> Stack {
-        stack_that_believes(&ForceModel::FlatPlate, form)
-    }
-
-    fn stack_that_believes(force_model: &ForceModel, form: AttitudeForm) -> Stack {
-        flying(force_model, form, &Mission::Hover { position: In::zero() })
-    }
-
-    pub(crate) fn stack_on(force_model: &ForceModel, mission: &Mission) -> Stack {
-        flying(force_model, AttitudeForm::Quaternion, mission)
-    }
-
-    fn flying(force_model: &ForceModel, form: AttitudeForm, mission: &Mission) -> Stack {
-        let attitude = AttitudeGains {
-            form,
-            c1_per_s: Vector3::new(9.0, 9.0, 4.0),
-            c2_per_s: Vector3::new(14.0, 14.0, 5.0),
-            lambda_per_s2: Vector3::new(8.0, 8.0, 2.0),
-            integral_max_rad_s: 0.1,
-            filter_frequency_rad_s: 20.0,
-            filter_damping: 1.0,
-        };
-        let twcc = TwccParameters { force_model: *force_model, ..twcc::fixtures::parameters() };
-        let parameters = StackParameters { attitude, twcc };
-        Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, *mission).unwrap()
-    }
-
-    pub(crate) fn level(time_us: u64) -> SensorFrame {
-        let mut frame = SensorFrame::empty(time_us);
-        frame.imu =
-            Some(Imu { omega: In::zero(), specific_force: In::new(Vector3::new(0.0, 0.0, -9.80665)) });
-        frame.attitude = Some(Rotation::identity());
-        frame.gnss = Some(Gnss { position: In::zero(), velocity: In::zero() });
-        frame
-    }
-
-    #[test]
-    fn level_on_the_spot_it_commands_hover() {
-        for form in [AttitudeForm::Euler, AttitudeForm::Quaternion] {
-            let (stack, mut state) = (stack(form), StackState::default());
-            let output = stack.step(&mut state, &level(0));
-            let p = &stack.vehicle().parameters().propulsion;
-            let total: f32 = output.rotor_command[..4]
-                .iter()
-                .map(|u| p.thrust_coefficient_n_s2 * p.target_speed_rad_s(*u).powi(2))
-                .sum();
-            assert!((total - stack.vehicle().weight_n()).abs() < 1e-4);
-            assert_eq!(output.rotor_command[4..], [0.0; 4]);
-        }
-    }
-
-    #[test]
-    fn the_outer_loop_runs_ten_times_a_second() {
-        let (stack, mut state) = (stack(AttitudeForm::Quaternion), StackState::default());
-        let ticks: Vec<u64> = (0..300u64)
-            .map(|k| k * 1_000_000 / 300)
-            .filter(|t| stack.step(&mut state, &level(*t)).outer.is_some())
-            .collect();
-        assert_eq!(ticks, (0..10).map(|k| k * 100_000).collect::<Vec<_>>());
-    }
-
-    #[test]
-    fn rotors_stand_still_until_the_attitude_is_known() {
-        let (stack, mut state) = (stack(AttitudeForm::Quaternion), StackState::default());
-        let output = stack.step(&mut state, &SensorFrame::empty(0));
-        assert_eq!(output.rotor_command, [0.0; MAX_ROTORS]);
-        assert!(output.inner.is_none() && output.outer.is_none());
-    }
-
-    /// A thawed copy continues as the original: the state hides nothing, not even what the network saw.
-    #[test]
-    fn a_frozen_state_continues_bit_for_bit() {
-        let (stack, mut state) =
-            (stack_that_believes(&ForceModel::Parnn(loud()), AttitudeForm::Euler), StackState::default());
-        let frame = |k: u64| {
-            let mut f = level(k * 3333);
-            f.attitude = Some(Rotation::from_euler(0.01 * (k as f32).sin(), 0.02, 0.0));
-            let velocity = In::new(Vector3::new(5.0 + (0.01 * k as f32).sin(), 0.5, 1.0));
-            f.gnss = Some(Gnss { position: In::zero(), velocity });
-            f
-        };
-        for k in 0..450 {
-            stack.step(&mut state, &frame(k));
-        }
-        let mut thawed = state;
-        let (mut asked, mut forgetful) = (0, 0);
-        for k in 450..900 {
-            let output = stack.step(&mut state, &frame(k));
-            assert_eq!(output, stack.step(&mut thawed, &frame(k)));
-            let Some(terms) = output.outer.and_then(|outer| outer.parnn) else { continue };
-            asked += i32::from(terms.guard == Guard::Inside);
-            // One without memory would not know its window.
-            let mut blank = StackState { twcc: TwccState::default(), outer_index: None, ..state };
-            let again = stack.step(&mut blank, &frame(k)).outer.unwrap().parnn.unwrap();
-            forgetful += i32::from(again.guard == Guard::WindowNotFull);
-        }
-        assert!(asked == 15 && forgetful == 15, "{asked}, {forgetful}");
-    }
-
-    /// A receiver that loses its velocity neither reaches the network nor makes it forget.
-    #[test]
-    fn a_velocity_that_is_no_number_never_leaves_the_frame() {
-        let stack = stack_that_believes(&ForceModel::Parnn(loud()), AttitudeForm::Quaternion);
-        let mut state = StackState::default();
-        let mut guards = std::vec::Vec::new();
-        for k in 0..20u64 {
-            let mut f = level(k * OUTER_PERIOD_US);
-            let x = if k == 15 { f32::NAN } else { 6.0 };
-            let position = In::new(Vector3::new(0.6 * k as f32, 0.0, 0.0));
-            f.gnss = Some(Gnss { position, velocity: In::new(Vector3::new(x, 0.0, 2.0)) });
-            let output = stack.step(&mut state, &f);
-            let outer = output.outer.unwrap();
-            assert!(crate::math::all_finite(&outer.wing_force.vector), "{k}: {outer:?}");
-            assert!(output.rotor_command.iter().all(|u| u.is_finite()), "{k}: {output:?}");
-            guards.push(outer.parnn.unwrap().guard);
-        }
-        assert_eq!(state.rejected, 1);
-        assert!(guards[..9].iter().all(|g| *g == Guard::WindowNotFull), "{guards:?}");
-        assert!(guards[9..].iter().all(|g| *g == Guard::Inside), "{guards:?}");
-    }
-
-    /// Mostly plausible, sometimes anything, so that single sensors fail while the others fly on.
-    fn number(size: f32) -> impl Strategy<Value = f32> {
-        prop_oneof![
-            20 => -size..size,
-            1 => Just(f32::NAN),
-            1 => Just(f32::INFINITY),
-            1 => Just(f32::MAX),
-            1 => Just(-f32::MAX),
-        ]
-    }
-    fn vector(size: f32) -> impl Strategy<Value = Vector3<f32>> {
-        [number(size), number(size), number(size)].prop_map(Vector3::from)
-    }
-    fn frame() -> impl Strategy<Value = SensorFrame> {
-        let attitude = prop_oneof![
-            6 => (-3.0..3.0f32, -1.5..1.5f32, -3.0..3.0f32).prop_map(|(r, p, y)| Some(Rotation::from_euler(r, p, y))),
-            1 => [number(1.0), number(1.0), number(1.0), number(1.0)].prop_map(Rotation::from_wxyz),
-            1 => Just(None),
-        ];
-        (0..3_000_000u64, vector(30.0), vector(40.0), attitude, vector(50.0), vector(15.0), number(100.0))
-            .prop_map(|(time_us, omega, force, attitude, position, velocity, altitude)| {
-                let mut frame = SensorFrame::empty(time_us);
-                frame.imu = Some(Imu { omega: In::new(omega), specific_force: In::new(force) });
-                frame.attitude = attitude;
-                frame.gnss = Some(Gnss { position: In::new(position), velocity: In::new(velocity) });
-                frame.altitude_m = Some(altitude);
-                frame.wing_force = Some(In::new(force));
-                frame.set_obstacles(&[Obstacle { id: 1, north_m: omega.x, east_m: omega.y }]);
-                frame
-            })
-    }
-
-    proptest! {
-        /// State and outputs stay finite, outputs inside limits, for any sensor values and times, also backwards.
-        #[test]
-        fn state_and_outputs_stay_finite_and_inside_limits(
-            frames in proptest::collection::vec(frame(), 60),
-            euler in any::<bool>(),
-            learned in any::<bool>(),
-        ) {
-            let form = if euler { AttitudeForm::Euler } else { AttitudeForm::Quaternion };
-            let model = if learned { ForceModel::Parnn(loud()) } else { ForceModel::FlatPlate };
-            let stack = stack_that_believes(&model, form);
-            let mut state = StackState::default();
-            for frame in frames {
-                let output = stack.step(&mut state, &frame);
-                for u in &output.rotor_command[..4] {
-                    prop_assert!((0.0..=1.0).contains(u), "{u}");
-                }
-                prop_assert!((0.0..=1.0).contains(&output.wing_command[0]));
-                let remembered = [
-                    state.filter.angle,
-                    state.filter.rate,
-                    state.filter.acceleration,
-                    state.attitude.integral,
-                    state.twcc.position.integral,
-                    state.twcc.position.last_error.unwrap_or_default(),
-                ];
-                prop_assert!(remembered.iter().all(crate::math::all_finite), "{remembered:?}");
-                prop_assert!(state.twcc.history.window().into_iter().flatten().flatten().all(|x| x.is_finite()));
-                if let Some(inner) = &output.inner {
-                    let demand = inner.demand;
-                    prop_assert!(demand.thrust_n.is_finite() && crate::math::all_finite(&demand.torque_n_m), "{demand:?}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn a_filter_that_would_run_away_is_refused() {
-        let mut gains = stack(AttitudeForm::Euler).parameters.attitude;
-        gains.filter_frequency_rad_s = 60.0;
-        let error = gains.check().unwrap_err().to_string();
-        assert!(error.starts_with("control.attitude.filter_frequency_rad_s = 60"), "{error}");
-        // The largest frequency that passes settles at the longest step.
-        gains.filter_frequency_rad_s = 41.0;
-        gains.check().unwrap();
-        let mut filter = EulerReference::default();
-        for _ in 0..5000 {
-            command_filter::step(&mut filter, &Vector3::repeat(0.5), 41.0, 1.0, INNER_STEP_MAX_S);
-        }
-        assert!((filter.angle - Vector3::repeat(0.5)).norm() < 1e-3, "{filter:?}");
-    }
-}
+pub(crate) mod tests;

@@ -2,18 +2,19 @@
 
 Vehicles (`Vehicle`), flights in closed loop (`simulate`) and their logs (`FlightLog`), many vehicles at once (`Batch`,
 `rollout`), the flight code itself (`Stack`, `squirrel.control`), the base model (`squirrel.dynamics`), learned models of the wing
-force (`squirrel.nn`), and what a model lacks (`squirrel.gap`). `squirrel.plot` needs matplotlib, `squirrel.torch` PyTorch,
-`squirrel.envs` Gymnasium.
+force (`squirrel.nn`), environments in which policies learn (`Tasks`; `squirrel.envs` for Gymnasium) and policies that fly (`Policy`), and
+what a model lacks (`squirrel.gap`). `squirrel.plot` needs matplotlib, `squirrel.torch` PyTorch.
 
 SI units and radians; world NED, body FRD, quaternions Hamilton, body to NED, w x y z. Functions are batched over the first axis.
 """
 
-from squirrel import control, dynamics, gap, nn
-from squirrel._squirrel import Batch, FlightLog, Stack, Tasks, Vehicle, __version__, rollout, simulate
+from squirrel import control, dynamics, gap, nn, policy
+from squirrel._squirrel import Batch, FlightLog, Policy, Stack, Tasks, Vehicle, __version__, rollout, simulate
 
 __all__ = [
     "Batch",
     "FlightLog",
+    "Policy",
     "Stack",
     "Tasks",
     "Vehicle",
@@ -22,6 +23,7 @@ __all__ = [
     "dynamics",
     "gap",
     "nn",
+    "policy",
     "rollout",
     "simulate",
 ]

@@ -1,4 +1,7 @@
-"""The paper's force model as a PyTorch module, with the same weights file. Needs PyTorch (``squirrel-flight[torch]``)."""
+"""The paper's force model as a PyTorch module, with the same weights file, and policies from PyTorch to flight.
+
+Needs PyTorch (``squirrel-flight[torch]``).
+"""
 
 from __future__ import annotations
 
@@ -8,13 +11,16 @@ from typing import TYPE_CHECKING
 import torch
 from torch import nn
 
-from squirrel._squirrel import Model
+from squirrel._squirrel import Model, Policy
 from squirrel._squirrel import load as load_model
 
 if TYPE_CHECKING:
     import os
 
-__all__ = ["ParRnn"]
+    import numpy as np
+    import numpy.typing as npt
+
+__all__ = ["ParRnn", "policy_from_sequential"]
 
 AIR_DENSITY_KG_M3 = 1.225
 SPEED_LOWEST_M_S = 0.3
@@ -126,3 +132,36 @@ class ParRnn(nn.Module):
         along_normal = size * torch.where(clipped, normal / towards, alpha_w.cos())
         force = torch.cat([along_wing[:, None] * direction, along_normal[:, None]], dim=1)
         return torch.where(moves[:, None], force, torch.zeros_like(force))
+
+
+def policy_from_sequential(module: nn.Sequential) -> Policy:
+    """Make a policy that flies of a module that was trained.
+
+    Parameters
+    ----------
+    module : torch.nn.Sequential
+        ``Linear(25, 32), Tanh(), Linear(32, 32), Tanh(), Linear(32, 4)``.
+
+    Returns
+    -------
+    squirrel.Policy
+        With the module's weights as float32.
+
+    Raises
+    ------
+    ValueError
+        The layers are others, or a weight is not finite.
+    """
+    layers = list(module)
+    kinds = [type(layer).__name__ for layer in layers]
+    if kinds != ["Linear", "Tanh", "Linear", "Tanh", "Linear"]:
+        raise ValueError(f"module: layers {', '.join(kinds)}: must be Linear, Tanh, Linear, Tanh, Linear")
+
+    def layer(linear: nn.Linear) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+        if linear.bias is None:
+            raise ValueError(f"module: {linear}: must have a bias")
+        weight, bias = (tensor.detach().cpu().float().numpy() for tensor in (linear.weight, linear.bias))
+        return weight, bias
+
+    first, second, output = (layer(linear) for linear in layers[::2])
+    return Policy(first=first, second=second, output=output)

@@ -6,10 +6,12 @@
 mod commands;
 mod integrator;
 mod metrics;
+mod pilot;
 mod record;
 
 pub use integrator::Integrator;
 pub use metrics::Metrics;
+pub use pilot::Pilot;
 pub(crate) use record::{FORMAT, Inputs, PARNN_WEIGHTS, record_output};
 pub use record::{INPUT_SOURCES, frames};
 
@@ -72,9 +74,18 @@ pub trait FlightComputer {
     fn step(&mut self, frame: &SensorFrame) -> Result<(StackOutput, u32), FlightError>;
 }
 
-struct InProcess {
+/// The flight code in this process.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InProcess {
     stack: Stack,
     state: StackState,
+}
+
+impl InProcess {
+    /// Before the first step.
+    pub fn new(stack: Stack) -> Self {
+        Self { stack, state: StackState::default() }
+    }
 }
 
 impl FlightComputer for InProcess {
@@ -132,17 +143,19 @@ impl Setup {
     /// A setup that cannot be used, or a plant that left the finite numbers.
     pub fn fly(&self, record: bool, progress: impl FnMut(f64)) -> Result<Flight, FlightError> {
         self.scenario.check().map_err(FlightError)?;
-        let mut here = InProcess { stack: self.stack()?, state: StackState::default() };
-        self.fly_on(&mut here, record, progress)
+        self.fly_on(&mut InProcess::new(self.stack()?), None, record, progress)
     }
 
     /// As [`Setup::fly`], with the flight code on `computer`, which has this setup's [`Setup::stack`].
+    ///
+    /// * `pilot` - commands instead of the flight code's outer loop
     ///
     /// # Errors
     /// As [`Setup::fly`], and where the computer does not answer.
     pub fn fly_on(
         &self,
         computer: &mut dyn FlightComputer,
+        mut pilot: Option<Pilot>,
         record: bool,
         mut progress: impl FnMut(f64),
     ) -> Result<Flight, FlightError> {
@@ -166,7 +179,8 @@ impl Setup {
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.vehicle.sensors, plant.effects(), seed);
         let mut metrics = metrics::Meter::new(&self.scenario);
-        let mut recorder = record.then(|| record::Recorder::new(self, plant.vehicle().rotors().len()));
+        let mut recorder =
+            record.then(|| record::Recorder::new(self, pilot.as_ref(), plant.vehicle().rotors().len()));
         let hover = Command { rotor: [hover_command(plant.vehicle()); MAX_ROTORS], wing: [0.0; 2] };
         let mut commands = CommandLine::new(plant.effects().command_latency_s(), hover);
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
@@ -190,7 +204,13 @@ impl Setup {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
-                let (output, encounters) = computer.step(&frame)?;
+                if let Some(pilot) = &mut pilot {
+                    frame.command = pilot.command(tick, &frame);
+                }
+                let (output, mut encounters) = computer.step(&frame)?;
+                if let Some(pilot) = &pilot {
+                    encounters = encounters.max(pilot.encounters());
+                }
                 if !state.body.is_finite() {
                     return Err(FlightError(format!(
                         "at {:.3} s the vehicle's state is not finite",

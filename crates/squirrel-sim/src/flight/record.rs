@@ -3,25 +3,31 @@
 //! Inputs are `f32` and stored as `f64`, so that a log holds their exact bits. Sources that the flight code reads are in
 //! [`INPUT_SOURCES`]; a frame is rebuilt from the samples that carry its time.
 
-use super::Setup;
+use super::{Pilot, Setup};
 use crate::log::FlightLog;
 use crate::plant::PlantState;
 use crate::sensors::BatteryReading;
+use squirrel_core::control::AttitudeThrust;
 use squirrel_core::control::wing_force::ParnnTerms;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::nalgebra::Vector3;
+use squirrel_core::policy::PilotCommand;
 use squirrel_core::rnn::parnn::Estimate;
 use squirrel_core::stack::failsafe::Failsafe;
 use squirrel_core::stack::{Gnss, Imu, MAX_OBSTACLES, SensorFrame, StackOutput};
 
 /// Sources that the flight code reads. `frame` has a sample for each step of the flight code.
-pub const INPUT_SOURCES: [&str; 7] = ["frame", "imu", "attitude", "gnss", "baro", "obstacle", "wing_force"];
+pub const INPUT_SOURCES: [&str; 8] =
+    ["frame", "imu", "attitude", "gnss", "baro", "obstacle", "wing_force", "offboard"];
 /// Metadata: the weights that the vehicle's text names, so that a log replays without them at hand.
 pub(crate) const PARNN_WEIGHTS: &str = "parnn_weights_hex";
 /// Version of the log's content.
 pub(crate) const FORMAT: &str = "1";
+
+/// Channel of `offboard`: what a [`PilotCommand`] holds.
+const COMMAND: &str = "roll_rad_pitch_rad_thrust_n_wing";
 
 pub(super) struct Recorder {
     log: FlightLog,
@@ -35,7 +41,7 @@ fn wide(v: &Vector3<f32>) -> [f64; 3] {
 }
 
 impl Recorder {
-    pub(super) fn new(setup: &Setup, rotors: usize) -> Self {
+    pub(super) fn new(setup: &Setup, pilot: Option<&Pilot>, rotors: usize) -> Self {
         let mut log = FlightLog::default();
         let scenario = &setup.scenario;
         let vehicle = setup.vehicle.vehicle.parameters();
@@ -58,6 +64,10 @@ impl Recorder {
         }
         if let Some(weights) = &setup.vehicle.weights {
             log.metadata.insert(PARNN_WEIGHTS.to_owned(), weights.to_hex());
+        }
+        if let Some(pilot) = pilot {
+            log.metadata.insert("policy".to_owned(), pilot.weights().name.clone());
+            log.metadata.insert("policy_hash".to_owned(), pilot.weights().hash());
         }
         Self { log, rotors, effects: setup.vehicle.effects, inputs: Inputs::default() }
     }
@@ -142,6 +152,10 @@ impl Inputs {
         }
         if let Some(force) = frame.wing_force {
             log.source_mut("wing_force").push(t, &[("as_if_spread_ned_n", &wide(&force.vector))]);
+        }
+        if let Some(PilotCommand { attitude: a, wing }) = frame.command {
+            let numbers = [a.roll_rad, a.pitch_rad, a.thrust_n, wing].map(f64::from);
+            log.source_mut("offboard").push(t, &[(COMMAND, &numbers)]);
         }
     }
 }
@@ -314,6 +328,7 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
     let mut baro = channel("baro.altitude_m", 1)?;
     let mut obstacle = channel("obstacle.id_north_m_east_m", 3 * MAX_OBSTACLES)?;
     let mut wing_force = channel("wing_force.as_if_spread_ned_n", 3)?;
+    let mut command = channel(&format!("offboard.{COMMAND}"), 4)?;
 
     let narrow = |row: &[f64]| Vector3::new(row[0] as f32, row[1] as f32, row[2] as f32);
     let mut obstacles: Vec<Obstacle> = Vec::new();
@@ -360,9 +375,17 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
         {
             frame.wing_force = Some(In::new(narrow(force.row(i))));
         }
+        if let Some((cursor, numbers)) = &mut command
+            && let Some(i) = cursor.at(*t)
+        {
+            let row = numbers.row(i);
+            let [roll_rad, pitch_rad, thrust_n, wing] = std::array::from_fn(|k| row[k] as f32);
+            let attitude = AttitudeThrust { roll_rad, pitch_rad, thrust_n };
+            frame.command = Some(PilotCommand { attitude, wing });
+        }
         all.push(frame);
     }
-    let cursors = [&imu, &attitude, &gnss, &baro, &obstacle, &wing_force];
+    let cursors = [&imu, &attitude, &gnss, &baro, &obstacle, &wing_force, &command];
     for (cursor, _) in cursors.into_iter().flatten() {
         if let Some(t) = cursor.time_s.get(cursor.next) {
             return Err(format!("an input at {t:.6} s belongs to no step of the flight code"));

@@ -11,6 +11,7 @@ use crate::control::woeg::WingFlag;
 use crate::control::{AttitudeThrust, Reference};
 use crate::guidance::excite::Excitation;
 use crate::guidance::sensing::Obstacle;
+use crate::policy::PilotCommand;
 use crate::rnn::head::Correction;
 use crate::rnn::parnn::Estimate;
 use crate::stack::failsafe::{Failsafe, FailsafeMode, FailsafeReason};
@@ -25,6 +26,7 @@ impl Wire for SensorFrame {
         self.gnss.put(to);
         self.altitude_m.put(to);
         self.wing_force.put(to);
+        self.command.put(to);
         (self.obstacles().len() as u8).put(to);
         for obstacle in self.obstacles() {
             obstacle.put(to);
@@ -37,6 +39,7 @@ impl Wire for SensorFrame {
         frame.gnss = Wire::take(from)?;
         frame.altitude_m = Wire::take(from)?;
         frame.wing_force = Wire::take(from)?;
+        frame.command = Wire::take(from)?;
         let mut obstacles = [Obstacle { id: 0, north_m: 0.0, east_m: 0.0 }; super::super::MAX_OBSTACLES];
         let seen = obstacles.get_mut(..usize::from(u8::take(from)?))?;
         for place in seen.iter_mut() {
@@ -62,6 +65,7 @@ wire_struct! {
         acceleration, request,
     }
     AttitudeThrust { roll_rad, pitch_rad, thrust_n }
+    PilotCommand { attitude, wing }
     ParnnTerms { guard, estimate }
     Estimate { force, correction, alpha_est_rad }
     Correction<f32> { alpha_w_rad, gamma }
@@ -78,6 +82,7 @@ wire_enum! {
     FailsafeMode { Off, Level, Cut }
     FailsafeReason {
         None, ClockStuck, ImuLost, ImuStuck, AttitudeLost, AttitudeStuck, GnssLost, GnssStuck, AltitudeLost,
+        CommandLost,
     }
     Mode { Primary, Wiic, FullThrust }
     Reason { InsideLimits, WingsWouldNotHelp, RollLimit, PitchLimit, ThrustLimit, Dwell, PolicyFixed }

@@ -3,7 +3,7 @@ use crate::control::wing_force::{ForceModel, fixtures::loud};
 use crate::guidance::excite::{Leg, Multisine, Programme};
 use crate::guidance::mission::Mission;
 use crate::guidance::sensing::Obstacle;
-use crate::stack::tests::{level, stack_on};
+use crate::stack::tests::{commanded, level, stack_on};
 use crate::stack::{SensorFrame, StackState};
 
 fn bytes(value: &impl Wire) -> Vec<u8> {
@@ -34,6 +34,7 @@ fn setups_frames_and_outputs_come_back() {
         let mut frame = level(5);
         frame.altitude_m = Some(3.0);
         frame.wing_force = Some(In::zero());
+        frame.command = Some(commanded([0.1, -0.2, 5.0, 0.5]));
         frame.set_obstacles(&[Obstacle { id: 7, north_m: 1.0, east_m: -2.0 }]);
         assert_eq!(back::<Record>(&bytes(&Record::Frame(frame, 9))), Some(Record::Frame(frame, 9)));
         let output = stack.step(&mut state, &frame);

@@ -1,21 +1,27 @@
-//! Safetensors files of `f32` with one metadata record, from this side: writing. `squirrel_sim::weights` reads.
+//! Writing safetensors files of `f32` with one metadata record; [`Contents`](super::Contents) reads them.
 
-use crate::error::NnError;
+use super::{RECORD, WeightsError};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde::Serialize;
-use squirrel_sim::weights::{RECORD, WeightsError};
 use std::path::Path;
 
 /// A named tensor to write.
-pub(crate) struct Tensor<'a> {
-    pub(crate) name: String,
-    pub(crate) shape: Vec<usize>,
-    pub(crate) numbers: &'a [f32],
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tensor<'a> {
+    /// Name.
+    pub name: String,
+    /// Shape.
+    pub shape: Vec<usize>,
+    /// As many numbers as the shape says, row by row.
+    pub numbers: &'a [f32],
 }
 
-/// Writes a file, under a temporary name first.
-pub(crate) fn write(path: &Path, record: &impl Serialize, tensors: &[Tensor<'_>]) -> Result<(), NnError> {
+/// Writes a file, under a temporary name first. Equal tensors and records give equal bytes.
+///
+/// # Errors
+/// A number is not finite, a tensor is of another shape than its numbers, or the disk refuses.
+pub fn write(path: &Path, record: &impl Serialize, tensors: &[Tensor<'_>]) -> Result<(), WeightsError> {
     let file = path.display().to_string();
     let format = |problem: String| WeightsError::Format { file: path.display().to_string(), problem };
     let text = serde_json::to_string(record)
@@ -26,7 +32,7 @@ pub(crate) fn write(path: &Path, record: &impl Serialize, tensors: &[Tensor<'_>]
     for (tensor, bytes) in tensors.iter().zip(&bytes) {
         if let Some(index) = tensor.numbers.iter().position(|x| !x.is_finite()) {
             let (tensor, value) = (tensor.name.clone(), tensor.numbers[index]);
-            return Err(WeightsError::NotFinite { file, tensor, index, value }.into());
+            return Err(WeightsError::NotFinite { file, tensor, index, value });
         }
         let view = TensorView::new(Dtype::F32, tensor.shape.clone(), bytes);
         views.push((tensor.name.as_str(), view.map_err(|e| format(e.to_string()))?));
@@ -40,6 +46,6 @@ pub(crate) fn write(path: &Path, record: &impl Serialize, tensors: &[Tensor<'_>]
     written.map_err(|error| {
         // Nothing half-written stays behind; that the removal may fail too adds nothing to the first error.
         let _ = std::fs::remove_file(&unfinished);
-        WeightsError::Io { file, error }.into()
+        WeightsError::Io { file, error }
     })
 }
