@@ -16,6 +16,9 @@ use squirrel_sim::task::course::Kind;
 use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks as Environments};
 use std::sync::{Mutex, MutexGuard};
 
+/// Rotors of the vehicles.
+const ROTORS: usize = 4;
+
 /// Environments to learn in, side by side: what the classes of `squirrel.envs` are made of.
 ///
 /// An action is 20 ms of flight. An episode that has ended is followed by a new one in the next step, whose action is not looked at.
@@ -54,13 +57,13 @@ use std::sync::{Mutex, MutexGuard};
 #[gen_stub_pyclass]
 #[pyclass(frozen, module = "squirrel._squirrel")]
 pub(crate) struct Tasks {
-    environments: Mutex<Environments>,
+    environments: Mutex<Environments<ROTORS>>,
     count: usize,
     level: Level,
 }
 
 impl Tasks {
-    fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Environments>> {
+    fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Environments<ROTORS>>> {
         let broken = |_| PyRuntimeError::new_err("a call on these environments has panicked; make new ones");
         self.environments.lock_py_attached(py).map_err(broken)
     }
@@ -191,7 +194,7 @@ impl Tasks {
         imports = ("numpy.typing", "numpy")
     ))]
     fn step<'py>(&self, py: Python<'py>, actions: Array32<'py>) -> PyResult<Stepped<'py>> {
-        let shape = [Some(self.count), Some(self.level.numbers())];
+        let shape = [Some(self.count), Some(self.level.numbers(ROTORS))];
         let actions = rows::<f32>("actions", &actions.0, &shape, Numbers::Finite)?;
         let n = self.count;
         let (mut observation, mut reward) = (vec![0.0; n * OBSERVATION], vec![0.0; n]);
@@ -204,7 +207,7 @@ impl Tasks {
         };
         let actions = actions.numbers();
         let mut guard = self.lock(py)?;
-        let environments: &mut Environments = &mut guard;
+        let environments: &mut Environments<ROTORS> = &mut guard;
         py.detach(|| environments.step(actions, outcome)).map_err(value)?;
         drop(guard);
         Ok((
@@ -277,7 +280,7 @@ impl Tasks {
     /// Numbers of an action.
     #[getter]
     fn action_numbers(&self) -> usize {
-        self.level.numbers()
+        self.level.numbers(ROTORS)
     }
 
     fn __len__(&self) -> usize {

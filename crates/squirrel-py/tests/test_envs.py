@@ -66,7 +66,7 @@ def test_the_mask_says_who_begins_anew() -> None:
 
 def test_domain_randomisation_is_a_list_of_vehicles() -> None:
     plain = squirrel.Vehicle.bundled("squirrel")
-    heavy = plain.edit({"effects.mass_error.mass_fraction": 0.3})
+    heavy = plain.edited({"effects.mass_error.mass_fraction": 0.3})
     envs = squirrel.envs.SquirrelVectorEnv(task="track", num_envs=200, vehicles=[plain, heavy])
     envs.reset(seed=0)
     start = envs.tasks.states()[0][:, 2]

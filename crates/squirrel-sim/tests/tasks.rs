@@ -79,7 +79,7 @@ fn an_environment_is_the_same_among_many_and_on_any_registers() {
                 _ => observation[..5].iter().map(|x| 0.2 * x).collect(),
             };
             let run = |count: usize, settings: TaskSettings| {
-                let mut tasks = Tasks::new(&vehicles(), count, 7, settings).unwrap();
+                let mut tasks: Tasks = Tasks::new(&vehicles(), count, 7, settings).unwrap();
                 fly(&mut tasks, 150, pilot)
             };
             let one = run(1, settings);
@@ -99,11 +99,13 @@ fn an_environment_is_the_same_among_many_and_on_any_registers() {
 
 #[test]
 fn who_follows_is_paid_and_who_falls_is_lost() {
-    let mut tasks = Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
+    let mut tasks: Tasks =
+        Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
     let good = fly(&mut tasks, 499, |observation| lean(observation).to_vec());
     let total: f32 = good.iter().flat_map(|seen| &seen.reward).sum::<f32>() / 50.0;
     assert!(total > 6.0, "{total}");
-    let mut tasks = Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
+    let mut tasks: Tasks =
+        Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
     let bad = fly(&mut tasks, 200, |_| vec![0.0, 0.0, -1.0, -1.0]);
     let lost = (0..50).filter(|k| bad.iter().any(|seen| seen.terminated[*k])).count();
     assert_eq!(lost, 50);
@@ -113,7 +115,7 @@ fn who_follows_is_paid_and_who_falls_is_lost() {
 #[test]
 fn episodes_end_in_time_and_begin_again() {
     let short = TaskSettings { episode_s: 0.1, ..settings(Kind::Avoid, Level::AttitudeWing) };
-    let mut tasks = Tasks::new(&vehicles()[..1], 3, 1, short).unwrap();
+    let mut tasks: Tasks = Tasks::new(&vehicles()[..1], 3, 1, short).unwrap();
     let before = tasks.obstacles(1).unwrap();
     let seen = fly(&mut tasks, 7, |observation| lean(observation).to_vec());
     let truncated: Vec<bool> = seen.iter().map(|seen| seen.truncated[1]).collect();
@@ -126,7 +128,8 @@ fn episodes_end_in_time_and_begin_again() {
 /// Flying straight on through the trunks ends at the first that is in the way.
 #[test]
 fn trunks_are_solid_and_seen_before_they_are_hit() {
-    let mut tasks = Tasks::new(&vehicles()[..1], 100, 5, settings(Kind::Avoid, Level::AttitudeWing)).unwrap();
+    let mut tasks: Tasks =
+        Tasks::new(&vehicles()[..1], 100, 5, settings(Kind::Avoid, Level::AttitudeWing)).unwrap();
     let trunks: Vec<_> = (0..100).map(|k| tasks.obstacles(k).unwrap()).collect();
     let seen = fly(&mut tasks, 450, |observation| lean(observation).to_vec());
     let (mut hits, mut warned) = (0, 0);
@@ -144,7 +147,7 @@ fn trunks_are_solid_and_seen_before_they_are_hit() {
 fn what_cannot_be_learned_is_named() {
     let bad = |vehicles: &[VehicleFile], count, episode_s| {
         let settings = TaskSettings { episode_s, ..settings(Kind::Avoid, Level::Motor) };
-        Tasks::new(vehicles, count, 0, settings).unwrap_err().to_string()
+        Tasks::<4>::new(vehicles, count, 0, settings).unwrap_err().to_string()
     };
     assert_eq!(bad(&vehicles(), 0, 1.0), "num_envs = 0: must be at least 1");
     assert_eq!(bad(&vehicles(), 1, f64::NAN), "episode_s = NaN: must be at least 0.02 and finite");
@@ -152,7 +155,7 @@ fn what_cannot_be_learned_is_named() {
     let mut uncontrolled = vehicles();
     uncontrolled[1].control = None;
     assert!(bad(&uncontrolled, 1, 1.0).starts_with("vehicles[1]: [control] is missing"));
-    let mut tasks = Tasks::new(&vehicles(), 2, 0, settings(Kind::Avoid, Level::Motor)).unwrap();
+    let mut tasks: Tasks = Tasks::new(&vehicles(), 2, 0, settings(Kind::Avoid, Level::Motor)).unwrap();
     let error = tasks.reset(|_| true, &mut [0.0; 3]).unwrap_err().to_string();
     assert_eq!(error, "observation: 3 numbers, must be 50");
 }

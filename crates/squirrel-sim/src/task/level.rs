@@ -4,7 +4,7 @@
 use crate::batch::SetPoint;
 use squirrel_core::math::{limit, lower};
 use squirrel_core::policy::{ACTION, Span};
-use squirrel_core::vehicle::Vehicle;
+use squirrel_core::vehicle::{MAX_ROTORS, PerRotor, Vehicle};
 
 /// Largest body rates about roll, pitch and yaw, rad/s.
 pub const RATE_MAX_RAD_S: [f32; 3] = [6.0, 6.0, 3.0];
@@ -23,19 +23,25 @@ pub enum Level {
 /// What an action tells.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Told {
-    /// Set point or rotor commands.
-    pub(super) rotors: [f32; 4],
+    /// Set point or rotor commands, as many as [`Level::told_numbers`].
+    pub(super) rotors: PerRotor<f32>,
     /// Both wings, 0..1.
     pub(super) wing: f32,
 }
 
 impl Level {
-    /// Numbers of an action.
-    pub fn numbers(self) -> usize {
+    /// Numbers of an action for vehicles of so many rotors.
+    pub fn numbers(self, rotors: usize) -> usize {
         match self {
-            Self::Motor | Self::BodyRate => 5,
+            Self::Motor => rotors + 1,
+            Self::BodyRate => 5,
             Self::AttitudeWing => ACTION,
         }
+    }
+
+    /// Numbers that the batch is told.
+    pub(super) fn told_numbers(self, rotors: usize) -> usize {
+        if self == Self::Motor { rotors } else { 4 }
     }
 
     /// What the autopilot is told; none where rotors are.
@@ -50,25 +56,30 @@ impl Level {
     /// * `action` - [`Self::numbers`] long
     pub(super) fn told(self, action: &[f32], span: &Span, vehicle: &Vehicle<f32>) -> Told {
         let number = |i: usize| limit(action.get(i).copied().unwrap_or(f32::NAN), -1.0, 1.0);
-        let wing = 0.5 * (1.0 + number(4));
+        let mut rotors = [0.0; MAX_ROTORS];
+        let mut wing = 0.5 * (1.0 + number(action.len().wrapping_sub(1)));
         match self {
             Self::Motor => {
                 let most = vehicle.rotor_thrust_max_n();
                 let propulsion = &vehicle.parameters().propulsion;
-                let rotor = |i| propulsion.command_for_thrust(0.5 * (1.0 + number(i)) * most);
-                Told { rotors: [rotor(0), rotor(1), rotor(2), rotor(3)], wing }
+                for (i, command) in rotors.iter_mut().enumerate().take(vehicle.rotors().len()) {
+                    *command = propulsion.command_for_thrust(0.5 * (1.0 + number(i)) * most);
+                }
             }
             Self::BodyRate => {
-                let [roll, pitch, yaw] = RATE_MAX_RAD_S;
-                let thrust = lower((1.0 + number(3)) * span.weight_n, span.thrust_max_n);
-                Told { rotors: [number(0) * roll, number(1) * pitch, number(2) * yaw, thrust], wing }
+                for (i, most) in RATE_MAX_RAD_S.into_iter().enumerate() {
+                    rotors[i] = number(i) * most;
+                }
+                rotors[3] = lower((1.0 + number(3)) * span.weight_n, span.thrust_max_n);
             }
             Self::AttitudeWing => {
                 let command = span.command(&[number(0), number(1), number(2), number(3)]);
                 let attitude = command.attitude;
-                let rotors = [attitude.roll_rad, attitude.pitch_rad, 0.0, attitude.thrust_n];
-                Told { rotors, wing: command.wing }
+                (rotors[0], rotors[1], rotors[3]) =
+                    (attitude.roll_rad, attitude.pitch_rad, attitude.thrust_n);
+                wing = command.wing;
             }
         }
+        Told { rotors, wing }
     }
 }

@@ -11,7 +11,7 @@
 pub mod course;
 mod level;
 
-pub use level::Level;
+pub use level::{Level, RATE_MAX_RAD_S};
 
 use crate::batch::simd::Path;
 use crate::batch::{Autopilot, Batch, BatchError, Craft, Scheme, Settings, Tuned};
@@ -35,9 +35,6 @@ use squirrel_core::stack::SensorFrame;
 pub const STEPS: usize = 10;
 /// What the environments see of obstacles: paper, section V.B.
 const SENSING: Sensing = Sensing { range_m: 5.0, half_view_rad: 0.261_799_4, speed_min_m_s: 0.5 };
-/// Rotors of the vehicles that learn.
-const ROTORS: usize = 4;
-
 /// What to learn, and how it runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TaskSettings {
@@ -121,9 +118,9 @@ pub struct Outcome<'a> {
     pub truncated: &'a mut [bool],
 }
 
-/// Environments side by side.
+/// Environments side by side, of vehicles with up to `ROTORS` rotors.
 #[derive(Debug)]
-pub struct Tasks {
+pub struct Tasks<const ROTORS: usize = 4> {
     settings: TaskSettings,
     batch: Batch<f32, ROTORS>,
     candidates: Vec<Candidate>,
@@ -150,7 +147,7 @@ impl Candidate {
     }
 }
 
-impl Tasks {
+impl<const ROTORS: usize> Tasks<ROTORS> {
     /// Environments, each at the start of its first episode.
     ///
     /// * `vehicles` - each episode takes one of them
@@ -206,7 +203,7 @@ impl Tasks {
             batch,
             candidates,
             episodes: vec![episode; count],
-            set_points: vec![0.0; count * 4],
+            set_points: vec![0.0; count * settings.level.told_numbers(ROTORS)],
             wings: vec![0.0; count * 2],
         };
         for number in 0..count {
@@ -282,7 +279,7 @@ impl Tasks {
     /// Lengths that are not those of the environments.
     pub fn step(&mut self, actions: &[f32], outcome: Outcome<'_>) -> Result<(), TaskError> {
         let level = self.settings.level;
-        self.check("actions", actions.len(), level.numbers())?;
+        self.check("actions", actions.len(), level.numbers(ROTORS))?;
         self.check("observation", outcome.observation.len(), OBSERVATION)?;
         for (what, length) in [
             ("reward", outcome.reward.len()),
@@ -291,12 +288,13 @@ impl Tasks {
         ] {
             self.check(what, length, 1)?;
         }
-        for (number, action) in actions.chunks_exact(level.numbers()).enumerate() {
+        let width = level.told_numbers(ROTORS);
+        for (number, action) in actions.chunks_exact(level.numbers(ROTORS)).enumerate() {
             let episode = &mut self.episodes[number];
             let candidate = &self.candidates[episode.candidate];
             let told = level.told(action, &candidate.span, &candidate.tuned.vehicle);
-            self.set_points[4 * number..4 * number + 4].copy_from_slice(&told.rotors);
-            self.wings[2 * number..2 * number + 2].fill(told.wing);
+            self.set_points[width * number..][..width].copy_from_slice(&told.rotors[..width]);
+            self.wings[2 * number..][..2].fill(told.wing);
             episode.wing = told.wing;
         }
         if level.set_point().is_some() {
