@@ -115,18 +115,20 @@ impl<T: Float> Rows<'_, T> {
     }
 }
 
-/// Checks an array.
+/// Numbers that are looked at at once: the processor looks at many in one go where it need not stop at the first.
+const LOOK: usize = 1024;
+
+/// Checks dtype and shape of an array.
 ///
 /// * `shape` - it must have; `None` for any length
 ///
 /// # Errors
-/// `ValueError` that names the argument: no array, another dtype or shape, a number that is not finite.
-pub(crate) fn rows<'py, T: Float>(
+/// `ValueError` that names the argument.
+pub(crate) fn array<'a, 'py, T: Float>(
     name: &str,
-    object: &Bound<'py, PyAny>,
+    object: &'a Bound<'py, PyAny>,
     shape: &[Option<usize>],
-    numbers: Numbers,
-) -> PyResult<Rows<'py, T>> {
+) -> PyResult<&'a Bound<'py, PyArrayDyn<T>>> {
     let expected = || format!("{name}: expected a {} array of shape {}", T::NAME, shape_text(shape));
     let Ok(array) = object.cast::<PyArrayDyn<T>>() else {
         return Err(value(format!("{}, got {}", expected(), kind(object))));
@@ -139,11 +141,27 @@ pub(crate) fn rows<'py, T: Float>(
     if !array.data().is_aligned() {
         return Err(value(format!("{name}: its numbers lie at odd addresses; hand in a copy")));
     }
+    Ok(array)
+}
+
+/// Checks an array and its numbers.
+///
+/// # Errors
+/// As [`array`]; a number that is not finite.
+pub(crate) fn rows<'py, T: Float>(
+    name: &str,
+    object: &Bound<'py, PyAny>,
+    shape: &[Option<usize>],
+    numbers: Numbers,
+) -> PyResult<Rows<'py, T>> {
+    let array = array::<T>(name, object, shape)?;
     let array = array.try_readonly().map_err(|error| value(format!("{name}: {error}")))?;
     // A slice of an array in Fortran's order would be columns.
     let copy = (!array.is_c_contiguous()).then(|| array.as_array().iter().copied().collect());
     let rows = Rows { array, copy };
+    let is_fine = |some: &[T]| some.iter().fold(true, |fine, x| fine & x.is_finite());
     if numbers == Numbers::Finite
+        && !rows.numbers().chunks(LOOK).all(is_fine)
         && let Some(at) = rows.numbers().iter().position(|x| !x.is_finite())
     {
         let place = place(at, rows.array.shape());

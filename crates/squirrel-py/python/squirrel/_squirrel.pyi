@@ -86,16 +86,23 @@ class Backstepping:
 @typing.final
 class Batch:
     r"""
-    Many vehicles at once, each with numbers of its own: rigid body, rotors with lag, drag, wind.
+    Many vehicles at once, each with numbers of its own.
     
-    Vehicles start at rest at the origin, level, rotors stopped. What a vehicle does depends on nothing but itself: the same bits
-    in a batch of any size, at any place in it, on any number of threads, in one call or in many. Wings, batteries and effects
-    that change in flight do not act here. Several threads may call at once; they wait for each other.
+    All have rigid body, rotors with lag, drag and wind; wings with their servos, batteries and effects fly where a vehicle has them,
+    as they do in `simulate`, and what no vehicle of the batch has costs nothing. The base model alone, ``whole=False``, is about three
+    times as fast as a vehicle with wings and battery.
+    
+    Vehicles start at rest at the origin, level, rotors stopped, wings folded, batteries full. What a vehicle does depends on nothing
+    but itself: the same bits in a batch of any size, at any place in it, on any number of threads and any registers, in one call or
+    in many. Several threads may call at once; they wait for each other.
     
     Parameters
     ----------
     vehicles : sequence of Vehicle
-        ``[vehicle] * 1000`` for a thousand that are alike. All have 4, 6 or 8 rotors.
+        ``[vehicle] * 1000`` for a thousand that are alike. All have 4, 6 or 8 rotors; wings, batteries and effects need 4. Refused
+        are wings that are a network, flat wings beside membranes, and effects that act on sensors, which a batch lacks.
+    whole : bool
+        Whether wings, batteries and effects fly, or the base model alone: rigid body, rotors, drag, and wind as `set_wind` says.
     dt_s : float
         Step.
     scheme : str
@@ -104,6 +111,9 @@ class Batch:
         ``float32`` or ``float64``.
     threads : int, optional
         That work, the caller among them; as many as there are cores if left out.
+    registers : str, optional
+        ``avx512``, ``avx2``, ``portable`` or ``scalar``; the widest that the processor has if left out. For comparisons: they differ in
+        speed alone.
     
     Raises
     ------
@@ -117,9 +127,10 @@ class Batch:
     >>> vehicle = squirrel.Vehicle.bundled("squirrel")
     >>> batch = squirrel.Batch(vehicles=[vehicle] * 100)
     >>> batch.command(np.full((100, 4), 0.8, np.float32))
+    >>> batch.command_wings(np.ones((100, 2), np.float32))
     >>> batch.step(1000)
-    >>> bool((batch.states()[:, 2] < 0).all())
-    True
+    >>> bool((batch.states()[:, 2] < 0).all()), batch.deployments()[0].tolist()
+    (True, [1.0, 1.0])
     """
     @property
     def dt_s(self) -> builtins.float:
@@ -132,11 +143,16 @@ class Batch:
         Threads that work, the caller among them.
         """
     @property
+    def registers(self) -> builtins.str:
+        r"""
+        What the processor works with: ``avx512``, ``avx2``, ``portable`` or ``scalar``.
+        """
+    @property
     def dtype(self) -> builtins.str:
         r"""
         ``float32`` or ``float64``.
         """
-    def __new__(cls, *, vehicles: typing.Sequence[Vehicle], dt_s: builtins.float = 0.001, scheme: builtins.str = 'rk4', dtype: builtins.str = 'float32', threads: typing.Optional[builtins.int] = None) -> Batch: ...
+    def __new__(cls, *, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, dt_s: builtins.float = 0.001, scheme: builtins.str = 'rk4', dtype: builtins.str = 'float32', threads: typing.Optional[builtins.int] = None, registers: typing.Optional[builtins.str] = None) -> Batch: ...
     def command(self, command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]) -> None:
         r"""
         Tell the rotors what to do from now on.
@@ -151,9 +167,23 @@ class Batch:
         ValueError
             Another dtype or shape, a number that is not finite.
         """
+    def command_wings(self, command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]) -> None:
+        r"""
+        Tell the wings what to do from now on.
+        
+        Parameters
+        ----------
+        command : ndarray of the batch's dtype, shape (n, 2)
+            Left and right, 0 folded to 1 spread; limited. Without effect where a vehicle has no wings.
+        
+        Raises
+        ------
+        ValueError
+            Another dtype or shape, a number that is not finite, a batch without wings.
+        """
     def step(self, steps: builtins.int = 1) -> None:
         r"""
-        Fly on, commands and wind held.
+        Fly on, commands held.
         
         A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it. Ctrl-C ends the call between two steps.
         
@@ -181,9 +211,38 @@ class Batch:
         ValueError
             `out` has another dtype, shape or order, or cannot be written to.
         """
+    def deployments(self) -> numpy.typing.NDArray[typing.Any]:
+        r"""
+        How far the wings of all vehicles are open.
+        
+        Returns
+        -------
+        ndarray of the batch's dtype, shape (n, 2)
+            Left and right, 0 folded to 1 spread.
+        
+        Raises
+        ------
+        ValueError
+            A batch without wings.
+        """
+    def battery(self) -> numpy.typing.NDArray[typing.Any]:
+        r"""
+        Batteries of all vehicles.
+        
+        Returns
+        -------
+        ndarray of the batch's dtype, shape (n, 3)
+            Charge (0 to 1), terminal voltage (V), current (A). A vehicle without a battery stays at its reference voltage.
+        
+        Raises
+        ------
+        ValueError
+            A batch without batteries.
+        """
     def reset(self, state: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], *, vehicles: typing.Optional[typing.Iterable[typing.SupportsIndex]] = None) -> None:
         r"""
-        Put vehicles somewhere else; their commands and their wind stay.
+        Put vehicles somewhere else: wings folded, batteries full. Their air stays and so does what their rotors are told; commands on
+        their way are lost.
         
         Parameters
         ----------
@@ -199,9 +258,27 @@ class Batch:
         ValueError
             Another dtype or shape, a number that is not finite, an attitude that is no rotation.
         """
+    def set_charge(self, charge: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], *, vehicles: typing.Optional[typing.Iterable[typing.SupportsIndex]] = None) -> None:
+        r"""
+        Rest batteries at a charge.
+        
+        Parameters
+        ----------
+        charge : ndarray of the batch's dtype, shape (n,)
+            0 to 1. Without effect where a vehicle has no battery.
+        vehicles : iterable of int, optional
+            Which; all in their order if left out.
+        
+        Raises
+        ------
+        IndexError
+            There is no such vehicle.
+        ValueError
+            Another dtype or shape, a charge out of range, a batch without batteries.
+        """
     def set_wind(self, wind_ned_m_s: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]) -> None:
         r"""
-        Velocity of the air about each vehicle from now on.
+        Velocity of the air about each vehicle from now on; gusts end, those of the effect ``gust`` too.
         
         Parameters
         ----------
@@ -212,30 +289,60 @@ class Batch:
         ValueError
             Another dtype or shape, a number that is not finite.
         """
-    def replace(self, index: builtins.int, vehicle: Vehicle) -> None:
+    def set_air(self, wind_ned_m_s: numpy.typing.NDArray[numpy.float64], *, gust_sigma_m_s: typing.Optional[numpy.typing.NDArray[numpy.float64]] = None, seed: typing.Optional[typing.Iterable[typing.SupportsIndex]] = None, vehicles: typing.Optional[typing.Iterable[typing.SupportsIndex]] = None) -> None:
         r"""
-        Another airframe for one vehicle; it keeps its motion.
+        Moving air about vehicles from now on, as a flight of `simulate` with the same seed has it.
+        
+        Gusts are a Gauss-Markov process of 1.5 s per axis that moves at 300 Hz. Those of the effect ``gust`` blow on top of them; where
+        nothing was set, with the number of the vehicle as seed.
         
         Parameters
         ----------
-        index : int
-            Which, from 0.
-        vehicle : Vehicle
-            With as many rotors.
+        wind_ned_m_s : ndarray of float64, shape (n, 3)
+            Steady part.
+        gust_sigma_m_s : ndarray of float64, shape (n,), optional
+            Standard deviation of the gusts per axis; 0 if left out.
+        seed : iterable of int, optional
+            Of each vehicle's gusts; its number in the batch if left out.
+        vehicles : iterable of int, optional
+            Which; all in their order if left out.
         
         Raises
         ------
         IndexError
             There is no such vehicle.
         ValueError
-            Another number of rotors, or rotors too quick for the step.
+            Another dtype or shape, a number that is not finite, a deviation below 0, a batch of the base model.
+        """
+    def replace(self, index: builtins.int, vehicle: Vehicle) -> None:
+        r"""
+        Another vehicle in the place of one, as for a domain that is drawn anew; motion, air, charge of the battery, and what rotors
+        and wings are told stay.
+        
+        Parameters
+        ----------
+        index : int
+            Which, from 0.
+        vehicle : Vehicle
+            With as many rotors, and no wings, battery or effect of a kind that no vehicle had when the batch was made.
+        
+        Raises
+        ------
+        IndexError
+            There is no such vehicle.
+        ValueError
+            Another number of rotors, rotors too quick for the step, something that the batch has no place for.
         """
     def __len__(self) -> builtins.int: ...
+    def __repr__(self) -> builtins.str: ...
 
 @typing.final
 class FlightLog:
     r"""
     A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their channels as arrays.
+    
+    An array is the caller's own, one copy of a column of the log. Files hold their samples row by row, compressed, so that there is
+    nothing in them to look at in place.
     
     Examples
     --------
@@ -857,7 +964,7 @@ def rk4_step(vehicle: Vehicle, *, state: numpy.typing.NDArray[numpy.float64], co
         Names the argument, what was expected and what came.
     """
 
-def rollout(*, vehicles: typing.Sequence[Vehicle], state: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], steps_per_command: builtins.int = 1, dt_s: builtins.float = 0.001, scheme: builtins.str = 'rk4', wind_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None, threads: typing.Optional[builtins.int] = None) -> numpy.typing.NDArray[typing.Any]:
+def rollout(*, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, state: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], wing_command: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None, steps_per_command: builtins.int = 1, dt_s: builtins.float = 0.001, scheme: builtins.str = 'rk4', wind_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None, threads: typing.Optional[builtins.int] = None) -> numpy.typing.NDArray[typing.Any]:
     r"""
     Fly many vehicles under given commands and keep every motion.
     
@@ -867,10 +974,14 @@ def rollout(*, vehicles: typing.Sequence[Vehicle], state: numpy.typing.NDArray[n
     ----------
     vehicles : sequence of Vehicle
         ``[vehicle] * n`` for n that are alike.
+    whole : bool
+        As for `Batch`: whether wings, batteries and effects fly, or the base model alone.
     state : ndarray of float32 or float64, shape (n, 13 + rotors)
         Where they start, as `Batch.states` gives it; its dtype is that of the flight.
     command : ndarray of the same dtype, shape (periods, n, rotors)
         Held for a period each.
+    wing_command : ndarray of the same dtype, shape (periods, n, 2), optional
+        Left and right, 0 folded to 1 spread; folded if left out.
     steps_per_command : int
         Steps of a period.
     dt_s : float

@@ -1,12 +1,12 @@
 //! A batch of any scalar and any number of rotors behind one trait, and how vehicles become one.
 
-use crate::arguments::{Float, Numbers, rows};
+use crate::arguments::{Float, Numbers, array, rows};
 use crate::error::value;
 use crate::log::table;
 use crate::state::{check_attitudes, state};
 use crate::vehicle::Vehicle;
 use nalgebra::{Vector3, convert};
-use numpy::{PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use squirrel_core::effects::GUST_TIME_CONSTANT_S;
 use squirrel_core::frames::In;
@@ -62,8 +62,7 @@ impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
     }
     fn states_into(&self, out: &Bound<'_, PyAny>) -> PyResult<()> {
         let shape = [Some(self.len()), Some(BODY_NUMBERS + ROTORS)];
-        rows::<T>("out", out, &shape, Numbers::Any)?;
-        let out = out.cast::<PyArrayDyn<T>>()?;
+        let out = array::<T>("out", out, &shape)?;
         if !out.is_c_contiguous() {
             return Err(value("out: must be contiguous, row after row"));
         }
