@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic, its helpers too")]
 
+use squirrel_core::nalgebra::Vector3;
 use squirrel_core::policy::{Policy, Span};
 use squirrel_core::stack::failsafe::{COMMAND_LIMIT_US, FailsafeReason};
 use squirrel_core::stack::{SensorFrame, StackOutput};
@@ -101,7 +102,8 @@ fn a_flight_replays_to_the_bit_without_the_policy() {
     let numbers = log.source_mut("offboard").channels.values_mut().next().unwrap();
     numbers.values[4 * 500 + 2] += 0.01;
     let difference = replay(&log, &setup_of(&log).unwrap()).unwrap().first_difference.unwrap();
-    assert_eq!((difference.time_s, difference.channel.as_str()), (time_s, "control.inner.thrust_demand_n"));
+    assert_eq!(difference.time_s, time_s);
+    assert!(difference.channel.starts_with("control.inner."), "{difference:?}");
 }
 
 /// The mission goes straight on for a policy: to avoid is its own business.
@@ -152,10 +154,13 @@ fn when_the_link_breaks_the_outer_loop_flies_the_mission() {
     let limit_us = u64::from(COMMAND_LIMIT_US);
     assert!((8_000_000 + limit_us - 20_000..=8_000_000 + limit_us + 4000).contains(&lost_us), "{lost_us}");
     assert!(resumed_us - lost_us < 100_000, "{resumed_us}");
-    let (time_s, truth) = log.channel("truth.position_ned_m").unwrap();
-    let (_, reference) = log.channel("reference.position_ned_m").unwrap();
-    for (i, t) in time_s.iter().enumerate().filter(|(_, t)| **t > 14.0) {
-        let error: f64 = truth.row(i).iter().zip(reference.row(i)).map(|(a, b)| (a - b).powi(2)).sum();
-        assert!(error.sqrt() < 1.5, "{t}: {error}");
-    }
+    // In the end it is where a flight without any policy is.
+    let alone = setup.fly(true, |_| {}).unwrap().log.unwrap();
+    let at = |log: &FlightLog, t_s: f64| {
+        let (time_s, truth) = log.channel("truth.position_ned_m").unwrap();
+        Vector3::from_row_slice(truth.row(time_s.partition_point(|t| *t < t_s)))
+    };
+    let apart_m = |t_s: f64| (at(&log, t_s) - at(&alone, t_s)).norm();
+    assert!(apart_m(7.9) > 0.5, "{}: the policy flies another way", apart_m(7.9));
+    assert!(apart_m(19.9) < 0.1, "{}", apart_m(19.9));
 }

@@ -21,7 +21,8 @@ pub(crate) struct Fly {
     /// out, twcc_flat, or pc with a policy.
     #[arg(long)]
     arm: Option<String>,
-    /// Policy that flies instead of the arm's outer loop (.safetensors); the arm takes over where its commands cease.
+    /// Policy that flies instead of the arm's outer loop (.safetensors); the mission goes straight on, to avoid is its own
+    /// business.
     #[arg(long)]
     policy: Option<PathBuf>,
     /// hover, avoid, steer, track, excite_calm, excite_normal, excite_rich, or a scenario file (.toml).

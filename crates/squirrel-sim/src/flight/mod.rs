@@ -207,10 +207,8 @@ impl Setup {
                 if let Some(pilot) = &mut pilot {
                     frame.command = pilot.command(tick, &frame);
                 }
-                let (output, mut encounters) = computer.step(&frame)?;
-                if let Some(pilot) = &pilot {
-                    encounters = encounters.max(pilot.encounters());
-                }
+                let (output, met) = computer.step(&frame)?;
+                let encounters = pilot.as_ref().map_or(met, |pilot| met.max(pilot.encounters()));
                 if !state.body.is_finite() {
                     return Err(FlightError(format!(
                         "at {:.3} s the vehicle's state is not finite",
