@@ -62,8 +62,8 @@ fn build(venv: &Path, package: &Path, dist: &Path) -> Result<PathBuf, String> {
     }
     // The release profile and the target folder are cargo's own, so that nothing is compiled that is compiled already.
     let mut maturin = Command::new(python::program(venv, "maturin"));
-    maturin.current_dir(root()?).args(["build", "--release", "--locked", "--quiet", "--manifest-path"]);
-    maturin.args(["--compression-level", "9"]);
+    maturin.current_dir(root()?).args(["build", "--release", "--locked", "--quiet"]);
+    maturin.args(["--compression-level", "9", "--manifest-path"]);
     call(maturin.arg(package.join("Cargo.toml")).arg("--out").arg(dist))?;
     let mut wheels = std::fs::read_dir(dist).map_err(at)?;
     let wheel = wheels.next().ok_or_else(|| format!("{}: maturin has left no wheel", dist.display()))?;

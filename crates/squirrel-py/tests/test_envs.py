@@ -81,7 +81,7 @@ def test_bad_arguments_are_named() -> None:
     envs.reset(seed=0)
     for actions, words in [
         (np.zeros((2, 5), np.float32), "actions: expected a float32 array of shape (2, 4), got shape (2, 5)"),
-        (np.full((2, 4), np.nan, np.float32), "actions[0, 0] = nan: must be finite"),
+        (np.full((2, 4), np.nan, np.float32), "actions[0, 0] = NaN: must be finite"),
     ]:
         with pytest.raises(ValueError) as error:
             envs.step(actions)

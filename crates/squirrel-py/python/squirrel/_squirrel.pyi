@@ -12,7 +12,9 @@ __all__ = [
     "Batch",
     "FlightLog",
     "Model",
+    "Policy",
     "Stack",
+    "Tasks",
     "Twcc",
     "Vehicle",
     "__version__",
@@ -129,8 +131,8 @@ class Batch:
     >>> batch.command(np.full((100, 4), 0.8, np.float32))
     >>> batch.command_wings(np.ones((100, 2), np.float32))
     >>> batch.step(1000)
-    >>> bool((batch.states()[:, 2] < 0).all()), batch.deployments()[0].tolist()
-    (True, [1.0, 1.0])
+    >>> bool((batch.states()[:, 2] < 0).all()), bool((batch.deployments() > 0.99).all())
+    (True, True)
     """
     @property
     def dt_s(self) -> builtins.float:
@@ -531,6 +533,87 @@ class Model:
     def __repr__(self) -> builtins.str: ...
 
 @typing.final
+class Policy:
+    r"""
+    A policy that flies: two layers of 32 tanh neurons and a linear output, from 25 numbers seen to 4 numbers commanded.
+    
+    What the numbers mean is written in `squirrel.policy`. Layers are ``(weight, bias)`` as `torch.nn.Linear` has them:
+    ``y = weight @ x + bias``.
+    
+    Parameters
+    ----------
+    first : tuple of ndarray of float32, shapes (32, 25) and (32,)
+    second : tuple of ndarray of float32, shapes (32, 32) and (32,)
+    output : tuple of ndarray of float32, shapes (4, 32) and (4,)
+    
+    Raises
+    ------
+    ValueError
+        Names the array, what was expected and what came.
+    """
+    @property
+    def hash(self) -> builtins.str:
+        r"""
+        FNV-1a of the weights, 16 hexadecimal digits; flight logs have it as ``policy_hash``.
+        """
+    def __new__(cls, *, first: tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]], second: tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]], output: tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]) -> Policy: ...
+    @staticmethod
+    def load(path: builtins.str | os.PathLike | pathlib.Path) -> Policy:
+        r"""
+        Read a weights file.
+        
+        Parameters
+        ----------
+        path : str or os.PathLike
+            A safetensors file that `save` wrote.
+        
+        Returns
+        -------
+        Policy
+        
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        ValueError
+            One line that names the file, and the tensor or field with its value.
+        """
+    def save(self, path: builtins.str | os.PathLike | pathlib.Path) -> None:
+        r"""
+        Write a safetensors file for ``squirrel fly --policy``; it appears under its name only when it is whole.
+        
+        Parameters
+        ----------
+        path : str or os.PathLike
+            File to write.
+        
+        Raises
+        ------
+        OSError
+            The disk refuses.
+        """
+    def __call__(self, observation: numpy.typing.NDArray[numpy.float32]) -> numpy.typing.NDArray[numpy.float32]:
+        r"""
+        What the policy answers, with the bits that fly.
+        
+        Parameters
+        ----------
+        observation : ndarray of float32, shape (n, 25)
+            As `squirrel.policy` has it.
+        
+        Returns
+        -------
+        ndarray of float32, shape (n, 4)
+            Roll, pitch, thrust, wings; what is beyond [-1, 1] counts as the limit.
+        
+        Raises
+        ------
+        ValueError
+            Names the argument, what was expected and what came.
+        """
+    def __repr__(self) -> builtins.str: ...
+
+@typing.final
 class Stack:
     r"""
     The whole flight code, the one that flies on the microcontroller, bit for bit (float32).
@@ -599,6 +682,141 @@ class Stack:
         Stack
             That goes on by itself.
         """
+
+@typing.final
+class Tasks:
+    r"""
+    Environments to learn in, side by side: what the classes of `squirrel.envs` are made of.
+    
+    An action is 20 ms of flight. An episode that has ended is followed by a new one in the next step, whose action is not looked at.
+    Environment k draws from ``seed + k``: what happens in it does not depend on how many there are, nor on threads.
+    
+    Parameters
+    ----------
+    task : str
+        ``avoid``: follow a straight run of 4 to 8 m/s past trunks that are seen from 5 m; ``track``: follow a curve.
+    vehicles : sequence of Vehicle
+        Each episode takes one of them, with its wings, battery and effects: domain randomisation is a list of vehicles. All have four
+        rotors and ``[control]``.
+    num_envs : int
+        How many environments.
+    action : str
+        ``motor``: thrust of each rotor from none to all, and wings. ``body_rate``: rates of roll, pitch, yaw (6, 6, 3 rad/s), thrust in
+        weights above hover, and wings. ``attitude_wing``: roll and pitch in the vehicle's largest tilt, thrust in weights above
+        hover, wings. All in [-1, 1]; wings are folded at -1 and spread at 1.
+    seed : int
+        Of everything random.
+    episode_s : float
+        Length of an episode.
+    sensors : bool
+        Observations come from the vehicle's sensors, with their rates, delays and noise, instead of the true state.
+    scheme : str
+        ``rk4`` or ``euler``, of steps of 2 ms.
+    threads : int, optional
+        That work, the caller among them; as many as there are cores if left out.
+    registers : str, optional
+        As in `Batch`.
+    
+    Raises
+    ------
+    ValueError
+        Names the argument, what was expected and what came.
+    """
+    @property
+    def observation_numbers(self) -> builtins.int:
+        r"""
+        Numbers of an observation.
+        """
+    @property
+    def action_numbers(self) -> builtins.int:
+        r"""
+        Numbers of an action.
+        """
+    def __new__(cls, *, task: builtins.str, vehicles: typing.Sequence[Vehicle], num_envs: builtins.int = 1, action: builtins.str = 'attitude_wing', seed: builtins.int = 0, episode_s: builtins.float = 10.0, sensors: builtins.bool = False, scheme: builtins.str = 'rk4', threads: typing.Optional[builtins.int] = None, registers: typing.Optional[builtins.str] = None) -> Tasks: ...
+    def seed(self, index: builtins.int, seed: builtins.int) -> None:
+        r"""
+        New streams of random numbers, from the next episodes on.
+        
+        Parameters
+        ----------
+        index : int
+            Which environment, from 0.
+        seed : int
+            Its seed.
+        
+        Raises
+        ------
+        IndexError
+            There is no such environment.
+        """
+    def reset(self, mask: typing.Optional[typing.Sequence[builtins.bool]] = None) -> numpy.typing.NDArray[numpy.float32]:
+        r"""
+        Start new episodes.
+        
+        Parameters
+        ----------
+        mask : sequence of bool, optional
+            In which environments; in all if left out.
+        
+        Returns
+        -------
+        ndarray of float32, shape (num_envs, 25)
+            What all of them see.
+        
+        Raises
+        ------
+        ValueError
+            A mask of another length.
+        """
+    def step(self, actions: numpy.typing.NDArray[numpy.float32]) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.bool_], numpy.typing.NDArray[numpy.bool_]]:
+        r"""
+        Fly on for 20 ms.
+        
+        Parameters
+        ----------
+        actions : ndarray of float32, shape (num_envs, 4 or 5)
+            Limited to [-1, 1].
+        
+        Returns
+        -------
+        tuple of ndarray
+            Observations, float32, shape (num_envs, 25); rewards, float32; terminated and truncated, bool, shape (num_envs,).
+        
+        Raises
+        ------
+        ValueError
+            Another dtype or shape, a number that is not finite.
+        """
+    def states(self) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
+        r"""
+        Motions of all vehicles and what they should follow.
+        
+        Returns
+        -------
+        tuple of ndarray
+            States, float32, shape (num_envs, 17), as `Batch.states` has them; positions that the references have, NED, m, shape
+            (num_envs, 3).
+        """
+    def obstacles(self, index: builtins.int) -> numpy.typing.NDArray[numpy.float32]:
+        r"""
+        Trunks of one environment.
+        
+        Parameters
+        ----------
+        index : int
+            Which, from 0.
+        
+        Returns
+        -------
+        ndarray of float32, shape (n, 3)
+            North, east, radius, m.
+        
+        Raises
+        ------
+        IndexError
+            There is no such environment.
+        """
+    def __len__(self) -> builtins.int: ...
 
 @typing.final
 class Twcc:
@@ -1004,7 +1222,7 @@ def rollout(*, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, 
         Names the argument, what was expected and what came.
     """
 
-def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str = 'avoid', arm: builtins.str = 'twcc_flat', seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, integrator: builtins.str = 'rk4') -> FlightLog:
+def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str = 'avoid', arm: typing.Optional[builtins.str] = None, seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, integrator: builtins.str = 'rk4', policy: typing.Optional[Policy] = None) -> FlightLog:
     r"""
     Fly one scenario in closed loop: plant, sensors and flight code.
     
@@ -1015,14 +1233,17 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
     scenario : str
         ``hover``, ``avoid``, ``steer``, ``track``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
         the path of a scenario file (.toml).
-    arm : str
-        Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``.
+    arm : str, optional
+        Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``; if left out,
+        ``twcc_flat``, or ``pc`` with a policy.
     seed : int, optional
         Of everything random; the scenario's own if left out.
     thrust_to_weight : float, optional
         Largest collective thrust over weight; overrides vehicle and scenario.
     integrator : str
         ``rk4`` (rapier near contact) or ``rapier`` (throughout, first order).
+    policy : Policy, optional
+        Flies instead of the arm's outer loop: asked 50 times a second, its commands go to the flight code as an offboard computer's.
     
     Returns
     -------
