@@ -12,6 +12,7 @@ __all__ = [
     "Batch",
     "FlightLog",
     "Model",
+    "Policy",
     "Stack",
     "Twcc",
     "Vehicle",
@@ -420,6 +421,87 @@ class Model:
         ------
         ValueError
             A tensor is missing or unknown, of another dtype or shape, or not finite.
+        """
+    def __repr__(self) -> builtins.str: ...
+
+@typing.final
+class Policy:
+    r"""
+    A policy that flies: two layers of 32 tanh neurons and a linear output, from 25 numbers seen to 4 numbers commanded.
+    
+    What the numbers mean is written in `squirrel.policy`. Layers are ``(weight, bias)`` as `torch.nn.Linear` has them:
+    ``y = weight @ x + bias``.
+    
+    Parameters
+    ----------
+    first : tuple of ndarray of float32, shapes (32, 25) and (32,)
+    second : tuple of ndarray of float32, shapes (32, 32) and (32,)
+    output : tuple of ndarray of float32, shapes (4, 32) and (4,)
+    
+    Raises
+    ------
+    ValueError
+        Names the array, what was expected and what came.
+    """
+    @property
+    def hash(self) -> builtins.str:
+        r"""
+        FNV-1a of the weights, 16 hexadecimal digits; flight logs have it as ``policy_hash``.
+        """
+    def __new__(cls, *, first: tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]], second: tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]], output: tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]) -> Policy: ...
+    @staticmethod
+    def load(path: builtins.str | os.PathLike | pathlib.Path) -> Policy:
+        r"""
+        Read a weights file.
+        
+        Parameters
+        ----------
+        path : str or os.PathLike
+            A safetensors file that `save` wrote.
+        
+        Returns
+        -------
+        Policy
+        
+        Raises
+        ------
+        OSError
+            The file cannot be read.
+        ValueError
+            One line that names the file, and the tensor or field with its value.
+        """
+    def save(self, path: builtins.str | os.PathLike | pathlib.Path) -> None:
+        r"""
+        Write a safetensors file for ``squirrel fly --policy``; it appears under its name only when it is whole.
+        
+        Parameters
+        ----------
+        path : str or os.PathLike
+            File to write.
+        
+        Raises
+        ------
+        OSError
+            The disk refuses.
+        """
+    def __call__(self, observation: numpy.typing.NDArray[numpy.float32]) -> numpy.typing.NDArray[numpy.float32]:
+        r"""
+        What the policy answers, with the bits that fly.
+        
+        Parameters
+        ----------
+        observation : ndarray of float32, shape (n, 25)
+            As `squirrel.policy` has it.
+        
+        Returns
+        -------
+        ndarray of float32, shape (n, 4)
+            Roll, pitch, thrust, wings; what is beyond [-1, 1] counts as the limit.
+        
+        Raises
+        ------
+        ValueError
+            Names the argument, what was expected and what came.
         """
     def __repr__(self) -> builtins.str: ...
 
@@ -893,7 +975,7 @@ def rollout(*, vehicles: typing.Sequence[Vehicle], state: numpy.typing.NDArray[n
         Names the argument, what was expected and what came.
     """
 
-def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str = 'avoid', arm: builtins.str = 'twcc_flat', seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, integrator: builtins.str = 'rk4') -> FlightLog:
+def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str = 'avoid', arm: typing.Optional[builtins.str] = None, seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, integrator: builtins.str = 'rk4', policy: typing.Optional[Policy] = None) -> FlightLog:
     r"""
     Fly one scenario in closed loop: plant, sensors and flight code.
     
@@ -904,14 +986,17 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
     scenario : str
         ``hover``, ``avoid``, ``steer``, ``track``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
         the path of a scenario file (.toml).
-    arm : str
-        Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``.
+    arm : str, optional
+        Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``; if left out,
+        ``twcc_flat``, or ``pc`` with a policy.
     seed : int, optional
         Of everything random; the scenario's own if left out.
     thrust_to_weight : float, optional
         Largest collective thrust over weight; overrides vehicle and scenario.
     integrator : str
         ``rk4`` (rapier near contact) or ``rapier`` (throughout, first order).
+    policy : Policy, optional
+        Flies instead of the arm's outer loop: asked 50 times a second, its commands go to the flight code as an offboard computer's.
     
     Returns
     -------
