@@ -226,7 +226,7 @@ impl Stack {
     }
 
     /// What flies while the failsafe acts or until the outer loop's next tick, and what control resumes from afterwards.
-    #[cold]
+    // Apart, so that a step in which nothing is lost stays short.
     #[inline(never)]
     fn forget(&self, state: &mut StackState, was: FailsafeMode) {
         let thrust_n = LEVEL_THRUST_SHARE * self.vehicle.weight_n();
