@@ -37,8 +37,6 @@ pub struct Envelope {
 
 impl Envelope {
     /// The nearest command inside.
-    // Called in two places; once in them is 440 bytes of a small processor's code.
-    #[inline(never)]
     pub fn limit(&self, wanted: &AttitudeThrust) -> AttitudeThrust {
         let angle = |x: f32| limit(x, -self.tilt_max_rad, self.tilt_max_rad);
         AttitudeThrust {

@@ -182,6 +182,9 @@ impl Stack {
         let alone = state.failsafe.command_is_lost() && state.known.command.take().is_some();
         if failsafe.mode != was || !is_well || alone {
             self.forget(state, was);
+        } else if let Some(command) = &state.known.command {
+            state.command = self.airframe.envelope.limit(&command.attitude);
+            state.wing_command = limit(command.wing, 0.0, 1.0);
         }
 
         // In most steps the period is the last one still; a processor without 64-bit division sees that sooner.
@@ -198,10 +201,6 @@ impl Stack {
             let dt_s = lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6;
             if is_well && state.known.command.is_none() { self.outer(state, frame, dt_s) } else { None }
         };
-        if let Some(command) = state.known.command.filter(|_| is_well) {
-            state.command = self.airframe.envelope.limit(&command.attitude);
-            state.wing_command = limit(command.wing, 0.0, 1.0);
-        }
         let reference = self.mission.reference(&state.mission, frame.time_us);
         let dt_s = lower(elapsed_us.unwrap_or(0) as f32 * 1e-6, INNER_STEP_MAX_S);
         let inner = if failsafe.mode == FailsafeMode::Cut {
@@ -227,6 +226,8 @@ impl Stack {
     }
 
     /// What flies while the failsafe acts or until the outer loop's next tick, and what control resumes from afterwards.
+    // Apart, so that a step in which nothing is lost stays short.
+    #[inline(never)]
     fn forget(&self, state: &mut StackState, was: FailsafeMode) {
         let thrust_n = LEVEL_THRUST_SHARE * self.vehicle.weight_n();
         state.command = AttitudeThrust { thrust_n, ..AttitudeThrust::default() };
