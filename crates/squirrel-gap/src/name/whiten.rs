@@ -73,11 +73,6 @@ impl Whitener {
         out
     }
 
-    /// Rows that are left.
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
-    }
-
     /// A column through the filters; each segment loses its first samples. No rows stay none.
     pub(crate) fn apply(&self, segments: &[Segment], column: &[f64]) -> Vec<f64> {
         if column.is_empty() {
