@@ -8,6 +8,7 @@
 //! not average away like noise.
 
 use nalgebra::{Cholesky, DMatrix, DVector};
+use squirrel_sim::batch::simd::{BLOCK, Kernel, Lanes, Path, Paths};
 
 /// Tempering of the likelihood.
 pub(crate) const BETA: f64 = 0.3;
@@ -31,69 +32,95 @@ pub(crate) struct Posterior {
 
 /// Rows that are taken at a time, so that a piece of every column stays in the cache.
 const PIECE: usize = 512;
-/// Columns and rows that are multiplied side by side.
+/// Columns that one column is multiplied with side by side.
 const WIDE: usize = 4;
 
-/// Inner products of a column with others; a column without rows is one of zeros.
-pub(crate) fn products(column: &[f64], others: &[&[f64]]) -> Vec<f64> {
-    let mut out = vec![0.0; others.len()];
-    for start in (0..column.len()).step_by(PIECE) {
-        add_products(&mut out, column, others, start);
-    }
-    out
+/// Inner products of columns with others, a row each; a column without rows is one of zeros.
+pub(crate) fn products(columns: &[&[f64]], others: &[&[f64]]) -> DMatrix<f64> {
+    let out = DMatrix::zeros(columns.len(), others.len());
+    f64::run(Path::best(), Products { columns, others, lower: false, out })
 }
 
-/// Adds the part of one piece of the rows.
-fn add_products(out: &mut [f64], column: &[f64], others: &[&[f64]], start: usize) {
-    let piece = |x: &'_ [f64]| -> std::ops::Range<usize> { start.min(x.len())..(start + PIECE).min(x.len()) };
-    let a = &column[piece(column)];
-    for (out, others) in out.chunks_mut(WIDE).zip(others.chunks(WIDE)) {
-        // What is missing of the last few, or has no rows, is multiplied by its own column and forgotten.
-        let mut b = [a; WIDE];
-        for (b, other) in b.iter_mut().zip(others).filter(|(_, other)| !other.is_empty()) {
-            *b = &other[piece(other)];
-        }
-        for ((out, other), x) in out.iter_mut().zip(others).zip(side_by_side(a, b)) {
-            if !other.is_empty() {
-                *out += x;
+/// Inner products on the registers of the processor. The order of the sums is that of [`BLOCK`] on all of them.
+struct Products<'a> {
+    columns: &'a [&'a [f64]],
+    others: &'a [&'a [f64]],
+    /// The two are the same, and what is above the diagonal is not asked for.
+    lower: bool,
+    out: DMatrix<f64>,
+}
+
+impl Kernel<f64> for Products<'_> {
+    type Output = DMatrix<f64>;
+
+    #[inline(always)]
+    fn run<L: Lanes<Weight = f64>>(self) -> DMatrix<f64> {
+        let Self { columns, others, lower, mut out } = self;
+        let rows = columns.iter().map(|column| column.len()).max().unwrap_or_default();
+        for start in (0..rows).step_by(PIECE) {
+            let piece = start..(start + PIECE).min(rows);
+            for (i, column) in columns.iter().enumerate().filter(|(_, column)| !column.is_empty()) {
+                let a = &column[piece.clone()];
+                let end = if lower { i + 1 } else { others.len() };
+                for first in (0..end).step_by(WIDE) {
+                    // What is missing of the last few, or has no rows, is multiplied by its own column and forgotten.
+                    let of = |j: usize| others[..end].get(first + j).filter(|other| !other.is_empty());
+                    let b = [0, 1, 2, 3].map(|j| of(j).map_or(a, |other| &other[piece.clone()]));
+                    for (j, sum) in side_by_side::<L>(a, b).into_iter().enumerate() {
+                        if of(j).is_some() {
+                            out[(i, first + j)] += sum;
+                        }
+                    }
+                }
             }
         }
+        out
     }
 }
 
-/// Inner products of one series with four; the order of the sums is fixed.
-fn side_by_side(a: &[f64], b: [&[f64]; WIDE]) -> [f64; WIDE] {
-    let mut sums = [[0.0; WIDE]; WIDE];
-    let whole = a.len() / WIDE * WIDE;
+/// Inner products of one series with four.
+#[inline(always)]
+fn side_by_side<L: Lanes<Weight = f64>>(a: &[f64], b: [&[f64]; WIDE]) -> [f64; WIDE] {
+    // A register holds fewer numbers than a block of some path has; each has its own sum.
+    let registers = BLOCK / L::WIDTH;
+    let mut sums = [[L::zero(); BLOCK]; WIDE];
+    let whole = a.len() / BLOCK * BLOCK;
     let b = b.map(|b| &b[..a.len()]);
-    for row in (0..whole).step_by(WIDE) {
-        for (sums, b) in sums.iter_mut().zip(b) {
-            for lane in 0..WIDE {
-                sums[lane] += a[row + lane] * b[row + lane];
+    for row in (0..whole).step_by(BLOCK) {
+        for register in 0..registers {
+            let at = row + register * L::WIDTH;
+            let x = L::load(&a[at..]);
+            for (sums, b) in sums.iter_mut().zip(b) {
+                sums[register] = sums[register] + x * L::load(&b[at..]);
             }
         }
     }
-    let mut out = sums.map(|lanes| lanes.iter().sum());
-    for (out, b) in out.iter_mut().zip(b) {
-        *out += a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum::<f64>();
+    let mut out = [0.0; WIDE];
+    for ((out, sums), b) in out.iter_mut().zip(sums).zip(b) {
+        let mut lanes = [0.0; BLOCK];
+        for (lanes, sum) in lanes.chunks_exact_mut(L::WIDTH).zip(sums) {
+            sum.store(lanes);
+        }
+        *out = lanes.iter().sum::<f64>() + a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum::<f64>();
     }
     out
+}
+
+/// Inner products of columns with each other.
+pub(crate) fn inner(columns: &[&[f64]]) -> DMatrix<f64> {
+    let n = columns.len();
+    let out = DMatrix::zeros(n, n);
+    let mut g = f64::run(Path::best(), Products { columns, others: columns, lower: true, out });
+    g.fill_upper_triangle_with_lower_triangle();
+    g
 }
 
 impl Gram {
     pub(crate) fn new(columns: &[Vec<f64>], y: &[f64]) -> Self {
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        let n = columns.len();
-        let mut lower: Vec<Vec<f64>> = (0..n).map(|i| vec![0.0; i + 1]).collect();
-        for start in (0..y.len()).step_by(PIECE) {
-            for (i, (row, column)) in lower.iter_mut().zip(&columns).enumerate() {
-                if !column.is_empty() {
-                    add_products(row, column, &columns[..=i], start);
-                }
-            }
-        }
-        let g = DMatrix::from_fn(n, n, |i, j| lower[i.max(j)][i.min(j)]);
-        Self { g, b: DVector::from_vec(products(y, &columns)), yy: products(y, &[y])[0] }
+        let with_y = products(&[y], &[columns.as_slice(), &[y]].concat());
+        let (b, yy) = (with_y.columns(0, columns.len()).transpose(), with_y[(0, columns.len())]);
+        Self { g: inner(&columns), b: DVector::from_column_slice(b.as_slice()), yy }
     }
 
     /// The posterior under prior deviations; a deviation of 0 leaves a parameter out.

@@ -2,7 +2,7 @@
 //!
 //! A column without rows is one of zeros: heights, where no effect of height acts.
 
-use super::evidence::{BETA, Gram};
+use super::evidence::{BETA, Gram, inner};
 use super::parameters::Catalogue;
 use super::point::{Other, Point, hypothesis};
 use super::whiten::Whitener;
@@ -120,7 +120,7 @@ impl Linear {
             whitener.refit(&predictor.segments, &draws, DYNAMIC);
         }
         let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
-        let gram = Gram::new(&columns, &vec![0.0; whitener.rows()]).g;
+        let gram = inner(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
         Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram })
     }
 }

@@ -6,7 +6,7 @@ use super::parameters::SLAB_OF_LARGEST;
 use super::point::{Member, Other, Point};
 use super::search::Search;
 use crate::GapError;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
 /// Most steps of a refinement.
@@ -224,18 +224,23 @@ impl Search<'_> {
             }
         }
         let (k, n) = (own.len(), linear.columns.len());
-        let all: Vec<&[f64]> =
+        let mut all: Vec<&[f64]> =
             own.iter().map(Vec::as_slice).chain((0..n).map(|j| column(j).as_slice())).collect();
+        // What is new, and last the measurement; the rest is known.
+        let new: Vec<usize> = (0..k).chain(fresh.keys().map(|i| k + i)).collect();
+        all.push(&y);
+        let with_new: Vec<&[f64]> = new.iter().map(|i| all[*i]).chain([y.as_slice()]).collect();
+        let inner = products(&with_new, &all);
         let mut gram = Gram {
             g: DMatrix::zeros(k + n, k + n),
-            b: DVector::from_vec(products(&y, &all)),
-            yy: products(&y, &[&y])[0],
+            b: inner.row(new.len()).columns(0, k + n).transpose(),
+            yy: inner[(new.len(), k + n)],
         };
         gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram);
-        for i in (0..k).chain(fresh.keys().map(|i| k + i)) {
-            for (j, x) in products(all[i], &all).into_iter().enumerate() {
-                gram.g[(i, j)] = x;
-                gram.g[(j, i)] = x;
+        for (row, i) in new.into_iter().enumerate() {
+            for j in 0..k + n {
+                gram.g[(i, j)] = inner[(row, j)];
+                gram.g[(j, i)] = inner[(row, j)];
             }
         }
         prior.extend(spikes);

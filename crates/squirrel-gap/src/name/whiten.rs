@@ -73,11 +73,6 @@ impl Whitener {
         out
     }
 
-    /// Rows that are left.
-    pub(crate) fn rows(&self) -> usize {
-        self.rows
-    }
-
     /// A column through the filters; each segment loses its first samples. No rows stay none.
     pub(crate) fn apply(&self, segments: &[Segment], column: &[f64]) -> Vec<f64> {
         if column.is_empty() {
@@ -91,10 +86,13 @@ impl Whitener {
             }
             let x = &column[segment.rows.clone()];
             let scale = 1.0 / deviation;
-            out.extend(x.windows(ORDER + 1).map(|w| {
-                let predicted: f64 =
-                    coefficients.iter().zip(w[..ORDER].iter().rev()).map(|(a, x)| a * x).sum();
-                (w[ORDER] - predicted) * scale
+            // By the age of samples, each a slice, so that rows are computed side by side.
+            let n = x.len() - ORDER;
+            let aged: [&[f64]; ORDER] = std::array::from_fn(|i| &x[ORDER - 1 - i..][..n]);
+            let now = &x[ORDER..];
+            out.extend((0..n).map(|row| {
+                let predicted: f64 = coefficients.iter().zip(aged).map(|(a, x)| a * x[row]).sum();
+                (now[row] - predicted) * scale
             }));
         }
         out
