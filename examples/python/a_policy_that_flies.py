@@ -11,7 +11,7 @@ import numpy as np
 
 import squirrel
 
-PAIRS, GENERATIONS, STEPS, SIGMA, RATE = 128, 150, 200, 0.05, 0.05
+PAIRS, GENERATIONS, STEPS, SIGMA, RATE = 128, 160, 250, 0.05, 0.05
 SHAPES = [(32, 25), (32,), (32, 32), (32,), (4, 32), (4,)]
 SIZES = [int(np.prod(shape)) for shape in SHAPES]
 rng = np.random.default_rng(1)
@@ -19,7 +19,8 @@ vehicle = squirrel.Vehicle.bundled("squirrel")
 
 
 def tasks_of(count: int) -> squirrel.Tasks:
-    return squirrel.Tasks(task="track", vehicles=[vehicle], num_envs=count, action="attitude_wing")
+    # With sensors: a policy that has only seen true states does not fly on a receiver that speaks ten times a second.
+    return squirrel.Tasks(task="track", vehicles=[vehicle], num_envs=count, action="attitude_wing", sensors=True)
 
 
 def layers(parameters: np.ndarray) -> list[np.ndarray]:
@@ -65,7 +66,8 @@ for generation in range(GENERATIONS):
     slope = ((rank[:PAIRS] - rank[PAIRS:]) @ noise) / (2 * PAIRS * SIGMA)
     momentum, square = 0.9 * momentum + 0.1 * slope, 0.99 * square + 0.01 * slope**2
     scale = np.sqrt(square / (1.0 - 0.99 ** (generation + 1))) + 1e-8
-    mean = (mean + RATE * momentum / (1.0 - 0.9 ** (generation + 1)) / scale).astype(np.float32)
+    rate = RATE * (1.0 - 0.9 * generation / GENERATIONS)
+    mean = (mean + rate * momentum / (1.0 - 0.9 ** (generation + 1)) / scale).astype(np.float32)
     curve.append(float(worth.mean()))
     if generation % 15 == 0 or generation + 1 == GENERATIONS:
         spent = time.perf_counter() - begin

@@ -10,7 +10,7 @@ use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use squirrel_core::control::Reference;
 use squirrel_core::dynamics::State;
-use squirrel_core::frames::In;
+use squirrel_core::frames::{In, Ned};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::guidance::trajectory::Trajectory;
 use squirrel_core::nalgebra::Vector3;
@@ -53,7 +53,12 @@ pub enum Course {
         trunks: [Obstacle; TRUNKS],
     },
     /// A curve.
-    Track(Sines),
+    Track {
+        /// What to follow.
+        sines: Sines,
+        /// The episode starts at rest instead of at the curve's speed.
+        at_rest: bool,
+    },
 }
 
 /// `p(t) = start + a (sin(w t + phase) - sin(phase))` for each axis.
@@ -116,8 +121,16 @@ impl Course {
                     sines.amplitude_m[axis] = amplitude;
                     sines.phase_rad[axis] = between(rng, 0.0, core::f32::consts::TAU);
                 }
-                Self::Track(sines)
+                Self::Track { sines, at_rest: draw(rng) & 1 == 0 }
             }
+        }
+    }
+
+    /// Velocity at the start of the episode.
+    pub(super) fn start_velocity(&self) -> In<Ned, f32> {
+        match self {
+            Self::Track { at_rest: true, .. } => In::zero(),
+            _ => self.reference(0.0).velocity,
         }
     }
 
@@ -125,14 +138,14 @@ impl Course {
     pub(super) fn reference(&self, time_s: f32) -> Reference {
         match self {
             Self::Avoid { run, ahead_s, .. } => run.at(time_s + ahead_s),
-            Self::Track(sines) => sines.at(time_s),
+            Self::Track { sines, .. } => sines.at(time_s),
         }
     }
 
     pub(super) fn obstacles(&self) -> &[Obstacle] {
         match self {
             Self::Avoid { trunks, .. } => trunks,
-            Self::Track(_) => &[],
+            Self::Track { .. } => &[],
         }
     }
 

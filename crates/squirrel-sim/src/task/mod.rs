@@ -191,7 +191,7 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
         let episode = Episode {
             rng: Pcg64Mcg::seed_from_u64(0),
             candidate: 0,
-            course: Course::Track(course::Sines::default()),
+            course: Course::Track { sines: course::Sines::default(), at_rest: true },
             lookout: Lookout::new(SENSING),
             sensors: None,
             steps: 0,
@@ -345,7 +345,7 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
         (episode.steps, episode.wing, episode.ended) = (0, 0.0, false);
         let start = episode.reference();
         let mut state = State::at_rest();
-        (state.position, state.velocity) = (start.position, start.velocity);
+        (state.position, state.velocity) = (start.position, episode.course.start_velocity());
         for speed in state.rotor_speed_rad_s.iter_mut().take(ROTORS) {
             *speed = chosen.hover_speed_rad_s;
         }
