@@ -31,7 +31,7 @@ use squirrel_sim::batch::BODY_NUMBERS;
 /// scheme : str
 ///     ``rk4`` or ``euler``.
 /// wind_ned_m_s : ndarray of the same dtype, shape (n, 3), optional
-///     Velocity of the air; calm if left out.
+///     Velocity of the air, which has no gusts then, not even those of the effect ``gust``; calm if left out.
 /// threads : int, optional
 ///     That work; as many as there are cores if left out.
 ///
