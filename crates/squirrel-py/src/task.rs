@@ -229,10 +229,7 @@ impl Tasks {
         type_repr = "tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]",
         imports = ("numpy.typing", "numpy")
     ))]
-    fn states<'py>(
-        &self,
-        py: Python<'py>,
-    ) -> PyResult<(Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>)> {
+    fn states<'py>(&self, py: Python<'py>) -> PyResult<Motions<'py>> {
         let environments = self.lock(py)?;
         let (mut states, mut references) = (Vec::new(), Vec::new());
         for index in 0..self.count {
@@ -273,6 +270,7 @@ impl Tasks {
 
     /// Numbers of an observation.
     #[getter]
+    #[allow(clippy::unused_self, reason = "a property of the environments, beside the other")]
     fn observation_numbers(&self) -> usize {
         OBSERVATION
     }
@@ -287,6 +285,9 @@ impl Tasks {
         self.count
     }
 }
+
+/// States and what they should be.
+type Motions<'py> = (Bound<'py, PyArray2<f32>>, Bound<'py, PyArray2<f32>>);
 
 /// Observations, rewards, terminated, truncated.
 type Stepped<'py> = (

@@ -1,4 +1,5 @@
 //! The inner loop in a batch is the flight code's, and what it does to a vehicle depends on nothing but the vehicle.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod batch_support;
 
@@ -125,7 +126,7 @@ fn body_rates_are_reached_and_thrust_is_the_thrust_asked_for() {
     let tuned = squirrel();
     let mut batch: Batch<f32> = Batch::new(&[tuned.vehicle], settings(1, Path::best())).unwrap();
     let level = Autopilot { set_point: SetPoint::BodyRate, period_steps: 1 };
-    batch.engage(level, &[tuned.clone()]).unwrap();
+    batch.engage(level, std::slice::from_ref(&tuned)).unwrap();
     batch.set_points(&[0.8, -0.5, 0.3, 6.0]).unwrap();
     batch.step(500);
     let state = batch.state(0).unwrap();
@@ -141,7 +142,7 @@ fn body_rates_are_reached_and_thrust_is_the_thrust_asked_for() {
 fn limits_hold_and_tilt_comes_first() {
     let tuned = squirrel();
     let mut batch: Batch<f32> = Batch::new(&[tuned.vehicle], settings(1, Path::best())).unwrap();
-    batch.engage(attitudes(1), &[tuned.clone()]).unwrap();
+    batch.engage(attitudes(1), std::slice::from_ref(&tuned)).unwrap();
     let most = Mixer::new(&tuned.vehicle).unwrap().rotor_thrust_max_n();
     let k = tuned.vehicle.parameters().propulsion.thrust_coefficient_n_s2;
     batch.set_points(&[0.6, 0.0, 0.5, 1e3]).unwrap();

@@ -51,13 +51,13 @@ fn random() -> Policy {
     policy
 }
 
-fn fly(setup: &Setup, computer: &mut dyn FlightComputer, policy: Policy) -> Flight {
-    let weights = PolicyWeights { policy, name: "test".to_owned() };
+fn fly(setup: &Setup, computer: &mut dyn FlightComputer, policy: &Policy) -> Flight {
+    let weights = PolicyWeights { policy: *policy, name: "test".to_owned() };
     let pilot = Pilot::new(weights, setup, &setup.stack().unwrap()).unwrap();
     setup.fly_on(computer, Some(pilot), true, |_| {}).unwrap()
 }
 
-fn flown(setup: &Setup, policy: Policy) -> Flight {
+fn flown(setup: &Setup, policy: &Policy) -> Flight {
     fly(setup, &mut InProcess::new(setup.stack().unwrap()), policy)
 }
 
@@ -69,8 +69,8 @@ fn hand_of(setup: &Setup) -> Policy {
 fn a_controller_in_a_network_hovers_and_tracks_and_a_random_one_does_not() {
     for (scenario, within_m) in [("hover", 0.3), ("track", 2.5)] {
         let setup = setup(scenario);
-        let hand = flown(&setup, hand_of(&setup)).metrics;
-        let chance = flown(&setup, random()).metrics;
+        let hand = flown(&setup, &hand_of(&setup)).metrics;
+        let chance = flown(&setup, &random()).metrics;
         assert!(hand.rmse_m < within_m, "{scenario}: {hand:?}");
         assert!(chance.rmse_m > 5.0 * hand.rmse_m, "{scenario}: {chance:?}");
         assert!(hand.wings_open_s == 0.0, "{hand:?}");
@@ -84,7 +84,7 @@ fn a_flight_replays_to_the_bit_without_the_policy() {
     let folder = std::env::temp_dir().join(format!("squirrel-pilot-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("track.mcap");
-    flown(&setup, policy).log.unwrap().write(&path).unwrap();
+    flown(&setup, &policy).log.unwrap().write(&path).unwrap();
     let mut log = FlightLog::read(&path).unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     let hash = PolicyWeights { policy, name: String::new() }.hash();
@@ -110,7 +110,7 @@ fn a_flight_replays_to_the_bit_without_the_policy() {
 #[test]
 fn an_obstacle_counts_when_the_lookout_sees_it_and_the_reference_goes_on() {
     let setup = setup("avoid");
-    let flight = flown(&setup, hand_of(&setup));
+    let flight = flown(&setup, &hand_of(&setup));
     assert_eq!(flight.metrics.encounters, 1);
     assert!(flight.metrics.window_s > 5.9, "{:?}", flight.metrics);
     let log = flight.log.unwrap();
@@ -149,7 +149,7 @@ fn when_the_link_breaks_the_outer_loop_flies_the_mission() {
     let setup = setup("track");
     let computer = InProcess::new(setup.stack().unwrap());
     let mut deaf = Deaf { computer, from_us: 8_000_000, lost_us: None, resumed_us: None };
-    let log = fly(&setup, &mut deaf, hand_of(&setup)).log.unwrap();
+    let log = fly(&setup, &mut deaf, &hand_of(&setup)).log.unwrap();
     let (lost_us, resumed_us) = (deaf.lost_us.unwrap(), deaf.resumed_us.unwrap());
     let limit_us = u64::from(COMMAND_LIMIT_US);
     assert!((8_000_000 + limit_us - 20_000..=8_000_000 + limit_us + 4000).contains(&lost_us), "{lost_us}");

@@ -1,4 +1,5 @@
 //! Environments: what happens in one depends on nothing but its seed, and rewards are for what they say.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use squirrel_core::policy::OBSERVATION;
 use squirrel_sim::batch::Scheme;

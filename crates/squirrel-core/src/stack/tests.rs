@@ -249,7 +249,7 @@ fn when_commands_cease_the_outer_loop_flies_again_as_if_new() {
     for k in 0..700u64 {
         let time_us = k * 10_000 / 3;
         let mut frame = frame(time_us);
-        frame.command = (time_us >= 1_000_000 && time_us <= 1_480_000 && k % 6 == 0)
+        frame.command = ((1_000_000..=1_480_000).contains(&time_us) && k % 6 == 0)
             .then(|| commanded([0.2, 0.0, 6.0, 1.0]));
         let output = stack.step(&mut state, &frame);
         let lost = time_us > 1_480_000 + u64::from(failsafe::COMMAND_LIMIT_US);

@@ -134,14 +134,9 @@ impl Candidate {
         let control = file.control.ok_or(TaskError::NoGains(number))?;
         let fail = |problem| BatchError::Airframe { vehicle: number, problem };
         let vehicle = file.vehicle.cast::<f32>().map_err(fail)?;
-        let p = vehicle.parameters();
-        let span = Span {
-            weight_n: vehicle.weight_n(),
-            thrust_max_n: p.limits.thrust_max_n,
-            tilt_max_rad: p.limits.tilt_max_rad,
-        };
+        let span = Span::of(&vehicle);
         let each = span.weight_n / vehicle.rotors().len() as f32;
-        let hover_speed_rad_s = (each / p.propulsion.thrust_coefficient_n_s2).sqrt();
+        let hover_speed_rad_s = (each / vehicle.parameters().propulsion.thrust_coefficient_n_s2).sqrt();
         let tuned = Tuned { vehicle, gains: control.attitude };
         Ok(Self { craft: Craft::from(file), tuned, sensors: file.sensors, span, hover_speed_rad_s })
     }
