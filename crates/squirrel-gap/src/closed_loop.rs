@@ -39,6 +39,10 @@ pub fn closed_loop(
 ) -> Result<(Vec<ClosedLoop>, Vec<String>), GapError> {
     let (mut all, mut notes) = (Vec::new(), Vec::new());
     for (flight, log) in held_out {
+        if let Some(policy) = log.metadata.get("policy") {
+            notes.push(format!("{flight}: not flown again in closed loop: commanded by the policy {policy}"));
+            continue;
+        }
         let setup = match replay::setup(log) {
             Ok(setup) => setup,
             Err(problem) => {
