@@ -87,7 +87,7 @@ fn what_is_wrong_is_named_with_its_value() {
     assert_eq!(with("\"policy\"", "\"parnn\""), "kind = parnn: must be \"policy\"");
     assert_eq!(with("\"format\":1", "\"format\":2"), "format = 2: this version reads 1");
     assert_eq!(with("\"hidden\":32", "\"hidden\":64"), "hidden = 64: the flight code has 32");
-    assert!(with("\"action\":4,", "").contains("metadata squirrel:"));
+    assert!(with(",\"action\":4", "").contains("metadata squirrel:"));
 }
 
 #[test]
