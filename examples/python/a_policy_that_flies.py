@@ -33,7 +33,8 @@ def act(weights: list[np.ndarray], seen: np.ndarray) -> np.ndarray:
     w1, b1, w2, b2, w3, b3 = weights
     hidden = np.tanh((w1 @ seen[..., None])[..., 0] + b1)
     hidden = np.tanh((w2 @ hidden[..., None])[..., 0] + b2)
-    return (w3 @ hidden[..., None])[..., 0] + b3
+    commanded: np.ndarray = (w3 @ hidden[..., None])[..., 0] + b3
+    return commanded
 
 
 def returns(tasks: squirrel.Tasks, weights: list[np.ndarray], seeds: np.ndarray, steps: int) -> np.ndarray:

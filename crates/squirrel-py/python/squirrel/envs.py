@@ -1,9 +1,10 @@
 """Gymnasium environments: fly past trunks, or along a curve.
 
 ``SquirrelAvoid-v0`` and ``SquirrelTrack-v0``, single (`SquirrelEnv`) and vectorised (`SquirrelVectorEnv`), with actions at motor, body-rate or
-attitude-and-wing level. Needs Gymnasium, which finds them on its own once squirrel is installed:
+attitude-and-wing level. Needs Gymnasium, to which importing this module makes them known:
 
 >>> import gymnasium
+>>> import squirrel.envs
 >>> env = gymnasium.make("SquirrelAvoid-v0")
 >>> envs = gymnasium.make_vec("SquirrelTrack-v0", num_envs=100, action="body_rate")
 >>> observation, info = envs.reset(seed=1)
@@ -238,7 +239,7 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
 
 
 def register() -> None:
-    """Make the environments known to Gymnasium, which calls this on its own."""
+    """Make the environments known to Gymnasium; importing this module does."""
     for task in ("avoid", "track"):
         name = f"Squirrel{task.capitalize()}-v0"
         if name not in gymnasium.registry:
