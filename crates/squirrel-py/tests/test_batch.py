@@ -112,6 +112,28 @@ def test_states_are_written_where_told(vehicle: squirrel.Vehicle) -> None:
         batch.states(out)
 
 
+@pytest.mark.parametrize("n", [3, 1000])
+def test_one_call_is_command_step_and_states(n: int, vehicle: squirrel.Vehicle) -> None:
+    state, command = (rows.astype(np.float32) for rows in thrown(n))
+    one, three = (squirrel.Batch(vehicles=[vehicle] * n) for _ in range(2))
+    out = np.empty_like(state)
+    for batch in (one, three):
+        batch.reset(state)
+    # The last are more than are flown without a look at Ctrl-C.
+    for steps in (1, 7, 1200 if n == 1000 else 400_000):
+        assert one.fly(command, steps, out=out) is out
+        three.command(command)
+        three.step(steps)
+        np.testing.assert_array_equal(out, three.states())
+    now = one.states()
+    with pytest.raises(ValueError, match=r"out: expected a float32 array"):
+        one.fly(command, out=out[:2])
+    with pytest.raises(ValueError, match=r"command: expected a float32 array"):
+        one.fly(command[:2])
+    np.testing.assert_array_equal(one.states(), now)
+    assert one.fly(command).shape == (n, 17)
+
+
 def test_rows_may_lie_anywhere_in_memory(vehicle: squirrel.Vehicle) -> None:
     state, command = thrown(4)
     expected = squirrel.dynamics.derivative(vehicle, state=state, command=command)

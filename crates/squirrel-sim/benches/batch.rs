@@ -46,9 +46,7 @@ fn commands_and_motions(c: &mut Criterion) {
         group.throughput(Throughput::Elements(vehicles as u64));
         group.bench_function(BenchmarkId::from_parameter(vehicles), |b| {
             b.iter(|| {
-                batch.command(black_box(&commands)).expect("fits");
-                batch.step(1);
-                batch.write_states(black_box(&mut rows)).expect("fits");
+                batch.fly(black_box(&commands), 1, black_box(&mut rows)).expect("fits");
             });
         });
     }

@@ -103,7 +103,7 @@ fn flown<const N: usize>(
         batch.step(steps);
         (done, turn) = (done + steps, turn + 1);
     }
-    bits(&batch)
+    bits(&mut batch)
 }
 
 #[test]

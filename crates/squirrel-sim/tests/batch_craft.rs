@@ -92,7 +92,7 @@ fn flown<T: Paths>(thrown: &Thrown<T>, crafts: &[Craft], settings: Settings, cal
             batch.step(call);
         }
     }
-    bits(&batch)
+    bits(&mut batch)
 }
 
 fn all_effects() -> Vec<&'static str> {
@@ -190,7 +190,7 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
             if step * 300 >= tick * 1000 {
                 let through = state.body.velocity - total_wind(plant.effects(), &state.body, air(&winds));
                 for wind in &mut winds {
-                    wind.advance((step - last) as f64 * 1e-3, through.vector.norm());
+                    wind.advance((step - last) as f64 * 1e-3, || through.vector.norm());
                 }
                 (tick, last) = (tick + 1, step);
             }

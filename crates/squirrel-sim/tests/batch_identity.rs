@@ -24,7 +24,7 @@ fn flown<T: Paths>(thrown: &Thrown<T>, settings: Settings, calls: &[usize]) -> V
     for steps in calls {
         batch.step(*steps);
     }
-    bits(&batch)
+    bits(&mut batch)
 }
 
 /// Registers, threads, and calls that a flight is cut into.
@@ -57,6 +57,42 @@ fn neither_registers_nor_threads_nor_calls_matter_in_f32() {
 #[test]
 fn neither_registers_nor_threads_nor_calls_matter_in_f64() {
     neither_registers_nor_threads_nor_calls_matter::<f64>();
+}
+
+/// Rows are exchanged by all threads, and the last chunk is not full.
+fn one_pass_is_command_step_and_look<T: Paths>() {
+    let thrown = Thrown::<T>::new(1801);
+    let other: Vec<T> = thrown.commands.iter().rev().copied().collect();
+    let mut batch = thrown.batch(settings(Scheme::Rk4));
+    batch.step(3);
+    batch.command(&other).unwrap();
+    batch.step(2);
+    let expected = bits(&mut batch);
+    for threads in [1, 2, 5] {
+        let mut batch = thrown.batch(Settings { threads, ..settings(Scheme::Rk4) });
+        let mut rows = vec![convert::<f64, T>(f64::NAN); 1801 * 17];
+        batch.fly(&thrown.commands, 3, &mut rows).unwrap();
+        batch.fly(&other, 2, &mut rows).unwrap();
+        let flown: Vec<u64> =
+            rows.iter().map(|x| nalgebra::try_convert::<T, f64>(*x).unwrap().to_bits()).collect();
+        assert!(flown == expected.concat(), "{threads} threads");
+        assert!(bits(&mut batch) == expected, "{threads} threads");
+        let refused = batch.fly(&other, 2, &mut rows[1..]).unwrap_err();
+        assert_eq!(refused.to_string(), "rows: 30616 numbers, must be 30617");
+        let refused = batch.fly(&other[..4], 2, &mut rows).unwrap_err();
+        assert_eq!(refused.to_string(), "commands: 4 numbers, must be 7204");
+        assert!(bits(&mut batch) == expected, "what is refused moves nothing");
+    }
+}
+
+#[test]
+fn one_pass_is_command_step_and_look_in_f32() {
+    one_pass_is_command_step_and_look::<f32>();
+}
+
+#[test]
+fn one_pass_is_command_step_and_look_in_f64() {
+    one_pass_is_command_step_and_look::<f64>();
 }
 
 #[test]
@@ -157,7 +193,7 @@ fn places_without_a_rotor_are_still() {
         thrown.commands.chunks(4).flat_map(|c| [c[0], c[1], c[2], c[3], 1.0, f32::NAN, 0.5, -1.0]).collect();
     wide.command(&commands).unwrap();
     wide.step(300);
-    for (wide, expected) in bits(&wide).iter().zip(&expected) {
+    for (wide, expected) in bits(&mut wide).iter().zip(&expected) {
         assert_eq!(wide[..17], expected[..]);
         assert_eq!(wide[17..], [0; 4]);
     }
@@ -178,7 +214,7 @@ fn neighbours_do_not_notice() {
         batch.reset(3, &thrown.states[4]).unwrap();
         batch.replace(5, &thrown.vehicles[6]).unwrap();
         batch.step(250);
-        let flown = bits(&batch);
+        let flown = bits(&mut batch);
         for number in (0..40).filter(|number| ![3, 5, 18].contains(number)) {
             assert_eq!(flown[number], expected[number], "vehicle {number}, {}", path.name());
         }
@@ -186,6 +222,6 @@ fn neighbours_do_not_notice() {
         assert_ne!(flown[5], expected[5]);
         batch.reset(18, &thrown.states[18]).unwrap();
         batch.step(400);
-        assert_eq!(bits(&batch)[18], expected[18], "what was broken flies again");
+        assert_eq!(bits(&mut batch)[18], expected[18], "what was broken flies again");
     }
 }

@@ -194,6 +194,29 @@ class Batch:
         steps : int
             How many steps of `dt_s`.
         """
+    def fly(self, command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], steps: builtins.int = 1, *, out: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None) -> numpy.typing.NDArray[typing.Any]:
+        r"""
+        Command, fly on, and look: `command`, `step` and `states` in one call, with the same bits and in less time.
+        
+        Parameters
+        ----------
+        command : ndarray of the batch's dtype, shape (n, rotors)
+            In the unit that each vehicle declares; limited to its range; held for all steps.
+        steps : int
+            How many steps of `dt_s`.
+        out : ndarray of the batch's dtype, shape (n, 13 + rotors), optional
+            To write into; contiguous. A new array if left out.
+        
+        Returns
+        -------
+        ndarray of the batch's dtype, shape (n, 13 + rotors)
+            As `states` gives them.
+        
+        Raises
+        ------
+        ValueError
+            Another dtype or shape, a command that is not finite, an `out` that cannot be written to. Nothing has moved then.
+        """
     def states(self, out: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None) -> numpy.typing.NDArray[typing.Any]:
         r"""
         Motions of all vehicles.

@@ -16,15 +16,29 @@ use squirrel_sim::batch::{BODY_NUMBERS, Batch, BatchError, Craft, Settings};
 use squirrel_sim::plant::{GustModel, WindParameters, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 
+/// Vehicle steps between two looks at Ctrl-C: a hundredth of a second, or some tenths where everything is slow.
+const STEPS_A_LOOK: usize = 1_000_000;
+/// Vehicle steps, some microseconds, below which handing the interpreter's lock to others takes longer than what they wait for.
+const FEW_STEPS: usize = 500;
+
 /// A batch of any scalar and any number of rotors.
 pub(super) trait AnyFlock: Send {
+    fn vehicles(&self) -> usize;
     fn advance(&mut self, steps: usize);
+    /// Commands, steps by way of `advance` where they are many, and motions.
+    fn fly<'py>(
+        &mut self,
+        py: Python<'py>,
+        command: &Bound<'py, PyAny>,
+        steps: usize,
+        out: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>>;
     fn is_32(&self) -> bool;
     fn rotors(&self) -> usize;
     fn command(&mut self, command: &Bound<'_, PyAny>) -> PyResult<()>;
     fn command_wings(&mut self, command: &Bound<'_, PyAny>) -> PyResult<()>;
-    fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
-    fn states_into(&self, out: &Bound<'_, PyAny>) -> PyResult<()>;
+    fn states<'py>(&mut self, py: Python<'py>, out: Option<Bound<'py, PyAny>>)
+    -> PyResult<Bound<'py, PyAny>>;
     fn deployments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
     fn battery<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
     fn reset(&mut self, states: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()>;
@@ -36,6 +50,9 @@ pub(super) trait AnyFlock: Send {
 }
 
 impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
+    fn vehicles(&self) -> usize {
+        self.len()
+    }
     fn advance(&mut self, steps: usize) {
         self.step(steps);
     }
@@ -54,21 +71,33 @@ impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
         let command = rows::<T>("command", command, &[Some(self.len()), Some(2)], Numbers::Finite)?;
         Self::command_wings(self, command.numbers()).map_err(value)
     }
-    fn states<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let width = BODY_NUMBERS + ROTORS;
-        let mut numbers = vec![convert(0.0); self.len() * width];
-        self.write_states(&mut numbers).map_err(value)?;
-        Ok(table::<T>(py, numbers, width)?.into_any())
+    fn states<'py>(
+        &mut self,
+        py: Python<'py>,
+        out: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        with_rows::<T, ROTORS>(py, self.len(), out, |rows| self.write_states(rows).map_err(value))
     }
-    fn states_into(&self, out: &Bound<'_, PyAny>) -> PyResult<()> {
-        let shape = [Some(self.len()), Some(BODY_NUMBERS + ROTORS)];
-        let out = array::<T>("out", out, &shape)?;
-        if !out.is_c_contiguous() {
-            return Err(value("out: must be contiguous, row after row"));
-        }
-        let mut out = out.try_readwrite().map_err(|error| value(format!("out: {error}")))?;
-        let numbers = out.as_slice_mut().map_err(|error| value(format!("out: {error}")))?;
-        self.write_states(numbers).map_err(value)
+    fn fly<'py>(
+        &mut self,
+        py: Python<'py>,
+        command: &Bound<'py, PyAny>,
+        steps: usize,
+        out: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let shape = [Some(self.len()), Some(ROTORS)];
+        let command = rows::<T>("command", command, &shape, Numbers::Finite)?;
+        let command = command.numbers();
+        with_rows::<T, ROTORS>(py, self.len(), out, |rows| {
+            match steps.saturating_mul(self.len()) {
+                few if few < FEW_STEPS => return Self::fly(self, command, steps, rows).map_err(value),
+                STEPS_A_LOOK.. => {}
+                _ => return py.detach(|| Self::fly(self, command, steps, rows).map_err(value)),
+            }
+            Self::command(self, command).map_err(value)?;
+            advance(py, self, steps)?;
+            self.write_states(rows).map_err(value)
+        })
     }
     fn deployments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let rows = (0..self.len()).map(|number| self.deployment(number).map_err(value));
@@ -121,6 +150,49 @@ impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
     fn refit(&mut self, number: usize, craft: &Craft) -> PyResult<()> {
         Self::refit(self, number, craft).map_err(refused)
     }
+}
+
+/// Steps, with looks at Ctrl-C in between where they are many.
+///
+/// # Errors
+/// Ctrl-C.
+pub(super) fn advance(py: Python<'_>, flock: &mut dyn AnyFlock, steps: usize) -> PyResult<()> {
+    if steps.saturating_mul(flock.vehicles()) < FEW_STEPS {
+        flock.advance(steps);
+        return Ok(());
+    }
+    let at_once = (STEPS_A_LOOK / flock.vehicles()).max(1);
+    let mut left = steps;
+    while left > at_once {
+        py.detach(|| flock.advance(at_once));
+        py.check_signals()?;
+        left -= at_once;
+    }
+    py.detach(|| flock.advance(left));
+    Ok(())
+}
+
+/// Rows of motions that `write` fills: of an array that came, or of a new one.
+fn with_rows<'py, T: Paths + Float, const ROTORS: usize>(
+    py: Python<'py>,
+    vehicles: usize,
+    out: Option<Bound<'py, PyAny>>,
+    write: impl FnOnce(&mut [T]) -> PyResult<()>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let width = BODY_NUMBERS + ROTORS;
+    let Some(out) = out else {
+        let mut numbers = vec![convert(0.0); vehicles * width];
+        write(&mut numbers)?;
+        return Ok(table::<T>(py, numbers, width)?.into_any());
+    };
+    let array = array::<T>("out", &out, &[Some(vehicles), Some(width)])?;
+    if !array.is_c_contiguous() {
+        return Err(value("out: must be contiguous, row after row"));
+    }
+    let mut rows = array.try_readwrite().map_err(|error| value(format!("out: {error}")))?;
+    write(rows.as_slice_mut().map_err(|error| value(format!("out: {error}")))?)?;
+    drop(rows);
+    Ok(out)
 }
 
 /// A batch that cannot be, and what can.

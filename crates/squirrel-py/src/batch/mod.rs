@@ -6,7 +6,7 @@ pub(crate) mod rollout;
 use crate::arguments::{Array64, ArrayAny, Float, Indices, Numbers, rows};
 use crate::error::value;
 use crate::vehicle::Vehicle;
-use flock::{AnyFlock, air, flock};
+use flock::{AnyFlock, advance, air, flock};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
@@ -15,11 +15,6 @@ use squirrel_sim::batch::simd::Path;
 use squirrel_sim::batch::{Craft, Scheme, Settings};
 use squirrel_sim::plant::WingPlant;
 use std::sync::{Mutex, MutexGuard};
-
-/// Vehicle steps between two looks at Ctrl-C: a hundredth of a second, or some tenths where everything is slow.
-const STEPS_A_LOOK: usize = 1_000_000;
-/// Vehicle steps, some microseconds, below which handing the interpreter's lock to others takes longer than what they wait for.
-const FEW_STEPS: usize = 500;
 
 pub(crate) fn settings(
     dt_s: f64,
@@ -221,21 +216,39 @@ impl Batch {
     ///     How many steps of `dt_s`.
     #[pyo3(signature = (steps = 1))]
     fn step(&self, py: Python<'_>, steps: usize) -> PyResult<()> {
-        let mut guard = self.lock(py)?;
-        let flock: &mut dyn AnyFlock = &mut *guard.flock;
-        if steps.saturating_mul(self.vehicles) < FEW_STEPS {
-            flock.advance(steps);
-            return Ok(());
-        }
-        let chunk = (STEPS_A_LOOK / self.vehicles).max(1);
-        let mut left = steps;
-        while left > chunk {
-            py.detach(|| flock.advance(chunk));
-            py.check_signals()?;
-            left -= chunk;
-        }
-        py.detach(|| flock.advance(left));
-        Ok(())
+        advance(py, &mut *self.lock(py)?.flock, steps)
+    }
+
+    /// Command, fly on, and look: `command`, `step` and `states` in one call, with the same bits and in less time.
+    ///
+    /// Parameters
+    /// ----------
+    /// command : ndarray of the batch's dtype, shape (n, rotors)
+    ///     In the unit that each vehicle declares; limited to its range; held for all steps.
+    /// steps : int
+    ///     How many steps of `dt_s`.
+    /// out : ndarray of the batch's dtype, shape (n, 13 + rotors), optional
+    ///     To write into; contiguous. A new array if left out.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray of the batch's dtype, shape (n, 13 + rotors)
+    ///     As `states` gives them.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Another dtype or shape, a command that is not finite, an `out` that cannot be written to. Nothing has moved then.
+    #[pyo3(signature = (command, steps = 1, *, out = None))]
+    #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
+    fn fly<'py>(
+        &self,
+        py: Python<'py>,
+        command: ArrayAny<'py>,
+        steps: usize,
+        out: Option<ArrayAny<'py>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.lock(py)?.flock.fly(py, &command.0, steps, out.map(|out| out.0))
     }
 
     /// Motions of all vehicles.
@@ -257,10 +270,7 @@ impl Batch {
     #[pyo3(signature = (out = None))]
     #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
     fn states<'py>(&self, py: Python<'py>, out: Option<ArrayAny<'py>>) -> PyResult<Bound<'py, PyAny>> {
-        let fleet = self.lock(py)?;
-        let Some(out) = out else { return fleet.flock.states(py) };
-        fleet.flock.states_into(&out.0)?;
-        Ok(out.0)
+        self.lock(py)?.flock.states(py, out.map(|out| out.0))
     }
 
     /// How far the wings of all vehicles are open.

@@ -100,7 +100,7 @@ fn periods<'py, T: Float>(
         }
         batch.step(py, steps)?;
         let row = out.get_item(period)?;
-        batch.lock(py)?.flock.states_into(&row)?;
+        batch.lock(py)?.flock.states(py, Some(row))?;
         py.check_signals()?;
     }
     Ok(out.into_any())

@@ -1,8 +1,9 @@
 //! What goes into a batch between its steps and what comes out: motions, commands, air, charge.
 
+use super::exchange::Chunk;
 use super::extra::Command;
 use super::simd::{BLOCK, Paths};
-use super::{BODY_NUMBERS, Batch, BatchError, CHUNK, Craft, autopilot, place, shape};
+use super::{Batch, BatchError, CHUNK, Craft, autopilot, place, shape};
 use crate::plant::{Wind, WindParameters};
 use nalgebra::convert;
 use squirrel_core::dynamics::State;
@@ -26,8 +27,9 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             return Err(BatchError::Attitude { vehicle: number, norm });
         }
         let (chunk, block, lane) = place(number);
-        let mut blocks = self.pool.chunk(chunk);
-        blocks[block].put_state(lane, state, &self.drives[number]);
+        let mut chunk = self.pool.chunk(chunk);
+        let Chunk { blocks, drives, .. } = &mut *chunk;
+        blocks[block].put_state(lane, state, &drives[block * BLOCK + lane]);
         if let Some(extra) = &mut blocks[block].extra {
             extra.rest(lane, convert(1.0));
         }
@@ -47,8 +49,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             return Err(BatchError::Charge { vehicle: number, charge });
         }
         let (chunk, block, lane) = place(number);
-        let mut blocks = self.pool.chunk(chunk);
-        if let Some(packs) = blocks[block].extra.as_mut().and_then(|extra| extra.packs.as_mut()) {
+        let mut chunk = self.pool.chunk(chunk);
+        if let Some(packs) = chunk.blocks[block].extra.as_mut().and_then(|extra| extra.packs.as_mut()) {
             packs.rest(lane, convert(charge));
         }
         Ok(())
@@ -61,8 +63,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     pub fn battery(&self, number: usize) -> Result<Option<[T; 3]>, BatchError> {
         self.check(number)?;
         let (chunk, block, lane) = place(number);
-        let blocks = self.pool.chunk(chunk);
-        let packs = blocks[block].extra.as_ref().and_then(|extra| extra.packs.as_ref());
+        let chunk = self.pool.chunk(chunk);
+        let packs = chunk.blocks[block].extra.as_ref().and_then(|extra| extra.packs.as_ref());
         Ok(packs.map(|packs| {
             let now = packs.charge.take(lane);
             [now.charge, now.voltage_v, now.current_a]
@@ -76,7 +78,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     pub fn deployment(&self, number: usize) -> Result<[T; 2], BatchError> {
         self.check(number)?;
         let (chunk, block, lane) = place(number);
-        Ok(self.pool.chunk(chunk)[block].deployment(lane))
+        Ok(self.pool.chunk(chunk).blocks[block].deployment(lane))
     }
 
     /// Motion of one vehicle.
@@ -86,46 +88,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     pub fn state(&self, number: usize) -> Result<State<T>, BatchError> {
         self.check(number)?;
         let (chunk, block, lane) = place(number);
-        Ok(self.pool.chunk(chunk)[block].state(lane))
-    }
-
-    /// Motion of all vehicles, a row each: position (NED, m), velocity (NED, m/s), attitude (body to NED, w x y z), angular
-    /// rate (body, rad/s), rotor speeds (rad/s).
-    ///
-    /// * `rows` - [`Self::len`] times [`BODY_NUMBERS`]` + ROTORS` numbers
-    ///
-    /// # Errors
-    /// A length that is another.
-    pub fn write_states(&self, rows: &mut [T]) -> Result<(), BatchError> {
-        let width = BODY_NUMBERS + ROTORS;
-        shape("rows", rows.len(), self.len() * width)?;
-        for (chunk, rows) in rows.chunks_mut(width * BLOCK * CHUNK).enumerate() {
-            let blocks = self.pool.chunk(chunk);
-            for (block, rows) in blocks.iter().zip(rows.chunks_mut(width * BLOCK)) {
-                block.write_states(rows);
-            }
-        }
-        Ok(())
-    }
-
-    /// Tells the rotors what to do from now on.
-    ///
-    /// * `commands` - a row of `ROTORS` numbers for each vehicle, in the unit that it declares; limited to their range, and the
-    ///   least of it for NaN; not looked at where a vehicle has no rotor
-    ///
-    /// # Errors
-    /// A length that is not [`Self::len`] times `ROTORS`.
-    pub fn command(&mut self, commands: &[T]) -> Result<(), BatchError> {
-        shape("commands", commands.len(), self.len() * ROTORS)?;
-        let rows = commands.chunks(ROTORS * BLOCK * CHUNK).zip(self.drives.chunks(BLOCK * CHUNK));
-        for (chunk, (commands, drives)) in rows.enumerate() {
-            let mut blocks = self.pool.chunk(chunk);
-            let rows = commands.chunks(ROTORS * BLOCK).zip(drives.chunks(BLOCK));
-            for (block, (commands, drives)) in blocks.iter_mut().zip(rows) {
-                block.command(commands, drives);
-            }
-        }
-        Ok(())
+        Ok(self.pool.chunk(chunk).blocks[block].state(lane))
     }
 
     /// Tells the wings what to do from now on; nothing where no vehicle has any.
@@ -137,8 +100,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     pub fn command_wings(&mut self, commands: &[T]) -> Result<(), BatchError> {
         shape("wing commands", commands.len(), self.len() * 2)?;
         for (chunk, commands) in commands.chunks(2 * BLOCK * CHUNK).enumerate() {
-            let mut blocks = self.pool.chunk(chunk);
-            for (block, commands) in blocks.iter_mut().zip(commands.chunks(2 * BLOCK)) {
+            let mut chunk = self.pool.chunk(chunk);
+            for (block, commands) in chunk.blocks.iter_mut().zip(commands.chunks(2 * BLOCK)) {
                 let Some(extra) = &mut block.extra else { return Ok(()) };
                 for (lane, command) in commands.chunks_exact(2).enumerate() {
                     let limited = |x| squirrel_core::math::limit(x, convert(0.0), convert(1.0));
@@ -177,13 +140,13 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             airs.push(Wind::new(WindParameters::of_gusts(gusts), seed ^ 0x9E6C_63D0_876A_3F1B));
         }
         let (chunk, block, lane) = place(number);
-        let mut blocks = self.pool.chunk(chunk);
-        let block = &mut blocks[block];
+        let mut chunk = self.pool.chunk(chunk);
+        let block = &mut chunk.blocks[block];
         let Some(extra) = &mut block.extra else {
             return Err(BatchError::NotFitted { vehicle: number, what: "gust" });
         };
-        extra.put_air(lane, airs, self.settings.dt_s);
-        if let Some(air) = extra.air(lane) {
+        extra.airs.put(lane, airs, extra.clock, self.settings.dt_s);
+        if let Some(air) = extra.airs.velocity(lane) {
             block.put_wind(lane, air);
         }
         Ok(())
@@ -199,10 +162,10 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             return Err(BatchError::NotFinite { what: "wind", vehicle: number });
         }
         let (chunk, block, lane) = place(number);
-        let mut blocks = self.pool.chunk(chunk);
-        blocks[block].put_wind(lane, wind);
-        if let Some(extra) = &mut blocks[block].extra {
-            extra.put_air(lane, Vec::new(), self.settings.dt_s);
+        let mut chunk = self.pool.chunk(chunk);
+        chunk.blocks[block].put_wind(lane, wind);
+        if let Some(extra) = &mut chunk.blocks[block].extra {
+            extra.airs.put(lane, Vec::new(), extra.clock, self.settings.dt_s);
         }
         Ok(())
     }

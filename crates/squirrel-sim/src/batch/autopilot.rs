@@ -169,10 +169,10 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Act<'_, S, ROTORS> {
     #[inline(always)]
     fn run<L: Lanes<Weight = S>>(self) {
         let Self { block, set_point, period_s } = self;
+        let starts = block.starts::<L>();
         let Block { motion, held, autopilots: Some(autopilots), .. } = block else { return };
         let dt = L::splat(period_s);
-        for group in 0..BLOCK / L::WIDTH {
-            let start = group * L::WIDTH;
+        for start in starts {
             let gains = Gains::<L>::load(&autopilots.gains, start);
             let mut course = Course::<L>::load(&autopilots.course, start);
             let omega = load::<L, 3>(&motion.omega, start);
@@ -434,7 +434,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         let mixers = tuned.iter().enumerate().map(|(number, one)| one.mixer(number));
         let mixers: Vec<Mixer> = mixers.collect::<Result<_, _>>()?;
         for chunk in 0..self.len().div_ceil(BLOCK * CHUNK) {
-            for block in self.pool.chunk(chunk).iter_mut() {
+            for block in &mut self.pool.chunk(chunk).blocks {
                 block.autopilots = Some(Box::new(Autopilots::empty()));
             }
         }
@@ -457,8 +457,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
 
     fn fit(&mut self, number: usize, tuned: &Tuned, mixer: &Mixer) {
         let (chunk, block, lane) = place(number);
-        let mut blocks = self.pool.chunk(chunk);
-        let block = &mut blocks[block];
+        let mut chunk = self.pool.chunk(chunk);
+        let block = &mut chunk.blocks[block];
         let angle = euler(&block.state(lane));
         if let Some(autopilots) = &mut block.autopilots {
             autopilots.fit(lane, &tuned.vehicle, &tuned.gains, mixer);
@@ -475,8 +475,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     pub fn set_points(&mut self, rows: &[T]) -> Result<(), BatchError> {
         shape("set points", rows.len(), self.len() * 4)?;
         for (chunk, rows) in rows.chunks(4 * BLOCK * CHUNK).enumerate() {
-            let mut blocks = self.pool.chunk(chunk);
-            for (block, rows) in blocks.iter_mut().zip(rows.chunks(4 * BLOCK)) {
+            let mut chunk = self.pool.chunk(chunk);
+            for (block, rows) in chunk.blocks.iter_mut().zip(rows.chunks(4 * BLOCK)) {
                 let Some(autopilots) = &mut block.autopilots else { return Err(BatchError::NoAutopilot) };
                 autopilots.tell(rows);
             }

@@ -4,11 +4,12 @@
 //! alone. No closures and no iterators in here: code must end up in the function that was compiled for the registers.
 
 use super::Scheme;
+use super::air::Forecast;
 use super::battery::{Charge, Pack};
 use super::effects::{Payload, Present, Situation, Sizes};
-use super::rows::{Airframe, Block, Held, Motion, load, store};
+use super::rows::{Airframe, Block, Held, Motion, Row, load, store};
 use super::servo::{Deployment, Servo};
-use super::simd::{BLOCK, Kernel, Lanes, Paths};
+use super::simd::{Kernel, Lanes, Paths};
 use super::wing::{Air, FLAT, MEMBRANE, Membrane, NONE, Plate, Sides, Wrench};
 use squirrel_core::math::{GRAVITY_M_S2, real};
 
@@ -62,7 +63,7 @@ impl<S: Paths, const ROTORS: usize> AdvanceWhole<'_, S, ROTORS> {
     #[inline(always)]
     fn with<L: Lanes<Weight = S>, const STAGES: usize>(self, stages: [[S; 2]; STAGES]) {
         let Advance { blocks, dt_s: dt, steps, .. } = self.0;
-        let wanted_dt_s: f64 = nalgebra::try_convert(dt).unwrap_or(f64::NAN);
+        let mut forecast = Forecast::empty();
         for block in blocks {
             let Some(kind) = block.extra.as_ref().map(|extra| (extra.wing, extra.present.any_in_steps()))
             else {
@@ -70,13 +71,16 @@ impl<S: Paths, const ROTORS: usize> AdvanceWhole<'_, S, ROTORS> {
             };
             let mut left = steps as u64;
             while left > 0 {
-                let steps = block.between(left, wanted_dt_s);
+                let steps = block.between(left, &mut forecast);
+                let winds = forecast.winds();
                 left -= steps;
                 match kind {
-                    (NONE, _) => fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, stages, dt),
-                    (FLAT, _) => fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, stages, dt),
-                    (_, false) => fitted::<L, ROTORS, STAGES, MEMBRANE, false>(block, steps, stages, dt),
-                    (_, true) => fitted::<L, ROTORS, STAGES, MEMBRANE, true>(block, steps, stages, dt),
+                    (NONE, _) => fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, winds, stages, dt),
+                    (FLAT, _) => fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, winds, stages, dt),
+                    (_, false) => {
+                        fitted::<L, ROTORS, STAGES, MEMBRANE, false>(block, steps, winds, stages, dt);
+                    }
+                    (_, true) => fitted::<L, ROTORS, STAGES, MEMBRANE, true>(block, steps, winds, stages, dt),
                 }
             }
         }
@@ -91,8 +95,7 @@ fn plain<L: Lanes, const ROTORS: usize, const STAGES: usize>(
     stages: [[L::Weight; 2]; STAGES],
 ) {
     let lagless = block.lagless;
-    for group in 0..BLOCK / L::WIDTH {
-        let start = group * L::WIDTH;
+    for start in block.starts::<L>() {
         let airframe = Airframe::<L, ROTORS>::load(&block.airframe, start);
         let held = Held::<L, ROTORS>::load(&block.held, start);
         let mut state = Motion::<L, ROTORS>::load(&block.motion, start);
@@ -132,18 +135,21 @@ struct Whole<L, const ROTORS: usize> {
 }
 
 /// Steps of blocks that have more than the base model, in the order of `crate::plant::Plant::step`.
+///
+/// * `winds` - that come, see `Forecast`
 #[inline(always)]
 fn fitted<L: Lanes, const ROTORS: usize, const STAGES: usize, const WING: u8, const EFFECTS: bool>(
     block: &mut Block<L::Weight, ROTORS>,
     steps: u64,
+    winds: &[(u64, [Row<L::Weight>; 3])],
     stages: [[L::Weight; 2]; STAGES],
     dt_s: L::Weight,
 ) {
+    let starts = block.starts::<L>();
     let Some(extra) = &mut block.extra else { return };
     let (lagless, dt) = (block.lagless, L::splat(dt_s));
     let per_step = L::splat(real::<L::Weight>(1.0) / dt_s);
-    for group in 0..BLOCK / L::WIDTH {
-        let start = group * L::WIDTH;
+    for start in starts {
         let held = Held::<L, ROTORS>::load(&block.held, start);
         let asked = held.target_speed;
         let mut whole = Whole {
@@ -164,7 +170,12 @@ fn fitted<L: Lanes, const ROTORS: usize, const STAGES: usize, const WING: u8, co
         let mut sides = Sides::<L>::load(&extra.sides, start);
         let mut charge = extra.packs.as_ref().map(|packs| Charge::<L>::load(&packs.charge, start));
         let mut state = Motion::<L, ROTORS>::load(&block.motion, start);
-        for _ in 0..steps {
+        let mut blown = 0;
+        for step in 0..steps {
+            if blown < winds.len() && winds[blown].0 == step {
+                whole.held.wind = load(&winds[blown].1, start);
+                blown += 1;
+            }
             if EFFECTS
                 && whole.present.battery_sag
                 && let Some(charge) = &charge
@@ -215,6 +226,7 @@ fn fitted<L: Lanes, const ROTORS: usize, const STAGES: usize, const WING: u8, co
             state = next;
         }
         state.store(&mut block.motion, start);
+        store(&whole.held.wind, &mut block.held.wind, start);
         whole.load.store(&mut extra.load, start);
         deployment.store(&mut extra.deployment, start);
         store(&angle, &mut extra.wing_angle, start);

@@ -1,8 +1,9 @@
 //! What vehicles of a block have on top of the base model: wings, battery, effects, gusts, commands on their way.
 //!
-//! Gusts and late commands change between steps. The steps of a call are therefore cut where the next of them is due, which
-//! changes no number: a flight is the same however it is cut.
+//! Late commands, and gusts that ask for the airspeed, change between steps. The steps of a call are therefore cut where the next of
+//! them is due, which changes no number: a flight is the same however it is cut.
 
+use super::air::{Airs, Forecast};
 use super::battery::Packs;
 use super::craft::Fitted;
 use super::effects::{Payload, Present, Sizes};
@@ -10,10 +11,7 @@ use super::rows::{Block, Row, put, take};
 use super::servo::{Deployment, Servo};
 use super::simd::{BLOCK, Paths};
 use super::wing::{Membrane, Plate, Sides};
-use crate::flight::CONTROL_RATE_HZ;
-use crate::plant::Wind;
 use nalgebra::{Vector3, try_convert};
-use squirrel_core::frames::{In, Ned};
 use squirrel_core::math::real;
 use std::collections::VecDeque;
 
@@ -55,11 +53,8 @@ pub(super) struct Extra<S: Copy, const ROTORS: usize> {
     pub(super) latency_steps: [u64; BLOCK],
     late: VecDeque<Late<S, ROTORS>>,
     /// Steps that the block has taken.
-    clock: u64,
-    airs: Vec<Vec<Wind>>,
-    /// Gusts moved on so far, and the clock when they last did.
-    gust_ticks: u64,
-    gust_clock: u64,
+    pub(super) clock: u64,
+    pub(super) airs: Airs,
 }
 
 impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
@@ -87,9 +82,7 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
             latency_steps: [0; BLOCK],
             late: VecDeque::new(),
             clock: 0,
-            airs: vec![Vec::new(); BLOCK],
-            gust_ticks: 0,
-            gust_clock: 0,
+            airs: Airs::none(),
         }
     }
 
@@ -123,32 +116,13 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
             }
         }
     }
-
-    /// Other air about a vehicle. The first that moves finds the clock of gusts where it were if there had always been some.
-    pub(super) fn put_air(&mut self, lane: usize, airs: Vec<Wind>, dt_s: f64) {
-        if self.airs.iter().all(Vec::is_empty) && self.clock > 0 {
-            let per_step = gusts_per_step(dt_s);
-            let mut tick = (self.clock as f64 * per_step + 1e-6) as u64;
-            while tick > 0 && gust_due(tick, per_step) >= self.clock {
-                tick -= 1;
-            }
-            self.gust_clock = gust_due(tick, per_step);
-            self.gust_ticks = (self.gust_clock as f64 * per_step + 1e-6) as u64 + 1;
-        }
-        self.airs[lane] = airs;
-    }
-
-    /// Velocity of the air about a vehicle that has air of its own, m/s.
-    pub(super) fn air(&self, lane: usize) -> Option<In<Ned, S>> {
-        let airs = &self.airs[lane];
-        let sum = airs.iter().fold(In::<Ned, f64>::zero(), |sum, air| sum + air.velocity());
-        (!airs.is_empty()).then(|| In::new(sum.vector.map(real)))
-    }
 }
 
 impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
     /// Does what is due between two steps; steps, at most `left`, until something is due again.
-    pub(super) fn between(&mut self, left: u64, dt_s: f64) -> u64 {
+    ///
+    /// * `forecast` - filled with the winds of these steps that are not the one now
+    pub(super) fn between(&mut self, left: u64, forecast: &mut Forecast<S>) -> u64 {
         let Some(extra) = &mut self.extra else { return left };
         let mut until = extra.clock.saturating_add(left);
         let mut arrived = Vec::new();
@@ -166,30 +140,14 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 Command::Wings(wings) => extra.ask_wings(lane, wings),
             }
         }
-        if extra.airs.iter().any(|airs| !airs.is_empty()) {
-            let per_step = gusts_per_step(dt_s);
-            if gust_due(extra.gust_ticks, per_step) <= extra.clock {
-                let passed_s = (extra.clock - extra.gust_clock) as f64 * dt_s;
-                for lane in 0..BLOCK {
-                    if !extra.airs[lane].is_empty() {
-                        let through =
-                            through_air(&take(&self.motion.velocity, lane), &take(&self.held.wind, lane));
-                        let height = real::<S>(0.0) - self.motion.position[2][lane];
-                        let [north, east] = extra.sizes.take(lane).wind_at(extra.present, height);
-                        let through = through - Vector3::new(north, east, 0.0);
-                        for air in &mut extra.airs[lane] {
-                            air.advance(passed_s, through.norm());
-                        }
-                        if let Some(air) = extra.air(lane) {
-                            put(&mut self.held.wind, lane, air.vector.into());
-                        }
-                    }
-                }
-                extra.gust_ticks = (extra.clock as f64 * per_step + 1e-6) as u64 + 1;
-                extra.gust_clock = extra.clock;
-            }
-            until = until.min(gust_due(extra.gust_ticks, per_step).max(extra.clock + 1));
-        }
+        let Extra { airs, sizes, present, clock, .. } = &mut **extra;
+        let (motion, wind) = (&self.motion, self.held.wind);
+        let airspeed_m_s = |lane| {
+            let through = through_air(&take(&motion.velocity, lane), &take(&wind, lane));
+            let [north, east] = sizes.take(lane).wind_at(*present, real::<S>(0.0) - motion.position[2][lane]);
+            (through - Vector3::new(north, east, 0.0)).norm()
+        };
+        until = airs.advance(*clock, until, &mut self.held.wind, forecast, airspeed_m_s);
         let steps = until - extra.clock;
         extra.clock = until;
         steps
@@ -199,16 +157,6 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
     pub(super) fn deployment(&self, lane: usize) -> [S; 2] {
         self.extra.as_ref().map_or([real(0.0); 2], |extra| take(&extra.deployment.now, lane))
     }
-}
-
-/// Gusts move at the rate of the flight code.
-fn gusts_per_step(dt_s: f64) -> f64 {
-    dt_s * CONTROL_RATE_HZ as f64
-}
-
-/// The first step at or after a move of the gusts, as in a flight.
-fn gust_due(tick: u64, per_step: f64) -> u64 {
-    ((tick as f64 - 1e-6) / per_step).ceil().max(0.0) as u64
 }
 
 /// Velocity through the air, m/s.

@@ -8,7 +8,7 @@
 //! `squirrel_core::dynamics` in the same scalar.
 //!
 //! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles ([`Craft`]): flat wings and
-//! membranes (`wing`) with their servos (`servo`), batteries (`battery`), effects (`effects`), gusts and late commands (`extra`),
+//! membranes (`wing`) with their servos (`servo`), batteries (`battery`), effects (`effects`), gusts (`air`) and late commands (`extra`),
 //! with the equations of [`crate::plant::Plant`]. What no vehicle of the batch has is not computed. A wing that is a network, and
 //! effects that act on sensors or stamps (accel_bias, clock_skew, gnss_latency, heading_bias), are refused.
 //!
@@ -25,12 +25,14 @@
 //! ```
 
 mod access;
+mod air;
 mod autopilot;
 mod battery;
 mod craft;
 mod dynamics;
 mod effects;
 mod error;
+mod exchange;
 mod extra;
 mod maths;
 mod pool;
@@ -46,6 +48,7 @@ pub use error::BatchError;
 use crate::plant::{MembraneParameters, ServoParameters, WingPlant};
 use craft::Fitted;
 use dynamics::{Advance, AdvanceWhole};
+use exchange::{Chunk, Job, do_job};
 use extra::Extra;
 use nalgebra::convert;
 use pool::Pool;
@@ -57,8 +60,6 @@ use wing::{Membrane, Plate};
 
 /// Blocks that a thread takes at once: little enough to share out evenly, enough to be worth claiming.
 const CHUNK: usize = 4;
-/// Steps times vehicles below which a second thread costs more than it does.
-const WORTH_THREADS: usize = 4000;
 /// Numbers of a vehicle's motion in a row of [`Batch::write_states`], before those of its rotors.
 pub const BODY_NUMBERS: usize = 13;
 
@@ -95,8 +96,8 @@ impl Default for Settings {
 /// Vehicles of up to `ROTORS` rotors that fly side by side.
 #[derive(Debug)]
 pub struct Batch<T: Paths, const ROTORS: usize = 4> {
-    pool: Pool<Box<[Block<T, ROTORS>]>, Job<T, ROTORS>>,
-    drives: Vec<Drive<T>>,
+    pool: Pool<Chunk<T, ROTORS>, Job<T, ROTORS>>,
+    vehicles: usize,
     fitted: Fitted,
     settings: Settings,
     work: Work<T, ROTORS>,
@@ -114,21 +115,6 @@ struct Call {
 type Work<T, const ROTORS: usize> = fn(&mut [Block<T, ROTORS>], Call);
 /// The same, with an autopilot in between.
 type Flown<T, const ROTORS: usize> = fn(&mut [Block<T, ROTORS>], Work<T, ROTORS>, Call, Autopilot);
-
-/// A call, and who takes its steps.
-#[derive(Debug, Clone, Copy)]
-struct Job<T: Copy, const ROTORS: usize> {
-    call: Call,
-    work: Work<T, ROTORS>,
-    autopilot: Option<(Flown<T, ROTORS>, Autopilot)>,
-}
-
-fn do_job<T: Paths, const ROTORS: usize>(blocks: &mut Box<[Block<T, ROTORS>]>, job: Job<T, ROTORS>) {
-    match job.autopilot {
-        None => (job.work)(blocks, job.call),
-        Some((flown, autopilot)) => flown(blocks, job.work, job.call, autopilot),
-    }
-}
 
 /// Steps of the base model.
 fn plain<T: Paths, const ROTORS: usize>(blocks: &mut [Block<T, ROTORS>], call: Call) {
@@ -161,7 +147,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// no threads.
     pub fn new(vehicles: &[Vehicle<T>], settings: Settings) -> Result<Self, BatchError> {
         let drives: Vec<Drive<T>> = vehicles.iter().map(Drive::new).collect();
-        let mut batch = Self::empty(drives, Fitted::all(&[])?, settings, plain)?;
+        let mut batch = Self::empty(&drives, Fitted::all(&[])?, settings, plain)?;
         for (number, vehicle) in vehicles.iter().enumerate() {
             batch.put(number, vehicle, &Tuning::none())?;
         }
@@ -188,8 +174,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         for (number, craft) in crafts.iter().enumerate() {
             kinds.push(Drive::new(&airframe(number, craft)?.0));
         }
-        let drives = kinds.iter().copied().cycle().take(count).collect();
-        let mut batch = Self::empty(drives, fitted, settings, whole)?;
+        let drives: Vec<Drive<T>> = kinds.iter().copied().cycle().take(count).collect();
+        let mut batch = Self::empty(&drives, fitted, settings, whole)?;
         for (number, craft) in crafts.iter().cycle().take(count).enumerate() {
             batch.refit(number, craft)?;
             batch.reset(number, &State::at_rest())?;
@@ -198,7 +184,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     }
 
     fn empty(
-        drives: Vec<Drive<T>>,
+        drives: &[Drive<T>],
         fitted: Fitted,
         settings: Settings,
         work: Work<T, ROTORS>,
@@ -218,17 +204,17 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         }
         let mut block = Block::empty();
         block.extra = (!fitted.is_plain()).then(|| Box::new(Extra::empty(&fitted)));
-        let chunks = drives.chunks(BLOCK * CHUNK);
-        let chunks =
-            chunks.map(|drives| vec![block.clone(); drives.len().div_ceil(BLOCK)].into_boxed_slice());
+        let each = BLOCK * CHUNK;
+        let chunks = drives.chunks(each).enumerate();
+        let chunks = chunks.map(|(number, drives)| Chunk::new(number * each, &block, drives));
         let pool = Pool::new(chunks.collect(), settings.threads, do_job)?;
-        Ok(Self { pool, drives, fitted, settings, work, autopilot: None })
+        Ok(Self { pool, vehicles: drives.len(), fitted, settings, work, autopilot: None })
     }
 
     /// Vehicles in it.
     #[allow(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
-        self.drives.len()
+        self.vehicles
     }
 
     /// How it runs.
@@ -258,8 +244,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         self.put(number, &vehicle, &Tuning::between(&craft.vehicle, &whole, effects))?;
         let (chunk, block, lane) = place(number);
         let dt_s = self.settings.dt_s;
-        let mut blocks = self.pool.chunk(chunk);
-        let Some(extra) = &mut blocks[block].extra else { return Ok(()) };
+        let mut chunk = self.pool.chunk(chunk);
+        let Some(extra) = &mut chunk.blocks[block].extra else { return Ok(()) };
         let own = whole.parameters().wing;
         let still = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.0 };
         let (plate, membrane, servo) = match &craft.wing {
@@ -306,21 +292,11 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
                 return Err(BatchError::TimeConstant { vehicle: number, dt_s, key, time_constant_s });
             }
         }
-        self.drives[number] = Drive::new(vehicle);
         let (chunk, block, lane) = place(number);
-        self.pool.chunk(chunk)[block].put_vehicle(lane, vehicle, tuning);
+        let mut chunk = self.pool.chunk(chunk);
+        chunk.drives[block * BLOCK + lane] = Drive::new(vehicle);
+        chunk.blocks[block].put_vehicle(lane, vehicle, tuning);
         Ok(())
-    }
-
-    /// Flies on, commands and wind held. A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it.
-    pub fn step(&mut self, steps: usize) {
-        let call = Call { settings: self.settings, steps };
-        let job = Job { call, work: self.work, autopilot: self.autopilot };
-        if self.len().saturating_mul(steps) < WORTH_THREADS {
-            self.pool.run_alone(job);
-        } else {
-            self.pool.run(job);
-        }
     }
 
     fn check(&self, vehicle: usize) -> Result<(), BatchError> {

@@ -219,12 +219,22 @@ pub(super) struct Block<S: Copy, const ROTORS: usize> {
     pub(super) motion: Motion<Row<S>, ROTORS>,
     pub(super) airframe: Airframe<Row<S>, ROTORS>,
     pub(super) held: Held<Row<S>, ROTORS>,
+    /// Columns with a vehicle, the first ones.
+    pub(super) vehicles: usize,
     /// Some rotors have no lag.
     pub(super) lagless: bool,
     /// What is not part of the base model, where the batch has any of it.
     pub(super) extra: Option<Box<Extra<S, ROTORS>>>,
     /// Where something flies the vehicles.
     pub(super) autopilots: Option<Box<Autopilots<S, ROTORS>>>,
+}
+
+impl<S: Copy, const ROTORS: usize> Block<S, ROTORS> {
+    /// Where registers begin between which all its vehicles are.
+    #[inline(always)]
+    pub(super) fn starts<L: Lanes<Weight = S>>(&self) -> impl Iterator<Item = usize> + use<L, S, ROTORS> {
+        (0..self.vehicles.div_ceil(L::WIDTH)).map(|group| group * L::WIDTH)
+    }
 }
 
 /// Registers from columns `start` and on of rows.
@@ -340,6 +350,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 slowing_down: one,
             },
             held: Held { wind: [none; 3], target_speed: [none; ROTORS] },
+            vehicles: BLOCK,
             lagless: false,
             extra: None,
             autopilots: None,

@@ -191,7 +191,7 @@ impl Setup {
             if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
                 let through_air = state.body.velocity - total_wind(plant.effects(), &state.body, air);
                 for wind in &mut winds {
-                    wind.advance((time_us - last_tick_us) as f64 * 1e-6, through_air.vector.norm());
+                    wind.advance((time_us - last_tick_us) as f64 * 1e-6, || through_air.vector.norm());
                 }
                 air = velocity_of(&winds);
                 let mut truth = truth(&plant, &state, air);

@@ -65,6 +65,25 @@ pub struct Wind {
     rng: Pcg64Mcg,
     first: Vector3<f64>,
     second: Vector3<f64>,
+    /// Of the last two lengths of steps: a clock whose ticks are cut to whole numbers has two.
+    decays: [Decay; 2],
+}
+
+/// What a step does to Gauss-Markov gusts.
+#[derive(Debug, Clone, Copy)]
+struct Decay {
+    dt_s: f64,
+    /// Part that stays.
+    keep: f64,
+    /// Standard deviation of what comes.
+    fresh: f64,
+}
+
+impl Decay {
+    fn new(dt_s: f64, time_constant_s: f64) -> Self {
+        let keep = (-dt_s / time_constant_s).exp();
+        Self { dt_s, keep, fresh: (1.0 - keep * keep).sqrt() }
+    }
 }
 
 impl Wind {
@@ -75,13 +94,14 @@ impl Wind {
             rng: Pcg64Mcg::seed_from_u64(seed),
             first: Vector3::zeros(),
             second: Vector3::zeros(),
+            decays: [Decay::new(0.0, 1.0); 2],
         };
         match parameters.gust {
             GustModel::GaussMarkov { .. } => wind.first = wind.noise(),
             // The second-order axes forget their start within a few of these steps.
             GustModel::Dryden { scale_length_m } if parameters.gust_sigma_m_s > 0.0 => {
                 for _ in 0..400 {
-                    wind.advance(0.02 * scale_length_m, 1.0);
+                    wind.advance(0.02 * scale_length_m, || 1.0);
                 }
             }
             GustModel::Dryden { .. } => {}
@@ -103,20 +123,31 @@ impl Wind {
         In::new(mean + gust * self.parameters.gust_sigma_m_s)
     }
 
+    /// Whether gusts come as fast as a vehicle meets them.
+    pub(crate) fn asks_for_airspeed(&self) -> bool {
+        self.parameters.gust_sigma_m_s != 0.0 && matches!(self.parameters.gust, GustModel::Dryden { .. })
+    }
+
     /// Moves the air on by `dt_s`.
     ///
-    /// * `airspeed_m_s` - of the vehicle, which meets the Dryden field at that speed; not below 1 m/s
-    pub fn advance(&mut self, dt_s: f64, airspeed_m_s: f64) {
+    /// * `airspeed_m_s` - of the vehicle, which meets the Dryden field at that speed, not below 1 m/s; not asked for other gusts
+    pub fn advance(&mut self, dt_s: f64, airspeed_m_s: impl FnOnce() -> f64) {
         if self.parameters.gust_sigma_m_s == 0.0 {
             return;
         }
         match self.parameters.gust {
             GustModel::GaussMarkov { time_constant_s } => {
-                let keep = (-dt_s / time_constant_s).exp();
-                self.first = self.first * keep + self.noise() * (1.0 - keep * keep).sqrt();
+                if self.decays[0].dt_s != dt_s {
+                    self.decays.swap(0, 1);
+                }
+                if self.decays[0].dt_s != dt_s {
+                    self.decays[0] = Decay::new(dt_s, time_constant_s);
+                }
+                let Decay { keep, fresh, .. } = self.decays[0];
+                self.first = self.first * keep + self.noise() * fresh;
             }
             GustModel::Dryden { scale_length_m } => {
-                let keep = (-dt_s * airspeed_m_s.max(1.0) / scale_length_m).exp();
+                let keep = (-dt_s * airspeed_m_s().max(1.0) / scale_length_m).exp();
                 // With unit noise the first stage has variance 1/2, so that the shaped output has variance 1.
                 let before = self.first;
                 self.first = self.first * keep + self.noise() * ((1.0 - keep * keep) * 0.5).sqrt();
@@ -140,7 +171,7 @@ mod tests {
         let n = 400_000;
         let mut square = Vector3::zeros();
         for _ in 0..n {
-            wind.advance(dt_s, 5.0);
+            wind.advance(dt_s, || 5.0);
             let gust = wind.velocity().vector - Vector3::new(2.0, 0.0, 0.0);
             square += gust.component_mul(&gust);
         }
@@ -169,7 +200,7 @@ mod tests {
         };
         let run = |seed| {
             let mut wind = Wind::new(parameters, seed);
-            (0..100).for_each(|_| wind.advance(0.01, 5.0));
+            (0..100).for_each(|_| wind.advance(0.01, || 5.0));
             wind.velocity().vector
         };
         assert_eq!(run(7), run(7));

@@ -69,7 +69,7 @@ impl<T: Paths> Thrown<T> {
 }
 
 /// The bits of all motions, a row a vehicle; `f32` by the `f64` of the same value.
-pub(crate) fn bits<T: Paths, const ROTORS: usize>(batch: &Batch<T, ROTORS>) -> Vec<Vec<u64>> {
+pub(crate) fn bits<T: Paths, const ROTORS: usize>(batch: &mut Batch<T, ROTORS>) -> Vec<Vec<u64>> {
     let width = BODY_NUMBERS + ROTORS;
     let mut rows = vec![convert::<f64, T>(0.0); batch.len() * width];
     batch.write_states(&mut rows).unwrap();
