@@ -79,20 +79,27 @@ fn an_environment_is_the_same_among_many_and_on_any_registers() {
                 Level::AttitudeWing => lean(observation).to_vec(),
                 _ => observation[..5].iter().map(|x| 0.2 * x).collect(),
             };
-            let run = |count: usize, settings: TaskSettings| {
-                let mut tasks: Tasks = Tasks::new(&vehicles(), count, 7, settings).unwrap();
+            let run = |count: usize, seed: u64, settings: TaskSettings| {
+                let mut tasks: Tasks = Tasks::new(&vehicles(), count, seed, settings).unwrap();
                 fly(&mut tasks, 150, pilot)
             };
-            let one = run(1, settings);
-            let slow = run(1, TaskSettings { path: Path::available()[0], threads: 1, ..settings });
+            let one = run(1, 7, settings);
+            let slow = run(1, 7, TaskSettings { path: Path::available()[0], threads: 1, ..settings });
             assert_eq!(one, slow);
-            let many = run(40, settings);
-            for (k, (one, many)) in one.iter().zip(&many).enumerate() {
-                assert_eq!(one.observation, many.observation[..OBSERVATION], "step {k}");
-                assert_eq!(one.reward[0].to_bits(), many.reward[0].to_bits(), "step {k}");
-                assert_eq!(one.terminated[0], many.terminated[0], "step {k}");
+            // More than a thread takes at once.
+            let count = 300;
+            let many = run(count, 7, TaskSettings { threads: 2, ..settings });
+            assert_eq!(many, run(count, 7, TaskSettings { threads: 1, ..settings }));
+            for number in [0, 130, count - 1] {
+                let one = run(1, 7 + number as u64, settings);
+                for (k, (one, many)) in one.iter().zip(&many).enumerate() {
+                    let seen = &many.observation[OBSERVATION * number..][..OBSERVATION];
+                    assert_eq!(one.observation, seen, "environment {number}, step {k}");
+                    assert_eq!(one.reward[0].to_bits(), many.reward[number].to_bits(), "step {k}");
+                    assert_eq!(one.terminated[0], many.terminated[number], "step {k}");
+                }
             }
-            let first: Vec<&[f32]> = many[0].observation.chunks(OBSERVATION).collect();
+            let first: Vec<&[f32]> = many[0].observation.chunks(OBSERVATION).take(40).collect();
             assert!(first.iter().all(|row| *row == first[0] || row[..3] != first[0][..3]), "seeds differ");
         }
     }

@@ -21,7 +21,11 @@ pub(super) struct Chunk<T: Copy, const ROTORS: usize> {
 impl<T: Paths, const ROTORS: usize> Chunk<T, ROTORS> {
     /// * `drives` - of its vehicles
     pub(super) fn new(first: usize, block: &Block<T, ROTORS>, drives: &[Drive<T>]) -> Self {
-        let of = |drives: &[Drive<T>]| Block { vehicles: drives.len(), ..block.clone() };
+        let of = |drives: &[Drive<T>]| {
+            let mut block = block.clone();
+            block.vehicles = drives.len();
+            block
+        };
         Self { first, blocks: drives.chunks(BLOCK).map(of).collect(), drives: drives.into() }
     }
 }

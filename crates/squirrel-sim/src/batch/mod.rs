@@ -35,7 +35,7 @@ mod error;
 mod exchange;
 mod extra;
 mod maths;
-mod pool;
+pub(crate) mod pool;
 mod rows;
 mod servo;
 pub mod simd;

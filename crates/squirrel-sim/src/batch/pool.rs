@@ -20,7 +20,7 @@ const CALLER_SPINS: usize = 500;
 
 /// Chunks `C`, and threads that do jobs `J` on them.
 #[derive(Debug)]
-pub(super) struct Pool<C, J> {
+pub(crate) struct Pool<C, J> {
     shared: Arc<Shared<C, J>>,
     threads: Vec<JoinHandle<()>>,
 }
@@ -106,7 +106,7 @@ impl<C: Send + 'static, J: Copy + Send + 'static> Pool<C, J> {
     ///
     /// # Errors
     /// A thread cannot be started.
-    pub(super) fn new(chunks: Vec<C>, threads: usize, work: fn(&mut C, J)) -> io::Result<Self> {
+    pub(crate) fn new(chunks: Vec<C>, threads: usize, work: fn(&mut C, J)) -> io::Result<Self> {
         let helpers = threads.min(chunks.len()).saturating_sub(1);
         let shared = Arc::new(Shared {
             chunks: chunks.into_iter().map(Mutex::new).collect(),
@@ -125,14 +125,14 @@ impl<C: Send + 'static, J: Copy + Send + 'static> Pool<C, J> {
     }
 
     /// Does a job on every chunk, by the caller alone.
-    pub(super) fn run_alone(&mut self, job: J) {
+    pub(crate) fn run_alone(&mut self, job: J) {
         for chunk in &self.shared.chunks {
             (self.shared.work)(&mut lock(chunk), job);
         }
     }
 
     /// Does a job on every chunk, by all threads.
-    pub(super) fn run(&mut self, job: J) {
+    pub(crate) fn run(&mut self, job: J) {
         if self.threads.is_empty() {
             return self.run_alone(job);
         }
@@ -146,7 +146,7 @@ impl<C: Send + 'static, J: Copy + Send + 'static> Pool<C, J> {
     }
 
     /// A chunk; nobody works on it while the pool is not running.
-    pub(super) fn chunk(&self, number: usize) -> MutexGuard<'_, C> {
+    pub(crate) fn chunk(&self, number: usize) -> MutexGuard<'_, C> {
         lock(&self.shared.chunks[number])
     }
 }

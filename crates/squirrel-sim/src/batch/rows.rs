@@ -10,9 +10,9 @@ use nalgebra::{Matrix3, Quaternion, Vector3};
 use squirrel_core::dynamics::{self, RotorDrive, State};
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Wrench};
-use squirrel_core::math::{AIR_DENSITY_KG_M3, real};
+use squirrel_core::math::{AIR_DENSITY_KG_M3, limit, real};
 use squirrel_core::rnn::lane::Lane;
-use squirrel_core::vehicle::{MAX_ROTORS, Propulsion, Vehicle};
+use squirrel_core::vehicle::{CommandKind, MAX_ROTORS, Propulsion, Vehicle};
 
 /// One number of each vehicle of a block.
 pub(super) type Row<S> = [S; BLOCK];
@@ -163,6 +163,13 @@ impl<S: Paths> Drive<S> {
         core::array::from_fn(|i| self.only(i, self.propulsion.target_speed_rad_s(command[i])))
     }
 
+    /// Speed at full command, rad/s, where a command is a part of it and there are as many rotors as places.
+    fn full_speed<const ROTORS: usize>(&self) -> Option<S> {
+        let p = &self.propulsion;
+        let is_part = matches!(p.command, CommandKind::SpeedFraction | CommandKind::Duty);
+        (is_part && p.thrust_curve.is_none() && self.rotors == ROTORS).then_some(p.speed_max_rad_s)
+    }
+
     /// `number` where rotor `i` is one, zero where it is not.
     pub(super) fn only(&self, i: usize, number: S) -> S {
         if i < self.rotors { number } else { <S as Lane>::zero() }
@@ -223,6 +230,10 @@ pub(super) struct Block<S: Copy, const ROTORS: usize> {
     pub(super) vehicles: usize,
     /// Some rotors have no lag.
     pub(super) lagless: bool,
+    /// Speed of the rotors at full command, rad/s, where a command is a part of it and there is a rotor in every place; NaN elsewhere.
+    full_speed: Row<S>,
+    /// It is so for every vehicle.
+    commands_are_parts: bool,
     /// What is not part of the base model, where the batch has any of it.
     pub(super) extra: Option<Box<Extra<S, ROTORS>>>,
     /// Where something flies the vehicles.
@@ -352,6 +363,8 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
             held: Held { wind: [none; 3], target_speed: [none; ROTORS] },
             vehicles: BLOCK,
             lagless: false,
+            full_speed: [real(f64::NAN); BLOCK],
+            commands_are_parts: false,
             extra: None,
             autopilots: None,
         }
@@ -386,6 +399,8 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         rows.slowing_down[lane] = inverse(p.propulsion.time_constant_down_s + extra.lag_s[1]);
         let all = rows.speeding_up.iter().chain(&rows.slowing_down);
         self.lagless = all.copied().any(|rate| rate == zero);
+        self.full_speed[lane] = Drive::new(vehicle).full_speed::<ROTORS>().unwrap_or(real(f64::NAN));
+        self.commands_are_parts = self.full_speed[..self.vehicles].iter().all(S::is_finite);
         for i in p.rotor_count..ROTORS {
             self.motion.rotor_speed[i][lane] = zero;
             self.held.target_speed[i][lane] = zero;
@@ -433,6 +448,18 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
 
     /// Targets of the rotors of the first vehicles from their commands, one vehicle after the other.
     pub(super) fn command(&mut self, commands: &[S], drives: &[Drive<S>]) {
+        let is_late =
+            self.extra.as_ref().is_some_and(|extra| extra.latency_steps.iter().any(|steps| *steps > 0));
+        if self.commands_are_parts && self.vehicles == BLOCK && !is_late {
+            // What `Drive::targets` does, in an order that the compiler makes registers of.
+            let (none, one) = (<S as Lane>::zero(), real::<S>(1.0));
+            for (i, targets) in self.held.target_speed.iter_mut().enumerate() {
+                for (lane, target) in targets.iter_mut().enumerate() {
+                    *target = limit(commands[lane * ROTORS + i], none, one) * self.full_speed[lane];
+                }
+            }
+            return;
+        }
         for (lane, (commands, drive)) in commands.chunks_exact(ROTORS).zip(drives).enumerate() {
             let targets = drive.targets(commands);
             match &mut self.extra {
