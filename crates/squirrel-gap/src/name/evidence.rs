@@ -101,7 +101,8 @@ fn side_by_side<L: Lanes<Weight = f64>>(a: &[f64], b: [&[f64]; WIDE]) -> [f64; W
         for (lanes, sum) in lanes.chunks_exact_mut(L::WIDTH).zip(sums) {
             sum.store(lanes);
         }
-        *out = lanes.iter().sum::<f64>() + a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum::<f64>();
+        *out =
+            lanes.iter().sum::<f64>() + a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum::<f64>();
     }
     out
 }
