@@ -4,7 +4,7 @@
 
 use super::evidence::{BETA, Gram, inner};
 use super::parameters::Catalogue;
-use super::point::{Other, Point, hypothesis};
+use super::point::{Member, Other, Point, hypothesis};
 use super::whiten::Whitener;
 use crate::GapError;
 use crate::leftover::noise;
@@ -23,6 +23,8 @@ pub(crate) struct Linear {
     pub(crate) tolerance: Vec<f64>,
     /// Inner products of the whitened columns.
     pub(crate) gram: DMatrix<f64>,
+    /// Columns are slopes at the point, and not secants from nothing to sizes that are typical.
+    near: bool,
 }
 
 /// Part of what was measured that no model is trusted with.
@@ -44,8 +46,7 @@ impl Linear {
         before: Option<Self>,
         gust_m_s: Option<f64>,
     ) -> Result<Self, GapError> {
-        let candidates = |point: &Point| point.members.iter().map(|m| m.candidate).collect::<Vec<_>>();
-        let alike = before.as_ref().is_some_and(|before| candidates(&before.point) == candidates(point));
+        let alike = before.as_ref().is_some_and(|before| before.is_about(&point.members));
         let mut before = before.map(|before| before.raw);
         let about = hypothesis(predictor, catalogue, point)?;
         let residual = predictor.residual(&about)?;
@@ -123,7 +124,16 @@ impl Linear {
         }
         let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = inner(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram })
+        Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram, near: !first })
+    }
+
+    fn is_about(&self, members: &[Member]) -> bool {
+        members.iter().map(|m| m.candidate).eq(self.point.members.iter().map(|m| m.candidate))
+    }
+
+    /// Whether slopes beside a set are known, even of what bends.
+    pub(super) fn knows(&self, members: &[Member]) -> bool {
+        self.near && self.is_about(members)
     }
 }
 

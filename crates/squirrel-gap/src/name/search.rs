@@ -198,10 +198,9 @@ impl Search<'_> {
     ) -> Result<Option<Scored>, GapError> {
         let mut best: Option<Scored> = None;
         for (log_evidence, member) in self.ranked(set, except).into_iter().take(REFINED) {
-            // What explains nothing along its slope is worth a flight only if it has another slope further on.
-            let straight =
-                !self.catalogue.bends(member.candidate) && !self.catalogue.starts_flat(member.candidate);
-            if straight && log_evidence <= set.log_evidence {
+            // What explains nothing along its slope is worth a flight only where the slope may be another one.
+            let straight = !self.catalogue.bends(member.candidate) && self.effect(&member) != "ground_effect";
+            if log_evidence <= set.log_evidence && (straight || linear.knows(&set.members)) {
                 continue;
             }
             let members = [set.members.as_slice(), &[member]].concat();
