@@ -20,7 +20,7 @@ impl Search<'_> {
             for form in self.other_forms(&best.members[index]) {
                 let mut members = best.members.clone();
                 members[index] = form;
-                let scored = self.score_towards(linear, &members, Some(best), f64::NEG_INFINITY)?;
+                let scored = self.score(linear, &members)?;
                 (self.progress)();
                 if scored.log_evidence > best.log_evidence + FORM_NATS && self.is_large(&scored) {
                     *best = scored;

@@ -53,7 +53,7 @@ impl Search<'_> {
 
     /// As [`Self::score`], given up after the first step that does not come near what the set must reach.
     ///
-    /// * `from` - the set that one member was added to, or changed in: everything else starts where it is there
+    /// * `from` - the set that the last member was added to: everything else starts where it is there
     /// * `near` - evidence that each step must lead to, nats
     ///
     /// # Errors
