@@ -244,31 +244,14 @@ impl Search<'_> {
                 prior.push(SLAB_OF_LARGEST * largest);
             }
         }
-        let (k, n) = (own.len(), linear.columns.len());
+        let n = linear.columns.len();
         // Products of columns that are not new are known.
         let (known, offset) = before.map_or((&linear.gram, 0), |before| (&before.gram.g, before.free.len()));
         let is_new = |j: usize| heights.contains_key(&j) && !heights_hold;
         places.extend((0..n).map(|j| (!is_new(j)).then_some(offset + j)));
-        let mut all: Vec<&[f64]> =
+        let all: Vec<&[f64]> =
             own.iter().map(|c| c.as_slice()).chain((0..n).map(|j| column(j).as_slice())).collect();
-        let new: Vec<usize> = (0..k + n).filter(|i| places[*i].is_none()).collect();
-        all.push(&y);
-        let with_new: Vec<&[f64]> = new.iter().map(|i| all[*i]).chain([y.as_slice()]).collect();
-        let inner = products(&with_new, &all);
-        let mut gram = Gram {
-            g: DMatrix::from_fn(k + n, k + n, |i, j| match (places[i], places[j]) {
-                (Some(i), Some(j)) => known[(i, j)],
-                _ => 0.0,
-            }),
-            b: inner.row(new.len()).columns(0, k + n).transpose(),
-            yy: inner[(new.len(), k + n)],
-        };
-        for (row, i) in new.into_iter().enumerate() {
-            for j in 0..k + n {
-                gram.g[(i, j)] = inner[(row, j)];
-                gram.g[(j, i)] = inner[(row, j)];
-            }
-        }
+        let gram = extended(known, &places, &all, &y);
         prior.extend(spikes);
         let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NotFinite)?;
         Ok(Scored {
@@ -303,6 +286,25 @@ impl Search<'_> {
             }
         }
     }
+}
+
+/// Inner products of columns of which some have places in known products.
+fn extended(known: &DMatrix<f64>, places: &[Option<usize>], columns: &[&[f64]], y: &[f64]) -> Gram {
+    let n = columns.len();
+    let new: Vec<usize> = (0..n).filter(|i| places[*i].is_none()).collect();
+    let with_new: Vec<&[f64]> = new.iter().map(|i| columns[*i]).chain([y]).collect();
+    let inner = products(&with_new, &[columns, &[y]].concat());
+    let mut g = DMatrix::from_fn(n, n, |i, j| match (places[i], places[j]) {
+        (Some(i), Some(j)) => known[(i, j)],
+        _ => 0.0,
+    });
+    for (row, i) in new.iter().enumerate() {
+        for j in 0..n {
+            g[(*i, j)] = inner[(row, j)];
+            g[(j, *i)] = inner[(row, j)];
+        }
+    }
+    Gram { g, b: inner.row(new.len()).columns(0, n).transpose(), yy: inner[(new.len(), n)] }
 }
 
 fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {
