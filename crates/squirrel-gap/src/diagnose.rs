@@ -276,7 +276,7 @@ fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {
         .map(|(index, member)| NamedEffect {
             name: search.effect(member),
             form: search.form(member),
-            evidence_nats: found.worth[index],
+            evidence_nats: found.worth(index),
             parameters: parameters(search, naming, index, member),
         })
         .collect();

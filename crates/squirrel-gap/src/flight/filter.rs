@@ -25,9 +25,12 @@ pub(crate) const DERIVATIVE_REACH: usize = 2;
 /// Lowest rate at which a model is asked: what aliases from above it has come through a lag of rotors and this filter.
 const MODEL_RATE_HZ: f64 = 140.0;
 
-/// The taps at one rate, from the middle outwards.
+/// The filter of a signal of which every sample, or one of `stride`, is known.
 pub(crate) struct LowPass {
+    /// The taps at the full rate, from the middle outwards.
     taps: Vec<f64>,
+    /// By how far an answer lies behind a known sample: how many known samples before that one count, and all their weights.
+    phases: Vec<(usize, Vec<f64>)>,
 }
 
 impl LowPass {
@@ -42,43 +45,49 @@ impl LowPass {
             };
             sinc * (0.54 + 0.46 * (PI * i / half).cos())
         };
-        let mut taps: Vec<f64> = (0..=half as usize).map(tap).collect();
-        let sum = 2.0 * taps.iter().sum::<f64>() - taps[0];
-        for tap in &mut taps {
-            *tap /= sum;
-        }
-        Self { taps }
+        Self { taps: (0..=half as usize).map(tap).collect(), phases: Vec::new() }.thinned(1)
     }
 
     /// The same filter for a signal of which one sample of `stride` is known.
     pub(crate) fn thinned(&self, stride: usize) -> Self {
-        let taps: Vec<f64> = self.taps.iter().step_by(stride).copied().collect();
-        let sum = 2.0 * taps.iter().sum::<f64>() - taps[0];
-        Self { taps: taps.iter().map(|tap| tap / sum).collect() }
+        let reach = self.reach();
+        let phases = (0..stride).map(|phase| {
+            let before = (reach - phase) / stride;
+            let after = (reach + phase) / stride;
+            let weights: Vec<f64> = (0..=before + after)
+                .map(|i| self.taps[(i * stride).abs_diff(before * stride + phase)])
+                .collect();
+            let sum: f64 = weights.iter().sum();
+            (before, weights.iter().map(|weight| weight / sum).collect())
+        });
+        Self { taps: self.taps.clone(), phases: phases.collect() }
     }
 
-    /// Samples that the filter costs at each end.
+    /// Samples at the full rate that the filter costs at each end.
     pub(crate) fn reach(&self) -> usize {
         self.taps.len() - 1
     }
 
-    /// One filtered sample of `every`, the first at sample `first`, which must be [`Self::reach`] from the beginning.
-    pub(crate) fn apply(&self, x: &[Vector6<f64>], first: usize, every: usize) -> Vec<Vector6<f64>> {
-        (first..x.len().saturating_sub(self.reach()))
+    /// One filtered sample of `every`, both at the full rate, the first at sample `first`, which must be [`Self::reach`] from
+    /// the beginning.
+    pub(crate) fn apply(&self, known: &[Vector6<f64>], first: usize, every: usize) -> Vec<Vector6<f64>> {
+        let stride = self.phases.len();
+        (first..)
             .step_by(every)
-            .map(|k| {
-                let pairs = self.taps.iter().enumerate().skip(1);
-                pairs.fold(x[k] * self.taps[0], |sum, (i, tap)| sum + (x[k - i] + x[k + i]) * *tap)
+            .map_while(|k| {
+                let (before, weights) = &self.phases[k % stride];
+                let start = k / stride - before;
+                let near = known.get(start..start + weights.len())?;
+                Some(near.iter().zip(weights).fold(Vector6::zeros(), |sum, (x, weight)| sum + x * *weight))
             })
             .collect()
     }
 }
 
-/// How many samples apart a model is asked whose answer is filtered and then read every so many samples.
-pub(crate) fn model_stride(period_s: f64, every: usize) -> usize {
-    let fits =
-        |stride: &usize| every.is_multiple_of(*stride) && *stride as f64 * period_s * MODEL_RATE_HZ <= 1.0;
-    (1..=every).rev().find(fits).unwrap_or(1)
+/// How many samples apart a model is asked whose answer is filtered.
+pub(crate) fn model_stride(period_s: f64) -> usize {
+    // The slack keeps a rate that is a multiple, whatever the rounding of its period.
+    ((1.0 / (period_s * MODEL_RATE_HZ) + 1e-6) as usize).max(1)
 }
 
 /// Five-point derivative of `x` at sample `k`, per second; `k` must be [`DERIVATIVE_REACH`] away from the ends.
@@ -124,22 +133,25 @@ mod tests {
 
     #[test]
     fn a_thinned_model_passes_what_the_measurement_passes() {
-        let (rate_hz, every) = (300.0, 10);
-        assert_eq!(model_stride(1.0 / rate_hz, every), 2);
-        assert_eq!((model_stride(0.001, 33), model_stride(0.01, 3), model_stride(0.02, 2)), (3, 1, 1));
-        let filter = LowPass::new(rate_hz);
-        let wave = |frequency_hz: f64| -> Vec<_> {
-            (0..400).map(|k| Vector6::repeat((TAU * frequency_hz * f64::from(k) / rate_hz).cos())).collect()
-        };
-        for (frequency_hz, off) in
-            [(0.0, 1e-12), (2.0, 1e-3), (6.0, 1e-3), (12.0, 2e-3), (20.0, 2e-3), (60.0, 2e-3)]
-        {
-            let full = wave(frequency_hz);
-            let thin: Vec<_> = full.iter().step_by(2).copied().collect();
-            let (all, few) = (filter.apply(&full, 62, every), filter.thinned(2).apply(&thin, 31, every / 2));
-            assert!(all.len() >= 27);
-            for (a, b) in all.iter().zip(&few) {
-                assert!((a - b).amax() < off, "{frequency_hz} Hz: {} and {}", a[0], b[0]);
+        let of = |rate_hz: f64| model_stride(1.0 / rate_hz);
+        assert_eq!([50.0, 100.0, 280.0, 300.0, 333.3, 1000.0].map(of), [1, 1, 2, 2, 2, 7]);
+        // An answer every 10 samples lies on known ones, one every 11 between them, too.
+        for (rate_hz, stride, every) in [(300.0, 2, 10), (1000.0 / 3.0, 2, 11), (1000.0, 7, 33)] {
+            let filter = LowPass::new(rate_hz);
+            let reach = filter.reach();
+            for (frequency_hz, off) in
+                [(0.0, 1e-12), (2.0, 1e-3), (6.0, 1e-3), (12.0, 2e-3), (20.0, 2e-3), (60.0, 2e-3)]
+            {
+                let full: Vec<_> = (0..4 * reach)
+                    .map(|k| Vector6::repeat((TAU * frequency_hz * k as f64 / rate_hz).cos()))
+                    .collect();
+                let thin: Vec<_> = full.iter().step_by(stride).copied().collect();
+                let few = filter.thinned(stride).apply(&thin, reach + 1, every);
+                let all = filter.apply(&full, reach + 1, every);
+                assert!(few.len() >= 2 * reach / every - 1, "{rate_hz} Hz: {}", few.len());
+                for (a, b) in all.iter().zip(&few) {
+                    assert!((a - b).amax() < off, "{frequency_hz} of {rate_hz} Hz: {} and {}", a[0], b[0]);
+                }
             }
         }
     }

@@ -4,7 +4,7 @@
 
 use super::evidence::{BETA, Gram, inner};
 use super::parameters::Catalogue;
-use super::point::{Other, Point, hypothesis};
+use super::point::{Member, Other, Point, hypothesis};
 use super::whiten::Whitener;
 use crate::GapError;
 use crate::leftover::noise;
@@ -23,6 +23,8 @@ pub(crate) struct Linear {
     pub(crate) tolerance: Vec<f64>,
     /// Inner products of the whitened columns.
     pub(crate) gram: DMatrix<f64>,
+    /// Columns are slopes at the point, and not secants from nothing to sizes that are typical.
+    near: bool,
 }
 
 /// Part of what was measured that no model is trusted with.
@@ -31,8 +33,8 @@ const DOUBT: f64 = 0.01;
 impl Linear {
     /// Predicts every number once about a point, fits the whitening to what the fullest model leaves, and whitens.
     ///
-    /// * `before` - the same predictor about another point: what floats beside the catalogue is its, and where neither has
-    ///   members, columns that hardly bend
+    /// * `before` - the same predictor about another point: what floats beside the catalogue is its, and with the same members
+    ///   columns that hardly bend
     /// * `gust_m_s` - deviation of gusts that blow: the noise is then theirs, by simulation
     ///
     /// # Errors
@@ -41,14 +43,14 @@ impl Linear {
         predictor: &Predictor,
         catalogue: &Catalogue,
         point: &Point,
-        before: Option<&Self>,
+        before: Option<Self>,
         gust_m_s: Option<f64>,
     ) -> Result<Self, GapError> {
-        let plain = |point: &Point| point.members.is_empty();
-        let alike = before.filter(|b| plain(&b.point) && plain(point));
+        let alike = before.as_ref().is_some_and(|before| before.is_about(&point.members));
+        let mut before = before.map(|before| before.raw);
         let about = hypothesis(predictor, catalogue, point)?;
         let residual = predictor.residual(&about)?;
-        let first = point.base.iter().all(|x| *x == 0.0) && plain(point);
+        let first = point.base.iter().all(|x| *x == 0.0) && point.members.is_empty();
         let (mut raw, mut tolerance, mut widest) = (Vec::new(), Vec::new(), Vec::new());
         // A column is the change of the residual for a step, of one flight or of all.
         let difference = |moved: &Point, step: f64, flight| -> Result<Vec<f64>, GapError> {
@@ -72,17 +74,18 @@ impl Linear {
                 member.values[parameter.slot] += 0.1 * parameter.smallest;
                 0.1 * parameter.smallest
             } else {
-                let far = first || catalogue.starts_flat(parameter);
+                let far = first || catalogue.starts_flat(parameter.candidate);
                 let near = parameter.tolerance.max(0.1 * parameter.smallest);
                 let step = if far { (parameter.smallest * parameter.largest).sqrt() } else { near };
                 moved.base[column] += step;
                 step
             };
-            raw.push(match alike {
-                Some(before) if !(is_named || catalogue.bends(parameter)) => before.raw[column].clone(),
+            let keeps = alike && !is_named && !catalogue.bends(parameter.candidate);
+            raw.push(match &mut before {
+                Some(before) if keeps => std::mem::take(&mut before[column]),
                 _ => {
                     let ahead = difference(&moved, step, None)?;
-                    if first && parameter.signed && catalogue.bends(parameter) {
+                    if first && parameter.signed && catalogue.bends(parameter.candidate) {
                         // Far from nothing, the two sides are not alike: the one that explains more.
                         moved.base[column] -= 2.0 * step;
                         let back = difference(&moved, -step, None)?;
@@ -100,9 +103,9 @@ impl Linear {
             let (other, sd) = catalogue.other(column);
             widest.push(sd);
             tolerance.push(sd);
-            raw.push(match (other, before) {
+            raw.push(match (other, &mut before) {
                 (Other::Height { .. }, _) => Vec::new(),
-                (_, Some(before)) => before.raw[column].clone(),
+                (_, Some(before)) => std::mem::take(&mut before[column]),
                 (other, None) => {
                     let mut moved = point.clone();
                     moved.base[column] += sd;
@@ -121,7 +124,16 @@ impl Linear {
         }
         let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = inner(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram })
+        Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram, near: !first })
+    }
+
+    fn is_about(&self, members: &[Member]) -> bool {
+        members.iter().map(|m| m.candidate).eq(self.point.members.iter().map(|m| m.candidate))
+    }
+
+    /// Whether slopes beside a set are known, even of what bends.
+    pub(super) fn knows(&self, members: &[Member]) -> bool {
+        self.near && self.is_about(members)
     }
 }
 

@@ -148,7 +148,8 @@ fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
         (inside || times == 1.0).then_some(loose)
     });
     let Some(loose) = loose else { return left };
-    for (i, column) in best.own_raw.iter().chain(&found.linear.raw).enumerate() {
+    let own = best.own_raw.iter().map(|column| &**column);
+    for (i, column) in own.chain(&found.linear.raw).enumerate() {
         let now = match best.free.get(i) {
             Some((member, slot)) => best.members[*member].values[*slot],
             None => point.base[i - k],

@@ -4,7 +4,7 @@
 //! along y and z beside that along x; and in each flight the tilt of the attitude estimate and the zero of the barometer,
 //! which wanders.
 
-use super::parameters::{Candidate, Catalogue, Parameter};
+use super::parameters::{Candidate, Catalogue};
 use crate::GapError;
 use crate::predictor::{HEIGHT_KNOTS, Hypothesis, Predictor};
 use nalgebra::Vector3;
@@ -180,15 +180,15 @@ impl Catalogue {
         }
     }
 
-    /// Whether a parameter has no slope at zero, so that nothing linear holds near it.
-    pub(crate) fn starts_flat(&self, parameter: &Parameter) -> bool {
-        ["ground_effect", "payload_swing"].contains(&self.candidates[parameter.candidate].effect)
+    /// Whether a candidate has no slope at zero, so that nothing linear holds near it.
+    pub(crate) fn starts_flat(&self, candidate: usize) -> bool {
+        ["ground_effect", "payload_swing"].contains(&self.candidates[candidate].effect)
     }
 
-    /// Whether the slope of a parameter is another one after a few tolerances: lags and delays.
-    pub(super) fn bends(&self, parameter: &Parameter) -> bool {
+    /// Whether the slope of a candidate is another one after a few tolerances: lags and delays.
+    pub(super) fn bends(&self, candidate: usize) -> bool {
         ["motor_lag", "actuation_latency", "clock_skew", "gnss_latency", "wing_servo_lag"]
-            .contains(&self.candidates[parameter.candidate].effect)
+            .contains(&self.candidates[candidate].effect)
     }
 
     /// Whether height is worth something: an effect of it acts.

@@ -8,6 +8,7 @@ use super::search::Search;
 use crate::GapError;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
+use std::rc::Rc;
 
 /// Most steps of a refinement.
 const STEPS_MAX: usize = 10;
@@ -15,6 +16,9 @@ const STEPS_MAX: usize = 10;
 const STEP_NATS: f64 = 1.0;
 /// Part of the smallest size worth reporting below which a step is the last.
 const CONVERGED: f64 = 0.01;
+/// The same for a step after which columns are what they were, unless they grow from nothing: that of the difference that
+/// makes them.
+const CLOSE: f64 = 0.1;
 
 /// A set of effects with its best numbers and its evidence.
 pub(crate) struct Scored {
@@ -29,8 +33,11 @@ pub(crate) struct Scored {
     /// Which number of which member each of the first columns is.
     pub(crate) free: Vec<(usize, usize)>,
     /// Columns of the free numbers, as they are and whitened.
-    pub(crate) own_raw: Vec<Vec<f64>>,
-    pub(crate) own: Vec<Vec<f64>>,
+    pub(crate) own_raw: Vec<Rc<Vec<f64>>>,
+    pub(crate) own: Vec<Rc<Vec<f64>>>,
+    /// Where everything else is held, as in [`Point::base`], and whitened columns of heights, by index, if they matter there.
+    base: Vec<f64>,
+    heights: BTreeMap<usize, Rc<Vec<f64>>>,
     /// Whitened measurement, with the free numbers' part in it.
     pub(crate) y: Vec<f64>,
 }
@@ -41,12 +48,13 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn score(&self, linear: &Linear, members: &[Member]) -> Result<Scored, GapError> {
-        self.score_towards(linear, members, f64::NEG_INFINITY)
+        self.score_towards(linear, members, None, f64::NEG_INFINITY)
     }
 
-    /// As [`Self::score`], given up where the first step does not come near what the set must reach.
+    /// As [`Self::score`], given up after the first step that does not come near what the set must reach.
     ///
-    /// * `near` - evidence that the first step must lead to, nats
+    /// * `from` - the set that the last member was added to: everything else starts where it is there
+    /// * `near` - evidence that each step must lead to, nats
     ///
     /// # Errors
     /// As [`Self::score`].
@@ -54,15 +62,22 @@ impl Search<'_> {
         &self,
         linear: &Linear,
         members: &[Member],
+        from: Option<&Scored>,
         near: f64,
     ) -> Result<Scored, GapError> {
-        let mut base = linear.point.base.clone();
+        let mut base = from.map_or(&linear.point.base, |from| &from.base).clone();
         let along = self.moving_along(linear, members);
+        let moved_already = from.map_or(Vec::new(), |from| self.moving_along(linear, &from.members));
         // A lag that is new explains what others were taken to be off for: they start at nothing.
+        let mut moved = false;
         for (column, _) in along.iter().filter(|(column, _)| *column < self.catalogue.parameters.len()) {
-            base[*column] = 0.0;
+            if moved_already.iter().all(|(other, _)| other != column) {
+                moved |= base[*column] != 0.0;
+                base[*column] = 0.0;
+            }
         }
-        let mut best = self.evaluate(linear, members, &base, None)?;
+        let mut best = self.evaluate(linear, members, &base, from, !moved)?;
+        let flat = members.iter().any(|member| self.catalogue.starts_flat(member.candidate));
         let mut share = 1.0;
         for _ in 0..STEPS_MAX {
             let mut next = best.members.clone();
@@ -86,7 +101,7 @@ impl Search<'_> {
             if moved < CONVERGED {
                 break;
             }
-            let scored = self.evaluate(linear, &next, &base, Some(&best))?;
+            let scored = self.evaluate(linear, &next, &base, Some(&best), moved < CLOSE && !flat)?;
             // Where the model is linear, every point of it has the same evidence: the mode is where steps end.
             if scored.log_evidence > best.log_evidence - STEP_NATS {
                 best = scored;
@@ -109,18 +124,14 @@ impl Search<'_> {
     /// thrust feels them, and lags and delays beside one of them that is new.
     fn moving_along(&self, linear: &Linear, members: &[Member]) -> Vec<(usize, f64)> {
         let catalogue = self.catalogue;
-        let bends = |m: &Member| {
-            catalogue.candidates[m.candidate]
-                .parameters
-                .iter()
-                .any(|p| catalogue.bends(&catalogue.parameters[*p]))
-        };
+        let bends = |m: &Member| catalogue.bends(m.candidate);
         let is_new = |m: &Member| !linear.point.members.iter().any(|other| other.candidate == m.candidate);
         let mut all = Vec::new();
         if members.iter().any(|m| bends(m) && is_new(m)) {
             let own = |p: usize| members.iter().any(|m| m.candidate == p);
             let free = catalogue.parameters.iter().enumerate();
-            let bending = free.filter(|(_, p)| catalogue.bends(p) && !own(p.candidate) && p.tolerance > 0.0);
+            let bending =
+                free.filter(|(_, p)| catalogue.bends(p.candidate) && !own(p.candidate) && p.tolerance > 0.0);
             all.extend(bending.map(|(column, p)| (column, p.tolerance)));
         }
         if catalogue.feels_height(members) {
@@ -136,9 +147,9 @@ impl Search<'_> {
     /// Whether a number of a member has one slope all along: it is in the catalogue's linear part and no lag.
     fn keeps_slope(&self, member: &Member, slot: usize) -> bool {
         let own = &self.catalogue.candidates[member.candidate].parameters;
-        own.iter()
-            .map(|p| &self.catalogue.parameters[*p])
-            .any(|p| p.slot == slot && !self.catalogue.bends(p) && !self.catalogue.starts_flat(p))
+        own.iter().map(|p| &self.catalogue.parameters[*p]).any(|p| p.slot == slot)
+            && !self.catalogue.bends(member.candidate)
+            && !self.catalogue.starts_flat(member.candidate)
     }
 
     /// Range of a number of a member.
@@ -153,13 +164,15 @@ impl Search<'_> {
 
     /// Evidence of a set, linearised in its free numbers where they are.
     ///
-    /// * `before` - the same set with other numbers: columns that hardly bend are its
+    /// * `before` - the same set with other numbers, or without its last member: columns that hardly bend are its
+    /// * `close` - it is so close that all of its columns hold here
     fn evaluate(
         &self,
         linear: &Linear,
         members: &[Member],
         base: &[f64],
         before: Option<&Scored>,
+        close: bool,
     ) -> Result<Scored, GapError> {
         let segments = &self.predictor.segments;
         let mut point = Point { members: members.to_vec(), base: base.to_vec() };
@@ -187,25 +200,32 @@ impl Search<'_> {
                 }
             }
         }
-        let mut fresh = BTreeMap::new();
-        for (index, column) in height_columns(self.predictor, self.catalogue, &point, &residual)? {
-            fresh.insert(index, linear.whitener.apply(segments, &column));
+        let mut heights =
+            before.filter(|_| close).map_or_else(BTreeMap::new, |before| before.heights.clone());
+        let heights_hold = !heights.is_empty();
+        if !heights_hold {
+            for (index, column) in height_columns(self.predictor, self.catalogue, &point, &residual)? {
+                heights.insert(index, Rc::new(linear.whitener.apply(segments, &column)));
+            }
         }
-        let column = |j: usize| fresh.get(&j).unwrap_or(&linear.columns[j]);
+        let column = |j: usize| heights.get(&j).map_or(&linear.columns[j], |column| &**column);
         for (j, x) in point.base.iter().enumerate() {
             if *x != 0.0 {
                 add_scaled(&mut y, column(j), *x);
             }
         }
         let (mut own, mut own_raw, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        // Where a column is among those of before, if it holds here.
+        let mut places = Vec::new();
         for (index, member) in members.iter().enumerate() {
             for slot in self.free_slots(member) {
                 let (smallest, largest, _) = self.range(member, slot);
-                let (column, white) = match before {
-                    Some(before) if self.keeps_slope(member, slot) => {
-                        (before.own_raw[own.len()].clone(), before.own[own.len()].clone())
-                    }
-                    _ => {
+                let place = before
+                    .filter(|_| close || self.keeps_slope(member, slot))
+                    .and_then(|before| self.place(before, index, member, slot));
+                let (column, white) = match before.zip(place) {
+                    Some((before, place)) => (before.own_raw[place].clone(), before.own[place].clone()),
+                    None => {
                         let step = 0.1 * smallest;
                         let mut moved = point.clone();
                         moved.members[index].values[slot] += step;
@@ -213,36 +233,25 @@ impl Search<'_> {
                         let column: Vec<f64> =
                             residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
                         let white = linear.whitener.apply(segments, &column);
-                        (column, white)
+                        (Rc::new(column), Rc::new(white))
                     }
                 };
                 add_scaled(&mut y, &white, member.values[slot]);
                 own.push(white);
                 own_raw.push(column);
+                places.push(place);
                 free.push((index, slot));
                 prior.push(SLAB_OF_LARGEST * largest);
             }
         }
-        let (k, n) = (own.len(), linear.columns.len());
-        let mut all: Vec<&[f64]> =
-            own.iter().map(Vec::as_slice).chain((0..n).map(|j| column(j).as_slice())).collect();
-        // What is new, and last the measurement; the rest is known.
-        let new: Vec<usize> = (0..k).chain(fresh.keys().map(|i| k + i)).collect();
-        all.push(&y);
-        let with_new: Vec<&[f64]> = new.iter().map(|i| all[*i]).chain([y.as_slice()]).collect();
-        let inner = products(&with_new, &all);
-        let mut gram = Gram {
-            g: DMatrix::zeros(k + n, k + n),
-            b: inner.row(new.len()).columns(0, k + n).transpose(),
-            yy: inner[(new.len(), k + n)],
-        };
-        gram.g.view_mut((k, k), (n, n)).copy_from(&linear.gram);
-        for (row, i) in new.into_iter().enumerate() {
-            for j in 0..k + n {
-                gram.g[(i, j)] = inner[(row, j)];
-                gram.g[(j, i)] = inner[(row, j)];
-            }
-        }
+        let n = linear.columns.len();
+        // Products of columns that are not new are known.
+        let (known, offset) = before.map_or((&linear.gram, 0), |before| (&before.gram.g, before.free.len()));
+        let is_new = |j: usize| heights.contains_key(&j) && !heights_hold;
+        places.extend((0..n).map(|j| (!is_new(j)).then_some(offset + j)));
+        let all: Vec<&[f64]> =
+            own.iter().map(|c| c.as_slice()).chain((0..n).map(|j| column(j).as_slice())).collect();
+        let gram = extended(known, &places, &all, &y);
         prior.extend(spikes);
         let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NotFinite)?;
         Ok(Scored {
@@ -254,8 +263,17 @@ impl Search<'_> {
             free,
             own_raw,
             own,
+            base: base.to_vec(),
+            heights,
             y,
         })
+    }
+
+    /// Where the column of a number of a member is among those of another set that has the same member at the same place.
+    fn place(&self, other: &Scored, index: usize, member: &Member, slot: usize) -> Option<usize> {
+        let same = |m: &Member| m.candidate == member.candidate && self.form(m) == self.form(member);
+        other.members.get(index).filter(|m| same(m))?;
+        other.free.iter().position(|free| *free == (index, slot))
     }
 
     /// The last step of a refinement that has converged, too short to be worth another look.
@@ -268,6 +286,25 @@ impl Search<'_> {
             }
         }
     }
+}
+
+/// Inner products of columns of which some have places in known products.
+fn extended(known: &DMatrix<f64>, places: &[Option<usize>], columns: &[&[f64]], y: &[f64]) -> Gram {
+    let n = columns.len();
+    let new: Vec<usize> = (0..n).filter(|i| places[*i].is_none()).collect();
+    let with_new: Vec<&[f64]> = new.iter().map(|i| columns[*i]).chain([y]).collect();
+    let inner = products(&with_new, &[columns, &[y]].concat());
+    let mut g = DMatrix::from_fn(n, n, |i, j| match (places[i], places[j]) {
+        (Some(i), Some(j)) => known[(i, j)],
+        _ => 0.0,
+    });
+    for (row, i) in new.iter().enumerate() {
+        for j in 0..n {
+            g[(*i, j)] = inner[(row, j)];
+            g[(j, *i)] = inner[(row, j)];
+        }
+    }
+    Gram { g, b: inner.row(new.len()).columns(0, n).transpose(), yy: inner[(new.len(), n)] }
 }
 
 fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {

@@ -19,17 +19,15 @@ impl Search<'_> {
     pub(crate) fn rivals(&self, found: &Found) -> Result<Vec<Scored>, GapError> {
         let mut all: Vec<Scored> = Vec::new();
         for i in 0..found.best.members.len() {
-            let mut rest = found.best.members.clone();
-            let out = rest.remove(i);
-            let without = self.score(&found.linear, &rest)?;
+            let (out, without) = (&found.best.members[i], &found.without[i]);
             let mut names: Vec<&str> = Vec::new();
-            for (_, member) in self.ranked(&without, &[self.effect(&out)]) {
+            for (_, member) in self.ranked(without, &[self.effect(out)]) {
                 if names.contains(&self.effect(&member)) {
                     continue;
                 }
                 names.push(self.effect(&member));
-                let members = [rest.as_slice(), &[member]].concat();
-                all.push(self.score(&found.linear, &members)?);
+                let members = [without.members.as_slice(), &[member]].concat();
+                all.push(self.score_towards(&found.linear, &members, Some(without), f64::NEG_INFINITY)?);
                 (self.progress)();
                 if names.len() == RIVALS {
                     break;

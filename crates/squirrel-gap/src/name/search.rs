@@ -48,8 +48,15 @@ pub(crate) struct Found {
     pub(crate) linear: Linear,
     pub(crate) null: Scored,
     pub(crate) best: Scored,
-    /// What each member is worth: evidence of the set over the set without it, nats.
-    pub(crate) worth: Vec<f64>,
+    /// The best without each of its members.
+    pub(crate) without: Vec<Scored>,
+}
+
+impl Found {
+    /// What a member is worth: evidence of the set over the set without it, nats.
+    pub(crate) fn worth(&self, member: usize) -> f64 {
+        self.best.log_evidence - self.without[member].log_evidence
+    }
 }
 
 impl Search<'_> {
@@ -58,34 +65,45 @@ impl Search<'_> {
     pub(crate) fn run(&self) -> Result<Found, GapError> {
         let mut point =
             Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] };
+        let mut linear = self.linear(&point, None)?;
         let mut round = 1;
-        let mut before: Option<Linear> = None;
         loop {
-            let linear =
-                Linear::about(self.predictor, self.catalogue, &point, before.as_ref(), self.gust_m_s)?;
-            (self.progress)();
-            let null = self.score(&linear, &[])?;
             let mut best = self.score(&linear, &point.members)?;
+            if !self.has_settled(&best, &point.members) {
+                // Numbers first: about others, columns are others, and all that is asked now would be asked again.
+                point = self.settled(&best);
+                linear = self.linear(&point, Some(linear))?;
+                best = self.score(&linear, &point.members)?;
+            }
             self.extend(&linear, &mut best)?;
-            self.drop_and_swap(&linear, &mut best)?;
+            let mut without = self.drop_and_swap(&linear, &mut best)?;
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
-                self.prune(&linear, &mut best)?;
+                if self.prune(&linear, &mut best)? || without.len() < best.members.len() {
+                    without = self.without(&linear, &best)?;
+                }
                 self.finish(&mut best);
-                let worth = self.worth(&linear, &null, &best)?;
-                return Ok(Found { linear, null, best, worth });
+                let null = self.score(&linear, &[])?;
+                return Ok(Found { linear, null, best, without });
             }
             point = self.settled(&best);
-            before = Some(linear);
+            linear = self.linear(&point, Some(linear))?;
             round += 1;
         }
+    }
+
+    /// The predictor linearised about a point.
+    fn linear(&self, point: &Point, before: Option<Linear>) -> Result<Linear, GapError> {
+        let linear = Linear::about(self.predictor, self.catalogue, point, before, self.gust_m_s)?;
+        (self.progress)();
+        Ok(linear)
     }
 
     /// The point at which a set explains most: its members, and everything else where it most likely is.
     pub(crate) fn whole(&self, set: &Scored) -> Point {
         let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
         for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
-            if self.catalogue.starts_flat(parameter) {
+            if self.catalogue.starts_flat(parameter.candidate) {
                 *x = 0.0;
             }
         }
@@ -112,24 +130,24 @@ impl Search<'_> {
         }
     }
 
-    /// Drops members that refinement has made too small to report.
-    fn prune(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+    /// Drops members that refinement has made too small to report; whether there were any.
+    fn prune(&self, linear: &Linear, best: &mut Scored) -> Result<bool, GapError> {
+        let before = best.members.len();
         while let Some(small) = best.members.iter().position(|member| !self.is_large_enough(member)) {
             let mut rest = best.members.clone();
             rest.remove(small);
             *best = self.score(linear, &rest)?;
         }
-        Ok(())
+        Ok(best.members.len() < before)
     }
 
-    fn worth(&self, linear: &Linear, null: &Scored, best: &Scored) -> Result<Vec<f64>, GapError> {
-        (0..best.members.len())
+    /// A set without each of its members in turn.
+    fn without(&self, linear: &Linear, set: &Scored) -> Result<Vec<Scored>, GapError> {
+        (0..set.members.len())
             .map(|i| {
-                let mut rest = best.members.clone();
+                let mut rest = set.members.clone();
                 rest.remove(i);
-                let without =
-                    if rest.is_empty() { null.log_evidence } else { self.score(linear, &rest)?.log_evidence };
-                Ok(best.log_evidence - without)
+                self.score(linear, &rest)
             })
             .collect()
     }
@@ -179,10 +197,15 @@ impl Search<'_> {
         mut beats: f64,
     ) -> Result<Option<Scored>, GapError> {
         let mut best: Option<Scored> = None;
-        for member in self.ranked(set, except).into_iter().take(REFINED) {
-            let members = [set.members.as_slice(), &[member.1]].concat();
+        for (log_evidence, member) in self.ranked(set, except).into_iter().take(REFINED) {
+            // What explains nothing along its slope is worth a flight only where the slope may be another one.
+            let straight = !self.catalogue.bends(member.candidate) && self.effect(&member) != "ground_effect";
+            if log_evidence <= set.log_evidence && (straight || linear.knows(&set.members)) {
+                continue;
+            }
+            let members = [set.members.as_slice(), &[member]].concat();
             let near = beats - GIVEN_UP * (beats - set.log_evidence).max(0.0) - GIVEN_UP_NATS;
-            let scored = self.score_towards(linear, &members, near)?;
+            let scored = self.score_towards(linear, &members, Some(set), near)?;
             (self.progress)();
             if self.is_large(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
                 beats = beats.max(scored.log_evidence);
@@ -255,7 +278,7 @@ impl Search<'_> {
                 plausible &= parameter.signed || *value > 0.0;
                 *value = value.clamp(-1.5 * parameter.largest, 1.5 * parameter.largest);
                 // What starts flat is not found from below.
-                if self.catalogue.starts_flat(parameter) {
+                if self.catalogue.starts_flat(parameter.candidate) {
                     *value = value.max(parameter.smallest);
                 }
             }
@@ -281,13 +304,17 @@ impl Search<'_> {
         hypothesis(self.predictor, self.catalogue, point)
     }
 
-    fn drop_and_swap(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+    /// Drops and replaces members as long as the evidence asks for it; the set without each of its members, unless it was
+    /// changed to the last.
+    fn drop_and_swap(&self, linear: &Linear, best: &mut Scored) -> Result<Vec<Scored>, GapError> {
         // Later members may have taken over what an early one was named for.
+        let mut all = Vec::new();
         let mut changed = true;
         let mut passes = 0;
         while changed && passes < 3 {
             changed = false;
             passes += 1;
+            all.clear();
             for i in (0..best.members.len()).rev() {
                 let mut rest = best.members.clone();
                 let out = rest.remove(i);
@@ -307,9 +334,10 @@ impl Search<'_> {
                     changed = true;
                     break;
                 }
+                all.insert(0, without);
             }
         }
-        Ok(())
+        Ok(if changed { Vec::new() } else { all })
     }
 }
 

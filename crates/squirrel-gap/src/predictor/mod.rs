@@ -407,6 +407,6 @@ fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<V
         let (f, a) = (led.specific_force.vector, a.vector);
         predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
     });
-    let filtered = filter.apply(&predicted, track.edge() / path.stride, track.every / path.stride);
+    let filtered = filter.apply(&predicted, track.edge() - path.first, track.every);
     track.measured.iter().zip(filtered).map(|(measured, model)| measured - model).collect()
 }

@@ -86,7 +86,7 @@ impl Track {
         let samples = recording.grid(piece);
         let period_s = recording.period_s;
         let every = (1.0 / (RATE_HZ * period_s)).round().max(1.0) as usize;
-        let stride = model_stride(period_s, every);
+        let stride = model_stride(period_s);
         let filter = LowPass::new(1.0 / period_s);
         let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..samples.len() - DERIVATIVE_REACH)
             .map(|k| {
