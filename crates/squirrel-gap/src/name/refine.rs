@@ -223,18 +223,16 @@ impl Search<'_> {
                 let place = before
                     .filter(|_| close || self.keeps_slope(member, slot))
                     .and_then(|before| self.place(before, index, member, slot));
-                let (column, white) = match before.zip(place) {
-                    Some((before, place)) => (before.own_raw[place].clone(), before.own[place].clone()),
-                    None => {
-                        let step = 0.1 * smallest;
-                        let mut moved = point.clone();
-                        moved.members[index].values[slot] += step;
-                        let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
-                        let column: Vec<f64> =
-                            residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
-                        let white = linear.whitener.apply(segments, &column);
-                        (Rc::new(column), Rc::new(white))
-                    }
+                let (column, white) = if let Some((before, place)) = before.zip(place) {
+                    (before.own_raw[place].clone(), before.own[place].clone())
+                } else {
+                    let step = 0.1 * smallest;
+                    let mut moved = point.clone();
+                    moved.members[index].values[slot] += step;
+                    let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
+                    let column: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
+                    let white = linear.whitener.apply(segments, &column);
+                    (Rc::new(column), Rc::new(white))
                 };
                 add_scaled(&mut y, &white, member.values[slot]);
                 own.push(white);
