@@ -4,6 +4,7 @@
 //!
 //! - [`stack`]: the whole flight code as one function of (state, sensor frame); 300 Hz inside, 10 Hz outside.
 //! - [`guidance`]: what to follow: reference trajectories, obstacle sensing.
+//! - [`estimate`]: where the vehicle is and how it stands, from noisy sensors.
 //! - [`control`]: how to follow it: position control, wing decisions, thrust-wing coordination, attitude, mixer.
 //! - [`rnn`]: small networks, and the paper's learned wing force.
 //! - [`effects`]: physics that a vehicle may have on top of the base model, one file an effect.
@@ -22,6 +23,7 @@ pub mod aero;
 pub mod control;
 pub mod dynamics;
 pub mod effects;
+pub mod estimate;
 pub mod frames;
 pub mod guidance;
 pub mod math;

@@ -1,0 +1,376 @@
+//! Position, velocity, attitude and the inertial unit's biases by an error-state Kalman filter of fifteen states: the default.
+//!
+//! Source: Sola, "Quaternion kinematics for the error-state Kalman filter", 2017, with the attitude's error about body axes; docs/equations.md
+//! C.2. The inertial unit moves the state, everything else corrects it:
+//!
+//! ```text
+//! p' = v,  v' = R (f - b_a) + g e3,  q' = q (w - b_g) / 2
+//! d_p' = d_v,  d_v' = -R [f - b_a]x d - R d_ba,  d' = -[w - b_g]x d - d_bg
+//! ```
+//! A satellite fix is late: it is compared with where the filter was then, which it remembers ([`Past`]), and a velocity that errs has
+//! carried the position along since. Measurements are taken in number by number, each with a gate of some deviations, so that an outlier
+//! costs nothing; what is refused for long is believed in the end.
+
+use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, heading_error, turned};
+use crate::frames::{Body, In, Ned, Rotation};
+use crate::math::{GRAVITY_M_S2, limit, lower};
+use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
+
+/// Numbers of the error's state: position, velocity, turn, bias of the accelerometer, bias of the gyro.
+pub const STATES: usize = 15;
+const POSITION: usize = 0;
+const VELOCITY: usize = 3;
+const TURN: usize = 6;
+const ACCEL_BIAS: usize = 9;
+const GYRO_BIAS: usize = 12;
+
+/// Moments that are remembered, and the time between them, s: a fix may be 0.3 s late.
+const MOMENTS: usize = 32;
+const MOMENT_S: f32 = 0.01;
+/// Without a fix for so long, s, the accelerometer is all that says where down is.
+const ALONE_S: f32 = 0.5;
+/// Variance beyond which nothing is known, SI.
+const VARIANCE_MAX: f32 = 1e8;
+/// Refusals in a row after which a sensor is believed again.
+const STUBBORN: u8 = 20;
+
+type Row = SVector<f32, STATES>;
+
+/// Numbers of the filter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EskfParameters {
+    /// Of the gyro per sample, rad/s.
+    pub gyro_noise_rad_s: f32,
+    /// Of the accelerometer per sample, vibration included, m/s^2.
+    pub accel_noise_m_s2: f32,
+    /// Walk of the gyro's bias, rad/s per root second.
+    pub gyro_walk_rad_s_root_s: f32,
+    /// Walk of the accelerometer's bias, m/s^2 per root second.
+    pub accel_walk_m_s2_root_s: f32,
+    /// Standard deviations at the start: inclination and heading, rad.
+    pub start_turn_rad: f32,
+    /// Of the gyro's bias, rad/s.
+    pub start_gyro_bias_rad_s: f32,
+    /// Of the accelerometer's bias, m/s^2.
+    pub start_accel_bias_m_s2: f32,
+    /// Of a fix's position, m.
+    pub gnss_position_noise_m: f32,
+    /// Of a fix's velocity, m/s.
+    pub gnss_velocity_noise_m_s: f32,
+    /// From a fix to its arrival, s; at most 0.3.
+    pub gnss_latency_s: f32,
+    /// Of the barometer per sample, m.
+    pub baro_noise_m: f32,
+    /// Of the compass's heading, rad.
+    pub heading_noise_rad: f32,
+    /// What the accelerometer may be off gravity where there are no fixes, m/s^2.
+    pub alone_noise_m_s2: f32,
+    /// Deviations beyond which a measurement is refused.
+    pub gate: f32,
+}
+
+impl Default for EskfParameters {
+    fn default() -> Self {
+        Self {
+            gyro_noise_rad_s: 0.0045,
+            accel_noise_m_s2: 0.25,
+            gyro_walk_rad_s_root_s: 1e-4,
+            accel_walk_m_s2_root_s: 1e-3,
+            start_turn_rad: 0.05,
+            start_gyro_bias_rad_s: 0.01,
+            start_accel_bias_m_s2: 0.1,
+            gnss_position_noise_m: 0.05,
+            gnss_velocity_noise_m_s: 0.05,
+            gnss_latency_s: 0.0,
+            baro_noise_m: 0.1,
+            heading_noise_rad: 0.05,
+            alone_noise_m_s2: 5.0,
+            gate: 5.0,
+        }
+    }
+}
+
+/// Where the filter was: position and velocity, the newest first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Past {
+    moments: [[Vector3<f32>; 2]; MOMENTS],
+    newest: usize,
+    known: usize,
+    /// Since the newest, s.
+    age_s: f32,
+}
+
+impl Past {
+    fn remember(&mut self, now: [Vector3<f32>; 2], dt_s: f32) {
+        self.age_s += dt_s;
+        if self.age_s >= MOMENT_S {
+            // Steps longer than a moment are moments: ages are then too small by what they are longer, which no flight code's are.
+            self.age_s = limit(self.age_s - MOMENT_S, 0.0, MOMENT_S);
+            self.newest = (self.newest + MOMENTS - 1) % MOMENTS;
+            self.moments[self.newest % MOMENTS] = now;
+            self.known = (self.known + 1).min(MOMENTS);
+        }
+    }
+
+    /// Where it was `late_s` ago, as far as it remembers.
+    fn at(&self, now: [Vector3<f32>; 2], late_s: f32) -> [Vector3<f32>; 2] {
+        if late_s <= self.age_s || self.known == 0 {
+            let share = limit(late_s / (self.age_s + 1e-9), 0.0, 1.0);
+            let then = if self.known == 0 { now } else { self.moments[self.newest % MOMENTS] };
+            return [now[0].lerp(&then[0], share), now[1].lerp(&then[1], share)];
+        }
+        let back = (late_s - self.age_s) / MOMENT_S;
+        let whole = (limit(back, 0.0, (MOMENTS - 1) as f32) as usize).min(self.known - 1);
+        let (a, b) = (whole, (whole + 1).min(self.known - 1));
+        let share = limit(back - whole as f32, 0.0, 1.0);
+        let [a, b] = [a, b].map(|i| self.moments[(self.newest + i) % MOMENTS]);
+        [a[0].lerp(&b[0], share), a[1].lerp(&b[1], share)]
+    }
+
+    fn correct(&mut self, position: &Vector3<f32>, velocity: &Vector3<f32>) {
+        for moment in &mut self.moments {
+            moment[0] += position;
+            moment[1] += velocity;
+        }
+    }
+}
+
+/// The filter of one vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Eskf {
+    parameters: EskfParameters,
+    position: Vector3<f32>,
+    velocity: Vector3<f32>,
+    attitude: UnitQuaternion<f32>,
+    accel_bias: Vector3<f32>,
+    gyro_bias: Vector3<f32>,
+    covariance: SMatrix<f32, STATES, STATES>,
+    past: Past,
+    /// Since the last fix, s.
+    alone_s: f32,
+    /// In a row: fixes, altitudes.
+    refused: [u8; 2],
+    /// Refused since the start.
+    refusals: u32,
+}
+
+impl Eskf {
+    /// At rest at the origin.
+    ///
+    /// * `gyro_bias` - to begin with, rad/s
+    pub fn new(
+        parameters: EskfParameters,
+        start: Rotation<Ned, Body, f32>,
+        gyro_bias: In<Body, f32>,
+    ) -> Self {
+        let here = [Vector3::zeros(); 2];
+        Self {
+            parameters,
+            position: Vector3::zeros(),
+            velocity: Vector3::zeros(),
+            attitude: start.quaternion,
+            accel_bias: Vector3::zeros(),
+            gyro_bias: gyro_bias.vector,
+            covariance: at_start(&parameters),
+            past: Past { moments: [here; MOMENTS], newest: 0, known: 0, age_s: 0.0 },
+            alone_s: 0.0,
+            refused: [0; 2],
+            refusals: 0,
+        }
+    }
+
+    /// Covariance of the error, in the order of [`STATES`]: NED, but the turn about body axes; SI.
+    pub fn covariance(&self) -> &SMatrix<f32, STATES, STATES> {
+        &self.covariance
+    }
+
+    /// Bias of the accelerometer, m/s^2.
+    pub fn accel_bias(&self) -> In<Body, f32> {
+        In::new(self.accel_bias)
+    }
+
+    /// Measurements that were too far off to be believed, so far.
+    pub fn refusals(&self) -> u32 {
+        self.refusals
+    }
+
+    fn predict(&mut self, omega: &Vector3<f32>, force: &Vector3<f32>, dt_s: f32) {
+        let p = self.parameters;
+        let ned_from_body = self.attitude.to_rotation_matrix().into_inner();
+        let acceleration = ned_from_body * force + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32);
+        self.position += (self.velocity + acceleration * (0.5 * dt_s)) * dt_s;
+        self.velocity += acceleration * dt_s;
+        self.attitude = turned(&self.attitude, &(omega * dt_s));
+
+        let of_turn = ned_from_body * cross(force) * -dt_s;
+        let of_bias = ned_from_body * -dt_s;
+        let turning = Matrix3::identity() - cross(omega) * dt_s;
+        // F P F' by blocks, rows and then columns: most of F is the identity.
+        let c = &mut self.covariance;
+        let row = |c: &SMatrix<f32, STATES, STATES>, part| c.fixed_view::<3, STATES>(part, 0).into_owned();
+        let rows = [
+            (POSITION, row(c, POSITION) + row(c, VELOCITY) * dt_s),
+            (VELOCITY, row(c, VELOCITY) + of_turn * row(c, TURN) + of_bias * row(c, ACCEL_BIAS)),
+            (TURN, turning * row(c, TURN) - row(c, GYRO_BIAS) * dt_s),
+        ];
+        for (part, rows) in rows {
+            c.fixed_view_mut::<3, STATES>(part, 0).copy_from(&rows);
+        }
+        let column = |c: &SMatrix<f32, STATES, STATES>, part| c.fixed_view::<STATES, 3>(0, part).into_owned();
+        let columns = [
+            (POSITION, column(c, POSITION) + column(c, VELOCITY) * dt_s),
+            (
+                VELOCITY,
+                column(c, VELOCITY)
+                    + column(c, TURN) * of_turn.transpose()
+                    + column(c, ACCEL_BIAS) * of_bias.transpose(),
+            ),
+            (TURN, column(c, TURN) * turning.transpose() - column(c, GYRO_BIAS) * dt_s),
+        ];
+        for (part, columns) in columns {
+            c.fixed_view_mut::<STATES, 3>(0, part).copy_from(&columns);
+        }
+        for (part, variance) in [
+            (VELOCITY, square(p.accel_noise_m_s2 * dt_s)),
+            (TURN, square(p.gyro_noise_rad_s * dt_s)),
+            (ACCEL_BIAS, square(p.accel_walk_m_s2_root_s) * dt_s),
+            (GYRO_BIAS, square(p.gyro_walk_rad_s_root_s) * dt_s),
+        ] {
+            for i in part..part + 3 {
+                c[(i, i)] += variance;
+            }
+        }
+    }
+
+    /// One number that was measured, `row` times the error plus noise; by how much the state is to move, `moved` so far.
+    ///
+    /// Whether it was believed.
+    fn update(&mut self, moved: &mut Row, row: &Row, residual: f32, noise: f32, is_gated: bool) -> bool {
+        let across = self.covariance * row;
+        let variance = row.dot(&across) + square(noise);
+        let left = residual - row.dot(moved);
+        // What is no number is refused, too.
+        let near = square(left) <= square(self.parameters.gate) * variance;
+        if !(near || (!is_gated && left.is_finite() && variance > 0.0)) {
+            return false;
+        }
+        let gain = across / variance;
+        *moved += gain * left;
+        self.covariance -= gain * across.transpose();
+        true
+    }
+
+    /// Puts an error into the state.
+    fn inject(&mut self, moved: &Row) {
+        let part = |at: usize| moved.fixed_rows::<3>(at).into_owned();
+        self.position += part(POSITION);
+        self.velocity += part(VELOCITY);
+        self.attitude = turned(&self.attitude, &part(TURN));
+        self.accel_bias += part(ACCEL_BIAS);
+        self.gyro_bias += part(GYRO_BIAS);
+        self.past.correct(&part(POSITION), &part(VELOCITY));
+    }
+
+    /// Whether measurements of a sensor that was refused `refused` times in a row pass the gate; keeps the count.
+    fn judge(&mut self, sensor: usize, believed: bool) {
+        let refused = &mut self.refused[sensor];
+        *refused = if believed { 0 } else { refused.saturating_add(1) };
+        self.refusals = self.refusals.saturating_add(u32::from(!believed));
+    }
+}
+
+impl Estimator for Eskf {
+    fn step(&mut self, sensed: &Sensed) {
+        let p = self.parameters;
+        let dt_s = lower(sensed.dt_s, STEP_MAX_S);
+        let omega = sensed.imu.omega.vector - self.gyro_bias;
+        let force = sensed.imu.specific_force.vector - self.accel_bias;
+        self.predict(&omega, &force, dt_s);
+        self.past.remember([self.position, self.velocity], dt_s);
+        self.alone_s += dt_s;
+
+        let mut moved = Row::zeros();
+        let unit = |at: usize| {
+            let mut row = Row::zeros();
+            row[at] = 1.0;
+            row
+        };
+        if let Some(gnss) = &sensed.gnss {
+            let late_s = p.gnss_latency_s;
+            let then = self.past.at([self.position, self.velocity], late_s);
+            let (position, velocity) = (gnss.position.vector - then[0], gnss.velocity.vector - then[1]);
+            let is_gated = self.refused[0] < STUBBORN;
+            let mut believed = true;
+            for i in 0..3 {
+                let noise = p.gnss_velocity_noise_m_s;
+                believed &= self.update(&mut moved, &unit(VELOCITY + i), velocity[i], noise, is_gated);
+            }
+            for i in 0..3 {
+                let mut row = unit(POSITION + i);
+                row[VELOCITY + i] = -late_s;
+                let noise = p.gnss_position_noise_m;
+                believed &= self.update(&mut moved, &row, position[i], noise, is_gated);
+            }
+            self.judge(0, believed);
+            if believed {
+                self.alone_s = 0.0;
+            }
+        }
+        if let Some(altitude_m) = sensed.altitude_m {
+            let is_gated = self.refused[1] < STUBBORN;
+            let residual = -altitude_m - self.position.z;
+            let believed = self.update(&mut moved, &unit(POSITION + 2), residual, p.baro_noise_m, is_gated);
+            self.judge(1, believed);
+        }
+        if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
+            let mut row = Row::zeros();
+            row.fixed_rows_mut::<3>(TURN).copy_from(&down(&self.attitude));
+            self.update(&mut moved, &row, -error, p.heading_noise_rad, true);
+        }
+        if self.alone_s > ALONE_S {
+            let expected = down(&self.attitude) * GRAVITY_M_S2 as f32;
+            let slope = cross(&expected);
+            for i in 0..3 {
+                let mut row = Row::zeros();
+                row.fixed_rows_mut::<3>(TURN).copy_from(&slope.row(i).transpose());
+                self.update(&mut moved, &row, -force[i] - expected[i], p.alone_noise_m_s2, true);
+            }
+        }
+        self.inject(&moved);
+        self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
+        // After what no vehicle does, the covariance may be none any more; the filter then starts from where it is.
+        if !self.covariance.diagonal().iter().all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX) {
+            self.covariance = at_start(&p);
+            (self.accel_bias, self.gyro_bias) = (Vector3::zeros(), Vector3::zeros());
+        }
+    }
+
+    fn estimate(&self) -> Estimate {
+        Estimate {
+            ned_from_body: Rotation::new(self.attitude),
+            gyro_bias: In::new(self.gyro_bias),
+            motion: Some((In::new(self.position), In::new(self.velocity))),
+        }
+    }
+}
+
+/// Covariance of a vehicle that stands where the origin is.
+fn at_start(p: &EskfParameters) -> SMatrix<f32, STATES, STATES> {
+    let mut covariance = SMatrix::zeros();
+    for (part, deviation) in [
+        (POSITION, 0.5),
+        (VELOCITY, 0.2),
+        (TURN, p.start_turn_rad),
+        (ACCEL_BIAS, p.start_accel_bias_m_s2),
+        (GYRO_BIAS, p.start_gyro_bias_rad_s),
+    ] {
+        for i in part..part + 3 {
+            covariance[(i, i)] = square(deviation);
+        }
+    }
+    covariance
+}
+
+fn square(x: f32) -> f32 {
+    x * x
+}
