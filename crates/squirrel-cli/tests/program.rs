@@ -143,6 +143,21 @@ fn the_study_writes_its_table_for_machines() {
 }
 
 #[test]
+fn the_study_of_filters_writes_its_table_and_its_flights() {
+    let folder = Folder::new("filters");
+    let arguments = ["study", "filters", "--trials", "2", "--out", "d", "--json", "f.json"];
+    let table = folder.succeeds(&arguments);
+    assert!(table.contains("rkf_mtf") && table.contains("off by 0.4, -0.3, 0.2 deg/s"), "{table}");
+    assert_eq!(json(&folder, "f.json")["rows"].as_array().unwrap().len(), 12);
+    assert_eq!(
+        fs::read(folder.0.join("f.json")).unwrap(),
+        fs::read(folder.0.join("d/filters.json")).unwrap()
+    );
+    assert_eq!(fs::read_to_string(folder.0.join("d/filters.csv")).unwrap().lines().count(), 13);
+    folder.succeeds(&["fly", "--arm", "pc_wings_open", "--scenario", "d/flights/trial-001.toml"]);
+}
+
+#[test]
 fn wrong_usage_is_exit_code_two() {
     let folder = Folder::new("usage");
     for arguments in [&["flie"][..], &["fly", "--speed", "3"], &["replay"], &["fly", "--seed", "one"]] {

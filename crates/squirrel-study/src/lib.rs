@@ -3,8 +3,10 @@
 //! - [`thrust`]: what wings are worth as a function of the effective thrust-to-weight ratio.
 //! - [`table2`]: how well models of the wing force predict flights that they have not seen (the paper's Table II).
 //! - [`wing_flights`]: random flights with spread wings, to learn from and to be judged by.
+//! - [`filters`]: how far estimators of attitude are off, with a calibrated gyro and without.
 //! - [`statistics`]: means, and intervals by a paired bootstrap.
 
+pub mod filters;
 pub mod statistics;
 pub mod table2;
 pub mod thrust;

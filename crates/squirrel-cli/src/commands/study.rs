@@ -1,5 +1,6 @@
 //! `squirrel study`: experiments with many flights.
 
+mod filters;
 mod table2;
 
 use super::vehicle;
@@ -12,6 +13,8 @@ use std::path::PathBuf;
 /// The experiments.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Study {
+    /// How far estimators of attitude are off in flight, with a calibrated gyro and without.
+    Filters(filters::Options),
     /// What models of the wing force predict, the paper's Table II: to labels and to truth, 30 to 300 s of training.
     Table2(table2::Options),
     /// What wings are worth as a function of the thrust-to-weight ratio.
@@ -44,6 +47,7 @@ pub(crate) struct Options {
 impl Study {
     pub(crate) fn run(&self) -> Result<(), String> {
         match self {
+            Self::Filters(options) => options.run(),
             Self::Table2(options) => options.run(),
             Self::Thrust(options) => options.thrust(),
         }

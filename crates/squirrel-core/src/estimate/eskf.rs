@@ -146,6 +146,8 @@ pub struct Eskf {
     gyro_bias: Vector3<f32>,
     covariance: SMatrix<f32, STATES, STATES>,
     past: Past,
+    /// A fix has said where it is.
+    placed: bool,
     /// Since the last fix, s.
     alone_s: f32,
     /// In a row: fixes, altitudes.
@@ -155,7 +157,7 @@ pub struct Eskf {
 }
 
 impl Eskf {
-    /// At rest at the origin.
+    /// Where the first fix will say.
     ///
     /// * `gyro_bias` - to begin with, rad/s
     pub fn new(
@@ -173,6 +175,7 @@ impl Eskf {
             gyro_bias: gyro_bias.vector,
             covariance: at_start(&parameters),
             past: Past { moments: [here; MOMENTS], newest: 0, known: 0, age_s: 0.0 },
+            placed: false,
             alone_s: 0.0,
             refused: [0; 2],
             refusals: 0,
@@ -297,6 +300,11 @@ impl Estimator for Eskf {
         };
         if let Some(gnss) = &sensed.gnss {
             let late_s = p.gnss_latency_s;
+            if !self.placed {
+                self.placed = true;
+                self.position = gnss.position.vector + gnss.velocity.vector * late_s;
+                self.velocity = gnss.velocity.vector;
+            }
             let then = self.past.at([self.position, self.velocity], late_s);
             let (position, velocity) = (gnss.position.vector - then[0], gnss.velocity.vector - then[1]);
             let is_gated = self.refused[0] < STUBBORN;

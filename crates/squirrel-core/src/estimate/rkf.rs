@@ -17,6 +17,10 @@ use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{GRAVITY_M_S2, lower, upper};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
+/// Samples of the accelerometer that the attitude at the start is the mean of. A filter that starts wider lets the first manoeuvre pull
+/// it level.
+const SAMPLES_AT_REST: f32 = 300.0;
+
 /// How much a surprising acceleration is distrusted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fading {
@@ -64,13 +68,16 @@ pub struct Rkf {
 }
 
 impl Rkf {
+    /// * `start` - as a second at rest left it
     /// * `gyro_bias` - as it was calibrated, rad/s
     pub fn new(parameters: RkfParameters, start: Rotation<Ned, Body, f32>, gyro_bias: In<Body, f32>) -> Self {
+        let sample = parameters.accel_noise_m_s2 / GRAVITY_M_S2 as f32;
+        let start_variance = sample * sample / SAMPLES_AT_REST;
         Self {
             parameters,
             attitude: start.quaternion,
             down: down(&start.quaternion),
-            covariance: Matrix3::from_diagonal_element(1e-3),
+            covariance: Matrix3::from_diagonal_element(start_variance),
             external_m_s2: Vector3::zeros(),
             gyro_bias: gyro_bias.vector,
         }

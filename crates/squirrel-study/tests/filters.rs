@@ -1,0 +1,37 @@
+//! What estimators of attitude are worth in flight.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use squirrel_sim::vehicle_file::VehicleFile;
+use squirrel_study::filters::{Filters, Plan, run};
+
+fn study(trials: u32) -> Filters {
+    run(&Plan { vehicle: VehicleFile::squirrel(), trials, seed: 1 }, || ()).unwrap()
+}
+
+/// The paper's filter bears accelerations if the gyro is calibrated, the plain one never does, and the default does in any case.
+#[test]
+fn the_default_needs_no_calibration_and_the_papers_filter_does() {
+    let study = study(20);
+    let rms = |filter: &str, calibrated: bool| {
+        let row = study.rows.iter().find(|row| row.filter == filter && row.calibrated == calibrated).unwrap();
+        row.inclination_rms_deg
+    };
+    assert!(rms("eskf", false).high <= 1.0 && rms("eskf", true).high <= 1.0, "{:?}", rms("eskf", false));
+    assert!(rms("rkf_mtf", true).high <= 1.2, "{:?}", rms("rkf_mtf", true));
+    assert!(rms("rkf_mtf", false).low > 2.0, "{:?}", rms("rkf_mtf", false));
+    assert!(rms("kalman", false).low > 4.0, "{:?}", rms("kalman", false));
+    assert!(rms("mahony", true).low > rms("mekf", true).high);
+}
+
+#[test]
+fn one_thread_and_two_give_the_same_numbers() {
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    assert_eq!(pool(1).install(|| study(2)), pool(2).install(|| study(2)));
+}
+
+#[test]
+fn no_trials_is_an_error() {
+    let plan = Plan { vehicle: VehicleFile::squirrel(), trials: 0, seed: 1 };
+    assert!(run(&plan, || ()).unwrap_err().to_string().starts_with("trials = 0"));
+}
