@@ -7,7 +7,7 @@
 //! p' = v,  v' = R (f - b_a) + g e3,  q' = q (w - b_g) / 2
 //! d_p' = d_v,  d_v' = -R [f - b_a]x d - R d_ba,  d' = -[w - b_g]x d - d_bg
 //! ```
-//! A satellite fix is late: it is compared with where the filter was then, which it remembers ([`Past`]), and a velocity that errs has
+//! A satellite fix is late: it is compared with where the filter was then, which it remembers (`Past`), and a velocity that errs has
 //! carried the position along since. Measurements are taken in number by number, each with a gate of some deviations, so that an outlier
 //! costs nothing; what is refused for long is believed in the end.
 
