@@ -4,8 +4,8 @@
 //! generic over it ([`Kernel`]) is run on the widest registers there are, without being compiled for one machine. All
 //! operations are rounded the same way on every path and there is no fused multiply-add, so the paths differ in speed only.
 //!
-//! This is the only module with `unsafe`: intrinsics may run only where the processor has them. The types of a path are
-//! private to this module and only [`Paths::run`] hands them out, and a [`Path`] that the processor lacks cannot be made.
+//! `unsafe` is here, because intrinsics may run only where the processor has them, and in `batch/exchange.rs`. The types of a path
+//! are private to this module and only [`Paths::run`] hands them out, and a [`Path`] that the processor lacks cannot be made.
 
 use core::ops::{Add, Div, Mul, Sub};
 use squirrel_core::rnn::lane::{Lane, NetScalar, tanh};
