@@ -239,12 +239,12 @@ fn heard(plan: &Plan, log: &FlightLog, filter: Filter, calibrated: bool) -> Resu
             at += 1;
         }
         if now_s >= SETTLED_S {
-            let up = |r: Rotation<Ned, Body, f64>| (r.inverse() * In::<Ned, f64>::new(Vector3::z())).vector;
+            let down = |r: Rotation<Ned, Body, f64>| (r.inverse() * In::<Ned, f64>::new(Vector3::z())).vector;
             let believed = filter.estimate().ned_from_body.wxyz().map(f64::from);
             let (Some(believed), Some(truth)) = (Rotation::from_wxyz(believed), attitude(at)) else {
                 continue;
             };
-            let (believed, truth) = (up(believed), up(truth));
+            let (believed, truth) = (down(believed), down(truth));
             let error_deg = believed.cross(&truth).norm().atan2(believed.dot(&truth)).to_degrees();
             sum += error_deg * error_deg;
             count += 1.0;

@@ -6,9 +6,10 @@ mod table2;
 use super::vehicle;
 use crate::output::{self, Table, say, talk};
 use squirrel_sim::arm::Arm;
+use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::thrust::{self, Plan};
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The experiments.
 #[derive(Debug, clap::Subcommand)]
@@ -21,7 +22,52 @@ pub(crate) enum Study {
     Thrust(Options),
 }
 
-/// Options of an experiment.
+/// What every experiment is told.
+#[derive(Debug, clap::Args)]
+struct Common {
+    /// Seed of all trials.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Vehicle file; the shipped squirrel if left out.
+    #[arg(long)]
+    vehicle: Option<PathBuf>,
+    /// Folder for the figures as CSV and JSON, and for what else there is to look at.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Write the figures here as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+impl Common {
+    /// The vehicle, once it is known that results can be written: nobody wants to learn that afterwards.
+    ///
+    /// * `name` - of the study's files
+    fn begin(&self, name: &str) -> Result<VehicleFile, String> {
+        if let Some(folder) = &self.out {
+            output::folder(folder)?;
+            output::writable(&folder.join(format!("{name}.csv")))?;
+        }
+        if let Some(path) = &self.json {
+            output::writable(path)?;
+        }
+        vehicle(self.vehicle.as_deref())
+    }
+
+    /// Writes the figures; the folder, where there is one.
+    fn end(&self, name: &str, csv: &str, study: &impl serde::Serialize) -> Result<Option<&Path>, String> {
+        if let Some(folder) = &self.out {
+            let file = folder.join(format!("{name}.csv"));
+            output::write_file(&file, csv.as_bytes())?;
+            output::write_json(Some(&folder.join(format!("{name}.json"))), study)?;
+            talk(&format!("wrote {}", file.display()));
+        }
+        output::write_json(self.json.as_deref(), study)?;
+        Ok(self.out.as_deref())
+    }
+}
+
+/// Options of the study of thrust.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
     /// Arms to fly beside pc, separated by commas; all if left out.
@@ -30,18 +76,8 @@ pub(crate) struct Options {
     /// Flights per arm and condition, on paired seeds.
     #[arg(long, default_value_t = 12)]
     trials: u32,
-    /// Seed of the first trial.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Vehicle file; the shipped squirrel if left out.
-    #[arg(long)]
-    vehicle: Option<PathBuf>,
-    /// Folder for thrust.csv and thrust.json.
-    #[arg(long)]
-    out: Option<PathBuf>,
-    /// Write the figures here as JSON.
-    #[arg(long)]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
 }
 
 impl Study {
@@ -56,7 +92,7 @@ impl Study {
 
 impl Options {
     fn thrust(&self) -> Result<(), String> {
-        let vehicle = vehicle(self.vehicle.as_deref())?;
+        let vehicle = self.common.begin("thrust")?;
         let mut arms = if self.arms.is_empty() {
             Arm::ALL.to_vec()
         } else {
@@ -66,7 +102,7 @@ impl Options {
             arms.retain(|arm| *arm != Arm::TwccParnn);
             talk(&format!("{} names no parnn_weights: twcc_parnn is left out", vehicle.name));
         }
-        let plan = Plan { vehicle, arms, trials: self.trials, seed: self.seed };
+        let plan = Plan { vehicle, arms, trials: self.trials, seed: self.common.seed };
         let bar = output::progress(thrust::flights(&plan), "flights");
         let study = thrust::run(&plan, || bar.inc(1));
         bar.finish_and_clear();
@@ -120,12 +156,6 @@ impl Options {
             );
         }
         table.print();
-        if let Some(folder) = &self.out {
-            output::folder(folder)?;
-            output::write_file(&folder.join("thrust.csv"), csv.as_bytes())?;
-            output::write_json(Some(&folder.join("thrust.json")), &study)?;
-            talk(&format!("wrote {}", folder.join("thrust.csv").display()));
-        }
-        output::write_json(self.json.as_deref(), &study)
+        self.common.end("thrust", &csv, &study).map(drop)
     }
 }

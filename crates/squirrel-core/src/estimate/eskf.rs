@@ -274,7 +274,9 @@ impl Eskf {
         self.past.correct(&part(POSITION), &part(VELOCITY));
     }
 
-    /// Whether measurements of a sensor that was refused `refused` times in a row pass the gate; keeps the count.
+    /// Counts what a sensor was refused.
+    ///
+    /// * `sensor` - place in `refused`
     fn judge(&mut self, sensor: usize, believed: bool) {
         let refused = &mut self.refused[sensor];
         *refused = if believed { 0 } else { refused.saturating_add(1) };

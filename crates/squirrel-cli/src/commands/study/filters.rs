@@ -1,10 +1,9 @@
 //! `squirrel study filters`: estimators of attitude on the same flights.
 
-use crate::commands::vehicle;
-use crate::output::{self, Table, say, talk};
+use super::Common;
+use crate::output::{self, Table, say};
 use squirrel_study::filters::{self, Plan};
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 /// Options of the study.
 #[derive(Debug, clap::Args)]
@@ -12,30 +11,14 @@ pub(crate) struct Options {
     /// Flights.
     #[arg(long, default_value_t = 20)]
     trials: u32,
-    /// Seed of all trials.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Vehicle file; the shipped squirrel if left out.
-    #[arg(long)]
-    vehicle: Option<PathBuf>,
-    /// Folder for filters.csv, filters.json and the scenarios of the flights, for `squirrel fly`.
-    #[arg(long)]
-    out: Option<PathBuf>,
-    /// Write the figures here as JSON.
-    #[arg(long)]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
 }
 
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
-        let plan = Plan { vehicle: vehicle(self.vehicle.as_deref())?, trials: self.trials, seed: self.seed };
-        if let Some(folder) = &self.out {
-            output::folder(folder)?;
-            output::writable(&folder.join("filters.csv"))?;
-        }
-        if let Some(path) = &self.json {
-            output::writable(path)?;
-        }
+        let (trials, seed) = (self.trials, self.common.seed);
+        let plan = Plan { vehicle: self.common.begin("filters")?, trials, seed };
         let bar = output::progress(u64::from(plan.trials), "flights");
         let study = filters::run(&plan, || bar.inc(1));
         bar.finish_and_clear();
@@ -66,17 +49,13 @@ impl Options {
             );
         }
         table.print();
-        if let Some(folder) = &self.out {
-            output::write_file(&folder.join("filters.csv"), csv.as_bytes())?;
-            output::write_json(Some(&folder.join("filters.json")), &study)?;
-            let flights = folder.join("flights");
-            output::folder(&flights)?;
-            for scenario in filters::scenarios(&plan).map_err(|e| e.to_string())? {
-                let file = flights.join(format!("{}.toml", scenario.name));
-                output::write_file(&file, scenario.to_toml().as_bytes())?;
-            }
-            talk(&format!("wrote {}", folder.join("filters.csv").display()));
+        let Some(folder) = self.common.end("filters", &csv, &study)? else { return Ok(()) };
+        let flights = folder.join("flights");
+        output::folder(&flights)?;
+        for scenario in filters::scenarios(&plan).map_err(|e| e.to_string())? {
+            let file = flights.join(format!("{}.toml", scenario.name));
+            output::write_file(&file, scenario.to_toml().as_bytes())?;
         }
-        output::write_json(self.json.as_deref(), &study)
+        Ok(())
     }
 }

@@ -1,12 +1,11 @@
 //! `squirrel study table2`: models of the wing force on flights that they have not seen.
 
-use crate::commands::vehicle;
+use super::Common;
 use crate::output::{self, Table, say, talk};
 use squirrel_nn::model::Model;
 use squirrel_nn::train::Settings;
 use squirrel_study::table2::{self, ERRORS, Error, Plan, Row, Spread, Table2};
 use std::fmt::Write as _;
-use std::path::PathBuf;
 
 /// Options of the study.
 #[derive(Debug, clap::Args)]
@@ -14,55 +13,31 @@ pub(crate) struct Options {
     /// Trials, each with its own flights and first weights.
     #[arg(long, default_value_t = 5)]
     trials: u32,
-    /// Seed of all trials.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
     /// Passes over the training windows.
     #[arg(long, default_value_t = Settings::default().epochs)]
     epochs: usize,
-    /// Vehicle file; the shipped squirrel if left out.
-    #[arg(long)]
-    vehicle: Option<PathBuf>,
-    /// Folder for table2.csv, table2.json, report.html and the scenarios of the flights, for `squirrel fly`.
-    #[arg(long)]
-    out: Option<PathBuf>,
-    /// Write the figures here as JSON.
-    #[arg(long)]
-    json: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
 }
 
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
-        let plan = Plan {
-            vehicle: vehicle(self.vehicle.as_deref())?,
-            trials: self.trials,
-            seed: self.seed,
-            epochs: self.epochs,
-        };
-        if let Some(folder) = &self.out {
-            output::folder(folder)?;
-            output::writable(&folder.join("table2.csv"))?;
-        }
-        if let Some(path) = &self.json {
-            output::writable(path)?;
-        }
+        let (trials, seed) = (self.trials, self.common.seed);
+        let plan = Plan { vehicle: self.common.begin("table2")?, trials, seed, epochs: self.epochs };
         let bar = output::progress(table2::steps(&plan), "flights and trainings");
         let study = table2::run(&plan, || bar.inc(1));
         bar.finish_and_clear();
         let study = study.map_err(|e| e.to_string())?;
 
         show(&study);
-        if let Some(folder) = &self.out {
-            output::write_file(&folder.join("table2.csv"), csv(&study).as_bytes())?;
-            output::write_json(Some(&folder.join("table2.json")), &study)?;
-            for scenario in table2::scenarios(&plan).map_err(|e| e.to_string())? {
-                let file = folder.join(format!("{}.toml", scenario.name));
-                output::write_file(&file, scenario.to_toml().as_bytes())?;
-            }
-            output::write_file(&folder.join("report.html"), table2::render(&study).as_bytes())?;
-            talk(&format!("wrote {}", folder.join("report.html").display()));
+        let Some(folder) = self.common.end("table2", &csv(&study), &study)? else { return Ok(()) };
+        for scenario in table2::scenarios(&plan).map_err(|e| e.to_string())? {
+            let file = folder.join(format!("{}.toml", scenario.name));
+            output::write_file(&file, scenario.to_toml().as_bytes())?;
         }
-        output::write_json(self.json.as_deref(), &study)
+        output::write_file(&folder.join("report.html"), table2::render(&study).as_bytes())?;
+        talk(&format!("wrote {}", folder.join("report.html").display()));
+        Ok(())
     }
 }
 
