@@ -38,12 +38,16 @@ pub struct SensorFrame {
     pub time_us: u64,
     /// Inertial measurement.
     pub imu: Option<Imu>,
-    /// Attitude estimate.
+    /// Of the second inertial unit, where there is one.
+    pub imu_2: Option<Imu>,
+    /// Attitude, where something outside the flight code estimates it.
     pub attitude: Option<Rotation<Ned, Body, f32>>,
     /// Satellite fix.
     pub gnss: Option<Gnss>,
     /// Barometric altitude above the origin, m, up.
     pub altitude_m: Option<f32>,
+    /// Magnetic field of the earth, and what of the vehicle's own a compass cannot tell from it, uT.
+    pub magnetic: Option<In<Body, f32>>,
     /// Wing force as if spread, N, where something outside the flight code knows it.
     pub wing_force: Option<In<Ned, f32>>,
     /// What to fly instead of the outer loop's command.
@@ -58,9 +62,11 @@ impl SensorFrame {
         Self {
             time_us,
             imu: None,
+            imu_2: None,
             attitude: None,
             gnss: None,
             altitude_m: None,
+            magnetic: None,
             wing_force: None,
             command: None,
             obstacles: [Obstacle { id: 0, north_m: 0.0, east_m: 0.0 }; MAX_OBSTACLES],

@@ -19,8 +19,18 @@ use squirrel_core::stack::failsafe::Failsafe;
 use squirrel_core::stack::{Gnss, Imu, MAX_OBSTACLES, SensorFrame, StackOutput};
 
 /// Sources that the flight code reads. `frame` has a sample for each step of the flight code.
-pub const INPUT_SOURCES: [&str; 8] =
-    ["frame", "imu", "attitude", "gnss", "baro", "obstacle", "wing_force", "offboard"];
+pub const INPUT_SOURCES: [&str; 10] = [
+    "frame",
+    "imu",
+    "imu_2",
+    "attitude",
+    "gnss",
+    "baro",
+    "magnetometer",
+    "obstacle",
+    "wing_force",
+    "offboard",
+];
 /// Metadata: the weights that the vehicle's text names, so that a log replays without them at hand.
 pub(crate) const PARNN_WEIGHTS: &str = "parnn_weights_hex";
 /// Version of the log's content.
@@ -124,10 +134,11 @@ pub(crate) struct Inputs {
 impl Inputs {
     pub(crate) fn record(&mut self, log: &mut FlightLog, t: f64, frame: &SensorFrame) {
         log.source_mut("frame").push(t, &[("time_us", &[frame.time_us as f64])]);
-        if let Some(imu) = frame.imu {
+        for (source, imu) in [("imu", frame.imu), ("imu_2", frame.imu_2)] {
+            let Some(imu) = imu else { continue };
             let omega = wide(&imu.omega.vector);
             let force = wide(&imu.specific_force.vector);
-            log.source_mut("imu")
+            log.source_mut(source)
                 .push(t, &[("omega_body_rad_s", &omega), ("specific_force_body_m_s2", &force)]);
         }
         if let Some(attitude) = frame.attitude {
@@ -140,6 +151,9 @@ impl Inputs {
         }
         if let Some(altitude) = frame.altitude_m {
             log.source_mut("baro").push(t, &[("altitude_m", &[f64::from(altitude)])]);
+        }
+        if let Some(field) = frame.magnetic {
+            log.source_mut("magnetometer").push(t, &[("field_body_ut", &wide(&field.vector))]);
         }
         if frame.obstacles() != self.obstacles {
             self.obstacles = frame.obstacles().to_vec();
@@ -314,6 +328,7 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
     };
     for (one, other) in [
         ("imu.omega_body_rad_s", "imu.specific_force_body_m_s2"),
+        ("imu_2.omega_body_rad_s", "imu_2.specific_force_body_m_s2"),
         ("gnss.position_ned_m", "gnss.velocity_ned_m_s"),
     ] {
         if log.channel(one).is_some() && log.channel(other).is_none() {
@@ -322,10 +337,13 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
     }
     let mut imu = channel("imu.omega_body_rad_s", 3)?;
     let force = channel("imu.specific_force_body_m_s2", 3)?;
+    let mut imu_2 = channel("imu_2.omega_body_rad_s", 3)?;
+    let force_2 = channel("imu_2.specific_force_body_m_s2", 3)?;
     let mut attitude = channel("attitude.q_ned_from_body_wxyz", 4)?;
     let mut gnss = channel("gnss.position_ned_m", 3)?;
     let velocity = channel("gnss.velocity_ned_m_s", 3)?;
     let mut baro = channel("baro.altitude_m", 1)?;
+    let mut magnetic = channel("magnetometer.field_body_ut", 3)?;
     let mut obstacle = channel("obstacle.id_north_m_east_m", 3 * MAX_OBSTACLES)?;
     let mut wing_force = channel("wing_force.as_if_spread_ned_n", 3)?;
     let mut command = channel(&format!("offboard.{COMMAND}"), 4)?;
@@ -335,11 +353,13 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
     let mut all = Vec::with_capacity(times.len());
     for (t, us) in times.iter().zip(&time_us.values) {
         let mut frame = SensorFrame::empty(*us as u64);
-        if let Some((cursor, omega)) = &mut imu
-            && let Some(i) = cursor.at(*t)
+        for (imu, force, place) in
+            [(&mut imu, &force, &mut frame.imu), (&mut imu_2, &force_2, &mut frame.imu_2)]
         {
+            let Some((cursor, omega)) = imu else { continue };
+            let Some(i) = cursor.at(*t) else { continue };
             let force = force.as_ref().map_or(Vector3::zeros(), |(_, c)| narrow(c.row(i)));
-            frame.imu = Some(Imu { omega: In::new(narrow(omega.row(i))), specific_force: In::new(force) });
+            *place = Some(Imu { omega: In::new(narrow(omega.row(i))), specific_force: In::new(force) });
         }
         if let Some((cursor, q)) = &mut attitude
             && let Some(i) = cursor.at(*t)
@@ -360,6 +380,11 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
             && let Some(i) = cursor.at(*t)
         {
             frame.altitude_m = Some(altitude.row(i)[0] as f32);
+        }
+        if let Some((cursor, field)) = &mut magnetic
+            && let Some(i) = cursor.at(*t)
+        {
+            frame.magnetic = Some(In::new(narrow(field.row(i))));
         }
         if let Some((cursor, rows)) = &mut obstacle
             && let Some(i) = cursor.at(*t)
@@ -385,7 +410,8 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
         }
         all.push(frame);
     }
-    let cursors = [&imu, &attitude, &gnss, &baro, &obstacle, &wing_force, &command];
+    let cursors =
+        [&imu, &imu_2, &attitude, &gnss, &baro, &magnetic, &obstacle, &wing_force, &command];
     for (cursor, _) in cursors.into_iter().flatten() {
         if let Some(t) = cursor.time_s.get(cursor.next) {
             return Err(format!("an input at {t:.6} s belongs to no step of the flight code"));

@@ -18,13 +18,16 @@ pub(super) enum Kind {
 }
 
 /// The fixed names; `truth.*`, `reference.*` and `control.*` are open.
-const FIXED: [(&str, Kind); 12] = [
+const FIXED: [(&str, Kind); 15] = [
     ("imu.omega_body_rad_s", Kind::VectorBody),
     ("imu.specific_force_body_m_s2", Kind::VectorBody),
+    ("imu_2.omega_body_rad_s", Kind::VectorBody),
+    ("imu_2.specific_force_body_m_s2", Kind::VectorBody),
     ("attitude.q_ned_from_body_wxyz", Kind::Attitude),
     ("gnss.position_ned_m", Kind::VectorNed),
     ("gnss.velocity_ned_m_s", Kind::VectorNed),
     ("baro.altitude_m", Kind::Numbers(1)),
+    ("magnetometer.field_body_ut", Kind::VectorBody),
     ("battery.voltage_v", Kind::Numbers(1)),
     ("battery.current_a", Kind::Numbers(1)),
     ("rotor.command", Kind::PerRotor),

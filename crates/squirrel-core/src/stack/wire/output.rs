@@ -22,9 +22,11 @@ impl Wire for SensorFrame {
     fn put(&self, to: &mut Writer<'_>) {
         self.time_us.put(to);
         self.imu.put(to);
+        self.imu_2.put(to);
         self.attitude.put(to);
         self.gnss.put(to);
         self.altitude_m.put(to);
+        self.magnetic.put(to);
         self.wing_force.put(to);
         self.command.put(to);
         (self.obstacles().len() as u8).put(to);
@@ -35,9 +37,11 @@ impl Wire for SensorFrame {
     fn take(from: &mut Reader<'_>) -> Option<Self> {
         let mut frame = Self::empty(Wire::take(from)?);
         frame.imu = Wire::take(from)?;
+        frame.imu_2 = Wire::take(from)?;
         frame.attitude = Wire::take(from)?;
         frame.gnss = Wire::take(from)?;
         frame.altitude_m = Wire::take(from)?;
+        frame.magnetic = Wire::take(from)?;
         frame.wing_force = Wire::take(from)?;
         frame.command = Wire::take(from)?;
         let mut obstacles = [Obstacle { id: 0, north_m: 0.0, east_m: 0.0 }; super::super::MAX_OBSTACLES];
