@@ -9,7 +9,8 @@
 //! ```
 //! A satellite fix is late: it is compared with where the filter was then, which it remembers (`Past`), and a velocity that errs has
 //! carried the position along since. Measurements are taken in number by number, each with a gate of some deviations, so that an outlier
-//! costs nothing; what is refused for long is believed in the end.
+//! costs nothing. Fixes that are refused for long are believed in the end. A barometer that is, has jumped: its zero is moved to where the
+//! filter is. A compass never is believed against the rest.
 
 use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, heading_error, turned};
 use crate::frames::{Body, In, Ned, Rotation};
@@ -31,8 +32,10 @@ const MOMENT_S: f32 = 0.01;
 const ALONE_S: f32 = 0.5;
 /// Variance beyond which nothing is known, SI.
 const VARIANCE_MAX: f32 = 1e8;
-/// Refusals in a row after which a sensor is believed again.
+/// Refusals in a row after which a sensor is right.
 const STUBBORN: u8 = 20;
+/// And after which it is doubted.
+const DOUBTED: u8 = 3;
 
 type Row = SVector<f32, STATES>;
 
@@ -150,10 +153,32 @@ pub struct Eskf {
     placed: bool,
     /// Since the last fix, s.
     alone_s: f32,
-    /// In a row: fixes, altitudes.
-    refused: [u8; 2],
+    refused: Refused,
+    /// What the barometer has jumped by, m.
+    baro_offset_m: f32,
     /// Refused since the start.
     refusals: u32,
+    /// Squares of the last step's innovations over their variances, and how many there were.
+    surprise: (f32, u32),
+}
+
+/// In a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Refused {
+    fixes: u8,
+    altitudes: u8,
+    fields: u8,
+}
+
+/// Which of the filter's aids contradict it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Doubts {
+    /// Satellite fixes.
+    pub gnss: bool,
+    /// Barometer.
+    pub baro: bool,
+    /// Compass.
+    pub compass: bool,
 }
 
 impl Eskf {
@@ -177,8 +202,10 @@ impl Eskf {
             past: Past { moments: [here; MOMENTS], newest: 0, known: 0, age_s: 0.0 },
             placed: false,
             alone_s: 0.0,
-            refused: [0; 2],
+            refused: Refused::default(),
+            baro_offset_m: 0.0,
             refusals: 0,
+            surprise: (0.0, 0),
         }
     }
 
@@ -195,6 +222,22 @@ impl Eskf {
     /// Measurements that were too far off to be believed, so far.
     pub fn refusals(&self) -> u32 {
         self.refusals
+    }
+
+    /// Which aids contradict the filter now.
+    pub fn doubts(&self) -> Doubts {
+        let Refused { fixes, altitudes, fields } = self.refused;
+        Doubts { gnss: fixes >= DOUBTED, baro: altitudes >= DOUBTED, compass: fields >= DOUBTED }
+    }
+
+    /// Time since the last fix that was believed, s.
+    pub fn alone_s(&self) -> f32 {
+        self.alone_s
+    }
+
+    /// Normalised innovations squared of the last step: their sum, and how many numbers were measured.
+    pub fn surprise(&self) -> (f32, u32) {
+        self.surprise
     }
 
     fn predict(&mut self, omega: &Vector3<f32>, force: &Vector3<f32>, dt_s: f32) {
@@ -254,6 +297,8 @@ impl Eskf {
         let left = residual - row.dot(moved);
         // What is no number is refused, too.
         let near = square(left) <= square(self.parameters.gate) * variance;
+        self.surprise.0 += square(left) / variance;
+        self.surprise.1 += 1;
         if !(near || (!is_gated && left.is_finite() && variance > 0.0)) {
             return false;
         }
@@ -274,13 +319,10 @@ impl Eskf {
         self.past.correct(&part(POSITION), &part(VELOCITY));
     }
 
-    /// Counts what a sensor was refused.
-    ///
-    /// * `sensor` - place in `refused`
-    fn judge(&mut self, sensor: usize, believed: bool) {
-        let refused = &mut self.refused[sensor];
-        *refused = if believed { 0 } else { refused.saturating_add(1) };
+    /// Counts a refusal; how many they are in a row now.
+    fn count(&mut self, before: u8, believed: bool) -> u8 {
         self.refusals = self.refusals.saturating_add(u32::from(!believed));
+        if believed { 0 } else { before.saturating_add(1) }
     }
 }
 
@@ -292,7 +334,8 @@ impl Estimator for Eskf {
         let force = sensed.imu.specific_force.vector - self.accel_bias;
         self.predict(&omega, &force, dt_s);
         self.past.remember([self.position, self.velocity], dt_s);
-        self.alone_s += dt_s;
+        self.alone_s = lower(self.alone_s + dt_s, 1e6);
+        self.surprise = (0.0, 0);
 
         let mut moved = Row::zeros();
         let unit = |at: usize| {
@@ -309,7 +352,7 @@ impl Estimator for Eskf {
             }
             let then = self.past.at([self.position, self.velocity], late_s);
             let (position, velocity) = (gnss.position.vector - then[0], gnss.velocity.vector - then[1]);
-            let is_gated = self.refused[0] < STUBBORN;
+            let is_gated = self.refused.fixes < STUBBORN;
             let mut believed = true;
             for i in 0..3 {
                 let noise = p.gnss_velocity_noise_m_s;
@@ -321,21 +364,25 @@ impl Estimator for Eskf {
                 let noise = p.gnss_position_noise_m;
                 believed &= self.update(&mut moved, &row, position[i], noise, is_gated);
             }
-            self.judge(0, believed);
+            self.refused.fixes = self.count(self.refused.fixes, believed);
             if believed {
                 self.alone_s = 0.0;
             }
         }
         if let Some(altitude_m) = sensed.altitude_m {
-            let is_gated = self.refused[1] < STUBBORN;
-            let residual = -altitude_m - self.position.z;
-            let believed = self.update(&mut moved, &unit(POSITION + 2), residual, p.baro_noise_m, is_gated);
-            self.judge(1, believed);
+            let residual = self.baro_offset_m - altitude_m - self.position.z;
+            let believed = self.update(&mut moved, &unit(POSITION + 2), residual, p.baro_noise_m, true);
+            self.refused.altitudes = self.count(self.refused.altitudes, believed);
+            if self.refused.altitudes >= STUBBORN && residual.is_finite() {
+                self.baro_offset_m -= residual;
+                self.refused.altitudes = 0;
+            }
         }
         if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
             let mut row = Row::zeros();
             row.fixed_rows_mut::<3>(TURN).copy_from(&down(&self.attitude));
-            self.update(&mut moved, &row, -error, p.heading_noise_rad, true);
+            let believed = self.update(&mut moved, &row, -error, p.heading_noise_rad, true);
+            self.refused.fields = self.count(self.refused.fields, believed);
         }
         if self.alone_s > ALONE_S {
             let expected = down(&self.attitude) * GRAVITY_M_S2 as f32;

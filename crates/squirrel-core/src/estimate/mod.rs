@@ -10,6 +10,8 @@
 //! | [`eskf`] | position, velocity, attitude, both biases | satellite fixes that are late, barometer, compass; the default |
 //!
 //! [`altitude`] is the paper's height filter, for those that have none of their own; [`rest`] finds the gyro's bias before take-off.
+//! [`voting`] makes one inertial measurement of two units', [`navigator`] runs what was chosen and tells
+//! control, [`monitor`] sees whether rotors push as told.
 //! All are fixed in size, take bounded work a step, and stay finite for whatever is finite. Which of them errs how much:
 //! docs/equations.md C.
 
@@ -17,8 +19,11 @@ pub mod altitude;
 pub mod eskf;
 pub mod mahony;
 pub mod mekf;
+pub mod monitor;
+pub mod navigator;
 pub mod rest;
 pub mod rkf;
+pub mod voting;
 
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::limit_norm;

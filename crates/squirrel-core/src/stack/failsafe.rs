@@ -8,7 +8,7 @@
 //! | what is gone | reaction |
 //! |---|---|
 //! | angular rate, attitude, the clock | [`FailsafeMode::Cut`]: rotors stop, wings fold |
-//! | position and velocity | [`FailsafeMode::Level`]: level, a little less thrust than weight, wings folded |
+//! | position and velocity | [`FailsafeMode::Level`]: level, wings folded, down at [`DESCENT_M_S`] where the flight code estimates how fast it sinks, else with a little less thrust than weight |
 //! | altitude | none; the height is that of the satellite fix, and the reason is reported |
 //! | commands from outside | the outer loop flies again, without any memory; the reason is reported |
 //!
@@ -16,6 +16,7 @@
 
 use super::Known;
 use super::frame::{Heard, Merged};
+use crate::math::{GRAVITY_M_S2, limit};
 use nalgebra::Vector3;
 
 /// The inertial unit is lost after this time, us.
@@ -30,8 +31,19 @@ pub const ALTITUDE_LIMIT_US: u32 = 1_000_000;
 pub const COMMAND_LIMIT_US: u32 = 500_000;
 /// A sensor must be well for this time before it is believed again, us.
 pub const RECOVERY_US: u32 = 200_000;
-/// Thrust over weight of [`FailsafeMode::Level`]: the vehicle sinks, slowly at first.
+/// Thrust over weight of [`FailsafeMode::Level`] where nobody knows how fast it sinks: slowly at first.
 pub const LEVEL_THRUST_SHARE: f32 = 0.95;
+/// How fast it comes down where somebody does, m/s.
+pub const DESCENT_M_S: f32 = 1.0;
+/// Acceleration for an error of that, 1/s, and the shares of the weight that it may take.
+const DESCENT_PER_S: f32 = 2.0;
+const DESCENT_SHARES: [f32; 2] = [0.6, 1.4];
+
+/// Thrust over weight that brings a level vehicle down at [`DESCENT_M_S`].
+pub(super) fn descending(descent_m_s: f32) -> f32 {
+    let share = 1.0 + DESCENT_PER_S / GRAVITY_M_S2 as f32 * (descent_m_s - DESCENT_M_S);
+    limit(share, DESCENT_SHARES[0], DESCENT_SHARES[1])
+}
 
 /// Repeated readings of the inertial unit, where it says that the vehicle turns faster than [`TURNING_RAD_S`].
 const IMU_REPEATS: u16 = 100;
@@ -145,7 +157,14 @@ impl FailsafeState {
     /// Looks at what came of a frame.
     ///
     /// * `elapsed_us` - time since the last frame, `None` for the first, 0 if it did not go on
-    pub(super) fn update(&mut self, elapsed_us: Option<u32>, merged: Merged, known: &Known) -> Failsafe {
+    /// * `position_is_lost` - the estimate says so itself
+    pub(super) fn update(
+        &mut self,
+        elapsed_us: Option<u32>,
+        merged: Merged,
+        known: &Known,
+        position_is_lost: bool,
+    ) -> Failsafe {
         self.standing = if elapsed_us == Some(0) { self.standing.saturating_add(1) } else { 0 };
         let elapsed_us = elapsed_us.unwrap_or(0);
         self.imu.look(elapsed_us, merged.imu);
@@ -168,7 +187,7 @@ impl FailsafeState {
         self.altitude_hangs = self.altitude.repeats >= ALTITUDE_REPEATS
             && (self.altitude_hangs || self.climbed_m.abs() > CLIMBED_M);
 
-        let judged = self.judge(known);
+        let judged = self.judge(known, position_is_lost);
         self.better_us =
             if judged.mode < self.active.mode { self.better_us.saturating_add(elapsed_us) } else { 0 };
         if judged.mode >= self.active.mode || self.better_us >= RECOVERY_US {
@@ -182,7 +201,7 @@ impl FailsafeState {
         self.command_age_us.is_some_and(|age| age > COMMAND_LIMIT_US)
     }
 
-    fn judge(&self, known: &Known) -> Failsafe {
+    fn judge(&self, known: &Known, position_is_lost: bool) -> Failsafe {
         use {FailsafeMode as M, FailsafeReason as R};
         let turning = |omega: &Vector3<f32>| omega.norm_squared() > TURNING_RAD_S * TURNING_RAD_S;
         let imu_stuck = self.imu.repeats >= IMU_REPEATS
@@ -202,7 +221,7 @@ impl FailsafeState {
             (M::Cut, R::AttitudeLost)
         } else if self.attitude_hangs {
             (M::Cut, R::AttitudeStuck)
-        } else if self.gnss.is_lost(GNSS_LIMIT_US) {
+        } else if position_is_lost || self.gnss.is_lost(GNSS_LIMIT_US) {
             (M::Level, R::GnssLost)
         } else if gnss_stuck {
             (M::Level, R::GnssStuck)

@@ -12,6 +12,7 @@ pub const MAX_OBSTACLES: usize = 4;
 const RATE_MAX_RAD_S: f32 = 1e3;
 const POSITION_MAX_M: f32 = 1e6;
 const VELOCITY_MAX_M_S: f32 = 1e3;
+const FIELD_MAX_UT: f32 = 1e4;
 
 /// One sample of an inertial measurement unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,6 +21,19 @@ pub struct Imu {
     pub omega: In<Body, f32>,
     /// Specific force, m/s^2; (0, 0, -g) at rest.
     pub specific_force: In<Body, f32>,
+}
+
+impl Imu {
+    fn is_reading(&self) -> bool {
+        self.omega.vector.iter().all(|x| x.abs() <= RATE_MAX_RAD_S) && all_finite(&self.specific_force.vector)
+    }
+}
+
+impl Gnss {
+    fn is_reading(&self) -> bool {
+        self.position.vector.iter().all(|x| x.abs() <= POSITION_MAX_M)
+            && self.velocity.vector.iter().all(|x| x.abs() <= VELOCITY_MAX_M_S)
+    }
 }
 
 /// One satellite fix.
@@ -88,6 +102,26 @@ impl SensorFrame {
         }
     }
 
+    /// Takes out what is not finite, or larger than any flight, of what estimators hear; how many readings that were.
+    pub(crate) fn drop_what_is_no_reading(&mut self) -> u32 {
+        let mut dropped = 0;
+        let mut accept = |valid: bool| {
+            dropped += u32::from(!valid);
+            valid
+        };
+        self.imu = self.imu.filter(|imu| accept(imu.is_reading()));
+        self.imu_2 = self.imu_2.filter(|imu| accept(imu.is_reading()));
+        self.gnss = self.gnss.filter(|gnss| accept(gnss.is_reading()));
+        self.altitude_m = self.altitude_m.filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
+        self.magnetic = self.magnetic.filter(|field| accept(field.vector.norm_squared() <= FIELD_MAX_UT * FIELD_MAX_UT));
+        dropped
+    }
+
+    /// What control hears where nothing was estimated.
+    pub(crate) fn without_motion(self) -> Self {
+        Self { attitude: None, gnss: None, altitude_m: None, ..self }
+    }
+
     /// Takes over what is valid, and says what came of it.
     pub(super) fn merge_into(&self, known: &mut Known) -> Merged {
         let mut rejected = 0;
@@ -95,16 +129,9 @@ impl SensorFrame {
             rejected += u32::from(!valid);
             valid
         };
-        let imu = self.imu.filter(|imu| {
-            let rate_ok = imu.omega.vector.iter().all(|x| x.abs() <= RATE_MAX_RAD_S);
-            accept(rate_ok && all_finite(&imu.specific_force.vector))
-        });
+        let imu = self.imu.filter(|imu| accept(imu.is_reading()));
         let attitude = self.attitude.filter(|q| accept((q.quaternion.norm_squared() - 1.0).abs() < 1e-3));
-        let gnss = self.gnss.filter(|gnss| {
-            let position_ok = gnss.position.vector.iter().all(|x| x.abs() <= POSITION_MAX_M);
-            let velocity_ok = gnss.velocity.vector.iter().all(|x| x.abs() <= VELOCITY_MAX_M_S);
-            accept(position_ok && velocity_ok)
-        });
+        let gnss = self.gnss.filter(|gnss| accept(gnss.is_reading()));
         let altitude_m = self.altitude_m.filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
         if let Some(force) = self.wing_force
             && accept(all_finite(&force.vector))

@@ -1,11 +1,11 @@
 //! The whole flight code as one function: `step(state, frame) -> output`.
 //!
 //! ```text
-//! frame -> latest valid measurements
+//! frame -> two units vote, the filter listens -> attitude, position, velocity
 //!   10 Hz:  guidance -> TWCC (PC, WOEG, WIIC) -> roll, pitch, thrust, wings; or a command from outside
 //!   300 Hz: command filter (+ excitation) -> integral backstepping -> mixer -> rotor commands
 //! ```
-//! When a sensor is gone or hangs, [`failsafe`] levels or cuts. [`Stack`] is constant in flight; [`StackState`] is everything that changes, one plain struct that can be frozen, logged
+//! [`Stack::control`] is the part below the first line, for who estimates by himself. When a sensor is gone or hangs, [`failsafe`] levels or cuts. [`Stack`] is constant in flight; [`StackState`] is everything that changes, one plain struct that can be frozen, logged
 //! and thawed. Time comes in with the frame. A step never panics, allocates or loops without bound; a measurement that is
 //! not finite is rejected and the last valid one kept.
 
@@ -21,6 +21,8 @@ use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
 use crate::control::position::Motion;
 use crate::control::twcc::{Airframe, TwccParameters, TwccState, TwccTerms};
 use crate::control::{AttitudeThrust, Reference};
+use crate::estimate::monitor::Monitor;
+use crate::estimate::navigator::{Health, Navigation, NavigationState, NavigationTerms};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
@@ -40,6 +42,8 @@ pub struct StackParameters {
     pub attitude: AttitudeGains,
     /// Outer loop.
     pub twcc: TwccParameters,
+    /// Estimation.
+    pub navigation: Navigation,
 }
 
 /// The flight code of one vehicle on one mission.
@@ -79,6 +83,10 @@ impl Known {
 /// Everything that changes in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StackState {
+    /// Estimation.
+    pub navigation: NavigationState,
+    /// Whether rotors push as they are told.
+    pub monitor: Monitor,
     /// Latest valid measurements.
     pub known: Known,
     /// Time of the last frame, us; `None` before the first.
@@ -118,6 +126,10 @@ pub struct StackOutput {
     pub rejected: u32,
     /// Whether the mission flies, or what instead, and why.
     pub failsafe: Failsafe,
+    /// What is not as it should be, whether or not that matters yet.
+    pub health: Health,
+    /// What is believed, where the flight code estimates and has heard enough to.
+    pub navigation: Option<NavigationTerms>,
     /// The outer loop, where it ran in this step; it does not while commands come from outside.
     pub outer: Option<TwccTerms>,
     /// The inner loop, once attitude and rate are known; rotors stand still before that and while the failsafe cuts. Until the first fix or command it
@@ -151,6 +163,7 @@ impl Stack {
         let p = vehicle.parameters();
         parameters.attitude.check()?;
         parameters.twcc.check(p.limits.thrust_max_n)?;
+        parameters.navigation.check()?;
         mission.check()?;
         let tilt_max_rad = p.limits.tilt_max_rad - mission.excitation_tilt_rad();
         if !(tilt_max_rad > 0.0) {
@@ -166,18 +179,34 @@ impl Stack {
         &self.vehicle
     }
 
+    /// The vehicle and gains that it was made with.
+    pub fn parameters(&self) -> &StackParameters {
+        &self.parameters
+    }
+
     /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any frame.
     pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
-        // A gap of an hour is as long as any longer one.
-        let elapsed_us = state.time_us.map(|last| {
-            let elapsed_us = frame.time_us.saturating_sub(last);
-            u32::try_from(elapsed_us).unwrap_or(u32::MAX)
-        });
+        let elapsed_us = elapsed_us(state, frame).unwrap_or(0);
+        let told = self.parameters.navigation.step(&mut state.navigation, frame, elapsed_us);
+        state.rejected = state.rejected.saturating_add(told.rejected);
+        let mut output = self.control(state, &told.frame);
+        let achieved = output.inner.as_ref().map(|inner| &inner.mixer.achieved);
+        let (imu, dt_s) = (told.frame.imu.as_ref(), lower(elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S));
+        state.monitor.look(&self.vehicle, achieved, imu, state.wing_command, dt_s);
+        output.health = state.monitor.judge(&self.vehicle, state.navigation.health);
+        output.navigation = told.terms;
+        output
+    }
+
+    /// One inner step on the attitude, position and velocity that the frame brings; as total as [`Self::step`].
+    pub fn control(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
+        let elapsed_us = elapsed_us(state, frame);
         state.time_us = Some(frame.time_us);
         let merged = frame.merge_into(&mut state.known);
         state.rejected = state.rejected.saturating_add(merged.rejected);
         let was = state.failsafe.active.mode;
-        let failsafe = state.failsafe.update(elapsed_us, merged, &state.known);
+        let is_lost = state.navigation.health.has(Health::POSITION_LOST);
+        let failsafe = state.failsafe.update(elapsed_us, merged, &state.known, is_lost);
         let is_well = failsafe.mode == FailsafeMode::Off;
         let alone = state.failsafe.command_is_lost() && state.known.command.take().is_some();
         if failsafe.mode != was || !is_well || alone {
@@ -220,6 +249,8 @@ impl Stack {
             reference,
             rejected: state.rejected,
             failsafe,
+            health: state.navigation.health,
+            navigation: None,
             outer,
             inner,
         }
@@ -229,7 +260,8 @@ impl Stack {
     // Apart, so that a step in which nothing is lost stays short.
     #[inline(never)]
     fn forget(&self, state: &mut StackState, was: FailsafeMode) {
-        let thrust_n = LEVEL_THRUST_SHARE * self.vehicle.weight_n();
+        let share = state.navigation.descent_m_s.map_or(LEVEL_THRUST_SHARE, failsafe::descending);
+        let thrust_n = share * self.vehicle.weight_n();
         state.command = AttitudeThrust { thrust_n, ..AttitudeThrust::default() };
         state.wing_command = 0.0;
         state.twcc = TwccState::default();
@@ -299,6 +331,11 @@ impl Stack {
         state.saturated = mixer.saturated;
         Some(InnerTerms { filter: state.filter, excitation, attitude, demand, mixer })
     }
+}
+
+/// Since the last frame, us; `None` for the first. A gap of an hour is as long as any longer one.
+fn elapsed_us(state: &StackState, frame: &SensorFrame) -> Option<u32> {
+    state.time_us.map(|last| u32::try_from(frame.time_us.saturating_sub(last)).unwrap_or(u32::MAX))
 }
 
 #[cfg(test)]

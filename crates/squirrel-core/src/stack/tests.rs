@@ -31,7 +31,7 @@ fn flying(force_model: &ForceModel, form: AttitudeForm, mission: &Mission) -> St
         filter_damping: 1.0,
     };
     let twcc = TwccParameters { force_model: *force_model, ..twcc::fixtures::parameters() };
-    let parameters = StackParameters { attitude, twcc };
+    let parameters = StackParameters { attitude, twcc, navigation: Navigation::external() };
     Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, *mission).unwrap()
 }
 

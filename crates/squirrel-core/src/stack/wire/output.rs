@@ -9,6 +9,7 @@ use crate::control::twcc::{Mode, Reason, TwccTerms};
 use crate::control::wing_force::{Guard, ParnnTerms};
 use crate::control::woeg::WingFlag;
 use crate::control::{AttitudeThrust, Reference};
+use crate::estimate::navigator::{Health, NavigationTerms};
 use crate::guidance::excite::Excitation;
 use crate::guidance::sensing::Obstacle;
 use crate::policy::PilotCommand;
@@ -54,11 +55,21 @@ impl Wire for SensorFrame {
     }
 }
 
+impl Wire for Health {
+    fn put(&self, to: &mut Writer<'_>) {
+        self.0.put(to);
+    }
+    fn take(from: &mut Reader<'_>) -> Option<Self> {
+        u16::take(from).map(Self)
+    }
+}
+
 wire_struct! {
     Imu { omega, specific_force }
     Gnss { position, velocity }
     Obstacle { id, north_m, east_m }
-    StackOutput { rotor_command, wing_command, reference, rejected, failsafe, outer, inner }
+    StackOutput { rotor_command, wing_command, reference, rejected, failsafe, health, navigation, outer, inner }
+    NavigationTerms { ned_from_body, gyro_bias, position, velocity }
     Failsafe { mode, reason }
     Reference { position, velocity, acceleration, yaw_rad }
     TwccTerms {

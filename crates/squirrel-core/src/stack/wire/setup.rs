@@ -7,6 +7,12 @@ use crate::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use crate::control::wiic::ThrustLaw;
 use crate::control::wing_force::ForceModel;
 use crate::control::woeg::{WingEvents, WingTest};
+use crate::estimate::altitude::AltitudeParameters;
+use crate::estimate::eskf::EskfParameters;
+use crate::estimate::mahony::MahonyParameters;
+use crate::estimate::mekf::MekfParameters;
+use crate::estimate::navigator::{Filter, Navigation, Start};
+use crate::estimate::rkf::{Fading, RkfParameters};
 use crate::guidance::excite::{Leg, Line, Multisine, Programme};
 use crate::guidance::mission::{Mission, Steering};
 use crate::guidance::sensing::Sensing;
@@ -88,6 +94,40 @@ impl Wire for ForceModel {
     }
 }
 
+impl Wire for Filter {
+    fn put(&self, to: &mut Writer<'_>) {
+        match self {
+            Self::External => 0u8.put(to),
+            Self::Rkf(parameters) => {
+                1u8.put(to);
+                parameters.put(to);
+            }
+            Self::Mahony(parameters) => {
+                2u8.put(to);
+                parameters.put(to);
+            }
+            Self::Mekf(parameters) => {
+                3u8.put(to);
+                parameters.put(to);
+            }
+            Self::Eskf(parameters) => {
+                4u8.put(to);
+                parameters.put(to);
+            }
+        }
+    }
+    fn take(from: &mut Reader<'_>) -> Option<Self> {
+        match u8::take(from)? {
+            0 => Some(Self::External),
+            1 => Wire::take(from).map(Self::Rkf),
+            2 => Wire::take(from).map(Self::Mahony),
+            3 => Wire::take(from).map(Self::Mekf),
+            4 => Wire::take(from).map(Self::Eskf),
+            _ => None,
+        }
+    }
+}
+
 impl Wire for Mission {
     fn put(&self, to: &mut Writer<'_>) {
         match self {
@@ -162,9 +202,23 @@ wire_struct! {
     Drag<f32> { linear_n_s_per_m, area_m2 }
     Wing<f32> { area_per_side_m2, normal_force_slope, lateral_arm_m, time_constant_s }
     Limits<f32> { tilt_max_rad, thrust_max_n, rotor_thrust_max_n }
-    StackParameters { attitude, twcc }
+    StackParameters { attitude, twcc, navigation }
     AttitudeGains {
         form, c1_per_s, c2_per_s, lambda_per_s2, integral_max_rad_s, filter_frequency_rad_s, filter_damping,
+    }
+    Navigation { filter, altitude, start }
+    Start { ned_from_body, gyro_bias }
+    AltitudeParameters { accel_noise_m_s2, bias_walk_m_s2_root_s, baro_noise_m }
+    RkfParameters { gyro_noise_rad_s, accel_noise_m_s2, external_memory, fading }
+    MahonyParameters { proportional_per_s, integral_per_s2, gate_m_s2 }
+    MekfParameters {
+        gyro_noise_rad_s, bias_walk_rad_s_root_s, bias_deviation_rad_s, fix_noise_m_s2, alone_noise_m_s2, gate_m_s2,
+        heading_noise_rad,
+    }
+    EskfParameters {
+        gyro_noise_rad_s, accel_noise_m_s2, gyro_walk_rad_s_root_s, accel_walk_m_s2_root_s, start_turn_rad,
+        start_gyro_bias_rad_s, start_accel_bias_m_s2, gnss_position_noise_m, gnss_velocity_noise_m_s, gnss_latency_s,
+        baro_noise_m, heading_noise_rad, alone_noise_m_s2, gate,
     }
     TwccParameters {
         position, wing_events, thrust_law, trigger, force_model, policy, dwell_s, thrust_min_n,
@@ -189,6 +243,7 @@ wire_struct! {
 }
 
 wire_enum! {
+    Fading { None, Single, Multiple }
     CommandKind { SpeedFraction, Duty, PwmMicroseconds, ThrustNewton }
     AttitudeForm { Euler, Quaternion }
     AngleLaw { SmallAngle, Exact }

@@ -1,0 +1,96 @@
+//! Whether rotors push as they were told to: what the inertial unit feels against what the mixer promised.
+//!
+//! ```text
+//! thrust:  -m f_z - T           torque:  J w' + w x J w - tau
+//! ```
+//! `T` and `tau` follow the mixer's answer with the rotors' time constant. Both differences are means over [`MEAN_S`], for a weak rotor, a
+//! sagging battery or a stuck wing stays, and noise and gusts do not. While wings are spread on purpose they push too, and nothing is learnt.
+
+use super::navigator::Health;
+use crate::control::mixer::ThrustTorque;
+use crate::math::{all_finite, lower};
+use crate::stack::Imu;
+use crate::vehicle::Vehicle;
+use nalgebra::Vector3;
+
+/// Time constant of the means, s.
+pub const MEAN_S: f32 = 0.3;
+/// Share of the weight that may be missing.
+const SHORT_SHARE: f32 = 0.12;
+/// Torque that may be too much, in weights at a rotor's arm.
+const OFF_SHARE: f32 = 0.04;
+/// After wings folded, s.
+const FOLDED_S: f32 = 0.5;
+
+/// What is remembered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Monitor {
+    told: ThrustTorque,
+    omega: Option<Vector3<f32>>,
+    missing_n: f32,
+    torque_n_m: Vector3<f32>,
+    spread_ago_s: f32,
+}
+
+impl Default for Monitor {
+    fn default() -> Self {
+        Self {
+            told: ThrustTorque { thrust_n: 0.0, torque_n_m: Vector3::zeros() },
+            omega: None,
+            missing_n: 0.0,
+            torque_n_m: Vector3::zeros(),
+            spread_ago_s: FOLDED_S,
+        }
+    }
+}
+
+impl Monitor {
+    /// Looks at a step.
+    ///
+    /// * `achieved` - what the mixer promised in this step; `None` where the rotors stand
+    /// * `wings` - largest of the wings' commands, 0..1
+    pub(crate) fn look(
+        &mut self,
+        vehicle: &Vehicle<f32>,
+        achieved: Option<&ThrustTorque>,
+        imu: Option<&Imu>,
+        wings: f32,
+        dt_s: f32,
+    ) {
+        let (Some(achieved), Some(imu)) = (achieved, imu) else {
+            *self = Self::default();
+            return;
+        };
+        let p = vehicle.parameters();
+        let omega = imu.omega.vector;
+        let before = self.omega.replace(omega);
+        self.spread_ago_s = if wings > 0.0 { 0.0 } else { lower(self.spread_ago_s + dt_s, FOLDED_S) };
+        let (Some(before), true) = (before, dt_s > 0.0) else {
+            self.told = *achieved;
+            return;
+        };
+        let follow = dt_s / (dt_s + p.propulsion.time_constant_up_s);
+        self.told.thrust_n += (achieved.thrust_n - self.told.thrust_n) * follow;
+        self.told.torque_n_m += (achieved.torque_n_m - self.told.torque_n_m) * follow;
+        let learn = dt_s / (dt_s + MEAN_S);
+        let is_folded = self.spread_ago_s >= FOLDED_S;
+        let missing_n = if is_folded { self.told.thrust_n + p.mass_kg * imu.specific_force.vector.z } else { 0.0 };
+        let spin = p.inertia_kg_m2 * omega;
+        let turned = p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin) - self.told.torque_n_m;
+        self.missing_n += (missing_n - self.missing_n) * learn;
+        self.torque_n_m += (if is_folded { turned } else { Vector3::zeros() } - self.torque_n_m) * learn;
+        if !(self.missing_n.is_finite() && all_finite(&self.torque_n_m)) {
+            *self = Self::default();
+        }
+    }
+
+    /// Health, with what was found.
+    pub(crate) fn judge(&self, vehicle: &Vehicle<f32>, health: Health) -> Health {
+        let weight_n = vehicle.weight_n();
+        let arm_m = vehicle.rotors().first().map_or(0.0, |rotor| rotor.position.vector.xy().norm());
+        let torque_max_n_m = OFF_SHARE * weight_n * arm_m;
+        health
+            .with(Health::THRUST_SHORT, self.missing_n > SHORT_SHARE * weight_n)
+            .with(Health::TORQUE_OFF, self.torque_n_m.norm_squared() > torque_max_n_m * torque_max_n_m)
+    }
+}
