@@ -9,6 +9,7 @@
 
 pub mod arm;
 pub mod batch;
+pub mod estimator;
 pub mod faults;
 pub mod flight;
 pub mod import;

@@ -4,6 +4,7 @@
 //! see what a changed gain would have done) and stepped with the recorded frames.
 
 use crate::arm::Arm;
+use crate::estimator::Estimator;
 use crate::flight::{self, Integrator, Setup};
 use crate::log::FlightLog;
 use crate::scenario::Scenario;
@@ -12,8 +13,9 @@ use crate::weights::ParnnWeights;
 use squirrel_core::stack::StackState;
 
 /// Sources that the flight code writes, causes before consequences: of two that differ at one time, the first is named.
-pub const OUTPUT_SOURCES: [&str; 9] = [
+pub const OUTPUT_SOURCES: [&str; 10] = [
     "control.status",
+    flight::ESTIMATE,
     "control.failsafe",
     "reference",
     "control.excitation",
@@ -63,9 +65,10 @@ pub fn setup(log: &FlightLog) -> Result<Setup, String> {
     let weights = log.metadata.get(flight::PARNN_WEIGHTS).map(|hex| {
         ParnnWeights::from_hex(&format!("metadata {}", flight::PARNN_WEIGHTS), hex).map_err(|e| e.to_string())
     });
-    let vehicle =
+    let mut vehicle =
         VehicleFile::parse_with(text("vehicle_toml")?, "metadata vehicle_toml", weights.transpose()?)
             .map_err(|e| e.to_string())?;
+    vehicle.estimator = log.metadata.get(flight::ESTIMATOR).map_or(Ok(Estimator::External), |n| Estimator::parse(n))?;
     let scenario = Scenario::parse(text("scenario_toml")?, "metadata scenario_toml")?;
     let integrator = Integrator::parse(text("integrator")?)?;
     Ok(Setup { vehicle, arm: Arm::parse(text("arm")?)?, scenario, integrator })

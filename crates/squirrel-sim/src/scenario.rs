@@ -1,9 +1,11 @@
 //! Scenarios: what to fly, in which air, among which obstacles. A TOML file or one of the built-in ones.
 
 mod excite;
+mod faults;
 mod runs;
 
 pub use excite::ExciteTable;
+pub use faults::{FaultKind, FaultTable};
 pub use runs::RunsTable;
 
 use crate::plant::{GustModel, WindParameters};
@@ -14,6 +16,8 @@ use squirrel_core::guidance::sensing::Sensing;
 use squirrel_core::guidance::trajectory::Trajectory;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::vehicle::ParameterError;
+use squirrel_core::vehicle::MAX_ROTORS;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// A flight to fly. Units are in the names; heights are positive up.
@@ -50,6 +54,9 @@ pub struct Scenario {
     /// Moving air.
     #[serde(default)]
     pub wind: WindTable,
+    /// What fails in flight.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub faults: BTreeMap<FaultKind, FaultTable>,
 }
 
 fn full() -> f64 {
@@ -179,6 +186,7 @@ impl Scenario {
             obstacles: Vec::new(),
             mission,
             wind: WindTable::default(),
+            faults: BTreeMap::new(),
         }
     }
 
@@ -268,6 +276,9 @@ impl Scenario {
             if !(x.is_finite() && x > 0.0) {
                 return Err(format!("{field} = {x}: must be finite and > 0"));
             }
+        }
+        for (kind, table) in &self.faults {
+            table.check(*kind, MAX_ROTORS)?;
         }
         match &self.mission {
             MissionTable::Excite(table) => table.check().map_err(|e| format!("mission.{e}"))?,

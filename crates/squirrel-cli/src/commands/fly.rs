@@ -5,6 +5,7 @@ use super::{facts, figures, vehicle, view, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{InProcess, Integrator, Metrics, Pilot, Setup};
 use squirrel_sim::report::flight::{Heading, render};
 use squirrel_sim::scenario::Scenario;
@@ -34,6 +35,10 @@ pub(crate) struct Fly {
     /// Largest collective thrust over weight; overrides vehicle and scenario.
     #[arg(long)]
     thrust_to_weight: Option<f64>,
+    /// Who estimates attitude, velocity and position: eskf, mekf, mahony, rkf_mtf, rkf_stf, kalman, external (what [sensors.attitude]
+    /// says), oracle (the truth); if left out, the vehicle's.
+    #[arg(long)]
+    estimator: Option<String>,
     /// rk4 (rapier near contact), or rapier throughout (first order).
     #[arg(long, default_value = "rk4")]
     integrator: String,
@@ -64,6 +69,7 @@ enum Hil {
 struct Flown {
     vehicle: String,
     arm: &'static str,
+    estimator: &'static str,
     /// Hash of the policy's weights.
     policy: Option<String>,
     scenario: String,
@@ -85,8 +91,12 @@ impl Fly {
         let by_default = if self.policy.is_some() { Arm::Pc } else { Arm::TwccFlat };
         // What the options changed is the scenario's, and so are errors in it; the rest is the vehicle's.
         scenario.check().map_err(|e| format!("scenario {}: {e}", self.scenario))?;
+        let mut vehicle = vehicle(self.vehicle.as_deref())?;
+        if let Some(name) = &self.estimator {
+            vehicle.estimator = Estimator::parse(name)?;
+        }
         let setup = Setup {
-            vehicle: vehicle(self.vehicle.as_deref())?,
+            vehicle,
             arm: self.arm.as_deref().map_or(Ok(by_default), Arm::parse)?,
             scenario,
             integrator: Integrator::parse(&self.integrator)?,
@@ -145,6 +155,7 @@ impl Fly {
         let result = Flown {
             vehicle: setup.vehicle.name.clone(),
             arm: setup.arm.name(),
+            estimator: setup.vehicle.estimator.name(),
             policy,
             scenario: setup.scenario.name.clone(),
             seed: setup.scenario.seed,

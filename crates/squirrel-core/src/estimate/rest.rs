@@ -1,11 +1,16 @@
-//! Bias of the gyro, found while the vehicle stands still before take-off.
+//! What a vehicle finds out while it stands still before take-off: bias of the gyro, attitude.
 //!
 //! A mean over a window in which neither the rate nor the specific force moves by more than noise does; what moves starts the window anew.
 
-use crate::frames::{Body, In};
+use crate::frames::{Body, In, Ned};
 use crate::math::GRAVITY_M_S2;
 use crate::stack::Imu;
-use nalgebra::Vector3;
+use super::navigator::Start;
+use super::voting::Voter;
+use super::{heading_error, levelled};
+use crate::frames::Rotation;
+use crate::stack::SensorFrame;
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// What counts as rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -61,5 +66,70 @@ impl RestCalibration {
             (self.first, self.sum, self.count) = (None, Vector3::zeros(), 0);
         }
         self.bias.map(In::new)
+    }
+}
+
+/// Listens to all sensors before take-off: units vote, the last second at rest counts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Preflight {
+    voter: Voter,
+    calibration: RestCalibration,
+    gyro_bias: Option<In<Body, f32>>,
+    force: Mean,
+    field: Mean,
+    last_us: Option<u64>,
+}
+
+/// A mean over all samples, from [`Self::SAMPLES`] on one that forgets.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Mean {
+    value: Option<Vector3<f32>>,
+    count: u16,
+}
+
+impl Mean {
+    const SAMPLES: u16 = 300;
+
+    fn hear(&mut self, now: &Vector3<f32>) {
+        self.count = (self.count + 1).min(Self::SAMPLES);
+        let before = self.value.unwrap_or(*now);
+        self.value = Some(before + (now - before) / f32::from(self.count));
+    }
+}
+
+impl Default for Preflight {
+    fn default() -> Self {
+        Self {
+            voter: Voter::default(),
+            calibration: RestCalibration::new(RestParameters { samples: 290, ..RestParameters::default() }),
+            gyro_bias: None,
+            force: Mean::default(),
+            field: Mean::default(),
+            last_us: None,
+        }
+    }
+}
+
+impl Preflight {
+    /// Hears a frame. What is not finite must not be in it.
+    pub fn hear(&mut self, frame: &SensorFrame) {
+        let elapsed_us = self.last_us.map_or(0, |last| frame.time_us.saturating_sub(last).min(100_000));
+        self.last_us = Some(frame.time_us);
+        if let Some(imu) = self.voter.vote([frame.imu, frame.imu_2], elapsed_us as u32) {
+            self.gyro_bias = self.calibration.hear(&imu).or(self.gyro_bias);
+            self.force.hear(&imu.specific_force.vector);
+        }
+        if let Some(field) = frame.magnetic {
+            self.field.hear(&field.vector);
+        }
+    }
+
+    /// Where the flight begins; `None` before a second at rest. Without a compass it looks north.
+    pub fn start(&self) -> Option<Start> {
+        let down = (-self.force.value?).try_normalize(1e-3)?;
+        let level = levelled(&UnitQuaternion::identity(), &down);
+        let yaw_rad = self.field.value.and_then(|field| heading_error(&level, &field)).map_or(0.0, |error| -error);
+        let heading = Rotation::<Ned, Ned, f32>::from_euler(0.0, 0.0, yaw_rad).quaternion;
+        Some(Start { ned_from_body: Rotation::new(heading * level), gyro_bias: self.gyro_bias? })
     }
 }

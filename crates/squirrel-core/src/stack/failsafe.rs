@@ -98,6 +98,38 @@ pub enum FailsafeReason {
     CommandLost = 9,
 }
 
+impl FailsafeReason {
+    /// All reasons, in the order of their numbers.
+    pub const ALL: [Self; 10] = [
+        Self::None,
+        Self::ClockStuck,
+        Self::ImuLost,
+        Self::ImuStuck,
+        Self::AttitudeLost,
+        Self::AttitudeStuck,
+        Self::GnssLost,
+        Self::GnssStuck,
+        Self::AltitudeLost,
+        Self::CommandLost,
+    ];
+
+    /// Name in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::ClockStuck => "clock_stuck",
+            Self::ImuLost => "imu_lost",
+            Self::ImuStuck => "imu_stuck",
+            Self::AttitudeLost => "attitude_lost",
+            Self::AttitudeStuck => "attitude_stuck",
+            Self::GnssLost => "gnss_lost",
+            Self::GnssStuck => "gnss_stuck",
+            Self::AltitudeLost => "altitude_lost",
+            Self::CommandLost => "command_lost",
+        }
+    }
+}
+
 /// What flies, and why.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Failsafe {

@@ -3,9 +3,13 @@
 use super::integrator::Contact;
 use crate::plant::PlantState;
 use crate::scenario::Scenario;
+use serde::Serialize;
 use squirrel_core::control::twcc::Mode;
-use squirrel_core::nalgebra::Vector2;
+use squirrel_core::estimate::navigator::Health;
+use squirrel_core::frames::{Body, In};
+use squirrel_core::nalgebra::{Vector2, Vector3};
 use squirrel_core::stack::StackOutput;
+use squirrel_core::stack::failsafe::FailsafeReason;
 
 /// Figures of one flight, over the measured window.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -30,7 +34,38 @@ pub struct Metrics {
     pub encounters: u32,
     /// Time of the first contact with ground or an obstacle, s.
     pub contact_s: Option<f64>,
+    /// Speed with which it was met, m/s.
+    pub contact_speed_m_s: Option<f64>,
+    /// Largest tilt of the whole flight, rad.
+    pub tilt_max_rad: f64,
+    /// What the flight code found not to be as it should, in the order of [`Health::NAMES`], and why its failsafe acted.
+    #[serde(serialize_with = "names")]
+    pub flags: Flags,
 }
+
+/// What was reported at any time in a flight.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Flags {
+    /// Health.
+    pub health: Health,
+    /// Reasons of the failsafe; a bit each.
+    reasons: u16,
+}
+
+impl Flags {
+    /// Names of everything that was reported.
+    pub fn names(self) -> Vec<String> {
+        let bit = |bits: u16, i: usize| bits >> i & 1 == 1;
+        let health = Health::NAMES.iter().enumerate().filter(|(i, _)| bit(self.health.0, *i));
+        let reasons = FailsafeReason::ALL.iter().filter(|reason| bit(self.reasons, **reason as usize));
+        health.map(|(_, name)| (*name).to_owned()).chain(reasons.map(|r| r.name().to_owned())).collect()
+    }
+}
+
+fn names<S: serde::Serializer>(flags: &Flags, to: S) -> Result<S::Ok, S::Error> {
+    flags.names().serialize(to)
+}
+
 
 /// Collects [`Metrics`].
 pub(super) struct Meter<'a> {
@@ -60,6 +95,9 @@ impl<'a> Meter<'a> {
             window_s: 0.0,
             encounters: 0,
             contact_s: None,
+            contact_speed_m_s: None,
+            tilt_max_rad: 0.0,
+            flags: Flags::default(),
         };
         Self {
             scenario,
@@ -80,6 +118,12 @@ impl<'a> Meter<'a> {
         let step_us = time_us - self.last_us;
         self.last_us = time_us;
         self.metrics.encounters = encounters;
+        self.metrics.flags.health.0 |= output.health.0;
+        if output.failsafe.reason != FailsafeReason::None {
+            self.metrics.flags.reasons |= 1 << output.failsafe.reason as u16;
+        }
+        let down = (state.body.ned_from_body() * In::<Body, f64>::new(Vector3::z())).vector.z;
+        self.metrics.tilt_max_rad = self.metrics.tilt_max_rad.max(down.clamp(-1.0, 1.0).acos());
         if let Some(outer) = &output.outer {
             self.mode = outer.mode;
         }
@@ -115,9 +159,11 @@ impl<'a> Meter<'a> {
         }
     }
 
-    pub(super) fn contact(&mut self, contact: Contact) {
+    /// * `speed_m_s` - before it
+    pub(super) fn contact(&mut self, contact: Contact, speed_m_s: f64) {
         if contact == Contact::Touching && self.metrics.contact_s.is_none() {
             self.metrics.contact_s = Some(self.last_us as f64 * 1e-6);
+            self.metrics.contact_speed_m_s = Some(speed_m_s);
         }
     }
 

@@ -1,34 +1,40 @@
 //! Flights: plant, sensors and flight code in closed loop.
 //!
 //! The plant steps at its own rate (1 kHz by default); the flight code runs at the first plant step at or after each
-//! 1/300 s, wind and sensors are sampled there. Everything random comes from the scenario's seed.
+//! 1/300 s, wind and sensors are sampled there. Everything random comes from the scenario's seed. Before the flight the flight code hears
+//! its sensors at rest for a second, as it would on the ground.
 
 mod commands;
+mod failing;
 mod integrator;
 mod metrics;
 mod pilot;
 mod record;
 
 pub use integrator::Integrator;
-pub use metrics::Metrics;
+pub use metrics::{Flags, Metrics};
 pub use pilot::Pilot;
-pub(crate) use record::{FORMAT, Inputs, PARNN_WEIGHTS, record_output};
+pub(crate) use record::{ESTIMATE, ESTIMATOR, FORMAT, Inputs, PARNN_WEIGHTS, record_output};
 pub use record::{INPUT_SOURCES, frames};
 
 use crate::arm::Arm;
+use crate::estimator::Estimator;
 use crate::log::FlightLog;
 use crate::plant::{Plant, PlantState, Wind, WindParameters};
 use crate::scenario::Scenario;
-use crate::sensors::{Sensors, Truth};
+use crate::sensors::{SensorParameters, Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
 use commands::{Command, CommandLine};
 use integrator::Mover;
+use failing::Failing;
 use squirrel_core::dynamics::{State, specific_force, total_wind};
+use squirrel_core::estimate::navigator::{Navigation, NavigationTerms};
+use squirrel_core::estimate::rest::Preflight;
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::Vector3;
-use squirrel_core::stack::{MAX_OBSTACLES, SensorFrame, Stack, StackOutput, StackState};
+use squirrel_core::stack::{Gnss, Imu, MAX_OBSTACLES, SensorFrame, Stack, StackOutput, StackState};
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
 
 /// Rate of the flight code, Hz (paper, section III.A).
@@ -112,7 +118,35 @@ impl Setup {
             .configure(&mut parameters.twcc, self.vehicle.weights.as_ref())
             .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
+        parameters.navigation = self.navigation()?;
         Stack::new(vehicle, parameters, self.scenario.mission().map_err(fail)?).map_err(fail)
+    }
+
+    /// What the sensors of this setup are: without error where the truth is told.
+    fn sensors(&self) -> SensorParameters {
+        if self.vehicle.estimator == Estimator::Oracle { SensorParameters::ideal() } else { self.vehicle.sensors }
+    }
+
+    /// Who estimates, and from where on.
+    fn navigation(&self) -> Result<Navigation, FlightError> {
+        let parameters = self.sensors();
+        let filter = self.vehicle.estimator.filter(&parameters);
+        let altitude = Estimator::altitude(&parameters);
+        let mut navigation = Navigation { filter, altitude, ..Navigation::external() };
+        if navigation.filter != Navigation::external().filter {
+            let sensors = Sensors::new(parameters, &self.vehicle.effects, self.scenario.seed);
+            let mut preflight = Preflight::default();
+            for frame in sensors.at_rest(self.start_position(), 0.0) {
+                preflight.hear(&frame);
+            }
+            let unheard = || FlightError(format!("{}: sensors.imu is not at rest before the flight: its bias is larger than a gyro at rest may read", self.vehicle.name));
+            navigation.start = preflight.start().ok_or_else(unheard)?;
+        }
+        Ok(navigation)
+    }
+
+    fn start_position(&self) -> In<Ned, f64> {
+        In::new(Vector3::new(0.0, 0.0, -self.scenario.height_m))
     }
 
     /// The vehicle as the flight code may use it: with the scenario's thrust-to-weight ratio, no rotor is asked for more than
@@ -161,23 +195,27 @@ impl Setup {
     ) -> Result<Flight, FlightError> {
         self.scenario.check().map_err(FlightError)?;
         let dt_s = PLANT_STEP_US as f64 * 1e-6;
-        let plant = Plant::new(
-            self.vehicle.vehicle,
-            self.vehicle.effects,
-            self.arm.plant_wing(&self.vehicle.wing),
-            self.vehicle.battery.clone(),
-            dt_s,
-        )
-        .map_err(FlightError)?;
+        let plant_with = |effects| {
+            let (wing, battery) = (self.arm.plant_wing(&self.vehicle.wing), self.vehicle.battery.clone());
+            Plant::new(self.vehicle.vehicle, effects, wing, battery, dt_s).map_err(FlightError)
+        };
+        let well = plant_with(self.vehicle.effects)?;
+        let mut failing = Failing::new(&self.scenario);
+        let weak = failing.weakened(&self.vehicle.effects)?.map(plant_with).transpose()?;
+        let plant_at = |failing: &Failing, time_us| match &weak {
+            Some(weak) if failing.is_weak(time_us) => weak,
+            _ => &well,
+        };
+        let plant = &well;
         let mut mover = Mover::new(self)?;
-        let mut state = plant.initial_state(self.hovering(&plant), self.scenario.start_charge());
+        let mut state = plant.initial_state(self.hovering(plant), self.scenario.start_charge());
         let seed = self.scenario.seed;
         let mut winds = vec![Wind::new(self.scenario.wind(), seed ^ 0x5851_F42D_4C95_7F2D)];
         if let Some(gusts) = plant.effects().gust() {
             winds.push(Wind::new(WindParameters::of_gusts(gusts), seed ^ 0x9E6C_63D0_876A_3F1B));
         }
         let mut air = velocity_of(&winds);
-        let mut sensors = Sensors::new(self.vehicle.sensors, plant.effects(), seed);
+        let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
         let mut metrics = metrics::Meter::new(&self.scenario);
         let mut recorder =
             record.then(|| record::Recorder::new(self, pilot.as_ref(), plant.vehicle().rotors().len()));
@@ -185,29 +223,33 @@ impl Setup {
         let mut commands = CommandLine::new(plant.effects().command_latency_s(), hover);
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
         let mut contact_specific_force: Option<In<Ned, f64>> = None;
+        let mut believed: Option<NavigationTerms> = None;
         let steps = (self.scenario.duration_s / dt_s).round() as u64;
         for step in 0..=steps {
             let time_us = step * PLANT_STEP_US;
+            let plant = plant_at(&failing, time_us);
             if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
                 let through_air = state.body.velocity - total_wind(plant.effects(), &state.body, air);
                 for wind in &mut winds {
                     wind.advance((time_us - last_tick_us) as f64 * 1e-6, || through_air.vector.norm());
                 }
                 air = velocity_of(&winds);
-                let mut truth = truth(&plant, &state, air);
+                let mut truth = truth(plant, &state, air);
                 if let Some(push) = contact_specific_force {
                     truth.specific_force = state.body.ned_from_body().inverse() * push;
                 }
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
+                failing.spoil(&mut frame);
                 frame.set_obstacles(&self.nearest_obstacles(&state.body));
                 if self.arm.is_told_the_force() {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
                 if let Some(pilot) = &mut pilot {
-                    frame.command = pilot.command(tick, &frame);
+                    frame.command = pilot.command(tick, &seen(&frame, believed.as_ref()));
                 }
                 let (output, met) = computer.step(&frame)?;
+                believed = output.navigation.or(believed);
                 let encounters = pilot.as_ref().map_or(met, |pilot| met.max(pilot.encounters()));
                 if !state.body.is_finite() {
                     return Err(FlightError(format!(
@@ -237,9 +279,10 @@ impl Setup {
                 (tick, last_tick_us) = (tick + 1, time_us);
             }
             let before = state.body.velocity;
-            let Command { rotor, wing } = commands.acting(time_us);
-            let contact = mover.step(&plant, &mut state, &rotor, wing, air)?;
-            metrics.contact(contact);
+            let mut command = commands.acting(time_us);
+            failing.hold(time_us, &mut command);
+            let contact = mover.step(plant, &mut state, &command.rotor, command.wing, air)?;
+            metrics.contact(contact, before.vector.norm());
             // While something pushes back, an accelerometer reads the whole change of velocity less gravity.
             contact_specific_force = (contact == integrator::Contact::Touching).then(|| {
                 (state.body.velocity - before) * (1.0 / dt_s) - In::new(Vector3::z() * GRAVITY_M_S2)
@@ -256,7 +299,7 @@ impl Setup {
         let vehicle = plant.vehicle();
         let speed = vehicle.parameters().propulsion.target_speed_rad_s(hover_command(vehicle));
         let mut state = State::at_rest();
-        state.position = In::new(Vector3::new(0.0, 0.0, -self.scenario.height_m));
+        state.position = self.start_position();
         state.rotor_speed_rad_s[..vehicle.rotors().len()].fill(speed);
         state
     }
@@ -285,6 +328,18 @@ impl Setup {
 fn hover_command(vehicle: &Vehicle<f64>) -> f64 {
     let share = vehicle.weight_n() / vehicle.rotors().len() as f64;
     vehicle.parameters().propulsion.command_for_thrust(share)
+}
+
+/// A frame with what the flight code believes instead of what sensors say, as far as it estimates: for who commands from outside.
+fn seen(frame: &SensorFrame, believed: Option<&NavigationTerms>) -> SensorFrame {
+    let mut seen = *frame;
+    if let Some(terms) = believed {
+        seen.attitude = Some(terms.ned_from_body);
+        seen.gnss = Some(Gnss { position: terms.position, velocity: terms.velocity });
+        seen.altitude_m = None;
+        seen.imu = frame.imu.map(|imu| Imu { omega: imu.omega - terms.gyro_bias, ..imu });
+    }
+    seen
 }
 
 /// Velocity of the air, m/s.

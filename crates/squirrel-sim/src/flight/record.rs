@@ -4,6 +4,7 @@
 //! [`INPUT_SOURCES`]; a frame is rebuilt from the samples that carry its time.
 
 use super::{Pilot, Setup};
+use crate::estimator::Estimator;
 use crate::log::FlightLog;
 use crate::plant::PlantState;
 use crate::sensors::BatteryReading;
@@ -31,8 +32,12 @@ pub const INPUT_SOURCES: [&str; 10] = [
     "wing_force",
     "offboard",
 ];
+/// Source of what the flight code believes.
+pub(crate) const ESTIMATE: &str = "estimate";
 /// Metadata: the weights that the vehicle's text names, so that a log replays without them at hand.
 pub(crate) const PARNN_WEIGHTS: &str = "parnn_weights_hex";
+/// Metadata: who estimated. A log without it is of somebody outside.
+pub(crate) const ESTIMATOR: &str = "estimator";
 /// Version of the log's content.
 pub(crate) const FORMAT: &str = "1";
 
@@ -64,6 +69,7 @@ impl Recorder {
             ("vehicle_toml", setup.vehicle.text.clone()),
             ("scenario_toml", scenario.to_toml()),
             ("arm", setup.arm.name().to_owned()),
+            (ESTIMATOR, setup.vehicle.estimator.name().to_owned()),
             ("integrator", setup.integrator.name().to_owned()),
             ("seed", scenario.seed.to_string()),
             ("tilt_max_rad", vehicle.limits.tilt_max_rad.to_string()),
@@ -79,7 +85,8 @@ impl Recorder {
             log.metadata.insert("policy".to_owned(), pilot.weights().name.clone());
             log.metadata.insert("policy_hash".to_owned(), pilot.weights().hash());
         }
-        Self { log, rotors, effects: setup.vehicle.effects, inputs: Inputs::default() }
+        let estimates = !matches!(setup.vehicle.estimator, Estimator::External | Estimator::Oracle);
+        Self { log, rotors, effects: setup.vehicle.effects, inputs: Inputs::new(estimates) }
     }
 
     pub(super) fn tick(
@@ -125,13 +132,19 @@ impl Recorder {
 }
 
 /// Records what the flight code was given.
-#[derive(Default)]
 pub(crate) struct Inputs {
     /// Those of the last frame: a log has them where they change.
     obstacles: Vec<Obstacle>,
+    /// The flight code estimates the attitude itself and does not look at that of a frame.
+    estimates: bool,
 }
 
 impl Inputs {
+    /// Of a flight code that estimates the attitude itself, or does not.
+    pub(crate) fn new(estimates: bool) -> Self {
+        Self { obstacles: Vec::new(), estimates }
+    }
+
     pub(crate) fn record(&mut self, log: &mut FlightLog, t: f64, frame: &SensorFrame) {
         log.source_mut("frame").push(t, &[("time_us", &[frame.time_us as f64])]);
         for (source, imu) in [("imu", frame.imu), ("imu_2", frame.imu_2)] {
@@ -141,7 +154,7 @@ impl Inputs {
             log.source_mut(source)
                 .push(t, &[("omega_body_rad_s", &omega), ("specific_force_body_m_s2", &force)]);
         }
-        if let Some(attitude) = frame.attitude {
+        if let Some(attitude) = frame.attitude.filter(|_| !self.estimates) {
             log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude.wxyz().map(f64::from))]);
         }
         if let Some(gnss) = frame.gnss {
@@ -207,7 +220,24 @@ pub(crate) fn record_output(
             ("yaw_rad", &[f64::from(r.yaw_rad)]),
         ],
     );
-    log.source_mut("control.status").push(t, &[("rejected", &[f64::from(output.rejected)])]);
+    log.source_mut("control.status").push(
+        t,
+        &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])],
+    );
+    if let Some(terms) = &output.navigation {
+        let attitude = terms.ned_from_body.wxyz().map(f64::from);
+        log.source_mut(ESTIMATE).push(
+            t,
+            &[
+                ("q_ned_from_body_wxyz", &attitude),
+                ("position_ned_m", &wide(&terms.position.vector)),
+                ("velocity_ned_m_s", &wide(&terms.velocity.vector)),
+                ("gyro_bias_body_rad_s", &wide(&terms.gyro_bias.vector)),
+            ],
+        );
+        // For who reads a log as that of any autopilot.
+        log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude)]);
+    }
     // A source of its own, so that a flight without a fault has the log that it always had.
     if output.failsafe != Failsafe::default() {
         let Failsafe { mode, reason } = output.failsafe;
@@ -339,7 +369,9 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
     let force = channel("imu.specific_force_body_m_s2", 3)?;
     let mut imu_2 = channel("imu_2.omega_body_rad_s", 3)?;
     let force_2 = channel("imu_2.specific_force_body_m_s2", 3)?;
-    let mut attitude = channel("attitude.q_ned_from_body_wxyz", 4)?;
+    // Where the flight code estimates, an attitude in the log is its own.
+    let attitude_name = if log.sources.contains_key(ESTIMATE) { None } else { Some("attitude.q_ned_from_body_wxyz") };
+    let mut attitude = attitude_name.map_or(Ok(None), |name| channel(name, 4))?;
     let mut gnss = channel("gnss.position_ned_m", 3)?;
     let velocity = channel("gnss.velocity_ned_m_s", 3)?;
     let mut baro = channel("baro.altitude_m", 1)?;

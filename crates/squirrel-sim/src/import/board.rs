@@ -8,6 +8,7 @@ use super::ImportError;
 use crate::flight::{FORMAT, Inputs, record_output};
 use crate::log::FlightLog;
 use serde::Serialize;
+use squirrel_core::estimate::navigator::Filter;
 use squirrel_core::stack::wire::{HASH_START, Reader, Record, Wire, hash, written};
 use squirrel_core::stack::{Stack, StackState};
 use std::path::Path;
@@ -57,7 +58,8 @@ pub fn import_board(path: &Path) -> Result<(FlightLog, BoardReport), ImportError
         log.metadata.insert(key.to_owned(), value.to_owned());
     }
     let rotors = flight.stack.vehicle().rotors().len();
-    let (mut state, mut inputs) = (StackState::default(), Inputs::default());
+    let estimates = flight.stack.parameters().navigation.filter != Filter::External;
+    let (mut state, mut inputs) = (StackState::default(), Inputs::new(estimates));
     let (mut outputs, mut proved, mut outputs_until_s) = (HASH_START, true, None);
     let mut last_us = None;
     for (frame, expected) in &flight.frames {

@@ -7,6 +7,7 @@ use super::tables::{
     InertiaValue, PositionTable, PropulsionTable, ThrustLawName, TriggerName, VehicleTable, WingControlTable,
     WingName, WingTable, WingTestName,
 };
+use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ParnnWing, ServoParameters, WingPlant};
 use crate::weights::ParnnWeights;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
@@ -16,6 +17,7 @@ use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::wing_force::ForceModel;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
 use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, forms};
+use squirrel_core::estimate::navigator::Navigation;
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::stack::StackParameters;
@@ -92,6 +94,7 @@ pub(super) fn build(
         weights,
         battery: t.battery.map(battery).transpose()?,
         control,
+        estimator: t.estimation.filter.as_deref().map_or(Ok(Estimator::default()), Estimator::parse)?,
         sensors: t.sensors,
         effects: effects(t.effects, vehicle.rotors().len())?,
         provenance: Vec::new(),
@@ -318,6 +321,8 @@ fn control(t: &ControlTable) -> StackParameters {
     StackParameters {
         attitude: attitude(&t.attitude),
         twcc: twcc(&t.position, &t.wing, t.thrust_min_n.0 as f32),
+        // A flight makes its own, from the sensors.
+        navigation: Navigation::external(),
     }
 }
 

@@ -10,6 +10,7 @@ mod tables;
 pub use quantity::Provenance;
 pub(crate) use quantity::plain;
 
+use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, WingPlant};
 use crate::sensors::SensorParameters;
 use crate::weights::{ParnnWeights, WeightsError};
@@ -46,6 +47,8 @@ pub struct VehicleFile {
     pub battery: Option<BatteryParameters>,
     /// Gains; a vehicle that is only analysed needs none.
     pub control: Option<StackParameters>,
+    /// Who tells the flight code how the vehicle stands and where it is.
+    pub estimator: Estimator,
     /// Sensors.
     pub sensors: SensorParameters,
     /// Effects on top of the base model.

@@ -23,9 +23,17 @@ pub(super) struct VehicleTable {
     pub(super) limits: LimitsTable,
     pub(super) control: Option<ControlTable>,
     #[serde(default)]
+    pub(super) estimation: EstimationTable,
+    #[serde(default)]
     pub(super) sensors: crate::sensors::SensorParameters,
     #[serde(default)]
     pub(super) effects: BTreeMap<String, BTreeMap<String, EffectValue>>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+pub(super) struct EstimationTable {
+    pub(super) filter: Option<String>,
 }
 
 /// A parameter of an effect: a number, or a name where there are only a few.

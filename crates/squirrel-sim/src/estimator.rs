@@ -1,0 +1,126 @@
+//! Who tells the flight code how the vehicle stands and where it is: `[estimation]` of a vehicle file.
+//!
+//! A filter's numbers are those of the file's `[sensors]`: it expects the noise that their datasheets state. `oracle` is no filter but
+//! the truth, to see what estimation costs.
+
+use crate::sensors::SensorParameters;
+use squirrel_core::estimate::altitude::AltitudeParameters;
+use squirrel_core::estimate::eskf::EskfParameters;
+use squirrel_core::estimate::mahony::MahonyParameters;
+use squirrel_core::estimate::mekf::MekfParameters;
+use squirrel_core::estimate::navigator::Filter;
+use squirrel_core::estimate::rkf::{Fading, RkfParameters};
+
+/// A way to know attitude, velocity and position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Estimator {
+    /// Fifteen states, aided by satellite fixes, barometer and compass.
+    #[default]
+    Eskf,
+    /// Attitude and gyro bias, aided by velocities of fixes.
+    Mekf,
+    /// Gated complementary filter.
+    Mahony,
+    /// The paper's filter of the direction of gravity, multiple factors.
+    RkfMtf,
+    /// With a single factor.
+    RkfStf,
+    /// With none: a plain Kalman filter.
+    Kalman,
+    /// What `[sensors.attitude]` and the fixes say, as they are.
+    External,
+    /// The truth: sensors without error, attitude from outside.
+    Oracle,
+}
+
+impl Estimator {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Eskf,
+        Self::Mekf,
+        Self::Mahony,
+        Self::RkfMtf,
+        Self::RkfStf,
+        Self::Kalman,
+        Self::External,
+        Self::Oracle,
+    ];
+
+    /// Name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Eskf => "eskf",
+            Self::Mekf => "mekf",
+            Self::Mahony => "mahony",
+            Self::RkfMtf => "rkf_mtf",
+            Self::RkfStf => "rkf_stf",
+            Self::Kalman => "kalman",
+            Self::External => "external",
+            Self::Oracle => "oracle",
+        }
+    }
+
+    /// The estimator of a name.
+    ///
+    /// # Errors
+    /// One line that lists the names.
+    pub fn parse(name: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|estimator| estimator.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            format!("estimation.filter = {name}: no such filter; known are {names}")
+        })
+    }
+
+    /// The filter, with what a vehicle's sensors are said to be.
+    pub fn filter(self, sensors: &SensorParameters) -> Filter {
+        let (imu, gnss) = (&sensors.imu, &sensors.gnss);
+        // Two units are averaged; and no filter may be told that there is no noise at all.
+        let units = 1.0_f64;
+        let [gyro, accel] = [(imu.gyro_noise_rad_s, 1e-4), (imu.accel_noise_m_s2, 1e-2)]
+            .map(|(noise, least)| f64::max(noise / units, least) as f32);
+        let rkf = |fading| {
+            let external_memory = RkfParameters::default().external_memory;
+            Filter::Rkf(RkfParameters { gyro_noise_rad_s: gyro, accel_noise_m_s2: accel, external_memory, fading })
+        };
+        match self {
+            Self::External | Self::Oracle => Filter::External,
+            Self::Kalman => rkf(Fading::None),
+            Self::RkfStf => rkf(Fading::Single),
+            Self::RkfMtf => rkf(Fading::Multiple),
+            Self::Mahony => Filter::Mahony(MahonyParameters::default()),
+            Self::Mekf => Filter::Mekf(MekfParameters { gyro_noise_rad_s: gyro, ..MekfParameters::default() }),
+            Self::Eskf => {
+                let by_default = EskfParameters::default();
+                let position_m = gnss.position_noise_m;
+                Filter::Eskf(EskfParameters {
+                    gyro_noise_rad_s: gyro,
+                    accel_noise_m_s2: accel,
+                    gnss_position_noise_m: f64::max(position_m, 0.01) as f32,
+                    gnss_velocity_noise_m_s: f64::max(gnss.velocity_noise_m_s, 0.01) as f32,
+                    gnss_latency_s: f64::min(gnss.timing.latency_s, 0.3) as f32,
+                    baro_noise_m: f64::max(sensors.baro.noise_m, 0.02) as f32,
+                    ..by_default
+                })
+            }
+        }
+    }
+
+    /// The height filter's numbers.
+    pub(crate) fn altitude(sensors: &SensorParameters) -> AltitudeParameters {
+        let by_default = AltitudeParameters::default();
+        AltitudeParameters { baro_noise_m: f64::max(sensors.baro.noise_m, 0.02) as f32, ..by_default }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_estimators_are_one_to_one() {
+        for estimator in Estimator::ALL {
+            assert_eq!(Estimator::parse(estimator.name()), Ok(estimator));
+        }
+        assert!(Estimator::parse("ekf").unwrap_err().contains("rkf_mtf"));
+    }
+}
