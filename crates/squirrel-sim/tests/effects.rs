@@ -9,6 +9,7 @@ use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::{Quaternion, Vector3};
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Flight, Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::plant::Plant;
@@ -104,6 +105,8 @@ fn fly(effect: &str, arm: Arm, scenario: &str, duration_s: f64) -> FlightLog {
 fn measured(effect: &str, arm: Arm, scenario: &str, duration_s: f64) -> Flight {
     let mut vehicle = parse(effect).unwrap();
     vehicle.sensors = SensorParameters::ideal();
+    // What an effect does to a reading is seen where no filter bears it.
+    vehicle.estimator = Estimator::External;
     let mut scenario = Scenario::find(scenario).unwrap();
     scenario.duration_s = duration_s;
     // Low enough for the ground to be felt.
