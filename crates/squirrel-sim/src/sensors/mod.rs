@@ -248,4 +248,48 @@ mod tests {
         };
         assert_eq!(gyro(0.0), gyro(1.0));
     }
+
+    /// Hashes of what the sensors say: old seeds fly old flights.
+    #[test]
+    fn readings_of_old_flights_keep_their_bits() {
+        let mut p = SensorParameters::default();
+        p.imu.timing.seed = Some(9);
+        p.imu.gyro_bias_rad_s = [0.01, -0.02, 0.03];
+        p.baro.bias_m = 0.4;
+        p.gnss.timing.latency_s = 0.15;
+        let mut effects = Effects::none();
+        effects.insert("heading_bias").unwrap().values[0] = 0.1;
+        effects.insert("accel_bias").unwrap().values[..3].copy_from_slice(&[0.1, 0.2, 0.3]);
+        let cases = [
+            (SensorParameters::default(), Effects::none(), 42, 0xcceb_c0b3_0a7d_8b53),
+            (p, effects, 7, 0x648e_2c35_8725_251a),
+        ];
+        for (p, effects, seed, before) in cases {
+            let mut sensors = Sensors::new(p, &effects, seed);
+            let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+            let mut eat = |bits: u64| hash = (hash ^ bits).wrapping_mul(0x0100_0000_01b3);
+            for k in 0..900_u64 {
+                let (frame, battery) = sensors.poll(k * 10_000 / 3, &truth());
+                let mut single = Vec::new();
+                if let Some(imu) = frame.imu {
+                    single.extend(imu.omega.vector.iter().chain(&imu.specific_force.vector));
+                }
+                if let Some(q) = frame.attitude {
+                    single.extend(q.wxyz());
+                }
+                if let Some(fix) = frame.gnss {
+                    single.extend(fix.position.vector.iter().chain(&fix.velocity.vector));
+                }
+                single.extend(frame.altitude_m);
+                for x in single {
+                    eat(x.to_bits().into());
+                }
+                if let Some(b) = battery {
+                    eat(b.voltage_v.to_bits());
+                    eat(b.current_a.to_bits());
+                }
+            }
+            assert_eq!(hash, before, "seed {seed}");
+        }
+    }
 }
