@@ -348,9 +348,11 @@ fn velocity_of(winds: &[Wind]) -> In<Ned, f64> {
 }
 
 fn truth(plant: &Plant, state: &PlantState, air: In<Ned, f64>) -> Truth {
+    let through_air = state.body.velocity - total_wind(plant.effects(), &state.body, air);
     Truth {
         position: state.body.position,
         velocity: state.body.velocity,
+        through_air: state.body.ned_from_body().inverse() * through_air,
         ned_from_body: state.body.ned_from_body(),
         omega: state.body.omega,
         specific_force: specific_force(
@@ -359,6 +361,9 @@ fn truth(plant: &Plant, state: &PlantState, air: In<Ned, f64>) -> Truth {
             state.body.omega,
             &plant.wrench(state, air),
         ),
+        rotor_speed_rad_s: state.body.rotor_speed_rad_s,
+        rotor_count: plant.vehicle().rotors().len(),
+        deployment: state.deployment(),
         voltage_v: state.battery.voltage_v,
         current_a: state.battery.current_a,
     }

@@ -1,23 +1,38 @@
 //! Sensors: what the flight code gets to know, and when.
 //!
-//! Each sensor has a rate, a latency, white noise, a constant bias and its own random stream, so that switching one sensor's
-//! noise on changes nothing in another's. A sample is taken at the sensor's rate and handed over when its latency has
-//! passed, never before. Effects on sensors (biases that a vehicle file hides from the flight code, more latency) act here.
+//! Each sensor has a rate, a latency, its errors and its own random streams, so that switching one sensor's noise on changes
+//! nothing in another's. A sample is taken at the sensor's rate and handed over when its latency has passed, never before.
+//! Effects on sensors (biases that a vehicle file hides from the flight code, more latency) act here. What a sensor reads is
+//! in its file; attitude and battery monitor are as simple as truth, bias and white noise.
 
+mod baro;
+mod devices;
+mod gnss;
+mod imu;
+mod line;
+mod magnetometer;
 mod parameters;
+mod suite;
+mod table;
+#[cfg(test)]
+mod tests;
 
 pub use parameters::{
-    AttitudeSensor, BaroSensor, BatterySensor, GnssSensor, ImuSensor, SensorParameters, Timing,
+    AttitudeSensor, BaroSensor, BatterySensor, GnssSensor, ImuSensor, MagnetometerSensor, Timing,
 };
+pub use suite::{SUITES, SensorParameters};
 
-use rand::SeedableRng;
-use rand_distr::{Distribution, StandardNormal};
-use rand_pcg::Pcg64Mcg;
+use baro::Barometer;
+use gnss::Receiver;
+use imu::{Unit, Vibration};
+use line::{Line, Stream, fork, noise, quantised};
+use magnetometer::Compass;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
+use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::{UnitQuaternion, Vector3};
-use squirrel_core::stack::{Gnss, Imu, SensorFrame};
-use std::collections::VecDeque;
+use squirrel_core::stack::SensorFrame;
+use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
 
 /// What the sensors measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,16 +41,45 @@ pub struct Truth {
     pub position: In<Ned, f64>,
     /// Velocity over ground, m/s.
     pub velocity: In<Ned, f64>,
+    /// Velocity of the body through the air, m/s.
+    pub through_air: In<Body, f64>,
     /// Attitude.
     pub ned_from_body: Rotation<Ned, Body, f64>,
     /// Angular rate, rad/s.
     pub omega: In<Body, f64>,
     /// Specific force, m/s^2.
     pub specific_force: In<Body, f64>,
+    /// Speed of each rotor, rad/s.
+    pub rotor_speed_rad_s: PerRotor<f64>,
+    /// How many rotors there are.
+    pub rotor_count: usize,
+    /// How far the wings are spread, left and right, 0 to 1.
+    pub deployment: [f64; 2],
     /// Battery terminal voltage, V.
     pub voltage_v: f64,
     /// Battery current, A.
     pub current_a: f64,
+}
+
+impl Truth {
+    /// Level on the ground in still air, rotors standing, nothing switched on.
+    ///
+    /// * `heading_rad` - from north towards east
+    pub fn at_rest(position: In<Ned, f64>, heading_rad: f64) -> Self {
+        Self {
+            position,
+            velocity: In::zero(),
+            through_air: In::zero(),
+            ned_from_body: Rotation::from_euler(0.0, 0.0, heading_rad),
+            omega: In::zero(),
+            specific_force: In::new(Vector3::z() * -GRAVITY_M_S2),
+            rotor_speed_rad_s: [0.0; MAX_ROTORS],
+            rotor_count: 0,
+            deployment: [0.0; 2],
+            voltage_v: 0.0,
+            current_a: 0.0,
+        }
+    }
 }
 
 /// Reading of the battery monitor; for the log, the flight code does not use it.
@@ -47,69 +91,37 @@ pub struct BatteryReading {
     pub current_a: f64,
 }
 
-/// Samples on their way, with the time at which they arrive.
-#[derive(Debug, Clone)]
-struct Line<S> {
-    timing: Timing,
-    rng: Pcg64Mcg,
-    taken: u64,
-    waiting: VecDeque<(u64, S)>,
-}
-
-impl<S> Line<S> {
-    fn new(timing: Timing, seed: u64, stream: u64) -> Self {
-        // Streams are apart by a large odd number; the seeding itself mixes the bits.
-        let own =
-            timing.seed.unwrap_or_else(|| seed.wrapping_add(stream.wrapping_mul(0x9E37_79B9_7F4A_7C15)));
-        Self { timing, rng: Pcg64Mcg::seed_from_u64(own), taken: 0, waiting: VecDeque::new() }
-    }
-
-    /// Takes a sample if one is due, and returns the newest that has arrived.
-    fn poll(&mut self, time_us: u64, sample: impl FnOnce(&mut Pcg64Mcg) -> S) -> Option<S> {
-        let due = (self.taken as f64 * 1e6 / self.timing.rate_hz).floor() as u64;
-        if time_us >= due {
-            let value = sample(&mut self.rng);
-            let late = (self.timing.latency_s * 1e6).round() as u64;
-            self.waiting.push_back((time_us.saturating_add(late), value));
-            // Periods shorter than the polling interval do not pile up.
-            self.taken = (self.taken + 1).max((time_us as f64 * 1e-6 * self.timing.rate_hz) as u64 + 1);
-        }
-        let mut newest = None;
-        while self.waiting.front().is_some_and(|(arrival, _)| *arrival <= time_us) {
-            newest = self.waiting.pop_front().map(|(_, value)| value);
-        }
-        newest
-    }
-}
-
 /// The sensors of one vehicle in one flight.
 #[derive(Debug, Clone)]
 pub struct Sensors {
     parameters: SensorParameters,
     effects: Effects<f64>,
-    imu: Line<Imu>,
+    imu: Unit,
+    imu_2: Option<Unit>,
+    vibration: Option<Vibration>,
     attitude: Line<Rotation<Ned, Body, f32>>,
-    gnss: Line<Gnss>,
-    baro: Line<f32>,
+    gnss: Receiver,
+    baro: Barometer,
     battery: Line<BatteryReading>,
-}
-
-fn noise(rng: &mut Pcg64Mcg, sd: f64) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| { let x: f64 = StandardNormal.sample(rng); x } * sd)
+    compass: Option<Compass>,
 }
 
 impl Sensors {
     /// * `seed` - of the flight; a sensor with its own `seed` does not look at it
     pub fn new(mut parameters: SensorParameters, effects: &Effects<f64>, seed: u64) -> Self {
         parameters.gnss.timing.latency_s += effects.gnss_latency_s();
+        let p = &parameters;
         Self {
-            parameters,
             effects: *effects,
-            imu: Line::new(parameters.imu.timing, seed, 1),
-            attitude: Line::new(parameters.attitude.timing, seed, 2),
-            gnss: Line::new(parameters.gnss.timing, seed, 3),
-            baro: Line::new(parameters.baro.timing, seed, 4),
-            battery: Line::new(parameters.battery.timing, seed, 5),
+            imu: Unit::new(&p.imu, seed, [Stream::Imu, Stream::ImuErrors]),
+            imu_2: (p.imu.units > 1).then(|| Unit::new(&p.imu, seed, [Stream::Imu2, Stream::Imu2Errors])),
+            vibration: Vibration::new(&p.imu, seed),
+            attitude: Line::new(p.attitude.timing, seed, Stream::Attitude),
+            gnss: Receiver::new(&p.gnss, seed),
+            baro: Barometer::new(&p.baro, seed),
+            battery: Line::new(p.battery.timing, seed, Stream::Battery),
+            compass: p.magnetometer.map(|p| Compass::new(&p, seed)),
+            parameters,
         }
     }
 
@@ -117,135 +129,65 @@ impl Sensors {
     pub fn poll(&mut self, time_us: u64, truth: &Truth) -> (SensorFrame, Option<BatteryReading>) {
         let p = &self.parameters;
         let time_s = time_us as f64 * 1e-6;
-        let force_bias = self.effects.specific_force_bias(time_s);
+        let force_bias = self.effects.specific_force_bias(time_s).vector;
         let heading_bias =
             Rotation::<Ned, Ned, f64>::from_euler(0.0, 0.0, self.effects.heading_bias_rad(time_s));
         let mut frame = SensorFrame::empty(time_us);
-        frame.imu = self.imu.poll(time_us, |rng| Imu {
-            omega: In::new(
-                (truth.omega.vector
-                    + Vector3::from(p.imu.gyro_bias_rad_s)
-                    + noise(rng, p.imu.gyro_noise_rad_s))
-                .map(|x| x as f32),
-            ),
-            specific_force: In::new(
-                (truth.specific_force.vector
-                    + force_bias.vector
-                    + Vector3::from(p.imu.accel_bias_m_s2)
-                    + noise(rng, p.imu.accel_noise_m_s2))
-                .map(|x| x as f32),
-            ),
-        });
+        let mut moved = [truth.omega.vector, truth.specific_force.vector];
+        if let Some(vibration) = &mut self.vibration {
+            let [rate, force] = vibration.shake(&p.imu, time_us, truth);
+            moved = [moved[0] + rate, moved[1] + force];
+        }
+        frame.imu = self.imu.poll(&p.imu, time_us, moved, force_bias);
+        if let Some(unit) = &mut self.imu_2 {
+            frame.imu_2 = unit.poll(&p.imu, time_us, moved, Vector3::zeros());
+        }
         frame.attitude = self.attitude.poll(time_us, |rng| {
             let error = Vector3::from(p.attitude.bias_rad) + noise(rng, p.attitude.noise_rad);
             let estimate = heading_bias.quaternion
                 * truth.ned_from_body.quaternion
                 * UnitQuaternion::from_scaled_axis(error);
-            Rotation::new(UnitQuaternion::new_unchecked(estimate.into_inner().cast::<f32>()))
+            Some(Rotation::new(UnitQuaternion::new_unchecked(estimate.into_inner().cast::<f32>())))
         });
-        frame.gnss = self.gnss.poll(time_us, |rng| Gnss {
-            position: In::new(
-                (truth.position.vector
-                    + Vector3::from(p.gnss.position_bias_m)
-                    + noise(rng, p.gnss.position_noise_m))
-                .map(|x| x as f32),
-            ),
-            velocity: In::new(
-                (truth.velocity.vector
-                    + Vector3::from(p.gnss.velocity_bias_m_s)
-                    + noise(rng, p.gnss.velocity_noise_m_s))
-                .map(|x| x as f32),
-            ),
-        });
-        frame.altitude_m = self.baro.poll(time_us, |rng| {
-            (-truth.position.vector.z + p.baro.bias_m + noise(rng, p.baro.noise_m).x) as f32
-        });
-        let battery = self.battery.poll(time_us, |rng| BatteryReading {
-            voltage_v: truth.voltage_v + p.battery.voltage_bias_v + noise(rng, p.battery.voltage_noise_v).x,
-            current_a: truth.current_a + p.battery.current_bias_a + noise(rng, p.battery.current_noise_a).x,
+        frame.gnss = self.gnss.poll(&p.gnss, time_us, truth);
+        frame.altitude_m = self.baro.poll(&p.baro, time_us, truth);
+        if let (Some(compass), Some(p)) = (&mut self.compass, &p.magnetometer) {
+            let measured = Rotation::new(heading_bias.quaternion * truth.ned_from_body.quaternion);
+            frame.magnetic = compass.poll(p, time_us, measured, truth);
+        }
+        let battery = self.battery.poll(time_us, |rng| {
+            let p = &p.battery;
+            let voltage_v = truth.voltage_v + p.voltage_bias_v + noise(rng, p.voltage_noise_v).x;
+            let current_a = truth.current_a + p.current_bias_a + noise(rng, p.current_noise_a).x;
+            Some(BatteryReading {
+                voltage_v: quantised(voltage_v, p.voltage_resolution_v),
+                current_a: quantised(current_a, p.current_resolution_a),
+            })
         });
         (frame, battery)
     }
-}
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn truth() -> Truth {
-        Truth {
-            position: In::new(Vector3::new(1.0, 2.0, -3.0)),
-            velocity: In::new(Vector3::new(4.0, 5.0, 6.0)),
-            ned_from_body: Rotation::identity(),
-            omega: In::new(Vector3::new(0.1, 0.2, 0.3)),
-            specific_force: In::new(Vector3::new(0.0, 0.0, -9.8)),
-            voltage_v: 15.0,
-            current_a: 10.0,
+    /// What these sensors say in a second at rest before the flight, at the rate of the inertial units: level on the ground, rotors
+    /// standing. Biases, scales, iron and the satellite receiver's slow error are the flight's, at its start; white noise is another, as
+    /// it would be a second earlier. The flight's own streams are untouched. Ask before the first [`Self::poll`].
+    ///
+    /// * `position` - where the mission starts, m
+    /// * `heading_rad` - from north towards east
+    pub fn at_rest(&self, position: In<Ned, f64>, heading_rad: f64) -> Vec<SensorFrame> {
+        let mut copy = self.clone();
+        copy.imu.fork();
+        if let Some(unit) = &mut copy.imu_2 {
+            unit.fork();
         }
-    }
-
-    #[test]
-    fn each_sensor_speaks_at_its_rate_and_after_its_latency() {
-        let mut p = SensorParameters::ideal();
-        p.gnss.timing = Timing { rate_hz: 10.0, latency_s: 0.15, seed: None };
-        let mut sensors = Sensors::new(p, &Effects::none(), 1);
-        let (mut imu, mut fixes) = (0_i32, Vec::new());
-        for k in 0..3000u64 {
-            let time_us = k * 1000 / 3;
-            let mut now = truth();
-            now.position = In::new(Vector3::new(time_us as f64 * 1e-6, 0.0, 0.0));
-            let (frame, _) = sensors.poll(time_us, &now);
-            imu += i32::from(frame.imu.is_some());
-            if let Some(gnss) = frame.gnss {
-                fixes.push((time_us, gnss.position.vector.x));
-            }
+        if let Some(compass) = &mut copy.compass {
+            compass.fork();
         }
-        assert!((imu - 300).abs() <= 1, "{imu} samples in a second at 300 Hz");
-        assert_eq!(fixes.len(), 9);
-        for (time_us, north) in fixes {
-            let age = time_us as f64 * 1e-6 - f64::from(north);
-            assert!((age - 0.15).abs() < 1e-3, "a fix is as old as its latency");
-        }
-    }
-
-    #[test]
-    fn ideal_sensors_tell_the_truth() {
-        let (frame, battery) = Sensors::new(SensorParameters::ideal(), &Effects::none(), 1).poll(0, &truth());
-        assert_eq!(frame.gnss.unwrap().velocity.vector, Vector3::new(4.0, 5.0, 6.0));
-        assert_eq!(frame.altitude_m, Some(3.0));
-        assert_eq!(frame.imu.unwrap().omega.vector, Vector3::new(0.1, 0.2, 0.3));
-        assert_eq!(battery.unwrap().voltage_v, 15.0);
-    }
-
-    #[test]
-    fn noise_has_its_size_and_bias_its_place() {
-        let mut p = SensorParameters::ideal();
-        p.baro.noise_m = 0.2;
-        p.baro.bias_m = 1.0;
-        p.baro.timing.rate_hz = 1000.0;
-        let mut sensors = Sensors::new(p, &Effects::none(), 3);
-        let n = 20_000u32;
-        let errors: Vec<f64> = (0..n)
-            .filter_map(|k| sensors.poll(u64::from(k) * 1000, &truth()).0.altitude_m)
-            .map(|a| f64::from(a) - 3.0)
-            .collect();
-        let mean = errors.iter().sum::<f64>() / errors.len() as f64;
-        let sd = (errors.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
-        assert!((mean - 1.0).abs() < 0.01 && (sd - 0.2).abs() < 0.005, "{mean} {sd}");
-    }
-
-    /// One sensor's noise does not shift another's stream.
-    #[test]
-    fn streams_are_independent() {
-        let gyro = |baro_noise: f64| {
-            let mut p = SensorParameters::default();
-            p.baro.noise_m = baro_noise;
-            let mut sensors = Sensors::new(p, &Effects::none(), 5);
-            (0..100u64)
-                .filter_map(|k| sensors.poll(k * 3334, &truth()).0.imu)
-                .map(|i| i.omega.vector.x)
-                .last()
-        };
-        assert_eq!(gyro(0.0), gyro(1.0));
+        copy.gnss.fork();
+        copy.baro.fork();
+        fork(&mut copy.attitude.rng);
+        let truth = Truth::at_rest(position, heading_rad);
+        let rate_hz = self.parameters.imu.timing.rate_hz;
+        let samples = rate_hz.round() as u64;
+        (0..samples).map(|k| copy.poll((k as f64 * 1e6 / rate_hz).ceil() as u64, &truth).0).collect()
     }
 }

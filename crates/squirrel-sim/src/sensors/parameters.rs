@@ -1,9 +1,12 @@
 //! Numbers of the sensors; the table `[sensors]` of a vehicle file.
 //!
 //! Defaults are of the size of docs/equations.md C: a consumer inertial unit, and a 10 Hz receiver over a flight of seconds, in which
-//! its slow position error does not show. No sensor is late by default.
+//! its slow position error does not show. No sensor is late by default, and what is drawn for each flight is off.
 
+use super::devices;
+use super::table::{DEVICE, Field, Limit, Slot, Table};
 use crate::vehicle_file::plain;
+use Limit::{AboveZero, Signed, Size, Within};
 use serde::Deserialize;
 
 /// When a sensor speaks.
@@ -21,230 +24,202 @@ pub struct Timing {
     pub seed: Option<u64>,
 }
 
-/// Gyroscope and accelerometer.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ImuSensor {
-    /// When it speaks.
-    pub timing: Timing,
-    /// White noise per sample, rad/s.
-    #[serde(deserialize_with = "plain")]
-    pub gyro_noise_rad_s: f64,
-    /// Constant bias, rad/s.
-    #[serde(deserialize_with = "plain")]
-    pub gyro_bias_rad_s: [f64; 3],
-    /// White noise per sample, m/s^2.
-    #[serde(deserialize_with = "plain")]
-    pub accel_noise_m_s2: f64,
-    /// Constant bias, m/s^2.
-    #[serde(deserialize_with = "plain")]
-    pub accel_bias_m_s2: [f64; 3],
-}
+impl Timing {
+    const fn every(rate_hz: f64) -> Self {
+        Self { rate_hz, latency_s: 0.0, seed: None }
+    }
 
-/// An attitude estimate that somebody else makes.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct AttitudeSensor {
-    /// When it speaks.
-    pub timing: Timing,
-    /// White error about each body axis, rad.
-    #[serde(deserialize_with = "plain")]
-    pub noise_rad: f64,
-    /// Constant error about the body axes, rad.
-    #[serde(deserialize_with = "plain")]
-    pub bias_rad: [f64; 3],
-}
-
-/// Satellite receiver.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct GnssSensor {
-    /// When it speaks.
-    pub timing: Timing,
-    /// White noise of position per axis, m.
-    #[serde(deserialize_with = "plain")]
-    pub position_noise_m: f64,
-    /// Constant error of position, m.
-    #[serde(deserialize_with = "plain")]
-    pub position_bias_m: [f64; 3],
-    /// White noise of velocity per axis, m/s.
-    #[serde(deserialize_with = "plain")]
-    pub velocity_noise_m_s: f64,
-    /// Constant error of velocity, m/s.
-    #[serde(deserialize_with = "plain")]
-    pub velocity_bias_m_s: [f64; 3],
-}
-
-/// Barometer.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BaroSensor {
-    /// When it speaks.
-    pub timing: Timing,
-    /// White noise, m.
-    #[serde(deserialize_with = "plain")]
-    pub noise_m: f64,
-    /// Constant error, m.
-    #[serde(deserialize_with = "plain")]
-    pub bias_m: f64,
-}
-
-/// Battery monitor.
-#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BatterySensor {
-    /// When it speaks.
-    pub timing: Timing,
-    /// White noise of voltage, V.
-    #[serde(deserialize_with = "plain")]
-    pub voltage_noise_v: f64,
-    /// Constant error of voltage, V.
-    #[serde(deserialize_with = "plain")]
-    pub voltage_bias_v: f64,
-    /// White noise of current, A.
-    #[serde(deserialize_with = "plain")]
-    pub current_noise_a: f64,
-    /// Constant error of current, A.
-    #[serde(deserialize_with = "plain")]
-    pub current_bias_a: f64,
-}
-
-/// All sensors of a vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SensorParameters {
-    /// Gyroscope and accelerometer.
-    pub imu: ImuSensor,
-    /// Attitude estimate.
-    pub attitude: AttitudeSensor,
-    /// Satellite receiver.
-    pub gnss: GnssSensor,
-    /// Barometer.
-    pub baro: BaroSensor,
-    /// Battery monitor.
-    pub battery: BatterySensor,
-}
-
-const fn every(rate_hz: f64) -> Timing {
-    Timing { rate_hz, latency_s: 0.0, seed: None }
+    /// * `sensor` - name of the table, for the error
+    pub(super) fn check(&self, sensor: &str) -> Result<(), String> {
+        let Self { rate_hz, latency_s, .. } = self;
+        if !(*rate_hz > 0.0 && *rate_hz <= 1e5) {
+            return Err(format!("sensors.{sensor}.timing.rate_hz = {rate_hz}: must be > 0 and <= 1e5"));
+        }
+        if !(0.0..=10.0).contains(latency_s) {
+            return Err(format!("sensors.{sensor}.timing.latency_s = {latency_s}: must be 0 to 10"));
+        }
+        Ok(())
+    }
 }
 
 impl Default for Timing {
     fn default() -> Self {
-        every(300.0)
-    }
-}
-impl Default for ImuSensor {
-    fn default() -> Self {
-        Self {
-            timing: every(300.0),
-            gyro_noise_rad_s: 0.0045,
-            gyro_bias_rad_s: [0.0; 3],
-            accel_noise_m_s2: 0.25,
-            accel_bias_m_s2: [0.0; 3],
-        }
-    }
-}
-impl Default for AttitudeSensor {
-    fn default() -> Self {
-        Self { timing: every(300.0), noise_rad: 0.002, bias_rad: [0.0; 3] }
-    }
-}
-impl Default for GnssSensor {
-    fn default() -> Self {
-        Self {
-            timing: every(10.0),
-            position_noise_m: 0.05,
-            position_bias_m: [0.0; 3],
-            velocity_noise_m_s: 0.05,
-            velocity_bias_m_s: [0.0; 3],
-        }
-    }
-}
-impl Default for BaroSensor {
-    fn default() -> Self {
-        Self { timing: every(50.0), noise_m: 0.1, bias_m: 0.0 }
-    }
-}
-impl Default for BatterySensor {
-    fn default() -> Self {
-        Self {
-            timing: every(50.0),
-            voltage_noise_v: 0.01,
-            voltage_bias_v: 0.0,
-            current_noise_a: 0.1,
-            current_bias_a: 0.0,
-        }
+        Self::every(300.0)
     }
 }
 
-impl SensorParameters {
-    /// No noise, no bias, no latency; rates as by default.
-    pub fn ideal() -> Self {
-        let mut p = Self::default();
-        p.imu.gyro_noise_rad_s = 0.0;
-        p.imu.accel_noise_m_s2 = 0.0;
-        p.attitude.noise_rad = 0.0;
-        p.gnss.position_noise_m = 0.0;
-        p.gnss.velocity_noise_m_s = 0.0;
-        p.baro.noise_m = 0.0;
-        p.battery.voltage_noise_v = 0.0;
-        p.battery.current_noise_a = 0.0;
-        p
-    }
+/// A sensor: its rate by default, its keys with defaults and limits, and where its devices are.
+macro_rules! sensor {
+    (
+        $(#[$doc:meta])*
+        $name:ident at $rate_hz:literal Hz $(, $devices:path, $fit:path)?;
+        $($(#[$field_doc:meta])* $key:ident: $kind:ty = $default:expr, $limit:expr;)*
+    ) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct $name {
+            /// When it speaks.
+            pub timing: Timing,
+            $($(#[$field_doc])* pub $key: $kind,)*
+        }
+        impl Default for $name {
+            fn default() -> Self {
+                Self { timing: Timing::every($rate_hz), $($key: $default,)* }
+            }
+        }
+        impl Table for $name {
+            fn keys(&self) -> &'static [&'static str] {
+                const KEYS: &[&str] = &[$({ let _ = $devices; DEVICE },)? "timing", $(stringify!($key)),*];
+                KEYS
+            }
+            fn fields(&mut self) -> Vec<Field<'_>> {
+                vec![
+                    Field { key: "timing", slot: Slot::Timing(&mut self.timing), limit: Signed },
+                    $(Field { key: stringify!($key), slot: Slot::from(&mut self.$key), limit: $limit },)*
+                ]
+            }
+            $(
+                fn devices(&self) -> &'static [&'static str] {
+                    &$devices
+                }
+                fn fit(&mut self, device: &str) {
+                    $fit(self, device);
+                }
+            )?
+        }
+    };
+}
 
-    pub(crate) fn check(&self) -> Result<(), String> {
-        let timings = [
-            ("imu", self.imu.timing),
-            ("attitude", self.attitude.timing),
-            ("gnss", self.gnss.timing),
-            ("baro", self.baro.timing),
-            ("battery", self.battery.timing),
-        ];
-        for (sensor, timing) in timings {
-            if !(timing.rate_hz > 0.0 && timing.rate_hz <= 1e5) {
-                return Err(format!(
-                    "sensors.{sensor}.timing.rate_hz = {}: must be > 0 and <= 1e5",
-                    timing.rate_hz
-                ));
-            }
-            if !(0.0..=10.0).contains(&timing.latency_s) {
-                return Err(format!(
-                    "sensors.{sensor}.timing.latency_s = {}: must be 0 to 10",
-                    timing.latency_s
-                ));
-            }
-        }
-        let noises = [
-            ("imu.gyro_noise_rad_s", self.imu.gyro_noise_rad_s),
-            ("imu.accel_noise_m_s2", self.imu.accel_noise_m_s2),
-            ("attitude.noise_rad", self.attitude.noise_rad),
-            ("gnss.position_noise_m", self.gnss.position_noise_m),
-            ("gnss.velocity_noise_m_s", self.gnss.velocity_noise_m_s),
-            ("baro.noise_m", self.baro.noise_m),
-            ("battery.voltage_noise_v", self.battery.voltage_noise_v),
-            ("battery.current_noise_a", self.battery.current_noise_a),
-        ];
-        for (key, sd) in noises {
-            if !(sd.is_finite() && sd >= 0.0) {
-                return Err(format!("sensors.{key} = {sd}: must be finite and >= 0"));
-            }
-        }
-        let biases = [
-            ("imu.gyro_bias_rad_s", self.imu.gyro_bias_rad_s),
-            ("imu.accel_bias_m_s2", self.imu.accel_bias_m_s2),
-            ("attitude.bias_rad", self.attitude.bias_rad),
-            ("gnss.position_bias_m", self.gnss.position_bias_m),
-            ("gnss.velocity_bias_m_s", self.gnss.velocity_bias_m_s),
-            ("baro.bias_m", [self.baro.bias_m, 0.0, 0.0]),
-            ("battery.voltage_bias_v", [self.battery.voltage_bias_v, 0.0, 0.0]),
-            ("battery.current_bias_a", [self.battery.current_bias_a, 0.0, 0.0]),
-        ];
-        for (key, list) in biases {
-            if let Some(x) = list.iter().find(|x| !x.is_finite()) {
-                return Err(format!("sensors.{key} = {x}: must be finite"));
-            }
-        }
-        Ok(())
-    }
+sensor! {
+    /// Gyroscopes and accelerometers.
+    ImuSensor at 300.0 Hz, devices::IMUS, devices::fit_imu;
+    /// Inertial units, 1 or 2; both have these numbers, and errors of their own.
+    units: u32 = 1, Within(1.0, 2.0);
+    /// White noise per sample, rad/s.
+    gyro_noise_rad_s: f64 = 0.0045, Size;
+    /// Constant bias, rad/s.
+    gyro_bias_rad_s: [f64; 3] = [0.0; 3], Signed;
+    /// Bias that each flight draws for each axis, standard deviation, rad/s.
+    gyro_bias_sd_rad_s: f64 = 0.0, Size;
+    /// Random walk of the bias, rad/s in a second.
+    gyro_walk_rad_s_root_s: f64 = 0.0, Size;
+    /// Error of scale that each flight draws for each axis, standard deviation.
+    gyro_scale_sd: f64 = 0.0, Size;
+    /// Largest rate that it can read, rad/s.
+    gyro_range_rad_s: f64 = f64::INFINITY, AboveZero;
+    /// Step of its converter, rad/s; 0: none.
+    gyro_resolution_rad_s: f64 = 0.0, Size;
+    /// White noise per sample, m/s^2.
+    accel_noise_m_s2: f64 = 0.25, Size;
+    /// Constant bias, m/s^2.
+    accel_bias_m_s2: [f64; 3] = [0.0; 3], Signed;
+    /// Bias that each flight draws for each axis, standard deviation, m/s^2.
+    accel_bias_sd_m_s2: f64 = 0.0, Size;
+    /// Random walk of the bias, m/s^2 in a second.
+    accel_walk_m_s2_root_s: f64 = 0.0, Size;
+    /// Error of scale that each flight draws for each axis, standard deviation.
+    accel_scale_sd: f64 = 0.0, Size;
+    /// Largest specific force that it can read, m/s^2.
+    accel_range_m_s2: f64 = f64::INFINITY, AboveZero;
+    /// Step of its converter, m/s^2; 0: none.
+    accel_resolution_m_s2: f64 = 0.0, Size;
+    /// Angle about each body axis by which a unit sits askew, standard deviation, rad.
+    misalignment_sd_rad: f64 = 0.0, Within(0.0, 0.5);
+    /// Amplitude on each axis of the rate that one rotor shakes up at `vibration_speed_rad_s`, rad/s.
+    vibration_gyro_rad_s: f64 = 0.0, Size;
+    /// Amplitude on each axis of the specific force that one rotor shakes up at `vibration_speed_rad_s`, m/s^2.
+    vibration_accel_m_s2: f64 = 0.0, Size;
+    /// Speed of a rotor at which vibration has the given size, rad/s; it grows with the square of the speed.
+    vibration_speed_rad_s: f64 = 1000.0, Within(1.0, 1e5);
+}
+
+sensor! {
+    /// An attitude estimate that somebody else makes.
+    AttitudeSensor at 300.0 Hz;
+    /// White error about each body axis, rad.
+    noise_rad: f64 = 0.002, Size;
+    /// Constant error about the body axes, rad.
+    bias_rad: [f64; 3] = [0.0; 3], Signed;
+}
+
+sensor! {
+    /// Satellite receiver.
+    GnssSensor at 10.0 Hz, devices::RECEIVERS, devices::fit_gnss;
+    /// White noise of position per axis, m.
+    position_noise_m: f64 = 0.05, Size;
+    /// Constant error of position, m.
+    position_bias_m: [f64; 3] = [0.0; 3], Signed;
+    /// Slow error of position per axis, standard deviation, m.
+    position_wander_m: f64 = 0.0, Size;
+    /// Time constant of the slow error, s.
+    wander_time_s: f64 = 60.0, Within(0.01, 1e6);
+    /// White noise of velocity per axis, m/s.
+    velocity_noise_m_s: f64 = 0.05, Size;
+    /// Constant error of velocity, m/s.
+    velocity_bias_m_s: [f64; 3] = [0.0; 3], Signed;
+    /// Share of the fixes whose position jumps.
+    outlier_share: f64 = 0.0, Within(0.0, 1.0);
+    /// How far such a fix jumps, to some side, m.
+    outlier_m: f64 = 0.0, Size;
+    /// Dropouts that begin in a second of fixes.
+    dropouts_per_s: f64 = 0.0, Within(0.0, 10.0);
+    /// Mean length of a dropout, s.
+    dropout_s: f64 = 0.0, Size;
+}
+
+sensor! {
+    /// Barometer.
+    BaroSensor at 50.0 Hz, devices::BAROMETERS, devices::fit_baro;
+    /// White noise, m.
+    noise_m: f64 = 0.1, Size;
+    /// Constant error, m.
+    bias_m: f64 = 0.0, Signed;
+    /// Random walk of the error, m in a second.
+    drift_m_root_s: f64 = 0.0, Size;
+    /// Time constant with which it follows the height, s.
+    lag_s: f64 = 0.0, Within(0.0, 10.0);
+    /// Error of static pressure over dynamic pressure for air along the body's x, y and z; positive reads too high.
+    pressure_coefficient: [f64; 3] = [0.0; 3], Within(-2.0, 2.0);
+    /// What fully spread wings add to each of them.
+    pressure_coefficient_wing: f64 = 0.0, Within(-2.0, 2.0);
+    /// Step of its converter, m; 0: none.
+    resolution_m: f64 = 0.0, Size;
+}
+
+sensor! {
+    /// Battery monitor.
+    BatterySensor at 50.0 Hz;
+    /// White noise of voltage, V.
+    voltage_noise_v: f64 = 0.01, Size;
+    /// Constant error of voltage, V.
+    voltage_bias_v: f64 = 0.0, Signed;
+    /// Step of its converter for the voltage, V; 0: none.
+    voltage_resolution_v: f64 = 0.0, Size;
+    /// White noise of current, A.
+    current_noise_a: f64 = 0.1, Size;
+    /// Constant error of current, A.
+    current_bias_a: f64 = 0.0, Signed;
+    /// Step of its converter for the current, A; 0: none.
+    current_resolution_a: f64 = 0.0, Size;
+}
+
+sensor! {
+    /// Magnetometer; without errors unless told.
+    MagnetometerSensor at 50.0 Hz, devices::MAGNETOMETERS, devices::fit_magnetometer;
+    /// Strength of the earth's field, uT.
+    field_ut: f64 = 48.0, Within(1.0, 100.0);
+    /// How far the field points down, rad.
+    inclination_rad: f64 = 1.13, Within(-1.6, 1.6);
+    /// White noise per axis, uT.
+    noise_ut: f64 = 0.0, Size;
+    /// Field of the vehicle's own iron that each flight draws for each axis, standard deviation, uT.
+    hard_iron_sd_ut: f64 = 0.0, Size;
+    /// Error that each flight draws for each entry of the symmetric matrix of soft iron, standard deviation.
+    soft_iron_sd: f64 = 0.0, Within(0.0, 0.3);
+    /// Field of the battery's current along the body axes, uT/A.
+    current_ut_per_a: [f64; 3] = [0.0; 3], Signed;
+    /// Largest field that it can read on an axis, uT.
+    range_ut: f64 = f64::INFINITY, AboveZero;
+    /// Step of its converter, uT; 0: none.
+    resolution_ut: f64 = 0.0, Size;
 }

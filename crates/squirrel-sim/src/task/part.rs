@@ -314,13 +314,20 @@ fn truth(state: &State<f32>) -> Truth {
     let q = state.ned_from_body().wxyz().map(f64::from);
     let ned_from_body = Rotation::<Ned, Body, f64>::from_wxyz(q).unwrap_or_else(Rotation::identity);
     let up = In::<Ned, f64>::new(Vector3::new(0.0, 0.0, -GRAVITY_M_S2));
+    let velocity = In::new(wide(state.velocity.vector));
     Truth {
         position: In::new(wide(state.position.vector)),
-        velocity: In::new(wide(state.velocity.vector)),
+        velocity,
+        // As in still air, wings folded: the batch keeps air and wings to itself.
+        through_air: ned_from_body.inverse() * velocity,
         ned_from_body,
         omega: In::new(wide(state.omega.vector)),
         // Of a vehicle that does not accelerate; no observation has it.
         specific_force: ned_from_body.inverse() * up,
+        rotor_speed_rad_s: state.rotor_speed_rad_s.map(f64::from),
+        // Those that are not there stand still.
+        rotor_count: state.rotor_speed_rad_s.len(),
+        deployment: [0.0; 2],
         voltage_v: 0.0,
         current_a: 0.0,
     }
