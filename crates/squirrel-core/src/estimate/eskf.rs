@@ -32,6 +32,8 @@ const MOMENT_S: f32 = 0.01;
 const ALONE_S: f32 = 0.5;
 /// Variance beyond which nothing is known, SI.
 const VARIANCE_MAX: f32 = 1e8;
+/// A compass errs by its vehicle's iron: so many times the deviation of a reading stands for many that err alike.
+const COMPASS_MEMORY: f32 = 10.0;
 /// Refusals in a row after which a sensor is right.
 const STUBBORN: u8 = 20;
 /// And after which it is doubted.
@@ -50,8 +52,10 @@ pub struct EskfParameters {
     pub gyro_walk_rad_s_root_s: f32,
     /// Walk of the accelerometer's bias, m/s^2 per root second.
     pub accel_walk_m_s2_root_s: f32,
-    /// Standard deviations at the start: inclination and heading, rad.
+    /// Standard deviations at the start: inclination, rad.
     pub start_turn_rad: f32,
+    /// Heading, rad.
+    pub start_heading_rad: f32,
     /// Of the gyro's bias, rad/s.
     pub start_gyro_bias_rad_s: f32,
     /// Of the accelerometer's bias, m/s^2.
@@ -64,7 +68,7 @@ pub struct EskfParameters {
     pub gnss_latency_s: f32,
     /// Of the barometer per sample, m.
     pub baro_noise_m: f32,
-    /// Of the compass's heading, rad.
+    /// Of the compass's heading, rad: iron that nobody took off included.
     pub heading_noise_rad: f32,
     /// What the accelerometer may be off gravity where there are no fixes, m/s^2.
     pub alone_noise_m_s2: f32,
@@ -80,6 +84,7 @@ impl Default for EskfParameters {
             gyro_walk_rad_s_root_s: 1e-4,
             accel_walk_m_s2_root_s: 1e-3,
             start_turn_rad: 0.05,
+            start_heading_rad: 0.05,
             start_gyro_bias_rad_s: 0.01,
             start_accel_bias_m_s2: 0.1,
             gnss_position_noise_m: 0.05,
@@ -381,7 +386,9 @@ impl Estimator for Eskf {
         if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
             let mut row = Row::zeros();
             row.fixed_rows_mut::<3>(TURN).copy_from(&down(&self.attitude));
-            let believed = self.update(&mut moved, &row, -error, p.heading_noise_rad, true);
+            let variance = row.dot(&(self.covariance * row)) + square(p.heading_noise_rad);
+            let believed = square(error) <= square(p.gate) * variance
+                && self.update(&mut moved, &row, -error, COMPASS_MEMORY * p.heading_noise_rad, true);
             self.refused.fields = self.count(self.refused.fields, believed);
         }
         if self.alone_s > ALONE_S {
@@ -425,6 +432,8 @@ fn at_start(p: &EskfParameters) -> SMatrix<f32, STATES, STATES> {
             covariance[(i, i)] = square(deviation);
         }
     }
+    // It stands level, so that a turn about its down is one of the heading.
+    covariance[(TURN + 2, TURN + 2)] = square(p.start_heading_rad);
     covariance
 }
 

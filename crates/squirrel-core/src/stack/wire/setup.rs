@@ -217,7 +217,7 @@ wire_struct! {
     }
     EskfParameters {
         gyro_noise_rad_s, accel_noise_m_s2, gyro_walk_rad_s_root_s, accel_walk_m_s2_root_s, start_turn_rad,
-        start_gyro_bias_rad_s, start_accel_bias_m_s2, gnss_position_noise_m, gnss_velocity_noise_m_s, gnss_latency_s,
+        start_heading_rad, start_gyro_bias_rad_s, start_accel_bias_m_s2, gnss_position_noise_m, gnss_velocity_noise_m_s, gnss_latency_s,
         baro_noise_m, heading_noise_rad, alone_noise_m_s2, gate,
     }
     TwccParameters {
