@@ -36,10 +36,10 @@ pub struct AltitudeFilter {
 }
 
 impl AltitudeFilter {
-    /// At rest on the ground.
-    pub fn new(parameters: AltitudeParameters) -> Self {
+    /// At rest at an altitude, m, up.
+    pub fn new(parameters: AltitudeParameters, altitude_m: f32) -> Self {
         let covariance = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 0.09));
-        Self { parameters, state: Vector3::zeros(), covariance }
+        Self { parameters, state: Vector3::new(-altitude_m, 0.0, 0.0), covariance }
     }
 
     /// One step.

@@ -214,6 +214,16 @@ impl Eskf {
         }
     }
 
+    /// Not where the first fix will say, but here, at rest.
+    #[must_use]
+    pub fn placed_at(mut self, position: In<Ned, f32>) -> Self {
+        self.position = position.vector;
+        self.past.moments = [[position.vector, Vector3::zeros()]; MOMENTS];
+        self.past.known = MOMENTS;
+        self.placed = true;
+        self
+    }
+
     /// Covariance of the error, in the order of [`STATES`]: NED, but the turn about body axes; SI.
     pub fn covariance(&self) -> &SMatrix<f32, STATES, STATES> {
         &self.covariance

@@ -48,6 +48,25 @@ pub struct Start {
     pub ned_from_body: Rotation<Ned, Body, f32>,
     /// Mean bias of the units' gyros, rad/s.
     pub gyro_bias: In<Body, f32>,
+    /// Where it stands in the mission's frame, m.
+    pub position: In<Ned, f32>,
+    /// What fixes there were more than that, m: the receiver's slow error, taken off every fix.
+    pub fix_offset: In<Ned, f32>,
+    /// What the barometer read there more than its height, m.
+    pub altitude_offset_m: f32,
+}
+
+impl Start {
+    /// Level at the origin, looking north, with sensors that have no error.
+    pub fn at_origin() -> Self {
+        Self {
+            ned_from_body: Rotation::identity(),
+            gyro_bias: In::zero(),
+            position: In::zero(),
+            fix_offset: In::zero(),
+            altitude_offset_m: 0.0,
+        }
+    }
 }
 
 /// What a vehicle file chose.
@@ -138,13 +157,13 @@ enum Running {
 
 impl Running {
     fn of(navigation: &Navigation) -> Self {
-        let Start { ned_from_body, gyro_bias } = navigation.start;
+        let Start { ned_from_body, gyro_bias, position, .. } = navigation.start;
         match navigation.filter {
             Filter::External => Self::None,
             Filter::Rkf(p) => Self::Rkf(Rkf::new(p, ned_from_body, gyro_bias)),
             Filter::Mahony(p) => Self::Mahony(Mahony::new(p, ned_from_body, gyro_bias)),
             Filter::Mekf(p) => Self::Mekf(Mekf::new(p, ned_from_body, gyro_bias)),
-            Filter::Eskf(p) => Self::Eskf(Eskf::new(p, ned_from_body, gyro_bias)),
+            Filter::Eskf(p) => Self::Eskf(Eskf::new(p, ned_from_body, gyro_bias).placed_at(position)),
         }
     }
 
@@ -207,7 +226,7 @@ impl Navigation {
         Self {
             filter: Filter::External,
             altitude: AltitudeParameters::default(),
-            start: Start { ned_from_body: Rotation::identity(), gyro_bias: In::zero() },
+            start: Start::at_origin(),
         }
     }
 
@@ -217,6 +236,10 @@ impl Navigation {
         if !(self.start.gyro_bias.vector.norm() <= 1.0) {
             let size = self.start.gyro_bias.vector.norm();
             return Err(ParameterError::of("estimation.start.gyro_bias_rad_s", size, "must be at most 1"));
+        }
+        let far = self.start.position.vector + self.start.fix_offset.vector;
+        if !(far.norm() + self.start.altitude_offset_m.abs() <= 1e5) {
+            return Err(ParameterError::of("estimation.start.position_ned_m", far.norm(), "must be within 1e5"));
         }
         let turn = self.start.ned_from_body.quaternion.norm_squared();
         if !((turn - 1.0).abs() < 1e-3) {
@@ -274,7 +297,12 @@ impl Navigation {
         }
         if state.running == Running::None {
             state.running = Running::of(self);
+            state.fix = Some(Gnss { position: self.start.position, velocity: In::zero() });
         }
+        if let Some(fix) = &mut told.gnss {
+            fix.position = fix.position - self.start.fix_offset;
+        }
+        told.altitude_m = told.altitude_m.map(|altitude| altitude - self.start.altitude_offset_m);
         let dt_s = elapsed_us as f32 * 1e-6;
         let waiting = &mut state.waiting;
         waiting.dt_s = lower(waiting.dt_s + dt_s, STEP_MAX_S);
@@ -301,7 +329,7 @@ impl Navigation {
         told.attitude = Some(terms.ned_from_body);
         told.altitude_m = None;
         told.gnss = Some(Gnss { position: terms.position, velocity: terms.velocity })
-            .filter(|_| state.fix.is_some() && !state.health.has(Health::POSITION_LOST));
+            .filter(|_| !state.health.has(Health::POSITION_LOST));
         Told { frame: told, terms: Some(terms), rejected }
     }
 
@@ -317,7 +345,7 @@ impl Navigation {
             }
             _ => {
                 let force = estimate.ned_from_body * imu.specific_force;
-                let height = state.altitude.get_or_insert_with(|| AltitudeFilter::new(self.altitude));
+                let height = state.altitude.get_or_insert_with(|| AltitudeFilter::new(self.altitude, -self.start.position.vector.z));
                 height.step(force.vector.z + GRAVITY_M_S2 as f32, altitude_m, dt_s);
                 let fix = state.fix.unwrap_or(Gnss { position: In::zero(), velocity: In::zero() });
                 let (mut position, mut velocity) = (fix.position, fix.velocity);
@@ -334,13 +362,13 @@ impl Navigation {
             return None;
         }
         state.descent_m_s = Some(velocity.vector.z);
-        let is_silent = state.fix.is_some() && alone_s > SILENT_S;
+        let is_silent = alone_s > SILENT_S;
         state.health = state
             .health
             .with(Health::GNSS_OUT, doubts.gnss || is_silent)
             .with(Health::BARO_OUT, doubts.baro)
             .with(Health::COMPASS_OUT, doubts.compass)
-            .with(Health::POSITION_LOST, state.fix.is_some() && alone_s > LOST_S);
+            .with(Health::POSITION_LOST, alone_s > LOST_S);
         Some(NavigationTerms {
             ned_from_body: estimate.ned_from_body,
             gyro_bias: estimate.gyro_bias,

@@ -77,6 +77,8 @@ pub struct Preflight {
     gyro_bias: Option<In<Body, f32>>,
     force: Mean,
     field: Mean,
+    fix: Mean,
+    altitude: Mean,
     last_us: Option<u64>,
 }
 
@@ -105,6 +107,8 @@ impl Default for Preflight {
             gyro_bias: None,
             force: Mean::default(),
             field: Mean::default(),
+            fix: Mean::default(),
+            altitude: Mean::default(),
             last_us: None,
         }
     }
@@ -122,14 +126,28 @@ impl Preflight {
         if let Some(field) = frame.magnetic {
             self.field.hear(&field.vector);
         }
+        if let Some(fix) = frame.gnss {
+            self.fix.hear(&fix.position.vector);
+        }
+        if let Some(altitude_m) = frame.altitude_m {
+            self.altitude.hear(&Vector3::repeat(altitude_m));
+        }
     }
 
     /// Where the flight begins; `None` before a second at rest. Without a compass it looks north.
-    pub fn start(&self) -> Option<Start> {
+    ///
+    /// * `position` - of the vehicle in the mission's frame, m
+    pub fn start(&self, position: In<Ned, f32>) -> Option<Start> {
         let down = (-self.force.value?).try_normalize(1e-3)?;
         let level = levelled(&UnitQuaternion::identity(), &down);
         let yaw_rad = self.field.value.and_then(|field| heading_error(&level, &field)).map_or(0.0, |error| -error);
         let heading = Rotation::<Ned, Ned, f32>::from_euler(0.0, 0.0, yaw_rad).quaternion;
-        Some(Start { ned_from_body: Rotation::new(heading * level), gyro_bias: self.gyro_bias? })
+        Some(Start {
+            ned_from_body: Rotation::new(heading * level),
+            gyro_bias: self.gyro_bias?,
+            position,
+            fix_offset: In::new(self.fix.value.map_or(Vector3::zeros(), |fix| fix - position.vector)),
+            altitude_offset_m: self.altitude.value.map_or(0.0, |altitude| altitude.z + position.vector.z),
+        })
     }
 }

@@ -136,11 +136,12 @@ impl Setup {
         if navigation.filter != Navigation::external().filter {
             let sensors = Sensors::new(parameters, &self.vehicle.effects, self.scenario.seed);
             let mut preflight = Preflight::default();
-            for frame in sensors.at_rest(self.start_position(), 0.0) {
+            let position = self.start_position();
+            for frame in sensors.at_rest(position, 0.0) {
                 preflight.hear(&frame);
             }
             let unheard = || FlightError(format!("{}: sensors.imu is not at rest before the flight: its bias is larger than a gyro at rest may read", self.vehicle.name));
-            navigation.start = preflight.start().ok_or_else(unheard)?;
+            navigation.start = preflight.start(In::new(position.vector.map(|x| x as f32))).ok_or_else(unheard)?;
         }
         Ok(navigation)
     }

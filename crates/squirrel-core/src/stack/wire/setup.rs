@@ -207,7 +207,7 @@ wire_struct! {
         form, c1_per_s, c2_per_s, lambda_per_s2, integral_max_rad_s, filter_frequency_rad_s, filter_damping,
     }
     Navigation { filter, altitude, start }
-    Start { ned_from_body, gyro_bias }
+    Start { ned_from_body, gyro_bias, position, fix_offset, altitude_offset_m }
     AltitudeParameters { accel_noise_m_s2, bias_walk_m_s2_root_s, baro_noise_m }
     RkfParameters { gyro_noise_rad_s, accel_noise_m_s2, external_memory, fading }
     MahonyParameters { proportional_per_s, integral_per_s2, gate_m_s2 }
