@@ -11,12 +11,12 @@ use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::wing_force::ForceModel;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
+use squirrel_core::estimate::navigator::Navigation;
 use squirrel_core::frames::{In, Rotation};
 use squirrel_core::guidance::mission::Mission;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::rnn::elman::Elman;
 use squirrel_core::rnn::parnn::{Domain, Parnn, WINDOW};
-use squirrel_core::estimate::navigator::Navigation;
 use squirrel_core::stack::{Gnss, Imu, OUTER_PERIOD_US, SensorFrame, Stack, StackParameters, StackState};
 use std::hint::black_box;
 
@@ -51,8 +51,12 @@ fn stack(form: AttitudeForm, force_model: &ForceModel) -> Stack {
         dwell_s: 0.3,
         thrust_min_n: 0.5,
     };
-    Stack::new(vehicle, StackParameters { attitude, twcc, navigation: Navigation::external() }, Mission::Hover { position: In::zero() })
-        .expect("sound")
+    Stack::new(
+        vehicle,
+        StackParameters { attitude, twcc, navigation: Navigation::external() },
+        Mission::Hover { position: In::zero() },
+    )
+    .expect("sound")
 }
 
 fn frame(time_us: u64) -> SensorFrame {

@@ -78,11 +78,18 @@ impl Estimator {
         let (imu, gnss) = (&sensors.imu, &sensors.gnss);
         // Two units are averaged; and no filter may be told that there is no noise at all.
         let units = f64::from(imu.units).sqrt();
-        let [gyro, accel] = [(imu.gyro_noise_rad_s, 1e-4), (imu.accel_noise_m_s2 + imu.vibration_accel_m_s2, 1e-2)]
-            .map(|(noise, least)| f64::max(noise / units, least) as f32);
+        let [gyro, accel] = [(imu.gyro_noise_rad_s, 1e-4), (imu.accel_noise_m_s2, 1e-2)]
+            .map(|(noise, least)| f64::max(noise / units, least));
+        // Vibration is the same in both units.
+        let [gyro, accel] = [gyro, accel.hypot(imu.shaken_m_s2())].map(|noise| noise as f32);
         let rkf = |fading| {
             let external_memory = RkfParameters::default().external_memory;
-            Filter::Rkf(RkfParameters { gyro_noise_rad_s: gyro, accel_noise_m_s2: accel, external_memory, fading })
+            Filter::Rkf(RkfParameters {
+                gyro_noise_rad_s: gyro,
+                accel_noise_m_s2: accel,
+                external_memory,
+                fading,
+            })
         };
         match self {
             Self::External | Self::Oracle => Filter::External,
@@ -90,7 +97,9 @@ impl Estimator {
             Self::RkfStf => rkf(Fading::Single),
             Self::RkfMtf => rkf(Fading::Multiple),
             Self::Mahony => Filter::Mahony(MahonyParameters::default()),
-            Self::Mekf => Filter::Mekf(MekfParameters { gyro_noise_rad_s: gyro, ..MekfParameters::default() }),
+            Self::Mekf => {
+                Filter::Mekf(MekfParameters { gyro_noise_rad_s: gyro, ..MekfParameters::default() })
+            }
             Self::Eskf => {
                 let position_m = gnss.position_noise_m.hypot(gnss.position_wander_m);
                 Filter::Eskf(EskfParameters {

@@ -68,7 +68,8 @@ pub fn setup(log: &FlightLog) -> Result<Setup, String> {
     let mut vehicle =
         VehicleFile::parse_with(text("vehicle_toml")?, "metadata vehicle_toml", weights.transpose()?)
             .map_err(|e| e.to_string())?;
-    vehicle.estimator = log.metadata.get(flight::ESTIMATOR).map_or(Ok(Estimator::External), |n| Estimator::parse(n))?;
+    vehicle.estimator =
+        log.metadata.get(flight::ESTIMATOR).map_or(Ok(Estimator::External), |n| Estimator::parse(n))?;
     let scenario = Scenario::parse(text("scenario_toml")?, "metadata scenario_toml")?;
     let integrator = Integrator::parse(text("integrator")?)?;
     Ok(Setup { vehicle, arm: Arm::parse(text("arm")?)?, scenario, integrator })

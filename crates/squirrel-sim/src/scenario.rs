@@ -15,8 +15,8 @@ use squirrel_core::guidance::mission::{Mission, Steering};
 use squirrel_core::guidance::sensing::Sensing;
 use squirrel_core::guidance::trajectory::Trajectory;
 use squirrel_core::nalgebra::Vector3;
-use squirrel_core::vehicle::ParameterError;
 use squirrel_core::vehicle::MAX_ROTORS;
+use squirrel_core::vehicle::ParameterError;
 use std::collections::BTreeMap;
 use std::path::Path;
 

@@ -74,7 +74,8 @@ impl Monitor {
         self.told.torque_n_m += (achieved.torque_n_m - self.told.torque_n_m) * follow;
         let learn = dt_s / (dt_s + MEAN_S);
         let is_folded = self.spread_ago_s >= FOLDED_S;
-        let missing_n = if is_folded { self.told.thrust_n + p.mass_kg * imu.specific_force.vector.z } else { 0.0 };
+        let missing_n =
+            if is_folded { self.told.thrust_n + p.mass_kg * imu.specific_force.vector.z } else { 0.0 };
         let spin = p.inertia_kg_m2 * omega;
         let turned = p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin) - self.told.torque_n_m;
         self.missing_n += (missing_n - self.missing_n) * learn;

@@ -20,7 +20,7 @@ use crate::vehicle::{ParameterError, positive};
 use nalgebra::Vector3;
 
 /// Without a believed fix for so long, s, nobody knows any more where the vehicle is.
-pub const LOST_S: f32 = 1.5;
+pub const LOST_S: f32 = 3.0;
 /// Without one for so long, s, the receiver is not well.
 const SILENT_S: f32 = 0.5;
 /// Identical fixes after which a receiver hangs, if the filter does not believe them.
@@ -223,11 +223,7 @@ pub(crate) struct Told {
 impl Navigation {
     /// Somebody outside estimates.
     pub fn external() -> Self {
-        Self {
-            filter: Filter::External,
-            altitude: AltitudeParameters::default(),
-            start: Start::at_origin(),
-        }
+        Self { filter: Filter::External, altitude: AltitudeParameters::default(), start: Start::at_origin() }
     }
 
     /// # Errors
@@ -239,7 +235,11 @@ impl Navigation {
         }
         let far = self.start.position.vector + self.start.fix_offset.vector;
         if !(far.norm() + self.start.altitude_offset_m.abs() <= 1e5) {
-            return Err(ParameterError::of("estimation.start.position_ned_m", far.norm(), "must be within 1e5"));
+            return Err(ParameterError::of(
+                "estimation.start.position_ned_m",
+                far.norm(),
+                "must be within 1e5",
+            ));
         }
         let turn = self.start.ned_from_body.quaternion.norm_squared();
         if !((turn - 1.0).abs() < 1e-3) {
@@ -268,7 +268,11 @@ impl Navigation {
                 positive("estimation.eskf.gate", p.gate)?;
                 if !(0.0..=0.3).contains(&p.gnss_latency_s) {
                     let reason = "must be 0 to 0.3";
-                    return Err(ParameterError::of("estimation.eskf.gnss_latency_s", p.gnss_latency_s, reason));
+                    return Err(ParameterError::of(
+                        "estimation.eskf.gnss_latency_s",
+                        p.gnss_latency_s,
+                        reason,
+                    ));
                 }
                 Ok(())
             }
@@ -345,7 +349,9 @@ impl Navigation {
             }
             _ => {
                 let force = estimate.ned_from_body * imu.specific_force;
-                let height = state.altitude.get_or_insert_with(|| AltitudeFilter::new(self.altitude, -self.start.position.vector.z));
+                let height = state
+                    .altitude
+                    .get_or_insert_with(|| AltitudeFilter::new(self.altitude, -self.start.position.vector.z));
                 height.step(force.vector.z + GRAVITY_M_S2 as f32, altitude_m, dt_s);
                 let fix = state.fix.unwrap_or(Gnss { position: In::zero(), velocity: In::zero() });
                 let (mut position, mut velocity) = (fix.position, fix.velocity);

@@ -2,13 +2,13 @@
 //!
 //! A mean over a window in which neither the rate nor the specific force moves by more than noise does; what moves starts the window anew.
 
-use crate::frames::{Body, In, Ned};
-use crate::math::GRAVITY_M_S2;
-use crate::stack::Imu;
 use super::navigator::Start;
 use super::voting::Voter;
 use super::{heading_error, levelled};
 use crate::frames::Rotation;
+use crate::frames::{Body, In, Ned};
+use crate::math::GRAVITY_M_S2;
+use crate::stack::Imu;
 use crate::stack::SensorFrame;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -140,7 +140,8 @@ impl Preflight {
     pub fn start(&self, position: In<Ned, f32>) -> Option<Start> {
         let down = (-self.force.value?).try_normalize(1e-3)?;
         let level = levelled(&UnitQuaternion::identity(), &down);
-        let yaw_rad = self.field.value.and_then(|field| heading_error(&level, &field)).map_or(0.0, |error| -error);
+        let yaw_rad =
+            self.field.value.and_then(|field| heading_error(&level, &field)).map_or(0.0, |error| -error);
         let heading = Rotation::<Ned, Ned, f32>::from_euler(0.0, 0.0, yaw_rad).quaternion;
         Some(Start {
             ned_from_body: Rotation::new(heading * level),

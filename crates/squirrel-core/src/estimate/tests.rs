@@ -359,8 +359,10 @@ fn outliers_cost_nothing() {
 #[test]
 fn height_and_climb_are_better_than_the_barometer() {
     let (flight, mut noise) = (Flight::agile(2), Noise(2));
-    let mut filter =
-        AltitudeFilter::new(AltitudeParameters { accel_noise_m_s2: 0.25, ..AltitudeParameters::default() }, 0.0);
+    let mut filter = AltitudeFilter::new(
+        AltitudeParameters { accel_noise_m_s2: 0.25, ..AltitudeParameters::default() },
+        0.0,
+    );
     let (mut height, mut climb, mut count) = (0.0, 0.0, 0.0);
     let dt = 1.0 / RATE_HZ as f64;
     for k in 1..=60 * RATE_HZ {

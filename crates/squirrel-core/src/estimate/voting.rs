@@ -255,7 +255,9 @@ mod tests {
                 heard[bad] = reading(2999)[bad];
                 heard
             });
-            for (what, (worst, out), bar) in [("jump", jump, 0.01), ("spikes", spikes, 0.01), ("hangs", hangs, 0.25)] {
+            for (what, (worst, out), bar) in
+                [("jump", jump, 0.01), ("spikes", spikes, 0.01), ("hangs", hangs, 0.25)]
+            {
                 assert!(worst < bar, "{what} of {bad}: {worst}");
                 assert_eq!(out, [bad == 0, bad == 1], "{what}");
             }

@@ -113,7 +113,8 @@ impl SensorFrame {
         self.imu_2 = self.imu_2.filter(|imu| accept(imu.is_reading()));
         self.gnss = self.gnss.filter(|gnss| accept(gnss.is_reading()));
         self.altitude_m = self.altitude_m.filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
-        self.magnetic = self.magnetic.filter(|field| accept(field.vector.norm_squared() <= FIELD_MAX_UT * FIELD_MAX_UT));
+        self.magnetic =
+            self.magnetic.filter(|field| accept(field.vector.norm_squared() <= FIELD_MAX_UT * FIELD_MAX_UT));
         dropped
     }
 

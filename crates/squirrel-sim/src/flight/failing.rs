@@ -115,7 +115,11 @@ impl Failing {
             let is_taken = effects.get_mut(effect).is_some();
             match effects.insert(effect) {
                 Some(found) if !is_taken => found.values.copy_from_slice(&values),
-                _ => return Err(FlightError(format!("faults.{kind}: the vehicle has effects.{effect} already"))),
+                _ => {
+                    return Err(FlightError(format!(
+                        "faults.{kind}: the vehicle has effects.{effect} already"
+                    )));
+                }
             }
             let window = |table: &FaultTable| (table.start_s, table.duration_s);
             if first.as_ref().is_some_and(|first| window(first) != window(table)) {

@@ -66,7 +66,6 @@ fn names<S: serde::Serializer>(flags: &Flags, to: S) -> Result<S::Ok, S::Error> 
     flags.names().serialize(to)
 }
 
-
 /// Collects [`Metrics`].
 pub(super) struct Meter<'a> {
     scenario: &'a Scenario,

@@ -25,8 +25,8 @@ use crate::scenario::Scenario;
 use crate::sensors::{SensorParameters, Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
 use commands::{Command, CommandLine};
-use integrator::Mover;
 use failing::Failing;
+use integrator::Mover;
 use squirrel_core::dynamics::{State, specific_force, total_wind};
 use squirrel_core::estimate::navigator::{Navigation, NavigationTerms};
 use squirrel_core::estimate::rest::Preflight;
@@ -124,7 +124,11 @@ impl Setup {
 
     /// What the sensors of this setup are: without error where the truth is told.
     fn sensors(&self) -> SensorParameters {
-        if self.vehicle.estimator == Estimator::Oracle { SensorParameters::ideal() } else { self.vehicle.sensors }
+        if self.vehicle.estimator == Estimator::Oracle {
+            SensorParameters::ideal()
+        } else {
+            self.vehicle.sensors
+        }
     }
 
     /// Who estimates, and from where on.
@@ -140,8 +144,14 @@ impl Setup {
             for frame in sensors.at_rest(position, 0.0) {
                 preflight.hear(&frame);
             }
-            let unheard = || FlightError(format!("{}: sensors.imu is not at rest before the flight: its bias is larger than a gyro at rest may read", self.vehicle.name));
-            navigation.start = preflight.start(In::new(position.vector.map(|x| x as f32))).ok_or_else(unheard)?;
+            let unheard = || {
+                FlightError(format!(
+                    "{}: sensors.imu is not at rest before the flight: its bias is larger than a gyro at rest may read",
+                    self.vehicle.name
+                ))
+            };
+            navigation.start =
+                preflight.start(In::new(position.vector.map(|x| x as f32))).ok_or_else(unheard)?;
         }
         Ok(navigation)
     }

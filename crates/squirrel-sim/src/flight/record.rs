@@ -220,10 +220,8 @@ pub(crate) fn record_output(
             ("yaw_rad", &[f64::from(r.yaw_rad)]),
         ],
     );
-    log.source_mut("control.status").push(
-        t,
-        &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])],
-    );
+    log.source_mut("control.status")
+        .push(t, &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])]);
     if let Some(terms) = &output.navigation {
         let attitude = terms.ned_from_body.wxyz().map(f64::from);
         log.source_mut(ESTIMATE).push(
@@ -370,7 +368,8 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
     let mut imu_2 = channel("imu_2.omega_body_rad_s", 3)?;
     let force_2 = channel("imu_2.specific_force_body_m_s2", 3)?;
     // Where the flight code estimates, an attitude in the log is its own.
-    let attitude_name = if log.sources.contains_key(ESTIMATE) { None } else { Some("attitude.q_ned_from_body_wxyz") };
+    let attitude_name =
+        if log.sources.contains_key(ESTIMATE) { None } else { Some("attitude.q_ned_from_body_wxyz") };
     let mut attitude = attitude_name.map_or(Ok(None), |name| channel(name, 4))?;
     let mut gnss = channel("gnss.position_ned_m", 3)?;
     let velocity = channel("gnss.velocity_ned_m_s", 3)?;
@@ -442,8 +441,7 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
         }
         all.push(frame);
     }
-    let cursors =
-        [&imu, &imu_2, &attitude, &gnss, &baro, &magnetic, &obstacle, &wing_force, &command];
+    let cursors = [&imu, &imu_2, &attitude, &gnss, &baro, &magnetic, &obstacle, &wing_force, &command];
     for (cursor, _) in cursors.into_iter().flatten() {
         if let Some(t) = cursor.time_s.get(cursor.next) {
             return Err(format!("an input at {t:.6} s belongs to no step of the flight code"));

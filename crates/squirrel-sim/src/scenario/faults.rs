@@ -121,7 +121,9 @@ impl FaultTable {
         }
         match (kind.sizes(), self.size) {
             (None, None) => {}
-            (None, Some(x)) => return Err(format!("faults.{name}.size = {x}: given, but this fault has no size")),
+            (None, Some(x)) => {
+                return Err(format!("faults.{name}.size = {x}: given, but this fault has no size"));
+            }
             (Some((low, high, unit)), x) => {
                 let x = x.unwrap_or(f64::NAN);
                 if !(low..=high).contains(&x) {
@@ -132,8 +134,12 @@ impl FaultTable {
         match (kind.count(rotors), self.which) {
             (Some(count), Some(which)) if (1..=count).contains(&(which as usize)) => Ok(()),
             (Some(count), Some(which)) => Err(format!("faults.{name}.which = {which}: must be 1 to {count}")),
-            (None, Some(which)) => Err(format!("faults.{name}.which = {which}: given, but there is only one")),
-            (_, None) if kind == FaultKind::MotorWeak => Err(format!("faults.{name}.which: missing; a rotor's number")),
+            (None, Some(which)) => {
+                Err(format!("faults.{name}.which = {which}: given, but there is only one"))
+            }
+            (_, None) if kind == FaultKind::MotorWeak => {
+                Err(format!("faults.{name}.which: missing; a rotor's number"))
+            }
             (_, None) => Ok(()),
         }
     }

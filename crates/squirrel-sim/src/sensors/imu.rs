@@ -7,9 +7,9 @@
 //! vehicle and the same in both units; what is drawn is each unit's own. The effect `accel_bias` is on the first unit.
 //!
 //! Each rotor is a little out of balance: a force that turns with it, of size `m e W^2`. So every axis sees
-//! `a (W / W0)^2 sin(phase + shift)`, the phase the integral of the rotor's speed, the shift drawn for each rotor and axis. Samples
-//! are taken of this as it is, without a filter, so that what is faster than half the rate appears at its alias. The
-//! airframe is stiff: both units feel the same.
+//! `a (W / W0)^2 sin(phase + shift)`, the phase the integral of the rotor's speed, the shift drawn for each rotor and axis. The
+//! device's filter, of second order and critically damped, weakens it by `1 + (f / f_c)^2`; what is faster than half the rate then appears at
+//! its alias. (Motion is slow beside the filter, which delays nothing here.) The airframe is stiff: both units feel the same.
 
 use super::Truth;
 use super::line::{Line, Stopwatch, Stream, fork, noise, quantised, uniform};
@@ -20,6 +20,19 @@ use squirrel_core::nalgebra::{Matrix3, UnitQuaternion, Vector3};
 use squirrel_core::stack::Imu;
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
 use std::f64::consts::TAU;
+
+impl ImuSensor {
+    /// Share of a vibration of this angular frequency, rad/s, that the device's filter lets through.
+    fn passed(&self, speed_rad_s: f64) -> f64 {
+        1.0 / (1.0 + (speed_rad_s / (TAU * self.bandwidth_hz)).powi(2))
+    }
+
+    /// Deviation on an axis of the specific force that four rotors shake up at `vibration_speed_rad_s`, m/s^2.
+    pub(crate) fn shaken_m_s2(&self) -> f64 {
+        // Four sines, each with a deviation of its amplitude over root two.
+        2.0_f64.sqrt() * self.vibration_accel_m_s2 * self.passed(self.vibration_speed_rad_s)
+    }
+}
 
 /// One unit.
 #[derive(Debug, Clone)]
@@ -145,7 +158,7 @@ impl Vibration {
             let turned = 0.5 * (self.speed_rad_s[rotor] + speed) * elapsed_s;
             self.phase_rad[rotor] = (self.phase_rad[rotor] + turned) % TAU;
             self.speed_rad_s[rotor] = speed;
-            let size = (speed / p.vibration_speed_rad_s).powi(2);
+            let size = (speed / p.vibration_speed_rad_s).powi(2) * p.passed(speed);
             for (axis, shift) in sum.iter_mut().zip(self.shift_rad[rotor]) {
                 *axis += size * (self.phase_rad[rotor] + shift).sin();
             }

@@ -131,6 +131,8 @@ sensor! {
     vibration_accel_m_s2: f64 = 0.0, Size;
     /// Speed of a rotor at which vibration has the given size, rad/s; it grows with the square of the speed.
     vibration_speed_rad_s: f64 = 1000.0, Within(1.0, 1e5);
+    /// Corner frequency of the device's low-pass filter, which weakens vibration, Hz.
+    bandwidth_hz: f64 = f64::INFINITY, AboveZero;
 }
 
 sensor! {

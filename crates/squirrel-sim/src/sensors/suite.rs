@@ -53,6 +53,11 @@ struct Airframe {
     current_ut_per_a: [f64; 3],
 }
 
+/// Speed of the rotors at which suites give their vibration: about hover of the shipped squirrel.
+const HOVER_RAD_S: f64 = 1500.0;
+/// Low-pass filter of the suites' inertial units, as such devices have one to choose (98 Hz in an MPU-6000), Hz.
+const BANDWIDTH_HZ: f64 = 98.0;
+
 impl SensorParameters {
     /// No noise, no bias, no latency; rates as by default, no magnetometer.
     pub fn ideal() -> Self {
@@ -77,7 +82,7 @@ impl SensorParameters {
     pub fn suite(name: &str) -> Option<Self> {
         let research = Airframe {
             devices: ["icm_42688_p", "neo_m9n", "bmp390", "ist8310"],
-            vibration: [0.003, 0.5],
+            vibration: [0.006, 1.0],
             walk: [5e-5, 5e-4],
             misalignment_sd_rad: 0.005,
             outliers: [0.001, 5.0],
@@ -96,7 +101,7 @@ impl SensorParameters {
             }
             "hobby" => Some(Self::of(&Airframe {
                 devices: ["mpu_6000", "neo_m9n", "ms5611", "qmc5883l"],
-                vibration: [0.01, 2.0],
+                vibration: [0.02, 4.0],
                 walk: [2e-4, 2e-3],
                 misalignment_sd_rad: 0.01,
                 outliers: [0.002, 8.0],
@@ -126,6 +131,8 @@ impl SensorParameters {
         p.baro.fit(baro);
         compass.fit(magnetometer);
         p.imu.units = 2;
+        p.imu.vibration_speed_rad_s = HOVER_RAD_S;
+        p.imu.bandwidth_hz = BANDWIDTH_HZ;
         [p.imu.vibration_gyro_rad_s, p.imu.vibration_accel_m_s2] = airframe.vibration;
         [p.imu.gyro_walk_rad_s_root_s, p.imu.accel_walk_m_s2_root_s] = airframe.walk;
         p.imu.misalignment_sd_rad = airframe.misalignment_sd_rad;
