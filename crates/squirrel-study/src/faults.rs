@@ -5,7 +5,7 @@
 //! thrust at a ratio below [`HEALTHY_RATIO`], or both inertial units that say nothing that is a number. A fault is *flagged* where the
 //! flight code reports anything from the fault on, be it health or a reason of its failsafe.
 
-use crate::journal::Journal;
+use crate::journal::{Journal, identity};
 use serde::{Deserialize, Serialize};
 use squirrel_core::guidance::mission::scramble;
 use squirrel_sim::arm::Arm;
@@ -13,6 +13,7 @@ use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
 use squirrel_sim::scenario::{FaultKind, FaultTable, Scenario};
 use squirrel_sim::sensors::{SUITES, SensorParameters};
 use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::Path;
 
 /// Thrust-to-weight ratio from which a weak rotor is survivable.
 pub const HEALTHY_RATIO: f64 = 1.6;
@@ -100,32 +101,21 @@ pub struct Faults {
     pub flights: Vec<Trial>,
 }
 
-impl Plan {
-    /// Everything that a trial depends on but its number.
-    pub fn identity(&self) -> String {
-        let hash = squirrel_core::stack::wire::hash(
-            squirrel_core::stack::wire::HASH_START,
-            self.vehicle.text.as_bytes(),
-        );
-        format!(
-            "faults of {} ({hash:016x}), seed {}, version {}",
-            self.vehicle.name,
-            self.seed,
-            env!("CARGO_PKG_VERSION")
-        )
-    }
-}
-
 /// Flies the study; the result depends neither on threads nor on how often it was stopped.
 ///
+/// * `folder` - keeps the trials, so that a study that was stopped goes on
 /// * `progress` - called once for each flight
 ///
 /// # Errors
-/// A vehicle that cannot fly, or a journal that cannot be written.
-pub fn run(plan: &Plan, journal: &Journal, progress: impl Fn() + Sync) -> Result<Faults, FlightError> {
+/// A vehicle that cannot fly, or a folder that cannot be written.
+pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Result<Faults, FlightError> {
     if plan.trials == 0 {
         return Err(FlightError("trials = 0: must be at least 1".to_owned()));
     }
+    let journal = match folder {
+        Some(folder) => Journal::open(folder, "faults", &identity("faults", &plan.vehicle, plan.seed))?,
+        None => Journal::none(),
+    };
     let flights = journal.run(plan.trials, |trial| fly(plan, trial), progress)?;
     let rows: Vec<Row> =
         FaultKind::ALL.iter().map(|kind| row(*kind, &flights)).filter(|row| row.flights > 0).collect();

@@ -5,9 +5,10 @@
 //! estimator; the filters hear the recorded inertial unit, receiver and barometer, and no compass. Errors count
 //! from five seconds on.
 
+use crate::in_loop;
+use crate::journal::{self, Journal};
 use crate::statistics::{Estimate, mean, paired};
 use crate::wing_flights::Kind;
-use rayon::prelude::*;
 use squirrel_core::estimate::eskf::Eskf;
 use squirrel_core::estimate::mahony::Mahony;
 use squirrel_core::estimate::mekf::Mekf;
@@ -22,7 +23,9 @@ use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{FlightError, Integrator, Setup, frames};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
+use squirrel_sim::sensors::SUITES;
 use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::Path;
 
 /// Bias that an uncalibrated gyro keeps, deg/s: docs/equations.md C.2.
 pub const BIAS_DEG_S: [f64; 3] = [0.4, -0.3, 0.2];
@@ -96,6 +99,8 @@ pub struct Filters {
     pub bias_deg_s: [f64; 3],
     /// Calibrated gyros first, filters in their order.
     pub rows: Vec<Row>,
+    /// The vehicle's own estimator in the loop, over suites of sensors.
+    pub in_loop: Vec<in_loop::Row>,
 }
 
 /// RMS and largest error of a filter in a flight, deg.
@@ -103,26 +108,29 @@ type Errors = [f64; 2];
 
 /// Flies the study on all cores; the result does not depend on how many there are.
 ///
-/// * `progress` - called once for each flight that has ended
+/// * `folder` - keeps the trials, so that a study that was stopped goes on
+/// * `progress` - called once for each trial: the flights, then a pair for each of them and each suite of sensors
 ///
 /// # Errors
-/// A vehicle that cannot fly.
-pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Filters, FlightError> {
+/// A vehicle that cannot fly, or a folder that cannot be written.
+pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Result<Filters, FlightError> {
     if plan.trials == 0 {
         return Err(FlightError("trials = 0: must be at least 1".to_owned()));
     }
     let kinds: Vec<(bool, Estimator)> =
         [true, false].into_iter().flat_map(|calibrated| FILTERS.map(|filter| (calibrated, filter))).collect();
-    let flown: Vec<Vec<Errors>> = (0..plan.trials)
-        .into_par_iter()
-        .map(|trial| {
-            let log = fly(plan, trial)?;
-            let errors = kinds.iter().map(|(calibrated, filter)| heard(plan, &log, *filter, *calibrated));
-            let errors = errors.collect::<Result<_, _>>();
-            progress();
-            errors
-        })
-        .collect::<Result<_, _>>()?;
+    let identity = journal::identity("filters", &plan.vehicle, plan.seed);
+    let journal = |name| match folder {
+        Some(folder) => Journal::open(folder, name, &identity),
+        None => Ok(Journal::none()),
+    };
+    let all = |trial| -> Result<Vec<Errors>, FlightError> {
+        let log = fly(plan, trial)?;
+        kinds.iter().map(|(calibrated, filter)| heard(plan, &log, *filter, *calibrated)).collect()
+    };
+    let flown = journal("filters")?.run(plan.trials, all, &progress)?;
+    let in_loop =
+        in_loop::run(&plan.vehicle, plan.trials, plan.seed, &journal("filters_in_loop")?, &progress)?;
     let rows = kinds.iter().enumerate().map(|(k, (calibrated, filter))| {
         let trials_deg: Vec<f64> = flown.iter().map(|trial| trial[k][0]).collect();
         Row {
@@ -139,7 +147,13 @@ pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Filters, FlightErr
         seed: plan.seed,
         bias_deg_s: BIAS_DEG_S,
         rows: rows.collect(),
+        in_loop,
     })
+}
+
+/// Number of times that [`run`] calls back.
+pub fn steps(plan: &Plan) -> u64 {
+    u64::from(plan.trials) * (1 + SUITES.len() as u64)
 }
 
 /// The flights, named by their trial.

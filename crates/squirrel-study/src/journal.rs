@@ -7,12 +7,21 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use squirrel_core::stack::wire::{HASH_START, hash};
 use squirrel_sim::flight::FlightError;
+use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+
+/// What a study's trials depend on beside their number, in one line: for [`Journal::open`].
+pub fn identity(name: &str, vehicle: &VehicleFile, seed: u64) -> String {
+    let hash = hash(HASH_START, vehicle.text.as_bytes());
+    let (of, estimator, version) = (&vehicle.name, vehicle.estimator.name(), env!("CARGO_PKG_VERSION"));
+    format!("{name} of {of} ({hash:016x}) on {estimator}, seed {seed}, version {version}")
+}
 
 /// A study's trials on disk, or nowhere.
 #[derive(Debug)]

@@ -251,7 +251,7 @@ impl Setup {
                 }
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
                 failing.spoil(&mut frame);
-                frame.set_obstacles(&self.nearest_obstacles(&state.body));
+                frame.set_obstacles(&self.nearest_obstacles(&state.body, believed.as_ref()));
                 if self.arm.is_told_the_force() {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
@@ -315,8 +315,10 @@ impl Setup {
         state
     }
 
-    fn nearest_obstacles(&self, body: &State<f64>) -> Vec<Obstacle> {
+    /// Obstacles where the flight code takes them to be: it sees them from where it is, and knows that as well as it knows its own place.
+    fn nearest_obstacles(&self, body: &State<f64>, believed: Option<&NavigationTerms>) -> Vec<Obstacle> {
         let at = body.position.vector;
+        let off = believed.map_or(Vector3::zeros(), |terms| terms.position.vector.cast::<f64>() - at);
         let mut near: Vec<(f64, usize)> = Vec::new();
         for (i, [north, east, _]) in self.scenario.obstacles.iter().enumerate() {
             let distance = (north - at.x).hypot(east - at.y);
@@ -329,7 +331,7 @@ impl Setup {
         near.iter()
             .map(|(_, i)| {
                 let [north, east, _] = self.scenario.obstacles[*i];
-                Obstacle { id: *i as u32, north_m: north as f32, east_m: east as f32 }
+                Obstacle { id: *i as u32, north_m: (north + off.x) as f32, east_m: (east + off.y) as f32 }
             })
             .collect()
     }

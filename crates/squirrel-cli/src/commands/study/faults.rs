@@ -3,7 +3,6 @@
 use super::Common;
 use crate::output::{self, Table, say};
 use squirrel_study::faults::{self, Plan, Row};
-use squirrel_study::journal::Journal;
 use std::fmt::Write as _;
 
 /// Options of the study.
@@ -20,12 +19,8 @@ impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
         let plan = Plan { vehicle: self.common.begin("faults")?, trials, seed };
-        let journal = match &self.common.out {
-            Some(folder) => Journal::open(folder, "faults", &plan.identity()).map_err(|e| e.to_string())?,
-            None => Journal::none(),
-        };
         let bar = output::progress(u64::from(trials), "flights");
-        let study = faults::run(&plan, &journal, || bar.inc(1));
+        let study = faults::run(&plan, self.common.out.as_deref(), || bar.inc(1));
         bar.finish_and_clear();
         let study = study.map_err(|e| e.to_string())?;
 
