@@ -137,7 +137,7 @@ impl Setup {
         let filter = self.vehicle.estimator.filter(&parameters);
         let altitude = Estimator::altitude(&parameters);
         let mut navigation = Navigation { filter, altitude, ..Navigation::external() };
-        if navigation.filter != Navigation::external().filter {
+        if self.vehicle.estimator.is_filter() {
             let sensors = Sensors::new(parameters, &self.vehicle.effects, self.scenario.seed);
             let mut preflight = Preflight::default();
             let position = self.start_position();
@@ -235,6 +235,7 @@ impl Setup {
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
         let mut contact_specific_force: Option<In<Ned, f64>> = None;
         let mut believed: Option<NavigationTerms> = None;
+        let estimates = self.vehicle.estimator.is_filter();
         let steps = (self.scenario.duration_s / dt_s).round() as u64;
         for step in 0..=steps {
             let time_us = step * PLANT_STEP_US;
@@ -257,7 +258,8 @@ impl Setup {
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
                 if let Some(pilot) = &mut pilot {
-                    frame.command = pilot.command(tick, &seen(&frame, believed.as_ref()));
+                    let told = if estimates { seen(&frame, believed.as_ref()) } else { frame };
+                    frame.command = pilot.command(tick, &told);
                 }
                 let (output, met) = computer.step(&frame)?;
                 believed = output.navigation.or(believed);
@@ -343,13 +345,13 @@ fn hover_command(vehicle: &Vehicle<f64>) -> f64 {
     vehicle.parameters().propulsion.command_for_thrust(share)
 }
 
-/// A frame with what the flight code believes instead of what sensors say, as far as it estimates: for who commands from outside.
+/// A frame with what the flight code believes instead of what sensors say: for who commands from outside.
 fn seen(frame: &SensorFrame, believed: Option<&NavigationTerms>) -> SensorFrame {
-    let mut seen = *frame;
+    let mut seen = SensorFrame::empty(frame.time_us);
+    seen.set_obstacles(frame.obstacles());
     if let Some(terms) = believed {
         seen.attitude = Some(terms.ned_from_body);
         seen.gnss = Some(Gnss { position: terms.position, velocity: terms.velocity });
-        seen.altitude_m = None;
         seen.imu = frame.imu.map(|imu| Imu { omega: imu.omega - terms.gyro_bias, ..imu });
     }
     seen
