@@ -297,9 +297,7 @@ impl Eskf {
             (ACCEL_BIAS, square(p.accel_walk_m_s2_root_s) * dt_s),
             (GYRO_BIAS, square(p.gyro_walk_rad_s_root_s) * dt_s),
         ] {
-            for i in part..part + 3 {
-                c[(i, i)] += variance;
-            }
+            on_diagonal(c, part, |x| x + variance);
         }
     }
 
@@ -355,7 +353,7 @@ impl Estimator for Eskf {
         let mut moved = Row::zeros();
         let unit = |at: usize| {
             let mut row = Row::zeros();
-            row[at] = 1.0;
+            set(&mut row, at, 1.0);
             row
         };
         if let Some(gnss) = &sensed.gnss {
@@ -375,7 +373,7 @@ impl Estimator for Eskf {
             }
             for i in 0..3 {
                 let mut row = unit(POSITION + i);
-                row[VELOCITY + i] = -late_s;
+                set(&mut row, VELOCITY + i, -late_s);
                 let noise = p.gnss_position_noise_m;
                 believed &= self.update(&mut moved, &row, position[i], noise, is_gated);
             }
@@ -438,13 +436,27 @@ fn at_start(p: &EskfParameters) -> SMatrix<f32, STATES, STATES> {
         (ACCEL_BIAS, p.start_accel_bias_m_s2),
         (GYRO_BIAS, p.start_gyro_bias_rad_s),
     ] {
-        for i in part..part + 3 {
-            covariance[(i, i)] = square(deviation);
-        }
+        on_diagonal(&mut covariance, part, |_| square(deviation));
     }
     // It stands level, so that a turn about its down is one of the heading.
     covariance[(TURN + 2, TURN + 2)] = square(p.start_heading_rad);
     covariance
+}
+
+/// One number of a row.
+fn set(row: &mut Row, at: usize, value: f32) {
+    if let Some(x) = row.get_mut(at) {
+        *x = value;
+    }
+}
+
+/// Changes three numbers of the diagonal. An index that is only a loop's would leave a panic in the code.
+fn on_diagonal(covariance: &mut SMatrix<f32, STATES, STATES>, part: usize, change: impl Fn(f32) -> f32) {
+    for i in part..part + 3 {
+        if let Some(x) = covariance.get_mut((i, i)) {
+            *x = change(*x);
+        }
+    }
 }
 
 fn square(x: f32) -> f32 {
