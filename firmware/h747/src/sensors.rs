@@ -202,7 +202,7 @@ pub(crate) mod tests {
         sensors.fix(fix(), now + 1);
         sensors.pressure(96_880.0, now + 1);
         let next = sensors.frame(20);
-        assert_eq!(next.imu.unwrap().omega.vector.x, 0.01);
+        assert_eq!(next.imu.unwrap().omega.vector, Vector3::new(0.01, 0.0, 0.0));
         assert_eq!(next.attitude, None, "the flight code estimates");
         assert_eq!(next.gnss.unwrap().position, In::zero());
         assert!((next.altitude_m.unwrap() - 10.7).abs() < 0.3, "{next:?}");
