@@ -3,6 +3,7 @@
 use crate::arming::State;
 use crate::outputs::{ROTORS, dshot_value, servo_pulses_us};
 use crate::sensors::Sensors;
+use squirrel_core::estimate::navigator::Filter;
 use squirrel_core::stack::failsafe::FailsafeMode;
 use squirrel_core::stack::wire::{HASH_START, Record, hash, written};
 use squirrel_core::stack::{Stack, StackState};
@@ -31,27 +32,33 @@ pub struct Flight {
     state: StackState,
     /// When the flight that flies now began, us.
     since_us: Option<u64>,
+    /// It began: the sensors knew where.
+    begun: bool,
     hash: u64,
 }
 
 impl Flight {
-    /// `None` where this board cannot drive the vehicle: not four rotors, or commands in newtons.
+    /// `None` where this board cannot fly the vehicle: not four rotors, commands in newtons, or an estimate from elsewhere.
     #[must_use]
     pub fn new(stack: Stack) -> Option<Self> {
         let propulsion = stack.vehicle().parameters().propulsion;
-        let fits = stack.vehicle().rotors().len() == ROTORS && dshot_value(propulsion.command, 0.0).is_some();
-        fits.then(|| Self { stack, state: StackState::default(), since_us: None, hash: HASH_START })
+        let fits = stack.vehicle().rotors().len() == ROTORS
+            && dshot_value(propulsion.command, 0.0).is_some()
+            && stack.parameters().navigation.filter != Filter::External;
+        let state = StackState::default();
+        fits.then_some(Self { stack, state, since_us: None, begun: false, hash: HASH_START })
     }
 
-    /// What flew in the last step.
+    /// What flew in the last step. A flight that could not begin is cut, so that arming ends it.
     #[must_use]
     pub fn failsafe(&self) -> FailsafeMode {
-        self.state.failsafe.active.mode
+        let could_not = self.since_us.is_some() && !self.begun;
+        if could_not { FailsafeMode::Cut } else { self.state.failsafe.active.mode }
     }
 
     /// One step.
     ///
-    /// * `arming` - whether the rotors may turn; a new flight starts from a new state
+    /// * `arming` - whether the rotors may turn; a new flight starts from a new state, where the ground has told
     /// * `now_us` - since the board started, never backwards
     /// * `log` - is given each record: a setup where a flight begins, then a frame a step
     pub fn step(
@@ -63,14 +70,22 @@ impl Flight {
     ) -> Outputs {
         let State::Armed { since_us } = arming else {
             if self.since_us.take().is_some() {
-                sensors.end();
+                sensors.forget();
             }
+            sensors.listen(now_us);
             return Outputs::safe();
         };
         if self.since_us != Some(since_us) {
-            sensors.begin();
             (self.state, self.hash, self.since_us) = (StackState::default(), HASH_START, Some(since_us));
-            send(&Record::Setup(self.stack), &mut log);
+            let stack = sensors.start().and_then(|start| self.stack.starting(start).ok());
+            self.begun = stack.is_some();
+            if let Some(stack) = stack {
+                self.stack = stack;
+                send(&Record::Setup(stack), &mut log);
+            }
+        }
+        if !self.begun {
+            return Outputs::safe();
         }
         let frame = sensors.frame(now_us.saturating_sub(since_us));
         let output = self.stack.step(&mut self.state, &frame);
@@ -96,6 +111,10 @@ mod tests {
     use crate::log::{LINE_MAX, framed};
     use crate::sensors::tests::{fix, rest};
     use crate::setup::{self, tests::SETUP};
+    use squirrel_core::estimate::navigator::Navigation;
+    use squirrel_core::frames::In;
+    use squirrel_core::guidance::mission::Mission;
+    use squirrel_core::stack::StackParameters;
     use squirrel_core::stack::wire::{Reader, Wire};
 
     /// A board on the bench: sensors at rest, each at its rate, until `silent_from_us`.
@@ -146,16 +165,35 @@ mod tests {
     }
 
     #[test]
+    fn a_flight_that_does_not_know_where_it_begins_is_cut() {
+        let mut bench = Bench::new();
+        bench.steps(10, State::Disarmed, true);
+        let armed = State::Armed { since_us: bench.now_us };
+        assert_eq!(bench.steps(600, armed, true), Outputs::safe());
+        assert_eq!(bench.flight.failsafe(), FailsafeMode::Cut);
+        assert!(bench.line.is_empty());
+    }
+
+    #[test]
+    fn a_vehicle_that_leaves_estimation_to_others_is_none_for_this_board() {
+        let stack = setup::read(SETUP).unwrap();
+        let p = *stack.parameters();
+        let parameters = StackParameters { navigation: Navigation::external(), ..p };
+        let mission = Mission::Hover { position: In::zero() };
+        assert!(Flight::new(Stack::new(*stack.vehicle(), parameters, mission).unwrap()).is_none());
+    }
+
+    #[test]
     fn armed_it_flies_and_a_sensor_that_falls_silent_stops_it() {
         let mut bench = Bench::new();
-        bench.steps(300, State::Disarmed, true);
+        bench.steps(330, State::Disarmed, true);
         let armed = State::Armed { since_us: bench.now_us };
         let flying = bench.steps(300, armed, true);
         assert!(flying.dshot.iter().all(|value| (48..=2047).contains(value)), "{flying:?}");
         assert_eq!(bench.flight.failsafe(), FailsafeMode::Off);
         assert_eq!(bench.steps(40, armed, false), Outputs::safe());
         assert_eq!(bench.flight.failsafe(), FailsafeMode::Cut);
-        bench.steps(1, State::Disarmed, true);
+        bench.steps(330, State::Disarmed, true);
         let again = State::Armed { since_us: bench.now_us };
         assert_ne!(bench.steps(100, again, true), Outputs::safe(), "a new flight remembers nothing");
     }
@@ -164,13 +202,18 @@ mod tests {
     #[test]
     fn the_log_flies_again() {
         let mut bench = Bench::new();
-        bench.steps(300, State::Disarmed, true);
+        bench.steps(330, State::Disarmed, true);
         bench.steps(600, State::Armed { since_us: bench.now_us }, true);
         let (mut flight, mut frames) = (None, 0);
         for sent in bench.line.split(|byte| *byte == 0).filter(|sent| !sent.is_empty()) {
             let record = cobs::decode_vec(sent).unwrap();
             match Record::take(&mut Reader::new(&record)).unwrap() {
-                Record::Setup(stack) => flight = Some((stack, StackState::default(), HASH_START)),
+                Record::Setup(stack) => {
+                    let start = stack.parameters().navigation.start;
+                    let bias = start.gyro_bias.vector.x;
+                    assert!((bias - 3e-3).abs() < 1e-4, "the start is the ground's: {bias}");
+                    flight = Some((stack, StackState::default(), HASH_START));
+                }
                 Record::Frame(frame, expected) => {
                     let (stack, state, seen) = flight.as_mut().unwrap();
                     let output = stack.step(state, &frame);

@@ -1,7 +1,7 @@
 //! The flight code on a real part, an STM32H747: everything around it that needs no hardware.
 //!
 //! ```text
-//! IMU, GNSS, baro -> sensors (what is new, attitude) -> core's step, 300 Hz -> outputs (DShot, servos)
+//! IMU, GNSS, baro -> sensors (what is new; at rest, where a flight would begin) -> core's step, 300 Hz -> outputs
 //!                                  arming, 10 Hz -> which of the outputs are let through
 //!                                  log <- setup, frames, hash of the outputs
 //! ```
@@ -12,7 +12,6 @@
 #![forbid(unsafe_code)]
 
 pub mod arming;
-pub mod attitude;
 pub mod flight;
 pub mod gnss;
 pub mod log;

@@ -1,19 +1,24 @@
-//! What the sensors said since the last step, as the frame that the flight code takes.
+//! What the sensors said since the last step, as the frame that the flight code takes: raw, for that estimates by itself.
 //!
-//! A reading goes into one frame; a sensor that is silent is absent from the next, and core's failsafe counts how long. Before the
-//! flight begins the fix and the pressure are the origin of what follows, and the attitude is that of a vehicle that stands.
+//! A reading goes into one frame; a sensor that is silent is absent from the next, and core's failsafe counts how long. On the ground
+//! frames go to core's [`Preflight`], which finds attitude, gyro bias and what fix and barometer are off by; they are relative to the
+//! first fix and pressure since the vehicle was set down. What moves it begins that anew.
 
-use crate::attitude::Attitude;
 use crate::gnss::{Fix, Place};
-use squirrel_core::frames::{Body, In};
+use squirrel_core::estimate::navigator::Start;
+use squirrel_core::estimate::rest::{Preflight, RestParameters};
+use squirrel_core::frames::{Body, In, Ned, Rotation};
+use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::stack::{Gnss, Imu, SensorFrame};
 
 /// Ages beyond which a sensor is not there for arming, us.
 const IMU_AGE_US: u64 = 20_000;
 const GNSS_AGE_US: u64 = 500_000;
 const PRESSURE_AGE_US: u64 = 200_000;
-/// A longer gap between samples is not integrated over, s.
-const GAP_MAX_S: f32 = 0.02;
+/// Slower is still, rad/s, the bias taken off.
+const STILL_RAD_S: f32 = 0.05;
+/// Less tilt is level, rad.
+const LEVEL_RAD: f32 = 0.2;
 
 /// A reading, when it was made, and whether no frame has carried it.
 #[derive(Debug, Clone, Copy)]
@@ -39,38 +44,39 @@ impl<T: Copy> Reading<T> {
     }
 }
 
-/// What the sensors said last.
+/// What the sensors said last, and what came of it before the flight.
 #[derive(Debug)]
 pub struct Sensors {
-    attitude: Attitude,
+    heading_rad: f32,
     imu: Option<Reading<Imu>>,
     fix: Option<Reading<Fix>>,
     pressure_pa: Option<Reading<f32>>,
-    /// Place and pressure where the flight began; `None` before it does.
-    origin: Option<(Place, f32)>,
+    /// What frames count from: the first of each since the vehicle was set down.
+    place: Option<Place>,
+    ground_pa: Option<f32>,
+    preflight: Preflight,
 }
 
 impl Sensors {
     /// No reading yet; `heading_rad` is how the vehicle stands at arming, clockwise from north.
     #[must_use]
     pub fn new(heading_rad: f32) -> Self {
-        Self { attitude: Attitude::new(heading_rad), imu: None, fix: None, pressure_pa: None, origin: None }
+        Self {
+            heading_rad,
+            imu: None,
+            fix: None,
+            pressure_pa: None,
+            place: None,
+            ground_pa: None,
+            preflight: Preflight::default(),
+        }
     }
 
     /// A sample of the inertial unit: rad/s and m/s^2, body. What is not finite is no sample.
     pub fn imu(&mut self, omega: In<Body, f32>, specific_force: In<Body, f32>, time_us: u64) {
-        let sample = Imu { omega, specific_force };
-        if !omega.vector.iter().chain(specific_force.vector.iter()).all(|x| x.is_finite()) {
-            return;
+        if omega.vector.iter().chain(specific_force.vector.iter()).all(|x| x.is_finite()) {
+            self.imu = Some(Reading::new(Imu { omega, specific_force }, time_us));
         }
-        let dt_us = self.imu.map_or(0, |last| time_us.saturating_sub(last.time_us));
-        let dt_s = (dt_us as f32 * 1e-6).min(GAP_MAX_S);
-        if self.origin.is_none() {
-            self.attitude.on_the_ground(&sample, dt_s);
-        } else {
-            self.attitude.in_flight(&sample, dt_s);
-        }
-        self.imu = Some(Reading::new(sample, time_us));
     }
 
     /// A satellite fix.
@@ -85,41 +91,66 @@ impl Sensors {
         }
     }
 
-    /// All sensors speak, and the vehicle lies level and still.
+    /// On the ground: what is new since the last call tells where a flight would begin.
+    pub fn listen(&mut self, now_us: u64) {
+        let frame = self.frame(now_us);
+        if frame.imu.as_ref().is_some_and(is_moved) {
+            self.forget();
+        } else {
+            self.preflight.hear(&frame);
+        }
+    }
+
+    /// The vehicle is put somewhere: what was heard there counts, nothing from before.
+    pub fn forget(&mut self) {
+        (self.place, self.ground_pa, self.preflight) = (None, None, Preflight::default());
+    }
+
+    /// Where a flight would begin now: here, in the middle of the mission's frame. `None` before a second at rest, in which fix
+    /// and barometer have spoken, too.
+    #[must_use]
+    pub fn start(&self) -> Option<Start> {
+        let (Some(_), Some(_)) = (self.place, self.ground_pa) else { return None };
+        let start = self.preflight.start(In::zero())?;
+        // Nothing on this board measures a heading, so that the start looks north.
+        let heading = Rotation::<Ned, Ned, f32>::from_euler(0.0, 0.0, self.heading_rad);
+        let ned_from_body = Rotation::new(heading.quaternion * start.ned_from_body.quaternion);
+        Some(Start { ned_from_body, ..start })
+    }
+
+    /// All sensors speak, it is known where a flight would begin, and the vehicle stands level and still.
     #[must_use]
     pub fn are_ready(&self, now_us: u64) -> bool {
-        Reading::is_fresh(self.imu.as_ref(), now_us, IMU_AGE_US)
+        let speak = Reading::is_fresh(self.imu.as_ref(), now_us, IMU_AGE_US)
             && Reading::is_fresh(self.fix.as_ref(), now_us, GNSS_AGE_US)
-            && Reading::is_fresh(self.pressure_pa.as_ref(), now_us, PRESSURE_AGE_US)
-            && self.imu.is_some_and(|imu| self.attitude.is_level_and_still(&imu.value))
+            && Reading::is_fresh(self.pressure_pa.as_ref(), now_us, PRESSURE_AGE_US);
+        let (true, Some(imu), Some(start)) = (speak, &self.imu, self.start()) else { return false };
+        let (roll, pitch, _) = start.ned_from_body.euler();
+        let rate = imu.value.omega.vector - start.gyro_bias.vector;
+        roll.abs() < LEVEL_RAD && pitch.abs() < LEVEL_RAD && rate.norm() < STILL_RAD_S
     }
 
-    /// The flight begins here. Without fix or pressure it does not: see [`Self::are_ready`].
-    pub fn begin(&mut self) {
-        let (Some(fix), Some(pressure)) = (self.fix, self.pressure_pa) else { return };
-        self.origin = Some((fix.value.place, pressure.value));
-    }
-
-    /// The flight is over.
-    pub fn end(&mut self) {
-        self.origin = None;
-    }
-
-    /// What is new since the last frame; empty before the flight begins.
+    /// What is new since the last frame.
     ///
     /// * `time_us` - since the flight began
     pub fn frame(&mut self, time_us: u64) -> SensorFrame {
         let mut frame = SensorFrame::empty(time_us);
-        let Some((place, pressure_pa)) = self.origin else { return frame };
-        if let Some(imu) = Reading::take(&mut self.imu) {
-            frame.imu = Some(Imu { omega: In::new(self.attitude.without_bias(&imu)), ..imu });
-            frame.attitude = Some(self.attitude.ned_from_body);
-        }
-        frame.gnss = Reading::take(&mut self.fix)
-            .map(|fix| Gnss { position: fix.place.from(&place), velocity: fix.velocity });
-        frame.altitude_m = Reading::take(&mut self.pressure_pa).map(|now| altitude_m(now, pressure_pa));
+        frame.imu = Reading::take(&mut self.imu);
+        frame.gnss = Reading::take(&mut self.fix).map(|fix| {
+            let place = self.place.get_or_insert(fix.place);
+            Gnss { position: fix.place.from(place), velocity: fix.velocity }
+        });
+        frame.altitude_m = Reading::take(&mut self.pressure_pa)
+            .map(|now| altitude_m(now, *self.ground_pa.get_or_insert(now)));
         frame
     }
+}
+
+/// It turns or is pushed, by what [`Preflight`] calls so.
+fn is_moved(sample: &Imu) -> bool {
+    let rest = RestParameters::default();
+    let push_m_s2 = (sample.specific_force.vector.norm() - GRAVITY_M_S2 as f32).abs();
+    sample.omega.vector.norm() >= rest.rate_max_rad_s || push_m_s2 >= rest.force_change_max_m_s2
 }
 
 /// Height above where the pressure was `ground_pa`, m, in the standard atmosphere.
@@ -142,32 +173,58 @@ pub(crate) mod tests {
         (In::zero(), In::new(Vector3::new(0.0, 0.0, -9.80665)))
     }
 
-    /// Everything has spoken for a second.
+    /// A second and a bit at rest, as the board lives it; the sensors, and the time.
     fn standing() -> (Sensors, u64) {
-        let mut sensors = Sensors::new(0.0);
-        for k in 0..300 {
-            sensors.imu(rest().0, rest().1, k * 3333);
-        }
-        let now = 299 * 3333;
-        sensors.fix(fix(), now);
-        sensors.pressure(97_000.0, now);
+        let (mut sensors, mut now) = (Sensors::new(1.2), 0);
+        stand(&mut sensors, &mut now, 330, In::new(Vector3::new(0.01, -0.02, 0.0)));
         (sensors, now)
     }
 
+    fn stand(sensors: &mut Sensors, now: &mut u64, steps: u64, omega: In<Body, f32>) {
+        for k in 0..steps {
+            *now += 3333;
+            sensors.imu(omega, rest().1, *now);
+            if k % 30 == 0 {
+                sensors.fix(fix(), *now);
+            }
+            if k % 6 == 0 {
+                sensors.pressure(97_000.0, *now);
+            }
+            sensors.listen(*now);
+        }
+    }
+
     #[test]
-    fn a_reading_is_in_one_frame() {
+    fn a_reading_is_in_one_frame_and_raw() {
         let (mut sensors, now) = standing();
-        assert_eq!(sensors.frame(0), SensorFrame::empty(0), "before the flight nothing is said");
-        sensors.begin();
-        let first = sensors.frame(10);
-        assert!(first.imu.is_some() && first.attitude.is_some());
-        assert_eq!(first.gnss.unwrap().position, In::zero());
-        assert_eq!(first.altitude_m, Some(0.0));
-        assert_eq!(sensors.frame(20), SensorFrame::empty(20));
+        assert_eq!(sensors.frame(0), SensorFrame::empty(0), "what the ground has heard is not new");
+        sensors.imu(In::new(Vector3::new(0.01, 0.0, 0.0)), rest().1, now + 1);
+        sensors.fix(fix(), now + 1);
         sensors.pressure(96_880.0, now + 1);
-        let next = sensors.frame(30);
+        let next = sensors.frame(20);
+        assert_eq!(next.imu.unwrap().omega.vector, Vector3::new(0.01, 0.0, 0.0));
+        assert_eq!(next.attitude, None, "the flight code estimates");
+        assert_eq!(next.gnss.unwrap().position, In::zero());
         assert!((next.altitude_m.unwrap() - 10.7).abs() < 0.3, "{next:?}");
-        assert_eq!((next.imu, next.gnss), (None, None));
+        assert_eq!(sensors.frame(30), SensorFrame::empty(30));
+    }
+
+    #[test]
+    fn a_second_at_rest_says_where_the_flight_begins() {
+        let (mut sensors, mut now) = (Sensors::new(1.2), 0);
+        stand(&mut sensors, &mut now, 280, In::zero());
+        assert_eq!(sensors.start(), None, "it is no second yet");
+        let (mut sensors, mut now) = standing();
+        let start = sensors.start().unwrap();
+        assert!((start.gyro_bias.vector - Vector3::new(0.01, -0.02, 0.0)).norm() < 1e-5);
+        let truth = Rotation::<Ned, Body, f32>::from_euler(0.0, 0.0, 1.2);
+        assert!(start.ned_from_body.quaternion.angle_to(&truth.quaternion) < 1e-3);
+        assert_eq!((start.position, start.fix_offset), (In::zero(), In::zero()));
+        // Moved and put down elsewhere, where the first fix says.
+        stand(&mut sensors, &mut now, 1, In::new(Vector3::new(0.0, 0.5, 0.0)));
+        assert_eq!((sensors.start(), sensors.place), (None, None));
+        stand(&mut sensors, &mut now, 330, In::zero());
+        assert!(sensors.start().is_some_and(|start| start.gyro_bias == In::zero()));
     }
 
     #[test]
@@ -176,16 +233,14 @@ pub(crate) mod tests {
         assert!(sensors.are_ready(now));
         assert!(!sensors.are_ready(now + IMU_AGE_US + 1));
         assert!(!Sensors::new(0.0).are_ready(0));
-        for missing in 0..2 {
+        for missing in 0..3 {
             let (mut sensors, now) = standing();
-            if missing == 0 {
-                sensors.fix = None;
-            } else {
-                sensors.pressure_pa = None;
+            match missing {
+                0 => sensors.fix = None,
+                1 => sensors.pressure_pa = None,
+                _ => sensors.place = None,
             }
-            assert!(!sensors.are_ready(now));
-            sensors.begin();
-            assert_eq!(sensors.origin, None, "a flight without an origin does not begin");
+            assert!(!sensors.are_ready(now), "{missing}");
         }
         let (mut moving, _) = standing();
         moving.imu(In::new(Vector3::new(0.0, 0.5, 0.0)), rest().1, now + 1);
@@ -193,10 +248,23 @@ pub(crate) mod tests {
     }
 
     #[test]
+    fn tilted_it_is_not_ready() {
+        let (mut sensors, mut now) = standing();
+        for _ in 0..2000 {
+            now += 3333;
+            let tilted =
+                Rotation::<Ned, Body, f32>::from_euler(0.25, 0.0, 0.0).inverse() * In::new(rest().1.vector);
+            sensors.imu(In::zero(), tilted, now);
+            sensors.fix(fix(), now);
+            sensors.pressure(97_000.0, now);
+            sensors.listen(now);
+        }
+        assert!(sensors.start().is_some() && !sensors.are_ready(now));
+    }
+
+    #[test]
     fn nonsense_is_silence() {
         let (mut sensors, now) = standing();
-        sensors.begin();
-        sensors.frame(0);
         sensors.imu(In::new(Vector3::new(f32::NAN, 0.0, 0.0)), rest().1, now + 1);
         for pressure in [f32::NAN, 0.0, -1.0, f32::INFINITY] {
             sensors.pressure(pressure, now + 1);

@@ -5,19 +5,19 @@
 //! 2. A flight with the flight code in QEMU must leave the same log, byte for byte, as one without.
 //! 3. Negative controls: another mass by one bit must change the hashes, a step that may panic must not link.
 //! 4. The workspace is linted; the image for the real part is built and sized, and what of it needs no hardware is tested.
-//! 5. Instructions of a step, size of the image that holds nothing but the step, its worst-case stack, against
-//!    `firmware/figures.txt`; `--write` takes the new ones.
+//! 5. Instructions of control and of the estimator, size of the images that hold nothing but control or the whole step, worst-case
+//!    stack, against `firmware/figures.txt` and the budget; `--write` takes the new ones.
 
 mod board;
 mod elf;
+mod figures;
 mod policy;
 mod stack;
 
 use crate::run::{call, cargo, installed_on_ci, root, succeeds, target_directory};
 use crate::thumb;
 use elf::Elf;
-use std::collections::BTreeMap;
-use std::fmt::Write as _;
+use figures::{FIGURES, Figures, check_budget, compare, parse, recorded};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -27,12 +27,6 @@ const ARMS: [&str; 7] =
 /// Which of them has the most to do.
 const LEARNED: usize = 5;
 const FAULTS: &str = "100";
-const FIGURES: &str = "firmware/figures.txt";
-/// A figure that grows by more than this is an error: compilers differ a little, careless code more.
-const GROWTH_ALLOWED: f64 = 0.05;
-/// Clock of the real part, and rates of the loops, Hz.
-const CLOCK_HZ: f64 = 480e6;
-const RATES_HZ: [f64; 2] = [300.0, 10.0];
 
 /// `cargo xtask firmware`.
 pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
@@ -40,6 +34,7 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
         [] => check().map(|_| ()),
         [write] if write == "--write" => {
             let figures = measure()?;
+            check_budget(&figures)?;
             let path = root()?.join(FIGURES);
             let partial = path.with_extension("partial");
             std::fs::write(&partial, recorded(&figures))
@@ -77,6 +72,7 @@ pub(crate) fn check() -> Result<String, String> {
     let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
     let (table, grown) = compare(&figures, &parse(&text)?);
     eprint!("{table}");
+    check_budget(&figures)?;
     if grown.is_empty() {
         Ok(String::new())
     } else {
@@ -86,9 +82,6 @@ pub(crate) fn check() -> Result<String, String> {
         ))
     }
 }
-
-/// A figure by its name with unit.
-type Figures = BTreeMap<&'static str, u64>;
 
 fn measure() -> Result<Figures, String> {
     emulator()?;
@@ -113,7 +106,7 @@ fn measure() -> Result<Figures, String> {
     eprintln!("negative control: a step that may panic does not link");
 
     let images = build(&["--package=squirrel-m7"])?;
-    eprintln!("no panic can be reached from the step: its image links");
+    eprintln!("no panic can be reached from control nor from the whole step: their images link");
     let mut flights = squirrel.play("flights")?;
     // The mass is nothing to a flight that is commanded, so that it is no part of the negative control.
     let commanded = squirrel.play("commanded")?;
@@ -130,14 +123,17 @@ fn measure() -> Result<Figures, String> {
     eprintln!("fly --hil qemu: the same log, byte for byte");
 
     let mut figures = flights.figures()?;
-    let path = images.join("step");
-    let bytes = std::fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
-    let elf = Elf::parse(&bytes).map_err(|error| format!("{}: {error}", path.display()))?;
-    figures.insert("step image: text, B", elf.size(".text").into());
-    figures.insert("step image: constants, B", elf.size(".rodata").into());
-    let (bytes, chain) = stack::worst_case(&elf, "squirrel_step")?;
-    eprintln!("deepest chain of calls: {}", chain.join(" > "));
-    figures.insert("step: stack, worst case, B", bytes.into());
+    for (image, function, names) in
+        [("control", "squirrel_control", figures::OF_CONTROL), ("step", "squirrel_step", figures::OF_STEP)]
+    {
+        let path = images.join(image);
+        let bytes = std::fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let elf = Elf::parse(&bytes).map_err(|error| format!("{}: {error}", path.display()))?;
+        let (stack_bytes, chain) = stack::worst_case(&elf, function)?;
+        eprintln!("{image}: deepest chain of calls: {}", chain.join(" > "));
+        let values = [elf.size(".text"), elf.size(".rodata"), stack_bytes];
+        figures.extend(names.into_iter().zip(values.map(u64::from)));
+    }
     board::size(&mut figures)?;
     Ok(figures)
 }
@@ -253,60 +249,18 @@ impl Played {
         };
         for (i, line) in self.lines[1..].iter().enumerate() {
             let words: Vec<&str> = line.split(' ').collect();
-            keep_largest("inner step, mean of the worst arm, instructions", number(&words, 6)?);
-            keep_largest("inner step, worst, instructions", number(&words, 7)?);
+            for (name, at) in figures::OF_ANY_FLIGHT {
+                keep_largest(name, number(&words, at)?);
+            }
             // Sequences are in the order of `ARMS`, the policy's behind them.
             if i == LEARNED {
-                keep_largest("inner and outer step with paRNN, mean, instructions", number(&words, 10)?);
-                keep_largest("inner and outer step with paRNN, worst, instructions", number(&words, 11)?);
+                for (name, at) in figures::OF_THE_LEARNED_ARM {
+                    keep_largest(name, number(&words, at)?);
+                }
             }
         }
         Ok(figures)
     }
-}
-
-/// Name, recorded and measured figure a line, and what grew.
-fn compare(measured: &Figures, recorded: &BTreeMap<String, u64>) -> (String, Vec<&'static str>) {
-    let mut text = format!("{:<54} {:>9} {:>9}\n", "figure", "recorded", "now");
-    let mut grown = Vec::new();
-    for (name, now) in measured {
-        let before = recorded.get(*name);
-        let shown = before.map_or("-".to_owned(), u64::to_string);
-        let _ = writeln!(text, "{name:<54} {shown:>9} {now:>9}");
-        if before.is_none_or(|before| *now as f64 > *before as f64 * (1.0 + GROWTH_ALLOWED)) {
-            grown.push(*name);
-        }
-    }
-    let of = |name: &str| measured.get(name).map_or(0.0, |n| *n as f64);
-    let load = RATES_HZ[0] * of("inner step, worst, instructions")
-        + RATES_HZ[1] * of("inner and outer step with paRNN, worst, instructions");
-    let percent = 100.0 * load / CLOCK_HZ;
-    let _ = writeln!(
-        text,
-        "{:<54} {:>9} {percent:>8.2}%",
-        "load at 480 MHz, one instruction a cycle (a proxy)", ""
-    );
-    (text, grown)
-}
-
-fn recorded(figures: &Figures) -> String {
-    let mut text = String::from(
-        "# Figures of the flight code on a Cortex-M7; `cargo xtask firmware --write` makes this file.\n",
-    );
-    for (name, value) in figures {
-        let _ = writeln!(text, "{name}: {value}");
-    }
-    text
-}
-
-fn parse(text: &str) -> Result<BTreeMap<String, u64>, String> {
-    let lines = text.lines().filter(|line| !line.starts_with('#'));
-    lines
-        .map(|line| {
-            let entry = line.rsplit_once(": ").and_then(|(name, n)| Some((name.to_owned(), n.parse().ok()?)));
-            entry.ok_or_else(|| format!("{FIGURES}: `{line}`: must be a name, a colon and a number"))
-        })
-        .collect()
 }
 
 #[cfg(test)]
@@ -314,27 +268,21 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_grows_is_named_and_the_rest_is_shown() {
-        let now = Figures::from([("state, B", 110), ("step: stack, worst case, B", 100)]);
-        let before =
-            parse(&recorded(&Figures::from([("state, B", 100), ("step: stack, worst case, B", 99)])));
-        let (table, grown) = compare(&now, &before.unwrap());
-        assert_eq!(grown, ["state, B"]);
-        assert!(table.lines().nth(1).unwrap().ends_with("100       110"), "{table}");
-        let (_, new) = compare(&now, &BTreeMap::new());
-        assert_eq!(new.len(), 2, "a figure that is not recorded is not passed over");
-        assert!(parse("state").is_err());
-    }
-
-    #[test]
     fn lines_of_the_image_become_figures() {
-        let line = |inner: u32| format!("sequence 9 ab same inner 8 10 {inner} outer 1 20 30");
+        let line = |inner: u32| {
+            format!(
+                "sequence 9 ab same inner 8 10 {inner} outer 1 20 30 inertial 7 40 50 aided 2 60 70 whole 9 80 90"
+            )
+        };
         let mut lines = vec!["memory stack 5 state 6".to_owned()];
         lines.extend((0..7).map(line));
         let figures = Played { lines, well: true }.figures().unwrap();
         assert_eq!(figures["state, B"], 6);
         assert_eq!(figures["inner step, worst, instructions"], 6);
         assert_eq!(figures["inner and outer step with paRNN, worst, instructions"], 30);
+        assert_eq!(figures["estimator, inertial units alone, worst, instructions"], 50);
+        assert_eq!(figures["estimator, fix, barometer or compass too, mean, instructions"], 60);
+        assert_eq!(figures["whole step, worst, instructions"], 90);
         let broken = Played { lines: vec!["memory".to_owned(), "x".to_owned()], well: true };
         assert!(broken.figures().is_err());
     }

@@ -167,6 +167,40 @@ pub struct Eskf {
     surprise: (f32, u32),
 }
 
+/// How a step carries an error on: what F differs from the identity by.
+struct Carry {
+    of_turn: Matrix3<f32>,
+    of_bias: Matrix3<f32>,
+    turning: Matrix3<f32>,
+    dt_s: f32,
+}
+
+impl Carry {
+    /// Position, velocity, turn, in this order: each takes what the next was before.
+    fn step(&self, error: &mut [f32; STATES]) {
+        let [px, py, pz, vx, vy, vz, tx, ty, tz, ax, ay, az, gx, gy, gz] = error;
+        let dt_s = self.dt_s;
+        for (p, v) in [(px, &*vx), (py, &*vy), (pz, &*vz)] {
+            *p += *v * dt_s;
+        }
+        let by_turn = times(&self.of_turn, [*tx, *ty, *tz]);
+        let by_bias = times(&self.of_bias, [*ax, *ay, *az]);
+        for (i, v) in [vx, vy, vz].into_iter().enumerate() {
+            *v = *v + by_turn[i] + by_bias[i];
+        }
+        let turned = times(&self.turning, [*tx, *ty, *tz]);
+        for (i, (t, g)) in [(tx, gx), (ty, gy), (tz, gz)].into_iter().enumerate() {
+            *t = turned[i] - *g * dt_s;
+        }
+    }
+}
+
+/// A product that is spelled out: a loop over nine numbers is most of its own work.
+#[inline(always)]
+fn times(m: &Matrix3<f32>, [x, y, z]: [f32; 3]) -> [f32; 3] {
+    [m.m11 * x + m.m12 * y + m.m13 * z, m.m21 * x + m.m22 * y + m.m23 * z, m.m31 * x + m.m32 * y + m.m33 * z]
+}
+
 /// In a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Refused {
@@ -266,40 +300,30 @@ impl Eskf {
         let of_turn = ned_from_body * cross(force) * -dt_s;
         let of_bias = ned_from_body * -dt_s;
         let turning = Matrix3::identity() - cross(omega) * dt_s;
-        // F P F' by blocks, rows and then columns: most of F is the identity.
+        // F P F', columns and then rows: most of F is the identity.
+        let carry = Carry { of_turn, of_bias, turning, dt_s };
+        let columns = &mut self.covariance.data.0;
+        for column in columns.iter_mut() {
+            carry.step(column);
+        }
+        for i in 0..STATES {
+            let mut row = [0.0; STATES];
+            for (x, column) in row.iter_mut().zip(columns.iter()) {
+                *x = column[i];
+            }
+            carry.step(&mut row);
+            for (x, column) in row.iter().zip(columns.iter_mut()) {
+                column[i] = *x;
+            }
+        }
         let c = &mut self.covariance;
-        let row = |c: &SMatrix<f32, STATES, STATES>, part| c.fixed_view::<3, STATES>(part, 0).into_owned();
-        let rows = [
-            (POSITION, row(c, POSITION) + row(c, VELOCITY) * dt_s),
-            (VELOCITY, row(c, VELOCITY) + of_turn * row(c, TURN) + of_bias * row(c, ACCEL_BIAS)),
-            (TURN, turning * row(c, TURN) - row(c, GYRO_BIAS) * dt_s),
-        ];
-        for (part, rows) in rows {
-            c.fixed_view_mut::<3, STATES>(part, 0).copy_from(&rows);
-        }
-        let column = |c: &SMatrix<f32, STATES, STATES>, part| c.fixed_view::<STATES, 3>(0, part).into_owned();
-        let columns = [
-            (POSITION, column(c, POSITION) + column(c, VELOCITY) * dt_s),
-            (
-                VELOCITY,
-                column(c, VELOCITY)
-                    + column(c, TURN) * of_turn.transpose()
-                    + column(c, ACCEL_BIAS) * of_bias.transpose(),
-            ),
-            (TURN, column(c, TURN) * turning.transpose() - column(c, GYRO_BIAS) * dt_s),
-        ];
-        for (part, columns) in columns {
-            c.fixed_view_mut::<STATES, 3>(0, part).copy_from(&columns);
-        }
         for (part, variance) in [
             (VELOCITY, square(p.accel_noise_m_s2 * dt_s)),
             (TURN, square(p.gyro_noise_rad_s * dt_s)),
             (ACCEL_BIAS, square(p.accel_walk_m_s2_root_s) * dt_s),
             (GYRO_BIAS, square(p.gyro_walk_rad_s_root_s) * dt_s),
         ] {
-            for i in part..part + 3 {
-                c[(i, i)] += variance;
-            }
+            on_diagonal(c, part, |x| x + variance);
         }
     }
 
@@ -307,7 +331,7 @@ impl Eskf {
     ///
     /// Whether it was believed.
     fn update(&mut self, moved: &mut Row, row: &Row, residual: f32, noise: f32, is_gated: bool) -> bool {
-        let across = self.covariance * row;
+        let across = self.across(row);
         let variance = row.dot(&across) + square(noise);
         let left = residual - row.dot(moved);
         // What is no number is refused, too.
@@ -319,8 +343,32 @@ impl Eskf {
         }
         let gain = across / variance;
         *moved += gain * left;
-        self.covariance -= gain * across.transpose();
+        self.covariance.ger(-1.0, &gain, &across, 1.0);
         true
+    }
+
+    /// The covariance times a row, most of which is zero.
+    fn across(&self, row: &Row) -> Row {
+        let mut across = Row::zeros();
+        for (column, share) in self.covariance.column_iter().zip(row.iter()) {
+            if *share != 0.0 {
+                across.axpy(*share, &column, 1.0);
+            }
+        }
+        across
+    }
+
+    /// What rounding made of a symmetric covariance, symmetric again.
+    fn symmetrise(&mut self) {
+        let columns = &mut self.covariance.data.0;
+        for i in 1..STATES {
+            let (before, after) = columns.split_at_mut(i);
+            let Some(column) = after.first_mut() else { return };
+            for (j, other) in before.iter_mut().enumerate() {
+                let mean = (other[i] + column[j]) * 0.5;
+                (other[i], column[j]) = (mean, mean);
+            }
+        }
     }
 
     /// Puts an error into the state.
@@ -331,7 +379,9 @@ impl Eskf {
         self.attitude = turned(&self.attitude, &part(TURN));
         self.accel_bias += part(ACCEL_BIAS);
         self.gyro_bias += part(GYRO_BIAS);
-        self.past.correct(&part(POSITION), &part(VELOCITY));
+        if part(POSITION) != Vector3::zeros() || part(VELOCITY) != Vector3::zeros() {
+            self.past.correct(&part(POSITION), &part(VELOCITY));
+        }
     }
 
     /// Counts a refusal; how many they are in a row now.
@@ -355,7 +405,7 @@ impl Estimator for Eskf {
         let mut moved = Row::zeros();
         let unit = |at: usize| {
             let mut row = Row::zeros();
-            row[at] = 1.0;
+            set(&mut row, at, 1.0);
             row
         };
         if let Some(gnss) = &sensed.gnss {
@@ -375,7 +425,7 @@ impl Estimator for Eskf {
             }
             for i in 0..3 {
                 let mut row = unit(POSITION + i);
-                row[VELOCITY + i] = -late_s;
+                set(&mut row, VELOCITY + i, -late_s);
                 let noise = p.gnss_position_noise_m;
                 believed &= self.update(&mut moved, &row, position[i], noise, is_gated);
             }
@@ -396,7 +446,7 @@ impl Estimator for Eskf {
         if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
             let mut row = Row::zeros();
             row.fixed_rows_mut::<3>(TURN).copy_from(&down(&self.attitude));
-            let variance = row.dot(&(self.covariance * row)) + square(p.heading_noise_rad);
+            let variance = row.dot(&self.across(&row)) + square(p.heading_noise_rad);
             let believed = square(error) <= square(p.gate) * variance
                 && self.update(&mut moved, &row, -error, COMPASS_MEMORY * p.heading_noise_rad, true);
             self.refused.fields = self.count(self.refused.fields, believed);
@@ -411,7 +461,7 @@ impl Estimator for Eskf {
             }
         }
         self.inject(&moved);
-        self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
+        self.symmetrise();
         // After what no vehicle does, the covariance may be none any more; the filter then starts from where it is.
         if !self.covariance.diagonal().iter().all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX) {
             self.covariance = at_start(&p);
@@ -438,13 +488,27 @@ fn at_start(p: &EskfParameters) -> SMatrix<f32, STATES, STATES> {
         (ACCEL_BIAS, p.start_accel_bias_m_s2),
         (GYRO_BIAS, p.start_gyro_bias_rad_s),
     ] {
-        for i in part..part + 3 {
-            covariance[(i, i)] = square(deviation);
-        }
+        on_diagonal(&mut covariance, part, |_| square(deviation));
     }
     // It stands level, so that a turn about its down is one of the heading.
     covariance[(TURN + 2, TURN + 2)] = square(p.start_heading_rad);
     covariance
+}
+
+/// One number of a row.
+fn set(row: &mut Row, at: usize, value: f32) {
+    if let Some(x) = row.get_mut(at) {
+        *x = value;
+    }
+}
+
+/// Changes three numbers of the diagonal. An index that is only a loop's would leave a panic in the code.
+fn on_diagonal(covariance: &mut SMatrix<f32, STATES, STATES>, part: usize, change: impl Fn(f32) -> f32) {
+    for i in part..part + 3 {
+        if let Some(x) = covariance.get_mut((i, i)) {
+            *x = change(*x);
+        }
+    }
 }
 
 fn square(x: f32) -> f32 {

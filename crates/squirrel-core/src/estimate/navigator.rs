@@ -12,7 +12,7 @@ use super::mahony::{Mahony, MahonyParameters};
 use super::mekf::{Mekf, MekfParameters};
 use super::rkf::{Rkf, RkfParameters};
 use super::voting::Voter;
-use super::{Estimator, STEP_MAX_S, Sensed};
+use super::{Estimate, Estimator, STEP_MAX_S, Sensed};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{GRAVITY_M_S2, lower};
 use crate::stack::{Gnss, Imu, SensorFrame};
@@ -171,14 +171,19 @@ impl Running {
         }
     }
 
-    fn listening(&mut self) -> Option<&mut dyn Estimator> {
-        match self {
-            Self::None => None,
-            Self::Rkf(filter) => Some(filter),
-            Self::Mahony(filter) => Some(filter),
-            Self::Mekf(filter) => Some(filter),
-            Self::Eskf(filter) => Some(filter),
+    /// A step of the filter that listens, and what it believes then. Calls by name, for one through a pointer has no known stack.
+    fn step(&mut self, sensed: &Sensed) -> Option<Estimate> {
+        fn of(filter: &mut impl Estimator, sensed: &Sensed) -> Estimate {
+            filter.step(sensed);
+            filter.estimate()
         }
+        Some(match self {
+            Self::None => return None,
+            Self::Rkf(filter) => of(filter, sensed),
+            Self::Mahony(filter) => of(filter, sensed),
+            Self::Mekf(filter) => of(filter, sensed),
+            Self::Eskf(filter) => of(filter, sensed),
+        })
     }
 }
 
@@ -217,11 +222,14 @@ impl NavigationState {
 
 /// What control is told.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Told {
-    pub(crate) frame: SensorFrame,
+pub struct Told {
+    /// The step's frame, estimated.
+    pub frame: SensorFrame,
     pub(crate) terms: Option<NavigationTerms>,
     /// Measurements that were no numbers.
     pub(crate) rejected: u32,
+    /// Since the frame before, us.
+    pub(crate) elapsed_us: u32,
 }
 
 impl Navigation {
@@ -301,9 +309,9 @@ impl Navigation {
             // Control rejects and counts by itself.
             let mut as_it_was = *frame;
             as_it_was.imu = told.imu.or(frame.imu);
-            return Told { frame: as_it_was, terms: None, rejected: 0 };
+            return Told { frame: as_it_was, terms: None, rejected: 0, elapsed_us };
         }
-        if state.running == Running::None {
+        if matches!(state.running, Running::None) {
             state.running = Running::of(self);
             state.fix = Some(Gnss { position: self.start.position, velocity: In::zero() });
         }
@@ -329,24 +337,24 @@ impl Navigation {
         state.fix_age_s = if told.gnss.is_some() { 0.0 } else { lower(state.fix_age_s + dt_s, 1e6) };
         state.fix = told.gnss.or(state.fix);
         told.attitude = None;
-        let Some(imu) = told.imu else { return Told { frame: told.without_motion(), terms: None, rejected } };
+        let Some(imu) = told.imu else {
+            return Told { frame: told.without_motion(), terms: None, rejected, elapsed_us };
+        };
         let Some(terms) = self.hear(state, &imu) else {
-            return Told { frame: told.without_motion(), terms: None, rejected };
+            return Told { frame: told.without_motion(), terms: None, rejected, elapsed_us };
         };
         told.imu = Some(Imu { omega: imu.omega - terms.gyro_bias, ..imu });
         told.attitude = Some(terms.ned_from_body);
         told.altitude_m = None;
         told.gnss = Some(Gnss { position: terms.position, velocity: terms.velocity })
             .filter(|_| !state.health.has(Health::POSITION_LOST));
-        Told { frame: told, terms: Some(terms), rejected }
+        Told { frame: told, terms: Some(terms), rejected, elapsed_us }
     }
 
     /// Runs the filter on an inertial measurement and what waited for it.
     fn hear(&self, state: &mut NavigationState, imu: &Imu) -> Option<NavigationTerms> {
         let Waiting { dt_s, gnss, altitude_m, magnetic } = core::mem::take(&mut state.waiting);
-        let filter = state.running.listening()?;
-        filter.step(&Sensed { dt_s, imu: *imu, gnss, altitude_m, magnetic });
-        let estimate = filter.estimate();
+        let estimate = state.running.step(&Sensed { dt_s, imu: *imu, gnss, altitude_m, magnetic })?;
         let (position, velocity, doubts, alone_s) = match (estimate.motion, &state.running) {
             (Some((position, velocity)), Running::Eskf(filter)) => {
                 (position, velocity, filter.doubts(), filter.alone_s())

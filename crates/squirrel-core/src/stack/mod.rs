@@ -22,7 +22,7 @@ use crate::control::position::Motion;
 use crate::control::twcc::{Airframe, TwccParameters, TwccState, TwccTerms};
 use crate::control::{AttitudeThrust, Reference};
 use crate::estimate::monitor::Monitor;
-use crate::estimate::navigator::{Health, Navigation, NavigationState, NavigationTerms};
+use crate::estimate::navigator::{Health, Navigation, NavigationState, NavigationTerms, Start, Told};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
@@ -184,19 +184,43 @@ impl Stack {
         &self.parameters
     }
 
+    /// The same vehicle, gains and mission, from where a flight begins.
+    ///
+    /// # Errors
+    /// As [`Navigation::check`].
+    pub fn starting(&self, start: Start) -> Result<Self, ParameterError> {
+        let mut stack = *self;
+        stack.parameters.navigation.start = start;
+        stack.parameters.navigation.check()?;
+        Ok(stack)
+    }
+
     /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any frame.
+    ///
+    /// It is [`Self::navigate`], [`Self::control`] on what that believes, and [`Self::watch`].
     pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
+        let told = self.navigate(state, frame);
+        let mut output = self.control(state, &told.frame);
+        self.watch(state, &told, &mut output);
+        output
+    }
+
+    /// The first part of a step: what the sensors say, estimated, as a frame for [`Self::control`].
+    pub fn navigate(&self, state: &mut StackState, frame: &SensorFrame) -> Told {
         let elapsed_us = elapsed_us(state, frame).unwrap_or(0);
         let told = self.parameters.navigation.step(&mut state.navigation, frame, elapsed_us);
         state.rejected = state.rejected.saturating_add(told.rejected);
-        let mut output = self.control(state, &told.frame);
+        told
+    }
+
+    /// The last part of a step: whether the rotors push as control told them, and what is to be logged of the estimate.
+    pub fn watch(&self, state: &mut StackState, told: &Told, output: &mut StackOutput) {
         let achieved = output.inner.as_ref().map(|inner| &inner.mixer.achieved);
-        let (imu, dt_s) = (told.frame.imu.as_ref(), lower(elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S));
-        state.monitor.look(&self.vehicle, achieved, imu, state.wing_command, dt_s);
+        let dt_s = lower(told.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
+        state.monitor.look(&self.vehicle, achieved, told.frame.imu.as_ref(), state.wing_command, dt_s);
         output.health =
             state.monitor.judge(&self.vehicle, told.frame.attitude.as_ref(), state.navigation.health);
         output.navigation = told.terms;
-        output
     }
 
     /// One inner step on the attitude, position and velocity that the frame brings; as total as [`Self::step`].

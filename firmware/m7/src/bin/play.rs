@@ -1,13 +1,20 @@
 //! Plays recorded sensor frames through the flight code and says the hash of every output.
 //!
-//! `play VECTORS` where the file is one of `squirrel export-vectors`. One line a sequence, with the instructions of steps
-//! without and with the outer loop: `sequence STEPS HASH same|differs@STEP inner CALLS MEAN WORST outer CALLS MEAN WORST`.
+//! `play VECTORS` where the file is one of `squirrel export-vectors`. One line a sequence:
+//! `sequence STEPS HASH same|differs@STEP`, then a name and `CALLS MEAN WORST` instructions each of
+//!
+//! - `inner`, `outer`: `Stack::control` without and with the outer loop
+//! - `inertial`, `aided`: the estimator where only inertial units spoke, and where anything else did, too
+//! - `whole`: `Stack::step`, all of these
+//!
+//! Each frame is flown twice, whole and in parts, and both must say the same.
 
 #![no_std]
 #![no_main]
 
 use core::fmt::Write;
 use cortex_m_rt::entry;
+use squirrel_core::estimate::navigator::Told;
 use squirrel_core::stack::wire::{
     HASH_START, Header, RECORD_MAX, Reader, Record, SETUP, Wire, hash, written,
 };
@@ -27,11 +34,15 @@ fn panic(info: &core::panic::PanicInfo) -> ! {
 struct Sequence {
     stack: Stack,
     state: StackState,
+    state_of_parts: StackState,
     steps: u32,
     hash: u64,
     differs_at: Option<u32>,
     inner: Counts,
     outer: Counts,
+    inertial: Counts,
+    aided: Counts,
+    whole: Counts,
 }
 
 impl Sequence {
@@ -39,24 +50,43 @@ impl Sequence {
         Self {
             stack: *stack,
             state: StackState::default(),
+            state_of_parts: StackState::default(),
             steps: 0,
             hash: HASH_START,
             differs_at: None,
             inner: Counts::default(),
             outer: Counts::default(),
+            inertial: Counts::default(),
+            aided: Counts::default(),
+            whole: Counts::default(),
         }
     }
 
     fn step(&mut self, counter: &mut Counter, frame: &SensorFrame, expected: u64) -> Option<()> {
         let (output, count) = counter.of(|| one_step(&self.stack, &mut self.state, frame));
-        let counts = if output.outer.is_some() { &mut self.outer } else { &mut self.inner };
-        counts.add(count);
-        self.hash = written(&output, |bytes| hash(self.hash, bytes))?;
-        if self.hash != expected && self.differs_at.is_none() {
+        self.whole.add(count);
+        let before = self.hash;
+        self.hash = written(&output, |bytes| hash(before, bytes))?;
+        let of_parts = self.parts(counter, frame);
+        let is_same = written(&of_parts, |bytes| hash(before, bytes))? == self.hash;
+        if !(is_same && self.hash == expected) && self.differs_at.is_none() {
             self.differs_at = Some(self.steps);
         }
         self.steps += 1;
         Some(())
+    }
+
+    fn parts(&mut self, counter: &mut Counter, frame: &SensorFrame) -> StackOutput {
+        let (stack, state) = (&self.stack, &mut self.state_of_parts);
+        let (told, to_navigate) = counter.of(|| navigate(stack, state, frame));
+        let (mut output, to_control) = counter.of(|| control(stack, state, &told.frame));
+        let ((), to_watch) = counter.of(|| watch(stack, state, &told, &mut output));
+        let is_aided = frame.gnss.is_some() || frame.altitude_m.is_some() || frame.magnetic.is_some();
+        let estimator = if is_aided { &mut self.aided } else { &mut self.inertial };
+        estimator.add(to_navigate + to_watch);
+        let loops = if output.outer.is_some() { &mut self.outer } else { &mut self.inner };
+        loops.add(to_control);
+        output
     }
 
     fn report(&self, out: &mut File) -> Option<()> {
@@ -66,14 +96,31 @@ impl Sequence {
             Some(step) => write!(out, "differs@{step}"),
         }
         .ok()?;
-        writeln!(out, " inner {} outer {}", self.inner, self.outer).ok()
+        write!(out, " inner {} outer {}", self.inner, self.outer).ok()?;
+        writeln!(out, " inertial {} aided {} whole {}", self.inertial, self.aided, self.whole).ok()
     }
 }
 
-/// A function of its own, as a task of a real board would call it.
+// Functions of their own, as a task of a real board would call them.
+
 #[inline(never)]
 fn one_step(stack: &Stack, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
     stack.step(state, frame)
+}
+
+#[inline(never)]
+fn navigate(stack: &Stack, state: &mut StackState, frame: &SensorFrame) -> Told {
+    stack.navigate(state, frame)
+}
+
+#[inline(never)]
+fn control(stack: &Stack, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
+    stack.control(state, frame)
+}
+
+#[inline(never)]
+fn watch(stack: &Stack, state: &mut StackState, told: &Told, output: &mut StackOutput) {
+    stack.watch(state, told, output);
 }
 
 /// Whether every output was the host's; `None` where the file is not what it should be.
