@@ -6,7 +6,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::filters::{Filters, Plan, run};
 
 fn study(trials: u32) -> Filters {
-    run(&Plan { vehicle: VehicleFile::squirrel(), trials, seed: 1 }, || ()).unwrap()
+    run(&Plan { vehicle: VehicleFile::squirrel(), trials, seed: 1 }, None, || ()).unwrap()
 }
 
 /// The paper's filter bears accelerations if the gyro is calibrated, the plain one never does, and the default does in any case.
@@ -21,6 +21,11 @@ fn the_default_needs_no_calibration_and_the_papers_filter_does() {
     assert!(rms("rkf_mtf", true).high <= 1.2, "{:?}", rms("rkf_mtf", true));
     assert!(rms("rkf_mtf", false).low > 2.0, "{:?}", rms("rkf_mtf", false));
     assert!(rms("kalman", false).low > 4.0, "{:?}", rms("kalman", false));
+    for row in &study.in_loop {
+        assert!(row.ratio.value <= 1.15 && row.lost == 0, "{row:?}");
+        assert!(row.flagged <= 2, "what is well is not reported: {row:?}");
+    }
+    assert_eq!(study.in_loop.len(), 4);
     assert!(rms("mahony", true).low > rms("mekf", true).high);
 }
 
@@ -33,5 +38,5 @@ fn one_thread_and_two_give_the_same_numbers() {
 #[test]
 fn no_trials_is_an_error() {
     let plan = Plan { vehicle: VehicleFile::squirrel(), trials: 0, seed: 1 };
-    assert!(run(&plan, || ()).unwrap_err().to_string().starts_with("trials = 0"));
+    assert!(run(&plan, None, || ()).unwrap_err().to_string().starts_with("trials = 0"));
 }

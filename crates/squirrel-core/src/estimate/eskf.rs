@@ -10,11 +10,12 @@
 //! A satellite fix is late: it is compared with where the filter was then, which it remembers (`Past`), and a velocity that errs has
 //! carried the position along since. Measurements are taken in number by number, each with a gate of some deviations, so that an outlier
 //! costs nothing. Fixes that are refused for long are believed in the end. A barometer that is, has jumped: its zero is moved to where the
-//! filter is. A compass never is believed against the rest.
+//! filter is. A compass never is believed against the rest. Where all fixes contradict for seconds the filter itself is wrong, and starts anew from the
+//! accelerometer and the next fix.
 
-use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, heading_error, turned};
+use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, heading_error, levelled, turned};
 use crate::frames::{Body, In, Ned, Rotation};
-use crate::math::{GRAVITY_M_S2, limit, lower};
+use crate::math::{GRAVITY_M_S2, limit, lower, upper};
 use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
 
 /// Numbers of the error's state: position, velocity, turn, bias of the accelerometer, bias of the gyro.
@@ -34,6 +35,14 @@ const ALONE_S: f32 = 0.5;
 const VARIANCE_MAX: f32 = 1e8;
 /// A compass errs by its vehicle's iron: so many times the deviation of a reading stands for many that err alike.
 const COMPASS_MEMORY: f32 = 10.0;
+/// A fix's normalised innovation squared, over its numbers, counts for so much at most: some outliers are no doubt.
+const SURPRISE_MAX: f32 = 30.0;
+/// Share of a fix's surprise in the mean.
+const UNEASE_SHARE: f32 = 0.05;
+/// Mean surprise at which the filter is wrong: after two seconds of fixes beyond their gate.
+const UNEASE_MAX: f32 = 20.0;
+/// What is then known of the attitude, rad.
+const START_ANEW_RAD: f32 = 0.5;
 /// Refusals in a row after which a sensor is right.
 const STUBBORN: u8 = 20;
 /// And after which it is doubted.
@@ -163,6 +172,10 @@ pub struct Eskf {
     baro_offset_m: f32,
     /// Refused since the start.
     refusals: u32,
+    /// How much fixes surprise, on the whole: 1 where the filter errs as it says.
+    unease: f32,
+    /// How often it started anew.
+    restarts: u32,
     /// Squares of the last step's innovations over their variances, and how many there were.
     surprise: (f32, u32),
 }
@@ -244,6 +257,8 @@ impl Eskf {
             refused: Refused::default(),
             baro_offset_m: 0.0,
             refusals: 0,
+            unease: 1.0,
+            restarts: 0,
             surprise: (0.0, 0),
         }
     }
@@ -279,6 +294,11 @@ impl Eskf {
         Doubts { gnss: fixes >= DOUBTED, baro: altitudes >= DOUBTED, compass: fields >= DOUBTED }
     }
 
+    /// How often everything contradicted the filter for so long that it started anew.
+    pub fn restarts(&self) -> u32 {
+        self.restarts
+    }
+
     /// Time since the last fix that was believed, s.
     pub fn alone_s(&self) -> f32 {
         self.alone_s
@@ -287,6 +307,28 @@ impl Eskf {
     /// Normalised innovations squared of the last step: their sum, and how many numbers were measured.
     pub fn surprise(&self) -> (f32, u32) {
         self.surprise
+    }
+
+    /// Takes notice of how much the fix of this step surprised, which was the first to be measured.
+    fn note_surprise(&mut self) {
+        let (squares, numbers) = self.surprise;
+        let mean = limit(squares / upper(numbers as f32, 1.0), 0.0, SURPRISE_MAX);
+        self.unease += (mean - self.unease) * UNEASE_SHARE;
+    }
+
+    /// From where it is, level by the accelerometer; the next fix says the rest.
+    fn restart(&mut self, felt: &Vector3<f32>) {
+        if let Some(down) = (-felt).try_normalize(1.0) {
+            self.attitude = levelled(&self.attitude, &down);
+        }
+        let turn = START_ANEW_RAD;
+        let p = EskfParameters { start_turn_rad: turn, start_heading_rad: turn, ..self.parameters };
+        self.covariance = at_start(&p);
+        (self.accel_bias, self.gyro_bias) = (Vector3::zeros(), Vector3::zeros());
+        self.placed = false;
+        self.refused = Refused { altitudes: STUBBORN - 1, ..Refused::default() };
+        self.unease = 1.0;
+        self.restarts = self.restarts.saturating_add(1);
     }
 
     fn predict(&mut self, omega: &Vector3<f32>, force: &Vector3<f32>, dt_s: f32) {
@@ -430,6 +472,7 @@ impl Estimator for Eskf {
                 believed &= self.update(&mut moved, &row, position[i], noise, is_gated);
             }
             self.refused.fixes = self.count(self.refused.fixes, believed);
+            self.note_surprise();
             if believed {
                 self.alone_s = 0.0;
             }
@@ -462,10 +505,12 @@ impl Estimator for Eskf {
         }
         self.inject(&moved);
         self.symmetrise();
-        // After what no vehicle does, the covariance may be none any more; the filter then starts from where it is.
-        if !self.covariance.diagonal().iter().all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX) {
-            self.covariance = at_start(&p);
-            (self.accel_bias, self.gyro_bias) = (Vector3::zeros(), Vector3::zeros());
+        let felt = sensed.imu.specific_force.vector;
+        // After what no vehicle does, the covariance may be none any more.
+        let is_one =
+            self.covariance.diagonal().iter().all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX);
+        if !is_one || self.unease > UNEASE_MAX {
+            self.restart(&felt);
         }
     }
 

@@ -107,8 +107,11 @@ impl Health {
     /// It hangs further over than any command asks for.
     pub const UPSET: Self = Self(1 << 9);
 
+    /// Fixes contradicted the filter for so long that it started anew, at some time in this flight.
+    pub const RESTARTED: Self = Self(1 << 10);
+
     /// Name of each bit, from the lowest.
-    pub const NAMES: [&str; 10] = [
+    pub const NAMES: [&str; 11] = [
         "imu_1_out",
         "imu_2_out",
         "not_a_reading",
@@ -119,6 +122,7 @@ impl Health {
         "thrust_short",
         "torque_off",
         "upset",
+        "restarted",
     ];
 
     /// Whether all of another's bits are set.
@@ -384,6 +388,7 @@ impl Navigation {
         state.health = state
             .health
             .with(Health::GNSS_OUT, doubts.gnss || is_silent)
+            .with(Health::RESTARTED, matches!(&state.running, Running::Eskf(filter) if filter.restarts() > 0))
             .with(Health::BARO_OUT, doubts.baro)
             .with(Health::COMPASS_OUT, doubts.compass)
             .with(Health::POSITION_LOST, alone_s > LOST_S);

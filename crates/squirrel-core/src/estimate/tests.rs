@@ -322,6 +322,34 @@ fn the_default_errs_as_much_as_it_says() {
     assert!((7.82..10.18).contains(&nees), "{nees:.2}");
 }
 
+/// Normalised innovation squared of a fix and an altitude over 50 seeds, against chi-squared of 7 numbers.
+#[test]
+fn the_default_is_surprised_as_often_as_it_says() {
+    struct Deaf(Eskf);
+    impl Estimator for Deaf {
+        fn step(&mut self, sensed: &Sensed) {
+            // A compass counts for less than it says, because its errors stay.
+            self.0.step(&Sensed { magnetic: None, ..*sensed });
+        }
+        fn estimate(&self) -> Estimate {
+            self.0.estimate()
+        }
+    }
+    let runs = 50;
+    let mut sum = 0.0;
+    for seed in 0..runs {
+        let flight = Flight::agile(seed);
+        let mut filter = Deaf(eskf(&flight, EskfParameters::default()));
+        fly(&flight, Wrong::uncalibrated(seed), 20, &mut filter, |_, _, _| {});
+        let (squares, numbers) = filter.0.surprise();
+        assert_eq!(numbers, 7);
+        sum += f64::from(squares);
+    }
+    let nis = sum / runs as f64;
+    // 95 % of chi-squared of 350 numbers, over 50: 350 +- 1.96 sqrt(700).
+    assert!((5.96..8.04).contains(&nis), "{nis:.2}");
+}
+
 /// One fix in twenty is a hundred metres off.
 #[test]
 fn outliers_cost_nothing() {

@@ -364,4 +364,6 @@ fn elapsed_us(state: &StackState, frame: &SensorFrame) -> Option<u32> {
 }
 
 #[cfg(test)]
+mod fuzz;
+#[cfg(test)]
 pub(crate) mod tests;

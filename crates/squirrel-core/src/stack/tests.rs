@@ -20,6 +20,14 @@ pub(crate) fn stack_on(force_model: &ForceModel, mission: &Mission) -> Stack {
     flying(force_model, AttitudeForm::Quaternion, mission)
 }
 
+/// In hover, on an estimator of its own.
+pub(crate) fn stack_with(navigation: Navigation) -> Stack {
+    let hover = Mission::Hover { position: In::zero() };
+    let stack = flying(&ForceModel::FlatPlate, AttitudeForm::Quaternion, &hover);
+    let parameters = StackParameters { navigation, ..stack.parameters };
+    Stack::new(stack.vehicle, parameters, hover).unwrap()
+}
+
 fn flying(force_model: &ForceModel, form: AttitudeForm, mission: &Mission) -> Stack {
     let attitude = AttitudeGains {
         form,

@@ -1,0 +1,65 @@
+//! Flights in which one thing fails, and studies that are stopped.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use squirrel_sim::vehicle_file::VehicleFile;
+use squirrel_study::faults::{Faults, Plan, run};
+use std::path::Path;
+
+fn study(trials: u32, folder: Option<&Path>) -> Faults {
+    run(&Plan { vehicle: VehicleFile::squirrel(), trials, seed: 3 }, folder, || ()).unwrap()
+}
+
+#[test]
+fn nine_of_ten_survivable_faults_are_survived_and_what_is_lost_is_flagged() {
+    let study = study(300, None);
+    assert!(study.survived_share >= 0.9, "{:#?}", study.rows);
+    assert_eq!(study.rows.len(), 10);
+    for row in &study.rows {
+        assert!(row.not_finite == 0 && row.lost_unflagged == 0, "{row:?}");
+        // Thirty flights of each; those that cannot go on are few.
+        assert!(row.flights == 30 && row.survivable >= 10, "{row:?}");
+    }
+    let flagged = |fault: &str| study.rows.iter().find(|row| row.fault == fault).unwrap().flagged;
+    for fault in ["imu_spike", "imu_stuck", "imu_nan", "imu_dead", "motor_weak"] {
+        assert!(flagged(fault) >= 28, "{fault}: {}", flagged(fault));
+    }
+    for (k, flight) in study.flights.iter().enumerate() {
+        let names = |flag: &str| flight.flags.iter().any(|f| f == flag);
+        // A unit that is gone is named by its number.
+        if flight.fault.name() == "imu_dead" {
+            let which = flight.table.which.unwrap();
+            assert!(names(&format!("imu_{which}_out")), "{k}: {flight:?}");
+        }
+        if flight.fault.name() == "gnss_lost" && flight.table.duration_s.is_none() {
+            assert!(names("gnss_lost") && names("position_lost"), "{k}: {flight:?}");
+        }
+    }
+}
+
+#[test]
+fn a_study_that_was_stopped_goes_on_to_the_same_bytes() {
+    let folder = std::env::temp_dir().join(format!("squirrel-faults-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let json = |study: &Faults| serde_json::to_string(study).unwrap();
+    let whole = json(&study(24, None));
+    assert_eq!(json(&study(24, Some(&folder))), whole);
+    let file = folder.join("faults.trials.jsonl");
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(text.lines().count(), 25);
+    // Stopped in the middle of a line.
+    std::fs::write(&file, &text[..text.len() / 2]).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(json(&pool.install(|| study(24, Some(&folder)))), whole);
+    assert_eq!(std::fs::read_to_string(&file).unwrap().lines().count(), 25);
+    // Nothing is flown again: what is in the file is what comes out.
+    let changed = std::fs::read_to_string(&file).unwrap().replace("\"survived\":true", "\"survived\":false");
+    std::fs::write(&file, changed).unwrap();
+    assert_eq!(study(24, Some(&folder)).survived_share, 0.0);
+    let other = Plan { vehicle: VehicleFile::squirrel(), trials: 24, seed: 4 };
+    let error = run(&other, Some(&folder), || ()).unwrap_err().to_string();
+    assert!(error.contains("faults.trials.jsonl: is of another plan"), "{error}");
+    std::fs::write(&file, "not a journal\n").unwrap();
+    assert!(run(&other, Some(&folder), || ()).unwrap_err().to_string().contains("faults.trials.jsonl"));
+    std::fs::remove_dir_all(&folder).unwrap();
+}
