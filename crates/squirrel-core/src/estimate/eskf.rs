@@ -7,8 +7,8 @@
 //! p' = v,  v' = R (f - b_a) + g e3,  q' = q (w - b_g) / 2
 //! d_p' = d_v,  d_v' = -R [f - b_a]x d - R d_ba,  d' = -[w - b_g]x d - d_bg
 //! ```
-//! A satellite fix is late: it is compared with where the filter was then, which it remembers (`Past`), and a velocity that errs has
-//! carried the position along since. Measurements are taken in number by number, each with a gate of some deviations, so that an outlier
+//! A satellite fix is late: it is compared with where the filter was then, which it remembers (`Past`), and errors of velocity,
+//! turn and bias have carried the state along since. Measurements are taken in number by number, each with a gate of some deviations, so that an outlier
 //! costs nothing. Fixes that are refused for long are believed in the end. A barometer that is, has jumped: its zero is moved to where the
 //! filter is. A compass never is believed against the rest. Where all fixes contradict for seconds the filter itself is wrong, and starts anew from the
 //! accelerometer and the next fix.
@@ -41,6 +41,9 @@ const SURPRISE_MAX: f32 = 30.0;
 const UNEASE_SHARE: f32 = 0.05;
 /// Mean surprise at which the filter is wrong: after two seconds of fixes beyond their gate.
 const UNEASE_MAX: f32 = 20.0;
+/// Biases beyond these are errors of something else, m/s^2 and rad/s.
+const ACCEL_BIAS_MAX_M_S2: f32 = 1.0;
+const GYRO_BIAS_MAX_RAD_S: f32 = 0.3;
 /// What is then known of the attitude, rad.
 const START_ANEW_RAD: f32 = 0.5;
 /// Refusals in a row after which a sensor is right.
@@ -144,10 +147,15 @@ impl Past {
         [a[0].lerp(&b[0], share), a[1].lerp(&b[1], share)]
     }
 
-    fn correct(&mut self, position: &Vector3<f32>, velocity: &Vector3<f32>) {
-        for moment in &mut self.moments {
-            moment[0] += position;
-            moment[1] += velocity;
+    /// An error that is put right now was another one then.
+    ///
+    /// * `acceleration` - that the rest of the error makes
+    fn correct(&mut self, position: &Vector3<f32>, velocity: &Vector3<f32>, acceleration: &Vector3<f32>) {
+        for back in 0..MOMENTS {
+            let ago_s = self.age_s + back as f32 * MOMENT_S;
+            let moment = &mut self.moments[(self.newest + back) % MOMENTS];
+            moment[0] += position - (velocity - acceleration * (0.5 * ago_s)) * ago_s;
+            moment[1] += velocity - acceleration * ago_s;
         }
     }
 }
@@ -266,11 +274,17 @@ impl Eskf {
     /// Not where the first fix will say, but here, at rest.
     #[must_use]
     pub fn placed_at(mut self, position: In<Ned, f32>) -> Self {
-        self.position = position.vector;
-        self.past.moments = [[position.vector, Vector3::zeros()]; MOMENTS];
-        self.past.known = MOMENTS;
-        self.placed = true;
+        self.place(position.vector, Vector3::zeros());
         self
+    }
+
+    /// It is here, and came here in a straight line.
+    fn place(&mut self, position: Vector3<f32>, velocity: Vector3<f32>) {
+        (self.position, self.velocity, self.placed) = (position, velocity, true);
+        for (back, moment) in self.past.moments.iter_mut().enumerate() {
+            *moment = [position - velocity * (back as f32 * MOMENT_S), velocity];
+        }
+        (self.past.newest, self.past.known, self.past.age_s) = (0, MOMENTS, 0.0);
     }
 
     /// Covariance of the error, in the order of [`STATES`]: NED, but the turn about body axes; SI.
@@ -414,7 +428,7 @@ impl Eskf {
     }
 
     /// Puts an error into the state.
-    fn inject(&mut self, moved: &Row) {
+    fn inject(&mut self, moved: &Row, of_turn: &Matrix3<f32>, of_bias: &Matrix3<f32>) {
         let part = |at: usize| moved.fixed_rows::<3>(at).into_owned();
         self.position += part(POSITION);
         self.velocity += part(VELOCITY);
@@ -422,7 +436,8 @@ impl Eskf {
         self.accel_bias += part(ACCEL_BIAS);
         self.gyro_bias += part(GYRO_BIAS);
         if part(POSITION) != Vector3::zeros() || part(VELOCITY) != Vector3::zeros() {
-            self.past.correct(&part(POSITION), &part(VELOCITY));
+            let acceleration = of_turn * part(TURN) + of_bias * part(ACCEL_BIAS);
+            self.past.correct(&part(POSITION), &part(VELOCITY), &acceleration);
         }
     }
 
@@ -444,6 +459,9 @@ impl Estimator for Eskf {
         self.alone_s = lower(self.alone_s + dt_s, 1e6);
         self.surprise = (0.0, 0);
 
+        // What a turn and a bias do to the acceleration.
+        let ned_from_body = self.attitude.to_rotation_matrix().into_inner();
+        let (of_turn, of_bias) = (-(ned_from_body * cross(&force)), -ned_from_body);
         let mut moved = Row::zeros();
         let unit = |at: usize| {
             let mut row = Row::zeros();
@@ -453,21 +471,31 @@ impl Estimator for Eskf {
         if let Some(gnss) = &sensed.gnss {
             let late_s = p.gnss_latency_s;
             if !self.placed {
-                self.placed = true;
-                self.position = gnss.position.vector + gnss.velocity.vector * late_s;
-                self.velocity = gnss.velocity.vector;
+                self.place(gnss.position.vector + gnss.velocity.vector * late_s, gnss.velocity.vector);
             }
             let then = self.past.at([self.position, self.velocity], late_s);
             let (position, velocity) = (gnss.position.vector - then[0], gnss.velocity.vector - then[1]);
             let is_gated = self.refused.fixes < STUBBORN;
             let mut believed = true;
+            // The error was smaller then by what an acceleration makes that errs by turn and bias.
+            let by_turn = of_turn * late_s;
+            let by_bias = of_bias * late_s;
             for i in 0..3 {
+                let mut row = unit(VELOCITY + i);
+                for k in 0..3 {
+                    set(&mut row, TURN + k, -by_turn[(i, k)]);
+                    set(&mut row, ACCEL_BIAS + k, -by_bias[(i, k)]);
+                }
                 let noise = p.gnss_velocity_noise_m_s;
-                believed &= self.update(&mut moved, &unit(VELOCITY + i), velocity[i], noise, is_gated);
+                believed &= self.update(&mut moved, &row, velocity[i], noise, is_gated);
             }
             for i in 0..3 {
                 let mut row = unit(POSITION + i);
                 set(&mut row, VELOCITY + i, -late_s);
+                for k in 0..3 {
+                    set(&mut row, TURN + k, 0.5 * late_s * by_turn[(i, k)]);
+                    set(&mut row, ACCEL_BIAS + k, 0.5 * late_s * by_bias[(i, k)]);
+                }
                 let noise = p.gnss_position_noise_m;
                 believed &= self.update(&mut moved, &row, position[i], noise, is_gated);
             }
@@ -503,13 +531,18 @@ impl Estimator for Eskf {
                 self.update(&mut moved, &row, -force[i] - expected[i], p.alone_noise_m_s2, true);
             }
         }
-        self.inject(&moved);
+        if self.surprise.1 > 0 {
+            self.inject(&moved, &of_turn, &of_bias);
+        }
         self.symmetrise();
         let felt = sensed.imu.specific_force.vector;
         // After what no vehicle does, the covariance may be none any more.
         let is_one =
             self.covariance.diagonal().iter().all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX);
-        if !is_one || self.unease > UNEASE_MAX {
+        // Nor does any unit have such biases; at rest, one of the accelerometer hides a tilt from every fix.
+        let is_biased = self.accel_bias.norm_squared() > square(ACCEL_BIAS_MAX_M_S2)
+            || self.gyro_bias.norm_squared() > square(GYRO_BIAS_MAX_RAD_S);
+        if !is_one || is_biased || self.unease > UNEASE_MAX {
             self.restart(&felt);
         }
     }
