@@ -169,6 +169,8 @@ impl Running {
 
     /// A step of the filter that listens, and what it believes then. Calls by name, for one through a pointer has no known stack.
     fn step(&mut self, sensed: &Sensed) -> Option<Estimate> {
+        // Apart, so that the stack of one is not also that of the others.
+        #[inline(never)]
         fn of(filter: &mut impl Estimator, sensed: &Sensed) -> Estimate {
             filter.step(sensed);
             filter.estimate()
