@@ -353,11 +353,10 @@ impl Navigation {
     fn hear(&self, state: &mut NavigationState, imu: &Imu) -> Option<NavigationTerms> {
         let Waiting { dt_s, gnss, altitude_m, magnetic } = core::mem::take(&mut state.waiting);
         let estimate = state.running.step(&Sensed { dt_s, imu: *imu, gnss, altitude_m, magnetic })?;
-        let (position, velocity, doubts, alone_s) = match (estimate.motion, &state.running) {
-            (Some((position, velocity)), Running::Eskf(filter)) => {
+        let (position, velocity, doubts, alone_s) =
+            if let (Some((position, velocity)), Running::Eskf(filter)) = (estimate.motion, &state.running) {
                 (position, velocity, filter.doubts(), filter.alone_s())
-            }
-            _ => {
+            } else {
                 let force = estimate.ned_from_body * imu.specific_force;
                 let height = state
                     .altitude
@@ -368,8 +367,7 @@ impl Navigation {
                 position.vector.z = -height.altitude_m();
                 velocity.vector.z = -height.climb_m_s();
                 (position, velocity, Doubts::default(), state.fix_age_s)
-            }
-        };
+            };
         // Where the filter leaves the numbers, control is told nothing.
         let all: Vector3<f32> = position.vector + velocity.vector + estimate.gyro_bias.vector;
         if !(crate::math::all_finite(&all) && estimate.ned_from_body.quaternion.norm_squared().is_finite()) {
