@@ -62,6 +62,11 @@ impl Estimator {
         }
     }
 
+    /// Whether the flight code estimates, and nobody outside.
+    pub fn is_filter(self) -> bool {
+        !matches!(self, Self::External | Self::Oracle)
+    }
+
     /// The estimator of a name.
     ///
     /// # Errors

@@ -11,7 +11,7 @@ use squirrel_core::stack::SensorFrame;
 /// What fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sensor {
-    /// Inertial unit.
+    /// Inertial units.
     Imu,
     /// Attitude.
     Attitude,
@@ -98,6 +98,7 @@ impl Fault {
             if !(self.start_us..self.end_us).contains(&frame.time_us) {
                 // The last reading of each sensor, for those that hang.
                 good.imu = frame.imu.or(good.imu);
+                good.imu_2 = frame.imu_2.or(good.imu_2);
                 good.attitude = frame.attitude.or(good.attitude);
                 good.gnss = frame.gnss.or(good.gnss);
                 good.altitude_m = frame.altitude_m.or(good.altitude_m);
@@ -122,8 +123,10 @@ impl Fault {
             let old = old.unwrap_or(SensorFrame::empty(0));
             match self.kind {
                 Kind::NotANumber | Kind::Infinite => {
-                    if let Some(imu) = broken.imu.as_mut().filter(|_| hit(Sensor::Imu)) {
-                        imu.omega = In::new(Vector3::new(imu.omega.vector.x, bad, 0.0));
+                    for imu in [&mut broken.imu, &mut broken.imu_2] {
+                        if let Some(imu) = imu.as_mut().filter(|_| hit(Sensor::Imu)) {
+                            imu.omega = In::new(Vector3::new(imu.omega.vector.x, bad, 0.0));
+                        }
                     }
                     if let Some(q) = broken.attitude.as_mut().filter(|_| hit(Sensor::Attitude)) {
                         *q = Rotation::new(Unit::new_unchecked(Quaternion::new(bad, 0.0, 0.0, 0.0)));
@@ -138,6 +141,7 @@ impl Fault {
                 Kind::Stuck => {
                     if hit(Sensor::Imu) {
                         broken.imu = broken.imu.and(good.imu);
+                        broken.imu_2 = broken.imu_2.and(good.imu_2);
                     }
                     if hit(Sensor::Attitude) {
                         broken.attitude = broken.attitude.and(good.attitude);
@@ -151,7 +155,7 @@ impl Fault {
                 }
                 Kind::Late | Kind::Missing => {
                     if hit(Sensor::Imu) {
-                        broken.imu = old.imu;
+                        (broken.imu, broken.imu_2) = (old.imu, old.imu_2);
                     }
                     if hit(Sensor::Attitude) {
                         broken.attitude = old.attitude;

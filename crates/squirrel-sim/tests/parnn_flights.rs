@@ -6,11 +6,11 @@ mod weights_support;
 
 use squirrel_core::control::wing_force::Guard;
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Flight, Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay::{OUTPUT_SOURCES, replay, setup};
 use squirrel_sim::scenario::Scenario;
-use squirrel_sim::sensors::SensorParameters;
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};
 use std::collections::BTreeSet;
 use std::fs;
@@ -69,7 +69,7 @@ fn a_silent_network_flies_exactly_as_the_flat_plate() {
 
 /// The ground speed that the flight code knew at a time, m/s.
 fn speed_at(log: &FlightLog, t: f64) -> f64 {
-    let (times, velocity) = log.channel("gnss.velocity_ned_m_s").unwrap();
+    let (times, velocity) = log.channel("estimate.velocity_ned_m_s").unwrap();
     let i = times.partition_point(|s| *s <= t).max(1) - 1;
     velocity.row(i).iter().map(|v| v * v).sum::<f64>().sqrt()
 }
@@ -137,7 +137,7 @@ fn outside_what_was_trained_the_arm_is_the_flat_plates() {
 fn where_the_plant_is_the_network_the_estimate_is_the_truth() {
     let text = SQUIRREL_TOML.replace("model = \"membrane\"", "model = \"parnn\"");
     let mut paper = VehicleFile::parse(&text, "paper").unwrap();
-    paper.sensors = SensorParameters::ideal();
+    paper.estimator = Estimator::Oracle;
     let mut scenario = Scenario::find("random_spread").unwrap();
     scenario.seed = 5;
     let of = |vehicle: VehicleFile| {
@@ -168,7 +168,7 @@ fn where_the_plant_is_the_network_the_estimate_is_the_truth() {
     assert!(in_paper < 1e-4, "{in_paper} N");
     // The membrane is no network: the same comparison tells them apart.
     let mut membrane = VehicleFile::squirrel();
-    membrane.sensors = SensorParameters::ideal();
+    membrane.estimator = Estimator::Oracle;
     assert!(worst(&of(membrane)) > 0.1);
 }
 

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{INPUT_SOURCES, Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay::{OUTPUT_SOURCES, replay, setup};
@@ -10,10 +11,14 @@ use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 fn flown(arm: Arm) -> FlightLog {
+    flown_by(VehicleFile::squirrel(), arm)
+}
+
+fn flown_by(vehicle: VehicleFile, arm: Arm) -> FlightLog {
     let mut scenario = Scenario::find("avoid").unwrap();
     scenario.seed = 7;
     scenario.wind.gust_sigma_m_s = 0.5;
-    let setup = Setup { vehicle: VehicleFile::squirrel(), arm, scenario, integrator: Integrator::Rk4 };
+    let setup = Setup { vehicle, arm, scenario, integrator: Integrator::Rk4 };
     setup.fly(true, |_| {}).unwrap().log.unwrap()
 }
 
@@ -46,14 +51,19 @@ fn a_changed_gain_is_found_at_the_first_output_that_it_reaches() {
 /// Every input source matters: a changed number changes an output.
 #[test]
 fn a_changed_input_changes_an_output() {
-    let log = flown(Arm::TwccOracle);
-    for (channel, row) in [
-        ("imu.omega_body_rad_s", 1000),
-        ("attitude.q_ned_from_body_wxyz", 1000),
-        ("gnss.position_ned_m", 50),
-        ("gnss.velocity_ned_m_s", 50),
-        ("baro.altitude_m", 250),
-        ("wing_force.as_if_spread_ned_n", 1500),
+    let mut outside = VehicleFile::squirrel();
+    outside.estimator = Estimator::External;
+    let logs = [flown(Arm::TwccOracle), flown_by(outside, Arm::TwccOracle)];
+    for (log, channel, row) in [
+        (&logs[0], "imu.omega_body_rad_s", 1000),
+        (&logs[0], "imu.specific_force_body_m_s2", 1000),
+        (&logs[0], "imu_2.omega_body_rad_s", 1000),
+        (&logs[1], "attitude.q_ned_from_body_wxyz", 1000),
+        (&logs[0], "gnss.position_ned_m", 50),
+        (&logs[0], "gnss.velocity_ned_m_s", 50),
+        (&logs[0], "baro.altitude_m", 250),
+        (&logs[0], "magnetometer.field_body_ut", 250),
+        (&logs[0], "wing_force.as_if_spread_ned_n", 1500),
     ] {
         let (source, name) = channel.rsplit_once('.').unwrap();
         assert!(INPUT_SOURCES.contains(&source));
@@ -62,7 +72,7 @@ fn a_changed_input_changes_an_output() {
         let i = row * c.width;
         c.values[i] = f64::from(c.values[i] as f32 * 1.001 + 1e-4);
         let t = log.sources[source].time_s[row];
-        let difference = replay(&changed, &setup(&log).unwrap()).unwrap().first_difference;
+        let difference = replay(&changed, &setup(log).unwrap()).unwrap().first_difference;
         let difference = difference.unwrap_or_else(|| panic!("{channel} does not matter"));
         assert!(difference.time_s >= t && difference.time_s <= t + 0.11, "{channel} at {t}: {difference:?}");
     }

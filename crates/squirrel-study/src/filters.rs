@@ -1,26 +1,31 @@
 //! How far estimators of attitude are off in flight: each filter on the same agile flights, with a calibrated gyro and with one whose bias
 //! nobody took off.
 //!
-//! Flights are random runs at up to 11 m/s with spread wings in gusts ([`crate::wing_flights`], kind `t1`), flown on the attitude that the
-//! vehicle's file has a sensor for; the filters hear the recorded inertial unit, receiver and barometer, and no compass. Errors count
+//! Flights are random runs at up to 11 m/s with spread wings in gusts ([`crate::wing_flights`], kind `t1`), flown on the vehicle's own
+//! estimator; the filters hear the recorded inertial unit, receiver and barometer, and no compass. Errors count
 //! from five seconds on.
 
+use crate::in_loop;
+use crate::journal::{self, Journal};
 use crate::statistics::{Estimate, mean, paired};
 use crate::wing_flights::Kind;
-use rayon::prelude::*;
-use squirrel_core::estimate::eskf::{Eskf, EskfParameters};
-use squirrel_core::estimate::mahony::{Mahony, MahonyParameters};
-use squirrel_core::estimate::mekf::{Mekf, MekfParameters};
-use squirrel_core::estimate::rkf::{Fading, Rkf, RkfParameters};
-use squirrel_core::estimate::{Estimator, Sensed};
+use squirrel_core::estimate::eskf::Eskf;
+use squirrel_core::estimate::mahony::Mahony;
+use squirrel_core::estimate::mekf::Mekf;
+use squirrel_core::estimate::navigator::Filter;
+use squirrel_core::estimate::rkf::Rkf;
+use squirrel_core::estimate::{Estimator as Estimates, Sensed};
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::Imu;
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{FlightError, Integrator, Setup, frames};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
+use squirrel_sim::sensors::SUITES;
 use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::Path;
 
 /// Bias that an uncalibrated gyro keeps, deg/s: docs/equations.md C.2.
 pub const BIAS_DEG_S: [f64; 3] = [0.4, -0.3, 0.2];
@@ -28,70 +33,30 @@ pub const BIAS_DEG_S: [f64; 3] = [0.4, -0.3, 0.2];
 const SETTLED_S: f64 = 5.0;
 
 /// Filters, in the order of tables.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Filter {
-    /// Plain Kalman filter of the direction of gravity.
-    Kalman,
-    /// With a single factor.
-    RkfStf,
-    /// With multiple factors, the paper's.
-    RkfMtf,
-    /// Gated complementary filter.
-    Mahony,
-    /// Attitude and bias, aided by velocities of fixes.
-    Mekf,
-    /// Fifteen states, the default.
-    Eskf,
-}
+const FILTERS: [Estimator; 6] = [
+    Estimator::Kalman,
+    Estimator::RkfStf,
+    Estimator::RkfMtf,
+    Estimator::Mahony,
+    Estimator::Mekf,
+    Estimator::Eskf,
+];
 
-impl Filter {
-    /// All filters.
-    pub const ALL: [Self; 6] =
-        [Self::Kalman, Self::RkfStf, Self::RkfMtf, Self::Mahony, Self::Mekf, Self::Eskf];
-
-    /// Name in tables and files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Kalman => "kalman",
-            Self::RkfStf => "rkf_stf",
-            Self::RkfMtf => "rkf_mtf",
-            Self::Mahony => "mahony",
-            Self::Mekf => "mekf",
-            Self::Eskf => "eskf",
-        }
-    }
-
-    fn make(self, vehicle: &VehicleFile, start: Rotation<Ned, Body, f32>) -> Box<dyn Estimator> {
-        let imu = &vehicle.sensors.imu;
-        let (gyro, accel) = (imu.gyro_noise_rad_s as f32, imu.accel_noise_m_s2 as f32);
-        let gnss = &vehicle.sensors.gnss;
-        let rkf = |fading| {
-            let noise =
-                RkfParameters { gyro_noise_rad_s: gyro, accel_noise_m_s2: accel, ..RkfParameters::default() };
-            Box::new(Rkf::new(RkfParameters { fading, ..noise }, start, In::zero()))
-        };
-        match self {
-            Self::Kalman => rkf(Fading::None),
-            Self::RkfStf => rkf(Fading::Single),
-            Self::RkfMtf => rkf(Fading::Multiple),
-            Self::Mahony => Box::new(Mahony::new(MahonyParameters::default(), start, In::zero())),
-            Self::Mekf => {
-                let noise = MekfParameters { gyro_noise_rad_s: gyro, ..MekfParameters::default() };
-                Box::new(Mekf::new(noise, start, In::zero()))
-            }
-            Self::Eskf => {
-                let parameters = EskfParameters {
-                    gyro_noise_rad_s: gyro,
-                    accel_noise_m_s2: accel,
-                    gnss_position_noise_m: gnss.position_noise_m as f32,
-                    gnss_velocity_noise_m_s: gnss.velocity_noise_m_s as f32,
-                    gnss_latency_s: gnss.timing.latency_s as f32,
-                    baro_noise_m: vehicle.sensors.baro.noise_m as f32,
-                    ..EskfParameters::default()
-                };
-                Box::new(Eskf::new(parameters, start, In::zero()))
-            }
-        }
+/// The filter of a name with what the vehicle's sensors are said to be; one that nobody told a bias.
+fn make(
+    estimator: Estimator,
+    vehicle: &VehicleFile,
+    start: Rotation<Ned, Body, f32>,
+) -> Option<Box<dyn Estimates>> {
+    let mut sensors = vehicle.sensors;
+    // It hears the first unit alone, and no compass.
+    (sensors.imu.units, sensors.magnetometer) = (1, None);
+    match estimator.filter(&sensors) {
+        Filter::External => None,
+        Filter::Rkf(p) => Some(Box::new(Rkf::new(p, start, In::zero()))),
+        Filter::Mahony(p) => Some(Box::new(Mahony::new(p, start, In::zero()))),
+        Filter::Mekf(p) => Some(Box::new(Mekf::new(p, start, In::zero()))),
+        Filter::Eskf(p) => Some(Box::new(Eskf::new(p, start, In::zero()))),
     }
 }
 
@@ -134,6 +99,8 @@ pub struct Filters {
     pub bias_deg_s: [f64; 3],
     /// Calibrated gyros first, filters in their order.
     pub rows: Vec<Row>,
+    /// The vehicle's own estimator in the loop, over suites of sensors.
+    pub in_loop: Vec<in_loop::Row>,
 }
 
 /// RMS and largest error of a filter in a flight, deg.
@@ -141,28 +108,29 @@ type Errors = [f64; 2];
 
 /// Flies the study on all cores; the result does not depend on how many there are.
 ///
-/// * `progress` - called once for each flight that has ended
+/// * `folder` - keeps the trials, so that a study that was stopped goes on
+/// * `progress` - called once for each trial: the flights, then a pair for each of them and each suite of sensors
 ///
 /// # Errors
-/// A vehicle that cannot fly.
-pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Filters, FlightError> {
+/// A vehicle that cannot fly, or a folder that cannot be written.
+pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Result<Filters, FlightError> {
     if plan.trials == 0 {
         return Err(FlightError("trials = 0: must be at least 1".to_owned()));
     }
-    let kinds: Vec<(bool, Filter)> = [true, false]
-        .into_iter()
-        .flat_map(|calibrated| Filter::ALL.map(|filter| (calibrated, filter)))
-        .collect();
-    let flown: Vec<Vec<Errors>> = (0..plan.trials)
-        .into_par_iter()
-        .map(|trial| {
-            let log = fly(plan, trial)?;
-            let errors = kinds.iter().map(|(calibrated, filter)| heard(plan, &log, *filter, *calibrated));
-            let errors = errors.collect::<Result<_, _>>();
-            progress();
-            errors
-        })
-        .collect::<Result<_, _>>()?;
+    let kinds: Vec<(bool, Estimator)> =
+        [true, false].into_iter().flat_map(|calibrated| FILTERS.map(|filter| (calibrated, filter))).collect();
+    let identity = journal::identity("filters", &plan.vehicle, plan.seed);
+    let journal = |name| match folder {
+        Some(folder) => Journal::open(folder, name, &identity),
+        None => Ok(Journal::none()),
+    };
+    let all = |trial| -> Result<Vec<Errors>, FlightError> {
+        let log = fly(plan, trial)?;
+        kinds.iter().map(|(calibrated, filter)| heard(plan, &log, *filter, *calibrated)).collect()
+    };
+    let flown = journal("filters")?.run(plan.trials, all, &progress)?;
+    let in_loop =
+        in_loop::run(&plan.vehicle, plan.trials, plan.seed, &journal("filters_in_loop")?, &progress)?;
     let rows = kinds.iter().enumerate().map(|(k, (calibrated, filter))| {
         let trials_deg: Vec<f64> = flown.iter().map(|trial| trial[k][0]).collect();
         Row {
@@ -179,7 +147,13 @@ pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Filters, FlightErr
         seed: plan.seed,
         bias_deg_s: BIAS_DEG_S,
         rows: rows.collect(),
+        in_loop,
     })
+}
+
+/// Number of times that [`run`] calls back.
+pub fn steps(plan: &Plan) -> u64 {
+    u64::from(plan.trials) * (1 + SUITES.len() as u64)
 }
 
 /// The flights, named by their trial.
@@ -203,7 +177,7 @@ fn fly(plan: &Plan, trial: u32) -> Result<FlightLog, FlightError> {
 }
 
 /// What a filter makes of a flight.
-fn heard(plan: &Plan, log: &FlightLog, filter: Filter, calibrated: bool) -> Result<Errors, FlightError> {
+fn heard(plan: &Plan, log: &FlightLog, filter: Estimator, calibrated: bool) -> Result<Errors, FlightError> {
     let frames = frames(log).map_err(FlightError)?;
     let Some((time_s, truth)) = log.channel("truth.q_ned_from_body_wxyz") else {
         return Err(FlightError("truth.q_ned_from_body_wxyz: missing".to_owned()));
@@ -215,7 +189,9 @@ fn heard(plan: &Plan, log: &FlightLog, filter: Filter, calibrated: bool) -> Resu
     let unreadable = || FlightError("truth.q_ned_from_body_wxyz: not a rotation".to_owned());
     let first = attitude(0).ok_or_else(unreadable)?;
     let start = Rotation::from_wxyz(first.wxyz().map(|x| x as f32)).ok_or_else(unreadable)?;
-    let mut filter = filter.make(&plan.vehicle, start);
+    let Some(mut filter) = make(filter, &plan.vehicle, start) else {
+        return Err(FlightError(format!("{}: is no filter", filter.name())));
+    };
     // What the file says of the gyro is what was calibrated.
     let known = Vector3::from(plan.vehicle.sensors.imu.gyro_bias_rad_s);
     let left = if calibrated { Vector3::zeros() } else { Vector3::from(BIAS_DEG_S).map(f64::to_radians) };

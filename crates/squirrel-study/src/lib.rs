@@ -4,9 +4,15 @@
 //! - [`table2`]: how well models of the wing force predict flights that they have not seen (the paper's Table II).
 //! - [`wing_flights`]: random flights with spread wings, to learn from and to be judged by.
 //! - [`filters`]: how far estimators of attitude are off, with a calibrated gyro and without.
+//! - [`in_loop`]: flights on estimates beside flights on the truth, over suites of sensors.
+//! - [`faults`]: what becomes of flights in which one thing fails.
+//! - [`journal`]: trials on disk, so that a study that was stopped goes on.
 //! - [`statistics`]: means, and intervals by a paired bootstrap.
 
+pub mod faults;
 pub mod filters;
+pub mod in_loop;
+pub mod journal;
 pub mod statistics;
 pub mod table2;
 pub mod thrust;

@@ -1,5 +1,6 @@
 //! `squirrel study`: experiments with many flights.
 
+mod faults;
 mod filters;
 mod table2;
 
@@ -14,6 +15,8 @@ use std::path::{Path, PathBuf};
 /// The experiments.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Study {
+    /// What becomes of flights in which one thing fails.
+    Faults(faults::Options),
     /// How far estimators of attitude are off in flight, with a calibrated gyro and without.
     Filters(filters::Options),
     /// What models of the wing force predict, the paper's Table II: to labels and to truth, 30 to 300 s of training.
@@ -83,6 +86,7 @@ pub(crate) struct Options {
 impl Study {
     pub(crate) fn run(&self) -> Result<(), String> {
         match self {
+            Self::Faults(options) => options.run(),
             Self::Filters(options) => options.run(),
             Self::Table2(options) => options.run(),
             Self::Thrust(options) => options.thrust(),

@@ -8,6 +8,7 @@
 
 use super::navigator::Health;
 use crate::control::mixer::ThrustTorque;
+use crate::frames::{Body, Ned, Rotation};
 use crate::math::{all_finite, lower};
 use crate::stack::Imu;
 use crate::vehicle::Vehicle;
@@ -16,11 +17,13 @@ use nalgebra::Vector3;
 /// Time constant of the means, s.
 pub const MEAN_S: f32 = 0.3;
 /// Share of the weight that may be missing.
-const SHORT_SHARE: f32 = 0.12;
+const SHORT_SHARE: f32 = 0.15;
 /// Torque that may be too much, in weights at a rotor's arm.
 const OFF_SHARE: f32 = 0.04;
+/// Cosine of the tilt beyond which control was lost: 60 deg.
+const UPSET_COSINE: f32 = 0.5;
 /// After wings folded, s.
-const FOLDED_S: f32 = 0.5;
+const FOLDED_S: f32 = 0.7;
 
 /// What is remembered.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,11 +89,19 @@ impl Monitor {
     }
 
     /// Health, with what was found.
-    pub(crate) fn judge(&self, vehicle: &Vehicle<f32>, health: Health) -> Health {
+    ///
+    /// * `attitude` - as believed
+    pub(crate) fn judge(
+        &self,
+        vehicle: &Vehicle<f32>,
+        attitude: Option<&Rotation<Ned, Body, f32>>,
+        health: Health,
+    ) -> Health {
         let weight_n = vehicle.weight_n();
         let arm_m = vehicle.rotors().first().map_or(0.0, |rotor| rotor.position.vector.xy().norm());
         let torque_max_n_m = OFF_SHARE * weight_n * arm_m;
         health
+            .with(Health::UPSET, attitude.is_some_and(|a| super::down(&a.quaternion).z < UPSET_COSINE))
             .with(Health::THRUST_SHORT, self.missing_n > SHORT_SHARE * weight_n)
             .with(Health::TORQUE_OFF, self.torque_n_m.norm_squared() > torque_max_n_m * torque_max_n_m)
     }

@@ -104,8 +104,11 @@ impl Health {
     /// Something turns the vehicle that the rotors have to hold against.
     pub const TORQUE_OFF: Self = Self(1 << 8);
 
+    /// It hangs further over than any command asks for.
+    pub const UPSET: Self = Self(1 << 9);
+
     /// Name of each bit, from the lowest.
-    pub const NAMES: [&str; 9] = [
+    pub const NAMES: [&str; 10] = [
         "imu_1_out",
         "imu_2_out",
         "not_a_reading",
@@ -115,6 +118,7 @@ impl Health {
         "position_lost",
         "thrust_short",
         "torque_off",
+        "upset",
     ];
 
     /// Whether all of another's bits are set.

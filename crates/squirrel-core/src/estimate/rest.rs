@@ -103,7 +103,12 @@ impl Default for Preflight {
     fn default() -> Self {
         Self {
             voter: Voter::default(),
-            calibration: RestCalibration::new(RestParameters { samples: 290, ..RestParameters::default() }),
+            // A cheap gyro may be off by 8 deg/s, and the window a little shorter than a second.
+            calibration: RestCalibration::new(RestParameters {
+                samples: 290,
+                rate_max_rad_s: 0.15,
+                ..RestParameters::default()
+            }),
             gyro_bias: None,
             force: Mean::default(),
             field: Mean::default(),

@@ -218,7 +218,8 @@ impl Stack {
         let achieved = output.inner.as_ref().map(|inner| &inner.mixer.achieved);
         let dt_s = lower(told.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
         state.monitor.look(&self.vehicle, achieved, told.frame.imu.as_ref(), state.wing_command, dt_s);
-        output.health = state.monitor.judge(&self.vehicle, state.navigation.health);
+        output.health =
+            state.monitor.judge(&self.vehicle, told.frame.attitude.as_ref(), state.navigation.health);
         output.navigation = told.terms;
     }
 

@@ -36,9 +36,12 @@ pub struct Metrics {
     pub contact_s: Option<f64>,
     /// Speed with which it was met, m/s.
     pub contact_speed_m_s: Option<f64>,
+    /// A command to a rotor or wing was not finite at any time.
+    pub not_finite: bool,
     /// Largest tilt of the whole flight, rad.
     pub tilt_max_rad: f64,
-    /// What the flight code found not to be as it should, in the order of [`Health::NAMES`], and why its failsafe acted.
+    /// What the flight code found not to be as it should, in the order of [`Health::NAMES`], and why its failsafe acted; from the first
+    /// of the scenario's faults on, where there is one.
     #[serde(serialize_with = "names")]
     pub flags: Flags,
 }
@@ -78,6 +81,7 @@ pub(super) struct Meter<'a> {
     wings_us: u64,
     wiic_us: u64,
     mode: Mode,
+    faults_from_s: f64,
     metrics: Metrics,
 }
 
@@ -95,9 +99,11 @@ impl<'a> Meter<'a> {
             encounters: 0,
             contact_s: None,
             contact_speed_m_s: None,
+            not_finite: false,
             tilt_max_rad: 0.0,
             flags: Flags::default(),
         };
+        let first = scenario.faults.values().map(|fault| fault.start_s).fold(f64::INFINITY, f64::min);
         Self {
             scenario,
             start_us: None,
@@ -109,6 +115,7 @@ impl<'a> Meter<'a> {
             wings_us: 0,
             wiic_us: 0,
             mode: Mode::Primary,
+            faults_from_s: if first.is_finite() { first } else { 0.0 },
             metrics,
         }
     }
@@ -117,9 +124,13 @@ impl<'a> Meter<'a> {
         let step_us = time_us - self.last_us;
         self.last_us = time_us;
         self.metrics.encounters = encounters;
-        self.metrics.flags.health.0 |= output.health.0;
-        if output.failsafe.reason != FailsafeReason::None {
-            self.metrics.flags.reasons |= 1 << output.failsafe.reason as u16;
+        let mut commands = output.rotor_command.iter().chain(&output.wing_command);
+        self.metrics.not_finite |= !commands.all(|command| command.is_finite());
+        if time_us as f64 * 1e-6 >= self.faults_from_s {
+            self.metrics.flags.health.0 |= output.health.0;
+            if output.failsafe.reason != FailsafeReason::None {
+                self.metrics.flags.reasons |= 1 << output.failsafe.reason as u16;
+            }
         }
         let down = (state.body.ned_from_body() * In::<Body, f64>::new(Vector3::z())).vector.z;
         self.metrics.tilt_max_rad = self.metrics.tilt_max_rad.max(down.clamp(-1.0, 1.0).acos());

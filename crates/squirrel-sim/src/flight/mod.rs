@@ -137,7 +137,7 @@ impl Setup {
         let filter = self.vehicle.estimator.filter(&parameters);
         let altitude = Estimator::altitude(&parameters);
         let mut navigation = Navigation { filter, altitude, ..Navigation::external() };
-        if navigation.filter != Navigation::external().filter {
+        if self.vehicle.estimator.is_filter() {
             let sensors = Sensors::new(parameters, &self.vehicle.effects, self.scenario.seed);
             let mut preflight = Preflight::default();
             let position = self.start_position();
@@ -235,6 +235,7 @@ impl Setup {
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
         let mut contact_specific_force: Option<In<Ned, f64>> = None;
         let mut believed: Option<NavigationTerms> = None;
+        let estimates = self.vehicle.estimator.is_filter();
         let steps = (self.scenario.duration_s / dt_s).round() as u64;
         for step in 0..=steps {
             let time_us = step * PLANT_STEP_US;
@@ -251,13 +252,14 @@ impl Setup {
                 }
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
                 failing.spoil(&mut frame);
-                frame.set_obstacles(&self.nearest_obstacles(&state.body));
+                frame.set_obstacles(&self.nearest_obstacles(&state.body, believed.as_ref()));
                 if self.arm.is_told_the_force() {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
                 if let Some(pilot) = &mut pilot {
-                    frame.command = pilot.command(tick, &seen(&frame, believed.as_ref()));
+                    let told = if estimates { seen(&frame, believed.as_ref()) } else { frame };
+                    frame.command = pilot.command(tick, &told);
                 }
                 let (output, met) = computer.step(&frame)?;
                 believed = output.navigation.or(believed);
@@ -315,8 +317,10 @@ impl Setup {
         state
     }
 
-    fn nearest_obstacles(&self, body: &State<f64>) -> Vec<Obstacle> {
+    /// Obstacles where the flight code takes them to be: it sees them from where it is, and knows that as well as it knows its own place.
+    fn nearest_obstacles(&self, body: &State<f64>, believed: Option<&NavigationTerms>) -> Vec<Obstacle> {
         let at = body.position.vector;
+        let off = believed.map_or(Vector3::zeros(), |terms| terms.position.vector.cast::<f64>() - at);
         let mut near: Vec<(f64, usize)> = Vec::new();
         for (i, [north, east, _]) in self.scenario.obstacles.iter().enumerate() {
             let distance = (north - at.x).hypot(east - at.y);
@@ -329,7 +333,7 @@ impl Setup {
         near.iter()
             .map(|(_, i)| {
                 let [north, east, _] = self.scenario.obstacles[*i];
-                Obstacle { id: *i as u32, north_m: north as f32, east_m: east as f32 }
+                Obstacle { id: *i as u32, north_m: (north + off.x) as f32, east_m: (east + off.y) as f32 }
             })
             .collect()
     }
@@ -341,13 +345,13 @@ fn hover_command(vehicle: &Vehicle<f64>) -> f64 {
     vehicle.parameters().propulsion.command_for_thrust(share)
 }
 
-/// A frame with what the flight code believes instead of what sensors say, as far as it estimates: for who commands from outside.
+/// A frame with what the flight code believes instead of what sensors say: for who commands from outside.
 fn seen(frame: &SensorFrame, believed: Option<&NavigationTerms>) -> SensorFrame {
-    let mut seen = *frame;
+    let mut seen = SensorFrame::empty(frame.time_us);
+    seen.set_obstacles(frame.obstacles());
     if let Some(terms) = believed {
         seen.attitude = Some(terms.ned_from_body);
         seen.gnss = Some(Gnss { position: terms.position, velocity: terms.velocity });
-        seen.altitude_m = None;
         seen.imu = frame.imu.map(|imu| Imu { omega: imu.omega - terms.gyro_bias, ..imu });
     }
     seen

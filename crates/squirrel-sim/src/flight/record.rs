@@ -4,7 +4,6 @@
 //! [`INPUT_SOURCES`]; a frame is rebuilt from the samples that carry its time.
 
 use super::{Pilot, Setup};
-use crate::estimator::Estimator;
 use crate::log::FlightLog;
 use crate::plant::PlantState;
 use crate::sensors::BatteryReading;
@@ -85,7 +84,7 @@ impl Recorder {
             log.metadata.insert("policy".to_owned(), pilot.weights().name.clone());
             log.metadata.insert("policy_hash".to_owned(), pilot.weights().hash());
         }
-        let estimates = !matches!(setup.vehicle.estimator, Estimator::External | Estimator::Oracle);
+        let estimates = setup.vehicle.estimator.is_filter();
         Self { log, rotors, effects: setup.vehicle.effects, inputs: Inputs::new(estimates) }
     }
 

@@ -65,7 +65,7 @@ fn sensors(text: &mut String, order: &Order<'_>) {
     let velocity = white::GNSS_VELOCITY_M_S.iter().sum::<f64>() / 3.0;
     let _ = write!(
         text,
-        "\n[sensors.imu]\ntiming = {{ rate_hz = 300.0 }}\ngyro_noise_rad_s = {:e}\ngyro_bias_rad_s = {}\n\
+        "\n[estimation]\nfilter = \"external\"\n[sensors.imu]\ntiming = {{ rate_hz = 300.0 }}\ngyro_noise_rad_s = {:e}\ngyro_bias_rad_s = {}\n\
          accel_noise_m_s2 = {:e}\naccel_bias_m_s2 = {}\n\
          [sensors.attitude]\ntiming = {{ rate_hz = 300.0 }}\nnoise_rad = {ATTITUDE_NOISE_RAD:e}\n\
          bias_rad = [0.0, 0.0, {:e}]\n\

@@ -3,6 +3,7 @@
 use super::Common;
 use crate::output::{self, Table, say};
 use squirrel_study::filters::{self, Plan};
+use squirrel_study::in_loop::Row;
 use std::fmt::Write as _;
 
 /// Options of the study.
@@ -19,8 +20,8 @@ impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
         let plan = Plan { vehicle: self.common.begin("filters")?, trials, seed };
-        let bar = output::progress(u64::from(plan.trials), "flights");
-        let study = filters::run(&plan, || bar.inc(1));
+        let bar = output::progress(filters::steps(&plan), "flights");
+        let study = filters::run(&plan, self.common.out.as_deref(), || bar.inc(1));
         bar.finish_and_clear();
         let study = study.map_err(|e| e.to_string())?;
 
@@ -46,6 +47,39 @@ impl Options {
                 csv,
                 "{},{},{},{},{},{}",
                 row.filter, row.calibrated, rms.value, rms.low, rms.high, row.inclination_max_deg
+            );
+        }
+        table.print();
+        say(
+            "\nThe avoidance manoeuvre on estimates over the same flight on the truth; distance to the reference, m.\n",
+        );
+        let mut table = Table::new(&[
+            "sensors",
+            "flights",
+            "RMSE",
+            "on the truth",
+            "ratio",
+            "95 % interval",
+            "lost",
+            "flagged",
+        ]);
+        csv.push_str("\nsuite,flights,rmse_m,oracle_rmse_m,ratio,ratio_low,ratio_high,lost,flagged\n");
+        for row in &study.in_loop {
+            let Row { suite, flights, rmse_m, oracle_rmse_m, ratio: r, lost, flagged } = row;
+            table.row(vec![
+                (*suite).to_owned(),
+                flights.to_string(),
+                format!("{rmse_m:.2}"),
+                format!("{oracle_rmse_m:.2}"),
+                format!("{:.3}", r.value),
+                format!("{:.3} to {:.3}", r.low, r.high),
+                lost.to_string(),
+                flagged.to_string(),
+            ]);
+            let _ = writeln!(
+                csv,
+                "{suite},{flights},{rmse_m},{oracle_rmse_m},{},{},{},{lost},{flagged}",
+                r.value, r.low, r.high
             );
         }
         table.print();

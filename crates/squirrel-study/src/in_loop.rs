@@ -1,0 +1,100 @@
+//! What estimation costs in the loop: the avoidance manoeuvre on estimates beside the same flight on the truth, over suites of sensors.
+
+use crate::journal::Journal;
+use crate::statistics::{self, Estimate, mean, paired};
+use serde::{Deserialize, Serialize};
+use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
+use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
+use squirrel_sim::scenario::Scenario;
+use squirrel_sim::sensors::{SUITES, SensorParameters};
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// Standard deviation of the gusts, m/s.
+const GUST_M_S: f64 = 0.5;
+/// A vehicle that tilts further has turned over, rad.
+const OVER_RAD: f64 = 1.6;
+
+/// Two flights with the same seed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Pair {
+    /// Distance to the reference, root mean square, m: on estimates, on the truth.
+    rmse_m: [f64; 2],
+    lost: bool,
+    flags: Vec<String>,
+}
+
+/// One suite of sensors.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Suite.
+    pub suite: &'static str,
+    /// Pairs of flights.
+    pub flights: u32,
+    /// Mean of the distance to the reference on estimates, m.
+    pub rmse_m: f64,
+    /// The same on the truth, m.
+    pub oracle_rmse_m: f64,
+    /// The former over the latter.
+    pub ratio: Estimate,
+    /// Flights on estimates that touched something or turned over.
+    pub lost: u32,
+    /// Flights in which something was reported.
+    pub flagged: u32,
+}
+
+/// Flies `trials` pairs for each suite.
+///
+/// * `progress` - called once for each pair
+///
+/// # Errors
+/// A vehicle that cannot fly, or a journal that cannot be written.
+pub fn run(
+    vehicle: &VehicleFile,
+    trials: u32,
+    seed: u64,
+    journal: &Journal,
+    progress: impl Fn() + Sync,
+) -> Result<Vec<Row>, FlightError> {
+    let count = SUITES.len() as u32;
+    let pairs = journal.run(
+        trials * count,
+        |k| pair(vehicle, SUITES[(k % count) as usize], seed.wrapping_mul(1_000_003) + u64::from(k / count)),
+        progress,
+    )?;
+    let row = |(i, suite): (usize, &&'static str)| {
+        let of: Vec<&Pair> = pairs.iter().skip(i).step_by(SUITES.len()).collect();
+        let [ours, oracle] = [0, 1].map(|k| of.iter().map(|pair| pair.rmse_m[k]).collect::<Vec<_>>());
+        Row {
+            suite,
+            flights: trials,
+            rmse_m: mean(&ours),
+            oracle_rmse_m: mean(&oracle),
+            ratio: paired(&ours, &oracle, |a, b| statistics::gain(a, b) + 1.0),
+            lost: of.iter().filter(|pair| pair.lost).count() as u32,
+            flagged: of.iter().filter(|pair| !pair.flags.is_empty()).count() as u32,
+        }
+    };
+    Ok(SUITES.iter().enumerate().map(row).collect())
+}
+
+fn pair(vehicle: &VehicleFile, suite: &str, seed: u64) -> Result<Pair, FlightError> {
+    let fly = |estimator| {
+        let mut vehicle = vehicle.clone();
+        vehicle.sensors = SensorParameters::suite(suite).unwrap_or(vehicle.sensors);
+        vehicle.estimator = estimator;
+        let mut scenario = Scenario::find("avoid").map_err(FlightError)?;
+        scenario.seed = seed;
+        scenario.wind.gust_sigma_m_s = GUST_M_S;
+        // The whole flight, so that one which a gust carries past the obstacle counts too.
+        scenario.measured_window_s = 0.0;
+        let setup = Setup { vehicle, arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
+        Ok::<Metrics, FlightError>(setup.fly(false, |_| {})?.metrics)
+    };
+    let (ours, oracle) = (fly(vehicle.estimator)?, fly(Estimator::Oracle)?);
+    Ok(Pair {
+        rmse_m: [ours.rmse_m, oracle.rmse_m],
+        lost: ours.contact_s.is_some() || ours.tilt_max_rad > OVER_RAD,
+        flags: ours.flags.names(),
+    })
+}
