@@ -314,8 +314,7 @@ impl Navigation {
             return Told { frame: as_it_was, terms: None, rejected: 0, elapsed_us };
         }
         if matches!(state.running, Running::None) {
-            state.running = Running::of(self);
-            state.fix = Some(Gnss { position: self.start.position, velocity: In::zero() });
+            self.begin(state);
         }
         if let Some(fix) = &mut told.gnss {
             fix.position = fix.position - self.start.fix_offset;
@@ -351,6 +350,14 @@ impl Navigation {
         told.gnss = Some(Gnss { position: terms.position, velocity: terms.velocity })
             .filter(|_| !state.health.has(Health::POSITION_LOST));
         Told { frame: told, terms: Some(terms), rejected, elapsed_us }
+    }
+
+    /// A filter from the start. Apart, because it is built on the stack, and once in a flight.
+    #[cold]
+    #[inline(never)]
+    fn begin(&self, state: &mut NavigationState) {
+        state.running = Running::of(self);
+        state.fix = Some(Gnss { position: self.start.position, velocity: In::zero() });
     }
 
     /// Runs the filter on an inertial measurement and what waited for it.
