@@ -13,18 +13,13 @@
 //! filter is. A compass never is believed against the rest. Where all fixes contradict for seconds the filter itself is wrong, and starts anew from the
 //! accelerometer and the next fix.
 
+use super::covariance::{ACCEL_BIAS, GYRO_BIAS, POSITION, Row, TURN, VELOCITY};
+use super::covariance::{Carry, across, on_diagonal, set, symmetrise};
+pub use super::covariance::{Covariance, STATES};
 use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, heading_error, levelled, turned};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{GRAVITY_M_S2, limit, lower, upper};
-use nalgebra::{Matrix3, SMatrix, SVector, UnitQuaternion, Vector3};
-
-/// Numbers of the error's state: position, velocity, turn, bias of the accelerometer, bias of the gyro.
-pub const STATES: usize = 15;
-const POSITION: usize = 0;
-const VELOCITY: usize = 3;
-const TURN: usize = 6;
-const ACCEL_BIAS: usize = 9;
-const GYRO_BIAS: usize = 12;
+use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
 /// Moments that are remembered, and the time between them, s: a fix may be 0.3 s late.
 const MOMENTS: usize = 32;
@@ -50,8 +45,6 @@ const START_ANEW_RAD: f32 = 0.5;
 const STUBBORN: u8 = 20;
 /// And after which it is doubted.
 const DOUBTED: u8 = 3;
-
-type Row = SVector<f32, STATES>;
 
 /// Numbers of the filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -169,7 +162,7 @@ pub struct Eskf {
     attitude: UnitQuaternion<f32>,
     accel_bias: Vector3<f32>,
     gyro_bias: Vector3<f32>,
-    covariance: SMatrix<f32, STATES, STATES>,
+    covariance: Covariance,
     past: Past,
     /// A fix has said where it is.
     placed: bool,
@@ -186,40 +179,6 @@ pub struct Eskf {
     restarts: u32,
     /// Squares of the last step's innovations over their variances, and how many there were.
     surprise: (f32, u32),
-}
-
-/// How a step carries an error on: what F differs from the identity by.
-struct Carry {
-    of_turn: Matrix3<f32>,
-    of_bias: Matrix3<f32>,
-    turning: Matrix3<f32>,
-    dt_s: f32,
-}
-
-impl Carry {
-    /// Position, velocity, turn, in this order: each takes what the next was before.
-    fn step(&self, error: &mut [f32; STATES]) {
-        let [px, py, pz, vx, vy, vz, tx, ty, tz, ax, ay, az, gx, gy, gz] = error;
-        let dt_s = self.dt_s;
-        for (p, v) in [(px, &*vx), (py, &*vy), (pz, &*vz)] {
-            *p += *v * dt_s;
-        }
-        let by_turn = times(&self.of_turn, [*tx, *ty, *tz]);
-        let by_bias = times(&self.of_bias, [*ax, *ay, *az]);
-        for (i, v) in [vx, vy, vz].into_iter().enumerate() {
-            *v = *v + by_turn[i] + by_bias[i];
-        }
-        let turned = times(&self.turning, [*tx, *ty, *tz]);
-        for (i, (t, g)) in [(tx, gx), (ty, gy), (tz, gz)].into_iter().enumerate() {
-            *t = turned[i] - *g * dt_s;
-        }
-    }
-}
-
-/// A product that is spelled out: a loop over nine numbers is most of its own work.
-#[inline(always)]
-fn times(m: &Matrix3<f32>, [x, y, z]: [f32; 3]) -> [f32; 3] {
-    [m.m11 * x + m.m12 * y + m.m13 * z, m.m21 * x + m.m22 * y + m.m23 * z, m.m31 * x + m.m32 * y + m.m33 * z]
 }
 
 /// In a row.
@@ -288,7 +247,7 @@ impl Eskf {
     }
 
     /// Covariance of the error, in the order of [`STATES`]: NED, but the turn about body axes; SI.
-    pub fn covariance(&self) -> &SMatrix<f32, STATES, STATES> {
+    pub fn covariance(&self) -> &Covariance {
         &self.covariance
     }
 
@@ -356,22 +315,8 @@ impl Eskf {
         let of_turn = ned_from_body * cross(force) * -dt_s;
         let of_bias = ned_from_body * -dt_s;
         let turning = Matrix3::identity() - cross(omega) * dt_s;
-        // F P F', columns and then rows: most of F is the identity.
         let carry = Carry { of_turn, of_bias, turning, dt_s };
-        let columns = &mut self.covariance.data.0;
-        for column in columns.iter_mut() {
-            carry.step(column);
-        }
-        for i in 0..STATES {
-            let mut row = [0.0; STATES];
-            for (x, column) in row.iter_mut().zip(columns.iter()) {
-                *x = column[i];
-            }
-            carry.step(&mut row);
-            for (x, column) in row.iter().zip(columns.iter_mut()) {
-                column[i] = *x;
-            }
-        }
+        carry.on(&mut self.covariance);
         let c = &mut self.covariance;
         for (part, variance) in [
             (VELOCITY, square(p.accel_noise_m_s2 * dt_s)),
@@ -387,7 +332,7 @@ impl Eskf {
     ///
     /// Whether it was believed.
     fn update(&mut self, moved: &mut Row, row: &Row, residual: f32, noise: f32, is_gated: bool) -> bool {
-        let across = self.across(row);
+        let across = across(&self.covariance, row);
         let variance = row.dot(&across) + square(noise);
         let left = residual - row.dot(moved);
         // What is no number is refused, too.
@@ -401,30 +346,6 @@ impl Eskf {
         *moved += gain * left;
         self.covariance.ger(-1.0, &gain, &across, 1.0);
         true
-    }
-
-    /// The covariance times a row, most of which is zero.
-    fn across(&self, row: &Row) -> Row {
-        let mut across = Row::zeros();
-        for (column, share) in self.covariance.column_iter().zip(row.iter()) {
-            if *share != 0.0 {
-                across.axpy(*share, &column, 1.0);
-            }
-        }
-        across
-    }
-
-    /// What rounding made of a symmetric covariance, symmetric again.
-    fn symmetrise(&mut self) {
-        let columns = &mut self.covariance.data.0;
-        for i in 1..STATES {
-            let (before, after) = columns.split_at_mut(i);
-            let Some(column) = after.first_mut() else { return };
-            for (j, other) in before.iter_mut().enumerate() {
-                let mean = (other[i] + column[j]) * 0.5;
-                (other[i], column[j]) = (mean, mean);
-            }
-        }
     }
 
     /// Puts an error into the state.
@@ -517,7 +438,7 @@ impl Estimator for Eskf {
         if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
             let mut row = Row::zeros();
             row.fixed_rows_mut::<3>(TURN).copy_from(&down(&self.attitude));
-            let variance = row.dot(&self.across(&row)) + square(p.heading_noise_rad);
+            let variance = row.dot(&across(&self.covariance, &row)) + square(p.heading_noise_rad);
             let believed = square(error) <= square(p.gate) * variance
                 && self.update(&mut moved, &row, -error, COMPASS_MEMORY * p.heading_noise_rad, true);
             self.refused.fields = self.count(self.refused.fields, believed);
@@ -534,7 +455,7 @@ impl Estimator for Eskf {
         if self.surprise.1 > 0 {
             self.inject(&moved, &of_turn, &of_bias);
         }
-        self.symmetrise();
+        symmetrise(&mut self.covariance);
         let felt = sensed.imu.specific_force.vector;
         // After what no vehicle does, the covariance may be none any more.
         let is_one =
@@ -557,8 +478,8 @@ impl Estimator for Eskf {
 }
 
 /// Covariance of a vehicle that stands where the origin is.
-fn at_start(p: &EskfParameters) -> SMatrix<f32, STATES, STATES> {
-    let mut covariance = SMatrix::zeros();
+fn at_start(p: &EskfParameters) -> Covariance {
+    let mut covariance = Covariance::zeros();
     for (part, deviation) in [
         (POSITION, 0.5),
         (VELOCITY, 0.2),
@@ -571,22 +492,6 @@ fn at_start(p: &EskfParameters) -> SMatrix<f32, STATES, STATES> {
     // It stands level, so that a turn about its down is one of the heading.
     covariance[(TURN + 2, TURN + 2)] = square(p.start_heading_rad);
     covariance
-}
-
-/// One number of a row.
-fn set(row: &mut Row, at: usize, value: f32) {
-    if let Some(x) = row.get_mut(at) {
-        *x = value;
-    }
-}
-
-/// Changes three numbers of the diagonal. An index that is only a loop's would leave a panic in the code.
-fn on_diagonal(covariance: &mut SMatrix<f32, STATES, STATES>, part: usize, change: impl Fn(f32) -> f32) {
-    for i in part..part + 3 {
-        if let Some(x) = covariance.get_mut((i, i)) {
-            *x = change(*x);
-        }
-    }
 }
 
 fn square(x: f32) -> f32 {

@@ -16,6 +16,7 @@
 //! docs/equations.md C.
 
 pub mod altitude;
+mod covariance;
 pub mod eskf;
 pub mod mahony;
 pub mod mekf;

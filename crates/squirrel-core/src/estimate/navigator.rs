@@ -177,6 +177,8 @@ impl Running {
 
     /// A step of the filter that listens, and what it believes then. Calls by name, for one through a pointer has no known stack.
     fn step(&mut self, sensed: &Sensed) -> Option<Estimate> {
+        // Apart, so that the stack of one is not also that of the others.
+        #[inline(never)]
         fn of(filter: &mut impl Estimator, sensed: &Sensed) -> Estimate {
             filter.step(sensed);
             filter.estimate()
@@ -316,8 +318,7 @@ impl Navigation {
             return Told { frame: as_it_was, terms: None, rejected: 0, elapsed_us };
         }
         if matches!(state.running, Running::None) {
-            state.running = Running::of(self);
-            state.fix = Some(Gnss { position: self.start.position, velocity: In::zero() });
+            self.begin(state);
         }
         if let Some(fix) = &mut told.gnss {
             fix.position = fix.position - self.start.fix_offset;
@@ -355,15 +356,22 @@ impl Navigation {
         Told { frame: told, terms: Some(terms), rejected, elapsed_us }
     }
 
+    /// A filter from the start. Apart, because it is built on the stack, and once in a flight.
+    #[cold]
+    #[inline(never)]
+    fn begin(&self, state: &mut NavigationState) {
+        state.running = Running::of(self);
+        state.fix = Some(Gnss { position: self.start.position, velocity: In::zero() });
+    }
+
     /// Runs the filter on an inertial measurement and what waited for it.
     fn hear(&self, state: &mut NavigationState, imu: &Imu) -> Option<NavigationTerms> {
         let Waiting { dt_s, gnss, altitude_m, magnetic } = core::mem::take(&mut state.waiting);
         let estimate = state.running.step(&Sensed { dt_s, imu: *imu, gnss, altitude_m, magnetic })?;
-        let (position, velocity, doubts, alone_s) = match (estimate.motion, &state.running) {
-            (Some((position, velocity)), Running::Eskf(filter)) => {
+        let (position, velocity, doubts, alone_s) =
+            if let (Some((position, velocity)), Running::Eskf(filter)) = (estimate.motion, &state.running) {
                 (position, velocity, filter.doubts(), filter.alone_s())
-            }
-            _ => {
+            } else {
                 let force = estimate.ned_from_body * imu.specific_force;
                 let height = state
                     .altitude
@@ -374,8 +382,7 @@ impl Navigation {
                 position.vector.z = -height.altitude_m();
                 velocity.vector.z = -height.climb_m_s();
                 (position, velocity, Doubts::default(), state.fix_age_s)
-            }
-        };
+            };
         // Where the filter leaves the numbers, control is told nothing.
         let all: Vector3<f32> = position.vector + velocity.vector + estimate.gyro_bias.vector;
         if !(crate::math::all_finite(&all) && estimate.ned_from_body.quaternion.norm_squared().is_finite()) {

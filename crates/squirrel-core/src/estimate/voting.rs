@@ -40,12 +40,11 @@ struct Unit {
 impl Unit {
     fn hear(&mut self, reading: Option<Imu>, elapsed_us: u32) {
         self.doubted_us = self.doubted_us.saturating_sub(elapsed_us);
-        match reading {
-            None => self.silent_us = self.silent_us.saturating_add(elapsed_us),
-            Some(_) => {
-                self.repeats = if reading == self.last { self.repeats.saturating_add(1) } else { 0 };
-                (self.last, self.silent_us) = (reading, 0);
-            }
+        if reading.is_none() {
+            self.silent_us = self.silent_us.saturating_add(elapsed_us);
+        } else {
+            self.repeats = if reading == self.last { self.repeats.saturating_add(1) } else { 0 };
+            (self.last, self.silent_us) = (reading, 0);
         }
     }
 }
@@ -133,7 +132,8 @@ impl Voter {
     fn of_two(&mut self, a: &Imu, b: &Imu, elapsed_us: u32) -> Imu {
         let difference = Difference::between(a, b);
         let apart = difference.less(&self.difference);
-        if apart.size() > 1.0 {
+        // Where they agree as they are, what was learnt is wrong.
+        if apart.size() > 1.0 && difference.size() > 1.0 {
             let doubted = match self.units.map(|unit| unit.doubted_us > 0) {
                 [true, false] => 0,
                 [false, true] => 1,

@@ -130,10 +130,11 @@ impl SensorFrame {
             rejected += u32::from(!valid);
             valid
         };
-        let imu = self.imu.filter(|imu| accept(imu.is_reading()));
-        let attitude = self.attitude.filter(|q| accept((q.quaternion.norm_squared() - 1.0).abs() < 1e-3));
-        let gnss = self.gnss.filter(|gnss| accept(gnss.is_reading()));
-        let altitude_m = self.altitude_m.filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
+        let imu = self.imu.as_ref().filter(|imu| accept(imu.is_reading()));
+        let is_turn = |q: &Rotation<Ned, Body, f32>| (q.quaternion.norm_squared() - 1.0).abs() < 1e-3;
+        let attitude = self.attitude.as_ref().filter(|q| accept(is_turn(q)));
+        let gnss = self.gnss.as_ref().filter(|gnss| accept(gnss.is_reading()));
+        let altitude_m = self.altitude_m.as_ref().filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
         if let Some(force) = self.wing_force
             && accept(all_finite(&force.vector))
         {
@@ -170,12 +171,10 @@ pub(super) enum Heard {
 }
 
 impl Heard {
-    fn replace<T: PartialEq>(known: &mut Option<T>, reading: Option<T>) -> Self {
-        if reading.is_none() {
-            return Self::Nothing;
-        }
-        let heard = if reading == *known { Self::Same } else { Self::New };
-        *known = reading;
+    fn replace<T: PartialEq + Copy>(known: &mut Option<T>, reading: Option<&T>) -> Self {
+        let Some(reading) = reading else { return Self::Nothing };
+        let heard = if known.as_ref() == Some(reading) { Self::Same } else { Self::New };
+        *known = Some(*reading);
         heard
     }
 }

@@ -1,6 +1,6 @@
 //! Sensors that say anything: every filter in the stack, frames that are noise, nonsense, late, repeated or missing.
 //!
-//! `FUZZ_FRAMES=10000000 cargo test --release -p squirrel-core fuzz` flies ten million frames; two hundred thousand by default.
+//! Ten million frames in a release build, two hundred thousand in another; `FUZZ_FRAMES=n` flies n.
 
 use super::tests::{level, stack_with};
 use super::*;
@@ -78,7 +78,10 @@ impl Draw {
 
 #[test]
 fn fuzzed_sensors_never_reach_the_rotors() {
-    let frames: u64 = std::env::var("FUZZ_FRAMES").ok().and_then(|n| n.parse().ok()).unwrap_or(200_000);
+    let frames: u64 = std::env::var("FUZZ_FRAMES")
+        .ok()
+        .and_then(|n| n.parse().ok())
+        .unwrap_or(if cfg!(debug_assertions) { 200_000 } else { 10_000_000 });
     let filters = [
         Filter::Eskf(EskfParameters::default()),
         Filter::Eskf(EskfParameters { gnss_latency_s: 0.3, ..EskfParameters::default() }),

@@ -206,6 +206,8 @@ impl Stack {
     }
 
     /// The first part of a step: what the sensors say, estimated, as a frame for [`Self::control`].
+    // Apart, so that what it takes of the stack is free again when control runs.
+    #[inline(never)]
     pub fn navigate(&self, state: &mut StackState, frame: &SensorFrame) -> Told {
         let elapsed_us = elapsed_us(state, frame).unwrap_or(0);
         let told = self.parameters.navigation.step(&mut state.navigation, frame, elapsed_us);

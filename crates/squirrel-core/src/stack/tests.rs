@@ -84,6 +84,17 @@ fn rotors_stand_still_until_the_attitude_is_known() {
     assert!(output.inner.is_none() && output.outer.is_none());
 }
 
+#[test]
+fn another_start_is_taken_or_refused() {
+    let stack = stack(AttitudeForm::Quaternion);
+    let start = Start { altitude_offset_m: 3.0, ..Start::at_origin() };
+    let elsewhere = stack.starting(start).unwrap();
+    assert_eq!(elsewhere.parameters().navigation.start, start);
+    assert_eq!(elsewhere.vehicle(), stack.vehicle());
+    let nowhere = Start { altitude_offset_m: f32::NAN, ..start };
+    assert_eq!(stack.starting(nowhere).unwrap_err().field, "estimation.start.position_ned_m");
+}
+
 /// A thawed copy continues as the original: the state hides nothing, not even what the network saw.
 #[test]
 fn a_frozen_state_continues_bit_for_bit() {

@@ -3,47 +3,39 @@
 #![no_std]
 #![no_main]
 
-use squirrel_core::estimate::rest::Preflight;
-use squirrel_core::frames::In;
+use squirrel_core::estimate::navigator::Start;
 use squirrel_core::stack::wire::{Reader, Record, Wire};
 use squirrel_core::stack::{SensorFrame, StackState};
 
 /// What a board has to give.
 trait Board {
-    /// Waits for the next 1/300 s; microseconds since the start, never backwards.
+    /// Waits for the next 1/300 s; microseconds since the flight began, never backwards.
     fn wait_for_tick(&mut self) -> u64;
     /// Fills in the sensors that have spoken since the last tick.
     fn read(&mut self, frame: &mut SensorFrame);
-    /// Whether the pilot wants to fly, and the vehicle stands level and still.
-    fn is_armed(&self) -> bool;
     /// One command a rotor in the vehicle's unit, and each wing's, 0 folded to 1 spread.
     fn write(&mut self, rotors: &[f32], wings: [f32; 2]);
 }
 
-/// Flies the setup that `squirrel export-vectors` wrote as its first record; returns only if that is none.
-fn fly(board: &mut impl Board, setup: &[u8]) {
+/// Flies the setup that `squirrel export-vectors` wrote as its first record; returns only if it or the start is none.
+fn fly(board: &mut impl Board, setup: &[u8], start: Start) {
     let Some(Record::Setup(setup)) = Record::take(&mut Reader::new(setup)) else { return };
-    // A second at rest says where the flight begins: attitude, gyro bias, what receiver and barometer are off by.
-    let mut ground = Preflight::default();
-    let (stack, begin_us) = loop {
-        let mut frame = SensorFrame::empty(board.wait_for_tick());
-        board.read(&mut frame);
-        ground.hear(&frame);
-        let start = ground.start(In::zero()).filter(|_| board.is_armed());
-        if let Some(stack) = start.and_then(|start| setup.starting(start).ok()) {
-            break (stack, frame.time_us);
-        }
-    };
+    let Ok(stack) = setup.starting(start) else { return };
     let mut state = StackState::default();
     loop {
-        let mut frame = SensorFrame::empty(board.wait_for_tick() - begin_us);
+        let mut frame = SensorFrame::empty(board.wait_for_tick());
         board.read(&mut frame);
         let output = stack.step(&mut state, &frame);
         let rotors = output.rotor_command.get(..stack.vehicle().rotors().len()).unwrap_or(&[]);
         board.write(rotors, output.wing_command);
     }
 }
-// The rest is this board: a clock that only counts, no sensors, rotors that are only looked at.
+// The rest is this board: a clock that only counts, a sensor that always rests, rotors that are only looked at.
+use squirrel_core::estimate::rest::Preflight;
+use squirrel_core::frames::In;
+use squirrel_core::nalgebra::Vector3;
+use squirrel_core::stack::Imu;
+
 struct Bench(u64);
 
 impl Board for Bench {
@@ -51,18 +43,32 @@ impl Board for Bench {
         self.0 += 3333;
         self.0
     }
-    fn read(&mut self, _: &mut SensorFrame) {}
-    fn is_armed(&self) -> bool {
-        true
+    fn read(&mut self, frame: &mut SensorFrame) {
+        let specific_force = In::new(Vector3::new(0.0, 0.0, -9.81));
+        frame.imu = Some(Imu { omega: In::zero(), specific_force });
     }
     fn write(&mut self, rotors: &[f32], wings: [f32; 2]) {
         core::hint::black_box((rotors, wings));
     }
 }
 
+/// Hears the sensors at rest until they say where a flight begins; a board with a pilot goes on until he arms.
+fn stand(board: &mut impl Board) -> Start {
+    let mut ground = Preflight::default();
+    loop {
+        let mut frame = SensorFrame::empty(board.wait_for_tick());
+        board.read(&mut frame);
+        ground.hear(&frame);
+        if let Some(start) = ground.start(In::zero()) {
+            return start;
+        }
+    }
+}
+
 #[cortex_m_rt::entry]
 fn main() -> ! {
-    fly(&mut Bench(0), core::hint::black_box(&[]));
+    let start = stand(&mut Bench(0));
+    fly(&mut Bench(0), core::hint::black_box(&[]), start);
     squirrel_m7::host::exit(false)
 }
 
