@@ -460,9 +460,11 @@ impl Estimator for Eskf {
         // After what no vehicle does, the covariance may be none any more.
         let is_one =
             self.covariance.diagonal().iter().all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX);
-        // Nor does any unit have such biases; at rest, one of the accelerometer hides a tilt from every fix.
-        let is_biased = self.accel_bias.norm_squared() > square(ACCEL_BIAS_MAX_M_S2)
+        // Nor does any unit have such biases; at rest, one of the accelerometer hides a tilt from every fix. (Alone the filter cannot tell,
+        // and nothing would lead it back.)
+        let is_far = self.accel_bias.norm_squared() > square(ACCEL_BIAS_MAX_M_S2)
             || self.gyro_bias.norm_squared() > square(GYRO_BIAS_MAX_RAD_S);
+        let is_biased = is_far && self.alone_s <= ALONE_S;
         if !is_one || is_biased || self.unease > UNEASE_MAX {
             self.restart(&felt);
         }
