@@ -12,6 +12,7 @@
 
 use squirrel_gap::{Finding, Verdict, add, diagnose, find};
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
@@ -52,6 +53,8 @@ struct Sink {
 fn measured() -> Outcome<VehicleFile> {
     let text = SECRETS.iter().fold(SQUIRREL_TOML.to_owned(), |text, (from, to)| text.replacen(from, to, 1));
     let mut vehicle = VehicleFile::parse(&text, "measured")?;
+    // Attitude comes from another autopilot, as in most logs.
+    vehicle.estimator = Estimator::External;
     let sensors = &mut vehicle.sensors;
     for timing in [&mut sensors.imu.timing, &mut sensors.attitude.timing, &mut sensors.gnss.timing] {
         timing.seed = Some(42);
@@ -85,7 +88,7 @@ fn height_error_m(a: &FlightLog, b: &FlightLog) -> Outcome<f64> {
 }
 
 fn story() -> Outcome<Story> {
-    let simulated = VehicleFile::squirrel();
+    let simulated = VehicleFile { estimator: Estimator::External, ..VehicleFile::squirrel() };
     let measured = measured()?;
 
     // The sink: the same manoeuvre on the measured drone and in the simulation.
@@ -108,7 +111,7 @@ fn story() -> Outcome<Story> {
     // Add: a new vehicle file.
     let names: Vec<String> = excitation.iter().map(|(name, _)| name.clone()).collect();
     let patch = add(&simulated, &diagnosis, &names)?;
-    let patched = VehicleFile::parse(&patch, "patched")?;
+    let patched = VehicleFile { estimator: Estimator::External, ..VehicleFile::parse(&patch, "patched")? };
 
     // Shrink: fly the avoidance again in closed loop, without and with the effect.
     let mut flights = Vec::new();

@@ -6,6 +6,7 @@ mod support;
 
 use squirrel_gap::{Kind, Verdict, diagnose};
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
@@ -41,8 +42,9 @@ impl Case {
             if let MissionTable::Excite(table) = &mut scenario.mission {
                 table.heights_m = vec![1.5, 1.0, 0.7];
             }
-            let setup =
-                Setup { vehicle: individual.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+            // Attitude comes from another autopilot, as in most logs.
+            let vehicle = VehicleFile { estimator: Estimator::External, ..individual.clone() };
+            let setup = Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
             let log = setup.fly(true, |_| {}).unwrap().log.unwrap();
             let (_, position) = log.channel("truth.position_ned_m").unwrap();
             assert!(position.values.chunks(3).all(|p| -p[2] > 0.06), "{name}: touches the ground");

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_core::stack::{SensorFrame, Stack, StackOutput, StackState};
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Pilot, Setup};
 use squirrel_sim::scenario::Scenario;
 use std::path::Path;
@@ -73,6 +74,9 @@ pub(crate) fn scenario(name: &str, seed: Option<u64>, thrust_to_weight: Option<f
 ///     Of everything random; the scenario's own if left out.
 /// thrust_to_weight : float, optional
 ///     Largest collective thrust over weight; overrides vehicle and scenario.
+/// estimator : str, optional
+///     Who tells the flight code attitude, velocity and position: ``eskf``, ``mekf``, ``mahony``, ``rkf_mtf``, ``rkf_stf``, ``kalman``,
+///     ``external``, ``oracle`` (the truth); the vehicle's own if left out.
 /// integrator : str
 ///     ``rk4`` (rapier near contact) or ``rapier`` (throughout, first order).
 /// policy : Policy, optional
@@ -98,7 +102,7 @@ pub(crate) fn scenario(name: &str, seed: Option<u64>, thrust_to_weight: Option<f
 /// 3
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
-#[pyo3(signature = (*, vehicle = None, scenario = "avoid", arm = None, seed = None, thrust_to_weight = None, integrator = "rk4", policy = None))]
+#[pyo3(signature = (*, vehicle = None, scenario = "avoid", arm = None, seed = None, thrust_to_weight = None, estimator = None, integrator = "rk4", policy = None))]
 pub(crate) fn simulate(
     py: Python<'_>,
     vehicle: Option<&Bound<'_, Vehicle>>,
@@ -106,12 +110,17 @@ pub(crate) fn simulate(
     arm: Option<&str>,
     seed: Option<u64>,
     thrust_to_weight: Option<f64>,
+    estimator: Option<&str>,
     integrator: &str,
     policy: Option<&Bound<'_, Policy>>,
 ) -> PyResult<FlightLog> {
     let by_default = if policy.is_some() { Arm::Pc } else { Arm::TwccFlat };
+    let mut vehicle = or_squirrel(vehicle);
+    if let Some(name) = estimator {
+        vehicle.estimator = Estimator::parse(name).map_err(error::value)?;
+    }
     let setup = Setup {
-        vehicle: or_squirrel(vehicle),
+        vehicle,
         arm: arm.map_or(Ok(by_default), Arm::parse).map_err(error::value)?,
         scenario: self::scenario(scenario, seed, thrust_to_weight)?,
         integrator: Integrator::parse(integrator).map_err(error::value)?,

@@ -13,6 +13,7 @@ use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::frames::{In, Rotation};
 use squirrel_core::stack::{self, Gnss, Imu, SensorFrame, StackState};
 use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
 use std::sync::Mutex;
 
@@ -53,8 +54,11 @@ impl Stack {
         thrust_to_weight: Option<f64>,
         count: usize,
     ) -> PyResult<Self> {
+        let mut vehicle = or_squirrel(vehicle);
+        // Attitudes come from the caller.
+        vehicle.estimator = Estimator::External;
         let setup = Setup {
-            vehicle: or_squirrel(vehicle),
+            vehicle,
             arm: Arm::parse(arm).map_err(value)?,
             scenario: self::scenario(scenario, seed, thrust_to_weight)?,
             integrator: Integrator::Rk4,
@@ -74,7 +78,7 @@ impl Stack {
     /// omega_body_rad_s, specific_force_body_m_s2 : ndarray of float32, shape (count, 3), optional
     ///     Of the inertial unit, both or none.
     /// q_ned_from_body_wxyz : ndarray of float32, shape (count, 4), optional
-    ///     Attitude.
+    ///     Attitude; nothing is estimated here.
     /// position_ned_m, velocity_ned_m_s : ndarray of float32, shape (count, 3), optional
     ///     Of the satellite fix, both or none.
     /// altitude_m : ndarray of float32, shape (count,), optional

@@ -120,8 +120,10 @@ impl Default for Preflight {
 }
 
 impl Preflight {
-    /// Hears a frame. What is not finite must not be in it.
+    /// Hears a frame; what is not finite, or larger than any flight, is left out.
     pub fn hear(&mut self, frame: &SensorFrame) {
+        let mut frame = *frame;
+        frame.drop_what_is_no_reading();
         let elapsed_us = self.last_us.map_or(0, |last| frame.time_us.saturating_sub(last).min(100_000));
         self.last_us = Some(frame.time_us);
         if let Some(imu) = self.voter.vote([frame.imu, frame.imu_2], elapsed_us as u32) {

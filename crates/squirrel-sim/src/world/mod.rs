@@ -247,6 +247,9 @@ impl core::fmt::Debug for World {
     }
 }
 
+/// Longest step, s: a contact that takes longer is no contact any more, and its solver may take for ever.
+const STEP_MAX_S: f64 = 1.0;
+
 fn check(state: &State<f64>, wrench: &Wrench<Body, f64>, dt_s: f64) -> Result<(), ParameterError> {
     use parameters::finite;
     finite("state.position_ned_m", &state.position.vector)?;
@@ -265,12 +268,12 @@ fn check(state: &State<f64>, wrench: &Wrench<Body, f64>, dt_s: f64) -> Result<()
     finite("state.omega_body_rad_s", &state.omega.vector)?;
     finite("wrench.force_body_n", &wrench.force.vector)?;
     finite("wrench.moment_body_n_m", &wrench.moment.vector)?;
-    if !(dt_s.is_finite() && dt_s > 0.0) {
+    if !(dt_s > 0.0 && dt_s <= STEP_MAX_S) {
         return Err(ParameterError {
             field: "dt_s",
             index: None,
             value: dt_s,
-            reason: "must be finite and > 0",
+            reason: "must be > 0 and <= 1",
         });
     }
     Ok(())

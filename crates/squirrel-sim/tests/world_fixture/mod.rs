@@ -6,14 +6,19 @@ use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_sim::world::WorldParameters;
+use std::sync::OnceLock;
 
 pub(crate) const SIZE_BODY_M: [f64; 3] = [0.276, 0.373, 0.025];
 
 pub(crate) fn vehicle() -> Vehicle<f64> {
-    let mut parameters = *VehicleFile::squirrel().vehicle.parameters();
-    parameters.inertia_kg_m2 =
-        Matrix3::new(3.22e-3, 2.0e-4, -1.0e-4, 2.0e-4, 4.68e-3, 1.5e-4, -1.0e-4, 1.5e-4, 7.72e-3);
-    Vehicle::new(parameters).expect("the fixture is a possible airframe")
+    // Read once: it is asked for in every step of some tests.
+    static VEHICLE: OnceLock<Vehicle<f64>> = OnceLock::new();
+    *VEHICLE.get_or_init(|| {
+        let mut parameters = *VehicleFile::squirrel().vehicle.parameters();
+        parameters.inertia_kg_m2 =
+            Matrix3::new(3.22e-3, 2.0e-4, -1.0e-4, 2.0e-4, 4.68e-3, 1.5e-4, -1.0e-4, 1.5e-4, 7.72e-3);
+        Vehicle::new(parameters).expect("the fixture is a possible airframe")
+    })
 }
 
 /// A world with ground and nothing else.

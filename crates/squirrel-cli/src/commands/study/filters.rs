@@ -63,7 +63,8 @@ impl Options {
             "lost",
             "flagged",
         ]);
-        csv.push_str("\nsuite,flights,rmse_m,oracle_rmse_m,ratio,ratio_low,ratio_high,lost,flagged\n");
+        let mut in_loop =
+            String::from("suite,flights,rmse_m,oracle_rmse_m,ratio,ratio_low,ratio_high,lost,flagged\n");
         for row in &study.in_loop {
             let Row { suite, flights, rmse_m, oracle_rmse_m, ratio: r, lost, flagged } = row;
             table.row(vec![
@@ -77,13 +78,14 @@ impl Options {
                 flagged.to_string(),
             ]);
             let _ = writeln!(
-                csv,
+                in_loop,
                 "{suite},{flights},{rmse_m},{oracle_rmse_m},{},{},{},{lost},{flagged}",
                 r.value, r.low, r.high
             );
         }
         table.print();
         let Some(folder) = self.common.end("filters", &csv, &study)? else { return Ok(()) };
+        output::write_file(&folder.join("filters_in_loop.csv"), in_loop.as_bytes())?;
         let flights = folder.join("flights");
         output::folder(&flights)?;
         for scenario in filters::scenarios(&plan).map_err(|e| e.to_string())? {
