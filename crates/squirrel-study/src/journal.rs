@@ -101,12 +101,11 @@ impl Journal {
         progress: impl Fn() + Sync,
     ) -> Result<Vec<T>, FlightError> {
         let one = |trial: u32| {
-            let result = match self.done.get(&trial) {
-                Some(line) => self.read(line)?,
-                None => {
-                    let result = fly(trial)?;
-                    self.keep(trial, &result)?
-                }
+            let result = if let Some(line) = self.done.get(&trial) {
+                self.read(line)?
+            } else {
+                let result = fly(trial)?;
+                self.keep(trial, &result)?
             };
             progress();
             Ok(result)

@@ -1,7 +1,7 @@
 //! One inertial measurement out of one unit or two.
 //!
 //! Two units that agree are averaged. Where they differ by more than noise, the one that left what both said before is doubted until they
-//! have agreed again for [`HOLD_US`]; with two units nothing else can tell who is wrong. A unit that is silent, or that hangs while the
+//! have agreed again for 0.3 s; with two units nothing else can tell who is wrong. A unit that is silent, or that hangs while the
 //! other moves, does not count. What the units constantly differ by is learnt and halved between them, so that nothing jumps when one of
 //! them goes. A unit that is alone may spike: what no vehicle turns or feels from one sample to the next is replaced by the sample before.
 

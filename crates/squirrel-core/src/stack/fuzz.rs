@@ -20,7 +20,7 @@ impl Draw {
     }
 
     fn one_in(&mut self, n: u64) -> bool {
-        self.bits() % n == 0
+        self.bits().is_multiple_of(n)
     }
 
     /// Of a size that makes sense, or any float there is.

@@ -65,6 +65,7 @@ impl Flags {
     }
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "the shape that serde calls")]
 fn names<S: serde::Serializer>(flags: &Flags, to: S) -> Result<S::Ok, S::Error> {
     flags.names().serialize(to)
 }

@@ -12,7 +12,7 @@ use squirrel_core::control::wing_force::ParnnTerms;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::sensing::Obstacle;
-use squirrel_core::nalgebra::Vector3;
+use squirrel_core::nalgebra::{Quaternion, Unit, Vector3};
 use squirrel_core::policy::PilotCommand;
 use squirrel_core::rnn::parnn::Estimate;
 use squirrel_core::stack::failsafe::Failsafe;
@@ -219,22 +219,7 @@ pub(crate) fn record_output(
             ("yaw_rad", &[f64::from(r.yaw_rad)]),
         ],
     );
-    log.source_mut("control.status")
-        .push(t, &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])]);
-    if let Some(terms) = &output.navigation {
-        let attitude = terms.ned_from_body.wxyz().map(f64::from);
-        log.source_mut(ESTIMATE).push(
-            t,
-            &[
-                ("q_ned_from_body_wxyz", &attitude),
-                ("position_ned_m", &wide(&terms.position.vector)),
-                ("velocity_ned_m_s", &wide(&terms.velocity.vector)),
-                ("gyro_bias_body_rad_s", &wide(&terms.gyro_bias.vector)),
-            ],
-        );
-        // For who reads a log as that of any autopilot.
-        log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude)]);
-    }
+    record_estimate(log, t, output);
     // A source of its own, so that a flight without a fault has the log that it always had.
     if output.failsafe != Failsafe::default() {
         let Failsafe { mode, reason } = output.failsafe;
@@ -307,6 +292,26 @@ pub(crate) fn record_output(
     }
 }
 
+/// What is believed, and what is not as it should be.
+fn record_estimate(log: &mut FlightLog, t: f64, output: &StackOutput) {
+    log.source_mut("control.status")
+        .push(t, &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])]);
+    if let Some(terms) = &output.navigation {
+        let attitude = terms.ned_from_body.wxyz().map(f64::from);
+        log.source_mut(ESTIMATE).push(
+            t,
+            &[
+                ("q_ned_from_body_wxyz", &attitude),
+                ("position_ned_m", &wide(&terms.position.vector)),
+                ("velocity_ned_m_s", &wide(&terms.velocity.vector)),
+                ("gyro_bias_body_rad_s", &wide(&terms.gyro_bias.vector)),
+            ],
+        );
+        // For who reads a log as that of any autopilot.
+        log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude)]);
+    }
+}
+
 /// What the network said, also where the flat plate stood in for it; NaN before its window was full.
 fn record_parnn(log: &mut FlightLog, t: f64, terms: &ParnnTerms) {
     let said = |of: fn(&Estimate) -> f32| terms.estimate.as_ref().map_or(f64::NAN, |e| f64::from(of(e)));
@@ -336,6 +341,12 @@ impl Cursor<'_> {
         self.next += usize::from(found);
         found.then(|| self.next - 1)
     }
+}
+
+/// A quaternion, w x y z, whatever its length: to judge it is the flight code's business.
+fn as_it_is(row: &[f64]) -> Rotation<Ned, Body, f32> {
+    let q = Quaternion::new(row[0] as f32, row[1] as f32, row[2] as f32, row[3] as f32);
+    Rotation::new(Unit::new_unchecked(q))
 }
 
 /// The frames that a log's flight code got, in order.
@@ -394,10 +405,7 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, String> {
         if let Some((cursor, q)) = &mut attitude
             && let Some(i) = cursor.at(*t)
         {
-            let q = q.row(i);
-            let q =
-                squirrel_core::nalgebra::Quaternion::new(q[0] as f32, q[1] as f32, q[2] as f32, q[3] as f32);
-            frame.attitude = Some(Rotation::new(squirrel_core::nalgebra::Unit::new_unchecked(q)));
+            frame.attitude = Some(as_it_is(q.row(i)));
         }
         if let Some((cursor, position)) = &mut gnss
             && let Some(i) = cursor.at(*t)
