@@ -672,7 +672,7 @@ class Stack:
         omega_body_rad_s, specific_force_body_m_s2 : ndarray of float32, shape (count, 3), optional
             Of the inertial unit, both or none.
         q_ned_from_body_wxyz : ndarray of float32, shape (count, 4), optional
-            Attitude.
+            Attitude; nothing is estimated here.
         position_ned_m, velocity_ned_m_s : ndarray of float32, shape (count, 3), optional
             Of the satellite fix, both or none.
         altitude_m : ndarray of float32, shape (count,), optional
@@ -1245,7 +1245,7 @@ def rollout(*, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, 
         Names the argument, what was expected and what came.
     """
 
-def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str = 'avoid', arm: typing.Optional[builtins.str] = None, seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, integrator: builtins.str = 'rk4', policy: typing.Optional[Policy] = None) -> FlightLog:
+def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str = 'avoid', arm: typing.Optional[builtins.str] = None, seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, estimator: typing.Optional[builtins.str] = None, integrator: builtins.str = 'rk4', policy: typing.Optional[Policy] = None) -> FlightLog:
     r"""
     Fly one scenario in closed loop: plant, sensors and flight code.
     
@@ -1263,6 +1263,9 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
         Of everything random; the scenario's own if left out.
     thrust_to_weight : float, optional
         Largest collective thrust over weight; overrides vehicle and scenario.
+    estimator : str, optional
+        Who tells the flight code attitude, velocity and position: ``eskf``, ``mekf``, ``mahony``, ``rkf_mtf``, ``rkf_stf``, ``kalman``,
+        ``external``, ``oracle`` (the truth); the vehicle's own if left out.
     integrator : str
         ``rk4`` (rapier near contact) or ``rapier`` (throughout, first order).
     policy : Policy, optional
