@@ -9,7 +9,7 @@ use crate::journal::{Journal, identity};
 use serde::{Deserialize, Serialize};
 use squirrel_core::guidance::mission::scramble;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
+use squirrel_sim::flight::{FlightError, Integrator, Metrics, OVER_RAD, Setup};
 use squirrel_sim::scenario::{FaultKind, FaultTable, Scenario};
 use squirrel_sim::sensors::{SUITES, SensorParameters};
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -21,8 +21,6 @@ pub const HEALTHY_RATIO: f64 = 1.6;
 const ROTOR_LOSS: f64 = 0.3;
 /// A vehicle that comes down slower has landed, m/s.
 const LANDING_M_S: f64 = 2.0;
-/// One that tilts further has turned over, rad.
-const OVER_RAD: f64 = 1.6;
 const SCENARIOS: [&str; 3] = ["avoid", "track", "hover"];
 
 /// What to run.

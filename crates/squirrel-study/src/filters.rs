@@ -217,11 +217,11 @@ fn heard(plan: &Plan, log: &FlightLog, filter: Estimator, calibrated: bool) -> R
         if now_s >= SETTLED_S {
             let down = |r: Rotation<Ned, Body, f64>| (r.inverse() * In::<Ned, f64>::new(Vector3::z())).vector;
             let believed = filter.estimate().ned_from_body.wxyz().map(f64::from);
-            let (Some(believed), Some(truth)) = (Rotation::from_wxyz(believed), attitude(at)) else {
-                continue;
-            };
-            let (believed, truth) = (down(believed), down(truth));
-            let error_deg = believed.cross(&truth).norm().atan2(believed.dot(&truth)).to_degrees();
+            let Some(truth) = attitude(at).map(down) else { continue };
+            // What is no attitude errs as much as can be.
+            let error_deg = Rotation::from_wxyz(believed).map(down).map_or(180.0, |believed| {
+                believed.cross(&truth).norm().atan2(believed.dot(&truth)).to_degrees()
+            });
             sum += error_deg * error_deg;
             count += 1.0;
             max = max.max(error_deg);

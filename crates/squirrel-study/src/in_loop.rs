@@ -5,15 +5,13 @@ use crate::statistics::{self, Estimate, mean, paired};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
+use squirrel_sim::flight::{FlightError, Integrator, Metrics, OVER_RAD, Setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::sensors::{SUITES, SensorParameters};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Standard deviation of the gusts, m/s.
 const GUST_M_S: f64 = 0.5;
-/// A vehicle that tilts further has turned over, rad.
-const OVER_RAD: f64 = 1.6;
 
 /// Two flights with the same seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

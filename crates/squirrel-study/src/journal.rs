@@ -49,7 +49,7 @@ impl Journal {
 
     /// The trials of a study in a folder, which must exist.
     ///
-    /// * `plan` - everything that a result depends on, in one line
+    /// * `plan` - what a result depends on beside the program itself, in one line
     ///
     /// # Errors
     /// The file cannot be read or written, or is of another plan.
@@ -93,7 +93,7 @@ impl Journal {
     /// * `progress` - called once for each trial, also for those that were there
     ///
     /// # Errors
-    /// The first trial that fails, a result that cannot be read, or one that cannot be written.
+    /// A trial that fails, a result that cannot be read, or one that cannot be written.
     pub fn run<T: Serialize + DeserializeOwned + Send>(
         &self,
         trials: u32,
@@ -121,12 +121,14 @@ impl Journal {
     /// Writes a result down; what is handed on is what was written, so that it does not matter who asks.
     fn keep<T: Serialize + DeserializeOwned>(&self, trial: u32, result: &T) -> Result<T, FlightError> {
         let line = serde_json::to_string(&Line { trial, result }).map_err(|e| self.at(&e))?;
+        // A number that is none cannot be read again, and must not be kept.
+        let kept = self.read(&line)?;
         if let Some((_, file)) = &self.file {
             let mut file = file.lock().map_err(|e| self.at(&e))?;
             // One write a line, so that a stop cuts at most the last.
             file.write_all(format!("{line}\n").as_bytes()).map_err(|e| self.at(&e))?;
         }
-        self.read(&line)
+        Ok(kept)
     }
 
     fn at(&self, problem: &dyn std::fmt::Display) -> FlightError {

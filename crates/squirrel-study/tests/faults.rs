@@ -12,17 +12,17 @@ fn study(trials: u32, folder: Option<&Path>) -> Faults {
 
 #[test]
 fn nine_of_ten_survivable_faults_are_survived_and_what_is_lost_is_flagged() {
-    let study = study(300, None);
+    let study = study(1000, None);
     assert!(study.survived_share >= 0.9, "{:#?}", study.rows);
     assert_eq!(study.rows.len(), 10);
     for row in &study.rows {
         assert!(row.not_finite == 0 && row.lost_unflagged == 0, "{row:?}");
-        // Thirty flights of each; those that cannot go on are few.
-        assert!(row.flights == 30 && row.survivable >= 10, "{row:?}");
+        // A hundred flights of each; about half of the weak rotors have too little thrust to spare.
+        assert!(row.flights == 100 && row.survivable >= 35, "{row:?}");
     }
     let flagged = |fault: &str| study.rows.iter().find(|row| row.fault == fault).unwrap().flagged;
     for fault in ["imu_spike", "imu_stuck", "imu_nan", "imu_dead", "motor_weak"] {
-        assert!(flagged(fault) >= 28, "{fault}: {}", flagged(fault));
+        assert!(flagged(fault) >= 95, "{fault}: {}", flagged(fault));
     }
     for (k, flight) in study.flights.iter().enumerate() {
         let names = |flag: &str| flight.flags.iter().any(|f| f == flag);

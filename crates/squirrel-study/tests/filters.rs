@@ -12,7 +12,7 @@ fn study(trials: u32) -> Filters {
 /// The paper's filter bears accelerations if the gyro is calibrated, the plain one never does, and the default does in any case.
 #[test]
 fn the_default_needs_no_calibration_and_the_papers_filter_does() {
-    let study = study(20);
+    let study = study(50);
     let rms = |filter: &str, calibrated: bool| {
         let row = study.rows.iter().find(|row| row.filter == filter && row.calibrated == calibrated).unwrap();
         row.inclination_rms_deg

@@ -162,6 +162,8 @@ pub struct Eskf {
     attitude: UnitQuaternion<f32>,
     accel_bias: Vector3<f32>,
     gyro_bias: Vector3<f32>,
+    /// As it was calibrated.
+    start_bias: Vector3<f32>,
     covariance: Covariance,
     past: Past,
     /// A fix has said where it is.
@@ -217,6 +219,7 @@ impl Eskf {
             attitude: start.quaternion,
             accel_bias: Vector3::zeros(),
             gyro_bias: gyro_bias.vector,
+            start_bias: gyro_bias.vector,
             covariance: at_start(&parameters),
             past: Past { moments: [here; MOMENTS], newest: 0, known: 0, age_s: 0.0 },
             placed: false,
@@ -297,7 +300,7 @@ impl Eskf {
         let turn = START_ANEW_RAD;
         let p = EskfParameters { start_turn_rad: turn, start_heading_rad: turn, ..self.parameters };
         self.covariance = at_start(&p);
-        (self.accel_bias, self.gyro_bias) = (Vector3::zeros(), Vector3::zeros());
+        (self.accel_bias, self.gyro_bias) = (Vector3::zeros(), self.start_bias);
         self.placed = false;
         self.refused = Refused { altitudes: STUBBORN - 1, ..Refused::default() };
         self.unease = 1.0;

@@ -33,6 +33,8 @@ pub struct Monitor {
     missing_n: f32,
     torque_n_m: Vector3<f32>,
     spread_ago_s: f32,
+    /// Since the last inertial measurement.
+    waited_s: f32,
 }
 
 impl Default for Monitor {
@@ -43,6 +45,7 @@ impl Default for Monitor {
             missing_n: 0.0,
             torque_n_m: Vector3::zeros(),
             spread_ago_s: FOLDED_S,
+            waited_s: 0.0,
         }
     }
 }
@@ -60,10 +63,16 @@ impl Monitor {
         wings: f32,
         dt_s: f32,
     ) {
-        let (Some(achieved), Some(imu)) = (achieved, imu) else {
+        let Some(achieved) = achieved else {
             *self = Self::default();
             return;
         };
+        let dt_s = self.waited_s + dt_s;
+        let Some(imu) = imu else {
+            self.waited_s = lower(dt_s, MEAN_S);
+            return;
+        };
+        self.waited_s = 0.0;
         let p = vehicle.parameters();
         let omega = imu.omega.vector;
         let before = self.omega.replace(omega);

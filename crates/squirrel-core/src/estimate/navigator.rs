@@ -16,12 +16,12 @@ use super::{Estimate, Estimator, STEP_MAX_S, Sensed};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{GRAVITY_M_S2, lower};
 use crate::stack::{Gnss, Imu, SensorFrame};
-use crate::vehicle::{ParameterError, positive};
+use crate::vehicle::{ParameterError, not_negative, positive};
 use nalgebra::Vector3;
 
 /// Without a believed fix for so long, s, nobody knows any more where the vehicle is.
 pub const LOST_S: f32 = 3.0;
-/// Without one for so long, s, the receiver is not well.
+/// Without one, or a word of barometer or compass, for so long, s, that sensor is not well.
 const SILENT_S: f32 = 0.5;
 /// Identical fixes after which a receiver hangs, if the filter does not believe them.
 const HANGS: u8 = 3;
@@ -93,9 +93,9 @@ impl Health {
     pub const NOT_A_READING: Self = Self(1 << 2);
     /// No fix for half a second, or fixes that contradict the rest.
     pub const GNSS_OUT: Self = Self(1 << 3);
-    /// The barometer contradicts the rest.
+    /// The barometer is silent or contradicts the rest.
     pub const BARO_OUT: Self = Self(1 << 4);
-    /// The compass contradicts the rest.
+    /// The compass is silent or contradicts the rest.
     pub const COMPASS_OUT: Self = Self(1 << 5);
     /// Nobody knows any more where the vehicle is.
     pub const POSITION_LOST: Self = Self(1 << 6);
@@ -107,7 +107,7 @@ impl Health {
     /// It hangs further over than any command asks for.
     pub const UPSET: Self = Self(1 << 9);
 
-    /// Fixes contradicted the filter for so long that it started anew, at some time in this flight.
+    /// The filter started anew at some time in this flight: fixes contradicted it for long, or its biases or its covariance were impossible.
     pub const RESTARTED: Self = Self(1 << 10);
 
     /// Name of each bit, from the lowest.
@@ -213,6 +213,10 @@ pub struct NavigationState {
     fix_age_s: f32,
     /// Fixes in a row that were the same, bit for bit.
     fix_repeats: u8,
+    /// Since barometer and compass last spoke, s; `None` before they did.
+    silent_s: [Option<f32>; 2],
+    /// The inertial units repeat themselves.
+    pub(crate) imu_hangs: bool,
     /// Vertical velocity, m/s, down, where it is known.
     pub(crate) descent_m_s: Option<f32>,
     /// Of the step.
@@ -265,20 +269,38 @@ impl Navigation {
         }
         positive("estimation.altitude.accel_noise_m_s2", self.altitude.accel_noise_m_s2)?;
         positive("estimation.altitude.baro_noise_m", self.altitude.baro_noise_m)?;
+        not_negative("estimation.altitude.bias_walk_m_s2_root_s", self.altitude.bias_walk_m_s2_root_s)?;
         match self.filter {
             Filter::External => Ok(()),
             Filter::Rkf(p) => {
                 positive("estimation.rkf.gyro_noise_rad_s", p.gyro_noise_rad_s)?;
+                not_negative("estimation.rkf.external_memory", p.external_memory)?;
                 positive("estimation.rkf.accel_noise_m_s2", p.accel_noise_m_s2)
             }
-            Filter::Mahony(p) => positive("estimation.mahony.proportional_per_s", p.proportional_per_s),
+            Filter::Mahony(p) => {
+                not_negative("estimation.mahony.integral_per_s2", p.integral_per_s2)?;
+                not_negative("estimation.mahony.gate_m_s2", p.gate_m_s2)?;
+                positive("estimation.mahony.proportional_per_s", p.proportional_per_s)
+            }
             Filter::Mekf(p) => {
                 positive("estimation.mekf.gyro_noise_rad_s", p.gyro_noise_rad_s)?;
+                not_negative("estimation.mekf.bias_walk_rad_s_root_s", p.bias_walk_rad_s_root_s)?;
+                positive("estimation.mekf.bias_deviation_rad_s", p.bias_deviation_rad_s)?;
+                positive("estimation.mekf.alone_noise_m_s2", p.alone_noise_m_s2)?;
+                not_negative("estimation.mekf.gate_m_s2", p.gate_m_s2)?;
+                positive("estimation.mekf.heading_noise_rad", p.heading_noise_rad)?;
                 positive("estimation.mekf.fix_noise_m_s2", p.fix_noise_m_s2)
             }
             Filter::Eskf(p) => {
                 positive("estimation.eskf.gyro_noise_rad_s", p.gyro_noise_rad_s)?;
                 positive("estimation.eskf.accel_noise_m_s2", p.accel_noise_m_s2)?;
+                not_negative("estimation.eskf.gyro_walk_rad_s_root_s", p.gyro_walk_rad_s_root_s)?;
+                not_negative("estimation.eskf.accel_walk_m_s2_root_s", p.accel_walk_m_s2_root_s)?;
+                positive("estimation.eskf.start_turn_rad", p.start_turn_rad)?;
+                positive("estimation.eskf.start_heading_rad", p.start_heading_rad)?;
+                positive("estimation.eskf.start_gyro_bias_rad_s", p.start_gyro_bias_rad_s)?;
+                positive("estimation.eskf.start_accel_bias_m_s2", p.start_accel_bias_m_s2)?;
+                positive("estimation.eskf.alone_noise_m_s2", p.alone_noise_m_s2)?;
                 positive("estimation.eskf.gnss_position_noise_m", p.gnss_position_noise_m)?;
                 positive("estimation.eskf.gnss_velocity_noise_m_s", p.gnss_velocity_noise_m_s)?;
                 positive("estimation.eskf.baro_noise_m", p.baro_noise_m)?;
@@ -306,6 +328,7 @@ impl Navigation {
         told.imu = state.voter.vote([told.imu, told.imu_2], elapsed_us);
         told.imu_2 = None;
         let [first, second] = state.voter.left_out();
+        state.imu_hangs = state.voter.hangs();
         let health = Health::default()
             .with(Health::IMU_1_OUT, first)
             .with(Health::IMU_2_OUT, second)
@@ -335,6 +358,10 @@ impl Navigation {
             if state.fix_repeats >= HANGS && is_doubted {
                 told.gnss = None;
             }
+        }
+        let [baro, compass] = &mut state.silent_s;
+        for (silent_s, spoke) in [(baro, told.altitude_m.is_some()), (compass, told.magnetic.is_some())] {
+            *silent_s = if spoke { Some(0.0) } else { silent_s.map(|s| lower(s + dt_s, 1e6)) };
         }
         waiting.gnss = told.gnss.or(waiting.gnss);
         waiting.altitude_m = told.altitude_m.or(waiting.altitude_m);
@@ -392,12 +419,14 @@ impl Navigation {
         }
         state.descent_m_s = Some(velocity.vector.z);
         let is_silent = alone_s > SILENT_S;
+        let [baro_is_silent, compass_is_silent] =
+            state.silent_s.map(|silent_s| silent_s.is_some_and(|s| s > SILENT_S));
         state.health = state
             .health
             .with(Health::GNSS_OUT, doubts.gnss || is_silent)
             .with(Health::RESTARTED, matches!(&state.running, Running::Eskf(filter) if filter.restarts() > 0))
-            .with(Health::BARO_OUT, doubts.baro)
-            .with(Health::COMPASS_OUT, doubts.compass)
+            .with(Health::BARO_OUT, doubts.baro || baro_is_silent)
+            .with(Health::COMPASS_OUT, doubts.compass || compass_is_silent)
             .with(Health::POSITION_LOST, alone_s > LOST_S);
         Some(NavigationTerms {
             ned_from_body: estimate.ned_from_body,

@@ -38,12 +38,14 @@ pub struct RestCalibration {
     sum: Vector3<f32>,
     count: u32,
     bias: Option<Vector3<f32>>,
+    /// The last sample was not at rest.
+    moved: bool,
 }
 
 impl RestCalibration {
     /// Nothing heard yet.
     pub fn new(parameters: RestParameters) -> Self {
-        Self { parameters, first: None, sum: Vector3::zeros(), count: 0, bias: None }
+        Self { parameters, first: None, sum: Vector3::zeros(), count: 0, bias: None, moved: false }
     }
 
     /// Hears a sample; the bias, rad/s, of the last whole window at rest.
@@ -55,6 +57,7 @@ impl RestCalibration {
         let is_still = imu.omega.vector.norm() < p.rate_max_rad_s
             && (force - first).norm() < p.force_change_max_m_s2
             && is_heavy;
+        self.moved = !is_still;
         if is_still {
             self.sum += imu.omega.vector;
             self.count += 1;
@@ -69,7 +72,7 @@ impl RestCalibration {
     }
 }
 
-/// Listens to all sensors before take-off: units vote, the last second at rest counts.
+/// Listens to all sensors before take-off: units vote, and what moves starts the second at rest anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Preflight {
     voter: Voter,
@@ -128,6 +131,11 @@ impl Preflight {
         self.last_us = Some(frame.time_us);
         if let Some(imu) = self.voter.vote([frame.imu, frame.imu_2], elapsed_us as u32) {
             self.gyro_bias = self.calibration.hear(&imu).or(self.gyro_bias);
+            if self.calibration.moved {
+                // What was heard before is of another place.
+                *self = Self { voter: self.voter, last_us: self.last_us, ..Self::default() };
+                return;
+            }
             self.force.hear(&imu.specific_force.vector);
         }
         if let Some(field) = frame.magnetic {

@@ -19,6 +19,9 @@ const HOLD_US: u32 = 300_000;
 const LEARN_S: f32 = 2.0;
 /// Identical samples after which a unit hangs, if the other changes.
 const HANGS: u16 = 10;
+/// And after which it does if there is no other to tell: a third of a second at 300 Hz.
+const HANGS_ALONE: u16 = 100;
+const TURNING_RAD_S: f32 = 1e-3;
 /// From one sample to the next, of a unit that is alone: rad/s and m/s^2.
 const SPIKE_RAD_S: f32 = 15.0;
 const SPIKE_M_S2: f32 = 150.0;
@@ -127,6 +130,17 @@ impl Voter {
             unit.last.is_some() && (unit.doubted_us > 0 || unit.silent_us > SPIKE_GAP_US || alone)
         };
         [out(0), out(1)]
+    }
+
+    /// Whether every unit that ever spoke repeats itself bit for bit although it says that the vehicle turns, or weighs nothing.
+    pub fn hangs(&self) -> bool {
+        let mut spoken =
+            self.units.iter().filter_map(|unit| unit.last.map(|imu| (unit.repeats, imu))).peekable();
+        spoken.peek().is_some()
+            && spoken.all(|(repeats, imu)| {
+                let is_turning = imu.omega.vector.norm_squared() > TURNING_RAD_S * TURNING_RAD_S;
+                repeats >= HANGS_ALONE && (is_turning || imu.specific_force.vector == Vector3::zeros())
+            })
     }
 
     fn of_two(&mut self, a: &Imu, b: &Imu, elapsed_us: u32) -> Imu {

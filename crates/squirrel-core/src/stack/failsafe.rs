@@ -12,6 +12,9 @@
 //! | altitude | none; the height is that of the satellite fix, and the reason is reported |
 //! | commands from outside | the outer loop flies again, without any memory; the reason is reported |
 //!
+//! Where the flight code estimates, position and velocity are gone once no fix was believed for `LOST_S` of
+//! [`crate::estimate::navigator`], and the inertial units repeat themselves where all of them do.
+//!
 //! When all is well again for [`RECOVERY_US`], control resumes without any memory of the time before.
 
 use super::Known;
@@ -161,6 +164,15 @@ impl Watch {
     }
 }
 
+/// What the flight code's own estimate says, where it has one: the sensors behind it can no longer be seen from here.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Estimated {
+    /// Nobody knows any more where the vehicle is.
+    pub(super) position_is_lost: bool,
+    /// The inertial units repeat themselves.
+    pub(super) imu_hangs: bool,
+}
+
 /// What the failsafe remembers.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FailsafeState {
@@ -189,13 +201,13 @@ impl FailsafeState {
     /// Looks at what came of a frame.
     ///
     /// * `elapsed_us` - time since the last frame, `None` for the first, 0 if it did not go on
-    /// * `position_is_lost` - the estimate says so itself
+    /// * `estimate` - what the flight code's own estimate says
     pub(super) fn update(
         &mut self,
         elapsed_us: Option<u32>,
         merged: Merged,
         known: &Known,
-        position_is_lost: bool,
+        estimate: Estimated,
     ) -> Failsafe {
         self.standing = if elapsed_us == Some(0) { self.standing.saturating_add(1) } else { 0 };
         let elapsed_us = elapsed_us.unwrap_or(0);
@@ -219,7 +231,7 @@ impl FailsafeState {
         self.altitude_hangs = self.altitude.repeats >= ALTITUDE_REPEATS
             && (self.altitude_hangs || self.climbed_m.abs() > CLIMBED_M);
 
-        let judged = self.judge(known, position_is_lost);
+        let judged = self.judge(known, estimate);
         self.better_us =
             if judged.mode < self.active.mode { self.better_us.saturating_add(elapsed_us) } else { 0 };
         if judged.mode >= self.active.mode || self.better_us >= RECOVERY_US {
@@ -233,7 +245,7 @@ impl FailsafeState {
         self.command_age_us.is_some_and(|age| age > COMMAND_LIMIT_US)
     }
 
-    fn judge(&self, known: &Known, position_is_lost: bool) -> Failsafe {
+    fn judge(&self, known: &Known, estimate: Estimated) -> Failsafe {
         use {FailsafeMode as M, FailsafeReason as R};
         let turning = |omega: &Vector3<f32>| omega.norm_squared() > TURNING_RAD_S * TURNING_RAD_S;
         let imu_stuck = self.imu.repeats >= IMU_REPEATS
@@ -247,13 +259,13 @@ impl FailsafeState {
             (M::Cut, R::ClockStuck)
         } else if self.imu.is_lost(IMU_LIMIT_US) {
             (M::Cut, R::ImuLost)
-        } else if imu_stuck {
+        } else if imu_stuck || estimate.imu_hangs {
             (M::Cut, R::ImuStuck)
         } else if self.attitude.is_lost(ATTITUDE_LIMIT_US) {
             (M::Cut, R::AttitudeLost)
         } else if self.attitude_hangs {
             (M::Cut, R::AttitudeStuck)
-        } else if position_is_lost || self.gnss.is_lost(GNSS_LIMIT_US) {
+        } else if estimate.position_is_lost || self.gnss.is_lost(GNSS_LIMIT_US) {
             (M::Level, R::GnssLost)
         } else if gnss_stuck {
             (M::Level, R::GnssStuck)

@@ -10,6 +10,7 @@ use crate::policy::PilotCommand;
 pub const MAX_OBSTACLES: usize = 4;
 /// Measurements beyond these sizes are faults, not motion.
 const RATE_MAX_RAD_S: f32 = 1e3;
+const FORCE_MAX_M_S2: f32 = 1e4;
 const POSITION_MAX_M: f32 = 1e6;
 const VELOCITY_MAX_M_S: f32 = 1e3;
 const FIELD_MAX_UT: f32 = 1e4;
@@ -25,7 +26,8 @@ pub struct Imu {
 
 impl Imu {
     fn is_reading(&self) -> bool {
-        self.omega.vector.iter().all(|x| x.abs() <= RATE_MAX_RAD_S) && all_finite(&self.specific_force.vector)
+        self.omega.vector.iter().all(|x| x.abs() <= RATE_MAX_RAD_S)
+            && self.specific_force.vector.iter().all(|x| x.abs() <= FORCE_MAX_M_S2)
     }
 }
 

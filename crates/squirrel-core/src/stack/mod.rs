@@ -29,7 +29,7 @@ use crate::guidance::mission::{Mission, MissionState};
 use crate::math::{limit, lower};
 use crate::policy::PilotCommand;
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
-use failsafe::{Failsafe, FailsafeMode, FailsafeReason, FailsafeState, LEVEL_THRUST_SHARE};
+use failsafe::{Estimated, Failsafe, FailsafeMode, FailsafeReason, FailsafeState, LEVEL_THRUST_SHARE};
 use nalgebra::Vector3;
 
 /// Period of the outer loop, us.
@@ -232,8 +232,11 @@ impl Stack {
         let merged = frame.merge_into(&mut state.known);
         state.rejected = state.rejected.saturating_add(merged.rejected);
         let was = state.failsafe.active.mode;
-        let is_lost = state.navigation.health.has(Health::POSITION_LOST);
-        let failsafe = state.failsafe.update(elapsed_us, merged, &state.known, is_lost);
+        let estimate = Estimated {
+            position_is_lost: state.navigation.health.has(Health::POSITION_LOST),
+            imu_hangs: state.navigation.imu_hangs,
+        };
+        let failsafe = state.failsafe.update(elapsed_us, merged, &state.known, estimate);
         let is_well = failsafe.mode == FailsafeMode::Off;
         let alone = state.failsafe.command_is_lost() && state.known.command.take().is_some();
         if failsafe.mode != was || !is_well || alone {

@@ -4,6 +4,8 @@ use super::*;
 use crate::control::backstepping::AttitudeForm;
 use crate::control::twcc;
 use crate::control::wing_force::{ForceModel, Guard, fixtures::loud};
+use crate::estimate::eskf::EskfParameters;
+use crate::estimate::navigator::Filter;
 use crate::guidance::sensing::Obstacle;
 use crate::vehicle::fixtures::squirrel;
 use proptest::prelude::*;
@@ -315,4 +317,33 @@ fn a_filter_that_would_run_away_is_refused() {
         command_filter::step(&mut filter, &Vector3::repeat(0.5), 41.0, 1.0, INNER_STEP_MAX_S);
     }
     assert!((filter.angle - Vector3::repeat(0.5)).norm() < 1e-3, "{filter:?}");
+}
+
+/// An inertial unit that hangs is found though the filter takes another bias off it in each step; and it stays with what it knew.
+#[test]
+fn a_single_unit_that_hangs_in_flight_is_found_behind_the_filter() {
+    let eskf = Filter::Eskf(EskfParameters::default());
+    let stack = stack_with(Navigation { filter: eskf, ..Navigation::external() });
+    let mut state = StackState::default();
+    let (mut last, mut found) = (None, None);
+    for k in 0..1200u64 {
+        let mut frame = level(k * 3333);
+        let wobble = 0.02 * (k as f32 * 0.3).sin();
+        if let Some(imu) = &mut frame.imu {
+            imu.omega = In::new(Vector3::new(0.05 + wobble, -wobble, 0.01));
+        }
+        frame.altitude_m = k.is_multiple_of(6).then_some(wobble);
+        frame.gnss = frame.gnss.filter(|_| k.is_multiple_of(30));
+        if k >= 900 {
+            frame.imu = last;
+        }
+        last = frame.imu;
+        let output = stack.step(&mut state, &frame);
+        if output.failsafe.reason == FailsafeReason::ImuStuck && found.is_none() {
+            found = Some(k);
+            assert_eq!(output.failsafe.mode, FailsafeMode::Cut);
+        }
+        assert!(k >= 900 || output.failsafe.mode == FailsafeMode::Off, "{k}: {output:?}");
+    }
+    assert!(found.is_some_and(|k| (995..=1010).contains(&k)), "{found:?}");
 }

@@ -7,7 +7,7 @@ mod check;
 mod thrust_curve;
 
 pub use check::ParameterError;
-pub(crate) use check::{each_not_negative, each_positive, positive};
+pub(crate) use check::{each_not_negative, each_positive, not_negative, positive};
 pub use thrust_curve::ThrustCurve;
 
 use crate::effects::Alteration;

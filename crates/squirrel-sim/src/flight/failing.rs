@@ -35,8 +35,9 @@ impl Failing {
             return;
         }
         let good = [frame.imu, frame.imu_2];
-        self.samples += 1;
-        let is_spike = self.samples.is_multiple_of(SPIKE_EVERY);
+        let is_sample = good.iter().any(Option::is_some);
+        self.samples += u64::from(is_sample);
+        let is_spike = is_sample && self.samples.is_multiple_of(SPIKE_EVERY);
         let mut stuck = [false; 2];
         for (kind, table) in self.faults.iter().filter(|(_, table)| table.acts(frame.time_us)) {
             let size = table.size.unwrap_or(0.0);

@@ -41,7 +41,7 @@ pub struct Metrics {
     /// Largest tilt of the whole flight, rad.
     pub tilt_max_rad: f64,
     /// What the flight code found not to be as it should, in the order of [`Health::NAMES`], and why its failsafe acted; from the first
-    /// of the scenario's faults on, where there is one.
+    /// of the scenario's faults on, where there is one, until it turns over or touches something.
     #[serde(serialize_with = "names")]
     pub flags: Flags,
 }
@@ -69,6 +69,9 @@ impl Flags {
 fn names<S: serde::Serializer>(flags: &Flags, to: S) -> Result<S::Ok, S::Error> {
     flags.names().serialize(to)
 }
+
+/// A vehicle that tilts further has turned over, rad.
+pub const OVER_RAD: f64 = 1.6;
 
 /// Collects [`Metrics`].
 pub(super) struct Meter<'a> {
@@ -127,7 +130,9 @@ impl<'a> Meter<'a> {
         self.metrics.encounters = encounters;
         let mut commands = output.rotor_command.iter().chain(&output.wing_command);
         self.metrics.not_finite |= !commands.all(|command| command.is_finite());
-        if time_us as f64 * 1e-6 >= self.faults_from_s {
+        // What is reported once a vehicle has turned over or lies on the ground warns nobody.
+        let is_flying = self.metrics.contact_s.is_none() && self.metrics.tilt_max_rad < OVER_RAD;
+        if is_flying && time_us as f64 * 1e-6 >= self.faults_from_s {
             self.metrics.flags.health.0 |= output.health.0;
             if output.failsafe.reason != FailsafeReason::None {
                 self.metrics.flags.reasons |= 1 << output.failsafe.reason as u16;

@@ -12,7 +12,7 @@ mod pilot;
 mod record;
 
 pub use integrator::Integrator;
-pub use metrics::{Flags, Metrics};
+pub use metrics::{Flags, Metrics, OVER_RAD};
 pub use pilot::Pilot;
 pub(crate) use record::{ESTIMATE, ESTIMATOR, FORMAT, Inputs, PARNN_WEIGHTS, record_output};
 pub use record::{INPUT_SOURCES, frames};
@@ -20,8 +20,8 @@ pub use record::{INPUT_SOURCES, frames};
 use crate::arm::Arm;
 use crate::estimator::Estimator;
 use crate::log::FlightLog;
-use crate::plant::{Plant, PlantState, Wind, WindParameters};
-use crate::scenario::Scenario;
+use crate::plant::{Plant, PlantState, Wind, WindParameters, WingPlant};
+use crate::scenario::{FaultKind, Scenario};
 use crate::sensors::{SensorParameters, Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
 use commands::{Command, CommandLine};
@@ -156,6 +156,33 @@ impl Setup {
         Ok(navigation)
     }
 
+    /// A fault that hits nothing would prove nothing.
+    fn check_faults(&self) -> Result<(), FlightError> {
+        let sensors = self.sensors();
+        let rotors = self.vehicle.vehicle.rotors().len();
+        for (kind, table) in &self.scenario.faults {
+            let name = kind.name();
+            let which = table.which.unwrap_or(1) as usize;
+            let problem = match kind {
+                FaultKind::MotorWeak if which > rotors => format!("which = {which}: must be 1 to {rotors}"),
+                FaultKind::CompassSwung if sensors.magnetometer.is_none() => {
+                    "start_s: given, but there is no magnetometer".to_owned()
+                }
+                FaultKind::ImuSpike | FaultKind::ImuStuck | FaultKind::ImuNan | FaultKind::ImuDead
+                    if which > sensors.imu.units as usize =>
+                {
+                    format!("which = {which}: must be 1, there is one inertial unit")
+                }
+                FaultKind::WingStuck if self.vehicle.wing == WingPlant::None => {
+                    "start_s: given, but there is no wing".to_owned()
+                }
+                _ => continue,
+            };
+            return Err(FlightError(format!("faults.{name}.{problem}")));
+        }
+        Ok(())
+    }
+
     fn start_position(&self) -> In<Ned, f64> {
         In::new(Vector3::new(0.0, 0.0, -self.scenario.height_m))
     }
@@ -205,6 +232,7 @@ impl Setup {
         mut progress: impl FnMut(f64),
     ) -> Result<Flight, FlightError> {
         self.scenario.check().map_err(FlightError)?;
+        self.check_faults()?;
         let dt_s = PLANT_STEP_US as f64 * 1e-6;
         let plant_with = |effects| {
             let (wing, battery) = (self.arm.plant_wing(&self.vehicle.wing), self.vehicle.battery.clone());

@@ -82,6 +82,9 @@ impl Truth {
     }
 }
 
+/// Samples of the inertial units that make a second at rest.
+const SAMPLES_AT_REST: f64 = 300.0;
+
 /// Reading of the battery monitor; for the log, the flight code does not use it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BatteryReading {
@@ -167,7 +170,7 @@ impl Sensors {
         (frame, battery)
     }
 
-    /// What these sensors say in a second at rest before the flight, at the rate of the inertial units: level on the ground, rotors
+    /// What these sensors say in a second at rest before the flight, or longer where inertial units are slow, at their rate: level on the ground, rotors
     /// standing. Biases, scales, iron and the satellite receiver's slow error are the flight's, at its start; white noise is another, as
     /// it would be a second earlier. The flight's own streams are untouched. Ask before the first [`Self::poll`].
     ///
@@ -187,7 +190,9 @@ impl Sensors {
         fork(&mut copy.attitude.rng);
         let truth = Truth::at_rest(position, heading_rad);
         let rate_hz = self.parameters.imu.timing.rate_hz;
-        let samples = rate_hz.round() as u64;
+        // As many as a flight code wants to hear, and those that are still on their way.
+        let late = (self.parameters.imu.timing.latency_s * rate_hz).ceil();
+        let samples = (f64::max(rate_hz.round(), SAMPLES_AT_REST) + late) as u64;
         (0..samples).map(|k| copy.poll((k as f64 * 1e6 / rate_hz).ceil() as u64, &truth).0).collect()
     }
 }
