@@ -156,8 +156,9 @@ impl Setup {
         Ok(navigation)
     }
 
-    /// A fault that hits nothing would prove nothing.
-    fn check_faults(&self) -> Result<(), FlightError> {
+    /// The scenario, and that its faults hit something of this vehicle: one that hits nothing would prove nothing.
+    fn check(&self) -> Result<(), FlightError> {
+        self.scenario.check().map_err(FlightError)?;
         let sensors = self.sensors();
         let rotors = self.vehicle.vehicle.rotors().len();
         for (kind, table) in &self.scenario.faults {
@@ -231,8 +232,7 @@ impl Setup {
         record: bool,
         mut progress: impl FnMut(f64),
     ) -> Result<Flight, FlightError> {
-        self.scenario.check().map_err(FlightError)?;
-        self.check_faults()?;
+        self.check()?;
         let dt_s = PLANT_STEP_US as f64 * 1e-6;
         let plant_with = |effects| {
             let (wing, battery) = (self.arm.plant_wing(&self.vehicle.wing), self.vehicle.battery.clone());
