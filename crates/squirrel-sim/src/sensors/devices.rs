@@ -1,6 +1,7 @@
 //! Devices that can be bought: `device = "..."` in a sensor's table.
 //!
-//! Figures are the datasheets' typical ones, in the datasheets' units; "assumed" stands where a datasheet says nothing. What depends
+//! Figures are the datasheets' typical ones, in the datasheets' units; "assumed" stands where a datasheet says nothing. Those of the MPU-6000 were
+//! read against the datasheet's text; the others were not yet, so read your part's before you rely on one. What depends
 //! on the airframe (vibration, iron, mounting, air flow) and on the settings (rate, latency) is not the device's. White
 //! noise per sample is the density times the root of the rate, as if the device's filter let all of the noise through.
 //! Offsets at first power-up are calibrated away by whoever builds the vehicle; a flight draws what ten degrees of temperature since then do
