@@ -110,10 +110,7 @@ pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Re
     if plan.trials == 0 {
         return Err(FlightError("trials = 0: must be at least 1".to_owned()));
     }
-    let journal = match folder {
-        Some(folder) => Journal::open(folder, "faults", &identity("faults", &plan.vehicle, plan.seed))?,
-        None => Journal::none(),
-    };
+    let journal = Journal::open(folder, "faults", &identity("faults", &plan.vehicle, plan.seed))?;
     let flights = journal.run(plan.trials, |trial| fly(plan, trial), progress)?;
     let rows: Vec<Row> =
         FaultKind::ALL.iter().map(|kind| row(*kind, &flights)).filter(|row| row.flights > 0).collect();

@@ -120,10 +120,7 @@ pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Re
     let kinds: Vec<(bool, Estimator)> =
         [true, false].into_iter().flat_map(|calibrated| FILTERS.map(|filter| (calibrated, filter))).collect();
     let identity = journal::identity("filters", &plan.vehicle, plan.seed);
-    let journal = |name| match folder {
-        Some(folder) => Journal::open(folder, name, &identity),
-        None => Ok(Journal::none()),
-    };
+    let journal = |name| Journal::open(folder, name, &identity);
     let all = |trial| -> Result<Vec<Errors>, FlightError> {
         let log = fly(plan, trial)?;
         kinds.iter().map(|(calibrated, filter)| heard(plan, &log, *filter, *calibrated)).collect()

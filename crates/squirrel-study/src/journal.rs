@@ -42,18 +42,14 @@ struct Line<T> {
 }
 
 impl Journal {
-    /// Trials that nobody keeps.
-    pub fn none() -> Self {
-        Self { file: None, done: BTreeMap::new() }
-    }
-
-    /// The trials of a study in a folder, which must exist.
+    /// The trials of a study in a folder, which must exist; without one nobody keeps them.
     ///
     /// * `plan` - what a result depends on beside the program itself, in one line
     ///
     /// # Errors
     /// The file cannot be read or written, or is of another plan.
-    pub fn open(folder: &Path, name: &str, plan: &str) -> Result<Self, FlightError> {
+    pub fn open(folder: Option<&Path>, name: &str, plan: &str) -> Result<Self, FlightError> {
+        let Some(folder) = folder else { return Ok(Self { file: None, done: BTreeMap::new() }) };
         let path = folder.join(format!("{name}.trials.jsonl"));
         let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
         let before = match std::fs::read_to_string(&path) {
