@@ -22,7 +22,7 @@ fn commands(c: &mut Criterion) {
         let view = FlightView {
             arm: "twcc_flat",
             log: &log,
-            obstacles: &setup.scenario.obstacles,
+            obstacles: setup.scenario.all_obstacles(),
             tilt_max_rad: 0.52,
             thrust_max_n: 6.7,
             summary: Vec::new(),

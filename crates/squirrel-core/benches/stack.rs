@@ -38,6 +38,8 @@ fn stack(form: AttitudeForm, force_model: &ForceModel) -> Stack {
             integral_per_s2: Vector3::repeat(0.15),
             derivative: Vector3::repeat(0.05),
             velocity_feed_forward: 0.0,
+            acceleration_feed_forward: 0.0,
+            speed_max_m_s: f32::INFINITY,
             acceleration_max_horizontal_m_s2: 11.0,
             acceleration_max_vertical_m_s2: 3.0,
             integral_max_m: 2.0,
@@ -50,6 +52,7 @@ fn stack(form: AttitudeForm, force_model: &ForceModel) -> Stack {
         policy: WingPolicy::Coordinated,
         dwell_s: 0.3,
         thrust_min_n: 0.5,
+        plus: None,
     };
     Stack::new(
         vehicle,

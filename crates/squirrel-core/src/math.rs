@@ -45,6 +45,22 @@ pub fn limit_norm<T: Real>(v: Vector3<T>, max: T) -> Vector3<T> {
     if norm > max { v * (max / norm) } else { v }
 }
 
+/// A count below 2^53 as it is: a processor without 64-bit integers has an f64 that holds both halves.
+#[inline(always)]
+pub fn whole(count: u64) -> f64 {
+    f64::from((count >> 32) as u32) * 4_294_967_296.0 + f64::from(count as u32)
+}
+
+/// Sine and cosine as `libm` gives them together: the same bits, and one function on the target instead of three.
+pub fn sin(x: f32) -> f32 {
+    libm::sincosf(x).0
+}
+
+/// See [`sin`].
+pub fn cos(x: f32) -> f32 {
+    libm::sincosf(x).1
+}
+
 /// Angle wrapped into (-pi, pi], rad, to within the rounding of the angle. Total: a non-finite angle gives 0.
 pub fn wrap_angle(angle: f32) -> f32 {
     use core::f32::consts::PI;
@@ -101,6 +117,27 @@ pub fn all_finite(v: &Vector3<f32>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_count_is_as_the_language_converts_it() {
+        for k in 0..1_000_000_u64 {
+            let count = (k * k * k).wrapping_mul(9001) >> 11;
+            assert_eq!((whole(count), whole(count) as f32), (count as f64, count as f32));
+        }
+    }
+
+    /// What flew with the three functions flies with the one.
+    #[test]
+    fn sine_and_cosine_are_the_same_together() {
+        for k in -200_000..200_000 {
+            let x = k as f32 * 1.7e-4 * (1.0 + (k % 97) as f32);
+            assert_eq!(
+                (sin(x).to_bits(), cos(x).to_bits()),
+                (libm::sinf(x).to_bits(), libm::cosf(x).to_bits()),
+                "{x}"
+            );
+        }
+    }
 
     #[test]
     fn a_limit_holds_for_nan() {

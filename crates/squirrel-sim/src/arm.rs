@@ -1,6 +1,7 @@
 //! Arms: who flies. Each pairs a controller with a plant, so that what a gain comes from can be told apart.
 
 use crate::plant::WingPlant;
+use crate::vehicle_file::VehicleFile;
 use crate::weights::ParnnWeights;
 use squirrel_core::control::twcc::{TwccParameters, WingPolicy};
 use squirrel_core::control::wing_force::ForceModel;
@@ -22,11 +23,15 @@ pub enum Arm {
     TwccParnn,
     /// TWCC that is told what the plant's wing would do.
     TwccOracle,
+    /// [`squirrel_core::control::plus`] with wings: ours.
+    TwccPlus,
+    /// The same with the wings folded: its fair rival.
+    PcPlus,
 }
 
 impl Arm {
     /// All arms.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Pc,
         Self::PcWingsOpen,
         Self::WiicNoWings,
@@ -34,6 +39,8 @@ impl Arm {
         Self::TwccFlat,
         Self::TwccParnn,
         Self::TwccOracle,
+        Self::TwccPlus,
+        Self::PcPlus,
     ];
 
     /// Name on the command line and in files.
@@ -46,6 +53,8 @@ impl Arm {
             Self::TwccFlat => "twcc_flat",
             Self::TwccParnn => "twcc_parnn",
             Self::TwccOracle => "twcc_oracle",
+            Self::TwccPlus => "twcc_plus",
+            Self::PcPlus => "pc_plus",
         }
     }
 
@@ -60,6 +69,12 @@ impl Arm {
         })
     }
 
+    /// Whether a vehicle has what this arm needs to know.
+    pub fn is_known_to(self, vehicle: &VehicleFile) -> bool {
+        let mut twcc = vehicle.control.map(|control| control.twcc);
+        twcc.as_mut().is_some_and(|twcc| self.configure(twcc, vehicle.weights.as_ref()).is_ok())
+    }
+
     /// Gives the flight code this arm's policy.
     ///
     /// * `weights` - of the vehicle's network; [`Arm::TwccParnn`] needs them
@@ -68,10 +83,12 @@ impl Arm {
     /// One line where they are needed and there are none.
     pub fn configure(self, twcc: &mut TwccParameters, weights: Option<&ParnnWeights>) -> Result<(), String> {
         twcc.policy = match self {
-            Self::Pc => WingPolicy::Folded,
+            Self::Pc | Self::PcPlus => WingPolicy::Folded,
             Self::PcWingsOpen => WingPolicy::Open,
             Self::WiicNoWings => WingPolicy::CoordinatedWithoutWings,
-            Self::Phantom | Self::TwccFlat | Self::TwccParnn | Self::TwccOracle => WingPolicy::Coordinated,
+            Self::Phantom | Self::TwccFlat | Self::TwccParnn | Self::TwccOracle | Self::TwccPlus => {
+                WingPolicy::Coordinated
+            }
         };
         twcc.force_model = match (self, weights) {
             (Self::TwccParnn, Some(weights)) => ForceModel::Parnn(*weights.parnn()),
@@ -84,7 +101,20 @@ impl Arm {
             (arm, _) if arm.is_told_the_force() => ForceModel::Given,
             _ => ForceModel::FlatPlate,
         };
+        if !self.is_plus() {
+            twcc.plus = None;
+        } else if twcc.plus.is_none() {
+            return Err(format!(
+                "arm = {}: needs [control.plus] of the vehicle, which is missing",
+                self.name()
+            ));
+        }
         Ok(())
+    }
+
+    /// Whether the law is [`squirrel_core::control::plus`].
+    fn is_plus(self) -> bool {
+        matches!(self, Self::TwccPlus | Self::PcPlus)
     }
 
     /// The wing that the plant of this arm has.

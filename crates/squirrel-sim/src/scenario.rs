@@ -2,10 +2,12 @@
 
 mod excite;
 mod faults;
+mod forest;
 mod runs;
 
 pub use excite::ExciteTable;
 pub use faults::{FaultKind, FaultTable};
+pub use forest::ForestTable;
 pub use runs::RunsTable;
 
 use crate::plant::{GustModel, WindParameters};
@@ -37,6 +39,9 @@ pub struct Scenario {
     /// `limits.thrust_max_n` and `limits.rotor_thrust_max_n` of the vehicle.
     #[serde(default)]
     pub thrust_to_weight: Option<f64>,
+    /// Fastest that a controller may fly horizontally to catch up with its reference, for those whose law has a limit: not the paper's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub speed_max_m_s: Option<f64>,
     /// Charge of the battery at the start, 0..1.
     #[serde(default = "full")]
     pub battery_charge: f64,
@@ -49,6 +54,9 @@ pub struct Scenario {
     /// Vertical cylinders: `[north_m, east_m, radius_m]`.
     #[serde(default)]
     pub obstacles: Vec<[f64; 3]>,
+    /// More of them, drawn from the seed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub forest: Option<ForestTable>,
     /// What to fly.
     pub mission: MissionTable,
     /// Moving air.
@@ -129,8 +137,17 @@ impl Default for WindTable {
 }
 
 /// Names of the built-in scenarios.
-pub const BUILT_IN: [&str; 8] =
-    ["hover", "avoid", "steer", "track", "excite_calm", "excite_normal", "excite_rich", "random_spread"];
+pub const BUILT_IN: [&str; 9] = [
+    "hover",
+    "avoid",
+    "steer",
+    "track",
+    "forest",
+    "excite_calm",
+    "excite_normal",
+    "excite_rich",
+    "random_spread",
+];
 
 impl Scenario {
     /// A built-in scenario by name, or a TOML file by path.
@@ -180,10 +197,12 @@ impl Scenario {
             duration_s,
             height_m: 30.0,
             thrust_to_weight: None,
+            speed_max_m_s: None,
             battery_charge: 1.0,
             measured_window_s: 0.0,
             solid_obstacles: false,
             obstacles: Vec::new(),
+            forest: None,
             mission,
             wind: WindTable::default(),
             faults: BTreeMap::new(),
@@ -203,6 +222,7 @@ impl Scenario {
             }
             // The paper's simulated study: R_d 5 m, one angle.
             "steer" => Some(Self::turn("steer", 7.0, 5.0, 120.0, 120.0)),
+            "forest" => Some(Self::through_forest()),
             "random_spread" => {
                 Some(Self::base(name, runs::DURATION_S, MissionTable::Runs(RunsTable::built_in())))
             }
@@ -235,6 +255,31 @@ impl Scenario {
         }
     }
 
+    /// The paper's simulated forest: 7 m/s, `R_d` 5 m, turns of 110 to 130 deg to either side until 400 m are flown.
+    fn through_forest() -> Self {
+        let mut scenario = Self::turn("forest", 7.0, 5.0, 110.0, 130.0);
+        if let MissionTable::Avoid { both_sides, .. } = &mut scenario.mission {
+            *both_sides = true;
+        }
+        Self {
+            duration_s: 200.0,
+            measured_window_s: 0.0,
+            thrust_to_weight: Some(2.0),
+            speed_max_m_s: Some(7.0),
+            solid_obstacles: true,
+            obstacles: Vec::new(),
+            forest: Some(ForestTable::built_in()),
+            ..scenario
+        }
+    }
+
+    /// Obstacles given one by one, and those of the forest: north, east, radius, m.
+    pub fn all_obstacles(&self) -> Vec<[f64; 3]> {
+        let mut all = self.obstacles.clone();
+        all.extend(self.forest.iter().flat_map(|forest| forest.trunks(self.seed)));
+        all
+    }
+
     /// # Errors
     /// `field = value: reason`.
     pub fn check(&self) -> Result<(), String> {
@@ -249,6 +294,11 @@ impl Scenario {
         {
             return Err(format!("thrust_to_weight = {ratio}: must be > 1 and <= 100"));
         }
+        if let Some(speed) = self.speed_max_m_s
+            && !(speed > 0.0 && speed <= 100.0)
+        {
+            return Err(format!("speed_max_m_s = {speed}: must be > 0 and <= 100"));
+        }
         if !(0.0..=1.0).contains(&self.battery_charge) {
             return Err(format!("battery_charge = {}: must be 0 to 1", self.battery_charge));
         }
@@ -261,6 +311,9 @@ impl Scenario {
                     "obstacles[{i}] = [{north}, {east}, {radius}]: must be finite, radius > 0 and <= 100"
                 ));
             }
+        }
+        if let Some(forest) = &self.forest {
+            forest.check().map_err(|problem| format!("forest.{problem}"))?;
         }
         let wind = &self.wind;
         if let Some(x) = wind.mean_ned_m_s.iter().find(|x| x.is_nan() || x.abs() > 100.0) {
@@ -326,12 +379,7 @@ impl Scenario {
                 steering_max_rad,
                 both_sides,
             } => Mission::Avoid {
-                run: Trajectory {
-                    start,
-                    course_rad: course_rad as f32,
-                    speed_m_s: speed_m_s as f32,
-                    ramp_s: ramp_s as f32,
-                },
+                run: Trajectory::new(start, course_rad as f32, speed_m_s as f32, ramp_s as f32),
                 sensing: Sensing {
                     range_m: range_m as f32,
                     half_view_rad: half_view_rad as f32,

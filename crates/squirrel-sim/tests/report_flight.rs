@@ -238,7 +238,7 @@ fn broken_flights_neither_panic_nor_leave_numbers_that_are_none() {
     for (flight, bad) in flights.iter_mut().zip([f64::NAN, f64::INFINITY, 1e308]) {
         (flight.tilt_max_rad, flight.thrust_max_n) = (bad, bad);
         flight.obstacles =
-            &[[f64::NAN, 0.0, 1.0], [0.0, 0.0, f64::INFINITY], [1e300, 0.0, 1.0], [0.0, 0.0, -1.0]];
+            vec![[f64::NAN, 0.0, 1.0], [0.0, 0.0, f64::INFINITY], [1e300, 0.0, 1.0], [0.0, 0.0, -1.0]];
     }
     check(&render(&heading(), &flights));
     check(&render(&Heading::default(), &[]));

@@ -9,8 +9,10 @@
 //! - [`journal`]: trials on disk, so that a study that was stopped goes on.
 //! - [`statistics`]: means, and intervals by a paired bootstrap.
 
+pub mod campaign;
 pub mod faults;
 pub mod filters;
+pub mod forest;
 pub mod in_loop;
 pub mod journal;
 pub mod statistics;

@@ -46,6 +46,40 @@ pub fn paired(a: &[f64], b: &[f64], statistic: impl Fn(&[f64], &[f64]) -> f64) -
     Estimate { value: statistic(&a[..n], &b[..n]), low: at(0.025), high: at(0.975) }
 }
 
+/// Mean of the paired differences `a - b` with its interval.
+///
+/// * `a`, `b` - paired by index; NaN where one of them is empty
+pub fn difference(a: &[f64], b: &[f64]) -> Estimate {
+    paired(a, b, |a, b| mean(a) - mean(b))
+}
+
+/// A share of trials with Wilson's 95 % interval, which holds for few trials and for shares near 0 and 1 too.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Share {
+    /// How many.
+    pub count: u32,
+    /// Of how many.
+    pub of: u32,
+    /// The share with its interval.
+    pub share: Estimate,
+}
+
+impl Share {
+    /// Of outcomes.
+    pub fn of(outcomes: impl IntoIterator<Item = bool>) -> Self {
+        let (mut count, mut of) = (0, 0);
+        for outcome in outcomes {
+            (count, of) = (count + u32::from(outcome), of + 1);
+        }
+        // The normal quantile of 97.5 %.
+        let (z, n) = (1.959_963_985, f64::from(of));
+        let p = f64::from(count) / n;
+        let centre = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+        let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+        Self { count, of, share: Estimate { value: p, low: centre - half, high: centre + half } }
+    }
+}
+
 /// The paper's gain: `mean(reference) / mean(x) - 1`.
 pub fn gain(reference: &[f64], x: &[f64]) -> f64 {
     mean(reference) / mean(x) - 1.0

@@ -22,8 +22,17 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const QEMU: &str = "qemu-system-arm";
-const ARMS: [&str; 7] =
-    ["pc", "pc_wings_open", "wiic_no_wings", "phantom", "twcc_flat", "twcc_parnn", "twcc_oracle"];
+const ARMS: [&str; 9] = [
+    "pc",
+    "pc_wings_open",
+    "wiic_no_wings",
+    "phantom",
+    "twcc_flat",
+    "twcc_parnn",
+    "twcc_oracle",
+    "twcc_plus",
+    "pc_plus",
+];
 /// Which of them has the most to do.
 const LEARNED: usize = 5;
 const FAULTS: &str = "100";

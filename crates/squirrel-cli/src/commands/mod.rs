@@ -77,11 +77,23 @@ fn view<'a>(setup: &'a Setup, log: &'a FlightLog, summary: Vec<(String, String)>
     FlightView {
         arm: setup.arm.name(),
         log,
-        obstacles: &setup.scenario.obstacles,
+        obstacles: passed(setup, log),
         tilt_max_rad: (one_axis * one_axis).acos(),
         thrust_max_n: setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n(),
         summary,
     }
+}
+
+/// Obstacles that the flight came near; a forest has a thousand more.
+fn passed(setup: &Setup, log: &FlightLog) -> Vec<[f64; 3]> {
+    /// Further away nothing is seen.
+    const NEAR_M: f64 = 8.0;
+    let mut obstacles = setup.scenario.all_obstacles();
+    if let Some((time_s, path)) = log.channel("truth.position_ned_m") {
+        let near = |[north, east, _]: &[f64; 3], at: &[f64]| (north - at[0]).hypot(east - at[1]) < NEAR_M;
+        obstacles.retain(|trunk| (0..time_s.len()).step_by(10).any(|i| near(trunk, path.row(i))));
+    }
+    obstacles
 }
 
 /// Facts at the head of a report.

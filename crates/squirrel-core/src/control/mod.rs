@@ -1,13 +1,15 @@
 //! Control: from a reference to rotor commands.
 //!
 //! Outer loop, 10 Hz ([`twcc`]): [`position`] (the paper's PC) asks for angles and thrust, [`wing_force`] estimates what
-//! spread wings would do, [`woeg`] says whether that would help, [`wiic`] takes over where the angles are at their limit.
+//! spread wings would do, [`woeg`] says whether that would help, [`wiic`] takes over where the angles are at their limit. Or
+//! [`plus`], which chooses angles, thrust and wings together.
 //! Inner loop, 300 Hz: [`command_filter`] smooths the 10 Hz steps, [`backstepping`] turns attitude error into torque,
 //! [`mixer`] turns thrust and torque into rotor thrusts.
 
 pub mod backstepping;
 pub mod command_filter;
 pub mod mixer;
+pub mod plus;
 pub mod position;
 pub mod twcc;
 pub mod wiic;

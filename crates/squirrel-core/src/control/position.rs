@@ -11,7 +11,7 @@
 
 use super::{AttitudeThrust, Reference};
 use crate::frames::{In, Ned};
-use crate::math::{GRAVITY_M_S2, limit, limit_norm, upper};
+use crate::math::{GRAVITY_M_S2, cos, limit, limit_norm, upper};
 use crate::vehicle::{ParameterError, each_not_negative, each_positive, positive};
 use nalgebra::{Vector2, Vector3};
 
@@ -37,6 +37,10 @@ pub struct PositionGains {
     pub derivative: Vector3<f32>,
     /// Share of the reference velocity that is fed forward, 0 in the paper.
     pub velocity_feed_forward: f32,
+    /// Share of the reference acceleration that is fed forward, 0 in the paper.
+    pub acceleration_feed_forward: f32,
+    /// Limit of the horizontal velocity that the position loop asks for, m/s; infinite in the paper.
+    pub speed_max_m_s: f32,
     /// Limit of the horizontal acceleration command, m/s^2.
     pub acceleration_max_horizontal_m_s2: f32,
     /// Limit of the vertical acceleration command, m/s^2.
@@ -104,12 +108,19 @@ impl PositionGains {
         positive("control.position.acceleration_max_horizontal_m_s2", horizontal)?;
         positive("control.position.acceleration_max_vertical_m_s2", self.acceleration_max_vertical_m_s2)?;
         positive("control.position.integral_max_m", self.integral_max_m)?;
-        let share = self.velocity_feed_forward;
-        if !(0.0..=1.0).contains(&share) {
+        for (field, share) in [
+            ("control.position.velocity_feed_forward", self.velocity_feed_forward),
+            ("control.position.acceleration_feed_forward", self.acceleration_feed_forward),
+        ] {
+            if !(0.0..=1.0).contains(&share) {
+                return Err(ParameterError::of(field, share, "must be 0 to 1"));
+            }
+        }
+        if !(self.speed_max_m_s > 0.0) {
             return Err(ParameterError::of(
-                "control.position.velocity_feed_forward",
-                share,
-                "must be 0 to 1",
+                "control.position.speed_max_m_s",
+                self.speed_max_m_s,
+                "must be > 0",
             ));
         }
         Ok(())
@@ -130,8 +141,11 @@ impl PositionGains {
         dt_s: f32,
     ) -> PositionTerms {
         let position_error = reference.position.vector - motion.position.vector;
-        let velocity_desired = self.position_per_s.component_mul(&position_error)
+        let mut velocity_desired = self.position_per_s.component_mul(&position_error)
             + reference.velocity.vector * self.velocity_feed_forward;
+        let horizontal =
+            limit_norm(Vector3::new(velocity_desired.x, velocity_desired.y, 0.0), self.speed_max_m_s);
+        (velocity_desired.x, velocity_desired.y) = (horizontal.x, horizontal.y);
         let error = velocity_desired - motion.velocity.vector;
         let slope = match state.last_error {
             Some(last) if dt_s > 0.0 => (error - last) / dt_s,
@@ -144,7 +158,8 @@ impl PositionGains {
         state.last_error = Some(error);
         let demand = self.velocity_per_s.component_mul(&error)
             + self.integral_per_s2.component_mul(&state.integral)
-            + self.derivative.component_mul(&slope);
+            + self.derivative.component_mul(&slope)
+            + reference.acceleration.vector * self.acceleration_feed_forward;
         let horizontal =
             limit_norm(Vector3::new(demand.x, demand.y, 0.0), self.acceleration_max_horizontal_m_s2);
         let max = self.acceleration_max_vertical_m_s2;
@@ -164,7 +179,7 @@ impl PositionGains {
 
 /// Horizontal part of a NED vector in the heading frame: forward, right.
 pub(super) fn heading_frame(v_ned: &Vector3<f32>, yaw_rad: f32) -> Vector2<f32> {
-    let (s, c) = (libm::sinf(yaw_rad), libm::cosf(yaw_rad));
+    let (s, c) = libm::sincosf(yaw_rad);
     Vector2::new(c * v_ned.x + s * v_ned.y, -s * v_ned.x + c * v_ned.y)
 }
 
@@ -172,13 +187,13 @@ fn request(law: AngleLaw, mass_kg: f32, acceleration_ned: &Vector3<f32>, motion:
     let a = heading_frame(acceleration_ned, motion.yaw_rad);
     // Thrust never asks for free fall or less: a downward command stronger than that keeps a tenth of g.
     let lift = upper(GRAVITY_M_S2 as f32 - acceleration_ned.z, 0.1 * GRAVITY_M_S2 as f32);
-    let cosines = libm::cosf(motion.roll_rad) * libm::cosf(motion.pitch_rad);
+    let cosines = cos(motion.roll_rad) * cos(motion.pitch_rad);
     let thrust_n = mass_kg * lift / upper(cosines, 0.5);
     let (roll_rad, pitch_rad) = match law {
         AngleLaw::SmallAngle => (mass_kg / thrust_n * a.y, -mass_kg / thrust_n * a.x),
         AngleLaw::Exact => {
             let pitch = libm::atan2f(-a.x, lift);
-            (libm::atan2f(a.y * libm::cosf(pitch), lift), pitch)
+            (libm::atan2f(a.y * cos(pitch), lift), pitch)
         }
     };
     AttitudeThrust { roll_rad, pitch_rad, thrust_n }
@@ -195,6 +210,8 @@ pub(super) mod fixtures {
             integral_per_s2: Vector3::new(0.15, 0.15, 0.15),
             derivative: Vector3::new(0.05, 0.05, 0.05),
             velocity_feed_forward: 0.0,
+            acceleration_feed_forward: 0.0,
+            speed_max_m_s: f32::INFINITY,
             acceleration_max_horizontal_m_s2: 11.0,
             acceleration_max_vertical_m_s2: 3.0,
             integral_max_m: 2.0,
@@ -282,6 +299,27 @@ mod tests {
             gains().update(&mut state, 0.548, &still(), &far, false, 0.1);
         }
         assert!(state.integral.amax() <= 2.0);
+    }
+
+    #[test]
+    fn what_the_reference_does_is_fed_forward_and_speed_has_a_limit() {
+        let ahead = gains();
+        let forward = PositionGains {
+            velocity_feed_forward: 1.0,
+            acceleration_feed_forward: 1.0,
+            speed_max_m_s: 2.0,
+            acceleration_max_horizontal_m_s2: 100.0,
+            ..ahead
+        };
+        let mut reference = at(0.0, 0.0, 0.0);
+        reference.velocity.vector.x = 1.0;
+        reference.acceleration.vector.x = 0.5;
+        // 2.5 * 1 and 0.15 * 0.1, and half of it again.
+        let a = tick(&forward, &still(), &reference).acceleration.vector;
+        assert!((a - Vector3::new(2.5 + 0.015 + 0.5, 0.0, 0.0)).norm() < 1e-5, "{a}");
+        assert_eq!(tick(&ahead, &still(), &reference).acceleration.vector, Vector3::zeros());
+        let far = tick(&forward, &still(), &at(30.0, 40.0, 5.0)).velocity_desired.vector;
+        assert!((far - Vector3::new(1.2, 1.6, 4.0)).norm() < 1e-5, "{far}");
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! - PC's integral is frozen while WIIC flies or anything is clamped;
 //! - every decision has a [`Reason`].
 
+use super::plus::{self, Demand, Plus};
 use super::position::{Motion, PositionGains, PositionState, PositionTerms, heading_frame};
 use super::wiic::{self, Envelope, ThrustLaw};
 use super::wing_force::{ForceModel, ParnnTerms};
@@ -75,6 +76,8 @@ pub enum Reason {
     Dwell = 5,
     /// The policy does not coordinate.
     PolicyFixed = 6,
+    /// Of [`super::plus`]: spread wings come closer to the acceleration command.
+    WingsComeCloser = 7,
 }
 
 /// Parameters of the outer loop.
@@ -96,6 +99,8 @@ pub struct TwccParameters {
     pub dwell_s: f32,
     /// Smallest collective thrust, N.
     pub thrust_min_n: f32,
+    /// Where given, [`super::plus`] flies instead of PC and WIIC.
+    pub plus: Option<Plus>,
 }
 
 /// What the outer loop remembers.
@@ -111,6 +116,8 @@ pub struct TwccState {
     pub mode_age_s: Option<f32>,
     /// The last command was clamped.
     pub clamped: bool,
+    /// The last command, where [`super::plus`] flies.
+    pub last: Option<AttitudeThrust>,
     /// What the network of [`ForceModel::Parnn`] saw; empty for the other models.
     pub history: History,
 }
@@ -186,7 +193,7 @@ impl TwccParameters {
         if let ForceModel::Parnn(parnn) = &self.force_model {
             parnn.check()?;
         }
-        Ok(())
+        self.plus.as_ref().map_or(Ok(()), Plus::check)
     }
 
     /// One tick.
@@ -208,6 +215,9 @@ impl TwccParameters {
         reference: &Reference,
         dt_s: f32,
     ) -> TwccTerms {
+        if let Some(plus) = &self.plus {
+            return self.update_plus(plus, state, airframe, motion, ned_from_body, reference, dt_s);
+        }
         let hold = state.clamped || state.mode == Mode::Wiic;
         let position =
             self.position.update(&mut state.position, airframe.mass_kg, motion, reference, hold, dt_s);
@@ -256,6 +266,100 @@ impl TwccParameters {
             angle_of_attack_rad: angle_of_attack(velocity_body),
             wing,
             mode,
+            reason,
+            command,
+            wing_command,
+            clamped,
+        }
+    }
+
+    /// One tick of [`super::plus`].
+    // Apart, so that what it needs of the stack is not laid out in every step.
+    #[inline(never)]
+    #[allow(clippy::too_many_arguments, reason = "those of the tick that it is")]
+    fn update_plus(
+        &self,
+        plus: &Plus,
+        state: &mut TwccState,
+        airframe: &Airframe,
+        motion: &Motion,
+        ned_from_body: &Rotation<Ned, Body, f32>,
+        reference: &Reference,
+        dt_s: f32,
+    ) -> TwccTerms {
+        let heading = |v: &Vector3<f32>| {
+            let forward_right = heading_frame(v, motion.yaw_rad);
+            Vector3::new(forward_right.x, forward_right.y, v.z)
+        };
+        // Until what is commanded now acts, the last command does.
+        let now = AttitudeThrust { roll_rad: motion.roll_rad, pitch_rad: motion.pitch_rad, thrust_n: 0.0 };
+        let velocity = heading(&motion.velocity.vector);
+        let (mut ahead, mut goal) = (*motion, *reference);
+        if let Some(last) = state.last {
+            let wings = f32::from(state.mode != Mode::Primary);
+            let meanwhile = plus::between(&now, &last, 0.5);
+            let a = plus::acceleration(airframe, &velocity, &meanwhile, wings);
+            let back = heading_frame(&a, -motion.yaw_rad);
+            let change = Vector3::new(back.x, back.y, a.z) * plus.delay_s;
+            ahead.position.vector += (motion.velocity.vector + change * 0.5) * plus.delay_s;
+            ahead.velocity.vector += change;
+            goal.position.vector += (reference.velocity.vector
+                + reference.acceleration.vector * (0.5 * plus.delay_s))
+                * plus.delay_s;
+            goal.velocity.vector += reference.acceleration.vector * plus.delay_s;
+        }
+        let position =
+            plus.position.update(&mut state.position, airframe.mass_kg, &ahead, &goal, state.clamped, dt_s);
+        let request = &position.request;
+        let demand = Demand {
+            airframe,
+            acceleration: heading(&position.acceleration.vector),
+            velocity: heading(&ahead.velocity.vector),
+            weight: plus.weight(
+                ahead.position.vector.z - goal.position.vector.z,
+                ahead.velocity.vector.z - goal.velocity.vector.z,
+            ),
+        };
+        let folded = demand.best(request, 0.0);
+        let (mut best, mut reason) = (folded, Reason::PolicyFixed);
+        if self.policy == WingPolicy::Coordinated {
+            let spread = demand.best(request, 1.0);
+            let open = plus.opens(&folded, &spread, state.mode != Mode::Primary);
+            let wanted = if open { Mode::Wiic } else { Mode::Primary };
+            state.mode_age_s = state.mode_age_s.map(|age| age + dt_s);
+            reason = if open { Reason::WingsComeCloser } else { Reason::InsideLimits };
+            if wanted != state.mode {
+                if state.mode_age_s.is_some_and(|age| age < self.dwell_s) {
+                    reason = Reason::Dwell;
+                } else {
+                    state.mode = wanted;
+                    state.mode_age_s = Some(0.0);
+                }
+            }
+            if state.mode != Mode::Primary {
+                best = spread;
+            }
+        }
+        let wing_command = f32::from(state.mode != Mode::Primary);
+        let meanwhile = plus::between(&now, &best.command, plus.thrust_share);
+        let AttitudeThrust { thrust_n, .. } =
+            demand.at(meanwhile.roll_rad, meanwhile.pitch_rad, wing_command).command;
+        let command = AttitudeThrust { thrust_n, ..best.command };
+        state.last = Some(command);
+        // A residual of this size is what a search of so many rounds leaves.
+        let clamped = best.cost > 0.01 || position.acceleration != position.acceleration_demand;
+        state.clamped = clamped;
+        let force = plus::wing_force(airframe, &demand.velocity, &best.command);
+        let back = heading_frame(&force, -motion.yaw_rad);
+        let wing_force = In::new(Vector3::new(back.x, back.y, force.z));
+        state.flag = state.mode != Mode::Primary;
+        TwccTerms {
+            position,
+            wing_force,
+            parnn: None,
+            angle_of_attack_rad: angle_of_attack(ned_from_body.inverse() * motion.velocity),
+            wing: WingFlag { helpful_n: 0.0, flag: state.flag },
+            mode: state.mode,
             reason,
             command,
             wing_command,
@@ -318,9 +422,10 @@ pub(crate) mod fixtures {
             policy: WingPolicy::Coordinated,
             dwell_s: 0.3,
             thrust_min_n: 0.5,
+            plus: None,
         }
     }
-    pub(super) fn airframe() -> Airframe {
+    pub(crate) fn airframe() -> Airframe {
         let envelope =
             Envelope { tilt_max_rad: core::f32::consts::FRAC_PI_6, thrust_min_n: 0.5, thrust_max_n: 10.0 };
         Airframe { mass_kg: 0.548, wing_area_m2: 0.04, envelope }

@@ -12,7 +12,7 @@
 //! and the other clamped. Thrust ends in `[U_min, U_max]`; a demand that the wings already exceed asks for `U_min`.
 
 use super::AttitudeThrust;
-use crate::math::{limit, upper};
+use crate::math::{cos, limit, sin, upper};
 use nalgebra::Vector2;
 
 /// Small-angle law as printed, or the exact inverse.
@@ -73,7 +73,7 @@ pub fn command(
                 (u, need.y / u)
             }
             ThrustLaw::Exact => {
-                let a = -need.x / (sign * libm::sinf(max));
+                let a = -need.x / (sign * sin(max));
                 let u = if a > 0.0 { thrust_range(libm::hypotf(a, need.y)) } else { envelope.thrust_min_n };
                 (u, if a > 0.0 { libm::atan2f(need.y, a) } else { libm::asinf(limit(need.y / u, -1.0, 1.0)) })
             }
@@ -87,8 +87,8 @@ pub fn command(
                 (u, -need.x / u)
             }
             ThrustLaw::Exact => {
-                let u = thrust_range(need.y / (sign * libm::sinf(max)));
-                let forward = upper(u * libm::cosf(max), 1e-6);
+                let u = thrust_range(need.y / (sign * sin(max)));
+                let forward = upper(u * cos(max), 1e-6);
                 (u, libm::asinf(limit(-need.x / forward, -1.0, 1.0)))
             }
         };

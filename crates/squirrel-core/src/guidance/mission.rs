@@ -9,7 +9,7 @@ use super::sensing::{Obstacle, Sensing, offset};
 use super::trajectory::Trajectory;
 use crate::control::Reference;
 use crate::frames::{In, Ned};
-use crate::math::wrap_angle;
+use crate::math::{whole, wrap_angle};
 use crate::vehicle::ParameterError;
 use nalgebra::Vector3;
 
@@ -86,8 +86,12 @@ impl Mission {
             Self::Hover { position } => finite("position", position),
             Self::Avoid { run, sensing, steering } => {
                 finite("start", &run.start)?;
-                if !(run.course_rad.abs() <= core::f32::consts::TAU) {
-                    return Err(ParameterError::of("course_rad", run.course_rad, "must be within one turn"));
+                if !(run.course_rad().abs() <= core::f32::consts::TAU) {
+                    return Err(ParameterError::of(
+                        "course_rad",
+                        run.course_rad(),
+                        "must be within one turn",
+                    ));
                 }
                 positive("speed_m_s", run.speed_m_s)?;
                 positive("ramp_s", run.ramp_s)?;
@@ -139,12 +143,8 @@ impl Mission {
         let Some(seen) = sensing.nearest(position, velocity, obstacles, known) else { return };
         let course = libm::atan2f(velocity.vector.y, velocity.vector.x);
         let start = In::new(Vector3::new(position.vector.x, position.vector.y, run.start.vector.z));
-        let turned = Trajectory {
-            start,
-            course_rad: wrap_angle(course + steering.angle(state.encounters)),
-            speed_m_s: run.speed_m_s,
-            ramp_s: steering.ramp_s,
-        };
+        let course_rad = wrap_angle(course + steering.angle(state.encounters));
+        let turned = Trajectory::new(start, course_rad, run.speed_m_s, steering.ramp_s);
         state.turned = Some((turned, time_us));
         let free = state.handled.iter().position(Option::is_none).unwrap_or(0);
         state.handled[free] = Some(seen);
@@ -153,7 +153,7 @@ impl Mission {
 
     /// The reference at a time since the start of the mission.
     pub fn reference(&self, state: &MissionState, time_us: u64) -> Reference {
-        let since = |start_us: u64| time_us.saturating_sub(start_us) as f32 * 1e-6;
+        let since = |start_us: u64| whole(time_us.saturating_sub(start_us)) as f32 * 1e-6;
         match self {
             Self::Hover { position } => Reference {
                 position: *position,
@@ -168,7 +168,7 @@ impl Mission {
             Self::Circle { centre, radius_m, speed_m_s } => {
                 let rate = speed_m_s / radius_m;
                 let angle = wrap_angle(rate * since(0));
-                let (s, c) = (libm::sinf(angle), libm::cosf(angle));
+                let (s, c) = libm::sincosf(angle);
                 let radius = Vector3::new(c, s, 0.0) * *radius_m;
                 Reference {
                     position: *centre + In::new(radius),
@@ -231,12 +231,7 @@ mod tests {
 
     fn avoid() -> Mission {
         Mission::Avoid {
-            run: Trajectory {
-                start: In::new(Vector3::new(0.0, 0.0, -10.0)),
-                course_rad: 0.0,
-                speed_m_s: 7.0,
-                ramp_s: 2.0,
-            },
+            run: Trajectory::new(In::new(Vector3::new(0.0, 0.0, -10.0)), 0.0, 7.0, 2.0),
             sensing: Sensing { range_m: 5.0, half_view_rad: 0.2618, speed_min_m_s: 1.0 },
             steering: Steering { min_rad: 1.92, max_rad: 2.27, ramp_s: 2.0, both_sides: false, seed: 3 },
         }
@@ -279,7 +274,8 @@ mod tests {
     #[test]
     fn numbers_that_are_none_are_refused_by_name() {
         let Mission::Avoid { run, sensing, steering } = avoid() else { unreachable!() };
-        let broken = Mission::Avoid { run: Trajectory { course_rad: f32::NAN, ..run }, sensing, steering };
+        let broken =
+            Mission::Avoid { run: Trajectory::new(run.start, f32::NAN, 7.0, 2.0), sensing, steering };
         assert!(broken.check().unwrap_err().to_string().starts_with("course_rad = NaN"));
         let hover = Mission::Hover { position: In::new(Vector3::new(0.0, f32::INFINITY, 0.0)) };
         assert!(hover.check().is_err());

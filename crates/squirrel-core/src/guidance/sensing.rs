@@ -61,7 +61,7 @@ impl Sensing {
         if !(speed >= self.speed_min_m_s) {
             return None;
         }
-        let view = libm::cosf(self.half_view_rad);
+        let view = crate::math::cos(self.half_view_rad);
         let mut best: Option<(f32, Obstacle)> = None;
         for obstacle in obstacles.iter().filter(|o| !known(o.id)) {
             let offset = offset(position, obstacle);

@@ -13,8 +13,9 @@ use nalgebra::Vector3;
 pub struct Trajectory {
     /// Where it starts, m.
     pub start: In<Ned, f32>,
-    /// Direction, rad clockwise from north.
-    pub course_rad: f32,
+    course_rad: f32,
+    /// Kept, for the reference is asked for three hundred times a second.
+    direction: In<Ned, f32>,
     /// Final speed, m/s.
     pub speed_m_s: f32,
     /// Time to reach it, s, > 0.
@@ -22,10 +23,25 @@ pub struct Trajectory {
 }
 
 impl Trajectory {
+    /// A run.
+    ///
+    /// * `start` - m
+    /// * `course_rad` - direction, clockwise from north
+    /// * `speed_m_s` - in the end
+    /// * `ramp_s` - time to reach it, > 0
+    pub fn new(start: In<Ned, f32>, course_rad: f32, speed_m_s: f32, ramp_s: f32) -> Self {
+        let (s, c) = libm::sincosf(course_rad);
+        Self { start, course_rad, direction: In::new(Vector3::new(c, s, 0.0)), speed_m_s, ramp_s }
+    }
+
+    /// Direction, rad clockwise from north.
+    pub fn course_rad(&self) -> f32 {
+        self.course_rad
+    }
+
     /// Unit vector of the direction.
     pub fn direction(&self) -> In<Ned, f32> {
-        let (s, c) = libm::sincosf(self.course_rad);
-        In::new(Vector3::new(c, s, 0.0))
+        self.direction
     }
 
     /// Reference at time `t_s` after the start; the start before that.
@@ -37,7 +53,7 @@ impl Trajectory {
         } else {
             (v * (t - ramp / 3.0), v, 0.0)
         };
-        let direction = self.direction();
+        let direction = self.direction;
         Reference {
             position: self.start + direction * s,
             velocity: direction * ds,
@@ -51,12 +67,13 @@ impl Trajectory {
 mod tests {
     use super::*;
 
-    const RUN: Trajectory =
-        Trajectory { start: In::<Ned, f32>::ORIGIN, course_rad: 0.5, speed_m_s: 7.0, ramp_s: 2.0 };
+    fn run() -> Trajectory {
+        Trajectory::new(In::zero(), 0.5, 7.0, 2.0)
+    }
 
     #[test]
     fn starts_at_rest_and_reaches_the_speed_smoothly() {
-        let (start, before, after) = (RUN.at(0.0), RUN.at(1.9999), RUN.at(2.0001));
+        let (start, before, after) = (run().at(0.0), run().at(1.9999), run().at(2.0001));
         assert_eq!(start.velocity.vector.norm(), 0.0);
         assert!((start.acceleration.vector.norm() - 7.0).abs() < 1e-4, "peak acceleration is 2 V / T");
         assert!((before.position - after.position).vector.norm() < 2e-3);
@@ -70,8 +87,8 @@ mod tests {
         let h = 1e-2_f32;
         for k in 1..60 {
             let t = k as f32 * 0.05;
-            let slope = (RUN.at(t + h).position - RUN.at(t - h).position).vector / (2.0 * h);
-            assert!((slope - RUN.at(t).velocity.vector).norm() < 5e-3, "{t}");
+            let slope = (run().at(t + h).position - run().at(t - h).position).vector / (2.0 * h);
+            assert!((slope - run().at(t).velocity.vector).norm() < 5e-3, "{t}");
         }
     }
 }

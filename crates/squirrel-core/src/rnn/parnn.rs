@@ -40,8 +40,10 @@ impl History {
 
     /// The oldest row makes room for this one.
     pub fn push(&mut self, row: [f32; INPUTS]) {
-        self.rows.rotate_left(1);
-        self.rows[WINDOW - 1] = row;
+        let mut newer = row;
+        for place in self.rows.iter_mut().rev() {
+            newer = core::mem::replace(place, newer);
+        }
         self.seen = (self.seen + 1).min(WINDOW);
     }
 

@@ -26,7 +26,7 @@ use crate::estimate::navigator::{Health, Navigation, NavigationState, Navigation
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
-use crate::math::{limit, lower};
+use crate::math::{limit, lower, whole};
 use crate::policy::PilotCommand;
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
 use failsafe::{Estimated, Failsafe, FailsafeMode, FailsafeReason, FailsafeState, LEVEL_THRUST_SHARE};
@@ -254,7 +254,7 @@ impl Stack {
         let outer = if is_same_period {
             None
         } else {
-            let outer_index = frame.time_us / OUTER_PERIOD_US;
+            let outer_index = outer_index(frame.time_us);
             let periods = state.outer_index.map_or(1, |last| outer_index.saturating_sub(last));
             state.outer_index = Some(outer_index);
             let dt_s = lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6;
@@ -361,6 +361,12 @@ impl Stack {
         state.saturated = mixer.saturated;
         Some(InnerTerms { filter: state.filter, excitation, attitude, demand, mixer })
     }
+}
+
+/// Number of the outer period that a time is in; of times after 13 years the last. The quotient is rounded by less than a hundred
+/// thousandth, which is as near as it comes to the next number from below.
+fn outer_index(time_us: u64) -> u64 {
+    u64::from((whole(time_us) / OUTER_PERIOD_US as f64) as u32)
 }
 
 /// Since the last frame, us; `None` for the first. A gap of an hour is as long as any longer one.

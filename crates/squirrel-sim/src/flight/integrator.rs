@@ -55,12 +55,12 @@ pub(super) struct Mover {
 
 #[cfg(feature = "rapier")]
 impl Mover {
-    pub(super) fn new(setup: &Setup) -> Result<Self, FlightError> {
+    /// * `obstacles` - all of the scenario's
+    pub(super) fn new(setup: &Setup, obstacles: &[[f64; 3]]) -> Result<Self, FlightError> {
         use crate::world::{Cylinder, World, WorldParameters};
         /// Trunks reach well above any mission.
         const TRUNK_HEIGHT_M: f64 = 200.0;
-        let scenario = &setup.scenario;
-        let solid = if scenario.solid_obstacles { scenario.obstacles.as_slice() } else { &[] };
+        let solid = if setup.scenario.solid_obstacles { obstacles } else { &[] };
         let obstacles = solid
             .iter()
             .map(|&[north_m, east_m, radius_m]| Cylinder {

@@ -28,6 +28,10 @@ pub struct Metrics {
     pub wiic_s: f64,
     /// Smallest distance to the surface of an obstacle, m; negative inside; absent without obstacles.
     pub clearance_m: Option<f64>,
+    /// Horizontal way of the whole flight until it touched something, m.
+    pub path_m: f64,
+    /// Horizontal distance from the start at that time, m.
+    pub displacement_m: f64,
     /// Length of the measured window, s.
     pub window_s: f64,
     /// Obstacles that were avoided, or tried to.
@@ -76,6 +80,8 @@ pub const OVER_RAD: f64 = 1.6;
 /// Collects [`Metrics`].
 pub(super) struct Meter<'a> {
     scenario: &'a Scenario,
+    obstacles: &'a [[f64; 3]],
+    from: Option<[Vector2<f64>; 2]>,
     start_us: Option<u64>,
     last_us: u64,
     over: bool,
@@ -90,7 +96,8 @@ pub(super) struct Meter<'a> {
 }
 
 impl<'a> Meter<'a> {
-    pub(super) fn new(scenario: &'a Scenario) -> Self {
+    /// * `obstacles` - all of the scenario's
+    pub(super) fn new(scenario: &'a Scenario, obstacles: &'a [[f64; 3]]) -> Self {
         let metrics = Metrics {
             rmse_m: 0.0,
             rmse_horizontal_m: 0.0,
@@ -99,6 +106,8 @@ impl<'a> Meter<'a> {
             wings_open_s: 0.0,
             wiic_s: 0.0,
             clearance_m: None,
+            path_m: 0.0,
+            displacement_m: 0.0,
             window_s: 0.0,
             encounters: 0,
             contact_s: None,
@@ -110,6 +119,8 @@ impl<'a> Meter<'a> {
         let first = scenario.faults.values().map(|fault| fault.start_s).fold(f64::INFINITY, f64::min);
         Self {
             scenario,
+            obstacles,
+            from: None,
             start_us: None,
             last_us: 0,
             over: false,
@@ -144,12 +155,14 @@ impl<'a> Meter<'a> {
             self.mode = outer.mode;
         }
         let at = state.body.position.vector;
-        for [north, east, radius] in &self.scenario.obstacles {
-            let clearance = Vector2::new(north - at.x, east - at.y).norm() - radius;
-            if self.metrics.clearance_m.is_none_or(|c| clearance < c) {
-                self.metrics.clearance_m = Some(clearance);
+        for [north, east, radius] in self.obstacles {
+            let square = (north - at.x).powi(2) + (east - at.y).powi(2);
+            let near = self.metrics.clearance_m.map_or(f64::INFINITY, |clearance| clearance + radius);
+            if square < near.max(0.0).powi(2) {
+                self.metrics.clearance_m = Some(square.sqrt() - radius);
             }
         }
+        self.way(at.xy());
         let windowed = self.scenario.measured_window_s > 0.0;
         if self.start_us.is_none() && (!windowed || encounters > 0) {
             self.start_us = Some(time_us);
@@ -173,6 +186,18 @@ impl<'a> Meter<'a> {
         if self.mode == Mode::Wiic {
             self.wiic_us += step_us;
         }
+    }
+
+    /// How far it has come; a flight through a forest ends where it has come through, or has touched something.
+    fn way(&mut self, at: Vector2<f64>) {
+        let [start, before] = self.from.unwrap_or([at; 2]);
+        self.from = Some([start, at]);
+        if self.metrics.contact_s.is_none() {
+            self.metrics.path_m += (at - before).norm();
+            self.metrics.displacement_m = (at - start).norm();
+        }
+        let come_through = |path_m| self.metrics.contact_s.is_some() || self.metrics.path_m >= path_m;
+        self.over |= self.scenario.forest.as_ref().is_some_and(|forest| come_through(forest.path_m));
     }
 
     /// * `speed_m_s` - before it

@@ -117,6 +117,9 @@ impl Setup {
         self.arm
             .configure(&mut parameters.twcc, self.vehicle.weights.as_ref())
             .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
+        if let (Some(plus), Some(speed)) = (&mut parameters.twcc.plus, self.scenario.speed_max_m_s) {
+            plus.position.speed_max_m_s = speed as f32;
+        }
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
         parameters.navigation = self.navigation()?;
         Stack::new(vehicle, parameters, self.scenario.mission().map_err(fail)?).map_err(fail)
@@ -246,7 +249,8 @@ impl Setup {
             _ => &well,
         };
         let plant = &well;
-        let mut mover = Mover::new(self)?;
+        let obstacles = self.scenario.all_obstacles();
+        let mut mover = Mover::new(self, &obstacles)?;
         let mut state = plant.initial_state(self.hovering(plant), self.scenario.start_charge());
         let seed = self.scenario.seed;
         let mut winds = vec![Wind::new(self.scenario.wind(), seed ^ 0x5851_F42D_4C95_7F2D)];
@@ -255,7 +259,7 @@ impl Setup {
         }
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
-        let mut metrics = metrics::Meter::new(&self.scenario);
+        let mut metrics = metrics::Meter::new(&self.scenario, &obstacles);
         let mut recorder =
             record.then(|| record::Recorder::new(self, pilot.as_ref(), plant.vehicle().rotors().len()));
         let hover = Command { rotor: [hover_command(plant.vehicle()); MAX_ROTORS], wing: [0.0; 2] };
@@ -280,7 +284,7 @@ impl Setup {
                 }
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
                 failing.spoil(&mut frame);
-                frame.set_obstacles(&self.nearest_obstacles(&state.body, believed.as_ref()));
+                frame.set_obstacles(&nearest_obstacles(&obstacles, &state.body, believed.as_ref()));
                 if self.arm.is_told_the_force() {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
@@ -344,27 +348,31 @@ impl Setup {
         state.rotor_speed_rad_s[..vehicle.rotors().len()].fill(speed);
         state
     }
+}
 
-    /// Obstacles where the flight code takes them to be: it sees them from where it is, and knows that as well as it knows its own place.
-    fn nearest_obstacles(&self, body: &State<f64>, believed: Option<&NavigationTerms>) -> Vec<Obstacle> {
-        let at = body.position.vector;
-        let off = believed.map_or(Vector3::zeros(), |terms| terms.position.vector.cast::<f64>() - at);
-        let mut near: Vec<(f64, usize)> = Vec::new();
-        for (i, [north, east, _]) in self.scenario.obstacles.iter().enumerate() {
-            let distance = (north - at.x).hypot(east - at.y);
-            if distance < OBSTACLE_HORIZON_M {
-                near.push((distance, i));
-            }
+/// Obstacles where the flight code takes them to be: it sees them from where it is, and knows that as well as it knows its own place.
+fn nearest_obstacles(
+    obstacles: &[[f64; 3]],
+    body: &State<f64>,
+    believed: Option<&NavigationTerms>,
+) -> Vec<Obstacle> {
+    let at = body.position.vector;
+    let off = believed.map_or(Vector3::zeros(), |terms| terms.position.vector.cast::<f64>() - at);
+    let mut near: Vec<(f64, usize)> = Vec::new();
+    for (i, [north, east, _]) in obstacles.iter().enumerate() {
+        let square = (north - at.x).powi(2) + (east - at.y).powi(2);
+        if square < OBSTACLE_HORIZON_M * OBSTACLE_HORIZON_M {
+            near.push((square, i));
         }
-        near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        near.truncate(MAX_OBSTACLES);
-        near.iter()
-            .map(|(_, i)| {
-                let [north, east, _] = self.scenario.obstacles[*i];
-                Obstacle { id: *i as u32, north_m: (north + off.x) as f32, east_m: (east + off.y) as f32 }
-            })
-            .collect()
     }
+    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    near.truncate(MAX_OBSTACLES);
+    near.iter()
+        .map(|(_, i)| {
+            let [north, east, _] = obstacles[*i];
+            Obstacle { id: *i as u32, north_m: (north + off.x) as f32, east_m: (east + off.y) as f32 }
+        })
+        .collect()
 }
 
 /// The command of each rotor that carries the weight.

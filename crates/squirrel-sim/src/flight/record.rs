@@ -59,7 +59,7 @@ impl Recorder {
         let mut log = FlightLog::default();
         let scenario = &setup.scenario;
         let vehicle = setup.vehicle.vehicle.parameters();
-        let obstacles: Vec<String> = scenario.obstacles.iter().map(|o| format!("{o:?}")).collect();
+        let obstacles: Vec<String> = scenario.all_obstacles().iter().map(|o| format!("{o:?}")).collect();
         let thrust_max_n = setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n();
         for (key, value) in [
             ("format", FORMAT.to_owned()),

@@ -100,7 +100,7 @@ impl Course {
             Kind::Avoid => {
                 let speed_m_s = between(rng, 4.0, 8.0);
                 let start = In::new(Vector3::new(0.0, 0.0, -HEIGHT_M));
-                let run = Trajectory { start, course_rad: 0.0, speed_m_s, ramp_s: 2.0 };
+                let run = Trajectory::new(start, 0.0, speed_m_s, 2.0);
                 // Half of the episodes start from rest, the others at speed.
                 let ahead_s = if draw(rng) & 1 == 0 { 0.0 } else { 2.0 };
                 let mut north_m = run.at(ahead_s).position.vector.x;

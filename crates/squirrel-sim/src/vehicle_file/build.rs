@@ -4,13 +4,14 @@ use super::VehicleFile;
 use super::quantity::Quantity;
 use super::tables::{
     AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, EffectValue, FormName,
-    InertiaValue, PositionTable, PropulsionTable, ThrustLawName, TriggerName, VehicleTable, WingControlTable,
-    WingName, WingTable, WingTestName,
+    InertiaValue, PlusTable, PositionTable, PropulsionTable, ThrustLawName, TriggerName, VehicleTable,
+    WingControlTable, WingName, WingTable, WingTestName,
 };
 use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ParnnWing, ServoParameters, WingPlant};
 use crate::weights::ParnnWeights;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
+use squirrel_core::control::plus::Plus;
 use squirrel_core::control::position::{AngleLaw, PositionGains};
 use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
@@ -320,7 +321,7 @@ fn triple(q: &Quantity<[f64; 3]>) -> Vector3<f32> {
 fn control(t: &ControlTable) -> StackParameters {
     StackParameters {
         attitude: attitude(&t.attitude),
-        twcc: twcc(&t.position, &t.wing, t.thrust_min_n.0 as f32),
+        twcc: twcc(&t.position, &t.wing, t.plus.as_ref(), t.thrust_min_n.0 as f32),
         // A flight makes its own, from the sensors.
         navigation: Navigation::external(),
     }
@@ -341,22 +342,34 @@ fn attitude(t: &AttitudeTable) -> AttitudeGains {
     }
 }
 
-fn twcc(position: &PositionTable, wing: &WingControlTable, thrust_min_n: f32) -> TwccParameters {
-    TwccParameters {
-        position: PositionGains {
-            position_per_s: triple(&position.position_per_s),
-            velocity_per_s: triple(&position.velocity_per_s),
-            integral_per_s2: triple(&position.integral_per_s2),
-            derivative: triple(&position.derivative),
-            velocity_feed_forward: position.velocity_feed_forward.0 as f32,
-            acceleration_max_horizontal_m_s2: position.acceleration_max_horizontal_m_s2.0 as f32,
-            acceleration_max_vertical_m_s2: position.acceleration_max_vertical_m_s2.0 as f32,
-            integral_max_m: position.integral_max_m.0 as f32,
-            angle_law: match position.angle_law {
-                AngleLawName::SmallAngle => AngleLaw::SmallAngle,
-                AngleLawName::Exact => AngleLaw::Exact,
-            },
+fn gains(position: &PositionTable) -> PositionGains {
+    PositionGains {
+        position_per_s: triple(&position.position_per_s),
+        velocity_per_s: triple(&position.velocity_per_s),
+        integral_per_s2: triple(&position.integral_per_s2),
+        derivative: triple(&position.derivative),
+        velocity_feed_forward: position.velocity_feed_forward.0 as f32,
+        acceleration_feed_forward: 0.0,
+        speed_max_m_s: f32::INFINITY,
+        acceleration_max_horizontal_m_s2: position.acceleration_max_horizontal_m_s2.0 as f32,
+        acceleration_max_vertical_m_s2: position.acceleration_max_vertical_m_s2.0 as f32,
+        integral_max_m: position.integral_max_m.0 as f32,
+        angle_law: match position.angle_law {
+            AngleLawName::SmallAngle => AngleLaw::SmallAngle,
+            AngleLawName::Exact => AngleLaw::Exact,
         },
+    }
+}
+
+fn twcc(
+    position: &PositionTable,
+    wing: &WingControlTable,
+    plus_table: Option<&PlusTable>,
+    thrust_min_n: f32,
+) -> TwccParameters {
+    let position = gains(position);
+    TwccParameters {
+        position,
         wing_events: WingEvents {
             test: match wing.test {
                 WingTestName::Normal => WingTest::Normal,
@@ -378,5 +391,24 @@ fn twcc(position: &PositionTable, wing: &WingControlTable, thrust_min_n: f32) ->
         policy: WingPolicy::Folded,
         dwell_s: wing.dwell_s.0 as f32,
         thrust_min_n,
+        plus: plus_table.map(|table| plus(table, &position)),
+    }
+}
+
+/// Gains that are not in the table are those of the primary controller; the reference's motion is fed forward whole.
+fn plus(t: &PlusTable, position: &PositionGains) -> Plus {
+    Plus {
+        position: PositionGains {
+            velocity_feed_forward: 1.0,
+            acceleration_feed_forward: 1.0,
+            acceleration_max_horizontal_m_s2: t.acceleration_max_horizontal_m_s2.0 as f32,
+            acceleration_max_vertical_m_s2: t.acceleration_max_vertical_m_s2.0 as f32,
+            ..*position
+        },
+        delay_s: t.delay_s.0 as f32,
+        vertical_weight: t.vertical_weight.0 as f32,
+        height_band_m: t.height_band_m.0 as f32,
+        thrust_share: t.thrust_share.0 as f32,
+        open_above_m_s2: t.open_above_m_s2.0 as f32,
     }
 }

@@ -156,6 +156,7 @@ pub(super) struct ControlTable {
     pub(super) attitude: AttitudeTable,
     pub(super) position: PositionTable,
     pub(super) wing: WingControlTable,
+    pub(super) plus: Option<PlusTable>,
 }
 
 #[derive(Deserialize, Clone, Copy)]
@@ -228,4 +229,16 @@ pub(super) struct WingControlTable {
     pub(super) open_above_n: Number,
     pub(super) close_below_n: Number,
     pub(super) dwell_s: Number,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PlusTable {
+    pub(super) delay_s: Number,
+    pub(super) vertical_weight: Number,
+    pub(super) height_band_m: Number,
+    pub(super) thrust_share: Number,
+    pub(super) open_above_m_s2: Number,
+    pub(super) acceleration_max_horizontal_m_s2: Number,
+    pub(super) acceleration_max_vertical_m_s2: Number,
 }

@@ -144,7 +144,7 @@ pub(crate) fn views(logs: &[FlightLog]) -> Vec<FlightView<'_>> {
     let view = |(log, (arm, hold, _)): (_, &(&'static str, f64, bool))| FlightView {
         arm,
         log,
-        obstacles: &OBSTACLES,
+        obstacles: OBSTACLES.to_vec(),
         tilt_max_rad: 30f64.to_radians(),
         thrust_max_n: 6.6,
         summary: vec![

@@ -100,6 +100,6 @@ wire_enum! {
         CommandLost,
     }
     Mode { Primary, Wiic, FullThrust }
-    Reason { InsideLimits, WingsWouldNotHelp, RollLimit, PitchLimit, ThrustLimit, Dwell, PolicyFixed }
+    Reason { InsideLimits, WingsWouldNotHelp, RollLimit, PitchLimit, ThrustLimit, Dwell, PolicyFixed, WingsComeCloser }
     Guard { Inside, WindowNotFull, Speed, AngleOfAttack }
 }

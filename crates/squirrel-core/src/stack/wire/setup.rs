@@ -2,6 +2,7 @@
 
 use super::{Reader, Wire, Writer, wire_enum, wire_struct};
 use crate::control::backstepping::{AttitudeForm, AttitudeGains};
+use crate::control::plus::Plus;
 use crate::control::position::{AngleLaw, PositionGains};
 use crate::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use crate::control::wiic::ThrustLaw;
@@ -172,6 +173,18 @@ impl Wire for Mission {
     }
 }
 
+impl Wire for Trajectory {
+    fn put(&self, to: &mut Writer<'_>) {
+        self.start.put(to);
+        self.course_rad().put(to);
+        self.speed_m_s.put(to);
+        self.ramp_s.put(to);
+    }
+    fn take(from: &mut Reader<'_>) -> Option<Self> {
+        Some(Self::new(Wire::take(from)?, Wire::take(from)?, Wire::take(from)?, Wire::take(from)?))
+    }
+}
+
 /// The number of legs, then as many legs; checked again.
 impl Wire for Programme {
     fn put(&self, to: &mut Writer<'_>) {
@@ -221,10 +234,11 @@ wire_struct! {
         baro_noise_m, heading_noise_rad, alone_noise_m_s2, gate,
     }
     TwccParameters {
-        position, wing_events, thrust_law, trigger, force_model, policy, dwell_s, thrust_min_n,
+        position, wing_events, thrust_law, trigger, force_model, policy, dwell_s, thrust_min_n, plus,
     }
+    Plus { position, delay_s, vertical_weight, height_band_m, thrust_share, open_above_m_s2 }
     PositionGains {
-        position_per_s, velocity_per_s, integral_per_s2, derivative, velocity_feed_forward,
+        position_per_s, velocity_per_s, integral_per_s2, derivative, velocity_feed_forward, acceleration_feed_forward, speed_max_m_s,
         acceleration_max_horizontal_m_s2, acceleration_max_vertical_m_s2, integral_max_m, angle_law,
     }
     WingEvents { test, open_above_n, close_below_n }
@@ -234,7 +248,6 @@ wire_struct! {
     Recurrent<HIDDEN, HIDDEN> { input, hidden, bias }
     Dense<HIDDEN, 2> { weight, bias }
     Domain { speed_m_s, alpha_rad }
-    Trajectory { start, course_rad, speed_m_s, ramp_s }
     Sensing { range_m, half_view_rad, speed_min_m_s }
     Steering { min_rad, max_rad, ramp_s, both_sides, seed }
     Leg { duration_s, move_s, ramp_s, to, yaw_rad, wings_s }

@@ -31,7 +31,7 @@ pub struct FlightView<'a> {
     /// The flight.
     pub log: &'a FlightLog,
     /// North m, east m, radius m of upright cylinders.
-    pub obstacles: &'a [[f64; 3]],
+    pub obstacles: Vec<[f64; 3]>,
     /// Largest tilt that the controller may command, rad.
     pub tilt_max_rad: f64,
     /// Largest collective thrust, N.

@@ -65,7 +65,7 @@ impl<'a> Tracks<'a> {
     fn new(flights: &'a [FlightView<'a>]) -> Self {
         let flown = flights.iter().map(|f| Flown::read(f)).collect::<Vec<_>>();
         let paths = || flown.iter().flat_map(|f| f.path.iter().chain(&f.reference));
-        let obstacles = || flights.iter().flat_map(|f| f.obstacles);
+        let obstacles = || flights.iter().flat_map(|f| &f.obstacles);
         let extents = [0, 1, 2].map(|axis| {
             let points = paths().flat_map(|p| p.points.iter().map(|p| p[axis]));
             let discs = obstacles().filter(|_| axis < 2).flat_map(|o| [o[axis] - o[2], o[axis] + o[2]]);
@@ -109,7 +109,7 @@ impl<'a> Tracks<'a> {
             });
         }
         let mut cylinders: Vec<Cylinder> = Vec::new();
-        for &[north_m, east_m, radius_m] in self.flights.iter().flat_map(|f| f.obstacles) {
+        for &[north_m, east_m, radius_m] in self.flights.iter().flat_map(|f| &f.obstacles) {
             let cylinder = Cylinder { north_m, east_m, radius_m };
             if !cylinders.contains(&cylinder) {
                 cylinders.push(cylinder);

@@ -1,0 +1,329 @@
+//! The better wing controller: attitude, thrust and wings chosen together, ten times a second.
+//!
+//! The paper's WIIC holds an angle at its limit and leaves height to itself; its PC saturates each angle and the thrust on their own. Here
+//! one weighted least-squares problem decides (docs/equations.md E):
+//!
+//! ```text
+//! min over roll, pitch, U, w of  | W (g e3 - U n/m + w f(n)/m - a_cmd) |^2      n = R e3, W = diag(1, 1, W_z)
+//! |roll|, |pitch| <= tilt_max        U_min <= U <= U_max        w = 0 or 1
+//! ```
+//!
+//! For an attitude and a wing, U is a formula; the attitude is found by a pattern search of [`ROUNDS`] rounds that starts from PC's request,
+//! so that work is bounded. What else is different from the paper's laws:
+//! - `f` is the flat plate at the *commanded* attitude: the present one is level when a turn begins, and says that wings do not help;
+//! - motion and reference are those of [`Plus::delay_s`] ahead, when what is commanded now acts: attitude bandwidth is compensated, and a
+//!   servo has travelled by the time that the attitude it was opened for is there;
+//! - thrust is for the attitude on the way there, not for its end, so that it does not lift before it brakes;
+//! - height is part of the residual with the weight `W_z`, so that it is held unless the horizontal gains more;
+//! - velocity and acceleration of the reference are fed forward by the position loop ([`super::position::PositionGains`]).
+//!
+//! Wings open where they make the residual smaller by [`Plus::open_above_m_s2`], and fold where they no longer make it smaller. Without
+//! wings it is the same controller: the fair rival.
+
+use super::AttitudeThrust;
+use super::position::PositionGains;
+use super::twcc::Airframe;
+use crate::aero::flat_plate;
+use crate::frames::{In, Ned};
+use crate::math::{GRAVITY_M_S2, limit, sqrt};
+use crate::vehicle::{ParameterError, positive};
+use nalgebra::Vector3;
+
+/// Rounds of the search; its step halves in each.
+const ROUNDS: u32 = 7;
+/// With which a climb or sink is turned, m/s^2.
+const TURN_M_S2: f32 = 5.0;
+/// First step of the search, rad.
+const STEP_RAD: f32 = 0.2;
+
+/// Parameters of the law.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plus {
+    /// The position loop, with the reference's motion fed forward.
+    pub position: PositionGains,
+    /// From a command to the attitude that it asks for, s.
+    pub delay_s: f32,
+    /// `W_z`: what a vertical acceleration counts that differs from the command, over a horizontal one.
+    pub vertical_weight: f32,
+    /// Height that may be lost or gained before it counts: where that much is foreseen, `W_z` is twice as large, m.
+    pub height_band_m: f32,
+    /// Share of the way from the present to the commanded attitude for which thrust is chosen.
+    pub thrust_share: f32,
+    /// Wings open where they bring the acceleration closer to the command by this much, m/s^2.
+    pub open_above_m_s2: f32,
+}
+
+/// What is asked for, in the heading frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Demand<'a> {
+    /// What flies.
+    pub(super) airframe: &'a Airframe,
+    /// Acceleration command: forward, right, down, m/s^2.
+    pub(super) acceleration: Vector3<f32>,
+    /// Velocity: forward, right, down, m/s.
+    pub(super) velocity: Vector3<f32>,
+    /// `W_z^2`.
+    pub(super) weight: f32,
+}
+
+/// An attitude with what it leaves of the demand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Choice {
+    /// Attitude and thrust.
+    pub(super) command: AttitudeThrust,
+    /// Square of the weighted residual, (m/s^2)^2.
+    pub(super) cost: f32,
+}
+
+impl Plus {
+    /// # Errors
+    /// The first number out of range, by its name in `[control.plus]`.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        self.position.check()?;
+        positive("control.plus.vertical_weight", self.vertical_weight)?;
+        positive("control.plus.height_band_m", self.height_band_m)?;
+        for (field, x, max) in [
+            ("control.plus.delay_s", self.delay_s, 1.0),
+            ("control.plus.thrust_share", self.thrust_share, 1.0),
+        ] {
+            if !(0.0..=max).contains(&x) {
+                return Err(ParameterError::of(field, x, "must be 0 to 1"));
+            }
+        }
+        positive("control.plus.open_above_m_s2", self.open_above_m_s2)
+    }
+
+    /// `W_z^2` for a height error and its rate: it grows with the error that is foreseen at the turn of a climb or sink.
+    ///
+    /// * `down_m`, `down_m_s` - position and velocity less those of the reference
+    pub(super) fn weight(&self, down_m: f32, down_m_s: f32) -> f32 {
+        let foreseen_m = down_m + down_m_s * down_m_s.abs() / (2.0 * TURN_M_S2);
+        let share = foreseen_m / self.height_band_m;
+        let weight = self.vertical_weight * (1.0 + share * share);
+        weight * weight
+    }
+
+    /// Whether wings are to be open.
+    ///
+    /// * `folded`, `spread` - the best without and with them
+    /// * `are_open` - as decided before
+    pub(super) fn opens(&self, folded: &Choice, spread: &Choice, are_open: bool) -> bool {
+        let saved = sqrt(folded.cost) - sqrt(spread.cost);
+        saved > if are_open { 0.0 } else { self.open_above_m_s2 }
+    }
+}
+
+/// Acceleration at an attitude, heading frame, m/s^2.
+///
+/// * `wings` - 0 folded to 1 spread
+pub(super) fn acceleration(
+    airframe: &Airframe,
+    velocity: &Vector3<f32>,
+    command: &AttitudeThrust,
+    wings: f32,
+) -> Vector3<f32> {
+    let n = normal(command.roll_rad, command.pitch_rad);
+    free_of_thrust(airframe, velocity, &n, wings) - n * (command.thrust_n / airframe.mass_kg)
+}
+
+/// Force of the air on spread wings at an attitude, heading frame, N.
+pub(super) fn wing_force(airframe: &Airframe, velocity: &Vector3<f32>, at: &AttitudeThrust) -> Vector3<f32> {
+    let n = normal(at.roll_rad, at.pitch_rad);
+    flat_plate::force::<Ned, f32>(In::new(*velocity), In::new(n), airframe.wing_area_m2).vector
+}
+
+/// An attitude on the way from one to another, with the latter's thrust.
+pub(super) fn between(from: &AttitudeThrust, to: &AttitudeThrust, share: f32) -> AttitudeThrust {
+    AttitudeThrust {
+        roll_rad: from.roll_rad + (to.roll_rad - from.roll_rad) * share,
+        pitch_rad: from.pitch_rad + (to.pitch_rad - from.pitch_rad) * share,
+        thrust_n: to.thrust_n,
+    }
+}
+
+/// Body z (down) of an attitude in the heading frame.
+fn normal(roll_rad: f32, pitch_rad: f32) -> Vector3<f32> {
+    let ((sr, cr), (sp, cp)) = (libm::sincosf(roll_rad), libm::sincosf(pitch_rad));
+    Vector3::new(sp * cr, -sr, cp * cr)
+}
+
+/// Gravity and wings, m/s^2.
+fn free_of_thrust(
+    airframe: &Airframe,
+    velocity: &Vector3<f32>,
+    n: &Vector3<f32>,
+    wings: f32,
+) -> Vector3<f32> {
+    let force = flat_plate::force::<Ned, f32>(In::new(*velocity), In::new(*n), wings * airframe.wing_area_m2);
+    force.vector / airframe.mass_kg + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32)
+}
+
+impl Demand<'_> {
+    /// The best thrust at an attitude, and what is left.
+    pub(super) fn at(&self, roll_rad: f32, pitch_rad: f32, wings: f32) -> Choice {
+        let Airframe { mass_kg, envelope, .. } = *self.airframe;
+        let n = normal(roll_rad, pitch_rad);
+        let need = free_of_thrust(self.airframe, &self.velocity, &n, wings) - self.acceleration;
+        let weighted = Vector3::new(n.x, n.y, self.weight * n.z);
+        let thrust_n = limit(
+            mass_kg * weighted.dot(&need) / weighted.dot(&n),
+            envelope.thrust_min_n,
+            envelope.thrust_max_n,
+        );
+        let left = need - n * (thrust_n / mass_kg);
+        let cost = left.x * left.x + left.y * left.y + self.weight * left.z * left.z;
+        Choice { command: AttitudeThrust { roll_rad, pitch_rad, thrust_n }, cost }
+    }
+
+    /// The best attitude near a first guess.
+    #[inline(never)]
+    pub(super) fn best(&self, guess: &AttitudeThrust, wings: f32) -> Choice {
+        let max = self.airframe.envelope.tilt_max_rad;
+        let guess = self.airframe.envelope.limit(guess);
+        let mut best = self.at(guess.roll_rad, guess.pitch_rad, wings);
+        let mut step = STEP_RAD;
+        for _ in 0..ROUNDS {
+            for (roll, pitch) in [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)] {
+                let AttitudeThrust { roll_rad, pitch_rad, .. } = best.command;
+                let next =
+                    self.at(limit(roll_rad + roll, -max, max), limit(pitch_rad + pitch, -max, max), wings);
+                if next.cost < best.cost {
+                    best = next;
+                }
+            }
+            step *= 0.5;
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::position::fixtures::{at, gains, still};
+    use super::super::position::{AngleLaw, Motion};
+    use super::super::twcc::fixtures::{airframe, parameters};
+    use super::super::twcc::{Reason, TwccParameters, TwccState, TwccTerms, WingPolicy};
+    use super::*;
+    use crate::frames::{Body, Rotation};
+    use proptest::prelude::*;
+
+    fn plus() -> Plus {
+        let position = PositionGains {
+            velocity_feed_forward: 1.0,
+            acceleration_feed_forward: 1.0,
+            acceleration_max_horizontal_m_s2: 30.0,
+            acceleration_max_vertical_m_s2: 6.0,
+            ..gains()
+        };
+        Plus {
+            position,
+            delay_s: 0.1,
+            vertical_weight: 0.5,
+            height_band_m: 1.5,
+            thrust_share: 0.5,
+            open_above_m_s2: 0.3,
+        }
+    }
+
+    fn demand(airframe: &Airframe, acceleration: [f32; 3], velocity: [f32; 3]) -> Demand<'_> {
+        Demand { airframe, acceleration: acceleration.into(), velocity: velocity.into(), weight: 0.25 }
+    }
+
+    /// Braking from 7 m/s, level, the goal here.
+    fn tick(p: &TwccParameters, state: &mut TwccState, thrust_max_n: f32) -> TwccTerms {
+        let motion = Motion { velocity: In::new(Vector3::new(7.0, 0.0, 0.0)), ..still() };
+        let mut airframe = airframe();
+        airframe.envelope.thrust_max_n = thrust_max_n;
+        p.update(
+            state,
+            &airframe,
+            &motion,
+            &Rotation::<Ned, Body, f32>::identity(),
+            None,
+            &at(0.0, 0.0, 0.0),
+            0.1,
+        )
+    }
+
+    proptest! {
+        /// What can be had is had, with wings too.
+        #[test]
+        fn inside_the_limits_nothing_is_left(
+            forward in -4.0..4.0f32, right in -4.0..4.0f32, down in -4.0..4.0f32, wings in any::<bool>(), speed in 0.0..8.0f32,
+        ) {
+            let airframe = airframe();
+            let demand = demand(&airframe, [forward, right, down], [speed, 0.0, 0.0]);
+            // As the position loop does, which knows no wings.
+            let pitch_rad = libm::atan2f(-forward, 9.8 - down);
+            let roll_rad = libm::atan2f(right * libm::cosf(pitch_rad), 9.8 - down);
+            let guess = AttitudeThrust { roll_rad, pitch_rad, thrust_n: 5.0 };
+            let best = demand.best(&guess, f32::from(wings));
+            prop_assume!(best.command.roll_rad.abs() < 0.5 && best.command.pitch_rad.abs() < 0.5);
+            prop_assume!(best.command.thrust_n > 0.6 && best.command.thrust_n < 9.9);
+            prop_assert!(best.cost < 0.02, "{best:?}");
+            let got = super::acceleration(&airframe, &demand.velocity, &best.command, f32::from(wings));
+            prop_assert!((got - demand.acceleration).norm() < 0.3, "{got} for {}", demand.acceleration);
+        }
+
+        /// No grid of a degree over the box and no thrust finds anything better than a hundredth.
+        #[test]
+        fn outside_them_the_search_finds_what_a_grid_finds(
+            forward in -20.0..20.0f32, right in -10.0..10.0f32, down in -6.0..6.0f32, speed in 0.0..9.0f32, climb in -4.0..4.0f32,
+            wings in any::<bool>(), thrust_max_n in 6.0..12.0f32,
+        ) {
+            let mut airframe = airframe();
+            airframe.envelope.thrust_max_n = thrust_max_n;
+            let demand = demand(&airframe, [forward, right, down], [speed, 0.0, climb]);
+            let wings = f32::from(wings);
+            let guess = AttitudeThrust { roll_rad: 0.1 * right, pitch_rad: -0.1 * forward, thrust_n: 5.0 };
+            let best = demand.best(&guess, wings);
+            let degrees = || (-30i8..=30).map(|k| f32::from(k).to_radians());
+            let grid = degrees()
+                .flat_map(|roll| degrees().map(move |pitch| (roll, pitch)))
+                .map(|(roll, pitch)| demand.at(roll, pitch, wings).cost)
+                .fold(f32::INFINITY, f32::min);
+            prop_assert!(best.cost <= grid * 1.01 + 0.02, "{best:?}, grid {grid}");
+        }
+    }
+
+    /// Level at the start of a turn the flat plate says that wings do not help; at the commanded attitude it says that they do.
+    #[test]
+    fn wings_open_before_the_nose_is_up() {
+        let p = TwccParameters { plus: Some(plus()), ..parameters() };
+        let ours = tick(&p, &mut TwccState::default(), 6.45);
+        assert_eq!((ours.wing_command, ours.reason), (1.0, Reason::WingsComeCloser));
+        assert!(ours.command.pitch_rad > 0.4, "{:?}", ours.command);
+        let theirs = tick(&parameters(), &mut TwccState::default(), 6.45);
+        assert_eq!(theirs.wing_command, 0.0);
+        let folded = TwccParameters { policy: WingPolicy::Folded, ..p };
+        assert_eq!(tick(&folded, &mut TwccState::default(), 6.45).wing_command, 0.0);
+    }
+
+    /// What is foreseen 4 m above the reference weighs so much that hardly any thrust is left.
+    #[test]
+    fn a_climb_ends_in_the_band() {
+        let plus = plus();
+        assert_eq!(plus.weight(0.0, 0.0), 0.25);
+        assert_eq!(plus.weight(-1.5, 0.0), 1.0, "twice the weight at the band's edge");
+        let rising = plus.weight(-1.0, -5.0);
+        assert!(rising > plus.weight(-1.0, 0.0) && plus.weight(-1.0, 3.0) < rising);
+        let airframe = airframe();
+        let brake = |weight| Demand { weight, ..demand(&airframe, [-20.0, 0.0, 5.0], [7.0, 0.0, -5.0]) };
+        let thrust = |weight| {
+            brake(weight).best(&AttitudeThrust { pitch_rad: 0.5, ..Default::default() }, 0.0).command.thrust_n
+        };
+        assert!(thrust(rising) < 0.6 * thrust(0.25), "{} {}", thrust(rising), thrust(0.25));
+    }
+
+    #[test]
+    fn a_bad_parameter_is_named() {
+        let error = |plus: Plus| plus.check().unwrap_err().to_string();
+        assert!(error(Plus { delay_s: f32::NAN, ..plus() }).starts_with("control.plus.delay_s = NaN"));
+        assert!(error(Plus { thrust_share: 1.5, ..plus() }).starts_with("control.plus.thrust_share = 1.5"));
+        let exact = PositionGains { angle_law: AngleLaw::Exact, integral_max_m: -1.0, ..gains() };
+        assert!(
+            error(Plus { position: exact, ..plus() }).starts_with("control.position.integral_max_m = -1")
+        );
+        plus().check().unwrap();
+    }
+}

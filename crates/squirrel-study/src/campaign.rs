@@ -1,0 +1,115 @@
+//! Flights of every arm under every condition on paired seeds: what the studies of controllers have in common.
+//!
+//! Trial `k` has one seed, whichever arm flies it and under whatever condition, so that differences between arms are of pairs.
+
+use crate::journal::{Journal, identity};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{FlightError, Integrator, Setup};
+use squirrel_sim::scenario::Scenario;
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// What to run.
+#[derive(Debug, Clone)]
+pub struct Plan {
+    /// Vehicle.
+    pub vehicle: VehicleFile,
+    /// Arms.
+    pub arms: Vec<Arm>,
+    /// Flights per arm and condition.
+    pub trials: u32,
+    /// Seed of all trials.
+    pub seed: u64,
+}
+
+impl Plan {
+    /// All arms that the vehicle can fly; without weights nobody believes in the network.
+    pub fn of_all_arms(vehicle: VehicleFile, trials: u32, seed: u64) -> Self {
+        let mut arms = Arm::ALL.to_vec();
+        arms.retain(|arm| arm.is_known_to(&vehicle));
+        Self { vehicle, arms, trials, seed }
+    }
+
+    /// With `arm` among the arms, each of them once and in their order.
+    ///
+    /// # Errors
+    /// No trials.
+    pub fn beside(&self, arm: Arm) -> Result<Self, FlightError> {
+        if self.trials == 0 {
+            return Err(FlightError("trials = 0: must be at least 1".to_owned()));
+        }
+        let mut plan = self.clone();
+        plan.arms.push(arm);
+        plan.arms.sort_unstable();
+        plan.arms.dedup();
+        Ok(plan)
+    }
+
+    /// Seed of a trial.
+    pub fn trial_seed(&self, trial: u32) -> u64 {
+        self.seed.wrapping_mul(1_000_003).wrapping_add(u64::from(trial))
+    }
+
+    /// What a result depends on beside its number, in one line.
+    pub fn identity(&self, study: &str) -> String {
+        let arms: Vec<&str> = self.arms.iter().map(|arm| arm.name()).collect();
+        format!("{}, arms {}", identity(study, &self.vehicle, self.seed), arms.join(" "))
+    }
+
+    /// Number of flights under so many conditions.
+    pub fn flights(&self, conditions: usize) -> u32 {
+        self.trials * conditions as u32 * self.arms.len() as u32
+    }
+
+    /// A setup of this vehicle.
+    pub fn setup(&self, arm: Arm, scenario: Scenario) -> Setup {
+        Setup { vehicle: self.vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 }
+    }
+}
+
+/// All flights of a campaign.
+#[derive(Debug)]
+pub struct Flown<T> {
+    arms: Vec<Arm>,
+    conditions: usize,
+    all: Vec<T>,
+}
+
+/// Flies what the journal does not hold yet.
+///
+/// * `fly` - arm, number of the condition, trial
+/// * `progress` - called once for each flight
+///
+/// # Errors
+/// A flight that fails, or a journal that cannot be written.
+pub fn run<T: Serialize + DeserializeOwned + Send>(
+    plan: &Plan,
+    conditions: usize,
+    journal: &Journal,
+    fly: impl Fn(Arm, usize, u32) -> Result<T, FlightError> + Sync,
+    progress: impl Fn() + Sync,
+) -> Result<Flown<T>, FlightError> {
+    let arms = plan.arms.len();
+    // Trials are the slowest to change, so that a study may go on to more of them.
+    let one = |k: u32| {
+        let (trial, rest) = (k as usize / (conditions * arms), k as usize % (conditions * arms));
+        fly(plan.arms[rest % arms], rest / arms, trial as u32)
+    };
+    let all = journal.run(plan.flights(conditions), one, progress)?;
+    Ok(Flown { arms: plan.arms.clone(), conditions, all })
+}
+
+impl<T> Flown<T> {
+    /// The flights of an arm under a condition, by trial; none for an arm that did not fly.
+    pub fn of(&self, arm: Arm, condition: usize) -> Vec<&T> {
+        let Some(place) = self.arms.iter().position(|other| *other == arm) else { return Vec::new() };
+        let first = condition * self.arms.len() + place;
+        self.all.iter().skip(first).step_by(self.conditions * self.arms.len()).collect()
+    }
+
+    /// A figure of each of them.
+    pub fn figures(&self, arm: Arm, condition: usize, figure: impl Fn(&T) -> f64) -> Vec<f64> {
+        self.of(arm, condition).into_iter().map(figure).collect()
+    }
+}

@@ -1,0 +1,164 @@
+//! The paper's forest (section V.C): who comes 400 m through trunks, and who owes it to wings.
+//!
+//! 7 m/s, `R_d` 5 m, turns of 110 to 130 deg, trunks of 1 m every 10.5 to 13.5 m, solid, the drone with its real size. A flight that is
+//! more than [`BAND_M`] above or below its height at any time has come through the plane, but not through the forest that the paper means:
+//! both counts are given. An arm owes its success to wings where it comes through in the band more often than the same trials of
+//! `phantom`, which decides alike and has none.
+
+use crate::campaign::{self, Flown, Plan};
+use crate::journal::Journal;
+use crate::statistics::{Estimate, Share, difference, mean};
+use serde::{Deserialize, Serialize};
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{FlightError, OVER_RAD};
+use squirrel_sim::scenario::Scenario;
+use std::path::Path;
+
+/// Height that may be lost or gained, m.
+pub const BAND_M: f64 = 3.0;
+
+/// One flight.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Flight {
+    /// Horizontal way until the first contact, m.
+    pub path_m: f64,
+    /// Distance from the start there, m.
+    pub displacement_m: f64,
+    /// Largest climb, m.
+    pub height_gained_m: f64,
+    /// Largest sink, m.
+    pub height_lost_m: f64,
+    /// Trunks that were avoided, or tried to.
+    pub encounters: u32,
+    /// Time with wings more than half spread, s.
+    pub wings_open_s: f64,
+    /// All of the way, without contact.
+    pub through: bool,
+}
+
+impl Flight {
+    /// Through, and never out of the height band.
+    pub fn in_band(&self) -> bool {
+        self.through && self.height_gained_m < BAND_M && self.height_lost_m < BAND_M
+    }
+}
+
+/// One arm.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Arm.
+    pub arm: &'static str,
+    /// Flights that came through, whatever their height.
+    pub through: Share,
+    /// Flights that came through in the height band.
+    pub in_band: Share,
+    /// The latter, less that of `phantom` on the same trials.
+    pub over_phantom: Estimate,
+    /// And less that of `pc_plus`.
+    pub over_pc_plus: Estimate,
+    /// Mean way until the first contact, m.
+    pub path_m: f64,
+    /// Mean distance from the start there, m.
+    pub displacement_m: f64,
+    /// Mean of the largest climbs, m.
+    pub height_gained_m: f64,
+    /// Mean of the largest sinks, m.
+    pub height_lost_m: f64,
+    /// Mean number of encounters.
+    pub encounters: f64,
+    /// Mean time with wings open, s.
+    pub wings_open_s: f64,
+}
+
+/// The study.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Forest {
+    /// Name of the vehicle.
+    pub vehicle: String,
+    /// Flights an arm.
+    pub trials: u32,
+    /// Seed.
+    pub seed: u64,
+    /// Effective thrust-to-weight ratio.
+    pub thrust_to_weight: f64,
+    /// By arm.
+    pub rows: Vec<Row>,
+}
+
+/// Number of flights that [`run`] flies.
+pub fn flights(plan: &Plan) -> u64 {
+    u64::from(plan.flights(1))
+}
+
+/// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped.
+///
+/// * `thrust_to_weight` - effective ratio
+/// * `folder` - keeps the flights
+/// * `progress` - called once for each flight
+///
+/// # Errors
+/// A vehicle that cannot fly, or a folder that cannot be written.
+pub fn run(
+    plan: &Plan,
+    thrust_to_weight: f64,
+    folder: Option<&Path>,
+    progress: impl Fn() + Sync,
+) -> Result<Forest, FlightError> {
+    let identity = format!("{}, T/W {thrust_to_weight}", plan.identity("forest"));
+    let journal = Journal::open(folder, "forest", &identity)?;
+    let fly = |arm, _, trial| fly(plan, arm, thrust_to_weight, trial);
+    let flown = campaign::run(plan, 1, &journal, fly, progress)?;
+    let rows = plan.arms.iter().map(|arm| row(&flown, *arm)).collect();
+    Ok(Forest {
+        vehicle: plan.vehicle.name.clone(),
+        trials: plan.trials,
+        seed: plan.seed,
+        thrust_to_weight,
+        rows,
+    })
+}
+
+/// The scenario of a trial.
+///
+/// # Errors
+/// Never in a program that has the built-in scenario.
+pub fn scenario(plan: &Plan, thrust_to_weight: f64, trial: u32) -> Result<Scenario, FlightError> {
+    let mut scenario = Scenario::find("forest").map_err(FlightError)?;
+    scenario.seed = plan.trial_seed(trial);
+    scenario.thrust_to_weight = Some(thrust_to_weight);
+    Ok(scenario)
+}
+
+fn fly(plan: &Plan, arm: Arm, thrust_to_weight: f64, trial: u32) -> Result<Flight, FlightError> {
+    let scenario = scenario(plan, thrust_to_weight, trial)?;
+    let way_m = scenario.forest.as_ref().map_or(f64::INFINITY, |forest| forest.path_m);
+    let m = plan.setup(arm, scenario).fly(false, |_| {})?.metrics;
+    Ok(Flight {
+        path_m: m.path_m,
+        displacement_m: m.displacement_m,
+        height_gained_m: m.height_gained_m,
+        height_lost_m: m.height_lost_m,
+        encounters: m.encounters,
+        wings_open_s: m.wings_open_s,
+        through: m.path_m >= way_m && m.contact_s.is_none() && m.tilt_max_rad < OVER_RAD,
+    })
+}
+
+fn row(flown: &Flown<Flight>, arm: Arm) -> Row {
+    let average = |figure: fn(&Flight) -> f64| mean(&flown.figures(arm, 0, figure));
+    let in_band = |arm| flown.figures(arm, 0, |flight: &Flight| f64::from(u8::from(flight.in_band())));
+    let of = flown.of(arm, 0);
+    Row {
+        arm: arm.name(),
+        through: Share::of(of.iter().map(|flight| flight.through)),
+        in_band: Share::of(of.iter().map(|flight| flight.in_band())),
+        over_phantom: difference(&in_band(arm), &in_band(Arm::Phantom)),
+        over_pc_plus: difference(&in_band(arm), &in_band(Arm::PcPlus)),
+        path_m: average(|flight| flight.path_m),
+        displacement_m: average(|flight| flight.displacement_m),
+        height_gained_m: average(|flight| flight.height_gained_m),
+        height_lost_m: average(|flight| flight.height_lost_m),
+        encounters: average(|flight| f64::from(flight.encounters)),
+        wings_open_s: average(|flight| flight.wings_open_s),
+    }
+}
