@@ -143,7 +143,7 @@ pub(crate) fn take_named(
 }
 
 /// Root mean square of force errors, N.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ForceError {
     /// Of the length of the difference: `sqrt(mean |e|^2)`.
     pub rms_n: f64,

@@ -5,6 +5,7 @@
 use crate::journal::{Journal, identity};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use squirrel_core::stack::wire::{HASH_START, hash};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
@@ -52,9 +53,13 @@ impl Plan {
     }
 
     /// What a result depends on beside its number, in one line.
-    pub fn identity(&self, study: &str) -> String {
+    ///
+    /// * `scenarios` - of all conditions
+    pub fn identity<'a>(&self, study: &str, scenarios: impl IntoIterator<Item = &'a Scenario>) -> String {
         let arms: Vec<&str> = self.arms.iter().map(|arm| arm.name()).collect();
-        format!("{}, arms {}", identity(study, &self.vehicle, self.seed), arms.join(" "))
+        let texts = scenarios.into_iter().fold(HASH_START, |h, s| hash(h, s.to_toml().as_bytes()));
+        let arms = arms.join(" ");
+        format!("{}, arms {arms}, scenarios {texts:016x}", identity(study, &self.vehicle, self.seed))
     }
 
     /// Number of flights under so many conditions.
@@ -76,7 +81,7 @@ pub struct Flown<T> {
     all: Vec<T>,
 }
 
-/// Flies what the journal does not hold yet.
+/// Flies what the journal does not hold yet; without a result where it is a part's.
 ///
 /// * `fly` - arm, number of the condition, trial
 /// * `progress` - called once for each flight
@@ -89,7 +94,7 @@ pub fn run<T: Serialize + DeserializeOwned + Send>(
     journal: &Journal,
     fly: impl Fn(Arm, usize, u32) -> Result<T, FlightError> + Sync,
     progress: impl Fn() + Sync,
-) -> Result<Flown<T>, FlightError> {
+) -> Result<Option<Flown<T>>, FlightError> {
     let arms = plan.arms.len();
     // Trials are the slowest to change, so that a study may go on to more of them.
     let one = |k: u32| {
@@ -97,7 +102,7 @@ pub fn run<T: Serialize + DeserializeOwned + Send>(
         fly(plan.arms[rest % arms], rest / arms, trial as u32)
     };
     let all = journal.run(plan.flights(conditions), one, progress)?;
-    Ok(Flown { arms: plan.arms.clone(), conditions, all })
+    Ok(all.map(|all| Flown { arms: plan.arms.clone(), conditions, all }))
 }
 
 impl<T> Flown<T> {

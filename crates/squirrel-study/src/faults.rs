@@ -5,7 +5,7 @@
 //! thrust at a ratio below [`HEALTHY_RATIO`], or both inertial units that say nothing that is a number. A fault is *flagged* where the
 //! flight code reports anything from the fault on, be it health or a reason of its failsafe.
 
-use crate::journal::{Journal, identity};
+use crate::journal::{Journal, Keep, identity};
 use serde::{Deserialize, Serialize};
 use squirrel_core::guidance::mission::scramble;
 use squirrel_sim::arm::Arm;
@@ -13,7 +13,6 @@ use squirrel_sim::flight::{FlightError, Integrator, Metrics, OVER_RAD, Setup};
 use squirrel_sim::scenario::{FaultKind, FaultTable, Scenario};
 use squirrel_sim::sensors::{SUITES, SensorParameters};
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::path::Path;
 
 /// Thrust-to-weight ratio from which a weak rotor is survivable.
 pub const HEALTHY_RATIO: f64 = 1.6;
@@ -101,28 +100,30 @@ pub struct Faults {
 
 /// Flies the study; the result depends neither on threads nor on how often it was stopped.
 ///
-/// * `folder` - keeps the trials, so that a study that was stopped goes on
+/// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it is a part of one
 /// * `progress` - called once for each flight
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Result<Faults, FlightError> {
+pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Faults>, FlightError> {
     if plan.trials == 0 {
         return Err(FlightError("trials = 0: must be at least 1".to_owned()));
     }
-    let journal = Journal::open(folder, "faults", &identity("faults", &plan.vehicle, plan.seed))?;
-    let flights = journal.run(plan.trials, |trial| fly(plan, trial), progress)?;
+    let journal = Journal::open(keep, "faults", &identity("faults", &plan.vehicle, plan.seed))?;
+    let Some(flights) = journal.run(plan.trials, |trial| fly(plan, trial), progress)? else {
+        return Ok(None);
+    };
     let rows: Vec<Row> =
         FaultKind::ALL.iter().map(|kind| row(*kind, &flights)).filter(|row| row.flights > 0).collect();
     let sum = |of: fn(&Row) -> u32| f64::from(rows.iter().map(of).sum::<u32>());
-    Ok(Faults {
+    Ok(Some(Faults {
         vehicle: plan.vehicle.name.clone(),
         trials: plan.trials,
         seed: plan.seed,
         survived_share: sum(|row| row.survived) / sum(|row| row.survivable),
         rows,
         flights,
-    })
+    }))
 }
 
 fn row(kind: FaultKind, flights: &[Trial]) -> Row {

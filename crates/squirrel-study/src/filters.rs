@@ -6,7 +6,7 @@
 //! from five seconds on.
 
 use crate::in_loop;
-use crate::journal::{self, Journal};
+use crate::journal::{self, Journal, Keep};
 use crate::statistics::{Estimate, mean, paired};
 use crate::wing_flights::Kind;
 use squirrel_core::estimate::eskf::Eskf;
@@ -25,7 +25,6 @@ use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::sensors::SUITES;
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::path::Path;
 
 /// Bias that an uncalibrated gyro keeps, deg/s: docs/equations.md C.2.
 pub const BIAS_DEG_S: [f64; 3] = [0.4, -0.3, 0.2];
@@ -108,19 +107,19 @@ type Errors = [f64; 2];
 
 /// Flies the study on all cores; the result does not depend on how many there are.
 ///
-/// * `folder` - keeps the trials, so that a study that was stopped goes on
+/// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it is a part of one
 /// * `progress` - called once for each trial: the flights, then a pair for each of them and each suite of sensors
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Result<Filters, FlightError> {
+pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Filters>, FlightError> {
     if plan.trials == 0 {
         return Err(FlightError("trials = 0: must be at least 1".to_owned()));
     }
     let kinds: Vec<(bool, Estimator)> =
         [true, false].into_iter().flat_map(|calibrated| FILTERS.map(|filter| (calibrated, filter))).collect();
     let identity = journal::identity("filters", &plan.vehicle, plan.seed);
-    let journal = |name| Journal::open(folder, name, &identity);
+    let journal = |name| Journal::open(keep, name, &identity);
     let all = |trial| -> Result<Vec<Errors>, FlightError> {
         let log = fly(plan, trial)?;
         kinds.iter().map(|(calibrated, filter)| heard(plan, &log, *filter, *calibrated)).collect()
@@ -128,6 +127,7 @@ pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Re
     let flown = journal("filters")?.run(plan.trials, all, &progress)?;
     let in_loop =
         in_loop::run(&plan.vehicle, plan.trials, plan.seed, &journal("filters_in_loop")?, &progress)?;
+    let (Some(flown), Some(in_loop)) = (flown, in_loop) else { return Ok(None) };
     let rows = kinds.iter().enumerate().map(|(k, (calibrated, filter))| {
         let trials_deg: Vec<f64> = flown.iter().map(|trial| trial[k][0]).collect();
         Row {
@@ -138,19 +138,20 @@ pub fn run(plan: &Plan, folder: Option<&Path>, progress: impl Fn() + Sync) -> Re
             trials_deg,
         }
     });
-    Ok(Filters {
+    Ok(Some(Filters {
         vehicle: plan.vehicle.name.clone(),
         trials: plan.trials,
         seed: plan.seed,
         bias_deg_s: BIAS_DEG_S,
         rows: rows.collect(),
         in_loop,
-    })
+    }))
 }
 
 /// Number of times that [`run`] calls back.
-pub fn steps(plan: &Plan) -> u64 {
-    u64::from(plan.trials) * (1 + SUITES.len() as u64)
+pub fn steps(plan: &Plan, keep: &Keep<'_>) -> u64 {
+    let trials = u64::from(plan.trials);
+    keep.share(trials) + keep.share(trials * SUITES.len() as u64)
 }
 
 /// The flights, named by their trial.

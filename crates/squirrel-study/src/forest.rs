@@ -6,13 +6,12 @@
 //! `phantom`, which decides alike and has none.
 
 use crate::campaign::{self, Flown, Plan};
-use crate::journal::Journal;
+use crate::journal::{Journal, Keep};
 use crate::statistics::{Estimate, Share, difference, mean};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, OVER_RAD};
 use squirrel_sim::scenario::Scenario;
-use std::path::Path;
 
 /// Height that may be lost or gained, m.
 pub const BAND_M: f64 = 3.0;
@@ -22,8 +21,8 @@ pub const BAND_M: f64 = 3.0;
 pub struct Flight {
     /// Horizontal way until the first contact, m.
     pub path_m: f64,
-    /// Distance from the start there, m.
-    pub displacement_m: f64,
+    /// Where it was then from the start, north and east, m.
+    pub displacement_m: [f64; 2],
     /// Largest climb, m.
     pub height_gained_m: f64,
     /// Largest sink, m.
@@ -53,9 +52,9 @@ pub struct Row {
     /// Flights that came through in the height band.
     pub in_band: Share,
     /// The latter, less that of `phantom` on the same trials.
-    pub over_phantom: Estimate,
-    /// And less that of `pc_plus`.
-    pub over_pc_plus: Estimate,
+    pub over_phantom: Option<Estimate>,
+    /// And less that of `pc_plus`; both absent where the rival did not fly.
+    pub over_pc_plus: Option<Estimate>,
     /// Mean way until the first contact, m.
     pub path_m: f64,
     /// Mean distance from the start there, m.
@@ -68,6 +67,17 @@ pub struct Row {
     pub encounters: f64,
     /// Mean time with wings open, s.
     pub wings_open_s: f64,
+    /// Where each flight ended.
+    pub ends: Vec<End>,
+}
+
+/// Where a flight ended.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct End {
+    /// From the start, north and east, m.
+    pub displacement_m: [f64; 2],
+    /// After all of the way, and not at a trunk or the ground.
+    pub through: bool,
 }
 
 /// The study.
@@ -85,15 +95,19 @@ pub struct Forest {
     pub rows: Vec<Row>,
 }
 
-/// Number of flights that [`run`] flies.
-pub fn flights(plan: &Plan) -> u64 {
-    u64::from(plan.flights(1))
+/// Number of flights that [`run`] flies here.
+///
+/// # Errors
+/// No trials.
+pub fn flights(plan: &Plan, keep: &Keep<'_>) -> Result<u64, FlightError> {
+    Ok(keep.share(u64::from(plan.beside(Arm::Phantom)?.flights(1))))
 }
 
 /// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped.
 ///
 /// * `thrust_to_weight` - effective ratio
-/// * `folder` - keeps the flights
+/// * `plan` - `phantom` is flown in any case
+/// * `keep` - keeps the flights; without a result where it is a part of them
 /// * `progress` - called once for each flight
 ///
 /// # Errors
@@ -101,21 +115,22 @@ pub fn flights(plan: &Plan) -> u64 {
 pub fn run(
     plan: &Plan,
     thrust_to_weight: f64,
-    folder: Option<&Path>,
+    keep: &Keep<'_>,
     progress: impl Fn() + Sync,
-) -> Result<Forest, FlightError> {
-    let identity = format!("{}, T/W {thrust_to_weight}", plan.identity("forest"));
-    let journal = Journal::open(folder, "forest", &identity)?;
+) -> Result<Option<Forest>, FlightError> {
+    let plan = &plan.beside(Arm::Phantom)?;
+    let first = scenario(plan, thrust_to_weight, 0)?;
+    let journal = Journal::open(keep, "forest", &plan.identity("forest", [&first]))?;
     let fly = |arm, _, trial| fly(plan, arm, thrust_to_weight, trial);
-    let flown = campaign::run(plan, 1, &journal, fly, progress)?;
+    let Some(flown) = campaign::run(plan, 1, &journal, fly, progress)? else { return Ok(None) };
     let rows = plan.arms.iter().map(|arm| row(&flown, *arm)).collect();
-    Ok(Forest {
+    Ok(Some(Forest {
         vehicle: plan.vehicle.name.clone(),
         trials: plan.trials,
         seed: plan.seed,
         thrust_to_weight,
         rows,
-    })
+    }))
 }
 
 /// The scenario of a trial.
@@ -148,17 +163,58 @@ fn row(flown: &Flown<Flight>, arm: Arm) -> Row {
     let average = |figure: fn(&Flight) -> f64| mean(&flown.figures(arm, 0, figure));
     let in_band = |arm| flown.figures(arm, 0, |flight: &Flight| f64::from(u8::from(flight.in_band())));
     let of = flown.of(arm, 0);
+    let over = |rival| (!flown.of(rival, 0).is_empty()).then(|| difference(&in_band(arm), &in_band(rival)));
     Row {
         arm: arm.name(),
         through: Share::of(of.iter().map(|flight| flight.through)),
         in_band: Share::of(of.iter().map(|flight| flight.in_band())),
-        over_phantom: difference(&in_band(arm), &in_band(Arm::Phantom)),
-        over_pc_plus: difference(&in_band(arm), &in_band(Arm::PcPlus)),
+        over_phantom: over(Arm::Phantom),
+        over_pc_plus: over(Arm::PcPlus),
         path_m: average(|flight| flight.path_m),
-        displacement_m: average(|flight| flight.displacement_m),
+        displacement_m: average(|flight| flight.displacement_m[0].hypot(flight.displacement_m[1])),
+        ends: of
+            .iter()
+            .map(|flight| End { displacement_m: flight.displacement_m, through: flight.through })
+            .collect(),
         height_gained_m: average(|flight| flight.height_gained_m),
         height_lost_m: average(|flight| flight.height_lost_m),
         encounters: average(|flight| f64::from(flight.encounters)),
         wings_open_s: average(|flight| flight.wings_open_s),
     }
 }
+
+/// What the rows say, in words: who owes its success to wings.
+pub fn words(study: &Forest) -> Vec<String> {
+    let share = |row: &Row| 100.0 * row.in_band.share.value;
+    let Some(phantom) = study.rows.iter().find(|row| row.arm == Arm::Phantom.name()) else {
+        return Vec::new();
+    };
+    let mut words = Vec::new();
+    for row in study.rows.iter().filter(|row| BELIEVES_IN_WINGS.iter().any(|arm| arm.name() == row.arm)) {
+        // What decides alike and has no wings: for ours its own law, for the paper's arms `phantom`.
+        let (rival, over) = if row.arm == Arm::TwccPlus.name() {
+            (Arm::PcPlus.name(), row.over_pc_plus)
+        } else {
+            (phantom.arm, row.over_phantom)
+        };
+        let Some(over) = over else { continue };
+        let points = format!(
+            "{:+.0} points ({:+.0} to {:+.0})",
+            100.0 * over.value,
+            100.0 * over.low,
+            100.0 * over.high
+        );
+        let verdict = if over.low > 0.0 {
+            "owes part of its success to wings"
+        } else if over.high < 0.0 {
+            "is worse for its wings"
+        } else {
+            "does not owe its success to wings, as far as these trials tell"
+        };
+        words.push(format!("{} ({:.0} % in band) {verdict}: {points} over {rival}.", row.arm, share(row)));
+    }
+    words
+}
+
+/// Arms whose plant has wings that the law opens.
+const BELIEVES_IN_WINGS: [Arm; 4] = [Arm::TwccFlat, Arm::TwccParnn, Arm::TwccOracle, Arm::TwccPlus];

@@ -41,7 +41,7 @@ pub struct Row {
     pub flagged: u32,
 }
 
-/// Flies `trials` pairs for each suite.
+/// Flies `trials` pairs for each suite; without a result where the journal is a part's.
 ///
 /// * `progress` - called once for each pair
 ///
@@ -53,13 +53,14 @@ pub fn run(
     seed: u64,
     journal: &Journal,
     progress: impl Fn() + Sync,
-) -> Result<Vec<Row>, FlightError> {
+) -> Result<Option<Vec<Row>>, FlightError> {
     let count = SUITES.len() as u32;
     let pairs = journal.run(
         trials * count,
         |k| pair(vehicle, SUITES[(k % count) as usize], seed.wrapping_mul(1_000_003) + u64::from(k / count)),
         progress,
     )?;
+    let Some(pairs) = pairs else { return Ok(None) };
     let row = |(i, suite): (usize, &&'static str)| {
         let of: Vec<&Pair> = pairs.iter().skip(i).step_by(SUITES.len()).collect();
         let [ours, oracle] = [0, 1].map(|k| of.iter().map(|pair| pair.rmse_m[k]).collect::<Vec<_>>());
@@ -73,7 +74,7 @@ pub fn run(
             flagged: of.iter().filter(|pair| !pair.flags.is_empty()).count() as u32,
         }
     };
-    Ok(SUITES.iter().enumerate().map(row).collect())
+    Ok(Some(SUITES.iter().enumerate().map(row).collect()))
 }
 
 fn pair(vehicle: &VehicleFile, suite: &str, seed: u64) -> Result<Pair, FlightError> {

@@ -1,8 +1,10 @@
-//! Studies that can be stopped: each trial's result is a line of a file, and who starts again flies only what is missing.
+//! Studies that can be stopped, and split over machines: each trial's result is a line of a file, and who starts again flies only what is
+//! missing.
 //!
 //! The file is `NAME.trials.jsonl` in the study's folder. Its first line says what was planned; a study with another plan refuses to go on
-//! from it. A line that was cut off by the stop counts as not flown. Results are handed back in the order of the trials, so that a study
-//! that was stopped ten times gives the same bytes as one that never was, on any number of threads.
+//! from it. A line that was cut off by the stop counts as not flown. Results are handed back in the order of the trials, and the lines of a
+//! study that is done are put in that order, so that a study that was stopped ten times, or flown in parts ([`Shard`]) that were merged
+//! ([`crate::merge`]), leaves the same bytes as one that never was, on any number of threads.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -14,6 +16,7 @@ use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::Mutex;
 
 /// What a study's trials depend on beside their number, in one line: for [`Journal::open`].
@@ -23,16 +26,88 @@ pub fn identity(name: &str, vehicle: &VehicleFile, seed: u64) -> String {
     format!("{name} of {of} ({hash:016x}) on {estimator}, seed {seed}, version {version}")
 }
 
+/// One part of a study: every `of`-th trial, from the `number`-th on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    number: u32,
+    of: u32,
+}
+
+impl Shard {
+    /// Whether a trial is in this part.
+    fn has(self, trial: u32) -> bool {
+        trial % self.of == self.number - 1
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    /// `K/N`, K from 1.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
+        match numbers {
+            Some((number, of)) if number >= 1 && number <= of => Ok(Self { number, of }),
+            _ => Err("must be K/N, with K from 1 to N".to_owned()),
+        }
+    }
+}
+
+impl std::fmt::Display for Shard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+/// Which trials are flown here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Part {
+    /// All that are missing.
+    #[default]
+    All,
+    /// Those of one part that are missing; the study has no result then.
+    Shard(Shard),
+    /// None: all have to be there.
+    Merged,
+}
+
+/// Where trials are kept, and which are flown here.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Keep<'a> {
+    /// Folder, which must exist; without one nobody keeps them.
+    pub folder: Option<&'a Path>,
+    /// Which are flown.
+    pub part: Part,
+    /// The arguments that describe the study, for who merges parts of it.
+    pub command: &'a [String],
+}
+
+impl Keep<'_> {
+    /// How many of so many trials are flown here.
+    pub fn share(&self, trials: u64) -> u64 {
+        match self.part {
+            Part::Shard(shard) => (0..trials as u32).filter(|trial| shard.has(*trial)).count() as u64,
+            Part::All | Part::Merged => trials,
+        }
+    }
+}
+
 /// A study's trials on disk, or nowhere.
 #[derive(Debug)]
 pub struct Journal {
+    part: Part,
     file: Option<(PathBuf, Mutex<File>)>,
+    head: Head,
     done: BTreeMap<u32, String>,
 }
 
-#[derive(Serialize, serde::Deserialize)]
-struct Head {
-    plan: String,
+/// The first line.
+#[derive(Debug, Clone, PartialEq, Serialize, serde::Deserialize)]
+pub(crate) struct Head {
+    /// What a result depends on beside the program itself.
+    pub(crate) plan: String,
+    /// [`Keep::command`].
+    pub(crate) command: Vec<String>,
 }
 
 #[derive(Serialize, serde::Deserialize)]
@@ -41,72 +116,107 @@ struct Line<T> {
     result: T,
 }
 
+/// A file's head and whole lines, by their trials, and how long they are; nothing where there is no file or no head yet.
+pub(crate) fn read(path: &Path) -> Result<(Option<Head>, BTreeMap<u32, String>, usize), FlightError> {
+    let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
+    let text = match std::fs::read_to_string(path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+        Err(e) => return Err(at(&e)),
+    };
+    // What follows the last line feed was cut off.
+    let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
+    let mut lines = whole.lines();
+    let head = lines.next().map(serde_json::from_str).transpose().map_err(|e| at(&e))?;
+    let mut done = BTreeMap::new();
+    for line in lines {
+        let Line::<serde_json::Value> { trial, .. } = serde_json::from_str(line).map_err(|e| at(&e))?;
+        done.insert(trial, line.to_owned());
+    }
+    Ok((head, done, whole.len()))
+}
+
+/// Writes head and lines in their order, whole or not at all.
+pub(crate) fn write(path: &Path, head: &Head, lines: &BTreeMap<u32, String>) -> Result<(), FlightError> {
+    let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
+    let mut text = serde_json::to_string(head).map_err(|e| at(&e))? + "\n";
+    for line in lines.values() {
+        text += line;
+        text.push('\n');
+    }
+    let partial = path.with_extension("partial");
+    std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path)).map_err(|e| at(&e))
+}
+
 impl Journal {
-    /// The trials of a study in a folder, which must exist; without one nobody keeps them.
+    /// The trials of a study.
     ///
     /// * `plan` - what a result depends on beside the program itself, in one line
     ///
     /// # Errors
-    /// The file cannot be read or written, or is of another plan.
-    pub fn open(folder: Option<&Path>, name: &str, plan: &str) -> Result<Self, FlightError> {
-        let Some(folder) = folder else { return Ok(Self { file: None, done: BTreeMap::new() }) };
+    /// The file cannot be read or written, or is of another plan; a part of a study that nobody keeps.
+    pub fn open(keep: &Keep<'_>, name: &str, plan: &str) -> Result<Self, FlightError> {
+        let head = Head { plan: plan.to_owned(), command: keep.command.to_vec() };
+        let Some(folder) = keep.folder else {
+            if keep.part == Part::All {
+                return Ok(Self { part: Part::All, file: None, head, done: BTreeMap::new() });
+            }
+            return Err(FlightError(
+                "shard: needs a folder that keeps what was flown; give --out".to_owned(),
+            ));
+        };
         let path = folder.join(format!("{name}.trials.jsonl"));
         let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
-        let before = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
-            Err(e) => return Err(at(&e)),
-        };
-        // What follows the last line feed was cut off.
-        let whole = before.rfind('\n').map_or("", |end| &before[..=end]);
-        let mut lines = whole.lines();
-        let mut done = BTreeMap::new();
-        if let Some(first) = lines.next() {
-            let head: Head = serde_json::from_str(first).map_err(|e| at(&e))?;
-            if head.plan != plan {
-                let problem = format!("is of another plan ({}); give another --out, or delete it", head.plan);
-                return Err(at(&problem));
-            }
-            for line in lines {
-                let Line::<serde_json::Value> { trial, .. } =
-                    serde_json::from_str(line).map_err(|e| at(&e))?;
-                done.insert(trial, line.to_owned());
-            }
+        let (before, done, length) = read(&path)?;
+        if let Some(before) = before
+            && before.plan != plan
+        {
+            let problem = format!("is of another plan ({}); give another --out, or delete it", before.plan);
+            return Err(at(&problem));
         }
         let mut file = OpenOptions::new().create(true).append(true).open(&path).map_err(|e| at(&e))?;
-        if whole.len() < before.len() {
-            file.set_len(whole.len() as u64).map_err(|e| at(&e))?;
+        file.set_len(length as u64).map_err(|e| at(&e))?;
+        if length == 0 {
+            let line = serde_json::to_string(&head).map_err(|e| at(&e))?;
+            writeln!(file, "{line}").map_err(|e| at(&e))?;
         }
-        if whole.is_empty() {
-            let head = serde_json::to_string(&Head { plan: plan.to_owned() }).map_err(|e| at(&e))?;
-            writeln!(file, "{head}").map_err(|e| at(&e))?;
-        }
-        Ok(Self { file: Some((path, Mutex::new(file))), done })
+        Ok(Self { part: keep.part, file: Some((path, Mutex::new(file))), head, done })
     }
 
-    /// The results of all trials, from 0; those that are missing are flown on all cores.
+    /// The results of all trials, from 0; those that are missing are flown on all cores. `None` where only a part of them is flown here.
     ///
     /// * `progress` - called once for each trial, also for those that were there
     ///
     /// # Errors
-    /// A trial that fails, a result that cannot be read, or one that cannot be written.
+    /// A trial that fails, a result that cannot be read, or one that cannot be written; after a merge, a trial that is missing.
     pub fn run<T: Serialize + DeserializeOwned + Send>(
         &self,
         trials: u32,
         fly: impl Fn(u32) -> Result<T, FlightError> + Sync,
         progress: impl Fn() + Sync,
-    ) -> Result<Vec<T>, FlightError> {
+    ) -> Result<Option<Vec<T>>, FlightError> {
         let one = |trial: u32| {
-            let result = if let Some(line) = self.done.get(&trial) {
-                self.read(line)?
-            } else {
-                let result = fly(trial)?;
-                self.keep(trial, &result)?
+            let result = match self.done.get(&trial) {
+                Some(line) => self.read(line)?,
+                None if self.part == Part::Merged => {
+                    return Err(self.at(&format!("trial = {trial}: missing, in none of the merged folders")));
+                }
+                None => self.keep(trial, &fly(trial)?)?,
             };
             progress();
             Ok(result)
         };
-        (0..trials).into_par_iter().map(one).collect()
+        if let Part::Shard(shard) = self.part {
+            let mine: Vec<u32> = (0..trials).filter(|trial| shard.has(*trial)).collect();
+            mine.into_par_iter().map(|trial| one(trial).map(drop)).collect::<Result<(), _>>()?;
+            return Ok(None);
+        }
+        let all: Vec<T> = (0..trials).into_par_iter().map(one).collect::<Result<_, _>>()?;
+        if let Some((path, _)) = &self.file {
+            let (_, lines, _) = read(path)?;
+            write(path, &self.head, &lines)?;
+        }
+        Ok(Some(all))
     }
 
     fn read<T: DeserializeOwned>(&self, line: &str) -> Result<T, FlightError> {

@@ -1,130 +1,213 @@
-//! What wings are worth as a function of thrust: every arm through the avoidance manoeuvre at several effective
-//! thrust-to-weight ratios, on paired seeds.
+//! What wings are worth as a function of thrust: every arm through the avoidance manoeuvre at several effective thrust-to-weight ratios.
 //!
-//! The paper's real flights: 7.3 m/s, `R_d` 4 m, a turn of 110 to 130 deg; error over 6 s from the encounter. The limit
-//! is the collective thrust that the flight code may ask for, so that it is the same for all arms.
+//! The paper's real flights: 7.3 m/s, `R_d` 4 m, a turn of 110 to 130 deg; error over 6 s from the encounter. Two series:
+//! - `limit`: the collective thrust that the flight code may ask for, at a battery that does not sag;
+//! - `battery`: one such limit, [`BATTERY_RATIO`], and a battery that is emptier from flight to flight. Thrust follows its voltage
+//!   (`battery_sag`), which the flight code does not know, and what is left of the limit is the effective ratio.
+//!
+//! The last rows of `battery` have the vehicle's own limit, to see where the battery alone brings it. Nothing is expected of wings from a ratio of
+//! about 1.155 on, where 30 deg of tilt hold height (docs/equations.md E); what is gained there is gained in transients and is said beside
+//! the fair rival `pc_plus`.
 
-use crate::statistics::{Estimate, gain, mean, paired};
-use rayon::prelude::*;
-use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
+use crate::campaign::Plan;
+use crate::journal::Keep;
+use crate::statistics::Estimate;
+use crate::tracking::{self, Condition, GUST_M_S, Row};
+use serde::Serialize;
+use squirrel_sim::flight::FlightError;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Ratios of the largest collective thrust to the weight.
-pub const THRUST_TO_WEIGHT: [f64; 6] = [1.15, 1.20, 1.25, 1.30, 1.50, 2.00];
-/// Standard deviation of the gusts, m/s.
-const GUST_M_S: f64 = 0.5;
+pub const THRUST_TO_WEIGHT: [f64; 7] = [1.15, 1.20, 1.25, 1.30, 1.50, 2.00, 3.00];
+/// The ratio that the battery takes its share of.
+pub const BATTERY_RATIO: f64 = 1.4;
+/// Charges of the battery.
+const CHARGE: [f64; 7] = [1.0, 0.6, 0.3, 0.15, 0.08, 0.05, 0.02];
+/// Charges at which the vehicle's own limit is flown.
+const FREE_CHARGE: [f64; 2] = [1.0, 0.02];
+/// How rotor speed follows voltage: a motor between no load (1) and full load (about 0.8).
+const VOLTAGE_EXPONENT: f64 = 0.9;
+/// The paper's tracking gain.
+pub const PAPER_GAIN: f64 = 0.131;
 
-/// What to run.
-#[derive(Debug, Clone)]
-pub struct Plan {
-    /// Vehicle.
-    pub vehicle: VehicleFile,
-    /// Arms; `pc` is flown in any case, as the reference of the gain.
-    pub arms: Vec<Arm>,
-    /// Trials per arm and ratio.
-    pub trials: u32,
-    /// Seed of the first trial.
-    pub seed: u64,
-}
-
-/// One arm at one ratio.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Row {
-    /// Effective thrust-to-weight ratio.
+/// Arms at one ratio.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Point {
+    /// `limit`, `battery` or `battery_alone`.
+    pub series: &'static str,
+    /// Charge of the battery at the start, where it counts.
+    pub charge: Option<f64>,
+    /// Effective thrust-to-weight ratio: as flown, mean of all arms.
     pub thrust_to_weight: f64,
-    /// Arm.
-    pub arm: &'static str,
-    /// Mean over the trials of the distance to the reference, root mean square, m.
-    pub rmse_m: f64,
-    /// The same without height, m.
-    pub rmse_horizontal_m: f64,
-    /// Mean of the largest sink, m.
-    pub height_lost_m: f64,
-    /// Mean of the largest climb, m.
-    pub height_gained_m: f64,
-    /// Mean time with wings more than half spread, s.
-    pub wings_open_s: f64,
-    /// `mean(pc) / mean(arm) - 1` with its 95 % interval over paired trials.
-    pub gain: Estimate,
-}
-
-/// The study's result.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Thrust {
-    /// Trials per arm and ratio.
-    pub trials: u32,
-    /// Seed of the first trial.
-    pub seed: u64,
-    /// Ratios from small to large, arms in their order.
+    /// By arm.
     pub rows: Vec<Row>,
 }
 
-/// Flies the study on all cores; the result does not depend on how many there are.
+/// Where an arm's gain is the paper's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Crossing {
+    /// [`Point::series`].
+    pub series: &'static str,
+    /// Arm.
+    pub arm: &'static str,
+    /// Largest effective ratio at which the gain is [`PAPER_GAIN`], between neighbouring points; absent where it is nowhere.
+    pub thrust_to_weight: Option<f64>,
+}
+
+/// The study's result.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Thrust {
+    /// Name of the vehicle.
+    pub vehicle: String,
+    /// Trials per arm and ratio.
+    pub trials: u32,
+    /// Seed of all trials.
+    pub seed: u64,
+    /// By series, from small ratios to large.
+    pub points: Vec<Point>,
+    /// By series and arm.
+    pub crossings: Vec<Crossing>,
+    /// Ratios of the series `limit` at which `twcc_plus` is better than `pc_plus` by an interval that excludes zero, with the gain.
+    pub headline: Vec<(f64, Estimate)>,
+}
+
+/// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped. `None` where only a part is flown
+/// here.
 ///
-/// * `progress` - called once for each flight that has ended
+/// * `progress` - called once for each flight
 ///
 /// # Errors
-/// A vehicle that cannot fly.
-pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Thrust, FlightError> {
-    if plan.trials == 0 {
-        return Err(FlightError("trials = 0: must be at least 1".to_owned()));
-    }
-    let mut arms = plan.arms.clone();
-    arms.push(Arm::Pc);
-    arms.sort_unstable();
-    arms.dedup();
-    let mut tasks = Vec::new();
-    for ratio in THRUST_TO_WEIGHT {
-        for arm in &arms {
-            tasks.extend((0..plan.trials).map(|trial| (ratio, *arm, trial)));
-        }
-    }
-    let flown: Vec<Metrics> = tasks
-        .par_iter()
-        .map(|(ratio, arm, trial)| {
-            let metrics = fly(plan, *ratio, *arm, *trial);
-            progress();
-            metrics
+/// A vehicle that cannot fly, or a folder that cannot be written.
+pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Thrust>, FlightError> {
+    let planned = planned(&plan.vehicle);
+    let conditions = conditions(&plan.vehicle)?;
+    let Some(rows) = tracking::run(plan, "thrust", &conditions, keep, progress)? else {
+        return Ok(None);
+    };
+    let reference_v = plan.vehicle.vehicle.parameters().propulsion.reference_voltage_v;
+    let mut points: Vec<Point> = planned
+        .into_iter()
+        .zip(rows)
+        .map(|((series, charge, ratio), rows)| {
+            let voltage_v = rows.iter().map(|row| row.voltage_v).sum::<f64>() / rows.len() as f64;
+            let sag = charge.map_or(1.0, |_| (voltage_v / reference_v).powf(2.0 * VOLTAGE_EXPONENT));
+            Point { series, charge, thrust_to_weight: ratio * sag, rows }
         })
-        .collect::<Result<_, _>>()?;
-
-    let trials = plan.trials as usize;
-    let errors = |flights: &[Metrics]| flights.iter().map(|m| m.rmse_m).collect::<Vec<f64>>();
-    let mut rows = Vec::new();
-    for (flights, ratio) in flown.chunks(trials * arms.len()).zip(THRUST_TO_WEIGHT) {
-        let of = |arm: usize| &flights[arm * trials..(arm + 1) * trials];
-        let pc = arms.iter().position(|a| *a == Arm::Pc).map_or_else(Vec::new, |i| errors(of(i)));
-        for (i, arm) in arms.iter().enumerate() {
-            let average = |f: fn(&Metrics) -> f64| mean(&of(i).iter().map(f).collect::<Vec<f64>>());
-            rows.push(Row {
-                thrust_to_weight: ratio,
-                arm: arm.name(),
-                rmse_m: average(|m| m.rmse_m),
-                rmse_horizontal_m: average(|m| m.rmse_horizontal_m),
-                height_lost_m: average(|m| m.height_lost_m),
-                height_gained_m: average(|m| m.height_gained_m),
-                wings_open_s: average(|m| m.wings_open_s),
-                gain: paired(&pc, &errors(of(i)), gain),
-            });
+        .collect();
+    let order = |point: &Point| SERIES.iter().position(|series| *series == point.series);
+    points.sort_by(|a, b| order(a).cmp(&order(b)).then(a.thrust_to_weight.total_cmp(&b.thrust_to_weight)));
+    let mut crossings = Vec::new();
+    for series in &SERIES[..2] {
+        let of: Vec<&Point> = points.iter().filter(|point| point.series == *series).collect();
+        for row in of.first().map_or(&[][..], |point| &point.rows) {
+            let crossing = Crossing { series, arm: row.arm, thrust_to_weight: crossing(&of, row.arm) };
+            crossings.push(crossing);
         }
     }
-    Ok(Thrust { trials: plan.trials, seed: plan.seed, rows })
+    let excludes_zero = |point: &Point| {
+        let plus = point.rows.iter().find(|row| row.arm == "twcc_plus")?;
+        plus.gain_over_pc_plus.filter(|gain| gain.low > 0.0).map(|gain| (point.thrust_to_weight, gain))
+    };
+    let headline =
+        points.iter().filter(|point| point.series == SERIES[0]).filter_map(excludes_zero).collect();
+    let vehicle = plan.vehicle.name.clone();
+    Ok(Some(Thrust { vehicle, trials: plan.trials, seed: plan.seed, points, crossings, headline }))
 }
 
-/// Number of flights that [`run`] will fly.
-pub fn flights(plan: &Plan) -> u64 {
-    let arms = plan.arms.len() + usize::from(!plan.arms.contains(&Arm::Pc));
-    THRUST_TO_WEIGHT.len() as u64 * arms as u64 * u64::from(plan.trials)
+const SERIES: [&str; 3] = ["limit", "battery", "battery_alone"];
+
+/// Number of flights that [`run`] flies here.
+///
+/// # Errors
+/// No trials.
+pub fn flights(plan: &Plan, keep: &Keep<'_>) -> Result<u64, FlightError> {
+    tracking::flights(plan, planned(&plan.vehicle).len(), keep)
 }
 
-fn fly(plan: &Plan, ratio: f64, arm: Arm, trial: u32) -> Result<Metrics, FlightError> {
-    let mut scenario = Scenario::find("avoid").map_err(FlightError)?;
-    // Paired: the seed does not depend on arm or ratio.
-    scenario.seed = plan.seed.wrapping_mul(1_000_003).wrapping_add(u64::from(trial));
-    scenario.thrust_to_weight = Some(ratio);
-    scenario.wind.gust_sigma_m_s = GUST_M_S;
-    let setup = Setup { vehicle: plan.vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 };
-    Ok(setup.fly(false, |_| {})?.metrics)
+/// Series, charge and limit of each point. Without a battery there is only a limit.
+fn planned(vehicle: &VehicleFile) -> Vec<(&'static str, Option<f64>, f64)> {
+    let mut all: Vec<_> = THRUST_TO_WEIGHT.iter().map(|ratio| (SERIES[0], None, *ratio)).collect();
+    if vehicle.battery.is_some() {
+        let own = vehicle.vehicle.parameters().limits.thrust_max_n / vehicle.vehicle.weight_n();
+        all.extend(CHARGE.iter().map(|charge| (SERIES[1], Some(*charge), BATTERY_RATIO)));
+        all.extend(FREE_CHARGE.iter().map(|charge| (SERIES[2], Some(*charge), own)));
+    }
+    all
+}
+
+/// What is flown at each point.
+///
+/// # Errors
+/// Never in a program that has the built-in scenario and the effect.
+pub fn conditions(vehicle: &VehicleFile) -> Result<Vec<Condition>, FlightError> {
+    let condition = |(_, charge, ratio): (&str, Option<f64>, f64)| {
+        let mut scenario = Scenario::find("avoid").map_err(FlightError)?;
+        scenario.thrust_to_weight = Some(ratio);
+        scenario.wind.gust_sigma_m_s = GUST_M_S;
+        let mut vehicle = vehicle.clone();
+        if let Some(charge) = charge {
+            scenario.battery_charge = charge;
+            let Some(sag) = vehicle.effects.insert("battery_sag") else {
+                return Err(FlightError("effects.battery_sag: unknown".to_owned()));
+            };
+            sag.values[0] = VOLTAGE_EXPONENT;
+        }
+        Ok(Condition { vehicle, scenario })
+    };
+    planned(vehicle).into_iter().map(condition).collect()
+}
+
+/// The largest ratio at which an arm's gain passes the paper's, on straight lines between points.
+fn crossing(points: &[&Point], arm: &str) -> Option<f64> {
+    let gains: Vec<[f64; 2]> = points
+        .iter()
+        .filter_map(|point| {
+            let row = point.rows.iter().find(|row| row.arm == arm)?;
+            Some([point.thrust_to_weight, row.gain.value - PAPER_GAIN])
+        })
+        .collect();
+    gains.array_windows().rev().find_map(|[[x0, y0], [x1, y1]]| {
+        ((*y0 > 0.0) != (*y1 > 0.0)).then(|| x0 + (x1 - x0) * y0 / (y0 - y1))
+    })
+}
+
+/// What the points say, in words: where the paper's gain lies, and what wings are worth to the best controller.
+pub fn words(study: &Thrust) -> Vec<String> {
+    let mut words = Vec::new();
+    for (series, how) in [(SERIES[0], "by the limit"), (SERIES[1], "by the battery")] {
+        let at: Vec<String> = study
+            .crossings
+            .iter()
+            .filter(|crossing| crossing.series == series)
+            .filter_map(|crossing| Some(format!("{} {:.2}", crossing.arm, crossing.thrust_to_weight?)))
+            .collect();
+        let none = || "at none of the ratios for any arm".to_owned();
+        let at = if at.is_empty() { none() } else { format!("at an effective T/W of {}", at.join(", ")) };
+        words.push(format!("A gain of {:.1} % lies, {how}, {at}.", 100.0 * PAPER_GAIN));
+    }
+    let alone = study.points.iter().filter(|point| point.series == SERIES[2]);
+    if let Some(least) = alone.map(|point| point.thrust_to_weight).min_by(f64::total_cmp) {
+        words.push(format!(
+            "The battery alone, empty, leaves the vehicle's own limit at an effective T/W of {least:.2}."
+        ));
+    }
+    let gains: Vec<String> = study
+        .headline
+        .iter()
+        .map(|(ratio, gain)| {
+            format!(
+                "{ratio:.2}: {:+.1} % ({:+.1} to {:+.1})",
+                100.0 * gain.value,
+                100.0 * gain.low,
+                100.0 * gain.high
+            )
+        })
+        .collect();
+    words.push(if gains.is_empty() {
+        "twcc_plus over pc_plus: at no ratio does the interval exclude zero.".to_owned()
+    } else {
+        format!("twcc_plus over pc_plus, where the interval excludes zero, at T/W {}.", gains.join("; "))
+    });
+    words
 }

@@ -2,14 +2,22 @@
 
 mod faults;
 mod filters;
+mod forest;
+mod merge;
+mod sheet;
+mod steering;
 mod table2;
+mod table3;
+mod thrust;
 
 use super::vehicle;
-use crate::output::{self, Table, say, talk};
+use crate::output::{self, talk};
+use indicatif::ProgressBar;
 use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
-use squirrel_study::thrust::{self, Plan};
-use std::fmt::Write;
+use squirrel_study::campaign::Plan;
+use squirrel_study::journal::{Keep, Part, Shard};
 use std::path::{Path, PathBuf};
 
 /// The experiments.
@@ -19,10 +27,18 @@ pub(crate) enum Study {
     Faults(faults::Options),
     /// How far estimators of attitude are off in flight, with a calibrated gyro and without.
     Filters(filters::Options),
+    /// Who comes through the paper's forest, in its height band and at all, and who owes it to wings.
+    Forest(forest::Options),
+    /// Put the parts of a study together that were flown with --shard.
+    Merge(merge::Options),
+    /// The paper's figure of steering angles and speeds, in paper mode and on the independent plant.
+    Steering(steering::Options),
     /// What models of the wing force predict, the paper's Table II: to labels and to truth, 30 to 300 s of training.
     Table2(table2::Options),
-    /// What wings are worth as a function of the thrust-to-weight ratio.
-    Thrust(Options),
+    /// The paper's Table III: its real flights, with the error as satellite fix and barometer have it.
+    Table3(table3::Options),
+    /// What wings are worth as a function of the thrust-to-weight ratio, with a battery that sags and without.
+    Thrust(thrust::Options),
 }
 
 /// What every experiment is told.
@@ -34,12 +50,29 @@ struct Common {
     /// Vehicle file; the shipped squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// Folder for the figures as CSV and JSON, and for what else there is to look at.
+    /// Folder for the figures as CSV and JSON, and for what else there is to look at; it keeps the trials, so that a study that was
+    /// stopped goes on.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Write the figures here as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
+    /// Fly a part of the trials only, K/N; `squirrel study merge` puts the parts together. Needs --out.
+    #[arg(long, value_name = "K/N")]
+    shard: Option<Shard>,
+    /// Fly nothing: all trials are there.
+    #[arg(skip)]
+    merged: bool,
+}
+
+/// Arms and trials of the experiments that compare controllers.
+#[derive(Debug, clap::Args)]
+struct Flown {
+    /// Arms to fly beside the reference, separated by commas; all if left out.
+    #[arg(long, value_delimiter = ',')]
+    arms: Vec<String>,
+    #[command(flatten)]
+    common: Common,
 }
 
 impl Common {
@@ -54,7 +87,44 @@ impl Common {
         if let Some(path) = &self.json {
             output::writable(path)?;
         }
+        if self.shard.is_some() && self.json.is_some() {
+            return Err("--json: a part of a study has no figures; merge the parts first".to_owned());
+        }
         vehicle(self.vehicle.as_deref())
+    }
+
+    /// Where trials are kept, and which are flown.
+    fn keep<'a>(&'a self, command: &'a [String]) -> Keep<'a> {
+        let part = match self.shard {
+            _ if self.merged => Part::Merged,
+            Some(shard) => Part::Shard(shard),
+            None => Part::All,
+        };
+        Keep { folder: self.out.as_deref(), part, command }
+    }
+
+    /// The arguments that describe a study, without those that say where it is flown.
+    fn command(&self, study: &str, own: &[(&str, String)]) -> Vec<String> {
+        let mut words = vec![study.to_owned(), format!("--seed={}", self.seed)];
+        words.extend(own.iter().map(|(name, value)| format!("--{name}={value}")));
+        words
+    }
+
+    /// Ends the progress bar; the study, or `None` where only a part was flown, with a word about it.
+    fn ended<T>(
+        &self,
+        bar: &ProgressBar,
+        study: Result<Option<T>, FlightError>,
+    ) -> Result<Option<T>, String> {
+        bar.finish_and_clear();
+        let study = study.map_err(|e| e.to_string())?;
+        if let (None, Some(shard), Some(folder)) = (&study, self.shard, &self.out) {
+            talk(&format!(
+                "part {shard} is in {}; `squirrel study merge` puts the parts together",
+                folder.display()
+            ));
+        }
+        Ok(study)
     }
 
     /// Writes the figures; the folder, where there is one.
@@ -70,17 +140,27 @@ impl Common {
     }
 }
 
-/// Options of the study of thrust.
-#[derive(Debug, clap::Args)]
-pub(crate) struct Options {
-    /// Arms to fly beside pc, separated by commas; all if left out.
-    #[arg(long, value_delimiter = ',')]
-    arms: Vec<String>,
-    /// Flights per arm and condition, on paired seeds.
-    #[arg(long, default_value_t = 12)]
-    trials: u32,
-    #[command(flatten)]
-    common: Common,
+impl Flown {
+    /// The plan, and the arguments that describe the study.
+    fn plan(&self, study: &str, trials: u32, own: &[(&str, String)]) -> Result<(Plan, Vec<String>), String> {
+        let vehicle = self.common.begin(study)?;
+        let mut plan = Plan::of_all_arms(vehicle, trials, self.common.seed);
+        if !self.arms.is_empty() {
+            plan.arms = self.arms.iter().map(|name| Arm::parse(name)).collect::<Result<_, _>>()?;
+        } else if plan.arms.len() < Arm::ALL.len() {
+            let missing: Vec<&str> =
+                Arm::ALL.iter().filter(|arm| !plan.arms.contains(arm)).map(|arm| arm.name()).collect();
+            talk(&format!(
+                "{} does not have what they need: {} left out",
+                plan.vehicle.name,
+                missing.join(", ")
+            ));
+        }
+        let arms: Vec<&str> = plan.arms.iter().map(|arm| arm.name()).collect();
+        let mut described = vec![("trials", trials.to_string()), ("arms", arms.join(","))];
+        described.extend(own.iter().cloned());
+        Ok((plan, self.common.command(study, &described)))
+    }
 }
 
 impl Study {
@@ -88,78 +168,26 @@ impl Study {
         match self {
             Self::Faults(options) => options.run(),
             Self::Filters(options) => options.run(),
+            Self::Forest(options) => options.run(),
+            Self::Merge(options) => options.run(),
+            Self::Steering(options) => options.run(),
             Self::Table2(options) => options.run(),
-            Self::Thrust(options) => options.thrust(),
+            Self::Table3(options) => options.run(),
+            Self::Thrust(options) => options.run(),
         }
     }
-}
 
-impl Options {
-    fn thrust(&self) -> Result<(), String> {
-        let vehicle = self.common.begin("thrust")?;
-        let mut arms = if self.arms.is_empty() {
-            Arm::ALL.to_vec()
-        } else {
-            self.arms.iter().map(|name| Arm::parse(name)).collect::<Result<_, _>>()?
-        };
-        if self.arms.is_empty() && vehicle.weights.is_none() {
-            arms.retain(|arm| *arm != Arm::TwccParnn);
-            talk(&format!("{} names no parnn_weights: twcc_parnn is left out", vehicle.name));
+    /// What every experiment is told; a merge is none.
+    fn common_mut(&mut self) -> Option<&mut Common> {
+        match self {
+            Self::Faults(options) => Some(&mut options.common),
+            Self::Filters(options) => Some(&mut options.common),
+            Self::Forest(options) => Some(&mut options.flown.common),
+            Self::Steering(options) => Some(&mut options.flown.common),
+            Self::Table2(options) => Some(&mut options.common),
+            Self::Table3(options) => Some(&mut options.flown.common),
+            Self::Thrust(options) => Some(&mut options.flown.common),
+            Self::Merge(_) => None,
         }
-        let plan = Plan { vehicle, arms, trials: self.trials, seed: self.common.seed };
-        let bar = output::progress(thrust::flights(&plan), "flights");
-        let study = thrust::run(&plan, || bar.inc(1));
-        bar.finish_and_clear();
-        let study = study.map_err(|e| e.to_string())?;
-
-        say(&format!(
-            "Avoidance manoeuvre, {} trials an arm on paired seeds from {}.",
-            study.trials, study.seed
-        ));
-        say("Gain is mean error of pc over mean error of the arm, minus 1, with its paired 95 % interval.\n");
-        let mut table = Table::new(&[
-            "T/W",
-            "arm",
-            "RMSE 3-D m",
-            "RMSE horiz. m",
-            "gain %",
-            "95 % interval",
-            "height lost m",
-            "height gained m",
-            "wings open s",
-        ]);
-        let mut csv = String::from(
-            "thrust_to_weight,arm,rmse_m,rmse_horizontal_m,gain,gain_low,gain_high,height_lost_m,height_gained_m,wings_open_s\n",
-        );
-        for r in &study.rows {
-            table.row(vec![
-                format!("{:.2}", r.thrust_to_weight),
-                r.arm.to_owned(),
-                format!("{:.2}", r.rmse_m),
-                format!("{:.2}", r.rmse_horizontal_m),
-                format!("{:+.1}", 100.0 * r.gain.value),
-                format!("{:+.1} to {:+.1}", 100.0 * r.gain.low, 100.0 * r.gain.high),
-                format!("{:.2}", r.height_lost_m),
-                format!("{:.2}", r.height_gained_m),
-                format!("{:.2}", r.wings_open_s),
-            ]);
-            let g = r.gain;
-            let _ = writeln!(
-                csv,
-                "{},{},{},{},{},{},{},{},{},{}",
-                r.thrust_to_weight,
-                r.arm,
-                r.rmse_m,
-                r.rmse_horizontal_m,
-                g.value,
-                g.low,
-                g.high,
-                r.height_lost_m,
-                r.height_gained_m,
-                r.wings_open_s
-            );
-        }
-        table.print();
-        self.common.end("thrust", &csv, &study).map(drop)
     }
 }

@@ -8,8 +8,8 @@ use squirrel_core::control::twcc::Mode;
 use squirrel_core::estimate::navigator::Health;
 use squirrel_core::frames::{Body, In};
 use squirrel_core::nalgebra::{Vector2, Vector3};
-use squirrel_core::stack::StackOutput;
 use squirrel_core::stack::failsafe::FailsafeReason;
+use squirrel_core::stack::{SensorFrame, StackOutput};
 
 /// Figures of one flight, over the measured window.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -18,6 +18,8 @@ pub struct Metrics {
     pub rmse_m: f64,
     /// The same without height, m.
     pub rmse_horizontal_m: f64,
+    /// Root mean square of the distance to the reference by satellite fix and barometer, as they arrive, m; absent without either.
+    pub rmse_measured_m: Option<f64>,
     /// Largest sink below the reference height, m.
     pub height_lost_m: f64,
     /// Largest climb above the reference height, m.
@@ -30,8 +32,10 @@ pub struct Metrics {
     pub clearance_m: Option<f64>,
     /// Horizontal way of the whole flight until it touched something, m.
     pub path_m: f64,
-    /// Horizontal distance from the start at that time, m.
-    pub displacement_m: f64,
+    /// Where it was then from the start, north and east, m.
+    pub displacement_m: [f64; 2],
+    /// Mean voltage of the battery, V.
+    pub voltage_mean_v: f64,
     /// Length of the measured window, s.
     pub window_s: f64,
     /// Obstacles that were avoided, or tried to.
@@ -88,6 +92,10 @@ pub(super) struct Meter<'a> {
     samples: u64,
     square: f64,
     square_horizontal: f64,
+    altitude_m: Option<f32>,
+    fixes: u64,
+    square_measured: f64,
+    volt: f64,
     wings_us: u64,
     wiic_us: u64,
     mode: Mode,
@@ -101,13 +109,15 @@ impl<'a> Meter<'a> {
         let metrics = Metrics {
             rmse_m: 0.0,
             rmse_horizontal_m: 0.0,
+            rmse_measured_m: None,
             height_lost_m: 0.0,
             height_gained_m: 0.0,
             wings_open_s: 0.0,
             wiic_s: 0.0,
             clearance_m: None,
             path_m: 0.0,
-            displacement_m: 0.0,
+            displacement_m: [0.0; 2],
+            voltage_mean_v: 0.0,
             window_s: 0.0,
             encounters: 0,
             contact_s: None,
@@ -127,6 +137,10 @@ impl<'a> Meter<'a> {
             samples: 0,
             square: 0.0,
             square_horizontal: 0.0,
+            altitude_m: None,
+            fixes: 0,
+            square_measured: 0.0,
+            volt: 0.0,
             wings_us: 0,
             wiic_us: 0,
             mode: Mode::Primary,
@@ -135,7 +149,16 @@ impl<'a> Meter<'a> {
         }
     }
 
-    pub(super) fn tick(&mut self, time_us: u64, state: &PlantState, output: &StackOutput, encounters: u32) {
+    /// * `encounters` - so far
+    pub(super) fn tick(
+        &mut self,
+        state: &PlantState,
+        frame: &SensorFrame,
+        output: &StackOutput,
+        encounters: u32,
+    ) {
+        let time_us = frame.time_us;
+        self.altitude_m = frame.altitude_m.or(self.altitude_m);
         let step_us = time_us - self.last_us;
         self.last_us = time_us;
         self.metrics.encounters = encounters;
@@ -177,6 +200,12 @@ impl<'a> Meter<'a> {
         self.samples += 1;
         self.square += error.norm_squared();
         self.square_horizontal += error.xy().norm_squared();
+        if let (Some(fix), Some(altitude_m)) = (&frame.gnss, self.altitude_m) {
+            let at = Vector3::new(fix.position.vector.x, fix.position.vector.y, -altitude_m);
+            self.fixes += 1;
+            self.square_measured += f64::from((at - output.reference.position.vector).norm_squared());
+        }
+        self.volt += state.battery.voltage_v;
         self.metrics.window_s = elapsed_s;
         self.metrics.height_lost_m = self.metrics.height_lost_m.max(error.z);
         self.metrics.height_gained_m = self.metrics.height_gained_m.max(-error.z);
@@ -194,7 +223,7 @@ impl<'a> Meter<'a> {
         self.from = Some([start, at]);
         if self.metrics.contact_s.is_none() {
             self.metrics.path_m += (at - before).norm();
-            self.metrics.displacement_m = (at - start).norm();
+            self.metrics.displacement_m = (at - start).into();
         }
         let come_through = |path_m| self.metrics.contact_s.is_some() || self.metrics.path_m >= path_m;
         self.over |= self.scenario.forest.as_ref().is_some_and(|forest| come_through(forest.path_m));
@@ -225,6 +254,9 @@ impl<'a> Meter<'a> {
         let n = self.samples as f64;
         self.metrics.rmse_m = (self.square / n).sqrt();
         self.metrics.rmse_horizontal_m = (self.square_horizontal / n).sqrt();
+        self.metrics.rmse_measured_m =
+            (self.fixes > 0).then(|| (self.square_measured / self.fixes as f64).sqrt());
+        self.metrics.voltage_mean_v = self.volt / n;
         self.metrics.wings_open_s = self.wings_us as f64 * 1e-6;
         self.metrics.wiic_s = self.wiic_us as f64 * 1e-6;
         Ok(self.metrics)

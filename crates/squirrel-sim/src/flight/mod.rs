@@ -304,7 +304,7 @@ impl Setup {
                 }
                 let rotor = output.rotor_command.map(f64::from);
                 commands.send(time_us, Command { rotor, wing: output.wing_command.map(f64::from) });
-                metrics.tick(time_us, &state, &output, encounters);
+                metrics.tick(&state, &frame, &output, encounters);
                 if let Some(recorder) = &mut recorder {
                     recorder.tick(
                         &frame,

@@ -53,6 +53,18 @@ pub enum WingPlant {
     },
 }
 
+impl WingPlant {
+    /// What moves the wings, where there are any.
+    pub fn servo(&self) -> Option<ServoParameters> {
+        match self {
+            Self::None => None,
+            Self::Flat { servo, .. } | Self::Membrane { servo, .. } | Self::Parnn { servo, .. } => {
+                Some(*servo)
+            }
+        }
+    }
+}
+
 /// Everything of the plant that does not change in flight.
 #[derive(Debug, Clone)]
 pub struct Plant {

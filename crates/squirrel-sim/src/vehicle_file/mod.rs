@@ -11,7 +11,7 @@ pub use quantity::Provenance;
 pub(crate) use quantity::plain;
 
 use crate::estimator::Estimator;
-use crate::plant::{BatteryParameters, WingPlant};
+use crate::plant::{BatteryParameters, ParnnWing, WingPlant};
 use crate::sensors::SensorParameters;
 use crate::weights::{ParnnWeights, WeightsError};
 use squirrel_core::effects::Effects;
@@ -171,6 +171,20 @@ impl VehicleFile {
     #[allow(clippy::expect_used, reason = "the text is part of the program and tested")]
     pub fn squirrel() -> Self {
         Self::parse(SQUIRREL_TOML, "squirrel.toml").expect("the shipped vehicle is sound")
+    }
+
+    /// The same vehicle with wings that do what its network says: the paper's simulation, in which plant and controller agree.
+    ///
+    /// # Errors
+    /// One line where there are no wings or no weights.
+    pub fn with_learned_wing(&self) -> Result<Self, String> {
+        let (Some(weights), Some(wing), Some(servo)) =
+            (&self.weights, &self.vehicle.parameters().wing, self.wing.servo())
+        else {
+            return Err(format!("{}: wing.parnn_weights: names none that were read", self.name));
+        };
+        let parnn = Box::new(ParnnWing::new(weights.parnn(), wing));
+        Ok(Self { wing: WingPlant::Parnn { parnn, servo }, ..self.clone() })
     }
 
     /// Fields whose number the file gives without a source.

@@ -9,9 +9,11 @@ mod report;
 
 pub use report::render;
 
+use crate::journal::{Journal, Keep, identity};
 use crate::statistics::mean;
 use crate::wing_flights::{FLIGHT_S, Kind, WingFlightError};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::rnn::parnn::{SPEED_SCALE_M_S, WINDOW};
@@ -23,6 +25,7 @@ use squirrel_nn::{NnError, labels};
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Flights to learn from: 30, 120 and 300 s.
 const TRAINING_FLIGHTS: [u32; 3] = [1, 4, 10];
@@ -140,14 +143,24 @@ pub struct Table2 {
 }
 
 /// The flights of one trial.
-struct Trial {
+struct Flights {
     /// [`TRAINING_FLIGHTS`]' last number of them.
     training: Vec<Vec<Window>>,
     /// In the order of [`Kind::TESTS`].
     tests: Vec<Vec<Window>>,
 }
 
+/// What became of one trial.
+#[derive(Serialize, Deserialize)]
+struct Trial {
+    /// By length of training, model.
+    judged: Vec<Judged>,
+    /// In the order of [`Kind::ALL`].
+    sets: Vec<Flown>,
+}
+
 /// A trained model on the sets, in the order of [`Kind::ALL`].
+#[derive(Serialize, Deserialize)]
 struct Judged {
     to_labels: Vec<ForceError>,
     to_truth: Vec<ForceError>,
@@ -155,44 +168,60 @@ struct Judged {
     words: Vec<[f64; 3]>,
 }
 
-/// Number of flights and trainings that [`run`] will do.
-pub fn steps(plan: &Plan) -> u64 {
-    let flights = TRAINING_FLIGHTS[2] + TEST_FLIGHTS * Kind::TESTS.len() as u32;
-    let trainings = TRAINING_FLIGHTS.len() * Model::ALL.len();
-    u64::from(plan.trials) * (u64::from(flights) + trainings as u64)
+/// What the flights of a set were like.
+#[derive(Serialize, Deserialize)]
+struct Flown {
+    speed_m_s: [f64; 2],
+    force_rms_n: f64,
+    label_noise_n: f64,
 }
 
-/// Flies and trains on all cores; the result does not depend on how many there are.
+/// Number of flights and trainings that [`run`] will do here.
+pub fn steps(plan: &Plan, keep: &Keep<'_>) -> u64 {
+    keep.share(u64::from(plan.trials)) * steps_of_a_trial()
+}
+
+fn steps_of_a_trial() -> u64 {
+    let flights = TRAINING_FLIGHTS[2] + TEST_FLIGHTS * Kind::TESTS.len() as u32;
+    let trainings = TRAINING_FLIGHTS.len() * Model::ALL.len();
+    u64::from(flights) + trainings as u64
+}
+
+/// Flies and trains on all cores; the result depends neither on how many there are nor on how often the study was stopped. `None` where
+/// only a part of it is done here.
 ///
-/// * `progress` - called once for each flight and each training that is done
+/// * `keep` - keeps the trials
+/// * `progress` - called with the number of flights and trainings that are done more than before
 ///
 /// # Errors
-/// A vehicle that cannot fly or has no wings, no trials, no epochs.
-pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Table2, WingFlightError> {
+/// A vehicle that cannot fly or has no wings, no trials, no epochs, or a folder that cannot be written.
+pub fn run(
+    plan: &Plan,
+    keep: &Keep<'_>,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Option<Table2>, FlightError> {
     if plan.trials == 0 {
-        return Err(FlightError("trials = 0: must be at least 1".to_owned()).into());
+        return Err(FlightError("trials = 0: must be at least 1".to_owned()));
     }
-    let trials = fly(plan, &progress)?;
-    let mut tasks = Vec::new();
-    for flights in TRAINING_FLIGHTS {
-        for trial in 0..trials.len() {
-            tasks.extend(Model::ALL.map(|model| (flights, trial, model)));
-        }
-    }
-    let judged: Vec<Judged> = tasks
-        .par_iter()
-        .map(|(flights, trial, model)| {
-            let judged = train(plan, *model, &trials[*trial], *flights as usize, trial_seed(plan, *trial));
-            progress();
-            judged
-        })
-        .collect::<Result<_, _>>()?;
+    let identity = identity("table2", &plan.vehicle, plan.seed);
+    let journal = Journal::open(keep, "table2", &format!("{identity}, {} epochs", plan.epochs))?;
+    let counted = AtomicU64::new(0);
+    let one = |trial: u32| {
+        let count = || {
+            counted.fetch_add(1, Ordering::Relaxed);
+            progress(1);
+        };
+        self::trial(plan, trial as usize, &count).map_err(|e| FlightError(e.to_string()))
+    };
+    // What a trial that was kept would have counted is counted in the end.
+    let Some(trials) = journal.run(plan.trials, one, || ())? else { return Ok(None) };
+    progress(steps(plan, keep).saturating_sub(counted.into_inner()));
 
     let (mut rows, mut words) = (Vec::new(), Vec::new());
     let models = Model::ALL.len();
-    for (judged, flights) in judged.chunks(models * trials.len()).zip(TRAINING_FLIGHTS) {
+    for (length, flights) in TRAINING_FLIGHTS.into_iter().enumerate() {
         let training_s = flights * FLIGHT_S;
-        let of = |model: usize| judged.iter().skip(model).step_by(models);
+        let of = |model: usize| trials.iter().map(move |trial| &trial.judged[length * models + model]);
         for (set, kind) in Kind::ALL.iter().enumerate() {
             for (m, model) in Model::ALL.into_iter().enumerate() {
                 let error = |errors: fn(&Judged) -> &[ForceError]| {
@@ -213,7 +242,7 @@ pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Table2, WingFlight
             });
         }
     }
-    Ok(Table2 {
+    Ok(Some(Table2 {
         vehicle: plan.vehicle.name.clone(),
         trials: plan.trials,
         seed: plan.seed,
@@ -221,7 +250,7 @@ pub fn run(plan: &Plan, progress: impl Fn() + Sync) -> Result<Table2, WingFlight
         sets: Kind::ALL.into_iter().enumerate().map(|(i, kind)| describe(kind, i, &trials)).collect(),
         rows,
         words,
-    })
+    }))
 }
 
 /// Mean and standard deviation.
@@ -263,15 +292,32 @@ fn trial_seed(plan: &Plan, trial: usize) -> u64 {
     plan.seed.wrapping_mul(1_000_003).wrapping_add(trial as u64)
 }
 
-/// All flights of all trials.
-fn fly(plan: &Plan, progress: &(impl Fn() + Sync)) -> Result<Vec<Trial>, WingFlightError> {
+/// Flies one trial, and trains and judges every model on it.
+fn trial(plan: &Plan, number: usize, progress: &(impl Fn() + Sync)) -> Result<Trial, WingFlightError> {
+    let flights = fly(plan, number, progress)?;
+    let seed = trial_seed(plan, number);
+    let tasks: Vec<(u32, Model)> =
+        TRAINING_FLIGHTS.into_iter().flat_map(|flights| Model::ALL.map(|model| (flights, model))).collect();
+    let judged = tasks
+        .par_iter()
+        .map(|(number, model)| {
+            let judged = train(plan, *model, &flights, *number as usize, seed);
+            progress();
+            judged
+        })
+        .collect::<Result<_, _>>()?;
+    let training = flights.training.concat();
+    let sets = std::iter::once(&training).chain(&flights.tests);
+    Ok(Trial { judged, sets: sets.map(|windows| flown(windows)).collect() })
+}
+
+/// All flights of a trial.
+fn fly(plan: &Plan, trial: usize, progress: &(impl Fn() + Sync)) -> Result<Flights, WingFlightError> {
     let mut tasks = Vec::new();
-    for trial in 0..plan.trials as usize {
-        for kind in Kind::ALL {
-            let flights = if kind == Kind::Training { TRAINING_FLIGHTS[2] } else { TEST_FLIGHTS };
-            let first = first_seed(plan, trial, kind);
-            tasks.extend((0..u64::from(flights)).map(|flight| (kind, first.wrapping_add(flight))));
-        }
+    for kind in Kind::ALL {
+        let flights = if kind == Kind::Training { TRAINING_FLIGHTS[2] } else { TEST_FLIGHTS };
+        let first = first_seed(plan, trial, kind);
+        tasks.extend((0..u64::from(flights)).map(|flight| (kind, first.wrapping_add(flight))));
     }
     let flown: Vec<Vec<Window>> = tasks
         .par_iter()
@@ -283,15 +329,13 @@ fn fly(plan: &Plan, progress: &(impl Fn() + Sync)) -> Result<Vec<Trial>, WingFli
         .collect::<Result<_, _>>()?;
     let mut flown = flown.into_iter();
     let mut take = |flights: u32| flown.by_ref().take(flights as usize).collect::<Vec<_>>();
-    Ok((0..plan.trials)
-        .map(|_| Trial {
-            training: take(TRAINING_FLIGHTS[2]),
-            tests: Kind::TESTS.iter().map(|_| take(TEST_FLIGHTS).concat()).collect(),
-        })
-        .collect())
+    Ok(Flights {
+        training: take(TRAINING_FLIGHTS[2]),
+        tests: Kind::TESTS.iter().map(|_| take(TEST_FLIGHTS).concat()).collect(),
+    })
 }
 
-fn train(plan: &Plan, model: Model, trial: &Trial, flights: usize, seed: u64) -> Result<Judged, NnError> {
+fn train(plan: &Plan, model: Model, trial: &Flights, flights: usize, seed: u64) -> Result<Judged, NnError> {
     let mut training = Windows::new();
     for (flight, windows) in trial.training[..flights].iter().enumerate() {
         training.push(&format!("training {flight}"), windows)?;
@@ -346,24 +390,28 @@ fn words(trained: &Trained, windows: &[Window]) -> [f64; 3] {
     [share(&all), share(&large), gammas.get(gammas.len() / 2).copied().unwrap_or(0.0)]
 }
 
-fn describe(kind: Kind, place: usize, trials: &[Trial]) -> Set {
-    let windows: Vec<Vec<Window>> = trials
-        .iter()
-        .map(|trial| match place.checked_sub(1) {
-            None => trial.training.concat(),
-            Some(test) => trial.tests[test].clone(),
-        })
-        .collect();
-    let speeds = windows.iter().flatten().map(|w| f64::from(w.rows[WINDOW - 1][0] * SPEED_SCALE_M_S));
+fn flown(windows: &[Window]) -> Flown {
+    let speeds = windows.iter().map(|w| f64::from(w.rows[WINDOW - 1][0] * SPEED_SCALE_M_S));
     let (slowest, fastest) =
         speeds.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
-    let rms = |of: &dyn Fn(&[Window]) -> f64| spread(&windows.iter().map(|w| of(w)).collect::<Vec<f64>>());
+    Flown {
+        speed_m_s: [slowest, fastest],
+        force_rms_n: ForceError::of(&truths_of(windows), &vec![[0.0; 3]; windows.len()]).rms_n,
+        label_noise_n: ForceError::of(&labels_of(windows), &truths_of(windows)).rms_n,
+    }
+}
+
+fn describe(kind: Kind, place: usize, trials: &[Trial]) -> Set {
+    let of = || trials.iter().map(|trial| &trial.sets[place]);
     Set {
         set: kind.name(),
         about: kind.about(),
         flights: if kind == Kind::Training { TRAINING_FLIGHTS[2] } else { TEST_FLIGHTS },
-        speed_m_s: [slowest, fastest],
-        force_rms_n: rms(&|w| ForceError::of(&truths_of(w), &vec![[0.0; 3]; w.len()]).rms_n),
-        label_noise_n: rms(&|w| ForceError::of(&labels_of(w), &truths_of(w)).rms_n),
+        speed_m_s: [
+            of().fold(f64::INFINITY, |low, set| low.min(set.speed_m_s[0])),
+            of().fold(0.0, |high: f64, set| high.max(set.speed_m_s[1])),
+        ],
+        force_rms_n: spread(&of().map(|set| set.force_rms_n).collect::<Vec<f64>>()),
+        label_noise_n: spread(&of().map(|set| set.label_noise_n).collect::<Vec<f64>>()),
     }
 }

@@ -12,17 +12,18 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 1000)]
     trials: u32,
     #[command(flatten)]
-    common: Common,
+    pub(super) common: Common,
 }
 
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
         let plan = Plan { vehicle: self.common.begin("faults")?, trials, seed };
-        let bar = output::progress(u64::from(trials), "flights");
-        let study = faults::run(&plan, self.common.out.as_deref(), || bar.inc(1));
-        bar.finish_and_clear();
-        let study = study.map_err(|e| e.to_string())?;
+        let command = self.common.command("faults", &[("trials", trials.to_string())]);
+        let keep = self.common.keep(&command);
+        let bar = output::progress(keep.share(u64::from(trials)), "flights");
+        let study = faults::run(&plan, &keep, || bar.inc(1));
+        let Some(study) = self.common.ended(&bar, study)? else { return Ok(()) };
 
         say(&format!(
             "{} single faults in flights of {} from seed {}.\n",

@@ -13,17 +13,18 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = 20)]
     trials: u32,
     #[command(flatten)]
-    common: Common,
+    pub(super) common: Common,
 }
 
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
         let plan = Plan { vehicle: self.common.begin("filters")?, trials, seed };
-        let bar = output::progress(filters::steps(&plan), "flights");
-        let study = filters::run(&plan, self.common.out.as_deref(), || bar.inc(1));
-        bar.finish_and_clear();
-        let study = study.map_err(|e| e.to_string())?;
+        let command = self.common.command("filters", &[("trials", trials.to_string())]);
+        let keep = self.common.keep(&command);
+        let bar = output::progress(filters::steps(&plan, &keep), "flights");
+        let study = filters::run(&plan, &keep, || bar.inc(1));
+        let Some(study) = self.common.ended(&bar, study)? else { return Ok(()) };
 
         say(&format!(
             "Random runs of {} with spread wings in gusts, {} flights from seed {}; inclination, deg.\n",

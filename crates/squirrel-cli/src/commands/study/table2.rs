@@ -17,17 +17,19 @@ pub(crate) struct Options {
     #[arg(long, default_value_t = Settings::default().epochs)]
     epochs: usize,
     #[command(flatten)]
-    common: Common,
+    pub(super) common: Common,
 }
 
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
         let plan = Plan { vehicle: self.common.begin("table2")?, trials, seed, epochs: self.epochs };
-        let bar = output::progress(table2::steps(&plan), "flights and trainings");
-        let study = table2::run(&plan, || bar.inc(1));
-        bar.finish_and_clear();
-        let study = study.map_err(|e| e.to_string())?;
+        let own = [("trials", trials.to_string()), ("epochs", self.epochs.to_string())];
+        let command = self.common.command("table2", &own);
+        let keep = self.common.keep(&command);
+        let bar = output::progress(table2::steps(&plan, &keep), "flights and trainings");
+        let study = table2::run(&plan, &keep, |steps| bar.inc(steps));
+        let Some(study) = self.common.ended(&bar, study)? else { return Ok(()) };
 
         show(&study);
         let Some(folder) = self.common.end("table2", &csv(&study), &study)? else { return Ok(()) };

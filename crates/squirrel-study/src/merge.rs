@@ -1,0 +1,73 @@
+//! Puts the parts of a study together that were flown in different folders, on different machines.
+
+use crate::journal::{Head, read, write};
+use squirrel_sim::flight::FlightError;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The end of every journal's name.
+const SUFFIX: &str = ".trials.jsonl";
+
+/// Writes the trials of all folders into another, which must exist; the arguments that describe the study.
+///
+/// # Errors
+/// A folder without trials or that cannot be read, folders of different studies, a trial that has two results.
+pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightError> {
+    let mut all: BTreeMap<String, (Head, BTreeMap<u32, String>)> = BTreeMap::new();
+    let mut command: Option<Vec<String>> = None;
+    for folder in folders {
+        let names = journals(folder)?;
+        if names.is_empty() {
+            return Err(FlightError(format!("{}: holds no part of a study (*{SUFFIX})", folder.display())));
+        }
+        for name in names {
+            let path = folder.join(&name);
+            let at = |problem: String| FlightError(format!("{}: {problem}", path.display()));
+            let (head, lines, _) = read(&path)?;
+            let Some(head) = head else { return Err(at("holds nothing".to_owned())) };
+            let (first, merged) = all.entry(name).or_insert_with(|| (head.clone(), BTreeMap::new()));
+            if *first != head {
+                return Err(at(format!(
+                    "is of another plan ({}) than the first ({})",
+                    head.plan, first.plan
+                )));
+            }
+            let command = command.get_or_insert_with(|| head.command.clone());
+            if *command != head.command {
+                return Err(at(format!("is of another study ({}) than the first", head.command.join(" "))));
+            }
+            for (trial, line) in lines {
+                if merged.get(&trial).is_some_and(|other| *other != line) {
+                    return Err(at(format!("trial = {trial}: has another result in another folder")));
+                }
+                merged.insert(trial, line);
+            }
+        }
+    }
+    for (name, (head, lines)) in &all {
+        let path = into.join(name);
+        if let (Some(there), _, _) = read(&path)?
+            && there != *head
+        {
+            let problem = format!("is of another plan ({}); give another --out, or delete it", there.plan);
+            return Err(FlightError(format!("{}: {problem}", path.display())));
+        }
+        write(&path, head, lines)?;
+    }
+    command.filter(|command| !command.is_empty()).ok_or_else(|| {
+        FlightError("merge: the folders do not say which study they hold a part of".to_owned())
+    })
+}
+
+fn journals(folder: &Path) -> Result<Vec<String>, FlightError> {
+    let at = |e: std::io::Error| FlightError(format!("{}: {e}", folder.display()));
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(at)? {
+        let name = entry.map_err(at)?.file_name().to_string_lossy().into_owned();
+        if name.ends_with(SUFFIX) {
+            names.push(name);
+        }
+    }
+    names.sort_unstable();
+    Ok(names)
+}
