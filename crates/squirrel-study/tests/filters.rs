@@ -4,9 +4,11 @@
 
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::filters::{Filters, Plan, run};
+use squirrel_study::journal::Keep;
 
 fn study(trials: u32) -> Filters {
-    run(&Plan { vehicle: VehicleFile::squirrel(), trials, seed: 1 }, None, || ()).unwrap()
+    let plan = Plan { vehicle: VehicleFile::squirrel(), trials, seed: 1 };
+    run(&plan, &Keep::default(), || ()).unwrap().unwrap()
 }
 
 /// The paper's filter bears accelerations if the gyro is calibrated, the plain one never does, and the default does in any case.
@@ -38,5 +40,5 @@ fn one_thread_and_two_give_the_same_numbers() {
 #[test]
 fn no_trials_is_an_error() {
     let plan = Plan { vehicle: VehicleFile::squirrel(), trials: 0, seed: 1 };
-    assert!(run(&plan, None, || ()).unwrap_err().to_string().starts_with("trials = 0"));
+    assert!(run(&plan, &Keep::default(), || ()).unwrap_err().to_string().starts_with("trials = 0"));
 }
