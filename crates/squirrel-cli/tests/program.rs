@@ -138,8 +138,44 @@ fn the_study_writes_its_table_for_machines() {
     let table = folder.succeeds(&arguments);
     assert!(table.contains("95 % interval"), "{table}");
     let study = json(&folder, "d/thrust.json");
-    assert_eq!(study["rows"].as_array().unwrap().len(), 12);
-    assert_eq!(fs::read_to_string(folder.0.join("d/thrust.csv")).unwrap().lines().count(), 13);
+    let points = study["points"].as_array().unwrap();
+    assert_eq!((points.len(), points[0]["rows"].as_array().unwrap().len()), (16, 2));
+    let csv = fs::read_to_string(folder.0.join("d/thrust.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 33);
+    let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+    assert!(columns.iter().all(|n| *n == columns[0]), "{csv}");
+}
+
+/// Four parts, as on four machines, leave the folder that one machine leaves.
+#[test]
+fn parts_of_a_study_are_merged_into_the_whole() {
+    let folder = Folder::new("parts");
+    let study = ["study", "table3", "--arms", "pc,twcc_plus", "--trials", "2", "--seed", "7", "--out"];
+    let whole = folder.succeeds(&[&study[..], &["whole"]].concat());
+    for k in 1..=4 {
+        let (out, shard) = (format!("part{k}"), format!("{k}/4"));
+        let said = folder.succeeds(&[&study[..], &[&out, "--shard", &shard]].concat());
+        assert!(said.is_empty(), "a part has nothing to say: {said}");
+    }
+    let merged = folder.succeeds(&["study", "merge", "part1", "part2", "part3", "part4", "--out", "merged"]);
+    assert_eq!(merged, whole);
+    let files = |name: &str| {
+        let mut files: Vec<_> = fs::read_dir(folder.0.join(name))
+            .unwrap()
+            .map(|entry| entry.unwrap())
+            .map(|entry| (entry.file_name(), fs::read(entry.path()).unwrap()))
+            .collect();
+        files.sort();
+        files
+    };
+    assert!(files("merged") == files("whole") && files("whole").len() >= 3);
+    folder.fails(
+        &["study", "merge", "part1", "part2", "--out", "half"],
+        &["table3.trials.jsonl", "trial = 2: missing"],
+    );
+    folder.fails(&["study", "merge", "nowhere", "--out", "half"], &["nowhere"]);
+    folder.fails(&[&study[..8], &["--shard", "1/2"]].concat(), &["shard", "--out"]);
+    assert_eq!(folder.run(&["study", "forest", "--shard", "3/2"]).status.code(), Some(2));
 }
 
 #[test]

@@ -46,13 +46,16 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
     }
     for (name, (head, lines)) in &all {
         let path = into.join(name);
-        if let (Some(there), _, _) = read(&path)?
+        let (there, mut all, _) = read(&path)?;
+        if let Some(there) = there
             && there != *head
         {
             let problem = format!("is of another plan ({}); give another --out, or delete it", there.plan);
             return Err(FlightError(format!("{}: {problem}", path.display())));
         }
-        write(&path, head, lines)?;
+        // What an earlier merge brought stays.
+        all.extend(lines.clone());
+        write(&path, head, &all)?;
     }
     command.filter(|command| !command.is_empty()).ok_or_else(|| {
         FlightError("merge: the folders do not say which study they hold a part of".to_owned())

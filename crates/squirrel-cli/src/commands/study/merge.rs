@@ -33,7 +33,17 @@ struct Again {
 
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
+        let is_new = !self.out.exists();
         output::folder(&self.out)?;
+        let merged = self.merged();
+        if merged.is_err() && is_new {
+            // Nothing half done is left.
+            std::fs::remove_dir_all(&self.out).map_err(|e| format!("{}: {e}", self.out.display()))?;
+        }
+        merged
+    }
+
+    fn merged(&self) -> Result<(), String> {
         let command = merge(&self.folders, &self.out).map_err(|e| e.to_string())?;
         let unknown = |_| format!("{}: is no study of this version", command.join(" "));
         let mut study = Again::try_parse_from(&command).map_err(unknown)?.study;
