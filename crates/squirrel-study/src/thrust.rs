@@ -6,7 +6,7 @@
 //!   (`battery_sag`), which the flight code does not know, and what is left of the limit is the effective ratio.
 //!
 //! The last rows of `battery` have the vehicle's own limit, to see where the battery alone brings it. Nothing is expected of wings from a ratio of
-//! about 1.155 on, where 30 deg of tilt hold height (docs/equations.md E); what is gained there is gained in transients and is said beside
+//! about 1.155 on, where 30 deg of tilt hold height (docs/equations.md E.4); what is gained there is gained in transients and is said beside
 //! the fair rival `pc_plus`.
 
 use crate::campaign::Plan;

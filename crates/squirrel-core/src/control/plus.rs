@@ -1,7 +1,7 @@
 //! The better wing controller: attitude, thrust and wings chosen together, ten times a second.
 //!
 //! The paper's WIIC holds an angle at its limit and leaves height to itself; its PC saturates each angle and the thrust on their own. Here
-//! one weighted least-squares problem decides (docs/equations.md E):
+//! one weighted least-squares problem decides (docs/equations.md E.5):
 //!
 //! ```text
 //! min over roll, pitch, U, w of  | W (g e3 - U n/m + w f(n)/m - a_cmd) |^2      n = R e3, W = diag(1, 1, W_z)
