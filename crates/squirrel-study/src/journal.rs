@@ -98,7 +98,7 @@ pub struct Journal {
     part: Part,
     file: Option<(PathBuf, Mutex<File>)>,
     head: Head,
-    done: BTreeMap<u32, String>,
+    done: Lines,
 }
 
 /// The first line.
@@ -116,8 +116,11 @@ struct Line<T> {
     result: T,
 }
 
-/// A file's head and whole lines, by their trials, and how long they are; nothing where there is no file or no head yet.
-pub(crate) fn read(path: &Path) -> Result<(Option<Head>, BTreeMap<u32, String>, usize), FlightError> {
+/// Lines by their trials.
+pub(crate) type Lines = BTreeMap<u32, String>;
+
+/// A file's head and whole lines, and how long they are; nothing where there is no file or no head yet.
+pub(crate) fn read(path: &Path) -> Result<(Option<Head>, Lines, usize), FlightError> {
     let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
     let text = match std::fs::read_to_string(path) {
         Ok(text) => text,
@@ -128,7 +131,7 @@ pub(crate) fn read(path: &Path) -> Result<(Option<Head>, BTreeMap<u32, String>, 
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     let mut lines = whole.lines();
     let head = lines.next().map(serde_json::from_str).transpose().map_err(|e| at(&e))?;
-    let mut done = BTreeMap::new();
+    let mut done = Lines::new();
     for line in lines {
         let Line::<serde_json::Value> { trial, .. } = serde_json::from_str(line).map_err(|e| at(&e))?;
         done.insert(trial, line.to_owned());
@@ -137,7 +140,7 @@ pub(crate) fn read(path: &Path) -> Result<(Option<Head>, BTreeMap<u32, String>, 
 }
 
 /// Writes head and lines in their order, whole or not at all.
-pub(crate) fn write(path: &Path, head: &Head, lines: &BTreeMap<u32, String>) -> Result<(), FlightError> {
+pub(crate) fn write(path: &Path, head: &Head, lines: &Lines) -> Result<(), FlightError> {
     let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
     let mut text = serde_json::to_string(head).map_err(|e| at(&e))? + "\n";
     for line in lines.values() {
@@ -159,7 +162,7 @@ impl Journal {
         let head = Head { plan: plan.to_owned(), command: keep.command.to_vec() };
         let Some(folder) = keep.folder else {
             if keep.part == Part::All {
-                return Ok(Self { part: Part::All, file: None, head, done: BTreeMap::new() });
+                return Ok(Self { part: Part::All, file: None, head, done: Lines::new() });
             }
             return Err(FlightError(
                 "shard: needs a folder that keeps what was flown; give --out".to_owned(),

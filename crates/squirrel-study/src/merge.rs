@@ -1,6 +1,6 @@
 //! Puts the parts of a study together that were flown in different folders, on different machines.
 
-use crate::journal::{Head, read, write};
+use crate::journal::{Head, Lines, read, write};
 use squirrel_sim::flight::FlightError;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ const SUFFIX: &str = ".trials.jsonl";
 /// # Errors
 /// A folder without trials or that cannot be read, folders of different studies, a trial that has two results.
 pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightError> {
-    let mut all: BTreeMap<String, (Head, BTreeMap<u32, String>)> = BTreeMap::new();
+    let mut all: BTreeMap<String, (Head, Lines)> = BTreeMap::new();
     let mut command: Option<Vec<String>> = None;
     for folder in folders {
         let names = journals(folder)?;
@@ -25,7 +25,7 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
             let at = |problem: String| FlightError(format!("{}: {problem}", path.display()));
             let (head, lines, _) = read(&path)?;
             let Some(head) = head else { return Err(at("holds nothing".to_owned())) };
-            let (first, merged) = all.entry(name).or_insert_with(|| (head.clone(), BTreeMap::new()));
+            let (first, merged) = all.entry(name).or_insert_with(|| (head.clone(), Lines::new()));
             if *first != head {
                 return Err(at(format!(
                     "is of another plan ({}) than the first ({})",

@@ -167,7 +167,8 @@ fn crossing(points: &[&Point], arm: &str) -> Option<f64> {
             Some([point.thrust_to_weight, row.gain.value - PAPER_GAIN])
         })
         .collect();
-    gains.array_windows().rev().find_map(|[[x0, y0], [x1, y1]]| {
+    gains.windows(2).rev().find_map(|pair| {
+        let [[x0, y0], [x1, y1]] = pair else { return None };
         ((*y0 > 0.0) != (*y1 > 0.0)).then(|| x0 + (x1 - x0) * y0 / (y0 - y1))
     })
 }

@@ -100,7 +100,9 @@ fn every_figure_is_the_studies_own() {
         let kept = before.trim_end_matches(|c: char| c.is_ascii_digit() || "+-.".contains(c));
         assert!(kept.len() < before.len(), "`{place}`: no figure before it");
         let value = find(studies.get(study).unwrap_or_else(|| panic!("`{place}`: no such study")), path);
-        now += &format!("{kept}{}<!--{place}-->", figure(value, path, format));
+        now += kept;
+        now += &figure(value, path, format);
+        now += &["<!--", place, "-->"].concat();
         (rest, figures) = (after, figures + 1);
     }
     now += rest;

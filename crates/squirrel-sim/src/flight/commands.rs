@@ -1,6 +1,7 @@
 //! Commands on their way from the flight code to the plant: the effect `actuation_latency`.
 
 use super::PLANT_STEP_US;
+use squirrel_core::stack::StackOutput;
 use squirrel_core::vehicle::PerRotor;
 use std::collections::VecDeque;
 
@@ -11,6 +12,13 @@ pub(super) struct Command {
     pub(super) rotor: PerRotor<f64>,
     /// Left, right, 0..1.
     pub(super) wing: [f64; 2],
+}
+
+impl Command {
+    /// Of the flight code.
+    pub(super) fn of(output: &StackOutput) -> Self {
+        Self { rotor: output.rotor_command.map(f64::from), wing: output.wing_command.map(f64::from) }
+    }
 }
 
 /// Commands that wait for their latency.

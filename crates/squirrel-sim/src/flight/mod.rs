@@ -302,8 +302,7 @@ impl Setup {
                         time_us as f64 * 1e-6
                     )));
                 }
-                let rotor = output.rotor_command.map(f64::from);
-                commands.send(time_us, Command { rotor, wing: output.wing_command.map(f64::from) });
+                commands.send(time_us, Command::of(&output));
                 metrics.tick(&state, &frame, &output, encounters);
                 if let Some(recorder) = &mut recorder {
                     recorder.tick(

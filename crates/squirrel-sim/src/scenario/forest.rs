@@ -84,7 +84,8 @@ mod tests {
         table.check().unwrap();
         let trunks = table.trunks(7);
         assert!((1000..1225).contains(&trunks.len()), "{}", trunks.len());
-        for [a, b] in trunks.array_windows() {
+        for pair in trunks.windows(2) {
+            let [a, b] = [pair[0], pair[1]];
             let apart = b[1] - a[1];
             assert!(a[0] != b[0] || (10.5..=27.0).contains(&apart), "{a:?} {b:?}");
         }
