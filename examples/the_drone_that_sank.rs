@@ -1,4 +1,4 @@
-//! The drone that sank: what a flight log knows that the simulation does not.
+//! Lesson 12, the drone that sank: what a flight log knows that the simulation does not.
 //!
 //! In the paper's flights the drone without wings sinks while it avoids an obstacle, and the authors suspect the battery.
 //! Here that suspicion is the truth, hidden in a "measured" drone whose rotors slow down as its voltage falls. The simulation
@@ -10,6 +10,7 @@
 //! ```
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
+use squirrel_examples::Outcome;
 use squirrel_gap::{Finding, Verdict, add, diagnose, find};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
@@ -17,7 +18,6 @@ use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};
-use std::error::Error;
 
 /// What only the measured drone has: the hidden effect, and rotors that are off by half of their tolerance.
 const SECRETS: [(&str, &str); 2] = [
@@ -28,8 +28,6 @@ const SECRETS: [(&str, &str); 2] = [
 const LOW: f64 = 0.25;
 /// Seeds of the avoidance flights: a steering angle and a run of noise each.
 const HELD_OUT: [u64; 4] = [11, 12, 13, 14];
-
-type Outcome<T> = Result<T, Box<dyn Error>>;
 
 /// What the lesson is about, in numbers.
 struct Story {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// Which of our crates a crate may depend on, top down.
 const ARROWS: [(&str, &[&str]); 9] = [
-    ("squirrel-examples", &["squirrel-gap", "squirrel-sim"]),
+    ("squirrel-examples", &["squirrel-study", "squirrel-gap", "squirrel-sim", "squirrel-core"]),
     ("hidden-effects", &["squirrel-sim"]),
     (
         "squirrel-py",

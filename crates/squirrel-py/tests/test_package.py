@@ -18,6 +18,8 @@ from squirrel import _squirrel
 
 PYTHON = Path(squirrel.__file__).parent
 EXAMPLES = sorted((ROOT / "examples/python").glob("*.py"))
+# What an example has to say, beside something.
+SAYS = {"a_study_on_many_machines": "the same bytes as in one go: forest.json, forest.csv, forest.trials.jsonl\n"}
 
 
 def run(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
@@ -125,7 +127,7 @@ def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
 def test_examples_run(example: Path, tmp_path: Path) -> None:
     done = run(sys.executable, "-W", "error", example, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert done.stdout
+    assert done.stdout and SAYS.get(example.stem, "") in done.stdout, done.stdout
 
 
 def test_there_are_examples() -> None:
