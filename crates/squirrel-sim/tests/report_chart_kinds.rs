@@ -4,8 +4,8 @@
 
 use proptest::prelude::*;
 use squirrel_sim::report::chart::{
-    Axis, ChartRow, Dot, Extent, HeatGroup, HeatMap, Ink, Level, Limit, LineChart, Matrix, Range, RowChart, Series,
-    Strip, Svg, Values, Wheel, WheelLine,
+    Axis, ChartRow, Dot, Extent, HeatGroup, HeatMap, Ink, Level, Limit, LineChart, Matrix, Range, RowChart,
+    Series, Strip, Svg, Values, Wheel, WheelLine,
 };
 
 fn any_number() -> impl Strategy<Value = f64> {

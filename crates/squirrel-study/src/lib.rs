@@ -7,6 +7,7 @@
 //! - [`in_loop`]: flights on estimates beside flights on the truth, over suites of sensors.
 //! - [`faults`]: what becomes of flights in which one thing fails.
 //! - [`journal`]: trials on disk, so that a study that was stopped goes on.
+//! - [`pages`]: the studies of controllers as HTML files, with the figures that the paper shows.
 //! - [`statistics`]: means, and intervals by a paired bootstrap.
 
 pub mod campaign;
@@ -16,6 +17,7 @@ pub mod forest;
 pub mod in_loop;
 pub mod journal;
 pub mod merge;
+pub mod pages;
 pub mod statistics;
 pub mod steering;
 pub mod table2;
