@@ -102,7 +102,7 @@ fn maps(page: &mut Page, study: &Forest, plan: &Plan) -> Result<(), FlightError>
         "Where flights ended",
         "Every flight from its start in the middle: a red X where it hit, an O where it came through, whatever its height. The \
          dashed circle has the mean distance of the ends from the start. Grey dots are the trunks of the first trial, and the \
-         track is that trial's, coloured by speed; other trials have other trunks.",
+         track is that trial's, coloured by speed; other trials have other trunks. Who leaves the dots meets no more of them.",
     );
     let map = |(row, first): (&Row, &First)| {
         let caption = format!(
@@ -145,8 +145,9 @@ impl Maps<'_> {
             if end.through {
                 through.extend(round([east, north], size, 12).chain([[f64::NAN; 2]]));
             } else {
-                for side in [-size, size] {
-                    hit.extend([[east - side, north - size], [east + side, north + size], [f64::NAN; 2]]);
+                // From the middle, because the ink of limits is dashed: no arm is as long as a dash.
+                for (x, y) in [(-size, -size), (-size, size), (size, -size), (size, size)] {
+                    hit.extend([[east, north], [east + x, north + y], [f64::NAN; 2]]);
                 }
             }
         }

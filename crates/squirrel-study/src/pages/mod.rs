@@ -57,7 +57,8 @@ fn percent(e: Option<Estimate>, digits: usize) -> String {
     let signed = |x: f64| format!("{:+.digits$}", (100.0 * x * unit).round() / unit + 0.0);
     e.map_or_else(
         || "\u{2013}".to_owned(),
-        |e| format!("{} ({} to {})", signed(e.value), signed(e.low), signed(e.high)),
+        // The interval is not broken between lines.
+        |e| format!("{} ({}\u{a0}to\u{a0}{})", signed(e.value), signed(e.low), signed(e.high)),
     )
 }
 

@@ -17,7 +17,7 @@ const SHOWN_M_S: f64 = 7.0;
 /// Of which arms.
 const SHOWN: [Arm; 4] = [Arm::Pc, Arm::TwccFlat, Arm::TwccParnn, Arm::TwccPlus];
 /// Above this ratio a line would press all others into the centre.
-const LARGEST_RATIO: f64 = 1.3;
+const LARGEST_RATIO: f64 = 1.1;
 
 /// The study as a page without network.
 ///
@@ -37,7 +37,7 @@ pub fn page(study: &Steering, plan: &Plan) -> Result<String, FlightError> {
         "Wheels: the paper's arms",
         "A spoke for each steering angle, a mean over the speeds, and for each speed, a mean over the angles. The distance from \
          the centre is the error over that of pc, whose circle is red: inside it is better. The centre is not zero; wheels of \
-         one thrust-to-weight ratio have one scale.",
+         one thrust-to-weight ratio have one scale. Where lines coincide, the last of the legend is in front.",
     );
     wheels(&mut page, study, &|arm| !is_plus(arm));
     page.section(
@@ -76,11 +76,13 @@ fn wheels(page: &mut Page, study: &Steering, shown: &dyn Fn(&str) -> bool) {
         let of_ratio = |mean: &&Mean| mean.thrust_to_weight == thrust_to_weight && shown(mean.arm);
         let means = || study.means.iter().filter(of_ratio).filter(|mean| mean.arm != Arm::Pc.name());
         let ratios = |mean: &Mean| [&mean.ratio_by_angle[..], &mean.ratio_by_speed].concat();
-        // In one plant too large is too large in both: the same arms are compared.
-        let is_large = |arm: &str| {
-            means().filter(|mean| mean.arm == arm).flat_map(&ratios).any(|ratio| ratio > LARGEST_RATIO)
-        };
-        let drawn: Vec<&Mean> = means().filter(|mean| !is_large(mean.arm)).collect();
+        // Too large on one plant is too large on both: the same arms are compared.
+        let most =
+            |arm: &str| largest(&means().filter(|mean| mean.arm == arm).flat_map(ratios).collect::<Vec<_>>());
+        let is_large = |arm: &str| most(arm) > LARGEST_RATIO;
+        let mut drawn: Vec<&Mean> = means().filter(|mean| !is_large(mean.arm)).collect();
+        // The paper's arm in front: others may hide behind it.
+        drawn.sort_by_key(|mean| mean.arm == Arm::TwccParnn.name());
         let mut range = drawn
             .iter()
             .flat_map(|mean| ratios(mean))
@@ -88,14 +90,12 @@ fn wheels(page: &mut Page, study: &Steering, shown: &dyn Fn(&str) -> bool) {
         if drawn.iter().any(|mean| is_plus(mean.arm)) {
             range[0] = 0.0;
         }
+        let of_plant = means().filter(|mean| mean.wings == Wings::Independent && is_large(mean.arm));
+        let left_out: Vec<String> = of_plant
+            .map(|mean| format!("{} is left out, with ratios up to {:.2}", mean.arm, most(mean.arm)))
+            .collect();
+        let caption = if left_out.is_empty() { String::new() } else { left_out.join("; ") + "." };
         for wings in Wings::ALL {
-            let left_out: Vec<String> = means()
-                .filter(|mean| mean.wings == wings && is_large(mean.arm))
-                .map(|mean| {
-                    format!("{} is left out, with ratios up to {:.1}", mean.arm, largest(&ratios(mean)))
-                })
-                .collect();
-            let caption = if left_out.is_empty() { String::new() } else { left_out.join("; ") + "." };
             for (what, spokes, names) in &by {
                 let title = format!("{}, T/W {thrust_to_weight:.1}, by {what}", wings.name());
                 let of: Vec<&Mean> = drawn.iter().filter(|mean| mean.wings == wings).copied().collect();
@@ -145,18 +145,20 @@ fn flown(page: &mut Page, study: &Steering, plan: &Plan) -> Result<(), FlightErr
 }
 
 fn numbers(page: &mut Page, study: &Steering) {
+    let cells = ANGLES_DEG.len() * SPEEDS_M_S.len();
     page.section(
         "Means",
-        "Means over cells of the error over that of pc; horizontal: of errors without height.",
+        &format!(
+            "Means over {cells} cells of the error over that of pc; horizontal: of errors without height; better: in how many cells."
+        ),
     );
     let mut names = head(&["arm", "plant", "T/W", "all", "horizontal", "better than pc", "than twcc_flat"]);
     names.extend(ANGLES_DEG.iter().map(|angle| format!("{angle:.0} deg")));
     names.extend(SPEEDS_M_S.iter().map(|speed| format!("{speed:.0} m/s")));
-    let cells = ANGLES_DEG.len() * SPEEDS_M_S.len();
     let of_mean = |mean: &Mean| {
         let place = [mean.wings.name().to_owned(), format!("{:.1}", mean.thrust_to_weight)];
         let all = [mean.ratio, mean.ratio_horizontal].map(|ratio| format!("{ratio:.3}"));
-        let better = [mean.better, mean.better_than_flat].map(|count| format!("{count} of {cells}"));
+        let better = [mean.better, mean.better_than_flat].map(|count| count.to_string());
         let ratios =
             mean.ratio_by_angle.iter().chain(&mean.ratio_by_speed).map(|ratio| format!("{ratio:.3}"));
         row(mean.arm, place.into_iter().chain(all).chain(better).chain(ratios))

@@ -70,7 +70,7 @@ impl Wheel {
         }
         for (i, name) in self.spokes.iter().enumerate() {
             canvas.line("grid", centre, place(i, self.rim_px));
-            let ([x, y], [east, north]) = (place(i, self.rim_px + 9.0), self.direction(i));
+            let ([x, y], [east, north]) = (place(i, self.rim_px + 12.0), self.direction(i));
             let anchor = match east {
                 east if east > 0.1 => Anchor::Start,
                 east if east < -0.1 => Anchor::End,

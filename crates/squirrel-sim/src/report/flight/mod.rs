@@ -98,7 +98,7 @@ fn is_limit(limit: f64) -> bool {
     limit > 0.0 && limit <= LARGEST
 }
 
-/// Columns for a panel that has one figure an arm.
+/// Columns for a panel that has one figure an arm; of four, three columns would leave one alone.
 fn columns_for(arms: usize) -> Columns {
-    if arms < 3 { Columns::Two } else { Columns::Three }
+    if arms < 3 || arms == 4 { Columns::Two } else { Columns::Three }
 }
