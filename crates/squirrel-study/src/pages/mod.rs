@@ -51,10 +51,10 @@ fn row(arm: &str, rest: impl IntoIterator<Item = String>) -> Row {
 }
 
 /// `+4.1 (+3.6 to +4.5)`, of a share in percent; a dash where there is none.
-fn percent(e: Option<Estimate>, digits: usize) -> String {
+fn percent(e: Option<Estimate>, digits: u8) -> String {
     // Plus zero turns a rounded minus zero round.
-    let unit = 10f64.powi(digits as i32);
-    let signed = |x: f64| format!("{:+.digits$}", (100.0 * x * unit).round() / unit + 0.0);
+    let unit = 10f64.powi(i32::from(digits));
+    let signed = |x: f64| format!("{:+.*}", usize::from(digits), (100.0 * x * unit).round() / unit + 0.0);
     e.map_or_else(
         || "\u{2013}".to_owned(),
         // The interval is not broken between lines.

@@ -126,12 +126,13 @@ fn wheel(title: &str, names: &[String], means: &[&Mean], spokes: Spokes, [low, h
 
 /// Tracks of the first trial in one cell.
 fn flown(page: &mut Page, study: &Steering, plan: &Plan) -> Result<(), FlightError> {
+    let is = |x: f64, wanted: f64| (x - wanted).abs() < 1e-9;
     // Cells are in the order of their conditions.
     let is_shown = |cell: &crate::steering::Cell| {
         cell.wings == Wings::Independent
-            && cell.thrust_to_weight == THRUST_TO_WEIGHT[0]
-            && cell.angle_deg == SHOWN_DEG
-            && cell.speed_m_s == SHOWN_M_S
+            && is(cell.thrust_to_weight, THRUST_TO_WEIGHT[0])
+            && is(cell.angle_deg, SHOWN_DEG)
+            && is(cell.speed_m_s, SHOWN_M_S)
     };
     let conditions = conditions(&plan.vehicle)?;
     let Some(condition) = study.cells.iter().position(is_shown).and_then(|i| conditions.get(i)) else {
