@@ -1,11 +1,11 @@
-//! Heat maps, matrices and row charts: cells and rows where the numbers say, and nothing drawn for what is no number.
+//! Heat maps, matrices, row charts and wheels: cells, rows and spokes where the numbers say, and nothing drawn for what is no number.
 
 #![allow(clippy::unwrap_used, reason = "a helper of a test fails the test")]
 
 use proptest::prelude::*;
 use squirrel_sim::report::chart::{
-    Axis, ChartRow, Dot, Extent, HeatGroup, HeatMap, Ink, Level, LineChart, Matrix, Range, RowChart, Series,
-    Strip, Svg, Values,
+    Axis, ChartRow, Dot, Extent, HeatGroup, HeatMap, Ink, Level, Limit, LineChart, Matrix, Range, RowChart,
+    Series, Strip, Svg, Values, Wheel, WheelLine,
 };
 
 fn any_number() -> impl Strategy<Value = f64> {
@@ -51,6 +51,14 @@ fn matrix(values: Vec<Vec<f64>>) -> Matrix {
     }
 }
 
+fn wheel(range: Range, names: &[&str], values: Vec<f64>) -> Wheel {
+    let spokes = names.iter().map(|&name| name.to_owned()).collect();
+    let mut wheel = Wheel::new("ratios", Axis::new("ratio", "").with_range(range), spokes);
+    wheel.limits.push(Limit { y: 1.0, label: "pc".to_owned() });
+    wheel.lines.push(WheelLine { name: "a<b".to_owned(), ink: Ink::Series(0), values });
+    wheel
+}
+
 fn is_drawn(svg: &Svg) -> bool {
     let text = svg.as_str();
     text.starts_with("<svg") && !text.contains("NaN") && !text.contains("inf\"") && !text.contains("1000000")
@@ -63,6 +71,7 @@ proptest! {
         numbers in prop::array::uniform5(any_number()),
         cells in prop::collection::vec(prop::collection::vec(any_number(), 0..5), 0..5),
     ) {
+        prop_assert!(is_drawn(&wheel(Range::Data, &["x"; 7][..cells.len()], values.clone()).svg()));
         prop_assert!(is_drawn(&map(values).svg()));
         prop_assert!(is_drawn(&rows(numbers).svg()));
         prop_assert!(is_drawn(&matrix(cells).svg()));
@@ -96,6 +105,37 @@ fn bars_reach_as_far_as_their_numbers_say() {
     assert!((bar / band - 4.0).abs() < 0.01, "{bar} {band}");
     let from_zero = number("dot limit", "cx") - number("fill s0", "x");
     assert!((from_zero / bar - 0.75).abs() < 0.01, "{from_zero} {bar}");
+}
+
+/// The pairs of numbers of the wheel's line, without those of its key in the legend.
+fn round(wheel: &Wheel) -> (String, Vec<[f64; 2]>) {
+    let svg = wheel.svg();
+    let d = svg.as_str().split("<path class=\"line s0\" d=\"").nth(1).unwrap().split('"').next().unwrap();
+    let numbers = d.split(['M', ' ']).filter(|word| !word.is_empty());
+    let numbers: Vec<f64> = numbers.map(|word| word.trim_end_matches("h0").parse().unwrap()).collect();
+    (d.to_owned(), numbers.as_chunks().0.to_vec())
+}
+
+#[test]
+fn a_wheel_has_its_numbers_on_its_spokes() {
+    let wheel = wheel(Range::Exact(0.5, 1.5), &["n", "e", "s", "w"], vec![1.0, 1.5, 0.5, 9.0]);
+    let (_, points) = round(&wheel);
+    let text = wheel.svg().as_str().to_owned();
+    let circle = text.split("<circle class=\"line limit\" cx=\"").nth(1).unwrap();
+    let [x, y, ring] = [0, 2, 4].map(|i| circle.split('"').nth(i).unwrap().parse::<f64>().unwrap());
+    assert_eq!(ring, 0.5 * wheel.rim_px);
+    // Half way up, at the rim to the right, in the centre, beyond the axis at the rim to the left, and closed.
+    let wanted = [[x, y - ring], [x + 2.0 * ring, y], [x, y], [x - 2.0 * ring, y], [x, y - ring]];
+    assert_eq!(points, wanted);
+    assert!(text.contains(">a&lt;b</text>") && text.contains(">pc</text>") && text.contains(">w</text>"));
+}
+
+#[test]
+fn a_spoke_without_a_number_opens_the_wheel() {
+    let of = |values| round(&wheel(Range::Exact(0.0, 2.0), &["a", "b", "c", "d"], values)).0;
+    assert_eq!(of(vec![1.0; 4]).matches('M').count(), 1);
+    assert_eq!(of(vec![1.0, f64::NAN, 1.0, f64::INFINITY]).matches("h0").count(), 3);
+    assert_eq!(of(vec![1.0, 1.0]).matches('M').count(), 2, "numbers that are missing are gaps");
 }
 
 #[test]

@@ -11,6 +11,7 @@
 //! - [`in_loop`]: flights on estimates beside flights on the truth, over suites of sensors.
 //! - [`faults`]: what becomes of flights in which one thing fails.
 //! - [`paper`]: what follows from the paper's own numbers without a flight.
+//! - [`pages`]: the studies of controllers as HTML files, with the figures that the paper shows.
 //! - [`journal`], [`merge`]: trials on disk, so that a study that was stopped goes on, and parts of one are put together.
 //! - [`statistics`]: means, shares, and intervals.
 
@@ -21,6 +22,7 @@ pub mod forest;
 pub mod in_loop;
 pub mod journal;
 pub mod merge;
+pub mod pages;
 pub mod paper;
 pub mod statistics;
 pub mod steering;

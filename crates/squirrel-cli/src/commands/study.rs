@@ -140,6 +140,14 @@ impl Common {
     }
 }
 
+/// Writes the study's page beside its figures.
+fn write_page(folder: &Path, html: &str) -> Result<(), String> {
+    let file = folder.join("report.html");
+    output::write_file(&file, html.as_bytes())?;
+    talk(&format!("wrote {}", file.display()));
+    Ok(())
+}
+
 impl Flown {
     /// The plan, and the arguments that describe the study.
     fn plan(&self, study: &str, trials: u32, own: &[(&str, String)]) -> Result<(Plan, Vec<String>), String> {

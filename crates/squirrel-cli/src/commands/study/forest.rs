@@ -1,9 +1,10 @@
 //! `squirrel study forest`: the paper's forest.
 
-use super::Flown;
 use super::sheet::{Cell, Sheet};
+use super::{Flown, write_page};
 use crate::output::{self, say};
 use squirrel_study::forest::{self, BAND_M, Forest};
+use squirrel_study::pages;
 
 /// Options of the study.
 #[derive(Debug, clap::Args)]
@@ -45,7 +46,9 @@ impl Options {
         for word in forest::words(&study) {
             say(&word);
         }
-        common.end("forest", &csv, &study).map(drop)
+        let Some(folder) = common.end("forest", &csv, &study)? else { return Ok(()) };
+        let page = pages::forest(&study, &plan).map_err(|e| e.to_string())?;
+        write_page(folder, &page)
     }
 }
 

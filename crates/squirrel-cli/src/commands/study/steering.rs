@@ -1,8 +1,9 @@
 //! `squirrel study steering`: the paper's figure of steering angles and speeds.
 
-use super::Flown;
 use super::sheet::{Cell, Sheet};
+use super::{Flown, write_page};
 use crate::output::{self, Table, say};
+use squirrel_study::pages;
 use squirrel_study::steering::{self, ANGLES_DEG, SPEEDS_M_S, Steering};
 
 /// Options of the study.
@@ -35,7 +36,9 @@ impl Options {
             say(&word);
         }
         let csv = cells(&study);
-        common.end("steering", &csv, &study).map(drop)
+        let Some(folder) = common.end("steering", &csv, &study)? else { return Ok(()) };
+        let page = pages::steering(&study, &plan).map_err(|e| e.to_string())?;
+        write_page(folder, &page)
     }
 }
 

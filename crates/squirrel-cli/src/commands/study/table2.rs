@@ -1,7 +1,7 @@
 //! `squirrel study table2`: models of the wing force on flights that they have not seen.
 
-use super::Common;
-use crate::output::{self, Table, say, talk};
+use super::{Common, write_page};
+use crate::output::{self, Table, say};
 use squirrel_nn::model::Model;
 use squirrel_nn::train::Settings;
 use squirrel_study::table2::{self, ERRORS, Error, Plan, Row, Spread, Table2};
@@ -37,9 +37,7 @@ impl Options {
             let file = folder.join(format!("{}.toml", scenario.name));
             output::write_file(&file, scenario.to_toml().as_bytes())?;
         }
-        output::write_file(&folder.join("report.html"), table2::render(&study).as_bytes())?;
-        talk(&format!("wrote {}", folder.join("report.html").display()));
-        Ok(())
+        write_page(folder, &table2::render(&study))
     }
 }
 

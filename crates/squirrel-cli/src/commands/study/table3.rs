@@ -1,8 +1,9 @@
 //! `squirrel study table3`: the paper's real flights.
 
-use super::Flown;
 use super::sheet::{Cell, Sheet, TRACKING, tracking};
+use super::{Flown, write_page};
 use crate::output::{self, say};
+use squirrel_study::pages;
 use squirrel_study::table3;
 
 /// Options of the study.
@@ -49,6 +50,8 @@ impl Options {
             }
         }
         let csv = sheet.print();
-        common.end("table3", &csv, &study).map(drop)
+        let Some(folder) = common.end("table3", &csv, &study)? else { return Ok(()) };
+        let page = pages::table3(&study, &plan).map_err(|e| e.to_string())?;
+        write_page(folder, &page)
     }
 }

@@ -1,8 +1,9 @@
 //! `squirrel study thrust`: what wings are worth as a function of thrust.
 
-use super::Flown;
 use super::sheet::{Cell, Sheet, TRACKING, tracking};
+use super::{Flown, write_page};
 use crate::output::{self, say};
+use squirrel_study::pages;
 use squirrel_study::thrust::{self, Thrust};
 
 /// Options of the study.
@@ -37,7 +38,8 @@ impl Options {
         for word in thrust::words(&study) {
             say(&word);
         }
-        common.end("thrust", &csv, &study).map(drop)
+        let Some(folder) = common.end("thrust", &csv, &study)? else { return Ok(()) };
+        write_page(folder, &pages::thrust(&study))
     }
 }
 

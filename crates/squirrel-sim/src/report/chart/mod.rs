@@ -2,7 +2,7 @@
 //!
 //! [`LineChart`] draws curves over a shared axis, [`TrackChart`] a track whose colour is a value, [`Scene`] the same
 //! track in three dimensions, [`RowChart`] bars, intervals and dots beside names, [`HeatMap`] numbers as colour over time,
-//! [`Matrix`] numbers between names. NaN breaks a line. Curves are thinned to what the pixels can show, so a long flight
+//! [`Matrix`] numbers between names, [`Wheel`] closed lines over spokes. NaN breaks a line. Curves are thinned to what the pixels can show, so a long flight
 //! does not make a large file.
 //!
 //! ```
@@ -25,6 +25,7 @@ mod scene;
 mod svg;
 mod thin;
 mod track;
+mod wheel;
 
 pub(super) use axis::extent;
 pub use axis::{Axis, Range};
@@ -36,3 +37,4 @@ pub use scale::{LARGEST, Scale, drawable};
 pub use scene::{Cylinder, Scene, SceneTrack};
 pub use svg::{Svg, escape};
 pub use track::{Obstacle, Track, TrackChart};
+pub use wheel::{Wheel, WheelLine};

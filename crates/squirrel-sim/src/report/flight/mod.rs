@@ -50,10 +50,18 @@ pub fn render(heading: &Heading, flights: &[FlightView<'_>]) -> String {
     }
     arms(&mut page, flights);
     if !flights.is_empty() {
-        tracks::add(&mut page, flights);
+        let inks: Vec<Ink> = (0..flights.len()).map(Ink::Series).collect();
+        tracks::add(&mut page, flights, &inks);
         time::add(&mut page, flights);
     }
     page.html()
+}
+
+/// Adds the panels of tracks to a page that shows more than these flights.
+///
+/// * `inks` - of each flight, as elsewhere on the page; a flight beyond them is muted
+pub fn tracks(page: &mut Page, flights: &[FlightView<'_>], inks: &[Ink]) {
+    tracks::add(page, flights, inks);
 }
 
 /// The table of arms: the columns of all summaries in the order in which they first appear.
@@ -90,7 +98,7 @@ fn is_limit(limit: f64) -> bool {
     limit > 0.0 && limit <= LARGEST
 }
 
-/// Columns for a panel that has one figure an arm.
+/// Columns for a panel that has one figure an arm; of four, three columns would leave one alone.
 fn columns_for(arms: usize) -> Columns {
-    if arms < 3 { Columns::Two } else { Columns::Three }
+    if arms < 3 || arms == 4 { Columns::Two } else { Columns::Three }
 }

@@ -18,6 +18,8 @@ struct Flown {
 /// What all track panels share, so that arms can be compared.
 struct Tracks<'a> {
     flights: &'a [FlightView<'a>],
+    /// Of each flight.
+    inks: &'a [Ink],
     flown: Vec<Flown>,
     values: Option<Values>,
     mark_every_s: f64,
@@ -28,8 +30,8 @@ struct Tracks<'a> {
 const NAMES: [&str; 3] = ["north", "east", "height"];
 
 /// Adds the panels.
-pub(super) fn add(page: &mut Page, flights: &[FlightView<'_>]) {
-    let tracks = Tracks::new(flights);
+pub(super) fn add(page: &mut Page, flights: &[FlightView<'_>], inks: &[Ink]) {
+    let tracks = Tracks::new(flights, inks);
     page.section("Tracks", "");
     page.figures(Columns::One, &[tracks.scene()]);
     page.section(
@@ -62,7 +64,7 @@ pub(super) fn add(page: &mut Page, flights: &[FlightView<'_>]) {
 }
 
 impl<'a> Tracks<'a> {
-    fn new(flights: &'a [FlightView<'a>]) -> Self {
+    fn new(flights: &'a [FlightView<'a>], inks: &'a [Ink]) -> Self {
         let flown = flights.iter().map(|f| Flown::read(f)).collect::<Vec<_>>();
         let paths = || flown.iter().flat_map(|f| f.path.iter().chain(&f.reference));
         let obstacles = || flights.iter().flat_map(|f| &f.obstacles);
@@ -77,7 +79,11 @@ impl<'a> Tracks<'a> {
             extent(flown.iter().filter_map(|f| f.path.as_ref().ok()).flat_map(|p| p.time_s.iter().copied()));
         let duration = times.map_or(1.0, |(from, to)| to - from);
         let mark_every_s = Scale::nice(0.0, duration, 15).step().max(1.0);
-        Self { flights, flown, values, mark_every_s, extents }
+        Self { flights, inks, flown, values, mark_every_s, extents }
+    }
+
+    fn ink(&self, i: usize) -> Ink {
+        self.inks.get(i).copied().unwrap_or(Ink::Muted)
     }
 
     fn axis(&self, axis: usize) -> Axis {
@@ -101,7 +107,7 @@ impl<'a> Tracks<'a> {
             let Ok(path) = &flown.path else { continue };
             tracks.push(SceneTrack {
                 name: self.flights[i].arm.to_owned(),
-                ink: Ink::Series(i),
+                ink: self.ink(i),
                 dashed: false,
                 points: path.points.clone(),
                 values: flown.speed.clone().unwrap_or_default(),
@@ -172,7 +178,7 @@ impl<'a> Tracks<'a> {
             let points = flat(path);
             tracks.push(Track {
                 name: String::new(),
-                ink: Ink::Series(i),
+                ink: self.ink(i),
                 dashed: false,
                 marks: path.marks(self.mark_every_s).into_iter().map(|i| points[i]).collect(),
                 points,

@@ -1,0 +1,101 @@
+//! The studies of controllers as HTML files: the figures that the paper shows, and every number. The same study gives the same bytes.
+//!
+//! Tracks are those of the first trial, flown again for the page: a study keeps figures of its flights, not their logs.
+
+mod forest;
+mod steering;
+mod tracking;
+
+pub use forest::page as forest;
+pub use steering::page as steering;
+pub use tracking::{table3, thrust};
+
+use crate::campaign::Plan;
+use crate::statistics::Estimate;
+use crate::tracking::{Condition, setup};
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{FlightError, Setup};
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::report::chart::{ChartRow, Dot, Extent, Ink, Svg};
+use squirrel_sim::report::flight::{self, FlightView};
+use squirrel_sim::report::page::{Figure, Page, Row};
+
+/// A page that begins with what was flown and with what it says, in words.
+fn begin(title: &str, lead: &str, facts: &[(&str, String)], words: &[String]) -> Page {
+    let mut page = Page::new(title, lead);
+    let version = ("version", env!("CARGO_PKG_VERSION").to_owned());
+    let facts = facts.iter().cloned().chain([version]);
+    page.facts(&facts.map(|(name, value)| (name.to_owned(), value)).collect::<Vec<_>>());
+    for word in words {
+        page.text(word);
+    }
+    page
+}
+
+/// The colour of an arm, on every page.
+fn ink(arm: &str) -> Ink {
+    Arm::ALL.iter().position(|known| known.name() == arm).map_or(Ink::Muted, Ink::Series)
+}
+
+fn figure(title: String, caption: String, drawing: Svg) -> Figure {
+    Figure { title, caption, drawings: vec![drawing], ..Figure::default() }
+}
+
+fn head(names: &[&str]) -> Vec<String> {
+    names.iter().map(|&name| name.to_owned()).collect()
+}
+
+/// A row of a table, with the colour of its arm.
+fn row(arm: &str, rest: impl IntoIterator<Item = String>) -> Row {
+    Row { ink: Some(ink(arm)), cells: std::iter::once(arm.to_owned()).chain(rest).collect() }
+}
+
+/// `+4.1 (+3.6 to +4.5)`, of a share in percent; a dash where there is none.
+fn percent(e: Option<Estimate>, digits: u8) -> String {
+    // Plus zero turns a rounded minus zero round.
+    let unit = 10f64.powi(i32::from(digits));
+    let signed = |x: f64| format!("{:+.*}", usize::from(digits), (100.0 * x * unit).round() / unit + 0.0);
+    e.map_or_else(
+        || "\u{2013}".to_owned(),
+        // The interval is not broken between lines.
+        |e| format!("{} ({}\u{a0}to\u{a0}{})", signed(e.value), signed(e.low), signed(e.high)),
+    )
+}
+
+/// An estimate of an arm as a dot with its interval, in percent.
+fn chart_row(arm: &str, e: Estimate, note: String) -> ChartRow {
+    let (ink, [at, from, to]) = (ink(arm), [e.value, e.low, e.high].map(|share| 100.0 * share));
+    ChartRow {
+        label: arm.to_owned(),
+        note,
+        intervals: vec![Extent { from, to, ink, name: String::new() }],
+        dots: vec![Dot { at, ink, name: String::new() }],
+        ..ChartRow::default()
+    }
+}
+
+/// Flies a setup again.
+fn log(setup: &Setup) -> Result<FlightLog, FlightError> {
+    let missing = || FlightError(format!("arm = {}: the flight has no log", setup.arm.name()));
+    setup.fly(true, |_| {})?.log.ok_or_else(missing)
+}
+
+/// Adds the tracks of the first trial under a condition, by those of the arms that are among the plan's.
+fn tracks(page: &mut Page, plan: &Plan, condition: &Condition, arms: &[Arm]) -> Result<(), FlightError> {
+    let plan = plan.beside(Arm::Pc)?;
+    let arms = arms.iter().filter(|arm| plan.arms.contains(arm));
+    let setups: Vec<Setup> = arms.map(|arm| setup(&plan, condition, *arm, 0)).collect();
+    let logs = setups.iter().map(log).collect::<Result<Vec<_>, _>>()?;
+    let view = |(setup, log): (&Setup, _)| FlightView {
+        arm: setup.arm.name(),
+        log,
+        obstacles: setup.scenario.all_obstacles(),
+        tilt_max_rad: setup.vehicle.vehicle.parameters().limits.tilt_max_rad,
+        thrust_max_n: setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n(),
+        summary: Vec::new(),
+    };
+    let views: Vec<FlightView<'_>> = setups.iter().zip(&logs).map(view).collect();
+    let inks: Vec<Ink> = views.iter().map(|view| ink(view.arm)).collect();
+    flight::tracks(page, &views, &inks);
+    Ok(())
+}
