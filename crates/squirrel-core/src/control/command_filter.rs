@@ -41,11 +41,14 @@ pub fn step(
     damping: f32,
     dt_s: f32,
 ) {
-    let gap = (target - filter.angle).map(wrap_angle);
+    let mut gap = target - filter.angle;
+    // Pitch never comes near half a turn.
+    (gap.x, gap.z) = (wrap_angle(gap.x), wrap_angle(gap.z));
     filter.acceleration =
         gap * (frequency_rad_s * frequency_rad_s) - filter.rate * (2.0 * damping * frequency_rad_s);
     filter.rate += filter.acceleration * dt_s;
-    filter.angle = (filter.angle + filter.rate * dt_s).map(wrap_angle);
+    filter.angle += filter.rate * dt_s;
+    (filter.angle.x, filter.angle.z) = (wrap_angle(filter.angle.x), wrap_angle(filter.angle.z));
 }
 
 #[cfg(test)]

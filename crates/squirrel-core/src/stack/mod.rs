@@ -91,8 +91,8 @@ pub struct StackState {
     pub known: Known,
     /// Time of the last frame, us; `None` before the first.
     pub time_us: Option<u64>,
-    /// Number of the outer period that was handled last.
-    pub outer_index: Option<u64>,
+    /// Begin of the outer period that was handled last, us.
+    pub outer_begin_us: Option<u64>,
     /// Which sensors can be believed.
     pub failsafe: FailsafeState,
     /// Guidance.
@@ -246,17 +246,17 @@ impl Stack {
             state.wing_command = limit(command.wing, 0.0, 1.0);
         }
 
-        // In most steps the period is the last one still; a processor without 64-bit division sees that sooner.
-        let is_same_period = state.outer_index.is_some_and(|last| {
-            let begin_us = last.wrapping_mul(OUTER_PERIOD_US);
+        // In most steps the period is the last one still, and that is soon seen.
+        let is_same_period = state.outer_begin_us.is_some_and(|begin_us| {
             (begin_us..begin_us.saturating_add(OUTER_PERIOD_US)).contains(&frame.time_us)
         });
         let outer = if is_same_period {
             None
         } else {
-            let outer_index = outer_index(frame.time_us);
-            let periods = state.outer_index.map_or(1, |last| outer_index.saturating_sub(last));
-            state.outer_index = Some(outer_index);
+            let period = outer_period(frame.time_us);
+            let periods =
+                state.outer_begin_us.map_or(1, |begin_us| period.saturating_sub(outer_period(begin_us)));
+            state.outer_begin_us = Some(period.wrapping_mul(OUTER_PERIOD_US));
             let dt_s = lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6;
             if is_well && state.known.command.is_none() { self.outer(state, frame, dt_s) } else { None }
         };
@@ -365,7 +365,7 @@ impl Stack {
 
 /// Number of the outer period that a time is in; of times after 13 years the last. The quotient is rounded by less than a hundred
 /// thousandth, which is as near as it comes to the next number from below.
-fn outer_index(time_us: u64) -> u64 {
+fn outer_period(time_us: u64) -> u64 {
     u64::from((whole(time_us) / OUTER_PERIOD_US as f64) as u32)
 }
 

@@ -120,7 +120,7 @@ fn a_frozen_state_continues_bit_for_bit() {
         let Some(terms) = output.outer.and_then(|outer| outer.parnn) else { continue };
         asked += i32::from(terms.guard == Guard::Inside);
         // One without memory would not know its window.
-        let mut blank = StackState { twcc: TwccState::default(), outer_index: None, ..state };
+        let mut blank = StackState { twcc: TwccState::default(), outer_begin_us: None, ..state };
         let again = stack.step(&mut blank, &frame(k)).outer.unwrap().parnn.unwrap();
         forgetful += i32::from(again.guard == Guard::WindowNotFull);
     }

@@ -1,6 +1,7 @@
 //! What a flight amounted to.
 
 use super::integrator::Contact;
+use super::surroundings::Surroundings;
 use crate::plant::PlantState;
 use crate::scenario::Scenario;
 use serde::Serialize;
@@ -84,7 +85,6 @@ pub const OVER_RAD: f64 = 1.6;
 /// Collects [`Metrics`].
 pub(super) struct Meter<'a> {
     scenario: &'a Scenario,
-    obstacles: &'a [[f64; 3]],
     from: Option<[Vector2<f64>; 2]>,
     start_us: Option<u64>,
     last_us: u64,
@@ -104,8 +104,7 @@ pub(super) struct Meter<'a> {
 }
 
 impl<'a> Meter<'a> {
-    /// * `obstacles` - all of the scenario's
-    pub(super) fn new(scenario: &'a Scenario, obstacles: &'a [[f64; 3]]) -> Self {
+    pub(super) fn new(scenario: &'a Scenario) -> Self {
         let metrics = Metrics {
             rmse_m: 0.0,
             rmse_horizontal_m: 0.0,
@@ -129,7 +128,6 @@ impl<'a> Meter<'a> {
         let first = scenario.faults.values().map(|fault| fault.start_s).fold(f64::INFINITY, f64::min);
         Self {
             scenario,
-            obstacles,
             from: None,
             start_us: None,
             last_us: 0,
@@ -178,14 +176,6 @@ impl<'a> Meter<'a> {
             self.mode = outer.mode;
         }
         let at = state.body.position.vector;
-        for [north, east, radius] in self.obstacles {
-            let square = (north - at.x).powi(2) + (east - at.y).powi(2);
-            let near = self.metrics.clearance_m.map_or(f64::INFINITY, |clearance| clearance + radius);
-            if square < near.max(0.0).powi(2) {
-                self.metrics.clearance_m = Some(square.sqrt() - radius);
-            }
-        }
-        self.way(at.xy());
         let windowed = self.scenario.measured_window_s > 0.0;
         if self.start_us.is_none() && (!windowed || encounters > 0) {
             self.start_us = Some(time_us);
@@ -215,6 +205,18 @@ impl<'a> Meter<'a> {
         if self.mode == Mode::Wiic {
             self.wiic_us += step_us;
         }
+    }
+
+    /// What it passes, and how far it has come.
+    pub(super) fn pass(&mut self, at: Vector2<f64>, obstacles: &mut Surroundings) {
+        for (_, [north, east, radius]) in obstacles.near(at) {
+            let square = (north - at.x).powi(2) + (east - at.y).powi(2);
+            let near = self.metrics.clearance_m.map_or(f64::INFINITY, |clearance| clearance + radius);
+            if square < near.max(0.0).powi(2) {
+                self.metrics.clearance_m = Some(square.sqrt() - radius);
+            }
+        }
+        self.way(at);
     }
 
     /// How far it has come; a flight through a forest ends where it has come through, or has touched something.

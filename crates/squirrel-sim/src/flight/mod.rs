@@ -10,6 +10,7 @@ mod integrator;
 mod metrics;
 mod pilot;
 mod record;
+mod surroundings;
 
 pub use integrator::Integrator;
 pub use metrics::{Flags, Metrics, OVER_RAD};
@@ -31,18 +32,16 @@ use squirrel_core::dynamics::{State, specific_force, total_wind};
 use squirrel_core::estimate::navigator::{Navigation, NavigationTerms};
 use squirrel_core::estimate::rest::Preflight;
 use squirrel_core::frames::{In, Ned};
-use squirrel_core::guidance::sensing::Obstacle;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::Vector3;
-use squirrel_core::stack::{Gnss, Imu, MAX_OBSTACLES, SensorFrame, Stack, StackOutput, StackState};
+use squirrel_core::stack::{Gnss, Imu, SensorFrame, Stack, StackOutput, StackState};
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
+use surroundings::Surroundings;
 
 /// Rate of the flight code, Hz (paper, section III.A).
 pub const CONTROL_RATE_HZ: u64 = 300;
 /// Default step of the plant, us.
 pub const PLANT_STEP_US: u64 = 1000;
-/// Obstacles further than this are not handed to the flight code, m.
-const OBSTACLE_HORIZON_M: f64 = 50.0;
 
 /// What to fly.
 #[derive(Debug, Clone)]
@@ -249,8 +248,8 @@ impl Setup {
             _ => &well,
         };
         let plant = &well;
-        let obstacles = self.scenario.all_obstacles();
-        let mut mover = Mover::new(self, &obstacles)?;
+        let mut obstacles = Surroundings::new(self.scenario.all_obstacles());
+        let mut mover = Mover::new(self, obstacles.all())?;
         let mut state = plant.initial_state(self.hovering(plant), self.scenario.start_charge());
         let seed = self.scenario.seed;
         let mut winds = vec![Wind::new(self.scenario.wind(), seed ^ 0x5851_F42D_4C95_7F2D)];
@@ -259,7 +258,7 @@ impl Setup {
         }
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
-        let mut metrics = metrics::Meter::new(&self.scenario, &obstacles);
+        let mut metrics = metrics::Meter::new(&self.scenario);
         let mut recorder =
             record.then(|| record::Recorder::new(self, pilot.as_ref(), plant.vehicle().rotors().len()));
         let hover = Command { rotor: [hover_command(plant.vehicle()); MAX_ROTORS], wing: [0.0; 2] };
@@ -284,7 +283,7 @@ impl Setup {
                 }
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
                 failing.spoil(&mut frame);
-                frame.set_obstacles(&nearest_obstacles(&obstacles, &state.body, believed.as_ref()));
+                frame.set_obstacles(&obstacles.seen(&state.body, believed.as_ref()));
                 if self.arm.is_told_the_force() {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
@@ -304,6 +303,7 @@ impl Setup {
                 }
                 commands.send(time_us, Command::of(&output));
                 metrics.tick(&state, &frame, &output, encounters);
+                metrics.pass(state.body.position.vector.xy(), &mut obstacles);
                 if let Some(recorder) = &mut recorder {
                     recorder.tick(
                         &frame,
@@ -347,31 +347,6 @@ impl Setup {
         state.rotor_speed_rad_s[..vehicle.rotors().len()].fill(speed);
         state
     }
-}
-
-/// Obstacles where the flight code takes them to be: it sees them from where it is, and knows that as well as it knows its own place.
-fn nearest_obstacles(
-    obstacles: &[[f64; 3]],
-    body: &State<f64>,
-    believed: Option<&NavigationTerms>,
-) -> Vec<Obstacle> {
-    let at = body.position.vector;
-    let off = believed.map_or(Vector3::zeros(), |terms| terms.position.vector.cast::<f64>() - at);
-    let mut near: Vec<(f64, usize)> = Vec::new();
-    for (i, [north, east, _]) in obstacles.iter().enumerate() {
-        let square = (north - at.x).powi(2) + (east - at.y).powi(2);
-        if square < OBSTACLE_HORIZON_M * OBSTACLE_HORIZON_M {
-            near.push((square, i));
-        }
-    }
-    near.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    near.truncate(MAX_OBSTACLES);
-    near.iter()
-        .map(|(_, i)| {
-            let [north, east, _] = obstacles[*i];
-            Obstacle { id: *i as u32, north_m: (north + off.x) as f32, east_m: (east + off.y) as f32 }
-        })
-        .collect()
 }
 
 /// The command of each rotor that carries the weight.
