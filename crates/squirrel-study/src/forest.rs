@@ -4,6 +4,8 @@
 //! more than [`BAND_M`] above or below its height at any time has come through the plane, but not through the forest that the paper means:
 //! both counts are given. An arm owes its success to wings where it comes through in the band more often than the same trials of
 //! `phantom`, which decides alike and has none.
+//!
+//! All of it is flown twice: with the laws as they are, and with the limit of speed that ours has for the paper's too.
 
 use crate::campaign::{self, Flown, Plan};
 use crate::journal::{Journal, Keep};
@@ -91,8 +93,10 @@ pub struct Forest {
     pub seed: u64,
     /// Effective thrust-to-weight ratio.
     pub thrust_to_weight: f64,
-    /// By arm.
+    /// By arm, each as its law is.
     pub rows: Vec<Row>,
+    /// By arm, with the scenario's limit of speed for the paper's laws too, which have none: what of the difference is that limit.
+    pub limited: Vec<Row>,
 }
 
 /// Number of flights that [`run`] flies here.
@@ -100,7 +104,7 @@ pub struct Forest {
 /// # Errors
 /// No trials.
 pub fn flights(plan: &Plan, keep: &Keep<'_>) -> Result<u64, FlightError> {
-    Ok(keep.share(u64::from(plan.beside(Arm::Phantom)?.flights(1))))
+    Ok(keep.share(u64::from(plan.beside(Arm::Phantom)?.flights(CONDITIONS))))
 }
 
 /// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped.
@@ -121,16 +125,32 @@ pub fn run(
     let plan = &plan.beside(Arm::Phantom)?;
     let first = scenario(plan, thrust_to_weight, 0)?;
     let journal = Journal::open(keep, "forest", &plan.identity("forest", [&first]))?;
-    let fly = |arm, _, trial| fly(plan, arm, thrust_to_weight, trial);
-    let Some(flown) = campaign::run(plan, 1, &journal, fly, progress)? else { return Ok(None) };
-    let rows = plan.arms.iter().map(|arm| row(&flown, *arm)).collect();
+    let limited = with_limit(plan, &first);
+    let fly = |arm, condition, trial| {
+        fly(if condition == 0 { plan } else { &limited }, arm, thrust_to_weight, trial)
+    };
+    let Some(flown) = campaign::run(plan, CONDITIONS, &journal, fly, progress)? else { return Ok(None) };
+    let rows = |condition| plan.arms.iter().map(|arm| row(&flown, *arm, condition)).collect();
     Ok(Some(Forest {
         vehicle: plan.vehicle.name.clone(),
         trials: plan.trials,
         seed: plan.seed,
         thrust_to_weight,
-        rows,
+        rows: rows(0),
+        limited: rows(1),
     }))
+}
+
+/// As the laws are, and with the limit of speed for all.
+const CONDITIONS: usize = 2;
+
+/// The plan with the scenario's limit of speed in the primary controller too.
+fn with_limit(plan: &Plan, scenario: &Scenario) -> Plan {
+    let mut plan = plan.clone();
+    if let (Some(control), Some(speed)) = (&mut plan.vehicle.control, scenario.speed_max_m_s) {
+        control.twcc.position.speed_max_m_s = speed as f32;
+    }
+    plan
 }
 
 /// The scenario of a trial.
@@ -159,11 +179,13 @@ fn fly(plan: &Plan, arm: Arm, thrust_to_weight: f64, trial: u32) -> Result<Fligh
     })
 }
 
-fn row(flown: &Flown<Flight>, arm: Arm) -> Row {
-    let average = |figure: fn(&Flight) -> f64| mean(&flown.figures(arm, 0, figure));
-    let in_band = |arm| flown.figures(arm, 0, |flight: &Flight| f64::from(u8::from(flight.in_band())));
-    let of = flown.of(arm, 0);
-    let over = |rival| (!flown.of(rival, 0).is_empty()).then(|| difference(&in_band(arm), &in_band(rival)));
+fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
+    let average = |figure: fn(&Flight) -> f64| mean(&flown.figures(arm, condition, figure));
+    let in_band =
+        |arm| flown.figures(arm, condition, |flight: &Flight| f64::from(u8::from(flight.in_band())));
+    let of = flown.of(arm, condition);
+    let over =
+        |rival| (!flown.of(rival, condition).is_empty()).then(|| difference(&in_band(arm), &in_band(rival)));
     Row {
         arm: arm.name(),
         through: Share::of(of.iter().map(|flight| flight.through)),

@@ -102,7 +102,7 @@ fn maps(page: &mut Page, study: &Forest, plan: &Plan) -> Result<(), FlightError>
         "Where flights ended",
         "Every flight from its start in the middle: a red X where it hit, an O where it came through, whatever its height. The \
          dashed circle has the mean distance of the ends from the start. Grey dots are the trunks of the first trial, and the \
-         track is that trial's, coloured by speed; other trials have other trunks. Who leaves the dots meets no more of them.",
+         track is that trial's, coloured by speed; other trials have other trunks.",
     );
     let map = |(row, first): (&Row, &First)| {
         let caption = format!(
@@ -212,4 +212,9 @@ fn numbers(page: &mut Page, study: &Forest) {
         row(of.arm, counts.chain(over).chain(means))
     };
     page.table(&head(&names), &study.rows.iter().map(cells).collect::<Vec<_>>());
+    page.section(
+        "With a limit of speed for all",
+        "The same flights, with the limit of speed that ours has for the paper's laws too: what of the difference is that limit.",
+    );
+    page.table(&head(&names), &study.limited.iter().map(cells).collect::<Vec<_>>());
 }

@@ -3,7 +3,7 @@
 use super::sheet::{Cell, Sheet};
 use super::{Flown, write_page};
 use crate::output::{self, say};
-use squirrel_study::forest::{self, BAND_M, Forest};
+use squirrel_study::forest::{self, BAND_M, Row};
 use squirrel_study::pages;
 
 /// Options of the study.
@@ -41,7 +41,10 @@ impl Options {
         say(
             "Over phantom: in band, less that of the controller without wings on the same trials, in points.\n",
         );
-        let csv = sheet(&study).print();
+        let mut csv = sheet(&study.rows, "as it is").print();
+        say("\nThe same, with the limit of speed that ours has for the paper's laws too.\n");
+        let limited = sheet(&study.limited, "limited").print();
+        csv.extend(limited.split_inclusive('\n').skip(1));
         say("");
         for word in forest::words(&study) {
             say(&word);
@@ -52,9 +55,10 @@ impl Options {
     }
 }
 
-fn sheet(study: &Forest) -> Sheet {
+fn sheet(rows: &[Row], speed: &str) -> Sheet {
     let mut sheet = Sheet::new(&[
         ("arm", "arm"),
+        ("speed", "speed"),
         ("through", "through"),
         ("95 %", "through_low,through_high"),
         ("in band", "in_band"),
@@ -68,9 +72,10 @@ fn sheet(study: &Forest) -> Sheet {
         ("met", "encounters"),
         ("wings s", "wings_open_s"),
     ]);
-    for row in &study.rows {
+    for row in rows {
         sheet.row(&[
             Cell::Text(row.arm),
+            Cell::Text(speed),
             Cell::Number(f64::from(row.through.count), 0),
             Cell::PercentInterval(Some(row.through.share), 0),
             Cell::Number(f64::from(row.in_band.count), 0),
