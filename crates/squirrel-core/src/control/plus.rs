@@ -8,7 +8,7 @@
 //! |roll|, |pitch| <= tilt_max        U_min <= U <= U_max        w = 0 or 1
 //! ```
 //!
-//! For an attitude and a wing, U is a formula; the attitude is found by a pattern search of [`ROUNDS`] rounds that starts from PC's request,
+//! For an attitude and a wing, U is a formula; the attitude is found by a pattern search of seven rounds that starts from PC's request,
 //! so that work is bounded. What else is different from the paper's laws:
 //! - `f` is the flat plate at the *commanded* attitude: the present one is level when a turn begins, and says that wings do not help;
 //! - motion and reference are those of [`Plus::delay_s`] ahead, when what is commanded now acts: attitude bandwidth is compensated, and a

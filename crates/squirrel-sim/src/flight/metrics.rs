@@ -154,6 +154,7 @@ impl<'a> Meter<'a> {
         frame: &SensorFrame,
         output: &StackOutput,
         encounters: u32,
+        obstacles: &mut Surroundings,
     ) {
         let time_us = frame.time_us;
         self.altitude_m = frame.altitude_m.or(self.altitude_m);
@@ -176,6 +177,7 @@ impl<'a> Meter<'a> {
             self.mode = outer.mode;
         }
         let at = state.body.position.vector;
+        self.pass(at.xy(), obstacles);
         let windowed = self.scenario.measured_window_s > 0.0;
         if self.start_us.is_none() && (!windowed || encounters > 0) {
             self.start_us = Some(time_us);
@@ -208,7 +210,7 @@ impl<'a> Meter<'a> {
     }
 
     /// What it passes, and how far it has come.
-    pub(super) fn pass(&mut self, at: Vector2<f64>, obstacles: &mut Surroundings) {
+    fn pass(&mut self, at: Vector2<f64>, obstacles: &mut Surroundings) {
         for (_, [north, east, radius]) in obstacles.near(at) {
             let square = (north - at.x).powi(2) + (east - at.y).powi(2);
             let near = self.metrics.clearance_m.map_or(f64::INFINITY, |clearance| clearance + radius);

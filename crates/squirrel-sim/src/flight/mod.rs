@@ -302,8 +302,7 @@ impl Setup {
                     )));
                 }
                 commands.send(time_us, Command::of(&output));
-                metrics.tick(&state, &frame, &output, encounters);
-                metrics.pass(state.body.position.vector.xy(), &mut obstacles);
+                metrics.tick(&state, &frame, &output, encounters, &mut obstacles);
                 if let Some(recorder) = &mut recorder {
                     recorder.tick(
                         &frame,
