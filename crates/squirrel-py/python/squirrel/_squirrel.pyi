@@ -1254,11 +1254,11 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
     vehicle : Vehicle, optional
         What flies; the paper's squirrel if left out.
     scenario : str
-        ``hover``, ``avoid``, ``steer``, ``track``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
+        ``hover``, ``avoid``, ``steer``, ``track``, ``forest``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
         the path of a scenario file (.toml).
     arm : str, optional
-        Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``; if left out,
-        ``twcc_flat``, or ``pc`` with a policy.
+        Who flies: ``pc``, ``pc_wings_open``, ``wiic_no_wings``, ``phantom``, ``twcc_flat``, ``twcc_parnn``, ``twcc_oracle``,
+        ``twcc_plus``, ``pc_plus``; if left out, ``twcc_flat``, or ``pc`` with a policy.
     seed : int, optional
         Of everything random; the scenario's own if left out.
     thrust_to_weight : float, optional
