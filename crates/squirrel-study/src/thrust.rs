@@ -180,7 +180,8 @@ pub fn words(study: &Thrust) -> Vec<String> {
         let at: Vec<String> = study
             .crossings
             .iter()
-            .filter(|crossing| crossing.series == series)
+            // Of the paper's arms; ours are above it at every ratio.
+            .filter(|crossing| crossing.series == series && crossing.arm.starts_with("twcc_"))
             .filter_map(|crossing| Some(format!("{} {:.2}", crossing.arm, crossing.thrust_to_weight?)))
             .collect();
         let none = || "at none of the ratios for any arm".to_owned();

@@ -102,15 +102,13 @@ impl Plus {
         let weight = self.vertical_weight * (1.0 + share * share);
         weight * weight
     }
+}
 
-    /// Whether wings are to be open.
-    ///
-    /// * `folded`, `spread` - the best without and with them
-    /// * `are_open` - as decided before
-    pub(super) fn opens(&self, folded: &Choice, spread: &Choice, are_open: bool) -> bool {
-        let saved = sqrt(folded.cost) - sqrt(spread.cost);
-        saved > if are_open { 0.0 } else { self.open_above_m_s2 }
-    }
+/// How much closer wings bring the acceleration to the command, m/s^2.
+///
+/// * `folded`, `spread` - the best without and with them
+pub(super) fn saved(folded: &Choice, spread: &Choice) -> f32 {
+    sqrt(folded.cost) - sqrt(spread.cost)
 }
 
 /// Acceleration at an attitude, heading frame, m/s^2.
@@ -293,6 +291,7 @@ mod tests {
         let ours = tick(&p, &mut TwccState::default(), 6.45);
         assert_eq!((ours.wing_command, ours.reason), (1.0, Reason::WingsComeCloser));
         assert!(ours.command.pitch_rad > 0.4, "{:?}", ours.command);
+        assert!(ours.wing.helpful_n > 0.3 * 0.548 && ours.wing.flag, "{:?}", ours.wing);
         let theirs = tick(&parameters(), &mut TwccState::default(), 6.45);
         assert_eq!(theirs.wing_command, 0.0);
         let folded = TwccParameters { policy: WingPolicy::Folded, ..p };

@@ -321,10 +321,13 @@ impl TwccParameters {
             ),
         };
         let folded = demand.best(request, 0.0);
-        let (mut best, mut reason) = (folded, Reason::PolicyFixed);
+        let (mut best, mut reason, mut helpful_n) = (folded, Reason::PolicyFixed, 0.0);
         if self.policy == WingPolicy::Coordinated {
             let spread = demand.best(request, 1.0);
-            let open = plus.opens(&folded, &spread, state.mode != Mode::Primary);
+            let saved = plus::saved(&folded, &spread);
+            helpful_n = airframe.mass_kg * saved;
+            let threshold = if state.mode == Mode::Primary { plus.open_above_m_s2 } else { 0.0 };
+            let open = saved > threshold;
             let wanted = if open { Mode::Wiic } else { Mode::Primary };
             state.mode_age_s = state.mode_age_s.map(|age| age + dt_s);
             reason = if open { Reason::WingsComeCloser } else { Reason::InsideLimits };
@@ -358,7 +361,7 @@ impl TwccParameters {
             wing_force,
             parnn: None,
             angle_of_attack_rad: angle_of_attack(ned_from_body.inverse() * motion.velocity),
-            wing: WingFlag { helpful_n: 0.0, flag: state.flag },
+            wing: WingFlag { helpful_n, flag: state.flag },
             mode: state.mode,
             reason,
             command,

@@ -33,7 +33,7 @@ pub struct WingEvents {
 /// Helpful part of the force and the flag.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WingFlag {
-    /// Part of the force that helps, N.
+    /// Part of the force that helps, N; of [`super::plus`], mass times how much closer wings bring the acceleration to the command.
     pub helpful_n: f32,
     /// The paper's Flag.
     pub flag: bool,
