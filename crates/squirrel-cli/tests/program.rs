@@ -171,7 +171,7 @@ fn parts_of_a_study_are_merged_into_the_whole() {
     assert!(files("merged") == files("whole") && files("whole").len() >= 3);
     folder.fails(
         &["study", "merge", "part1", "part2", "--out", "half"],
-        &["table3.trials.jsonl", "trial = 2: missing"],
+        &["table3.trials.jsonl", "flight = 2: missing"],
     );
     folder.fails(&["study", "merge", "nowhere", "--out", "half"], &["nowhere"]);
     folder.fails(&[&study[..8], &["--shard", "1/2"]].concat(), &["shard", "--out"]);

@@ -236,7 +236,7 @@ fn table_two_writes_the_same_bytes_twice_and_holds_every_model() {
     let run = |out: &str| {
         let study = ["study", "table2", "--trials", "2", "--seed", "1", "--epochs", "5", "--out", out];
         let table = folder.succeeds(&study);
-        let files = ["table2.csv", "table2.json", "report.html"];
+        let files = ["table2.csv", "table2.json", "table2.html"];
         (table, files.map(|file| fs::read(folder.0.join(out).join(file)).unwrap()))
     };
     let (table, files) = run("one");

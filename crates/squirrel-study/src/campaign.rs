@@ -2,7 +2,7 @@
 //!
 //! Trial `k` has one seed, whichever arm flies it and under whatever condition, so that differences between arms are of pairs.
 
-use crate::journal::{Journal, identity};
+use crate::journal::{Journal, check_trials, identity};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use squirrel_core::stack::wire::{HASH_START, hash};
@@ -37,9 +37,7 @@ impl Plan {
     /// # Errors
     /// No trials.
     pub fn beside(&self, arm: Arm) -> Result<Self, FlightError> {
-        if self.trials == 0 {
-            return Err(FlightError("trials = 0: must be at least 1".to_owned()));
-        }
+        check_trials(self.trials)?;
         let mut plan = self.clone();
         plan.arms.push(arm);
         plan.arms.sort_unstable();
@@ -65,6 +63,19 @@ impl Plan {
     /// Number of flights under so many conditions.
     pub fn flights(&self, conditions: usize) -> u32 {
         self.trials * conditions as u32 * self.arms.len() as u32
+    }
+
+    /// That every arm can fly a scenario: asked before anything is kept.
+    ///
+    /// # Errors
+    /// The first number that cannot be used, by the file's name for the vehicle and its field.
+    pub fn check(&self, vehicle: &VehicleFile, scenario: &Scenario) -> Result<(), FlightError> {
+        scenario.check().map_err(FlightError)?;
+        for arm in &self.arms {
+            let (vehicle, scenario) = (vehicle.clone(), scenario.clone());
+            Setup { vehicle, arm: *arm, scenario, integrator: Integrator::Rk4 }.stack()?;
+        }
+        Ok(())
     }
 
     /// A setup of this vehicle.

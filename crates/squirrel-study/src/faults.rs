@@ -5,7 +5,7 @@
 //! thrust at a ratio below [`HEALTHY_RATIO`], or both inertial units that say nothing that is a number. A fault is *flagged* where the
 //! flight code reports anything from the fault on, be it health or a reason of its failsafe.
 
-use crate::journal::{Journal, Keep, identity};
+use crate::journal::{Journal, Keep, check_trials, identity};
 use serde::{Deserialize, Serialize};
 use squirrel_core::guidance::mission::scramble;
 use squirrel_sim::arm::Arm;
@@ -106,9 +106,7 @@ pub struct Faults {
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
 pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Faults>, FlightError> {
-    if plan.trials == 0 {
-        return Err(FlightError("trials = 0: must be at least 1".to_owned()));
-    }
+    check_trials(plan.trials)?;
     let journal = Journal::open(keep, "faults", &identity("faults", &plan.vehicle, plan.seed))?;
     let Some(flights) = journal.run(plan.trials, |trial| fly(plan, trial), progress)? else {
         return Ok(None);

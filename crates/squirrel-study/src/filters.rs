@@ -6,7 +6,7 @@
 //! from five seconds on.
 
 use crate::in_loop;
-use crate::journal::{self, Journal, Keep};
+use crate::journal::{self, Journal, Keep, check_trials};
 use crate::statistics::{Estimate, mean, paired};
 use crate::wing_flights::Kind;
 use squirrel_core::estimate::eskf::Eskf;
@@ -113,9 +113,7 @@ type Errors = [f64; 2];
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
 pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Filters>, FlightError> {
-    if plan.trials == 0 {
-        return Err(FlightError("trials = 0: must be at least 1".to_owned()));
-    }
+    check_trials(plan.trials)?;
     let kinds: Vec<(bool, Estimator)> =
         [true, false].into_iter().flat_map(|calibrated| FILTERS.map(|filter| (calibrated, filter))).collect();
     let identity = journal::identity("filters", &plan.vehicle, plan.seed);

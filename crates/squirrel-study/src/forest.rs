@@ -2,14 +2,15 @@
 //!
 //! 7 m/s, `R_d` 5 m, turns of 110 to 130 deg, trunks of 1 m every 10.5 to 13.5 m, solid, the drone with its real size. A flight that is
 //! more than [`BAND_M`] above or below its height at any time has come through the plane, but not through the forest that the paper means:
-//! both counts are given. An arm owes its success to wings where it comes through in the band more often than the same trials of
-//! `phantom`, which decides alike and has none.
+//! both counts are given. An arm owes its success to wings where it comes through in the band more often than, on the same trials, the arm
+//! that decides alike and has none: `phantom` for `twcc_flat`, `pc_plus` for `twcc_plus`. What the others have over `phantom`, which believes in
+//! the flat plate, they owe to wings and to what they believe, together.
 //!
 //! All of it is flown twice: with the laws as they are, and with the limit of speed that ours has for the paper's too.
 
 use crate::campaign::{self, Flown, Plan};
 use crate::journal::{Journal, Keep};
-use crate::statistics::{Estimate, Share, difference, mean};
+use crate::statistics::{Estimate, FEW, Share, mean, paired_shares};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, OVER_RAD};
@@ -124,6 +125,7 @@ pub fn run(
 ) -> Result<Option<Forest>, FlightError> {
     let plan = &plan.beside(Arm::Phantom)?;
     let first = scenario(plan, thrust_to_weight, 0)?;
+    plan.check(&plan.vehicle, &first)?;
     let journal = Journal::open(keep, "forest", &plan.identity("forest", [&first]))?;
     let limited = with_limit(plan, &first);
     let fly = |arm, condition, trial| {
@@ -181,11 +183,11 @@ fn fly(plan: &Plan, arm: Arm, thrust_to_weight: f64, trial: u32) -> Result<Fligh
 
 fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
     let average = |figure: fn(&Flight) -> f64| mean(&flown.figures(arm, condition, figure));
-    let in_band =
-        |arm| flown.figures(arm, condition, |flight: &Flight| f64::from(u8::from(flight.in_band())));
+    let in_band = |arm| flown.of(arm, condition).into_iter().map(Flight::in_band).collect::<Vec<_>>();
     let of = flown.of(arm, condition);
-    let over =
-        |rival| (!flown.of(rival, condition).is_empty()).then(|| difference(&in_band(arm), &in_band(rival)));
+    let over = |rival| {
+        (!flown.of(rival, condition).is_empty()).then(|| paired_shares(&in_band(arm), &in_band(rival)))
+    };
     Row {
         arm: arm.name(),
         through: Share::of(of.iter().map(|flight| flight.through)),
@@ -207,36 +209,30 @@ fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
 
 /// What the rows say, in words: who owes its success to wings.
 pub fn words(study: &Forest) -> Vec<String> {
-    let share = |row: &Row| 100.0 * row.in_band.share.value;
-    let Some(phantom) = study.rows.iter().find(|row| row.arm == Arm::Phantom.name()) else {
-        return Vec::new();
-    };
+    if study.trials < FEW {
+        return vec![format!("Fewer than {FEW} trials tell nothing about wings.")];
+    }
     let mut words = Vec::new();
-    for row in study.rows.iter().filter(|row| BELIEVES_IN_WINGS.iter().any(|arm| arm.name() == row.arm)) {
-        // What decides alike and has no wings: for ours its own law, for the paper's arms `phantom`.
-        let (rival, over) = if row.arm == Arm::TwccPlus.name() {
-            (Arm::PcPlus.name(), row.over_pc_plus)
-        } else {
-            (phantom.arm, row.over_phantom)
-        };
+    for row in &study.rows {
+        let is = |arm: Arm| arm.name() == row.arm;
+        let (rival, over) =
+            if is(Arm::TwccPlus) { ("pc_plus", row.over_pc_plus) } else { ("phantom", row.over_phantom) };
         let Some(over) = over else { continue };
-        let points = format!(
-            "{:+.0} points ({:+.0} to {:+.0})",
-            100.0 * over.value,
-            100.0 * over.low,
-            100.0 * over.high
-        );
-        let verdict = if over.low > 0.0 {
-            "owes part of its success to wings"
+        let [value, low, high] = [over.value, over.low, over.high].map(|points| 100.0 * points);
+        let points = format!("{value:+.0} points ({low:+.0} to {high:+.0}) over {rival}");
+        let verdict = if is(Arm::TwccParnn) || is(Arm::TwccOracle) {
+            "is, by wings and by what it believes together,"
+        } else if !(is(Arm::TwccFlat) || is(Arm::TwccPlus)) {
+            continue;
+        } else if over.low > 0.0 {
+            "owes part of its success to wings:"
         } else if over.high < 0.0 {
-            "is worse for its wings"
+            "is worse for its wings:"
         } else {
-            "does not owe its success to wings, as far as these trials tell"
+            "does not owe its success to wings, as far as these trials tell:"
         };
-        words.push(format!("{} ({:.0} % in band) {verdict}: {points} over {rival}.", row.arm, share(row)));
+        let share = 100.0 * row.in_band.share.value;
+        words.push(format!("{} ({share:.0} % in band) {verdict} {points}.", row.arm));
     }
     words
 }
-
-/// Arms whose plant has wings that the law opens.
-const BELIEVES_IN_WINGS: [Arm; 4] = [Arm::TwccFlat, Arm::TwccParnn, Arm::TwccOracle, Arm::TwccPlus];

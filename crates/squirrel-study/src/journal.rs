@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use squirrel_core::stack::wire::{HASH_START, hash};
+use squirrel_core::stack::wire::{HASH_START, hash, written};
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
@@ -19,9 +19,23 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::Mutex;
 
+/// Most trials of a study: what is more was not meant.
+pub const TRIALS_MAX: u32 = 100_000;
+
+/// # Errors
+/// No trials, or more than anybody flies.
+pub fn check_trials(trials: u32) -> Result<(), FlightError> {
+    if (1..=TRIALS_MAX).contains(&trials) {
+        return Ok(());
+    }
+    Err(FlightError(format!("trials = {trials}: must be 1 to {TRIALS_MAX}")))
+}
+
 /// What a study's trials depend on beside their number, in one line: for [`Journal::open`].
 pub fn identity(name: &str, vehicle: &VehicleFile, seed: u64) -> String {
-    let hash = hash(HASH_START, vehicle.text.as_bytes());
+    // The file names its network; what that says is not in the text.
+    let weights = vehicle.weights.as_ref().and_then(|weights| written(weights.parnn(), <[u8]>::to_vec));
+    let hash = hash(hash(HASH_START, vehicle.text.as_bytes()), &weights.unwrap_or_default());
     let (of, estimator, version) = (&vehicle.name, vehicle.estimator.name(), env!("CARGO_PKG_VERSION"));
     format!("{name} of {of} ({hash:016x}) on {estimator}, seed {seed}, version {version}")
 }
@@ -86,7 +100,9 @@ impl Keep<'_> {
     /// How many of so many trials are flown here.
     pub fn share(&self, trials: u64) -> u64 {
         match self.part {
-            Part::Shard(shard) => (0..trials as u32).filter(|trial| shard.has(*trial)).count() as u64,
+            Part::Shard(shard) => {
+                (trials + u64::from(shard.of) - u64::from(shard.number)) / u64::from(shard.of)
+            }
             Part::All | Part::Merged => trials,
         }
     }
@@ -132,8 +148,9 @@ pub(crate) fn read(path: &Path) -> Result<(Option<Head>, Lines, usize), FlightEr
     let mut lines = whole.lines();
     let head = lines.next().map(serde_json::from_str).transpose().map_err(|e| at(&e))?;
     let mut done = Lines::new();
-    for line in lines {
-        let Line::<serde_json::Value> { trial, .. } = serde_json::from_str(line).map_err(|e| at(&e))?;
+    for (number, line) in lines.enumerate() {
+        let Line::<serde_json::Value> { trial, .. } = serde_json::from_str(line)
+            .map_err(|e| at(&format!("line {}, from its begin: {e}", number + 2)))?;
         done.insert(trial, line.to_owned());
     }
     Ok((head, done, whole.len()))
@@ -170,12 +187,18 @@ impl Journal {
         };
         let path = folder.join(format!("{name}.trials.jsonl"));
         let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
-        let (before, done, length) = read(&path)?;
-        if let Some(before) = before
-            && before.plan != plan
-        {
-            let problem = format!("is of another plan ({}); give another --out, or delete it", before.plan);
-            return Err(at(&problem));
+        let (before, done, mut length) = read(&path)?;
+        if let Some(before) = before {
+            if before.plan != plan {
+                let problem =
+                    format!("is of another plan ({}); give another --out, or delete it", before.plan);
+                return Err(at(&problem));
+            }
+            if before != head {
+                // As many trials as are asked for now, for who merges.
+                write(&path, &head, &done)?;
+                length = read(&path)?.2;
+            }
         }
         let mut file = OpenOptions::new().create(true).append(true).open(&path).map_err(|e| at(&e))?;
         file.set_len(length as u64).map_err(|e| at(&e))?;
@@ -202,7 +225,7 @@ impl Journal {
             let result = match self.done.get(&trial) {
                 Some(line) => self.read(line)?,
                 None if self.part == Part::Merged => {
-                    return Err(self.at(&format!("trial = {trial}: missing, in none of the merged folders")));
+                    return Err(self.at(&format!("flight = {trial}: missing, in none of the merged folders")));
                 }
                 None => self.keep(trial, &fly(trial)?)?,
             };
@@ -223,7 +246,11 @@ impl Journal {
     }
 
     fn read<T: DeserializeOwned>(&self, line: &str) -> Result<T, FlightError> {
-        let line: Line<T> = serde_json::from_str(line).map_err(|e| self.at(&e))?;
+        let whole = |e: &serde_json::Error| {
+            let place = line.split_once(",\"result\"").map_or(line, |(place, _)| place);
+            self.at(&format!("{place}...: {e}"))
+        };
+        let line: Line<T> = serde_json::from_str(line).map_err(|e| whole(&e))?;
         Ok(line.result)
     }
 

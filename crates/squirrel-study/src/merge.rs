@@ -38,7 +38,7 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
             }
             for (trial, line) in lines {
                 if merged.get(&trial).is_some_and(|other| *other != line) {
-                    return Err(at(format!("trial = {trial}: has another result in another folder")));
+                    return Err(at(format!("flight = {trial}: has another result in another folder")));
                 }
                 merged.insert(trial, line);
             }

@@ -206,8 +206,8 @@ fn average(cells: &[Cell], arm: usize) -> Mean {
 /// What the means say, in words: the shape of the paper's figure, in its own mode and out of it.
 pub fn words(study: &Steering) -> Vec<String> {
     let cells = ANGLES_DEG.len() * SPEEDS_M_S.len();
-    let parnn = study.means.iter().filter(|mean| mean.arm == "twcc_parnn");
-    parnn
+    let parnn = || study.means.iter().filter(|mean| mean.arm == "twcc_parnn");
+    let mut words: Vec<String> = parnn()
         .map(|mean| {
             let by_speed: Vec<String> = SPEEDS_M_S
                 .iter()
@@ -223,5 +223,17 @@ pub fn words(study: &Steering) -> Vec<String> {
                 by_speed.join(", ")
             )
         })
-        .collect()
+        .collect();
+    let paper = parnn().filter(|mean| mean.wings == Wings::Paper);
+    let independent = parnn().filter(|mean| mean.wings == Wings::Independent);
+    for (paper, independent) in paper.zip(independent) {
+        words.push(format!(
+            "With the independent plant the mean of twcc_parnn over pc at T/W {:.1} is {:.3} instead of {:.3} ({:+.3}).",
+            paper.thrust_to_weight,
+            independent.ratio,
+            paper.ratio,
+            independent.ratio - paper.ratio
+        ));
+    }
+    words
 }

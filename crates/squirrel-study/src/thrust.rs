@@ -5,13 +5,13 @@
 //! - `battery`: one such limit, [`BATTERY_RATIO`], and a battery that is emptier from flight to flight. Thrust follows its voltage
 //!   (`battery_sag`), which the flight code does not know, and what is left of the limit is the effective ratio.
 //!
-//! The last rows of `battery` have the vehicle's own limit, to see where the battery alone brings it. Nothing is expected of wings from a ratio of
-//! about 1.155 on, where 30 deg of tilt hold height (docs/equations.md E.4); what is gained there is gained in transients and is said beside
+//! The last rows of `battery` have the vehicle's own limit, to see where the battery alone brings it. Little is expected of wings from the ratio on at
+//! which the tilt limit holds height, 1.155 with one angle at 30 deg and 1.33 with both (docs/equations.md E.4); what is gained there is said beside
 //! the fair rival `pc_plus`.
 
 use crate::campaign::Plan;
 use crate::journal::Keep;
-use crate::statistics::Estimate;
+use crate::statistics::{Estimate, FEW};
 use crate::tracking::{self, Condition, GUST_M_S, Row};
 use serde::Serialize;
 use squirrel_sim::flight::FlightError;
@@ -175,6 +175,9 @@ fn crossing(points: &[&Point], arm: &str) -> Option<f64> {
 
 /// What the points say, in words: where the paper's gain lies, and what wings are worth to the best controller.
 pub fn words(study: &Thrust) -> Vec<String> {
+    if study.trials < FEW {
+        return vec![format!("Fewer than {FEW} trials tell nothing about wings.")];
+    }
     let mut words = Vec::new();
     for (series, how) in [(SERIES[0], "by the limit"), (SERIES[1], "by the battery")] {
         let at: Vec<String> = study

@@ -86,6 +86,9 @@ pub fn run(
     progress: impl Fn() + Sync,
 ) -> Result<Option<Vec<Vec<Row>>>, FlightError> {
     let plan = plan.beside(Arm::Pc)?;
+    for condition in conditions {
+        plan.check(&condition.vehicle, &condition.scenario)?;
+    }
     let scenarios = conditions.iter().map(|condition| &condition.scenario);
     let journal = Journal::open(keep, name, &plan.identity(name, scenarios))?;
     let one = |arm, condition: usize, trial| fly(&plan, &conditions[condition], arm, trial);

@@ -157,7 +157,7 @@ fn the_better_controller_comes_through_and_the_papers_arms_owe_nothing_to_wings(
     let ours = row("twcc_plus").in_band.share;
     assert!(ours.value >= 1.5 * best && ours.low > best, "{ours:?}, the paper's best {best}");
 
-    // With ours' limit of speed they come further, and wings are worth something to them; ours is still ahead.
+    // With ours' limit of speed they come further; ours is still ahead.
     let limited = |arm: &str| study.limited.iter().find(|row| row.arm == arm).unwrap();
     let best = papers.iter().map(|arm| limited(arm).in_band.share.high).fold(0.0, f64::max);
     assert!(ours.low > best, "{ours:?}, with the limit {best}");

@@ -112,8 +112,66 @@ fn stopped_threaded_and_merged_studies_leave_the_same_bytes() {
         let three = folder.below("three");
         merge(&parts[1..], &three).unwrap();
         let error = study(&keep(&three, Part::Merged)).unwrap_err().to_string();
-        assert!(error.contains("trial = 0: missing, in none of the merged folders"), "{name}: {error}");
+        assert!(error.contains("flight = 0: missing, in none of the merged folders"), "{name}: {error}");
     }
+}
+
+/// More trials than before: the parts say so, and the whole has them all. Other weights: another plan. What cannot be flown leaves nothing.
+#[test]
+fn a_study_that_changes_does_not_go_on_as_it_was() {
+    let folder = Folder::new("changed");
+    let parts: Vec<PathBuf> = (1..=2).map(|k| folder.below(&format!("part{k}"))).collect();
+    for trials in [1, 2] {
+        let command = ["thrust".to_owned(), format!("--trials={trials}")];
+        for (k, part) in parts.iter().enumerate() {
+            let part = Keep {
+                folder: Some(part),
+                part: Part::Shard(format!("{}/2", k + 1).parse().unwrap()),
+                command: &command,
+            };
+            thrust::run(&plan(trials), &part, || ()).unwrap();
+        }
+    }
+    let merged = folder.below("merged");
+    assert_eq!(merge(&parts, &merged).unwrap(), ["thrust", "--trials=2"]);
+    let whole = Keep { folder: Some(&merged), part: Part::Merged, ..Keep::default() };
+    assert_eq!(thrust::run(&plan(2), &whole, || ()).unwrap().unwrap().trials, 2);
+
+    let kept = Keep { folder: Some(&merged), ..Keep::default() };
+    let other =
+        VehicleFile::parse(&plan(1).vehicle.text.replace("parnn_weights", "# parnn_weights"), "v").unwrap();
+    let mut changed = plan(2);
+    changed.vehicle.weights = other.weights;
+    let error = thrust::run(&changed, &kept, || ()).unwrap_err().to_string();
+    assert!(error.contains("is of another plan"), "{error}");
+
+    let empty = folder.below("empty");
+    let nothing = Keep { folder: Some(&empty), ..Keep::default() };
+    assert!(forest::run(&plan(1), 0.5, &nothing, || ()).is_err());
+    let mut bare = plan(1);
+    bare.vehicle.control = None;
+    assert!(table3::run(&bare, &nothing, || ()).is_err());
+    assert!(
+        thrust::run(&plan(100_001), &nothing, || ()).unwrap_err().to_string().starts_with("trials = 100001")
+    );
+    assert!(journals(&empty).is_empty(), "what cannot be flown is not begun");
+}
+
+#[test]
+fn a_damaged_line_is_named() {
+    let folder = Folder::new("damaged");
+    let keep = Keep { folder: Some(&folder.0), ..Keep::default() };
+    table3::run(&plan(1), &keep, || ()).unwrap();
+    let file = folder.0.join("table3.trials.jsonl");
+    let text = fs::read_to_string(&file).unwrap();
+    let damage = |from: &str, to: &str| {
+        fs::write(&file, text.replacen(from, to, 1)).unwrap();
+        table3::run(&plan(1), &keep, || ()).unwrap_err().to_string()
+    };
+    let error = damage("\"rmse_m\":", "\"rmse_m\":NaN,\"x\":");
+    assert!(error.contains("table3.trials.jsonl: line 2, from its begin:"), "{error}");
+    let error = damage("\"rmse_m\":", "\"rsme_m\":");
+    assert!(error.contains("{\"trial\":0...: missing field `rmse_m`"), "{error}");
 }
 
 #[test]
@@ -135,7 +193,7 @@ fn what_cannot_be_merged_is_named() {
     let file = "thrust.trials.jsonl";
     let text = fs::read_to_string(one.join(file)).unwrap();
     fs::write(other.join(file), text.replacen("\"rmse_m\":", "\"rmse_m\":1", 1)).unwrap();
-    assert!(error(&both).contains("trial = 0: has another result in another folder"), "{}", error(&both));
+    assert!(error(&both).contains("flight = 0: has another result in another folder"), "{}", error(&both));
     fs::write(other.join(file), "").unwrap();
     assert!(error(&both).contains("thrust.trials.jsonl: holds nothing"));
     for bad in ["0/4", "5/4", "4", "a/b", "1/0"] {

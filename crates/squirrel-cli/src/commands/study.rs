@@ -17,7 +17,7 @@ use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
-use squirrel_study::journal::{Keep, Part, Shard};
+use squirrel_study::journal::{Keep, Part, Shard, check_trials};
 use std::path::{Path, PathBuf};
 
 /// The experiments.
@@ -57,7 +57,7 @@ struct Common {
     /// Write the figures here as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Fly a part of the trials only, K/N; `squirrel study merge` puts the parts together. Needs --out.
+    /// Fly a part of the trials only, K/N, into an --out of its own; `squirrel study merge` puts the parts together.
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
     /// Fly nothing: all trials are there.
@@ -79,7 +79,12 @@ impl Common {
     /// The vehicle, once it is known that results can be written: nobody wants to learn that afterwards.
     ///
     /// * `name` - of the study's files
-    fn begin(&self, name: &str) -> Result<VehicleFile, String> {
+    fn begin(&self, name: &str, trials: u32) -> Result<VehicleFile, String> {
+        if self.shard.is_some() && self.json.is_some() {
+            return Err("--json: a part of a study has no figures; merge the parts first".to_owned());
+        }
+        check_trials(trials).map_err(|e| e.to_string())?;
+        let vehicle = vehicle(self.vehicle.as_deref())?;
         if let Some(folder) = &self.out {
             output::folder(folder)?;
             output::writable(&folder.join(format!("{name}.csv")))?;
@@ -87,10 +92,7 @@ impl Common {
         if let Some(path) = &self.json {
             output::writable(path)?;
         }
-        if self.shard.is_some() && self.json.is_some() {
-            return Err("--json: a part of a study has no figures; merge the parts first".to_owned());
-        }
-        vehicle(self.vehicle.as_deref())
+        Ok(vehicle)
     }
 
     /// Where trials are kept, and which are flown.
@@ -141,8 +143,8 @@ impl Common {
 }
 
 /// Writes the study's page beside its figures.
-fn write_page(folder: &Path, html: &str) -> Result<(), String> {
-    let file = folder.join("report.html");
+fn write_page(folder: &Path, name: &str, html: &str) -> Result<(), String> {
+    let file = folder.join(format!("{name}.html"));
     output::write_file(&file, html.as_bytes())?;
     talk(&format!("wrote {}", file.display()));
     Ok(())
@@ -151,10 +153,11 @@ fn write_page(folder: &Path, html: &str) -> Result<(), String> {
 impl Flown {
     /// The plan, and the arguments that describe the study.
     fn plan(&self, study: &str, trials: u32, own: &[(&str, String)]) -> Result<(Plan, Vec<String>), String> {
-        let vehicle = self.common.begin(study)?;
+        let arms: Vec<Arm> = self.arms.iter().map(|name| Arm::parse(name)).collect::<Result<_, _>>()?;
+        let vehicle = self.common.begin(study, trials)?;
         let mut plan = Plan::of_all_arms(vehicle, trials, self.common.seed);
-        if !self.arms.is_empty() {
-            plan.arms = self.arms.iter().map(|name| Arm::parse(name)).collect::<Result<_, _>>()?;
+        if !arms.is_empty() {
+            plan.arms = arms;
         } else if plan.arms.len() < Arm::ALL.len() {
             let missing: Vec<&str> =
                 Arm::ALL.iter().filter(|arm| !plan.arms.contains(arm)).map(|arm| arm.name()).collect();

@@ -80,14 +80,19 @@ impl Plus {
     /// The first number out of range, by its name in `[control.plus]`.
     pub fn check(&self) -> Result<(), ParameterError> {
         self.position.check()?;
-        positive("control.plus.vertical_weight", self.vertical_weight)?;
-        positive("control.plus.height_band_m", self.height_band_m)?;
-        for (field, x, max) in [
-            ("control.plus.delay_s", self.delay_s, 1.0),
-            ("control.plus.thrust_share", self.thrust_share, 1.0),
-        ] {
-            if !(0.0..=max).contains(&x) {
+        for (field, x) in
+            [("control.plus.delay_s", self.delay_s), ("control.plus.thrust_share", self.thrust_share)]
+        {
+            if !(0.0..=1.0).contains(&x) {
                 return Err(ParameterError::of(field, x, "must be 0 to 1"));
+            }
+        }
+        for (field, x) in [
+            ("control.plus.vertical_weight", self.vertical_weight),
+            ("control.plus.height_band_m", self.height_band_m),
+        ] {
+            if !(0.01..=100.0).contains(&x) {
+                return Err(ParameterError::of(field, x, "must be 0.01 to 100"));
             }
         }
         positive("control.plus.open_above_m_s2", self.open_above_m_s2)

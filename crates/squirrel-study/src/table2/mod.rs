@@ -9,7 +9,7 @@ mod report;
 
 pub use report::render;
 
-use crate::journal::{Journal, Keep, identity};
+use crate::journal::{Journal, Keep, check_trials, identity};
 use crate::statistics::mean;
 use crate::wing_flights::{FLIGHT_S, Kind, WingFlightError};
 use rayon::prelude::*;
@@ -200,9 +200,7 @@ pub fn run(
     keep: &Keep<'_>,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Option<Table2>, FlightError> {
-    if plan.trials == 0 {
-        return Err(FlightError("trials = 0: must be at least 1".to_owned()));
-    }
+    check_trials(plan.trials)?;
     let identity = identity("table2", &plan.vehicle, plan.seed);
     let journal = Journal::open(keep, "table2", &format!("{identity}, {} epochs", plan.epochs))?;
     let counted = AtomicU64::new(0);

@@ -19,7 +19,7 @@ pub(crate) struct Options {
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
-        let plan = Plan { vehicle: self.common.begin("filters")?, trials, seed };
+        let plan = Plan { vehicle: self.common.begin("filters", trials)?, trials, seed };
         let command = self.common.command("filters", &[("trials", trials.to_string())]);
         let keep = self.common.keep(&command);
         let bar = output::progress(filters::steps(&plan, &keep), "flights");

@@ -51,7 +51,7 @@ impl Options {
         }
         let Some(folder) = common.end("forest", &csv, &study)? else { return Ok(()) };
         let page = pages::forest(&study, &plan).map_err(|e| e.to_string())?;
-        write_page(folder, &page)
+        write_page(folder, "forest", &page)
     }
 }
 

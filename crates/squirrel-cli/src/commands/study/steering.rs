@@ -38,7 +38,7 @@ impl Options {
         let csv = cells(&study);
         let Some(folder) = common.end("steering", &csv, &study)? else { return Ok(()) };
         let page = pages::steering(&study, &plan).map_err(|e| e.to_string())?;
-        write_page(folder, &page)
+        write_page(folder, "steering", &page)
     }
 }
 

@@ -23,7 +23,7 @@ pub(crate) struct Options {
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
-        let plan = Plan { vehicle: self.common.begin("table2")?, trials, seed, epochs: self.epochs };
+        let plan = Plan { vehicle: self.common.begin("table2", trials)?, trials, seed, epochs: self.epochs };
         let own = [("trials", trials.to_string()), ("epochs", self.epochs.to_string())];
         let command = self.common.command("table2", &own);
         let keep = self.common.keep(&command);
@@ -37,7 +37,7 @@ impl Options {
             let file = folder.join(format!("{}.toml", scenario.name));
             output::write_file(&file, scenario.to_toml().as_bytes())?;
         }
-        write_page(folder, &table2::render(&study))
+        write_page(folder, "table2", &table2::render(&study))
     }
 }
 

@@ -52,6 +52,6 @@ impl Options {
         let csv = sheet.print();
         let Some(folder) = common.end("table3", &csv, &study)? else { return Ok(()) };
         let page = pages::table3(&study, &plan).map_err(|e| e.to_string())?;
-        write_page(folder, &page)
+        write_page(folder, "table3", &page)
     }
 }

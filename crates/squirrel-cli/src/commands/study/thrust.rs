@@ -39,7 +39,7 @@ impl Options {
             say(&word);
         }
         let Some(folder) = common.end("thrust", &csv, &study)? else { return Ok(()) };
-        write_page(folder, &pages::thrust(&study))
+        write_page(folder, "thrust", &pages::thrust(&study))
     }
 }
 
