@@ -7,17 +7,32 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Which of our crates a crate may depend on, top down.
-const ARROWS: [(&str, &[&str]); 9] = [
-    ("squirrel-examples", &["squirrel-study", "squirrel-gap", "squirrel-sim", "squirrel-core"]),
+const ARROWS: [(&str, &[&str]); 10] = [
+    (
+        "squirrel-examples",
+        &["squirrel-study", "squirrel-gap", "squirrel-plan", "squirrel-sim", "squirrel-core"],
+    ),
     ("hidden-effects", &["squirrel-sim"]),
     (
         "squirrel-py",
-        &["squirrel-cli", "squirrel-study", "squirrel-gap", "squirrel-nn", "squirrel-sim", "squirrel-core"],
+        &[
+            "squirrel-cli",
+            "squirrel-study",
+            "squirrel-gap",
+            "squirrel-nn",
+            "squirrel-plan",
+            "squirrel-sim",
+            "squirrel-core",
+        ],
     ),
-    ("squirrel-cli", &["squirrel-study", "squirrel-gap", "squirrel-nn", "squirrel-sim", "squirrel-core"]),
-    ("squirrel-study", &["squirrel-gap", "squirrel-nn", "squirrel-sim", "squirrel-core"]),
+    (
+        "squirrel-cli",
+        &["squirrel-study", "squirrel-gap", "squirrel-nn", "squirrel-plan", "squirrel-sim", "squirrel-core"],
+    ),
+    ("squirrel-study", &["squirrel-gap", "squirrel-nn", "squirrel-plan", "squirrel-sim", "squirrel-core"]),
     ("squirrel-gap", &["squirrel-sim", "squirrel-core"]),
     ("squirrel-nn", &["squirrel-sim", "squirrel-core"]),
+    ("squirrel-plan", &["squirrel-sim", "squirrel-core"]),
     ("squirrel-sim", &["squirrel-core"]),
     ("squirrel-core", &[]),
 ];
@@ -28,7 +43,7 @@ const KEPT_IN: [(&str, &[&str]); 6] = [
     ("glam", &[]),
     ("glamx", &[]),
     ("clap", &["squirrel-cli"]),
-    ("clarabel", &[]),
+    ("clarabel", &["squirrel-plan"]),
     ("pyo3", &["squirrel-py"]),
 ];
 

@@ -114,7 +114,7 @@ pub(super) struct Mover;
 
 #[cfg(not(feature = "rapier"))]
 impl Mover {
-    pub(super) fn new(setup: &Setup) -> Result<Self, FlightError> {
+    pub(super) fn new(setup: &Setup, _obstacles: &[[f64; 3]]) -> Result<Self, FlightError> {
         if setup.integrator == Integrator::Rapier || setup.scenario.solid_obstacles {
             return Err(FlightError("this build has no world: it lacks the feature `rapier`".to_owned()));
         }
