@@ -1,0 +1,229 @@
+//! Successive convexification: solve about an iterate, fly the answer through the model, believe it as far as the model agreed.
+//!
+//! Every iterate is a motion that the model really makes, so a plan that is stopped early can be flown. The wings stay folded until the way
+//! without them is found and may open from there: a plan with wings is never worse than the one without. Where the reference leads through
+//! obstacles, both sides of up to two of them are tried first.
+
+use super::model::Craft;
+use super::subproblem::{Control, Iterate, Subproblem, Weights};
+use super::task::{KeepOut, Node, Plan, Status, Task};
+use nalgebra::{Vector2, Vector3};
+
+/// Trust at the beginning without a plan to start from, N: more than any change.
+const COLD_TRUST_N: f64 = 20.0;
+/// The same with one.
+const WARM_TRUST_N: f64 = 4.0;
+/// Trust below which nothing moves any more, N.
+const TRUST_MIN_N: f64 = 1e-2;
+/// Relative gain that is not worth another iteration.
+const GAIN: f64 = 2e-3;
+/// Depth in an obstacle that counts as none, m.
+const TOUCH_M: f64 = 0.01;
+/// Iterations in which a side is judged.
+const TRIAL: u32 = 2;
+/// Obstacles of which both sides are tried.
+const SIDES: usize = 2;
+
+/// Plans.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Planner {
+    /// What counts how much.
+    pub weights: Weights,
+    /// Bound on convex problems: without wings, and again with them.
+    pub iterations_max: u32,
+}
+
+impl Default for Planner {
+    fn default() -> Self {
+        Self { weights: Weights::default(), iterations_max: 12 }
+    }
+}
+
+/// An iterate and what it costs.
+struct Held {
+    iterate: Iterate,
+    merit: f64,
+    trust_n: f64,
+    is_settled: bool,
+}
+
+impl Planner {
+    /// Plans; always ends, with the plan that violates least where all constraints cannot be held.
+    ///
+    /// * `warm` - an earlier plan of the same step, and how many of its steps have passed
+    pub fn plan(&self, craft: &Craft, task: &Task, warm: Option<(&Plan, usize)>) -> Plan {
+        let mut iterations = 0;
+        let mut held = self.begin(craft, task, warm, &mut iterations);
+        self.improve(craft, task, false, self.iterations_max, &mut held, &mut iterations);
+        if craft.wing.is_some() {
+            (held.is_settled, held.trust_n) = (false, held.trust_n.max(WARM_TRUST_N));
+            self.improve(craft, task, true, self.iterations_max, &mut held, &mut iterations);
+        }
+        self.finish(task, held, iterations)
+    }
+
+    fn finish(&self, task: &Task, held: Held, iterations: u32) -> Plan {
+        let Iterate { controls, path, .. } = held.iterate;
+        let (cost, _) = self.weights.cost(task, &path, &controls);
+        let depths = path.windows(2).map(|pair| task.violation_m(&pair[0], &pair[1]));
+        let violation_m = depths.fold(0.0, f64::max);
+        let status = match (violation_m <= TOUCH_M, held.is_settled) {
+            (true, true) => Status::Solved,
+            (true, false) => Status::Feasible,
+            (false, _) => Status::Infeasible,
+        };
+        let node = |(motion, (thrust, spread)): (super::model::Motion, Control)| Node {
+            position: motion.position,
+            velocity: motion.velocity,
+            acceleration: motion.acceleration,
+            thrust,
+            spread,
+        };
+        let nodes = path.into_iter().zip(controls).map(node).collect();
+        Plan { status, step_s: task.step_s(), nodes, cost, violation_m, iterations }
+    }
+
+    /// The best of a few first guesses.
+    fn begin(
+        &self,
+        craft: &Craft,
+        task: &Task,
+        warm: Option<(&Plan, usize)>,
+        iterations: &mut u32,
+    ) -> Held {
+        let controls = first_controls(craft, task, warm);
+        let start = (task.begin().position, task.begin().velocity);
+        let path = craft.roll_out(start, &controls, task.step_s());
+        let (_, merit) = self.weights.cost(task, &path, &controls);
+        let trust_n = if warm.is_some() { WARM_TRUST_N } else { COLD_TRUST_N };
+        let held = |sides| Held {
+            iterate: Iterate { controls: controls.clone(), path: path.clone(), sides },
+            merit,
+            trust_n,
+            is_settled: false,
+        };
+        let flown: Vec<Vector2<f64>> = path.iter().map(|node| node.position.xy()).collect();
+        let base = match warm {
+            Some(_) => flown,
+            None => task.wanted().iter().map(|node| node.position.xy()).collect(),
+        };
+        let mut best: Option<Held> = None;
+        for sides in guesses(task, &base) {
+            let mut next = held(sides);
+            self.improve(craft, task, false, TRIAL, &mut next, iterations);
+            if best.as_ref().is_none_or(|best| next.merit < best.merit) {
+                best = Some(next);
+            }
+        }
+        best.unwrap_or_else(|| held(base))
+    }
+
+    fn improve(
+        &self,
+        craft: &Craft,
+        task: &Task,
+        may_spread: bool,
+        most: u32,
+        held: &mut Held,
+        iterations: &mut u32,
+    ) {
+        let start = (task.begin().position, task.begin().velocity);
+        for _ in 0..most {
+            if held.is_settled {
+                return;
+            }
+            let problem = Subproblem {
+                craft,
+                task,
+                weights: &self.weights,
+                iterate: &held.iterate,
+                trust_n: held.trust_n,
+                may_spread,
+            };
+            *iterations += 1;
+            let Some((controls, foreseen)) = problem.solve() else {
+                held.trust_n *= 0.5;
+                held.is_settled = held.trust_n < TRUST_MIN_N;
+                continue;
+            };
+            let path = craft.roll_out(start, &controls, task.step_s());
+            let (_, merit) = self.weights.cost(task, &path, &controls);
+            let (_, promised) = self.weights.cost(task, &foreseen, &controls);
+            let (gain, hope) = (held.merit - merit, held.merit - promised);
+            let enough = GAIN * (1.0 + held.merit);
+            if gain > 0.0 {
+                let sides = path.iter().map(|node| node.position.xy()).collect();
+                held.iterate = Iterate { controls, path, sides };
+                held.merit = merit;
+            }
+            if hope <= enough {
+                held.is_settled = true;
+            } else if gain < 0.1 * hope {
+                held.trust_n *= 0.5;
+                held.is_settled = held.trust_n < TRUST_MIN_N;
+            } else if gain > 0.7 * hope {
+                held.trust_n = (2.0 * held.trust_n).min(COLD_TRUST_N);
+            }
+        }
+    }
+}
+
+/// Thrusts to start from: those of the earlier plan, or what carries the weight; wings fold where nothing else is known.
+fn first_controls(craft: &Craft, task: &Task, warm: Option<(&Plan, usize)>) -> Vec<Control> {
+    let begin = task.begin();
+    let rate = craft.wing_rate_max_per_s * task.step_s();
+    let mut controls = vec![(craft.limited(&begin.thrust), begin.spread)];
+    for k in 1..task.wanted().len() {
+        let fold = (begin.spread - rate * k as f64).max(0.0);
+        controls.push(match warm {
+            Some((plan, passed)) => match plan.nodes.get(k + passed).or(plan.nodes.last()) {
+                Some(node) => (node.thrust, fold),
+                None => (craft.hover(), fold),
+            },
+            None => (craft.hover(), fold),
+        });
+    }
+    controls
+}
+
+/// To which side of the obstacles that are in the way a path could lead: places about which they are linearised.
+fn guesses(task: &Task, base: &[Vector2<f64>]) -> Vec<Vec<Vector2<f64>>> {
+    let depth = |keep: &KeepOut| {
+        base.iter().map(|place| keep.radius_m - (place - keep.centre).norm()).fold(f64::NEG_INFINITY, f64::max)
+    };
+    let mut blocking: Vec<&KeepOut> = task.keep_out().iter().filter(|keep| depth(keep) > 0.0).collect();
+    let far = |keep: &KeepOut| (keep.centre - base[0]).norm();
+    blocking.sort_by(|a, b| far(a).total_cmp(&far(b)));
+    blocking.truncate(SIDES);
+    let mut all = vec![base.to_vec()];
+    for keep in blocking {
+        all = all
+            .iter()
+            .flat_map(|sides| [-1.0, 1.0].map(|side| past(keep, side, sides)))
+            .collect();
+    }
+    all
+}
+
+/// A path, moved to one side of an obstacle where it is near it: -1 left, 1 right of the way.
+fn past(keep: &KeepOut, side: f64, path: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
+    let (first, last) = (path[0], path[path.len() - 1]);
+    let way = (last - first).try_normalize(1e-9).unwrap_or_else(Vector2::x);
+    let across = Vector2::new(-way.y, way.x) * side;
+    let move_out = |place: &Vector2<f64>| {
+        let (along, off) = ((place - keep.centre).dot(&way), (place - keep.centre).dot(&across));
+        let width = keep.radius_m * keep.radius_m - along * along;
+        if width > 0.0 { place + across * (width.sqrt() - off).max(0.0) } else { *place }
+    };
+    path.iter().map(move_out).collect()
+}
+
+impl Craft {
+    /// The nearest thrust that may be asked for: a plan begins there.
+    fn limited(&self, thrust: &Vector3<f64>) -> Vector3<f64> {
+        let z = thrust.z.clamp(self.thrust_min_n, self.thrust_max_n);
+        let slope = self.tilt_max_rad.tan() * z;
+        let inside = Vector3::new(thrust.x.clamp(-slope, slope), thrust.y.clamp(-slope, slope), z);
+        inside * (self.thrust_max_n / inside.norm()).min(1.0)
+    }
+}

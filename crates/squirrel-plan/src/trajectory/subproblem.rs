@@ -1,0 +1,346 @@
+//! One convex problem of the successive convexification, for Clarabel.
+//!
+//! The model is linear about an iterate; obstacles are half-spaces that touch them where the iterate is nearest, so that whoever stays in
+//! the half-space stays out of the obstacle. Constraints that may have no solution have a slack that costs more than anything else.
+//!
+//! ```text
+//! min  sum_k |p - p_ref|_P^2 + |v - v_ref|_V^2 + r |T+ - T|^2 + c |w+ - w| + mu s
+//! a = a_bar + A (v - v_bar) + B (T - T_bar) + C (w - w_bar)        v+, p+ as in `model`
+//! |T| <= T_max     T_z >= T_min     |T_x| <= tan(tilt) T_z     |T_y| <= tan(tilt) T_z     |T+ - T| <= rates     |T - T_bar| <= trust
+//! 0 <= w <= 1      |w+ - w| <= rate      d.(p - centre) + s >= radius      |v_xy| <= v_max + s
+//! ```
+//! `|T_y| <= tan(tilt) T_z` is the inner bound of the roll limit (docs/equations.md F): the limit itself is not convex.
+
+use super::model::{Craft, Motion};
+use super::task::Task;
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus, SupportedConeT};
+use nalgebra::{Vector2, Vector3};
+
+/// What counts how much.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weights {
+    /// Of a distance to the reference, horizontal and vertical, 1/m^2.
+    pub position_per_m2: [f64; 2],
+    /// Of a difference to its velocity, s^2/m^2.
+    pub velocity_s2_per_m2: f64,
+    /// Of the last node over the others.
+    pub last: f64,
+    /// Of changes of the thrust from node to node, 1/N^2.
+    pub thrust_change_per_n2: f64,
+    /// Of folding or spreading once.
+    pub wing_move: f64,
+    /// Of the depth in an obstacle, 1/m, and of being too fast, s/m.
+    pub violation: f64,
+}
+
+impl Weights {
+    /// What a way costs: without violations, and with what they cost.
+    pub(super) fn cost(&self, task: &Task, path: &[Motion], controls: &[Control]) -> (f64, f64) {
+        let (mut cost, mut worst) = (0.0, 0.0);
+        for (k, (motion, wanted)) in path.iter().zip(task.wanted()).enumerate() {
+            let share = if k + 1 == path.len() { self.last } else { 1.0 };
+            let (off, slip) = (motion.position - wanted.position, motion.velocity - wanted.velocity);
+            let [level, height] = self.position_per_m2;
+            let place = level * off.xy().norm_squared() + height * off.z * off.z;
+            cost += share * (place + self.velocity_s2_per_m2 * slip.norm_squared());
+            if k > 0 {
+                let too_fast = motion.velocity.xy().norm() - task.speed_max_m_s();
+                worst += task.violation_m(&path[k - 1], motion).max(too_fast);
+                let ((thrust, spread), (thrust_before, spread_before)) = (controls[k], controls[k - 1]);
+                cost += self.thrust_change_per_n2 * (thrust - thrust_before).norm_squared()
+                    + self.wing_move * (spread - spread_before).abs();
+            }
+        }
+        (cost, cost + self.violation * worst)
+    }
+}
+
+impl Default for Weights {
+    fn default() -> Self {
+        Self {
+            position_per_m2: [1.0, 2.0],
+            velocity_s2_per_m2: 0.1,
+            last: 4.0,
+            thrust_change_per_n2: 0.02,
+            wing_move: 0.05,
+            violation: 300.0,
+        }
+    }
+}
+
+/// `U n`, N, and deployment at a node.
+pub(super) type Control = (Vector3<f64>, f64);
+
+/// About what the problem is linear.
+#[derive(Debug, Clone)]
+pub(super) struct Iterate {
+    /// At each node.
+    pub(super) controls: Vec<Control>,
+    /// Where they lead.
+    pub(super) path: Vec<Motion>,
+    /// Where obstacles are linearised at: the path, or a guess to which side of them it shall lead.
+    pub(super) sides: Vec<Vector2<f64>>,
+}
+
+/// Numbers of a node: position, velocity, acceleration, thrust, deployment, its change, slack.
+const WIDTH: usize = 15;
+const P: usize = 0;
+const V: usize = 3;
+const A: usize = 6;
+const T: usize = 9;
+const W: usize = 12;
+const DW: usize = 13;
+const S: usize = 14;
+/// Obstacles further than this from an iterate's node do not matter there, m.
+const NEAR_M: f64 = 4.0;
+/// How much further than its servo goes the deployment may be for a trust of 1 N, 1/N.
+const SPREAD_TRUST_PER_N: f64 = 0.5;
+
+/// Rows `a x + s = b`, `s` in a cone, in the order of their cones.
+#[derive(Default)]
+struct Rows {
+    row: Vec<usize>,
+    column: Vec<usize>,
+    value: Vec<f64>,
+    b: Vec<f64>,
+}
+
+impl Rows {
+    fn push(&mut self, terms: &[(usize, f64)], b: f64) {
+        for (column, value) in terms {
+            self.row.push(self.b.len());
+            self.column.push(*column);
+            self.value.push(*value);
+        }
+        self.b.push(b);
+    }
+}
+
+fn at(node: usize, what: usize) -> usize {
+    node * WIDTH + what
+}
+
+/// The problem about an iterate.
+pub(super) struct Subproblem<'a> {
+    pub(super) craft: &'a Craft,
+    pub(super) task: &'a Task,
+    pub(super) weights: &'a Weights,
+    pub(super) iterate: &'a Iterate,
+    /// Largest change of a component of the thrust, N.
+    pub(super) trust_n: f64,
+    /// Wings may spread; otherwise they fold where they are not.
+    pub(super) may_spread: bool,
+}
+
+impl Subproblem<'_> {
+    fn nodes(&self) -> usize {
+        self.iterate.path.len()
+    }
+
+    /// Controls, and where the linear model takes them to lead; `None` where Clarabel finds no solution, which only numbers out of all proportion bring about.
+    pub(super) fn solve(&self) -> Option<(Vec<Control>, Vec<Motion>)> {
+        let nodes = self.nodes();
+        let (p, q) = self.cost();
+        let mut rows = Rows::default();
+        self.dynamics(&mut rows);
+        let equalities = rows.b.len();
+        self.bounds(&mut rows);
+        let inequalities = rows.b.len() - equalities;
+        let mut cones =
+            vec![SupportedConeT::ZeroConeT(equalities), SupportedConeT::NonnegativeConeT(inequalities)];
+        self.cones(&mut rows, &mut cones);
+        let size = (rows.b.len(), nodes * WIDTH);
+        let a = CscMatrix::new_from_triplets(size.0, size.1, rows.row, rows.column, rows.value);
+        let settings = DefaultSettings {
+            verbose: false,
+            presolve_enable: false,
+            tol_gap_abs: 1e-6,
+            tol_gap_rel: 1e-6,
+            tol_feas: 1e-7,
+            max_iter: 60,
+            ..DefaultSettings::default()
+        };
+        let mut solver = DefaultSolver::new(&p, &q, &a, &rows.b, &cones, settings).ok()?;
+        solver.solve();
+        let usable = matches!(
+            solver.solution.status,
+            SolverStatus::Solved
+                | SolverStatus::AlmostSolved
+                | SolverStatus::MaxIterations
+                | SolverStatus::InsufficientProgress
+        );
+        let x = &solver.solution.x;
+        if !usable || !x.iter().all(|x| x.is_finite()) {
+            return None;
+        }
+        let control = |k: usize| {
+            let thrust = Vector3::from_column_slice(&x[at(k, T)..at(k, T) + 3]);
+            (thrust, x[at(k, W)].clamp(0.0, 1.0))
+        };
+        let motion = |k: usize| {
+            let three = |what: usize| Vector3::from_column_slice(&x[at(k, what)..at(k, what) + 3]);
+            Motion { position: three(P), velocity: three(V), acceleration: three(A) }
+        };
+        Some(((0..nodes).map(control).collect(), (0..nodes).map(motion).collect()))
+    }
+
+    fn cost(&self) -> (CscMatrix<f64>, Vec<f64>) {
+        let (nodes, weights) = (self.nodes(), self.weights);
+        let mut square = Rows::default();
+        let mut q = vec![0.0; nodes * WIDTH];
+        let mut entry = |i: usize, j: usize, value: f64| {
+            square.row.push(i);
+            square.column.push(j);
+            square.value.push(value);
+        };
+        let [level, height] = weights.position_per_m2;
+        for (k, wanted) in self.task.wanted().iter().enumerate() {
+            let share = if k + 1 == nodes { weights.last } else { 1.0 };
+            for axis in 0..3 {
+                let by_position = 2.0 * share * if axis == 2 { height } else { level };
+                let by_velocity = 2.0 * share * weights.velocity_s2_per_m2;
+                entry(at(k, P + axis), at(k, P + axis), by_position);
+                entry(at(k, V + axis), at(k, V + axis), by_velocity);
+                q[at(k, P + axis)] = -by_position * wanted.position[axis];
+                q[at(k, V + axis)] = -by_velocity * wanted.velocity[axis];
+                let change = 2.0 * weights.thrust_change_per_n2;
+                let ends = if k == 0 || k + 1 == nodes { 1.0 } else { 2.0 };
+                entry(at(k, T + axis), at(k, T + axis), change * ends);
+                if k > 0 {
+                    entry(at(k - 1, T + axis), at(k, T + axis), -change);
+                }
+            }
+            q[at(k, DW)] = weights.wing_move;
+            q[at(k, S)] = weights.violation;
+        }
+        let size = nodes * WIDTH;
+        (CscMatrix::new_from_triplets(size, size, square.row, square.column, square.value), q)
+    }
+
+    fn dynamics(&self, rows: &mut Rows) {
+        let (begin, h) = (self.task.begin(), self.task.step_s());
+        let (thrust, spread) = self.iterate.controls[0];
+        for axis in 0..3 {
+            rows.push(&[(at(0, P + axis), 1.0)], begin.position[axis]);
+            rows.push(&[(at(0, V + axis), 1.0)], begin.velocity[axis]);
+            rows.push(&[(at(0, T + axis), 1.0)], thrust[axis]);
+        }
+        rows.push(&[(at(0, W), 1.0)], spread);
+        for (k, motion) in self.iterate.path.iter().enumerate() {
+            let (thrust, spread) = self.iterate.controls[k];
+            let slopes = self.craft.slopes(&motion.velocity, &thrust, spread);
+            let rest = motion.acceleration
+                - slopes.by_velocity * motion.velocity
+                - slopes.by_thrust * thrust
+                - slopes.by_spread * spread;
+            for axis in 0..3 {
+                let mut terms = vec![(at(k, A + axis), 1.0), (at(k, W), -slopes.by_spread[axis])];
+                for other in 0..3 {
+                    terms.push((at(k, V + other), -slopes.by_velocity[(axis, other)]));
+                    terms.push((at(k, T + other), -slopes.by_thrust[(axis, other)]));
+                }
+                rows.push(&terms, rest[axis]);
+                if k + 1 < self.nodes() {
+                    let of = |what: usize| (at(k, what + axis), at(k + 1, what + axis));
+                    let ((p, p_next), (v, v_next), (a, a_next)) = (of(P), of(V), of(A));
+                    rows.push(&[(v_next, 1.0), (v, -1.0), (a, -h / 2.0), (a_next, -h / 2.0)], 0.0);
+                    let h2 = h * h;
+                    rows.push(
+                        &[(p_next, 1.0), (p, -1.0), (v, -h), (a, -h2 / 3.0), (a_next, -h2 / 6.0)],
+                        0.0,
+                    );
+                }
+            }
+        }
+    }
+
+    fn bounds(&self, rows: &mut Rows) {
+        let (craft, h) = (self.craft, self.task.step_s());
+        let slope = craft.tilt_max_rad.tan();
+        let sideways = craft.tilt_rate_max_rad_s * craft.hover().z * h;
+        let upwards = craft.thrust_rate_max_n_s * h;
+        let may_spread = self.may_spread && craft.wing.is_some();
+        for k in 0..self.nodes() {
+            rows.push(&[(at(k, S), -1.0)], 0.0);
+            rows.push(&[(at(k, DW), -1.0)], 0.0);
+            if k == 0 {
+                continue;
+            }
+            let (thrust, spread) = self.iterate.controls[k];
+            let z = at(k, T + 2);
+            let trust = self.trust_n;
+            rows.push(&[(z, -1.0)], -craft.thrust_min_n.max(thrust.z - trust));
+            rows.push(&[(z, 1.0)], thrust.z + trust);
+            for axis in 0..2 {
+                let x = at(k, T + axis);
+                rows.push(&[(x, 1.0), (z, -slope)], 0.0);
+                rows.push(&[(x, -1.0), (z, -slope)], 0.0);
+                rows.push(&[(x, 1.0)], thrust[axis] + trust);
+                rows.push(&[(x, -1.0)], trust - thrust[axis]);
+            }
+            for axis in 0..3 {
+                let limit = if axis == 2 { upwards } else { sideways };
+                let (now, before) = (at(k, T + axis), at(k - 1, T + axis));
+                rows.push(&[(now, 1.0), (before, -1.0)], limit);
+                rows.push(&[(now, -1.0), (before, 1.0)], limit);
+            }
+            let (now, before, change) = (at(k, W), at(k - 1, W), at(k, DW));
+            let room = SPREAD_TRUST_PER_N * trust;
+            let left = self.task.begin().spread - craft.wing_rate_max_per_s * h * k as f64;
+            let most = if may_spread { (spread + room).min(1.0) } else { left.max(0.0) };
+            rows.push(&[(now, 1.0)], most);
+            rows.push(&[(now, -1.0)], -(spread - room).clamp(0.0, most));
+            rows.push(&[(now, 1.0), (before, -1.0), (change, -1.0)], 0.0);
+            rows.push(&[(now, -1.0), (before, 1.0), (change, -1.0)], 0.0);
+            rows.push(&[(change, 1.0)], craft.wing_rate_max_per_s * h);
+            self.half_spaces(k, rows);
+        }
+    }
+
+    /// Obstacles near a node, and near the middle of the way to it: between two nodes a path cuts corners.
+    fn half_spaces(&self, k: usize, rows: &mut Rows) {
+        let h = self.task.step_s();
+        for keep in self.task.keep_out() {
+            let outward = |place: Vector2<f64>| {
+                let away = place - keep.centre;
+                (away.norm() < keep.radius_m + NEAR_M).then(|| away / away.norm().max(1e-9))
+            };
+            if let Some(d) = outward(self.iterate.sides[k]) {
+                let terms = [(at(k, P), -d.x), (at(k, P + 1), -d.y), (at(k, S), -1.0)];
+                rows.push(&terms, -keep.radius_m - d.dot(&keep.centre));
+            }
+            if k > 1
+                && let Some(d) = outward((self.iterate.sides[k] + self.iterate.sides[k - 1]) * 0.5)
+            {
+                let mut terms = vec![(at(k, S), -1.0)];
+                for axis in 0..2 {
+                    for node in [k - 1, k] {
+                        terms.push((at(node, P + axis), -0.5 * d[axis]));
+                        let sign = if node == k { -1.0 } else { 1.0 };
+                        terms.push((at(node, V + axis), -d[axis] * sign * h / 8.0));
+                    }
+                }
+                rows.push(&terms, -keep.radius_m - d.dot(&keep.centre));
+            }
+        }
+    }
+
+    fn cones(&self, rows: &mut Rows, cones: &mut Vec<SupportedConeT<f64>>) {
+        let fastest = self.task.speed_max_m_s();
+        for k in 1..self.nodes() {
+            rows.push(&[], self.craft.thrust_max_n);
+            for axis in 0..3 {
+                rows.push(&[(at(k, T + axis), -1.0)], 0.0);
+            }
+            cones.push(SupportedConeT::SecondOrderConeT(4));
+            if fastest.is_finite() {
+                rows.push(&[(at(k, S), -1.0)], fastest);
+                for axis in 0..2 {
+                    rows.push(&[(at(k, V + axis), -1.0)], 0.0);
+                }
+                cones.push(SupportedConeT::SecondOrderConeT(3));
+            }
+        }
+    }
+}
