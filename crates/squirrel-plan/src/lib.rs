@@ -4,5 +4,6 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
+pub mod pilot;
 pub mod trajectory;
 pub mod wing;

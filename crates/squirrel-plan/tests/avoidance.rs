@@ -19,7 +19,7 @@ fn task(craft: &Craft, draw: &mut Draw) -> Task {
     let speed = draw.within(4.0, 8.0);
     let velocity = Vector3::new(speed, 0.0, 0.0);
     let position = Vector3::new(0.0, 0.0, -30.0);
-    let begin = Begin { position, velocity, thrust: craft.hover(), spread: 0.0 };
+    let begin = Begin { position, velocity, thrust: -craft.hover(), spread: 0.0 };
     let wanted =
         (0..=20).map(|k| Wanted { position: position + velocity * (0.1 * f64::from(k)), velocity }).collect();
     let count = draw.within(1.0, 3.999) as usize;

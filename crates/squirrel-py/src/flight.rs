@@ -9,7 +9,7 @@ use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_core::stack::{SensorFrame, Stack, StackOutput, StackState};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Pilot, Setup};
+use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Offboard, Pilot, Setup};
 use squirrel_sim::scenario::Scenario;
 use std::path::Path;
 
@@ -127,9 +127,12 @@ pub(crate) fn simulate(
     };
     let stack = setup.stack().map_err(error::value)?;
     let pilot = policy.map(|policy| Pilot::new(policy.get().weights.clone(), &setup, &stack));
-    let pilot = pilot.transpose().map_err(error::value)?;
+    let mut pilot = pilot.transpose().map_err(error::value)?;
     let mut computer = Interruptible { stack, state: StackState::default(), steps: 0, signal: None };
-    let flown = py.detach(|| setup.fly_on(&mut computer, pilot, true, |_| {}));
+    let flown = py.detach(|| {
+        let pilot = pilot.as_mut().map(|pilot| pilot as &mut dyn Offboard);
+        setup.fly_on(&mut computer, pilot, true, |_| {})
+    });
     if let Some(signal) = computer.signal {
         return Err(signal);
     }

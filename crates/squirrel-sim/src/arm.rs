@@ -27,11 +27,15 @@ pub enum Arm {
     TwccPlus,
     /// The same with the wings folded: its fair rival.
     PcPlus,
+    /// A planner that uses the wings, outside of the flight code (`squirrel-plan`).
+    PlanWings,
+    /// The same planner with the wings folded: its fair rival.
+    PlanNoWings,
 }
 
 impl Arm {
-    /// All arms.
-    pub const ALL: [Self; 9] = [
+    /// The arms that the flight code flies alone.
+    pub const ALONE: [Self; 9] = [
         Self::Pc,
         Self::PcWingsOpen,
         Self::WiicNoWings,
@@ -42,6 +46,16 @@ impl Arm {
         Self::TwccPlus,
         Self::PcPlus,
     ];
+
+    /// All arms.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Self::ALONE.into_iter().chain([Self::PlanWings, Self::PlanNoWings])
+    }
+
+    /// Whether commands come from a planner outside of the flight code.
+    pub fn plans(self) -> bool {
+        matches!(self, Self::PlanWings | Self::PlanNoWings)
+    }
 
     /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
@@ -55,6 +69,8 @@ impl Arm {
             Self::TwccOracle => "twcc_oracle",
             Self::TwccPlus => "twcc_plus",
             Self::PcPlus => "pc_plus",
+            Self::PlanWings => "plan_wings",
+            Self::PlanNoWings => "plan_no_wings",
         }
     }
 
@@ -63,8 +79,8 @@ impl Arm {
     /// # Errors
     /// One line that lists the names.
     pub fn parse(name: &str) -> Result<Self, String> {
-        Self::ALL.into_iter().find(|arm| arm.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
+        Self::all().find(|arm| arm.name() == name).ok_or_else(|| {
+            let names = Self::all().map(Self::name).collect::<Vec<_>>().join(", ");
             format!("arm = {name}: no such arm; known are {names}")
         })
     }
@@ -83,7 +99,8 @@ impl Arm {
     /// One line where they are needed and there are none.
     pub fn configure(self, twcc: &mut TwccParameters, weights: Option<&ParnnWeights>) -> Result<(), String> {
         twcc.policy = match self {
-            Self::Pc | Self::PcPlus => WingPolicy::Folded,
+            // What flies before the first command of a planner, and where it is lost.
+            Self::Pc | Self::PcPlus | Self::PlanWings | Self::PlanNoWings => WingPolicy::Folded,
             Self::PcWingsOpen => WingPolicy::Open,
             Self::WiicNoWings => WingPolicy::CoordinatedWithoutWings,
             Self::Phantom | Self::TwccFlat | Self::TwccParnn | Self::TwccOracle | Self::TwccPlus => {
@@ -134,7 +151,7 @@ mod tests {
 
     #[test]
     fn names_and_arms_are_one_to_one() {
-        for arm in Arm::ALL {
+        for arm in Arm::all() {
             assert_eq!(Arm::parse(arm.name()), Ok(arm));
         }
         assert!(Arm::parse("twcc").unwrap_err().contains("twcc_flat"));

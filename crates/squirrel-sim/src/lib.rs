@@ -3,7 +3,7 @@
 //! - [`flight`] closes the loop: [`plant`] (and [`world`] near contact) moves, [`sensors`] measure, the flight code of
 //!   `squirrel-core` commands, the log records. [`replay`] runs the flight code again on a log's inputs.
 //! - [`vehicle_file`], [`weights`] and [`scenario`] read what to fly; [`arm`] says who flies; [`faults`] breaks sensors in
-//!   recorded frames.
+//!   recorded frames; [`track`] is a plan to follow.
 //! - [`batch`] flies thousands of vehicles at once on wide registers, [`task`] makes environments of it in which policies learn.
 //! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it.
 
@@ -21,6 +21,7 @@ pub mod scenario;
 pub mod sensors;
 pub mod task;
 mod toml_text;
+pub mod track;
 pub mod vehicle_file;
 pub mod weights;
 #[cfg(feature = "rapier")]

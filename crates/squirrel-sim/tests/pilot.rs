@@ -53,8 +53,8 @@ fn random() -> Policy {
 
 fn fly(setup: &Setup, computer: &mut dyn FlightComputer, policy: &Policy) -> Flight {
     let weights = PolicyWeights { policy: *policy, name: "test".to_owned() };
-    let pilot = Pilot::new(weights, setup, &setup.stack().unwrap()).unwrap();
-    setup.fly_on(computer, Some(pilot), true, |_| {}).unwrap()
+    let mut pilot = Pilot::new(weights, setup, &setup.stack().unwrap()).unwrap();
+    setup.fly_on(computer, Some(&mut pilot), true, |_| {}).unwrap()
 }
 
 fn flown(setup: &Setup, policy: &Policy) -> Flight {

@@ -26,7 +26,7 @@ fn flown_by(vehicle: VehicleFile, arm: Arm) -> FlightLog {
 fn every_arm_replays_bit_for_bit_through_a_file() {
     let folder = std::env::temp_dir().join(format!("squirrel-replays-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
-    for arm in Arm::ALL {
+    for arm in Arm::ALONE {
         let path = folder.join(arm.name()).with_extension("mcap");
         flown(arm).write(&path).unwrap();
         let log = FlightLog::read(&path).unwrap();

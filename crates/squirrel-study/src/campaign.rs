@@ -25,9 +25,9 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// All arms that the vehicle can fly; without weights nobody believes in the network.
+    /// All arms that the vehicle can fly alone; without weights nobody believes in the network. Planners fly where they are asked for.
     pub fn of_all_arms(vehicle: VehicleFile, trials: u32, seed: u64) -> Self {
-        let mut arms = Arm::ALL.to_vec();
+        let mut arms = Arm::ALONE.to_vec();
         arms.retain(|arm| arm.is_known_to(&vehicle));
         Self { vehicle, arms, trials, seed }
     }

@@ -12,6 +12,7 @@ use crate::campaign::{self, Flown, Plan};
 use crate::journal::{Journal, Keep};
 use crate::statistics::{Estimate, FEW, Share, mean, paired_shares};
 use serde::{Deserialize, Serialize};
+use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, OVER_RAD};
 use squirrel_sim::scenario::Scenario;
@@ -169,7 +170,7 @@ pub fn scenario(plan: &Plan, thrust_to_weight: f64, trial: u32) -> Result<Scenar
 fn fly(plan: &Plan, arm: Arm, thrust_to_weight: f64, trial: u32) -> Result<Flight, FlightError> {
     let scenario = scenario(plan, thrust_to_weight, trial)?;
     let way_m = scenario.forest.as_ref().map_or(f64::INFINITY, |forest| forest.path_m);
-    let m = plan.setup(arm, scenario).fly(false, |_| {})?.metrics;
+    let m = pilot::fly(&plan.setup(arm, scenario), false, |_| {})?.metrics;
     Ok(Flight {
         path_m: m.path_m,
         displacement_m: m.displacement_m,

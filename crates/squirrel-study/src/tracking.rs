@@ -5,6 +5,7 @@ use crate::campaign::{self, Flown, Plan};
 use crate::journal::{Journal, Keep};
 use crate::statistics::{Estimate, gain, mean, paired};
 use serde::{Deserialize, Serialize};
+use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
@@ -116,7 +117,7 @@ pub fn setup(plan: &Plan, condition: &Condition, arm: Arm, trial: u32) -> Setup 
 }
 
 fn fly(plan: &Plan, condition: &Condition, arm: Arm, trial: u32) -> Result<Flight, FlightError> {
-    let m = setup(plan, condition, arm, trial).fly(false, |_| {})?.metrics;
+    let m = pilot::fly(&setup(plan, condition, arm, trial), false, |_| {})?.metrics;
     Ok(Flight {
         rmse_m: m.rmse_m,
         rmse_horizontal_m: m.rmse_horizontal_m,

@@ -4,11 +4,20 @@ use super::hil::EmulatedM7;
 use super::{facts, figures, vehicle, view, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
+use squirrel_core::control::follow::FollowGains;
+use squirrel_core::stack::Stack;
+use squirrel_plan::pilot::Replanner;
+use squirrel_plan::wing::WingModel;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{InProcess, Integrator, Metrics, Pilot, Setup};
+use squirrel_sim::flight::{
+    FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Pilot, Setup,
+};
+use squirrel_sim::log::FlightLog;
 use squirrel_sim::report::flight::{Heading, render};
 use squirrel_sim::scenario::Scenario;
+use squirrel_sim::track::Track;
+use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_sim::weights::PolicyWeights;
 use std::path::PathBuf;
 
@@ -18,14 +27,17 @@ pub(crate) struct Fly {
     /// Vehicle file; the shipped squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_parnn, twcc_oracle; if left
-    /// out, twcc_flat, or pc with a policy.
+    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_parnn, twcc_oracle, twcc_plus, pc_plus,
+    /// plan_wings, plan_no_wings; if left out, twcc_flat, or pc with a policy or a reference.
     #[arg(long)]
     arm: Option<String>,
     /// Policy that flies instead of the arm's outer loop (.safetensors); the mission goes straight on, to avoid is its own
     /// business.
     #[arg(long)]
     policy: Option<PathBuf>,
+    /// Plan to fly along instead of the mission (.mcap, as `squirrel plan` writes it, or any log with a reference), to its end.
+    #[arg(long, conflicts_with = "policy")]
+    reference: Option<PathBuf>,
     /// hover, avoid, steer, track, excite_calm, excite_normal, excite_rich, or a scenario file (.toml).
     #[arg(long, default_value = "avoid")]
     scenario: String,
@@ -79,7 +91,37 @@ struct Flown {
     metrics: Metrics,
 }
 
+/// Who commands from outside of the flight code, if anybody.
+fn offboard_of(
+    setup: &Setup,
+    stack: &Stack,
+    policy: Option<PolicyWeights>,
+    track: Option<Track>,
+) -> Result<Option<Box<dyn Offboard>>, FlightError> {
+    if let Some(weights) = policy {
+        return Ok(Some(Box::new(Pilot::new(weights, setup, stack)?)));
+    }
+    if let Some(track) = track {
+        let mut follower = Follower::new(setup, FollowGains::default())?;
+        follower.follow(track, 0);
+        return Ok(Some(Box::new(follower)));
+    }
+    if setup.arm.plans() {
+        return Ok(Some(Box::new(Replanner::new(setup, WingModel::Flat)?)));
+    }
+    Ok(None)
+}
+
 impl Fly {
+    /// The plan of `--reference`.
+    fn track(&self, vehicle: &VehicleFile) -> Result<Option<Track>, String> {
+        let Some(path) = &self.reference else { return Ok(None) };
+        let log = FlightLog::read(path).map_err(|e| e.to_string())?;
+        let mass_kg = vehicle.vehicle.parameters().mass_kg;
+        let track = Track::of(&log, mass_kg).map_err(|problem| format!("{}: {problem}", path.display()))?;
+        Ok(Some(track))
+    }
+
     pub(crate) fn run(&self) -> Result<(), String> {
         let mut scenario = Scenario::find(&self.scenario)?;
         if let Some(seed) = self.seed {
@@ -88,12 +130,18 @@ impl Fly {
         if self.thrust_to_weight.is_some() {
             scenario.thrust_to_weight = self.thrust_to_weight;
         }
-        let by_default = if self.policy.is_some() { Arm::Pc } else { Arm::TwccFlat };
+        let offboard = self.policy.is_some() || self.reference.is_some();
+        let by_default = if offboard { Arm::Pc } else { Arm::TwccFlat };
         // What the options changed is the scenario's, and so are errors in it; the rest is the vehicle's.
         scenario.check().map_err(|e| format!("scenario {}: {e}", self.scenario))?;
         let mut vehicle = vehicle(self.vehicle.as_deref())?;
         if let Some(name) = &self.estimator {
             vehicle.estimator = Estimator::parse(name)?;
+        }
+        let track = self.track(&vehicle)?;
+        if let Some(track) = &track {
+            scenario.duration_s = scenario.duration_s.min(track.end_s());
+            scenario.measured_window_s = 0.0;
         }
         let setup = Setup {
             vehicle,
@@ -105,20 +153,19 @@ impl Fly {
             Some(file) => format!("{}: {e}", file.display()),
             None => e.to_string(),
         })?;
-        let pilot = self.policy.as_deref().map(|path| {
-            let weights = PolicyWeights::load(path).map_err(|e| e.to_string())?;
-            Pilot::new(weights, &setup, &stack).map_err(|e| e.to_string())
-        });
-        let pilot = pilot.transpose()?;
+        let weights = self.policy.as_deref().map(PolicyWeights::load).transpose().map_err(|e| e.to_string())?;
         // What flies, in words.
-        let who = match &pilot {
-            Some(pilot) => format!("policy {} over {}", pilot.weights().name, setup.arm.name()),
-            None => setup.arm.name().to_owned(),
+        let who = match (&weights, &self.reference) {
+            (Some(weights), _) => format!("policy {} over {}", weights.name, setup.arm.name()),
+            (None, Some(file)) => format!("the plan of {} over {}", file.display(), setup.arm.name()),
+            (None, None) => setup.arm.name().to_owned(),
         };
-        let policy = pilot.as_ref().map(|pilot| pilot.weights().hash());
+        let policy = weights.as_ref().map(PolicyWeights::hash);
+        let mut pilot = offboard_of(&setup, &stack, weights, track).map_err(|e| e.to_string())?;
         let record = self.out.is_some() || self.report.is_some();
         let bar = output::progress((setup.scenario.duration_s * 10.0) as u64, "x 0.1 s");
         let progress = |t: f64| bar.set_position((t * 10.0) as u64);
+        let pilot = pilot.as_mut().map(|pilot| &mut **pilot as &mut dyn Offboard);
         let flown = match self.hil {
             None => setup.fly_on(&mut InProcess::new(stack), pilot, record, progress),
             Some(Hil::Qemu) => {

@@ -158,9 +158,9 @@ impl Flown {
         let mut plan = Plan::of_all_arms(vehicle, trials, self.common.seed);
         if !arms.is_empty() {
             plan.arms = arms;
-        } else if plan.arms.len() < Arm::ALL.len() {
+        } else if plan.arms.len() < Arm::ALONE.len() {
             let missing: Vec<&str> =
-                Arm::ALL.iter().filter(|arm| !plan.arms.contains(arm)).map(|arm| arm.name()).collect();
+                Arm::ALONE.iter().filter(|arm| !plan.arms.contains(arm)).map(|arm| arm.name()).collect();
             talk(&format!(
                 "{} does not have what they need: {} left out",
                 plan.vehicle.name,

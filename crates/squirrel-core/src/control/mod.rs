@@ -2,12 +2,13 @@
 //!
 //! Outer loop, 10 Hz ([`twcc`]): [`position`] (the paper's PC) asks for angles and thrust, [`wing_force`] estimates what
 //! spread wings would do, [`woeg`] says whether that would help, [`wiic`] takes over where the angles are at their limit. Or
-//! [`plus`], which chooses angles, thrust and wings together.
+//! [`plus`], which chooses angles, thrust and wings together. Or [`follow`], outside of the step, on a plan.
 //! Inner loop, 300 Hz: [`command_filter`] smooths the 10 Hz steps, [`backstepping`] turns attitude error into torque,
 //! [`mixer`] turns thrust and torque into rotor thrusts.
 
 pub mod backstepping;
 pub mod command_filter;
+pub mod follow;
 pub mod mixer;
 pub mod plus;
 pub mod position;

@@ -8,4 +8,4 @@ mod task;
 pub use model::{Craft, Motion, Slopes};
 pub use scp::Planner;
 pub use subproblem::Weights;
-pub use task::{Begin, KeepOut, Node, Plan, STEPS_MAX, Status, Task, Wanted};
+pub use task::{Begin, KeepOut, Plan, STEPS_MAX, Status, Task, Wanted};

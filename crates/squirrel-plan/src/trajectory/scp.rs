@@ -4,10 +4,11 @@
 //! without them is found and may open from there: a plan with wings is never worse than the one without. Where the reference leads through
 //! obstacles, both sides of up to two of them are tried first.
 
-use super::model::Craft;
+use super::model::{Craft, Motion};
 use super::subproblem::{Control, Iterate, Subproblem, Weights};
-use super::task::{KeepOut, Node, Plan, Status, Task};
+use super::task::{KeepOut, Plan, Status, Task};
 use nalgebra::{Vector2, Vector3};
+use squirrel_sim::track::{Track, TrackPoint};
 
 /// Trust at the beginning without a plan to start from, N: more than any change.
 const COLD_TRUST_N: f64 = 20.0;
@@ -50,8 +51,8 @@ struct Held {
 impl Planner {
     /// Plans; always ends, with the plan that violates least where all constraints cannot be held.
     ///
-    /// * `warm` - an earlier plan of the same step, and how many of its steps have passed
-    pub fn plan(&self, craft: &Craft, task: &Task, warm: Option<(&Plan, usize)>) -> Plan {
+    /// * `warm` - an earlier plan, and how much of it has passed, s
+    pub fn plan(&self, craft: &Craft, task: &Task, warm: Option<(&Track, f64)>) -> Plan {
         let mut iterations = 0;
         let mut held = self.begin(craft, task, warm, &mut iterations);
         self.improve(craft, task, false, self.iterations_max, &mut held, &mut iterations);
@@ -72,15 +73,15 @@ impl Planner {
             (true, false) => Status::Feasible,
             (false, _) => Status::Infeasible,
         };
-        let node = |(motion, (thrust, spread)): (super::model::Motion, Control)| Node {
+        let point = |(motion, (thrust, wing)): (&Motion, &Control)| TrackPoint {
             position: motion.position,
             velocity: motion.velocity,
             acceleration: motion.acceleration,
-            thrust,
-            spread,
+            thrust: -thrust,
+            wing: *wing,
         };
-        let nodes = path.into_iter().zip(controls).map(node).collect();
-        Plan { status, step_s: task.step_s(), nodes, cost, violation_m, iterations }
+        let track = Track::even(task.step_s(), path.iter().zip(&controls).map(point).collect());
+        Plan { status, track, cost, violation_m, iterations }
     }
 
     /// The best of a few first guesses.
@@ -88,7 +89,7 @@ impl Planner {
         &self,
         craft: &Craft,
         task: &Task,
-        warm: Option<(&Plan, usize)>,
+        warm: Option<(&Track, f64)>,
         iterations: &mut u32,
     ) -> Held {
         let controls = first_controls(craft, task, warm);
@@ -169,15 +170,15 @@ impl Planner {
 }
 
 /// Thrusts to start from: those of the earlier plan, or what carries the weight; wings fold where nothing else is known.
-fn first_controls(craft: &Craft, task: &Task, warm: Option<(&Plan, usize)>) -> Vec<Control> {
+fn first_controls(craft: &Craft, task: &Task, warm: Option<(&Track, f64)>) -> Vec<Control> {
     let begin = task.begin();
     let rate = craft.wing_rate_max_per_s * task.step_s();
-    let mut controls = vec![(craft.limited(&begin.thrust), begin.spread)];
+    let mut controls = vec![(craft.limited(&-begin.thrust), begin.spread)];
     for k in 1..task.wanted().len() {
         let fold = (begin.spread - rate * k as f64).max(0.0);
         controls.push(match warm {
-            Some((plan, passed)) => match plan.nodes.get(k + passed).or(plan.nodes.last()) {
-                Some(node) => (node.thrust, fold),
+            Some((track, passed_s)) => match track.at(passed_s + k as f64 * task.step_s()) {
+                Some(point) => (craft.limited(&-point.thrust), fold),
                 None => (craft.hover(), fold),
             },
             None => (craft.hover(), fold),

@@ -2,6 +2,7 @@
 
 use super::model::Motion;
 use nalgebra::{Vector2, Vector3};
+use squirrel_sim::track::Track;
 
 /// Most steps of a plan.
 pub const STEPS_MAX: usize = 400;
@@ -13,7 +14,7 @@ pub struct Begin {
     pub position: Vector3<f64>,
     /// NED, m/s.
     pub velocity: Vector3<f64>,
-    /// Thrust along body z, `U n`, NED, N.
+    /// Force of the rotors, NED, N.
     pub thrust: Vector3<f64>,
     /// Deployment of the wings, 0 folded to 1 spread.
     pub spread: f64,
@@ -161,59 +162,17 @@ impl Status {
     }
 }
 
-/// One node of a plan.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Node {
-    /// NED, m.
-    pub position: Vector3<f64>,
-    /// NED, m/s.
-    pub velocity: Vector3<f64>,
-    /// NED, m/s^2.
-    pub acceleration: Vector3<f64>,
-    /// Thrust along body z, `U n`, NED, N.
-    pub thrust: Vector3<f64>,
-    /// Deployment of the wings, 0 folded to 1 spread.
-    pub spread: f64,
-}
-
 /// A plan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// How it ended.
     pub status: Status,
-    /// From node to node, s.
-    pub step_s: f64,
-    /// Nodes, the first where the task begins.
-    pub nodes: Vec<Node>,
+    /// What to fly.
+    pub track: Track,
     /// What it costs, without what violations cost.
     pub cost: f64,
     /// How deep it is in what it must stay out of, at worst, m.
     pub violation_m: f64,
     /// Convex problems that were solved.
     pub iterations: u32,
-}
-
-impl Plan {
-    /// The node at a time, thrust and deployment linear in between as planned; the last one after the end.
-    ///
-    /// * `t_s` - since the beginning
-    pub fn at(&self, t_s: f64) -> Option<Node> {
-        let last = self.nodes.len().checked_sub(1)?;
-        let place = (t_s / self.step_s).max(0.0);
-        let k = (place.floor() as usize).min(last);
-        let (a, b) = (self.nodes[k], self.nodes[(k + 1).min(last)]);
-        let (share, h) = ((place - k as f64).clamp(0.0, 1.0), self.step_s);
-        let s = share * h;
-        let jerk = (b.acceleration - a.acceleration) / h;
-        Some(Node {
-            position: a.position
-                + a.velocity * s
-                + a.acceleration * (s * s / 2.0)
-                + jerk * (s * s * s / 6.0),
-            velocity: a.velocity + a.acceleration * s + jerk * (s * s / 2.0),
-            acceleration: a.acceleration + jerk * s,
-            thrust: a.thrust + (b.thrust - a.thrust) * share,
-            spread: a.spread + (b.spread - a.spread) * share,
-        })
-    }
 }

@@ -5,6 +5,7 @@ use super::surroundings::Surroundings;
 use crate::plant::PlantState;
 use crate::scenario::Scenario;
 use serde::Serialize;
+use squirrel_core::control::Reference;
 use squirrel_core::control::twcc::Mode;
 use squirrel_core::estimate::navigator::Health;
 use squirrel_core::frames::{Body, In};
@@ -147,12 +148,14 @@ impl<'a> Meter<'a> {
         }
     }
 
+    /// * `reference` - what is followed
     /// * `encounters` - so far
     pub(super) fn tick(
         &mut self,
         state: &PlantState,
         frame: &SensorFrame,
         output: &StackOutput,
+        reference: &Reference,
         encounters: u32,
         obstacles: &mut Surroundings,
     ) {
@@ -188,14 +191,14 @@ impl<'a> Meter<'a> {
             self.over = true;
             return;
         }
-        let error = at - output.reference.position.vector.cast::<f64>();
+        let error = at - reference.position.vector.cast::<f64>();
         self.samples += 1;
         self.square += error.norm_squared();
         self.square_horizontal += error.xy().norm_squared();
         if let (Some(fix), Some(altitude_m)) = (&frame.gnss, self.altitude_m) {
             let at = Vector3::new(fix.position.vector.x, fix.position.vector.y, -altitude_m);
             self.fixes += 1;
-            self.square_measured += f64::from((at - output.reference.position.vector).norm_squared());
+            self.square_measured += f64::from((at - reference.position.vector).norm_squared());
         }
         self.volt += state.battery.voltage_v;
         self.metrics.window_s = elapsed_s;

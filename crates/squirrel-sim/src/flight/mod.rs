@@ -8,14 +8,16 @@ mod commands;
 mod failing;
 mod integrator;
 mod metrics;
+mod offboard;
 mod pilot;
 mod record;
 mod surroundings;
 
 pub use integrator::Integrator;
 pub use metrics::{Flags, Metrics, OVER_RAD};
+pub use offboard::{Follower, Offboard};
 pub use pilot::Pilot;
-pub(crate) use record::{ESTIMATE, ESTIMATOR, FORMAT, Inputs, PARNN_WEIGHTS, record_output};
+pub(crate) use record::{ESTIMATE, ESTIMATOR, FOLLOWED, FORMAT, Inputs, PARNN_WEIGHTS, record_output};
 pub use record::{INPUT_SOURCES, frames};
 
 use crate::arm::Arm;
@@ -218,6 +220,10 @@ impl Setup {
     /// A setup that cannot be used, or a plant that left the finite numbers.
     pub fn fly(&self, record: bool, progress: impl FnMut(f64)) -> Result<Flight, FlightError> {
         self.scenario.check().map_err(FlightError)?;
+        if self.arm.plans() {
+            let name = self.arm.name();
+            return Err(FlightError(format!("arm = {name}: needs its planner, which is no part of the flight code")));
+        }
         self.fly_on(&mut InProcess::new(self.stack()?), None, record, progress)
     }
 
@@ -230,7 +236,7 @@ impl Setup {
     pub fn fly_on(
         &self,
         computer: &mut dyn FlightComputer,
-        mut pilot: Option<Pilot>,
+        mut pilot: Option<&mut dyn Offboard>,
         record: bool,
         mut progress: impl FnMut(f64),
     ) -> Result<Flight, FlightError> {
@@ -260,7 +266,7 @@ impl Setup {
         let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
         let mut metrics = metrics::Meter::new(&self.scenario);
         let mut recorder =
-            record.then(|| record::Recorder::new(self, pilot.as_ref(), plant.vehicle().rotors().len()));
+            record.then(|| record::Recorder::new(self, pilot.as_deref(), plant.vehicle().rotors().len()));
         let hover = Command { rotor: [hover_command(plant.vehicle()); MAX_ROTORS], wing: [0.0; 2] };
         let mut commands = CommandLine::new(plant.effects().command_latency_s(), hover);
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
@@ -302,8 +308,11 @@ impl Setup {
                     )));
                 }
                 commands.send(time_us, Command::of(&output));
-                metrics.tick(&state, &frame, &output, encounters, &mut obstacles);
+                let followed = pilot.as_ref().and_then(|pilot| pilot.reference());
+                let reference = followed.unwrap_or(output.reference);
+                metrics.tick(&state, &frame, &output, &reference, encounters, &mut obstacles);
                 if let Some(recorder) = &mut recorder {
+                    recorder.followed(time_us, followed.as_ref());
                     recorder.tick(
                         &frame,
                         battery,

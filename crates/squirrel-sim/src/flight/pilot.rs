@@ -3,7 +3,7 @@
 //! The policy is asked 50 times a second, on the last valid measurements. It follows the mission as if no obstacle were met,
 //! and knows what its lookout knows: avoiding is its own business. The flight code treats it as any offboard computer.
 
-use super::{CONTROL_RATE_HZ, FlightError, Setup};
+use super::{CONTROL_RATE_HZ, FlightError, Offboard, Setup};
 use crate::weights::PolicyWeights;
 use squirrel_core::guidance::mission::{Mission, MissionState};
 use squirrel_core::guidance::sensing::Sensing;
@@ -53,14 +53,18 @@ impl Pilot {
     pub fn weights(&self) -> &PolicyWeights {
         &self.weights
     }
+}
 
-    /// Obstacles that came into view so far.
-    pub(super) fn encounters(&self) -> u32 {
+impl Offboard for Pilot {
+    fn encounters(&self) -> u32 {
         self.encounters
     }
 
-    /// Looks at the frame of a step; what to fly from here on, where the policy is asked in this step.
-    pub(super) fn command(&mut self, tick: u64, frame: &SensorFrame) -> Option<PilotCommand> {
+    fn facts(&self) -> Vec<(&'static str, String)> {
+        vec![("policy", self.weights.name.clone()), ("policy_hash", self.weights.hash())]
+    }
+
+    fn command(&mut self, tick: u64, frame: &SensorFrame) -> Option<PilotCommand> {
         self.known.take_over(frame);
         let (Some(imu), Some(ned_from_body), Some(gnss)) =
             (self.known.imu, self.known.attitude, self.known.gnss)

@@ -3,11 +3,11 @@
 //! Inputs are `f32` and stored as `f64`, so that a log holds their exact bits. Sources that the flight code reads are in
 //! [`INPUT_SOURCES`]; a frame is rebuilt from the samples that carry its time.
 
-use super::{Pilot, Setup};
+use super::{Offboard, Setup};
 use crate::log::FlightLog;
 use crate::plant::PlantState;
 use crate::sensors::BatteryReading;
-use squirrel_core::control::AttitudeThrust;
+use squirrel_core::control::{AttitudeThrust, Reference};
 use squirrel_core::control::wing_force::ParnnTerms;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
@@ -35,6 +35,8 @@ pub const INPUT_SOURCES: [&str; 10] = [
 pub(crate) const ESTIMATE: &str = "estimate";
 /// Metadata: the weights that the vehicle's text names, so that a log replays without them at hand.
 pub(crate) const PARNN_WEIGHTS: &str = "parnn_weights_hex";
+/// Source of what an offboard computer follows, where that is not the mission.
+pub(crate) const FOLLOWED: &str = "offboard.reference";
 /// Metadata: who estimated. A log without it is of somebody outside.
 pub(crate) const ESTIMATOR: &str = "estimator";
 /// Version of the log's content.
@@ -55,7 +57,7 @@ fn wide(v: &Vector3<f32>) -> [f64; 3] {
 }
 
 impl Recorder {
-    pub(super) fn new(setup: &Setup, pilot: Option<&Pilot>, rotors: usize) -> Self {
+    pub(super) fn new(setup: &Setup, pilot: Option<&dyn Offboard>, rotors: usize) -> Self {
         let mut log = FlightLog::default();
         let scenario = &setup.scenario;
         let vehicle = setup.vehicle.vehicle.parameters();
@@ -81,8 +83,7 @@ impl Recorder {
             log.metadata.insert(PARNN_WEIGHTS.to_owned(), weights.to_hex());
         }
         if let Some(pilot) = pilot {
-            log.metadata.insert("policy".to_owned(), pilot.weights().name.clone());
-            log.metadata.insert("policy_hash".to_owned(), pilot.weights().hash());
+            log.metadata.extend(pilot.facts().into_iter().map(|(key, value)| (key.to_owned(), value)));
         }
         let estimates = setup.vehicle.estimator.is_filter();
         Self { log, rotors, effects: setup.vehicle.effects, inputs: Inputs::new(estimates) }
@@ -106,6 +107,12 @@ impl Recorder {
         let stamp = self.effects.command_clock_s(t);
         record_output(&mut self.log, t, stamp, output, self.rotors, Some(state));
         self.plant(t, state, air, wing_force);
+    }
+
+    /// What an offboard computer follows, where that is not the mission.
+    pub(super) fn followed(&mut self, time_us: u64, reference: Option<&Reference>) {
+        let Some(reference) = reference else { return };
+        record_reference(&mut self.log, FOLLOWED, time_us as f64 * 1e-6, reference);
     }
 
     fn plant(&mut self, t: f64, state: &PlantState, air: In<Ned, f64>, wing_force: In<Body, f64>) {
@@ -209,16 +216,7 @@ pub(crate) fn record_output(
     }
     log.source_mut("rotor").push(command_stamp, &rotor);
     log.source_mut("wing").push(command_stamp, &wing);
-    let r = &output.reference;
-    log.source_mut("reference").push(
-        t,
-        &[
-            ("position_ned_m", &wide(&r.position.vector)),
-            ("velocity_ned_m_s", &wide(&r.velocity.vector)),
-            ("acceleration_ned_m_s2", &wide(&r.acceleration.vector)),
-            ("yaw_rad", &[f64::from(r.yaw_rad)]),
-        ],
-    );
+    record_reference(log, "reference", t, &output.reference);
     record_estimate(log, t, output);
     // A source of its own, so that a flight without a fault has the log that it always had.
     if output.failsafe != Failsafe::default() {
@@ -290,6 +288,18 @@ pub(crate) fn record_output(
             ],
         );
     }
+}
+
+fn record_reference(log: &mut FlightLog, source: &str, t: f64, r: &Reference) {
+    log.source_mut(source).push(
+        t,
+        &[
+            ("position_ned_m", &wide(&r.position.vector)),
+            ("velocity_ned_m_s", &wide(&r.velocity.vector)),
+            ("acceleration_ned_m_s2", &wide(&r.acceleration.vector)),
+            ("yaw_rad", &[f64::from(r.yaw_rad)]),
+        ],
+    );
 }
 
 /// What is believed, and what is not as it should be.

@@ -13,6 +13,7 @@ pub use tracking::{table3, thrust};
 use crate::campaign::Plan;
 use crate::statistics::Estimate;
 use crate::tracking::{Condition, setup};
+use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Setup};
 use squirrel_sim::log::FlightLog;
@@ -34,7 +35,7 @@ fn begin(title: &str, lead: &str, facts: &[(&str, String)], words: &[String]) ->
 
 /// The colour of an arm, on every page.
 fn ink(arm: &str) -> Ink {
-    Arm::ALL.iter().position(|known| known.name() == arm).map_or(Ink::Muted, Ink::Series)
+    Arm::all().position(|known| known.name() == arm).map_or(Ink::Muted, Ink::Series)
 }
 
 fn figure(title: String, caption: String, drawing: Svg) -> Figure {
@@ -77,7 +78,7 @@ fn chart_row(arm: &str, e: Estimate, note: String) -> ChartRow {
 /// Flies a setup again.
 fn log(setup: &Setup) -> Result<FlightLog, FlightError> {
     let missing = || FlightError(format!("arm = {}: the flight has no log", setup.arm.name()));
-    setup.fly(true, |_| {})?.log.ok_or_else(missing)
+    pilot::fly(setup, true, |_| {})?.log.ok_or_else(missing)
 }
 
 /// Adds the tracks of the first trial under a condition, by those of the arms that are among the plan's.

@@ -1,5 +1,6 @@
 //! From a flight log to the curves of the report. What the log lacks comes back as a sentence, not as a failure.
 
+use crate::flight::FOLLOWED;
 use crate::log::{Channel, FlightLog};
 use crate::report::chart::drawable;
 
@@ -73,10 +74,15 @@ pub(super) fn flown(log: &FlightLog) -> Result<Path, Lack> {
 
 /// The path that should have been flown.
 pub(super) fn reference(log: &FlightLog) -> Result<Path, Lack> {
-    path(log, "reference.position_ned_m")
+    path(log, &format!("{}.position_ned_m", followed(log)))
 }
 
-/// Speed over ground and in height, m/s; `source` is `truth` or `reference`.
+/// Source of what was to be followed: that of an offboard computer where it does not follow the mission.
+pub(super) fn followed(log: &FlightLog) -> &'static str {
+    if log.sources.contains_key(FOLLOWED) { FOLLOWED } else { "reference" }
+}
+
+/// Speed over ground and in height, m/s; `source` is `truth` or what [`followed`] says.
 pub(super) fn speed(log: &FlightLog, source: &str) -> Result<Curve, Lack> {
     curve(log, &format!("{source}.velocity_ned_m_s"), 3, |v| v[0].hypot(v[1]).hypot(v[2]))
 }

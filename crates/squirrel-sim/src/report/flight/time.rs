@@ -1,6 +1,6 @@
 //! What the arms did over time: tilt, thrust, wings and error, all on one time axis.
 
-use super::curves::{Curve, Errors, Lack, errors, scalar, speed, tilt_deg, wings};
+use super::curves::{Curve, Errors, Lack, errors, followed, scalar, speed, tilt_deg, wings};
 use super::{FlightView, columns_for, is_limit, lacks};
 use crate::report::chart::{Axis, Ink, Lane, Limit, LineChart, Range, Series, Span, extent};
 use crate::report::page::{Columns, Figure, Page};
@@ -157,7 +157,7 @@ impl Time<'_> {
         let y = Axis::new("speed", "m/s");
         let (mut chart, mut notes) = (self.chart("speed over time", columns, y), Vec::new());
         for flight in self.flights {
-            match speed(flight.log, "reference") {
+            match speed(flight.log, followed(flight.log)) {
                 // All arms fly the same reference: one line stands for all.
                 Ok(c) if chart.series.is_empty() => {
                     let line = Series::line("reference", Ink::Reference, c.time_s, c.values);
