@@ -68,7 +68,7 @@ impl Replanner {
         };
         let thrust_max_n = setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n();
         let wing = (setup.arm == Arm::PlanWings).then_some(wing);
-        let craft = Craft::of(&setup.vehicle, thrust_max_n, wing).map_err(FlightError)?;
+        let craft = Craft::of(&setup.vehicle, thrust_max_n, wing, 0.0).map_err(FlightError)?;
         let obstacles = setup.scenario.all_obstacles();
         let largest_m = obstacles.iter().map(|[_, _, radius]| *radius).fold(0.0, f64::max);
         Ok(Self {
@@ -102,8 +102,11 @@ impl Replanner {
             centre: Vector2::new(f64::from(o.north_m), f64::from(o.east_m)),
             radius_m: self.keep_out_m,
         };
-        let attitude =
-            Rotation::<squirrel_core::frames::Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, motion.yaw_rad);
+        let attitude = Rotation::<squirrel_core::frames::Ned, Body, f32>::from_euler(
+            motion.roll_rad,
+            motion.pitch_rad,
+            motion.yaw_rad,
+        );
         let down = attitude * squirrel_core::frames::In::new(Vector3::z());
         let begin = Begin {
             position: wide(&motion.position.vector),
@@ -150,7 +153,7 @@ impl Replanner {
 }
 
 /// Half of the vehicle's larger horizontal size, m.
-fn half_width_m(setup: &Setup) -> f64 {
+pub fn half_width_m(setup: &Setup) -> f64 {
     let [length, width, _] = setup.vehicle.size_body_m;
     0.5 * length.max(width)
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use nalgebra::{Vector2, Vector3};
-use squirrel_plan::trajectory::{Begin, Craft, KeepOut, Planner, Status, Task, Wanted};
+use squirrel_plan::trajectory::{Begin, Craft, KeepOut, Planner, RESERVE, Status, Task, Wanted};
 use squirrel_plan::wing::WingModel;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::time::Instant;
@@ -37,7 +37,7 @@ fn most_tasks_are_solved_in_time() {
     let vehicle = VehicleFile::squirrel();
     for ratio in [1.2, 1.5, 2.0] {
         for wing in [None, Some(WingModel::Flat), Some(WingModel::Membrane)] {
-            let craft = Craft::of(&vehicle, ratio * vehicle.vehicle.weight_n(), wing).unwrap();
+            let craft = Craft::of(&vehicle, ratio * vehicle.vehicle.weight_n(), wing, RESERVE).unwrap();
             let mut draw = Draw(1);
             let mut times = Vec::new();
             let (mut solved, mut feasible, mut iterations, mut cost) = (0, 0, 0, 0.0);

@@ -67,10 +67,7 @@ impl Track {
         let (h, s) = (self.time_s[next] - self.time_s[k], time_s - self.time_s[k]);
         let jerk = (b.acceleration - a.acceleration) / h;
         Some(TrackPoint {
-            position: a.position
-                + a.velocity * s
-                + a.acceleration * (s * s / 2.0)
-                + jerk * (s * s * s / 6.0),
+            position: a.position + a.velocity * s + a.acceleration * (s * s / 2.0) + jerk * (s * s * s / 6.0),
             velocity: a.velocity + a.acceleration * s + jerk * (s * s / 2.0),
             acceleration: a.acceleration + jerk * s,
             thrust: a.thrust + (b.thrust - a.thrust) * (s / h),

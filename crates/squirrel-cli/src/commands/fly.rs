@@ -10,9 +10,7 @@ use squirrel_plan::pilot::Replanner;
 use squirrel_plan::wing::WingModel;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{
-    FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Pilot, Setup,
-};
+use squirrel_sim::flight::{FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Pilot, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::report::flight::{Heading, render};
 use squirrel_sim::scenario::Scenario;
@@ -153,7 +151,8 @@ impl Fly {
             Some(file) => format!("{}: {e}", file.display()),
             None => e.to_string(),
         })?;
-        let weights = self.policy.as_deref().map(PolicyWeights::load).transpose().map_err(|e| e.to_string())?;
+        let weights =
+            self.policy.as_deref().map(PolicyWeights::load).transpose().map_err(|e| e.to_string())?;
         // What flies, in words.
         let who = match (&weights, &self.reference) {
             (Some(weights), _) => format!("policy {} over {}", weights.name, setup.arm.name()),

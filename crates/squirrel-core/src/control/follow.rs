@@ -63,9 +63,7 @@ impl FollowGains {
         positive("follow.position_per_s2", self.position_per_s2)?;
         positive("follow.velocity_per_s", self.velocity_per_s)?;
         positive("follow.acceleration_max_m_s2", self.acceleration_max_m_s2)?;
-        for (field, x) in
-            [("follow.delay_s", self.delay_s), ("follow.wing_delay_s", self.wing_delay_s)]
-        {
+        for (field, x) in [("follow.delay_s", self.delay_s), ("follow.wing_delay_s", self.wing_delay_s)] {
             if !(0.0..=1.0).contains(&x) {
                 return Err(ParameterError::of(field, x, "must be 0 to 1"));
             }
@@ -89,8 +87,7 @@ impl FollowGains {
         let error = (now.position.vector - motion.position.vector) * self.position_per_s2
             + (now.velocity.vector - motion.velocity.vector) * self.velocity_per_s;
         // Along body z.
-        let wanted =
-            -ahead.vector - limit_norm(error, self.acceleration_max_m_s2) * airframe.mass_kg;
+        let wanted = -ahead.vector - limit_norm(error, self.acceleration_max_m_s2) * airframe.mass_kg;
         let level = heading_frame(&wanted, motion.yaw_rad);
         // A thrust that would have to pull downwards is none.
         let down = upper(wanted.z, airframe.envelope.thrust_min_n);
@@ -139,7 +136,10 @@ mod tests {
         let ahead = PlanPoint { position: In::new(Vector3::new(0.3, 0.2, -0.2)), ..hovering() };
         let command =
             FollowGains::default().command(&airframe(), &still(), &ahead, hovering().thrust, 0.0).attitude;
-        assert!(command.pitch_rad < -0.05 && command.roll_rad > 0.03 && command.thrust_n > 5.4, "{command:?}");
+        assert!(
+            command.pitch_rad < -0.05 && command.roll_rad > 0.03 && command.thrust_n > 5.4,
+            "{command:?}"
+        );
     }
 
     /// Whatever is asked for, the command stays in the envelope.

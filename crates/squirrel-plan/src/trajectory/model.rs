@@ -44,29 +44,36 @@ pub struct Craft {
     pub wing_rate_max_per_s: f64,
 }
 
-/// Part of thrust and tilt that a plan leaves to whoever follows it.
-const RESERVE: f64 = 0.03;
+/// Part of thrust and tilt that a plan leaves to whoever follows it to its end.
+pub const RESERVE: f64 = 0.03;
 /// Most of a half turn that the command filter and the attitude loop do in a second.
 const TILT_RATE_MAX_RAD_S: f64 = 4.0;
 /// Time in which rotors go from nothing to full thrust.
 const THRUST_TIME_S: f64 = 0.25;
 
 impl Craft {
-    /// Of a vehicle file, with a reserve of 3 % of thrust and tilt for who follows the plan.
+    /// Of a vehicle file.
     ///
     /// * `thrust_max_n` - of the flight code: the vehicle's limit, or less
     /// * `wing` - what is believed of the wings; `None` plans without them
+    /// * `reserve` - part of thrust and tilt that is left to whoever follows the plan, [`RESERVE`] or less
     ///
     /// # Errors
     /// One line that names what the vehicle lacks.
-    pub fn of(vehicle: &VehicleFile, thrust_max_n: f64, wing: Option<WingModel>) -> Result<Self, String> {
+    pub fn of(
+        vehicle: &VehicleFile,
+        thrust_max_n: f64,
+        wing: Option<WingModel>,
+        reserve: f64,
+    ) -> Result<Self, String> {
         let p = vehicle.vehicle.parameters();
         let weight_n = vehicle.vehicle.weight_n();
-        let thrust_max_n = thrust_max_n * (1.0 - RESERVE);
+        let thrust_max_n = thrust_max_n * (1.0 - reserve);
         if !(thrust_max_n.is_finite() && thrust_max_n > weight_n) {
             return Err(format!(
-                "{}: thrust_max_n = {thrust_max_n}, with a reserve of 3 %: must be above the weight of {weight_n:.3} N",
-                vehicle.name
+                "{}: thrust_max_n = {thrust_max_n}, less a reserve of {:.0} %: must be above the weight of {weight_n:.3} N",
+                vehicle.name,
+                100.0 * reserve
             ));
         }
         let servo_s = vehicle.wing.servo().map_or(0.2, |s| 1.0 / s.rate_max_per_s + s.time_constant_s);
@@ -75,7 +82,7 @@ impl Craft {
             mass_kg: p.mass_kg,
             thrust_min_n: vehicle.control.map_or(0.1 * weight_n, |c| f64::from(c.twcc.thrust_min_n)),
             thrust_max_n,
-            tilt_max_rad: p.limits.tilt_max_rad * (1.0 - RESERVE),
+            tilt_max_rad: p.limits.tilt_max_rad * (1.0 - reserve),
             tilt_rate_max_rad_s: TILT_RATE_MAX_RAD_S,
             thrust_rate_max_n_s: thrust_max_n / THRUST_TIME_S,
             drag_n_s_m: 0.5 * (linear.x + linear.y),
@@ -223,7 +230,7 @@ mod tests {
 
     fn craft(wing: WingModel) -> Craft {
         let vehicle = VehicleFile::squirrel();
-        Craft::of(&vehicle, 2.0 * vehicle.vehicle.weight_n(), Some(wing)).unwrap()
+        Craft::of(&vehicle, 2.0 * vehicle.vehicle.weight_n(), Some(wing), RESERVE).unwrap()
     }
 
     /// Every derivative is the difference quotient, for the wing with a formula and for those without.
@@ -274,8 +281,8 @@ mod tests {
     #[test]
     fn a_vehicle_that_cannot_hover_is_refused() {
         let vehicle = VehicleFile::squirrel();
-        let error = Craft::of(&vehicle, 1.02 * vehicle.vehicle.weight_n(), None).unwrap_err();
+        let error = Craft::of(&vehicle, 1.02 * vehicle.vehicle.weight_n(), None, RESERVE).unwrap_err();
         assert!(error.contains("thrust_max_n"), "{error}");
-        assert!(Craft::of(&vehicle, f64::NAN, None).is_err());
+        assert!(Craft::of(&vehicle, f64::NAN, None, RESERVE).is_err());
     }
 }

@@ -85,13 +85,7 @@ impl Planner {
     }
 
     /// The best of a few first guesses.
-    fn begin(
-        &self,
-        craft: &Craft,
-        task: &Task,
-        warm: Option<(&Track, f64)>,
-        iterations: &mut u32,
-    ) -> Held {
+    fn begin(&self, craft: &Craft, task: &Task, warm: Option<(&Track, f64)>, iterations: &mut u32) -> Held {
         let controls = first_controls(craft, task, warm);
         let start = (task.begin().position, task.begin().velocity);
         let path = craft.roll_out(start, &controls, task.step_s());
@@ -190,7 +184,9 @@ fn first_controls(craft: &Craft, task: &Task, warm: Option<(&Track, f64)>) -> Ve
 /// To which side of the obstacles that are in the way a path could lead: places about which they are linearised.
 fn guesses(task: &Task, base: &[Vector2<f64>]) -> Vec<Vec<Vector2<f64>>> {
     let depth = |keep: &KeepOut| {
-        base.iter().map(|place| keep.radius_m - (place - keep.centre).norm()).fold(f64::NEG_INFINITY, f64::max)
+        base.iter()
+            .map(|place| keep.radius_m - (place - keep.centre).norm())
+            .fold(f64::NEG_INFINITY, f64::max)
     };
     let mut blocking: Vec<&KeepOut> = task.keep_out().iter().filter(|keep| depth(keep) > 0.0).collect();
     let far = |keep: &KeepOut| (keep.centre - base[0]).norm();
@@ -198,10 +194,7 @@ fn guesses(task: &Task, base: &[Vector2<f64>]) -> Vec<Vec<Vector2<f64>>> {
     blocking.truncate(SIDES);
     let mut all = vec![base.to_vec()];
     for keep in blocking {
-        all = all
-            .iter()
-            .flat_map(|sides| [-1.0, 1.0].map(|side| past(keep, side, sides)))
-            .collect();
+        all = all.iter().flat_map(|sides| [-1.0, 1.0].map(|side| past(keep, side, sides))).collect();
     }
     all
 }

@@ -4,12 +4,12 @@
 //! the half-space stays out of the obstacle. Constraints that may have no solution have a slack that costs more than anything else.
 //!
 //! ```text
-//! min  sum_k |p - p_ref|_P^2 + |v - v_ref|_V^2 + r |T+ - T|^2 + c |w+ - w| + mu s
+//! min  sum_k |p - p_ref|_P^2 + |v - v_ref|_V^2 + r |T+ - T|^2 + c |w+ - w| + d w + mu s
 //! a = a_bar + A (v - v_bar) + B (T - T_bar) + C (w - w_bar)        v+, p+ as in `model`
-//! |T| <= T_max     T_z >= T_min     |T_x| <= tan(tilt) T_z     |T_y| <= tan(tilt) T_z     |T+ - T| <= rates     |T - T_bar| <= trust
+//! |T| <= T_max     T_z >= T_min     |T_x| <= tan(tilt) T_z     |T_y| <= tan(tilt) (T_x, T_z).e     |T+ - T| <= rates     |T - T_bar| <= trust
 //! 0 <= w <= 1      |w+ - w| <= rate      d.(p - centre) + s >= radius      |v_xy| <= v_max + s
 //! ```
-//! `|T_y| <= tan(tilt) T_z` is the inner bound of the roll limit (docs/equations.md F): the limit itself is not convex.
+//! The roll limit `|T_y| <= tan(tilt) |(T_x, T_z)|` is not convex; its tangent at the iterate lies inside of it (docs/equations.md F).
 
 use super::model::{Craft, Motion};
 use super::task::Task;
@@ -30,6 +30,8 @@ pub struct Weights {
     pub thrust_change_per_n2: f64,
     /// Of folding or spreading once.
     pub wing_move: f64,
+    /// Of spread wings at a node: they fold where they hardly help.
+    pub wing_spread: f64,
     /// Of the depth in an obstacle, 1/m, and of being too fast, s/m.
     pub violation: f64,
 }
@@ -49,7 +51,8 @@ impl Weights {
                 worst += task.violation_m(&path[k - 1], motion).max(too_fast);
                 let ((thrust, spread), (thrust_before, spread_before)) = (controls[k], controls[k - 1]);
                 cost += self.thrust_change_per_n2 * (thrust - thrust_before).norm_squared()
-                    + self.wing_move * (spread - spread_before).abs();
+                    + self.wing_move * (spread - spread_before).abs()
+                    + self.wing_spread * spread;
             }
         }
         (cost, cost + self.violation * worst)
@@ -59,12 +62,13 @@ impl Weights {
 impl Default for Weights {
     fn default() -> Self {
         Self {
-            position_per_m2: [1.0, 2.0],
+            position_per_m2: [1.0, 1.0],
             velocity_s2_per_m2: 0.1,
             last: 4.0,
             thrust_change_per_n2: 0.02,
             wing_move: 0.05,
-            violation: 300.0,
+            wing_spread: 0.01,
+            violation: 100.0,
         }
     }
 }
@@ -211,6 +215,7 @@ impl Subproblem<'_> {
                     entry(at(k - 1, T + axis), at(k, T + axis), -change);
                 }
             }
+            q[at(k, W)] = weights.wing_spread;
             q[at(k, DW)] = weights.wing_move;
             q[at(k, S)] = weights.violation;
         }
@@ -246,10 +251,7 @@ impl Subproblem<'_> {
                     let ((p, p_next), (v, v_next), (a, a_next)) = (of(P), of(V), of(A));
                     rows.push(&[(v_next, 1.0), (v, -1.0), (a, -h / 2.0), (a_next, -h / 2.0)], 0.0);
                     let h2 = h * h;
-                    rows.push(
-                        &[(p_next, 1.0), (p, -1.0), (v, -h), (a, -h2 / 3.0), (a_next, -h2 / 6.0)],
-                        0.0,
-                    );
+                    rows.push(&[(p_next, 1.0), (p, -1.0), (v, -h), (a, -h2 / 3.0), (a_next, -h2 / 6.0)], 0.0);
                 }
             }
         }
@@ -272,10 +274,14 @@ impl Subproblem<'_> {
             let trust = self.trust_n;
             rows.push(&[(z, -1.0)], -craft.thrust_min_n.max(thrust.z - trust));
             rows.push(&[(z, 1.0)], thrust.z + trust);
+            let (x, y) = (at(k, T), at(k, T + 1));
+            let forward = Vector2::new(thrust.x, thrust.z).normalize() * slope;
+            for sign in [1.0, -1.0] {
+                rows.push(&[(x, sign), (z, -slope)], 0.0);
+                rows.push(&[(x, -forward.x), (y, sign), (z, -forward.y)], 0.0);
+            }
             for axis in 0..2 {
                 let x = at(k, T + axis);
-                rows.push(&[(x, 1.0), (z, -slope)], 0.0);
-                rows.push(&[(x, -1.0), (z, -slope)], 0.0);
                 rows.push(&[(x, 1.0)], thrust[axis] + trust);
                 rows.push(&[(x, -1.0)], trust - thrust[axis]);
             }

@@ -222,7 +222,9 @@ impl Setup {
         self.scenario.check().map_err(FlightError)?;
         if self.arm.plans() {
             let name = self.arm.name();
-            return Err(FlightError(format!("arm = {name}: needs its planner, which is no part of the flight code")));
+            return Err(FlightError(format!(
+                "arm = {name}: needs its planner, which is no part of the flight code"
+            )));
         }
         self.fly_on(&mut InProcess::new(self.stack()?), None, record, progress)
     }
