@@ -10,7 +10,7 @@ use nalgebra::{Vector2, Vector3};
 use squirrel_core::control::Reference;
 use squirrel_core::control::follow::FollowGains;
 use squirrel_core::control::position::Motion;
-use squirrel_core::frames::{Body, Rotation};
+use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::mission::{Mission, MissionState};
 use squirrel_core::guidance::sensing::{Obstacle, Sensing};
 use squirrel_core::policy::PilotCommand;
@@ -102,20 +102,9 @@ impl Replanner {
             centre: Vector2::new(f64::from(o.north_m), f64::from(o.east_m)),
             radius_m: self.keep_out_m,
         };
-        let attitude = Rotation::<squirrel_core::frames::Ned, Body, f32>::from_euler(
-            motion.roll_rad,
-            motion.pitch_rad,
-            motion.yaw_rad,
-        );
-        let down = attitude * squirrel_core::frames::In::new(Vector3::z());
-        let begin = Begin {
-            position: wide(&motion.position.vector),
-            velocity: wide(&motion.velocity.vector),
-            thrust: wide(&down.vector) * -self.thrust_n,
-            spread: self.follower.planned(time_us).map_or(0.0, |point| point.wing),
-        };
+        let spread = self.follower.planned(time_us).map_or(0.0, |point| point.wing);
         let task = Task::new(
-            begin,
+            begin(motion, self.thrust_n, spread),
             (0..=steps).map(wanted).collect(),
             self.seen.iter().map(keep).collect(),
             STEP_S,
@@ -149,6 +138,21 @@ impl Replanner {
             let Some(new) = next else { return };
             self.seen.push(new);
         }
+    }
+}
+
+/// Where a plan begins that begins now.
+///
+/// * `thrust_n` - asked for last
+/// * `spread` - deployment of the wings
+pub fn begin(motion: &Motion, thrust_n: f64, spread: f64) -> Begin {
+    let attitude = Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, motion.yaw_rad);
+    let down = attitude * In::new(Vector3::z());
+    Begin {
+        position: motion.position.vector.cast(),
+        velocity: motion.velocity.vector.cast(),
+        thrust: down.vector.cast::<f64>() * -thrust_n,
+        spread,
     }
 }
 

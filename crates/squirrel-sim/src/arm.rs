@@ -99,7 +99,7 @@ impl Arm {
     /// One line where they are needed and there are none.
     pub fn configure(self, twcc: &mut TwccParameters, weights: Option<&ParnnWeights>) -> Result<(), String> {
         twcc.policy = match self {
-            // What flies before the first command of a planner, and where it is lost.
+            // Of a planner: what flies before its first command, and where it is lost.
             Self::Pc | Self::PcPlus | Self::PlanWings | Self::PlanNoWings => WingPolicy::Folded,
             Self::PcWingsOpen => WingPolicy::Open,
             Self::WiicNoWings => WingPolicy::CoordinatedWithoutWings,
@@ -118,9 +118,9 @@ impl Arm {
             (arm, _) if arm.is_told_the_force() => ForceModel::Given,
             _ => ForceModel::FlatPlate,
         };
-        if !self.is_plus() {
+        if !self.is_plus() && !self.plans() {
             twcc.plus = None;
-        } else if twcc.plus.is_none() {
+        } else if self.is_plus() && twcc.plus.is_none() {
             return Err(format!(
                 "arm = {}: needs [control.plus] of the vehicle, which is missing",
                 self.name()

@@ -5,6 +5,7 @@
 use crate::journal::{Journal, check_trials, identity};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use squirrel_core::guidance::mission::scramble;
 use squirrel_core::stack::wire::{HASH_START, hash};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Integrator, Setup};
@@ -127,5 +128,28 @@ impl<T> Flown<T> {
     /// A figure of each of them.
     pub fn figures(&self, arm: Arm, condition: usize, figure: impl Fn(&T) -> f64) -> Vec<f64> {
         self.of(arm, condition).into_iter().map(figure).collect()
+    }
+}
+
+/// Numbers of one trial, drawn one after the other.
+pub(crate) struct Draw {
+    state: u32,
+}
+
+impl Draw {
+    pub(crate) fn new(seed: u64, trial: u32) -> Self {
+        let seed = (seed ^ (seed >> 32)) as u32;
+        Self { state: scramble(scramble(seed).wrapping_add(trial)) }
+    }
+
+    /// Uniform.
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.state = scramble(self.state.wrapping_add(0x9E37_79B9));
+        low + (high - low) * f64::from(self.state) / f64::from(u32::MAX)
+    }
+
+    pub(crate) fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
+        let at = self.between(0.0, all.len() as f64) as usize;
+        all[at.min(all.len() - 1)]
     }
 }

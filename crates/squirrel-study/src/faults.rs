@@ -5,9 +5,9 @@
 //! thrust at a ratio below [`HEALTHY_RATIO`], or both inertial units that say nothing that is a number. A fault is *flagged* where the
 //! flight code reports anything from the fault on, be it health or a reason of its failsafe.
 
+use crate::campaign::Draw;
 use crate::journal::{Journal, Keep, check_trials, identity};
 use serde::{Deserialize, Serialize};
-use squirrel_core::guidance::mission::scramble;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Integrator, Metrics, OVER_RAD, Setup};
 use squirrel_sim::scenario::{FaultKind, FaultTable, Scenario};
@@ -137,29 +137,6 @@ fn row(kind: FaultKind, flights: &[Trial]) -> Row {
         lost: count(|t| !t.survived),
         lost_unflagged: count(|t| !t.survived && t.flags.is_empty()),
         not_finite: count(|t| t.not_finite),
-    }
-}
-
-/// Numbers of one trial, drawn one after the other.
-struct Draw {
-    state: u32,
-}
-
-impl Draw {
-    fn new(seed: u64, trial: u32) -> Self {
-        let seed = (seed ^ (seed >> 32)) as u32;
-        Self { state: scramble(scramble(seed).wrapping_add(trial)) }
-    }
-
-    /// Uniform.
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.state = scramble(self.state.wrapping_add(0x9E37_79B9));
-        low + (high - low) * f64::from(self.state) / f64::from(u32::MAX)
-    }
-
-    fn one_of<T: Copy>(&mut self, all: &[T]) -> T {
-        let at = self.between(0.0, all.len() as f64) as usize;
-        all[at.min(all.len() - 1)]
     }
 }
 

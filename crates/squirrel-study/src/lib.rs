@@ -5,6 +5,7 @@
 //! - [`table3`]: the paper's real flights, with the error as its log has it.
 //! - [`thrust`]: what wings are worth as a function of the effective thrust-to-weight ratio, and where a battery brings it.
 //! - [`campaign`], [`tracking`]: what these have in common: flights of every arm under every condition on paired seeds.
+//! - [`planning`]: what wings buy where both plan: avoidance tasks, planned and flown.
 //! - [`table2`]: how well models of the wing force predict flights that they have not seen (the paper's Table II).
 //! - [`wing_flights`]: random flights with spread wings, to learn from and to be judged by.
 //! - [`filters`]: how far estimators of attitude are off, with a calibrated gyro and without.
@@ -24,6 +25,7 @@ pub mod journal;
 pub mod merge;
 pub mod pages;
 pub mod paper;
+pub mod planning;
 pub mod statistics;
 pub mod steering;
 pub mod table2;

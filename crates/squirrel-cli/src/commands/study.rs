@@ -4,6 +4,7 @@ mod faults;
 mod filters;
 mod forest;
 mod merge;
+mod planning;
 mod sheet;
 mod steering;
 mod table2;
@@ -31,6 +32,8 @@ pub(crate) enum Study {
     Forest(forest::Options),
     /// Put the parts of a study together that were flown with --shard.
     Merge(merge::Options),
+    /// What wings buy where both plan: avoidance tasks, planned with wings and without, and flown.
+    Planning(planning::Options),
     /// The paper's figure of steering angles and speeds, in paper mode and on the independent plant.
     Steering(steering::Options),
     /// What models of the wing force predict, the paper's Table II: to labels and to truth, 30 to 300 s of training.
@@ -181,6 +184,7 @@ impl Study {
             Self::Filters(options) => options.run(),
             Self::Forest(options) => options.run(),
             Self::Merge(options) => options.run(),
+            Self::Planning(options) => options.run(),
             Self::Steering(options) => options.run(),
             Self::Table2(options) => options.run(),
             Self::Table3(options) => options.run(),
@@ -194,6 +198,7 @@ impl Study {
             Self::Faults(options) => Some(&mut options.common),
             Self::Filters(options) => Some(&mut options.common),
             Self::Forest(options) => Some(&mut options.flown.common),
+            Self::Planning(options) => Some(&mut options.common),
             Self::Steering(options) => Some(&mut options.flown.common),
             Self::Table2(options) => Some(&mut options.common),
             Self::Table3(options) => Some(&mut options.flown.common),
