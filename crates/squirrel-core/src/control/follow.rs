@@ -4,13 +4,13 @@
 //! -U n = F(t + delay) + m (k_p (p(t) - p_measured) + k_v (v(t) - v_measured))        F: what the rotors push
 //! ```
 //! The plan's thrust already holds the air's part (docs/equations.md G.1), so no wing model is asked here; wings are told what the plan
-//! has for them when their servo will have moved. What the attitude cannot do, the thrust is chosen to the least harm of.
+//! has for them when their servo will have moved. Where the thrust does not suffice, height goes first.
 
 use super::AttitudeThrust;
 use super::position::{Motion, heading_frame};
 use super::twcc::Airframe;
 use crate::frames::{In, Ned};
-use crate::math::{limit, limit_norm, upper};
+use crate::math::{limit, limit_norm, sqrt};
 use crate::policy::PilotCommand;
 use crate::vehicle::{ParameterError, positive};
 use nalgebra::Vector3;
@@ -88,9 +88,12 @@ impl FollowGains {
             + (now.velocity.vector - motion.velocity.vector) * self.velocity_per_s;
         // Along body z.
         let wanted = -ahead.vector - limit_norm(error, self.acceleration_max_m_s2) * airframe.mass_kg;
+        let most = airframe.envelope.thrust_max_n;
+        // Height first: what is left of the thrust goes sideways. A thrust that would have to pull downwards is none.
+        let down = limit(wanted.z, airframe.envelope.thrust_min_n, most);
         let level = heading_frame(&wanted, motion.yaw_rad);
-        // A thrust that would have to pull downwards is none.
-        let down = upper(wanted.z, airframe.envelope.thrust_min_n);
+        let sideways = limit_norm(Vector3::new(level.x, level.y, 0.0), sqrt(most * most - down * down));
+        let level = sideways.xy();
         let pitch_rad = libm::atan2f(level.x, down);
         let roll_rad = -libm::atan2f(level.y, libm::hypotf(level.x, down));
         let max = airframe.envelope.tilt_max_rad;

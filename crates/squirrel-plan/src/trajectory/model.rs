@@ -30,8 +30,13 @@ pub struct Craft {
     pub thrust_max_n: f64,
     /// Limit of |roll| and |pitch|, rad.
     pub tilt_max_rad: f64,
+    /// From a command to the attitude that it asks for, s: so long nothing can be changed.
+    pub delay_s: f64,
     /// How fast the attitude follows, rad/s.
     pub tilt_rate_max_rad_s: f64,
+    /// Thrust that is given up for turning, over the horizontal thrust's second derivative, north and east at zero yaw, s^2: a rotor at its
+    /// limit can only turn the vehicle by giving less on the other side.
+    pub turning_s2: [f64; 2],
     /// How fast thrust follows, N/s.
     pub thrust_rate_max_n_s: f64,
     /// Linear drag, N s/m: the mean of the vehicle's forward and right axes.
@@ -46,6 +51,8 @@ pub struct Craft {
 
 /// Part of thrust and tilt that a plan leaves to whoever follows it to its end.
 pub const RESERVE: f64 = 0.03;
+/// Of the command filter and the attitude loop.
+const DELAY_S: f64 = 0.1;
 /// Most of a half turn that the command filter and the attitude loop do in a second.
 const TILT_RATE_MAX_RAD_S: f64 = 4.0;
 /// Time in which rotors go from nothing to full thrust.
@@ -83,6 +90,8 @@ impl Craft {
             thrust_min_n: vehicle.control.map_or(0.1 * weight_n, |c| f64::from(c.twcc.thrust_min_n)),
             thrust_max_n,
             tilt_max_rad: p.limits.tilt_max_rad * (1.0 - reserve),
+            delay_s: DELAY_S,
+            turning_s2: turning_s2(vehicle),
             tilt_rate_max_rad_s: TILT_RATE_MAX_RAD_S,
             thrust_rate_max_n_s: thrust_max_n / THRUST_TIME_S,
             drag_n_s_m: 0.5 * (linear.x + linear.y),
@@ -195,6 +204,17 @@ impl Craft {
         }
         path
     }
+}
+
+/// `J / (d m g)` for pitch and roll: `U <= n F_max - |tau| / d` with rotors at distance `d` from the axis, and `tau = J T'' / U`.
+fn turning_s2(vehicle: &VehicleFile) -> [f64; 2] {
+    let (p, rotors) = (vehicle.vehicle.parameters(), vehicle.vehicle.rotors());
+    let arm_m = |axis: usize| {
+        rotors.iter().map(|rotor| rotor.position.vector[axis].abs()).sum::<f64>() / rotors.len() as f64
+    };
+    let inertia = p.inertia_kg_m2;
+    [(1, 0), (0, 1)]
+        .map(|(about, along)| inertia[(about, about)] / (arm_m(along) * vehicle.vehicle.weight_n()))
 }
 
 /// Derivatives of the acceleration.

@@ -168,13 +168,16 @@ fn first_controls(craft: &Craft, task: &Task, warm: Option<(&Track, f64)>) -> Ve
     let begin = task.begin();
     let rate = craft.wing_rate_max_per_s * task.step_s();
     let mut controls = vec![(craft.limited(&-begin.thrust), begin.spread)];
+    let held_s = craft.delay_s + 0.5 * task.step_s();
     for k in 1..task.wanted().len() {
+        let is_held = k as f64 * task.step_s() < held_s;
         let fold = (begin.spread - rate * k as f64).max(0.0);
         controls.push(match warm {
             Some((track, passed_s)) => match track.at(passed_s + k as f64 * task.step_s()) {
                 Some(point) => (craft.limited(&-point.thrust), fold),
                 None => (craft.hover(), fold),
             },
+            None if is_held => (controls[0].0, fold),
             None => (craft.hover(), fold),
         });
     }

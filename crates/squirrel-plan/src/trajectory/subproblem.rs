@@ -6,7 +6,7 @@
 //! ```text
 //! min  sum_k |p - p_ref|_P^2 + |v - v_ref|_V^2 + r |T+ - T|^2 + c |w+ - w| + d w + mu s
 //! a = a_bar + A (v - v_bar) + B (T - T_bar) + C (w - w_bar)        v+, p+ as in `model`
-//! |T| <= T_max     T_z >= T_min     |T_x| <= tan(tilt) T_z     |T_y| <= tan(tilt) (T_x, T_z).e     |T+ - T| <= rates     |T - T_bar| <= trust
+//! |T| + r <= T_max     r >= c |T+ - 2 T + T-|_xy / h^2     T_z >= T_min     |T_x| <= tan(tilt) T_z     |T_y| <= tan(tilt) (T_x, T_z).e     |T+ - T| <= rates     |T - T_bar| <= trust
 //! 0 <= w <= 1      |w+ - w| <= rate      d.(p - centre) + s >= radius      |v_xy| <= v_max + s
 //! ```
 //! The roll limit `|T_y| <= tan(tilt) |(T_x, T_z)|` is not convex; its tangent at the iterate lies inside of it (docs/equations.md F).
@@ -87,8 +87,9 @@ pub(super) struct Iterate {
     pub(super) sides: Vec<Vector2<f64>>,
 }
 
-/// Numbers of a node: position, velocity, acceleration, thrust, deployment, its change, slack.
-const WIDTH: usize = 15;
+/// Numbers of a node: position, velocity, acceleration, thrust, deployment, its change, slack,
+/// thrust given up for turning.
+const WIDTH: usize = 16;
 const P: usize = 0;
 const V: usize = 3;
 const A: usize = 6;
@@ -96,6 +97,7 @@ const T: usize = 9;
 const W: usize = 12;
 const DW: usize = 13;
 const S: usize = 14;
+const R: usize = 15;
 /// Obstacles further than this from an iterate's node do not matter there, m.
 const NEAR_M: f64 = 4.0;
 /// How much further than its servo goes the deployment may be for a trust of 1 N, 1/N.
@@ -140,6 +142,11 @@ pub(super) struct Subproblem<'a> {
 impl Subproblem<'_> {
     fn nodes(&self) -> usize {
         self.iterate.path.len()
+    }
+
+    /// Nodes whose thrust is on its way already, the first among them.
+    fn held(&self) -> usize {
+        1 + (self.craft.delay_s / self.task.step_s()).round() as usize
     }
 
     /// Controls, and where the linear model takes them to lead; `None` where Clarabel finds no solution, which only numbers out of all proportion bring about.
@@ -225,13 +232,16 @@ impl Subproblem<'_> {
 
     fn dynamics(&self, rows: &mut Rows) {
         let (begin, h) = (self.task.begin(), self.task.step_s());
-        let (thrust, spread) = self.iterate.controls[0];
         for axis in 0..3 {
             rows.push(&[(at(0, P + axis), 1.0)], begin.position[axis]);
             rows.push(&[(at(0, V + axis), 1.0)], begin.velocity[axis]);
-            rows.push(&[(at(0, T + axis), 1.0)], thrust[axis]);
         }
-        rows.push(&[(at(0, W), 1.0)], spread);
+        rows.push(&[(at(0, W), 1.0)], begin.spread);
+        for (k, (thrust, _)) in self.iterate.controls.iter().enumerate().take(self.held()) {
+            for axis in 0..3 {
+                rows.push(&[(at(k, T + axis), 1.0)], thrust[axis]);
+            }
+        }
         for (k, motion) in self.iterate.path.iter().enumerate() {
             let (thrust, spread) = self.iterate.controls[k];
             let slopes = self.craft.slopes(&motion.velocity, &thrust, spread);
@@ -262,14 +272,20 @@ impl Subproblem<'_> {
         let slope = craft.tilt_max_rad.tan();
         let sideways = craft.tilt_rate_max_rad_s * craft.hover().z * h;
         let upwards = craft.thrust_rate_max_n_s * h;
-        let may_spread = self.may_spread && craft.wing.is_some();
         for k in 0..self.nodes() {
             rows.push(&[(at(k, S), -1.0)], 0.0);
             rows.push(&[(at(k, DW), -1.0)], 0.0);
+            rows.push(&[(at(k, R), -1.0)], 0.0);
             if k == 0 {
                 continue;
             }
-            let (thrust, spread) = self.iterate.controls[k];
+            self.wings(k, rows);
+            self.turning(k, rows);
+            self.half_spaces(k, rows);
+            if k < self.held() {
+                continue;
+            }
+            let (thrust, _) = self.iterate.controls[k];
             let z = at(k, T + 2);
             let trust = self.trust_n;
             rows.push(&[(z, -1.0)], -craft.thrust_min_n.max(thrust.z - trust));
@@ -291,17 +307,42 @@ impl Subproblem<'_> {
                 rows.push(&[(now, 1.0), (before, -1.0)], limit);
                 rows.push(&[(now, -1.0), (before, 1.0)], limit);
             }
-            let (now, before, change) = (at(k, W), at(k - 1, W), at(k, DW));
-            let room = SPREAD_TRUST_PER_N * trust;
-            let left = self.task.begin().spread - craft.wing_rate_max_per_s * h * k as f64;
-            let most = if may_spread { (spread + room).min(1.0) } else { left.max(0.0) };
-            rows.push(&[(now, 1.0)], most);
-            rows.push(&[(now, -1.0)], -(spread - room).clamp(0.0, most));
-            rows.push(&[(now, 1.0), (before, -1.0), (change, -1.0)], 0.0);
-            rows.push(&[(now, -1.0), (before, 1.0), (change, -1.0)], 0.0);
-            rows.push(&[(change, 1.0)], craft.wing_rate_max_per_s * h);
-            self.half_spaces(k, rows);
         }
+    }
+
+    /// What turning takes of the thrust.
+    fn turning(&self, k: usize, rows: &mut Rows) {
+        let h2 = self.task.step_s() * self.task.step_s();
+        if k + 1 < self.nodes() && k + 1 >= self.held() {
+            for axis in 0..2 {
+                let share = self.craft.turning_s2[axis] / h2;
+                let [before, now, after] = [k - 1, k, k + 1].map(|node| at(node, T + axis));
+                for sign in [1.0, -1.0] {
+                    let by = share * sign;
+                    rows.push(&[(after, by), (now, -2.0 * by), (before, by), (at(k, R), -1.0)], 0.0);
+                }
+            }
+        }
+        if k + 1 == self.held() {
+            // That thrust is on its way; what there is left for turning may be nothing.
+            let left = self.craft.thrust_max_n - self.iterate.controls[k].0.norm();
+            rows.push(&[(at(k, R), 1.0), (at(k, S), -1.0)], left.max(0.0));
+        }
+    }
+
+    fn wings(&self, k: usize, rows: &mut Rows) {
+        let (craft, h) = (self.craft, self.task.step_s());
+        let may_spread = self.may_spread && craft.wing.is_some();
+        let (_, spread) = self.iterate.controls[k];
+        let (now, before, change) = (at(k, W), at(k - 1, W), at(k, DW));
+        let room = SPREAD_TRUST_PER_N * self.trust_n;
+        let left = self.task.begin().spread - craft.wing_rate_max_per_s * h * k as f64;
+        let most = if may_spread { (spread + room).min(1.0) } else { left.max(0.0) };
+        rows.push(&[(now, 1.0)], most);
+        rows.push(&[(now, -1.0)], -(spread - room).clamp(0.0, most));
+        rows.push(&[(now, 1.0), (before, -1.0), (change, -1.0)], 0.0);
+        rows.push(&[(now, -1.0), (before, 1.0), (change, -1.0)], 0.0);
+        rows.push(&[(change, 1.0)], craft.wing_rate_max_per_s * h);
     }
 
     /// Obstacles near a node, and near the middle of the way to it: between two nodes a path cuts corners.
@@ -333,13 +374,15 @@ impl Subproblem<'_> {
     }
 
     fn cones(&self, rows: &mut Rows, cones: &mut Vec<SupportedConeT<f64>>) {
-        let fastest = self.task.speed_max_m_s();
-        for k in 1..self.nodes() {
-            rows.push(&[], self.craft.thrust_max_n);
+        for k in self.held()..self.nodes() {
+            rows.push(&[(at(k, R), 1.0)], self.craft.thrust_max_n);
             for axis in 0..3 {
                 rows.push(&[(at(k, T + axis), -1.0)], 0.0);
             }
             cones.push(SupportedConeT::SecondOrderConeT(4));
+        }
+        let fastest = self.task.speed_max_m_s();
+        for k in 1..self.nodes() {
             if fastest.is_finite() {
                 rows.push(&[(at(k, S), -1.0)], fastest);
                 for axis in 0..2 {
