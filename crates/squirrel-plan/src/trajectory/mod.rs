@@ -26,6 +26,7 @@
 mod model;
 mod scenario;
 mod scp;
+mod sides;
 mod subproblem;
 mod task;
 

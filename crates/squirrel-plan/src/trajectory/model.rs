@@ -50,11 +50,11 @@ pub struct Craft {
 }
 
 /// Part of thrust and tilt that a plan leaves to whoever follows it to its end.
-pub const RESERVE: f64 = 0.03;
+pub const RESERVE: f64 = 0.05;
 /// Of the command filter and the attitude loop.
 const DELAY_S: f64 = 0.1;
 /// Most of a half turn that the command filter and the attitude loop do in a second.
-const TILT_RATE_MAX_RAD_S: f64 = 4.0;
+const TILT_RATE_MAX_RAD_S: f64 = 2.5;
 /// Time in which rotors go from nothing to full thrust.
 const THRUST_TIME_S: f64 = 0.25;
 

@@ -5,8 +5,9 @@
 //! obstacles, both sides of up to two of them are tried first.
 
 use super::model::{Craft, Motion};
+use super::sides::guesses;
 use super::subproblem::{Control, Iterate, Subproblem, Weights};
-use super::task::{KeepOut, Plan, Status, Task};
+use super::task::{Plan, Status, Task};
 use nalgebra::{Vector2, Vector3};
 use squirrel_sim::track::{Track, TrackPoint};
 
@@ -22,8 +23,6 @@ const GAIN: f64 = 2e-3;
 const TOUCH_M: f64 = 0.01;
 /// Iterations in which a side is judged.
 const TRIAL: u32 = 2;
-/// Obstacles of which both sides are tried.
-const SIDES: usize = 2;
 
 /// Plans.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -182,37 +181,6 @@ fn first_controls(craft: &Craft, task: &Task, warm: Option<(&Track, f64)>) -> Ve
         });
     }
     controls
-}
-
-/// To which side of the obstacles that are in the way a path could lead: places about which they are linearised.
-fn guesses(task: &Task, base: &[Vector2<f64>]) -> Vec<Vec<Vector2<f64>>> {
-    let depth = |keep: &KeepOut| {
-        base.iter()
-            .map(|place| keep.radius_m - (place - keep.centre).norm())
-            .fold(f64::NEG_INFINITY, f64::max)
-    };
-    let mut blocking: Vec<&KeepOut> = task.keep_out().iter().filter(|keep| depth(keep) > 0.0).collect();
-    let far = |keep: &KeepOut| (keep.centre - base[0]).norm();
-    blocking.sort_by(|a, b| far(a).total_cmp(&far(b)));
-    blocking.truncate(SIDES);
-    let mut all = vec![base.to_vec()];
-    for keep in blocking {
-        all = all.iter().flat_map(|sides| [-1.0, 1.0].map(|side| past(keep, side, sides))).collect();
-    }
-    all
-}
-
-/// A path, moved to one side of an obstacle where it is near it: -1 left, 1 right of the way.
-fn past(keep: &KeepOut, side: f64, path: &[Vector2<f64>]) -> Vec<Vector2<f64>> {
-    let (first, last) = (path[0], path[path.len() - 1]);
-    let way = (last - first).try_normalize(1e-9).unwrap_or_else(Vector2::x);
-    let across = Vector2::new(-way.y, way.x) * side;
-    let move_out = |place: &Vector2<f64>| {
-        let (along, off) = ((place - keep.centre).dot(&way), (place - keep.centre).dot(&across));
-        let width = keep.radius_m * keep.radius_m - along * along;
-        if width > 0.0 { place + across * (width.sqrt() - off).max(0.0) } else { *place }
-    };
-    path.iter().map(move_out).collect()
 }
 
 impl Craft {
