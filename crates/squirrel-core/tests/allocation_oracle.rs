@@ -7,6 +7,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod airframe;
+/// What the emulated M7 is asked.
+#[allow(unreachable_pub, reason = "public where it is at home")]
+#[path = "../../../firmware/m7/src/draws.rs"]
+mod draws;
 
 use airframe::{PAPER_SIGNS, PAPER_X, vehicle};
 use clarabel::algebra::CscMatrix;
@@ -404,12 +408,30 @@ fn nothing_comes_in_nothing_bad_goes_out() {
                     if i < v.rotors().len() && most.is_finite() { most.clamp(0.0, 5.4001) } else { 0.0 };
                 assert!((0.0..=top).contains(f), "case {case}: {f} of {top} for {demand:?}, {answer:?}");
             }
-            assert!(answer.steps <= STEPS_MAX / 2, "{answer:?}");
+            assert!(answer.optimal && answer.steps <= STEPS_MAX / 10, "{answer:?} for {demand:?}");
         }
         let nothing = ThrustTorque { thrust_n: f32::NAN, torque_n_m: Vector3::repeat(f32::NEG_INFINITY) };
         let (before, most) = (draw.thrusts(), draw.limits());
         assert_eq!(allocation.allocate(&nothing, &before, &most), allocation.allocate(&zero, &before, &most));
     }
+}
+
+/// `cargo xtask firmware` asks the same of the M7.
+#[test]
+fn the_hash_that_the_m7_must_have_is_this_one() {
+    let (mut hash, mut steps) = (draws::HASH_START, [(0, 0); 4]);
+    for (kind, (sum, worst)) in draws::KINDS.into_iter().zip(&mut steps) {
+        let mut of_kind = draws::Draws::new(kind);
+        let allocation = of_kind.allocation().unwrap();
+        for _ in 0..draws::EACH {
+            let answer = of_kind.case().allocate(&allocation);
+            assert!(answer.optimal && (kind != draws::Kind::Within || answer.steps == 0));
+            hash = draws::hash(hash, &answer);
+            (*sum, *worst) = (*sum + answer.steps, answer.steps.max(*worst));
+        }
+    }
+    println!("steps of {} demands of each kind, all and most: {steps:?}", draws::EACH);
+    assert_eq!(hash, draws::EXPECTED, "{hash:#x}");
 }
 
 #[test]

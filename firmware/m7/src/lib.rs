@@ -2,5 +2,6 @@
 
 #![no_std]
 
+pub mod draws;
 pub mod host;
 pub mod instructions;

@@ -4,10 +4,12 @@
 //!    same hashes. So it must for a hundred pieces of flight in which a sensor fails.
 //! 2. A flight with the flight code in QEMU must leave the same log, byte for byte, as one without.
 //! 3. Negative controls: another mass by one bit must change the hashes, a step that may panic must not link.
-//! 4. The workspace is linted; the image for the real part is built and sized, and what of it needs no hardware is tested.
-//! 5. Instructions of control and of the estimator, size of the images that hold nothing but control or the whole step, worst-case
-//!    stack, against `firmware/figures.txt` and the budget; `--write` takes the new ones.
+//! 4. The weighted allocation, which no flight has, answers random demands with the host's bits.
+//! 5. The workspace is linted; the image for the real part is built and sized, and what of it needs no hardware is tested.
+//! 6. Instructions of control, of the estimator and of the allocation, size of the images that hold nothing but one of them or the whole
+//!    step, worst-case stack, against `firmware/figures.txt` and the budget; `--write` takes the new ones.
 
+mod allocation;
 mod board;
 mod elf;
 mod figures;
@@ -115,7 +117,7 @@ fn measure() -> Result<Figures, String> {
     eprintln!("negative control: a step that may panic does not link");
 
     let images = build(&["--package=squirrel-m7"])?;
-    eprintln!("no panic can be reached from control nor from the whole step: their images link");
+    eprintln!("no panic can be reached from control, the allocation nor the whole step: their images link");
     let mut flights = squirrel.play("flights")?;
     // The mass is nothing to a flight that is commanded, so that it is no part of the negative control.
     let commanded = squirrel.play("commanded")?;
@@ -132,9 +134,12 @@ fn measure() -> Result<Figures, String> {
     eprintln!("fly --hil qemu: the same log, byte for byte");
 
     let mut figures = flights.figures()?;
-    for (image, function, names) in
-        [("control", "squirrel_control", figures::OF_CONTROL), ("step", "squirrel_step", figures::OF_STEP)]
-    {
+    allocation::measure(&mut figures)?;
+    for (image, function, names) in [
+        ("control", "squirrel_control", figures::OF_CONTROL),
+        ("allocation", "squirrel_allocation", figures::OF_ALLOCATION),
+        ("step", "squirrel_step", figures::OF_STEP),
+    ] {
         let path = images.join(image);
         let bytes = std::fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let elf = Elf::parse(&bytes).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -160,6 +165,23 @@ fn emulator() -> Result<(), String> {
 fn build(arguments: &[&str]) -> Result<PathBuf, String> {
     let done = thumb::build(arguments, false)?;
     if done.status.success() { thumb::images() } else { Err("the firmware does not build".to_owned()) }
+}
+
+/// Runs an image that says at least two lines.
+fn emulate(image: &str, argument: Option<&str>, folder: &Path) -> Result<Played, String> {
+    let mut command = Command::new(QEMU);
+    command.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-nographic", "-monitor", "none"]);
+    command.args(["-serial", "none", "-icount", "shift=6", "-semihosting-config"]);
+    let argument = argument.map_or(String::new(), |argument| format!(",arg={argument}"));
+    command.arg(format!("enable=on,target=native,arg={image}{argument}"));
+    let done = command.arg("-kernel").arg(thumb::images()?.join(image)).current_dir(folder).output();
+    let done = done.map_err(|error| format!("{QEMU}: {error}"))?;
+    let text = String::from_utf8_lossy(&done.stdout);
+    let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+    if lines.len() < 2 {
+        return Err(format!("{QEMU}: {image}{argument}: said `{}`", text.trim()));
+    }
+    Ok(Played { lines, well: done.status.success() })
 }
 
 /// The host's program and a folder for what it makes.
@@ -195,19 +217,7 @@ impl Squirrel {
     }
 
     fn play(&self, vectors: &str) -> Result<Played, String> {
-        let mut command = Command::new(QEMU);
-        command.args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-nographic", "-monitor", "none"]);
-        command.args(["-serial", "none", "-icount", "shift=6", "-semihosting-config"]);
-        command.arg(format!("enable=on,target=native,arg=play,arg={vectors}/vectors.bin"));
-        let done =
-            command.arg("-kernel").arg(thumb::images()?.join("play")).current_dir(&self.folder).output();
-        let done = done.map_err(|error| format!("{QEMU}: {error}"))?;
-        let text = String::from_utf8_lossy(&done.stdout);
-        let lines: Vec<String> = text.lines().map(str::to_owned).collect();
-        if lines.len() < 2 {
-            return Err(format!("{QEMU}: {vectors}: said `{}`", text.trim()));
-        }
-        Ok(Played { lines, well: done.status.success() })
+        emulate("play", Some(&format!("{vectors}/vectors.bin")), &self.folder)
     }
 
     fn hardware_in_the_loop(&self, images: &Path) -> Result<(), String> {
@@ -236,7 +246,7 @@ impl Squirrel {
     }
 }
 
-/// What the image `play` said: a line of memory, then a line a sequence.
+/// What an image said: `play` a line of memory, then a line a sequence.
 struct Played {
     lines: Vec<String>,
     well: bool,

@@ -40,8 +40,9 @@ impl Allocation {
         let noise = self.noise(&problem.want);
         // Rotors that rounding alone let go: not again until something has moved.
         let mut settled = [false; MAX_ROTORS];
+        let mut slope = self.slope(problem, &at);
         for step in 1..=STEPS_MAX {
-            let way = self.newton_step(free, &self.slope(problem, &at).map(|x| -x));
+            let way = self.newton_step(free, &slope.map(|x| -x));
             let (mut share, mut stop) = (1.0, None);
             for i in 0..n {
                 let goal = at[i] + way[i];
@@ -62,10 +63,14 @@ impl Allocation {
                 settled = [false; MAX_ROTORS];
             }
             if let Some((i, bound)) = stop {
+                // The remainder is the index; with it the compiler sees a place in the array.
+                let i = i % MAX_ROTORS;
                 (at[i], free[i], settled[i]) = (bound, false, share == 0.0);
+            }
+            slope = self.slope(problem, &at);
+            if stop.is_some() {
                 continue;
             }
-            let slope = self.slope(problem, &at);
             let mut best = (0.0, None);
             for i in 0..n {
                 let gain = if at[i] > 0.0 { slope[i] } else { -slope[i] };
@@ -74,7 +79,7 @@ impl Allocation {
                 }
             }
             match best.1 {
-                Some(i) => free[i] = true,
+                Some(i) => free[i % MAX_ROTORS] = true,
                 None => return (at, step, true),
             }
         }
