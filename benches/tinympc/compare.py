@@ -1,0 +1,200 @@
+#!/usr/bin/env python3
+"""Planning without wings beside TinyMPC 0.0.8 (ADMM over a horizon, C++): time of a solve, and what flies by it, in one run.
+
+    python3 compare.py [--states 200] [--flights 20] [--thrust-to-weight 2.0] [--only tinympc]
+
+Needs requirements.txt and the wheel of squirrel (`cargo xtask wheel` leaves it in target/wheel/dist) in one environment; TinyMPC is compiled, which
+takes a minute and a half. Without `squirrel.plan` its rows are left out.
+
+The task is what an avoidance leaves behind: anywhere within 3 m of a straight reference and up to 3 m/s off its 5 to 7 m/s, back to it. Position
+and velocity in NED, acceleration as the input, 20 steps of 0.1 s. TinyMPC's own example, a quadrotor of twelve states with quaternions,
+is not needed: neither of the two plans attitude here. What each knows of the vehicle:
+
+- TinyMPC: |a| within g tan(30 deg) north and east, and between free fall and full thrust as if level down: a box, the linearised problem. That
+  tilt and thrust limit each other it cannot know. 0.0.8 has second-order cones, but from Python they did not hold: inputs came back up to
+  8 m/s^2 outside of the tilt cone after any number of iterations, and its test for the end does not look at them. Obstacles it has none, only half-spaces
+  that are the same over the whole horizon.
+- squirrel: thrust in the cone and below the limit in length, obstacles (none here). It may use wings; here it must not.
+
+States and references change at every call, so that no call begins at the answer of the one before it. TinyMPC prints a line a solve into
+nowhere; that is in its time. Its penalty `rho` is part of its cost at the end of the horizon, too, so it is not only a matter of speed: of 0.1 to 10, 1 is the
+fastest and 0.1 tracks best. Then each flies twice by its first input, ten times a second for 4 s, from the first states: as a double integrator that takes any
+acceleration, and as a point mass whose thrust is cut to the cone and to the limit.
+"""
+
+import argparse
+import contextlib
+import os
+import re
+import statistics
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+# From position, velocity and the reference's positions (steps + 1, 3) to the first acceleration, NED.
+Planner = Callable[[Array, Array, Array], Array]
+
+GRAVITY = 9.80665
+DOWN = np.array([0.0, 0.0, GRAVITY])
+TILT = np.radians(30.0)
+STEP_S = 0.1
+STEPS = 20
+FLIGHT_STEPS = 40
+
+
+@contextlib.contextmanager
+def silent() -> Iterator[None]:
+    """The solver prints by itself, past Python."""
+    kept, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(nowhere)
+
+
+def of_tinympc(thrust_to_weight: float, rho: float) -> Planner:
+    import tinympc
+
+    identity = np.eye(3)
+    a = np.block([[identity, STEP_S * identity], [np.zeros((3, 3)), identity]])
+    b = np.vstack([0.5 * STEP_S**2 * identity, STEP_S * identity])
+    weight = np.diag([10.0] * 3 + [1.0] * 3)
+    solver = tinympc.TinyMPC()
+    solver.setup(a, b, weight, 0.1 * identity, STEPS, rho=rho, max_iter=500, abs_pri_tol=1e-3, abs_dua_tol=1e-3)
+    side, up = GRAVITY * np.tan(TILT), (thrust_to_weight - 1.0) * GRAVITY
+    solver.set_bound_constraints(None, None, np.array([-side, -side, -up]), np.array([side, side, GRAVITY]))
+
+    def plan(position: Array, velocity: Array, reference: Array) -> Array:
+        speed = np.diff(reference, axis=0) / STEP_S
+        solver.set_x0(np.concatenate([position, velocity]))
+        solver.set_x_ref(np.vstack([reference[:STEPS].T, speed.T]))
+        # What it returns is a view of its own memory.
+        return np.array(solver.solve()["controls"])
+
+    return plan
+
+
+def of_squirrel(thrust_to_weight: float) -> Planner:
+    import squirrel
+    import squirrel.plan
+
+    text = squirrel.Vehicle.bundled("squirrel").text
+    mass = float(re.search(r"mass_kg = \{ value = ([0-9.]+)", text)[1])
+    limit = thrust_to_weight * mass * GRAVITY
+    vehicle = squirrel.Vehicle.parse(re.sub(r"(thrust_max_n = \{ value = )[0-9.]+", rf"\g<1>{limit}", text, count=1))
+
+    def plan(position: Array, velocity: Array, reference: Array) -> Array:
+        planned = squirrel.plan.trajectory(
+            vehicle,
+            position_ned_m=position,
+            velocity_ned_m_s=velocity,
+            reference_position_ned_m=reference,
+            wings=False,
+            horizon_s=STEPS * STEP_S,
+            step_s=STEP_S,
+        )
+        return DOWN + np.asarray(planned.thrust_ned_n)[0] / mass
+
+    return plan
+
+
+def any_acceleration(acceleration: Array, _: float) -> Array:
+    return acceleration
+
+
+def within_thrust(acceleration: Array, thrust_to_weight: float) -> Array:
+    """What a point mass does that is asked for an acceleration: thrust over mass in the cone first, then shortened."""
+    thrust = DOWN - acceleration
+    thrust[2] = max(thrust[2], 0.0)
+    side, most = np.hypot(thrust[0], thrust[1]), np.tan(TILT) * thrust[2]
+    if side > most:
+        thrust[:2] *= most / side
+    length = np.linalg.norm(thrust)
+    if length > thrust_to_weight * GRAVITY:
+        thrust *= thrust_to_weight * GRAVITY / length
+    return DOWN - thrust
+
+
+def states(count: int) -> list[tuple[Array, Array, Array, Array]]:
+    """Position, velocity, and where and how fast the reference is."""
+    draw = np.random.default_rng(1)
+    out = []
+    for _ in range(count):
+        heading, speed = draw.uniform(-np.pi, np.pi), draw.uniform(5.0, 7.0)
+        along = speed * np.array([np.cos(heading), np.sin(heading), 0.0])
+        start = np.array([*draw.uniform(-50.0, 50.0, 2), draw.uniform(-20.0, -5.0)])
+        off = draw.normal(size=3)
+        off *= draw.uniform(0.0, 3.0) / np.linalg.norm(off)
+        out.append((start + off, along + draw.uniform(-3.0, 3.0, 3) / np.sqrt(3.0), start, along))
+    return out
+
+
+def line(start: Array, along: Array, from_step: int) -> Array:
+    return start + STEP_S * np.arange(from_step, from_step + STEPS + 1)[:, None] * along
+
+
+def times_us(plan: Planner, cases: list[tuple[Array, Array, Array, Array]]) -> list[float]:
+    took = []
+    for position, velocity, start, along in cases:
+        reference = line(start, along, 0)
+        before = time.perf_counter()
+        plan(position, velocity, reference)
+        took.append(1e6 * (time.perf_counter() - before))
+    return took
+
+
+def rmse_m(plan: Planner, cases: list[tuple[Array, Array, Array, Array]], plant: Callable[[Array, float], Array], ratio: float) -> float:
+    squares = []
+    for position, velocity, start, along in cases:
+        for step in range(FLIGHT_STEPS):
+            acceleration = plant(plan(position, velocity, line(start, along, step)), ratio)
+            position = position + STEP_S * velocity + 0.5 * STEP_S**2 * acceleration
+            velocity = velocity + STEP_S * acceleration
+            squares.append(float(np.sum((position - start - STEP_S * (step + 1) * along) ** 2)))
+    return float(np.sqrt(np.mean(squares)))
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--states", type=int, default=200)
+    options.add_argument("--flights", type=int, default=20)
+    options.add_argument("--thrust-to-weight", type=float, default=2.0)
+    options.add_argument("--only", choices=["tinympc", "squirrel"])
+    chosen = options.parse_args()
+    ratio = chosen.thrust_to_weight
+    planners: dict[str, Callable[[], Planner]] = {
+        "TinyMPC, rho 1": lambda: of_tinympc(ratio, rho=1.0),
+        "TinyMPC, rho 0.1": lambda: of_tinympc(ratio, rho=0.1),
+        "squirrel": lambda: of_squirrel(ratio),
+    }
+    cases = states(chosen.states)
+    print("| planner | solve, median, us | 90 %, us | RMSE, double integrator, m | RMSE, point mass with limits, m |")
+    print("|---|---|---|---|---|")
+    for name, make in planners.items():
+        if chosen.only and chosen.only not in name.lower():
+            continue
+        with silent():
+            try:
+                plan = make()
+            except ImportError as error:
+                missing = str(error)
+            else:
+                missing = ""
+                times_us(plan, cases[:10])
+                took = times_us(plan, cases)
+                flown = [rmse_m(plan, cases[: chosen.flights], plant, ratio) for plant in (any_acceleration, within_thrust)]
+        if missing:
+            print(f"| {name} | left out: {missing} | | | |")
+            continue
+        late = statistics.quantiles(took, n=10)[-1]
+        print(f"| {name} | {statistics.median(took):.0f} | {late:.0f} | {flown[0]:.3f} | {flown[1]:.3f} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
