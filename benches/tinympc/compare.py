@@ -7,19 +7,19 @@ Needs requirements.txt and the wheel of squirrel (`cargo xtask wheel` leaves it 
 takes a minute and a half. Without `squirrel.plan` its rows are left out.
 
 The task is what an avoidance leaves behind: anywhere within 3 m of a straight reference and up to 3 m/s off its 5 to 7 m/s, back to it. Position
-and velocity in NED, acceleration as the input, 20 steps of 0.1 s. TinyMPC's own example, a quadrotor of twelve states with quaternions,
-is not needed: neither of the two plans attitude here. What each knows of the vehicle:
+and velocity in NED, acceleration as the input, 20 steps of 0.1 s. TinyMPC's own example, a quadrotor of twelve states with
+quaternions, is not needed: neither of the two plans attitude here. What each knows of the vehicle:
 
-- TinyMPC: |a| within g tan(30 deg) north and east, and between free fall and full thrust as if level down: a box, the linearised problem. That
-  tilt and thrust limit each other it cannot know. 0.0.8 has second-order cones, but from Python they did not hold: inputs came back up to
-  8 m/s^2 outside of the tilt cone after any number of iterations, and its test for the end does not look at them. Obstacles it has none, only half-spaces
-  that are the same over the whole horizon.
+- TinyMPC: |a| within g tan(30 deg) north and east, and between free fall and full thrust as if level down: a box, the linearised
+  problem. That tilt and thrust limit each other it cannot know. 0.0.8 has second-order cones, but from Python they did not hold: inputs
+  came back up to 8 m/s^2 outside of the tilt cone after any number of iterations, and its test for the end does not look at them. It
+  has no obstacles, only half-spaces that are the same over the whole horizon.
 - squirrel: thrust in the cone and below the limit in length, obstacles (none here). It may use wings; here it must not.
 
 States and references change at every call, so that no call begins at the answer of the one before it. TinyMPC prints a line a solve into
-nowhere; that is in its time. Its penalty `rho` is part of its cost at the end of the horizon, too, so it is not only a matter of speed: of 0.1 to 10, 1 is the
-fastest and 0.1 tracks best. Then each flies twice by its first input, ten times a second for 4 s, from the first states: as a double integrator that takes any
-acceleration, and as a point mass whose thrust is cut to the cone and to the limit.
+nowhere; that is in its time. Its penalty `rho` is part of its cost at the end of the horizon, too, so it is not only a matter of speed:
+of 0.1 to 10, 1 is the fastest and 0.1 tracks best. Then each flies twice by its first input, ten times a second for 4 s, from the first
+states: as a double integrator that takes any acceleration, and as a point mass whose thrust is cut to the cone and to the limit.
 """
 
 import argparse

@@ -21,7 +21,7 @@
 //! more than a tenth of it, and [`AllocationTerms::optimal`] says.
 //!
 //! Demands and thrusts are f32, the arithmetic is f64, which a Cortex-M7 has in hardware: with the weights of G.2 the curvature spans
-//! 1e8, an f32 carries 1.7e7.
+//! 1e8, an f32 carries 1.7e7. In f32 this search is off by more than 1e-5 of the largest thrust in three draws of ten.
 
 mod active_set;
 
