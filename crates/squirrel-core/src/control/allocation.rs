@@ -16,9 +16,9 @@
 //! A primal active set. Within the limits, a product with constants. Else: minimise over the rotors that are free, stop at the
 //! first limit in the way and hold that rotor there; at a minimum, let go the rotor that gains most; if none gains, the conditions of
 //! Karush, Kuhn and Tucker hold, and as the programme is strictly convex that is its only answer. The cost falls from minimum to
-//! minimum, so no set of held rotors is minimised over twice: with `n` rotors at most `3^n` minima, each behind at most `n` stops,
-//! for four rotors [`STEPS_MAX`]. More rotors end there too, within the limits and better than they began; no draw of the tests needed
-//! more than a tenth of it, and [`AllocationTerms::optimal`] says.
+//! minimum, so none of the `3^n` ways to hold `n` rotors is minimised over twice; and no rotor is held that was not free at first or let go at
+//! a minimum: at most `2 * 3^n + n - 1` steps, for four rotors [`STEPS_MAX`]. More rotors end there too, within the limits and better than they
+//! began; no draw of the tests needed more than a fifth of it, and [`AllocationTerms::optimal`] says.
 //!
 //! Demands and thrusts are f32, the arithmetic is f64, which a Cortex-M7 has in hardware: with the weights of G.2 the curvature spans
 //! 1e8, an f32 carries 1.7e7. In f32 this search is off by more than 1e-5 of the largest thrust in three draws of ten.
@@ -31,8 +31,8 @@ use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle, not_negative
 use active_set::Problem;
 use nalgebra::Vector3;
 
-/// Most minimisations of one allocation: `4 * 3^4`.
-pub const STEPS_MAX: u32 = 324;
+/// Most steps of one allocation, each a minimisation: `2 * 3^4 + 3`.
+pub const STEPS_MAX: u32 = 165;
 /// Largest weight over that of the change: beyond, f64 runs out too.
 const SPREAD_MAX: f32 = 1e9;
 
@@ -63,7 +63,7 @@ pub struct AllocationTerms {
     pub rotor_thrust_n: PerRotor<f32>,
     /// What these thrusts amount to.
     pub achieved: ThrustTorque,
-    /// Minimisations, 0 where no limit is in the way; at most [`STEPS_MAX`].
+    /// Steps, 0 where no limit is in the way; at most [`STEPS_MAX`].
     pub steps: u32,
     /// Nothing costs less.
     pub optimal: bool,
