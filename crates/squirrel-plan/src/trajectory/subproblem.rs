@@ -186,7 +186,9 @@ impl Subproblem<'_> {
             return None;
         }
         let control = |k: usize| {
-            let thrust = Vector3::from_column_slice(&x[at(k, T)..at(k, T) + 3]);
+            // What is held is held to the bit.
+            let found = Vector3::from_column_slice(&x[at(k, T)..at(k, T) + 3]);
+            let thrust = if k < self.held() { self.iterate.controls[k].0 } else { found };
             (thrust, x[at(k, W)].clamp(0.0, 1.0))
         };
         let motion = |k: usize| {
