@@ -2,8 +2,10 @@
 //!
 //! Upwards and against the motion with height free are values of the support function. Braking at constant height is not: it is asked
 //! of the set, not of its hull, which would mix folded and spread wings. For an attitude the thrust that holds height is
-//! `U = (m g + w f_z)/n_z`, and a search over the tilt set that narrows around its best points finds the attitude.
+//! `U = (m g + w f_z)/n_z`, and a search in two numbers finds the attitude: the inner one ends
+//! where thrust does.
 
+use super::turned::golden;
 use super::{Reach, Wings};
 use nalgebra::Vector3;
 use squirrel_core::frames::In;
@@ -11,12 +13,12 @@ use squirrel_core::math::GRAVITY_M_S2;
 
 /// Horizontal speed below which there is nothing to brake, m/s.
 const BRAKING_SPEED_MIN_M_S: f64 = 1e-3;
-/// Cells of the first grid along each of its two numbers.
-const CELLS: u32 = 60;
-/// Points from which the search narrows.
-const STARTS: usize = 4;
-/// How often it narrows.
-const ROUNDS: u32 = 40;
+/// Steps of a search along each of the two numbers of an attitude.
+const SAMPLES: usize = 40;
+/// Peaks that are refined.
+const PEAKS: usize = 2;
+/// How often the end of what is defined is halved in.
+const HALVINGS: u32 = 40;
 
 /// A number with folded wings, and with a choice of folded or spread.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,27 +85,38 @@ impl Reach {
 
     /// The largest acceleration along a horizontal direction at constant height; minus infinity where height cannot be held.
     fn level(&self, direction: Vector3<f64>, wings: Wings) -> f64 {
-        let value = |[p, q]: [f64; 2]| self.holding_height(self.tilt.normal(p, q).0, direction, wings);
-        let place = |i: u32| f64::from(i) / f64::from(CELLS);
-        let grid = (0..=CELLS).flat_map(|i| (0..=CELLS).map(move |j| [place(i), place(j)]));
-        let mut starts: Vec<(f64, [f64; 2])> = grid.map(|at| (value(at), at)).collect();
-        starts.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let narrowed = starts.into_iter().take(STARTS).map(|(mut best, mut at)| {
-            let mut reach = 1.5 / f64::from(CELLS);
-            for _ in 0..ROUNDS {
-                let centre = at;
-                let near = (-4..=4).flat_map(|i| (-4..=4).map(move |j| [i, j]));
-                for offset in near.map(|ij| ij.map(|k| reach * f64::from(k) / 4.0)) {
-                    let there = [0, 1].map(|k| (centre[k] + offset[k]).clamp(0.0, 1.0));
-                    let found = value(there);
-                    if found > best {
-                        (best, at) = (found, there);
-                    }
-                }
-                reach *= 0.6;
-            }
-            best
-        });
-        narrowed.fold(f64::NEG_INFINITY, f64::max)
+        let value = |p: f64, q: f64| self.holding_height(self.tilt.normal(p, q).0, direction, wings);
+        peak(&|q| peak(&|p| value(p, q)))
     }
+}
+
+/// The largest value of a function on [0, 1] that is minus infinity where it is not defined.
+fn peak(value: &impl Fn(f64) -> f64) -> f64 {
+    let place = |i: usize| i as f64 / SAMPLES as f64;
+    let samples: Vec<f64> = (0..=SAMPLES).map(|i| value(place(i))).collect();
+    let best = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let beside = |i: usize| [i.checked_sub(1), Some(i + 1)].map(|j| j.and_then(|j| samples.get(j)).copied());
+    let is_peak = |i: &usize| samples[*i].is_finite() && beside(*i).iter().flatten().all(|x| *x <= samples[*i]);
+    let mut peaks: Vec<usize> = (0..=SAMPLES).filter(is_peak).collect();
+    peaks.sort_by(|a, b| samples[*b].total_cmp(&samples[*a]));
+    let refined = peaks.into_iter().take(PEAKS).flat_map(|i| {
+        let ends = [place(i.saturating_sub(1)), place((i + 1).min(SAMPLES))];
+        // The thrust that holds height ends within a step: there the best is at the end of what is defined.
+        let ends = ends.map(|end| last_defined(value, place(i), end));
+        [ends[0], golden(value, ends), ends[1]].map(value)
+    });
+    refined.fold(best, f64::max)
+}
+
+/// The end of where a function is defined between a place where it is and another.
+fn last_defined(value: &impl Fn(f64) -> f64, mut inside: f64, end: f64) -> f64 {
+    if value(end).is_finite() {
+        return end;
+    }
+    let mut outside = end;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (inside + outside);
+        if value(middle).is_finite() { inside = middle } else { outside = middle }
+    }
+    inside
 }

@@ -17,7 +17,7 @@ const PEAKS: usize = 3;
 /// Bands that a proof begins with.
 const BANDS: usize = 32;
 /// Bands after which a proof ends with the bound that it has.
-const BANDS_MAX: usize = 40_000;
+const BANDS_MAX: usize = 20_000;
 
 /// What is to be largest: the part of thrust and wings along a direction.
 #[derive(Debug, Clone, Copy)]
@@ -122,15 +122,24 @@ impl Search<'_> {
         let (towards, length) = self.aside();
         let [low, high] = [part.furthest(-towards)?, part.furthest(towards)?].map(|n| n.dot(&towards));
         let cosines = band.map(f64::cos);
-        let least = cosines[0].min(cosines[1]).max(1e-12);
+        let least = cosines[0].min(cosines[1]);
         let most = if band[0] <= 0.0 && band[1] >= 0.0 { 1.0 } else { cosines[0].max(cosines[1]) };
         // The cosine between `m` and `towards`, from that between `n` and `towards`.
-        let low = (if low < 0.0 { low / least } else { low / most }).max(-1.0);
-        let high = (if high > 0.0 { high / least } else { high / most }).min(1.0);
+        let low = (if low < 0.0 { low / least.max(1e-12) } else { low / most }).max(-1.0);
+        let high = (if high > 0.0 { high / least.max(1e-12) } else { high / most }).min(1.0);
         let [along, cross] = self.polar.range(band);
         let forward = self.motion.dot(&self.d);
-        let corners = cross.iter().flat_map(|f| [f * low, f * high]).fold(f64::NEG_INFINITY, f64::max);
-        Some(thrust + (along[0] * forward).max(along[1] * forward) + length * corners)
+        let largest = |along: [f64; 2], cross: [f64; 2]| {
+            let corners = cross.iter().flat_map(|f| [f * low, f * high]).fold(f64::NEG_INFINITY, f64::max);
+            (along[0] * forward).max(along[1] * forward) + length * corners
+        };
+        // Thrust by itself is the better bound of a wide band; with the wings, of a narrow one, where both want the same `m`.
+        let apart = thrust + largest(along, cross);
+        let with_thrust = |[low, high]: [f64; 2], [least, most]: [f64; 2]| {
+            [low - self.thrust_n * most, high - self.thrust_n * least]
+        };
+        let together = largest(with_thrust(along, sines), with_thrust(cross, [least, most]));
+        Some(apart.min(together))
     }
 }
 
