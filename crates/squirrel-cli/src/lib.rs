@@ -37,6 +37,8 @@ enum Command {
     /// Find where simulation and measurement disagree.
     #[command(subcommand)]
     Gap(commands::gap::Gap),
+    /// What spread wings add to the accelerations that a vehicle can reach.
+    Reach(commands::reach::Reach),
     /// Check vehicle files.
     #[command(subcommand)]
     Vehicle(commands::vehicle::VehicleCommand),
@@ -62,6 +64,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::ExportVectors(export) => export.run(),
         Command::Import(import) => import.run(),
         Command::Gap(gap) => gap.run(),
+        Command::Reach(reach) => reach.run(),
         Command::Vehicle(vehicle) => vehicle.run(),
     };
     match done {

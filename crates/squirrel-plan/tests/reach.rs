@@ -161,7 +161,7 @@ fn the_table_at_seven_metres_a_second_comes_out() {
     row("upward, level", ["1.74", "3.61", "10.27", "19.9"], |ratio| up(level)(ratio).with_wings);
     row("upward, descending", ["3.97", "5.90", "12.7", "22.4"], |ratio| up(slanted)(ratio).with_wings);
     row("upward, vertical descent", ["5.36", "7.32", "14.2", "24.0"], |ratio| up(down)(ratio).with_wings);
-    let hull = |velocity| move |ratio| reach(ratio, velocity).volumes().hull_m3_s6.ratio();
+    let hull = |velocity| move |ratio| reach(ratio, velocity).volumes().hull_volume_m3_s6.ratio();
     row("hull, level", ["1.45", "1.37", "1.22", "1.14"], hull(level));
     row("hull, vertical descent", ["2.56", "2.26", "1.74", "1.46"], hull(down));
     let free = |ratio| reach(ratio, level).extremes().braking_height_free_m_s2.unwrap();

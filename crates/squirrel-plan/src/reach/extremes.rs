@@ -8,6 +8,8 @@
 use super::turned::golden;
 use super::{Reach, Wings};
 use nalgebra::Vector3;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
 
@@ -40,14 +42,25 @@ impl Compared {
     }
 }
 
+impl Serialize for Compared {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_struct("Compared", 3)?;
+        map.serialize_field("folded", &self.folded)?;
+        map.serialize_field("with_wings", &self.with_wings)?;
+        map.serialize_field("ratio", &self.ratio())?;
+        map.end()
+    }
+}
+
 /// The largest accelerations that matter most, m/s^2.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Extremes {
     /// Upwards; below zero, height cannot be held.
     pub upward_m_s2: Compared,
     /// Against the horizontal motion, whatever becomes of the height; nothing to brake without such a motion.
     pub braking_height_free_m_s2: Option<Compared>,
-    /// Against the horizontal motion with no vertical acceleration; nothing where height cannot be held in either way.
+    /// Against the horizontal motion with no vertical acceleration; nothing where height cannot be held in either
+    /// way, NaN where it cannot be held with folded wings.
     pub braking_level_m_s2: Option<Compared>,
 }
 
@@ -63,7 +76,8 @@ impl Reach {
         let level = back.and_then(|back| {
             let [folded, spread] = [Wings::Folded, Wings::Spread].map(|wings| self.level(back, wings));
             let with_wings = folded.max(spread);
-            (with_wings > f64::NEG_INFINITY).then_some(Compared { folded, with_wings })
+            let folded = if folded.is_finite() { folded } else { f64::NAN };
+            with_wings.is_finite().then_some(Compared { folded, with_wings })
         });
         Extremes {
             upward_m_s2: along(-Vector3::z()),
@@ -96,7 +110,8 @@ fn peak(value: &impl Fn(f64) -> f64) -> f64 {
     let samples: Vec<f64> = (0..=SAMPLES).map(|i| value(place(i))).collect();
     let best = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let beside = |i: usize| [i.checked_sub(1), Some(i + 1)].map(|j| j.and_then(|j| samples.get(j)).copied());
-    let is_peak = |i: &usize| samples[*i].is_finite() && beside(*i).iter().flatten().all(|x| *x <= samples[*i]);
+    let is_peak =
+        |i: &usize| samples[*i].is_finite() && beside(*i).iter().flatten().all(|x| *x <= samples[*i]);
     let mut peaks: Vec<usize> = (0..=SAMPLES).filter(is_peak).collect();
     peaks.sort_by(|a, b| samples[*b].total_cmp(&samples[*a]));
     let refined = peaks.into_iter().take(PEAKS).flat_map(|i| {

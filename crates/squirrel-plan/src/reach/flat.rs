@@ -100,12 +100,7 @@ impl Trigonometric {
 /// The largest `-(thrust + b v.n)(d.n)` over the region, N.
 ///
 /// * `bv` - direction of motion times `b`, N
-pub(super) fn largest(
-    region: &Region,
-    thrust_n: f64,
-    bv: Vector3<f64>,
-    d: Vector3<f64>,
-) -> Option<Largest> {
+pub(super) fn largest(region: &Region, thrust_n: f64, bv: Vector3<f64>, d: Vector3<f64>) -> Option<Largest> {
     let axis = d.try_normalize(0.0)?;
     let aside = bv - axis * axis.dot(&bv);
     // Along `d`, every plane through both will do: what the one plane misses lies on circles around `d` that meet the edge.

@@ -74,26 +74,22 @@ fn icosahedron() -> (Vec<Vector3<f64>>, Vec<[usize; 3]>) {
 }
 
 impl Reach {
+    /// The acceleration that lies furthest along a direction: with folded wings, or with a choice of both.
+    pub(super) fn furthest(&self, direction: In<Ned, f64>, wings: Wings) -> In<Ned, f64> {
+        let folded = self.folded(direction);
+        if wings == Wings::Folded {
+            return folded.acceleration;
+        }
+        let spread = self.spread_by(direction.vector, None);
+        if spread.value_m_s2 > folded.value_m_s2 { spread.acceleration } else { folded.acceleration }
+    }
+
     /// Convex hull of the accelerations: with folded wings, or with a choice of both.
     ///
     /// * `halvings` - of the edges of an icosahedron: 12, 42, 162, 642, ... corners
     pub fn hull(&self, wings: Wings, halvings: u32) -> Mesh {
         let (directions, triangles) = icosphere(halvings);
-        let corner = |d: &Vector3<f64>| {
-            let folded = self.folded(In::new(*d));
-            match wings {
-                Wings::Folded => folded.acceleration,
-                Wings::Spread => {
-                    let spread = self.spread_by(*d, None);
-                    if spread.value_m_s2 > folded.value_m_s2 {
-                        spread.acceleration
-                    } else {
-                        folded.acceleration
-                    }
-                }
-            }
-        };
-        Mesh { corners: directions.iter().map(corner).collect(), triangles }
+        Mesh { corners: directions.iter().map(|d| self.furthest(In::new(*d), wings)).collect(), triangles }
     }
 }
 

@@ -8,18 +8,20 @@
 //! acceleration along a direction, which both share, with a bound that no acceleration exceeds; [`Reach::volumes`] compares set and hull
 //! with those of folded wings, [`Reach::extremes`] says what that means for climbing and for braking.
 
+mod case;
 mod extremes;
 mod flat;
 mod mesh;
-
+mod page;
 mod polar;
 mod tilt;
 mod turned;
 mod volume;
 
+pub use case::Case;
 pub use extremes::{Compared, Extremes};
 pub use mesh::Mesh;
-
+pub use page::page;
 pub use tilt::Tilt;
 pub use volume::Volumes;
 

@@ -136,8 +136,10 @@ impl Region {
         let faces = match *tilt {
             Tilt::Box { roll_max_rad, pitch_max_rad, yaw_rad } => {
                 let ((sin_pitch, cos_pitch), sin_roll) = (pitch_max_rad.sin_cos(), roll_max_rad.sin());
-                let pitch =
-                    |sign: f64| Face { outward: Vector3::new(sign * cos_pitch, 0.0, -sin_pitch), offset: 0.0 };
+                let pitch = |sign: f64| Face {
+                    outward: Vector3::new(sign * cos_pitch, 0.0, -sin_pitch),
+                    offset: 0.0,
+                };
                 let roll = |sign: f64| Face { outward: Vector3::new(0.0, sign, 0.0), offset: sin_roll };
                 let turn = |face: Face| Face { outward: turned(face.outward, yaw_rad), ..face };
                 [pitch(1.0), pitch(-1.0), roll(1.0), roll(-1.0)].map(turn).to_vec()

@@ -8,6 +8,8 @@
 use super::polar::Polar;
 use super::{Compared, Reach, Wings};
 use nalgebra::Vector3;
+use serde::Serialize;
+use squirrel_core::frames::{In, Ned};
 use squirrel_core::math::GRAVITY_M_S2;
 
 /// Cells of the tilt set along each of its two numbers.
@@ -20,12 +22,12 @@ const ANGLES: u32 = 400;
 const HALVINGS: u32 = 4;
 
 /// Volumes with folded wings and with a choice.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Volumes {
     /// Of the set, (m/s^2)^3.
-    pub set_m3_s6: Compared,
+    pub set_volume_m3_s6: Compared,
     /// Of its convex hull, (m/s^2)^3.
-    pub hull_m3_s6: Compared,
+    pub hull_volume_m3_s6: Compared,
 }
 
 /// Angles of attack with what is needed to look for an acceleration: sine, cosine, force.
@@ -46,8 +48,8 @@ impl Reach {
             fine + (fine - coarse) / 3.0
         };
         Volumes {
-            set_m3_s6: Compared::new(folded, with_wings),
-            hull_m3_s6: Compared::new(hull(Wings::Folded), hull(Wings::Spread)),
+            set_volume_m3_s6: Compared::new(folded, with_wings),
+            hull_volume_m3_s6: Compared::new(hull(Wings::Folded), hull(Wings::Spread)),
         }
     }
 
@@ -129,8 +131,9 @@ impl Reach {
         for sign in [1.0, -1.0] {
             let cross = sign * aside.norm();
             // Across thrust nothing may be left, and along it what is left is the thrust.
-            let left =
-                |[s, c, f, g]: [f64; 4]| [(along - f) * c - (cross - g) * s, -(along - f) * s - (cross - g) * c];
+            let left = |[s, c, f, g]: [f64; 4]| {
+                [(along - f) * c - (cross - g) * s, -(along - f) * s - (cross - g) * c]
+            };
             for pair in lookup.windows(2) {
                 let [a, b] = [left(pair[0]), left(pair[1])];
                 if (a[0] < 0.0) == (b[0] < 0.0) {
@@ -149,7 +152,7 @@ impl Reach {
     }
 
     /// Whether an acceleration can be had, m/s^2.
-    pub fn contains(&self, acceleration: squirrel_core::frames::In<squirrel_core::frames::Ned, f64>) -> bool {
+    pub fn contains(&self, acceleration: In<Ned, f64>) -> bool {
         let force = (acceleration.vector - Vector3::z() * GRAVITY_M_S2) * self.mass_kg;
         self.folds(force) || self.ways(force, &self.lookup()) > 0
     }
@@ -176,9 +179,12 @@ mod tests {
                     wing: WingForce::Flat { area_m2: 0.04 },
                 };
                 let reach = Reach::new(&question).unwrap();
-                let by_formula = reach.volumes().set_m3_s6.with_wings;
+                let by_formula = reach.volumes().set_volume_m3_s6.with_wings;
                 let by_jacobian = reach.folded_volume() + reach.beyond_folded();
-                assert!((by_jacobian / by_formula - 1.0).abs() < 3e-3, "{tilt:?} {velocity:?}: {by_jacobian} {by_formula}");
+                assert!(
+                    (by_jacobian / by_formula - 1.0).abs() < 3e-3,
+                    "{tilt:?} {velocity:?}: {by_jacobian} {by_formula}"
+                );
             }
         }
     }
