@@ -14,7 +14,7 @@ const RIBS: u32 = 16;
 /// Points of a wire.
 const POINTS: u32 = 96;
 /// Thrust-to-weight ratios of the curves.
-const RATIOS: [f64; 12] = [1.05, 1.1, 1.2, 1.3, 1.4, 1.6, 1.8, 2.0, 2.4, 2.8, 3.4, 4.0];
+const RATIOS: [f64; 10] = [1.05, 1.1, 1.15, 1.2, 1.3, 1.4, 1.6, 2.0, 2.5, 3.0];
 /// Colour of folded wings.
 const FOLDED: Ink = Ink::Series(0);
 /// Colour of a choice of folded or spread.
@@ -58,7 +58,7 @@ fn scene(reach: &Reach) -> Scene {
         lines.collect::<Vec<_>>()
     };
     let mut tracks = wires("folded", FOLDED, true, Wings::Folded);
-    tracks.extend(wires("folded or spread", CHOICE, true, Wings::Spread));
+    tracks.extend(wires("folded or spread", CHOICE, false, Wings::Spread));
     let nothing = SceneTrack { marks: vec![[0.0; 3]], ..track("", Ink::Reference, true, vec![[0.0; 3]]) };
     tracks.push(nothing);
     let axes = ["north", "east", "up"].map(|name| Axis::new(name, "m/s\u{b2}"));
@@ -91,21 +91,30 @@ fn curves(question: &Question) -> Result<Vec<Figure>, String> {
     let weight_n = question.mass_kg * GRAVITY_M_S2;
     let case = |ratio: f64| Case::of(&Question { thrust_max_n: ratio * weight_n, ..question.clone() });
     let cases = RATIOS.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
-    let names = cases.first().map_or(Vec::new(), |case| case.figures().to_vec());
-    let chart = |(i, (name, unit, _)): (usize, (&str, &str, _))| {
-        let y = Axis::new(name, unit).with_range(Range::Including(0.0, 0.0));
+    let chart = |name: &str, unit: &str, least: f64, lines: [(&str, Ink, Vec<f64>); 2]| {
+        let y = Axis::new(name, unit).with_range(Range::Including(least, least));
         let mut chart = LineChart::new(&format!("{name} over T/W"), Axis::new("T/W", ""), y);
-        let series = |number: fn(Compared) -> f64| -> Vec<f64> {
-            cases.iter().map(|case| case.figures()[i].2.map_or(f64::NAN, number)).collect()
-        };
-        chart.series = vec![
-            Series::line("folded", FOLDED, RATIOS.to_vec(), series(|both| both.folded)),
-            Series::line("folded or spread", CHOICE, RATIOS.to_vec(), series(|both| both.with_wings)),
-        ];
-        let drawn = cases.iter().any(|case| case.figures()[i].2.is_some());
-        drawn.then(|| Figure { title: name.to_owned(), drawings: vec![chart.svg()], ..Figure::default() })
+        let line = |(name, ink, y)| Series::line(name, ink, RATIOS.to_vec(), y);
+        chart.series = lines.map(line).into();
+        Figure { title: name.to_owned(), drawings: vec![chart.svg()], ..Figure::default() }
     };
-    Ok(names.into_iter().enumerate().filter_map(chart).collect())
+    let series = |i: usize, number: fn(Compared) -> f64| -> Vec<f64> {
+        cases.iter().map(|case| case.figures()[i].2.map_or(f64::NAN, number)).collect()
+    };
+    let drawn = |i: &usize| cases.iter().any(|case| case.figures()[*i].2.is_some());
+    let mut figures: Vec<Figure> = (0..3)
+        .filter(drawn)
+        .map(|i| {
+            let folded = ("folded", FOLDED, series(i, |both| both.folded));
+            let choice = ("folded or spread", CHOICE, series(i, |both| both.with_wings));
+            let (name, unit, _) = cases[0].figures()[i];
+            chart(name, unit, 0.0, [folded, choice])
+        })
+        .collect();
+    let set = ("set", Ink::Series(2), series(3, |both| both.ratio()));
+    let hull = ("hull", Ink::Series(3), series(4, |both| both.ratio()));
+    figures.push(chart("volume over that of folded wings", "", 1.0, [set, hull]));
+    Ok(figures)
 }
 
 fn numbers(page: &mut Page, cases: &[Case]) {

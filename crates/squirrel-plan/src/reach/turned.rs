@@ -11,7 +11,7 @@ use super::tilt::{Circle, Region, across};
 use nalgebra::Vector3;
 
 /// Angles that a search begins with.
-const SAMPLES: usize = 128;
+const SAMPLES: usize = 96;
 /// Peaks that are refined.
 const PEAKS: usize = 3;
 /// Bands that a proof begins with.

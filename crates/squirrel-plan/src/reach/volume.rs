@@ -18,8 +18,8 @@ const CELLS: u32 = 96;
 const STEPS: u32 = 48;
 /// Steps in which an acceleration is looked for among angles of attack.
 const ANGLES: u32 = 400;
-/// Directions of a hull: 2562 and 10242.
-const HALVINGS: u32 = 4;
+/// Directions of a hull: 642 and 2562.
+const HALVINGS: u32 = 3;
 
 /// Volumes with folded wings and with a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
