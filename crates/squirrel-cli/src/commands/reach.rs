@@ -132,14 +132,13 @@ impl Reach {
         let speeds = or(&self.speeds, level.hypot(down));
         let descents_deg = or(&self.descent_deg, down.atan2(level).to_degrees());
         let ratios = or(&self.ratios, self.thrust_to_weight.unwrap_or(p.limits.thrust_max_n / weight_n));
-        finite("--speeds", &speeds)?;
         finite("--descent-deg", &descents_deg)?;
-        for (option, numbers) in [("--speeds", &speeds), ("--thrust-to-weight", &ratios)] {
-            let least = if option == "--speeds" { 0.0 } else { f64::MIN_POSITIVE };
-            if let Some(wrong) = numbers.iter().find(|x| !(**x >= least && x.is_finite())) {
-                let bound = if option == "--speeds" { ">= 0" } else { "> 0" };
-                return Err(format!("{option} = {wrong}: must be finite and {bound}"));
-            }
+        if let Some(wrong) = speeds.iter().find(|x| !(**x >= 0.0 && x.is_finite())) {
+            return Err(format!("--speeds = {wrong}: must be finite and >= 0"));
+        }
+        if let Some(wrong) = ratios.iter().find(|x| !(**x > 0.0 && x.is_finite())) {
+            let option = if self.ratios.is_empty() { "--thrust-to-weight" } else { "--ratios" };
+            return Err(format!("{option} = {wrong}: must be finite and > 0"));
         }
         let mut questions = Vec::new();
         for speed in &speeds {

@@ -9,8 +9,8 @@ use squirrel_sim::report::page::{Columns, Figure, Page, Row};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Wires of a hull around the vertical and from below to above.
-const RINGS: u32 = 11;
-const RIBS: u32 = 16;
+const RINGS: u32 = 9;
+const RIBS: u32 = 12;
 /// Points of a wire.
 const POINTS: u32 = 96;
 /// Thrust-to-weight ratios of the curves.
@@ -57,8 +57,8 @@ fn scene(reach: &Reach) -> Scene {
         let lines = lines.map(move |(i, line)| track(if i == 0 { name } else { "" }, ink, dashed, line));
         lines.collect::<Vec<_>>()
     };
-    let mut tracks = wires("folded", FOLDED, true, Wings::Folded);
-    tracks.extend(wires("folded or spread", CHOICE, false, Wings::Spread));
+    let mut tracks = wires("folded", FOLDED, false, Wings::Folded);
+    tracks.extend(wires("folded or spread", CHOICE, true, Wings::Spread));
     let nothing = SceneTrack { marks: vec![[0.0; 3]], ..track("", Ink::Reference, true, vec![[0.0; 3]]) };
     tracks.push(nothing);
     let axes = ["north", "east", "up"].map(|name| Axis::new(name, "m/s\u{b2}"));
