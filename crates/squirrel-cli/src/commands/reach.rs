@@ -127,7 +127,9 @@ impl Reach {
         let level = north.hypot(east);
         // Straight up or down has no heading; north will do.
         let heading_rad = if level > 0.0 { east.atan2(north) } else { 0.0 };
-        let tilt = self.tilt(p.limits.tilt_max_rad, heading_rad)?;
+        let yaw_rad = self.yaw_rad.unwrap_or(heading_rad);
+        finite("--yaw-rad", &[yaw_rad])?;
+        let tilt = Tilt::named(&self.tilt, p.limits.tilt_max_rad, yaw_rad).map_err(|e| format!("--{e}"))?;
         let or = |given: &[f64], own: f64| if given.is_empty() { vec![own] } else { given.to_vec() };
         let speeds = or(&self.speeds, level.hypot(down));
         let descents_deg = or(&self.descent_deg, down.atan2(level).to_degrees());
@@ -156,16 +158,6 @@ impl Reach {
             }
         }
         Ok(questions)
-    }
-
-    fn tilt(&self, max_rad: f64, heading_rad: f64) -> Result<Tilt, String> {
-        let yaw_rad = self.yaw_rad.unwrap_or(heading_rad);
-        finite("--yaw-rad", &[yaw_rad])?;
-        match self.tilt.as_str() {
-            "box" => Ok(Tilt::Box { roll_max_rad: max_rad, pitch_max_rad: max_rad, yaw_rad }),
-            "cone" => Ok(Tilt::Cone { max_rad }),
-            other => Err(format!("--tilt = {other}: no such limit; known are box, cone")),
-        }
     }
 }
 

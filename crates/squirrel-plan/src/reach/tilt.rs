@@ -30,6 +30,18 @@ pub enum Tilt {
 }
 
 impl Tilt {
+    /// The limits of a name, `box` or `cone`, with one angle for all.
+    ///
+    /// # Errors
+    /// One line that lists the names.
+    pub fn named(name: &str, max_rad: f64, yaw_rad: f64) -> Result<Self, String> {
+        match name {
+            "box" => Ok(Self::Box { roll_max_rad: max_rad, pitch_max_rad: max_rad, yaw_rad }),
+            "cone" => Ok(Self::Cone { max_rad }),
+            other => Err(format!("tilt = {other}: no such limit; known are box, cone")),
+        }
+    }
+
     /// Names the first number out of range.
     pub(super) fn check(&self) -> Result<(), String> {
         let angle = |name: &str, rad: f64| {
