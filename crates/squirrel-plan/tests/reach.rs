@@ -1,5 +1,6 @@
 //! The controllable accelerations against dense sampling, against the table of docs/equations.md F, and against what must hold.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
+#![allow(clippy::print_stdout, reason = "the figures that documents quote")]
 
 use nalgebra::{Rotation3, Vector3};
 use rand::{Rng, SeedableRng};
