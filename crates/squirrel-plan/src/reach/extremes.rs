@@ -15,6 +15,8 @@ use squirrel_core::math::GRAVITY_M_S2;
 
 /// Horizontal speed below which there is nothing to brake, m/s.
 const BRAKING_SPEED_MIN_M_S: f64 = 1e-3;
+/// What is not above this is rounding, or points the other way.
+const NOTHING: f64 = 1e-9;
 /// Steps of a search along each of the two numbers of an attitude.
 const SAMPLES: usize = 40;
 /// Peaks that are refined.
@@ -36,9 +38,9 @@ impl Compared {
         Self { folded, with_wings }
     }
 
-    /// With wings over folded.
+    /// With wings over folded; NaN where folded wings have nothing to compare with.
     pub fn ratio(&self) -> f64 {
-        self.with_wings / self.folded
+        if self.folded > NOTHING { self.with_wings / self.folded } else { f64::NAN }
     }
 }
 

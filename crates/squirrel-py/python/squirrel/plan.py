@@ -27,7 +27,7 @@ class Compared:
     folded, with_wings : float
         NaN where folded wings cannot do it at all.
     ratio : float
-        The second over the first.
+        The second over the first; NaN unless that is above zero.
     """
 
     folded: float
