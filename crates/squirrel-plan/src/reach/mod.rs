@@ -105,11 +105,11 @@ impl Reach {
                 return Err(format!("{name} = {value}: must be finite and > 0"));
             }
         }
-        tilt.check()?;
         let velocity_ned = velocity.vector;
         if let Some(wrong) = velocity_ned.iter().find(|x| !x.is_finite()) {
             return Err(format!("velocity_ned_m_s = {wrong}: must be finite"));
         }
+        tilt.check()?;
         if let WingForce::Flat { area_m2 } = wing
             && !(*area_m2 >= 0.0 && area_m2.is_finite())
         {
