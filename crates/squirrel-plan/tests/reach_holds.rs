@@ -99,10 +99,7 @@ fn braking_at_constant_height_is_what_a_grid_finds() {
             let most = grid.fold(f64::NEG_INFINITY, f64::max);
             println!("{:.4} m/s^2, {most:.4} on a grid", level.with_wings);
             // A grid stops short of where thrust ends.
-            assert!(
-                (-1e-3..1e-2).contains(&(level.with_wings - most)),
-                "{question:?}: {level:?} {most}"
-            );
+            assert!((-1e-3..1e-2).contains(&(level.with_wings - most)), "{question:?}: {level:?} {most}");
         }
     }
 }
