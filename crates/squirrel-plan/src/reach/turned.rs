@@ -2,8 +2,8 @@
 //!
 //! At one angle of attack the normals form a circle around the motion, `n = sin(alpha) v + cos(alpha) m`, and thrust and wings push by
 //! `(F_v - U sin(alpha)) d.v + (F_m - U cos(alpha)) d.m`: linear in `m`, so the best point of the circle is its nearest or farthest one, or one
-//! on the edge of the tilt set. What is left is a search in one angle. [`Search::largest`] samples and refines; [`Search::bound`] proves: over a band of
-//! angles each term has a largest value, and branch and bound narrows the bands.
+//! on the edge of the tilt set. What is left is a search in one angle. [`Search::largest`] samples and refines; [`Search::bound`]
+//! proves: over a band of angles each term has a largest value, and branch and bound narrows the bands.
 
 use super::flat::Largest;
 use super::polar::Polar;
