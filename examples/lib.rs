@@ -15,6 +15,7 @@
 //! | 10 | `study_filters` | how far estimators are off, and what that costs in flight |
 //! | 11 | `study_faults` | what becomes of flights in which one thing fails |
 //! | 12 | `the_drone_that_sank` | naming what a model lacks |
+//! | 13 | `what_wings_reach` | which accelerations wings add, and where that is worth something |
 //!
 //! Lessons 5 to 11 are the studies of `squirrel study` with fewer flights. Here is what lessons share.
 

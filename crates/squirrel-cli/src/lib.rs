@@ -39,6 +39,8 @@ enum Command {
     Gap(commands::gap::Gap),
     /// Plan a trajectory through a scenario, with wings and without.
     Plan(commands::plan::PlanCommand),
+    /// What spread wings add to the accelerations that a vehicle can reach.
+    Reach(commands::reach::Reach),
     /// Check vehicle files.
     #[command(subcommand)]
     Vehicle(commands::vehicle::VehicleCommand),
@@ -65,6 +67,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Import(import) => import.run(),
         Command::Gap(gap) => gap.run(),
         Command::Plan(plan) => plan.run(),
+        Command::Reach(reach) => reach.run(),
         Command::Vehicle(vehicle) => vehicle.run(),
     };
     match done {

@@ -5,5 +5,6 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
 pub mod pilot;
+pub mod reach;
 pub mod trajectory;
 pub mod wing;

@@ -47,7 +47,10 @@ fn check(craft: &Craft, task: &Task, plan: &Plan) {
         let change = b.thrust - a.thrust;
         let sideways = craft.tilt_rate_max_rad_s * craft.hover().z * 0.1;
         assert!(change.x.abs() <= sideways + 1e-4 && change.y.abs() <= sideways + 1e-4, "{change}");
-        assert!((b.wing - a.wing).abs() <= craft.wing_rate_max_per_s * 0.1 + 1e-5 && (0.0..=1.0).contains(&b.wing));
+        assert!(
+            (b.wing - a.wing).abs() <= craft.wing_rate_max_per_s * 0.1 + 1e-5
+                && (0.0..=1.0).contains(&b.wing)
+        );
     }
     assert_eq!(points[1].thrust, points[0].thrust, "what is commanded now acts a tenth of a second later");
     let path = flown(plan, task);

@@ -18,13 +18,16 @@ fn wings_never_make_a_plan_worse_and_open_where_they_brake() {
         let task = random(&with, &mut draw);
         let (a, b) =
             (Planner::default().plan(&with, &task, None), Planner::default().plan(&without, &task, None));
-        assert!(a.cost + 100.0 * a.violation_m <= b.cost + 100.0 * b.violation_m + 1e-6 || a.status == b.status);
+        assert!(
+            a.cost + 100.0 * a.violation_m <= b.cost + 100.0 * b.violation_m + 1e-6 || a.status == b.status
+        );
     }
     let velocity = Vector3::new(7.0, 0.0, 0.0);
     let begin = Begin { position: Vector3::zeros(), velocity, thrust: -with.hover(), spread: 0.0 };
     let stop = vec![Wanted { position: Vector3::zeros(), velocity: Vector3::zeros() }; 21];
     let task = Task::new(begin, stop, Vec::new(), 0.1, f64::INFINITY).unwrap();
-    let (a, b) = (Planner::default().plan(&with, &task, None), Planner::default().plan(&without, &task, None));
+    let (a, b) =
+        (Planner::default().plan(&with, &task, None), Planner::default().plan(&without, &task, None));
     let open = a.track.points().iter().filter(|point| point.wing > 0.9).count();
     assert!(open >= 8 && a.cost < 0.97 * b.cost, "{open} nodes open, {} for {}", a.cost, b.cost);
     assert!(b.track.points().iter().all(|point| point.wing == 0.0));
@@ -90,7 +93,10 @@ fn nonsense_is_refused_by_name() {
         Task::new(input.0, input.1, input.2, step_s, f64::INFINITY).unwrap_err()
     };
     for (error, expected) in [
-        (refused(&|i| i.0.velocity.y = f64::NAN, 0.1), "velocity_ned_m_s = NaN: must be finite and within 100"),
+        (
+            refused(&|i| i.0.velocity.y = f64::NAN, 0.1),
+            "velocity_ned_m_s = NaN: must be finite and within 100",
+        ),
         (refused(&|i| i.0.position.x = f64::INFINITY, 0.1), "position_ned_m = inf"),
         (refused(&|i| i.0.thrust.z = f64::NAN, 0.1), "thrust_ned_n = NaN"),
         (refused(&|i| i.0.spread = 1.5, 0.1), "wing = 1.5: must be 0 to 1"),

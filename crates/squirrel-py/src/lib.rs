@@ -18,6 +18,7 @@ mod gap;
 mod interrupt;
 mod log;
 mod nn;
+mod plan;
 mod policy;
 mod stack;
 mod state;
@@ -73,6 +74,8 @@ mod _squirrel {
     use super::log::FlightLog;
     #[pymodule_export]
     use super::nn::{Model, forward, load, train, windows};
+    #[pymodule_export]
+    use super::plan::plan_reach;
     #[pymodule_export]
     use super::policy::Policy;
     #[pymodule_export]

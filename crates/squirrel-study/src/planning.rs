@@ -135,8 +135,10 @@ pub fn run(
     for (kind, ratio) in &all {
         plan.check(&plan.vehicle, &scenario(plan, kind, *ratio, 0)?.1)?;
     }
-    let scenarios: Vec<Scenario> =
-        all.iter().map(|(kind, ratio)| Ok(scenario(plan, kind, *ratio, 0)?.1)).collect::<Result<_, FlightError>>()?;
+    let scenarios: Vec<Scenario> = all
+        .iter()
+        .map(|(kind, ratio)| Ok(scenario(plan, kind, *ratio, 0)?.1))
+        .collect::<Result<_, FlightError>>()?;
     let journal = Journal::open(keep, "planning", &plan.identity("planning", &scenarios))?;
     let fly = |arm, condition: usize, trial| {
         let (kind, ratio) = all[condition];
@@ -192,9 +194,7 @@ fn scenario(plan: &Plan, kind: &str, ratio: f64, trial: u32) -> Result<(Drawn, S
     } else {
         let count = draw.one_of(&[1, 2, 3]);
         let trunks = (0..count)
-            .map(|_| {
-                [draw.between(0.9, 1.8) * speed_m_s, draw.between(-1.5, 1.5), draw.between(0.3, 0.6)]
-            })
+            .map(|_| [draw.between(0.9, 1.8) * speed_m_s, draw.between(-1.5, 1.5), draw.between(0.3, 0.6)])
             .collect();
         Drawn { speed_m_s, turn_rad: None, trunks }
     };
@@ -203,7 +203,8 @@ fn scenario(plan: &Plan, kind: &str, ratio: f64, trial: u32) -> Result<(Drawn, S
         *ramp_s = RAMP_S;
     }
     let begin_m = speed_m_s * (BEGIN_S - RAMP_S / 3.0);
-    scenario.obstacles = drawn.trunks.iter().map(|[ahead, across, r]| [begin_m + ahead, *across, *r]).collect();
+    scenario.obstacles =
+        drawn.trunks.iter().map(|[ahead, across, r]| [begin_m + ahead, *across, *r]).collect();
     scenario.duration_s = BEGIN_S + HORIZON_S + 0.1;
     scenario.measured_window_s = HORIZON_S;
     scenario.thrust_to_weight = Some(ratio);
@@ -295,7 +296,8 @@ fn fly(plan: &Plan, arm: Arm, kind: &str, ratio: f64, trial: u32) -> Result<Tria
     let Some((task, plan)) = pilot.made else {
         return Err(FlightError("planning: the vehicle never knew where it was".to_owned()));
     };
-    let off = plan.track.points().iter().zip(task.wanted()).map(|(p, w)| (p.position - w.position).norm_squared());
+    let off =
+        plan.track.points().iter().zip(task.wanted()).map(|(p, w)| (p.position - w.position).norm_squared());
     let m = flight.metrics;
     Ok(Trial {
         status: plan.status.name().to_owned(),

@@ -7,6 +7,7 @@ pub(crate) mod gap;
 pub(crate) mod hil;
 pub(crate) mod import;
 pub(crate) mod plan;
+pub(crate) mod reach;
 pub(crate) mod replay;
 pub(crate) mod study;
 pub(crate) mod train;

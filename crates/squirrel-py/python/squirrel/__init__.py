@@ -2,13 +2,13 @@
 
 Vehicles (`Vehicle`), flights in closed loop (`simulate`) and their logs (`FlightLog`), many vehicles at once (`Batch`,
 `rollout`), the flight code itself (`Stack`, `squirrel.control`), the base model (`squirrel.dynamics`), learned models of the wing
-force (`squirrel.nn`), environments in which policies learn (`Tasks`; `squirrel.envs` for Gymnasium) and policies that fly (`Policy`), and
-what a model lacks (`squirrel.gap`). `squirrel.plot` needs matplotlib, `squirrel.torch` PyTorch.
+force (`squirrel.nn`), environments in which policies learn (`Tasks`; `squirrel.envs` for Gymnasium) and policies that fly (`Policy`), what
+wings make reachable (`squirrel.plan`), and what a model lacks (`squirrel.gap`). `squirrel.plot` needs matplotlib, `squirrel.torch` PyTorch.
 
 SI units and radians; world NED, body FRD, quaternions Hamilton, body to NED, w x y z. Functions are batched over the first axis.
 """
 
-from squirrel import control, dynamics, gap, nn, policy
+from squirrel import control, dynamics, gap, nn, plan, policy
 from squirrel._squirrel import Batch, FlightLog, Policy, Stack, Tasks, Vehicle, __version__, rollout, simulate
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "dynamics",
     "gap",
     "nn",
+    "plan",
     "policy",
     "rollout",
     "simulate",

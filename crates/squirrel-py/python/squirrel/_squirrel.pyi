@@ -23,6 +23,7 @@ __all__ = [
     "gap_diagnose",
     "gap_find",
     "load",
+    "plan_reach",
     "program",
     "rk4_step",
     "rollout",
@@ -1156,6 +1157,13 @@ def load(path: builtins.str | os.PathLike | pathlib.Path) -> Model:
         The file cannot be read.
     ValueError
         One line that names the file, and the tensor or field with its value.
+    """
+
+def plan_reach(vehicle: Vehicle, velocity_ned_m_s: typing.Sequence[builtins.float], thrust_to_weight: typing.Optional[builtins.float], wing: builtins.str, tilt: builtins.str, yaw_rad: typing.Optional[builtins.float], directions: typing.Optional[numpy.typing.NDArray[numpy.float64]]) -> tuple[dict[str, typing.Any], dict[str, typing.Any] | None]:
+    r"""
+    What wings make reachable, as a case in the JSON of ``squirrel reach``, and the support function along directions as arrays.
+    
+    * `yaw_rad` - of the box; the heading of the velocity if left out
     """
 
 def program(arguments: typing.Sequence[builtins.str]) -> builtins.int:

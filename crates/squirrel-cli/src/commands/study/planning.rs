@@ -1,7 +1,7 @@
 //! `squirrel study planning`: what wings buy where both plan.
 
-use super::sheet::{Cell, Sheet};
 use super::Common;
+use super::sheet::{Cell, Sheet};
 use crate::output::{self, Table, say};
 use squirrel_plan::trajectory::Planner;
 use squirrel_study::campaign::Plan;
@@ -22,8 +22,7 @@ impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let common = &self.common;
         let vehicle = common.begin("planning", self.trials)?;
-        let plan =
-            Plan { vehicle, arms: ARMS.to_vec(), trials: self.trials, seed: common.seed };
+        let plan = Plan { vehicle, arms: ARMS.to_vec(), trials: self.trials, seed: common.seed };
         let command = common.command("planning", &[("trials", self.trials.to_string())]);
         let keep = common.keep(&command);
         let bar = output::progress(planning::flights(&plan, &keep), "flights");
@@ -33,8 +32,12 @@ impl Options {
             "Plans of 2 s at 0.1 s for {} tasks of each kind, seeds from {}, each followed once on the full plant.",
             study.trials, study.seed
         ));
-        say(&format!("Numbers of plans; Wilson's 95 % interval in %. Followed: within {FOLLOWED_M} m RMSE of the plan."));
-        say("Gain: distance to what was wanted of the planner without wings over the arm's, minus 1, in %, paired.\n");
+        say(&format!(
+            "Numbers of plans; Wilson's 95 % interval in %. Followed: within {FOLLOWED_M} m RMSE of the plan."
+        ));
+        say(
+            "Gain: distance to what was wanted of the planner without wings over the arm's, minus 1, in %, paired.\n",
+        );
         let csv = sheet(&study).print();
         if !common.merged {
             self.times(&plan)?;

@@ -43,6 +43,8 @@ pub struct Cylinder {
 pub struct Scene {
     /// What the scene shows, for readers who cannot see it.
     pub label: String,
+    /// North, east and height; the ranges are those of the tracks.
+    pub axes: [Axis; 3],
     /// Tracks.
     pub tracks: Vec<SceneTrack>,
     /// Obstacles.
@@ -108,7 +110,7 @@ impl Scene {
     pub fn svg(&self) -> Svg {
         let frame = self.frame();
         let mut canvas = Canvas::new(WIDTH, HEIGHT);
-        draw_floor(&mut canvas, &frame);
+        draw_floor(&mut canvas, &frame, &self.axes);
         for track in self.tracks.iter().filter(|t| !t.dashed) {
             let shadow = format!("shadow {}", track.ink.class());
             let floor = |p: &[f64; 3]| frame.place([p[0], p[1], frame.height.lo()]);
@@ -244,7 +246,7 @@ fn cylinder(frame: &Frame, [e, n, floor]: [f64; 3], radius: f64) -> String {
 }
 
 /// Grid on the floor, upright scale of height, and labels on the edges that face the reader.
-fn draw_floor(canvas: &mut Canvas, frame: &Frame) {
+fn draw_floor(canvas: &mut Canvas, frame: &Frame, axes: &[Axis; 3]) {
     let [half_e, half_n, half_h] = frame.half;
     let [east, north] = [(&frame.east, half_e), (&frame.north, half_n)]
         .map(|(s, half)| s.ticks().iter().map(|t| (2.0 * s.fraction(*t) - 1.0) * half).collect::<Vec<_>>());
@@ -265,9 +267,9 @@ fn draw_floor(canvas: &mut Canvas, frame: &Frame) {
         let h = (2.0 * frame.height.fraction(*tick) - 1.0) * half_h;
         canvas.raw(&label(frame, 'h', h, 14.0, "tick", &frame.height.label(*tick)));
     }
-    canvas.raw(&label(frame, 'e', 0.0, 62.0, "axis", &Axis::new("east", "m").title()));
-    canvas.raw(&label(frame, 'n', 0.0, 62.0, "axis", &Axis::new("north", "m").title()));
-    canvas.raw(&label(frame, 'h', half_h + 22.0, 14.0, "axis", &Axis::new("height", "m").title()));
+    canvas.raw(&label(frame, 'e', 0.0, 62.0, "axis", &axes[1].title()));
+    canvas.raw(&label(frame, 'n', 0.0, 62.0, "axis", &axes[0].title()));
+    canvas.raw(&label(frame, 'h', half_h + 22.0, 14.0, "axis", &axes[2].title()));
 }
 
 /// A label `offset` px outside the edge of an axis (`e`, `n` or `h`) at `value` px along it.

@@ -121,7 +121,9 @@ impl<'a> Tracks<'a> {
                 cylinders.push(cylinder);
             }
         }
-        let scene = Scene { label: "3-D tracks".to_owned(), tracks, cylinders, values: self.values.clone() };
+        let axes = ["north", "east", "height"].map(|name| Axis::new(name, "m"));
+        let scene =
+            Scene { label: "3-D tracks".to_owned(), axes, tracks, cylinders, values: self.values.clone() };
         Figure {
             title: "3-D track of every arm".to_owned(),
             caption: format!(

@@ -1,0 +1,88 @@
+//! What wings make reachable. `squirrel/plan.py` makes dataclasses of what comes back.
+
+use crate::arguments::{Array64, Numbers, rows};
+use crate::error::value;
+use crate::interrupt::interruptible;
+use crate::json;
+use crate::log::table;
+use crate::vehicle::Vehicle;
+use nalgebra::Vector3;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use pyo3::types::{PyAny, PyDict};
+use pyo3_stub_gen::derive::gen_stub_pyfunction;
+use squirrel_core::frames::In;
+use squirrel_plan::reach::{Case, Question, Reach, Support, Tilt, Wings};
+use squirrel_plan::wing::{WingForce, WingModel};
+
+/// What wings make reachable, as a case in the JSON of ``squirrel reach``, and the support function along directions as arrays.
+///
+/// * `yaw_rad` - of the box; the heading of the velocity if left out
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+#[gen_stub(override_return_type(type_repr = "tuple[dict[str, typing.Any], dict[str, typing.Any] | None]", imports = ("typing")))]
+pub(crate) fn plan_reach<'py>(
+    py: Python<'py>,
+    vehicle: &Bound<'py, Vehicle>,
+    velocity_ned_m_s: [f64; 3],
+    thrust_to_weight: Option<f64>,
+    wing: String,
+    tilt: String,
+    yaw_rad: Option<f64>,
+    directions: Option<Array64<'py>>,
+) -> PyResult<(Bound<'py, PyAny>, Option<Bound<'py, PyDict>>)> {
+    let file = &vehicle.get().file;
+    let (p, weight_n) = (file.vehicle.parameters(), file.vehicle.weight_n());
+    let ratio = thrust_to_weight.unwrap_or(p.limits.thrust_max_n / weight_n);
+    if !(ratio > 0.0 && ratio.is_finite()) {
+        return Err(value(format!("thrust_to_weight = {ratio}: must be finite and > 0")));
+    }
+    let [north, east, _] = velocity_ned_m_s;
+    let yaw_rad = yaw_rad.unwrap_or_else(|| east.atan2(north));
+    let model = WingModel::parse(&wing).map_err(value)?;
+    let question = Question {
+        mass_kg: p.mass_kg,
+        thrust_max_n: ratio * weight_n,
+        velocity: In::new(Vector3::from(velocity_ned_m_s)),
+        wing: WingForce::of(file, model).map_err(value)?,
+        tilt: Tilt::named(&tilt, p.limits.tilt_max_rad, yaw_rad).map_err(value)?,
+    };
+    let directions: Option<Vec<Vector3<f64>>> = directions
+        .map(|array| {
+            let rows = rows::<f64>("directions", &array.0, &[None, Some(3)], Numbers::Finite)?;
+            Ok::<_, PyErr>(rows.numbers().chunks_exact(3).map(Vector3::from_column_slice).collect())
+        })
+        .transpose()?;
+    let (case, found) = interruptible(py, move |stop| {
+        let reach = Reach::new(&question)?;
+        let found = directions.map(|directions| {
+            let both = |d: &Vector3<f64>| {
+                stop.check();
+                (reach.folded(In::new(*d)).value_m_s2, reach.support(In::new(*d)))
+            };
+            directions.iter().map(both).collect::<Vec<_>>()
+        });
+        stop.check();
+        Ok::<_, String>((Case::of(&question)?, found))
+    })?
+    .map_err(value)?;
+    Ok((json(py, &case)?, found.map(|found| arrays(py, &found)).transpose()?))
+}
+
+/// A support function along many directions.
+fn arrays<'py>(py: Python<'py>, found: &[(f64, Support)]) -> PyResult<Bound<'py, PyDict>> {
+    let numbers = |number: fn(&(f64, Support)) -> f64| PyArray1::from_iter(py, found.iter().map(number));
+    let vectors = |vector: fn(&Support) -> Vector3<f64>| {
+        table(py, found.iter().flat_map(|(_, s)| <[f64; 3]>::from(vector(s))).collect(), 3)
+    };
+    let arrays = PyDict::new(py);
+    arrays.set_item("folded_m_s2", numbers(|(folded, _)| *folded))?;
+    arrays.set_item("value_m_s2", numbers(|(_, s)| s.value_m_s2))?;
+    arrays.set_item("upper_m_s2", numbers(|(_, s)| s.upper_m_s2))?;
+    arrays.set_item("thrust_n", numbers(|(_, s)| s.thrust_n))?;
+    arrays.set_item("normal_ned", vectors(|s| s.normal.vector)?)?;
+    arrays.set_item("acceleration_ned_m_s2", vectors(|s| s.acceleration.vector)?)?;
+    let spread = found.iter().map(|(_, s)| s.wings == Wings::Spread);
+    arrays.set_item("spread", PyArray1::from_iter(py, spread))?;
+    Ok(arrays)
+}
