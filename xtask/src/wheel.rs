@@ -64,10 +64,26 @@ fn build(venv: &Path, package: &Path, dist: &Path) -> Result<PathBuf, String> {
     let mut maturin = Command::new(python::program(venv, "maturin"));
     maturin.current_dir(root()?).args(["build", "--release", "--locked", "--quiet"]);
     maturin.args(["--compression-level", "9", "--manifest-path"]);
-    call(maturin.arg(package.join("Cargo.toml")).arg("--out").arg(dist))?;
+    maturin.arg(package.join("Cargo.toml")).arg("--out").arg(dist);
+    if has_lld() {
+        // Functions with the same code are kept once: 0.15 MB.
+        maturin.args(["--", "-Clink-arg=-Wl,--icf=all"]);
+    }
+    call(&mut maturin)?;
     let mut wheels = std::fs::read_dir(dist).map_err(at)?;
     let wheel = wheels.next().ok_or_else(|| format!("{}: maturin has left no wheel", dist.display()))?;
     Ok(wheel.map_err(at)?.path())
+}
+
+/// Whether the compiler links with the linker that it brings along, as it does for this target where there is one.
+fn has_lld() -> bool {
+    let target = "x86_64-unknown-linux-gnu";
+    let sysroot = Command::new("rustc").args(["--print", "sysroot"]).output();
+    let sysroot = sysroot.ok().and_then(|out| String::from_utf8(out.stdout).ok());
+    let lld =
+        |sysroot: String| Path::new(sysroot.trim()).join(format!("lib/rustlib/{target}/bin/gcc-ld/ld.lld"));
+    cfg!(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))
+        && sysroot.is_some_and(|sysroot| lld(sysroot).exists())
 }
 
 /// File name of a dynamic library.

@@ -14,10 +14,13 @@ use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::mission::{Mission, MissionState};
 use squirrel_core::guidance::sensing::{Obstacle, Sensing};
 use squirrel_core::policy::PilotCommand;
-use squirrel_core::stack::SensorFrame;
+use squirrel_core::stack::{SensorFrame, Stack};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{CONTROL_RATE_HZ, Flight, FlightError, Follower, InProcess, Offboard, Setup};
+use squirrel_sim::flight::{
+    CONTROL_RATE_HZ, Flight, FlightError, Follower, InProcess, Offboard, Pilot, Setup,
+};
 use squirrel_sim::track::Track;
+use squirrel_sim::weights::PolicyWeights;
 
 /// How far a plan looks ahead, s.
 pub const HORIZON_S: f64 = 2.0;
@@ -190,6 +193,22 @@ impl Offboard for Replanner {
     fn facts(&self) -> Vec<(&'static str, String)> {
         vec![("offboard", format!("plans {HORIZON_S} s ahead every {STEP_S} s"))]
     }
+}
+
+/// Who commands a setup from outside of the flight code, if anybody: a policy, or the planner of its arm.
+///
+/// # Errors
+/// A mission that cannot be flown so.
+pub fn offboard(
+    setup: &Setup,
+    stack: &Stack,
+    policy: Option<PolicyWeights>,
+) -> Result<Option<Box<dyn Offboard + Send>>, FlightError> {
+    Ok(match policy {
+        Some(weights) => Some(Box::new(Pilot::new(weights, setup, stack)?)),
+        None if setup.arm.plans() => Some(Box::new(Replanner::new(setup, WingModel::Flat)?)),
+        None => None,
+    })
 }
 
 /// Flies a setup, with a [`Replanner`] that believes in the flat plate where its arm plans.

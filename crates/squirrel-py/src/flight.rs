@@ -7,9 +7,10 @@ use crate::vehicle::{Vehicle, or_squirrel};
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_core::stack::{SensorFrame, Stack, StackOutput, StackState};
+use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Offboard, Pilot, Setup};
+use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Offboard, Setup};
 use squirrel_sim::scenario::Scenario;
 use std::path::Path;
 
@@ -126,11 +127,11 @@ pub(crate) fn simulate(
         integrator: Integrator::parse(integrator).map_err(error::value)?,
     };
     let stack = setup.stack().map_err(error::value)?;
-    let pilot = policy.map(|policy| Pilot::new(policy.get().weights.clone(), &setup, &stack));
-    let mut pilot = pilot.transpose().map_err(error::value)?;
+    let policy = policy.map(|policy| policy.get().weights.clone());
+    let mut pilot = pilot::offboard(&setup, &stack, policy).map_err(error::value)?;
     let mut computer = Interruptible { stack, state: StackState::default(), steps: 0, signal: None };
     let flown = py.detach(|| {
-        let pilot = pilot.as_mut().map(|pilot| pilot as &mut dyn Offboard);
+        let pilot = pilot.as_mut().map(|pilot| &mut **pilot as &mut dyn Offboard);
         setup.fly_on(&mut computer, pilot, true, |_| {})
     });
     if let Some(signal) = computer.signal {

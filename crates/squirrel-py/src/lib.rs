@@ -75,7 +75,7 @@ mod _squirrel {
     #[pymodule_export]
     use super::nn::{Model, forward, load, train, windows};
     #[pymodule_export]
-    use super::plan::plan_reach;
+    use super::plan::{plan_reach, plan_trajectory};
     #[pymodule_export]
     use super::policy::Policy;
     #[pymodule_export]

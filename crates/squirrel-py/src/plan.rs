@@ -1,4 +1,4 @@
-//! What wings make reachable. `squirrel/plan.py` makes dataclasses of what comes back.
+//! What wings make reachable, and trajectories. `squirrel/plan.py` makes dataclasses of what comes back.
 
 use crate::arguments::{Array64, Numbers, rows};
 use crate::error::value;
@@ -6,14 +6,16 @@ use crate::interrupt::interruptible;
 use crate::json;
 use crate::log::table;
 use crate::vehicle::Vehicle;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_core::frames::In;
 use squirrel_plan::reach::{Case, Question, Reach, Support, Tilt, Wings};
+use squirrel_plan::trajectory::{Begin, Craft, KeepOut, Planner, Task, Wanted};
 use squirrel_plan::wing::{WingForce, WingModel};
+use squirrel_sim::track::TrackPoint;
 
 /// What wings make reachable, as a case in the JSON of ``squirrel reach``, and the support function along directions as arrays.
 ///
@@ -85,4 +87,74 @@ fn arrays<'py>(py: Python<'py>, found: &[(f64, Support)]) -> PyResult<Bound<'py,
     let spread = found.iter().map(|(_, s)| s.wings == Wings::Spread);
     arrays.set_item("spread", PyArray1::from_iter(py, spread))?;
     Ok(arrays)
+}
+
+/// A trajectory: status, cost, violation, iterations, and the nodes as arrays.
+///
+/// * `reference_position_ned_m` - at each node, the first at the beginning
+/// * `obstacles_m` - north, east and radius of upright cylinders
+/// * `wing` - what is believed of the wings; none plans without them
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+#[gen_stub(override_return_type(type_repr = "tuple[dict[str, typing.Any], dict[str, typing.Any]]", imports = ("typing")))]
+pub(crate) fn plan_trajectory<'py>(
+    py: Python<'py>,
+    vehicle: &Bound<'py, Vehicle>,
+    reference_position_ned_m: Array64<'py>,
+    reference_velocity_ned_m_s: Array64<'py>,
+    position_ned_m: [f64; 3],
+    velocity_ned_m_s: [f64; 3],
+    thrust_ned_n: Option<[f64; 3]>,
+    deployment: f64,
+    obstacles_m: Array64<'py>,
+    wing: Option<String>,
+    thrust_to_weight: Option<f64>,
+    step_s: f64,
+    speed_max_m_s: f64,
+    reserve: f64,
+) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
+    let file = &vehicle.get().file;
+    let (p, weight_n) = (file.vehicle.parameters(), file.vehicle.weight_n());
+    let thrust_max_n = thrust_to_weight.map_or(p.limits.thrust_max_n, |ratio| ratio * weight_n);
+    let model = wing.as_deref().map(WingModel::parse).transpose().map_err(value)?;
+    let craft = Craft::of(file, thrust_max_n, model, reserve).map_err(value)?;
+    let three = |name: &str, array: &Array64<'py>, count: Option<usize>| {
+        let rows = rows::<f64>(name, &array.0, &[count, Some(3)], Numbers::Any)?;
+        Ok::<_, PyErr>(rows.numbers().chunks_exact(3).map(Vector3::from_column_slice).collect::<Vec<_>>())
+    };
+    let positions = three("reference_position_ned_m", &reference_position_ned_m, None)?;
+    let velocities = three("reference_velocity_ned_m_s", &reference_velocity_ned_m_s, Some(positions.len()))?;
+    let keep = |o: Vector3<f64>| KeepOut { centre: Vector2::new(o.x, o.y), radius_m: o.z };
+    let obstacles = three("obstacles_m", &obstacles_m, None)?.into_iter().map(keep).collect();
+    let begin = Begin {
+        position: position_ned_m.into(),
+        velocity: velocity_ned_m_s.into(),
+        thrust: thrust_ned_n.map_or_else(|| -craft.hover(), Vector3::from),
+        spread: deployment,
+    };
+    let wanted =
+        positions.into_iter().zip(velocities).map(|(position, velocity)| Wanted { position, velocity });
+    let task = Task::new(begin, wanted.collect(), obstacles, step_s, speed_max_m_s).map_err(value)?;
+    let plan = py.detach(|| Planner::default().plan(&craft, &task, None));
+    let facts = PyDict::new(py);
+    facts.set_item("status", plan.status.name())?;
+    facts.set_item("cost", plan.cost)?;
+    facts.set_item("violation_m", plan.violation_m)?;
+    facts.set_item("iterations", plan.iterations)?;
+    let nodes = PyDict::new(py);
+    let points = plan.track.points();
+    nodes.set_item("time_s", PyArray1::from_slice(py, plan.track.time_s()))?;
+    for (name, of) in [
+        ("position_ned_m", (|point| point.position) as fn(&TrackPoint) -> Vector3<f64>),
+        ("velocity_ned_m_s", |point| point.velocity),
+        ("acceleration_ned_m_s2", |point| point.acceleration),
+        ("thrust_ned_n", |point| point.thrust),
+    ] {
+        nodes.set_item(
+            name,
+            table(py, points.iter().flat_map(|point| <[f64; 3]>::from(of(point))).collect(), 3)?,
+        )?;
+    }
+    nodes.set_item("deployment", PyArray1::from_iter(py, points.iter().map(|point| point.wing)))?;
+    Ok((facts, nodes))
 }

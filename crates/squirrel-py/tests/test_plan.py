@@ -1,4 +1,4 @@
-"""What wings make reachable."""
+"""What wings make reachable, and trajectories."""
 
 import numpy as np
 import pytest
@@ -49,3 +49,65 @@ def test_a_bad_argument_is_named(vehicle: squirrel.Vehicle) -> None:
         squirrel.plan.reach(vehicle, velocity_ned_m_s=(float("nan"), 0.0, 0.0))
     with pytest.raises(ValueError, match="directions: expected a float64 array"):
         squirrel.plan.reach(vehicle, velocity_ned_m_s=ahead, directions=np.zeros((2, 2)))
+
+
+def straight(speed_m_s: float) -> np.ndarray:
+    return np.outer(np.arange(21) * 0.1, [speed_m_s, 0.0, 0.0])
+
+
+def test_a_trajectory_passes_a_trunk_within_the_limits(vehicle: squirrel.Vehicle) -> None:
+    trunk = np.array([[9.0, 0.2, 1.0]])
+    plan = squirrel.plan.trajectory(
+        vehicle, reference_position_ned_m=straight(7.0), obstacles_m=trunk, thrust_to_weight=1.5
+    )
+    assert plan.status == "solved" and plan.violation_m < 0.01 and plan.iterations > 1
+    assert np.linalg.norm(plan.position_ned_m[:, :2] - trunk[0, :2], axis=1).min() > 0.98
+    thrust = np.linalg.norm(plan.thrust_ned_n, axis=1)
+    assert thrust.max() <= 1.5 * 0.95 * 0.548 * 9.80665 + 1e-3 and (plan.thrust_ned_n[:, 2] < 0.0).all()
+    # Linear accelerations between nodes.
+    a, v = plan.acceleration_ned_m_s2, plan.velocity_ned_m_s
+    assert np.allclose(np.diff(v, axis=0), 0.05 * (a[1:] + a[:-1]), atol=1e-9)
+
+
+def test_wings_open_to_brake_and_none_plans_without(vehicle: squirrel.Vehicle) -> None:
+    stop = np.zeros((21, 3))
+    ahead = (7.0, 0.0, 0.0)
+
+    def brake(wing: str | None) -> squirrel.plan.Trajectory:
+        return squirrel.plan.trajectory(
+            vehicle,
+            reference_position_ned_m=stop,
+            velocity_ned_m_s=ahead,
+            wing=wing,  # type: ignore[arg-type]
+            thrust_to_weight=1.2,
+        )
+
+    with_wings, without = brake("flat"), brake(None)
+    assert with_wings.deployment.max() > 0.9 and without.deployment.max() == 0.0
+    assert with_wings.cost < without.cost
+
+
+def test_an_impossible_task_has_a_plan_all_the_same(vehicle: squirrel.Vehicle) -> None:
+    plan = squirrel.plan.trajectory(
+        vehicle, reference_position_ned_m=straight(8.0), obstacles_m=np.array([[1.5, 0.1, 1.0]])
+    )
+    assert plan.status == "infeasible" and plan.violation_m > 0.1 and np.isfinite(plan.position_ned_m).all()
+
+
+def test_a_bad_task_is_named(vehicle: squirrel.Vehicle) -> None:
+    ahead = straight(5.0)
+    broken = ahead.copy()
+    broken[3, 1] = np.nan
+    for match, arguments in [
+        (r"reference\[3\].position_ned_m = NaN", {"reference_position_ned_m": broken, "reference_velocity_ned_m_s": ahead}),
+        ("velocity_ned_m_s = NaN", {"velocity_ned_m_s": (np.nan, 0.0, 0.0)}),
+        (r"obstacles\[0\].radius_m = 0", {"obstacles_m": np.zeros((1, 3))}),
+        ("obstacles_m: expected a float64 array", {"obstacles_m": np.zeros((1, 2))}),
+        ("step_s = 0", {"step_s": 0.0, "reference_velocity_ned_m_s": ahead}),
+        ("thrust_max_n", {"thrust_to_weight": 0.9}),
+        ("wing = paper", {"wing": "paper"}),
+        ("position_ned_m: expected 3 numbers, got 2", {"position_ned_m": (1.0, 2.0)}),
+        ("n > 2", {"reference_position_ned_m": np.zeros(3)}),
+    ]:
+        with pytest.raises(ValueError, match=match):
+            squirrel.plan.trajectory(vehicle, **({"reference_position_ned_m": ahead} | arguments))  # type: ignore[arg-type]

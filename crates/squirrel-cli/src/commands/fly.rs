@@ -6,11 +6,10 @@ use crate::output::{self, Table, say, talk};
 use serde::Serialize;
 use squirrel_core::control::follow::FollowGains;
 use squirrel_core::stack::Stack;
-use squirrel_plan::pilot::Replanner;
-use squirrel_plan::wing::WingModel;
+use squirrel_plan::pilot::offboard;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Pilot, Setup};
+use squirrel_sim::flight::{FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::report::flight::{Heading, render};
 use squirrel_sim::scenario::Scenario;
@@ -95,19 +94,13 @@ fn offboard_of(
     stack: &Stack,
     policy: Option<PolicyWeights>,
     track: Option<Track>,
-) -> Result<Option<Box<dyn Offboard>>, FlightError> {
-    if let Some(weights) = policy {
-        return Ok(Some(Box::new(Pilot::new(weights, setup, stack)?)));
-    }
+) -> Result<Option<Box<dyn Offboard + Send>>, FlightError> {
     if let Some(track) = track {
         let mut follower = Follower::new(setup, FollowGains::default())?;
         follower.follow(track, 0);
         return Ok(Some(Box::new(follower)));
     }
-    if setup.arm.plans() {
-        return Ok(Some(Box::new(Replanner::new(setup, WingModel::Flat)?)));
-    }
-    Ok(None)
+    offboard(setup, stack, policy)
 }
 
 impl Fly {

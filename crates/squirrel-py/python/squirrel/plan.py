@@ -1,21 +1,22 @@
-"""What wings make reachable: the accelerations that thrust, attitude and wings can make at once."""
+"""What wings make reachable, and trajectories that use it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from squirrel._squirrel import plan_reach
+import numpy as np
+
+from squirrel._squirrel import plan_reach, plan_trajectory
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import numpy as np
     from numpy.typing import NDArray
 
     from squirrel._squirrel import Vehicle
 
-__all__ = ["Compared", "Reach", "Support", "reach"]
+__all__ = ["Compared", "Reach", "Support", "Trajectory", "reach", "trajectory"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,9 +143,7 @@ def reach(
     >>> round(reach.upward_m_s2.folded, 2), round(reach.upward_m_s2.with_wings, 2)
     (0.98, 1.74)
     """
-    velocity = [float(v) for v in velocity_ned_m_s]
-    if len(velocity) != 3:
-        raise ValueError(f"velocity_ned_m_s: expected 3 numbers, got {len(velocity)}")
+    velocity = _three("velocity_ned_m_s", velocity_ned_m_s)
     case, support = plan_reach(vehicle, velocity, thrust_to_weight, wing, tilt, yaw_rad, directions)
     return Reach(
         thrust_to_weight=case["thrust_to_weight"],
@@ -155,6 +154,139 @@ def reach(
         hull_volume_m3_s6=_compared(case["hull_volume_m3_s6"]),
         support=None if support is None else Support(**support),
     )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """A planned motion of n nodes.
+
+    Attributes
+    ----------
+    status : {"solved", "feasible", "infeasible"}
+        Whether every constraint holds and nothing nearby is better; every constraint holds; or the plan violates them least.
+    cost : float
+    violation_m : float
+        How deep it is in an obstacle, at worst; 0 outside.
+    iterations : int
+        Convex problems that were solved.
+    time_s : ndarray of float64, shape (n,)
+    position_ned_m, velocity_ned_m_s, acceleration_ned_m_s2 : ndarray of float64, shape (n, 3)
+    thrust_ned_n : ndarray of float64, shape (n, 3)
+        Force of the rotors; it points upwards, so its last column is below zero. Linear between nodes.
+    deployment : ndarray of float64, shape (n,)
+        Of both wings, 0 folded to 1 spread.
+    """
+
+    status: Literal["solved", "feasible", "infeasible"]
+    cost: float
+    violation_m: float
+    iterations: int
+    time_s: NDArray[np.float64]
+    position_ned_m: NDArray[np.float64]
+    velocity_ned_m_s: NDArray[np.float64]
+    acceleration_ned_m_s2: NDArray[np.float64]
+    thrust_ned_n: NDArray[np.float64]
+    deployment: NDArray[np.float64]
+
+
+def trajectory(
+    vehicle: Vehicle,
+    *,
+    reference_position_ned_m: NDArray[np.float64],
+    reference_velocity_ned_m_s: NDArray[np.float64] | None = None,
+    position_ned_m: Sequence[float] | NDArray[np.float64] | None = None,
+    velocity_ned_m_s: Sequence[float] | NDArray[np.float64] | None = None,
+    thrust_ned_n: Sequence[float] | NDArray[np.float64] | None = None,
+    deployment: float = 0.0,
+    obstacles_m: NDArray[np.float64] | None = None,
+    wing: Literal["flat", "membrane", "parnn"] | None = "flat",
+    thrust_to_weight: float | None = None,
+    step_s: float = 0.1,
+    speed_max_m_s: float = float("inf"),
+    reserve: float = 0.05,
+) -> Trajectory:
+    """A trajectory near a reference and out of obstacles, by successive convexification.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    reference_position_ned_m : ndarray of float64, shape (n, 3)
+        Where to be near to at each node, from now on.
+    reference_velocity_ned_m_s : ndarray of float64, shape (n, 3), optional
+        Differences of the positions if left out.
+    position_ned_m, velocity_ned_m_s : sequence of 3 floats, optional
+        Where it begins; the reference's first if left out.
+    thrust_ned_n : sequence of 3 floats, optional
+        Force of the rotors there; that of hovering if left out.
+    deployment : float
+        Of the wings there, 0 folded to 1 spread.
+    obstacles_m : ndarray of float64, shape (k, 3), optional
+        North, east and radius of upright cylinders that the vehicle's centre must stay out of: what the vehicle is wide, and what
+        is to spare, belongs to the radius.
+    wing : {"flat", "membrane", "parnn"} or None
+        What is believed of spread wings; None plans without them.
+    thrust_to_weight : float, optional
+        Limit of thrust over weight; the vehicle's if left out.
+    step_s : float
+        From node to node, 0.01 to 1.
+    speed_max_m_s : float
+        Limit of the horizontal speed.
+    reserve : float
+        Part of thrust and tilt that is left to whoever follows the plan.
+
+    Returns
+    -------
+    Trajectory
+        Always, also where the constraints cannot all be held.
+
+    Raises
+    ------
+    ValueError
+        Names the argument, what was expected and what came.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import squirrel
+    >>> ahead = np.outer(np.arange(21) * 0.1, [6.0, 0.0, 0.0])
+    >>> plan = squirrel.plan.trajectory(
+    ...     squirrel.Vehicle.bundled("squirrel"),
+    ...     reference_position_ned_m=ahead,
+    ...     obstacles_m=np.array([[8.0, 0.2, 1.0]]),
+    ... )
+    >>> plan.status
+    'solved'
+    """
+    positions = np.asarray(reference_position_ned_m)
+    if reference_velocity_ned_m_s is None:
+        if positions.ndim != 2 or len(positions) < 2:
+            raise ValueError(f"reference_position_ned_m: expected an array of shape (n, 3), n > 2, got {positions.shape}")
+        reference_velocity_ned_m_s = np.ascontiguousarray(np.gradient(positions, step_s, axis=0))
+    start = positions[0] if position_ned_m is None else position_ned_m
+    velocity = reference_velocity_ned_m_s[0] if velocity_ned_m_s is None else velocity_ned_m_s
+    facts, nodes = plan_trajectory(
+        vehicle,
+        reference_position_ned_m,
+        reference_velocity_ned_m_s,
+        _three("position_ned_m", start),
+        _three("velocity_ned_m_s", velocity),
+        None if thrust_ned_n is None else _three("thrust_ned_n", thrust_ned_n),
+        deployment,
+        np.zeros((0, 3)) if obstacles_m is None else obstacles_m,
+        wing,
+        thrust_to_weight,
+        step_s,
+        speed_max_m_s,
+        reserve,
+    )
+    return Trajectory(**facts, **nodes)
+
+
+def _three(name: str, numbers: Sequence[float] | NDArray[np.float64]) -> list[float]:
+    three = [float(x) for x in numbers]
+    if len(three) != 3:
+        raise ValueError(f"{name}: expected 3 numbers, got {len(three)}")
+    return three
 
 
 def _compared(both: dict[str, Any]) -> Compared:

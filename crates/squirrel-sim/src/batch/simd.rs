@@ -131,12 +131,12 @@ pub trait Paths: NetScalar + Bits + Lanes<Weight = Self> {
 }
 
 macro_rules! paths {
-    ($scalar:ty, $avx2:ident, $avx512:ident, $mantissa:literal, $bias:literal, $guess:expr) => {
+    ($scalar:ty, $width:literal, $avx2:ident, $avx512:ident, $mantissa:literal, $bias:literal, $guess:expr) => {
         impl Paths for $scalar {
             fn run<K: Kernel<Self>>(path: Path, kernel: K) -> K::Output {
                 match path.0 {
                     Width::Scalar => kernel.run::<Self>(),
-                    Width::Portable => kernel.run::<Portable<Self>>(),
+                    Width::Portable => kernel.run::<Portable<Self, $width>>(),
                     #[cfg(target_arch = "x86_64")]
                     Width::Avx2 => x86::$avx2(kernel),
                     #[cfg(target_arch = "x86_64")]
@@ -184,11 +184,11 @@ macro_rules! paths {
         }
     };
 }
-paths!(f32, avx2_f32, avx512_f32, 23, 127.0, |x: f32| {
+paths!(f32, 4, avx2_f32, avx512_f32, 23, 127.0, |x: f32| {
     // By numbers instead of integers: registers have no product of 32 bits by 32 bits to shift down.
     f32::from_bits((THIRDS_F32 - x.to_bits().cast_signed() as f32 * THIRD_F32) as i32 as u32)
 });
-paths!(f64, avx2_f64, avx512_f64, 52, 1023.0, |x: f64| {
+paths!(f64, 2, avx2_f64, avx512_f64, 52, 1023.0, |x: f64| {
     let third = ((x.to_bits() >> 32) * 0x5555_5556) >> 32;
     f64::from_bits(0x553e_eaa8_u64.wrapping_sub(third) << 32)
 });
@@ -197,33 +197,36 @@ paths!(f64, avx2_f64, avx512_f64, 52, 1023.0, |x: f64| {
 const THIRDS_F32: f32 = 1_419_967_100.0;
 const THIRD_F32: f32 = 1.0 / 3.0;
 
-/// Four numbers in plain Rust; compilers make SSE2 or NEON of it.
+/// 128 bits of numbers in plain Rust; compilers make SSE2 or NEON of it.
 #[derive(Clone, Copy)]
-struct Portable<S>([S; 4]);
+struct Portable<S, const N: usize>([S; N]);
 
 macro_rules! portable {
-    ($scalar:ty, $activation:expr) => {
-        portable!(@operator $scalar, Add add +, Sub sub -, Mul mul *, Div div /);
+    ($scalar:ty, $width:literal, $activation:expr, $($a:ident $b:ident $c:ident),*) => {
+        portable!(@operator $scalar, $width, ($($a $b),*), Add add);
+        portable!(@operator $scalar, $width, ($($a $b),*), Sub sub);
+        portable!(@operator $scalar, $width, ($($a $b),*), Mul mul);
+        portable!(@operator $scalar, $width, ($($a $b),*), Div div);
 
-        impl Lane for Portable<$scalar> {
+        impl Lane for Portable<$scalar, $width> {
             type Weight = $scalar;
             #[inline(always)]
             fn splat(weight: $scalar) -> Self {
-                Self([weight; 4])
+                Self([weight; $width])
             }
             #[inline(always)]
             fn zero() -> Self {
-                Self([0.0; 4])
+                Self([0.0; $width])
             }
             #[inline(always)]
             fn lower(self, bound: Self) -> Self {
-                let ([a, b, c, d], [e, f, g, h]) = (self.0, bound.0);
-                Self([a.lower(e), b.lower(f), c.lower(g), d.lower(h)])
+                let ([$($a),*], [$($b),*]) = (self.0, bound.0);
+                Self([$($a.lower($b)),*])
             }
             #[inline(always)]
             fn upper(self, bound: Self) -> Self {
-                let ([a, b, c, d], [e, f, g, h]) = (self.0, bound.0);
-                Self([a.upper(e), b.upper(f), c.upper(g), d.upper(h)])
+                let ([$($a),*], [$($b),*]) = (self.0, bound.0);
+                Self([$($a.upper($b)),*])
             }
             #[inline(always)]
             fn activation(self) -> Self {
@@ -231,30 +234,27 @@ macro_rules! portable {
             }
         }
 
-        impl Lanes for Portable<$scalar> {
-            const WIDTH: usize = 4;
+        impl Lanes for Portable<$scalar, $width> {
+            const WIDTH: usize = $width;
             #[inline(always)]
             fn load(from: &[$scalar]) -> Self {
-                Self([from[0], from[1], from[2], from[3]])
+                let mut numbers = [0.0; $width];
+                numbers.copy_from_slice(&from[..$width]);
+                Self(numbers)
             }
             #[inline(always)]
             fn store(self, to: &mut [$scalar]) {
-                to[..4].copy_from_slice(&self.0);
+                to[..$width].copy_from_slice(&self.0);
             }
             #[inline(always)]
             fn root(self) -> Self {
-                let [a, b, c, d] = self.0;
-                Self([a.root(), b.root(), c.root(), d.root()])
+                let [$($a),*] = self.0;
+                Self([$($a.root()),*])
             }
             #[inline(always)]
             fn where_positive(self, then: Self, otherwise: Self) -> Self {
-                let ([a, b, c, d], [e, f, g, h], [i, j, k, l]) = (self.0, then.0, otherwise.0);
-                Self([
-                    a.where_positive(e, i),
-                    b.where_positive(f, j),
-                    c.where_positive(g, k),
-                    d.where_positive(h, l),
-                ])
+                let ([$($a),*], [$($b),*], [$($c),*]) = (self.0, then.0, otherwise.0);
+                Self([$($a.where_positive($b, $c)),*])
             }
             #[inline(always)]
             fn power_of_two(self) -> Self {
@@ -266,24 +266,24 @@ macro_rules! portable {
             }
             #[inline(always)]
             fn mantissa_and_exponent(self) -> (Self, Self) {
-                let [(a, e), (b, f), (c, g), (d, h)] = self.0.map(Lanes::mantissa_and_exponent);
-                (Self([a, b, c, d]), Self([e, f, g, h]))
+                let [$(($a, $b)),*] = self.0.map(Lanes::mantissa_and_exponent);
+                (Self([$($a),*]), Self([$($b),*]))
             }
         }
     };
-    (@operator $scalar:ty, $($trait:ident $method:ident $operator:tt),*) => {$(
-        impl $trait for Portable<$scalar> {
+    (@operator $scalar:ty, $width:literal, ($($a:ident $b:ident),*), $trait:ident $method:ident) => {
+        impl $trait for Portable<$scalar, $width> {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                let ([a, b, c, d], [e, f, g, h]) = (self.0, other.0);
-                Self([a $operator e, b $operator f, c $operator g, d $operator h])
+                let ([$($a),*], [$($b),*]) = (self.0, other.0);
+                Self([$($a.$method($b)),*])
             }
         }
-    )*};
+    };
 }
-portable!(f32, tanh);
-portable!(f64, |x: Self| Self(x.0.map(Lane::activation)));
+portable!(f32, 4, tanh, a e i, b f j, c g k, d h l);
+portable!(f64, 2, |x: Self| Self(x.0.map(Lane::activation)), a c e, b d f);
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "intrinsics; each use says why the processor has them")]
