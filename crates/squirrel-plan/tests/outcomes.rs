@@ -76,6 +76,8 @@ fn a_warm_start_is_shorter_and_a_plan_has_no_luck() {
     assert!(2 * warm < cold, "{warm} convex problems for {cold}");
 }
 
+type Input = (Begin, Vec<Wanted>, Vec<KeepOut>);
+
 #[test]
 fn nonsense_is_refused_by_name() {
     let good = || {
@@ -87,7 +89,7 @@ fn nonsense_is_refused_by_name() {
         };
         (begin, vec![Wanted { position: Vector3::zeros(), velocity: Vector3::zeros() }; 5], Vec::new())
     };
-    let refused = |change: &dyn Fn(&mut (Begin, Vec<Wanted>, Vec<KeepOut>)), step_s: f64| {
+    let refused = |change: &dyn Fn(&mut Input), step_s: f64| {
         let mut input = good();
         change(&mut input);
         Task::new(input.0, input.1, input.2, step_s, f64::INFINITY).unwrap_err()

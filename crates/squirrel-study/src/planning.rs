@@ -133,12 +133,10 @@ pub fn run(
 ) -> Result<Option<Planning>, FlightError> {
     let all: Vec<(&str, f64)> = conditions().collect();
     for (kind, ratio) in &all {
-        plan.check(&plan.vehicle, &scenario(plan, kind, *ratio, 0)?.1)?;
+        plan.check(&plan.vehicle, &scenario(plan, kind, *ratio, 0).1)?;
     }
-    let scenarios: Vec<Scenario> = all
-        .iter()
-        .map(|(kind, ratio)| Ok(scenario(plan, kind, *ratio, 0)?.1))
-        .collect::<Result<_, FlightError>>()?;
+    let scenarios: Vec<Scenario> =
+        all.iter().map(|(kind, ratio)| scenario(plan, kind, *ratio, 0).1).collect();
     let journal = Journal::open(keep, "planning", &plan.identity("planning", &scenarios))?;
     let fly = |arm, condition: usize, trial| {
         let (kind, ratio) = all[condition];
@@ -182,7 +180,7 @@ fn row(flown: &Flown<Trial>, arm: Arm, condition: usize, kind: &'static str, rat
 }
 
 /// A task and the scenario around it.
-fn scenario(plan: &Plan, kind: &str, ratio: f64, trial: u32) -> Result<(Drawn, Scenario), FlightError> {
+fn scenario(plan: &Plan, kind: &str, ratio: f64, trial: u32) -> (Drawn, Scenario) {
     let seed = plan.trial_seed(trial);
     let mut draw = campaign::Draw::new(seed, trial);
     let speed_m_s = draw.between(4.0, 8.0);
@@ -209,7 +207,7 @@ fn scenario(plan: &Plan, kind: &str, ratio: f64, trial: u32) -> Result<(Drawn, S
     scenario.measured_window_s = HORIZON_S;
     scenario.thrust_to_weight = Some(ratio);
     scenario.seed = seed;
-    Ok((drawn, scenario))
+    (drawn, scenario)
 }
 
 /// One plan, made at [`BEGIN_S`] and followed.
@@ -289,7 +287,7 @@ impl Offboard for Once {
 }
 
 fn fly(plan: &Plan, arm: Arm, kind: &str, ratio: f64, trial: u32) -> Result<Trial, FlightError> {
-    let (drawn, scenario) = scenario(plan, kind, ratio, trial)?;
+    let (drawn, scenario) = scenario(plan, kind, ratio, trial);
     let setup = plan.setup(arm, scenario);
     let mut pilot = Once::new(drawn, &setup)?;
     let flight = setup.fly_on(&mut InProcess::new(setup.stack()?), Some(&mut pilot), false, |_| {})?;
@@ -318,7 +316,7 @@ fn fly(plan: &Plan, arm: Arm, kind: &str, ratio: f64, trial: u32) -> Result<Tria
 pub fn tasks(plan: &Plan, arm: Arm, kind: &str, ratio: f64) -> Result<Vec<(Craft, Task)>, FlightError> {
     (0..plan.trials)
         .map(|trial| {
-            let (drawn, scenario) = scenario(plan, kind, ratio, trial)?;
+            let (drawn, scenario) = scenario(plan, kind, ratio, trial);
             let setup = plan.setup(arm, scenario);
             let craft = craft(&setup)?;
             let begin = Begin {

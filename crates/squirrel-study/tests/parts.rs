@@ -9,7 +9,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::{Keep, Part};
 use squirrel_study::merge::merge;
-use squirrel_study::{faults, filters, forest, steering, table2, table3, thrust};
+use squirrel_study::{faults, filters, forest, planning, steering, table2, table3, thrust};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -24,7 +24,7 @@ fn plan(trials: u32) -> Plan {
     Plan { vehicle: VehicleFile::squirrel(), arms: vec![Arm::Pc, Arm::TwccPlus], trials, seed: 5 }
 }
 
-const STUDIES: [(&str, Study); 7] = [
+const STUDIES: [(&str, Study); 8] = [
     ("faults", |keep| {
         let plan = faults::Plan { vehicle: VehicleFile::squirrel(), trials: 9, seed: 5 };
         faults::run(&plan, keep, || ()).map(json)
@@ -34,6 +34,10 @@ const STUDIES: [(&str, Study); 7] = [
         filters::run(&plan, keep, || ()).map(json)
     }),
     ("forest", |keep| forest::run(&plan(3), 2.0, keep, || ()).map(json)),
+    ("planning", |keep| {
+        let plan = Plan { arms: planning::ARMS.to_vec(), ..plan(1) };
+        planning::run(&plan, keep, || ()).map(json)
+    }),
     ("steering", |keep| steering::run(&plan(1), keep, || ()).map(json)),
     ("table2", |keep| {
         let plan = table2::Plan { vehicle: VehicleFile::squirrel(), trials: 2, seed: 5, epochs: 1 };

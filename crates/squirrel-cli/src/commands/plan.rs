@@ -129,14 +129,14 @@ impl PlanCommand {
             plans.push((model, task, plan));
         }
         bar.finish_and_clear();
-        self.show(&setup, &plans);
+        show(&setup, &plans);
         if let (Some(path), Some((model, task, plan))) = (&self.out, plans.first()) {
             let mut log = log(&setup, *model, task, plan);
             write_log(&mut log, path)?;
             talk(&format!("wrote {}", path.display()));
         }
         if let Some(path) = &self.report {
-            output::write_file(path, self.page(&setup, &plans).as_bytes())?;
+            output::write_file(path, page(&setup, &plans).as_bytes())?;
             talk(&format!("wrote {}", path.display()));
         }
         let result = Planned {
@@ -149,71 +149,71 @@ impl PlanCommand {
         };
         output::write_json(self.json.as_deref(), &result)
     }
+}
 
-    fn show(&self, setup: &Setup, plans: &[Made]) {
-        let ratio = setup.thrust_to_weight();
-        say(&format!(
-            "{} through {}, seed {}, thrust-to-weight {ratio:.2}, {:.1} s of it\n",
-            setup.vehicle.name,
-            setup.scenario.name,
-            setup.scenario.seed,
-            plans.first().map_or(self.horizon_s, |(_, _, plan)| plan.track.end_s()),
-        ));
-        let mut table = Table::new(&[
-            "wings",
-            "status",
-            "cost",
-            "RMSE m",
-            "height lost m",
-            "gained m",
-            "wings open s",
-            "too near m",
-            "problems",
+fn show(setup: &Setup, plans: &[Made]) {
+    let ratio = setup.thrust_to_weight();
+    say(&format!(
+        "{} through {}, seed {}, thrust-to-weight {ratio:.2}, {:.1} s of it\n",
+        setup.vehicle.name,
+        setup.scenario.name,
+        setup.scenario.seed,
+        plans.first().map_or(0.0, |(_, _, plan)| plan.track.end_s()),
+    ));
+    let mut table = Table::new(&[
+        "wings",
+        "status",
+        "cost",
+        "RMSE m",
+        "height lost m",
+        "gained m",
+        "wings open s",
+        "too near m",
+        "problems",
+    ]);
+    for (model, task, plan) in plans {
+        let o = Outcome::of(*model, task, plan);
+        table.row(vec![
+            o.wing.to_owned(),
+            o.status.to_owned(),
+            format!("{:.2}", o.cost),
+            format!("{:.2}", o.rmse_m),
+            format!("{:.2}", o.height_lost_m),
+            format!("{:.2}", o.height_gained_m),
+            format!("{:.1}", o.wings_open_s),
+            format!("{:.2}", o.violation_m),
+            o.iterations.to_string(),
         ]);
-        for (model, task, plan) in plans {
-            let o = Outcome::of(*model, task, plan);
-            table.row(vec![
-                o.wing.to_owned(),
-                o.status.to_owned(),
-                format!("{:.2}", o.cost),
-                format!("{:.2}", o.rmse_m),
-                format!("{:.2}", o.height_lost_m),
-                format!("{:.2}", o.height_gained_m),
-                format!("{:.1}", o.wings_open_s),
-                format!("{:.2}", o.violation_m),
-                o.iterations.to_string(),
-            ]);
-        }
-        table.print();
     }
+    table.print();
+}
 
-    fn page(&self, setup: &Setup, plans: &[Made]) -> String {
-        let logs: Vec<FlightLog> =
-            plans.iter().map(|(model, task, plan)| log(setup, *model, task, plan)).collect();
-        let view = |((model, task, plan), log): (&Made, _)| {
-            let o = Outcome::of(*model, task, plan);
-            FlightView {
-                arm: if model.is_some() { "with wings" } else { "without" },
-                log,
-                obstacles: setup.scenario.all_obstacles(),
-                tilt_max_rad: setup.vehicle.vehicle.parameters().limits.tilt_max_rad,
-                thrust_max_n: setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n(),
-                summary: vec![
-                    ("status".to_owned(), o.status.to_owned()),
-                    ("RMSE m".to_owned(), format!("{:.2}", o.rmse_m)),
-                    ("wings open s".to_owned(), format!("{:.1}", o.wings_open_s)),
-                ],
-            }
-        };
-        let views: Vec<FlightView<'_>> = plans.iter().zip(&logs).map(view).collect();
-        let heading = Heading {
-            title: format!("{}: planned", setup.scenario.name),
-            lead: "What a plan that knows the whole scenario makes of it, with wings and without: planned motion, not flown.".to_owned(),
-            facts: super::facts(setup),
-            card: String::new(),
-        };
-        render(&heading, &views)
-    }
+fn page(setup: &Setup, plans: &[Made]) -> String {
+    let logs: Vec<FlightLog> =
+        plans.iter().map(|(model, task, plan)| log(setup, *model, task, plan)).collect();
+    let view = |((model, task, plan), log): (&Made, _)| {
+        let o = Outcome::of(*model, task, plan);
+        FlightView {
+            arm: if model.is_some() { "with wings" } else { "without" },
+            log,
+            obstacles: setup.scenario.all_obstacles(),
+            tilt_max_rad: setup.vehicle.vehicle.parameters().limits.tilt_max_rad,
+            thrust_max_n: setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n(),
+            summary: vec![
+                ("status".to_owned(), o.status.to_owned()),
+                ("RMSE m".to_owned(), format!("{:.2}", o.rmse_m)),
+                ("wings open s".to_owned(), format!("{:.1}", o.wings_open_s)),
+            ],
+        }
+    };
+    let views: Vec<FlightView<'_>> = plans.iter().zip(&logs).map(view).collect();
+    let heading = Heading {
+        title: format!("{}: planned", setup.scenario.name),
+        lead: "What a plan that knows the whole scenario makes of it, with wings and without: planned motion, not flown.".to_owned(),
+        facts: super::facts(setup),
+        card: String::new(),
+    };
+    render(&heading, &views)
 }
 
 /// A plan as a log: what to fly, and the reference behind it; its motion stands where a flight has the truth.

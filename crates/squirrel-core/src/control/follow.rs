@@ -43,6 +43,10 @@ pub struct FollowGains {
     pub wing_delay_s: f32,
 }
 
+/// Most of the thrust that goes into height: at all of it, a little more or less would be all or nothing sideways, and turning back and
+/// forth takes more of the thrust than there is.
+const HEIGHT_SHARE: f32 = 0.95;
+
 impl Default for FollowGains {
     /// For an attitude loop of 10 rad/s and more behind a command filter of 20 rad/s.
     fn default() -> Self {
@@ -90,7 +94,7 @@ impl FollowGains {
         let wanted = -ahead.vector - limit_norm(error, self.acceleration_max_m_s2) * airframe.mass_kg;
         let most = airframe.envelope.thrust_max_n;
         // Height first: what is left of the thrust goes sideways. A thrust that would have to pull downwards is none.
-        let down = limit(wanted.z, airframe.envelope.thrust_min_n, most);
+        let down = limit(wanted.z, airframe.envelope.thrust_min_n, HEIGHT_SHARE * most);
         let level = heading_frame(&wanted, motion.yaw_rad);
         let sideways = limit_norm(Vector3::new(level.x, level.y, 0.0), sqrt(most * most - down * down));
         let level = sideways.xy();

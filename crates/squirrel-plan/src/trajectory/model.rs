@@ -66,7 +66,7 @@ impl Craft {
     /// * `reserve` - part of thrust and tilt that is left to whoever follows the plan, [`RESERVE`] or less
     ///
     /// # Errors
-    /// One line that names what the vehicle lacks.
+    /// One line that names what the vehicle lacks, or what cannot be.
     pub fn of(
         vehicle: &VehicleFile,
         thrust_max_n: f64,
@@ -74,6 +74,9 @@ impl Craft {
         reserve: f64,
     ) -> Result<Self, String> {
         let p = vehicle.vehicle.parameters();
+        if !(0.0..=0.5).contains(&reserve) {
+            return Err(format!("reserve = {reserve}: must be 0 to 0.5"));
+        }
         let weight_n = vehicle.vehicle.weight_n();
         let thrust_max_n = thrust_max_n * (1.0 - reserve);
         if !(thrust_max_n.is_finite() && thrust_max_n > weight_n) {
@@ -99,11 +102,6 @@ impl Craft {
             wing: wing.map(|model| WingForce::of(vehicle, model)).transpose()?,
             wing_rate_max_per_s: 1.0 / servo_s,
         })
-    }
-
-    /// The same vehicle with its wings folded.
-    pub fn without_wings(&self) -> Self {
-        Self { wing: None, ..self.clone() }
     }
 
     /// Thrust that carries the weight, N, world axes, along body z.
@@ -304,5 +302,6 @@ mod tests {
         let error = Craft::of(&vehicle, 1.02 * vehicle.vehicle.weight_n(), None, RESERVE).unwrap_err();
         assert!(error.contains("thrust_max_n"), "{error}");
         assert!(Craft::of(&vehicle, f64::NAN, None, RESERVE).is_err());
+        assert_eq!(Craft::of(&vehicle, 9.0, None, 0.9).unwrap_err(), "reserve = 0.9: must be 0 to 0.5");
     }
 }

@@ -86,12 +86,14 @@ impl Planner {
     /// The best of a few first guesses.
     fn begin(&self, craft: &Craft, task: &Task, warm: Option<(&Track, f64)>, iterations: &mut u32) -> Held {
         let controls = first_controls(craft, task, warm);
+        let told = warm.and_then(|(track, passed_s)| track.at(passed_s));
+        let told = told.map_or(controls[0].0, |point| craft.limited(&-point.thrust));
         let start = (task.begin().position, task.begin().velocity);
         let path = craft.roll_out(start, &controls, task.step_s());
         let (_, merit) = self.weights.cost(task, &path, &controls);
         let trust_n = if warm.is_some() { WARM_TRUST_N } else { COLD_TRUST_N };
         let held = |sides| Held {
-            iterate: Iterate { controls: controls.clone(), path: path.clone(), sides },
+            iterate: Iterate { controls: controls.clone(), told, path: path.clone(), sides },
             merit,
             trust_n,
             is_settled: false,
@@ -147,7 +149,7 @@ impl Planner {
             let enough = GAIN * (1.0 + held.merit);
             if gain > 0.0 {
                 let sides = path.iter().map(|node| node.position.xy()).collect();
-                held.iterate = Iterate { controls, path, sides };
+                held.iterate = Iterate { controls, told: held.iterate.told, path, sides };
                 held.merit = merit;
             }
             if hope <= enough {

@@ -81,6 +81,8 @@ pub(super) type Control = (Vector3<f64>, f64);
 pub(super) struct Iterate {
     /// At each node.
     pub(super) controls: Vec<Control>,
+    /// Thrust at the first node as it was planned before: how the vehicle was told to turn. What it is measured to be there lags behind.
+    pub(super) told: Vector3<f64>,
     /// Where they lead.
     pub(super) path: Vec<Motion>,
     /// Where obstacles are linearised at: the path, or a guess to which side of them it shall lead.
@@ -293,7 +295,8 @@ impl Subproblem<'_> {
             rows.push(&[(z, -1.0)], -craft.thrust_min_n.max(thrust.z - trust));
             rows.push(&[(z, 1.0)], thrust.z + trust);
             let (x, y) = (at(k, T), at(k, T + 1));
-            let forward = Vector2::new(thrust.x, thrust.z).normalize() * slope;
+            let forward =
+                Vector2::new(thrust.x, thrust.z).try_normalize(1e-9).unwrap_or_else(Vector2::y) * slope;
             for sign in [1.0, -1.0] {
                 rows.push(&[(x, sign), (z, -slope)], 0.0);
                 rows.push(&[(x, -forward.x), (y, sign), (z, -forward.y)], 0.0);
@@ -321,15 +324,30 @@ impl Subproblem<'_> {
                 let [before, now, after] = [k - 1, k, k + 1].map(|node| at(node, T + axis));
                 for sign in [1.0, -1.0] {
                     let by = share * sign;
-                    rows.push(&[(after, by), (now, -2.0 * by), (before, by), (at(k, R), -1.0)], 0.0);
+                    let mut terms = vec![(after, by), (now, -2.0 * by), (at(k, R), -1.0)];
+                    let told = if k == 1 { self.iterate.told[axis] } else { 0.0 };
+                    if k > 1 {
+                        terms.push((before, by));
+                    }
+                    rows.push(&terms, -by * told);
                 }
             }
         }
         if k + 1 == self.held() {
-            // That thrust is on its way; what there is left for turning may be nothing.
+            // That thrust is on its way. Where it leaves nothing for turning, a turn that was begun may still end as it was planned to.
             let left = self.craft.thrust_max_n - self.iterate.controls[k].0.norm();
-            rows.push(&[(at(k, R), 1.0), (at(k, S), -1.0)], left.max(0.0));
+            rows.push(&[(at(k, R), 1.0), (at(k, S), -1.0)], left.max(self.turned(k)));
         }
+    }
+
+    /// What turning takes of the thrust in the iterate.
+    fn turned(&self, k: usize) -> f64 {
+        let controls = &self.iterate.controls;
+        let before = if k == 1 { self.iterate.told } else { controls[k - 1].0 };
+        let bend =
+            controls.get(k + 1).map_or_else(Vector3::zeros, |after| after.0 - controls[k].0 * 2.0 + before);
+        let h2 = self.task.step_s() * self.task.step_s();
+        (0..2).map(|axis| self.craft.turning_s2[axis] * bend[axis].abs() / h2).fold(0.0, f64::max)
     }
 
     fn wings(&self, k: usize, rows: &mut Rows) {

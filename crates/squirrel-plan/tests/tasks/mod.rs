@@ -6,22 +6,22 @@ use squirrel_plan::wing::WingModel;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// A small deterministic generator.
-pub struct Draw(pub u64);
+pub(crate) struct Draw(pub(crate) u64);
 
 impl Draw {
-    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 }
 
-pub fn craft(ratio: f64, wing: Option<WingModel>) -> Craft {
+pub(crate) fn craft(ratio: f64, wing: Option<WingModel>) -> Craft {
     let vehicle = VehicleFile::squirrel();
     Craft::of(&vehicle, ratio * vehicle.vehicle.weight_n(), wing, RESERVE).unwrap()
 }
 
 /// Straight on at a speed.
-pub fn straight(craft: &Craft, speed_m_s: f64, keep_out: Vec<KeepOut>) -> Task {
+pub(crate) fn straight(craft: &Craft, speed_m_s: f64, keep_out: Vec<KeepOut>) -> Task {
     let velocity = Vector3::new(speed_m_s, 0.0, 0.0);
     let position = Vector3::new(0.0, 0.0, -30.0);
     let begin = Begin { position, velocity, thrust: -craft.hover(), spread: 0.0 };
@@ -29,7 +29,7 @@ pub fn straight(craft: &Craft, speed_m_s: f64, keep_out: Vec<KeepOut>) -> Task {
     Task::new(begin, wanted.collect(), keep_out, 0.1, f64::INFINITY).unwrap()
 }
 
-pub fn random(craft: &Craft, draw: &mut Draw) -> Task {
+pub(crate) fn random(craft: &Craft, draw: &mut Draw) -> Task {
     let speed = draw.within(4.0, 8.0);
     let count = draw.within(1.0, 3.999) as usize;
     let keep_out = (0..count).map(|_| KeepOut {

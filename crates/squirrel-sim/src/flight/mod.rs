@@ -303,12 +303,7 @@ impl Setup {
                 let (output, met) = computer.step(&frame)?;
                 believed = output.navigation.or(believed);
                 let encounters = pilot.as_ref().map_or(met, |pilot| met.max(pilot.encounters()));
-                if !state.body.is_finite() {
-                    return Err(FlightError(format!(
-                        "at {:.3} s the vehicle's state is not finite",
-                        time_us as f64 * 1e-6
-                    )));
-                }
+                check_finite(&state, time_us)?;
                 commands.send(time_us, Command::of(&output));
                 let followed = pilot.as_ref().and_then(|pilot| pilot.reference());
                 let reference = followed.unwrap_or(output.reference);
@@ -357,6 +352,14 @@ impl Setup {
         state.rotor_speed_rad_s[..vehicle.rotors().len()].fill(speed);
         state
     }
+}
+
+/// A plant that left the numbers has nothing more to tell.
+fn check_finite(state: &PlantState, time_us: u64) -> Result<(), FlightError> {
+    if state.body.is_finite() {
+        return Ok(());
+    }
+    Err(FlightError(format!("at {:.3} s the vehicle's state is not finite", time_us as f64 * 1e-6)))
 }
 
 /// The command of each rotor that carries the weight.

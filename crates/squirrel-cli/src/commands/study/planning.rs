@@ -40,34 +40,35 @@ impl Options {
         );
         let csv = sheet(&study).print();
         if !common.merged {
-            self.times(&plan)?;
+            times(&plan)?;
         }
         common.end("planning", &csv, &study).map(drop)
     }
+}
 
-    /// How long a plan takes on one core of this machine; no part of the figures that are kept.
-    fn times(&self, plan: &Plan) -> Result<(), String> {
-        say("\nA plan from nothing on one core of this machine, ms.\n");
-        let mut table = Table::new(&["task", "T/W", "arm", "median", "p90", "longest"]);
-        for (kind, ratio) in KINDS.iter().flat_map(|kind| THRUST_TO_WEIGHT.map(|ratio| (*kind, ratio))) {
-            for arm in ARMS {
-                let tasks = planning::tasks(plan, arm, kind, ratio).map_err(|e| e.to_string())?;
-                let mut took_ms: Vec<f64> = Vec::with_capacity(tasks.len());
-                for (craft, task) in &tasks {
-                    let begin = Instant::now();
-                    std::hint::black_box(Planner::default().plan(craft, task, None));
-                    took_ms.push(begin.elapsed().as_secs_f64() * 1e3);
-                }
-                took_ms.sort_by(f64::total_cmp);
-                let at = |share: f64| took_ms[((took_ms.len() - 1) as f64 * share).round() as usize];
-                let mut cells = vec![kind.to_owned(), format!("{ratio:.1}"), arm.name().to_owned()];
-                cells.extend([0.5, 0.9, 1.0].map(|share| format!("{:.1}", at(share))));
-                table.row(cells);
+/// How long a plan takes on one core of this machine; no part of the figures that are kept.
+#[allow(clippy::disallowed_methods, reason = "how long it takes is the question")]
+fn times(plan: &Plan) -> Result<(), String> {
+    say("\nA plan from nothing on one core of this machine, ms.\n");
+    let mut table = Table::new(&["task", "T/W", "arm", "median", "p90", "longest"]);
+    for (kind, ratio) in KINDS.iter().flat_map(|kind| THRUST_TO_WEIGHT.map(|ratio| (*kind, ratio))) {
+        for arm in ARMS {
+            let tasks = planning::tasks(plan, arm, kind, ratio).map_err(|e| e.to_string())?;
+            let mut took_ms: Vec<f64> = Vec::with_capacity(tasks.len());
+            for (craft, task) in &tasks {
+                let begin = Instant::now();
+                std::hint::black_box(Planner::default().plan(craft, task, None));
+                took_ms.push(begin.elapsed().as_secs_f64() * 1e3);
             }
+            took_ms.sort_by(f64::total_cmp);
+            let at = |share: f64| took_ms[((took_ms.len() - 1) as f64 * share).round() as usize];
+            let mut cells = vec![kind.to_owned(), format!("{ratio:.1}"), arm.name().to_owned()];
+            cells.extend([0.5, 0.9, 1.0].map(|share| format!("{:.1}", at(share))));
+            table.row(cells);
         }
-        table.print();
-        Ok(())
     }
+    table.print();
+    Ok(())
 }
 
 fn sheet(study: &Planning) -> Sheet {
