@@ -4,12 +4,12 @@ use super::{vehicle, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
 use squirrel_plan::pilot::{SPARE_M, half_width_m};
-use squirrel_plan::trajectory::{Craft, Plan, Planner, RESERVE, Task};
+use squirrel_plan::trajectory::{self, Craft, Plan, Planner, RESERVE, Shown, Task};
 use squirrel_plan::wing::WingModel;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
-use squirrel_sim::report::flight::{FlightView, Heading, render};
+use squirrel_sim::report::flight::FlightView;
 use squirrel_sim::scenario::Scenario;
 use std::path::PathBuf;
 
@@ -194,26 +194,23 @@ fn page(setup: &Setup, plans: &[Made]) -> String {
     let view = |((model, task, plan), log): (&Made, _)| {
         let o = Outcome::of(*model, task, plan);
         FlightView {
-            arm: if model.is_some() { "with wings" } else { "without" },
+            arm: o.wing,
             log,
             obstacles: setup.scenario.all_obstacles(),
             tilt_max_rad: setup.vehicle.vehicle.parameters().limits.tilt_max_rad,
             thrust_max_n: setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n(),
             summary: vec![
                 ("status".to_owned(), o.status.to_owned()),
+                ("cost".to_owned(), format!("{:.2}", o.cost)),
                 ("RMSE m".to_owned(), format!("{:.2}", o.rmse_m)),
                 ("wings open s".to_owned(), format!("{:.1}", o.wings_open_s)),
             ],
         }
     };
     let views: Vec<FlightView<'_>> = plans.iter().zip(&logs).map(view).collect();
-    let heading = Heading {
-        title: format!("{}: planned", setup.scenario.name),
-        lead: "What a plan that knows the whole scenario makes of it, with wings and without: planned motion, not flown.".to_owned(),
-        facts: super::facts(setup),
-        card: String::new(),
-    };
-    render(&heading, &views)
+    let shown: Vec<Shown<'_>> =
+        plans.iter().zip(&views).map(|((_, task, plan), view)| Shown { view, task, plan }).collect();
+    trajectory::page(&format!("{}: planned", setup.scenario.name), &super::facts(setup), &shown)
 }
 
 /// A plan as a log: what to fly, and the reference behind it; its motion stands where a flight has the truth.

@@ -24,6 +24,7 @@
 //! ```
 
 mod model;
+mod page;
 mod scenario;
 mod scp;
 mod sides;
@@ -31,6 +32,7 @@ mod subproblem;
 mod task;
 
 pub use model::{Craft, Motion, RESERVE, Slopes};
+pub use page::{Shown, page};
 pub use scp::Planner;
 pub use subproblem::Weights;
 pub use task::{Begin, KeepOut, Plan, STEPS_MAX, Status, Task, Wanted};
