@@ -1,6 +1,6 @@
 //! What wings buy where both plan: random avoidance tasks, planned with and without, and flown on the full plant.
 //!
-//! Each trial flies straight on until [`BEGIN_S`]. Then one plan is made from what the vehicle believes of itself, two seconds long, and
+//! Each trial flies straight on for four and a half seconds. Then one plan is made from what the vehicle believes of itself, two seconds long, and
 //! followed to its end without another one. Two kinds of task, each at three thrust-to-weight ratios:
 //! - `pass`: on past one to three trunks that stand in the way;
 //! - `turn`: away from a trunk by 110 to 130 deg, the paper's manoeuvre.

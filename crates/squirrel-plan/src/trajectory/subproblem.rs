@@ -191,7 +191,9 @@ impl Subproblem<'_> {
             // What is held is held to the bit.
             let found = Vector3::from_column_slice(&x[at(k, T)..at(k, T) + 3]);
             let thrust = if k < self.held() { self.iterate.controls[k].0 } else { found };
-            (thrust, x[at(k, W)].clamp(0.0, 1.0))
+            // A solver's zero is none.
+            let spread = x[at(k, W)].clamp(0.0, 1.0);
+            (thrust, if spread < 1e-6 { 0.0 } else { spread })
         };
         let motion = |k: usize| {
             let three = |what: usize| Vector3::from_column_slice(&x[at(k, what)..at(k, what) + 3]);
