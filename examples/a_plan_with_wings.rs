@@ -1,7 +1,7 @@
 //! Lesson 14, `squirrel plan`: what wings buy where both with and without them plan ahead.
 //!
 //! A [`Craft`] is what the vehicle can do, a [`Task`] where it is and what it should be near to, and a [`Planner`] makes a plan of both: where
-//! to be, how the rotors shall push, when the wings shall open. Here a run-up of 4.5 s leads straight on, and then the vehicle shall go off at
+//! to be, how the rotors shall push, when the wings shall open. Here a run-up of 6 s leads straight on, and then the vehicle shall go off at
 //! 120 deg at once, the paper's manoeuvre, of which the first plan knew nothing. The same planner without wings is the fair rival. Both
 //! plans in a row are flown on the full plant, with sensors, rotors and a membrane for a wing, by a [`Follower`]: look how far beside its plan each
 //! flight is. Wings brake harder, so that the way back is shorter, by a few percent where thrust is scarce and by one where it is
@@ -29,7 +29,7 @@ use squirrel_sim::track::{Track, TrackPoint};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 const STEP_S: f64 = 0.1;
-const RUN_UP_S: f64 = 4.5;
+const RUN_UP_S: f64 = 6.0;
 const TURN_S: f64 = 2.0;
 const SPEED_M_S: f32 = 7.0;
 
@@ -41,7 +41,7 @@ struct Flown {
     /// Of the flown turn to the planned one, m.
     beside_rmse_m: f64,
     wings_open_s: f64,
-    /// Largest speed against the old course at the end of the turn, m/s.
+    /// Planned speed against the old course at the end, m/s.
     back_m_s: f64,
 }
 
@@ -69,7 +69,7 @@ fn fly(thrust_to_weight: f64, wing: Option<WingModel>) -> Outcome<Flown> {
 
     let start = Vector3::new(0.0, 0.0, -scenario.height_m);
     let hover = Begin { position: start, velocity: Vector3::zeros(), thrust: -craft.hover(), spread: 0.0 };
-    let straight = Task::new(hover, along(start, 0.0, 3.0, RUN_UP_S), vec![], STEP_S, f64::INFINITY)?;
+    let straight = Task::new(hover, along(start, 0.0, 5.0, RUN_UP_S), vec![], STEP_S, f64::INFINITY)?;
     let run_up = Planner::default().plan(&craft.without_wings(), &straight, None);
     let last = run_up.track.points().last().ok_or("an empty plan")?;
 
@@ -130,7 +130,7 @@ fn wings_buy_a_few_percent_where_both_plan() -> Outcome<()> {
     let gain = |ratio| {
         let [with, without] = [fly(ratio, Some(WingModel::Flat))?, fly(ratio, None)?];
         assert!(with.beside_rmse_m < 0.5 && without.beside_rmse_m < 0.5, "{ratio}");
-        assert!(with.wings_open_s > 0.3 && without.wings_open_s == 0.0, "{ratio}");
+        assert!(with.wings_open_s > 0.3 && without.wings_open_s < 1e-6, "{ratio}");
         Ok::<_, Box<dyn std::error::Error>>(without.wanted_rmse_m / with.wanted_rmse_m - 1.0)
     };
     let [scarce, plenty] = [gain(1.2)?, gain(2.0)?];
