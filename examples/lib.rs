@@ -16,6 +16,7 @@
 //! | 11 | `study_faults` | what becomes of flights in which one thing fails |
 //! | 12 | `the_drone_that_sank` | naming what a model lacks |
 //! | 13 | `what_wings_reach` | which accelerations wings add, and where that is worth something |
+//! | 14 | `a_plan_with_wings` | what wings buy where both plan ahead, planned and flown |
 //!
 //! Lessons 5 to 11 are the studies of `squirrel study` with fewer flights. Here is what lessons share.
 

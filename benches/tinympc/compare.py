@@ -3,11 +3,11 @@
 
     python3 compare.py [--states 200] [--flights 20] [--thrust-to-weight 2.0] [--only tinympc]
 
-Needs requirements.txt and the wheel of squirrel (`cargo xtask wheel` leaves it in target/wheel/dist) in one environment; TinyMPC is compiled, which
-takes a minute and a half. Without `squirrel.plan` its rows are left out.
+Needs requirements.txt and the wheel of squirrel (`cargo xtask wheel` leaves it in target/wheel/dist; `pip install --no-deps`) in one environment;
+TinyMPC is compiled, which takes a minute and a half.
 
 The task is what an avoidance leaves behind: anywhere within 3 m of a straight reference and up to 3 m/s off its 5 to 7 m/s, back to it. Position
-and velocity in NED, acceleration as the input, 20 steps of 0.1 s. TinyMPC's own example, a quadrotor of twelve states with
+and velocity in NED, 20 steps of 0.1 s, a point mass without drag. TinyMPC's own example, a quadrotor of twelve states with
 quaternions, is not needed: neither of the two plans attitude here. What each knows of the vehicle:
 
 - TinyMPC, box: |a| within g tan(30 deg) north and east, and between free fall and full thrust as if level down: the linearised problem.
@@ -16,18 +16,25 @@ quaternions, is not needed: neither of the two plans attitude here. What each kn
   Its length, the ratio of thrust to weight, has no bound. The binding of 0.0.8 hands cones of inputs to states and the other way round,
   which is undone here; and its test for the end does not look at cones, so it has 50 iterations, after which inputs are up to 0.04 m/s^2 outside.
 - Obstacles TinyMPC has none in either, only half-spaces that are the same over the whole horizon.
-- squirrel: thrust in the cone and below the limit in length, obstacles (none here). It may use wings; here it must not.
+- squirrel: thrust below the limit in length, roll and pitch of 30 deg each, obstacles (none here). It may use wings; here it must not. Thrust is linear
+  between nodes, may not change faster than the attitude loop and the rotors of the vehicle do, and is held for the first step, because
+  what is asked for takes so long to come. TinyMPC's inputs are constant over a step and may jump.
+
+What is asked for comes a step late for all. What the rotors push meanwhile is known: squirrel plans from the state now, TinyMPC
+from where that push leads in a step, so that being late costs neither anything but reaction. TinyMPC's first input is asked for, and of
+squirrel's plan the thrust at which its second step ends; the mean over that step never gets there, because each plan begins at what was asked for last.
 
 States and references change at every call, so that no call begins at the answer of the one before it. TinyMPC prints a line a solve into
 nowhere; that is in its time. Its penalty `rho` is part of its cost at the end of the horizon, too, so it is not only a matter of speed:
-in the box, of 0.1 to 10, 1 is the fastest and 0.1 tracks best. Then each flies twice by its first input, ten times a second for 4 s, from the first
-states: as a double integrator that takes any acceleration, and as a point mass whose thrust is cut to the cone and to the limit.
+in the box, of 0.1 to 10, 1 is the fastest and 0.1 tracks best. Then each flies twice, asked ten times a second for 4 s, from the first
+states, hovering's thrust before: as a double integrator that takes any acceleration, and as a point mass whose thrust is cut to what the
+vehicle can do: roll and pitch of 30 deg each, and the limit. Both take steps of thrust, which no vehicle does; that squirrel plans without them
+costs it here, and gains nothing.
 """
 
 import argparse
 import contextlib
 import os
-import re
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -36,12 +43,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-# From position, velocity and the reference's positions (steps + 1, 3) to the first acceleration, NED.
-Planner = Callable[[Array, Array, Array], Array]
+# From position, velocity, the acceleration that acts for a step more, and the reference's positions (steps + 2, 3), to the acceleration
+# of the step after that, NED.
+Planner = Callable[[Array, Array, Array, Array], Array]
 
 GRAVITY = 9.80665
 DOWN = np.array([0.0, 0.0, GRAVITY])
-TILT = np.radians(30.0)
+SLOPE = np.tan(np.radians(30.0))
 STEP_S = 0.1
 STEPS = 20
 FLIGHT_STEPS = 40
@@ -66,7 +74,7 @@ def of_tinympc(thrust_to_weight: float, rho: float, cone: bool) -> Planner:
     identity = np.eye(3)
     a = np.block([[identity, STEP_S * identity], [np.zeros((3, 3)), identity]])
     of_acceleration = np.vstack([0.5 * STEP_S**2 * identity, STEP_S * identity])
-    weight, side = np.diag([10.0] * 3 + [1.0] * 3), GRAVITY * np.tan(TILT)
+    weight, side = np.diag([10.0] * 3 + [1.0] * 3), GRAVITY * SLOPE
     solver = tinympc.TinyMPC()
     if cone:
         # Thrust over mass, its third component up.
@@ -77,7 +85,7 @@ def of_tinympc(thrust_to_weight: float, rho: float, cone: bool) -> Planner:
         none, nothing = np.zeros(0, np.int32), np.zeros(0)
         first, size = np.array([0], np.int32), np.array([3], np.int32)
         # Not by the method of this name: it switches on cones of inputs, and puts them where those of states belong.
-        solver._solver.set_cone_constraints(none, none, nothing, first, size, np.array([np.tan(TILT)]))
+        solver._solver.set_cone_constraints(none, none, nothing, first, size, np.array([SLOPE]))
         solver.update_settings(en_input_soc=True, en_state_soc=False)
         solver.set_u_ref(np.array([0.0, 0.0, GRAVITY]))
     else:
@@ -85,10 +93,11 @@ def of_tinympc(thrust_to_weight: float, rho: float, cone: bool) -> Planner:
         up = (thrust_to_weight - 1.0) * GRAVITY
         solver.set_bound_constraints(None, None, np.array([-side, -side, -up]), np.array([side, side, GRAVITY]))
 
-    def plan(position: Array, velocity: Array, reference: Array) -> Array:
-        speed = np.diff(reference, axis=0) / STEP_S
-        solver.set_x0(np.concatenate([position, velocity]))
-        solver.set_x_ref(np.vstack([reference[:STEPS].T, speed.T]))
+    def plan(position: Array, velocity: Array, acting: Array, reference: Array) -> Array:
+        ahead = reference[1:]
+        speed = np.diff(ahead, axis=0) / STEP_S
+        solver.set_x0(np.concatenate(moved(position, velocity, acting)))
+        solver.set_x_ref(np.vstack([ahead[:STEPS].T, speed.T]))
         # What it returns is a view of its own memory.
         first = np.array(solver.solve()["controls"])
         return DOWN + first * np.array([1.0, 1.0, -1.0]) if cone else first
@@ -100,24 +109,29 @@ def of_squirrel(thrust_to_weight: float) -> Planner:
     import squirrel
     import squirrel.plan
 
-    text = squirrel.Vehicle.bundled("squirrel").text
-    mass = float(re.search(r"mass_kg = \{ value = ([0-9.]+)", text)[1])
-    limit = thrust_to_weight * mass * GRAVITY
-    vehicle = squirrel.Vehicle.parse(re.sub(r"(thrust_max_n = \{ value = )[0-9.]+", rf"\g<1>{limit}", text, count=1))
+    mass_kg = 0.548
+    vehicle = squirrel.Vehicle.bundled("squirrel").edited({"mass.mass_kg": mass_kg, "drag.area_m2": 0.0})
 
-    def plan(position: Array, velocity: Array, reference: Array) -> Array:
+    def plan(position: Array, velocity: Array, acting: Array, reference: Array) -> Array:
         planned = squirrel.plan.trajectory(
             vehicle,
+            reference_position_ned_m=reference[: STEPS + 1],
             position_ned_m=position,
             velocity_ned_m_s=velocity,
-            reference_position_ned_m=reference,
-            wings=False,
-            horizon_s=STEPS * STEP_S,
+            thrust_ned_n=mass_kg * (acting - DOWN),
+            wing=None,
+            thrust_to_weight=thrust_to_weight,
             step_s=STEP_S,
+            reserve=0.0,
         )
-        return DOWN + np.asarray(planned.thrust_ned_n)[0] / mass
+        return DOWN + planned.thrust_ned_n[2] / mass_kg
 
     return plan
+
+
+def moved(position: Array, velocity: Array, acceleration: Array) -> tuple[Array, Array]:
+    """A step on."""
+    return position + STEP_S * velocity + 0.5 * STEP_S**2 * acceleration, velocity + STEP_S * acceleration
 
 
 def any_acceleration(acceleration: Array, _: float) -> Array:
@@ -125,12 +139,12 @@ def any_acceleration(acceleration: Array, _: float) -> Array:
 
 
 def within_thrust(acceleration: Array, thrust_to_weight: float) -> Array:
-    """What a point mass does that is asked for an acceleration: thrust over mass in the cone first, then shortened."""
+    """What a point mass does that is asked for an acceleration: pitch first, then roll, then the length of the thrust."""
     thrust = DOWN - acceleration
     thrust[2] = max(thrust[2], 0.0)
-    side, most = np.hypot(thrust[0], thrust[1]), np.tan(TILT) * thrust[2]
-    if side > most:
-        thrust[:2] *= most / side
+    thrust[0] = np.clip(thrust[0], -SLOPE * thrust[2], SLOPE * thrust[2])
+    across = SLOPE * np.hypot(thrust[0], thrust[2])
+    thrust[1] = np.clip(thrust[1], -across, across)
     length = np.linalg.norm(thrust)
     if length > thrust_to_weight * GRAVITY:
         thrust *= thrust_to_weight * GRAVITY / length
@@ -152,7 +166,7 @@ def states(count: int) -> list[tuple[Array, Array, Array, Array]]:
 
 
 def line(start: Array, along: Array, from_step: int) -> Array:
-    return start + STEP_S * np.arange(from_step, from_step + STEPS + 1)[:, None] * along
+    return start + STEP_S * np.arange(from_step, from_step + STEPS + 2)[:, None] * along
 
 
 def times_us(plan: Planner, cases: list[tuple[Array, Array, Array, Array]]) -> list[float]:
@@ -160,7 +174,7 @@ def times_us(plan: Planner, cases: list[tuple[Array, Array, Array, Array]]) -> l
     for position, velocity, start, along in cases:
         reference = line(start, along, 0)
         before = time.perf_counter()
-        plan(position, velocity, reference)
+        plan(position, velocity, np.zeros(3), reference)
         took.append(1e6 * (time.perf_counter() - before))
     return took
 
@@ -168,10 +182,11 @@ def times_us(plan: Planner, cases: list[tuple[Array, Array, Array, Array]]) -> l
 def rmse_m(plan: Planner, cases: list[tuple[Array, Array, Array, Array]], plant: Callable[[Array, float], Array], ratio: float) -> float:
     squares = []
     for position, velocity, start, along in cases:
+        acting = np.zeros(3)
         for step in range(FLIGHT_STEPS):
-            acceleration = plant(plan(position, velocity, line(start, along, step)), ratio)
-            position = position + STEP_S * velocity + 0.5 * STEP_S**2 * acceleration
-            velocity = velocity + STEP_S * acceleration
+            asked = plan(position, velocity, acting, line(start, along, step))
+            position, velocity = moved(position, velocity, acting)
+            acting = plant(asked, ratio)
             squares.append(float(np.sum((position - start - STEP_S * (step + 1) * along) ** 2)))
     return float(np.sqrt(np.mean(squares)))
 
