@@ -70,7 +70,7 @@ fn fly(thrust_to_weight: f64, wing: Option<WingModel>) -> Outcome<Flown> {
     let start = Vector3::new(0.0, 0.0, -scenario.height_m);
     let hover = Begin { position: start, velocity: Vector3::zeros(), thrust: -craft.hover(), spread: 0.0 };
     let straight = Task::new(hover, along(start, 0.0, 5.0, RUN_UP_S), vec![], STEP_S, f64::INFINITY)?;
-    let run_up = Planner::default().plan(&craft.without_wings(), &straight, None);
+    let run_up = Planner::default().plan(&Craft { wing: None, ..craft.clone() }, &straight, None);
     let last = run_up.track.points().last().ok_or("an empty plan")?;
 
     let begin = Begin { position: last.position, velocity: last.velocity, thrust: last.thrust, spread: 0.0 };
