@@ -61,6 +61,11 @@ fn a_planner_is_an_arm() {
 fn what_cannot_be_planned_or_followed_is_one_line() {
     let folder = Folder::new("plan-refused");
     folder.write("broken.mcap", "not a log");
+    folder.succeeds(&["plan", "--scenario", "hover", "--horizon-s", "1", "--out", "p.mcap"]);
+    folder.write(
+        "low.toml",
+        "name = \"low\"\nduration_s = 5.0\nheight_m = 25.0\n[mission]\nkind = \"hover\"\n",
+    );
     for (arguments, word) in [
         (vec!["plan", "--scenario", "excite_rich"], "there is nothing to plan"),
         (vec!["plan", "--thrust-to-weight", "1.01"], "thrust_max_n"),
@@ -69,8 +74,11 @@ fn what_cannot_be_planned_or_followed_is_one_line() {
         (vec!["plan", "--horizon-s", "0.1"], "makes 1 steps"),
         (vec!["plan", "--step-s", "0"], "step_s = 0"),
         (vec!["plan", "--step-s", "0.001"], "steps, must make 2 to 400"),
-        (vec!["plan", "--wing", "paper"], "known are flat, membrane, parnn"),
+        (vec!["plan", "--wing", "paper"], "known are flat, membrane, parnn, none"),
         (vec!["fly", "--reference", "no-such.mcap"], "no-such.mcap"),
+        (vec!["fly", "--reference", "p.mcap", "--scenario", "excite_calm"], "manoeuvres of its own"),
+        (vec!["fly", "--reference", "p.mcap", "--scenario", "low.toml"], "begins 5.0 m from"),
+        (vec!["fly", "--reference", "p.mcap", "--arm", "plan_wings"], "plans by itself"),
         (vec!["fly", "--reference", "broken.mcap"], "broken.mcap"),
     ] {
         folder.fails(&arguments, &[word]);

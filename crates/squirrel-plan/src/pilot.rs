@@ -2,7 +2,8 @@
 //!
 //! It is told what the other controllers are told: the mission's reference, which turns away where an obstacle comes into view, and of
 //! obstacles those that came into view so far. It looks [`HORIZON_S`] ahead. The time that planning takes is not simulated: a plan acts in
-//! the step in which it is asked for. The arms are [`Arm::PlanWings`] and, with the wings folded, [`Arm::PlanNoWings`].
+//! the step in which it is asked for. It takes the air to be calm and its model to be right, and estimates no disturbance: in a wind of 2 m/s and
+//! more from behind, plans that use wings lose height. The arms are [`Arm::PlanWings`] and, with the wings folded, [`Arm::PlanNoWings`].
 
 use crate::trajectory::{Begin, Craft, KeepOut, Planner, Task, Wanted};
 use crate::wing::WingModel;

@@ -12,10 +12,12 @@ use squirrel_core::rnn::parnn::{Parnn, WINDOW, features};
 use squirrel_sim::plant::{Membrane, MembraneState, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Step in which the membrane is led to its steady state, s.
+/// Longest step in which the membrane is led to its steady state, s.
 const SETTLING_STEP_S: f64 = 0.04;
+/// The same in chords of the air's way: the flow attaches within four, and faster than that a step is longer than what it follows.
+const SETTLING_STEP_CHORDS: f64 = 1.6;
 /// Bound on such steps: creep, the slowest, is over by then.
-const SETTLING_STEPS: u32 = 400;
+const SETTLING_STEPS: u32 = 2000;
 /// Cambers and attachment that move less than this in a step have settled.
 const SETTLED: f64 = 1e-10;
 
@@ -125,10 +127,12 @@ impl WingForce {
 fn settled(membrane: &Membrane, air: &Air<f64>) -> Vector3<f64> {
     let mut state = MembraneState::at_rest();
     let mut force = Vector3::zeros();
+    let chords_s = membrane.parameters().chord_m / air.speed.max(1e-9);
+    let step_s = SETTLING_STEP_S.min(SETTLING_STEP_CHORDS * chords_s);
     for _ in 0..SETTLING_STEPS {
         let (wrench, rates) = membrane.evaluate(air, [0.0; 2], [1.0; 2], &state);
         force = wrench.force.vector;
-        let next = state.plus_scaled(SETTLING_STEP_S, &rates);
+        let next = state.plus_scaled(step_s, &rates);
         let moved = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() > SETTLED;
         if !moved(next.fast_camber, state.fast_camber)
             && !moved(next.creep_camber, state.creep_camber)
@@ -169,16 +173,21 @@ mod tests {
     #[test]
     fn the_membrane_has_settled() {
         let WingForce::Membrane(membrane) = squirrel(WingModel::Membrane) else { unreachable!() };
-        for pitch_rad in [0.05, 0.3, 0.6, 1.2] {
+        for (pitch_rad, speed) in
+            [0.05, 0.3, 0.6, 1.2].iter().flat_map(|pitch| [2.0, 7.0, 20.0, 50.0, 100.0].map(|v| (*pitch, v)))
+        {
             let (s, c) = f64::sin_cos(pitch_rad);
-            let air = Air::new(In::new(Vector3::new(7.0 * c, 0.0, 7.0 * s)), In::zero());
+            let air = Air::new(In::new(Vector3::new(speed * c, 0.0, speed * s)), In::zero());
             let mut state = MembraneState::at_rest();
             for _ in 0..20_000 {
                 let (_, rates) = membrane.evaluate(&air, [0.0; 2], [1.0; 2], &state);
                 state = state.plus_scaled(1e-3, &rates);
             }
             let plant = membrane.evaluate(&air, [0.0; 2], [1.0; 2], &state).0.force.vector;
-            assert!((settled(&membrane, &air) - plant).norm() < 1e-6, "{pitch_rad}");
+            let off = (settled(&membrane, &air) - plant).norm();
+            // Faster than anything here flies, a step of the plant's own size is not small either.
+            let near = if speed > 20.0 { 1e-3 } else { 1e-6 };
+            assert!(off < near * (1.0 + plant.norm()), "{pitch_rad} at {speed}: {off} of {}", plant.norm());
         }
     }
 

@@ -140,6 +140,7 @@ pub(crate) fn plan_trajectory<'py>(
     facts.set_item("status", plan.status.name())?;
     facts.set_item("cost", plan.cost)?;
     facts.set_item("violation_m", plan.violation_m)?;
+    facts.set_item("overspeed_m_s", plan.overspeed_m_s)?;
     facts.set_item("iterations", plan.iterations)?;
     let nodes = PyDict::new(py);
     let points = plan.track.points();

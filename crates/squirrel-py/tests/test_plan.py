@@ -103,7 +103,8 @@ def test_a_bad_task_is_named(vehicle: squirrel.Vehicle) -> None:
         ("velocity_ned_m_s = NaN", {"velocity_ned_m_s": (np.nan, 0.0, 0.0)}),
         (r"obstacles\[0\].radius_m = 0", {"obstacles_m": np.zeros((1, 3))}),
         ("obstacles_m: expected a float64 array", {"obstacles_m": np.zeros((1, 2))}),
-        ("step_s = 0", {"step_s": 0.0, "reference_velocity_ned_m_s": ahead}),
+        ("step_s = 0", {"step_s": 0.0}),
+        ("deployment = 2", {"deployment": 2.0}),
         ("thrust_max_n", {"thrust_to_weight": 0.9}),
         ("wing = paper", {"wing": "paper"}),
         ("position_ned_m: expected 3 numbers, got 2", {"position_ned_m": (1.0, 2.0)}),
@@ -111,3 +112,8 @@ def test_a_bad_task_is_named(vehicle: squirrel.Vehicle) -> None:
     ]:
         with pytest.raises(ValueError, match=match):
             squirrel.plan.trajectory(vehicle, **({"reference_position_ned_m": ahead} | arguments))  # type: ignore[arg-type]
+
+
+def test_a_planner_flies_as_an_arm(vehicle: squirrel.Vehicle) -> None:
+    log = squirrel.simulate(vehicle=vehicle, scenario="hover", arm="plan_wings")
+    assert log.metadata["offboard"].startswith("plans") and np.abs(log["truth.position_ned_m"][-1] - [0, 0, -30]).max() < 0.5

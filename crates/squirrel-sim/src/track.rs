@@ -11,6 +11,8 @@ use squirrel_core::nalgebra::Vector3;
 const PLAN: &str = "plan";
 /// Source of what a flight was asked to follow.
 const REFERENCE: &str = "reference";
+/// Shortest motion to follow, s.
+const SHORTEST_S: f64 = 0.1;
 /// Largest number of any kind that a plan may hold.
 const LARGEST: f64 = 1e5;
 
@@ -104,8 +106,12 @@ impl Track {
             Some(source) => source.time_s.clone(),
             None => return Err("has neither a `plan` nor a `reference` to follow".to_owned()),
         };
-        if time_s.len() < 2 {
+        let (Some(first), Some(last), true) = (time_s.first(), time_s.last(), time_s.len() > 1) else {
             return Err(format!("{source}: has {} samples, must have at least 2", time_s.len()));
+        };
+        let first = *first;
+        if !(last - first >= SHORTEST_S) {
+            return Err(format!("{source}: lasts {} s, must last {SHORTEST_S} s or more", last - first));
         }
         let column = |channel: &str, width: usize, largest: f64| {
             let name = format!("{source}.{channel}");
@@ -140,7 +146,8 @@ impl Track {
             thrust: thrust[k],
             wing: wing[k].max(0.0),
         });
-        Ok(Self { points: points.collect(), time_s })
+        // A piece of a longer log begins when it is flown.
+        Ok(Self { points: points.collect(), time_s: time_s.iter().map(|t| t - first).collect() })
     }
 }
 

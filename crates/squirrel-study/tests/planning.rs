@@ -85,7 +85,9 @@ fn what_cannot_be_planned_is_refused() {
     };
     let error = pilot::fly(&of("excite_calm"), false, |_| {}).unwrap_err().to_string();
     assert!(error.contains("nothing to plan"), "{error}");
+    // Hardly more thrust than weight still holds height.
     let mut weak = of("hover");
-    weak.scenario.thrust_to_weight = Some(1.0 + 1e-9);
-    assert!(pilot::fly(&weak, false, |_| {}).is_ok(), "above its weight it can be planned for");
+    weak.scenario.thrust_to_weight = Some(1.03);
+    let flown = pilot::fly(&weak, false, |_| {}).unwrap().metrics;
+    assert!(flown.height_lost_m < 1.0, "{flown:?}");
 }

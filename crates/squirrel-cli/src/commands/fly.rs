@@ -5,6 +5,7 @@ use super::{facts, figures, vehicle, view, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
 use squirrel_core::control::follow::FollowGains;
+use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::Stack;
 use squirrel_plan::pilot::offboard;
 use squirrel_sim::arm::Arm;
@@ -12,7 +13,7 @@ use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::report::flight::{Heading, render};
-use squirrel_sim::scenario::Scenario;
+use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::track::Track;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_sim::weights::PolicyWeights;
@@ -88,6 +89,9 @@ struct Flown {
     metrics: Metrics,
 }
 
+/// How far from the start of a scenario a plan may begin, m.
+const START_M: f64 = 1.0;
+
 /// Who commands from outside of the flight code, if anybody.
 fn offboard_of(
     setup: &Setup,
@@ -105,11 +109,32 @@ fn offboard_of(
 
 impl Fly {
     /// The plan of `--reference`.
-    fn track(&self, vehicle: &VehicleFile) -> Result<Option<Track>, String> {
+    fn track(&self, vehicle: &VehicleFile, scenario: &Scenario) -> Result<Option<Track>, String> {
         let Some(path) = &self.reference else { return Ok(None) };
         let log = FlightLog::read(path).map_err(|e| e.to_string())?;
         let mass_kg = vehicle.vehicle.parameters().mass_kg;
         let track = Track::of(&log, mass_kg).map_err(|problem| format!("{}: {problem}", path.display()))?;
+        if matches!(scenario.mission, MissionTable::Excite(_) | MissionTable::Runs(_)) {
+            return Err(format!(
+                "scenario = {}: has manoeuvres of its own, nothing else is followed",
+                scenario.name
+            ));
+        }
+        if self.arm.as_deref().is_some_and(|arm| arm.starts_with("plan_")) {
+            return Err("--arm: plans by itself, and follows no --reference".to_owned());
+        }
+        let start = Vector3::new(0.0, 0.0, -scenario.height_m);
+        let apart_m = track.points().first().map_or(0.0, |point| (point.position - start).norm());
+        if apart_m > START_M {
+            return Err(format!(
+                "{}: begins {apart_m:.1} m from where scenario {} does; must be within {START_M} m",
+                path.display(),
+                scenario.name
+            ));
+        }
+        if let Some(name) = log.metadata.get("vehicle").filter(|name| **name != vehicle.name) {
+            talk(&format!("{}: was made for {name}, and {} flies it", path.display(), vehicle.name));
+        }
         Ok(Some(track))
     }
 
@@ -129,7 +154,7 @@ impl Fly {
         if let Some(name) = &self.estimator {
             vehicle.estimator = Estimator::parse(name)?;
         }
-        let track = self.track(&vehicle)?;
+        let track = self.track(&vehicle, &scenario)?;
         if let Some(track) = &track {
             scenario.duration_s = scenario.duration_s.min(track.end_s());
             scenario.measured_window_s = 0.0;

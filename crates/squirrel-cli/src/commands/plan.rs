@@ -28,9 +28,9 @@ pub(crate) struct PlanCommand {
     /// Largest collective thrust over weight; overrides vehicle and scenario.
     #[arg(long)]
     thrust_to_weight: Option<f64>,
-    /// What is believed of the wings: flat, membrane, parnn, or none to plan without.
-    #[arg(long, default_value = "flat")]
-    wing: String,
+    /// What is believed of the wings: flat, membrane, parnn, or none to plan without; if left out, flat where there are wings.
+    #[arg(long)]
+    wing: Option<String>,
     /// How much of the scenario, s; at most its duration.
     #[arg(long, default_value_t = 10.0)]
     horizon_s: f64,
@@ -68,6 +68,7 @@ struct Outcome {
     status: &'static str,
     cost: f64,
     violation_m: f64,
+    overspeed_m_s: f64,
     iterations: u32,
     rmse_m: f64,
     height_lost_m: f64,
@@ -90,6 +91,7 @@ impl Outcome {
             status: plan.status.name(),
             cost: plan.cost,
             violation_m: plan.violation_m,
+            overspeed_m_s: plan.overspeed_m_s,
             iterations: plan.iterations,
             rmse_m: (off().map(|e| e.norm_squared()).sum::<f64>() / points.len() as f64).sqrt(),
             height_lost_m: off().map(|e| e.z).fold(0.0, f64::max),
@@ -106,7 +108,6 @@ impl Outcome {
 
 impl PlanCommand {
     pub(crate) fn run(&self) -> Result<(), String> {
-        let wing = if self.wing == "none" { None } else { Some(WingModel::parse(&self.wing)?) };
         let mut scenario = Scenario::find(&self.scenario)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
         scenario.thrust_to_weight = self.thrust_to_weight.or(scenario.thrust_to_weight);
@@ -115,6 +116,11 @@ impl PlanCommand {
             output::writable(path)?;
         }
         let vehicle = vehicle(self.vehicle.as_deref())?;
+        let wing = match self.wing.as_deref() {
+            Some("none") => None,
+            Some(name) => Some(WingModel::parse(name).map_err(|e| format!("{e}, none"))?),
+            None => vehicle.vehicle.parameters().wing.map(|_| WingModel::Flat),
+        };
         let setup = Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
         let thrust_max_n = setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n();
         let spare_m = half_width_m(&setup) + SPARE_M;
@@ -189,8 +195,7 @@ fn show(setup: &Setup, plans: &[Made]) {
 }
 
 fn page(setup: &Setup, plans: &[Made]) -> String {
-    let logs: Vec<FlightLog> =
-        plans.iter().map(|(model, task, plan)| log(setup, *model, task, plan)).collect();
+    let logs: Vec<FlightLog> = plans.iter().map(|made| drawn(setup, made)).collect();
     let view = |((model, task, plan), log): (&Made, _)| {
         let o = Outcome::of(*model, task, plan);
         FlightView {
@@ -213,7 +218,7 @@ fn page(setup: &Setup, plans: &[Made]) -> String {
     trajectory::page(&format!("{}: planned", setup.scenario.name), &super::facts(setup), &shown)
 }
 
-/// A plan as a log: what to fly, and the reference behind it; its motion stands where a flight has the truth.
+/// A plan as a log: what to fly, and the reference behind it.
 fn log(setup: &Setup, wing: Option<WingModel>, task: &Task, plan: &Plan) -> FlightLog {
     let mut log = FlightLog::default();
     for (key, value) in [
@@ -228,17 +233,23 @@ fn log(setup: &Setup, wing: Option<WingModel>, task: &Task, plan: &Plan) -> Flig
         log.metadata.insert(key.to_owned(), value);
     }
     plan.track.record(&mut log);
-    for ((time_s, point), wanted) in plan.track.time_s().iter().zip(plan.track.points()).zip(task.wanted()) {
+    for (time_s, wanted) in plan.track.time_s().iter().zip(task.wanted()) {
         let rows: [(&str, &[f64]); 2] = [
             ("position_ned_m", wanted.position.as_slice()),
             ("velocity_ned_m_s", wanted.velocity.as_slice()),
         ];
         log.source_mut("reference").push(*time_s, &rows);
+    }
+    log
+}
+
+/// The same for the page, which draws flights: planned motion stands where a flight has the truth. No such log is written, for nothing flew.
+fn drawn(setup: &Setup, (model, task, plan): &Made) -> FlightLog {
+    let mut log = log(setup, *model, task, plan);
+    for (time_s, point) in plan.track.time_s().iter().zip(plan.track.points()) {
         let rows: [(&str, &[f64]); 2] =
             [("position_ned_m", point.position.as_slice()), ("velocity_ned_m_s", point.velocity.as_slice())];
         log.source_mut("truth").push(*time_s, &rows);
-        log.source_mut("wing")
-            .push(*time_s, &[("command", &[point.wing; 2]), ("deployment", &[point.wing; 2])]);
     }
     log
 }

@@ -10,7 +10,7 @@ use super::AttitudeThrust;
 use super::position::{Motion, heading_frame};
 use super::twcc::Airframe;
 use crate::frames::{In, Ned};
-use crate::math::{limit, limit_norm, sqrt};
+use crate::math::{GRAVITY_M_S2, limit, limit_norm, lower, sqrt, upper};
 use crate::policy::PilotCommand;
 use crate::vehicle::{ParameterError, positive};
 use nalgebra::Vector3;
@@ -46,6 +46,9 @@ pub struct FollowGains {
 /// Most of the thrust that goes into height: at all of it, a little more or less would be all or nothing sideways, and turning back and
 /// forth takes more of the thrust than there is.
 const HEIGHT_SHARE: f32 = 0.95;
+
+/// What height has in any case, over the weight.
+const WEIGHT_SHARE: f32 = 1.02;
 
 impl Default for FollowGains {
     /// For an attitude loop of 10 rad/s and more behind a command filter of 20 rad/s.
@@ -94,7 +97,9 @@ impl FollowGains {
         let wanted = -ahead.vector - limit_norm(error, self.acceleration_max_m_s2) * airframe.mass_kg;
         let most = airframe.envelope.thrust_max_n;
         // Height first: what is left of the thrust goes sideways. A thrust that would have to pull downwards is none.
-        let down = limit(wanted.z, airframe.envelope.thrust_min_n, HEIGHT_SHARE * most);
+        let hover_n = airframe.mass_kg * GRAVITY_M_S2 as f32;
+        let most_down = lower(upper(HEIGHT_SHARE * most, WEIGHT_SHARE * hover_n), most);
+        let down = limit(wanted.z, airframe.envelope.thrust_min_n, most_down);
         let level = heading_frame(&wanted, motion.yaw_rad);
         let sideways = limit_norm(Vector3::new(level.x, level.y, 0.0), sqrt(most * most - down * down));
         let level = sideways.xy();

@@ -34,6 +34,10 @@ use squirrel_core::math::GRAVITY_M_S2;
 use tilt::Region;
 use turned::Search;
 
+/// Largest mass, kg, and thrust, N: more was not meant.
+const LARGEST: f64 = 1e5;
+/// Fastest of each component of the velocity, m/s.
+const FASTEST_M_S: f64 = 100.0;
 /// Airspeed below which wings do nothing, m/s.
 const SPEED_MIN_M_S: f64 = 1e-6;
 /// How far the bound of a wing that is not flat may lie above what was found, m/s^2.
@@ -101,13 +105,13 @@ impl Reach {
     pub fn new(question: &Question) -> Result<Self, String> {
         let Question { mass_kg, thrust_max_n, tilt, velocity, wing } = question;
         for (name, value) in [("mass_kg", *mass_kg), ("thrust_max_n", *thrust_max_n)] {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(format!("{name} = {value}: must be finite and > 0"));
+            if !(value > 0.0 && value <= LARGEST) {
+                return Err(format!("{name} = {value}: must be finite, > 0 and within {LARGEST}"));
             }
         }
         let velocity_ned = velocity.vector;
-        if let Some(wrong) = velocity_ned.iter().find(|x| !x.is_finite()) {
-            return Err(format!("velocity_ned_m_s = {wrong}: must be finite"));
+        if let Some(wrong) = velocity_ned.iter().find(|x| !(x.abs() <= FASTEST_M_S)) {
+            return Err(format!("velocity_ned_m_s = {wrong}: must be finite and within {FASTEST_M_S}"));
         }
         tilt.check()?;
         if let WingForce::Flat { area_m2 } = wing

@@ -21,6 +21,8 @@ const TRUST_MIN_N: f64 = 1e-2;
 const GAIN: f64 = 2e-3;
 /// Depth in an obstacle that counts as none, m.
 const TOUCH_M: f64 = 0.01;
+/// Speed above the limit that counts as none, m/s.
+const TOO_FAST_M_S: f64 = 0.05;
 /// Iterations in which a side is judged.
 const TRIAL: u32 = 2;
 
@@ -67,7 +69,11 @@ impl Planner {
         let (cost, _) = self.weights.cost(task, &path, &controls);
         let depths = path.windows(2).map(|pair| task.violation_m(&pair[0], &pair[1]));
         let violation_m = depths.fold(0.0, f64::max);
-        let status = match (violation_m <= TOUCH_M, held.is_settled) {
+        let too_fast = path.iter().skip(1).map(|node| node.velocity.xy().norm() - task.speed_max_m_s());
+        let overspeed_m_s = too_fast.fold(0.0, f64::max);
+        let is_motion = path.iter().all(|node| node.position.iter().all(|x| x.is_finite()));
+        let holds = is_motion && violation_m <= TOUCH_M && overspeed_m_s <= TOO_FAST_M_S;
+        let status = match (holds, held.is_settled) {
             (true, true) => Status::Solved,
             (true, false) => Status::Feasible,
             (false, _) => Status::Infeasible,
@@ -80,7 +86,7 @@ impl Planner {
             wing: *wing,
         };
         let track = Track::even(task.step_s(), path.iter().zip(&controls).map(point).collect());
-        Plan { status, track, cost, violation_m, iterations }
+        Plan { status, track, cost, violation_m, overspeed_m_s, iterations }
     }
 
     /// The best of a few first guesses.
@@ -139,7 +145,6 @@ impl Planner {
             *iterations += 1;
             let Some((controls, foreseen)) = problem.solve() else {
                 held.trust_n *= 0.5;
-                held.is_settled = held.trust_n < TRUST_MIN_N;
                 continue;
             };
             let path = craft.roll_out(start, &controls, task.step_s());

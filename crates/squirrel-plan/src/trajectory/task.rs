@@ -38,7 +38,7 @@ pub struct KeepOut {
     pub radius_m: f64,
 }
 
-/// A checked task.
+/// A checked task, in calm air.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
     begin: Begin,
@@ -75,7 +75,7 @@ impl Task {
         finite("velocity_ned_m_s", &begin.velocity, 100.0)?;
         finite("thrust_ned_n", &begin.thrust, 1e4)?;
         if !(0.0..=1.0).contains(&begin.spread) {
-            return Err(format!("wing = {}: must be 0 to 1", begin.spread));
+            return Err(format!("deployment = {}: must be 0 to 1", begin.spread));
         }
         if !(0.01..=1.0).contains(&step_s) {
             return Err(format!("step_s = {step_s}: must be 0.01 to 1"));
@@ -173,6 +173,8 @@ pub struct Plan {
     pub cost: f64,
     /// How deep it is in what it must stay out of, at worst, m.
     pub violation_m: f64,
+    /// How much faster it is than it may be, at worst, m/s.
+    pub overspeed_m_s: f64,
     /// Convex problems that were solved.
     pub iterations: u32,
 }

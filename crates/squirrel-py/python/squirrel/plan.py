@@ -167,6 +167,8 @@ class Trajectory:
     cost : float
     violation_m : float
         How deep it is in an obstacle, at worst; 0 outside.
+    overspeed_m_s : float
+        How much faster it is than it may be, at worst.
     iterations : int
         Convex problems that were solved.
     time_s : ndarray of float64, shape (n,)
@@ -180,6 +182,7 @@ class Trajectory:
     status: Literal["solved", "feasible", "infeasible"]
     cost: float
     violation_m: float
+    overspeed_m_s: float
     iterations: int
     time_s: NDArray[np.float64]
     position_ned_m: NDArray[np.float64]
@@ -205,7 +208,7 @@ def trajectory(
     speed_max_m_s: float = float("inf"),
     reserve: float = 0.05,
 ) -> Trajectory:
-    """A trajectory near a reference and out of obstacles, by successive convexification.
+    """A trajectory near a reference and out of obstacles, in calm air and heading north, by successive convexification.
 
     Parameters
     ----------
@@ -258,9 +261,11 @@ def trajectory(
     'solved'
     """
     positions = np.asarray(reference_position_ned_m)
+    if positions.ndim != 2 or len(positions) < 3:
+        raise ValueError(f"reference_position_ned_m: expected an array of shape (n, 3), n > 2, got {positions.shape}")
+    if not step_s > 0.0:
+        raise ValueError(f"step_s = {step_s}: must be 0.01 to 1")
     if reference_velocity_ned_m_s is None:
-        if positions.ndim != 2 or len(positions) < 2:
-            raise ValueError(f"reference_position_ned_m: expected an array of shape (n, 3), n > 2, got {positions.shape}")
         reference_velocity_ned_m_s = np.ascontiguousarray(np.gradient(positions, step_s, axis=0))
     start = positions[0] if position_ned_m is None else position_ned_m
     velocity = reference_velocity_ned_m_s[0] if velocity_ned_m_s is None else velocity_ned_m_s
