@@ -87,7 +87,7 @@ fn what_cannot_be_planned_is_refused() {
     assert!(error.contains("nothing to plan"), "{error}");
     // Hardly more thrust than weight still holds height.
     let mut weak = of("hover");
-    weak.scenario.thrust_to_weight = Some(1.03);
+    weak.scenario.thrust_to_weight = Some(1.04);
     let flown = pilot::fly(&weak, false, |_| {}).unwrap().metrics;
     assert!(flown.height_lost_m < 1.0, "{flown:?}");
 }
