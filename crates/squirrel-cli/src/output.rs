@@ -85,6 +85,9 @@ impl Table {
 
 /// Writes a file under a temporary name beside it, then renames: a reader never sees half of it.
 pub(crate) fn write_file(path: &Path, content: &[u8]) -> Result<(), String> {
+    if is_device(path) {
+        return std::fs::write(path, content).map_err(|e| format!("{}: {e}", path.display()));
+    }
     let partial = partial(path)?;
     std::fs::write(&partial, content).and_then(|()| std::fs::rename(&partial, path)).map_err(|e| {
         let _ = std::fs::remove_file(&partial);
@@ -97,10 +100,18 @@ pub(crate) fn writable(path: &Path) -> Result<(), String> {
     if path.is_dir() {
         return Err(format!("{}: is a folder, must be a file", path.display()));
     }
+    if is_device(path) {
+        return Ok(());
+    }
     let partial = partial(path)?;
     std::fs::write(&partial, [])
         .and_then(|()| std::fs::remove_file(&partial))
         .map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Something that is there and is no file, such as `/dev/null` or a pipe: it is written to, never replaced.
+fn is_device(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
 }
 
 /// The temporary name.

@@ -84,3 +84,13 @@ fn what_cannot_be_planned_or_followed_is_one_line() {
         folder.fails(&arguments, &[word]);
     }
 }
+
+/// A link to a device stands for it: were it replaced, it would be a file afterwards.
+#[cfg(unix)]
+#[test]
+fn a_device_is_written_to_and_not_replaced() {
+    let folder = Folder::new("device");
+    std::os::unix::fs::symlink("/dev/null", folder.0.join("null.json")).unwrap();
+    folder.succeeds(&["plan", "--scenario", "hover", "--horizon-s", "1", "--json", "null.json"]);
+    assert!(fs::symlink_metadata(folder.0.join("null.json")).unwrap().file_type().is_symlink());
+}

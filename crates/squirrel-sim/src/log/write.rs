@@ -36,6 +36,10 @@ impl FlightLog {
         let file = path.display().to_string();
         check::check(&file, self)?;
         let bytes = self.to_mcap(&file)?;
+        if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+            // A device or a pipe is written to, never replaced.
+            return fs::write(path, bytes).map_err(|error| LogError::Io { file, error });
+        }
         let mut unfinished = path.as_os_str().to_owned();
         unfinished.push(".unfinished");
         let written = fs::write(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, path));
