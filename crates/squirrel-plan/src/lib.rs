@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 
+pub mod air;
 pub mod pilot;
 pub mod reach;
 pub mod trajectory;

@@ -2,9 +2,10 @@
 //!
 //! It is told what the other controllers are told: the mission's reference, which turns away where an obstacle comes into view, and of
 //! obstacles those that came into view so far. It looks [`HORIZON_S`] ahead. The time that planning takes is not simulated: a plan acts in
-//! the step in which it is asked for. It takes the air to be calm and its model to be right, and estimates no disturbance: in a wind of 2 m/s and
-//! more from behind, plans that use wings lose height. The arms are [`Arm::PlanWings`] and, with the wings folded, [`Arm::PlanNoWings`].
+//! the step in which it is asked for. What the air does, and what its model lacks, it takes from how the vehicle moves ([`AirEstimate`]). The
+//! arms are [`Arm::PlanWings`] and, with the wings folded, [`Arm::PlanNoWings`].
 
+use crate::air::AirEstimate;
 use crate::trajectory::{Begin, Craft, KeepOut, Planner, Task, Wanted};
 use crate::wing::WingModel;
 use nalgebra::{Vector2, Vector3};
@@ -27,6 +28,8 @@ use squirrel_sim::weights::PolicyWeights;
 pub const HORIZON_S: f64 = 2.0;
 /// From node to node, s; plans are made as often.
 pub const STEP_S: f64 = 0.1;
+/// From estimate to estimate of the air, s; a whole part of [`STEP_S`].
+const FEEL_S: f64 = 0.02;
 /// What is kept to spare between vehicle and obstacle, m.
 pub const SPARE_M: f64 = 0.3;
 /// Convex problems a plan, without wings and again with them: the next plan goes on from this one.
@@ -38,7 +41,9 @@ const FORGET_M: f64 = 30.0;
 #[derive(Debug, Clone)]
 pub struct Replanner {
     planner: Planner,
-    craft: Craft,
+    air: AirEstimate,
+    /// The velocity that the estimate was given last, and when, us.
+    felt: Option<(In<Ned, f32>, u64)>,
     follower: Follower,
     mission: Mission,
     state: MissionState,
@@ -78,7 +83,8 @@ impl Replanner {
         Ok(Self {
             planner: Planner { iterations_max: ITERATIONS, ..Planner::default() },
             thrust_n: craft.hover().z,
-            craft,
+            air: AirEstimate::new(craft),
+            felt: None,
             follower: Follower::new(setup, FollowGains::default())?,
             mission,
             state: MissionState::default(),
@@ -117,9 +123,22 @@ impl Replanner {
         // What is believed can be nonsense where sensors fail: then the last plan is flown to its end.
         let Ok(task) = task else { return };
         let warm = self.last.as_ref().map(|(track, begin_us)| (track, (time_us - begin_us) as f64 * 1e-6));
-        let plan = self.planner.plan(&self.craft, &task, warm);
+        let plan = self.planner.plan(self.air.craft(), &task, warm);
         self.follower.follow(plan.track.clone(), time_us);
         self.last = Some((plan.track, time_us));
+    }
+
+    /// What the last moments say about the air.
+    fn feel(&mut self, motion: &Motion, time_us: u64) {
+        let (before, before_us) = self.felt.unwrap_or((motion.velocity, time_us));
+        let begin =
+            begin(motion, self.thrust_n, self.follower.planned(time_us).map_or(0.0, |point| point.wing));
+        self.air.predict(&-begin.thrust, begin.spread, (time_us - before_us) as f64 * 1e-6);
+        // A velocity that stays the same to the bit is the last one still.
+        if self.felt.is_none() || motion.velocity != before {
+            self.air.measure(&begin.velocity);
+        }
+        self.felt = Some((motion.velocity, time_us));
     }
 
     /// Remembers obstacles that are in range and in view, as the mission's own sensing does.
@@ -169,11 +188,14 @@ pub fn half_width_m(setup: &Setup) -> f64 {
 impl Offboard for Replanner {
     fn command(&mut self, tick: u64, frame: &SensorFrame) -> Option<PilotCommand> {
         self.follower.look(frame);
-        let period = (CONTROL_RATE_HZ as f64 * STEP_S).round() as u64;
-        if tick.is_multiple_of(period)
+        let every = |step_s: f64| tick.is_multiple_of((CONTROL_RATE_HZ as f64 * step_s).round() as u64);
+        if every(FEEL_S)
             && let Some(motion) = self.follower.motion()
         {
-            self.plan(&motion, frame);
+            self.feel(&motion, frame.time_us);
+            if every(STEP_S) {
+                self.plan(&motion, frame);
+            }
         }
         self.reference = Some(self.mission.reference(&self.state, frame.time_us));
         let command = self.follower.steer(tick, frame.time_us);
@@ -189,6 +211,11 @@ impl Offboard for Replanner {
 
     fn reference(&self) -> Option<Reference> {
         self.reference
+    }
+
+    fn believed(&self) -> Vec<(&'static str, [f64; 3])> {
+        let air = &self.air.craft().air;
+        vec![("wind_ned_m_s", air.wind.into()), ("offset_ned_m_s2", air.offset.into())]
     }
 
     fn facts(&self) -> Vec<(&'static str, String)> {

@@ -13,7 +13,7 @@ use pyo3::types::{PyAny, PyDict};
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_core::frames::In;
 use squirrel_plan::reach::{Case, Question, Reach, Support, Tilt, Wings};
-use squirrel_plan::trajectory::{Begin, Craft, KeepOut, Planner, Task, Wanted};
+use squirrel_plan::trajectory::{Air, Begin, Craft, KeepOut, Planner, Task, Wanted};
 use squirrel_plan::wing::{WingForce, WingModel};
 use squirrel_sim::track::TrackPoint;
 
@@ -112,12 +112,14 @@ pub(crate) fn plan_trajectory<'py>(
     step_s: f64,
     speed_max_m_s: f64,
     reserve: f64,
+    wind_ned_m_s: [f64; 3],
 ) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
     let file = &vehicle.get().file;
     let (p, weight_n) = (file.vehicle.parameters(), file.vehicle.weight_n());
     let thrust_max_n = thrust_to_weight.map_or(p.limits.thrust_max_n, |ratio| ratio * weight_n);
     let model = wing.as_deref().map(WingModel::parse).transpose().map_err(value)?;
-    let craft = Craft::of(file, thrust_max_n, model, reserve).map_err(value)?;
+    let mut craft = Craft::of(file, thrust_max_n, model, reserve).map_err(value)?;
+    craft.air = Air::windy(wind_ned_m_s.into()).map_err(value)?;
     let three = |name: &str, array: &Array64<'py>, count: Option<usize>| {
         let rows = rows::<f64>(name, &array.0, &[count, Some(3)], Numbers::Any)?;
         Ok::<_, PyErr>(rows.numbers().chunks_exact(3).map(Vector3::from_column_slice).collect::<Vec<_>>())

@@ -4,7 +4,7 @@ use super::{vehicle, write_log};
 use crate::output::{self, Table, say, talk};
 use serde::Serialize;
 use squirrel_plan::pilot::{SPARE_M, half_width_m};
-use squirrel_plan::trajectory::{self, Craft, Plan, Planner, RESERVE, Shown, Task};
+use squirrel_plan::trajectory::{self, Air, Craft, Plan, Planner, RESERVE, Shown, Task};
 use squirrel_plan::wing::WingModel;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
@@ -129,7 +129,8 @@ impl PlanCommand {
         let bar = output::spinner();
         for model in models {
             bar.set_message(format!("planning with wings: {}", model.map_or("none", WingModel::name)));
-            let craft = Craft::of(&setup.vehicle, thrust_max_n, model, RESERVE)?;
+            let mut craft = Craft::of(&setup.vehicle, thrust_max_n, model, RESERVE)?;
+            craft.air = Air::windy(setup.scenario.wind.mean_ned_m_s.into())?;
             let task = Task::of(&setup.scenario, &craft, spare_m, self.horizon_s, self.step_s)?;
             let plan = Planner::default().plan(&craft, &task, None);
             plans.push((model, task, plan));

@@ -31,7 +31,7 @@ mod sides;
 mod subproblem;
 mod task;
 
-pub use model::{Craft, Motion, RESERVE, Slopes};
+pub use model::{Air, Craft, Motion, RESERVE, Slopes};
 pub use page::{Shown, page};
 pub use scp::Planner;
 pub use subproblem::Weights;

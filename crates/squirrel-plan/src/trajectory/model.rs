@@ -1,7 +1,7 @@
 //! The point mass that is planned for: what accelerates it, how that changes, and where it goes.
 //!
 //! ```text
-//! m a = m g e3 - T + w f(v, T/|T|) - (c + 1/2 rho C_D A |v|) v
+//! m a = m g e3 - T + w f(u, T/|T|) - (c + 1/2 rho C_D A |u|) u + m b            u = v - wind
 //! T = U n: thrust along body z (down)            0 <= w <= 1
 //! v+ = v + h (a + a+) / 2             p+ = p + h v + h^2 (2 a + a+) / 6             accelerations are linear between nodes
 //! ```
@@ -47,6 +47,24 @@ pub struct Craft {
     pub wing: Option<WingForce>,
     /// How fast they spread, 1/s.
     pub wing_rate_max_per_s: f64,
+    /// What it flies in.
+    pub air: Air,
+}
+
+/// The air, and what the model lacks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Air {
+    /// Where it moves to, NED, m/s.
+    pub wind: Vector3<f64>,
+    /// Acceleration besides the model's, NED, m/s^2.
+    pub offset: Vector3<f64>,
+}
+
+impl Air {
+    /// At rest, and the model is right.
+    pub fn calm() -> Self {
+        Self { wind: Vector3::zeros(), offset: Vector3::zeros() }
+    }
 }
 
 /// Part of thrust and tilt that a plan leaves to whoever follows it to its end.
@@ -59,7 +77,7 @@ const TILT_RATE_MAX_RAD_S: f64 = 2.5;
 const THRUST_TIME_S: f64 = 0.25;
 
 impl Craft {
-    /// Of a vehicle file.
+    /// Of a vehicle file, in calm air.
     ///
     /// * `thrust_max_n` - of the flight code: the vehicle's limit, or less
     /// * `wing` - what is believed of the wings; `None` plans without them
@@ -101,6 +119,7 @@ impl Craft {
             drag_n_s2_m2: 0.5 * AIR_DENSITY_KG_M3 * p.drag.area_m2,
             wing: wing.map(|model| WingForce::of(vehicle, model)).transpose()?,
             wing_rate_max_per_s: 1.0 / servo_s,
+            air: Air::calm(),
         })
     }
 
@@ -115,28 +134,31 @@ impl Craft {
     /// * `thrust` - `U n`, N
     /// * `spread` - deployment of the wings, 0 to 1
     pub fn acceleration(&self, v: &Vector3<f64>, thrust: &Vector3<f64>, spread: f64) -> Vector3<f64> {
-        let mut force = -thrust - v * (self.drag_n_s_m + self.drag_n_s2_m2 * v.norm());
+        let through = v - self.air.wind;
+        let mut force = -thrust - through * (self.drag_n_s_m + self.drag_n_s2_m2 * through.norm());
         if spread > 0.0 {
-            force += self.wing_force(v, &unit(thrust)) * spread;
+            force += self.wing_force(&through, &unit(thrust)) * spread;
         }
-        force / self.mass_kg + Vector3::z() * GRAVITY_M_S2
+        force / self.mass_kg + Vector3::z() * GRAVITY_M_S2 + self.air.offset
     }
 
+    /// * `v` - through the air, m/s
     fn wing_force(&self, v: &Vector3<f64>, n: &Vector3<f64>) -> Vector3<f64> {
         self.wing.as_ref().map_or_else(Vector3::zeros, |wing| wing.force(In::new(*v), In::new(*n)).vector)
     }
 
     /// How the acceleration changes with velocity, thrust and wings, at a place in that space.
     pub fn slopes(&self, v: &Vector3<f64>, thrust: &Vector3<f64>, spread: f64) -> Slopes {
+        let v = v - self.air.wind;
         let speed = v.norm();
         let along = if speed > 1e-6 { v * v.transpose() / speed } else { Matrix3::zeros() };
         let mut by_velocity = (Matrix3::identity() * speed + along) * -self.drag_n_s2_m2
             - Matrix3::identity() * self.drag_n_s_m;
         let mut by_thrust = -Matrix3::identity();
         let n = unit(thrust);
-        let force = self.wing_force(v, &n);
+        let force = self.wing_force(&v, &n);
         if spread > 0.0 {
-            let (wing_by_velocity, wing_by_normal) = self.wing_slopes(v, &n, &force);
+            let (wing_by_velocity, wing_by_normal) = self.wing_slopes(&v, &n, &force);
             by_velocity += wing_by_velocity * spread;
             let normal_by_thrust = (Matrix3::identity() - n * n.transpose()) / thrust.norm().max(1e-6);
             by_thrust += wing_by_normal * normal_by_thrust * spread;

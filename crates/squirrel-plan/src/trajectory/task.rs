@@ -1,6 +1,6 @@
 //! What is asked of a plan, checked once, and what comes back.
 
-use super::model::Motion;
+use super::model::{Air, Motion};
 use nalgebra::{Vector2, Vector3};
 use squirrel_sim::track::Track;
 
@@ -38,7 +38,7 @@ pub struct KeepOut {
     pub radius_m: f64,
 }
 
-/// A checked task, in calm air.
+/// A checked task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
     begin: Begin,
@@ -52,6 +52,17 @@ fn finite(field: &str, x: &Vector3<f64>, bound: f64) -> Result<(), String> {
     match x.iter().find(|x| !(x.abs() <= bound)) {
         Some(x) => Err(format!("{field} = {x}: must be finite and within {bound}")),
         None => Ok(()),
+    }
+}
+
+impl Air {
+    /// A steady wind that is known, NED, m/s.
+    ///
+    /// # Errors
+    /// A number that is no wind.
+    pub fn windy(wind: Vector3<f64>) -> Result<Self, String> {
+        finite("wind_ned_m_s", &wind, 100.0)?;
+        Ok(Self { wind, ..Self::calm() })
     }
 }
 

@@ -207,8 +207,9 @@ def trajectory(
     step_s: float = 0.1,
     speed_max_m_s: float = float("inf"),
     reserve: float = 0.05,
+    wind_ned_m_s: Sequence[float] | NDArray[np.float64] = (0.0, 0.0, 0.0),
 ) -> Trajectory:
-    """A trajectory near a reference and out of obstacles, in calm air and heading north, by successive convexification.
+    """A trajectory near a reference and out of obstacles, heading north, by successive convexification.
 
     Parameters
     ----------
@@ -236,6 +237,8 @@ def trajectory(
         Limit of the horizontal speed.
     reserve : float
         Part of thrust and tilt that is left to whoever follows the plan.
+    wind_ned_m_s : sequence of 3 floats
+        Where the air moves to.
 
     Returns
     -------
@@ -283,6 +286,7 @@ def trajectory(
         step_s,
         speed_max_m_s,
         reserve,
+        _three("wind_ned_m_s", wind_ned_m_s),
     )
     return Trajectory(**facts, **nodes)
 

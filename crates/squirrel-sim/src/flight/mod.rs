@@ -310,6 +310,9 @@ impl Setup {
                 metrics.tick(&state, &frame, &output, &reference, encounters, &mut obstacles);
                 if let Some(recorder) = &mut recorder {
                     recorder.followed(time_us, followed.as_ref());
+                    if let Some(pilot) = &pilot {
+                        recorder.believed(time_us, &pilot.believed());
+                    }
                     recorder.tick(
                         &frame,
                         battery,

@@ -31,6 +31,11 @@ pub trait Offboard {
         None
     }
 
+    /// What it believes besides, for the log: vectors in NED, by names with units.
+    fn believed(&self) -> Vec<(&'static str, [f64; 3])> {
+        Vec::new()
+    }
+
     /// What a log shall say of it.
     fn facts(&self) -> Vec<(&'static str, String)>;
 }

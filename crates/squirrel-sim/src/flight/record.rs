@@ -115,6 +115,14 @@ impl Recorder {
         record_reference(&mut self.log, FOLLOWED, time_us as f64 * 1e-6, reference);
     }
 
+    /// What an offboard computer believes besides.
+    pub(super) fn believed(&mut self, time_us: u64, vectors: &[(&str, [f64; 3])]) {
+        let rows: Vec<(&str, &[f64])> = vectors.iter().map(|(name, v)| (*name, v.as_slice())).collect();
+        if !rows.is_empty() {
+            self.log.source_mut("offboard.believed").push(time_us as f64 * 1e-6, &rows);
+        }
+    }
+
     fn plant(&mut self, t: f64, state: &PlantState, air: In<Ned, f64>, wing_force: In<Body, f64>) {
         let body = &state.body;
         let log = &mut self.log;
