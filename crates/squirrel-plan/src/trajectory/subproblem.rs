@@ -32,7 +32,8 @@ pub struct Weights {
     pub wing_move: f64,
     /// Of spread wings at a node: they fold where they hardly help.
     pub wing_spread: f64,
-    /// Of the depth in an obstacle, 1/m, and of being too fast, s/m.
+    /// Of the depth in an obstacle, 1/m, and of being too fast, s/m: more than any reference is worth that leads away from where there is a way,
+    /// such as one that turned back.
     pub violation: f64,
 }
 
@@ -62,13 +63,13 @@ impl Weights {
 impl Default for Weights {
     fn default() -> Self {
         Self {
-            position_per_m2: [1.0, 1.0],
+            position_per_m2: [1.0, 10.0],
             velocity_s2_per_m2: 0.1,
             last: 4.0,
             thrust_change_per_n2: 0.02,
             wing_move: 0.05,
             wing_spread: 0.01,
-            violation: 100.0,
+            violation: 1000.0,
         }
     }
 }
