@@ -4,8 +4,8 @@
 //! to be, how the rotors shall push, when the wings shall open. Here a run-up of 6 s leads straight on, and then the vehicle shall go off at
 //! 120 deg at once, the paper's manoeuvre, of which the first plan knew nothing. The same planner without wings is the fair rival. Both
 //! plans in a row are flown on the full plant, with sensors, rotors and a membrane for a wing, by a [`Follower`]: look how far beside its plan each
-//! flight is. Wings brake harder, so that the turn comes nearer to what was wanted, by a few percent where thrust is scarce and by one where it
-//! is not, and a plan that has them is easier to follow where thrust is scarce.
+//! flight is. Wings brake harder, so that the turn comes nearer to what was wanted, by four percent where thrust is scarce and by hardly one where
+//! it is not.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example a_plan_with_wings

@@ -74,7 +74,7 @@ def of_tinympc(thrust_to_weight: float, rho: float, cone: bool) -> Planner:
     identity = np.eye(3)
     a = np.block([[identity, STEP_S * identity], [np.zeros((3, 3)), identity]])
     of_acceleration = np.vstack([0.5 * STEP_S**2 * identity, STEP_S * identity])
-    weight, side = np.diag([10.0] * 3 + [1.0] * 3), GRAVITY * SLOPE
+    weight, side = np.diag([10.0, 10.0, 100.0] + [1.0] * 3), GRAVITY * SLOPE
     solver = tinympc.TinyMPC()
     if cone:
         # Thrust over mass, its third component up.

@@ -87,6 +87,21 @@ def test_wings_open_to_brake_and_none_plans_without(vehicle: squirrel.Vehicle) -
     assert with_wings.cost < without.cost
 
 
+def test_a_wind_from_behind_keeps_wings_folded(vehicle: squirrel.Vehicle) -> None:
+    def spread(north_m_s: float) -> float:
+        plan = squirrel.plan.trajectory(
+            vehicle,
+            reference_position_ned_m=np.zeros((21, 3)),
+            velocity_ned_m_s=(7.0, 0.0, 0.0),
+            thrust_to_weight=1.2,
+            wind_ned_m_s=(north_m_s, 0.0, 0.0),
+        )
+        return float(plan.deployment.sum())
+
+    # As fast as the air: nothing for the wings to push against.
+    assert spread(-3.0) > 5.0 and spread(7.0) < 1.0
+
+
 def test_an_impossible_task_has_a_plan_all_the_same(vehicle: squirrel.Vehicle) -> None:
     plan = squirrel.plan.trajectory(
         vehicle, reference_position_ned_m=straight(8.0), obstacles_m=np.array([[1.5, 0.1, 1.0]])
@@ -108,6 +123,7 @@ def test_a_bad_task_is_named(vehicle: squirrel.Vehicle) -> None:
         ("thrust_max_n", {"thrust_to_weight": 0.9}),
         ("wing = paper", {"wing": "paper"}),
         ("position_ned_m: expected 3 numbers, got 2", {"position_ned_m": (1.0, 2.0)}),
+        ("wind_ned_m_s = NaN", {"wind_ned_m_s": (0.0, np.nan, 0.0)}),
         ("n > 2", {"reference_position_ned_m": np.zeros(3)}),
     ]:
         with pytest.raises(ValueError, match=match):

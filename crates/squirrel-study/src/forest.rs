@@ -57,8 +57,10 @@ pub struct Row {
     pub in_band: Share,
     /// The latter, less that of `phantom` on the same trials.
     pub over_phantom: Option<Estimate>,
-    /// And less that of `pc_plus`; both absent where the rival did not fly.
+    /// And less that of `pc_plus`.
     pub over_pc_plus: Option<Estimate>,
+    /// And less that of `plan_no_wings`; each absent where the rival did not fly.
+    pub over_plan_no_wings: Option<Estimate>,
     /// Mean way until the first contact, m.
     pub path_m: f64,
     /// Mean distance from the start there, m.
@@ -195,6 +197,7 @@ fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
         in_band: Share::of(of.iter().map(|flight| flight.in_band())),
         over_phantom: over(Arm::Phantom),
         over_pc_plus: over(Arm::PcPlus),
+        over_plan_no_wings: over(Arm::PlanNoWings),
         path_m: average(|flight| flight.path_m),
         displacement_m: average(|flight| flight.displacement_m[0].hypot(flight.displacement_m[1])),
         ends: of
@@ -216,14 +219,19 @@ pub fn words(study: &Forest) -> Vec<String> {
     let mut words = Vec::new();
     for row in &study.rows {
         let is = |arm: Arm| arm.name() == row.arm;
-        let (rival, over) =
-            if is(Arm::TwccPlus) { ("pc_plus", row.over_pc_plus) } else { ("phantom", row.over_phantom) };
+        let (rival, over) = if is(Arm::TwccPlus) {
+            ("pc_plus", row.over_pc_plus)
+        } else if is(Arm::PlanWings) {
+            ("plan_no_wings", row.over_plan_no_wings)
+        } else {
+            ("phantom", row.over_phantom)
+        };
         let Some(over) = over else { continue };
         let [value, low, high] = [over.value, over.low, over.high].map(|points| 100.0 * points);
         let points = format!("{value:+.0} points ({low:+.0} to {high:+.0}) over {rival}");
         let verdict = if is(Arm::TwccParnn) || is(Arm::TwccOracle) {
             "is, by wings and by what it believes together,"
-        } else if !(is(Arm::TwccFlat) || is(Arm::TwccPlus)) {
+        } else if !(is(Arm::TwccFlat) || is(Arm::TwccPlus) || is(Arm::PlanWings)) {
             continue;
         } else if over.low > 0.0 {
             "owes part of its success to wings:"
