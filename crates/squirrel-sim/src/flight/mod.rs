@@ -309,10 +309,7 @@ impl Setup {
                 let reference = followed.unwrap_or(output.reference);
                 metrics.tick(&state, &frame, &output, &reference, encounters, &mut obstacles);
                 if let Some(recorder) = &mut recorder {
-                    recorder.followed(time_us, followed.as_ref());
-                    if let Some(pilot) = &pilot {
-                        recorder.believed(time_us, &pilot.believed());
-                    }
+                    recorder.followed(time_us, followed.as_ref(), pilot.as_deref());
                     recorder.tick(
                         &frame,
                         battery,

@@ -109,17 +109,21 @@ impl Recorder {
         self.plant(t, state, air, wing_force);
     }
 
-    /// What an offboard computer follows, where that is not the mission.
-    pub(super) fn followed(&mut self, time_us: u64, reference: Option<&Reference>) {
-        let Some(reference) = reference else { return };
-        record_reference(&mut self.log, FOLLOWED, time_us as f64 * 1e-6, reference);
-    }
-
-    /// What an offboard computer believes besides.
-    pub(super) fn believed(&mut self, time_us: u64, vectors: &[(&str, [f64; 3])]) {
+    /// What an offboard computer follows, where that is not the mission, and what it believes besides.
+    pub(super) fn followed(
+        &mut self,
+        time_us: u64,
+        reference: Option<&Reference>,
+        pilot: Option<&dyn Offboard>,
+    ) {
+        let t = time_us as f64 * 1e-6;
+        if let Some(reference) = reference {
+            record_reference(&mut self.log, FOLLOWED, t, reference);
+        }
+        let vectors = pilot.map(Offboard::believed).unwrap_or_default();
         let rows: Vec<(&str, &[f64])> = vectors.iter().map(|(name, v)| (*name, v.as_slice())).collect();
         if !rows.is_empty() {
-            self.log.source_mut("offboard.believed").push(time_us as f64 * 1e-6, &rows);
+            self.log.source_mut("offboard.believed").push(t, &rows);
         }
     }
 
