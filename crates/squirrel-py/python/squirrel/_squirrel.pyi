@@ -1167,7 +1167,7 @@ def plan_reach(vehicle: Vehicle, velocity_ned_m_s: typing.Sequence[builtins.floa
     * `yaw_rad` - of the box; the heading of the velocity if left out
     """
 
-def plan_trajectory(vehicle: Vehicle, reference_position_ned_m: numpy.typing.NDArray[numpy.float64], reference_velocity_ned_m_s: numpy.typing.NDArray[numpy.float64], position_ned_m: typing.Sequence[builtins.float], velocity_ned_m_s: typing.Sequence[builtins.float], thrust_ned_n: typing.Optional[typing.Sequence[builtins.float]], deployment: builtins.float, obstacles_m: numpy.typing.NDArray[numpy.float64], wing: typing.Optional[builtins.str], thrust_to_weight: typing.Optional[builtins.float], step_s: builtins.float, speed_max_m_s: builtins.float, reserve: builtins.float) -> tuple[dict[str, typing.Any], dict[str, typing.Any]]:
+def plan_trajectory(vehicle: Vehicle, reference_position_ned_m: numpy.typing.NDArray[numpy.float64], reference_velocity_ned_m_s: numpy.typing.NDArray[numpy.float64], position_ned_m: typing.Sequence[builtins.float], velocity_ned_m_s: typing.Sequence[builtins.float], thrust_ned_n: typing.Optional[typing.Sequence[builtins.float]], deployment: builtins.float, obstacles_m: numpy.typing.NDArray[numpy.float64], wing: typing.Optional[builtins.str], thrust_to_weight: typing.Optional[builtins.float], step_s: builtins.float, speed_max_m_s: builtins.float, reserve: builtins.float, wind_ned_m_s: typing.Sequence[builtins.float]) -> tuple[dict[str, typing.Any], dict[str, typing.Any]]:
     r"""
     A trajectory: status, cost, violation, iterations, and the nodes as arrays.
     
