@@ -67,6 +67,10 @@ fn what_cannot_be_planned_or_followed_is_one_line() {
         "name = \"low\"\nduration_s = 5.0\nheight_m = 25.0\n[mission]\nkind = \"hover\"\n",
     );
     for (arguments, word) in [
+        (
+            vec!["fly", "--reference", "p.mcap", "--scenario", "hover", "--out", "none/f.mcap"],
+            "none/f.mcap: ",
+        ),
         (vec!["plan", "--scenario", "excite_rich"], "there is nothing to plan"),
         (vec!["plan", "--thrust-to-weight", "1.01"], "thrust_max_n"),
         (vec!["plan", "--thrust-to-weight", "nan"], "thrust_to_weight = NaN"),

@@ -1,13 +1,15 @@
 //! The air that a plan is made for, estimated from how the vehicle moves.
 //!
 //! ```text
-//! v+ = v + h (a(v - w, T, s) + b)        w+ = w exp(-h / tau_w)        b+ = b exp(-h / tau_b)        measured: v
+//! v+ = v + dt (a(v - wind, T, w) + b)     wind+ = wind exp(-dt / tau_wind)     b+ = b exp(-dt / tau_b)     measured: v
 //! ```
-//! An extended Kalman filter over velocity `v`, wind `w` and an acceleration `b` that the model has not: rotors that give less than they are told,
-//! wings that are not those believed in. Wings at speed tell one from the other; with folded wings only drag does, and what is thought of each
-//! beforehand decides. Both are drawn to zero, so that what is not seen any more is forgotten.
+//! An extended Kalman filter over velocity `v`, wind, and an acceleration `b` that the model has not, such as of rotors that give less than
+//! they are told. Wings that push less than is believed look like a tail wind, and are planned for as well by it. Wings at speed tell wind from
+//! `b`; with folded wings only drag does, and what is thought of each beforehand decides. Both are drawn to zero, so that what is not seen
+//! any more is forgotten. A velocity that jumps, where fixes come back or something is touched, is taken over and says nothing about the air.
+//! That the flight code may not fly what it is told, after a loss of all fixes, is not known here.
 
-use crate::trajectory::Craft;
+use crate::trajectory::{Air, Craft};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Wind beforehand: how large north, east and down, m/s, and how long it lasts, s.
@@ -18,6 +20,10 @@ const OFFSET: ([f64; 3], f64) = ([0.3; 3], 10.0);
 const UNREST: f64 = 0.4;
 /// Of a measured velocity, m/s.
 const VELOCITY: f64 = 0.05;
+/// Jump of a measured velocity, squared, in its expected errors: beyond it is no air's doing.
+const JUMP: f64 = 25.0;
+/// Bounds of wind, m/s, and offset, m/s^2: no estimate beyond helps a plan.
+const MOST: [f64; 2] = [30.0, 5.0];
 /// Where velocity, wind and offset begin in the state.
 const V: usize = 0;
 const W: usize = 3;
@@ -94,13 +100,29 @@ impl AirEstimate {
         };
         let seen: SMatrix<f64, 9, 3> = self.covariance.fixed_columns::<3>(V).into();
         let spread = self.covariance.fixed_view::<3, 3>(V, V) + Matrix3::identity() * VELOCITY.powi(2);
-        // Positive definite by its second part, unless something is not finite.
+        let error = measured - *velocity;
         let Some(inverse) = spread.try_inverse() else { return };
+        let jump = error.dot(&(inverse * error));
+        if !jump.is_finite() {
+            *self = Self {
+                velocity: Some(*measured),
+                ..Self::new(Craft { air: Air::calm(), ..self.craft.clone() })
+            };
+            return;
+        }
+        if jump > JUMP {
+            *velocity = *measured;
+            self.covariance.fixed_rows_mut::<3>(V).fill(0.0);
+            self.covariance.fixed_columns_mut::<3>(V).fill(0.0);
+            self.covariance.fixed_view_mut::<3, 3>(V, V).fill_diagonal(VELOCITY.powi(2));
+            return;
+        }
         let gain = seen * inverse;
-        let change = gain * (measured - *velocity);
+        let change = gain * error;
         *velocity += change.fixed_rows::<3>(V);
-        self.craft.air.wind += change.fixed_rows::<3>(W);
-        self.craft.air.offset += change.fixed_rows::<3>(B);
+        let air = &mut self.craft.air;
+        air.wind = (air.wind + change.fixed_rows::<3>(W)).cap_magnitude(MOST[0]);
+        air.offset = (air.offset + change.fixed_rows::<3>(B)).cap_magnitude(MOST[1]);
         let less = self.covariance - gain * seen.transpose();
         self.covariance = (less + less.transpose()) * 0.5;
     }
@@ -109,20 +131,30 @@ impl AirEstimate {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trajectory::{Air, RESERVE};
+    use crate::trajectory::RESERVE;
     use crate::wing::WingModel;
     use squirrel_sim::vehicle_file::VehicleFile;
 
-    /// What is believed after twenty seconds of weaving and changes of speed, the wings open for a second of every three if at all.
-    fn believed(air: Air, opens: bool) -> Air {
+    /// The shipped squirrel as a plan knows it.
+    fn squirrel() -> Craft {
         let vehicle = VehicleFile::squirrel();
-        let weight_n = vehicle.vehicle.weight_n();
-        let calm = Craft::of(&vehicle, 1.5 * weight_n, Some(WingModel::Flat), RESERVE).unwrap();
-        let (real, mut estimate) = (Craft { air, ..calm.clone() }, AirEstimate::new(calm));
+        Craft::of(&vehicle, 1.5 * vehicle.vehicle.weight_n(), Some(WingModel::Flat), RESERVE).unwrap()
+    }
+
+    fn believed(air: Air, opens: bool) -> Air {
+        flown(&Craft { air, ..squirrel() }, opens, 0.0)
+    }
+
+    /// What is believed after twenty seconds of weaving and changes of speed, the wings open for a second of every three if at all.
+    ///
+    /// * `noise_m_s` - of each measured velocity, to one side and the other
+    fn flown(real: &Craft, opens: bool, noise_m_s: f64) -> Air {
+        let mut estimate = AirEstimate::new(squirrel());
         let mut velocity = Vector3::new(6.0, 0.0, 0.0);
         for step in 0..1000 {
             let time_s = f64::from(step) * 0.02;
-            estimate.measure(&velocity);
+            let sides = Vector3::new(1.0, if step % 2 == 0 { 1.0 } else { -1.0 }, -1.0);
+            estimate.measure(&(velocity + sides * if step % 3 == 0 { noise_m_s } else { -0.5 * noise_m_s }));
             // What keeps height, and about the speed.
             let still = real.acceleration(&velocity, &real.hover(), 0.0);
             let wanted = Vector3::new(
@@ -167,6 +199,31 @@ mod tests {
         let real = pushed(Air { wind, ..Air::calm() });
         let (missed, unknown) = ((pushed(found) - real).norm(), (pushed(Air::calm()) - real).norm());
         assert!(missed < 0.4 * unknown, "{missed} of {unknown}, {found:?}");
+    }
+
+    /// A wing of less area than is believed brakes less: that is a tail wind's doing, too.
+    #[test]
+    fn a_lesser_wing_passes_for_a_tail_wind() {
+        let wing = Some(crate::wing::WingForce::Flat { area_m2: 0.7 * 0.04 });
+        let air = flown(&Craft { wing, ..squirrel() }, true, 0.0);
+        assert!((0.2..3.0).contains(&air.wind.x) && air.wind.yz().norm() < air.wind.x, "{air:?}");
+    }
+
+    /// Neither noise nor a velocity out of all proportion is believed to be wind.
+    #[test]
+    fn nonsense_is_no_wind() {
+        let air = flown(&squirrel(), true, 0.05);
+        assert!(air.wind.norm() < 0.6 && air.offset.norm() < 0.2, "{air:?}");
+        for wild in [Vector3::new(500.0, 0.0, 0.0), Vector3::new(-3.0, 2.0, 1.0), Vector3::repeat(1e200)] {
+            let mut estimate = AirEstimate::new(squirrel());
+            for step in 0..200 {
+                let velocity = if step == 100 { wild } else { Vector3::zeros() };
+                estimate.measure(&velocity);
+                estimate.predict(&estimate.craft().hover(), 1.0, 0.02);
+            }
+            let air = estimate.craft().air;
+            assert!(air.wind.norm() < 0.1 && air.offset.norm() < 0.1, "{wild}: {air:?}");
+        }
     }
 
     #[test]

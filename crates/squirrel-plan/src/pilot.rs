@@ -42,7 +42,7 @@ const FORGET_M: f64 = 30.0;
 pub struct Replanner {
     planner: Planner,
     air: AirEstimate,
-    /// The velocity that the estimate was given last, and when, us.
+    /// The velocity at the last estimate of the air, and when that was, us.
     felt: Option<(In<Ned, f32>, u64)>,
     follower: Follower,
     mission: Mission,
@@ -112,9 +112,8 @@ impl Replanner {
             centre: Vector2::new(f64::from(o.north_m), f64::from(o.east_m)),
             radius_m: self.keep_out_m,
         };
-        let spread = self.follower.planned(time_us).map_or(0.0, |point| point.wing);
         let task = Task::new(
-            begin(motion, self.thrust_n, spread),
+            begin(motion, self.thrust_n, self.spread(time_us)),
             (0..=steps).map(wanted).collect(),
             self.seen.iter().map(keep).collect(),
             STEP_S,
@@ -128,15 +127,19 @@ impl Replanner {
         self.last = Some((plan.track, time_us));
     }
 
+    /// Deployment of the wings, as planned.
+    fn spread(&self, time_us: u64) -> f64 {
+        self.follower.planned(time_us).map_or(0.0, |point| point.wing)
+    }
+
     /// What the last moments say about the air.
     fn feel(&mut self, motion: &Motion, time_us: u64) {
         let (before, before_us) = self.felt.unwrap_or((motion.velocity, time_us));
-        let begin =
-            begin(motion, self.thrust_n, self.follower.planned(time_us).map_or(0.0, |point| point.wing));
-        self.air.predict(&-begin.thrust, begin.spread, (time_us - before_us) as f64 * 1e-6);
+        let now = begin(motion, self.thrust_n, self.spread(time_us));
+        self.air.predict(&-now.thrust, now.spread, time_us.saturating_sub(before_us) as f64 * 1e-6);
         // A velocity that stays the same to the bit is the last one still.
         if self.felt.is_none() || motion.velocity != before {
-            self.air.measure(&begin.velocity);
+            self.air.measure(&now.velocity);
         }
         self.felt = Some((motion.velocity, time_us));
     }

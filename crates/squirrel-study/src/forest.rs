@@ -219,12 +219,10 @@ pub fn words(study: &Forest) -> Vec<String> {
     let mut words = Vec::new();
     for row in &study.rows {
         let is = |arm: Arm| arm.name() == row.arm;
-        let (rival, over) = if is(Arm::TwccPlus) {
-            ("pc_plus", row.over_pc_plus)
-        } else if is(Arm::PlanWings) {
-            ("plan_no_wings", row.over_plan_no_wings)
-        } else {
-            ("phantom", row.over_phantom)
+        let (rival, over) = match row.arm {
+            arm if arm == Arm::TwccPlus.name() => ("pc_plus", row.over_pc_plus),
+            arm if arm == Arm::PlanWings.name() => ("plan_no_wings", row.over_plan_no_wings),
+            _ => ("phantom", row.over_phantom),
         };
         let Some(over) = over else { continue };
         let [value, low, high] = [over.value, over.low, over.high].map(|points| 100.0 * points);

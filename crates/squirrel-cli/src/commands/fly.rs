@@ -150,6 +150,9 @@ impl Fly {
         let by_default = if offboard { Arm::Pc } else { Arm::TwccFlat };
         // What the options changed is the scenario's, and so are errors in it; the rest is the vehicle's.
         scenario.check().map_err(|e| format!("scenario {}: {e}", self.scenario))?;
+        for path in [&self.out, &self.report, &self.json].into_iter().flatten() {
+            output::writable(path)?;
+        }
         let mut vehicle = vehicle(self.vehicle.as_deref())?;
         if let Some(name) = &self.estimator {
             vehicle.estimator = Estimator::parse(name)?;

@@ -31,7 +31,7 @@ const TRIAL: u32 = 2;
 pub struct Planner {
     /// What counts how much.
     pub weights: Weights,
-    /// Bound on convex problems: without wings, and again with them.
+    /// Bound on convex problems: with folded wings, and again where they may spread.
     pub iterations_max: u32,
 }
 
@@ -44,6 +44,8 @@ impl Default for Planner {
 /// An iterate and what it costs.
 struct Held {
     iterate: Iterate,
+    /// Without what violations cost, and with.
+    cost: f64,
     merit: f64,
     trust_n: f64,
     is_settled: bool,
@@ -57,10 +59,9 @@ impl Planner {
         let mut iterations = 0;
         let mut held = self.begin(craft, task, warm, &mut iterations);
         self.improve(craft, task, false, self.iterations_max, &mut held, &mut iterations);
-        if craft.wing.is_some() {
-            (held.is_settled, held.trust_n) = (false, held.trust_n.max(WARM_TRUST_N));
-            self.improve(craft, task, true, self.iterations_max, &mut held, &mut iterations);
-        }
+        // As many rounds for a craft without wings: what wings are worth is not what more rounds are.
+        (held.is_settled, held.trust_n) = (false, held.trust_n.max(WARM_TRUST_N));
+        self.improve(craft, task, true, self.iterations_max, &mut held, &mut iterations);
         self.finish(task, held, iterations)
     }
 
@@ -96,10 +97,11 @@ impl Planner {
         let told = told.map_or(controls[0].0, |point| craft.limited(&-point.thrust));
         let start = (task.begin().position, task.begin().velocity);
         let path = craft.roll_out(start, &controls, task.step_s());
-        let (_, merit) = self.weights.cost(task, &path, &controls);
+        let (cost, merit) = self.weights.cost(task, &path, &controls);
         let trust_n = if warm.is_some() { WARM_TRUST_N } else { COLD_TRUST_N };
         let held = |sides| Held {
             iterate: Iterate { controls: controls.clone(), told, path: path.clone(), sides },
+            cost,
             merit,
             trust_n,
             is_settled: false,
@@ -148,14 +150,14 @@ impl Planner {
                 continue;
             };
             let path = craft.roll_out(start, &controls, task.step_s());
-            let (_, merit) = self.weights.cost(task, &path, &controls);
+            let (cost, merit) = self.weights.cost(task, &path, &controls);
             let (_, promised) = self.weights.cost(task, &foreseen, &controls);
             let (gain, hope) = (held.merit - merit, held.merit - promised);
-            let enough = GAIN * (1.0 + held.merit);
+            let enough = GAIN * (1.0 + held.cost);
             if gain > 0.0 {
                 let sides = path.iter().map(|node| node.position.xy()).collect();
                 held.iterate = Iterate { controls, told: held.iterate.told, path, sides };
-                held.merit = merit;
+                (held.cost, held.merit) = (cost, merit);
             }
             if hope <= enough {
                 held.is_settled = true;

@@ -4,10 +4,10 @@
 //! the half-space stays out of the obstacle. Constraints that may have no solution have a slack that costs more than anything else.
 //!
 //! ```text
-//! min  sum_k |p - p_ref|_P^2 + |v - v_ref|_V^2 + r |T+ - T|^2 + c |w+ - w| + d w + mu s
+//! min  sum_k |p - p_ref|_P^2 + |v - v_ref|_V^2 + r |T+ - T|^2 + c |w+ - w| + d w + mu s + nu f
 //! a = a_bar + A (v - v_bar) + B (T - T_bar) + C (w - w_bar)        v+, p+ as in `model`
 //! |T| + r <= T_max     r >= c |T+ - 2 T + T-|_xy / h^2     T_z >= T_min     |T_x| <= tan(tilt) T_z     |T_y| <= tan(tilt) (T_x, T_z).e     |T+ - T| <= rates     |T - T_bar| <= trust
-//! 0 <= w <= 1      |w+ - w| <= rate      d.(p - centre) + s >= radius      |v_xy| <= v_max + s
+//! 0 <= w <= 1      |w+ - w| <= rate      d.(p - centre) + s >= radius      |v_xy| <= v_max + f
 //! ```
 //! The roll limit `|T_y| <= tan(tilt) |(T_x, T_z)|` is not convex; its tangent at the iterate lies inside of it (docs/equations.md F).
 
@@ -32,15 +32,17 @@ pub struct Weights {
     pub wing_move: f64,
     /// Of spread wings at a node: they fold where they hardly help.
     pub wing_spread: f64,
-    /// Of the depth in an obstacle, 1/m, and of being too fast, s/m: more than any reference is worth that leads away from where there is a way,
-    /// such as one that turned back.
-    pub violation: f64,
+    /// Of the depth in an obstacle, 1/m: more than any reference is worth that leads away from where there is a way, such as one that turned
+    /// back.
+    pub violation_per_m: f64,
+    /// Of being too fast, s/m.
+    pub overspeed_s_per_m: f64,
 }
 
 impl Weights {
     /// What a way costs: without violations, and with what they cost.
     pub(super) fn cost(&self, task: &Task, path: &[Motion], controls: &[Control]) -> (f64, f64) {
-        let (mut cost, mut worst) = (0.0, 0.0);
+        let (mut cost, mut violations) = (0.0, 0.0);
         for (k, (motion, wanted)) in path.iter().zip(task.wanted()).enumerate() {
             let share = if k + 1 == path.len() { self.last } else { 1.0 };
             let (off, slip) = (motion.position - wanted.position, motion.velocity - wanted.velocity);
@@ -49,14 +51,15 @@ impl Weights {
             cost += share * (place + self.velocity_s2_per_m2 * slip.norm_squared());
             if k > 0 {
                 let too_fast = motion.velocity.xy().norm() - task.speed_max_m_s();
-                worst += task.violation_m(&path[k - 1], motion).max(too_fast);
+                violations += self.violation_per_m * task.violation_m(&path[k - 1], motion)
+                    + self.overspeed_s_per_m * too_fast.max(0.0);
                 let ((thrust, spread), (thrust_before, spread_before)) = (controls[k], controls[k - 1]);
                 cost += self.thrust_change_per_n2 * (thrust - thrust_before).norm_squared()
                     + self.wing_move * (spread - spread_before).abs()
                     + self.wing_spread * spread;
             }
         }
-        (cost, cost + self.violation * worst)
+        (cost, cost + violations)
     }
 }
 
@@ -69,7 +72,8 @@ impl Default for Weights {
             thrust_change_per_n2: 0.02,
             wing_move: 0.05,
             wing_spread: 0.01,
-            violation: 1000.0,
+            violation_per_m: 1000.0,
+            overspeed_s_per_m: 100.0,
         }
     }
 }
@@ -90,9 +94,9 @@ pub(super) struct Iterate {
     pub(super) sides: Vec<Vector2<f64>>,
 }
 
-/// Numbers of a node: position, velocity, acceleration, thrust, deployment, its change, slack,
-/// thrust given up for turning.
-const WIDTH: usize = 16;
+/// Numbers of a node: position, velocity, acceleration, thrust, deployment, its change, depth in what to stay out of, thrust given up for
+/// turning, how much too fast.
+const WIDTH: usize = 17;
 const P: usize = 0;
 const V: usize = 3;
 const A: usize = 6;
@@ -101,6 +105,7 @@ const W: usize = 12;
 const DW: usize = 13;
 const S: usize = 14;
 const R: usize = 15;
+const F: usize = 16;
 /// Obstacles further than this from an iterate's node do not matter there, m.
 const NEAR_M: f64 = 4.0;
 /// How much further than its servo goes the deployment may be for a trust of 1 N, 1/N.
@@ -231,7 +236,8 @@ impl Subproblem<'_> {
             }
             q[at(k, W)] = weights.wing_spread;
             q[at(k, DW)] = weights.wing_move;
-            q[at(k, S)] = weights.violation;
+            q[at(k, S)] = weights.violation_per_m;
+            q[at(k, F)] = weights.overspeed_s_per_m;
         }
         let size = nodes * WIDTH;
         (CscMatrix::new_from_triplets(size, size, square.row, square.column, square.value), q)
@@ -280,9 +286,9 @@ impl Subproblem<'_> {
         let sideways = craft.tilt_rate_max_rad_s * craft.hover().z * h;
         let upwards = craft.thrust_rate_max_n_s * h;
         for k in 0..self.nodes() {
-            rows.push(&[(at(k, S), -1.0)], 0.0);
-            rows.push(&[(at(k, DW), -1.0)], 0.0);
-            rows.push(&[(at(k, R), -1.0)], 0.0);
+            for what in [S, DW, R, F] {
+                rows.push(&[(at(k, what), -1.0)], 0.0);
+            }
             if k == 0 {
                 continue;
             }
@@ -337,6 +343,7 @@ impl Subproblem<'_> {
             }
         }
         if k + 1 == self.held() {
+            // A newton for turning that is not there costs what a metre in an obstacle does, so that there is always a solution.
             // That thrust is on its way. Where it leaves nothing for turning, a turn that was begun may still end as it was planned to.
             let left = self.craft.thrust_max_n - self.iterate.controls[k].0.norm();
             rows.push(&[(at(k, R), 1.0), (at(k, S), -1.0)], left.max(self.turned(k)));
@@ -407,7 +414,7 @@ impl Subproblem<'_> {
         let fastest = self.task.speed_max_m_s();
         for k in 1..self.nodes() {
             if fastest.is_finite() {
-                rows.push(&[(at(k, S), -1.0)], fastest);
+                rows.push(&[(at(k, F), -1.0)], fastest);
                 for axis in 0..2 {
                     rows.push(&[(at(k, V + axis), -1.0)], 0.0);
                 }
