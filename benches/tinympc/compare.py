@@ -26,7 +26,7 @@ squirrel's plan the thrust at which its second step ends; the mean over that ste
 
 States and references change at every call, so that no call begins at the answer of the one before it. TinyMPC prints a line a solve into
 nowhere; that is in its time. Its penalty `rho` is part of its cost at the end of the horizon, too, so it is not only a matter of speed:
-in the box, of 0.1 to 10, 1 is the fastest and 0.1 tracks best. Then each flies twice, asked ten times a second for 4 s, from the first
+in the box, of 0.1 to 10, 1 is the fastest and 0.1 tracks best where nothing limits it. Then each flies twice, asked ten times a second for 4 s, from the first
 states, hovering's thrust before: as a double integrator that takes any acceleration, and as a point mass whose thrust is cut to what the
 vehicle can do: roll and pitch of 30 deg each, and the limit. Both take steps of thrust, which no vehicle does; that squirrel plans without them
 costs it here, and gains nothing.

@@ -94,6 +94,7 @@ fn arrays<'py>(py: Python<'py>, found: &[(f64, Support)]) -> PyResult<Bound<'py,
 /// * `reference_position_ned_m` - at each node, the first at the beginning
 /// * `obstacles_m` - north, east and radius of upright cylinders
 /// * `wing` - what is believed of the wings; none plans without them
+/// * `wind_ned_m_s` - where the air moves to
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
 #[gen_stub(override_return_type(type_repr = "tuple[dict[str, typing.Any], dict[str, typing.Any]]", imports = ("typing")))]

@@ -57,6 +57,8 @@ struct Planned {
     scenario: String,
     seed: u64,
     thrust_to_weight: f64,
+    /// The scenario's steady wind, which is planned for.
+    wind_ned_m_s: [f64; 3],
     step_s: f64,
     /// With wings, if they were asked for, and without.
     plans: Vec<Outcome>,
@@ -151,6 +153,7 @@ impl PlanCommand {
             scenario: setup.scenario.name.clone(),
             seed: setup.scenario.seed,
             thrust_to_weight: setup.thrust_to_weight(),
+            wind_ned_m_s: setup.scenario.wind.mean_ned_m_s,
             step_s: self.step_s,
             plans: plans.iter().map(|(model, task, plan)| Outcome::of(*model, task, plan)).collect(),
         };
@@ -160,8 +163,11 @@ impl PlanCommand {
 
 fn show(setup: &Setup, plans: &[Made]) {
     let ratio = setup.thrust_to_weight();
+    let [north, east, down] = setup.scenario.wind.mean_ned_m_s;
+    let is_calm = [north, east, down] == [0.0; 3];
+    let wind = if is_calm { String::new() } else { format!(", wind to {north} {east} {down} m/s") };
     say(&format!(
-        "{} through {}, seed {}, thrust-to-weight {ratio:.2}, {:.1} s of it\n",
+        "{} through {}, seed {}, thrust-to-weight {ratio:.2}{wind}, {:.1} s of it\n",
         setup.vehicle.name,
         setup.scenario.name,
         setup.scenario.seed,

@@ -37,6 +37,8 @@ pub(crate) const ESTIMATE: &str = "estimate";
 pub(crate) const PARNN_WEIGHTS: &str = "parnn_weights_hex";
 /// Source of what an offboard computer follows, where that is not the mission.
 pub(crate) const FOLLOWED: &str = "offboard.reference";
+/// Source of what it believes besides.
+const BELIEVED: &str = "offboard.believed";
 /// Metadata: who estimated. A log without it is of somebody outside.
 pub(crate) const ESTIMATOR: &str = "estimator";
 /// Version of the log's content.
@@ -123,7 +125,7 @@ impl Recorder {
         let vectors = pilot.map(Offboard::believed).unwrap_or_default();
         let rows: Vec<(&str, &[f64])> = vectors.iter().map(|(name, v)| (*name, v.as_slice())).collect();
         if !rows.is_empty() {
-            self.log.source_mut("offboard.believed").push(t, &rows);
+            self.log.source_mut(BELIEVED).push(t, &rows);
         }
     }
 
