@@ -1174,6 +1174,7 @@ def plan_trajectory(vehicle: Vehicle, reference_position_ned_m: numpy.typing.NDA
     * `reference_position_ned_m` - at each node, the first at the beginning
     * `obstacles_m` - north, east and radius of upright cylinders
     * `wing` - what is believed of the wings; none plans without them
+    * `wind_ned_m_s` - where the air moves to
     """
 
 def program(arguments: typing.Sequence[builtins.str]) -> builtins.int:
