@@ -3,9 +3,10 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is where the program speaks")]
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use squirrel_sim::files;
 use std::fmt::Write as _;
 use std::io::{IsTerminal, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// A result line on stdout.
 pub(crate) fn say(line: &str) {
@@ -83,16 +84,9 @@ impl Table {
     }
 }
 
-/// Writes a file under a temporary name beside it, then renames: a reader never sees half of it.
+/// Writes a file, whole or not at all.
 pub(crate) fn write_file(path: &Path, content: &[u8]) -> Result<(), String> {
-    if is_device(path) {
-        return std::fs::write(path, content).map_err(|e| format!("{}: {e}", path.display()));
-    }
-    let partial = partial(path)?;
-    std::fs::write(&partial, content).and_then(|()| std::fs::rename(&partial, path)).map_err(|e| {
-        let _ = std::fs::remove_file(&partial);
-        format!("{}: {e}", path.display())
-    })
+    files::write_whole(path, content).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 /// Asks before long work whether its result could be written.
@@ -100,25 +94,7 @@ pub(crate) fn writable(path: &Path) -> Result<(), String> {
     if path.is_dir() {
         return Err(format!("{}: is a folder, must be a file", path.display()));
     }
-    if is_device(path) {
-        return Ok(());
-    }
-    let partial = partial(path)?;
-    std::fs::write(&partial, [])
-        .and_then(|()| std::fs::remove_file(&partial))
-        .map_err(|e| format!("{}: {e}", path.display()))
-}
-
-/// Something that is there and is no file, such as `/dev/null` or a pipe: it is written to, never replaced.
-fn is_device(path: &Path) -> bool {
-    std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
-}
-
-/// The temporary name.
-fn partial(path: &Path) -> Result<PathBuf, String> {
-    let mut name = path.file_name().ok_or_else(|| format!("{}: not a file name", path.display()))?.to_owned();
-    name.push(".partial");
-    Ok(path.with_file_name(name))
+    files::writable(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 /// Writes a result as JSON where `--json` asks for it.

@@ -32,7 +32,7 @@ pub const STEP_S: f64 = 0.1;
 const FEEL_S: f64 = 0.02;
 /// What is kept to spare between vehicle and obstacle, m.
 pub const SPARE_M: f64 = 0.3;
-/// Convex problems a plan, without wings and again with them: the next plan goes on from this one.
+/// Convex problems a plan, with folded wings and again where they may spread: the next plan goes on from this one.
 const ITERATIONS: u32 = 4;
 /// Obstacles further behind than this are forgotten, m.
 const FORGET_M: f64 = 30.0;

@@ -5,6 +5,7 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
+use squirrel_sim::files::write_whole;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -248,16 +249,9 @@ pub(crate) fn or_squirrel(vehicle: Option<&Bound<'_, Vehicle>>) -> VehicleFile {
     vehicle.map_or_else(VehicleFile::squirrel, |given| given.get().file.clone())
 }
 
-/// Writes a file under a temporary name beside it, then renames.
+/// Writes a file, whole or not at all.
 pub(crate) fn write_file(path: &Path, content: &[u8]) -> PyResult<()> {
-    let fail = |e: &std::io::Error| error::system(e.kind(), format!("{}: {e}", path.display()));
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(".partial");
-    let partial = path.with_file_name(name);
-    std::fs::write(&partial, content).and_then(|()| std::fs::rename(&partial, path)).map_err(|e| {
-        let _ = std::fs::remove_file(&partial);
-        fail(&e)
-    })
+    write_whole(path, content).map_err(|e| error::system(e.kind(), format!("{}: {e}", path.display())))
 }
 
 /// The table that holds a key, and the last part of the key.

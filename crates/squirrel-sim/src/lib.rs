@@ -5,12 +5,14 @@
 //! - [`vehicle_file`], [`weights`] and [`scenario`] read what to fly; [`arm`] says who flies; [`faults`] breaks sensors in
 //!   recorded frames; [`track`] is a plan to follow.
 //! - [`batch`] flies thousands of vehicles at once on wide registers, [`task`] makes environments of it in which policies learn.
-//! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it.
+//! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it; [`files`] writes whatever
+//!   is written, whole or not at all.
 
 pub mod arm;
 pub mod batch;
 pub mod estimator;
 pub mod faults;
+pub mod files;
 pub mod flight;
 pub mod import;
 pub mod log;

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use squirrel_core::stack::wire::{HASH_START, hash, written};
+use squirrel_sim::files::write_whole;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
@@ -164,8 +165,7 @@ pub(crate) fn write(path: &Path, head: &Head, lines: &Lines) -> Result<(), Fligh
         text += line;
         text.push('\n');
     }
-    let partial = path.with_extension("partial");
-    std::fs::write(&partial, text).and_then(|()| std::fs::rename(&partial, path)).map_err(|e| at(&e))
+    write_whole(path, text.as_bytes()).map_err(|e| at(&e))
 }
 
 impl Journal {

@@ -120,7 +120,7 @@ impl Fly {
                 scenario.name
             ));
         }
-        if self.arm.as_deref().is_some_and(|arm| arm.starts_with("plan_")) {
+        if self.arm.as_deref().is_some_and(|arm| Arm::parse(arm).is_ok_and(Arm::plans)) {
             return Err("--arm: plans by itself, and follows no --reference".to_owned());
         }
         let start = Vector3::new(0.0, 0.0, -scenario.height_m);

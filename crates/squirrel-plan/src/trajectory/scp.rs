@@ -70,8 +70,7 @@ impl Planner {
         let (cost, _) = self.weights.cost(task, &path, &controls);
         let depths = path.windows(2).map(|pair| task.violation_m(&pair[0], &pair[1]));
         let violation_m = depths.fold(0.0, f64::max);
-        let too_fast = path.iter().skip(1).map(|node| node.velocity.xy().norm() - task.speed_max_m_s());
-        let overspeed_m_s = too_fast.fold(0.0, f64::max);
+        let overspeed_m_s = path.iter().skip(1).map(|node| task.overspeed_m_s(node)).fold(0.0, f64::max);
         let is_motion = path.iter().all(|node| node.position.iter().all(|x| x.is_finite()));
         let holds = is_motion && violation_m <= TOUCH_M && overspeed_m_s <= TOO_FAST_M_S;
         let status = match (holds, held.is_settled) {

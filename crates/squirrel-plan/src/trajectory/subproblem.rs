@@ -50,9 +50,8 @@ impl Weights {
             let place = level * off.xy().norm_squared() + height * off.z * off.z;
             cost += share * (place + self.velocity_s2_per_m2 * slip.norm_squared());
             if k > 0 {
-                let too_fast = motion.velocity.xy().norm() - task.speed_max_m_s();
                 violations += self.violation_per_m * task.violation_m(&path[k - 1], motion)
-                    + self.overspeed_s_per_m * too_fast.max(0.0);
+                    + self.overspeed_s_per_m * task.overspeed_m_s(motion);
                 let ((thrust, spread), (thrust_before, spread_before)) = (controls[k], controls[k - 1]);
                 cost += self.thrust_change_per_n2 * (thrust - thrust_before).norm_squared()
                     + self.wing_move * (spread - spread_before).abs()
@@ -343,8 +342,8 @@ impl Subproblem<'_> {
             }
         }
         if k + 1 == self.held() {
-            // A newton for turning that is not there costs what a metre in an obstacle does, so that there is always a solution.
             // That thrust is on its way. Where it leaves nothing for turning, a turn that was begun may still end as it was planned to.
+            // A newton beyond costs what a metre in an obstacle does, so that there is always a solution.
             let left = self.craft.thrust_max_n - self.iterate.controls[k].0.norm();
             rows.push(&[(at(k, R), 1.0), (at(k, S), -1.0)], left.max(self.turned(k)));
         }

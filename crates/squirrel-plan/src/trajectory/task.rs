@@ -138,6 +138,11 @@ impl Task {
         self.speed_max_m_s
     }
 
+    /// How much faster than the limit a node is, m/s; 0 below it.
+    pub(crate) fn overspeed_m_s(&self, now: &Motion) -> f64 {
+        (now.velocity.xy().norm() - self.speed_max_m_s).max(0.0)
+    }
+
     /// How deep the end of a step of a path is in what it must stay out of, and its middle, m; 0 outside. Nothing can be done about where a
     /// path begins.
     pub(crate) fn violation_m(&self, before: &Motion, now: &Motion) -> f64 {

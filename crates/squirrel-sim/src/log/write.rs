@@ -1,6 +1,5 @@
 //! Writes a flight as an MCAP file: metadata first, then all samples in the order of time.
 
-use std::fs;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -8,6 +7,7 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, WriteOptions};
 
 use super::{FlightLog, LogError, METADATA_NAME, Source, check, foxglove, message, schema};
+use crate::files::write_whole;
 
 /// A chunk is what a truncated file loses. It is closed by flight time, because only time bounds the loss for every
 /// mix of sources: 1 s is some 300 kB of a simulated flight and 2 kB of a GNSS receiver alone. Beyond 1 MiB, mcap's
@@ -36,18 +36,7 @@ impl FlightLog {
         let file = path.display().to_string();
         check::check(&file, self)?;
         let bytes = self.to_mcap(&file)?;
-        if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
-            // A device or a pipe is written to, never replaced.
-            return fs::write(path, bytes).map_err(|error| LogError::Io { file, error });
-        }
-        let mut unfinished = path.as_os_str().to_owned();
-        unfinished.push(".unfinished");
-        let written = fs::write(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, path));
-        written.map_err(|error| {
-            // Nothing half-written stays behind; that the removal may fail too adds nothing to the first error.
-            let _ = fs::remove_file(&unfinished);
-            LogError::Io { file, error }
-        })
+        write_whole(path, &bytes).map_err(|error| LogError::Io { file, error })
     }
 
     fn to_mcap(&self, file: &str) -> Result<Vec<u8>, LogError> {

@@ -1,6 +1,7 @@
 //! Writing safetensors files of `f32` with one metadata record; [`Contents`](super::Contents) reads them.
 
 use super::{RECORD, WeightsError};
+use crate::files::write_whole;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde::Serialize;
@@ -40,12 +41,5 @@ pub fn write(path: &Path, record: &impl Serialize, tensors: &[Tensor<'_>]) -> Re
     let metadata = [(RECORD.to_owned(), text)].into_iter().collect();
     let content = safetensors::serialize(views, Some(metadata)).map_err(|e| format(e.to_string()))?;
 
-    let mut unfinished = path.as_os_str().to_owned();
-    unfinished.push(".unfinished");
-    let written = std::fs::write(&unfinished, content).and_then(|()| std::fs::rename(&unfinished, path));
-    written.map_err(|error| {
-        // Nothing half-written stays behind; that the removal may fail too adds nothing to the first error.
-        let _ = std::fs::remove_file(&unfinished);
-        WeightsError::Io { file, error }
-    })
+    write_whole(path, &content).map_err(|error| WeightsError::Io { file, error })
 }
