@@ -39,6 +39,7 @@ fn stack(form: AttitudeForm, force_model: &ForceModel) -> Stack {
             derivative: Vector3::repeat(0.05),
             velocity_feed_forward: 0.0,
             acceleration_feed_forward: 0.0,
+            approach_max_m_s2: f32::INFINITY,
             speed_max_m_s: f32::INFINITY,
             acceleration_max_horizontal_m_s2: 11.0,
             acceleration_max_vertical_m_s2: 3.0,

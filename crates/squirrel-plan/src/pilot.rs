@@ -172,7 +172,8 @@ impl Replanner {
 /// * `thrust_n` - asked for last
 /// * `spread` - deployment of the wings
 pub fn begin(motion: &Motion, thrust_n: f64, spread: f64) -> Begin {
-    let attitude = Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, motion.yaw_rad);
+    let attitude =
+        Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, motion.heading_rad);
     let down = attitude * In::new(Vector3::z());
     Begin {
         position: motion.position.vector.cast(),

@@ -12,7 +12,7 @@ use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::control::Reference;
-use squirrel_core::control::backstepping::{AttitudeGains, AttitudeState};
+use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains, AttitudeState};
 use squirrel_core::control::command_filter::EulerReference;
 use squirrel_core::control::position::Motion;
 use squirrel_core::control::twcc::{Airframe, TwccParameters, TwccState};
@@ -199,6 +199,7 @@ impl Backstepping {
 #[pyclass(frozen, module = "squirrel._squirrel")]
 pub(crate) struct Twcc {
     parameters: TwccParameters,
+    form: AttitudeForm,
     airframe: Airframe,
     memory: Mutex<Vec<TwccState>>,
 }
@@ -209,13 +210,14 @@ impl Twcc {
     #[new]
     #[pyo3(signature = (vehicle, *, arm = "twcc_flat", count = 1))]
     fn new(vehicle: &Bound<'_, Vehicle>, arm: &str, count: usize) -> PyResult<Self> {
-        let (mut parameters, airframe) = (gains(vehicle)?.twcc, single(vehicle)?);
+        let gains = gains(vehicle)?;
+        let (mut parameters, form, airframe) = (gains.twcc, gains.attitude.form, single(vehicle)?);
         let limits = airframe.parameters().limits;
         let weights = vehicle.get().file.weights.as_ref();
         Arm::parse(arm).and_then(|arm| arm.configure(&mut parameters, weights)).map_err(value)?;
         parameters.check(limits.thrust_max_n).map_err(value)?;
         let airframe = Airframe::new(&airframe, parameters.thrust_min_n, limits.tilt_max_rad);
-        Ok(Self { parameters, airframe, memory: memory(count)? })
+        Ok(Self { parameters, form, airframe, memory: memory(count)? })
     }
 
     /// One tick of each vehicle.
@@ -282,14 +284,13 @@ impl Twcc {
         let dt_s = step_s(dt_s)?;
         let mut terms = Terms::default();
         for (i, state) in memory.iter_mut().enumerate() {
-            let (roll_rad, pitch_rad, yaw_rad) = attitudes[i].euler();
-            let motion = Motion {
-                position: In::new(Vector3::from(position.row(i))),
-                velocity: In::new(Vector3::from(velocity.row(i))),
-                roll_rad,
-                pitch_rad,
-                yaw_rad,
-            };
+            let (.., yaw_rad) = attitudes[i].euler();
+            let motion = Motion::new(
+                In::new(Vector3::from(position.row(i))),
+                In::new(Vector3::from(velocity.row(i))),
+                &attitudes[i],
+                self.form.heading_rad(yaw_rad, reference_yaw_rad),
+            );
             let reference = Reference {
                 position: In::new(Vector3::from(wanted.row(i))),
                 velocity: In::new(wanted_velocity(i)),

@@ -49,15 +49,17 @@ pub(super) const OF_STEP: [&str; 3] =
     ["step image: text, B", "step image: constants, B", "step: stack, worst case, B"];
 
 /// What must not be exceeded, however slowly it grew.
-const BUDGET: [(&str, u64); 7] = [
-    (INNER, 3000),
+const BUDGET: [(&str, u64); 8] = [
+    (INNER, 4500),
     (OUTER, 40_000),
     (INERTIAL, 60_000),
     // With an inner step still less than the outer one may take.
     (BEYOND, 10_000),
     (EIGHT_BEYOND, 30_000),
-    (CONTROL_TEXT, 40 * 1024),
-    (STATE, 4096),
+    (CONTROL_TEXT, 52 * 1024),
+    (STATE, 6 * 1024),
+    // A load of 1.2 % at 480 MHz, one instruction a cycle.
+    (WHOLE_MEAN, 19_200),
 ];
 
 /// # Errors
@@ -128,7 +130,7 @@ mod tests {
         let before = parse(&recorded(&Figures::from([(STATE, 100), (INNER, 99)])));
         let (table, grown) = compare(&now, &before.unwrap());
         assert_eq!(grown, [STATE]);
-        assert!(table.lines().any(|line| line.ends_with("4096       100       110")), "{table}");
+        assert!(table.lines().any(|line| line.ends_with("6144       100       110")), "{table}");
         let (_, new) = compare(&now, &BTreeMap::new());
         assert_eq!(new.len(), 2, "a figure that is not recorded is not passed over");
         assert!(parse("state").is_err());
@@ -138,12 +140,12 @@ mod tests {
     fn what_is_above_its_budget_or_missing_is_an_error() {
         let mut figures: Figures = BUDGET.into_iter().collect();
         assert_eq!(check_budget(&figures), Ok(()));
-        figures.insert(INNER, 3001);
+        figures.insert(INNER, 4501);
         figures.remove(STATE);
         let error = check_budget(&figures).unwrap_err();
         assert_eq!(
             error,
-            "inner step, worst, instructions must be at most 3000; state, B must be at most 4096"
+            "inner step, worst, instructions must be at most 4500; state, B must be at most 6144"
         );
     }
 }

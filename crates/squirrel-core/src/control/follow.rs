@@ -100,7 +100,7 @@ impl FollowGains {
         let hover_n = airframe.mass_kg * GRAVITY_M_S2 as f32;
         let most_down = lower(upper(HEIGHT_SHARE * most, WEIGHT_SHARE * hover_n), most);
         let down = limit(wanted.z, airframe.envelope.thrust_min_n, most_down);
-        let level = heading_frame(&wanted, motion.yaw_rad);
+        let level = heading_frame(&wanted, motion.heading_rad);
         let sideways = limit_norm(Vector3::new(level.x, level.y, 0.0), sqrt(most * most - down * down));
         let level = sideways.xy();
         let pitch_rad = libm::atan2f(level.x, down);
@@ -129,15 +129,15 @@ mod tests {
     /// On the plan the command is the plan's thrust vector, whatever the heading.
     #[test]
     fn on_the_plan_the_thrust_is_the_plans() {
-        for yaw_rad in [0.0, 0.8, -2.0] {
+        for heading_rad in [0.0, 0.8, -2.0] {
             let thrust = Vector3::new(1.1, -0.8, -5.5);
-            let motion = Motion { yaw_rad, ..still() };
+            let motion = Motion { heading_rad, ..still() };
             let gains = FollowGains::default();
             let command = gains.command(&airframe(), &motion, &hovering(), In::new(thrust), 1.0);
             let a = command.attitude;
-            let ned_from_body = Rotation::<Ned, Body, f32>::from_euler(a.roll_rad, a.pitch_rad, yaw_rad);
+            let ned_from_body = Rotation::<Ned, Body, f32>::from_euler(a.roll_rad, a.pitch_rad, heading_rad);
             let got = ned_from_body * In::new(Vector3::new(0.0, 0.0, -a.thrust_n));
-            assert!((got.vector - thrust).norm() < 1e-4, "{yaw_rad}: {}", got.vector);
+            assert!((got.vector - thrust).norm() < 1e-4, "{heading_rad}: {}", got.vector);
             assert_eq!(command.wing, 1.0);
         }
     }

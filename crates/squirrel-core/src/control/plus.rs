@@ -14,25 +14,30 @@
 //! - motion and reference are those of [`Plus::delay_s`] ahead, when what is commanded now acts: attitude bandwidth is compensated, and a
 //!   servo has travelled by the time that the attitude it was opened for is there;
 //! - thrust is for the attitude on the way there, not for its end, so that it does not lift before it brakes;
-//! - height is part of the residual with the weight `W_z`, so that it is held unless the horizontal gains more;
+//! - height is part of the residual with the weight `W_z`, so that it is held unless the horizontal gains more; a sink weighs the more the less
+//!   thrust there is to end it;
+//! - the way to the reference is flown no faster than rotors alone can brake it beside what the reference itself asks for;
 //! - velocity and acceleration of the reference are fed forward by the position loop ([`super::position::PositionGains`]).
 //!
 //! Wings open where they make the residual smaller by [`Plus::open_above_m_s2`], and fold where they no longer make it smaller. Without
 //! wings it is the same controller: the fair rival.
 
-use super::AttitudeThrust;
 use super::position::PositionGains;
 use super::twcc::Airframe;
+use super::wiic::Envelope;
+use super::{AttitudeThrust, Reference};
 use crate::aero::flat_plate;
 use crate::frames::{In, Ned};
-use crate::math::{GRAVITY_M_S2, limit, sqrt};
+use crate::math::{GRAVITY_M_S2, limit, lower, sqrt, upper};
 use crate::vehicle::{ParameterError, positive};
 use nalgebra::Vector3;
 
 /// Rounds of the search; its step halves in each.
 const ROUNDS: u32 = 7;
-/// With which a climb or sink is turned, m/s^2.
+/// With which a climb is turned, and a sink at most, m/s^2.
 const TURN_M_S2: f32 = 5.0;
+/// With which a sink is turned at least, m/s^2: no thrust to spare is no reason to divide by it.
+const TURN_MIN_M_S2: f32 = 2.0;
 /// First step of the search, rad.
 const STEP_RAD: f32 = 0.2;
 
@@ -49,6 +54,8 @@ pub struct Plus {
     pub height_band_m: f32,
     /// Share of the way from the present to the commanded attitude for which thrust is chosen.
     pub thrust_share: f32,
+    /// Share of the acceleration that rotors have to spare in level flight with which an approach to the reference is braked.
+    pub approach_share: f32,
     /// Wings open where they bring the acceleration closer to the command by this much, m/s^2.
     pub open_above_m_s2: f32,
 }
@@ -95,14 +102,27 @@ impl Plus {
                 return Err(ParameterError::of(field, x, "must be 0.01 to 100"));
             }
         }
+        positive("control.plus.approach_share", self.approach_share)?;
         positive("control.plus.open_above_m_s2", self.open_above_m_s2)
+    }
+
+    /// With what the way to the reference can be braked without wings while height is held and the reference's own acceleration is flown, m/s^2.
+    pub(super) fn approach_m_s2(&self, airframe: &Airframe, reference: &Reference) -> f32 {
+        let Envelope { tilt_max_rad, thrust_max_n, .. } = airframe.envelope;
+        let weight_n = airframe.mass_kg * GRAVITY_M_S2 as f32;
+        let spare = sqrt(upper(thrust_max_n * thrust_max_n - weight_n * weight_n, 0.0)) / airframe.mass_kg;
+        let level = lower(spare, GRAVITY_M_S2 as f32 * libm::tanf(tilt_max_rad));
+        self.approach_share * upper(level - reference.acceleration.vector.xy().norm(), 0.1 * level)
     }
 
     /// `W_z^2` for a height error and its rate: it grows with the error that is foreseen at the turn of a climb or sink.
     ///
     /// * `down_m`, `down_m_s` - position and velocity less those of the reference
-    pub(super) fn weight(&self, down_m: f32, down_m_s: f32) -> f32 {
-        let foreseen_m = down_m + down_m_s * down_m_s.abs() / (2.0 * TURN_M_S2);
+    pub(super) fn weight(&self, airframe: &Airframe, down_m: f32, down_m_s: f32) -> f32 {
+        // Gravity ends a climb; a sink is ended by what thrust there is above the weight.
+        let spare = airframe.envelope.thrust_max_n / airframe.mass_kg - GRAVITY_M_S2 as f32;
+        let turn = if down_m_s > 0.0 { limit(spare, TURN_MIN_M_S2, TURN_M_S2) } else { TURN_M_S2 };
+        let foreseen_m = down_m + down_m_s * down_m_s.abs() / (2.0 * turn);
         let share = foreseen_m / self.height_band_m;
         let weight = self.vertical_weight * (1.0 + share * share);
         weight * weight
@@ -224,6 +244,7 @@ mod tests {
             vertical_weight: 0.5,
             height_band_m: 1.5,
             thrust_share: 0.5,
+            approach_share: 0.5,
             open_above_m_s2: 0.3,
         }
     }
@@ -307,11 +328,12 @@ mod tests {
     #[test]
     fn a_climb_ends_in_the_band() {
         let plus = plus();
-        assert_eq!(plus.weight(0.0, 0.0), 0.25);
-        assert_eq!(plus.weight(-1.5, 0.0), 1.0, "twice the weight at the band's edge");
-        let rising = plus.weight(-1.0, -5.0);
-        assert!(rising > plus.weight(-1.0, 0.0) && plus.weight(-1.0, 3.0) < rising);
         let airframe = airframe();
+        let weight = |down_m, down_m_s| plus.weight(&airframe, down_m, down_m_s);
+        assert_eq!(weight(0.0, 0.0), 0.25);
+        assert_eq!(weight(-1.5, 0.0), 1.0, "twice the weight at the band's edge");
+        let rising = weight(-1.0, -5.0);
+        assert!(rising > weight(-1.0, 0.0) && weight(-1.0, 3.0) < rising);
         let brake = |weight| Demand { weight, ..demand(&airframe, [-20.0, 0.0, 5.0], [7.0, 0.0, -5.0]) };
         let thrust = |weight| {
             brake(weight).best(&AttitudeThrust { pitch_rad: 0.5, ..Default::default() }, 0.0).command.thrust_n

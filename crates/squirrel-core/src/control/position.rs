@@ -10,8 +10,8 @@
 //! kept above 0.5 (T8). [`AngleLaw::Exact`] inverts the thrust direction instead of taking sines as angles.
 
 use super::{AttitudeThrust, Reference};
-use crate::frames::{In, Ned};
-use crate::math::{GRAVITY_M_S2, cos, limit, limit_norm, upper};
+use crate::frames::{Body, In, Ned, Rotation};
+use crate::math::{GRAVITY_M_S2, cos, limit, limit_norm, sqrt, upper};
 use crate::vehicle::{ParameterError, each_not_negative, each_positive, positive};
 use nalgebra::{Vector2, Vector3};
 
@@ -39,6 +39,9 @@ pub struct PositionGains {
     pub velocity_feed_forward: f32,
     /// Share of the reference acceleration that is fed forward, 0 in the paper.
     pub acceleration_feed_forward: f32,
+    /// With what the way to the reference can be braked, m/s^2; infinite in the paper. The position loop asks for no more horizontal speed
+    /// towards it than that: it is proportional to the error nearby, and to its square root far away.
+    pub approach_max_m_s2: f32,
     /// Limit of the horizontal velocity that the position loop asks for, m/s; infinite in the paper.
     pub speed_max_m_s: f32,
     /// Limit of the horizontal acceleration command, m/s^2.
@@ -88,12 +91,28 @@ pub struct Motion {
     pub position: In<Ned, f32>,
     /// Velocity over ground, m/s.
     pub velocity: In<Ned, f32>,
-    /// Roll, rad.
+    /// Roll that has the thrust axis where it is, at [`Self::heading_rad`], rad.
     pub roll_rad: f32,
-    /// Pitch, rad.
+    /// Pitch, likewise.
     pub pitch_rad: f32,
-    /// Yaw, rad.
-    pub yaw_rad: f32,
+    /// The heading that roll and pitch are of, measured and commanded ones, rad: see
+    /// [`super::backstepping::AttitudeForm::heading_rad`].
+    pub heading_rad: f32,
+}
+
+impl Motion {
+    /// With the thrust axis of an attitude, as roll and pitch at a heading that need not be the measured one.
+    pub fn new(
+        position: In<Ned, f32>,
+        velocity: In<Ned, f32>,
+        ned_from_body: &Rotation<Ned, Body, f32>,
+        heading_rad: f32,
+    ) -> Self {
+        let down = (*ned_from_body * In::new(Vector3::z())).vector;
+        let level = heading_frame(&down, heading_rad);
+        let roll_rad = -libm::asinf(limit(level.y, -1.0, 1.0));
+        Self { position, velocity, roll_rad, pitch_rad: libm::atan2f(level.x, down.z), heading_rad }
+    }
 }
 
 impl PositionGains {
@@ -116,12 +135,13 @@ impl PositionGains {
                 return Err(ParameterError::of(field, share, "must be 0 to 1"));
             }
         }
-        if !(self.speed_max_m_s > 0.0) {
-            return Err(ParameterError::of(
-                "control.position.speed_max_m_s",
-                self.speed_max_m_s,
-                "must be > 0",
-            ));
+        for (field, x) in [
+            ("control.position.approach_max_m_s2", self.approach_max_m_s2),
+            ("control.position.speed_max_m_s", self.speed_max_m_s),
+        ] {
+            if !(x > 0.0) {
+                return Err(ParameterError::of(field, x, "must be > 0"));
+            }
         }
         Ok(())
     }
@@ -141,8 +161,8 @@ impl PositionGains {
         dt_s: f32,
     ) -> PositionTerms {
         let position_error = reference.position.vector - motion.position.vector;
-        let mut velocity_desired = self.position_per_s.component_mul(&position_error)
-            + reference.velocity.vector * self.velocity_feed_forward;
+        let mut velocity_desired =
+            self.approach(&position_error) + reference.velocity.vector * self.velocity_feed_forward;
         let horizontal =
             limit_norm(Vector3::new(velocity_desired.x, velocity_desired.y, 0.0), self.speed_max_m_s);
         (velocity_desired.x, velocity_desired.y) = (horizontal.x, horizontal.y);
@@ -177,14 +197,30 @@ impl PositionGains {
     }
 }
 
+impl PositionGains {
+    /// Velocity towards the reference, m/s. Far away it is that from which [`Self::approach_max_m_s2`] stops at the reference, with the
+    /// proportional law's lag: `v^2 = a (2 e - a / k^2)` joins `v = k e` smoothly at `e = a / k^2`.
+    fn approach(&self, position_error: &Vector3<f32>) -> Vector3<f32> {
+        let mut velocity = self.position_per_s.component_mul(position_error);
+        let (error, speed) = (position_error.xy().norm(), velocity.xy().norm());
+        let max = self.approach_max_m_s2;
+        // That is k v > a; where both are nothing, they are proportional.
+        if speed * speed > max * error {
+            let slow = sqrt(max * (2.0 * error - max * error * error / (speed * speed))) / speed;
+            (velocity.x, velocity.y) = (velocity.x * slow, velocity.y * slow);
+        }
+        velocity
+    }
+}
+
 /// Horizontal part of a NED vector in the heading frame: forward, right.
-pub(super) fn heading_frame(v_ned: &Vector3<f32>, yaw_rad: f32) -> Vector2<f32> {
-    let (s, c) = libm::sincosf(yaw_rad);
+pub(super) fn heading_frame(v_ned: &Vector3<f32>, heading_rad: f32) -> Vector2<f32> {
+    let (s, c) = libm::sincosf(heading_rad);
     Vector2::new(c * v_ned.x + s * v_ned.y, -s * v_ned.x + c * v_ned.y)
 }
 
 fn request(law: AngleLaw, mass_kg: f32, acceleration_ned: &Vector3<f32>, motion: &Motion) -> AttitudeThrust {
-    let a = heading_frame(acceleration_ned, motion.yaw_rad);
+    let a = heading_frame(acceleration_ned, motion.heading_rad);
     // Thrust never asks for free fall or less: a downward command stronger than that keeps a tenth of g.
     let lift = upper(GRAVITY_M_S2 as f32 - acceleration_ned.z, 0.1 * GRAVITY_M_S2 as f32);
     let cosines = cos(motion.roll_rad) * cos(motion.pitch_rad);
@@ -211,6 +247,7 @@ pub(super) mod fixtures {
             derivative: Vector3::new(0.05, 0.05, 0.05),
             velocity_feed_forward: 0.0,
             acceleration_feed_forward: 0.0,
+            approach_max_m_s2: f32::INFINITY,
             speed_max_m_s: f32::INFINITY,
             acceleration_max_horizontal_m_s2: 11.0,
             acceleration_max_vertical_m_s2: 3.0,
@@ -219,7 +256,7 @@ pub(super) mod fixtures {
         }
     }
     pub(in super::super) fn still() -> Motion {
-        Motion { position: In::zero(), velocity: In::zero(), roll_rad: 0.0, pitch_rad: 0.0, yaw_rad: 0.0 }
+        Motion { position: In::zero(), velocity: In::zero(), roll_rad: 0.0, pitch_rad: 0.0, heading_rad: 0.0 }
     }
     pub(in super::super) fn at(north: f32, east: f32, down: f32) -> Reference {
         Reference {
@@ -235,7 +272,6 @@ pub(super) mod fixtures {
 mod tests {
     use super::fixtures::*;
     use super::*;
-    use crate::frames::{Body, Rotation};
 
     fn tick(gains: &PositionGains, motion: &Motion, reference: &Reference) -> PositionTerms {
         gains.update(&mut PositionState::default(), 0.548, motion, reference, false, 0.1)
@@ -260,7 +296,7 @@ mod tests {
     #[test]
     fn the_exact_law_inverts_the_dynamics_at_any_yaw() {
         for yaw in [-3.0, -1.0, 0.0, 0.7, 2.5] {
-            let motion = Motion { yaw_rad: yaw, ..still() };
+            let motion = Motion { heading_rad: yaw, ..still() };
             let terms = tick(&gains(), &motion, &at(1.0, -0.7, -0.3));
             let r = terms.request;
             let ned_from_body = Rotation::<Ned, Body, f32>::from_euler(r.roll_rad, r.pitch_rad, yaw);
@@ -271,6 +307,21 @@ mod tests {
             let got = (ned_from_body * In::new(Vector3::new(0.0, 0.0, -u / 0.548))).vector
                 + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32);
             assert!((got - a).norm() < 1e-4, "yaw {yaw}: {got} for {a}");
+        }
+    }
+
+    /// Roll and pitch say where the thrust axis is, whatever heading they are of and whatever the yaw is.
+    #[test]
+    fn roll_and_pitch_at_any_heading_have_the_thrust_axis_of_the_attitude() {
+        for (yaw, heading) in [(0.0, 0.0), (0.3, 0.3), (0.0, 0.5), (1.5, 0.0), (-3.0, 2.0)] {
+            let attitude = Rotation::<Ned, Body, f32>::from_euler(0.4, -0.3, yaw);
+            let motion = Motion::new(In::zero(), In::zero(), &attitude, heading);
+            let same = Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, heading);
+            let axis = |of: Rotation<Ned, Body, f32>| (of * In::new(Vector3::z())).vector;
+            assert!((axis(attitude) - axis(same)).norm() < 1e-5, "yaw {yaw}, heading {heading}: {motion:?}");
+            if yaw == heading {
+                assert!((motion.roll_rad - 0.4).abs() < 1e-5 && (motion.pitch_rad + 0.3).abs() < 1e-5);
+            }
         }
     }
 
@@ -320,6 +371,30 @@ mod tests {
         assert_eq!(tick(&ahead, &still(), &reference).acceleration.vector, Vector3::zeros());
         let far = tick(&forward, &still(), &at(30.0, 40.0, 5.0)).velocity_desired.vector;
         assert!((far - Vector3::new(1.2, 1.6, 4.0)).norm() < 1e-5, "{far}");
+    }
+
+    /// Braked with the given acceleration from the speed that is asked for, the vehicle comes to rest at the reference but for the lag of the
+    /// proportional law, `v / k`; nearby, and without a limit, nothing changes.
+    #[test]
+    fn an_approach_is_no_faster_than_can_be_braked() {
+        let slow = PositionGains { approach_max_m_s2: 2.0, ..gains() };
+        for distance in [0.5_f32, 0.78, 0.79, 3.0, 30.0] {
+            let speed = |gains: &PositionGains| {
+                let terms = tick(gains, &still(), &at(0.6 * distance, -0.8 * distance, -1.0));
+                assert!((terms.velocity_desired.vector.z + 0.8).abs() < 1e-6, "height has a loop of its own");
+                terms.velocity_desired.vector.xy().norm()
+            };
+            let (v, proportional) = (speed(&slow), speed(&gains()));
+            assert!((proportional - 1.6 * distance).abs() < 1e-4);
+            // Where both laws join, a / k^2.
+            if distance < 2.0 / 2.56 {
+                assert_eq!(v, proportional, "{distance}");
+            } else {
+                let lag = 2.0 / (2.0 * 2.56);
+                assert!((v * v / 4.0 - (distance - lag)).abs() < 1e-3, "{v} m/s at {distance} m");
+            }
+        }
+        assert_eq!(tick(&slow, &still(), &at(0.0, 0.0, 0.0)).velocity_desired, In::zero());
     }
 
     #[test]

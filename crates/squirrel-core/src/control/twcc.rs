@@ -244,8 +244,8 @@ impl TwccParameters {
             wiic::command(
                 self.thrust_law,
                 airframe.mass_kg,
-                heading_frame(&position.acceleration.vector, motion.yaw_rad),
-                heading_frame(&wing_force.vector, motion.yaw_rad),
+                heading_frame(&position.acceleration.vector, motion.heading_rad),
+                heading_frame(&wing_force.vector, motion.heading_rad),
                 request,
                 envelope,
             )
@@ -288,7 +288,7 @@ impl TwccParameters {
         dt_s: f32,
     ) -> TwccTerms {
         let heading = |v: &Vector3<f32>| {
-            let forward_right = heading_frame(v, motion.yaw_rad);
+            let forward_right = heading_frame(v, motion.heading_rad);
             Vector3::new(forward_right.x, forward_right.y, v.z)
         };
         // Until what is commanded now acts, the last command does.
@@ -299,7 +299,7 @@ impl TwccParameters {
             let wings = f32::from(state.mode != Mode::Primary);
             let meanwhile = plus::between(&now, &last, 0.5);
             let a = plus::acceleration(airframe, &velocity, &meanwhile, wings);
-            let back = heading_frame(&a, -motion.yaw_rad);
+            let back = heading_frame(&a, -motion.heading_rad);
             let change = Vector3::new(back.x, back.y, a.z) * plus.delay_s;
             ahead.position.vector += (motion.velocity.vector + change * 0.5) * plus.delay_s;
             ahead.velocity.vector += change;
@@ -308,14 +308,17 @@ impl TwccParameters {
                 * plus.delay_s;
             goal.velocity.vector += reference.acceleration.vector * plus.delay_s;
         }
+        let gains =
+            PositionGains { approach_max_m_s2: plus.approach_m_s2(airframe, reference), ..plus.position };
         let position =
-            plus.position.update(&mut state.position, airframe.mass_kg, &ahead, &goal, state.clamped, dt_s);
+            gains.update(&mut state.position, airframe.mass_kg, &ahead, &goal, state.clamped, dt_s);
         let request = &position.request;
         let demand = Demand {
             airframe,
             acceleration: heading(&position.acceleration.vector),
             velocity: heading(&ahead.velocity.vector),
             weight: plus.weight(
+                airframe,
                 ahead.position.vector.z - goal.position.vector.z,
                 ahead.velocity.vector.z - goal.velocity.vector.z,
             ),
@@ -353,7 +356,7 @@ impl TwccParameters {
         let clamped = best.cost > 0.01 || position.acceleration != position.acceleration_demand;
         state.clamped = clamped;
         let force = plus::wing_force(airframe, &demand.velocity, &best.command);
-        let back = heading_frame(&force, -motion.yaw_rad);
+        let back = heading_frame(&force, -motion.heading_rad);
         let wing_force = In::new(Vector3::new(back.x, back.y, force.z));
         state.flag = state.mode != Mode::Primary;
         TwccTerms {

@@ -184,6 +184,14 @@ impl Stack {
         &self.parameters
     }
 
+    /// The heading that roll and pitch commands are of at an instant, those from outside, too, rad.
+    pub fn heading_rad(&self, time_us: u64, ned_from_body: &Rotation<Ned, Body, f32>) -> f32 {
+        // Headings of missions do not depend on what was met.
+        let commanded_rad = self.mission.reference(&MissionState::default(), time_us).yaw_rad;
+        let (.., measured_rad) = ned_from_body.euler();
+        self.parameters.attitude.form.heading_rad(measured_rad, commanded_rad)
+    }
+
     /// The same vehicle, gains and mission, from where a flight begins.
     ///
     /// # Errors
@@ -314,8 +322,8 @@ impl Stack {
         }
         self.mission.sense(&mut state.mission, frame.time_us, position, gnss.velocity, frame.obstacles());
         let reference = self.mission.reference(&state.mission, frame.time_us);
-        let (roll_rad, pitch_rad, yaw_rad) = ned_from_body.euler();
-        let motion = Motion { position, velocity: gnss.velocity, roll_rad, pitch_rad, yaw_rad };
+        let heading_rad = self.heading_rad(frame.time_us, &ned_from_body);
+        let motion = Motion::new(position, gnss.velocity, &ned_from_body, heading_rad);
         let terms = self.parameters.twcc.update(
             &mut state.twcc,
             &self.airframe,
@@ -330,9 +338,17 @@ impl Stack {
         Some(terms)
     }
 
-    fn inner(&self, state: &mut StackState, time_us: u64, yaw_rad: f32, dt_s: f32) -> Option<InnerTerms> {
+    fn inner(
+        &self,
+        state: &mut StackState,
+        time_us: u64,
+        commanded_rad: f32,
+        dt_s: f32,
+    ) -> Option<InnerTerms> {
         let (Some(imu), Some(ned_from_body)) = (state.known.imu, state.known.attitude) else { return None };
         let gains = &self.parameters.attitude;
+        let (.., measured_rad) = ned_from_body.euler();
+        let yaw_rad = gains.form.yaw_target_rad(measured_rad, commanded_rad);
         let target = Vector3::new(state.command.roll_rad, state.command.pitch_rad, yaw_rad);
         command_filter::step(
             &mut state.filter,

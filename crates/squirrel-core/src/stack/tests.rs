@@ -7,7 +7,9 @@ use crate::control::wing_force::{ForceModel, Guard, fixtures::loud};
 use crate::estimate::eskf::EskfParameters;
 use crate::estimate::navigator::Filter;
 use crate::guidance::sensing::Obstacle;
+use crate::math::GRAVITY_M_S2;
 use crate::vehicle::fixtures::squirrel;
+use nalgebra::UnitQuaternion;
 use proptest::prelude::*;
 
 fn stack(form: AttitudeForm) -> Stack {
@@ -65,6 +67,54 @@ fn level_on_the_spot_it_commands_hover() {
             .sum();
         assert!((total - stack.vehicle().weight_n()).abs() < 1e-4);
         assert_eq!(output.rotor_command[4..], [0.0; 4]);
+    }
+}
+
+/// A body that turns as the rotors make it, on the spot, yawed away from the reference, which asks it to tilt: degrees between the thrust axis and the one that
+/// was asked for, worst after `settled_s`, and of yaw in the end.
+fn beside_what_was_asked_deg(form: AttitudeForm, yaw_rad: f32, settled_s: f32) -> (f32, f32) {
+    let goal = Mission::Hover { position: In::new(Vector3::new(0.9, -0.5, 0.0)) };
+    let (stack, mut state) = (flying(&ForceModel::FlatPlate, form, &goal), StackState::default());
+    let inertia = stack.vehicle().parameters().inertia_kg_m2;
+    let (mut attitude, mut omega) =
+        (Rotation::<Ned, Body, f32>::from_euler(0.0, 0.0, yaw_rad), Vector3::zeros());
+    let (mut asked, mut worst) = (Vector3::z(), 0.0_f32);
+    let dt_s = 1.0 / 300.0;
+    for k in 0..1200u64 {
+        let mut frame = level(k * 1_000_000 / 300);
+        frame.attitude = Some(attitude);
+        frame.imu =
+            Some(Imu { omega: In::new(omega), specific_force: In::new(Vector3::new(0.0, 0.0, -9.8)) });
+        let output = stack.step(&mut state, &frame);
+        if let Some(outer) = output.outer {
+            let pull = Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32) - outer.position.acceleration.vector;
+            asked = pull / pull.norm();
+        }
+        let torque = output.inner.unwrap().mixer.achieved.torque_n_m;
+        omega += inertia.try_inverse().unwrap() * (torque - omega.cross(&(inertia * omega))) * dt_s;
+        attitude = Rotation::new(attitude.quaternion * UnitQuaternion::from_scaled_axis(omega * dt_s));
+        let beside = (attitude * In::new(Vector3::z())).vector.angle(&asked).to_degrees();
+        if k as f32 * dt_s > settled_s {
+            worst = worst.max(beside);
+        }
+    }
+    (worst, attitude.euler().2.to_degrees().abs())
+}
+
+/// Where the vehicle points and where it should point are two things: thrust goes where the outer loop wants it all the while that yaw is on its way.
+#[test]
+fn thrust_points_where_it_was_asked_to_whatever_the_yaw_error() {
+    for form in [AttitudeForm::Euler, AttitudeForm::Quaternion] {
+        for yaw_deg in [0.0_f32, 10.0, -30.0, 60.0, 90.0, -90.0] {
+            let (beside, yaw) = beside_what_was_asked_deg(form, yaw_deg.to_radians(), 0.5);
+            // The Euler law's roll and pitch are of the heading of the last tick while it turns on.
+            let most = if form == AttitudeForm::Euler { 9.0 } else { 4.0 };
+            assert!(
+                beside < most,
+                "{form:?} at {yaw_deg} deg of yaw: {beside} deg beside what was asked for"
+            );
+            assert!(yaw < 3.0, "{form:?} from {yaw_deg} deg: still {yaw} deg of yaw");
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use squirrel_core::control::twcc::Airframe;
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::policy::PilotCommand;
-use squirrel_core::stack::{Known, SensorFrame};
+use squirrel_core::stack::{Known, SensorFrame, Stack};
 
 /// Commands a second of who follows a plan.
 const FOLLOW_RATE_HZ: u64 = 50;
@@ -48,7 +48,9 @@ pub struct Follower {
     begin_us: u64,
     gains: FollowGains,
     airframe: Airframe,
+    stack: Stack,
     known: Known,
+    time_us: u64,
     now: Option<TrackPoint>,
 }
 
@@ -63,7 +65,16 @@ impl Follower {
         let vehicle = stack.vehicle();
         let tilt_max_rad = vehicle.parameters().limits.tilt_max_rad;
         let airframe = Airframe::new(vehicle, stack.parameters().twcc.thrust_min_n, tilt_max_rad);
-        Ok(Self { track: Track::default(), begin_us: 0, gains, airframe, known: Known::default(), now: None })
+        Ok(Self {
+            track: Track::default(),
+            begin_us: 0,
+            gains,
+            airframe,
+            stack,
+            known: Known::default(),
+            time_us: 0,
+            now: None,
+        })
     }
 
     /// From now on, this plan.
@@ -79,17 +90,18 @@ impl Follower {
     /// Takes over what a frame brings.
     pub fn look(&mut self, frame: &SensorFrame) {
         self.known.take_over(frame);
+        self.time_us = frame.time_us;
     }
 
-    /// Motion as known from the frames so far.
+    /// Motion as known from the frames so far, at the heading that the flight code takes commands to be of.
     pub fn motion(&self) -> Option<Motion> {
         let (gnss, attitude) = (self.known.gnss?, self.known.attitude?);
         let mut position = gnss.position;
         if let Some(altitude_m) = self.known.altitude_m {
             position.vector.z = -altitude_m;
         }
-        let (roll_rad, pitch_rad, yaw_rad) = attitude.euler();
-        Some(Motion { position, velocity: gnss.velocity, roll_rad, pitch_rad, yaw_rad })
+        let heading_rad = self.stack.heading_rad(self.time_us, &attitude);
+        Some(Motion::new(position, gnss.velocity, &attitude, heading_rad))
     }
 
     /// The plan at a time of the flight.

@@ -350,6 +350,7 @@ fn gains(position: &PositionTable) -> PositionGains {
         derivative: triple(&position.derivative),
         velocity_feed_forward: position.velocity_feed_forward.0 as f32,
         acceleration_feed_forward: 0.0,
+        approach_max_m_s2: f32::INFINITY,
         speed_max_m_s: f32::INFINITY,
         acceleration_max_horizontal_m_s2: position.acceleration_max_horizontal_m_s2.0 as f32,
         acceleration_max_vertical_m_s2: position.acceleration_max_vertical_m_s2.0 as f32,
@@ -409,6 +410,7 @@ fn plus(t: &PlusTable, position: &PositionGains) -> Plus {
         vertical_weight: t.vertical_weight.0 as f32,
         height_band_m: t.height_band_m.0 as f32,
         thrust_share: t.thrust_share.0 as f32,
+        approach_share: t.approach_share.0 as f32,
         open_above_m_s2: t.open_above_m_s2.0 as f32,
     }
 }

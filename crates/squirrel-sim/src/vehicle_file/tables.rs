@@ -238,7 +238,14 @@ pub(super) struct PlusTable {
     pub(super) vertical_weight: Number,
     pub(super) height_band_m: Number,
     pub(super) thrust_share: Number,
+    #[serde(default = "approach_share")]
+    pub(super) approach_share: Number,
     pub(super) open_above_m_s2: Number,
     pub(super) acceleration_max_horizontal_m_s2: Number,
     pub(super) acceleration_max_vertical_m_s2: Number,
+}
+
+/// Files of before this number have it not.
+fn approach_share() -> Number {
+    Quantity(0.5)
 }

@@ -8,12 +8,14 @@ pub mod quaternion;
 
 use super::command_filter::EulerReference;
 use crate::frames::{Body, Ned, Rotation};
-use crate::math::{Real, limit, real};
+use crate::math::{Real, limit, real, wrap_angle};
 use crate::vehicle::{ParameterError, each_positive, positive};
 use nalgebra::{Matrix3, Vector3};
 
 /// Longest step that the inner loop integrates over, s; a longer gap counts as this.
 pub const INNER_STEP_MAX_S: f32 = 0.02;
+/// Largest yaw error that the quaternion law is given, rad: 20 deg, twice of what tight turns leave.
+pub const YAW_LEAD_MAX_RAD: f32 = 0.35;
 
 /// Which law turns error into torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +24,35 @@ pub enum AttitudeForm {
     Euler,
     /// docs/equations.md B.3.
     Quaternion,
+}
+
+impl AttitudeForm {
+    /// The yaw to turn to on the way to a commanded one.
+    ///
+    /// The quaternion law turns roll, pitch and yaw together, and a large error of yaw leads it beside the thrust axis that was asked for. Yaw is
+    /// the weakest axis, and the first that is given up where thrust is short: the yaw to turn to is never further than
+    /// [`YAW_LEAD_MAX_RAD`] from the measured one. The Euler law needs no such limit.
+    pub fn yaw_target_rad(self, measured_rad: f32, commanded_rad: f32) -> f32 {
+        match self {
+            Self::Euler => commanded_rad,
+            Self::Quaternion => {
+                let lead =
+                    limit(wrap_angle(commanded_rad - measured_rad), -YAW_LEAD_MAX_RAD, YAW_LEAD_MAX_RAD);
+                measured_rad + lead
+            }
+        }
+    }
+
+    /// The heading that commanded roll and pitch have to be of for thrust to point where it was asked to.
+    ///
+    /// The Euler law controls each angle on its own: roll and pitch act at the yaw that there is. The quaternion law turns to one attitude, of
+    /// which [`Self::yaw_target_rad`] is a part: roll and pitch of another heading would tilt beside what was asked for while yaw lags.
+    pub fn heading_rad(self, measured_rad: f32, commanded_rad: f32) -> f32 {
+        match self {
+            Self::Euler => measured_rad,
+            Self::Quaternion => self.yaw_target_rad(measured_rad, commanded_rad),
+        }
+    }
 }
 
 /// Gains of the attitude loop, roll, pitch, yaw.
