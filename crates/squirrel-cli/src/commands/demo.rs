@@ -26,12 +26,6 @@ pub(crate) struct Demo {
     json: Option<PathBuf>,
 }
 
-impl Default for Demo {
-    fn default() -> Self {
-        Self { out: PathBuf::from("squirrel-demo"), seed: 1, json: None }
-    }
-}
-
 #[derive(Serialize)]
 struct Row {
     arm: &'static str,
