@@ -5,6 +5,7 @@
 
 mod commands;
 mod output;
+mod paths;
 
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
