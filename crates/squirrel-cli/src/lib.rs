@@ -5,16 +5,25 @@
 
 mod commands;
 mod output;
+mod paths;
 
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
 
 /// A flight stack for multirotors that change shape: fly it, log it, replay it, compare it with measured flights.
 #[derive(Debug, Parser)]
-#[command(name = "squirrel", version, about, disable_help_subcommand = true)]
+#[command(
+    name = "squirrel",
+    version,
+    about,
+    disable_help_subcommand = true,
+    args_conflicts_with_subcommands = true
+)]
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten, next_help_heading = "Options of the demo, without a command")]
+    demo: commands::demo::Demo,
 }
 
 #[derive(Debug, Subcommand)]
@@ -57,7 +66,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
             return u8::try_from(code).unwrap_or(2);
         }
     };
-    let done = match cli.command.unwrap_or_else(|| Command::Demo(commands::demo::Demo::default())) {
+    let done = match cli.command.unwrap_or(Command::Demo(cli.demo)) {
         Command::Demo(demo) => demo.run(),
         Command::Fly(fly) => fly.run(),
         Command::Study(study) => study.run(),

@@ -89,14 +89,6 @@ pub(crate) fn write_file(path: &Path, content: &[u8]) -> Result<(), String> {
     files::write_whole(path, content).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// Asks before long work whether its result could be written.
-pub(crate) fn writable(path: &Path) -> Result<(), String> {
-    if path.is_dir() {
-        return Err(format!("{}: is a folder, must be a file", path.display()));
-    }
-    files::writable(path).map_err(|e| format!("{}: {e}", path.display()))
-}
-
 /// Writes a result as JSON where `--json` asks for it.
 pub(crate) fn write_json(path: Option<&Path>, result: &impl serde::Serialize) -> Result<(), String> {
     let Some(path) = path else { return Ok(()) };

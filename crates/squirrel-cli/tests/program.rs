@@ -32,6 +32,29 @@ fn without_arguments_it_flies_the_demo() {
     }
 }
 
+/// No command is the demo, with all of its options; an option before another command belongs to nobody.
+#[test]
+fn the_options_of_the_demo_are_those_of_the_program() {
+    let folder = Folder::new("options");
+    for (command, out) in [(&["demo"][..], "a"), (&[], "b")] {
+        let options = ["--out", out, "--seed", "3", "--json", &format!("{out}.json")];
+        folder.succeeds(&[command, &options].concat());
+    }
+    for [a, b] in [["a.json", "b.json"], ["a/report.html", "b/report.html"]] {
+        assert!(
+            fs::read(folder.0.join(a)).unwrap() == fs::read(folder.0.join(b)).unwrap(),
+            "{a} and {b} differ"
+        );
+    }
+    assert_eq!(json(&folder, "b.json")["seed"], 3);
+    let help = folder.succeeds(&["--help"]);
+    for words in ["squirrel [OPTIONS]", "squirrel <COMMAND>", "Options of the demo", "--json <JSON>"] {
+        assert!(help.contains(words), "`{words}` is not in:\n{help}");
+    }
+    assert_eq!(folder.run(&["--json", "c.json", "fly"]).status.code(), Some(2));
+    assert_eq!(folder.files(), ["a", "a.json", "b", "b.json"]);
+}
+
 #[test]
 fn the_demo_is_the_same_bytes_twice_and_replays() {
     let folder = Folder::new("twice");

@@ -6,7 +6,7 @@
 //!   recorded frames; [`track`] is a plan to follow.
 //! - [`batch`] flies thousands of vehicles at once on wide registers, [`task`] makes environments of it in which policies learn.
 //! - [`log`] is the flight log in memory and as MCAP, [`import`] fills it from foreign logs, [`report`] draws it; [`files`] writes whatever
-//!   is written, whole or not at all.
+//!   is written, whole or not at all, and tells which paths are one file.
 
 pub mod arm;
 pub mod batch;

@@ -162,7 +162,12 @@ pub fn scenarios(plan: &Plan) -> Result<Vec<Scenario>, FlightError> {
 
 fn scenario(plan: &Plan, trial: u32) -> Result<Scenario, FlightError> {
     let scenario = Kind::T1.scenario(plan.seed.wrapping_mul(1_000_003).wrapping_add(u64::from(trial)))?;
-    Ok(Scenario { name: format!("trial-{trial:03}"), ..scenario })
+    Ok(Scenario { name: name(trial), ..scenario })
+}
+
+/// The name of a trial's scenario.
+pub fn name(trial: u32) -> String {
+    format!("trial-{trial:03}")
 }
 
 fn fly(plan: &Plan, trial: u32) -> Result<FlightLog, FlightError> {

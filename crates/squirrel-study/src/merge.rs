@@ -62,7 +62,11 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
     })
 }
 
-fn journals(folder: &Path) -> Result<Vec<String>, FlightError> {
+/// The names of a folder's journals.
+///
+/// # Errors
+/// The folder cannot be read.
+pub fn journals(folder: &Path) -> Result<Vec<String>, FlightError> {
     let at = |e: std::io::Error| FlightError(format!("{}: {e}", folder.display()));
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(at)? {

@@ -25,11 +25,11 @@ impl Drop for Folder {
     }
 }
 
-/// A program that writes a fixed verdict to the file after `--json`, if every file that it is given exists.
+/// A program that writes a fixed verdict into the folder after `--out`, if every file that it is given exists.
 fn program(folder: &Path, verdict: &str) -> PathBuf {
     let script = format!(
-        "#!/bin/sh\nset -e\nwhile [ $# -gt 0 ]; do case \"$1\" in\n--json) json=\"$2\"; shift 2;;\n\
-         --vehicle|--held-out) test -f \"$2\"; shift 2;;\n--out) test -d \"$2\"; shift 2;;\n\
+        "#!/bin/sh\nset -e\nwhile [ $# -gt 0 ]; do case \"$1\" in\n--out) test -d \"$2\"; json=\"$2/verdict.json\"; shift 2;;\n\
+         --vehicle|--held-out) test -f \"$2\"; shift 2;;\n\
          *.mcap) test -f \"$1\"; shift;;\n*) shift;;\nesac; done\necho '{verdict}' > \"$json\"\n"
     );
     let path = folder.join("program");

@@ -2,6 +2,7 @@
 
 use super::{facts, figures, view, write_log};
 use crate::output::{self, Table, say, talk};
+use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Flight, Integrator, Metrics, Setup};
@@ -11,6 +12,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::PathBuf;
 
 const ARMS: [Arm; 3] = [Arm::Pc, Arm::TwccFlat, Arm::TwccOracle];
+const REPORT: &str = "report.html";
 
 /// Options of the demo.
 #[derive(Debug, clap::Args)]
@@ -24,12 +26,6 @@ pub(crate) struct Demo {
     /// Write the figures here as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
-}
-
-impl Default for Demo {
-    fn default() -> Self {
-        Self { out: PathBuf::from("squirrel-demo"), seed: 1, json: None }
-    }
 }
 
 #[derive(Serialize)]
@@ -50,6 +46,8 @@ struct Figures {
 
 impl Demo {
     pub(crate) fn run(&self) -> Result<(), String> {
+        let names = ARMS.map(flight_file).into_iter().chain([REPORT.to_owned()]);
+        Paths::default().writes_into(&self.out, names).writes("--json", &self.json).check()?;
         output::folder(&self.out)?;
         let mut scenario = Scenario::find("avoid")?;
         scenario.seed = self.seed;
@@ -91,7 +89,7 @@ impl Demo {
             table.row(name.chain(cells.iter().map(|(_, v)| v.clone())).collect());
             rows.push(Row { arm: setup.arm.name(), gain, metrics: flight.metrics });
             if let Some(log) = &mut flight.log {
-                let path = self.out.join(format!("flight-{}.mcap", setup.arm.name()));
+                let path = self.out.join(flight_file(setup.arm));
                 write_log(log, &path)?;
                 views.push(view(setup, log, cells));
             }
@@ -107,7 +105,7 @@ impl Demo {
             facts: facts(&setups[0]),
             card: String::new(),
         };
-        let report = self.out.join("report.html");
+        let report = self.out.join(REPORT);
         output::write_file(&report, render(&heading, &views).as_bytes())?;
         let result = Figures {
             vehicle: setups[0].vehicle.name.clone(),
@@ -119,4 +117,9 @@ impl Demo {
         talk(&format!("\nwrote {} and flight-*.mcap (open in Foxglove) beside it", report.display()));
         Ok(())
     }
+}
+
+/// The log of one controller.
+fn flight_file(arm: Arm) -> String {
+    format!("flight-{}.mcap", arm.name())
 }

@@ -6,6 +6,7 @@
 
 use super::log_files;
 use crate::output::{self, Table, talk};
+use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Record, Wire, hash, written};
 use squirrel_core::stack::{SensorFrame, Stack, StackState};
@@ -14,6 +15,8 @@ use squirrel_sim::flight;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay;
 use std::path::PathBuf;
+
+const VECTORS: &str = "vectors.bin";
 
 /// Options of the export.
 #[derive(Debug, clap::Args)]
@@ -51,10 +54,14 @@ struct Sequence {
 
 impl ExportVectors {
     pub(crate) fn run(&self) -> Result<(), String> {
+        let flights = log_files(&self.flights)?;
+        let names = (0..flights.len()).map(setup_file).chain([VECTORS.to_owned()]);
+        let paths = Paths::default().reads("FLIGHTS", &flights).writes_into(&self.out, names);
+        paths.writes("--json", &self.json).check()?;
         let mut setups = Vec::new();
         let mut sequences = Vec::new();
         let mut records = Vec::new();
-        for path in log_files(&self.flights)? {
+        for path in flights {
             let file = path.display().to_string();
             let at = |e: String| format!("{file}: {e}");
             let log = FlightLog::read(&path).map_err(|e| e.to_string())?;
@@ -67,7 +74,7 @@ impl ExportVectors {
             }
             let stack = setup.stack().map_err(|e| at(e.to_string()))?;
             let frames = flight::frames(&log).map_err(at)?;
-            let setup_file = format!("setup-{}.bin", setups.len());
+            let setup_file = setup_file(setups.len());
             let alone = Header { sequences: 1, frames: 0 };
             setups.push([wire(&alone)?, record(&Record::Setup(stack))?].concat());
             let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -94,9 +101,9 @@ impl ExportVectors {
         bytes.append(&mut records);
         output::folder(&self.out)?;
         for (k, setup) in setups.iter().enumerate() {
-            output::write_file(&self.out.join(format!("setup-{k}.bin")), setup)?;
+            output::write_file(&self.out.join(setup_file(k)), setup)?;
         }
-        let vectors = self.out.join("vectors.bin");
+        let vectors = self.out.join(VECTORS);
         output::write_file(&vectors, &bytes)?;
         let mut table = Table::new(&["flight", "setup", "arm", "what", "steps", "hash of the outputs"]);
         for s in &sequences {
@@ -108,6 +115,11 @@ impl ExportVectors {
         talk(&format!("wrote {}, {} bytes", vectors.display(), bytes.len()));
         output::write_json(self.json.as_deref(), &sequences)
     }
+}
+
+/// The setup of a flight alone.
+fn setup_file(flight: usize) -> String {
+    format!("setup-{flight}.bin")
 }
 
 /// What a value is on the wire.

@@ -3,6 +3,7 @@
 use super::hil::EmulatedM7;
 use super::{facts, figures, vehicle, view, write_log};
 use crate::output::{self, Table, say, talk};
+use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_core::control::follow::FollowGains;
 use squirrel_core::nalgebra::Vector3;
@@ -138,7 +139,21 @@ impl Fly {
         Ok(Some(track))
     }
 
+    /// What is read and what is written.
+    fn paths(&self) -> Paths {
+        Paths::default()
+            .vehicle("--vehicle", &self.vehicle)
+            .scenario(&self.scenario)
+            .reads("--policy", &self.policy)
+            .reads("--reference", &self.reference)
+            .reads("--hil-image", self.hil.map(|_| &self.hil_image))
+            .writes("--out", &self.out)
+            .writes("--report", &self.report)
+            .writes("--json", &self.json)
+    }
+
     pub(crate) fn run(&self) -> Result<(), String> {
+        self.paths().check()?;
         let mut scenario = Scenario::find(&self.scenario)?;
         if let Some(seed) = self.seed {
             scenario.seed = seed;
@@ -150,9 +165,6 @@ impl Fly {
         let by_default = if offboard { Arm::Pc } else { Arm::TwccFlat };
         // What the options changed is the scenario's, and so are errors in it; the rest is the vehicle's.
         scenario.check().map_err(|e| format!("scenario {}: {e}", self.scenario))?;
-        for path in [&self.out, &self.report, &self.json].into_iter().flatten() {
-            output::writable(path)?;
-        }
         let mut vehicle = vehicle(self.vehicle.as_deref())?;
         if let Some(name) = &self.estimator {
             vehicle.estimator = Estimator::parse(name)?;

@@ -2,11 +2,18 @@
 
 use super::log_files;
 use crate::output::{self, Table, say, talk};
+use crate::paths::Paths;
 use squirrel_gap::{ClosedLoop, Diagnosis, Kind, NamedEffect, Value, Verdict, significant};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::path::{Path, PathBuf};
+use std::ffi::OsStr;
+use std::path::PathBuf;
+
+/// What the steps write into the folder of `--out`.
+const FIND: &str = "find.json";
+const VERDICT: &str = "verdict.json";
+const REPORT: &str = "report.html";
 
 /// Steps of the gap workflow.
 #[derive(Debug, clap::Subcommand)]
@@ -94,6 +101,17 @@ impl Gap {
 }
 
 impl Given {
+    /// Whether a step may begin that writes these files into the folder.
+    fn check(&self, names: &[&OsStr]) -> Result<(), String> {
+        let reads =
+            Paths::default().vehicle("--vehicle", [&self.vehicle]).flights("--flights", &self.flights)?;
+        let mut paths = reads.flights("--held-out", &self.held_out)?.writes("--json", &self.json);
+        if let Some(folder) = &self.out {
+            paths = paths.writes_into(folder, names);
+        }
+        paths.check()
+    }
+
     fn read(&self) -> Result<(VehicleFile, Logs, Logs), String> {
         let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
         Ok((vehicle, logs(&self.flights)?, logs(&self.held_out)?))
@@ -113,6 +131,7 @@ impl Given {
     }
 
     fn find(&self) -> Result<(), String> {
+        self.check(&[FIND.as_ref()])?;
         let (vehicle, flights, held_out) = self.read()?;
         let logs = [flights, held_out].concat();
         let finding = squirrel_gap::find(&vehicle, &logs).map_err(|e| e.to_string())?;
@@ -126,12 +145,13 @@ impl Given {
         notes(&finding.notes);
         if let Some(folder) = &self.out {
             output::folder(folder)?;
-            output::write_json(Some(&folder.join("find.json")), &finding)?;
+            output::write_json(Some(&folder.join(FIND)), &finding)?;
         }
         output::write_json(self.json.as_deref(), &finding)
     }
 
     fn name(&self) -> Result<(), String> {
+        self.check(&[VERDICT.as_ref()])?;
         let found = self.diagnose()?;
         show(&found.diagnosis.verdict);
         self.write(&found.diagnosis.verdict)
@@ -141,6 +161,7 @@ impl Given {
         if self.held_out.is_empty() {
             return Err("--held-out: none given; shrink needs flights that the fit never sees".to_owned());
         }
+        self.check(&[REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
         let text = found.patched()?;
         if let Some(text) = &text {
@@ -152,8 +173,11 @@ impl Given {
     }
 
     fn add(&self, dry_run: bool) -> Result<(), String> {
-        if !dry_run {
+        if dry_run {
+            self.check(&[])?;
+        } else {
             self.patch_path()?;
+            self.check(&[self.patch_name(), VERDICT.as_ref()])?;
         }
         let mut found = self.diagnose()?;
         show(&found.diagnosis.verdict);
@@ -173,6 +197,7 @@ impl Given {
 
     fn everything(&self) -> Result<(), String> {
         self.patch_path()?;
+        self.check(&[self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
         let text = found.patched()?;
         if let Some(text) = &text {
@@ -193,7 +218,7 @@ impl Given {
         let held_out: Vec<String> = found.held_out.iter().map(|(name, _)| name.clone()).collect();
         let data =
             squirrel_gap::picture(&found.vehicle, &found.diagnosis, &found.flights, &held_out, patched);
-        let path = folder.join("report.html");
+        let path = folder.join(REPORT);
         output::write_file(&path, squirrel_gap::report::render(&data).as_bytes())?;
         say(&format!("report: {}", path.display()));
         Ok(())
@@ -203,14 +228,11 @@ impl Given {
     fn patch_path(&self) -> Result<PathBuf, String> {
         let folder =
             self.out.as_deref().ok_or("--out: none given; a folder is needed for what is written")?;
-        let path = folder.join(self.vehicle.file_name().unwrap_or_default());
-        if same_file(&path, &self.vehicle) {
-            return Err(format!(
-                "{}: --out is the folder of the vehicle file, which is never overwritten",
-                path.display()
-            ));
-        }
-        Ok(path)
+        Ok(folder.join(self.patch_name()))
+    }
+
+    fn patch_name(&self) -> &OsStr {
+        self.vehicle.file_name().unwrap_or_default()
     }
 
     /// Writes the patched vehicle file.
@@ -228,14 +250,10 @@ impl Given {
     fn write(&self, verdict: &Verdict) -> Result<(), String> {
         if let Some(folder) = &self.out {
             output::folder(folder)?;
-            output::write_json(Some(&folder.join("verdict.json")), verdict)?;
+            output::write_json(Some(&folder.join(VERDICT)), verdict)?;
         }
         output::write_json(self.json.as_deref(), verdict)
     }
-}
-
-fn same_file(a: &Path, b: &Path) -> bool {
-    a.canonicalize().ok().is_some_and(|a| b.canonicalize().ok() == Some(a))
 }
 
 /// Whether the verdict has effects that a vehicle file can take.

@@ -1,7 +1,8 @@
 //! `squirrel import`: foreign logs in, flight logs out.
 
 use crate::output::{self, say, talk};
-use squirrel_sim::import::{ImportMap, import_board, import_watched};
+use crate::paths::Paths;
+use squirrel_sim::import::{ImportMap, files_of, import_board, import_watched};
 use squirrel_sim::log::FlightLog;
 use std::path::{Path, PathBuf};
 
@@ -32,11 +33,20 @@ pub(crate) struct Import {
 }
 
 impl Import {
+    /// What is read, and where it goes.
+    fn paths(&self, read: &[PathBuf]) -> Paths {
+        Paths::default().reads("PATHS", read).writes("--out", [&self.out]).writes("--json", &self.json)
+    }
+
     pub(crate) fn run(&self) -> Result<(), String> {
-        let Some(map) = &self.map else {
+        let Some(file) = &self.map else {
+            self.paths(&self.paths).check()?;
             return if self.board { self.board() } else { self.recover() };
         };
-        let map = ImportMap::load(map).map_err(|e| e.to_string())?;
+        let map = ImportMap::load(file).map_err(|e| e.to_string())?;
+        // A folder may hold more than is read; an earlier import, for one.
+        let found = files_of(&map, &self.paths).map_err(|e| e.to_string())?;
+        self.paths(&found).reads("--map", [file]).check()?;
         let bar = output::progress(0, "bytes");
         let imported = import_watched(&map, &self.paths, &|done, total| {
             if total >= BAR_FROM_BYTES {

@@ -28,7 +28,7 @@ fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
 }
 
 /// Flight logs by path; a folder stands for the logs in it, in the order of their names.
-fn log_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
+pub(crate) fn log_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
     let mut files = Vec::new();
     for path in paths {
         if !path.is_dir() {

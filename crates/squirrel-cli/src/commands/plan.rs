@@ -2,6 +2,7 @@
 
 use super::{vehicle, write_log};
 use crate::output::{self, Table, say, talk};
+use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_plan::pilot::{SPARE_M, half_width_m};
 use squirrel_plan::trajectory::{self, Air, Craft, Plan, Planner, RESERVE, Shown, Task};
@@ -110,13 +111,17 @@ impl Outcome {
 
 impl PlanCommand {
     pub(crate) fn run(&self) -> Result<(), String> {
+        Paths::default()
+            .vehicle("--vehicle", &self.vehicle)
+            .scenario(&self.scenario)
+            .writes("--out", &self.out)
+            .writes("--report", &self.report)
+            .writes("--json", &self.json)
+            .check()?;
         let mut scenario = Scenario::find(&self.scenario)?;
         scenario.seed = self.seed.unwrap_or(scenario.seed);
         scenario.thrust_to_weight = self.thrust_to_weight.or(scenario.thrust_to_weight);
         scenario.check().map_err(|e| format!("scenario {}: {e}", self.scenario))?;
-        for path in [&self.out, &self.report, &self.json].into_iter().flatten() {
-            output::writable(path)?;
-        }
         let vehicle = vehicle(self.vehicle.as_deref())?;
         let wing = match self.wing.as_deref() {
             Some("none") => None,

@@ -2,6 +2,7 @@
 
 use super::vehicle;
 use crate::output::{self, Table, say};
+use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::Vector3;
@@ -63,12 +64,11 @@ struct Reached<'a> {
 
 impl Reach {
     pub(crate) fn run(&self) -> Result<(), String> {
+        let paths = Paths::default().vehicle("--vehicle", &self.vehicle);
+        paths.writes("--html", &self.html).writes("--json", &self.json).check()?;
         let vehicle = vehicle(self.vehicle.as_deref())?;
         let model = WingModel::parse(&self.wing).map_err(|e| format!("--{e}"))?;
         let wing = WingForce::of(&vehicle, model)?;
-        for path in [&self.html, &self.json].into_iter().flatten() {
-            output::writable(path)?;
-        }
         let questions = self.questions(&vehicle, &wing)?;
         let bar = output::progress(questions.len() as u64, "cases");
         let case = |question| {

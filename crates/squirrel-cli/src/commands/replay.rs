@@ -1,6 +1,7 @@
 //! `squirrel replay`: the flight code again on a log's inputs, bit for bit.
 
 use crate::output::{self, say};
+use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay;
@@ -31,6 +32,8 @@ struct Replayed<'a> {
 
 impl Replay {
     pub(crate) fn run(&self) -> Result<(), String> {
+        let paths = Paths::default().reads("FLIGHT", [&self.flight]).vehicle("--vehicle", &self.vehicle);
+        paths.writes("--json", &self.json).check()?;
         let file = self.flight.display();
         let log = FlightLog::read(&self.flight).map_err(|e| e.to_string())?;
         let mut setup = replay::setup(&log).map_err(|e| format!("{file}: {e}"))?;

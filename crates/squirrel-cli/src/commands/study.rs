@@ -13,6 +13,7 @@ mod thrust;
 
 use super::vehicle;
 use crate::output::{self, talk};
+use crate::paths::Paths;
 use indicatif::ProgressBar;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
@@ -82,18 +83,26 @@ impl Common {
     /// The vehicle, once it is known that results can be written: nobody wants to learn that afterwards.
     ///
     /// * `name` - of the study's files
-    fn begin(&self, name: &str, trials: u32) -> Result<VehicleFile, String> {
+    /// * `others` - what it writes beside them
+    fn begin(
+        &self,
+        name: &str,
+        trials: u32,
+        others: impl IntoIterator<Item = String>,
+    ) -> Result<VehicleFile, String> {
         if self.shard.is_some() && self.json.is_some() {
             return Err("--json: a part of a study has no figures; merge the parts first".to_owned());
         }
         check_trials(trials).map_err(|e| e.to_string())?;
+        let mut paths = Paths::default().vehicle("--vehicle", &self.vehicle).writes("--json", &self.json);
+        if let Some(folder) = &self.out {
+            let names = ["csv", "json", "html", "trials.jsonl"].map(|kind| format!("{name}.{kind}"));
+            paths = paths.writes_into(folder, names.into_iter().chain(others));
+        }
+        paths.check()?;
         let vehicle = vehicle(self.vehicle.as_deref())?;
         if let Some(folder) = &self.out {
             output::folder(folder)?;
-            output::writable(&folder.join(format!("{name}.csv")))?;
-        }
-        if let Some(path) = &self.json {
-            output::writable(path)?;
         }
         Ok(vehicle)
     }
@@ -157,7 +166,7 @@ impl Flown {
     /// The plan, and the arguments that describe the study.
     fn plan(&self, study: &str, trials: u32, own: &[(&str, String)]) -> Result<(Plan, Vec<String>), String> {
         let arms: Vec<Arm> = self.arms.iter().map(|name| Arm::parse(name)).collect::<Result<_, _>>()?;
-        let vehicle = self.common.begin(study, trials)?;
+        let vehicle = self.common.begin(study, trials, [])?;
         let mut plan = Plan::of_all_arms(vehicle, trials, self.common.seed);
         if !arms.is_empty() {
             plan.arms = arms;

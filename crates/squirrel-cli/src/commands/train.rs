@@ -2,6 +2,7 @@
 
 use super::{log_files, vehicle};
 use crate::output::{self, Table, say, talk};
+use crate::paths::Paths;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use squirrel_nn::NnError;
@@ -10,6 +11,7 @@ use squirrel_nn::model::Model;
 use squirrel_nn::train::{Epoch, Settings, Trainer};
 use squirrel_nn::trained::{ForceError, Trained};
 use squirrel_nn::windows::Windows;
+use squirrel_sim::files::FileId;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::report::chart::{Axis, Ink, LineChart, Range, Series};
 use squirrel_sim::report::page::{Columns, Figure, Page, Row};
@@ -81,9 +83,8 @@ struct Outcome<'a> {
 impl Train {
     pub(crate) fn run(&self) -> Result<(), String> {
         let fail = |e: NnError| e.to_string();
-        for path in [Some(&self.out), self.report.as_ref(), self.json.as_ref()].into_iter().flatten() {
-            output::writable(path)?;
-        }
+        let checkpoint = self.checkpoint();
+        self.paths(checkpoint.as_ref())?.check()?;
         let vehicle = vehicle(self.vehicle.as_deref())?;
         let windows = self.windows(&vehicle)?;
         let held_out: Vec<&str> = self.validation.iter().map(String::as_str).collect();
@@ -94,13 +95,13 @@ impl Train {
         let settings = Settings { epochs: self.epochs, seed: self.seed, ..Settings::default() };
         let area_m2 = labels::plate_area_m2(&vehicle);
         let new = |model| Trainer::new(model, &vehicle.name, area_m2, &training, &validation, settings);
-        let checkpoint = self.out.with_extension("checkpoint.safetensors");
         let mut trainer = if self.resume {
-            self.resumed(&checkpoint, settings, &training, &validation)?
+            let nothing = || format!("--resume: {} keeps no checkpoint", self.out.display());
+            self.resumed(checkpoint.as_ref().ok_or_else(nothing)?, settings, &training, &validation)?
         } else {
             new(self.model).map_err(fail)?
         };
-        train(&mut trainer, &checkpoint)?;
+        train(&mut trainer, checkpoint.as_deref())?;
 
         let plate = new(Model::FlatPlate).map_err(fail)?.best();
         let mut best = trainer.best();
@@ -111,7 +112,7 @@ impl Train {
         best.card.figures = figures(&sets);
         best.save(&self.out).map_err(fail)?;
         // What is left of the way is no longer needed.
-        let _ = std::fs::remove_file(&checkpoint);
+        let _ = checkpoint.map(std::fs::remove_file);
 
         say(&format!("{} of {}, seed {}\n", self.model.name(), vehicle.name, self.seed));
         let table = table(&sets);
@@ -135,6 +136,19 @@ impl Train {
             history: trainer.history(),
         };
         output::write_json(self.json.as_deref(), &outcome)
+    }
+
+    /// The checkpoint beside the weights; none where these go into a device or a pipe.
+    fn checkpoint(&self) -> Option<PathBuf> {
+        let is_file = !FileId::written(&self.out).is_empty();
+        is_file.then(|| self.out.with_extension("checkpoint.safetensors"))
+    }
+
+    /// What is read and what is written.
+    fn paths(&self, checkpoint: Option<&PathBuf>) -> Result<Paths, String> {
+        let reads = Paths::default().flights("--flights", &self.flights)?.vehicle("--vehicle", &self.vehicle);
+        let writes = reads.writes("--out", [&self.out]).writes("checkpoint of --out", checkpoint);
+        Ok(writes.writes("--report", &self.report).writes("--json", &self.json))
     }
 
     /// Windows of all flights in the order of their files; a flight whose wings stay folded is left out and said.
@@ -189,14 +203,17 @@ impl Train {
 }
 
 /// All epochs that are left, with a checkpoint every now and then.
-fn train(trainer: &mut Trainer, checkpoint: &Path) -> Result<(), String> {
+fn train(trainer: &mut Trainer, checkpoint: Option<&Path>) -> Result<(), String> {
     let fail = |e: NnError| e.to_string();
     let bar = output::progress(trainer.settings().epochs as u64, "epochs");
     bar.set_position(trainer.history().len() as u64);
     while let Some(epoch) = trainer.epoch().map_err(fail)? {
         bar.set_message(format!("{:.4} N", epoch.validation.unwrap_or(epoch.training).sqrt()));
         bar.inc(1);
-        if trainer.history().len().is_multiple_of(CHECKPOINT_EPOCHS) && !trainer.is_done() {
+        if trainer.history().len().is_multiple_of(CHECKPOINT_EPOCHS)
+            && !trainer.is_done()
+            && let Some(checkpoint) = checkpoint
+        {
             trainer.save(checkpoint).map_err(fail)?;
         }
     }

@@ -1,6 +1,7 @@
 //! `squirrel vehicle`: vehicle files.
 
 use crate::output::{self, Table, say};
+use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_sim::vehicle_file::{Provenance, VehicleFile};
 use std::collections::BTreeMap;
@@ -32,6 +33,7 @@ struct Checked<'a> {
 impl VehicleCommand {
     pub(crate) fn run(&self) -> Result<(), String> {
         let Self::Check { file, json } = self;
+        Paths::default().vehicle("FILE", [file]).writes("--json", json).check()?;
         let vehicle = VehicleFile::load(file).map_err(|e| e.to_string())?;
         let v = &vehicle.vehicle;
         say(&format!(

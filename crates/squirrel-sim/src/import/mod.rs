@@ -87,6 +87,14 @@ pub fn import(map: &ImportMap, paths: &[PathBuf]) -> Result<(FlightLog, ImportRe
     import_watched(map, paths, &|_, _| {})
 }
 
+/// The files that an import reads, one for each source of the map.
+///
+/// # Errors
+/// A file that none or two of the paths offer, a path that does not exist or that nothing reads.
+pub fn files_of(map: &ImportMap, paths: &[PathBuf]) -> Result<Vec<PathBuf>, ImportError> {
+    files::find(map, paths)
+}
+
 /// Imports one flight as [`import`] does, and says how far it is.
 ///
 /// * `watch` - gets, about once a MiB, the bytes worked through and the bytes of all files

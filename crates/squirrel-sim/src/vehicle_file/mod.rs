@@ -18,7 +18,7 @@ use squirrel_core::effects::Effects;
 use squirrel_core::stack::StackParameters;
 use squirrel_core::vehicle::Vehicle;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The squirrel of the paper, as shipped.
 pub const SQUIRREL_TOML: &str = include_str!("../../../../vehicles/squirrel.toml");
@@ -103,8 +103,7 @@ impl VehicleFile {
             Err(source) => return Err(VehicleFileError::Read { file, source }),
         };
         Self::read(&text, &file, |name| {
-            let beside = path.with_file_name("").join(name);
-            match (ParnnWeights::load(&beside), shipped(name)) {
+            match (ParnnWeights::load(&beside(path, name)), shipped(name)) {
                 // The shipped ones stand in for a file that is not there, not for one that is damaged.
                 (Err(WeightsError::Io { error, .. }), Some(weights))
                     if error.kind() == io::ErrorKind::NotFound =>
@@ -114,6 +113,13 @@ impl VehicleFile {
                 (read, _) => read.map(Some),
             }
         })
+    }
+
+    /// The file of the weights that a vehicle file names; `None` where it names none, cannot be read, or is no file: a pipe is read once.
+    pub fn weights_path(path: &Path) -> Option<PathBuf> {
+        let path = Some(path).filter(|path| path.is_file())?;
+        let table: toml::Table = std::fs::read_to_string(path).ok()?.parse().ok()?;
+        Some(beside(path, table.get("wing")?.get("parnn_weights")?.as_str()?))
     }
 
     /// Checks the text of a file. A text lies in no folder, so of weights only the shipped ones are at hand.
@@ -192,6 +198,11 @@ impl VehicleFile {
         let bare = |p: &Provenance| p.source.is_none();
         self.provenance.iter().filter(move |(_, p)| bare(p)).map(|(field, _)| field.as_str())
     }
+}
+
+/// A file that a vehicle file names.
+fn beside(path: &Path, name: &str) -> PathBuf {
+    path.with_file_name("").join(name)
 }
 
 /// The shipped weights, where this is their name.

@@ -25,7 +25,7 @@ pub(super) fn ask(squirrel: &Path, case: &Path, results: &Path) -> Asked {
     let json = results.join("verdict.json");
     let start = Instant::now();
     let verdict = make_folder(results)
-        .and_then(|()| process(squirrel, case, results, &json))
+        .and_then(|()| process(squirrel, case, results))
         .and_then(|child| wait(child, start))
         .and_then(|()| read(&json));
     Asked { verdict, seconds: start.elapsed().as_secs_f64() }
@@ -35,12 +35,12 @@ fn make_folder(results: &Path) -> Result<(), String> {
     std::fs::create_dir_all(results).map_err(|error| format!("{}: {error}", results.display()))
 }
 
-fn process(squirrel: &Path, case: &Path, results: &Path, json: &Path) -> Result<Child, String> {
+fn process(squirrel: &Path, case: &Path, results: &Path) -> Result<Child, String> {
     let mut command = Command::new(squirrel);
     command.args(["gap", "run", "--vehicle"]).arg(case.join("vehicle.toml"));
     command.arg("--flights").args(FLIGHTS[..2].iter().map(|flight| case.join(flight)));
     command.arg("--held-out").arg(case.join(FLIGHTS[2]));
-    command.arg("--out").arg(results).arg("--json").arg(json);
+    command.arg("--out").arg(results);
     let log = results.join("stderr.txt");
     let log = std::fs::File::create(&log).map_err(|error| format!("{}: {error}", log.display()))?;
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(log);

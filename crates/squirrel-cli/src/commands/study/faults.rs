@@ -18,7 +18,7 @@ pub(crate) struct Options {
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
-        let plan = Plan { vehicle: self.common.begin("faults", trials)?, trials, seed };
+        let plan = Plan { vehicle: self.common.begin("faults", trials, [])?, trials, seed };
         let command = self.common.command("faults", &[("trials", trials.to_string())]);
         let keep = self.common.keep(&command);
         let bar = output::progress(keep.share(u64::from(trials)), "flights");

@@ -6,6 +6,11 @@ use squirrel_study::filters::{self, Plan};
 use squirrel_study::in_loop::Row;
 use std::fmt::Write as _;
 
+/// What is written beside the files that every study has.
+const FLIGHTS: &str = "flights";
+const IN_LOOP: &str = "filters_in_loop.csv";
+const IN_LOOP_TRIALS: &str = "filters_in_loop.trials.jsonl";
+
 /// Options of the study.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
@@ -19,7 +24,9 @@ pub(crate) struct Options {
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
-        let plan = Plan { vehicle: self.common.begin("filters", trials)?, trials, seed };
+        let flown = (0..trials).map(|trial| format!("{FLIGHTS}/{}.toml", filters::name(trial)));
+        let others = flown.chain([IN_LOOP, IN_LOOP_TRIALS].map(str::to_owned));
+        let plan = Plan { vehicle: self.common.begin("filters", trials, others)?, trials, seed };
         let command = self.common.command("filters", &[("trials", trials.to_string())]);
         let keep = self.common.keep(&command);
         let bar = output::progress(filters::steps(&plan, &keep), "flights");
@@ -86,8 +93,8 @@ impl Options {
         }
         table.print();
         let Some(folder) = self.common.end("filters", &csv, &study)? else { return Ok(()) };
-        output::write_file(&folder.join("filters_in_loop.csv"), in_loop.as_bytes())?;
-        let flights = folder.join("flights");
+        output::write_file(&folder.join(IN_LOOP), in_loop.as_bytes())?;
+        let flights = folder.join(FLIGHTS);
         output::folder(&flights)?;
         for scenario in filters::scenarios(&plan).map_err(|e| e.to_string())? {
             let file = flights.join(format!("{}.toml", scenario.name));

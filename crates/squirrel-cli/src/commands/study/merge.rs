@@ -2,8 +2,10 @@
 
 use super::Study;
 use crate::output;
+use crate::paths::Paths;
 use clap::Parser;
-use squirrel_study::merge::merge;
+use squirrel_study::merge::{journals, merge};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Options of the merge.
@@ -33,6 +35,7 @@ struct Again {
 
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
+        self.paths()?.check()?;
         let is_new = !self.out.exists();
         output::folder(&self.out)?;
         let merged = self.merged();
@@ -41,6 +44,18 @@ impl Options {
             std::fs::remove_dir_all(&self.out).map_err(|e| format!("{}: {e}", self.out.display()))?;
         }
         merged
+    }
+
+    /// The journals that are read, and those that are written; what follows from them is the study's.
+    fn paths(&self) -> Result<Paths, String> {
+        let mut paths = Paths::default().vehicle("--vehicle", &self.vehicle).writes("--json", &self.json);
+        let mut all = BTreeSet::new();
+        for folder in &self.folders {
+            let names = journals(folder).map_err(|e| e.to_string())?;
+            paths = paths.reads("FOLDERS", names.iter().map(|name| folder.join(name)));
+            all.extend(names);
+        }
+        Ok(paths.writes_into(&self.out, &all))
     }
 
     fn merged(&self) -> Result<(), String> {

@@ -21,7 +21,7 @@ pub(crate) struct Options {
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let common = &self.common;
-        let vehicle = common.begin("planning", self.trials)?;
+        let vehicle = common.begin("planning", self.trials, [])?;
         let plan = Plan { vehicle, arms: ARMS.to_vec(), trials: self.trials, seed: common.seed };
         let command = common.command("planning", &[("trials", self.trials.to_string())]);
         let keep = common.keep(&command);

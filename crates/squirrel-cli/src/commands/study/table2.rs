@@ -5,6 +5,7 @@ use crate::output::{self, Table, say};
 use squirrel_nn::model::Model;
 use squirrel_nn::train::Settings;
 use squirrel_study::table2::{self, ERRORS, Error, Plan, Row, Spread, Table2};
+use squirrel_study::wing_flights::Kind;
 use std::fmt::Write as _;
 
 /// Options of the study.
@@ -23,7 +24,9 @@ pub(crate) struct Options {
 impl Options {
     pub(super) fn run(&self) -> Result<(), String> {
         let (trials, seed) = (self.trials, self.common.seed);
-        let plan = Plan { vehicle: self.common.begin("table2", trials)?, trials, seed, epochs: self.epochs };
+        let others = Kind::ALL.map(|kind| format!("{}.toml", kind.name()));
+        let plan =
+            Plan { vehicle: self.common.begin("table2", trials, others)?, trials, seed, epochs: self.epochs };
         let own = [("trials", trials.to_string()), ("epochs", self.epochs.to_string())];
         let command = self.common.command("table2", &own);
         let keep = self.common.keep(&command);

@@ -1,0 +1,128 @@
+//! What a command reads and what it writes, compared before it begins: nothing that is read is overwritten, and no two results go into one
+//! file.
+
+use crate::commands::log_files;
+use squirrel_sim::files::{self, FileId};
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// The files of a command, by the arguments that give them.
+#[derive(Default)]
+pub(crate) struct Paths {
+    reads: Vec<Given>,
+    writes: Vec<Given>,
+    /// Folders that the command makes where they are missing.
+    makes: Vec<FileId>,
+}
+
+struct Given {
+    argument: &'static str,
+    path: PathBuf,
+    /// In a folder that the command makes, or in one in it.
+    in_folder: bool,
+}
+
+impl Paths {
+    /// Files that are read.
+    pub(crate) fn reads<P: Into<PathBuf>>(
+        mut self,
+        argument: &'static str,
+        paths: impl IntoIterator<Item = P>,
+    ) -> Self {
+        let given = |path: P| Given { argument, path: path.into(), in_folder: false };
+        self.reads.extend(paths.into_iter().map(given));
+        self
+    }
+
+    /// A vehicle file, and the weights that it names.
+    pub(crate) fn vehicle<'a>(
+        self,
+        argument: &'static str,
+        path: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Self {
+        path.into_iter().fold(self, |paths, file| {
+            // Where they are missing, others stand in for them.
+            let weights = VehicleFile::weights_path(file).filter(|weights| weights.is_file());
+            paths.reads(argument, [file]).reads("wing.parnn_weights of the vehicle", weights)
+        })
+    }
+
+    /// A scenario, where it is a file and not the name of a built-in one.
+    pub(crate) fn scenario(self, name: &str) -> Self {
+        self.reads(
+            "--scenario",
+            Some(name).filter(|name| Path::new(name).extension().is_some_and(|e| e == "toml")),
+        )
+    }
+
+    /// Flight logs, or folders of them.
+    ///
+    /// # Errors
+    /// A folder that cannot be read, or that holds none.
+    pub(crate) fn flights(self, argument: &'static str, paths: &[PathBuf]) -> Result<Self, String> {
+        Ok(self.reads(argument, log_files(paths)?))
+    }
+
+    /// Files that are written.
+    pub(crate) fn writes<'a>(
+        mut self,
+        argument: &'static str,
+        paths: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Self {
+        let given = |path: &PathBuf| Given { argument, path: path.clone(), in_folder: false };
+        self.writes.extend(paths.into_iter().map(given));
+        self
+    }
+
+    /// Files that are written into the folder of `--out`.
+    pub(crate) fn writes_into<N: AsRef<Path>>(
+        mut self,
+        folder: &Path,
+        names: impl IntoIterator<Item = N>,
+    ) -> Self {
+        let given = |name: N| Given { argument: "--out", path: folder.join(name), in_folder: true };
+        self.writes.extend(names.into_iter().map(given));
+        self.makes.extend(FileId::read(folder));
+        self
+    }
+
+    /// Whether the command may begin.
+    ///
+    /// # Errors
+    /// A result that would overwrite what is read, or another result; one that cannot be written, which nobody wants to learn after the work.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        let mut taken: BTreeMap<FileId, (&Given, &str)> = BTreeMap::new();
+        for input in &self.reads {
+            let id = FileId::read(&input.path);
+            taken.extend(id.map(|id| (id, (input, "what is read is never overwritten"))));
+        }
+        for result in &self.writes {
+            let ids = FileId::written(&result.path);
+            if let Some((other, why)) = ids.iter().find_map(|id| taken.get(id)) {
+                let (path, its) = (result.path.display(), other.path.display());
+                let (argument, other) = (result.argument, other.argument);
+                return Err(format!("{argument} {path}: would be written over {other} {its}; {why}"));
+            }
+            taken.extend(ids.into_iter().map(|id| (id, (result, "each result needs a file of its own"))));
+        }
+        self.writes
+            .iter()
+            .filter(|given| !self.is_yet_to_be(given))
+            .try_for_each(|given| writable(&given.path))
+    }
+
+    /// Whether a result's folder is missing, and the command makes it.
+    fn is_yet_to_be(&self, result: &Given) -> bool {
+        let Some(folder) = result.path.parent().filter(|folder| !folder.is_dir()) else { return false };
+        result.in_folder || FileId::read(folder).is_some_and(|id| self.makes.contains(&id))
+    }
+}
+
+/// Asks whether a result could be written.
+fn writable(path: &Path) -> Result<(), String> {
+    if path.is_dir() {
+        return Err(format!("{}: is a folder, must be a file", path.display()));
+    }
+    files::writable(path).map_err(|e| format!("{}: {e}", path.display()))
+}
