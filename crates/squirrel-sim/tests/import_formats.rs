@@ -1,16 +1,17 @@
-//! One flight written as CSV, Parquet, ULog and MCAP: it must come out the same, and damage must come out as an error.
+//! One flight written as CSV, Parquet, ULog, MCAP and a Crazyflie's micro-SD log: it must come out the same, and damage must
+//! come out as an error.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod import_support;
 
 use std::fmt::Write;
 
-use import_support::formats::{Cells, Ulog, mcap_bytes, parquet_bytes};
+use import_support::formats::{Cells, Ulog, Usd, mcap_bytes, parquet_bytes};
 use import_support::{Flight, OMEGA, one_source};
 use parquet::basic::Compression;
 
 const ROWS: i32 = 24;
-const FORMATS: [&str; 3] = ["f.parquet", "f.ulg", "f.mcap"];
+const FORMATS: [&str; 4] = ["f.parquet", "f.ulg", "f.mcap", "log00"];
 
 /// Time in us and three rates that are exact in `f32`; row 7 has a missing number.
 fn row(row: i32) -> (i64, [f32; 3]) {
@@ -68,10 +69,21 @@ fn mcap() -> Vec<u8> {
     mcap_bytes(&(0..ROWS).map(row).map(message).collect::<Vec<_>>(), 1000)
 }
 
+fn usd() -> Vec<u8> {
+    let mut log =
+        Usd::new(2, &[(0xffff, "gyro", &["x(f)", "y(f)", "z(f)"]), (0, "battery", &["pm.vbatMV(H)"])]);
+    for (t, rates) in (0..ROWS).map(row) {
+        log = log.record(0xffff, t.cast_unsigned(), &rates.map(f32::to_le_bytes).concat());
+        log = log.record(0, t.cast_unsigned(), &3700_u16.to_le_bytes());
+    }
+    log.finish()
+}
+
 /// A map of the flight in a file of some format.
 fn map(file: &str) -> String {
     let (topic, time, columns) = match file {
         "f.ulg" => ("topic = \"sensor_gyro\"", "timestamp", ["x", "y", "z"]),
+        "log00" => ("topic = \"gyro\"", "timestamp", ["x", "y", "z"]),
         "f.mcap" => ("topic = \"/imu\"", "stamp", ["gyro.x", "gyro.yz[0]", "gyro.yz[1]"]),
         _ => ("", "t", ["x", "y", "z"]),
     };
@@ -86,6 +98,7 @@ fn flight() -> Flight {
     flight.write("f.parquet", &parquet(Compression::UNCOMPRESSED));
     flight.write("f.ulg", &ulog());
     flight.write("f.mcap", &mcap());
+    flight.write("log00", &usd());
     flight
 }
 
@@ -135,7 +148,7 @@ fn a_prefix_of_a_file_is_an_error_or_a_shorter_flight() {
             }
         }
         assert!(errors > 0, "{file}");
-        // Only a ULog is read up to where it was cut: the others have their index at the end.
+        // Only a ULog is read up to where it was cut: the others have their index or a checksum at the end.
         assert_eq!(shorter > 0, file == "f.ulg", "{file}: {shorter}");
     }
 }
@@ -167,6 +180,7 @@ fn a_bad_file_is_one_line_that_says_what_is_wrong() {
         ("f.parquet", &b""[..], "f.parquet: empty file"),
         ("f.ulg", b"", "f.ulg: empty file"),
         ("f.mcap", b"", "f.mcap: empty file"),
+        ("log00", b"", "log00: empty file"),
         ("f.parquet", b"t,x,y,z\n0,1,2,3\n", "f.parquet: "),
         ("f.ulg", b"t,x,y,z\n0,1,2,3\n", "f.ulg: the first 7 bytes are not those of a ULog file"),
         ("f.mcap", b"t,x,y,z\n0,1,2,3\n", "f.mcap: the first 8 bytes are not those of an MCAP file"),
@@ -182,7 +196,8 @@ fn a_bad_file_is_one_line_that_says_what_is_wrong() {
         assert_eq!(
             flight.message(&flight.import(&one_source(OMEGA), &[file]).unwrap_err()),
             format!(
-                "{file}: import reads .csv, .parquet, .ulg (PX4) and .mcap (JSON messages), by the file's extension"
+                "{file}: import reads .csv, .parquet, .ulg (PX4) and .mcap (JSON messages), by the file's extension, and \
+                 Crazyflie micro-SD logs, by the first byte"
             )
         );
     }
@@ -210,6 +225,8 @@ fn a_map_that_asks_for_what_is_not_there_is_refused() {
         "f.ulg: no message of topic `sensor_baro`; nearest: sensor_gyro, battery"
     );
     assert_eq!(gone("f.mcap", "/imu", "/gps"), "f.mcap: no message of topic `/gps`; nearest: /imu");
+    assert_eq!(gone("log00", "gyro", "gyr"), "log00: no message of topic `gyr`; nearest: gyro, battery");
+    assert_eq!(gone("log00", "\"x\"", "\"t\""), "log00, topic `gyro`: no column `t`; nearest: x, y, z");
     assert_eq!(
         gone("f.ulg", "topic = \"sensor_gyro\"", ""),
         "map.toml: source 1, topic: missing: say which topic of `f.ulg`"

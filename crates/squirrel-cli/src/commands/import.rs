@@ -21,7 +21,8 @@ pub(crate) struct Import {
     /// Fly what a board wrote down its serial line again: inputs and outputs of its flight code.
     #[arg(long, conflicts_with_all = ["map", "recover"])]
     board: bool,
-    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages; with --board what the board wrote.
+    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages, Crazyflie micro-SD; with --board what the
+    /// board wrote.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.

@@ -77,9 +77,10 @@ pub enum ImportError {
         /// Path as given.
         path: String,
     },
-    /// No format has this extension.
+    /// No format has this extension, nor this first byte.
     #[error(
-        "{file}: import reads .csv, .parquet, .ulg (PX4) and .mcap (JSON messages), by the file's extension"
+        "{file}: import reads .csv, .parquet, .ulg (PX4) and .mcap (JSON messages), by the file's extension, and Crazyflie \
+         micro-SD logs, by the first byte"
     )]
     UnknownFormat {
         /// Path as given.

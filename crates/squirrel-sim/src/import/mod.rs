@@ -1,5 +1,6 @@
-//! Import of foreign flight logs: CSV, Parquet, ULog and MCAP files become a [`FlightLog`] in NED, FRD, SI and radians by
-//! a TOML map. The extension of a file says its format.
+//! Import of foreign flight logs: CSV, Parquet, ULog, MCAP and Crazyflie micro-SD files become a [`FlightLog`] in NED, FRD, SI
+//! and radians by a TOML map. The extension of a file says its format; a Crazyflie's log, which has none of its own, is known
+//! by its first byte.
 //!
 //! The map names, for each canonical channel, the columns, their scale and offset, their frame, and how time is written:
 //!
@@ -15,8 +16,8 @@
 //! "battery.voltage_v"             = { columns = ["vbat"], repeats = "forward_filled" }
 //! ```
 //!
-//! ULog files of PX4 (`.ulg`) and MCAP files with JSON messages (`.mcap`) have topics: a source reads one, its fields are
-//! the columns. `instance` counts the publishers of a ULog topic from 0.
+//! ULog files of PX4 (`.ulg`), MCAP files with JSON messages (`.mcap`) and the micro-SD logs of a Crazyflie have topics: a
+//! source reads one, its fields are the columns. `instance` counts the publishers of a ULog topic from 0.
 //!
 //! ```toml
 //! [[source]]
@@ -30,6 +31,11 @@
 //! topic = "/battery"
 //! time = { column = "log_time", unit = "ns" }   # MCAP's own time of a message; or a field of it
 //! channels = { "battery.voltage_v" = { columns = ["cells[0].voltage"] } }
+//! [[source]]
+//! file = "log00"
+//! topic = "fixedFrequency"              # an event type of the micro-SD log
+//! time = { column = "timestamp", unit = "us" }  # us in both versions of the format
+//! channels = { "battery.voltage_v" = { columns = ["pm.vbatMV"], scale = 0.001 } }
 //! ```
 //!
 //! - A number becomes `value * scale + offset` (each one number, or one a column) before frames are turned.
@@ -55,11 +61,14 @@ mod mask;
 mod mcap_file;
 mod meter;
 mod names;
+mod number;
 mod parquet_file;
 mod report;
 mod table;
 mod ulog_file;
 mod ulog_format;
+mod usd_file;
+mod usd_format;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;

@@ -1,6 +1,7 @@
 //! What every reader gives: the columns that a map asks for, as numbers, with the row of the file each came from.
 
 use std::fs;
+use std::io::{self, Read};
 use std::path::Path;
 
 use super::csv_file::CsvFile;
@@ -11,6 +12,8 @@ use super::meter::Meter;
 use super::names::nearest;
 use super::parquet_file::ParquetFile;
 use super::ulog_file::UlogFile;
+use super::usd_file::UsdFile;
+use super::usd_format::is_usd;
 
 /// A file, or a topic of one, whose column names are known and whose numbers are not read yet.
 pub(super) trait TableFile {
@@ -36,10 +39,49 @@ pub(super) struct Table {
     pub(super) bytes_cut: u64,
 }
 
-/// Opens the file of one `[[source]]`; its extension says the format.
+/// What a file is.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Format {
+    Csv,
+    Parquet,
+    Ulog,
+    Mcap,
+    /// Micro-SD log of a Crazyflie.
+    Usd,
+}
+
+/// The format of a file: by its extension, or by its first byte, for the logs of a Crazyflie are called `log00`.
 ///
 /// # Errors
-/// An unknown extension, `topic` or `instance` where the format has none or missing where it has, an unreadable or
+/// Neither says it, or the file cannot be read or is empty.
+fn format(path: &Path) -> Result<Format, ImportError> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
+    match extension.as_str() {
+        "csv" => return Ok(Format::Csv),
+        "parquet" => return Ok(Format::Parquet),
+        "ulg" => return Ok(Format::Ulog),
+        "mcap" => return Ok(Format::Mcap),
+        _ => {}
+    }
+    let file = path.display().to_string();
+    match first_byte(path) {
+        Ok(Some(first)) if is_usd(first) => Ok(Format::Usd),
+        Ok(Some(_)) => Err(ImportError::UnknownFormat { file }),
+        Ok(None) => Err(ImportError::Empty { file }),
+        Err(source) => Err(ImportError::Read { file, source }),
+    }
+}
+
+fn first_byte(path: &Path) -> io::Result<Option<u8>> {
+    let mut first = Vec::new();
+    fs::File::open(path)?.take(1).read_to_end(&mut first)?;
+    Ok(first.first().copied())
+}
+
+/// Opens the file of one `[[source]]`.
+///
+/// # Errors
+/// An unknown format, `topic` or `instance` where the format has none or missing where it has, an unreadable or
 /// empty file, a damaged header, a missing topic.
 pub(super) fn open<'a>(
     map: &ImportMap,
@@ -54,34 +96,34 @@ pub(super) fn open<'a>(
         field: format!("source {}, {key}", index + 1),
         problem,
     };
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let (has_topics, has_instances) = match extension.as_str() {
-        "csv" | "parquet" => (false, false),
-        "mcap" => (true, false),
-        "ulg" => (true, true),
-        _ => return Err(ImportError::UnknownFormat { file }),
-    };
-    if source.instance.is_some() && !has_instances {
+    let format = format(path)?;
+    if source.instance.is_some() && format != Format::Ulog {
         return Err(topic_error("instance", format!("means nothing for `{file}`: leave it out")));
     }
-    let topic = match (&source.topic, has_topics) {
-        (Some(topic), true) => topic,
-        (None, true) => return Err(topic_error("topic", format!("missing: say which topic of `{file}`"))),
-        (Some(_), false) => {
-            return Err(topic_error("topic", format!("means nothing for `{file}`: leave it out")));
+    let has_topics = !matches!(format, Format::Csv | Format::Parquet);
+    if source.topic.is_some() && !has_topics {
+        return Err(topic_error("topic", format!("means nothing for `{file}`: leave it out")));
+    }
+    let topic = match &source.topic {
+        None if has_topics => {
+            return Err(topic_error("topic", format!("missing: say which topic of `{file}`")));
         }
-        (None, false) if extension == "csv" => return Ok(Box::new(CsvFile::open(path, meter)?)),
-        (None, false) => return Ok(Box::new(ParquetFile::open(path, meter)?)),
+        topic => topic.as_deref().unwrap_or_default(),
     };
-    let bytes = fs::read(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
-    if bytes.is_empty() {
-        return Err(ImportError::Empty { file });
-    }
-    if has_instances {
-        let instance = source.instance.unwrap_or(0);
-        return Ok(Box::new(UlogFile::open(&file, bytes, topic, instance, meter)?));
-    }
-    Ok(Box::new(McapFile::open(&file, &bytes, topic, meter)?))
+    let whole = || match fs::read(path) {
+        Ok(bytes) if bytes.is_empty() => Err(ImportError::Empty { file: file.clone() }),
+        Ok(bytes) => Ok(bytes),
+        Err(source) => Err(ImportError::Read { file: file.clone(), source }),
+    };
+    Ok(match format {
+        Format::Csv => Box::new(CsvFile::open(path, meter)?),
+        Format::Parquet => Box::new(ParquetFile::open(path, meter)?),
+        Format::Ulog => {
+            Box::new(UlogFile::open(&file, whole()?, topic, source.instance.unwrap_or(0), meter)?)
+        }
+        Format::Mcap => Box::new(McapFile::open(&file, &whole()?, topic, meter)?),
+        Format::Usd => Box::new(UsdFile::open(&file, whole()?, topic, meter)?),
+    })
 }
 
 impl Table {

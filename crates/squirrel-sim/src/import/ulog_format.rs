@@ -4,6 +4,8 @@
 
 use std::collections::BTreeMap;
 
+use super::number::{Column, Kind};
+
 /// Longest message that the format can frame, bytes.
 const MESSAGE_MAX_BYTES: usize = u16::MAX as usize;
 /// Deeper nesting than any vehicle logs; bounds the recursion.
@@ -16,27 +18,6 @@ pub(super) struct Layout {
     pub(super) size: usize,
     /// Bytes of a message without the padding at its end, which need not be logged.
     pub(super) size_logged: usize,
-}
-
-/// One number of a message.
-pub(super) struct Column {
-    pub(super) name: String,
-    offset: usize,
-    kind: Kind,
-}
-
-#[derive(Clone, Copy)]
-enum Kind {
-    I8,
-    U8,
-    I16,
-    U16,
-    I32,
-    U32,
-    I64,
-    U64,
-    F32,
-    F64,
 }
 
 impl Layout {
@@ -76,8 +57,8 @@ impl Layout {
             for i in 0..count.unwrap_or(1) {
                 let index = if count.is_some() { format!("[{i}]") } else { String::new() };
                 let start = self.size;
-                if let Some((kind, size)) = primitive(kind) {
-                    self.size += size;
+                if let Some(kind) = primitive(kind) {
+                    self.size += kind.size();
                     if !name.starts_with("_padding") {
                         let name = format!("{prefix}{name}{index}");
                         self.columns.push(Column { name, offset: start, kind });
@@ -100,40 +81,20 @@ impl Layout {
     }
 }
 
-fn primitive(name: &str) -> Option<(Kind, usize)> {
+fn primitive(name: &str) -> Option<Kind> {
     Some(match name {
-        "int8_t" => (Kind::I8, 1),
-        "uint8_t" | "bool" | "char" => (Kind::U8, 1),
-        "int16_t" => (Kind::I16, 2),
-        "uint16_t" => (Kind::U16, 2),
-        "int32_t" => (Kind::I32, 4),
-        "uint32_t" => (Kind::U32, 4),
-        "int64_t" => (Kind::I64, 8),
-        "uint64_t" => (Kind::U64, 8),
-        "float" => (Kind::F32, 4),
-        "double" => (Kind::F64, 8),
+        "int8_t" => Kind::I8,
+        "uint8_t" | "bool" | "char" => Kind::U8,
+        "int16_t" => Kind::I16,
+        "uint16_t" => Kind::U16,
+        "int32_t" => Kind::I32,
+        "uint32_t" => Kind::U32,
+        "int64_t" => Kind::I64,
+        "uint64_t" => Kind::U64,
+        "float" => Kind::F32,
+        "double" => Kind::F64,
         _ => return None,
     })
-}
-
-impl Column {
-    /// The number in a message; NaN if the message is too short for it.
-    pub(super) fn number(&self, message: &[u8]) -> f64 {
-        let Some(bytes) = message.get(self.offset..) else { return f64::NAN };
-        match self.kind {
-            Kind::I8 => bytes.first_chunk().map(|&b| f64::from(i8::from_le_bytes(b))),
-            Kind::U8 => bytes.first_chunk().map(|&b| f64::from(u8::from_le_bytes(b))),
-            Kind::I16 => bytes.first_chunk().map(|&b| f64::from(i16::from_le_bytes(b))),
-            Kind::U16 => bytes.first_chunk().map(|&b| f64::from(u16::from_le_bytes(b))),
-            Kind::I32 => bytes.first_chunk().map(|&b| f64::from(i32::from_le_bytes(b))),
-            Kind::U32 => bytes.first_chunk().map(|&b| f64::from(u32::from_le_bytes(b))),
-            Kind::I64 => bytes.first_chunk().map(|&b| i64::from_le_bytes(b) as f64),
-            Kind::U64 => bytes.first_chunk().map(|&b| u64::from_le_bytes(b) as f64),
-            Kind::F32 => bytes.first_chunk().map(|&b| f64::from(f32::from_le_bytes(b))),
-            Kind::F64 => bytes.first_chunk().map(|&b| f64::from_le_bytes(b)),
-        }
-        .unwrap_or(f64::NAN)
-    }
 }
 
 #[cfg(test)]

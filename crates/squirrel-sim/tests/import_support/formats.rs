@@ -138,3 +138,46 @@ pub(crate) fn mcap_bytes(messages: &[McapMessage<'_>], chunk_bytes: u64) -> Vec<
     drop(writer);
     file.into_inner()
 }
+
+/// A micro-SD log of a Crazyflie, without its CRC.
+pub(crate) struct Usd {
+    version: u16,
+    bytes: Vec<u8>,
+}
+
+impl Usd {
+    /// * `events` - id, name and variables, such as `motor.m1(I)`, of each event type
+    pub(crate) fn new(version: u16, events: &[(u16, &str, &[&str])]) -> Self {
+        let count = |count: usize| u16::try_from(count).unwrap().to_le_bytes();
+        let mut bytes = vec![0xBC];
+        bytes.extend(version.to_le_bytes());
+        bytes.extend(count(events.len()));
+        for (id, name, variables) in events {
+            bytes.extend(id.to_le_bytes());
+            bytes.extend(name.as_bytes());
+            bytes.push(0);
+            bytes.extend(count(variables.len()));
+            for variable in *variables {
+                bytes.extend(variable.as_bytes());
+                bytes.push(0);
+            }
+        }
+        Self { version, bytes }
+    }
+
+    /// * `time` - ms in version 1, us in version 2
+    pub(crate) fn record(mut self, id: u16, time: u64, variables: &[u8]) -> Self {
+        self.bytes.extend(id.to_le_bytes());
+        let time = time.to_le_bytes();
+        self.bytes.extend(if self.version == 1 { &time[..4] } else { &time });
+        self.bytes.extend(variables);
+        self
+    }
+
+    /// With the CRC at the end.
+    pub(crate) fn finish(mut self) -> Vec<u8> {
+        let crc = crc32fast::hash(&self.bytes);
+        self.bytes.extend(crc.to_le_bytes());
+        self.bytes
+    }
+}
