@@ -191,7 +191,7 @@ fn no_two_results_go_into_one_file() {
         ("--out new --json new/report.html", ["--out", "--json"]),
         ("export-vectors f/a.mcap --out new --json new/vectors.bin", ["--out", "--json"]),
         ("gap run --vehicle v.toml --flights f --out new --json new/v.toml", ["--out", "--json"]),
-        ("study thrust --out new --json new/thrust.json", ["--out", "--json"]),
+        ("study thrust --out new --json new/thrust.csv", ["--out", "--json"]),
         ("study merge part1 part2 --out new --json new/thrust.trials.jsonl", ["--out", "--json"]),
     ] {
         let words: Vec<&str> = command.split_whitespace().collect();
@@ -238,6 +238,17 @@ fn json_may_go_into_the_folder_that_is_yet_to_be_made_and_into_no_other() {
         assert!(folder.0.join(out).join("j.json").is_file(), "{command}");
     }
     folder.fails(&["study", "faults", "--out", "e", "--json", "nowhere/j.json"], &["nowhere/j.json"]);
+}
+
+/// `--json` may name the file in which the folder has the same bytes.
+#[test]
+fn the_figures_that_the_folder_has_too_may_be_asked_for_there() {
+    let folder = with_inputs("same-json");
+    folder.succeeds(&["study", "faults", "--trials", "1", "--out", "a", "--json", "a/faults.json"]);
+    folder.succeeds(&["study", "faults", "--trials", "1", "--out", "b", "--json", "b.json"]);
+    let read = |name: &str| fs::read(folder.0.join(name)).unwrap();
+    assert_eq!(read("a/faults.json"), read("b.json"));
+    assert_eq!(read("b/faults.json"), read("b.json"));
 }
 
 /// What comes through a pipe is there once.

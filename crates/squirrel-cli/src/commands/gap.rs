@@ -101,11 +101,12 @@ impl Gap {
 }
 
 impl Given {
-    /// Whether a step may begin that writes these files into the folder.
+    /// Whether a step may begin that writes these files into the folder, the last of them what `--json` has, too.
     fn check(&self, names: &[&OsStr]) -> Result<(), String> {
         let reads =
             Paths::default().vehicle("--vehicle", [&self.vehicle]).flights("--flights", &self.flights)?;
-        let mut paths = reads.flights("--held-out", &self.held_out)?.writes("--json", &self.json);
+        let kept = self.out.as_ref().zip(names.last()).map(|(folder, name)| folder.join(name));
+        let mut paths = reads.flights("--held-out", &self.held_out)?.writes_json(self.json.as_ref(), kept);
         if let Some(folder) = &self.out {
             paths = paths.writes_into(folder, names);
         }

@@ -94,7 +94,9 @@ impl Common {
             return Err("--json: a part of a study has no figures; merge the parts first".to_owned());
         }
         check_trials(trials).map_err(|e| e.to_string())?;
-        let mut paths = Paths::default().vehicle("--vehicle", &self.vehicle).writes("--json", &self.json);
+        let kept = self.out.as_ref().map(|folder| folder.join(format!("{name}.json")));
+        let paths = Paths::default().vehicle("--vehicle", &self.vehicle);
+        let mut paths = paths.writes_json(self.json.as_ref(), kept);
         if let Some(folder) = &self.out {
             let names = ["csv", "json", "html", "trials.jsonl"].map(|kind| format!("{name}.{kind}"));
             paths = paths.writes_into(folder, names.into_iter().chain(others));
