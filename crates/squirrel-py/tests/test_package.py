@@ -32,7 +32,9 @@ def python_blocks(page: Path) -> list[str]:
 
 
 def run(*arguments: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(list(map(str, arguments)), cwd=cwd, capture_output=True, text=True, check=False)
+    # Dask's processes wait 30 s for each other, which is little on a busy machine.
+    environment = os.environ | {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "600s"}
+    return subprocess.run(list(map(str, arguments)), cwd=cwd, env=environment, capture_output=True, text=True, check=False)
 
 
 def test_the_installed_package_is_tested() -> None:
