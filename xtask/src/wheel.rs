@@ -2,7 +2,7 @@
 //!
 //! The wheel is built in the release profile and the target folder of everything else, and installed into a virtual
 //! environment of its own. The tests then see nothing but that environment: they check arguments, bits, threads, types and
-//! stubs, run the lines of the README and the examples, and install the wheel once more where nothing is.
+//! stubs, run the lines of the README, the guide and the examples, and install the wheel once more where nothing is.
 
 use crate::python;
 use crate::run::{call, cargo, root, target_directory};
