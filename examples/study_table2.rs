@@ -3,7 +3,7 @@
 //! Models learn from the specific force in random flights with spread wings and are judged on four other sets: faster and in wind (t1), as in
 //! training (t2), in wind (t3), slowly (t4). Errors are to the true force, which only a simulator knows, and to the labels, which
 //! is all that a flight has. Five passes of one trial show who learns fast: look at the models that correct the flat plate (`parnn`,
-//! `scaled_flat_plate`) beside those that learn a force from nothing. What 800 passes make of them is in the README.
+//! `scaled_flat_plate`) beside those that learn a force from nothing. What 800 passes make of them is in docs/guide/learn.md.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example study_table2

@@ -74,6 +74,22 @@ pub(crate) fn batch_gate(_: &[String]) -> Result<(), String> {
     call(cargo()?.args(["run", "--release", "--locked", "-p", "squirrel-sim", "--example", "batch_gate"]))
 }
 
+/// `cargo xtask pictures`: what the README shows, as the program flies it now.
+pub(crate) fn pictures(_: &[String]) -> Result<(), String> {
+    let example = [
+        "run",
+        "--release",
+        "--locked",
+        "-p",
+        "squirrel-sim",
+        "--example",
+        "pictures",
+        "--",
+        "docs/pictures",
+    ];
+    call(cargo()?.args(example))
+}
+
 /// `cargo xtask gap-bench`: the blind bench of the gap workflow on the program as it is built now.
 pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
     call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli", "-p", "hidden-effects"]))?;

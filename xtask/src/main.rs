@@ -17,7 +17,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 11] = [
+const CHORES: [Chore; 12] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
@@ -58,6 +58,7 @@ const CHORES: [Chore; 11] = [
         "draw a report with a headless Chromium; without a file, the gap report of a hidden effect",
         png::chore,
     ),
+    ("pictures", "", "fly the README's picture again, into docs/pictures", chores::pictures),
     (
         "clean-fresh",
         "",

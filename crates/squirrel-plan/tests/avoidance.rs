@@ -1,4 +1,4 @@
-//! Two hundred random avoidance tasks: how many are solved, how long it takes, and that what is planned is a motion that the vehicle can
+//! Two hundred random avoidance tasks: how many are solved, how much work it is, and that what is planned is a motion that the vehicle can
 //! make.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -8,7 +8,6 @@ mod tasks;
 use nalgebra::Vector3;
 use squirrel_plan::trajectory::{Craft, Plan, Planner, Status, Task};
 use squirrel_plan::wing::WingModel;
-use std::time::Instant;
 use tasks::{Draw, craft, random};
 
 /// The flat plate and the drag of the shipped squirrel, written down a second time.
@@ -63,30 +62,39 @@ fn check(craft: &Craft, task: &Task, plan: &Plan) {
     }
 }
 
+/// The middle and the largest of what plans took.
+fn middle_and_most(mut counts: Vec<u32>) -> (u32, u32) {
+    counts.sort_unstable();
+    (counts[counts.len() / 2], counts[counts.len() - 1])
+}
+
+/// Work is counted: the same on a fast machine and on a busy one; `benches/plan.rs` has the time. Measured: 6 problems and 65 to 73
+/// iterations in the middle; at most 18 to 22 and 257 to 330 with wings, 13 or 14 and 177 to 189 without.
 #[test]
-#[allow(clippy::disallowed_methods, reason = "how long it takes is the question")]
-fn ninety_five_of_a_hundred_are_solved_within_fifty_milliseconds() {
+fn ninety_five_of_a_hundred_are_solved_within_a_bounded_number_of_iterations() {
     for ratio in [1.2, 1.5, 2.0] {
         for wing in [Some(WingModel::Flat), None] {
             let (craft, mut draw) = (craft(ratio, wing), Draw(1));
-            let (mut took_ms, mut solved) = (Vec::new(), 0);
+            let (mut problems, mut iterations, mut solved) = (Vec::new(), Vec::new(), 0);
             for _ in 0..200 {
                 let task = random(&craft, &mut draw);
-                let begin = Instant::now();
                 let plan = Planner::default().plan(&craft, &task, None);
-                took_ms.push(begin.elapsed().as_secs_f64() * 1e3);
+                problems.push(plan.iterations);
+                iterations.push(plan.solver_iterations);
                 if plan.status == Status::Solved {
                     solved += 1;
                     check(&craft, &task, &plan);
                 }
             }
-            took_ms.sort_by(f64::total_cmp);
+            let (problems, iterations) = (middle_and_most(problems), middle_and_most(iterations));
             println!(
-                "T/W {ratio}, wings {wing:?}: {solved} of 200 solved; {:.1} ms in the middle, {:.1} ms of nine in ten, {:.1} ms at most",
-                took_ms[100], took_ms[180], took_ms[199]
+                "T/W {ratio}, wings {wing:?}: {solved} of 200 solved; {problems:?} problems, {iterations:?} iterations, middle and most"
             );
             assert!(solved >= 190, "{solved} of 200 at {ratio}");
-            assert!(took_ms[100] <= 50.0, "median {} ms", took_ms[100]);
+            // Half as much again as was measured: room for another target's rounding, none for twice the work.
+            let most = if wing.is_some() { (33, 480) } else { (21, 280) };
+            assert!(problems.0 <= 9 && problems.1 <= most.0, "{problems:?} problems at {ratio}");
+            assert!(iterations.0 <= 105 && iterations.1 <= most.1, "{iterations:?} iterations at {ratio}");
         }
     }
 }

@@ -4,8 +4,9 @@
 
 use proptest::prelude::*;
 use squirrel_sim::report::chart::{
-    Axis, BINS, Ink, LARGEST, LineChart, Range, Scale, Series, Track, TrackChart, Values, escape,
+    Axis, BINS, Ink, LARGEST, LineChart, Note, Range, Scale, Series, Svg, Track, TrackChart, Values, escape,
 };
+use squirrel_sim::report::picture::picture;
 
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![any::<f64>(), -1e3..1e3, Just(0.0), Just(f64::NAN), Just(f64::INFINITY), Just(f64::MAX)]
@@ -144,6 +145,7 @@ fn colour_grows_with_the_value_and_is_grey_without_one() {
             marks: Vec::new(),
         }],
         obstacles: Vec::new(),
+        notes: Vec::new(),
     };
     let svg = chart.svg();
     let classes = svg.as_str().split("class=\"track ").skip(1).map(|p| p.split('"').next().unwrap());
@@ -170,6 +172,7 @@ fn equal_scales_are_equal() {
                 marks: Vec::new(),
             }],
             obstacles: Vec::new(),
+            notes: Vec::new(),
         };
         let svg = chart.svg();
         let d = svg.as_str().split("<path class=\"line s0\" d=\"").nth(1).unwrap().split('"').next().unwrap();
@@ -179,6 +182,52 @@ fn equal_scales_are_equal() {
         assert!((dx * north - dy * east).abs() <= 0.2 * (north + east), "{east} {north}: {d}");
         assert!(n.iter().all(|v| (0.0..=600.0).contains(v)), "{d}");
     }
+}
+
+/// A plot of two pixels a unit with these notes.
+fn noted(notes: Vec<Note>) -> Svg {
+    TrackChart {
+        label: "a < b".to_owned(),
+        width: 260.0,
+        plot_height: Some(200.0),
+        x: Axis::new("east", "m").with_range(Range::Exact(0.0, 100.0)),
+        y: Axis::new("height", "m").with_range(Range::Exact(0.0, 100.0)),
+        values: None,
+        tracks: Vec::new(),
+        obstacles: Vec::new(),
+        notes,
+    }
+    .svg()
+}
+
+#[test]
+fn a_note_stands_beside_its_point() {
+    let note = |at, ends| Note { at, text: "pc & others".to_owned(), ink: Ink::Series(3), ends };
+    let svg = noted(vec![note([50.0, 50.0], false), note([50.0, 0.0], true), note([f64::NAN, 0.0], true)]);
+    let texts: Vec<_> = svg.as_str().split("<text class=\"note s3\"").skip(1).collect();
+    assert_eq!(texts.len(), 2, "{}", svg.as_str());
+    // The plot begins 46 px from the left and 38 px from the top.
+    assert!(
+        texts[0].starts_with(" x=\"154\" y=\"142\" text-anchor=\"start\">pc &amp; others</text>"),
+        "{}",
+        texts[0]
+    );
+    assert!(texts[1].starts_with(" x=\"138\" y=\"242\" text-anchor=\"end\">"), "{}", texts[1]);
+}
+
+#[test]
+fn a_picture_needs_nothing_else_and_is_light() {
+    let drawing = noted(Vec::new());
+    let [width, height] = drawing.size();
+    let text = picture("left & right", &["first", "second"], &[drawing.clone(), drawing]);
+    assert!(text.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"576\" "), "{}", &text[..200]);
+    assert_eq!(
+        text.matches(&format!("<svg width=\"{width}\" height=\"{height}\" class=\"chart\"")).count(),
+        2
+    );
+    assert!(text.contains(">left &amp; right</text>") && text.contains(">second</text>"));
+    assert!(text.contains("--s0: #0072b2") && !text.contains("@media"));
+    assert!(!text.contains("href") && !text.contains("url("), "loads something");
 }
 
 #[test]

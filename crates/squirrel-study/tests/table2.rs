@@ -1,4 +1,4 @@
-//! What Table II shows, on fewer trials than the README states.
+//! What Table II shows, on fewer trials than docs/guide/learn.md states.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test may panic and print figures")]
 

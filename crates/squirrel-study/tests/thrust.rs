@@ -1,4 +1,4 @@
-//! What the studies of the avoidance manoeuvre show, on the trials that the README states.
+//! What the studies of the avoidance manoeuvre show, on the trials that docs/guide/what-holds.md states.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

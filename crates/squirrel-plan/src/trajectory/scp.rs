@@ -41,6 +41,13 @@ impl Default for Planner {
     }
 }
 
+/// What a plan took.
+#[derive(Default)]
+struct Work {
+    problems: u32,
+    solver_iterations: u32,
+}
+
 /// An iterate and what it costs.
 struct Held {
     iterate: Iterate,
@@ -56,16 +63,16 @@ impl Planner {
     ///
     /// * `warm` - an earlier plan, and how much of it has passed, s
     pub fn plan(&self, craft: &Craft, task: &Task, warm: Option<(&Track, f64)>) -> Plan {
-        let mut iterations = 0;
-        let mut held = self.begin(craft, task, warm, &mut iterations);
-        self.improve(craft, task, false, self.iterations_max, &mut held, &mut iterations);
+        let mut work = Work::default();
+        let mut held = self.begin(craft, task, warm, &mut work);
+        self.improve(craft, task, false, self.iterations_max, &mut held, &mut work);
         // As many rounds for a craft without wings: what wings are worth is not what more rounds are.
         (held.is_settled, held.trust_n) = (false, held.trust_n.max(WARM_TRUST_N));
-        self.improve(craft, task, true, self.iterations_max, &mut held, &mut iterations);
-        self.finish(task, held, iterations)
+        self.improve(craft, task, true, self.iterations_max, &mut held, &mut work);
+        self.finish(task, held, &work)
     }
 
-    fn finish(&self, task: &Task, held: Held, iterations: u32) -> Plan {
+    fn finish(&self, task: &Task, held: Held, work: &Work) -> Plan {
         let Iterate { controls, path, .. } = held.iterate;
         let (cost, _) = self.weights.cost(task, &path, &controls);
         let depths = path.windows(2).map(|pair| task.violation_m(&pair[0], &pair[1]));
@@ -86,11 +93,12 @@ impl Planner {
             wing: *wing,
         };
         let track = Track::even(task.step_s(), path.iter().zip(&controls).map(point).collect());
-        Plan { status, track, cost, violation_m, overspeed_m_s, iterations }
+        let (iterations, solver_iterations) = (work.problems, work.solver_iterations);
+        Plan { status, track, cost, violation_m, overspeed_m_s, iterations, solver_iterations }
     }
 
     /// The best of a few first guesses.
-    fn begin(&self, craft: &Craft, task: &Task, warm: Option<(&Track, f64)>, iterations: &mut u32) -> Held {
+    fn begin(&self, craft: &Craft, task: &Task, warm: Option<(&Track, f64)>, work: &mut Work) -> Held {
         let controls = first_controls(craft, task, warm);
         let told = warm.and_then(|(track, passed_s)| track.at(passed_s));
         let told = told.map_or(controls[0].0, |point| craft.limited(&-point.thrust));
@@ -113,7 +121,7 @@ impl Planner {
         let mut best: Option<Held> = None;
         for sides in guesses(task, &base) {
             let mut next = held(sides);
-            self.improve(craft, task, false, TRIAL, &mut next, iterations);
+            self.improve(craft, task, false, TRIAL, &mut next, work);
             if best.as_ref().is_none_or(|best| next.merit < best.merit) {
                 best = Some(next);
             }
@@ -128,7 +136,7 @@ impl Planner {
         may_spread: bool,
         most: u32,
         held: &mut Held,
-        iterations: &mut u32,
+        work: &mut Work,
     ) {
         let start = (task.begin().position, task.begin().velocity);
         for _ in 0..most {
@@ -143,8 +151,8 @@ impl Planner {
                 trust_n: held.trust_n,
                 may_spread,
             };
-            *iterations += 1;
-            let Some((controls, foreseen)) = problem.solve() else {
+            work.problems += 1;
+            let Some((controls, foreseen)) = problem.solve(&mut work.solver_iterations) else {
                 held.trust_n *= 0.5;
                 continue;
             };

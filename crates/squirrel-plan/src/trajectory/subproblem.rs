@@ -157,7 +157,9 @@ impl Subproblem<'_> {
     }
 
     /// Controls, and where the linear model takes them to lead; `None` where Clarabel finds no solution, which only numbers out of all proportion bring about.
-    pub(super) fn solve(&self) -> Option<(Vec<Control>, Vec<Motion>)> {
+    ///
+    /// * `iterations` - grows by those of Clarabel
+    pub(super) fn solve(&self, iterations: &mut u32) -> Option<(Vec<Control>, Vec<Motion>)> {
         let nodes = self.nodes();
         let (p, q) = self.cost();
         let mut rows = Rows::default();
@@ -181,6 +183,7 @@ impl Subproblem<'_> {
         };
         let mut solver = DefaultSolver::new(&p, &q, &a, &rows.b, &cones, settings).ok()?;
         solver.solve();
+        *iterations += solver.solution.iterations;
         let usable = matches!(
             solver.solution.status,
             SolverStatus::Solved

@@ -193,4 +193,6 @@ pub struct Plan {
     pub overspeed_m_s: f64,
     /// Convex problems that were solved.
     pub iterations: u32,
+    /// Iterations of the solver in all of them: what a plan takes, whatever machine makes it.
+    pub solver_iterations: u32,
 }

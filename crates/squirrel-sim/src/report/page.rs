@@ -2,7 +2,8 @@
 
 use super::chart::{Ink, Svg, escape};
 
-const STYLE: &str = include_str!("page.css");
+const STYLE: &str =
+    concat!(include_str!("colours.css"), include_str!("charts.css"), include_str!("page.css"));
 const SCRIPT: &str = include_str!("page.js");
 
 /// How many figures stand side by side on a wide screen; narrow screens take fewer.

@@ -171,6 +171,7 @@ impl Maps<'_> {
                 plain(Ink::Reference, through),
             ],
             obstacles: Vec::new(),
+            notes: Vec::new(),
             values: Some(self.values.clone()),
         }
         .svg()

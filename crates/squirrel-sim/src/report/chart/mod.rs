@@ -36,5 +36,5 @@ pub use rows::{ChartRow, Dot, Extent, RowChart};
 pub use scale::{LARGEST, Scale, drawable};
 pub use scene::{Cylinder, Scene, SceneTrack};
 pub use svg::{Svg, escape};
-pub use track::{Obstacle, Track, TrackChart};
+pub use track::{Note, Obstacle, Track, TrackChart};
 pub use wheel::{Wheel, WheelLine};

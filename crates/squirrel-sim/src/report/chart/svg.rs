@@ -5,13 +5,21 @@ use std::fmt::Write as _;
 use super::scale::drawable;
 
 /// A finished drawing: an `<svg>` element that can stand inside an HTML page.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Svg(String);
+#[derive(Debug, Clone, PartialEq)]
+pub struct Svg {
+    text: String,
+    size: [f64; 2],
+}
 
 impl Svg {
+    /// Width and height, px.
+    pub fn size(&self) -> [f64; 2] {
+        self.size
+    }
+
     /// The element as text.
     pub fn as_str(&self) -> &str {
-        &self.0
+        &self.text
     }
 }
 
@@ -170,12 +178,14 @@ impl Canvas {
 
     /// The finished drawing; `attributes` goes into the `<svg>` tag and is already safe.
     pub(super) fn finish(self, class: &str, label: &str, attributes: &str) -> Svg {
-        let (width, height, label) = (px(self.width), px(self.height), escape(label));
+        let size = [self.width, self.height];
+        let ([width, height], label) = (size.map(px), escape(label));
         let space = if attributes.is_empty() { "" } else { " " };
-        Svg(format!(
+        let text = format!(
             "<svg class=\"{class}\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{label}\"{space}{attributes}>\
              {}</svg>\n",
             self.body
-        ))
+        );
+        Svg { text, size }
     }
 }

@@ -42,6 +42,19 @@ pub enum Obstacle {
     },
 }
 
+/// A word at a point, in the colour of what it names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Note {
+    /// Where it begins, or ends, in the units of the axes.
+    pub at: [f64; 2],
+    /// The word.
+    pub text: String,
+    /// Colour.
+    pub ink: Ink,
+    /// Ends at the point instead of beginning there.
+    pub ends: bool,
+}
+
 /// A track plot.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackChart {
@@ -59,6 +72,8 @@ pub struct TrackChart {
     pub tracks: Vec<Track>,
     /// Obstacles.
     pub obstacles: Vec<Obstacle>,
+    /// Words in the plot, in front of everything.
+    pub notes: Vec<Note>,
     /// What the colour measures; `None` if no track has values.
     pub values: Option<Values>,
 }
@@ -93,6 +108,13 @@ impl TrackChart {
         for track in &self.tracks {
             for mark in track.marks.iter().map(|m| plot.point(*m)).filter(|m| !m[0].is_nan()) {
                 canvas.circle(&format!("dot {}", track.ink.class()), mark, 3.2);
+            }
+        }
+        for note in &self.notes {
+            let [x, y] = plot.point(note.at);
+            let (anchor, x) = if note.ends { (Anchor::End, x - 8.0) } else { (Anchor::Start, x + 8.0) };
+            if x.is_finite() {
+                canvas.text(&format!("note {}", note.ink.class()), [x, y + 4.0], anchor, &note.text);
             }
         }
         canvas.text("axis", [4.0, 12.0], Anchor::Start, &self.y.title());

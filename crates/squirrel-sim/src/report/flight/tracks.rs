@@ -205,6 +205,7 @@ impl<'a> Tracks<'a> {
             y,
             tracks,
             obstacles,
+            notes: Vec::new(),
             values: self.values.clone(),
         }
         .svg()
