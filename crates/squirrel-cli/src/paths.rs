@@ -78,9 +78,9 @@ impl Paths {
     /// The figures, which `--out` may have, too: there both are one file with the same bytes, and may be.
     ///
     /// * `kept` - that file
-    pub(crate) fn writes_json(self, json: Option<&PathBuf>, kept: Option<PathBuf>) -> Self {
+    pub(crate) fn writes_json(self, json: Option<&PathBuf>, kept: Option<&PathBuf>) -> Self {
         let ids = |path: &PathBuf| FileId::written(path);
-        let kept = kept.as_ref().map(ids).unwrap_or_default();
+        let kept = kept.map(ids).unwrap_or_default();
         self.writes("--json", json.filter(|json| !ids(json).iter().any(|id| kept.contains(id))))
     }
 

@@ -106,7 +106,8 @@ impl Given {
         let reads =
             Paths::default().vehicle("--vehicle", [&self.vehicle]).flights("--flights", &self.flights)?;
         let kept = self.out.as_ref().zip(names.last()).map(|(folder, name)| folder.join(name));
-        let mut paths = reads.flights("--held-out", &self.held_out)?.writes_json(self.json.as_ref(), kept);
+        let mut paths =
+            reads.flights("--held-out", &self.held_out)?.writes_json(self.json.as_ref(), kept.as_ref());
         if let Some(folder) = &self.out {
             paths = paths.writes_into(folder, names);
         }

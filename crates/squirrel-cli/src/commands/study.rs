@@ -96,7 +96,7 @@ impl Common {
         check_trials(trials).map_err(|e| e.to_string())?;
         let kept = self.out.as_ref().map(|folder| folder.join(format!("{name}.json")));
         let paths = Paths::default().vehicle("--vehicle", &self.vehicle);
-        let mut paths = paths.writes_json(self.json.as_ref(), kept);
+        let mut paths = paths.writes_json(self.json.as_ref(), kept.as_ref());
         if let Some(folder) = &self.out {
             let names = ["csv", "json", "html", "trials.jsonl"].map(|kind| format!("{name}.{kind}"));
             paths = paths.writes_into(folder, names.into_iter().chain(others));
