@@ -1,6 +1,6 @@
 //! The picture of the README: `cargo xtask pictures`.
 //!
-//! Flies the manoeuvre of `squirrel demo` (scenario `avoid`, seed 1) and writes `avoidance.svg` into the folder that is its argument: the
+//! Flies the manoeuvre of `squirrel demo` (scenario `avoid`, seed 1) with a little less thrust, and writes `avoidance.svg` into the folder that is its argument: the
 //! tracks from above, and height over time. `twcc_plus` stands for `twcc_oracle`, whose track hides that of `twcc_flat`.
 
 use squirrel_sim::arm::Arm;
@@ -16,11 +16,12 @@ use std::path::PathBuf;
 /// Who flies, in which colour and under which name.
 const ARMS: [(Arm, Ink, &str); 3] = [
     (Arm::Pc, Ink::Series(1), "pc (wings folded)"),
-    (Arm::TwccFlat, Ink::Series(0), "twcc_flat (the paper's, wings)"),
-    (Arm::TwccPlus, Ink::Series(2), "twcc_plus (ours, wings)"),
+    (Arm::TwccFlat, Ink::Series(0), "twcc_flat (wings)"),
+    (Arm::TwccPlus, Ink::Series(2), "twcc_plus (wings, ours)"),
 ];
 /// Where their names stand beside the height over time: s, m above the height that was wanted, and whether the name ends there.
-const NAMES: [(f64, f64, bool); 3] = [(4.2, -2.0, true), (-0.8, 0.45, false), (-0.8, 0.78, false)];
+const NAMES: [(f64, f64, bool); 3] = [(3.3, -4.6, true), (3.4, -3.4, true), (-0.8, 0.9, false)];
+const THRUST_TO_WEIGHT: f64 = 1.2;
 const BEFORE_S: f64 = 1.0;
 const AFTER_S: f64 = 6.0;
 
@@ -63,7 +64,7 @@ fn seen_s(log: &FlightLog) -> Result<f64, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: pictures FOLDER")?);
-    let scenario = Scenario { seed: 1, ..Scenario::find("avoid")? };
+    let scenario = Scenario { seed: 1, thrust_to_weight: Some(THRUST_TO_WEIGHT), ..Scenario::find("avoid")? };
     let (mut paths, mut references, mut lost_m) = (Vec::new(), Vec::new(), Vec::new());
     for (arm, ..) in ARMS {
         let (vehicle, scenario) = (VehicleFile::squirrel(), scenario.clone());
@@ -79,7 +80,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     ];
     let lead = [
         "A quadrotor flies north at 7.3 m/s, sees an obstacle 4 m ahead and has to turn back by 110 to 130 deg.",
-        "Its rotors lift 1.25 times its weight. Simulated; a dot each second; the obstacle is seen but not solid.",
+        "Its rotors lift 1.2 times its weight. Simulated; a dot each second; the obstacle is seen but not solid.",
     ];
     let text = picture("The avoidance manoeuvre: with folded wings the drone sinks", &lead, &drawings);
     std::fs::create_dir_all(&folder)?;
@@ -131,7 +132,7 @@ fn height(reference: &Path, paths: &[Path], lost_m: &[f64], wanted_m: f64) -> Sv
         width: 405.0,
         plot_height: Some(250.0),
         x: Axis::new("time since the obstacle was seen", "s").with_range(Range::Exact(-BEFORE_S, AFTER_S)),
-        y: Axis::new("height", "m").with_range(Range::Including(wanted_m - 3.0, wanted_m + 1.0)),
+        y: Axis::new("height", "m").with_range(Range::Including(wanted_m - 6.0, wanted_m + 2.0)),
         // Their names stand in the plot.
         tracks: tracks.into_iter().map(|track| Track { name: String::new(), ..track }).collect(),
         obstacles: Vec::new(),
