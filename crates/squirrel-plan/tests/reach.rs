@@ -48,7 +48,7 @@ fn a_membrane_reaches_what_dense_sampling_finds() {
 #[test]
 fn a_learned_wing_reaches_what_dense_sampling_finds() {
     let wing = WingForce::of(&VehicleFile::squirrel(), WingModel::Parnn).unwrap();
-    let [gap, bound] = gaps(&wing, 500, 30, 12, 3);
+    let [gap, bound] = gaps(&wing, 500, 48, 16, 3);
     assert!(gap <= 1e-3 && bound <= 1e-3, "{gap:.1e} {bound:.1e}");
 }
 
