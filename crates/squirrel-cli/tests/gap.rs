@@ -115,13 +115,16 @@ fn what_is_added_leaves_the_file_as_it_was() {
     let folder = with_flights("gap-add");
     let before = folder.files();
     let patch = folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--dry-run"]].concat());
+    assert!(!patch.contains("vehicle with"), "{patch}");
     for line in ["+ [effects.motor_lag]", "+ extra_time_constant_s = { value = "] {
         assert!(patch.contains(line), "`{line}` is not in:\n{patch}");
     }
     assert!(!patch.lines().any(|line| line.starts_with("- ")), "{patch}");
     assert_eq!(folder.files(), before, "a dry run writes nothing");
 
-    folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--json", "v.json"]].concat());
+    let said =
+        folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--json", "v.json"]].concat());
+    assert!(said.contains("vehicle with motor_lag: out/squirrel.toml"), "{said}");
     let patched = fs::read_to_string(folder.0.join("out/squirrel.toml")).unwrap();
     assert!(holds_in_order(&patched, SQUIRREL), "every line and comment stays in its place");
     let more = patched.lines().count() - SQUIRREL.lines().count();
@@ -136,6 +139,20 @@ fn what_is_added_leaves_the_file_as_it_was() {
         ["gap", "name", "--vehicle", "out/squirrel.toml", "--flights", "train", "--json", "w.json"];
     folder.succeeds(&arguments);
     assert_eq!(json(&folder, "w.json")["verdict"], "none");
+
+    // A verdict without a name is an answer, but no patch: `add` fails with why, `run` says it.
+    let none = ["--vehicle", "out/squirrel.toml", "--flights", "train", "--out", "more", "--json", "w.json"];
+    let why = "squirrel: nothing to add: no effect is above its tolerance";
+    for dry_run in [&["--dry-run"][..], &[]] {
+        let output = folder.run(&[&["gap", "add"], &none[..], dry_run].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert_eq!(stderr.lines().last(), Some(format!("error: {why}").as_str()), "{stderr}");
+        assert_eq!(json(&folder, "w.json")["verdict"], "none");
+    }
+    let said = folder.succeeds(&[&["gap", "run"], &none[..]].concat());
+    assert!(said.lines().any(|line| line == why), "{said}");
+    assert!(!folder.0.join("more/squirrel.toml").exists(), "no patch");
 }
 
 #[test]

@@ -23,7 +23,7 @@ mod shrink;
 mod verdict;
 mod words;
 
-pub use add::{add, difference};
+pub use add::{add, difference, nothing_to_add};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
