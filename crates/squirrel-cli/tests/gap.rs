@@ -155,6 +155,41 @@ fn what_is_added_leaves_the_file_as_it_was() {
     assert!(!folder.0.join("more/squirrel.toml").exists(), "no patch");
 }
 
+/// What is outside of the catalogue still has effects in it, whose numbers hold with those that floated beside them.
+#[test]
+fn effects_are_shown_with_what_moved_beside_them() {
+    let folder = Folder::new("gap-moved");
+    let known = "value = [3.22e-3, 4.68e-3, 7.72e-3], sd = [3e-5, 5e-5, 8e-5]";
+    let vague = "value = [32.2e-3, 46.8e-3, 77.2e-3], sd = [3e-2, 5e-2, 8e-2]";
+    assert!(SQUIRREL.contains(known));
+    folder.write("squirrel.toml", &SQUIRREL.replacen(known, vague, 1));
+    folder.succeeds(&["fly", "--arm", "pc", "--scenario", "track", "--out", "f.mcap"]);
+    let mut light = FlightLog::read(&folder.0.join("f.mcap")).unwrap();
+    let force = light.source_mut("imu").channels.get_mut("specific_force_body_m_s2").unwrap();
+    force.values.iter_mut().for_each(|f| *f *= 0.7);
+    light.write(&folder.0.join("f.mcap")).unwrap();
+    let shown = folder.succeeds(&[
+        "gap",
+        "name",
+        "--vehicle",
+        "squirrel.toml",
+        "--flights",
+        "f.mcap",
+        "--json",
+        "v.json",
+    ]);
+    let verdict = json(&folder, "v.json");
+    assert_eq!(verdict["verdict"], "outside_catalogue");
+    let moved = verdict["moved"].as_array().unwrap();
+    assert!(moved.iter().any(|m| m["name"] == "inertia_error[x].inertia_fraction"), "{moved:?}");
+    for number in moved {
+        let [value, sd, tolerance] = ["value", "sd", "tolerance"].map(|key| number[key].as_f64().unwrap());
+        assert!(value != 0.0 && sd > 0.0 && tolerance > 0.0, "{number}");
+        assert!(shown.contains(number["name"].as_str().unwrap()), "{number} is not in:\n{shown}");
+    }
+    assert!(shown.contains("moved with them"), "{shown}");
+}
+
 #[test]
 fn the_vehicle_file_is_never_overwritten() {
     let folder = with_flights("gap-overwrite");

@@ -98,6 +98,7 @@ pub fn diagnose(
         let verdict = Verdict {
             verdict: Kind::DataProblem,
             effects: Vec::new(),
+            moved: Vec::new(),
             alternatives: Vec::new(),
             places,
             goes_with: Some(format!("{}: {}", problem.flight, problem.channel)),
@@ -229,9 +230,11 @@ fn decide(
         }
         _ => None,
     };
+    let moved = if effects.is_empty() { Vec::new() } else { search.moved(&found.best) };
     let mut verdict = Verdict {
         verdict: kind,
         effects,
+        moved,
         alternatives,
         places,
         goes_with,

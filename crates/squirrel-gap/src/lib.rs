@@ -29,5 +29,5 @@ pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::picture;
-pub use verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
+pub use verdict::{Alternative, Gap, Kind, Moved, NamedEffect, Value, Verdict};
 pub use words::significant;

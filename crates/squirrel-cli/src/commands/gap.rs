@@ -3,7 +3,7 @@
 use super::log_files;
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
-use squirrel_gap::{ClosedLoop, Diagnosis, Kind, NamedEffect, Value, Verdict, significant};
+use squirrel_gap::{ClosedLoop, Diagnosis, Kind, Moved, NamedEffect, Value, Verdict, significant};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -297,6 +297,9 @@ fn show(verdict: &Verdict) {
     if !verdict.effects.is_empty() {
         effects(&verdict.effects);
     }
+    if !verdict.moved.is_empty() {
+        moved(&verdict.moved);
+    }
     if !verdict.alternatives.is_empty() {
         let mut table = Table::new(&["other explanation", "nats"]);
         for other in &verdict.alternatives {
@@ -316,6 +319,18 @@ fn show(verdict: &Verdict) {
         say(&format!("\nwhat to fly:\n{card}"));
     }
     notes(&verdict.notes);
+}
+
+/// What moved with the effects: their numbers hold with these.
+fn moved(all: &[Moved]) {
+    let mut table = Table::new(&["moved with them", "value", "sd", "tolerance"]);
+    for number in all {
+        let mut row = vec![number.name.clone()];
+        row.extend([number.value, number.sd, number.tolerance].map(|x| significant(x, 3)));
+        table.row(row);
+    }
+    table.print();
+    say("");
 }
 
 /// Root mean square of simulated less measured position.

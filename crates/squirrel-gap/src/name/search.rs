@@ -27,7 +27,7 @@ const REFINED: usize = 4;
 const GIVEN_UP: f64 = 0.5;
 const GIVEN_UP_NATS: f64 = 30.0;
 /// Part of its tolerance by which a number must be off to act in the simulator's own model.
-const ACTS: f64 = 0.7;
+pub(super) const ACTS: f64 = 0.7;
 /// Most effects in a set.
 const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
