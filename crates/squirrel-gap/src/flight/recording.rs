@@ -14,6 +14,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Slowest IMU whose samples still describe what passes the filter, Hz.
 const RATE_MIN_HZ: f64 = 4.0 * CUTOFF_HZ;
+/// For so long a monitor of coarse steps may show a battery in flight without a change, s.
+const STUCK_MIN_S: f64 = 10.0;
 /// Shortest flight worth a number, s.
 const USABLE_MIN_S: f64 = 1.0;
 
@@ -75,7 +77,8 @@ impl<'a> Recording<'a> {
         let position = optional("gnss.position_ned_m", 3)?;
         let baro = optional("baro.altitude_m", 1)?;
         let voltage = optional("battery.voltage_v", 1)?;
-        let stuck_at_v = voltage.as_ref().and_then(Series::only_number);
+        let long = voltage.as_ref().filter(|voltage| voltage.duration_s() >= STUCK_MIN_S);
+        let stuck_at_v = long.and_then(Series::only_number);
         let voltage = voltage.filter(|_| stuck_at_v.is_none());
         let has_wings = vehicle.wing != WingPlant::None;
         let wing = if has_wings { optional("wing.command", 2)? } else { None };

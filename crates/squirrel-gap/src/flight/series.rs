@@ -130,6 +130,11 @@ impl Series {
         self.values.iter().all(|x| *x == first).then_some(first)
     }
 
+    /// From the first sample to the last, s.
+    pub(crate) fn duration_s(&self) -> f64 {
+        self.time_s[self.time_s.len() - 1] - self.time_s[0]
+    }
+
     /// Time of the first sample, s.
     pub(crate) fn start_s(&self) -> f64 {
         self.time_s[0]
