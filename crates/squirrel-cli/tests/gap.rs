@@ -115,13 +115,16 @@ fn what_is_added_leaves_the_file_as_it_was() {
     let folder = with_flights("gap-add");
     let before = folder.files();
     let patch = folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--dry-run"]].concat());
+    assert!(!patch.contains("vehicle with"), "{patch}");
     for line in ["+ [effects.motor_lag]", "+ extra_time_constant_s = { value = "] {
         assert!(patch.contains(line), "`{line}` is not in:\n{patch}");
     }
     assert!(!patch.lines().any(|line| line.starts_with("- ")), "{patch}");
     assert_eq!(folder.files(), before, "a dry run writes nothing");
 
-    folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--json", "v.json"]].concat());
+    let said =
+        folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--json", "v.json"]].concat());
+    assert!(said.contains("vehicle with motor_lag: out/squirrel.toml"), "{said}");
     let patched = fs::read_to_string(folder.0.join("out/squirrel.toml")).unwrap();
     assert!(holds_in_order(&patched, SQUIRREL), "every line and comment stays in its place");
     let more = patched.lines().count() - SQUIRREL.lines().count();
@@ -136,6 +139,55 @@ fn what_is_added_leaves_the_file_as_it_was() {
         ["gap", "name", "--vehicle", "out/squirrel.toml", "--flights", "train", "--json", "w.json"];
     folder.succeeds(&arguments);
     assert_eq!(json(&folder, "w.json")["verdict"], "none");
+
+    // A verdict without a name is an answer, but no patch: `add` fails with why, `run` says it.
+    let none = ["--vehicle", "out/squirrel.toml", "--flights", "train", "--out", "more", "--json", "w.json"];
+    let why = "squirrel: nothing to add: no effect is above its tolerance";
+    for dry_run in [&["--dry-run"][..], &[]] {
+        let output = folder.run(&[&["gap", "add"], &none[..], dry_run].concat());
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{stderr}");
+        assert_eq!(stderr.lines().last(), Some(format!("error: {why}").as_str()), "{stderr}");
+        assert_eq!(json(&folder, "w.json")["verdict"], "none");
+    }
+    let said = folder.succeeds(&[&["gap", "run"], &none[..]].concat());
+    assert!(said.lines().any(|line| line == why), "{said}");
+    assert!(!folder.0.join("more/squirrel.toml").exists(), "no patch");
+}
+
+/// What is outside of the catalogue still has effects in it, whose numbers hold with those that floated beside them.
+#[test]
+fn effects_are_shown_with_what_moved_beside_them() {
+    let folder = Folder::new("gap-moved");
+    let known = "value = [3.22e-3, 4.68e-3, 7.72e-3], sd = [3e-5, 5e-5, 8e-5]";
+    let vague = "value = [32.2e-3, 46.8e-3, 77.2e-3], sd = [3e-2, 5e-2, 8e-2]";
+    assert!(SQUIRREL.contains(known));
+    folder.write("squirrel.toml", &SQUIRREL.replacen(known, vague, 1));
+    folder.succeeds(&["fly", "--arm", "pc", "--scenario", "track", "--out", "f.mcap"]);
+    let mut light = FlightLog::read(&folder.0.join("f.mcap")).unwrap();
+    let force = light.source_mut("imu").channels.get_mut("specific_force_body_m_s2").unwrap();
+    force.values.iter_mut().for_each(|f| *f *= 0.7);
+    light.write(&folder.0.join("f.mcap")).unwrap();
+    let shown = folder.succeeds(&[
+        "gap",
+        "name",
+        "--vehicle",
+        "squirrel.toml",
+        "--flights",
+        "f.mcap",
+        "--json",
+        "v.json",
+    ]);
+    let verdict = json(&folder, "v.json");
+    assert_eq!(verdict["verdict"], "outside_catalogue");
+    let moved = verdict["moved"].as_array().unwrap();
+    assert!(moved.iter().any(|m| m["name"] == "inertia_error[x].inertia_fraction"), "{moved:?}");
+    for number in moved {
+        let [value, sd, tolerance] = ["value", "sd", "tolerance"].map(|key| number[key].as_f64().unwrap());
+        assert!(value != 0.0 && sd > 0.0 && tolerance > 0.0, "{number}");
+        assert!(shown.contains(number["name"].as_str().unwrap()), "{number} is not in:\n{shown}");
+    }
+    assert!(shown.contains("moved with them"), "{shown}");
 }
 
 #[test]

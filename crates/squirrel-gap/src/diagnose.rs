@@ -24,6 +24,8 @@ const FORM_SHARE: f64 = 0.1;
 const FORM_REMOVED: f64 = 0.6;
 /// How much more of the held-out gap the best other name must leave.
 const RIVAL_GAP: f64 = 3.0;
+/// Part of an error on held-out flights by which another one may be larger and no worse: the floor takes what noise is beyond it.
+const HELD_OUT_NOISE: f64 = 0.05;
 /// More alternatives than this within the evidence of a name are no answer.
 const ALTERNATIVES_MAX: usize = 3;
 
@@ -98,6 +100,7 @@ pub fn diagnose(
         let verdict = Verdict {
             verdict: Kind::DataProblem,
             effects: Vec::new(),
+            moved: Vec::new(),
             alternatives: Vec::new(),
             places,
             goes_with: Some(format!("{}: {}", problem.flight, problem.channel)),
@@ -173,7 +176,7 @@ fn decide(
     let clearly_worse = |rival: usize| {
         let (Some(proof), Some(gap)) = (proof, &gap) else { return false };
         let left = proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
-        left.is_some_and(|left| left - 1.0 >= RIVAL_GAP * (gap.after - 1.0).max(0.05))
+        left.is_some_and(|left| left - 1.0 >= RIVAL_GAP * (gap.after - 1.0).max(HELD_OUT_NOISE))
     };
     let close: Vec<&Scored> = rivals
         .iter()
@@ -187,6 +190,8 @@ fn decide(
         blind.push("battery_sag");
     }
     let share = left_share(naming);
+    // What explains some flights and makes others worse is no name for what the vehicle lacks.
+    let fails = gap.as_ref().is_some_and(|gap| gap.after > (1.0 + HELD_OUT_NOISE) * gap.before);
     let kind = if effects.is_empty() {
         match (leftover.is_real(), blind.is_empty()) {
             (true, _) => Kind::OutsideCatalogue,
@@ -202,6 +207,8 @@ fn decide(
         }
     } else if close.len() > ALTERNATIVES_MAX {
         Kind::NotIdentifiable
+    } else if close.is_empty() && fails {
+        Kind::OutsideCatalogue
     } else if close.is_empty() {
         Kind::Named
     } else {
@@ -216,10 +223,12 @@ fn decide(
         let evidence_nats = single.map_or(0.0, |(_, nats)| nats);
         alternatives.push(Alternative { effects: vec!["battery_sag"], evidence_nats });
     }
-    let goes_with = leftover
-        .is_real()
-        .then(|| leftover.goes_with().unwrap_or_else(|| leftover.channels()))
-        .filter(|_| kind != Kind::Named);
+    let goes_with = if leftover.is_real() {
+        Some(leftover.goes_with().unwrap_or_else(|| leftover.channels()))
+    } else {
+        fails.then(|| "the flight, since the held-out ones lack something else".to_owned())
+    };
+    let goes_with = goes_with.filter(|_| kind != Kind::Named);
     let fly_next = match kind {
         Kind::NotIdentifiable if effects.is_empty() => Some(words::fly_for(&blind)),
         Kind::Ambiguous | Kind::NotIdentifiable => {
@@ -229,9 +238,11 @@ fn decide(
         }
         _ => None,
     };
+    let moved = if effects.is_empty() { Vec::new() } else { search.moved(&found.best) };
     let mut verdict = Verdict {
         verdict: kind,
         effects,
+        moved,
         alternatives,
         places,
         goes_with,

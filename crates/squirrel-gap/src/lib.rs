@@ -23,11 +23,11 @@ mod shrink;
 mod verdict;
 mod words;
 
-pub use add::{add, difference};
+pub use add::{add, difference, nothing_to_add};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::picture;
-pub use verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
+pub use verdict::{Alternative, Gap, Kind, Moved, NamedEffect, Value, Verdict};
 pub use words::significant;

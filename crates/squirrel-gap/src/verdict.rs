@@ -62,6 +62,27 @@ pub struct NamedEffect {
     pub parameters: BTreeMap<&'static str, Value>,
 }
 
+/// A number of the vehicle, inside its declared tolerance or near it, that moved with the named effects: theirs hold with it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Moved {
+    /// `mass_error.mass_fraction`, `weak_rotor[2].thrust_loss_fraction`, `rotor[0].position_body_m[1]` (rotors of effects count
+    /// from 1, tables of the file from 0).
+    pub name: String,
+    /// By how much, in the unit of the name.
+    pub value: f64,
+    /// Standard deviation that these flights leave it.
+    pub sd: f64,
+    /// What the vehicle file allows it, one standard deviation.
+    pub tolerance: f64,
+}
+
+impl Moved {
+    /// How many of its tolerances it moved.
+    pub(crate) fn far(&self) -> f64 {
+        self.value.abs() / self.tolerance
+    }
+}
+
 /// Another explanation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alternative {
@@ -95,6 +116,8 @@ pub struct Verdict {
     pub verdict: Kind,
     /// What is missing, the most certain first.
     pub effects: Vec<NamedEffect>,
+    /// What moved with the effects, the farthest first; empty without effects.
+    pub moved: Vec<Moved>,
     /// Other sets, the best first.
     pub alternatives: Vec<Alternative>,
     /// Where the flights disagree with the vehicle as it was, the worst first.

@@ -116,13 +116,19 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
     if let Some(gap) = &verdict.gap
         && !verdict.effects.is_empty()
     {
-        let _ = write!(
-            text,
-            " On held-out flights it removes {:.1} % of the error above the noise floor ({:.2} to {:.2} times the floor).",
-            100.0 * gap.removed_fraction,
-            gap.before,
-            gap.after
-        );
+        let (before, after) = (gap.before, gap.after);
+        let _ = if after > before {
+            write!(
+                text,
+                " On held-out flights it makes the error larger ({before:.2} to {after:.2} times the noise floor)."
+            )
+        } else {
+            write!(
+                text,
+                " On held-out flights it removes {:.1} % of the error above the noise floor ({before:.2} to {after:.2} times the floor).",
+                100.0 * gap.removed_fraction
+            )
+        };
     }
     if !blind.is_empty() && verdict.verdict != Kind::NotIdentifiable {
         let _ = write!(text, " These flights would not show: {}.", blind.join(", "));

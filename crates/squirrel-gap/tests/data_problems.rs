@@ -254,3 +254,22 @@ fn noise_makes_no_other_name() {
         assert!(refused || names(&loud) == [name], "{name}: {:?}: {}", loud.verdict, loud.words);
     }
 }
+
+/// The battery falls and takes the thrust with it, and the log says that it stays: what thrust lacks is no sag by that voltage.
+#[test]
+fn a_battery_monitor_that_is_stuck_is_said_and_names_no_sag() {
+    let sagging = vehicle_with(
+        "squirrel.toml",
+        &[("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]")],
+    );
+    let stuck = |log: &mut FlightLog| {
+        log.source_mut("battery").channels.get_mut("voltage_v").unwrap().values.fill(15.6);
+    };
+    let verdict = Case::flown_by(&sagging).with(&stuck).verdict();
+    println!("{}\n{:?}", verdict.words, verdict.notes);
+    let said = "first: battery.voltage_v: 15.6 V in every sample, a monitor that is stuck; thrust may be that of any charge";
+    assert!(verdict.notes.iter().any(|note| note == said), "{:?}", verdict.notes);
+    let named = verdict.effects.iter().map(|e| e.name);
+    let names: Vec<&str> = named.chain(verdict.alternatives.iter().flat_map(|a| a.effects.clone())).collect();
+    assert!(!names.contains(&"battery_sag"), "{names:?}");
+}

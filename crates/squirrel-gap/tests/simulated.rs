@@ -75,6 +75,17 @@ fn wings_and_effects_of_the_own_vehicle_leave_noise() {
     }
 }
 
+/// Thrust near the ground depends on the height: at the ground's it would be a third more, 1.8 N.
+#[test]
+fn an_effect_of_height_in_the_file_acts_at_the_height_of_the_flight() {
+    let near =
+        squirrel_with(&[("[limits]", "[effects.ground_effect]\neffective_radius_m = 0.5\n\n[limits]")]);
+    let log = fly(&near, "hover", Arm::Pc);
+    let (_, altitude) = log.channel("baro.altitude_m").unwrap();
+    assert!(altitude.values.iter().all(|h| *h > 1.0), "far from the ground");
+    assert_noise(&near, &found(&near, log));
+}
+
 #[test]
 fn a_wrong_mass_shows_as_weight() {
     let vehicle = VehicleFile::squirrel();

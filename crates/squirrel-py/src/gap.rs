@@ -8,7 +8,6 @@ use crate::vehicle::{Vehicle, write_file};
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
-use squirrel_gap::Kind;
 use squirrel_sim::log;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::{Path, PathBuf};
@@ -79,9 +78,8 @@ fn diagnose(
     let mut diagnosis =
         squirrel_gap::diagnose(vehicle, flights, held_out, &|_| stop.check()).map_err(value)?;
     let names = |logs: &Logs| logs.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    let is_file = matches!(diagnosis.verdict.verdict, Kind::Named | Kind::NamedFormDiffers | Kind::Ambiguous)
-        && !diagnosis.verdict.effects.is_empty();
-    let text = is_file
+    let text = squirrel_gap::nothing_to_add(&diagnosis.verdict)
+        .is_none()
         .then(|| squirrel_gap::add(vehicle, &diagnosis, &names(flights)))
         .transpose()
         .map_err(value)?;

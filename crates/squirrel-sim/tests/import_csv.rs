@@ -221,6 +221,33 @@ fn a_mask_drops_rows_of_its_file_and_time_spans_of_the_others() {
     );
 }
 
+/// Files and topics often call their columns alike: that a row of one holds by itself does not bring back a time that the
+/// other has dropped.
+#[test]
+fn a_mask_drops_time_spans_of_files_that_have_its_column_too() {
+    let mut imu = "t,x,y,z\n".to_owned();
+    for tick in 0..=20 {
+        writeln!(imu, "{},0,0,9.8", f64::from(tick) * 0.25).unwrap();
+    }
+    let place = "t,x,y,z\n0,0,0,0\n1,0,0,1\n2,0,0,1\n3,0,0,0\n4,0,0,1\n5,0,0,1\n";
+    let flight = Flight::new("alike", &[("imu.csv", &imu), ("place.csv", place)]);
+    let map = r#"
+        keep = "z > 0.4"
+        [[source]]
+        file = "imu.csv"
+        time = { column = "t", unit = "s" }
+        channels = { "imu.specific_force_body_m_s2" = { columns = ["x", "y", "z"], body = "flu" } }
+        [[source]]
+        file = "place.csv"
+        time = { column = "t", unit = "s" }
+        channels = { "gnss.position_ned_m" = { columns = ["x", "y", "z"], world = "nwu" } }
+    "#;
+    let (log, _) = flight.import_folder(map).unwrap();
+    assert_eq!(log.channel("gnss.position_ned_m").unwrap().0, [0.0, 1.0, 3.0, 4.0]);
+    let imu_s = log.channel("imu.specific_force_body_m_s2").unwrap().0;
+    assert_eq!(imu_s, [0.0, 0.25, 0.5, 0.75, 1.0, 3.0, 3.25, 3.5, 3.75, 4.0]);
+}
+
 #[test]
 fn masked_rows_may_have_a_broken_clock() {
     let flight = Flight::new("clock", &[("f.csv", "t,x,y,z\n900,0,0,0\n901,0,0,0\n1,1,0,0\n2,1,0,0\n")]);

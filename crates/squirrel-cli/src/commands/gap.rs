@@ -3,7 +3,7 @@
 use super::log_files;
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
-use squirrel_gap::{ClosedLoop, Diagnosis, Kind, NamedEffect, Value, Verdict, significant};
+use squirrel_gap::{ClosedLoop, Diagnosis, Kind, Moved, NamedEffect, Value, Verdict, significant};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -67,10 +67,12 @@ struct Found {
 }
 
 impl Found {
-    /// Text of the vehicle file with the named effects; `None` where the verdict has none that a file can take.
-    fn patched(&self) -> Result<Option<String>, String> {
-        let text = || squirrel_gap::add(&self.vehicle, &self.diagnosis, &self.flights);
-        nameable(&self.diagnosis.verdict).then(text).transpose()
+    /// Text of the vehicle file with the named effects, or why the verdict has none that a file can take.
+    fn patched(&self) -> Result<Result<String, String>, String> {
+        match squirrel_gap::nothing_to_add(&self.diagnosis.verdict) {
+            Some(why) => Ok(Err(format!("{}: nothing to add: {why}", self.vehicle.name))),
+            None => squirrel_gap::add(&self.vehicle, &self.diagnosis, &self.flights).map(Ok),
+        }
     }
 
     /// Flies held-out flights again with the effects added.
@@ -165,7 +167,7 @@ impl Given {
         }
         self.check(&[REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
-        let text = found.patched()?;
+        let text = found.patched()?.ok();
         if let Some(text) = &text {
             found.fly_again(text)?;
         }
@@ -185,16 +187,17 @@ impl Given {
         show(&found.diagnosis.verdict);
         let text = found.patched()?;
         if dry_run {
-            if let Some(text) = &text {
+            if let Ok(text) = &text {
                 say(&squirrel_gap::difference(&found.vehicle.text, text));
             }
-            return output::write_json(self.json.as_deref(), &found.diagnosis.verdict);
+            output::write_json(self.json.as_deref(), &found.diagnosis.verdict)?;
+        } else {
+            if let Ok(text) = &text {
+                self.patch(text, &mut found.diagnosis.verdict)?;
+            }
+            self.write(&found.diagnosis.verdict)?;
         }
-        let Some(text) = text else {
-            return self.write(&found.diagnosis.verdict);
-        };
-        self.patch(&text, &mut found.diagnosis.verdict)?;
-        self.write(&found.diagnosis.verdict)
+        text.map(drop)
     }
 
     fn everything(&self) -> Result<(), String> {
@@ -202,14 +205,15 @@ impl Given {
         self.check(&[self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
         let text = found.patched()?;
-        if let Some(text) = &text {
+        if let Ok(text) = &text {
             found.fly_again(text)?;
         }
         show(&found.diagnosis.verdict);
-        if let Some(text) = &text {
-            self.patch(text, &mut found.diagnosis.verdict)?;
+        match &text {
+            Ok(text) => self.patch(text, &mut found.diagnosis.verdict)?,
+            Err(why) => say(why),
         }
-        self.report(&found, text.as_deref())?;
+        self.report(&found, text.as_deref().ok())?;
         self.write(&found.diagnosis.verdict)
     }
 
@@ -245,7 +249,8 @@ impl Given {
         }
         output::write_file(&path, text.as_bytes())?;
         verdict.model_patch = Some(path.display().to_string());
-        say(&format!("vehicle with the effect: {}", path.display()));
+        let names: Vec<&str> = verdict.effects.iter().map(|effect| effect.name).collect();
+        say(&format!("vehicle with {}: {}", names.join(" and "), path.display()));
         Ok(())
     }
 
@@ -256,12 +261,6 @@ impl Given {
         }
         output::write_json(self.json.as_deref(), verdict)
     }
-}
-
-/// Whether the verdict has effects that a vehicle file can take.
-fn nameable(verdict: &Verdict) -> bool {
-    !verdict.effects.is_empty()
-        && matches!(verdict.verdict, Kind::Named | Kind::NamedFormDiffers | Kind::Ambiguous)
 }
 
 /// Logs by path; a folder stands for the logs in it.
@@ -299,6 +298,9 @@ fn show(verdict: &Verdict) {
     if !verdict.effects.is_empty() {
         effects(&verdict.effects);
     }
+    if !verdict.moved.is_empty() {
+        moved(&verdict.moved);
+    }
     if !verdict.alternatives.is_empty() {
         let mut table = Table::new(&["other explanation", "nats"]);
         for other in &verdict.alternatives {
@@ -318,6 +320,18 @@ fn show(verdict: &Verdict) {
         say(&format!("\nwhat to fly:\n{card}"));
     }
     notes(&verdict.notes);
+}
+
+/// What moved with the effects: their numbers hold with these.
+fn moved(all: &[Moved]) {
+    let mut table = Table::new(&["moved with them", "value", "sd", "tolerance"]);
+    for number in all {
+        let mut row = vec![number.name.clone()];
+        row.extend([number.value, number.sd, number.tolerance].map(|x| significant(x, 3)));
+        table.row(row);
+    }
+    table.print();
+    say("");
 }
 
 /// Root mean square of simulated less measured position.

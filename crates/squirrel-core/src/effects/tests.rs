@@ -176,11 +176,12 @@ fn sizes_and_signs_by_hand() {
     );
     // R = 0.4 m at 0.3 m: 1 / (1 - 0.16 / 1.44).
     close(factor("ground_effect", &[0.4]), 1.125, "ground effect");
-    close(
-        with("ground_effect", &[0.4]).thrust_factor(&air, 0.0),
-        4.0 / 3.0,
-        "height floored at half the radius",
-    );
+    // At 0.25 m, still above the floor: 1 / (1 - 0.16 / 1). From R / 2 = 0.2 m down, what it is there: 1 / (1 - 0.16 / 0.64).
+    close(with("ground_effect", &[0.4]).thrust_factor(&air, 0.25), 1.0 / 0.84, "above the floor");
+    for height_m in [0.2, 0.16, 0.05, 0.0, -1.0] {
+        let factor = with("ground_effect", &[0.4]).thrust_factor(&air, height_m);
+        close(factor, 4.0 / 3.0, "height floored at half the radius");
+    }
     close(
         factor("translational_lift", &[1e-3]),
         1.0 + 1e-3 * 13.0 / (1.0 + 0.004 * 13.0),

@@ -3,12 +3,13 @@
 //! ```text
 //! r_F = LP[ m a - F ]                               a      imu.specific_force_body_m_s2
 //! r_M = LP[ J D[w] + w x J w - M ]                  w      imu.omega_body_rad_s
-//! F, M = plant(Omega, v, q, w, V, deployment)       v, q   gnss.velocity_ned_m_s, attitude.q_ned_from_body_wxyz
+//! F, M = plant(Omega, v, q, w, h, V, deployment)    v, q   gnss.velocity_ned_m_s, attitude.q_ned_from_body_wxyz
+//!                                                   h      baro.altitude_m, or else gnss.position_ned_m
 //! Omega, deployment: the plant under u, c           u, c   rotor.command, wing.command;  V  battery.voltage_v
 //! ```
 //! `m` and `J` are the vehicle's. `F` and `M` are force without gravity and moment of the simulator's own plant: rotors
-//! behind their lag, drag, wings behind their servos, and the effects of the vehicle file, at the measured motion and
-//! voltage in still air. `LP` is a zero-phase low-pass at 12 Hz and `D` a derivative, whose taps stand in `filter`;
+//! behind their lag, drag, wings behind their servos, and the effects of the vehicle file, at the measured motion, height and
+//! voltage in still air; the height is smoothed as `name` does it. `LP` is a zero-phase low-pass at 12 Hz and `D` a derivative, whose taps stand in `filter`;
 //! both sides pass the same `LP`, which is linear, so that it is applied once, to their difference.
 //!
 //! **Time.** Each flight has a uniform grid with the median period `T` of the IMU. IMU, attitude (normalised), velocity and

@@ -7,6 +7,7 @@ use super::{CHANNELS, GapError};
 use crate::flight::filter::{DERIVATIVE_REACH, derivative};
 use crate::flight::recording::{Recording, Sample};
 use crate::flight::series::{Span, between};
+use crate::predictor::{SensorErrors, Track};
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{Body, In, Wrench};
@@ -29,7 +30,7 @@ pub(super) fn residuals(
     recording: &Recording,
     piece: Span,
 ) -> Result<Vec<Vector6<f64>>, GapError> {
-    let samples = recording.grid(piece);
+    let samples = samples(vehicle, recording, piece);
     let model = model(vehicle, recording, &samples)?;
     // Effects on mass and inertia change what the measured motion is worth in newtons.
     let airframe = vehicle.effects.alter(&vehicle.vehicle).map_err(|problem| GapError::Vehicle {
@@ -63,6 +64,16 @@ pub(super) fn residuals(
             Ok(value)
         })
         .collect()
+}
+
+/// The measured samples of a piece, at the heights that `name` has: strapdown, held by barometer or GNSS.
+fn samples(vehicle: &VehicleFile, recording: &Recording, piece: Span) -> Vec<Sample> {
+    let mut samples = recording.grid(piece);
+    let motion = Track::new(0, recording, piece).motion(&vehicle.effects, &SensorErrors::default());
+    for (sample, known) in samples.iter_mut().zip(&motion.body) {
+        sample.body.position = known.position;
+    }
+    samples
 }
 
 fn stack(force: Vector3<f64>, moment: Vector3<f64>) -> Vector6<f64> {
@@ -122,6 +133,7 @@ fn model(
 fn led(a: &State<f64>, b: &State<f64>, share: f64) -> State<f64> {
     let line = |a: Vector3<f64>, b: Vector3<f64>| a + (b - a) * share;
     State {
+        position: In::new(line(a.position.vector, b.position.vector)),
         velocity: In::new(line(a.velocity.vector, b.velocity.vector)),
         attitude: between(a.attitude, b.attitude, share),
         omega: In::new(line(a.omega.vector, b.omega.vector)),

@@ -14,6 +14,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Slowest IMU whose samples still describe what passes the filter, Hz.
 const RATE_MIN_HZ: f64 = 4.0 * CUTOFF_HZ;
+/// For so long a monitor of coarse steps may show a battery in flight without a change, s.
+const STUCK_MIN_S: f64 = 10.0;
 /// Shortest flight worth a number, s.
 const USABLE_MIN_S: f64 = 1.0;
 
@@ -48,7 +50,7 @@ pub(crate) struct Sample {
     pub(crate) specific_force: Vector3<f64>,
     /// Measured velocity, attitude and angular rate; position and rotor speeds are not measured.
     pub(crate) body: State<f64>,
-    /// Battery, V; the reference voltage where it is not logged.
+    /// Battery, V; the reference voltage where it is not logged or never changes.
     pub(crate) voltage_v: f64,
 }
 
@@ -75,6 +77,9 @@ impl<'a> Recording<'a> {
         let position = optional("gnss.position_ned_m", 3)?;
         let baro = optional("baro.altitude_m", 1)?;
         let voltage = optional("battery.voltage_v", 1)?;
+        let long = voltage.as_ref().filter(|voltage| voltage.duration_s() >= STUCK_MIN_S);
+        let stuck_at_v = long.and_then(Series::only_number);
+        let voltage = voltage.filter(|_| stuck_at_v.is_none());
         let has_wings = vehicle.wing != WingPlant::None;
         let wing = if has_wings { optional("wing.command", 2)? } else { None };
 
@@ -90,12 +95,17 @@ impl<'a> Recording<'a> {
         }
         if voltage.is_none() {
             let reference = parameters.propulsion.reference_voltage_v;
+            // A battery that flies changes: a monitor that does not says nothing of it.
+            let what = stuck_at_v.map_or_else(
+                || "missing".to_owned(),
+                |volt| format!("{volt} V in every sample, a monitor that is stuck"),
+            );
             notes.push(if vehicle.effects.has("battery_sag") {
                 format!(
-                    "{flight}: battery.voltage_v: missing; battery_sag is that of the reference voltage, {reference} V"
+                    "{flight}: battery.voltage_v: {what}; battery_sag is that of the reference voltage, {reference} V"
                 )
             } else {
-                format!("{flight}: battery.voltage_v: missing; thrust may be that of any charge")
+                format!("{flight}: battery.voltage_v: {what}; thrust may be that of any charge")
             });
         }
         if baro.is_none() && position.is_none() {
@@ -241,7 +251,7 @@ impl<'a> Recording<'a> {
     pub(crate) fn has_attitude(&self) -> bool {
         self.attitude.is_some()
     }
-    /// Whether the log has a battery voltage.
+    /// Whether the log has a battery voltage that changes.
     pub(crate) fn has_voltage(&self) -> bool {
         self.voltage.is_some()
     }

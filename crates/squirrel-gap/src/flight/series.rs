@@ -124,6 +124,17 @@ impl Series {
         (sum / (20 * n.max(1)) as f64).map(f64::sqrt)
     }
 
+    /// The number that all samples have, if it is one.
+    pub(crate) fn only_number(&self) -> Option<f64> {
+        let first = self.values[0];
+        self.values.iter().all(|x| *x == first).then_some(first)
+    }
+
+    /// From the first sample to the last, s.
+    pub(crate) fn duration_s(&self) -> f64 {
+        self.time_s[self.time_s.len() - 1] - self.time_s[0]
+    }
+
     /// Time of the first sample, s.
     pub(crate) fn start_s(&self) -> f64 {
         self.time_s[0]

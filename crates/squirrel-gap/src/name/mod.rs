@@ -10,6 +10,7 @@ mod evidence;
 mod forms;
 mod interval;
 mod linear;
+mod moved;
 mod parameters;
 mod payload;
 mod point;

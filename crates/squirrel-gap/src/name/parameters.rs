@@ -15,6 +15,9 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Width of the slab over the largest plausible size.
 pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
+/// How many times the largest plausible size a number may have on the way: farther off nothing linear holds, and a mass or an
+/// inertia would be below zero.
+pub(crate) const LARGEST_TIMES: f64 = 2.0;
 /// Effects that are known by their moments, and by the horizontal force; without these channels nothing is said of them.
 const MOMENTS: [&str; 6] = [
     "angular_damping",
@@ -52,6 +55,16 @@ pub(crate) struct Parameter {
     pub(crate) slab: f64,
     /// By how much the number that the effect adds to is off by itself, one standard deviation: flights show only the sum.
     pub(crate) spread: f64,
+}
+
+impl Parameter {
+    /// A change of the number, no farther from nothing than a vehicle can be, or than its file has it already.
+    ///
+    /// * `own` - what the vehicle file has
+    pub(super) fn bounded(&self, own: f64, change: f64) -> f64 {
+        let most = LARGEST_TIMES * self.largest;
+        (own + change).clamp(own.min(-most), own.max(most)) - own
+    }
 }
 
 /// One effect, with its choices made: which rotor, which axis, which side.

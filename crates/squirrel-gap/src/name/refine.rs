@@ -2,7 +2,7 @@
 
 use super::evidence::{BETA, Gram, Posterior, products};
 use super::linear::{Linear, height_columns};
-use super::parameters::SLAB_OF_LARGEST;
+use super::parameters::{LARGEST_TIMES, SLAB_OF_LARGEST};
 use super::point::{Member, Other, Point};
 use super::search::Search;
 use crate::GapError;
@@ -84,9 +84,10 @@ impl Search<'_> {
             let mut moved: f64 = 0.0;
             for (column, (member, slot)) in best.free.iter().enumerate() {
                 let (smallest, largest, signed) = self.range(&next[*member], *slot);
-                let low = if signed { -2.0 * largest } else { 0.02 * smallest };
+                let most = LARGEST_TIMES * largest;
+                let low = if signed { -most } else { 0.02 * smallest };
                 let value = &mut next[*member].values[*slot];
-                let target = best.posterior.mean[column].clamp(low, 2.0 * largest);
+                let target = best.posterior.mean[column].clamp(low, most);
                 let step = share * (target - *value);
                 moved = moved.max(step.abs() / smallest);
                 *value += step;

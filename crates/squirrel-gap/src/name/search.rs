@@ -27,7 +27,7 @@ const REFINED: usize = 4;
 const GIVEN_UP: f64 = 0.5;
 const GIVEN_UP_NATS: f64 = 30.0;
 /// Part of its tolerance by which a number must be off to act in the simulator's own model.
-const ACTS: f64 = 0.7;
+pub(super) const ACTS: f64 = 0.7;
 /// Most effects in a set.
 const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
@@ -99,13 +99,14 @@ impl Search<'_> {
         Ok(linear)
     }
 
-    /// The point at which a set explains most: its members, and everything else where it most likely is.
+    /// The point at which a set explains most: its members, and everything else where it most likely is, as far as a vehicle
+    /// can be there. What is linear knows no end: where something else is wrong, it asks for a mass below zero.
     pub(crate) fn whole(&self, set: &Scored) -> Point {
         let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
         for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
-            if self.catalogue.starts_flat(parameter.candidate) {
-                *x = 0.0;
-            }
+            let own = self.catalogue.absent(self.predictor, parameter.candidate).values[parameter.slot];
+            let flat = self.catalogue.starts_flat(parameter.candidate);
+            *x = if flat { 0.0 } else { parameter.bounded(own, *x) };
         }
         Point { members: set.members.clone(), base }
     }

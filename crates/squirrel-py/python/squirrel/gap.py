@@ -18,6 +18,7 @@ __all__ = [
     "Finding",
     "FlightResidual",
     "Gap",
+    "Moved",
     "NamedEffect",
     "Parameter",
     "Place",
@@ -205,6 +206,28 @@ class ClosedLoop:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Moved:
+    """A number of the vehicle that moved with the named effects: theirs hold with it.
+
+    Attributes
+    ----------
+    name : str
+        ``mass_error.mass_fraction``, ``weak_rotor[2].thrust_loss_fraction``, ``rotor[0].position_body_m[1]``.
+    value : float
+        By how much, in the unit of the name.
+    sd : float
+        Standard deviation that the flights leave it.
+    tolerance : float
+        What the vehicle file allows it, one standard deviation.
+    """
+
+    name: str
+    value: float
+    sd: float
+    tolerance: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Verdict:
     """The answer of the workflow.
 
@@ -214,6 +237,8 @@ class Verdict:
         Exactly one of the answers.
     effects : tuple of NamedEffect
         What is missing, the most certain first.
+    moved : tuple of Moved
+        What moved with the effects, the farthest first.
     alternatives : tuple of Alternative
         The best first.
     where : tuple of Place
@@ -236,6 +261,7 @@ class Verdict:
         "none", "named", "named_form_differs", "ambiguous", "outside_catalogue", "not_identifiable", "data_problem"
     ]
     effects: tuple[NamedEffect, ...]
+    moved: tuple[Moved, ...]
     alternatives: tuple[Alternative, ...]
     where: tuple[Place, ...]
     goes_with: str | None
@@ -385,6 +411,7 @@ def _verdict(verdict: dict[str, Any], patched: Vehicle | None) -> Verdict:
     return Verdict(
         verdict=verdict["verdict"],
         effects=tuple(_effect(effect) for effect in verdict["effects"]),
+        moved=tuple(Moved(**number) for number in verdict["moved"]),
         alternatives=tuple(
             Alternative(effects=tuple(other["effects"]), evidence_nats=other["evidence_nats"])
             for other in verdict["alternatives"]

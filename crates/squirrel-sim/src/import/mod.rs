@@ -44,9 +44,9 @@
 //! - `rotors[i]` is the number, from 1, of the vehicle's rotor in column `i`; without it columns are in vehicle order.
 //! - `forward_filled` drops rows that only repeat the last sample: a slow sensor written at a fast rate gets its own slow
 //!   time axis. Channels of one log source (`battery.*`) share the axis; a row stays when any of them changes.
-//! - `keep` may join parts with `and` that look at different files. A part drops rows of the files that have its
-//!   columns; of all other files it drops rows outside the time spans in which it keeps consecutive rows of the first
-//!   file that has them.
+//! - `keep` may join parts with `and` that look at different files. A part drops rows of each file or topic that has its
+//!   columns, and of all others, by time: their rows outside the spans in which it keeps consecutive rows of the first. One
+//!   that has the columns itself, as topics have an `x` each, is no exception: its rows must hold by themselves, too.
 //! - Empty cells, nulls and `nan` are NaN in the log and counted in the report.
 //! - The earliest kept time over all files is time zero; metadata `time_zero_s` has it in the foreign clock.
 
@@ -225,12 +225,18 @@ fn kept_rows(keep: &[Condition], tables: &[Table], times: &[Vec<f64>]) -> Vec<Ve
         let columns = term.columns();
         let by_rows: Vec<Option<Vec<bool>>> =
             tables.iter().map(|table| table.has_all(&columns).then(|| term.rows(table))).collect();
-        let first = by_rows.iter().zip(times).find_map(|(rows, time_s)| Some((rows.as_ref()?, time_s)));
-        let spans = first.map_or_else(Vec::new, |(rows, time_s)| spans(rows, time_s));
-        for ((kept, rows), time_s) in kept.iter_mut().zip(by_rows).zip(times) {
-            let rows = rows.unwrap_or_else(|| time_s.iter().map(|&t| inside(&spans, t)).collect());
-            for (kept, row) in kept.iter_mut().zip(rows) {
-                *kept &= row;
+        let spans: Vec<(&str, Vec<(f64, f64)>)> = tables
+            .iter()
+            .zip(&by_rows)
+            .zip(times)
+            .filter_map(|((table, rows), time_s)| Some((table.name.as_str(), spans(rows.as_ref()?, time_s))))
+            .collect();
+        for (((kept, rows), table), time_s) in kept.iter_mut().zip(by_rows).zip(tables).zip(times) {
+            // Two sources may read one file: its rows are the same.
+            let others = || spans.iter().filter(|(name, _)| *name != table.name);
+            for (row, (kept, t)) in kept.iter_mut().zip(time_s).enumerate() {
+                *kept &= rows.as_ref().is_none_or(|rows| rows[row]);
+                *kept = *kept && others().all(|(_, spans)| inside(spans, *t));
             }
         }
     }
