@@ -12,16 +12,9 @@ use std::fs::{self, OpenOptions};
 use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::process::{Command, Stdio};
-use support::{Folder, SQUIRREL};
+use support::{Folder, MAP, SQUIRREL};
 
 const PARNN: &[u8] = include_bytes!("../../../vehicles/squirrel-parnn.safetensors");
-
-const MAP: &str = r#"
-[[source]]
-time = { column = "t", unit = "s" }
-[source.channels]
-"imu.omega_body_rad_s" = { columns = ["gx", "gy", "gz"], body = "frd" }
-"#;
 
 const STUDIES: [&str; 8] =
     ["faults", "filters", "forest", "planning", "steering", "table2", "table3", "thrust"];

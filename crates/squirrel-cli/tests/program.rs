@@ -8,7 +8,7 @@ use squirrel_core::policy::Policy;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::weights::PolicyWeights;
 use std::fs;
-use support::{Folder, SQUIRREL, json};
+use support::{Folder, MAP, SQUIRREL, json};
 
 #[test]
 fn without_arguments_it_flies_the_demo() {
@@ -319,13 +319,6 @@ fn a_sound_vehicle_is_shown_with_its_sources() {
     assert_eq!(json(&folder, "v.json")["numbers"]["mass.mass_kg"]["source"], "paper, Table I");
     assert!(table.contains("squirrel: sound") && table.contains("paper, Table I"), "{table}");
 }
-
-const MAP: &str = r#"
-[[source]]
-time = { column = "t", unit = "s" }
-[source.channels]
-"imu.omega_body_rad_s" = { columns = ["gx", "gy", "gz"], body = "frd" }
-"#;
 
 #[test]
 fn bad_tables_get_one_line_with_file_field_and_value() {

@@ -51,6 +51,14 @@ impl Folder {
 
 pub(crate) const SQUIRREL: &str = include_str!("../../../../vehicles/squirrel.toml");
 
+/// An import map of a table of angular rates.
+pub(crate) const MAP: &str = r#"
+[[source]]
+time = { column = "t", unit = "s" }
+[source.channels]
+"imu.omega_body_rad_s" = { columns = ["gx", "gy", "gz"], body = "frd" }
+"#;
+
 /// A JSON file of the folder.
 pub(crate) fn json(folder: &Folder, name: &str) -> serde_json::Value {
     serde_json::from_str(&fs::read_to_string(folder.0.join(name)).unwrap()).unwrap()

@@ -195,9 +195,7 @@ impl PositionGains {
             request: request(self.angle_law, mass_kg, &acceleration, motion),
         }
     }
-}
 
-impl PositionGains {
     /// Velocity towards the reference, m/s. Far away it is that from which [`Self::approach_max_m_s2`] stops at the reference, with the
     /// proportional law's lag: `v^2 = a (2 e - a / k^2)` joins `v = k e` smoothly at `e = a / k^2`.
     fn approach(&self, position_error: &Vector3<f32>) -> Vector3<f32> {

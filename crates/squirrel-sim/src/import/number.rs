@@ -6,12 +6,14 @@ pub(super) struct Column {
     pub(super) name: String,
     pub(super) offset: usize,
     pub(super) kind: Kind,
+    /// From what is stored to the column's unit.
+    pub(super) scale: f64,
 }
 
 impl Column {
     /// The number in a record; NaN if the record is too short for it.
     pub(super) fn number(&self, record: &[u8]) -> f64 {
-        record.get(self.offset..).map_or(f64::NAN, |bytes| self.kind.number(bytes))
+        record.get(self.offset..).map_or(f64::NAN, |bytes| self.kind.number(bytes) * self.scale)
     }
 }
 

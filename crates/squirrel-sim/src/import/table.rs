@@ -10,6 +10,7 @@ use super::map::ImportMap;
 use super::mcap_file::McapFile;
 use super::meter::Meter;
 use super::names::nearest;
+use super::number::Column;
 use super::parquet_file::ParquetFile;
 use super::ulog_file::UlogFile;
 use super::usd_file::UsdFile;
@@ -132,6 +133,38 @@ impl Table {
     pub(super) fn new(name: String, wanted: &[&str], values: Vec<Vec<f64>>, rows: Vec<u64>) -> Self {
         let columns = wanted.iter().map(|&column| column.to_owned()).zip(values).collect();
         Self { name, columns, rows, bytes_cut: 0 }
+    }
+
+    /// Of a binary log: the wanted columns, a row a record.
+    ///
+    /// * `columns`, `names` - all columns of a record
+    ///
+    /// # Errors
+    /// A column that is missing, or a number that no log holds.
+    pub(super) fn of_records<'r>(
+        file: String,
+        columns: &[Column],
+        names: &[String],
+        wanted: &[&str],
+        records: &(impl ExactSizeIterator<Item = &'r [u8]> + Clone),
+    ) -> Result<Self, ImportError> {
+        let places = places(&file, names, wanted)?;
+        let mut values = vec![Vec::with_capacity(records.len()); wanted.len()];
+        for (&place, values) in places.iter().zip(&mut values) {
+            let column = &columns[place];
+            for (row, record) in records.clone().enumerate() {
+                let number = column.number(record);
+                values.push(checked(number).map_err(|problem| ImportError::Cell {
+                    file: file.clone(),
+                    column: column.name.clone(),
+                    row: row as u64 + 1,
+                    value: number.to_string(),
+                    problem,
+                })?);
+            }
+        }
+        let rows = (1..=records.len() as u64).collect();
+        Ok(Self::new(file, wanted, values, rows))
     }
 
     /// Rows.

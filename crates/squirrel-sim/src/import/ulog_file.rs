@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::error::ImportError;
 use super::meter::Meter;
 use super::names::nearest;
-use super::table::{Table, TableFile, checked, places};
+use super::table::{Table, TableFile};
 use super::ulog_format::Layout;
 
 const MAGIC: [u8; 7] = *b"ULog\x01\x12\x35";
@@ -85,24 +85,9 @@ impl TableFile for UlogFile<'_> {
     }
 
     fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
-        let places = places(&self.name, &self.columns, wanted)?;
-        let mut values = vec![Vec::with_capacity(self.messages.len()); wanted.len()];
-        for (&place, values) in places.iter().zip(&mut values) {
-            let column = &self.layout.columns[place];
-            for (row, message) in self.messages.iter().enumerate() {
-                let number = column.number(&self.bytes[message.clone()]);
-                values.push(checked(number).map_err(|problem| ImportError::Cell {
-                    file: self.name.clone(),
-                    column: column.name.clone(),
-                    row: row as u64 + 1,
-                    value: number.to_string(),
-                    problem,
-                })?);
-            }
-        }
+        let records = self.messages.iter().map(|message| &self.bytes[message.clone()]);
+        let mut table = Table::of_records(self.name, &self.layout.columns, &self.columns, wanted, &records)?;
         self.meter.add(self.bytes.len());
-        let rows = (1..=self.messages.len() as u64).collect();
-        let mut table = Table::new(self.name, wanted, values, rows);
         table.bytes_cut = self.bytes_cut as u64;
         Ok(table)
     }

@@ -61,7 +61,7 @@ impl Layout {
                     self.size += kind.size();
                     if !name.starts_with("_padding") {
                         let name = format!("{prefix}{name}{index}");
-                        self.columns.push(Column { name, offset: start, kind });
+                        self.columns.push(Column { name, offset: start, kind, scale: 1.0 });
                         self.size_logged = self.size;
                     }
                 } else {

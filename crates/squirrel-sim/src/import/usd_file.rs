@@ -11,7 +11,7 @@ use super::error::ImportError;
 use super::meter::Meter;
 use super::names::nearest;
 use super::number::Column;
-use super::table::{Table, TableFile, checked, places};
+use super::table::{Table, TableFile};
 use super::usd_format::Header;
 
 /// Bytes of the CRC at the end.
@@ -24,7 +24,6 @@ pub(super) struct UsdFile<'a> {
     bytes: Vec<u8>,
     columns: Vec<Column>,
     names: Vec<String>,
-    time_step_us: f64,
     /// Where the records of the event start.
     records: Vec<usize>,
     meter: &'a Meter<'a>,
@@ -54,10 +53,10 @@ impl<'a> UsdFile<'a> {
                 nearest,
             });
         }
-        let Header { columns, time_step_us, .. } = header;
+        let columns = header.columns;
         let names = columns.iter().map(|column| column.name.clone()).collect();
         let name = format!("{file}, topic `{topic}`");
-        Ok(Self { name, bytes, columns, names, time_step_us, records, meter })
+        Ok(Self { name, bytes, columns, names, records, meter })
     }
 }
 
@@ -67,25 +66,10 @@ impl TableFile for UsdFile<'_> {
     }
 
     fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
-        let places = places(&self.name, &self.names, wanted)?;
-        let mut values = vec![Vec::with_capacity(self.records.len()); wanted.len()];
-        for (&place, values) in places.iter().zip(&mut values) {
-            let column = &self.columns[place];
-            let scale = if place == 0 { self.time_step_us } else { 1.0 };
-            for (row, &record) in self.records.iter().enumerate() {
-                let number = column.number(&self.bytes[record..]) * scale;
-                values.push(checked(number).map_err(|problem| ImportError::Cell {
-                    file: self.name.clone(),
-                    column: column.name.clone(),
-                    row: row as u64 + 1,
-                    value: number.to_string(),
-                    problem,
-                })?);
-            }
-        }
+        let records = self.records.iter().map(|&record| &self.bytes[record..]);
+        let table = Table::of_records(self.name, &self.columns, &self.names, wanted, &records)?;
         self.meter.add(self.bytes.len());
-        let rows = (1..=self.records.len() as u64).collect();
-        Ok(Table::new(self.name, wanted, values, rows))
+        Ok(table)
     }
 }
 

@@ -27,8 +27,6 @@ pub(super) struct Header {
     pub(super) events: BTreeMap<u16, EventType>,
     /// Of the wanted event; the time is the first.
     pub(super) columns: Vec<Column>,
-    /// Microseconds of one step of the time.
-    pub(super) time_step_us: f64,
     /// Bytes of the header: where the records start.
     pub(super) size: usize,
 }
@@ -54,13 +52,14 @@ impl Header {
         if !is_usd(magic) {
             return Err(format!("byte 0 is {magic:#04x}, not {MAGIC:#04x} as in a Crazyflie's micro-SD log"));
         }
-        let (clock, time_step_us) = match text.count()? {
+        // Its type, and the microseconds of a step.
+        let clock = match text.count()? {
             1 => (Kind::U32, 1000.0),
             2 => (Kind::U64, 1.0),
             version => return Err(format!("version {version} at byte 1, import reads 1 and 2")),
         };
         let count = text.count()?;
-        let mut header = Self { events: BTreeMap::new(), columns: Vec::new(), time_step_us, size: 0 };
+        let mut header = Self { events: BTreeMap::new(), columns: Vec::new(), size: 0 };
         let mut names = BTreeSet::new();
         for _ in 0..count {
             let at = text.at;
@@ -79,12 +78,16 @@ impl Header {
 }
 
 /// Reads the variables of an event, and adds the columns of its records; returns the bytes of a record.
-fn event(text: &mut Text, clock: Kind, mut columns: Option<&mut Vec<Column>>) -> Result<usize, String> {
+fn event(
+    text: &mut Text,
+    clock: (Kind, f64),
+    mut columns: Option<&mut Vec<Column>>,
+) -> Result<usize, String> {
     let count = text.count()?;
     let mut size = ID_BYTES;
-    let mut add = |name: &str, kind: Kind| {
+    let mut add = |name: &str, (kind, scale): (Kind, f64)| {
         if let Some(columns) = &mut columns {
-            columns.push(Column { name: name.to_owned(), offset: size, kind });
+            columns.push(Column { name: name.to_owned(), offset: size, kind, scale });
         }
         size += kind.size();
     };
@@ -99,7 +102,7 @@ fn event(text: &mut Text, clock: Kind, mut columns: Option<&mut Vec<Column>>) ->
         let kind = kind(letter).ok_or_else(|| {
             format!("the variable `{variable}` at byte {at} has the unknown type `{letter}`")
         })?;
-        add(name, kind);
+        add(name, (kind, 1.0));
     }
     Ok(size)
 }
