@@ -4,7 +4,7 @@
 //! `w'` depends on the force, so the dynamics solve for both: with all other forces `F_z`,
 //! `w' = (F_z / m + g_z - (w x V)_z) / (1 + m_a / m)`. Unlike `mass_error` it has no weight.
 
-use super::{Effect, EffectParameter};
+use super::{Effect, EffectParameter, Scale};
 use crate::math::Real;
 
 /// Mass of that air.
@@ -13,7 +13,8 @@ pub struct AddedMass<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for AddedMass<T> {
     const NAME: &'static str = "added_mass";
-    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::size("mass_kg", 0.03, 0.15)];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::size("mass_kg", 0.03, 0.15).growing_with(Scale::Mass)];
 
     #[inline(always)]
     fn added_mass_kg(&self) -> T {

@@ -2,7 +2,7 @@
 //!
 //! Form `quadratic`: `M -= k (|p| p, |q| q, |r| r / 2)`.
 
-use super::{Effect, EffectParameter, Situation, is};
+use super::{Effect, EffectParameter, Scale, Situation, is};
 use crate::frames::{Body, In, Wrench};
 use crate::math::{Real, real};
 use nalgebra::Vector3;
@@ -16,8 +16,12 @@ pub struct AngularDamping<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for AngularDamping<T> {
     const NAME: &'static str = "angular_damping";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("damping_n_m_s_per_rad", 4e-3, 0.03).only_in(&["linear"]),
-        EffectParameter::size("damping_n_m_s2_per_rad2", 2e-3, 0.03).only_in(&["quadratic"]),
+        EffectParameter::size("damping_n_m_s_per_rad", 4e-3, 0.03)
+            .growing_with(Scale::Inertia)
+            .only_in(&["linear"]),
+        EffectParameter::size("damping_n_m_s2_per_rad2", 2e-3, 0.03)
+            .growing_with(Scale::Inertia)
+            .only_in(&["quadratic"]),
         EffectParameter::form(&["linear", "quadratic"]),
     ];
 

@@ -15,7 +15,7 @@ pub struct AxialInflow<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for AxialInflow<T> {
     const NAME: &'static str = "axial_inflow";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("gain_s_per_m", 0.012, 0.06),
+        EffectParameter::signed("gain_s_per_m", 0.012, 0.06),
         EffectParameter::signed("quadratic_s2_per_m2", 4e-3, 0.03).only_in(&["quadratic"]),
         EffectParameter::form(&["linear", "quadratic"]),
     ];

@@ -3,7 +3,7 @@
 //!
 //! The accelerometer stays at the geometric centre, at `-r` from the centre of mass, and feels the rotation there.
 
-use super::{Effect, EffectParameter, Situation, is};
+use super::{Effect, EffectParameter, Scale, Situation, is};
 use crate::frames::{Body, In, Wrench};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -17,9 +17,9 @@ pub struct CgOffset<T>(pub(super) [T; 4]);
 impl<T: Real> Effect<T> for CgOffset<T> {
     const NAME: &'static str = "cg_offset";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("cg_x_m", 0.003, 0.012),
-        EffectParameter::signed("cg_y_m", 0.003, 0.012),
-        EffectParameter::signed("cg_z_m", 0.003, 0.012).only_in(&["spatial"]),
+        EffectParameter::signed("cg_x_m", 0.003, 0.012).growing_with(Scale::Arm),
+        EffectParameter::signed("cg_y_m", 0.003, 0.012).growing_with(Scale::Arm),
+        EffectParameter::signed("cg_z_m", 0.003, 0.012).growing_with(Scale::Arm).only_in(&["spatial"]),
         EffectParameter::form(&["planar", "spatial"]),
     ];
 

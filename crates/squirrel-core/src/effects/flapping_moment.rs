@@ -2,7 +2,7 @@
 //!
 //! Form `saturating`: the velocity is divided by `1 + V_h / scale`, `V_h` the airspeed in the rotor plane.
 
-use super::{Effect, EffectParameter, Situation, is};
+use super::{Effect, EffectParameter, Scale, Situation, is};
 use crate::frames::{Body, In, Wrench};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -16,7 +16,7 @@ pub struct FlappingMoment<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for FlappingMoment<T> {
     const NAME: &'static str = "flapping_moment";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("gain_n_m_s_per_m", 1e-3, 6e-3),
+        EffectParameter::signed("gain_n_m_s_per_m", 1e-3, 6e-3).growing_with(Scale::MassTimesArm),
         EffectParameter::size("speed_scale_m_s", 3.0, 20.0).only_in(&["saturating"]),
         EffectParameter::form(&["linear", "saturating"]),
     ];

@@ -3,7 +3,7 @@
 //! `h` is the height above the origin's level, not below `R / 2`. Form `exponential`: `T <- T (1 + g exp(-h / R))`, as fitted
 //! to multirotors, with `h` not below 0.
 
-use super::{Effect, EffectParameter, is};
+use super::{Effect, EffectParameter, Scale, is};
 use crate::aero::Air;
 use crate::math::{Real, real, upper};
 
@@ -16,7 +16,7 @@ pub struct GroundEffect<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for GroundEffect<T> {
     const NAME: &'static str = "ground_effect";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("effective_radius_m", 0.25, 0.55),
+        EffectParameter::size("effective_radius_m", 0.25, 0.55).growing_with(Scale::Arm),
         EffectParameter::size("gain", 0.1, 0.5).only_in(&["exponential"]),
         EffectParameter::form(&["cheeseman_bennett", "exponential"]),
     ];

@@ -3,7 +3,7 @@
 //! Form `anisotropic`: `F -= (D (1 + e) u, D (1 - e) v, D_z w)`, for rotors or an airframe longer than wide (Svacha et al.
 //! 2017 identify such a drag matrix).
 
-use super::{Effect, EffectParameter, Situation, is};
+use super::{Effect, EffectParameter, Scale, Situation, is};
 use crate::frames::{Body, In, Wrench};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -17,9 +17,11 @@ pub struct LinearDrag<T>(pub(super) [T; 4]);
 impl<T: Real> Effect<T> for LinearDrag<T> {
     const NAME: &'static str = "linear_drag";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("extra_drag_n_s_per_m", 0.04, 0.25),
+        EffectParameter::signed("extra_drag_n_s_per_m", 0.04, 0.25).growing_with(Scale::Mass),
         EffectParameter::signed("anisotropy", 0.1, 0.5).only_in(&["anisotropic"]),
-        EffectParameter::size("extra_drag_z_n_s_per_m", 0.04, 0.25).only_in(&["anisotropic"]),
+        EffectParameter::signed("extra_drag_z_n_s_per_m", 0.04, 0.25)
+            .growing_with(Scale::Mass)
+            .only_in(&["anisotropic"]),
         EffectParameter::form(&["isotropic", "anisotropic"]),
     ];
 

@@ -77,7 +77,7 @@ pub use yaw_torque_coeff::YawTorqueCoeff;
 use crate::aero::Air;
 use crate::frames::{Body, Frame, In, Ned, Wrench};
 use crate::math::{Real, real};
-use crate::vehicle::{PerRotor, Wing};
+use crate::vehicle::{PerRotor, Vehicle, Wing};
 use nalgebra::{Matrix3, Vector3};
 
 /// What a parameter of an effect is.
@@ -85,17 +85,71 @@ use nalgebra::{Matrix3, Vector3};
 pub enum Kind {
     /// A size in the unit that the key ends with; zero means absent.
     Size {
-        /// Smallest size worth reporting.
+        /// Smallest size worth reporting, on the vehicle of the paper.
         smallest: f64,
-        /// Largest plausible size.
+        /// Largest plausible size, on the same.
         largest: f64,
         /// Whether it may be negative; its size is then its absolute value.
         signed: bool,
+        /// What both sizes grow with from one vehicle to another.
+        scale: Scale,
     },
     /// Number of a rotor, from 1 in command order.
     Rotor,
     /// One of a few names; the value is its index.
     OneOf(&'static [&'static str]),
+}
+
+/// What the plausible sizes of a parameter grow with: the same part of a vehicle's own numbers is as much on a nano
+/// quadrotor as on a large one. Lengths, times and speeds of the catalogue are those of the air, and stay.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scale {
+    /// A fraction, an angle, a time or a speed.
+    Fixed,
+    /// Forces, with the weight.
+    Mass,
+    /// Moments that go with rates, with the mean inertia.
+    Inertia,
+    /// Lengths on the airframe, with the mean arm.
+    Arm,
+    /// Moments of forces.
+    MassTimesArm,
+}
+
+/// Mass, kg, mean inertia about roll and pitch, kg m^2, and mean arm, m, of the vehicle that sizes are written for: the
+/// paper's (Table I).
+const REFERENCE: [f64; 3] = [0.548, 3.95e-3, 0.1202];
+
+impl Scale {
+    /// How many times the reference vehicle's sizes those of a vehicle are.
+    fn of(self, vehicle: &Vehicle<f64>) -> f64 {
+        let p = vehicle.parameters();
+        let [mass_kg, inertia_kg_m2, arm_m] = REFERENCE;
+        let rotors = vehicle.rotors();
+        let arms = rotors.iter().map(|rotor| rotor.position.vector.xy().norm());
+        let mass = p.mass_kg / mass_kg;
+        let arm = arms.sum::<f64>() / (rotors.len().max(1) as f64 * arm_m);
+        match self {
+            Self::Fixed => 1.0,
+            Self::Mass => mass,
+            Self::Inertia => 0.5 * (p.inertia_kg_m2[(0, 0)] + p.inertia_kg_m2[(1, 1)]) / inertia_kg_m2,
+            Self::Arm => arm,
+            Self::MassTimesArm => mass * arm,
+        }
+    }
+}
+
+/// Plausible sizes of a parameter on one vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SizeRange {
+    /// Smallest size worth reporting.
+    pub smallest: f64,
+    /// Largest plausible size.
+    pub largest: f64,
+    /// Whether it may be negative.
+    pub signed: bool,
+    /// What both sizes grow with.
+    pub scale: Scale,
 }
 
 /// One parameter of an effect.
@@ -118,19 +172,32 @@ impl EffectParameter {
     }
     /// A size that is not negative.
     const fn size(key: &'static str, smallest: f64, largest: f64) -> Self {
-        Self::new(key, Kind::Size { smallest, largest, signed: false })
+        Self::new(key, Kind::Size { smallest, largest, signed: false, scale: Scale::Fixed })
     }
     /// A size with a sign.
     const fn signed(key: &'static str, smallest: f64, largest: f64) -> Self {
-        Self::new(key, Kind::Size { smallest, largest, signed: true })
+        Self::new(key, Kind::Size { smallest, largest, signed: true, scale: Scale::Fixed })
     }
     /// The choice of a form, the standard one first.
     const fn form(names: &'static [&'static str]) -> Self {
         Self::new(FORM, Kind::OneOf(names))
     }
+    /// The same, with sizes that grow with the vehicle.
+    const fn growing_with(mut self, with: Scale) -> Self {
+        if let Kind::Size { smallest, largest, signed, .. } = self.kind {
+            self.kind = Kind::Size { smallest, largest, signed, scale: with };
+        }
+        self
+    }
     const fn only_in(mut self, forms: &'static [&'static str]) -> Self {
         self.forms = Some(forms);
         self
+    }
+    /// Its plausible sizes on a vehicle; `None` for what counts or chooses.
+    pub fn range(&self, vehicle: &Vehicle<f64>) -> Option<SizeRange> {
+        let Kind::Size { smallest, largest, signed, scale } = self.kind else { return None };
+        let times = scale.of(vehicle);
+        Some(SizeRange { smallest: smallest * times, largest: largest * times, signed, scale })
     }
     /// Whether it exists in a form.
     pub fn exists_in(&self, form: &str) -> bool {

@@ -15,7 +15,7 @@ pub struct MotorLag<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for MotorLag<T> {
     const NAME: &'static str = "motor_lag";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("extra_time_constant_s", 0.015, 0.06),
+        EffectParameter::signed("extra_time_constant_s", 0.015, 0.06),
         EffectParameter::signed("asymmetry", 0.2, 0.8).only_in(&["asymmetric"]),
         EffectParameter::form(&["symmetric", "asymmetric"]),
     ];

@@ -3,7 +3,7 @@
 //! `s` is the load's horizontal offset from the vehicle, whose horizontal acceleration is `a`; small angles, damping
 //! `c = 0.1 1/s`, in the form `damped` a parameter. The tether is fixed at the centre of mass. A length of 0 is no load.
 
-use super::{Effect, EffectParameter, is};
+use super::{Effect, EffectParameter, Scale, is};
 use crate::frames::{In, Ned};
 use crate::math::{GRAVITY_M_S2, Real, real};
 use nalgebra::{Vector2, Vector3};
@@ -17,7 +17,7 @@ pub struct PayloadSwing<T>(pub(super) [T; 4]);
 impl<T: Real> Effect<T> for PayloadSwing<T> {
     const NAME: &'static str = "payload_swing";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("mass_kg", 0.03, 0.12),
+        EffectParameter::size("mass_kg", 0.03, 0.12).growing_with(Scale::Mass),
         EffectParameter::size("length_m", 0.3, 0.9),
         EffectParameter::size("damping_per_s", 0.2, 2.0).only_in(&["damped"]),
         EffectParameter::form(&["light", "damped"]),

@@ -2,7 +2,7 @@
 //!
 //! Form `anisotropic`: its own drag area along each body axis, `A (1 + e)`, `A (1 - e)`, `A_z`.
 
-use super::{Effect, EffectParameter, Situation, is};
+use super::{Effect, EffectParameter, Scale, Situation, is};
 use crate::frames::{Body, In, Wrench};
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
 use nalgebra::Vector3;
@@ -16,9 +16,11 @@ pub struct QuadraticDrag<T>(pub(super) [T; 4]);
 impl<T: Real> Effect<T> for QuadraticDrag<T> {
     const NAME: &'static str = "quadratic_drag";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("extra_drag_area_m2", 0.008, 0.05),
+        EffectParameter::signed("extra_drag_area_m2", 0.008, 0.05).growing_with(Scale::Mass),
         EffectParameter::signed("anisotropy", 0.1, 0.5).only_in(&["anisotropic"]),
-        EffectParameter::size("extra_drag_area_z_m2", 0.008, 0.05).only_in(&["anisotropic"]),
+        EffectParameter::signed("extra_drag_area_z_m2", 0.008, 0.05)
+            .growing_with(Scale::Mass)
+            .only_in(&["anisotropic"]),
         EffectParameter::form(&["isotropic", "anisotropic"]),
     ];
 

@@ -3,7 +3,7 @@
 //! `s_i` is the rotor's `yaw_sign`, the sign of its reaction torque about +z, so it spins the other way: `I_r H e3` is the
 //! angular momentum of all rotors in the body frame, and its rate there is taken from the airframe.
 
-use super::{Effect, EffectParameter, Situation};
+use super::{Effect, EffectParameter, Scale, Situation};
 use crate::frames::{Body, In, Wrench};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -15,7 +15,7 @@ pub struct RotorGyroTorque<T>(pub(super) [T; 1]);
 impl<T: Real> Effect<T> for RotorGyroTorque<T> {
     const NAME: &'static str = "rotor_gyro_torque";
     const PARAMETERS: &'static [EffectParameter] =
-        &[EffectParameter::size("rotor_inertia_kg_m2", 4e-6, 2e-5)];
+        &[EffectParameter::size("rotor_inertia_kg_m2", 4e-6, 2e-5).growing_with(Scale::Inertia)];
 
     #[inline(always)]
     fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {

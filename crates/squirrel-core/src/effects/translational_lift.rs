@@ -16,8 +16,8 @@ pub struct TranslationalLift<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for TranslationalLift<T> {
     const NAME: &'static str = "translational_lift";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("gain_s2_per_m2", 6e-4, 3e-3).only_in(&["saturating", "quadratic"]),
-        EffectParameter::size("gain_s_per_m", 3e-3, 0.02).only_in(&["linear"]),
+        EffectParameter::signed("gain_s2_per_m2", 6e-4, 3e-3).only_in(&["saturating", "quadratic"]),
+        EffectParameter::signed("gain_s_per_m", 3e-3, 0.02).only_in(&["linear"]),
         EffectParameter::form(&["saturating", "linear", "quadratic"]),
     ];
 

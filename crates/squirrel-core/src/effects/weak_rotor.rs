@@ -11,7 +11,7 @@ impl<T: Real> Effect<T> for WeakRotor<T> {
     const NAME: &'static str = "weak_rotor";
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::new("rotor", Kind::Rotor),
-        EffectParameter::size("thrust_loss_fraction", 0.05, 0.2),
+        EffectParameter::signed("thrust_loss_fraction", 0.05, 0.2),
     ];
 
     fn alter(&self, airframe: &mut Alteration<T>) {

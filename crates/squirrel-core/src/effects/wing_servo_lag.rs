@@ -14,7 +14,7 @@ pub struct WingServoLag<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for WingServoLag<T> {
     const NAME: &'static str = "wing_servo_lag";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("extra_time_constant_s", 0.12, 0.5),
+        EffectParameter::signed("extra_time_constant_s", 0.12, 0.5),
         EffectParameter::signed("asymmetry", 0.2, 0.8).only_in(&["asymmetric"]),
         EffectParameter::form(&["symmetric", "asymmetric"]),
     ];

@@ -5,7 +5,7 @@ use super::point::Member;
 use super::refine::Scored;
 use super::search::Search;
 use crate::GapError;
-use squirrel_core::effects::{Effects, FORM, Kind};
+use squirrel_core::effects::{Effects, FORM, Kind, SizeRange};
 
 /// What another form must be worth, nats.
 const FORM_NATS: f64 = 6.0;
@@ -22,7 +22,7 @@ impl Search<'_> {
                 members[index] = form;
                 let scored = self.score(linear, &members)?;
                 (self.progress)();
-                if scored.log_evidence > best.log_evidence + FORM_NATS && self.is_large(&scored) {
+                if scored.log_evidence > best.log_evidence + FORM_NATS {
                     *best = scored;
                 }
             }
@@ -61,7 +61,8 @@ impl Search<'_> {
                 let mut other = member.clone();
                 other.values[slot] = form as f64;
                 for (value, parameter) in other.values.iter_mut().zip(list) {
-                    let Kind::Size { smallest, largest, signed } = parameter.kind else { continue };
+                    let Some(range) = parameter.range(&self.predictor.vehicle.vehicle) else { continue };
+                    let SizeRange { smallest, largest, signed, .. } = range;
                     match (parameter.exists_in(now), parameter.exists_in(names[form])) {
                         (false, true) if signed => *value = 0.0,
                         (false, true) => *value = (smallest * largest).sqrt(),

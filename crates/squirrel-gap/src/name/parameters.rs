@@ -9,15 +9,17 @@ use super::tolerance::{SHARE_OF_SMALLEST, airframe, timing_s, tolerance};
 use crate::GapError;
 use crate::leftover::Slack;
 use crate::predictor::Predictor;
-use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, Scale, SizeRange};
+use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::plant::WingPlant;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Width of the slab over the largest plausible size.
 pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
-/// How many times the largest plausible size a number may have on the way: farther off nothing linear holds, and a mass or an
-/// inertia would be below zero.
-pub(crate) const LARGEST_TIMES: f64 = 2.0;
+/// How many times the largest plausible size a fraction or a time may have: farther off nothing linear holds, and a mass or an
+/// inertia would be below zero. What grows with the vehicle differs more from one design to another.
+const LARGEST_TIMES: f64 = 2.0;
+const GROWING_TIMES: f64 = 8.0;
 /// Effects that are known by their moments, and by the horizontal force; without these channels nothing is said of them.
 const MOMENTS: [&str; 6] = [
     "angular_damping",
@@ -49,6 +51,8 @@ pub(crate) struct Parameter {
     pub(crate) smallest: f64,
     pub(crate) largest: f64,
     pub(crate) signed: bool,
+    /// Least and greatest change of what the vehicle file has.
+    pub(crate) bounds: (f64, f64),
     /// Standard deviation of the spike.
     pub(crate) tolerance: f64,
     /// Standard deviation of the slab.
@@ -62,8 +66,8 @@ impl Parameter {
     ///
     /// * `own` - what the vehicle file has
     pub(super) fn bounded(&self, own: f64, change: f64) -> f64 {
-        let most = LARGEST_TIMES * self.largest;
-        (own + change).clamp(own.min(-most), own.max(most)) - own
+        let (least, most) = self.bounds;
+        (own + change).clamp(own.min(least), own.max(most)) - own
     }
 }
 
@@ -167,7 +171,7 @@ impl Catalogue {
         let standard = standard.unwrap_or_default();
         let (candidate, mut own, mut started) = (self.candidates.len(), Vec::new(), Vec::new());
         for (slot, parameter) in list.iter().enumerate() {
-            let Kind::Size { smallest, largest, signed } = parameter.kind else { continue };
+            let Some(range) = parameter.range(&vehicle.vehicle) else { continue };
             if !parameter.exists_in(standard) {
                 continue;
             }
@@ -180,17 +184,35 @@ impl Catalogue {
                 candidate,
                 slot,
                 key: parameter.key,
-                smallest,
-                largest,
-                signed,
-                tolerance: tolerance(vehicle, effect, slot, &fixed, smallest)?,
-                slab: SLAB_OF_LARGEST * largest,
+                smallest: range.smallest,
+                largest: range.largest,
+                signed: range.signed,
+                bounds: bounds(&vehicle.vehicle, effect, parameter.key, &range),
+                tolerance: tolerance(vehicle, effect, slot, &fixed, range.smallest)?,
+                slab: SLAB_OF_LARGEST * range.largest,
                 spread: 0.0,
             });
         }
         self.candidates.push(Candidate { effect, fixed, parameters: own, shape: started });
         Ok(())
     }
+}
+
+/// How far a number may go: what takes away from one of the vehicle's own leaves it at nothing, and no less.
+pub(super) fn bounds(vehicle: &Vehicle<f64>, effect: &str, key: &str, range: &SizeRange) -> (f64, f64) {
+    let times = if range.scale == Scale::Fixed { LARGEST_TIMES } else { GROWING_TIMES };
+    let most = times * range.largest;
+    let p = vehicle.parameters();
+    let own = match (effect, key) {
+        ("linear_drag", "extra_drag_n_s_per_m") => p.drag.linear_n_s_per_m.x,
+        ("linear_drag", "extra_drag_z_n_s_per_m") => p.drag.linear_n_s_per_m.z,
+        ("quadratic_drag", "extra_drag_area_m2" | "extra_drag_area_z_m2") => p.drag.area_m2,
+        ("motor_lag", "extra_time_constant_s") => p.propulsion.time_constant_up_s,
+        ("wing_servo_lag", "extra_time_constant_s") => p.wing.map_or(0.0, |wing| wing.time_constant_s),
+        _ if range.signed => most,
+        _ => 0.0,
+    };
+    (-own.min(most), most)
 }
 
 /// Every way in which the choices of an effect can be made.

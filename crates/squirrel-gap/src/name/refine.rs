@@ -2,11 +2,12 @@
 
 use super::evidence::{BETA, Gram, Posterior, products};
 use super::linear::{Linear, height_columns};
-use super::parameters::{LARGEST_TIMES, SLAB_OF_LARGEST};
+use super::parameters::{SLAB_OF_LARGEST, bounds};
 use super::point::{Member, Other, Point};
 use super::search::Search;
 use crate::GapError;
 use nalgebra::DMatrix;
+use squirrel_core::effects::{Effects, Scale, SizeRange};
 use std::collections::BTreeMap;
 use std::rc::Rc;
 
@@ -83,9 +84,10 @@ impl Search<'_> {
             let mut next = best.members.clone();
             let mut moved: f64 = 0.0;
             for (column, (member, slot)) in best.free.iter().enumerate() {
-                let (smallest, largest, signed) = self.range(&next[*member], *slot);
-                let most = LARGEST_TIMES * largest;
-                let low = if signed { -most } else { 0.02 * smallest };
+                let range = self.range(&next[*member], *slot);
+                let (low, most) = self.bounds(&next[*member], *slot);
+                let low = if range.signed { low } else { 0.02 * range.smallest };
+                let smallest = range.smallest;
                 let value = &mut next[*member].values[*slot];
                 let target = best.posterior.mean[column].clamp(low, most);
                 let step = share * (target - *value);
@@ -154,13 +156,16 @@ impl Search<'_> {
     }
 
     /// Range of a number of a member.
-    pub(crate) fn range(&self, member: &Member, slot: usize) -> (f64, f64, bool) {
-        use squirrel_core::effects::{Effects, Kind};
+    pub(crate) fn range(&self, member: &Member, slot: usize) -> SizeRange {
         let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
-        match list[slot].kind {
-            Kind::Size { smallest, largest, signed } => (smallest, largest, signed),
-            _ => (1.0, 1.0, true),
-        }
+        let chosen = SizeRange { smallest: 1.0, largest: 1.0, signed: true, scale: Scale::Fixed };
+        list[slot].range(&self.predictor.vehicle.vehicle).unwrap_or(chosen)
+    }
+
+    /// How far a number of a member may go.
+    fn bounds(&self, member: &Member, slot: usize) -> (f64, f64) {
+        let key = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default()[slot].key;
+        bounds(&self.predictor.vehicle.vehicle, self.effect(member), key, &self.range(member, slot))
     }
 
     /// Evidence of a set, linearised in its free numbers where they are.
@@ -220,7 +225,7 @@ impl Search<'_> {
         let mut places = Vec::new();
         for (index, member) in members.iter().enumerate() {
             for slot in self.free_slots(member) {
-                let (smallest, largest, _) = self.range(member, slot);
+                let SizeRange { smallest, largest, .. } = self.range(member, slot);
                 let place = before
                     .filter(|_| close || self.keeps_slope(member, slot))
                     .and_then(|before| self.place(before, index, member, slot));
@@ -278,7 +283,7 @@ impl Search<'_> {
     /// The last step of a refinement that has converged, too short to be worth another look.
     pub(super) fn finish(&self, best: &mut Scored) {
         for (column, (member, slot)) in best.free.iter().enumerate() {
-            let (smallest, ..) = self.range(&best.members[*member], *slot);
+            let SizeRange { smallest, .. } = self.range(&best.members[*member], *slot);
             let step = best.posterior.mean[column] - best.members[*member].values[*slot];
             if step.abs() < CONVERGED * smallest {
                 best.members[*member].values[*slot] += step;

@@ -34,7 +34,6 @@ impl Search<'_> {
                 }
             }
         }
-        all.retain(|rival| self.is_large(rival));
         all.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         Ok(all)
     }

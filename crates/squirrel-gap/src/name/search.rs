@@ -17,10 +17,10 @@ const FURTHER_NATS: f64 = 10.0;
 const BESIDE_GUSTS_NATS: f64 = 12.0;
 const BLOWN_NATS: f64 = 40.0;
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
-/// Part of the smallest size worth reporting that an effect must reach.
-const SIZE_MIN: f64 = 0.5;
 /// How much larger than the largest plausible size a number may be.
 const PLAUSIBLE: f64 = 1.3;
+/// How many times the largest plausible size a first step may lead to.
+const FIRST_STEP: f64 = 1.5;
 /// Candidates that are refined after each linear ranking.
 const REFINED: usize = 4;
 /// A candidate is given up if its first step leaves more than this part of what must be explained, and this much, nats.
@@ -79,7 +79,7 @@ impl Search<'_> {
             let mut without = self.drop_and_swap(&linear, &mut best)?;
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
-                if self.prune(&linear, &mut best)? || without.len() < best.members.len() {
+                if without.len() < best.members.len() {
                     without = self.without(&linear, &best)?;
                 }
                 self.finish(&mut best);
@@ -131,17 +131,6 @@ impl Search<'_> {
         }
     }
 
-    /// Drops members that refinement has made too small to report; whether there were any.
-    fn prune(&self, linear: &Linear, best: &mut Scored) -> Result<bool, GapError> {
-        let before = best.members.len();
-        while let Some(small) = best.members.iter().position(|member| !self.is_large_enough(member)) {
-            let mut rest = best.members.clone();
-            rest.remove(small);
-            *best = self.score(linear, &rest)?;
-        }
-        Ok(best.members.len() < before)
-    }
-
     /// A set without each of its members in turn.
     fn without(&self, linear: &Linear, set: &Scored) -> Result<Vec<Scored>, GapError> {
         (0..set.members.len())
@@ -165,7 +154,7 @@ impl Search<'_> {
                         && self.form(other) == self.form(member)
                         && self.free_slots(member).into_iter().all(|slot| {
                             let moved = (member.values[slot] - other.values[slot]).abs();
-                            moved < 0.1 * self.range(member, slot).0
+                            moved < 0.1 * self.range(member, slot).smallest
                         })
                 })
             })
@@ -187,7 +176,7 @@ impl Search<'_> {
         Ok(())
     }
 
-    /// The best set with one more effect that is large enough to report.
+    /// The best set with one more effect.
     ///
     /// * `beats` - evidence that it must have to matter, nats
     fn best_addition(
@@ -208,7 +197,7 @@ impl Search<'_> {
             let near = beats - GIVEN_UP * (beats - set.log_evidence).max(0.0) - GIVEN_UP_NATS;
             let scored = self.score_towards(linear, &members, Some(set), near)?;
             (self.progress)();
-            if self.is_large(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
+            if best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
                 beats = beats.max(scored.log_evidence);
                 best = Some(scored);
             }
@@ -216,35 +205,12 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Whether each member is at least half the smallest size worth reporting.
-    pub(crate) fn is_large(&self, scored: &Scored) -> bool {
-        scored.members.iter().all(|member| self.is_large_enough(member))
-    }
-
     /// Whether no member is larger than anything plausible: what is forced into a name goes to its limit.
     pub(crate) fn is_plausible(&self, scored: &Scored) -> bool {
         scored.members.iter().all(|member| {
-            self.free_slots(member).into_iter().all(|slot| {
-                let (_, largest, _) = self.range(member, slot);
-                member.values[slot].abs() <= PLAUSIBLE * largest
-            })
-        })
-    }
-
-    fn is_large_enough(&self, member: &Member) -> bool {
-        // Beside what the vehicle file has of it already; by the numbers of the standard form, unless this form has others.
-        let before = self.catalogue.absent(self.predictor, member.candidate).values;
-        let own = &self.catalogue.candidates[member.candidate].parameters;
-        let standard: Vec<usize> = own.iter().map(|p| self.catalogue.parameters[*p].slot).collect();
-        let mut slots = self.free_slots(member);
-        if slots.iter().any(|slot| standard.contains(slot)) {
-            slots.retain(|slot| standard.contains(slot));
-        }
-        slots.into_iter().any(|slot| {
-            let (smallest, _, signed) = self.range(member, slot);
-            let size = member.values[slot] - before[slot];
-            let may_shrink = signed || before[slot] != 0.0;
-            (if may_shrink { size.abs() } else { size }) >= SIZE_MIN * smallest
+            self.free_slots(member)
+                .into_iter()
+                .all(|slot| member.values[slot].abs() <= PLAUSIBLE * self.range(member, slot).largest)
         })
     }
 
@@ -277,7 +243,11 @@ impl Search<'_> {
                 let value = &mut member.values[parameter.slot];
                 *value += posterior.mean[offset + p];
                 plausible &= parameter.signed || *value > 0.0;
-                *value = value.clamp(-1.5 * parameter.largest, 1.5 * parameter.largest);
+                let (least, most) = parameter.bounds;
+                *value = value.clamp(
+                    least.max(-FIRST_STEP * parameter.largest),
+                    most.min(FIRST_STEP * parameter.largest),
+                );
                 // What starts flat is not found from below.
                 if self.catalogue.starts_flat(parameter.candidate) {
                     *value = value.max(parameter.smallest);

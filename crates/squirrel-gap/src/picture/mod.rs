@@ -19,7 +19,7 @@ use crate::report::{
 };
 use crate::shrink::{BIN_S, BINS, CHANNELS as FLOWN_CHANNELS};
 use crate::verdict::{Kind, NamedEffect, Value};
-use squirrel_core::effects::{Effects, Kind as ParameterKind};
+use squirrel_core::effects::{Effects, Kind as ParameterKind, SizeRange};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
 
@@ -176,7 +176,7 @@ pub fn picture(
     let again = verdict.closed_loop.iter().cloned();
     data.closed_loop = again.map(|flight| ClosedLoop { flight: short(&flight.flight), ..flight }).collect();
     data.whiteness.clone_from(&seen.whiteness);
-    data.parameters = verdict.effects.iter().flat_map(|e| parameters(e, &seen.tolerances)).collect();
+    data.parameters = verdict.effects.iter().flat_map(|e| parameters(vehicle, e, &seen.tolerances)).collect();
     let (names, chi_square) = &details.confusability;
     data.confusability = Some(confusability(names, chi_square));
     data.fly_next = fly_next(verdict.verdict, verdict.fly_next.as_deref(), data.confusability.as_ref());
@@ -260,7 +260,11 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
 }
 
 /// The sizes of an effect; its choices stand beside its name.
-fn parameters(effect: &NamedEffect, tolerances: &[(&str, &str, f64)]) -> Vec<ParameterRow> {
+fn parameters(
+    vehicle: &VehicleFile,
+    effect: &NamedEffect,
+    tolerances: &[(&str, &str, f64)],
+) -> Vec<ParameterRow> {
     let list = Effects::<f64>::parameters(effect.name).unwrap_or_default();
     let mut name = effect.name.to_owned();
     let mut rows = Vec::new();
@@ -268,7 +272,10 @@ fn parameters(effect: &NamedEffect, tolerances: &[(&str, &str, f64)]) -> Vec<Par
         match (parameter.kind, effect.parameters.get(parameter.key)) {
             (_, Some(Value::Choice { value, .. })) => name = format!("{name} {value}"),
             (ParameterKind::Rotor, Some(Value::Number { value, .. })) => name = format!("{name} {value}"),
-            (ParameterKind::Size { smallest, largest, .. }, Some(&Value::Number { value, low, high })) => {
+            (ParameterKind::Size { .. }, Some(&Value::Number { value, low, high })) => {
+                let Some(SizeRange { smallest, largest, .. }) = parameter.range(&vehicle.vehicle) else {
+                    continue;
+                };
                 let own = tolerances.iter().find(|(e, key, _)| *e == effect.name && *key == parameter.key);
                 let tolerance = own.map_or(f64::NAN, |(.., tolerance)| *tolerance);
                 let (effect, key, unit) =
