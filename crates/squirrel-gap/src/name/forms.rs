@@ -22,7 +22,7 @@ impl Search<'_> {
                 members[index] = form;
                 let scored = self.score(linear, &members)?;
                 (self.progress)();
-                if scored.log_evidence > best.log_evidence + FORM_NATS {
+                if scored.log_evidence > best.log_evidence + FORM_NATS && self.is_off(&scored) {
                     *best = scored;
                 }
             }

@@ -34,6 +34,7 @@ impl Search<'_> {
                 }
             }
         }
+        all.retain(|rival| self.is_off(rival));
         all.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         Ok(all)
     }

@@ -17,6 +17,8 @@ const FURTHER_NATS: f64 = 10.0;
 const BESIDE_GUSTS_NATS: f64 = 12.0;
 const BLOWN_NATS: f64 = 40.0;
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
+/// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
+const TOLERANCES_MIN: f64 = 3.5;
 /// How much larger than the largest plausible size a number may be.
 const PLAUSIBLE: f64 = 1.3;
 /// How many times the largest plausible size a first step may lead to.
@@ -79,7 +81,7 @@ impl Search<'_> {
             let mut without = self.drop_and_swap(&linear, &mut best)?;
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
-                if without.len() < best.members.len() {
+                if self.prune(&linear, &mut best)? || without.len() < best.members.len() {
                     without = self.without(&linear, &best)?;
                 }
                 self.finish(&mut best);
@@ -197,12 +199,40 @@ impl Search<'_> {
             let near = beats - GIVEN_UP * (beats - set.log_evidence).max(0.0) - GIVEN_UP_NATS;
             let scored = self.score_towards(linear, &members, Some(set), near)?;
             (self.progress)();
-            if best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
+            if self.is_off(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
                 beats = beats.max(scored.log_evidence);
                 best = Some(scored);
             }
         }
         Ok(best)
+    }
+
+    /// Whether each member is beyond what the vehicle file allows it.
+    pub(crate) fn is_off(&self, scored: &Scored) -> bool {
+        scored.members.iter().all(|member| self.is_beyond_tolerance(member))
+    }
+
+    /// By the numbers of the standard form, unless this form has others.
+    fn is_beyond_tolerance(&self, member: &Member) -> bool {
+        let before = self.catalogue.absent(self.predictor, member.candidate).values;
+        let own = self.catalogue.candidates[member.candidate].parameters.iter();
+        let own: Vec<_> = own.map(|p| &self.catalogue.parameters[*p]).collect();
+        let free = self.free_slots(member);
+        let mut standard = own.iter().filter(|p| free.contains(&p.slot)).peekable();
+        standard.peek().is_none()
+            || standard
+                .any(|p| (member.values[p.slot] - before[p.slot]).abs() >= TOLERANCES_MIN * p.tolerance)
+    }
+
+    /// Drops members that refinement has made too small to be off; whether there were any.
+    fn prune(&self, linear: &Linear, best: &mut Scored) -> Result<bool, GapError> {
+        let before = best.members.len();
+        while let Some(small) = best.members.iter().position(|member| !self.is_beyond_tolerance(member)) {
+            let mut rest = best.members.clone();
+            rest.remove(small);
+            *best = self.score(linear, &rest)?;
+        }
+        Ok(best.members.len() < before)
     }
 
     /// Whether no member is larger than anything plausible: what is forced into a name goes to its limit.
