@@ -280,7 +280,8 @@ fn fly(
 ) -> Result<(), GapError> {
     let track = &predictor.tracks[piece];
     let n = track.time_s.len();
-    let plant = predictor.plant_at(hypothesis, track.period_s / substeps(track.period_s) as f64)?;
+    let dt_s = track.period_s / substeps(track.period_s) as f64;
+    let plant = predictor.plant_in(hypothesis, track.flight, dt_s)?;
     let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
     let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
     let starts: Vec<usize> = (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();

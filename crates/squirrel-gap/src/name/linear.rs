@@ -109,7 +109,7 @@ impl Linear {
                 (other, None) => {
                     let mut moved = point.clone();
                     moved.base[column] += sd;
-                    let flight = if let Other::Tilt { flight } = other { Some(flight) } else { None };
+                    let flight = if let Other::Flight { flight } = other { Some(flight) } else { None };
                     difference(&moved, sd, flight)?
                 }
             });

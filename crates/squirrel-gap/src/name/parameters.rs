@@ -4,7 +4,7 @@
 //! deviation of the nominal number that the effect would change, and, where the effect is hypothesised, its **slab**, as wide
 //! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
 
-use super::point::{Airframe, Member};
+use super::point::{Airframe, DAY_FRACTION, Member};
 use super::tolerance::{SHARE_OF_SMALLEST, airframe, timing_s, tolerance};
 use crate::GapError;
 use crate::leftover::Slack;
@@ -16,17 +16,19 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Width of the slab over the largest plausible size.
 pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
-/// How many times the largest plausible size a fraction or a time may have: farther off nothing linear holds, and a mass or an
-/// inertia would be below zero. What grows with the vehicle differs more from one design to another.
+/// How many times the largest plausible size a fraction, a time or a length may have: farther off nothing linear holds, and a
+/// mass or an inertia would be below zero. Forces differ more from one design to another.
 const LARGEST_TIMES: f64 = 2.0;
 const GROWING_TIMES: f64 = 8.0;
 /// Effects that are known by their moments, and by the horizontal force; without these channels nothing is said of them.
-const MOMENTS: [&str; 6] = [
+const MOMENTS: [&str; 8] = [
     "angular_damping",
     "cg_offset",
     "flapping_moment",
     "inertia_error",
     "rotor_gyro_torque",
+    "weak_rotor",
+    "wing_asymmetry",
     "yaw_torque_coeff",
 ];
 const HORIZONTAL: [&str; 9] = [
@@ -91,6 +93,8 @@ pub(crate) struct Catalogue {
     pub(crate) unseen: Vec<&'static str>,
     /// Numbers of the airframe beside them, with their tolerances.
     pub(crate) airframe: Vec<(Airframe, f64)>,
+    /// By how much thrust may differ from one flight to the next, as a fraction.
+    pub(crate) day_fraction: f64,
 }
 
 impl Catalogue {
@@ -109,6 +113,7 @@ impl Catalogue {
             parameters: Vec::new(),
             unseen: Vec::new(),
             airframe: airframe(predictor),
+            day_fraction: DAY_FRACTION,
         };
         for name in Effects::<f64>::NAMES {
             if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
@@ -200,7 +205,10 @@ impl Catalogue {
 
 /// How far a number may go: what takes away from one of the vehicle's own leaves it at nothing, and no less.
 pub(super) fn bounds(vehicle: &Vehicle<f64>, effect: &str, key: &str, range: &SizeRange) -> (f64, f64) {
-    let times = if range.scale == Scale::Fixed { LARGEST_TIMES } else { GROWING_TIMES };
+    let times = match range.scale {
+        Scale::Fixed | Scale::Arm => LARGEST_TIMES,
+        Scale::Mass | Scale::Inertia | Scale::MassTimesArm => GROWING_TIMES,
+    };
     let most = times * range.largest;
     let p = vehicle.parameters();
     let own = match (effect, key) {

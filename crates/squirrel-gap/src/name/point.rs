@@ -1,8 +1,8 @@
 //! Where the predictor is asked: effects with a name, and everything else that may be off by its tolerance.
 //!
 //! What may be off beside the catalogue: where each rotor sits and what torque it has, since rotors of one make scatter; drag
-//! along y and z beside that along x; and in each flight the tilt of the attitude estimate and the zero of the barometer,
-//! which wanders.
+//! along y and z beside that along x; and in each flight the tilt of the attitude estimate, how it leans into an acceleration,
+//! a little thrust, and the zero of the barometer, which wanders.
 
 use super::parameters::{Candidate, Catalogue};
 use crate::GapError;
@@ -14,10 +14,16 @@ use squirrel_core::vehicle::Vehicle;
 
 /// Tolerance of the tilt of an attitude estimate, rad.
 const TILT_RAD: f64 = 0.006;
+/// By how much an attitude estimate may lean into an acceleration that lasts, rad per m/s^2: a degree at two of them.
+const LEVELLING_RAD_S2_PER_M: f64 = 0.01;
+/// By how much thrust differs from one flight to the next, as a fraction.
+pub(super) const DAY_FRACTION: f64 = 0.004;
 /// Tolerance of the barometer's zero, m.
 const HEIGHT_M: f64 = 0.2;
-/// Numbers of a flight's sensors: tilt about north and east, then heights.
-const SENSORS: usize = 2 + HEIGHT_KNOTS;
+/// Numbers of a flight before its heights: tilt about north and east, levelling, thrust.
+const SHORT: usize = 4;
+/// All of them.
+const OF_A_FLIGHT: usize = SHORT + HEIGHT_KNOTS;
 
 /// An effect with its numbers.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,8 +72,13 @@ impl Airframe {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Other {
     Airframe,
-    Tilt { flight: usize },
-    Height { flight: usize },
+    /// Of one flight: its attitude, or its thrust.
+    Flight {
+        flight: usize,
+    },
+    Height {
+        flight: usize,
+    },
 }
 
 /// The hypothesis of a point, on top of the vehicle file.
@@ -135,9 +146,12 @@ pub(crate) fn hypothesis(
             all.vehicle = number.act(&all.vehicle, x);
         }
     }
-    for (errors, x) in all.errors.iter_mut().zip(others[catalogue.airframe.len()..].chunks_exact(SENSORS)) {
+    let flights = others[catalogue.airframe.len()..].chunks_exact(OF_A_FLIGHT);
+    for ((errors, thrust), x) in all.errors.iter_mut().zip(&mut all.thrust).zip(flights) {
         errors.tilt_rad = [x[0], x[1]];
-        errors.height_m.copy_from_slice(&x[2..]);
+        errors.levelling_rad_s2_per_m = x[2];
+        *thrust = x[3];
+        errors.height_m.copy_from_slice(&x[SHORT..]);
     }
     Ok(all)
 }
@@ -162,7 +176,7 @@ impl Catalogue {
 
     /// Numbers beside the members in a [`Point`].
     pub(crate) fn columns(&self, predictor: &Predictor) -> usize {
-        self.shared_columns() + SENSORS * predictor.names.len()
+        self.shared_columns() + OF_A_FLIGHT * predictor.names.len()
     }
 
     /// What a column behind those of the parameters is, and its tolerance.
@@ -172,11 +186,12 @@ impl Catalogue {
             return (Other::Airframe, *tolerance);
         }
         let sensor = index - self.airframe.len();
-        let flight = sensor / SENSORS;
-        if sensor % SENSORS < 2 {
-            (Other::Tilt { flight }, TILT_RAD)
-        } else {
-            (Other::Height { flight }, HEIGHT_M)
+        let flight = sensor / OF_A_FLIGHT;
+        match sensor % OF_A_FLIGHT {
+            0 | 1 => (Other::Flight { flight }, TILT_RAD),
+            2 => (Other::Flight { flight }, LEVELLING_RAD_S2_PER_M),
+            3 => (Other::Flight { flight }, self.day_fraction),
+            _ => (Other::Height { flight }, HEIGHT_M),
         }
     }
 

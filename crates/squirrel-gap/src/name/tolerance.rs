@@ -13,9 +13,9 @@ const SAMPLE_SHARE: f64 = 0.29;
 /// Voltage of a full cell, of one at rest, and of an empty one under load, V.
 const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
 
-/// What sensors may be off by where the vehicle file does not say: m/s^2, and half a degree in rad.
-const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.02, "m/s^2");
-const HEADING: (&str, f64, &str) = ("sensors.attitude.bias_rad", 0.5_f64.to_radians(), "rad");
+/// What sensors may be off by where the vehicle file does not say: m/s^2, and a degree and a quarter in rad.
+const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.04, "m/s^2");
+const HEADING: (&str, f64, &str) = ("sensors.attitude.bias_rad", 1.25_f64.to_radians(), "rad");
 
 /// What the vehicle file does not say and is taken instead.
 pub(crate) fn notes(vehicle: &VehicleFile) -> Vec<String> {
@@ -31,6 +31,9 @@ pub(crate) fn notes(vehicle: &VehicleFile) -> Vec<String> {
     }
     notes
 }
+
+/// By how much a filter's velocity is late, one standard deviation, s.
+const VELOCITY_LAG_S: f64 = 0.02;
 
 /// How far the number that an effect changes may be off, one standard deviation, in the unit of the effect's parameter.
 pub(super) fn tolerance(
@@ -100,6 +103,7 @@ pub(super) fn tolerance(
         "accel_bias" => declared(ACCEL_BIAS.0, ACCEL_BIAS.1)?,
         "heading_bias" => declared(HEADING.0, HEADING.1)?,
         "constant_wind" => 0.12,
+        "gnss_latency" => VELOCITY_LAG_S,
         // A vehicle carries a load or it does not; a ground effect of a small radius is none.
         "payload_swing" | "ground_effect" => 0.0,
         _ => none,

@@ -64,6 +64,18 @@ pub(crate) struct Hypothesis {
     pub(crate) vehicle: Vehicle<f64>,
     pub(crate) effects: Effects<f64>,
     pub(crate) errors: Vec<SensorErrors>,
+    /// By what fraction the thrust of each flight is more than the vehicle's: propellers wear, and packs differ.
+    pub(crate) thrust: Vec<f64>,
+}
+
+impl Hypothesis {
+    /// The same with the vehicle as it was in one flight.
+    fn in_flight(&self, flight: usize) -> Option<Self> {
+        let fraction = *self.thrust.get(flight).filter(|fraction| **fraction != 0.0)?;
+        let mut day = Effects::none();
+        day.insert("thrust_coefficient")?.values[0] = fraction;
+        Some(Self { vehicle: day.alter(&self.vehicle).ok()?, ..self.clone() })
+    }
 }
 
 /// A set of flights of one vehicle, ready to be predicted again and again.
@@ -207,6 +219,7 @@ impl<'a> Predictor<'a> {
             vehicle: self.vehicle.vehicle,
             effects: self.vehicle.effects,
             errors: vec![SensorErrors::default(); self.names.len()],
+            thrust: vec![0.0; self.names.len()],
         }
     }
 
@@ -239,6 +252,9 @@ impl<'a> Predictor<'a> {
         rows: &mut [f64],
     ) -> Result<(), GapError> {
         let plant = self.plant_at(hypothesis, LED_STEP_S)?;
+        let days: Vec<Option<Plant>> = (0..self.names.len())
+            .map(|flight| hypothesis.in_flight(flight).map(|own| self.plant_at(&own, LED_STEP_S)).transpose())
+            .collect::<Result<_, _>>()?;
         let paths = self.paths.of(&plant, &self.tracks, &self.commands, |t| stride(plant.effects(), t));
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
@@ -247,7 +263,8 @@ impl<'a> Predictor<'a> {
                 continue;
             }
             let motion = self.motion(piece, hypothesis);
-            let dynamics = dynamics(&plant, track, &motion, &paths[piece]);
+            let own = days[track.flight].as_ref().unwrap_or(&plant);
+            let dynamics = dynamics(own, track, &motion, &paths[piece]);
             while let Some(segment) = segments.next_if(|s| s.piece == piece) {
                 let out = &mut rows[segment.rows.clone()];
                 if segment.channel < DYNAMIC {
@@ -314,6 +331,22 @@ impl<'a> Predictor<'a> {
             Ok(still.iter().zip(&after).map(|(b, a)| b - a).collect())
         };
         Ok([column(0)?, column(1)?, column(2)?])
+    }
+
+    /// The plant of a hypothesis as it was in one flight.
+    ///
+    /// # Errors
+    /// As [`Self::plant_at`].
+    pub(crate) fn plant_in(
+        &self,
+        hypothesis: &Hypothesis,
+        flight: usize,
+        dt_s: f64,
+    ) -> Result<Plant, GapError> {
+        match hypothesis.in_flight(flight) {
+            Some(own) => self.plant_at(&own, dt_s),
+            None => self.plant_at(hypothesis, dt_s),
+        }
     }
 
     /// The plant of a hypothesis, without a battery, whose voltage is measured.

@@ -37,6 +37,9 @@ const LOW_M: f64 = 2.0;
 pub(crate) struct SensorErrors {
     /// Tilt of the attitude estimate about north and east, rad.
     pub(crate) tilt_rad: [f64; 2],
+    /// By how much an attitude estimate leans into an acceleration that lasts, rad per m/s^2: a filter that takes the
+    /// accelerometer for the vertical.
+    pub(crate) levelling_rad_s2_per_m: f64,
     /// What the barometer reads too high, m, on lines between the knots of the flight.
     pub(crate) height_m: [f64; HEIGHT_KNOTS],
     /// By how much the velocity through the air is less than that over ground, m/s: moving air, or an error of velocity.
@@ -230,12 +233,13 @@ impl Track {
         };
         let [north, east] = errors.tilt_rad;
         let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(-north, -east, 0.0));
+        let mut leaning = Leaning::new(errors.levelling_rad_s2_per_m, self.period_s);
         let attitude: Vec<UnitQuaternion<f64>> = attitude
             .iter()
-            .zip(&self.time_s)
-            .map(|(q, t)| {
+            .zip(self.time_s.iter().zip(&self.specific_force))
+            .map(|(q, (t, force))| {
                 let heading = effects.heading_bias_rad(t - self.began_s);
-                let turned = UnitQuaternion::new_unchecked(*q);
+                let turned = leaning.upright(UnitQuaternion::new_unchecked(*q), force);
                 if heading == 0.0 && errors.tilt_rad == [0.0; 2] {
                     turned
                 } else {
@@ -312,6 +316,33 @@ impl Track {
             let share = if t1 > t0 { ((t - t0) / (t1 - t0)).clamp(0.0, 1.0) } else { 0.0 };
             *value += p0 + (p1 - p0) * share;
         }
+    }
+}
+
+/// Time over which a filter of attitude trusts its gyroscope, s.
+const LEVELLING_S: f64 = 1.5;
+
+/// How an attitude estimate leans into an acceleration: in proportion, behind a lag.
+struct Leaning {
+    gain: f64,
+    keep: f64,
+    acceleration: Vector3<f64>,
+}
+
+impl Leaning {
+    fn new(gain: f64, period_s: f64) -> Self {
+        Self { gain, keep: (-period_s / LEVELLING_S).exp(), acceleration: Vector3::zeros() }
+    }
+
+    /// The attitude without its lean: one sample on.
+    fn upright(&mut self, attitude: UnitQuaternion<f64>, force: &Vector3<f64>) -> UnitQuaternion<f64> {
+        if self.gain == 0.0 {
+            return attitude;
+        }
+        let now = attitude * force;
+        self.acceleration += (Vector3::new(now.x, now.y, 0.0) - self.acceleration) * (1.0 - self.keep);
+        let a = self.acceleration;
+        UnitQuaternion::from_scaled_axis(Vector3::new(-a.y, a.x, 0.0) * self.gain) * attitude
     }
 }
 
