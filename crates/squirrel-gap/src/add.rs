@@ -1,7 +1,7 @@
 //! The vehicle file with the named effects in it: a patch that keeps every comment and the order of what was there.
 
 use crate::diagnose::Diagnosis;
-use crate::verdict::{Kind, Value, Verdict};
+use crate::verdict::{Kind, NamedEffect, Value, Verdict};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::fmt::Write;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
@@ -9,13 +9,16 @@ use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
 /// Why a vehicle file has nothing to take from a verdict, in one line; `None` where the verdict names what the file lacks.
 pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
     Some(match verdict.verdict {
-        Kind::Named | Kind::NamedFormDiffers => return None,
+        Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers => return None,
         Kind::None => "no effect is above its tolerance".to_owned(),
         Kind::Ambiguous => {
             let own: Vec<&str> = verdict.effects.iter().map(|effect| effect.name).collect();
             let others = verdict.alternatives.iter().map(|other| other.effects.join(" + "));
             let sets: Vec<String> = std::iter::once(own.join(" + ")).chain(others).collect();
-            format!("these flights do not tell apart {}", sets.join(", "))
+            format!(
+                "these flights do not tell apart {}; `gap add --effect NAME` takes one of them",
+                sets.join(", ")
+            )
         }
         Kind::OutsideCatalogue => "something is missing that the catalogue does not have".to_owned(),
         Kind::NotIdentifiable if verdict.effects.is_empty() => {
@@ -37,6 +40,41 @@ pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
 /// # Errors
 /// One line: the text is not TOML, or the patched file would not be a vehicle.
 pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
+    with(vehicle, diagnosis, &diagnosis.verdict.effects, flights)
+}
+
+/// As [`add`], of the explanations that flights do not tell apart the first with an effect: the answer, then its alternatives.
+///
+/// # Errors
+/// One line: no explanation has the effect; or as [`add`].
+pub fn add_effect(
+    vehicle: &VehicleFile,
+    diagnosis: &Diagnosis,
+    effect: &str,
+    flights: &[String],
+) -> Result<String, String> {
+    let verdict = &diagnosis.verdict;
+    let sets =
+        || std::iter::once(&verdict.effects).chain(verdict.alternatives.iter().map(|set| &set.numbers));
+    let Some(chosen) = sets().find(|set| set.iter().any(|named| named.name == effect)) else {
+        let mut names: Vec<&str> = sets().flatten().map(|named| named.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        let names = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        return Err(format!(
+            "{}: no explanation of these flights has {effect:?}; they have: {names}",
+            vehicle.name
+        ));
+    };
+    with(vehicle, diagnosis, chosen, flights)
+}
+
+fn with(
+    vehicle: &VehicleFile,
+    diagnosis: &Diagnosis,
+    chosen: &[NamedEffect],
+    flights: &[String],
+) -> Result<String, String> {
     let mut document: DocumentMut = vehicle.text.parse().map_err(|e| format!("{}: {e}", vehicle.name))?;
     let effects = document.entry("effects").or_insert_with(|| {
         let mut table = Table::new();
@@ -49,7 +87,7 @@ pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> 
     };
     let source = format!("gap: {}", flights.join(", "));
     let domain = domain(diagnosis);
-    for effect in &diagnosis.verdict.effects {
+    for effect in chosen {
         let table = effects.entry(effect.name).or_insert_with(|| Item::Table(Table::new()));
         let Some(table) = table.as_table_mut() else {
             return Err(format!("{}: effects.{}: must be a table", vehicle.name, effect.name));

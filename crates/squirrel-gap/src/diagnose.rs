@@ -2,32 +2,18 @@
 
 use crate::GapError;
 use crate::compatibility;
-use crate::find::{self, Place};
+use crate::decide::{alternatives, close, decide, shared};
+use crate::find;
 use crate::name::{
-    Catalogue, Member, NATS_MIN, Naming, Point, Scored, Search, TURBULENCE_M_S, explain, heights, hypothesis,
-    payload_lengths_m, sds, silent_tolerances,
+    Catalogue, NATS_MIN, Search, explain, only, payload_lengths_m, sds, silent_tolerances, standing,
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
-use crate::shrink::{self, Errors12, Floor};
-use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Value, Verdict};
-use crate::words;
-use squirrel_core::effects::{Effects, Kind as ParameterKind};
+use crate::proof::{HeldOut, gap, hold, prove};
+use crate::verdict::{Kind, Verdict};
 use squirrel_core::vehicle::{ThrustCurve, Vehicle};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::collections::BTreeMap;
-
-/// Part of what the nominal model leaves that a form which differs may leave; more is outside the catalogue.
-const FORM_SHARE: f64 = 0.1;
-/// Part of the held-out gap that a name in another form must remove.
-const FORM_REMOVED: f64 = 0.6;
-/// How much more of the held-out gap the best other name must leave.
-const RIVAL_GAP: f64 = 3.0;
-/// Part of an error on held-out flights by which another one may be larger and no worse: the floor takes what noise is beyond it.
-const HELD_OUT_NOISE: f64 = 0.05;
-/// More alternatives than this within the evidence of a name are no answer.
-const ALTERNATIVES_MAX: usize = 3;
 
 /// Everything that the workflow found out.
 #[derive(Debug)]
@@ -62,18 +48,6 @@ pub(crate) struct Details {
     pub(crate) seen: picture::Seen,
 }
 
-/// Errors on held-out flights.
-#[derive(Debug)]
-pub(crate) struct HeldOut {
-    pub(crate) nominal: Errors12,
-    /// Of the best other name and of all that the evidence hardly tells from the answer, the best first.
-    pub(crate) rivals: Vec<Errors12>,
-    pub(crate) fitted: Errors12,
-    /// What the explanation leaves if it is true, and what is left in air without gusts.
-    pub(crate) floor: Floor,
-    pub(crate) calm: Floor,
-}
-
 /// Looks at flights of a vehicle and says which effect its file lacks.
 ///
 /// * `flights` - name and log of each, which the explanation is fitted to
@@ -106,6 +80,7 @@ pub fn diagnose(
             goes_with: Some(format!("{}: {}", problem.flight, problem.channel)),
             fly_next: None,
             gap: None,
+            leftover: None,
             closed_loop: Vec::new(),
             model_patch: None,
             words: problem.words,
@@ -139,17 +114,29 @@ pub fn diagnose(
     let catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
     let tick = || progress("naming");
     let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
-    let naming = explain(&search)?;
+    let wanted = |naming: &_| unseen.as_ref().map_or(Ok(None), |unseen| hold(unseen, &search, naming));
+    let mut naming = standing(&search, explain(&search)?, wanted)?;
     let rivals = search.rivals(&naming.found)?;
-    let best = naming.found.best.log_evidence;
-    let close = rivals.iter().filter(|rival| rival.log_evidence > best - NATS_MIN).count();
     progress("flying the held-out flights");
-    let proof = match &unseen {
-        Some(unseen) => prove(unseen, &search, &naming, &rivals[..rivals.len().min(1.max(close))])?,
-        None => None,
+    let proven = |naming: &_, rivals: &[_]| -> Result<_, GapError> {
+        let proof = match &unseen {
+            Some(unseen) => prove(unseen, &search, naming, rivals)?,
+            None => None,
+        };
+        let gap = proof.as_ref().map(|proof| gap(held_out, proof));
+        Ok((proof, gap))
     };
-    let gap = proof.as_ref().map(|proof| gap(held_out, proof));
-    let verdict = decide(&search, &naming, &rivals, proof.as_ref(), gap, places, curve_hides_sag);
+    let best = naming.found.best.log_evidence;
+    let near = rivals.iter().filter(|rival| rival.log_evidence > best - NATS_MIN).count();
+    let (mut proof, mut numbers) = proven(&naming, &rivals[..rivals.len().min(1.max(near))])?;
+    let close: Vec<_> = close(&naming, &rivals, proof.as_ref(), numbers.as_ref()).collect();
+    let mut open = Vec::new();
+    if let Some(kept) = shared(&search, &naming, &close) {
+        open = alternatives(&search, &naming, std::iter::once(&naming.found.best).chain(close));
+        naming = only(&search, naming, &kept)?;
+        (proof, numbers) = proven(&naming, &[])?;
+    }
+    let verdict = decide(&search, &naming, &rivals, proof.as_ref(), numbers, places, open, curve_hides_sag);
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.null),
@@ -157,234 +144,6 @@ pub fn diagnose(
         held_out: proof,
     };
     Ok(Diagnosis { verdict, domain, details: Some(details) })
-}
-
-/// The one answer.
-fn decide(
-    search: &Search<'_>,
-    naming: &Naming,
-    rivals: &[Scored],
-    proof: Option<&HeldOut>,
-    gap: Option<Gap>,
-    places: Vec<Place>,
-    curve_hides_sag: bool,
-) -> Verdict {
-    let found = &naming.found;
-    let effects = named(search, naming);
-    let nats = |set: &Scored| set.log_evidence - found.null.log_evidence;
-    // Another name is as good if the evidence hardly tells them apart and held-out flights do not either.
-    let clearly_worse = |rival: usize| {
-        let (Some(proof), Some(gap)) = (proof, &gap) else { return false };
-        let left = proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
-        left.is_some_and(|left| left - 1.0 >= RIVAL_GAP * (gap.after - 1.0).max(HELD_OUT_NOISE))
-    };
-    let close: Vec<&Scored> = rivals
-        .iter()
-        .enumerate()
-        .filter(|(i, rival)| rival.log_evidence > found.best.log_evidence - NATS_MIN && !clearly_worse(*i))
-        .map(|(_, rival)| rival)
-        .collect();
-    let leftover = &naming.leftover;
-    let mut blind = search.blind(&found.best);
-    if curve_hides_sag && !blind.contains(&"battery_sag") && effects.iter().all(|e| e.name != "battery_sag") {
-        blind.push("battery_sag");
-    }
-    let share = left_share(naming);
-    // What explains some flights and makes others worse is no name for what the vehicle lacks.
-    let fails = gap.as_ref().is_some_and(|gap| gap.after > (1.0 + HELD_OUT_NOISE) * gap.before);
-    let kind = if effects.is_empty() {
-        match (leftover.is_real(), blind.is_empty()) {
-            (true, _) => Kind::OutsideCatalogue,
-            (false, false) => Kind::NotIdentifiable,
-            (false, true) => Kind::None,
-        }
-    } else if leftover.is_real() {
-        let shrinks = gap.as_ref().is_none_or(|gap| gap.removed_fraction > FORM_REMOVED);
-        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) && shrinks {
-            Kind::NamedFormDiffers
-        } else {
-            Kind::OutsideCatalogue
-        }
-    } else if close.len() > ALTERNATIVES_MAX {
-        Kind::NotIdentifiable
-    } else if close.is_empty() && fails {
-        Kind::OutsideCatalogue
-    } else if close.is_empty() {
-        Kind::Named
-    } else {
-        Kind::Ambiguous
-    };
-    let names = |set: &Scored| set.members.iter().map(|m| search.effect(m)).collect::<Vec<_>>();
-    let shown = rivals.iter().take(5);
-    let mut alternatives: Vec<Alternative> =
-        shown.map(|set| Alternative { effects: names(set), evidence_nats: nats(set) }).collect();
-    if curve_hides_sag && effects.is_empty() {
-        let single = search.single_evidence(found).into_iter().find(|(name, _)| *name == "battery_sag");
-        let evidence_nats = single.map_or(0.0, |(_, nats)| nats);
-        alternatives.push(Alternative { effects: vec!["battery_sag"], evidence_nats });
-    }
-    let goes_with = if leftover.is_real() {
-        Some(leftover.goes_with().unwrap_or_else(|| leftover.channels()))
-    } else {
-        fails.then(|| "the flight, since the held-out ones lack something else".to_owned())
-    };
-    let goes_with = goes_with.filter(|_| kind != Kind::Named);
-    let fly_next = match kind {
-        Kind::NotIdentifiable if effects.is_empty() => Some(words::fly_for(&blind)),
-        Kind::Ambiguous | Kind::NotIdentifiable => {
-            let mut all: Vec<&str> = effects.iter().map(|e| e.name).collect();
-            all.extend(close.iter().flat_map(|set| names(set)));
-            Some(words::fly_for(&all))
-        }
-        _ => None,
-    };
-    let moved = if effects.is_empty() { Vec::new() } else { search.moved(&found.best) };
-    let mut verdict = Verdict {
-        verdict: kind,
-        effects,
-        moved,
-        alternatives,
-        places,
-        goes_with,
-        fly_next,
-        gap,
-        closed_loop: Vec::new(),
-        model_patch: None,
-        words: String::new(),
-        notes: search.predictor.notes.clone(),
-    };
-    verdict.words = words::paragraph(&verdict, &blind, curve_hides_sag);
-    verdict
-}
-
-/// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too, in the channels that it
-/// explains; 1 where it explains none. What stands out in other channels is another thing.
-fn left_share(naming: &Naming) -> f64 {
-    let excess = |slow: f64, floor: f64| (slow.powi(2) / floor.powi(2) - 1.0).max(0.0);
-    let (mut before, mut after) = (0.0, 0.0);
-    for band in &naming.leftover.bands {
-        let was = excess(band.slow_nominal, band.slow_floor);
-        let is = excess(band.slow, band.slow_floor);
-        if is < EXPLAINED * was && was > 1.0 {
-            before += was;
-            after += is;
-        }
-    }
-    if before > 0.0 { after / before } else { 1.0 }
-}
-
-/// Part of its excess that a channel may keep and still be explained.
-const EXPLAINED: f64 = 0.5;
-
-/// The members of the explanation as the verdict writes them, the most certain first.
-fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {
-    let found = &naming.found;
-    let mut all: Vec<NamedEffect> = found
-        .best
-        .members
-        .iter()
-        .enumerate()
-        .map(|(index, member)| NamedEffect {
-            name: search.effect(member),
-            form: search.form(member),
-            evidence_nats: found.worth(index),
-            parameters: parameters(search, naming, index, member),
-        })
-        .collect();
-    if let Some(sigma) = naming.gust_m_s {
-        let number = Value::Number { value: sigma, low: 0.8 * sigma, high: 1.25 * sigma };
-        all.push(NamedEffect {
-            name: "gust",
-            form: "gauss_markov",
-            evidence_nats: naming.gust_nats,
-            parameters: BTreeMap::from([("sigma_m_s", number)]),
-        });
-    }
-    all.sort_by(|a, b| b.evidence_nats.total_cmp(&a.evidence_nats));
-    all
-}
-
-/// 95 % of a normal distribution lies within this many standard deviations.
-const INTERVAL: f64 = 1.96;
-
-fn parameters(
-    search: &Search<'_>,
-    naming: &Naming,
-    index: usize,
-    member: &Member,
-) -> BTreeMap<&'static str, Value> {
-    let list = Effects::<f64>::parameters(search.effect(member)).unwrap_or_default();
-    let form = search.form(member);
-    let free = &naming.found.best.free;
-    list.iter()
-        .enumerate()
-        .filter(|(_, p)| p.key != squirrel_core::effects::FORM && p.exists_in(form))
-        .map(|(slot, parameter)| {
-            let value = member.values[slot];
-            let value = match parameter.kind {
-                ParameterKind::OneOf(names) => {
-                    let value = names[value as usize];
-                    Value::Choice { value, low: value, high: value }
-                }
-                ParameterKind::Rotor => Value::Number { value, low: value, high: value },
-                ParameterKind::Size { .. } => {
-                    let column = free.iter().position(|f| *f == (index, slot));
-                    let sd = column.map_or(0.0, |column| naming.deviations[column]);
-                    Value::Number { value, low: value - INTERVAL * sd, high: value + INTERVAL * sd }
-                }
-            };
-            (parameter.key, value)
-        })
-        .collect()
-}
-
-/// Re-simulates the held-out flights as the vehicle was, with the explanation and with other names.
-fn prove(
-    unseen: &Predictor,
-    search: &Search<'_>,
-    naming: &Naming,
-    others: &[Scored],
-) -> Result<Option<HeldOut>, GapError> {
-    let at = |members: &[Member], base: &[f64]| -> Result<Hypothesis, GapError> {
-        // What floats inside its tolerance is shared; what the sensors of other flights did is not. A barometer's own error is
-        // found from its flight.
-        let mut base = base[..search.catalogue.shared_columns()].to_vec();
-        base.resize(search.catalogue.columns(unseen), 0.0);
-        let mut point = Point { members: members.to_vec(), base };
-        heights(unseen, search.catalogue, &naming.found.linear.whitener, &mut point)?;
-        hypothesis(unseen, search.catalogue, &point)
-    };
-    let whole = search.whole(&naming.found.best);
-    let fitted_at = at(&whole.members, &whole.base)?;
-    let Some(fitted) = shrink::errors(unseen, &fitted_at)? else { return Ok(None) };
-    let Some(nominal) = shrink::errors(unseen, &at(&[], &whole.base)?)? else { return Ok(None) };
-    let mut rivals = Vec::with_capacity(others.len());
-    for rival in others {
-        rivals.extend(shrink::errors(unseen, &at(&rival.members, &search.whole(rival).base)?)?);
-    }
-    let calm = shrink::floor(unseen, &fitted_at, TURBULENCE_M_S)?;
-    let floor = match naming.gust_m_s {
-        Some(sigma) => shrink::floor(unseen, &fitted_at, sigma)?,
-        None => calm.clone(),
-    };
-    Ok(Some(HeldOut { nominal, rivals, fitted, floor, calm }))
-}
-
-fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
-    // Gusts are no force that could be foreseen: with them, errors are as large as expected, and without them larger.
-    let before = proof.nominal.over(&proof.calm.of(&proof.fitted));
-    let floor = proof.floor.of(&proof.fitted);
-    let after = proof.fitted.over(&floor);
-    let best_rival = proof.rivals.iter().map(|rival| rival.over(&floor)).reduce(f64::min);
-    let removed = |left: f64| if before > 1.0 { 1.0 - (left - 1.0) / (before - 1.0) } else { 0.0 };
-    Gap {
-        held_out_flights: held_out.iter().map(|(name, _)| name.clone()).collect(),
-        before,
-        after,
-        best_rival,
-        removed_fraction: removed(after),
-        best_rival_removed_fraction: best_rival.map(removed),
-    }
 }
 
 /// Whether the thrust curve of the vehicle file, moved by its sd, changes the vertical force more than the smallest sag

@@ -10,6 +10,7 @@
 mod add;
 mod closed_loop;
 mod compatibility;
+mod decide;
 mod diagnose;
 mod error;
 pub mod find;
@@ -18,16 +19,17 @@ mod leftover;
 mod name;
 mod picture;
 mod predictor;
+mod proof;
 pub mod report;
 mod shrink;
 mod verdict;
 mod words;
 
-pub use add::{add, difference, nothing_to_add};
+pub use add::{add, add_effect, difference, nothing_to_add};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::picture;
-pub use verdict::{Alternative, Gap, Kind, Moved, NamedEffect, Value, Verdict};
+pub use verdict::{Alternative, Gap, Kind, Left, Moved, NamedEffect, Value, Verdict};
 pub use words::significant;

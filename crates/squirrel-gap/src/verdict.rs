@@ -2,6 +2,8 @@
 
 use crate::closed_loop::ClosedLoop;
 use crate::find::Place;
+use crate::leftover::Leftover;
+use crate::predictor::CHANNELS;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -13,6 +15,8 @@ pub enum Kind {
     None,
     /// These effects, in these forms.
     Named,
+    /// These effects lead in evidence and hold on held-out flights; something else remains.
+    NamedIncomplete,
     /// These effects, but none of their published forms accounts for all of it.
     NamedFormDiffers,
     /// One of several sets that these flights cannot tell apart.
@@ -90,6 +94,45 @@ pub struct Alternative {
     pub effects: Vec<&'static str>,
     /// Evidence over no effect at all, nats.
     pub evidence_nats: f64,
+    /// Its effects with their numbers, for who chooses it.
+    #[serde(skip)]
+    pub numbers: Vec<NamedEffect>,
+}
+
+/// What the names leave of the flights that they were fitted to.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Left {
+    /// Part of the mean square above noise, in units of noise, that the names remove, over all channels.
+    pub share_removed: f64,
+    /// What is left above noise and tolerances, as part of what was measured about its mean, rms, in the channels that stand
+    /// out; 0 where none does.
+    pub share_left: f64,
+    /// The channels that stand out, the worst first.
+    pub channels: Vec<&'static str>,
+    /// What it goes with, where something predicts it.
+    pub goes_with: Option<String>,
+}
+
+impl Left {
+    pub(crate) fn of(leftover: &Leftover) -> Self {
+        let excess = |rms: f64, floor: f64| (rms.powi(2) - floor.powi(2)).max(0.0);
+        let (mut before, mut after, mut left, mut measured) = (0.0, 0.0, 0.0, 0.0);
+        for band in &leftover.bands {
+            let noise = band.slow_floor.powi(2);
+            before += excess(band.slow_nominal, band.slow_floor) / noise;
+            after += excess(band.slow, band.slow_floor) / noise;
+            if leftover.excess.iter().any(|(channel, _)| *channel == band.channel) {
+                left += excess(band.slow, band.slow_floor);
+                measured += band.slow_measured.powi(2);
+            }
+        }
+        Self {
+            share_removed: if before > 0.0 { 1.0 - after / before } else { 0.0 },
+            share_left: if measured > 0.0 { (left / measured).sqrt() } else { 0.0 },
+            channels: leftover.excess.iter().map(|(channel, _)| CHANNELS[*channel]).collect(),
+            goes_with: leftover.goes_with(),
+        }
+    }
 }
 
 /// What the explanation is worth on flights that it never saw.
@@ -129,6 +172,8 @@ pub struct Verdict {
     pub fly_next: Option<String>,
     /// On held-out flights, if there are any.
     pub gap: Option<Gap>,
+    /// What the names leave; none where nothing was looked for.
+    pub leftover: Option<Left>,
     /// Held-out flights of our own flight code, flown again; empty until somebody does, and for those of other autopilots.
     pub closed_loop: Vec<ClosedLoop>,
     /// Path of the vehicle file with the effects added.

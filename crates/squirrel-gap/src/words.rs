@@ -98,6 +98,7 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
         Kind::NamedFormDiffers => format!(
             "The vehicle file lacks {effects}, but none of the published forms accounts for all of it; the rest goes with {goes_with}."
         ),
+        Kind::NamedIncomplete => format!("The vehicle file lacks {effects}. {}.", remains(verdict)),
         Kind::Ambiguous => format!(
             "The vehicle file lacks {effects}, or one of: {}. These flights do not tell them apart.",
             others.join("; ")
@@ -140,6 +141,23 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
         let _ = write!(text, " Fly next: {fly_next}.");
     }
     text
+}
+
+/// What an incomplete answer leaves: how much, where, and with what it goes; or names that the flights do not tell apart.
+fn remains(verdict: &Verdict) -> String {
+    let Some(left) = verdict.leftover.as_ref().filter(|left| !left.channels.is_empty()) else {
+        let sets: Vec<String> = verdict.alternatives.iter().map(|set| set.effects.join(" + ")).collect();
+        return format!(
+            "Something else remains, which these flights do not tell apart: {}",
+            sets.join("; or ")
+        );
+    };
+    let goes_with = left.goes_with.as_ref().map_or_else(
+        || "nothing that was tried predicts it".to_owned(),
+        |family| format!("it goes with {family}"),
+    );
+    let (share, channels) = (100.0 * left.share_left, left.channels.join(", "));
+    format!("Something else remains, {share:.0} % of what was measured in {channels}; {goes_with}")
 }
 
 #[cfg(test)]

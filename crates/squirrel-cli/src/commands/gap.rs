@@ -26,6 +26,9 @@ pub(crate) enum Gap {
     Add {
         #[command(flatten)]
         flights: Given,
+        /// Add this effect, of an answer that is a set of them or not sure enough to be added by itself.
+        #[arg(long, value_name = "NAME")]
+        effect: Option<String>,
         /// Print the patch and write nothing.
         #[arg(long)]
         dry_run: bool,
@@ -95,7 +98,7 @@ impl Gap {
         match self {
             Self::Find(flights) => flights.find(),
             Self::Name(flights) => flights.name(),
-            Self::Add { flights, dry_run } => flights.add(*dry_run),
+            Self::Add { flights, effect, dry_run } => flights.add(effect.as_deref(), *dry_run),
             Self::Shrink(flights) => flights.shrink(),
             Self::Run(flights) => flights.everything(),
         }
@@ -176,7 +179,7 @@ impl Given {
         self.write(&found.diagnosis.verdict)
     }
 
-    fn add(&self, dry_run: bool) -> Result<(), String> {
+    fn add(&self, effect: Option<&str>, dry_run: bool) -> Result<(), String> {
         if dry_run {
             self.check(&[])?;
         } else {
@@ -185,7 +188,12 @@ impl Given {
         }
         let mut found = self.diagnose()?;
         show(&found.diagnosis.verdict);
-        let text = found.patched()?;
+        let text = match effect {
+            Some(effect) => {
+                Ok(squirrel_gap::add_effect(&found.vehicle, &found.diagnosis, effect, &found.flights)?)
+            }
+            None => found.patched()?,
+        };
         if dry_run {
             if let Ok(text) = &text {
                 say(&squirrel_gap::difference(&found.vehicle.text, text));

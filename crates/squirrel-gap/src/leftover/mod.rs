@@ -11,6 +11,7 @@ pub(crate) mod floor;
 use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
 use features::{families, place_share, predicted_share};
+use nalgebra::Matrix3;
 use squirrel_core::math::GRAVITY_M_S2;
 use std::rc::Rc;
 
@@ -51,6 +52,8 @@ pub(crate) struct Band {
     /// The slow part of the vehicle as it was.
     pub(crate) slow_nominal: f64,
     pub(crate) whole_floor: f64,
+    /// The slow part of what was measured, about its mean.
+    pub(crate) slow_measured: f64,
 }
 
 /// What is left.
@@ -68,6 +71,8 @@ pub(crate) struct Leftover {
     pub(crate) kurtosis: f64,
     /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above 0.5 Hz.
     pub(crate) line: Option<(f64, f64)>,
+    /// Whether the model misses a little everywhere, as models of real vehicles do, and not one thing.
+    pub(crate) is_everywhere: bool,
 }
 
 impl Leftover {
@@ -159,6 +164,7 @@ pub(crate) fn leftover(
         let track = &predictor.tracks[segment.piece];
         let measured = track.measured.iter().map(|m| m[segment.channel]);
         let mean = measured.clone().sum::<f64>() / own.len() as f64;
+        let about_mean: Vec<f64> = measured.clone().map(|m| m - mean).collect();
         let explained: Vec<f64> = measured
             .zip(rows(nominal).iter().zip(&own))
             .map(|(m, (n, l))| (m - mean).abs().max((n - l).abs()))
@@ -174,6 +180,7 @@ pub(crate) fn leftover(
             slow_floor: mean(rms_of_means),
             slow_nominal: rms_of_means(&rows(nominal)),
             whole_floor: mean(rms),
+            slow_measured: rms_of_means(&about_mean),
         };
         let within = within_tolerance(predictor, &motions[segment.piece], segment, slack);
         let allowed = |floor: f64, ratio: f64, explained: f64| {
@@ -187,8 +194,15 @@ pub(crate) fn leftover(
     let mut excess: Vec<(usize, f64)> =
         worst.iter().copied().enumerate().filter(|(_, ratio)| *ratio > 1.0).collect();
     excess.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let mut out =
-        Leftover { bands, excess, families: Vec::new(), place_share: 0.0, kurtosis: 3.0, line: None };
+    let mut out = Leftover {
+        bands,
+        excess,
+        families: Vec::new(),
+        place_share: 0.0,
+        kurtosis: 3.0,
+        line: None,
+        is_everywhere: false,
+    };
     if let Some(&(channel, _)) = out.excess.first() {
         let y = means(predictor, left, channel);
         let moments = moments_of(predictor, motions, channel);
@@ -205,6 +219,7 @@ pub(crate) fn leftover(
         out.families.sort_by(|a, b| b.1.total_cmp(&a.1));
         out.kurtosis = kurtosis(&x).max(kurtosis(&y));
         out.line = line(predictor, left, channel);
+        out.is_everywhere = is_everywhere(predictor, left, &out.bands, channel / 3);
     }
     out
 }
@@ -249,6 +264,35 @@ fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, s
         }
         _ => slack.lever_m * slow(0).hypot(slow(1)) / p.inertia_kg_m2[(2, 2)],
     }
+}
+
+/// How far above noise an axis is that a model misses something on.
+const MISSED: f64 = 2.0;
+/// Part of the variance of three axes, each in units of its own size, that one cause behind all has at least.
+const ONE_CAUSE: f64 = 0.8;
+
+/// Whether all three axes of force or moment are left with something, and not the same thing: one missing effect leaves the
+/// others at their noise, or moves all as one.
+fn is_everywhere(predictor: &Predictor, left: &[f64], bands: &[Band], group: usize) -> bool {
+    let axes = [0, 1, 2].map(|axis| 3 * group + axis);
+    let rms_of = |channel: usize, of: fn(&Band) -> f64| {
+        let own = bands.iter().filter(|b| b.channel == channel);
+        let (sum, n) = own.fold((0.0, 0.0_f64), |(sum, n), b| (sum + of(b).powi(2), n + 1.0));
+        (sum / n.max(1.0)).sqrt()
+    };
+    if !axes.iter().all(|channel| {
+        let floor = rms_of(*channel, |b| b.slow_floor);
+        floor > 0.0 && rms_of(*channel, |b| b.slow) > MISSED * floor
+    }) {
+        return false;
+    }
+    let all = axes.map(|channel| means(predictor, left, channel));
+    let size = all.each_ref().map(|x| rms(x));
+    let correlation = Matrix3::from_fn(|i, j| {
+        let sum: f64 = all[i].iter().zip(&all[j]).map(|(a, b)| a * b).sum();
+        sum / (all[i].len().max(1) as f64 * size[i] * size[j])
+    });
+    correlation.symmetric_eigenvalues().max() < 3.0 * ONE_CAUSE
 }
 
 /// The moments of the blocks of one channel.

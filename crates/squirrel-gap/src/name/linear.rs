@@ -109,7 +109,7 @@ impl Linear {
                 (other, None) => {
                     let mut moved = point.clone();
                     moved.base[column] += sd;
-                    let flight = if let Other::Flight { flight } = other { Some(flight) } else { None };
+                    let flight = if let Other::Flight { flight, .. } = other { Some(flight) } else { None };
                     difference(&moved, sd, flight)?
                 }
             });
@@ -185,35 +185,60 @@ pub(super) fn height_columns(
 /// Steps towards the heights of flights.
 const HEIGHT_STEPS: usize = 5;
 
-/// Puts the barometer's errors of flights where they fit best inside their tolerance, if anything acts that feels height.
+/// Puts what the sensors and the thrust of flights were off by where it fits best inside its tolerance: of flights that
+/// nothing was fitted to, this is not known from others.
+///
+/// * `thrust_fraction` - by how much thrust may differ from that of the flights that were fitted
 ///
 /// # Errors
 /// What the predictor says.
-pub(crate) fn heights(
+pub(crate) fn settle_flights(
     predictor: &Predictor,
     catalogue: &Catalogue,
     whitener: &Whitener,
+    thrust_fraction: f64,
     point: &mut Point,
 ) -> Result<(), GapError> {
+    let segments = &predictor.segments;
+    let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
+    let mut of_flights: Vec<(usize, f64, Vec<f64>)> = Vec::new();
+    for column in catalogue.shared_columns()..catalogue.columns(predictor) {
+        let (Other::Flight { flight, is_thrust }, sd) = catalogue.other(column) else { continue };
+        let sd = if is_thrust { thrust_fraction.max(sd) } else { sd };
+        let mut moved = point.clone();
+        moved.base[column] += sd;
+        let mut after = residual.clone();
+        predictor.residual_of(&hypothesis(predictor, catalogue, &moved)?, Some(flight), &mut after)?;
+        let slope: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / sd).collect();
+        of_flights.push((column, sd, whitener.apply(segments, &slope)));
+    }
     for _ in 0..HEIGHT_STEPS {
         let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
-        let (index, columns): (Vec<usize>, Vec<Vec<f64>>) =
-            height_columns(predictor, catalogue, point, &residual)?.into_iter().unzip();
-        if index.is_empty() {
-            break;
+        let heights = height_columns(predictor, catalogue, point, &residual)?;
+        let is_last = heights.is_empty();
+        let (mut index, mut sd, mut white) = (Vec::new(), Vec::new(), Vec::new());
+        for (column, own_sd, own) in &of_flights {
+            index.push(*column);
+            sd.push(*own_sd);
+            white.push(own.clone());
         }
-        let segments = &predictor.segments;
+        for (column, slope) in heights {
+            index.push(column);
+            sd.push(catalogue.other(column).1);
+            white.push(whitener.apply(segments, &slope));
+        }
         let mut y = whitener.apply(segments, &residual);
-        let white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.apply(segments, c)).collect();
         for (column, c) in index.iter().zip(&white) {
             for (y, c) in y.iter_mut().zip(c) {
                 *y += c * point.base[*column];
             }
         }
-        let sd: Vec<f64> = index.iter().map(|column| catalogue.other(*column).1).collect();
         let Some(posterior) = Gram::new(&white, &y).posterior(&sd, BETA) else { break };
         for (column, x) in index.iter().zip(posterior.mean.iter()) {
             point.base[*column] = *x;
+        }
+        if is_last {
+            break;
         }
     }
     Ok(())

@@ -20,7 +20,7 @@ mod search;
 mod tolerance;
 mod whiten;
 
-pub(crate) use linear::heights;
+pub(crate) use linear::settle_flights;
 pub(crate) use parameters::Catalogue;
 pub(crate) use payload::payload_lengths_m;
 pub(crate) use point::{Member, Point, hypothesis};
@@ -51,6 +51,8 @@ pub(crate) struct Naming {
     pub(crate) gust_m_s: Option<f64>,
     /// What they are worth, nats.
     pub(crate) gust_nats: f64,
+    /// Whether its names stand although something is left: each leads by far, and held-out flights want it.
+    pub(crate) stands: bool,
 }
 
 /// Finds the best explanation.
@@ -89,6 +91,51 @@ pub(crate) fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
     Ok(again)
 }
 
+/// Standard deviations, from blocks of the flights, by which a number stands out from a model that misses a little everywhere.
+pub(crate) const STANDS: f64 = 5.0;
+
+/// The explanation with those names alone that stand although something is left; as it was where what is left is one thing.
+///
+/// * `hold` - of each name, whether held-out flights want it; `None` where there are none
+///
+/// # Errors
+/// What the predictor says.
+pub(crate) fn standing(
+    search: &Search<'_>,
+    mut naming: Naming,
+    mut hold: impl FnMut(&Naming) -> Result<Option<Vec<bool>>, GapError>,
+) -> Result<Naming, GapError> {
+    loop {
+        let is_candidate = naming.leftover.is_real()
+            && naming.leftover.is_everywhere
+            && !naming.leftover.is_foreign()
+            && naming.gust_m_s.is_none()
+            && !naming.found.best.members.is_empty();
+        if !is_candidate {
+            return Ok(naming);
+        }
+        let holds = hold(&naming)?;
+        let stand = |index: usize| {
+            holds.as_ref().is_none_or(|holds| holds[index])
+                && search.stands_out(&naming.found.best, index, &naming.deviations) >= STANDS
+        };
+        let kept: Vec<usize> = (0..naming.found.best.members.len()).filter(|i| stand(*i)).collect();
+        if kept.len() == naming.found.best.members.len() {
+            naming.stands = true;
+            return Ok(naming);
+        }
+        naming = only(search, naming, &kept)?;
+    }
+}
+
+/// The same explanation with some of its names alone.
+///
+/// # Errors
+/// What the predictor says.
+pub(crate) fn only(search: &Search<'_>, naming: Naming, kept: &[usize]) -> Result<Naming, GapError> {
+    judge(search, search.only(naming.found, kept)?)
+}
+
 /// What floats may be off by this many tolerances before a leftover is a leftover.
 const LEFTOVER_TOLERANCES: f64 = 2.0;
 /// Most tolerances that anything may be off by in it.
@@ -125,6 +172,7 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
         deviations,
         gust_m_s: None,
         gust_nats: 0.0,
+        stands: false,
     })
 }
 

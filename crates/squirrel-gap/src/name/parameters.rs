@@ -5,7 +5,7 @@
 //! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
 
 use super::point::{Airframe, DAY_FRACTION, Member};
-use super::tolerance::{SHARE_OF_SMALLEST, airframe, timing_s, tolerance};
+use super::tolerance::{SHARE_OF_SMALLEST, airframe, slip_ppm, timing_s, tolerance};
 use crate::GapError;
 use crate::leftover::Slack;
 use crate::predictor::Predictor;
@@ -136,6 +136,9 @@ impl Catalogue {
         }
         for parameter in &mut all.parameters {
             let effect = all.candidates[parameter.candidate].effect;
+            if effect == "clock_skew" {
+                parameter.tolerance = parameter.tolerance.max(slip_ppm(predictor));
+            }
             parameter.spread = match timing_s(predictor, effect) {
                 Some(spread) => spread,
                 // What has no declared number has none to be off.
@@ -217,6 +220,8 @@ pub(super) fn bounds(vehicle: &Vehicle<f64>, effect: &str, key: &str, range: &Si
         ("quadratic_drag", "extra_drag_area_m2" | "extra_drag_area_z_m2") => p.drag.area_m2,
         ("motor_lag", "extra_time_constant_s") => p.propulsion.time_constant_up_s,
         ("wing_servo_lag", "extra_time_constant_s") => p.wing.map_or(0.0, |wing| wing.time_constant_s),
+        // From a radius of five arms on, the air under a rotor is no ground effect's.
+        ("ground_effect", "effective_radius_m") => return (0.0, range.largest),
         _ if range.signed => most,
         _ => 0.0,
     };

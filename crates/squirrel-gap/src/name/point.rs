@@ -75,6 +75,7 @@ pub(crate) enum Other {
     /// Of one flight: its attitude, or its thrust.
     Flight {
         flight: usize,
+        is_thrust: bool,
     },
     Height {
         flight: usize,
@@ -188,9 +189,9 @@ impl Catalogue {
         let sensor = index - self.airframe.len();
         let flight = sensor / OF_A_FLIGHT;
         match sensor % OF_A_FLIGHT {
-            0 | 1 => (Other::Flight { flight }, TILT_RAD),
-            2 => (Other::Flight { flight }, LEVELLING_RAD_S2_PER_M),
-            3 => (Other::Flight { flight }, self.day_fraction),
+            0 | 1 => (Other::Flight { flight, is_thrust: false }, TILT_RAD),
+            2 => (Other::Flight { flight, is_thrust: false }, LEVELLING_RAD_S2_PER_M),
+            3 => (Other::Flight { flight, is_thrust: true }, self.day_fraction),
             _ => (Other::Height { flight }, HEIGHT_M),
         }
     }

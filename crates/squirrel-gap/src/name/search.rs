@@ -19,6 +19,8 @@ const BLOWN_NATS: f64 = 40.0;
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
 const TOLERANCES_MIN: f64 = 3.5;
+/// Part of its bounds at which a number is at its end.
+const AT_ITS_END: f64 = 0.98;
 /// How much larger than the largest plausible size a number may be.
 const PLAUSIBLE: f64 = 1.3;
 /// How many times the largest plausible size a first step may lead to.
@@ -207,9 +209,20 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Whether each member is beyond what the vehicle file allows it.
+    /// Whether each member is beyond what the vehicle file allows it, and none at the end of what is plausible: what is forced
+    /// into a name goes there.
     pub(crate) fn is_off(&self, scored: &Scored) -> bool {
-        scored.members.iter().all(|member| self.is_beyond_tolerance(member))
+        scored.members.iter().all(|member| self.is_beyond_tolerance(member) && !self.is_at_its_end(member))
+    }
+
+    fn is_at_its_end(&self, member: &Member) -> bool {
+        let own = self.catalogue.candidates[member.candidate].parameters.iter();
+        own.map(|p| &self.catalogue.parameters[*p]).any(|p| {
+            let (least, most) = p.bounds;
+            let value = member.values[p.slot];
+            // What takes away all that the vehicle file has is no end of anything.
+            value >= AT_ITS_END * most || (least == -most && value <= AT_ITS_END * least)
+        })
     }
 
     /// By the numbers of the standard form, unless this form has others.
@@ -233,6 +246,28 @@ impl Search<'_> {
             *best = self.score(linear, &rest)?;
         }
         Ok(best.members.len() < before)
+    }
+
+    /// The same with some of its members alone.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn only(&self, found: Found, kept: &[usize]) -> Result<Found, GapError> {
+        let members: Vec<Member> = kept.iter().map(|i| found.best.members[*i].clone()).collect();
+        let mut best = self.score(&found.linear, &members)?;
+        let without = self.without(&found.linear, &best)?;
+        self.finish(&mut best);
+        Ok(Found { best, without, ..found })
+    }
+
+    /// By how many standard deviations a member's number differs from what the vehicle file has, the clearest of them.
+    ///
+    /// * `deviations` - of the free numbers
+    pub(crate) fn stands_out(&self, set: &Scored, index: usize, deviations: &[f64]) -> f64 {
+        let before = self.catalogue.absent(self.predictor, set.members[index].candidate).values;
+        let own = set.free.iter().zip(deviations).filter(|((member, _), _)| *member == index);
+        own.map(|((_, slot), sd)| (set.members[index].values[*slot] - before[*slot]).abs() / sd)
+            .fold(0.0, f64::max)
     }
 
     /// Whether no member is larger than anything plausible: what is forced into a name goes to its limit.
@@ -320,7 +355,8 @@ impl Search<'_> {
                 let mut rest = best.members.clone();
                 let out = rest.remove(i);
                 let without = self.score(linear, &rest)?;
-                if without.log_evidence > best.log_evidence - self.needed(&out) {
+                let needed = if best.members.len() > 1 { FURTHER_NATS } else { NATS_MIN };
+                if without.log_evidence > best.log_evidence - self.needed(&out).max(needed) {
                     *best = without;
                     changed = true;
                     break;

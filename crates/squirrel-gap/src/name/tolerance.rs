@@ -137,14 +137,19 @@ pub(crate) fn sds(vehicle: &VehicleFile, field: &str) -> Option<Vec<f64>> {
 /// its flight.
 pub(super) fn timing_s(predictor: &Predictor, effect: &str) -> Option<f64> {
     let period_s = predictor.tracks.iter().map(|track| track.period_s).fold(0.0, f64::max);
-    let span_s =
-        predictor.tracks.iter().map(|t| t.time_s[t.time_s.len() - 1] - t.began_s).fold(0.0, f64::max);
-    let sample_s = SAMPLE_SHARE * period_s;
     match effect {
-        "actuation_latency" | "gnss_latency" => Some(sample_s),
-        "clock_skew" => Some(1e6 * sample_s / span_s),
+        "actuation_latency" | "gnss_latency" => Some(SAMPLE_SHARE * period_s),
+        "clock_skew" => Some(SAMPLE_SHARE * slip_ppm(predictor)),
         _ => None,
     }
+}
+
+/// The skew, in millionths, at which a clock slips by one sample in the longest flight.
+pub(super) fn slip_ppm(predictor: &Predictor) -> f64 {
+    let period_s = predictor.tracks.iter().map(|track| track.period_s).fold(0.0, f64::max);
+    let span_s =
+        predictor.tracks.iter().map(|t| t.time_s[t.time_s.len() - 1] - t.began_s).fold(0.0, f64::max);
+    1e6 * period_s / span_s
 }
 
 /// By how much thrust may be off, as a fraction, where the battery's voltage is not logged: it is anywhere between full and

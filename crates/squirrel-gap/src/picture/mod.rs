@@ -10,9 +10,10 @@ mod windows;
 
 use crate::ClosedLoop;
 use crate::GapError;
-use crate::diagnose::{Details, Diagnosis, HeldOut as Flown};
+use crate::diagnose::{Details, Diagnosis};
 use crate::name::{Naming, Scored, Search, TURBULENCE_M_S};
 use crate::predictor::DYNAMIC;
+use crate::proof::HeldOut as Flown;
 use crate::report::{
     Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut, HeldOutChannel,
     Horizon, ParameterRow, ReportData, Whiteness,

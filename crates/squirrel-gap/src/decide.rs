@@ -1,0 +1,284 @@
+//! Which answer it is: evidence ranks names, held-out flights say whether one stands, and what is left is told beside it.
+//!
+//! | what is left | names | answer |
+//! |---|---|---|
+//! | nothing above noise and tolerances | lead | `named`, `ambiguous` |
+//! | a little of what they explain | another form would do | `named_form_differs` |
+//! | a little everywhere, as models do | lead and hold on held-out flights | `named_incomplete` |
+//! | something of its own | - | `outside_catalogue` |
+
+use crate::find::Place;
+use crate::name::{Member, NATS_MIN, Naming, STANDS, Scored, Search};
+use crate::proof::HeldOut;
+use crate::verdict::{Alternative, Gap, Kind, Left, NamedEffect, Value, Verdict};
+use crate::words;
+use squirrel_core::effects::{Effects, Kind as ParameterKind};
+use std::collections::BTreeMap;
+
+/// Part of what the nominal model leaves that a form which differs may leave; more is outside the catalogue.
+const FORM_SHARE: f64 = 0.1;
+/// Part of the held-out gap that a name in another form must remove.
+const FORM_REMOVED: f64 = 0.6;
+/// The same of a name beside which something remains.
+const INCOMPLETE_REMOVED: f64 = 0.05;
+/// How much more of the held-out gap the best other name must leave.
+const RIVAL_GAP: f64 = 3.0;
+/// Part of an error on held-out flights by which another one may be larger and no worse: the floor takes what noise is beyond it.
+const HELD_OUT_NOISE: f64 = 0.05;
+/// More alternatives than this within the evidence of a name are no answer.
+const ALTERNATIVES_MAX: usize = 3;
+/// Alternatives that are shown.
+const SHOWN: usize = 5;
+
+/// Other names that are as good: the evidence hardly tells them apart, and held-out flights do not either.
+pub(crate) fn close<'a>(
+    naming: &Naming,
+    rivals: &'a [Scored],
+    proof: Option<&HeldOut>,
+    gap: Option<&Gap>,
+) -> impl Iterator<Item = &'a Scored> {
+    let best = naming.found.best.log_evidence;
+    let clearly_worse = move |rival: usize| {
+        let (Some(proof), Some(gap)) = (proof, gap) else { return false };
+        let left = proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
+        left.is_some_and(|left| left - 1.0 >= RIVAL_GAP * (gap.after - 1.0).max(HELD_OUT_NOISE))
+    };
+    let is_close =
+        move |(i, rival): &(usize, &Scored)| rival.log_evidence > best - NATS_MIN && !clearly_worse(*i);
+    let all: Vec<&Scored> = rivals.iter().enumerate().filter(is_close).map(|(_, rival)| rival).collect();
+    all.into_iter()
+}
+
+/// The names that an answer shares with all that are as good, if that is a part of it: they stand whichever is right.
+pub(crate) fn shared(search: &Search<'_>, naming: &Naming, close: &[&Scored]) -> Option<Vec<usize>> {
+    let own = &naming.found.best.members;
+    let has =
+        |set: &Scored, member: &Member| set.members.iter().any(|other| other.candidate == member.candidate);
+    let kept: Vec<usize> = (0..own.len()).filter(|i| close.iter().all(|set| has(set, &own[*i]))).collect();
+    let stands = |i: usize| search.stands_out(&naming.found.best, i, &naming.deviations) >= STANDS;
+    let some = !kept.is_empty() && kept.len() < own.len();
+    (some && kept.iter().all(|i| stands(*i))).then_some(kept)
+}
+
+/// The one answer.
+///
+/// * `open` - sets that the flights do not tell apart, of which the answer is what they share
+#[allow(clippy::too_many_arguments, reason = "everything that was found out comes together here")]
+pub(crate) fn decide(
+    search: &Search<'_>,
+    naming: &Naming,
+    rivals: &[Scored],
+    proof: Option<&HeldOut>,
+    gap: Option<Gap>,
+    places: Vec<Place>,
+    open: Vec<Alternative>,
+    curve_hides_sag: bool,
+) -> Verdict {
+    let found = &naming.found;
+    let effects = named(search, naming);
+    let close: Vec<&Scored> = close(naming, rivals, proof, gap.as_ref()).collect();
+    let leftover = &naming.leftover;
+    let mut blind = search.blind(&found.best);
+    if curve_hides_sag && !blind.contains(&"battery_sag") && effects.iter().all(|e| e.name != "battery_sag") {
+        blind.push("battery_sag");
+    }
+    let share = left_share(naming);
+    // What explains some flights and makes others worse is no name for what the vehicle lacks.
+    let fails = gap.as_ref().is_some_and(|gap| gap.after > (1.0 + HELD_OUT_NOISE) * gap.before);
+    let kind = if effects.is_empty() {
+        match (leftover.is_real(), blind.is_empty()) {
+            (true, _) => Kind::OutsideCatalogue,
+            (false, false) => Kind::NotIdentifiable,
+            (false, true) => Kind::None,
+        }
+    } else if !open.is_empty() {
+        if fails { Kind::OutsideCatalogue } else { Kind::NamedIncomplete }
+    } else if leftover.is_real() {
+        let shrinks = gap.as_ref().is_none_or(|gap| gap.removed_fraction > FORM_REMOVED);
+        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) && shrinks {
+            Kind::NamedFormDiffers
+        } else if naming.stands && gap.as_ref().is_none_or(|gap| gap.removed_fraction > INCOMPLETE_REMOVED) {
+            if close.is_empty() { Kind::NamedIncomplete } else { Kind::Ambiguous }
+        } else {
+            Kind::OutsideCatalogue
+        }
+    } else if close.len() > ALTERNATIVES_MAX {
+        Kind::NotIdentifiable
+    } else if close.is_empty() && fails {
+        Kind::OutsideCatalogue
+    } else if close.is_empty() {
+        Kind::Named
+    } else {
+        Kind::Ambiguous
+    };
+    let is_open = !open.is_empty();
+    let mut alternatives =
+        if is_open { open } else { alternatives(search, naming, rivals.iter().take(SHOWN)) };
+    if curve_hides_sag && effects.is_empty() {
+        let single = search.single_evidence(found).into_iter().find(|(name, _)| *name == "battery_sag");
+        let evidence_nats = single.map_or(0.0, |(_, nats)| nats);
+        alternatives.push(Alternative { effects: vec!["battery_sag"], evidence_nats, numbers: Vec::new() });
+    }
+    let left = Left::of(leftover);
+    let goes_with = if leftover.is_real() {
+        Some(leftover.goes_with().unwrap_or_else(|| leftover.channels()))
+    } else {
+        fails.then(|| "the flight, since the held-out ones lack something else".to_owned())
+    };
+    let goes_with = goes_with.filter(|_| kind != Kind::Named);
+    let fly_next = match kind {
+        Kind::NamedIncomplete if is_open => Some(words::fly_for(&names_beside(&effects, &alternatives))),
+        Kind::NotIdentifiable if effects.is_empty() => Some(words::fly_for(&blind)),
+        Kind::Ambiguous | Kind::NotIdentifiable => {
+            let mut all: Vec<&str> = effects.iter().map(|e| e.name).collect();
+            all.extend(close.iter().flat_map(|set| names(search, set)));
+            Some(words::fly_for(&all))
+        }
+        _ => None,
+    };
+    let moved = if effects.is_empty() { Vec::new() } else { search.moved(&found.best) };
+    let mut verdict = Verdict {
+        verdict: kind,
+        effects,
+        moved,
+        alternatives,
+        places,
+        goes_with,
+        fly_next,
+        gap,
+        leftover: Some(left),
+        closed_loop: Vec::new(),
+        model_patch: None,
+        words: String::new(),
+        notes: search.predictor.notes.clone(),
+    };
+    verdict.words = words::paragraph(&verdict, &blind, curve_hides_sag);
+    verdict
+}
+
+/// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too, in the channels that it
+/// explains; 1 where it explains none. What stands out in other channels is another thing.
+fn left_share(naming: &Naming) -> f64 {
+    let excess = |slow: f64, floor: f64| (slow.powi(2) / floor.powi(2) - 1.0).max(0.0);
+    let (mut before, mut after) = (0.0, 0.0);
+    for band in &naming.leftover.bands {
+        let was = excess(band.slow_nominal, band.slow_floor);
+        let is = excess(band.slow, band.slow_floor);
+        if is < EXPLAINED * was && was > 1.0 {
+            before += was;
+            after += is;
+        }
+    }
+    if before > 0.0 { after / before } else { 1.0 }
+}
+
+/// Part of its excess that a channel may keep and still be explained.
+const EXPLAINED: f64 = 0.5;
+
+/// The members of the explanation as the verdict writes them, the most certain first.
+fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {
+    let found = &naming.found;
+    let mut all: Vec<NamedEffect> = found
+        .best
+        .members
+        .iter()
+        .enumerate()
+        .map(|(index, member)| NamedEffect {
+            name: search.effect(member),
+            form: search.form(member),
+            evidence_nats: found.worth(index),
+            parameters: parameters(search, &found.best, &naming.deviations, index, member),
+        })
+        .collect();
+    if let Some(sigma) = naming.gust_m_s {
+        let number = Value::Number { value: sigma, low: 0.8 * sigma, high: 1.25 * sigma };
+        all.push(NamedEffect {
+            name: "gust",
+            form: "gauss_markov",
+            evidence_nats: naming.gust_nats,
+            parameters: BTreeMap::from([("sigma_m_s", number)]),
+        });
+    }
+    all.sort_by(|a, b| b.evidence_nats.total_cmp(&a.evidence_nats));
+    all
+}
+
+/// 95 % of a normal distribution lies within this many standard deviations.
+const INTERVAL: f64 = 1.96;
+
+fn parameters(
+    search: &Search<'_>,
+    set: &Scored,
+    deviations: &[f64],
+    index: usize,
+    member: &Member,
+) -> BTreeMap<&'static str, Value> {
+    let list = Effects::<f64>::parameters(search.effect(member)).unwrap_or_default();
+    let form = search.form(member);
+    let free = &set.free;
+    list.iter()
+        .enumerate()
+        .filter(|(_, p)| p.key != squirrel_core::effects::FORM && p.exists_in(form))
+        .map(|(slot, parameter)| {
+            let value = member.values[slot];
+            let value = match parameter.kind {
+                ParameterKind::OneOf(names) => {
+                    let value = names[value as usize];
+                    Value::Choice { value, low: value, high: value }
+                }
+                ParameterKind::Rotor => Value::Number { value, low: value, high: value },
+                ParameterKind::Size { .. } => {
+                    let column = free.iter().position(|f| *f == (index, slot));
+                    let sd = column.map_or(0.0, |column| deviations[column]);
+                    Value::Number { value, low: value - INTERVAL * sd, high: value + INTERVAL * sd }
+                }
+            };
+            (parameter.key, value)
+        })
+        .collect()
+}
+
+/// The members of another set, as a vehicle file would take them.
+fn numbers(search: &Search<'_>, set: &Scored) -> Vec<NamedEffect> {
+    let offset = set.free.len();
+    let deviations: Vec<f64> = (0..offset).map(|column| set.posterior.variance(column).sqrt()).collect();
+    let members = set.members.iter().enumerate();
+    members
+        .map(|(index, member)| NamedEffect {
+            name: search.effect(member),
+            form: search.form(member),
+            evidence_nats: f64::NAN,
+            parameters: parameters(search, set, &deviations, index, member),
+        })
+        .collect()
+}
+
+fn names(search: &Search<'_>, set: &Scored) -> Vec<&'static str> {
+    set.members.iter().map(|member| search.effect(member)).collect()
+}
+
+/// Sets as the verdict writes them.
+pub(crate) fn alternatives<'a>(
+    search: &Search<'_>,
+    naming: &Naming,
+    sets: impl Iterator<Item = &'a Scored>,
+) -> Vec<Alternative> {
+    let nats = |set: &Scored| set.log_evidence - naming.found.null.log_evidence;
+    sets.map(|set| Alternative {
+        effects: names(search, set),
+        evidence_nats: nats(set),
+        numbers: numbers(search, set),
+    })
+    .collect()
+}
+
+/// Names of alternatives that an answer does not have.
+fn names_beside(effects: &[NamedEffect], alternatives: &[Alternative]) -> Vec<&'static str> {
+    let mut all: Vec<&'static str> = Vec::new();
+    for name in alternatives.iter().flat_map(|set| set.effects.iter().copied()) {
+        if !all.contains(&name) && effects.iter().all(|effect| effect.name != name) {
+            all.push(name);
+        }
+    }
+    all
+}

@@ -1,0 +1,113 @@
+//! What an explanation is worth on flights that it never saw: the vehicle as it was, with the names, with other names, and
+//! with each name left out.
+//!
+//! Every model may put the sensors and the thrust of these flights where it fits them best inside their tolerances, so that
+//! what differs is the effect.
+
+use crate::GapError;
+use crate::name::{Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights};
+use crate::predictor::{Hypothesis, Predictor};
+use crate::shrink::{self, Errors12, Floor};
+use crate::verdict::Gap;
+use squirrel_sim::log::FlightLog;
+
+/// Errors on held-out flights.
+#[derive(Debug)]
+pub(crate) struct HeldOut {
+    pub(crate) nominal: Errors12,
+    /// Of the best other name and of all that the evidence hardly tells from the answer, the best first.
+    pub(crate) rivals: Vec<Errors12>,
+    pub(crate) fitted: Errors12,
+    /// What the explanation leaves if it is true, and what is left in air without gusts.
+    pub(crate) floor: Floor,
+    pub(crate) calm: Floor,
+}
+
+/// Re-simulates the held-out flights as the vehicle was, with the explanation and with other names.
+pub(crate) fn prove(
+    unseen: &Predictor,
+    search: &Search<'_>,
+    naming: &Naming,
+    others: &[Scored],
+) -> Result<Option<HeldOut>, GapError> {
+    let at = |members: &[Member], base: &[f64]| settled_on(unseen, search, naming, members, base);
+    let whole = search.whole(&naming.found.best);
+    let fitted_at = at(&whole.members, &whole.base)?;
+    let Some(fitted) = shrink::errors(unseen, &fitted_at)? else { return Ok(None) };
+    let Some(nominal) = shrink::errors(unseen, &at(&[], &whole.base)?)? else { return Ok(None) };
+    let mut rivals = Vec::with_capacity(others.len());
+    for rival in others {
+        rivals.extend(shrink::errors(unseen, &at(&rival.members, &search.whole(rival).base)?)?);
+    }
+    let calm = shrink::floor(unseen, &fitted_at, TURBULENCE_M_S)?;
+    let floor = match naming.gust_m_s {
+        Some(sigma) => shrink::floor(unseen, &fitted_at, sigma)?,
+        None => calm.clone(),
+    };
+    Ok(Some(HeldOut { nominal, rivals, fitted, floor, calm }))
+}
+
+/// The proof in numbers.
+pub(crate) fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
+    // Gusts are no force that could be foreseen: with them, errors are as large as expected, and without them larger.
+    let before = proof.nominal.over(&proof.calm.of(&proof.fitted));
+    let floor = proof.floor.of(&proof.fitted);
+    let after = proof.fitted.over(&floor);
+    let best_rival = proof.rivals.iter().map(|rival| rival.over(&floor)).reduce(f64::min);
+    let removed = |left: f64| if before > 1.0 { 1.0 - (left - 1.0) / (before - 1.0) } else { 0.0 };
+    Gap {
+        held_out_flights: held_out.iter().map(|(name, _)| name.clone()).collect(),
+        before,
+        after,
+        best_rival,
+        removed_fraction: removed(after),
+        best_rival_removed_fraction: best_rival.map(removed),
+    }
+}
+
+/// A hypothesis on flights that were not fitted. What floats inside its tolerance is shared; what the sensors of other flights
+/// did is not, and is found from these.
+fn settled_on(
+    unseen: &Predictor,
+    search: &Search<'_>,
+    naming: &Naming,
+    members: &[Member],
+    base: &[f64],
+) -> Result<Hypothesis, GapError> {
+    let catalogue = search.catalogue;
+    let mut base = base[..catalogue.shared_columns()].to_vec();
+    base.resize(catalogue.columns(unseen), 0.0);
+    let mut point = Point { members: members.to_vec(), base };
+    let thrust =
+        catalogue.parameters.iter().find(|p| p.key == "thrust_fraction").map_or(0.0, |p| p.tolerance);
+    settle_flights(unseen, catalogue, &naming.found.linear.whitener, thrust, &mut point)?;
+    hypothesis(unseen, catalogue, &point)
+}
+
+/// Part of the error on held-out flights that a name must take away to hold.
+const HOLDS: f64 = 0.002;
+
+/// Of each name, whether held-out flights are predicted worse without it; `None` where they cannot be flown.
+///
+/// # Errors
+/// What the predictor says.
+pub(crate) fn hold(
+    unseen: &Predictor,
+    search: &Search<'_>,
+    naming: &Naming,
+) -> Result<Option<Vec<bool>>, GapError> {
+    let found = &naming.found;
+    let whole = search.whole(&found.best);
+    let fitted_at = settled_on(unseen, search, naming, &whole.members, &whole.base)?;
+    let Some(fitted) = shrink::errors(unseen, &fitted_at)? else { return Ok(None) };
+    let floor = shrink::floor(unseen, &fitted_at, TURBULENCE_M_S)?.of(&fitted);
+    let with = fitted.over(&floor);
+    let mut all = Vec::with_capacity(found.without.len());
+    for without in &found.without {
+        let rest = search.whole(without);
+        let at = settled_on(unseen, search, naming, &rest.members, &rest.base)?;
+        let errors = shrink::errors(unseen, &at)?;
+        all.push(errors.is_some_and(|errors| errors.over(&floor) > (1.0 + HOLDS) * with));
+    }
+    Ok(Some(all))
+}
