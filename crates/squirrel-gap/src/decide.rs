@@ -21,8 +21,11 @@ const FORM_SHARE: f64 = 0.1;
 const FORM_REMOVED: f64 = 0.6;
 /// The same of a name beside which something remains.
 const INCOMPLETE_REMOVED: f64 = 0.05;
-/// How much more of the held-out gap the best other name must leave.
+/// How much more of the held-out gap another name must leave to be worse by that alone, and how much if the evidence is against
+/// it, too, by so many nats.
 const RIVAL_GAP: f64 = 3.0;
+const RIVAL_GAP_BEHIND: f64 = 1.5;
+const BEHIND_NATS: f64 = 3.0;
 /// Part of an error on held-out flights by which another one may be larger and no worse: the floor takes what noise is beyond it.
 const HELD_OUT_NOISE: f64 = 0.05;
 /// More alternatives than this within the evidence of a name are no answer.
@@ -41,7 +44,9 @@ pub(crate) fn close<'a>(
     let clearly_worse = move |rival: usize| {
         let (Some(proof), Some(gap)) = (proof, gap) else { return false };
         let left = proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
-        left.is_some_and(|left| left - 1.0 >= RIVAL_GAP * (gap.after - 1.0).max(HELD_OUT_NOISE))
+        let is_behind = rivals[rival].log_evidence < best - BEHIND_NATS;
+        let times = if is_behind { RIVAL_GAP_BEHIND } else { RIVAL_GAP };
+        left.is_some_and(|left| left - 1.0 >= times * (gap.after - 1.0).max(HELD_OUT_NOISE))
     };
     let is_close =
         move |(i, rival): &(usize, &Scored)| rival.log_evidence > best - NATS_MIN && !clearly_worse(*i);

@@ -18,7 +18,7 @@ const BESIDE_GUSTS_NATS: f64 = 12.0;
 const BLOWN_NATS: f64 = 40.0;
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
-const TOLERANCES_MIN: f64 = 3.5;
+const TOLERANCES_MIN: f64 = 3.0;
 /// Part of its bounds at which a number is at its end.
 const AT_ITS_END: f64 = 0.98;
 /// How much larger than the largest plausible size a number may be.
