@@ -4,7 +4,8 @@
     python compare.py nanobench SQUIRREL VEHICLE LOGS --out results.jsonl
     python compare.py table results.jsonl
 
-FOLDER is what `hidden-effects make` wrote. `run` takes the folders in turns, so that it can be cut short, and goes on where it was cut.
+FOLDER is what `hidden-effects make` wrote. `run` takes the folders in turns, so that it can be cut short, and goes on where it
+was cut.
 """
 
 import argparse
@@ -22,12 +23,13 @@ from pathlib import Path
 os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
-import mujoco_sysid
 import numpy as np
+
+import mujoco_sysid
 import ours
 import physics
 import sindy
-from flight import Array, Piece, errors, read_flight, read_vehicle, total
+from flight import Piece, errors, read_flight, read_vehicle, total
 
 SURE = ("named", "named_form_differs", "named_incomplete", "ambiguous")
 RIVALS = ("mujoco", "sindy polynomial", "sindy catalogue")
@@ -148,40 +150,54 @@ def median(values: list[float]) -> str:
     return f"{np.median(x):.3g} ({low:.3g} to {high:.3g})"
 
 
+SETS = ("single", "two", "none", "nanobench", "nanobench, three")
+PARTS = {"all": slice(0, 6), "force": slice(0, 3), "moment": slice(3, 6)}
+
+
+def error(line: dict, tool: str, part: str = "all") -> float:
+    """`E` of a tool on a case."""
+    return total(np.array(line["tools"][tool]["channels"])[PARTS[part]])
+
+
+def row(cases: list[dict], tool: str) -> str:
+    """A tool's line of the table."""
+    n = len(cases)
+    said = [(c["tools"][tool], {h["name"] for h in c["effects"]}) for c in cases]
+    ratios = [[error(c, tool, part) / error(c, "nominal", part) for c in cases] for part in PARTS]
+    first = sum(bool(t["names"]) and t["names"][0] in hidden for t, hidden in said)
+    wrong = sum(bool(set(t["names"]) - hidden) or (not hidden and t["claims"] > 0) for t, hidden in said)
+    silent = sum(t["claims"] == 0 for t, _ in said)
+    # Products of inputs are not names.
+    names = [wilson(first, n), wilson(wrong, n)] if tool != "sindy polynomial" else ["", ""]
+    cells = [*(median(r) for r in ratios), *names, wilson(silent, n), f"{np.median([t['cpu_s'] for t, _ in said]):.2f}"]
+    return f"| {tool} | {' | '.join(cells)} |"
+
+
 def table(lines: list[dict]) -> None:
     """The tables of the README."""
-    groups = {"single": 3 * [0], "two": 0, "none": 0, "nanobench": 0, "nanobench, three": 0}
-    parts: dict[str, slice] = {"all": slice(0, 6), "force": slice(0, 3), "moment": slice(3, 6)}
-
-    def error(line: dict, tool: str, part: str = "all") -> float:
-        channels: Array = np.array(line["tools"][tool]["channels"])
-        return total(channels[parts[part]])
-
-    for group in groups:
-        cases = [line for line in lines if line["set"] == group]
+    for group in (*SETS, "all of the bench"):
+        cases = [c for c in lines if c["set"] == group or (group not in SETS and not c["set"].startswith("nano"))]
         if not cases:
             continue
         print(f"\n{group}, {len(cases)} cases\n")
-        print("| | error over nominal | force | moment | squirrel lower % | first name right % | silent or wrong claims % | CPU s |")
-        print("|---|---|---|---|---|---|---|---|")
-        for tool in TOOLS:
-            ratio = [[error(c, tool, part) / error(c, "nominal", part) for c in cases] for part in parts]
-            lower = sum(error(c, "squirrel") < error(c, tool) for c in cases)
-            said = [(c["tools"][tool], {h["name"] for h in c["effects"]}) for c in cases]
-            first = sum(bool(t["names"]) and t["names"][0] in hidden for t, hidden in said)
-            wrong = sum(bool(set(t["names"]) - hidden) or (not hidden and t["claims"] > 0) for t, hidden in said)
-            known = group != "nanobench" or tool != "sindy polynomial"
-            cpu = median([t["cpu_s"] for t, _ in said])
-            row = [*(median(r) for r in ratio), "" if tool.startswith("squirrel") else wilson(lower, len(cases))]
-            row += [wilson(first, len(cases)) if known and group != "none" else "", wilson(wrong, len(cases)), cpu]
-            print(f"| {tool} | {' | '.join(row)} |")
-        best = min
-        for part in parts:
-            for us in ("squirrel", "squirrel, moved numbers too"):
-                wins = {r: sum(error(c, us, part) < error(c, r, part) for c in cases) for r in RIVALS}
-                wins["all of them"] = sum(error(c, us, part) < best(error(c, r, part) for r in RIVALS) for c in cases)
-                text = ", ".join(f"{rival} {wilson(n, len(cases))}" for rival, n in wins.items())
-                print(f"{us} lower, {part}: {text}")
+        if group in SETS:
+            print(
+                "| | error over nominal | of force | of moment | first name right % | wrong name % | claims nothing % | CPU s |"
+            )
+            print("|---|---|---|---|---|---|---|---|")
+            print("\n".join(row(cases, tool) for tool in TOOLS))
+        print("\n| lower error than, % of cases | " + " | ".join((*RIVALS, "all three")) + " |\n|---|---|---|---|---|")
+        for us in TOOLS[:2]:
+            for part in PARTS:
+                wins = [sum(error(c, us, part) < error(c, r, part) for c in cases) for r in RIVALS]
+                wins.append(sum(error(c, us, part) < min(error(c, r, part) for r in RIVALS) for c in cases))
+                print(f"| {us}, {part} | {' | '.join(wilson(w, len(cases)) for w in wins)} |")
+    checks = [
+        total(np.array(c["tools"]["squirrel"]["gap_find"])) / error(c, "squirrel")
+        for c in lines
+        if "gap_find" in c["tools"]["squirrel"]
+    ]
+    print(f"\n`gap find` over physics.py, patched vehicle: {median(checks)}, {min(checks):.2f} to {max(checks):.2f}")
 
 
 def main() -> None:

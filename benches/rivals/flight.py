@@ -36,8 +36,7 @@ def read_log(path: Path) -> dict[str, dict[str, Array]]:
                 value = getattr(message, field.name)
                 source.setdefault(field.name, []).append(value if isinstance(value, float) else list(value))
     return {
-        topic: {name: np.array(values) for name, values in source.items() if name != "crc32"}
-        for topic, source in rows.items()
+        topic: {name: np.array(values) for name, values in source.items() if name != "crc32"} for topic, source in rows.items()
     }
 
 
@@ -142,10 +141,10 @@ class Piece:
         return np.concatenate([force, white(self.omega) * np.linalg.norm(kernel)])
 
 
-def motion(log: dict, t: Array, R: Array, force: Array, period_s: float) -> tuple[Array, Array]:
-    """Velocity and height: strapdown, held by GNSS and barometer where these are slow."""
+def motion(log: dict, t: Array, R: Array, force: Array, period_s: float, late_s: float = 0.0) -> tuple[Array, Array]:
+    """Velocity and height: strapdown, held by GNSS, whose fixes may be late, and by the barometer where these are slow."""
     gnss = log["gnss"]
-    fix_t, fix_v = gnss["time_s"], gnss["velocity_ned_m_s"]
+    fix_t, fix_v = gnss["time_s"] - late_s, gnss["velocity_ned_m_s"]
     if np.median(np.diff(fix_t)) < 2 * period_s:
         return lines(t, fix_t, fix_v), -np.interp(t, fix_t, gnss["position_ned_m"][:, 2])
     acceleration = np.einsum("nij,nj->ni", R, force) + np.array([0, 0, G_M_S2])

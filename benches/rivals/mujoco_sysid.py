@@ -1,14 +1,15 @@
 """`mujoco.sysid` on a case: an MJCF model of the vehicle file, fitted to windows of the training flights from measured states.
 
-The model is a free body in NED and FRD axes. Actuators on sites: one a rotor (force along its axis and the reaction moment through
-`gear`), one a wing side, and three with a velocity bias for what of the drag and damping is of the body's axes; the rest of the drag is
-MuJoCo's own fluid on a sphere, which knows the wind. Controls are rotor thrusts behind lag, delay and voltage and the wings' nominal
-forces: a `custom_rollout` makes them from the logged commands, so that time constants and delay are parameters like any other.
+The model is a free body in NED and FRD axes. Actuators on sites: one a rotor (force along its axis and the reaction moment
+through `gear`), one a wing side, and six with a velocity bias for what of the drag and damping is of the body's axes; the rest of
+the drag is MuJoCo's own fluid on a sphere, which knows the wind. Controls are rotor thrusts behind lag, delay and voltage and the
+wings' nominal forces: a `custom_rollout` makes them from the logged commands, so that time constants and delay are parameters
+like any other.
 
-Residual: accelerometer and gyro of each window against the log, in units of their noise, by `modify_residual`. Optimiser: MuJoCo's own,
-`x_scale="jac"`. A parameter may go as far as the catalogue's largest plausible size; the tolerances of the vehicle file are rows of the
-residual, as regularisation, and serve to read the answer: a claim is a number beyond three tolerances with zero outside the
-package's own 95 % interval.
+Residual: accelerometer and gyro of each window against the log, in units of their noise, by `modify_residual`. Optimiser:
+MuJoCo's own, `x_scale="jac"`. A parameter may go as far as the catalogue's largest plausible size; the tolerances of the vehicle
+file are rows of the residual, as regularisation, and serve to read the answer: a claim is a number beyond three tolerances with
+zero outside the package's own 95 % interval.
 """
 
 import io
@@ -18,9 +19,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from mujoco import sysid
+
 import physics
 from flight import G_M_S2, Array, Piece, lines, smooth
-from mujoco import sysid
 
 WINDOW_S = 0.4
 RATE_HZ = 100.0  # of rollouts; the faster log is averaged
@@ -97,7 +99,8 @@ def mjcf(p: dict, dt_s: float) -> mujoco.MjSpec:
     viscosity = drag["linear_n_s_per_m"][0] / (6 * np.pi * RADIUS_M)
     return mujoco.MjSpec.from_string(f"""<mujoco><option timestep="{dt_s}" gravity="0 0 {G_M_S2}" density="{physics.RHO_KG_M3}"
         viscosity="{viscosity}" integrator="Euler"><flag contact="disable"/></option>
-        <worldbody><body name="body"><freejoint/><inertial pos="0 0 0" mass="{p["mass"]["mass_kg"]}" diaginertia="{J[0]} {J[1]} {J[2]}"/>
+        <worldbody><body name="body"><freejoint/>
+        <inertial pos="0 0 0" mass="{p["mass"]["mass_kg"]}" diaginertia="{J[0]} {J[1]} {J[2]}"/>
         <geom name="air" type="sphere" size="{RADIUS_M}" fluidshape="ellipsoid" fluidcoef="{blunt} 0 0 0 0"/>
         <site name="imu"/>{rotors}</body></worldbody><actuator>{actuators}</actuator>
         <sensor><accelerometer name="accelerometer" site="imu"/><gyro name="gyro" site="imu"/></sensor></mujoco>""")
@@ -157,9 +160,7 @@ class Fit:
         own = linear + [e["linear_drag"], e["linear_drag"], e["drag_z"]] - fluid
         spec.option.viscosity = fluid / (6 * np.pi * RADIUS_M)
         spec.option.wind = [e["wind_0"], e["wind_1"], 0.0]
-        spec.geom("air").fluid_coefs[0] = (p["drag"]["area_m2"] + e["quadratic_drag"]) / (
-            2 * np.pi * RADIUS_M**2
-        )
+        spec.geom("air").fluid_coefs[0] = (p["drag"]["area_m2"] + e["quadratic_drag"]) / (2 * np.pi * RADIUS_M**2)
         for i in range(3):
             spec.actuator(f"drag{i}").biasprm[2] = -own[i]
             spec.actuator(f"damp{i}").biasprm[2] = -e["damping"] * (0.5 if i == 2 else 1.0)
@@ -292,7 +293,7 @@ class Fit:
         return out
 
     def claims(self) -> tuple[int, list[str]]:
-        """Parameters beyond three tolerances with an interval that excludes the nominal, and their effects, the clearest first."""
+        """Parameters beyond three tolerances whose interval excludes the nominal, and their effects, the clearest first."""
         x = np.abs(self.params.as_vector())
         sure = (x > 3) & (x > self.half)
         score = x / np.sqrt(1 + (self.half / 1.96) ** 2)

@@ -9,6 +9,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+
 from flight import Array, Piece, read_vehicle
 
 # Key of the model in physics.py for a parameter of the catalogue.
@@ -36,6 +37,8 @@ KEYS = {
     "wing_membrane.angle_of_attack_offset_rad": "wing_angle",
     "wing_servo_lag.extra_time_constant_s": "wing_lag",
     "added_mass.mass_kg": "added_mass",
+    "heading_bias.bias_rad": "heading",
+    "gnss_latency.latency_s": "gnss_latency",
     "accel_bias.bias_x_m_s2": "bias_0",
     "accel_bias.bias_y_m_s2": "bias_1",
     "accel_bias.bias_z_m_s2": "bias_2",

@@ -7,10 +7,12 @@ vehicle file that squirrel hands over is evaluated with it, too, as a check of `
 
 from collections import defaultdict
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
-from flight import G_M_S2, Array, Piece, held
 from scipy.signal import lfilter
+
+from flight import G_M_S2, Array, Piece, held, motion, rotations
 
 RHO_KG_M3 = 1.225
 E3 = np.array([0.0, 0.0, 1.0])
@@ -37,6 +39,7 @@ CATALOGUE = (
     + [("wing_asymmetry", f"wing_loss_{i}", 0.12) for i in range(2)]
     + [("wing_servo_lag", "wing_lag", 0.12), ("added_mass", "added_mass", 0.03)]
     + [("accel_bias", f"bias_{i}", 0.15) for i in range(3)]
+    + [("heading_bias", "heading", np.radians(5.0)), ("gnss_latency", "gnss_latency", 0.08)]
     + [("payload_swing", f"payload_{length}", 0.03) for length in TETHERS_M]
 )
 # Sizes that are masses, forces or moments grow with the vehicle.
@@ -105,9 +108,22 @@ def pendulum(piece: Piece, length_m: float) -> Array:
     return out
 
 
+def unbiased(piece: Piece, e: Mapping[str, float]) -> Piece:
+    """The motion with what a heading error and late fixes make of it taken away."""
+    if not (e["heading"] or e["gnss_latency"]):
+        return piece
+    half = -0.5 * e["heading"]
+    w, x, y, z = piece.q.T
+    c, s = np.cos(half), np.sin(half)
+    q = np.stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w], 1)
+    v, height = motion(piece.log, piece.t, rotations(q), piece.force, piece.period_s, e["gnss_latency"])
+    return replace(piece, q=q, v=v, height=height)
+
+
 def predict(piece: Piece, p: dict, given: Mapping[str, float] | None = None) -> Array:
     """Specific force and angular acceleration at each sample, body frame, with effects of the given sizes."""
     e: Mapping[str, float] = defaultdict(float, given or {})
+    piece = unbiased(piece, e)
     m, J = p["mass"]["mass_kg"] * (1 + e["mass"]), np.array(p["mass"]["inertia_kg_m2"])
     J = J * (1 + np.array([e[f"inertia_{i}"] for i in range(3)]))
     prop, drag, omega = p["propulsion"], p["drag"], piece.omega

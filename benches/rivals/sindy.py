@@ -5,8 +5,8 @@
 Two libraries. `polynomial` is what the package offers: all products of two of the nominal forces and moments, velocity, rates,
 voltage, height and wing force, one sparse vector a channel. `catalogue` is what it could be given at best: one column a parameter
 of squirrel's own catalogue, by finite differences of the nominal model, so that lags and latencies have columns too, with one
-number in front for all channels. The threshold and ridge of STLSQ are those with the least error in cross-validation over blocks of
-the training flights, nothing among them.
+number in front for all channels. The threshold and ridge of STLSQ are those with the least error in cross-validation over blocks
+of the training flights, nothing among them.
 """
 
 import warnings
@@ -15,8 +15,9 @@ from collections.abc import Callable
 from itertools import product
 
 import numpy as np
-import physics
 import pysindy
+
+import physics
 from flight import Array, Piece
 
 RATE_HZ = 30.0
@@ -148,7 +149,7 @@ class Fit:
         return physics.predict(piece, self.p) + np.stack(add, 1)
 
     def claims(self) -> tuple[int, list[str]]:
-        """Number of terms, and for the catalogue the effects that reach a reportable size, the largest share of the residual first."""
+        """Number of terms, and for the catalogue the effects of half a reportable size or more, the largest share first."""
         terms = sum(int((xi != 0).sum()) for xi in self.coefficients)
         if self.library.channels != 1:
             return terms, []
