@@ -30,14 +30,14 @@ const PART: [f64; 2] = [0.3, 0.6];
 /// neighbours, lift, inflow and flapping against the usual sign. Only the independent generator flies them.
 const OTHER_SIDE: [&str; 4] = ["weak_rotor", "translational_lift", "axial_inflow", "flapping_moment"];
 
-/// Effects that a number of the vehicle has too.
-const IN_BASE: [&str; 8] = [
+/// Effects that a number of the vehicle has too. A moment of inertia is not among them: too high by much, it is that of no
+/// body, and no file may have it.
+const IN_BASE: [&str; 7] = [
     "linear_drag",
     "quadratic_drag",
     "thrust_coefficient",
     "motor_lag",
     "mass_error",
-    "inertia_error",
     "yaw_torque_coeff",
     "wing_servo_lag",
 ];
@@ -91,10 +91,6 @@ impl Stated {
             }
             "motor_lag" => file.rotor_time_constant_s += x("extra_time_constant_s"),
             "mass_error" => file.mass_kg *= 1.0 + x("mass_fraction"),
-            "inertia_error" => {
-                let axis = ["x", "y", "z"].iter().position(|name| *name == self.effect.text("axis"));
-                file.inertia_kg_m2[axis.unwrap_or(0)] *= 1.0 + x("inertia_fraction");
-            }
             "yaw_torque_coeff" => {
                 let grown = 1.0 + x("torque_fraction");
                 file.rotors.iter_mut().for_each(|rotor| rotor.torque_coefficient_n_m_s2 *= grown);

@@ -99,7 +99,8 @@ fn motion(truth: &Source, latency_s: f64, draw: &mut Draw) -> Source {
     let mut off_velocity = Wander::new(VELOCITY_M_S.0, VELOCITY_M_S.1, draw);
     let mut off_position = Wander::new(POSITION_M.0, POSITION_M.1, draw);
     let every = (FILTER_HZ / RATE_HZ) as usize;
-    let gain = 1.0 - (-1.0 / (FILTER_HZ * LAG_S)).exp();
+    // A sampled lag is late by (1 - gain) / gain of its periods.
+    let gain = 1.0 / (1.0 + FILTER_HZ * LAG_S);
     for k in 0..(end_s * FILTER_HZ) as usize {
         let time_s = k as f64 / FILTER_HZ;
         let follow = |lags: &mut [Vector3<f64>; 2], channel| {
