@@ -99,7 +99,11 @@ impl Formula {
             Makes::Moment => heavy * draw.uniform(0.025, 0.04),
             Makes::ThrustFactor => draw.uniform(0.12, 0.2),
         };
-        let axis = draw.normal3(1.0);
+        let mut axis = draw.normal3(1.0);
+        if makes == Makes::Moment {
+            // Rotors turn a vehicle about its vertical axis with little moment.
+            axis[2] *= YAW;
+        }
         let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
         Self {
             shape: Self::SHAPES[number % Self::SHAPES.len()],
@@ -125,6 +129,8 @@ impl Formula {
     }
 }
 
+/// Moment about the vertical axis over that about the others.
+const YAW: f64 = 0.2;
 /// Length of a formula's weights.
 const LENGTH: f64 = 1.6;
 /// As good as none: three samples of the inertial unit.
