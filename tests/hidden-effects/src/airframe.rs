@@ -192,6 +192,7 @@ impl Airframe {
 
     /// A machine of a fleet that one file stands for: mass, thrust, inertia, drag and the place of the centre of mass are
     /// each off by up to a tenth (the place: of the longest arm), evenly.
+    #[must_use]
     pub fn of_a_fleet(&self, draw: &mut Draw) -> Self {
         let mut off = |x: f64| x * (1.0 + draw.uniform(-FLEET, FLEET));
         let mut other = self.clone();

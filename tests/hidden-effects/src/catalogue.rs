@@ -65,13 +65,12 @@ impl HiddenEffect {
         let quantities = entry.map_or(&[][..], |entry| entry.quantities);
         let sizes = quantities.iter().filter_map(|quantity| match *quantity {
             // The length of a load's line says how it swings, not how much of it there is.
-            Quantity::Size { key: "length_m", .. } => None,
+            Quantity::Size { key: "length_m", .. } | Quantity::Rotor { .. } | Quantity::OneOf { .. } => None,
             Quantity::Size { key, .. } | Quantity::Extensive { key, .. } | Quantity::Signed { key, .. } => {
                 Some(vec![key])
             }
             Quantity::Plane { keys, .. } => Some(keys.to_vec()),
             Quantity::Space { keys, .. } => Some(keys.to_vec()),
-            Quantity::Rotor { .. } | Quantity::OneOf { .. } => None,
         });
         sizes.collect()
     }

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 /// One kind with its sizes. Places are horizontal, from the take-off point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[allow(clippy::large_enum_variant, reason = "there is one in a flight")]
 #[allow(missing_docs, reason = "keys say quantity and unit; the equations are the independent generator's")]
 pub enum Outside {
     /// Something falls off.

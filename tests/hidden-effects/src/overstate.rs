@@ -50,9 +50,8 @@ impl Overstatement {
         let in_base = round % 4 == 2 && IN_BASE.contains(&entry.name);
         let turned = round % 4 == 3 && (entry.is_signed() || OTHER_SIDE.contains(&entry.name));
         let share = match round % 4 {
-            1 => 0.0,
             3 if turned => -part,
-            3 => 0.0,
+            1 | 3 => 0.0,
             _ => part,
         };
         // What is to be found is the difference: it must not be below the smallest that is worth reporting.
@@ -136,7 +135,7 @@ impl Stated {
 }
 
 /// Part of what the file was off by that a patch may leave.
-const LEFT_MAX: f64 = 0.25;
+const LEFT_MAX: f64 = 1.0 / 3.0;
 
 #[cfg(test)]
 mod tests {

@@ -117,10 +117,7 @@ pub(super) fn score(answer: &Answer, asked: Asked) -> Outcome {
         word == Word::Ambiguous && !truth.is_empty() && truth.is_subset(&verdict.all_names());
     outcome.flagged = open || rightly_ambiguous;
     if truth.is_empty() {
-        let right = match answer.hides_nothing() {
-            true => Word::None,
-            false => Word::OutsideCatalogue,
-        };
+        let right = if answer.hides_nothing() { Word::None } else { Word::OutsideCatalogue };
         (outcome.first_right, outcome.exact) = (word == right, word == right);
     } else {
         let names = names_surely || word == Word::Ambiguous;

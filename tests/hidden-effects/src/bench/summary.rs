@@ -78,6 +78,10 @@ pub struct Coverage {
     pub covered: f64,
 }
 
+/// From so many intervals of an effect on, a share outside of these bounds is told.
+const COVERAGE_N: usize = 20;
+const COVERAGE: [f64; 2] = [0.88, 0.99];
+
 fn coverage(cases: &[Outcome]) -> BTreeMap<String, Coverage> {
     let mut effects: BTreeMap<String, Coverage> = BTreeMap::new();
     for (effect, inside) in cases.iter().flat_map(|case| &case.parameter_covered) {
@@ -214,6 +218,12 @@ impl Summary {
         if !self.bars.is_empty() {
             text.push_str("\nbars\n");
             self.bars.iter().for_each(|bar| text += &bar.line());
+        }
+        for (effect, intervals) in &self.coverage {
+            if intervals.n >= COVERAGE_N && !(COVERAGE[0]..=COVERAGE[1]).contains(&intervals.covered) {
+                let covered = 100.0 * intervals.covered;
+                let _ = writeln!(text, "{effect}: {covered:.1} % of {} intervals hold the size", intervals.n);
+            }
         }
         let imperfect = self.hidden.iter().filter(|(_, group)| group.exact < 1.0);
         for (number, (name, group)) in imperfect.enumerate() {

@@ -49,7 +49,7 @@ impl Capture {
             let velocity = (three[2].1 - three[0].1) * (0.5 * RATE_HZ);
             let rows: [(&str, &[f64]); 2] =
                 [("position_ned_m", position.as_slice()), ("velocity_ned_m_s", velocity.as_slice())];
-            place.push(time_s, &rows[..1 + usize::from(self.has_velocity)]);
+            place.push(time_s, &rows[..=usize::from(self.has_velocity)]);
             attitude.push(time_s, &[("q_ned_from_body_wxyz", &wxyz(&turned))]);
         }
         log.sources.retain(|name, _| matches!(name.as_str(), "rotor" | "wing" | "battery"));
