@@ -190,6 +190,29 @@ impl Airframe {
         (real, errors)
     }
 
+    /// A machine of a fleet that one file stands for: mass, thrust, inertia, drag and the place of the centre of mass are
+    /// each off by up to a tenth (the place: of the longest arm), evenly.
+    #[must_use]
+    pub fn of_a_fleet(&self, draw: &mut Draw) -> Self {
+        let mut off = |x: f64| x * (1.0 + draw.uniform(-FLEET, FLEET));
+        let mut other = self.clone();
+        other.mass_kg = off(self.mass_kg);
+        let inertia = self.inertia_kg_m2.map(&mut off);
+        // No body has more about one axis than about the other two.
+        other.inertia_kg_m2 =
+            Vector3::new(inertia.x, inertia.y, inertia.z.min(0.98 * (inertia.x + inertia.y)));
+        other.drag_n_s_per_m = self.drag_n_s_per_m.map(&mut off);
+        other.drag_area_m2 = off(self.drag_area_m2);
+        let thrust = off(1.0);
+        let arm = self.rotors.iter().map(|rotor| rotor.position_body_m.norm()).fold(0.0, f64::max);
+        let centre = Vector3::new(off(arm) - arm, off(arm) - arm, 0.0);
+        for rotor in &mut other.rotors {
+            rotor.thrust_coefficient_n_s2 *= thrust;
+            rotor.position_body_m -= centre;
+        }
+        other
+    }
+
     /// Thrust of a rotor at the speed at which all together carry the weight, over that at top speed.
     pub fn hover_command(&self) -> f64 {
         let squared: f64 = self.rotors.iter().map(|r| r.thrust_coefficient_n_s2).sum();
@@ -250,6 +273,9 @@ impl Airframe {
 pub const GRAVITY_M_S2: f64 = 9.80665;
 /// Density of the air, kg/m^3.
 pub const AIR_DENSITY_KG_M3: f64 = 1.225;
+
+/// By how much the machines of a fleet are off their file.
+const FLEET: f64 = 0.1;
 
 const SOURCE: &str = "source = \"stated by the maker\"";
 

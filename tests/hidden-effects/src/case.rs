@@ -1,118 +1,19 @@
 //! Cases: what is drawn, what is hidden, and the files that go to the program and those that do not.
 
-use crate::airframe::Airframe;
+use crate::airframe::{Airframe, SensorErrors};
 use crate::catalogue::{CATALOGUE, CLASS_MASS_KG, Entry, HiddenEffect};
 use crate::draw::{Draw, mix};
-use crate::independent::{self, Excitation, Order, Pack};
+use crate::independent::{self, Excitation, Misfit, Order, Pack};
 use crate::outside::Outside;
+use crate::overstate::{Overstatement, Stated};
+use crate::recorder::{Capture, Estimator, Recorder, SensorFault};
+use crate::set::forms;
+pub use crate::set::{Generator, Set};
 use crate::squirrel_made;
 use serde::{Deserialize, Serialize};
-use squirrel_sim::log::LogError;
+use squirrel_sim::log::{FlightLog, LogError};
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// A group of cases that is scored together.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Set {
-    /// One effect of the catalogue.
-    Single,
-    /// Two of different kinds.
-    Two,
-    /// Nothing.
-    None,
-    /// Physics that no catalogue has.
-    Outside,
-    /// One effect in another published form.
-    OtherForm,
-    /// One effect, twice the noise.
-    NoiseX2,
-    /// One effect, three times the noise.
-    NoiseX3,
-    /// One effect, normal excitation.
-    Normal,
-    /// One effect, calm excitation.
-    Calm,
-}
-
-impl Set {
-    /// All sets with the number of cases of a full run.
-    pub const ALL: [(Self, usize); 9] = [
-        (Self::Single, 290),
-        (Self::Two, 200),
-        (Self::None, 300),
-        (Self::Outside, 200),
-        (Self::OtherForm, 60),
-        (Self::NoiseX2, 60),
-        (Self::NoiseX3, 60),
-        (Self::Normal, 60),
-        (Self::Calm, 60),
-    ];
-
-    /// Name as on the command line and in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Single => "single",
-            Self::Two => "two",
-            Self::None => "none",
-            Self::Outside => "outside",
-            Self::OtherForm => "other_form",
-            Self::NoiseX2 => "noise_x2",
-            Self::NoiseX3 => "noise_x3",
-            Self::Normal => "normal",
-            Self::Calm => "calm",
-        }
-    }
-
-    /// The set of a name.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().map(|(set, _)| set).find(|set| set.name() == name)
-    }
-
-    fn excitation(self) -> Excitation {
-        match self {
-            Self::Normal => Excitation::Normal,
-            Self::Calm => Excitation::Calm,
-            _ => Excitation::Rich,
-        }
-    }
-
-    fn noise(self) -> f64 {
-        match self {
-            Self::NoiseX2 => 2.0,
-            Self::NoiseX3 => 3.0,
-            _ => 1.0,
-        }
-    }
-}
-
-/// Who flies a case.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Generator {
-    /// [`crate::independent`].
-    Independent,
-    /// [`crate::squirrel_made`].
-    Squirrel,
-}
-
-impl Generator {
-    /// Each flies every other case of a set, and so every effect and form. What no catalogue has, only one can fly.
-    fn of(set: Set, index: usize) -> Self {
-        let round = match set {
-            Set::Outside => return Self::Independent,
-            // An even number of forms: the generators change places from one round to the next.
-            Set::OtherForm => index / forms().len(),
-            _ => 0,
-        };
-        if (index + round).is_multiple_of(2) { Self::Independent } else { Self::Squirrel }
-    }
-}
-
-/// Every form that is not the standard one.
-fn forms() -> Vec<(&'static Entry, &'static str)> {
-    CATALOGUE.iter().flat_map(|entry| entry.forms.iter().map(move |form| (entry, *form))).collect()
-}
 
 /// What a case hides; the file that the program under test never sees.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -131,6 +32,25 @@ pub struct Answer {
     pub effects: Vec<HiddenEffect>,
     /// What no catalogue has.
     pub outside: Option<Outside>,
+    /// What the vehicle file says too much of.
+    pub stated: Option<Stated>,
+    /// What writes the log down.
+    pub recorder: Recorder,
+    /// Part of the variation of force and moment that is unmodelled.
+    pub misfit: Option<Misfit>,
+}
+
+impl Answer {
+    /// Whether there is nothing to be found.
+    pub fn hides_nothing(&self) -> bool {
+        let errs = matches!(self.recorder, Recorder::Faulty(_));
+        self.effects.is_empty() && self.outside.is_none() && self.stated.is_none() && !errs
+    }
+
+    /// Where the case is counted.
+    pub fn group(&self) -> &'static str {
+        self.set.group(self.hides_nothing())
+    }
 }
 
 /// A drawn case.
@@ -194,42 +114,56 @@ impl Case {
         let one = |draw: &mut Draw, entry: &Entry, form: &str| {
             entry.draw(draw, form, nominal.mass_kg, nominal.rotors.len())
         };
-        let mut outside = None;
-        let first = &CATALOGUE[index % CATALOGUE.len()];
-        let effects = match set {
-            Set::None => Vec::new(),
-            Set::Outside => {
-                outside = Some(Outside::draw(
-                    index % Outside::KINDS,
-                    &mut draw,
-                    nominal.mass_kg,
-                    nominal.rotors.len(),
-                ));
-                Vec::new()
-            }
-            Set::Two => {
-                let partners: Vec<_> = CATALOGUE.iter().filter(|other| first.goes_with(other)).collect();
-                let second = partners[draw.index(partners.len())];
-                vec![one(&mut draw, first, STANDARD), one(&mut draw, second, STANDARD)]
-            }
-            Set::OtherForm => {
-                let forms = forms();
-                let (entry, form) = forms[index % forms.len()];
-                vec![one(&mut draw, entry, form)]
-            }
-            Set::Single | Set::NoiseX2 | Set::NoiseX3 | Set::Normal | Set::Calm => {
-                vec![one(&mut draw, first, STANDARD)]
-            }
-        };
-        let answer = Answer {
+        let mut answer = Answer {
             case: format!("{:010x}", mix(seed, 2) >> 24),
             set,
             generator: Generator::of(set, index),
             excitation: set.excitation(),
             noise: set.noise(),
-            effects,
-            outside,
+            effects: Vec::new(),
+            outside: None,
+            stated: None,
+            recorder: Recorder::Board,
+            misfit: None,
         };
+        let turn = if set.is_half() { index / 2 } else { index };
+        let hides_nothing = set.is_half() && index % 2 == 1;
+        let effects = set.effects();
+        let first = effects[turn % effects.len()];
+        let (mass_kg, rotors) = (nominal.mass_kg, nominal.rotors.len());
+        match set {
+            Set::None => {}
+            Set::Outside => answer.outside = Some(Outside::draw(index, &mut draw, mass_kg, rotors)),
+            Set::Sensors => answer.recorder = Recorder::Faulty(SensorFault::draw(index, &mut draw)),
+            Set::Two => {
+                let partners: Vec<_> = CATALOGUE.iter().filter(|other| first.goes_with(other)).collect();
+                let second = partners[draw.index(partners.len())];
+                answer.effects = vec![one(&mut draw, first, STANDARD), one(&mut draw, second, STANDARD)];
+            }
+            Set::OtherForm => {
+                let forms = forms();
+                let (entry, form) = forms[index % forms.len()];
+                answer.effects = vec![one(&mut draw, entry, form)];
+            }
+            Set::Overstated => {
+                // Few cases see all four kinds of overstatement, and four rounds see each with each effect.
+                let round = index / effects.len() + index / 2;
+                let drawn = Overstatement::draw(first, round, &mut draw, mass_kg, rotors);
+                if drawn.is_of_the_other_side() {
+                    answer.generator = Generator::Independent;
+                }
+                answer.effects = drawn.real.into_iter().collect();
+                answer.stated = Some(drawn.stated);
+            }
+            _ if hides_nothing => {}
+            _ => answer.effects = vec![one(&mut draw, first, STANDARD)],
+        }
+        match set {
+            Set::Estimates => answer.recorder = Recorder::Estimator(Estimator::draw(&mut draw)),
+            Set::Capture => answer.recorder = Recorder::Capture(Capture::draw(&mut draw)),
+            Set::Misfit => answer.misfit = Some(Misfit::draw(&mut draw)),
+            _ => {}
+        }
         Self { answer, nominal, seed }
     }
 
@@ -265,24 +199,26 @@ impl Case {
         other
     }
 
-    /// Flies the case and writes `FOLDER/cases/ID/` (`vehicle.toml`, `train/`, `held-out/`) and `FOLDER/answers/ID.json`.
-    /// Returns the case's folder, which appears only when it is whole.
+    /// Flies the case and writes `FOLDER/cases/ID/` (`vehicle.toml`, `train/`, `held-out/`, and `baseline/` where good flights
+    /// are given) and `FOLDER/answers/ID.json`, beside it the true vehicle as `ID.toml` where a patch is compared with it. Returns the case's folder, which appears only when it is whole.
     ///
     /// # Errors
     /// [`CaseError`]
     pub fn make(&self, folder: &Path) -> Result<PathBuf, CaseError> {
         let id = &self.answer.case;
         let (cases, answers) = (folder.join("cases"), folder.join("answers"));
-        let flights = [self.flight(0)?, self.flight(1)?, self.flight(2)?];
+        let names = self.flight_names();
+        let flights = (0..names.len()).map(|number| self.flight(number)).collect::<Result<Vec<_>, _>>()?;
         let partial = cases.join(format!("{id}.partial"));
-        for path in [&partial.join("train"), &partial.join("held-out"), &answers] {
-            fs::create_dir_all(path).map_err(CaseError::io(path))?;
+        let write = |path: &Path, text: &str| fs::write(path, text).map_err(CaseError::io(path));
+        for (flight, name) in flights.iter().zip(names) {
+            let path = partial.join(name);
+            let folder = path.parent().unwrap_or(&partial);
+            fs::create_dir_all(folder).map_err(CaseError::io(folder))?;
+            flight.write(&path)?;
         }
-        let vehicle = partial.join("vehicle.toml");
-        fs::write(&vehicle, self.nominal.to_toml()).map_err(CaseError::io(&vehicle))?;
-        for (flight, name) in flights.iter().zip(FLIGHTS) {
-            flight.write(&partial.join(name))?;
-        }
+        fs::create_dir_all(&answers).map_err(CaseError::io(&answers))?;
+        write(&partial.join("vehicle.toml"), &self.vehicle_toml())?;
         let whole = cases.join(id);
         if whole.exists() {
             fs::remove_dir_all(&whole).map_err(CaseError::io(&whole))?;
@@ -290,16 +226,77 @@ impl Case {
         fs::rename(&partial, &whole).map_err(CaseError::io(&whole))?;
         let answer = answers.join(format!("{id}.json"));
         write_json(&answer, &self.answer)?;
+        if self.answer.misfit.is_some() {
+            let tables: String = self.answer.effects.iter().map(squirrel_made::effect_table).collect();
+            write(&answer.with_extension("toml"), &(self.vehicle_toml() + &tables))?;
+        }
         Ok(whole)
     }
 
-    /// Flight 0 and 1 of the training, 2 held out.
+    /// The vehicle file that the program is given.
+    pub fn vehicle_toml(&self) -> String {
+        let Some(stated) = &self.answer.stated else { return self.nominal.to_toml() };
+        let text = stated.in_airframe(&self.nominal).to_toml();
+        if stated.in_base { text } else { text + &squirrel_made::effect_table(&stated.effect) }
+    }
+
+    /// Files of the flights in the case's folder, by number.
+    pub fn flight_names(&self) -> &'static [&'static str] {
+        if self.answer.set == Set::Baseline { &FLIGHTS } else { &FLIGHTS[..3] }
+    }
+
+    /// The individual that flies, and its sensors.
+    fn individual(&self, draw: &mut Draw) -> (Airframe, SensorErrors) {
+        if self.answer.set == Set::Baseline {
+            return self.nominal.of_a_fleet(&mut Draw::new(mix(self.seed, 4))).individual(draw);
+        }
+        self.nominal.individual(draw)
+    }
+
+    /// Flight 0 and 1 of the training, 2 held out, 3 and 4 before anything was hidden, as its recorder writes it down.
     ///
     /// # Errors
     /// [`CaseError::Flight`] if the vehicle does not stay up.
-    pub fn flight(&self, number: usize) -> Result<squirrel_sim::log::FlightLog, CaseError> {
+    pub fn flight(&self, number: usize) -> Result<FlightLog, CaseError> {
+        let log = self.flown(number)?;
+        let draw = Draw::new(mix(self.seed, 1000 + number as u64));
+        let late = |effect: &&HiddenEffect| effect.name == "gnss_latency";
+        let latency_s =
+            self.answer.effects.iter().find(late).map_or(0.0, |effect| effect.number("latency_s"));
+        Ok(self.answer.recorder.record(log, latency_s, draw))
+    }
+
+    /// A flight with the sensors' readings and the truth.
+    pub(crate) fn flown(&self, number: usize) -> Result<FlightLog, CaseError> {
+        self.ordered(number, |order| match self.answer.generator {
+            Generator::Independent => independent::fly(order),
+            Generator::Squirrel => squirrel_made::fly(&squirrel_made::Order {
+                real: order.real,
+                errors: order.errors,
+                resistance_ohm: order.pack.resistance_ohm,
+                effects: order.effects,
+                excitation: order.excitation,
+                noise: order.noise,
+                charge: order.charge,
+                seed: order.seed,
+            }),
+        })
+    }
+
+    /// A flight with the sums of what is measured, hidden and unmodelled in it.
+    #[cfg(test)]
+    pub(crate) fn watched(&self, number: usize) -> Result<independent::Watched, CaseError> {
+        self.ordered(number, independent::watched)
+    }
+
+    /// Has a flight flown; one that ends early is flown again in another order of manoeuvres.
+    fn ordered<T>(
+        &self,
+        number: usize,
+        fly: impl Fn(&Order<'_>) -> Result<T, String>,
+    ) -> Result<T, CaseError> {
         let mut draw = Draw::new(mix(self.seed, 3));
-        let (real, errors) = self.nominal.individual(&mut draw);
+        let (real, errors) = self.individual(&mut draw);
         let heavy = self.nominal.mass_kg / CLASS_MASS_KG;
         let pack = Pack {
             resistance_ohm: draw.uniform(0.035, 0.08) / heavy,
@@ -307,51 +304,63 @@ impl Case {
             capacity_ah: 1.3 * heavy,
         };
         // One training flight starts high, the other low; the held-out one anywhere between.
-        let charges = [draw.uniform(0.85, 0.95), draw.uniform(0.5, 0.65), draw.uniform(0.55, 0.9)];
+        let charges = [
+            draw.uniform(0.85, 0.95),
+            draw.uniform(0.5, 0.65),
+            draw.uniform(0.55, 0.9),
+            draw.uniform(0.85, 0.95),
+            draw.uniform(0.5, 0.7),
+        ];
+        let effects = if number < GOOD_FROM { &self.answer.effects[..] } else { &[] };
         let order = Order {
             nominal: &self.nominal,
             real: &real,
             errors,
             pack,
-            effects: &self.answer.effects,
+            effects,
             outside: self.answer.outside,
             excitation: self.answer.excitation,
             noise: self.answer.noise,
             charge: charges[number],
+            unmodelled: None,
             seed: 0,
         };
-        // A flight that ends early is flown again in another order of manoeuvres.
-        let attempt = |attempt: u64| {
-            let seed = mix(self.seed, 10 + number as u64 + 100 * attempt);
-            match self.answer.generator {
-                Generator::Independent => independent::fly(&Order { seed, ..order.clone() }),
-                Generator::Squirrel => squirrel_made::fly(&squirrel_made::Order {
-                    real: order.real,
-                    errors,
-                    resistance_ohm: pack.resistance_ohm,
-                    effects: order.effects,
-                    excitation: order.excitation,
-                    noise: order.noise,
-                    charge: order.charge,
-                    seed,
-                }),
-            }
-        };
-        attempt(0).or_else(|_| attempt(1)).or_else(|_| attempt(2)).map_err(|reason| CaseError::Flight {
+        let refused = |reason| CaseError::Flight {
             case: self.answer.case.clone(),
             hidden: format!("{:?} {:?}", self.answer.effects, self.answer.outside),
             reason,
-        })
+        };
+        // What is unmodelled belongs to the vehicle: its size comes from the first flight, whichever is flown.
+        let unmodelled = match self.answer.misfit {
+            Some(misfit) => {
+                let first = Order { charge: charges[0], seed: mix(self.seed, 10), ..order.clone() };
+                Some(independent::unmodelled(&first, misfit).map_err(refused)?)
+            }
+            None => None,
+        };
+        let attempt = |attempt: u64| {
+            let seed = mix(self.seed, 10 + number as u64 + 100 * attempt);
+            fly(&Order { seed, unmodelled: unmodelled.as_ref(), ..order.clone() })
+        };
+        attempt(0).or_else(|_| attempt(1)).or_else(|_| attempt(2)).map_err(refused)
     }
 
-    /// The vehicle as its file states it.
+    /// The vehicle that everybody believes: what its file states, unless that says too much of something.
     pub fn nominal(&self) -> &Airframe {
         &self.nominal
     }
 }
 
-/// Where the flights of a case stand in its folder.
-pub const FLIGHTS: [&str; 3] = ["train/flight00.mcap", "train/flight01.mcap", "held-out/flight00.mcap"];
+/// Where the flights of a case stand in its folder; only some have the last two.
+pub const FLIGHTS: [&str; 5] = [
+    "train/flight00.mcap",
+    "train/flight01.mcap",
+    "held-out/flight00.mcap",
+    "baseline/flight00.mcap",
+    "baseline/flight01.mcap",
+];
+/// The first of the flights from before anything was hidden.
+pub(crate) const GOOD_FROM: usize = 3;
 
 /// Writes JSON under a temporary name, then renames.
 ///
@@ -369,6 +378,7 @@ pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CaseError> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use squirrel_sim::vehicle_file::VehicleFile;
     use std::collections::BTreeSet;
 
     #[test]
@@ -386,6 +396,58 @@ mod tests {
         assert_eq!(names.len(), 29);
     }
 
+    /// Half of the cases of a half set hide one effect, half of them nothing; the other new sets hide what they say.
+    #[test]
+    fn new_sets_hide_what_they_say() {
+        for index in 0..60 {
+            let hidden = |set| Case::draw(set, index, 1).answer;
+            for set in [Set::Estimates, Set::Capture, Set::Baseline] {
+                let answer = hidden(set);
+                assert_eq!(answer.effects.len(), 1 - index % 2, "{set:?}");
+                assert_eq!(answer.group().ends_with("_none"), index % 2 == 1);
+            }
+            let (sensors, overstated, misfit) =
+                (hidden(Set::Sensors), hidden(Set::Overstated), hidden(Set::Misfit));
+            assert!(matches!(sensors.recorder, Recorder::Faulty(_)) && !sensors.hides_nothing());
+            assert!(overstated.stated.is_some() && overstated.group() == "overstated");
+            let share = misfit.misfit.unwrap().share;
+            assert!((0.1..0.25).contains(&share) && misfit.effects.len() == 1);
+        }
+        let stated =
+            (0..28).map(|index| Case::draw(Set::Overstated, index, 1).answer.stated.unwrap().effect.name);
+        let names: BTreeSet<_> = stated.collect();
+        assert!(names.len() == 28 && !names.contains("gust"));
+    }
+
+    /// The file says what the answer says it says.
+    #[test]
+    fn overstated_files_carry_the_effect() {
+        for index in 0..112 {
+            let case = Case::draw(Set::Overstated, index, 1);
+            let stated = case.answer.stated.clone().unwrap();
+            let file = VehicleFile::parse(&case.vehicle_toml(), "vehicle.toml").unwrap();
+            assert_eq!(file.effects.has(&stated.effect.name), !stated.in_base, "{index}");
+            assert_eq!(stated.in_airframe(case.nominal()) != *case.nominal(), stated.in_base);
+        }
+    }
+
+    #[test]
+    fn fleets_are_farther_off_than_their_tolerance() {
+        let case = Case::draw(Set::Baseline, 1, 1);
+        let (real, _) = case.individual(&mut Draw::new(1));
+        let off = (real.mass_kg / case.nominal().mass_kg - 1.0).abs();
+        assert!((0.0..0.11).contains(&off));
+        let offs: Vec<f64> = (0..40)
+            .map(|index| {
+                let case = Case::draw(Set::Baseline, index, 1);
+                case.individual(&mut Draw::new(1)).0.mass_kg / case.nominal().mass_kg - 1.0
+            })
+            .collect();
+        let rms = (offs.iter().map(|x| x * x).sum::<f64>() / 40.0).sqrt();
+        assert!((0.04..0.075).contains(&rms), "evenly to 10 %: {rms}");
+        assert_eq!(case.flight_names().len(), 5);
+    }
+
     #[test]
     fn names_say_nothing_and_are_unique() {
         let mut names = BTreeSet::new();
@@ -400,7 +462,7 @@ mod tests {
 
     #[test]
     fn answers_survive_their_file() {
-        for set in [Set::Two, Set::Outside, Set::OtherForm] {
+        for (set, _) in Set::ALL {
             for index in 0..20 {
                 let answer = Case::draw(set, index, 5).answer;
                 let text = serde_json::to_string(&answer).unwrap();

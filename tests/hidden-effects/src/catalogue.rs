@@ -46,6 +46,34 @@ impl HiddenEffect {
             _ => "",
         }
     }
+
+    /// The same effect with all its sizes times a factor; what says where or how long stays.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let mut other = self.clone();
+        for key in self.sizes().concat() {
+            if let Some(Value::Number(x)) = other.parameters.get_mut(key) {
+                *x *= factor;
+            }
+        }
+        other
+    }
+
+    /// Keys of its sizes; those of a vector stand together.
+    pub fn sizes(&self) -> Vec<Vec<&'static str>> {
+        let entry = CATALOGUE.iter().find(|entry| entry.name == self.name);
+        let quantities = entry.map_or(&[][..], |entry| entry.quantities);
+        let sizes = quantities.iter().filter_map(|quantity| match *quantity {
+            // The length of a load's line says how it swings, not how much of it there is.
+            Quantity::Size { key: "length_m", .. } | Quantity::Rotor { .. } | Quantity::OneOf { .. } => None,
+            Quantity::Size { key, .. } | Quantity::Extensive { key, .. } | Quantity::Signed { key, .. } => {
+                Some(vec![key])
+            }
+            Quantity::Plane { keys, .. } => Some(keys.to_vec()),
+            Quantity::Space { keys, .. } => Some(keys.to_vec()),
+        });
+        sizes.collect()
+    }
 }
 
 /// How a parameter, or a few together, are drawn.
@@ -183,28 +211,43 @@ impl Entry {
     ///
     /// * `form` - `standard` or one of [`Entry::forms`]
     pub fn draw(&self, draw: &mut Draw, form: &str, mass_kg: f64, rotors: usize) -> HiddenEffect {
+        self.draw_above(1.0, draw, form, mass_kg, rotors)
+    }
+
+    /// The same with the lower end of the range times a factor, as far as the range allows.
+    pub fn draw_above(
+        &self,
+        factor: f64,
+        draw: &mut Draw,
+        form: &str,
+        mass_kg: f64,
+        rotors: usize,
+    ) -> HiddenEffect {
+        let raised = |smallest: f64, largest: f64| {
+            if factor > 1.0 { (factor * smallest).min(0.7 * largest).max(smallest) } else { smallest }
+        };
         let mut parameters = BTreeMap::new();
         let mut put = |key: &str, value: Value| parameters.insert(key.to_owned(), value);
         let heavy = (mass_kg / CLASS_MASS_KG).max(1.0);
         for quantity in self.quantities {
             match *quantity {
                 Quantity::Size { key, smallest, largest } => {
-                    put(key, Value::Number(draw.uniform(smallest, largest)));
+                    put(key, Value::Number(draw.uniform(raised(smallest, largest), largest)));
                 }
                 Quantity::Extensive { key, smallest, largest } => {
-                    let least = (smallest * heavy).min(0.7 * largest);
+                    let least = raised((smallest * heavy).min(0.7 * largest), largest);
                     put(key, Value::Number(draw.uniform(least, largest)));
                 }
                 Quantity::Signed { key, smallest, largest } => {
-                    put(key, Value::Number(draw.sign() * draw.uniform(smallest, largest)));
+                    put(key, Value::Number(draw.sign() * draw.uniform(raised(smallest, largest), largest)));
                 }
                 Quantity::Plane { keys, smallest, largest } => {
-                    let (length, angle) = (draw.uniform(smallest, largest), draw.angle());
+                    let (length, angle) = (draw.uniform(raised(smallest, largest), largest), draw.angle());
                     put(keys[0], Value::Number(length * angle.cos()));
                     put(keys[1], Value::Number(length * angle.sin()));
                 }
                 Quantity::Space { keys, smallest, largest } => {
-                    let (length, angle) = (draw.uniform(smallest, largest), draw.angle());
+                    let (length, angle) = (draw.uniform(raised(smallest, largest), largest), draw.angle());
                     let up = draw.uniform(-1.0, 1.0);
                     let flat = (1.0 - up * up).sqrt();
                     for (key, x) in keys.iter().zip([flat * angle.cos(), flat * angle.sin(), up]) {
@@ -220,6 +263,14 @@ impl Entry {
             }
         }
         HiddenEffect { name: self.name.to_owned(), form: form.to_owned(), parameters }
+    }
+
+    /// Whether its sizes have both signs in the catalogue.
+    pub fn is_signed(&self) -> bool {
+        let signed = |quantity: &Quantity| {
+            matches!(quantity, Quantity::Signed { .. } | Quantity::Plane { .. } | Quantity::Space { .. })
+        };
+        self.quantities.iter().any(signed)
     }
 
     /// Whether both can be told from flights that hide the two of them.

@@ -2,11 +2,13 @@
 
 use crate::catalogue::CLASS_MASS_KG;
 use crate::draw::Draw;
+use crate::independent::{FEATURES, weights};
 use serde::{Deserialize, Serialize};
 
 /// One kind with its sizes. Places are horizontal, from the take-off point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
+#[allow(clippy::large_enum_variant, reason = "there is one in a flight")]
 #[allow(missing_docs, reason = "keys say quantity and unit; the equations are the independent generator's")]
 pub enum Outside {
     /// Something falls off.
@@ -43,11 +45,113 @@ pub enum Outside {
     Wall { force_n: f64, reach_m: f64, distance_m: f64, direction_rad: f64 },
     /// The wings stop where they should not.
     WingJam { deployment: f64, from_s: f64 },
+    /// A random formula of motion and commands.
+    Formula(Formula),
 }
 
+/// The shape of a formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "each is the function of its name")]
+pub enum Shape {
+    Sin,
+    Tanh,
+    Square,
+    Abs,
+    Product,
+}
+
+/// What a formula makes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(missing_docs, reason = "each is what its name says")]
+pub enum Makes {
+    BodyForce,
+    Moment,
+    NedForce,
+    ThrustFactor,
+}
+
+/// `size * axis * shape(first . x, second . x)`, `x` motion and commands over what is usual; late by a lag, and there only
+/// where another sum is positive.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[allow(missing_docs, reason = "the equation above says what each is")]
+pub struct Formula {
+    pub shape: Shape,
+    pub makes: Makes,
+    /// N, N m, or a share of the thrust.
+    pub size: f64,
+    pub axis: [f64; 3],
+    pub first: [f64; FEATURES],
+    pub second: [f64; FEATURES],
+    pub lag_s: f64,
+    pub gate: Option<[f64; FEATURES]>,
+}
+
+impl Formula {
+    const SHAPES: [Shape; 5] = [Shape::Sin, Shape::Tanh, Shape::Square, Shape::Abs, Shape::Product];
+    const MAKES: [Makes; 4] = [Makes::BodyForce, Makes::Moment, Makes::NedForce, Makes::ThrustFactor];
+
+    /// Shape and what it makes go by the number, everything else is drawn.
+    fn draw(number: usize, draw: &mut Draw, heavy: f64) -> Self {
+        let makes = Self::MAKES[number % Self::MAKES.len()];
+        let size = match makes {
+            Makes::BodyForce | Makes::NedForce => heavy * draw.uniform(0.7, 1.1),
+            Makes::Moment => heavy * draw.uniform(0.025, 0.04),
+            Makes::ThrustFactor => draw.uniform(0.12, 0.2),
+        };
+        let mut axis = draw.normal3(1.0);
+        if makes == Makes::Moment {
+            // Rotors turn a vehicle about its vertical axis with little moment.
+            axis[2] *= YAW;
+        }
+        let length = axis.iter().map(|x| x * x).sum::<f64>().sqrt();
+        Self {
+            shape: Self::SHAPES[number % Self::SHAPES.len()],
+            makes,
+            size,
+            axis: axis.map(|x| x / length),
+            first: weights(LENGTH, draw),
+            second: weights(LENGTH, draw),
+            lag_s: if draw.sign() > 0.0 { draw.uniform(0.2, 0.6) } else { LAG_NONE_S },
+            gate: (draw.sign() > 0.0).then(|| weights(LENGTH, draw)),
+        }
+    }
+
+    /// The function of the two sums; of usual motion it is about 1 in size, and about 0 in the mean.
+    pub fn of(&self, a: f64, b: f64) -> f64 {
+        match self.shape {
+            Shape::Sin => (2.0 * a).sin(),
+            Shape::Tanh => (3.0 * a).tanh(),
+            Shape::Square => (a * a - 0.5).min(3.0),
+            Shape::Abs => (1.5 * a.abs() - 0.8).min(2.0),
+            Shape::Product => (1.5 * a * b).clamp(-2.5, 2.5),
+        }
+    }
+}
+
+/// Moment about the vertical axis over that about the others.
+const YAW: f64 = 0.2;
+/// Length of a formula's weights.
+const LENGTH: f64 = 1.6;
+/// As good as none: three samples of the inertial unit.
+const LAG_NONE_S: f64 = 0.01;
+
 impl Outside {
-    /// How many kinds there are.
-    pub const KINDS: usize = 17;
+    /// Kinds with an equation of their own, and as many formulas.
+    const BY_HAND: usize = 17;
+    /// How many kinds there are; the even ones are by hand, the odd ones formulas.
+    pub const KINDS: usize = 2 * Self::BY_HAND;
+
+    /// What it is called in summaries.
+    pub fn name(&self) -> String {
+        let value = serde_json::to_value(self).unwrap_or_default();
+        let word = |key: &str| value[key].as_str().unwrap_or_default().to_owned();
+        match self {
+            Self::Formula(_) => format!("formula_{}_{}", word("shape"), word("makes")),
+            _ => word("kind"),
+        }
+    }
 
     /// A kind by its number, 0 to [`Self::KINDS`], in sizes that matter for such a vehicle.
     pub fn draw(kind: usize, draw: &mut Draw, mass_kg: f64, rotors: usize) -> Self {
@@ -55,7 +159,10 @@ impl Outside {
         let place =
             |draw: &mut Draw, radius: f64| (draw.uniform(-radius, radius), draw.uniform(-radius, radius));
         let half_time_s = draw.uniform(14.0, 24.0);
-        match kind % Self::KINDS {
+        if kind % 2 == 1 {
+            return Self::Formula(Formula::draw(kind / 2 % Self::BY_HAND, draw, heavy));
+        }
+        match kind / 2 % Self::BY_HAND {
             0 => Self::MassLost { mass_fraction: draw.uniform(0.1, 0.2), at_s: half_time_s },
             1 => {
                 let (north_m, east_m) = place(draw, 3.0);
@@ -127,11 +234,10 @@ mod tests {
 
     #[test]
     fn every_number_is_another_kind() {
-        let name = |kind| {
-            let outside = Outside::draw(kind, &mut Draw::new(1), 0.5, 4);
-            serde_json::to_value(outside).unwrap()["kind"].to_string()
-        };
-        let mut names: Vec<_> = (0..Outside::KINDS).map(name).collect();
+        let mut names: Vec<_> =
+            (0..Outside::KINDS).map(|kind| Outside::draw(kind, &mut Draw::new(1), 0.5, 4).name()).collect();
+        let formulas = names.iter().filter(|name| name.starts_with("formula_")).count();
+        assert_eq!(2 * formulas, Outside::KINDS);
         names.sort();
         names.dedup();
         assert_eq!(names.len(), Outside::KINDS);

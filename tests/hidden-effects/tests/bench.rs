@@ -30,7 +30,10 @@ fn program(folder: &Path, verdict: &str) -> PathBuf {
     let script = format!(
         "#!/bin/sh\nset -e\nwhile [ $# -gt 0 ]; do case \"$1\" in\n--out) test -d \"$2\"; json=\"$2/verdict.json\"; shift 2;;\n\
          --vehicle|--held-out) test -f \"$2\"; shift 2;;\n\
-         *.mcap) test -f \"$1\"; shift;;\n*) shift;;\nesac; done\necho '{verdict}' > \"$json\"\n"
+         --baseline) test -f \"$2\"; test -f \"$3\"; echo \"$2\" >> '{good}'; shift 3;;\n\
+         --json) json=\"$2\"; shift 2;;\n\
+         *.mcap) test -f \"$1\"; shift;;\n*) shift;;\nesac; done\necho '{verdict}' > \"$json\"\n",
+        good = folder.join("good").display()
     );
     let path = folder.join("program");
     std::fs::write(&path, script).unwrap();
@@ -41,7 +44,7 @@ fn program(folder: &Path, verdict: &str) -> PathBuf {
 fn plan(folder: &Folder, verdict: &str) -> Plan {
     Plan {
         squirrel: program(&folder.0, verdict),
-        cases: vec![(Set::None, 0), (Set::Single, 7), (Set::Outside, 1)],
+        cases: vec![(Set::None, 0), (Set::Single, 7), (Set::Outside, 2)],
         seed: 5,
         folder: folder.0.join("bench"),
         keep: false,
@@ -53,6 +56,7 @@ fn plan(folder: &Folder, verdict: &str) -> Plan {
 fn programs_that_answer_without_looking_are_seen_through() {
     says_none();
     guesses_then_fails();
+    new_sets();
 }
 
 /// Right where nothing is hidden.
@@ -68,6 +72,34 @@ fn says_none() {
     assert_eq!(summary.hidden["tether"].first_right, 0.0);
     let left: Vec<_> = std::fs::read_dir(plan.folder.join("cases")).unwrap().collect();
     assert!(left.is_empty(), "cases are not kept: {left:?}");
+}
+
+/// What the new sets make of a program that says nothing and of one that guesses; good flights are given where they are.
+fn new_sets() {
+    let folder = Folder::new("new");
+    let sets = [Set::Estimates, Set::Sensors, Set::Capture, Set::Overstated, Set::Misfit, Set::Baseline];
+    let cases: Vec<_> = sets.into_iter().flat_map(|set| [(set, 0), (set, 1)]).collect();
+    let run = |verdict: &str| {
+        let plan = Plan { cases: cases.clone(), ..plan(&folder, verdict) };
+        bench::run(&plan).unwrap()
+    };
+    let half = [Set::Estimates, Set::Capture, Set::Baseline];
+    for outcome in run(r#"{"verdict": "none"}"#) {
+        let nothing = half.contains(&outcome.set) && outcome.hidden.is_empty();
+        assert_eq!((outcome.right, outcome.failure.clone()), (nothing, None), "{outcome:?}");
+    }
+    let guess =
+        r#"{"verdict": "named_incomplete", "effects": [{"name": "linear_drag"}], "model_patch": "a.toml"}"#;
+    for outcome in run(guess) {
+        // The name of the first effect is right, but it takes a number to mend a file.
+        let drag = outcome.hidden == ["linear_drag"];
+        assert_eq!(outcome.right, drag && outcome.set != Set::Overstated, "{outcome:?}");
+        assert!(outcome.silent_wrong != drag && outcome.patched);
+        // This program has no answer to what remains beside a patch.
+        assert_eq!(outcome.failure.is_some(), outcome.set == Set::Misfit, "{outcome:?}");
+    }
+    let good = std::fs::read_to_string(folder.0.join("good")).unwrap();
+    assert_eq!(good.lines().count(), 2 * 2, "two cases of one set, asked twice");
 }
 
 /// Silently wrong; and a program that does not start is said not to.

@@ -4,6 +4,7 @@
 use hidden_effects::case::{Answer, Case, FLIGHTS, Set};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::{Path, PathBuf};
 
 fn column(log: &FlightLog, name: &str, i: usize) -> Vec<f64> {
     let (time_s, channel) = log.channel(name).unwrap();
@@ -62,7 +63,7 @@ fn a_case_is_a_folder_and_its_answer_is_elsewhere() {
     let case = Case::draw(Set::Two, 4, 9);
     let made = case.make(&folder).unwrap();
     let vehicle = VehicleFile::load(&made.join("vehicle.toml")).unwrap();
-    for (number, name) in FLIGHTS.iter().enumerate() {
+    for (number, name) in case.flight_names().iter().enumerate() {
         let log = FlightLog::read(&made.join(name)).unwrap();
         assert_eq!(log, case.flight(number).unwrap());
         assert!(log.metadata.is_empty(), "what a log says of its making could give the answer away");
@@ -78,4 +79,53 @@ fn a_case_is_a_folder_and_its_answer_is_elsewhere() {
     case.make(&folder).unwrap();
     assert!(before == std::fs::read(made.join(FLIGHTS[0])).unwrap());
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Every file of a folder with its bytes, by path inside it.
+fn files(folder: &Path, inside: &Path) -> Vec<(PathBuf, Vec<u8>)> {
+    let mut entries: Vec<_> =
+        std::fs::read_dir(folder.join(inside)).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    entries.sort();
+    let mut all = Vec::new();
+    for name in entries {
+        let path = inside.join(name);
+        match folder.join(&path) {
+            whole if whole.is_dir() => all.extend(files(folder, &path)),
+            whole => all.push((path, std::fs::read(whole).unwrap())),
+        }
+    }
+    all
+}
+
+#[test]
+fn the_same_seed_makes_the_same_bytes_in_every_new_set() {
+    let folder = |which: &str| std::env::temp_dir().join(format!("hidden-{which}-{}", std::process::id()));
+    let [first, second] = ["first", "second"].map(folder);
+    for set in [
+        Set::Estimates,
+        Set::Sensors,
+        Set::Capture,
+        Set::Overstated,
+        Set::Misfit,
+        Set::Baseline,
+        Set::Outside,
+    ] {
+        for folder in [&first, &second] {
+            let (case, made) = Case::draw_and_make(set, 1, 7, folder).unwrap();
+            assert_eq!(made.join("baseline").is_dir(), set == Set::Baseline);
+            assert_eq!(
+                folder.join(format!("answers/{}.toml", case.answer.case)).exists(),
+                set == Set::Misfit
+            );
+            for name in case.flight_names() {
+                let log = FlightLog::read(&made.join(name)).unwrap();
+                assert!(log.metadata.is_empty() && !log.sources.contains_key("truth"), "{set:?}");
+            }
+        }
+        let [one, other] = [&first, &second].map(|folder| files(folder, Path::new("")));
+        assert!(one.len() > 4 && one == other, "{set:?}");
+        for folder in [&first, &second] {
+            std::fs::remove_dir_all(folder).unwrap();
+        }
+    }
 }

@@ -1,9 +1,17 @@
 //! A verdict against the answer.
+//!
+//! [`Outcome::right`] is what the set asks of a case: exactly the hidden names, or that nothing or something unknown is
+//! said where that is so. Beside an unmodelled rest and without an inertial unit the first name is enough. An erring sensor
+//! is named or flagged: a flight that is set aside, a contradiction in the data, or something outside the catalogue. Of a
+//! file that says too much, the effect is named with a number that mends the file.
 
 use super::ask::Asked;
 use super::verdict::{Verdict, Word};
 use crate::case::{Answer, Generator, Set};
 use crate::catalogue::{HiddenEffect, Value};
+use crate::outside::Outside;
+use crate::overstate::Stated;
+use crate::recorder::Recorder;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,6 +23,8 @@ pub struct Outcome {
     pub case: String,
     /// Its set.
     pub set: Set,
+    /// Where it is counted.
+    pub group: &'static str,
     /// Who flew it.
     pub generator: Generator,
     /// Hidden effects, or the kind outside the catalogue.
@@ -33,6 +43,12 @@ pub struct Outcome {
     pub flagged: bool,
     /// A name that is not hidden, said without a doubt.
     pub silent_wrong: bool,
+    /// What the set asks for.
+    pub right: bool,
+    /// A patched vehicle file was written.
+    pub patched: bool,
+    /// Part of the held-out residual that the true vehicle file removes and the patched one removes, too.
+    pub removable_removed: Option<f64>,
     /// Part of the held-out gap that went away.
     pub gap_removed: Option<f64>,
     /// Wall time, s.
@@ -53,15 +69,18 @@ fn single_size(effect: &HiddenEffect) -> Option<(&str, f64)> {
 }
 
 pub(super) fn score(answer: &Answer, asked: Asked) -> Outcome {
-    let truth: BTreeSet<&str> = answer.effects.iter().map(|effect| effect.name.as_str()).collect();
+    let truth = truth(answer);
     let mut hidden: Vec<String> = truth.iter().map(|name| (*name).to_owned()).collect();
-    if let Some(outside) = &answer.outside {
-        let kind = serde_json::to_value(outside).ok().and_then(|v| v["kind"].as_str().map(str::to_owned));
-        hidden.push(kind.unwrap_or_default());
+    hidden.extend(answer.outside.as_ref().map(Outside::name));
+    if let Recorder::Faulty(fault) = &answer.recorder
+        && fault.name().is_none()
+    {
+        hidden.push("gyro_drift".to_owned());
     }
     let mut outcome = Outcome {
         case: answer.case.clone(),
         set: answer.set,
+        group: answer.group(),
         generator: answer.generator,
         hidden,
         verdict: Word::Failed,
@@ -71,6 +90,9 @@ pub(super) fn score(answer: &Answer, asked: Asked) -> Outcome {
         exact: false,
         flagged: false,
         silent_wrong: false,
+        right: false,
+        patched: false,
+        removable_removed: None,
         gap_removed: None,
         seconds: asked.seconds,
         parameter_errors: BTreeMap::new(),
@@ -87,24 +109,65 @@ pub(super) fn score(answer: &Answer, asked: Asked) -> Outcome {
     outcome.verdict = word;
     outcome.named = verdict.effects.iter().map(|effect| effect.name.clone()).collect();
     outcome.gap_removed = verdict.gap.and_then(|gap| gap.removed_fraction).filter(|x| x.is_finite());
-    let names_surely = matches!(word, Word::Named | Word::NamedFormDiffers);
+    outcome.patched = verdict.model_patch.is_some();
+    let names_surely = verdict.names_surely();
     outcome.silent_wrong = names_surely && verdict.names().iter().any(|name| !truth.contains(name));
     let open = matches!(word, Word::OutsideCatalogue | Word::NotIdentifiable | Word::DataProblem);
     let rightly_ambiguous =
         word == Word::Ambiguous && !truth.is_empty() && truth.is_subset(&verdict.all_names());
     outcome.flagged = open || rightly_ambiguous;
     if truth.is_empty() {
-        let right = if answer.outside.is_some() { Word::OutsideCatalogue } else { Word::None };
+        let right = if answer.hides_nothing() { Word::None } else { Word::OutsideCatalogue };
         (outcome.first_right, outcome.exact) = (word == right, word == right);
-        return outcome;
+    } else {
+        let names = names_surely || word == Word::Ambiguous;
+        outcome.first_right = names && verdict.first().is_some_and(|name| truth.contains(name));
+        outcome.exact = names_surely && verdict.names() == truth;
     }
-    outcome.first_right =
-        (names_surely || word == Word::Ambiguous) && verdict.first().is_some_and(|name| truth.contains(name));
-    outcome.exact = names_surely && verdict.names() == truth;
-    if names_surely {
+    let unknown = matches!(word, Word::OutsideCatalogue | Word::DataProblem) || rightly_ambiguous;
+    let set_aside = !verdict.set_aside.is_empty() && !outcome.silent_wrong;
+    outcome.right = match (answer.set, &answer.stated) {
+        (Set::Sensors, _) => outcome.exact || unknown || set_aside,
+        (_, Some(stated)) => {
+            let effect = &stated.effect.name;
+            outcome.first_right && names_surely && is_where_it_is(&verdict, stated) && {
+                stated.is_mended(answer.effects.first(), |key| verdict.number(effect, key))
+            }
+        }
+        (Set::Capture | Set::Misfit, _) => outcome.first_right,
+        _ => outcome.exact,
+    };
+    if names_surely && answer.stated.is_none() {
         sizes(answer, &verdict, &mut outcome);
     }
     outcome
+}
+
+/// Names that a right verdict has.
+fn truth(answer: &Answer) -> BTreeSet<&str> {
+    if let Some(stated) = &answer.stated {
+        return [stated.effect.name.as_str()].into();
+    }
+    let fault = match &answer.recorder {
+        Recorder::Faulty(fault) => fault.name(),
+        _ => None,
+    };
+    answer.effects.iter().map(|effect| effect.name.as_str()).chain(fault).collect()
+}
+
+/// A rotor, an axis or a side is the one that the file speaks of.
+fn is_where_it_is(verdict: &Verdict, stated: &Stated) -> bool {
+    let named = verdict.effects.iter().find(|named| named.name == stated.effect.name);
+    ["rotor", "axis", "side"].iter().all(|key| match stated.effect.parameters.get(*key) {
+        None => true,
+        Some(place) => {
+            let said = named.and_then(|named| named.parameters.get(*key)).map(|p| &p.value);
+            match place {
+                Value::Number(number) => said.and_then(serde_json::Value::as_f64) == Some(*number),
+                Value::Name(name) => said.and_then(serde_json::Value::as_str) == Some(name),
+            }
+        }
+    })
 }
 
 /// Errors of the sizes of rightly named effects in their standard form.
@@ -146,6 +209,8 @@ mod tests {
         for (verdict, expected) in [
             (said("named", &["motor_lag"], &[]), [true, true, false, false]),
             (said("named_form_differs", &["motor_lag"], &[]), [true, true, false, false]),
+            (said("named_incomplete", &["motor_lag"], &[]), [true, true, false, false]),
+            (said("named_incomplete", &["gust"], &[]), [false, false, false, true]),
             (said("named", &["actuation_latency"], &[]), [false, false, false, true]),
             (said("named", &["motor_lag", "gust"], &[]), [true, false, false, true]),
             (said("ambiguous", &["actuation_latency"], &["motor_lag"]), [false, false, true, false]),
@@ -173,8 +238,76 @@ mod tests {
         assert_eq!(against(Set::Outside, 0, &outside).hidden, ["mass_lost"]);
         let named = said("named", &["mass_error"], &[]);
         assert_eq!(marks(&against(Set::Outside, 0, &named)), [false, false, false, true]);
+        let incomplete = said("named_incomplete", &["mass_error"], &[]);
+        assert_eq!(marks(&against(Set::Outside, 0, &incomplete)), [false, false, false, true]);
         let ambiguous = said("ambiguous", &["mass_error"], &["gust"]);
         assert_eq!(marks(&against(Set::Outside, 0, &ambiguous)), [false; 4]);
+    }
+
+    fn right(set: Set, index: usize, verdict: &str) -> bool {
+        against(set, index, verdict).right
+    }
+
+    /// Cases 0 to 4 hide a gyroscope's scale, an accelerometer's, a compass, a clock, a drift.
+    #[test]
+    fn erring_sensors_are_named_or_flagged() {
+        let set = Set::Sensors;
+        assert!(right(set, 0, &said("named", &["gyro_scale"], &[])));
+        assert!(right(set, 3, &said("named_incomplete", &["clock_step"], &[])));
+        for index in 0..5 {
+            assert!(right(set, index, &said("outside_catalogue", &["inertia_error"], &[])));
+            assert!(right(set, index, &said("data_problem", &[], &[])));
+            assert!(!right(set, index, &said("none", &[], &[])));
+            assert!(!right(set, index, &said("not_identifiable", &[], &[])));
+            for word in ["named", "named_incomplete"] {
+                let verdict = said(word, &["inertia_error"], &[]);
+                assert!(!right(set, index, &verdict) && against(set, index, &verdict).silent_wrong);
+            }
+        }
+        let aside = |word: &str, names: &[&str]| {
+            said(word, names, &[]).replacen('{', r#"{"set_aside": [{"flight": "a"}], "#, 1)
+        };
+        assert!(right(set, 0, &aside("none", &[])) && !right(set, 0, &aside("named", &["inertia_error"])));
+        assert_eq!(against(set, 4, &said("none", &[], &[])).hidden, ["gyro_drift"]);
+    }
+
+    /// The name alone is not enough: the number must mend the file.
+    #[test]
+    fn overstated_effects_are_found_with_a_number_that_mends_the_file() {
+        let answer = Case::draw(Set::Overstated, 0, 1).answer;
+        let (truth, stated) = (answer.effects[0].clone(), answer.stated.unwrap());
+        let verdict = |drag: f64| {
+            format!(
+                r#"{{"verdict": "named", "effects": [{{"name": "linear_drag", "parameters":
+                    {{"extra_drag_n_s_per_m": {{"value": {drag}}}}}}}]}}"#
+            )
+        };
+        let [is, file] = [&truth, &stated.effect].map(|effect| effect.number("extra_drag_n_s_per_m"));
+        assert!(
+            right(Set::Overstated, 0, &verdict(is))
+                && right(Set::Overstated, 0, &verdict(0.9 * is + 0.1 * file))
+        );
+        assert!(!right(Set::Overstated, 0, &verdict(file)) && !right(Set::Overstated, 0, &verdict(0.0)));
+        assert!(!right(Set::Overstated, 0, &said("none", &[], &[])));
+        let wrong = against(Set::Overstated, 0, &said("named", &["gust"], &[]));
+        assert!(wrong.silent_wrong && !wrong.right && wrong.hidden == ["linear_drag"]);
+    }
+
+    /// Half sets: the second case hides nothing. Beside a misfit and without an inertial unit the first name counts.
+    #[test]
+    fn other_sets_against_those_who_always_say_the_same() {
+        for set in [Set::Estimates, Set::Capture, Set::Baseline] {
+            assert!(!right(set, 0, &said("none", &[], &[])) && right(set, 1, &said("none", &[], &[])));
+            assert!(right(set, 0, &said("named", &["linear_drag"], &[])));
+            let alarm = against(set, 1, &said("named_incomplete", &["linear_drag"], &[]));
+            assert!(alarm.silent_wrong && !alarm.right && alarm.group.ends_with("_none"));
+        }
+        let two = said("named_incomplete", &["linear_drag", "gust"], &[]);
+        assert!(right(Set::Misfit, 0, &two) && !right(Set::Estimates, 0, &two));
+        assert!(against(Set::Misfit, 0, &two).silent_wrong);
+        assert!(!right(Set::Misfit, 1, &two), "the second hides quadratic drag");
+        let patch = said("named", &["linear_drag"], &[]).replacen('{', r#"{"model_patch": "a.toml", "#, 1);
+        assert!(against(Set::Misfit, 0, &patch).patched && !against(Set::Misfit, 0, &two).patched);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Shares with their intervals, by set, generator and effect; as JSON and as a table.
 
+use super::bars::{self, Bar};
 use super::score::Outcome;
 use super::verdict::Word;
 use serde::Serialize;
@@ -27,6 +28,14 @@ pub struct Group {
     pub silent_wrong: f64,
     /// Its interval.
     pub silent_wrong_interval: [f64; 2],
+    /// Share of cases that are as the set asks.
+    pub right: f64,
+    /// Its interval.
+    pub right_interval: [f64; 2],
+    /// Share with a patched vehicle file.
+    pub patched: f64,
+    /// Median, over cases with a patch, of what it removes of the removable held-out residual.
+    pub removable_removed_median: Option<f64>,
     /// Of the held-out gap; over cases that state it.
     pub gap_removed_median: Option<f64>,
     /// One case in ten is below.
@@ -48,12 +57,39 @@ pub struct Summary {
     pub seed: u64,
     /// By set.
     pub sets: BTreeMap<&'static str, Group>,
+    /// What the sets are asked for, and whether they have it.
+    pub bars: Vec<Bar>,
     /// By generator, then by set.
     pub generators: BTreeMap<String, BTreeMap<&'static str, Group>>,
+    /// By effect, over all sets: sizes whose 95 % interval is stated, and the share of intervals that hold the size.
+    pub coverage: BTreeMap<String, Coverage>,
     /// By what is hidden, of the sets with one hidden thing at standard noise and rich excitation.
     pub hidden: BTreeMap<String, Group>,
     /// Case by case.
     pub cases: Vec<Outcome>,
+}
+
+/// Intervals of one effect.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Coverage {
+    /// How many there are.
+    pub n: usize,
+    /// Share that holds the size.
+    pub covered: f64,
+}
+
+/// From so many intervals of an effect on, a share outside of these bounds is told.
+const COVERAGE_N: usize = 20;
+const COVERAGE: [f64; 2] = [0.88, 0.99];
+
+fn coverage(cases: &[Outcome]) -> BTreeMap<String, Coverage> {
+    let mut effects: BTreeMap<String, Coverage> = BTreeMap::new();
+    for (effect, inside) in cases.iter().flat_map(|case| &case.parameter_covered) {
+        let own = effects.entry(effect.clone()).or_default();
+        own.covered = (own.covered * own.n as f64 + f64::from(u8::from(*inside))) / (own.n + 1) as f64;
+        own.n += 1;
+    }
+    effects
 }
 
 /// Wilson's 95 % interval of a share.
@@ -85,6 +121,9 @@ impl Group {
         let (exact, exact_interval) = share(|c| c.exact);
         let (flagged, flagged_interval) = share(|c| c.flagged);
         let (silent_wrong, silent_wrong_interval) = share(|c| c.silent_wrong);
+        let (right, right_interval) = share(|c| c.right);
+        let (patched, _) = share(|c| c.patched);
+        let removable = cases.iter().filter_map(|c| c.removable_removed).collect();
         let gaps: Vec<f64> = cases.iter().filter_map(|c| c.gap_removed).collect();
         let errors = cases.iter().flat_map(|c| c.parameter_errors.values().copied()).collect();
         let covered: Vec<bool> = cases.iter().flat_map(|c| c.parameter_covered.values().copied()).collect();
@@ -103,6 +142,10 @@ impl Group {
             flagged_interval,
             silent_wrong,
             silent_wrong_interval,
+            right,
+            right_interval,
+            patched,
+            removable_removed_median: quantile(removable, 0.5),
             gap_removed_median: quantile(gaps.clone(), 0.5),
             gap_removed_p10: quantile(gaps, 0.1),
             seconds_median: quantile(cases.iter().map(|c| c.seconds).collect(), 0.5).unwrap_or(0.0),
@@ -130,14 +173,16 @@ pub fn summarise(seed: u64, cases: Vec<Outcome>) -> Summary {
         let name = format!("{:?}", case.generator).to_lowercase();
         generators.entry(name).or_insert_with(|| {
             let own = |other: &Outcome| other.generator == case.generator;
-            grouped(&cases, |other| own(other).then(|| other.set.name()))
+            grouped(&cases, |other| own(other).then_some(other.group))
         });
     }
     let hidden = grouped(&cases, |case| {
         let plain = matches!(case.set.name(), "single" | "outside");
         case.hidden.first().filter(|_| plain).cloned()
     });
-    Summary { seed, sets: grouped(&cases, |case| Some(case.set.name())), generators, hidden, cases }
+    let sets = grouped(&cases, |case| Some(case.group));
+    let bars = bars::of(&sets);
+    Summary { seed, bars, coverage: coverage(&cases), sets, generators, hidden, cases }
 }
 
 impl Summary {
@@ -146,8 +191,21 @@ impl Summary {
         let mut text = String::new();
         let _ = writeln!(
             text,
-            "{:<24} {:>4}  {:<19} {:>6} {:>7} {:>7}  {:>6} {:>6}  {:>6} {:>6}  {:>6}",
-            "set", "n", "first right %", "exact", "flagged", "silent", "gap", "p10", "error", "cover", "s"
+            "{:<24} {:>4}  {:<19} {:>6} {:>7} {:>7} {:>6} {:>6}  {:>6} {:>6} {:>6}  {:>6} {:>6}  {:>6}",
+            "set",
+            "n",
+            "first right %",
+            "exact",
+            "flagged",
+            "silent",
+            "right",
+            "patch",
+            "gap",
+            "p10",
+            "remov",
+            "error",
+            "cover",
+            "s"
         );
         for (name, group) in &self.sets {
             row(&mut text, name, group);
@@ -155,6 +213,16 @@ impl Summary {
         for (generator, sets) in self.generators.iter().filter(|_| self.generators.len() > 1) {
             for (name, group) in sets {
                 row(&mut text, &format!("{generator}: {name}"), group);
+            }
+        }
+        if !self.bars.is_empty() {
+            text.push_str("\nbars\n");
+            self.bars.iter().for_each(|bar| text += &bar.line());
+        }
+        for (effect, intervals) in &self.coverage {
+            if intervals.n >= COVERAGE_N && !(COVERAGE[0]..=COVERAGE[1]).contains(&intervals.covered) {
+                let covered = 100.0 * intervals.covered;
+                let _ = writeln!(text, "{effect}: {covered:.1} % of {} intervals hold the size", intervals.n);
             }
         }
         let imperfect = self.hidden.iter().filter(|(_, group)| group.exact < 1.0);
@@ -174,14 +242,17 @@ fn row(text: &mut String, name: &str, g: &Group) {
     let [low, high] = g.first_right_interval.map(percent);
     let _ = writeln!(
         text,
-        "{name:<24} {:>4}  {:<19} {:>6} {:>7} {:>7}  {:>6} {:>6}  {:>6} {:>6}  {:>6.2}",
+        "{name:<24} {:>4}  {:<19} {:>6} {:>7} {:>7} {:>6} {:>6}  {:>6} {:>6} {:>6}  {:>6} {:>6}  {:>6.2}",
         g.n,
         format!("{:>5} ({low} to {high})", percent(g.first_right)),
         percent(g.exact),
         percent(g.flagged),
         percent(g.silent_wrong),
+        percent(g.right),
+        percent(g.patched),
         or_dash(g.gap_removed_median),
         or_dash(g.gap_removed_p10),
+        or_dash(g.removable_removed_median),
         or_dash(g.parameter_error_median),
         or_dash(g.interval_coverage),
         g.seconds_median
@@ -197,6 +268,7 @@ mod tests {
         Outcome {
             case: "0".to_owned(),
             set,
+            group: set.name(),
             generator: Generator::Independent,
             hidden: vec!["motor_lag".to_owned()],
             verdict: if right { Word::Named } else { Word::None },
@@ -206,6 +278,9 @@ mod tests {
             exact: right,
             flagged: false,
             silent_wrong: false,
+            right,
+            patched: right,
+            removable_removed: right.then_some(0.97),
             gap_removed: Some(gap_removed),
             seconds: 0.5,
             parameter_errors: [("motor_lag".to_owned(), 0.02)].into(),
@@ -233,7 +308,10 @@ mod tests {
         assert_eq!(single.gap_removed_p10, Some(0.9));
         assert_eq!(single.gap_removed_median, Some(0.94));
         assert_eq!(single.verdicts[&Word::None], 1);
+        assert_eq!((single.right, single.patched, single.removable_removed_median), (0.9, 0.9, Some(0.97)));
         assert_eq!(summary.sets["calm"].first_right, 0.0);
+        assert_eq!(summary.coverage["motor_lag"].n, 11);
+        assert!((summary.coverage["motor_lag"].covered - 9.0 / 11.0).abs() < 1e-9);
         assert_eq!(summary.hidden["motor_lag"].n, 10, "calm flights do not count against an effect");
         assert!(summary.table().contains("single") && summary.table().contains("90.0"));
         let json = serde_json::to_value(&summary).unwrap();

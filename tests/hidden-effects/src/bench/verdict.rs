@@ -13,6 +13,8 @@ pub enum Word {
     Named,
     /// Effects of the catalogue, with something of their form left over.
     NamedFormDiffers,
+    /// Effects of the catalogue that hold, with something else left over.
+    NamedIncomplete,
     /// Several explanations.
     Ambiguous,
     /// Something else.
@@ -94,9 +96,25 @@ pub struct Verdict {
     pub gap: Option<Gap>,
     /// What a leftover goes with.
     pub goes_with: Option<String>,
+    /// Path of the patched vehicle file, where one was written.
+    pub model_patch: Option<String>,
+    /// Flights that the program did not use, because their data contradict themselves.
+    #[serde(default)]
+    pub set_aside: Vec<serde_json::Value>,
 }
 
 impl Verdict {
+    /// Whether names are said without a doubt. A remainder beside them is no doubt about them.
+    pub fn names_surely(&self) -> bool {
+        matches!(self.verdict, Word::Named | Word::NamedFormDiffers | Word::NamedIncomplete)
+    }
+
+    /// A number of a named effect.
+    pub fn number(&self, effect: &str, key: &str) -> Option<f64> {
+        let named = self.effects.iter().find(|named| named.name == effect)?;
+        named.parameters.get(key)?.value.as_f64()
+    }
+
     /// The named effect with the highest evidence; of equals the first.
     pub fn first(&self) -> Option<&str> {
         let evidence = |effect: &Named| effect.evidence_nats.unwrap_or(f64::NEG_INFINITY);
@@ -142,5 +160,11 @@ mod tests {
         assert!(serde_json::from_str::<Verdict>(r#"{"verdict": "failed"}"#).is_err());
         let bare: Verdict = serde_json::from_str(r#"{"verdict": "none"}"#).unwrap();
         assert_eq!((bare.first(), bare.verdict), (None, Word::None));
+        assert!(bare.model_patch.is_none() && bare.set_aside.is_empty() && !bare.names_surely());
+        assert_eq!(verdict.model_patch.as_deref(), Some("x.toml"));
+        assert_eq!(verdict.number("motor_lag", "extra_time_constant_s"), Some(0.03));
+        let incomplete = r#"{"verdict": "named_incomplete", "set_aside": ["flight00.mcap"]}"#;
+        let incomplete: Verdict = serde_json::from_str(incomplete).unwrap();
+        assert!(incomplete.names_surely() && incomplete.set_aside.len() == 1);
     }
 }

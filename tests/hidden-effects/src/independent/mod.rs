@@ -8,15 +8,22 @@ mod air;
 mod battery;
 mod controller;
 mod extras;
+mod features;
 mod physics;
 mod programme;
 mod sensors;
 mod state;
 mod unknown;
+mod unmodelled;
 
 pub use battery::Pack;
+pub use features::FEATURES;
+pub(crate) use features::weights;
 pub use programme::Excitation;
 pub use sensors::white;
+pub use unmodelled::{Misfit, Unmodelled, unmodelled};
+#[cfg(test)]
+pub(crate) use unmodelled::{Watched, watched};
 
 use crate::airframe::{Airframe, MAX_ROTORS, SensorErrors};
 use crate::catalogue::HiddenEffect;
@@ -61,6 +68,8 @@ pub struct Order<'a> {
     pub noise: f64,
     /// Charge at take-off, 0 to 1.
     pub charge: f64,
+    /// What nobody has an equation for.
+    pub unmodelled: Option<&'a Unmodelled>,
     /// Order of manoeuvres, turbulence and noise.
     pub seed: u64,
 }
@@ -70,6 +79,7 @@ pub struct Order<'a> {
 struct Truth {
     position: Vector3<f64>,
     velocity: Vector3<f64>,
+    attitude: Quaternion<f64>,
     specific_force: Vector3<f64>,
     gyro: Vector3<f64>,
     attitude_measured: Quaternion<f64>,
@@ -85,9 +95,14 @@ struct Truth {
 /// The vehicle fell or tumbled: time, height and rate.
 pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
     let extras = Extras::new(order.effects);
-    let world = World { airframe: order.real.clone(), extras: extras.clone(), outside: order.outside };
+    let world = World {
+        airframe: order.real.clone(),
+        extras: extras.clone(),
+        outside: order.outside,
+        unmodelled: order.unmodelled.cloned(),
+    };
     let stream = |salt: u64| Draw::new(mix(order.seed, salt));
-    let truth = simulate(order, &world, stream)?;
+    let truth = simulate(order, &world, stream, |_, _, _| {})?;
     let mut log = sensors::log(&truth, &extras, &order.errors, order.noise, stream(3));
     // The arrays have room for the largest layout.
     if let Some(command) = log.source_mut("rotor").channels.get_mut("command") {
@@ -98,13 +113,20 @@ pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
     Ok(log)
 }
 
-fn simulate(order: &Order<'_>, world: &World, stream: impl Fn(u64) -> Draw) -> Result<Vec<Truth>, String> {
+/// * `watch` - sees state and input after every step, and the commands that were sent last
+fn simulate(
+    order: &Order<'_>,
+    world: &World,
+    stream: impl Fn(u64) -> Draw,
+    mut watch: impl FnMut(&State, &Input, &Truth),
+) -> Result<Vec<Truth>, String> {
     let tick_s = 1.0 / IMU_HZ;
     let dt_s = tick_s / STEPS as f64;
     let mut programme = Programme::new(order.excitation, &mut stream(0));
     let mut controller = Controller::new(order.nominal);
     let mut air = Air::new(world.extras.gust, stream(1));
     let mut inertial = Inertial::new(order.errors, world.extras.heading_rad, order.noise, stream(2));
+    let mut noise = unmodelled::Noise::new(stream(4));
     let mut followed = [order.real.hover_command(); MAX_ROTORS];
 
     let reference = programme.step(0.0, 0.0);
@@ -121,6 +143,7 @@ fn simulate(order: &Order<'_>, world: &World, stream: impl Fn(u64) -> Draw) -> R
         voltage_v: battery.voltage_v,
         current_ratio: 1.0,
         moving_air: Vector3::zeros(),
+        noise: [0.0; 6],
     };
     for tick in 0..ticks {
         let time_s = tick as f64 * tick_s;
@@ -133,6 +156,7 @@ fn simulate(order: &Order<'_>, world: &World, stream: impl Fn(u64) -> Draw) -> R
         truth.push(Truth {
             position: state.position,
             velocity: state.velocity,
+            attitude: state.attitude,
             specific_force,
             gyro,
             attitude_measured: attitude.into_inner(),
@@ -149,8 +173,12 @@ fn simulate(order: &Order<'_>, world: &World, stream: impl Fn(u64) -> Draw) -> R
             input.voltage_v = battery.voltage_v;
             input.current_ratio = battery.current_a / hover_current;
             input.moving_air = air.step(dt_s, state.velocity.norm());
+            if let Some(unmodelled) = &world.unmodelled {
+                input.noise = noise.step(dt_s, unmodelled);
+            }
             state = state.heun(dt_s, |s, ahead| world.rates(s, &input, ahead).state);
             battery.step(power_w(order.real, &state), dt_s);
+            watch(&state, &input, &truth[tick]);
         }
         let height_m = -state.position.z;
         if !(state.omega.norm() < 25.0 && height_m > -1.0 && height_m < 60.0) {

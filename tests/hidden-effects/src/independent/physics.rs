@@ -1,8 +1,10 @@
 //! The equations of motion: rotors, drag, wings, every effect, a rigid body. World NED, body FRD.
 
 use super::extras::{Extras, Ground, Lift, Sag};
+use super::features::{self, FEATURES};
 use super::state::State;
 use super::unknown::{self, Motion};
+use super::unmodelled::Unmodelled;
 use crate::airframe::{AIR_DENSITY_KG_M3, Airframe, GRAVITY_M_S2, MAX_ROTORS};
 use crate::outside::Outside;
 use nalgebra::{Matrix3, Vector2, Vector3, Vector4};
@@ -21,6 +23,8 @@ pub(super) struct Input {
     pub(super) current_ratio: f64,
     /// Turbulence and gusts, NED, m/s.
     pub(super) moving_air: Vector3<f64>,
+    /// Unmodelled noise: force x, y, z, N, moment x, y, z, N m.
+    pub(super) noise: [f64; 6],
 }
 
 /// A vehicle and what acts on it.
@@ -29,6 +33,7 @@ pub(super) struct World {
     pub(super) airframe: Airframe,
     pub(super) extras: Extras,
     pub(super) outside: Option<Outside>,
+    pub(super) unmodelled: Option<Unmodelled>,
 }
 
 /// Rate of the state and what an accelerometer at the geometric centre feels.
@@ -97,24 +102,54 @@ impl World {
         (-(left + right), a.wing_arm_m * (left - right))
     }
 
+    /// What formulas may look at.
+    fn motion<'a>(
+        &self,
+        state: &'a State,
+        input: &Input,
+        rotation: &'a Matrix3<f64>,
+        air_body: Vector3<f64>,
+        ahead_s: f64,
+    ) -> Motion<'a> {
+        let throttle = input.rotor.iter().sum::<f64>() / self.airframe.rotors.len() as f64;
+        Motion {
+            time_s: input.time_s + ahead_s,
+            state,
+            rotation,
+            air_body,
+            throttle,
+            hover_throttle: self.airframe.hover_command(),
+        }
+    }
+
+    /// Velocity through the air, body axes.
+    fn air_body(&self, state: &State, input: &Input, rotation: &Matrix3<f64>) -> Vector3<f64> {
+        rotation.tr_mul(&(state.velocity - self.wind(-state.position.z) - input.moving_air))
+    }
+
+    /// What is unmodelled at a state: its smooth part with the noise of the step.
+    pub(super) fn unmodelled_at(&self, state: &State, input: &Input) -> [f64; 6] {
+        let Some(unmodelled) = &self.unmodelled else { return [0.0; 6] };
+        let smooth = unmodelled.of_features(&self.features_at(state, input));
+        std::array::from_fn(|c| smooth[c] + input.noise[c])
+    }
+
+    /// What random formulas look at.
+    pub(super) fn features_at(&self, state: &State, input: &Input) -> [f64; FEATURES] {
+        let rotation = state.ned_from_body();
+        let air_body = self.air_body(state, input, &rotation);
+        features::of(&self.motion(state, input, &rotation, air_body, 0.0))
+    }
+
     /// Rates of everything at a state, `ahead_s` after the start of the step.
     pub(super) fn rates(&self, state: &State, input: &Input, ahead_s: f64) -> Rates {
         let (a, x) = (&self.airframe, &self.extras);
-        let time_s = input.time_s + ahead_s;
         let rotation = state.ned_from_body();
         let height_m = -state.position.z;
-        let v = rotation.tr_mul(&(state.velocity - self.wind(height_m) - input.moving_air));
+        let v = self.air_body(state, input, &rotation);
         let speed = v.norm();
         let omega = state.omega;
-        let throttle = input.rotor.iter().sum::<f64>() / a.rotors.len() as f64;
-        let motion = Motion {
-            time_s,
-            state,
-            rotation: &rotation,
-            air_body: v,
-            throttle,
-            hover_throttle: a.hover_command(),
-        };
+        let motion = self.motion(state, input, &rotation, v, ahead_s);
         let unknown = self.outside.map(|outside| unknown::act(&outside, &motion)).unwrap_or_default();
 
         let factor = self.lift_and_ground(v.x.hypot(v.y), v.z, height_m) * unknown.thrust_factor;
@@ -152,6 +187,12 @@ impl World {
         moment -= x.rotor_inertia * (omega.cross(&e3) * spin + e3 * spin_rate);
         force += unknown.force_body + rotation.tr_mul(&unknown.force_ned);
         moment += unknown.moment_body;
+        if let Some(unmodelled) = &self.unmodelled {
+            let smooth = unmodelled.at(&motion);
+            let sum = |c: usize| smooth[c] + input.noise[c];
+            force += Vector3::new(sum(0), sum(1), sum(2));
+            moment += Vector3::new(sum(3), sum(4), sum(5));
+        }
         let pull = x.payload_kg * GRAVITY_M_S2;
         let swing_force =
             Vector3::new(state.swing.x, state.swing.y, x.payload_length_m) * (pull / x.payload_length_m);

@@ -9,6 +9,7 @@ use super::programme::DURATION_S;
 use super::{IMU_HZ, Truth};
 use crate::airframe::SensorErrors;
 use crate::draw::Draw;
+use crate::recorder::TRUTH;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_sim::log::{FlightLog, Source};
 
@@ -97,9 +98,25 @@ pub(super) fn log(
         let current = now.current_a + draw.normal(noise * white::CURRENT_A);
         battery.push(time_s(k), &[("voltage_v", &[voltage]), ("current_a", &[current])]);
     }
+    log.sources.insert(TRUTH.to_owned(), happened(&truth[..ticks]));
     log.sources.insert("baro".to_owned(), baro);
     log.sources.insert("battery".to_owned(), battery);
     log
+}
+
+/// What no recorder knows.
+fn happened(truth: &[Truth]) -> Source {
+    let mut source = Source::default();
+    for (k, now) in truth.iter().enumerate() {
+        let q = now.attitude;
+        let rows: [(&str, &[f64]); 3] = [
+            ("position_ned_m", now.position.as_slice()),
+            ("velocity_ned_m_s", now.velocity.as_slice()),
+            ("q_ned_from_body_wxyz", &[q.w, q.i, q.j, q.k]),
+        ];
+        source.push(time_s(k), &rows);
+    }
+    source
 }
 
 fn time_s(tick: usize) -> f64 {

@@ -8,7 +8,7 @@ fn airframe() -> Airframe {
 }
 
 fn world(effects: &[HiddenEffect]) -> World {
-    World { airframe: airframe(), extras: Extras::new(effects), outside: None }
+    World { airframe: airframe(), extras: Extras::new(effects), outside: None, unmodelled: None }
 }
 
 fn effect(name: &str, key: &str, x: f64) -> HiddenEffect {
@@ -24,6 +24,7 @@ fn hover_input(world: &World) -> Input {
         voltage_v: world.airframe.reference_voltage_v,
         current_ratio: 1.0,
         moving_air: Vector3::zeros(),
+        noise: [0.0; 6],
     }
 }
 

@@ -1,8 +1,9 @@
 //! Equations of what no catalogue has.
 
+use super::features;
 use super::state::State;
 use crate::airframe::GRAVITY_M_S2;
-use crate::outside::Outside;
+use crate::outside::{Formula, Makes, Outside};
 use nalgebra::{Matrix3, Vector3, Vector4};
 use std::f64::consts::TAU;
 
@@ -141,6 +142,24 @@ pub(super) fn act(outside: &Outside, motion: &Motion<'_>) -> Action {
         Outside::WingJam { deployment, from_s } => {
             action.jammed_wings = (time_s >= from_s).then_some(deployment);
         }
+        Outside::Formula(formula) => by_formula(&formula, motion, &mut action),
     }
     action
+}
+
+/// The sums follow motion and commands behind a lag: the state's memory.
+fn by_formula(formula: &Formula, motion: &Motion<'_>, action: &mut Action) {
+    let (x, memory) = (features::of(motion), motion.state.memory);
+    let rate = |weights, now: f64| (features::dot(weights, &x) - now) / formula.lag_s;
+    action.memory_rate.x = rate(&formula.first, memory.x);
+    action.memory_rate.y = rate(&formula.second, memory.y);
+    let open = formula.gate.map_or(1.0, |gate| 0.5 + 0.5 * (4.0 * features::dot(&gate, &x)).tanh());
+    let size = formula.size * open * formula.of(memory.x, memory.y);
+    let along = size * Vector3::from(formula.axis);
+    match formula.makes {
+        Makes::BodyForce => action.force_body = along,
+        Makes::NedForce => action.force_ned = along,
+        Makes::Moment => action.moment_body = along,
+        Makes::ThrustFactor => action.thrust_factor = 1.0 + size,
+    }
 }

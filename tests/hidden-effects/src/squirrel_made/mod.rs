@@ -10,6 +10,7 @@ pub use tables::effect_table;
 use crate::airframe::{Airframe, SensorErrors};
 use crate::catalogue::HiddenEffect;
 use crate::independent::Excitation;
+use crate::recorder::TRUTH;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::{Channel, FlightLog, Source};
@@ -37,8 +38,9 @@ pub struct Order<'a> {
     pub seed: u64,
 }
 
-/// What a recorder on board has.
-const KEPT: [(&str, &[&str]); 7] = [
+/// What a recorder on board has, and the truth, which stays with the bench.
+const KEPT: [(&str, &[&str]); 8] = [
+    (TRUTH, &["position_ned_m", "velocity_ned_m_s", "q_ned_from_body_wxyz"]),
     ("imu", &["omega_body_rad_s", "specific_force_body_m_s2"]),
     ("attitude", &["q_ned_from_body_wxyz"]),
     ("gnss", &["position_ned_m", "velocity_ned_m_s"]),
