@@ -1,0 +1,126 @@
+//! Fixes against accelerometer and attitude, and positions against velocities.
+
+use super::Found;
+use super::flight::{Flight, Strapdown};
+use super::pairs::{Pairs, axes};
+use nalgebra::{Quaternion, Vector3};
+
+const FORCE: &str = "imu.specific_force_body_m_s2";
+const VELOCITY: &str = "gnss.velocity_ned_m_s";
+const POSITION: &str = "gnss.position_ned_m";
+/// Time shifts of GNSS that effects can explain, and the longest that are looked for, s.
+const SHIFT_S: (f64, f64) = (-0.08, 0.5);
+const SHIFT_MAX_S: (f64, f64) = (-0.5, 1.0);
+/// Smallest acceleration, m/s^2, and speed, m/s, that say something about axes.
+const MOVES_M_S2: f64 = 0.3;
+const MOVES_M_S: f64 = 0.5;
+/// Correlation from which on a time shift is believed.
+const MATCH: f64 = 0.6;
+/// What one source may be of the other.
+const SCALE: (f64, f64) = (0.5, 2.0);
+/// Part of the misfit in the body frame that the world frame must leave at most, and how well its axes must fit.
+const WORLD_MISFIT: f64 = 0.4;
+const WORLD_MATCH: f64 = 0.7;
+
+/// How well fixes go with a strapdown, by the names of their axes and however late up to what effects explain.
+pub(super) fn match_of(flight: &Flight, strapdown: &[Strapdown]) -> f64 {
+    let at = |shift: i32| flight.accelerations(strapdown, 0.1 * f64::from(shift)).1.own_match(MOVES_M_S2);
+    (0..=4).map(at).fold(f64::NEG_INFINITY, f64::max)
+}
+
+pub(super) fn velocities(flight: &Flight) -> Found {
+    if !flight.has_attitude() {
+        return None;
+    }
+    let strapdown = flight.strapdown(&|q| q);
+    let (first, last) = ((SHIFT_MAX_S.0 / 0.05).round() as i32, (SHIFT_MAX_S.1 / 0.05).round() as i32);
+    let shifts: Vec<f64> = (first..=last).map(|i| f64::from(i) * 0.05).collect();
+    let pairs_at = |shift_s: f64| flight.accelerations(&strapdown, shift_s).1;
+    let fit: Vec<f64> = shifts.iter().map(|s| pairs_at(*s).best_match(MOVES_M_S2)).collect();
+    let best = (0..shifts.len()).max_by(|a, b| fit[*a].total_cmp(&fit[*b]))?;
+    let pairs = pairs_at(shifts[best]);
+    if let Some(found) = world_frame(flight, &pairs, shifts[best]) {
+        return Some(found);
+    }
+    if let Some((_, naming)) = pairs.misnamed_axes(MOVES_M_S2) {
+        let remedy = remedy_of(naming.map(|(axis, sign)| (axis, sign > 0.0)));
+        let words = format!("fits the accelerometer better with its axes as {}; {remedy}", axes(naming));
+        return Some((VELOCITY, words));
+    }
+    if fit[best] > MATCH && !(SHIFT_S.0..=SHIFT_S.1).contains(&shifts[best]) {
+        let words = format!(
+            "fits the accelerometer best {:.2} s later than stamped; see `time` of its source, `offset` in s",
+            -shifts[best]
+        );
+        return Some((VELOCITY, words));
+    }
+    let (low, high) = pairs.slope()?;
+    (low > SCALE.1 || high < SCALE.0).then(|| {
+        let remedy = scale_remedy(low, "m/s");
+        (VELOCITY, format!("is {low:.3} to {high:.3} times what the accelerometer gives; {remedy}"))
+    })
+}
+
+pub(super) fn positions(flight: &Flight) -> Found {
+    let moved = flight.moved();
+    if let Some((_, naming)) = moved.misnamed_axes(MOVES_M_S) {
+        let remedy = remedy_of(naming.map(|(axis, sign)| (axis, sign > 0.0)));
+        return Some((POSITION, format!("fits the velocity better with its axes as {}; {remedy}", axes(naming))));
+    }
+    let (low, high) = moved.slope()?;
+    (low > SCALE.1 || high < SCALE.0).then(|| {
+        let remedy = scale_remedy(low, "m");
+        (POSITION, format!("moves {low:.3} to {high:.3} times as fast as the velocity says; {remedy}"))
+    })
+}
+
+/// Accelerations that are given in the world frame although they should be in the body's: they fit without the attitude.
+fn world_frame(flight: &Flight, body: &Pairs, shift_s: f64) -> Found {
+    // Without an attitude the strapdown is the sum of the logged numbers themselves.
+    let level = flight.strapdown(&|_| Quaternion::identity());
+    let world = flight.accelerations(&level, shift_s).1;
+    let flat = |v: &Vector3<f64>| Vector3::new(v.x, v.y, 0.0);
+    // Forward-left-up numbers of an ENU or NWU world come with other names and signs.
+    let named = world.map(|own, other| (flat(own), flat(other)));
+    let (r, _) = named.correlations(MOVES_M_S2);
+    let straight = r[0][0].abs() + r[1][1].abs();
+    let crossed = r[0][1].abs() + r[1][0].abs();
+    let swaps = crossed > straight;
+    let fit = straight.max(crossed) / 2.0;
+    let sign = |i: usize, j: usize| if r[i][j] < 0.0 { -1.0 } else { 1.0 };
+    let world = named.map(|own, other| {
+        let turned = if swaps {
+            Vector3::new(sign(0, 1) * other.y, sign(1, 0) * other.x, 0.0)
+        } else {
+            Vector3::new(sign(0, 0) * other.x, sign(1, 1) * other.y, 0.0)
+        };
+        (*own, turned)
+    });
+    let body = body.map(|own, other| (flat(own), flat(other)));
+    let is_world = fit > WORLD_MATCH && world.misfit() < WORLD_MISFIT * body.misfit();
+    is_world.then(|| {
+        let words = "is the acceleration in the world frame, not what the accelerometer felt in the body: it fits the fixes without the attitude; import the body's `columns = [...]`";
+        (FORCE, words.to_owned())
+    })
+}
+
+fn remedy_of(naming: [(usize, bool); 3]) -> String {
+    let frame = match naming {
+        [(1, true), (0, true), (2, false)] => "`world = \"enu\"`, or \"ned\" where the map has that",
+        [(0, true), (1, false), (2, false)] => "`world = \"nwu\"`, or \"ned\" where the map has that",
+        [(1, _), (0, _), (2, true)] => "`world = \"enu\"` for \"nwu\" or the other way round, here or of the attitude, or the order of `columns = [...]`",
+        _ => "see `world`, and the order of `columns = [...]`",
+    };
+    frame.to_owned()
+}
+
+fn scale_remedy(times: f64, unit: &str) -> String {
+    let of = |factor: f64| (0.5..2.0).contains(&(times / factor));
+    if of(100.0) {
+        format!("it is in hundredths of {unit}: `scale = 0.01`")
+    } else if of(1000.0) {
+        format!("it is in thousandths of {unit}: `scale = 0.001`")
+    } else {
+        format!("is it in {unit}? see `scale`")
+    }
+}
