@@ -26,9 +26,10 @@ fn window(log: &FlightLog, from_s: f64, until_s: f64) -> FlightLog {
 fn parts(name: &str, log: &FlightLog, length_s: f64) -> Vec<(String, FlightLog)> {
     let time_s = &log.sources["imu"].time_s;
     let (start_s, end_s) = (time_s[0], time_s[time_s.len() - 1]);
-    let windows = ((end_s - start_s) / length_s) as usize;
+    // Windows overlap by half.
+    let windows = (2.0 * (end_s - start_s) / length_s) as usize;
     let cut = |i: usize| {
-        let from_s = start_s + i as f64 * length_s;
+        let from_s = start_s + 0.5 * i as f64 * length_s;
         (format!("{name} {from_s:.0} s"), window(log, from_s, from_s + length_s))
     };
     let whole = (name.to_owned(), log.clone());

@@ -35,7 +35,10 @@ pub(super) fn rates(flight: &Flight) -> Found {
     if misnamed.is_some() || mean.norm() > MEAN_MAX_M_S2 {
         let now = worth(flight, &as_logged);
         let of_gyro = misnamed.map_or(now, |(fit, _)| now - pairs.own_match(MOVES_RAD_S) + fit);
-        let mirrored = misnamed.is_some_and(|(_, naming)| naming.iter().all(|(_, sign)| *sign < 0.0));
+        // Whoever mixes up columns or frames of a gyroscope gets no other signs than these.
+        let is_odd = misnamed.is_some_and(|(_, naming)| {
+            !(naming.iter().all(|(_, sign)| *sign > 0.0) || axes(naming) == "(x, -y, -z)")
+        });
         // Mistakes are in the order in which they are made most; a later one must be better.
         let mut best: Option<(f64, String)> = None;
         for mistake in mistakes() {
@@ -44,7 +47,7 @@ pub(super) fn rates(flight: &Flight) -> Found {
                 best = Some((worth, mistake.words));
             }
         }
-        let least = of_gyro + if mirrored { -MARGIN } else { MARGIN };
+        let least = of_gyro + if is_odd { -MARGIN } else { MARGIN };
         if let Some((_, words)) = best.filter(|(worth, _)| *worth > least && *worth > now + 2.0 * MARGIN) {
             return Some((ATTITUDE, words));
         }
@@ -67,7 +70,7 @@ pub(super) fn rates(flight: &Flight) -> Found {
     }
     let (low, high) = pairs.slope()?;
     (low > SCALE.1 || high < SCALE.0).then(|| {
-        let remedy = if (40.0..80.0).contains(&(low.max(1.0) * high.min(1e6)).sqrt()) || low > 20.0 {
+        let remedy = if low <= 60.0 && high >= 54.0 {
             "it is in deg/s: `scale = 0.017453292519943295`"
         } else {
             "is it in rad/s? see `scale`"
@@ -104,6 +107,23 @@ fn mistakes() -> Vec<Mistake> {
     let mut push = |words: String, turn: Box<dyn Fn(Quaternion<f64>) -> Quaternion<f64>>| {
         all.push(Mistake { words, turn });
     };
+    for (has, w) in worlds {
+        for (is, v) in worlds.iter().copied().filter(|(is, _)| *is != has) {
+            let words = format!("is in another world frame: `world = \"{is}\"` where the map has \"{has}\"");
+            push(words, Box::new(move |q| v * w.conjugate() * q));
+        }
+    }
+    let [(_, frd), (_, flu)] = bodies;
+    let body = "is of another body frame: `body = \"flu\"` where the map has \"frd\", or the other way round";
+    push(body.to_owned(), Box::new(move |q| q * frd * flu));
+    for (has, w) in worlds {
+        for (is, v) in worlds.iter().copied().filter(|(is, _)| *is != has) {
+            let words = format!(
+                "is in other frames: `world = \"{is}\"` where the map has \"{has}\", and `body = \"flu\"` for \"frd\" or the other way round"
+            );
+            push(words, Box::new(move |q| v * w.conjugate() * q * flu));
+        }
+    }
     let in_file = |change: fn(Quaternion<f64>) -> Quaternion<f64>, w: Quaternion<f64>, b: Quaternion<f64>| {
         Box::new(move |q: Quaternion<f64>| w * change(w.conjugate() * q * b.conjugate()) * b)
     };
@@ -126,23 +146,6 @@ fn mistakes() -> Vec<Mistake> {
             for (_, b) in bodies {
                 push(order.to_owned(), in_file(change, w, b));
             }
-        }
-    }
-    for (has, w) in worlds {
-        for (is, v) in worlds.iter().copied().filter(|(is, _)| *is != has) {
-            let words = format!("is in another world frame: `world = \"{is}\"` where the map has \"{has}\"");
-            push(words, Box::new(move |q| v * w.conjugate() * q));
-        }
-    }
-    let [(_, frd), (_, flu)] = bodies;
-    let body = "is of another body frame: `body = \"flu\"` where the map has \"frd\", or the other way round";
-    push(body.to_owned(), Box::new(move |q| q * frd * flu));
-    for (has, w) in worlds {
-        for (is, v) in worlds.iter().copied().filter(|(is, _)| *is != has) {
-            let words = format!(
-                "is in other frames: `world = \"{is}\"` where the map has \"{has}\", and `body = \"flu\"` for \"frd\" or the other way round"
-            );
-            push(words, Box::new(move |q| v * w.conjugate() * q * flu));
         }
     }
     all

@@ -24,7 +24,9 @@ const SKEW_STEP_PPM: i32 = 250;
 const F_MIN: f64 = 40.0;
 const LEFT_MAX: f64 = 0.8;
 /// How well the two must go together on each side of it.
-const MATCH: f64 = 0.4;
+const MATCH: f64 = 0.6;
+/// On one side of it the clock is right: shifts that effects explain, s.
+const RIGHT_S: (f64, f64) = (-0.1, 0.5);
 /// Samples of these sources that count as one.
 const SAMPLES_ALIKE: f64 = 3.0;
 
@@ -77,6 +79,10 @@ pub(super) fn steps(flight: &Flight, residual: &[f64]) -> Found {
 /// * `balanced` - each axis counts alike, whatever its unit
 fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], balanced: bool) -> Option<Step> {
     let (own, other) = (centred(own, balanced), centred(other, balanced));
+    // Where a model has no finite answer, times are not known.
+    if own.len() != time_s.len() || other.len() != time_s.len() {
+        return None;
+    }
     let (start_s, end_s) = (*time_s.first()?, *time_s.last()?);
     let block_s = BLOCK_S.max((end_s - start_s) / BLOCKS_MAX);
     let blocks = ((end_s - start_s) / block_s) as usize;
@@ -139,6 +145,8 @@ fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], balanced: 
         if both > stepped {
             stepped = both;
             let sides = before.min(after);
+            let is_right = |shift: i32| (RIGHT_S.0..=RIGHT_S.1).contains(&(f64::from(shift) * SHIFT_STEP_S));
+            let sides = if is_right(s0) || is_right(s1) { sides } else { 0.0 };
             found = Some((sides, f64::from(s1 - s0) * SHIFT_STEP_S, start_s + cut as f64 * block_s));
         }
     }

@@ -12,13 +12,16 @@ const POSITION: &str = "gnss.position_ned_m";
 const SHIFT_S: (f64, f64) = (-0.08, 0.5);
 const SHIFT_MAX_S: (f64, f64) = (-0.5, 1.0);
 /// Smallest acceleration, m/s^2, and speed, m/s, that say something about axes.
-const MOVES_M_S2: f64 = 0.3;
+const MOVES_M_S2: f64 = 0.1;
 const MOVES_M_S: f64 = 0.5;
 /// Correlation from which on a time shift is believed.
 const MATCH: f64 = 0.6;
+/// How much better the accelerometer must go with axes by position for the velocity to be wrong, in correlations.
+const POSITION_RIGHT: f64 = 0.3;
 /// What one source may be of the other.
 const SCALE: (f64, f64) = (0.5, 2.0);
 /// Part of the misfit in the body frame that the world frame must leave at most, and how well its axes must fit.
+const WORLD_MOVES_M_S2: f64 = 0.3;
 const WORLD_MISFIT: f64 = 0.4;
 const WORLD_MATCH: f64 = 0.7;
 
@@ -65,7 +68,22 @@ pub(super) fn positions(flight: &Flight) -> Found {
     let moved = flight.moved();
     if let Some((_, naming)) = moved.misnamed_axes(MOVES_M_S) {
         let remedy = remedy_of(naming.map(|(axis, sign)| (axis, sign > 0.0)));
-        return Some((POSITION, format!("fits the velocity better with its axes as {}; {remedy}", axes(naming))));
+        // Whoever goes with the accelerometer is right.
+        let by_position = |v: &Vector3<f64>| Vector3::from_fn(|i, _| naming[i].1 * v[naming[i].0]);
+        let strapdown = flight.strapdown(&|q| q);
+        let fits = |turned: bool| {
+            let at = |shift: i32| {
+                let pairs = flight.accelerations(&strapdown, 0.1 * f64::from(shift)).1;
+                pairs.map(|own, other| (if turned { by_position(own) } else { *own }, *other)).own_match(MOVES_M_S2)
+            };
+            (0..=4).map(at).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let (channel, other) = if flight.has_attitude() && fits(true) > fits(false) + POSITION_RIGHT {
+            (VELOCITY, "position")
+        } else {
+            (POSITION, "velocity")
+        };
+        return Some((channel, format!("its axes are not those of the {other}, which fits better with them as {}; {remedy}", axes(naming))));
     }
     let (low, high) = moved.slope()?;
     (low > SCALE.1 || high < SCALE.0).then(|| {
@@ -82,7 +100,7 @@ fn world_frame(flight: &Flight, body: &Pairs, shift_s: f64) -> Found {
     let flat = |v: &Vector3<f64>| Vector3::new(v.x, v.y, 0.0);
     // Forward-left-up numbers of an ENU or NWU world come with other names and signs.
     let named = world.map(|own, other| (flat(own), flat(other)));
-    let (r, _) = named.correlations(MOVES_M_S2);
+    let r = named.significant(WORLD_MOVES_M_S2);
     let straight = r[0][0].abs() + r[1][1].abs();
     let crossed = r[0][1].abs() + r[1][0].abs();
     let swaps = crossed > straight;

@@ -89,8 +89,8 @@ fn problems_of(predictor: &Predictor<'_>, residual: &[f64], logs: &[(String, Fli
             .or_else(|| units::commands(&flight))
             .or_else(|| held::held(log, &flight.spans()))
             .or_else(|| units::force(&flight))
-            .or_else(|| clock::steps(&flight, residual))
             .or_else(|| attitude::rates(&flight))
+            .or_else(|| clock::steps(&flight, residual))
             .or_else(|| fixes::velocities(&flight))
             .or_else(|| fixes::positions(&flight))
             .or_else(|| rotors::model(&flight, residual))?;
@@ -137,16 +137,21 @@ pub(crate) fn tell(verdict: &mut Verdict, given: usize) {
     if aside.is_empty() {
         return;
     }
-    let lines: Vec<&str> = aside.iter().map(|a| a.words.as_str()).collect();
-    let is_told = lines == [verdict.words.as_str()];
-    let count = lines.len();
-    let words = format!("{count} of {given} flights were set aside: {}.", lines.join("; "));
     verdict.notes.extend(aside.iter().map(|a| format!("set aside: {}", a.words)));
-    if !is_told {
-        let said = if verdict.verdict == Kind::DataProblem { String::new() } else { format!("{} ", verdict.words) };
-        verdict.words = format!("{said}{words}");
-    }
+    let told = if verdict.verdict == Kind::DataProblem { 1 } else { TOLD };
+    let lines: Vec<&str> = aside.iter().take(told).map(|a| a.words.as_str()).collect();
+    let more = aside.len() - lines.len();
+    let and = if more > 0 { format!("; {more} more: see the notes") } else { String::new() };
+    let words = format!("{} of {given} flights were set aside: {}{and}.", aside.len(), lines.join("; "));
+    verdict.words = match verdict.verdict {
+        Kind::DataProblem if given == 1 => return,
+        Kind::DataProblem => words,
+        _ => format!("{} {words}", verdict.words),
+    };
 }
+
+/// Flights set aside that a verdict tells by themselves.
+const TOLD: usize = 3;
 
 /// Correlation of roll and pitch with their commands, however late, below which the model says nothing about moments.
 const MOMENT_FIT: f64 = 0.75;

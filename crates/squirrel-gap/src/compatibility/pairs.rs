@@ -10,9 +10,8 @@
 
 use nalgebra::Vector3;
 
-/// How much better another naming of the axes must fit, in sums of three correlations, and as a part of its own fit.
+/// How much better another naming of the axes must fit, in sums of three correlations.
 const MARGIN: f64 = 0.8;
-const MARGIN_SHARE: f64 = 0.6;
 /// How well it must fit at all.
 const MATCH: f64 = 0.8;
 /// A correlation below so many of its standard deviations is none.
@@ -88,9 +87,10 @@ impl Pairs {
         })
     }
 
-    /// Mean square of the first less the second.
+    /// Mean square of the first less the second, about the means.
     pub(super) fn misfit(&self) -> f64 {
-        self.0.iter().map(|(x, y)| (x - y).norm_squared()).sum::<f64>() / self.0.len().max(1) as f64
+        let (aa, bb, ab) = self.sums();
+        (aa + bb - 2.0 * ab) / self.0.len().max(1) as f64
     }
 
     /// Autocorrelations of an axis of the first or second up to [`LAGS`].
@@ -134,7 +134,7 @@ impl Pairs {
     }
 
     /// As [`Self::correlations`], 0 where one may be chance.
-    fn significant(&self, least: f64) -> [[f64; 3]; 3] {
+    pub(super) fn significant(&self, least: f64) -> [[f64; 3]; 3] {
         let (r, sd) = self.correlations(least);
         std::array::from_fn(|i| {
             std::array::from_fn(|j| if r[i][j].abs() > SIGNIFICANT * sd[i][j] { r[i][j] } else { 0.0 })
@@ -159,8 +159,7 @@ impl Pairs {
     pub(super) fn misnamed_axes(&self, least: f64) -> Option<(f64, Naming)> {
         let (best, naming) = best_naming(&self.significant(least));
         let own = self.own_match(least);
-        let better = best - own > MARGIN && best - own > MARGIN_SHARE * best;
-        (better && best > MATCH).then_some((best, naming))
+        (best - own > MARGIN && best > MATCH).then_some((best, naming))
     }
 
     /// Bounds of what the first is times the second, from all axes together, whatever noise either has.

@@ -26,8 +26,8 @@ const MATCH: f64 = 0.4;
 const MOVES_M_S2: f64 = 0.15;
 /// An order of rotors is wrong where another one fits better by so many standard deviations of what chance does, and where
 /// its own fits at most by this part as well.
-const ORDER_SD: f64 = 6.0;
-const ORDER_SHARE: f64 = 0.4;
+const ORDER_SD: f64 = 4.0;
+const ORDER_SHARE: f64 = 0.75;
 
 pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
     let (forces, moments) = (flight.predicted(residual, 0), flight.predicted(residual, 3));
