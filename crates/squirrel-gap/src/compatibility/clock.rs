@@ -20,13 +20,23 @@ const SIDE_MIN: usize = 2;
 /// Clocks that run off, ppm: up to, and apart.
 const SKEW_MAX_PPM: i32 = 2000;
 const SKEW_STEP_PPM: i32 = 250;
-/// How much a step must explain: F, and the part of what the line leaves that the step may leave.
-const F_MIN: f64 = 40.0;
-const LEFT_MAX: f64 = 0.8;
-/// How well the two must go together on each side of it.
-const MATCH: f64 = 0.6;
+/// What a step must show to be believed: F, the correlation on each side, its size, s, and the most that it may leave of what
+/// the line leaves.
+struct Bar {
+    f: f64,
+    fit: f64,
+    by_s: f64,
+    left: f64,
+}
+
+const ATTITUDE: Bar = Bar { f: 25.0, fit: 0.6, by_s: 0.07, left: 0.85 };
+const FIXES: Bar = Bar { f: 25.0, fit: 0.6, by_s: 0.12, left: 0.8 };
+/// What commands do not explain is mostly noise of the rates' derivative, which has no time.
+const COMMANDS: Bar = Bar { f: 12.0, fit: 0.15, by_s: 0.07, left: 1.0 };
 /// On one side of it the clock is right: shifts that effects explain, s.
 const RIGHT_S: (f64, f64) = (-0.1, 0.5);
+/// Steps of two sources this close are one, s.
+const ALIKE_S: f64 = 0.1;
 /// Samples of these sources that count as one.
 const SAMPLES_ALIKE: f64 = 3.0;
 
@@ -39,34 +49,32 @@ struct Step {
 /// Steps of attitude, fixes or commands against the inertial unit.
 pub(super) fn steps(flight: &Flight, residual: &[f64]) -> Found {
     let mut found: Vec<(&'static str, Step)> = Vec::new();
-    let mut look = |channel, step: Option<Step>, least_s: f64| {
-        found.extend(step.filter(|s| s.by_s.abs() > least_s).map(|step| (channel, step)));
-    };
     if flight.has_attitude() {
         let (time_s, pairs) = flight.rates(&|q| q);
         let (gyro, attitude) = pairs.split();
-        look("attitude.q_ned_from_body_wxyz", step(&time_s, &attitude, &gyro, false), 0.05);
+        let by = step(&time_s, &attitude, &gyro, &ATTITUDE);
+        found.extend(by.map(|step| ("attitude.q_ned_from_body_wxyz", step)));
         let (time_s, pairs) = flight.accelerations(&flight.strapdown(&|q| q), 0.0);
         let (fixes, strapdown) = pairs.split();
-        look("gnss.velocity_ned_m_s", step(&time_s, &fixes, &strapdown, false), 0.12);
+        let by = step(&time_s, &fixes, &strapdown, &FIXES);
+        found.extend(by.map(|step| ("gnss.velocity_ned_m_s", step)));
     }
-    // Roll and pitch by their commands, and thrust.
+    // Roll and pitch by their commands, and thrust, each in its standard deviations.
     let (forces, moments) = (flight.predicted(residual, 0), flight.predicted(residual, 3));
     let (f, a) = (forces.split(), moments.split());
-    let joined = |a: &[Vector3<f64>], f: &[Vector3<f64>]| -> Vec<Vector3<f64>> {
-        a.iter().zip(f).map(|(a, f)| Vector3::new(a.x, a.y, f.z)).collect()
+    let joined = |a: &[Vector3<f64>], f: &[Vector3<f64>]| {
+        let all: Vec<_> = a.iter().zip(f).map(|(a, f)| Vector3::new(a.x, a.y, f.z)).collect();
+        in_deviations(&all)
     };
-    let time_s = flight.residual_time_s();
-    let (did, asked) = (joined(&a.0, &f.0), joined(&a.1, &f.1));
-    // What comes later in time than asked has stamps of commands that are early: the sign is that of the commands' clock.
-    let of_commands = step(&time_s, &did, &asked, true).map(|s| Step { by_s: -s.by_s, ..s });
-    look("rotor.command", of_commands, 0.05);
+    // What is done later after what was asked has stamps of commands that are early.
+    let by = step(&flight.residual_time_s(), &joined(&a.0, &f.0), &joined(&a.1, &f.1), &COMMANDS);
+    found.extend(by.map(|s| ("rotor.command", Step { by_s: -s.by_s, ..s })));
     // A unit whose own clock steps does so against all others.
-    let same = found.windows(2).all(|w| (w[0].1.by_s - w[1].1.by_s).abs() < 0.1);
-    let others = found.iter().filter(|(channel, _)| *channel != "gnss.velocity_ned_m_s").count();
+    let others: Vec<f64> =
+        found.iter().filter(|(channel, _)| *channel != "gnss.velocity_ned_m_s").map(|(_, s)| s.by_s).collect();
+    let is_unit = matches!(others[..], [a, b] if (a - b).abs() < ALIKE_S);
     let (channel, step) = found.first()?;
-    let channel = if others >= 2 && same { "imu.omega_body_rad_s" } else { channel };
-    let by_s = if others >= 2 && same { -step.by_s } else { step.by_s };
+    let (channel, by_s) = if is_unit { ("imu.omega_body_rad_s", -step.by_s) } else { (*channel, step.by_s) };
     let words = format!(
         "its clock steps by {by_s:+.2} s against the other sources at about {:.0} s; mend `time` of its source, or cut the flight there",
         step.at_s
@@ -75,10 +83,8 @@ pub(super) fn steps(flight: &Flight, residual: &[f64]) -> Found {
 }
 
 /// The step of the first against the second, if there is one: how much later the first comes after it.
-///
-/// * `balanced` - each axis counts alike, whatever its unit
-fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], balanced: bool) -> Option<Step> {
-    let (own, other) = (centred(own, balanced), centred(other, balanced));
+fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar) -> Option<Step> {
+    let (own, other) = (centred(own), centred(other));
     // Where a model has no finite answer, times are not known.
     if own.len() != time_s.len() || other.len() != time_s.len() {
         return None;
@@ -152,19 +158,23 @@ fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], balanced: 
     }
     let (sides, by_s, at_s) = found?;
     let f = time_s.len() as f64 / SAMPLES_ALIKE * (stepped - line) / (1.0 - stepped).max(1e-6);
-    let is_real = sides > MATCH * MATCH && f > F_MIN && 1.0 - stepped < LEFT_MAX * (1.0 - line);
+    let is_real = f > bar.f
+        && sides > bar.fit * bar.fit
+        && by_s.abs() > bar.by_s
+        && 1.0 - stepped <= bar.left * (1.0 - line);
     is_real.then_some(Step { by_s, at_s })
 }
 
-/// About the mean, in standard deviations of each axis or as it is.
-fn centred(values: &[Vector3<f64>], balanced: bool) -> Vec<Vector3<f64>> {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<Vector3<f64>>() / n;
-    let square = values.iter().map(|v| (v - mean).component_mul(&(v - mean))).sum::<Vector3<f64>>() / n;
-    let scale = if balanced {
-        square.map(|s| if s > 0.0 { s.sqrt().recip() } else { 0.0 })
-    } else {
-        Vector3::repeat(1.0)
-    };
-    values.iter().map(|v| (v - mean).component_mul(&scale)).collect()
+/// About the mean.
+fn centred(values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mean = values.iter().sum::<Vector3<f64>>() / values.len().max(1) as f64;
+    values.iter().map(|v| v - mean).collect()
+}
+
+/// Each axis about its mean and in its standard deviations, so that axes count alike whatever their units.
+fn in_deviations(values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let values = centred(values);
+    let square = values.iter().map(|v| v.component_mul(v)).sum::<Vector3<f64>>() / values.len().max(1) as f64;
+    let scale = square.map(|s| if s > 0.0 { s.sqrt().recip() } else { 0.0 });
+    values.iter().map(|v| v.component_mul(&scale)).collect()
 }

@@ -21,8 +21,8 @@ const POSITION_RIGHT: f64 = 0.3;
 /// What one source may be of the other.
 const SCALE: (f64, f64) = (0.5, 2.0);
 /// Part of the misfit in the body frame that the world frame must leave at most, and how well its axes must fit.
-const WORLD_MOVES_M_S2: f64 = 0.3;
-const WORLD_MISFIT: f64 = 0.4;
+const WORLD_MOVES_M_S2: f64 = 0.2;
+const WORLD_MISFIT: f64 = 0.25;
 const WORLD_MATCH: f64 = 0.7;
 
 /// How well fixes go with a strapdown, by the names of their axes and however late up to what effects explain.
@@ -104,7 +104,8 @@ fn world_frame(flight: &Flight, body: &Pairs, shift_s: f64) -> Found {
     let straight = r[0][0].abs() + r[1][1].abs();
     let crossed = r[0][1].abs() + r[1][0].abs();
     let swaps = crossed > straight;
-    let fit = straight.max(crossed) / 2.0;
+    let moving = (0..2).filter(|i| r[*i][0] != 0.0 || r[*i][1] != 0.0).count();
+    let fit = straight.max(crossed) / moving.max(1) as f64;
     let sign = |i: usize, j: usize| if r[i][j] < 0.0 { -1.0 } else { 1.0 };
     let world = named.map(|own, other| {
         let turned = if swaps {

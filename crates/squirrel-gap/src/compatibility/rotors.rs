@@ -29,6 +29,9 @@ const MOVES_M_S2: f64 = 0.15;
 const ORDER_SD: f64 = 4.0;
 const ORDER_SHARE: f64 = 0.75;
 
+/// Sum of three correlations from which on the attitude says that the gyroscope's axes are right.
+const GYRO_MATCH: f64 = 1.5;
+
 pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
     let (forces, moments) = (flight.predicted(residual, 0), flight.predicted(residual, 3));
     let n = moments.len();
@@ -104,10 +107,10 @@ fn order(flight: &Flight) -> Found {
     for (rotor, slot) in order.iter().enumerate() {
         rotors[*slot] = rotor + 1;
     }
-    let gyro = if flight.has_attitude() {
+    let gyro = if flight.has_attitude() && flight.rates(&|q| q).1.own_match(0.0) > GYRO_MATCH {
         ""
     } else {
-        "; or the gyroscope's `body` is another one, which a log without attitude does not tell apart"
+        "; or the axes of imu.omega_body_rad_s are others, see its `columns` and `body`: no attitude tells"
     };
     Some((
         COMMAND,

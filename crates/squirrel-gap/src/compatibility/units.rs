@@ -44,7 +44,7 @@ pub(super) fn force(flight: &Flight) -> Found {
     let size = all.iter().map(Vector3::norm).sum::<f64>() / all.len() as f64;
     if !(FORCE_G.0..FORCE_G.1).contains(&(size / GRAVITY_M_S2)) {
         let remedy = match size {
-            s if (FORCE_G.0..FORCE_G.1).contains(&s) && mean.norm() > 0.5 * size => "it is in g: `scale = 9.80665`",
+            s if (0.95..FORCE_G.1).contains(&s) && mean.norm() > 0.8 * size => "it is in g: `scale = 9.80665`",
             s if (FORCE_G.0 * 1e3..FORCE_G.1 * 1e3).contains(&s) => "it is in thousandths of g: `scale = 0.00980665`",
             s if s < GRAVITY_M_S2 => {
                 "gravity is taken off: this is the vehicle's acceleration, perhaps in the world frame; import what the accelerometer felt in the body"
