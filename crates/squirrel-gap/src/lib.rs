@@ -25,8 +25,8 @@ mod verdict;
 mod words;
 
 pub use add::{add, difference, nothing_to_add};
-pub use compatibility::check;
 pub use closed_loop::{ClosedLoop, closed_loop};
+pub use compatibility::check;
 pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};

@@ -56,7 +56,8 @@ fn measured_flights_and_windows_raise_no_alarm() {
     let (mut count, mut said) = (0, Vec::new());
     let mut of = |vehicle: &VehicleFile, map: &str, folder: &str, lengths_s: [f64; 2]| {
         let Some(folder) = shared(folder) else { return };
-        let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
         files.retain(|path| path.extension().is_some_and(|e| e == "csv"));
         files.sort();
         for file in files {

@@ -20,20 +20,62 @@ const COMMAND: &str = "rotor.command";
 type Mistake = (&'static str, &'static str, &'static str, &'static [&'static str], &'static str);
 
 const MISTAKES: [Mistake; 17] = [
-    ("gyro axes swapped", "\"imu_gyro_x\", \"imu_gyro_y\"", "\"imu_gyro_y\", \"imu_gyro_x\"", &[OMEGA], "columns"),
-    ("accelerometer axes swapped", "\"imu_acc_y\", \"imu_acc_z\"", "\"imu_acc_z\", \"imu_acc_y\"", &[FORCE], "columns"),
+    (
+        "gyro axes swapped",
+        "\"imu_gyro_x\", \"imu_gyro_y\"",
+        "\"imu_gyro_y\", \"imu_gyro_x\"",
+        &[OMEGA],
+        "columns",
+    ),
+    (
+        "accelerometer axes swapped",
+        "\"imu_acc_y\", \"imu_acc_z\"",
+        "\"imu_acc_z\", \"imu_acc_y\"",
+        &[FORCE],
+        "columns",
+    ),
     ("velocity axes swapped", "[\"vx\", \"vy\", \"vz\"]", "[\"vy\", \"vx\", \"vz\"]", &[VELOCITY], "columns"),
     ("specific force in g", "body = \"flu\", scale = 9.80665", "body = \"flu\"", &[FORCE], "scale = 9.80665"),
-    ("rates in deg/s", "body = \"flu\" }\n\"imu.spec", "body = \"flu\", scale = 57.29578 }\n\"imu.spec", &[OMEGA], "scale = 0.0174"),
+    (
+        "rates in deg/s",
+        "body = \"flu\" }\n\"imu.spec",
+        "body = \"flu\", scale = 57.29578 }\n\"imu.spec",
+        &[OMEGA],
+        "scale = 0.0174",
+    ),
     ("voltage in mV", "[\"pwr_pm_vbat\"]", "[\"pwr_pm_vbat\"], scale = 1000.0", &[VOLTAGE], "scale = 0.001"),
     ("quaternion order", "order = \"xyzw\"", "order = \"wxyz\"", &[ATTITUDE], "order"),
     ("quaternion direction", "world_from_body", "body_from_world", &[ATTITUDE], "direction"),
-    ("attitude world", "order = \"xyzw\", world = \"nwu\"", "order = \"xyzw\", world = \"ned\"", &[ATTITUDE], "world"),
-    ("attitude body", "world = \"nwu\", body = \"flu\"", "world = \"nwu\", body = \"frd\"", &[ATTITUDE], "body"),
-    ("attitude enu", "order = \"xyzw\", world = \"nwu\"", "order = \"xyzw\", world = \"enu\"", &[ATTITUDE, VELOCITY], "world"),
+    (
+        "attitude world",
+        "order = \"xyzw\", world = \"nwu\"",
+        "order = \"xyzw\", world = \"ned\"",
+        &[ATTITUDE],
+        "world",
+    ),
+    (
+        "attitude body",
+        "world = \"nwu\", body = \"flu\"",
+        "world = \"nwu\", body = \"frd\"",
+        &[ATTITUDE],
+        "body",
+    ),
+    (
+        "attitude enu",
+        "order = \"xyzw\", world = \"nwu\"",
+        "order = \"xyzw\", world = \"enu\"",
+        &[ATTITUDE, VELOCITY],
+        "world",
+    ),
     ("velocity world", "\"vz\"], world = \"nwu\"", "\"vz\"], world = \"ned\"", &[VELOCITY], "world"),
     ("gyro body", "\"imu_gyro_z\"], body = \"flu\"", "\"imu_gyro_z\"], body = \"frd\"", &[OMEGA], "body"),
-    ("accelerometer body", "\"imu_acc_z\"], body = \"flu\"", "\"imu_acc_z\"], body = \"frd\"", &[FORCE], "body"),
+    (
+        "accelerometer body",
+        "\"imu_acc_z\"], body = \"flu\"",
+        "\"imu_acc_z\"], body = \"frd\"",
+        &[FORCE],
+        "body",
+    ),
     ("command unscaled", "4], scale = 1.5259021896696422e-5", "4]", &[COMMAND], "scale = 1.52"),
     ("motors 1 and 2 swapped", "[1, 2, 3, 4]", "[2, 1, 3, 4]", &[COMMAND], "rotors = [2, 1, 3, 4]"),
     ("motors 2 and 4 swapped", "[1, 2, 3, 4]", "[1, 4, 3, 2]", &[COMMAND], "rotors = [1, 4, 3, 2]"),
@@ -60,10 +102,13 @@ const SPOILS: [Spoil; 12] = [
 /// Gives specific force in the world frame, NED, plus something.
 fn to_world(log: &mut FlightLog, plus: [f64; 3]) {
     let attitude = log.sources["attitude"].channels["q_ned_from_body_wxyz"].values.clone();
-    let force = &mut log.sources.get_mut("imu").unwrap().channels.get_mut("specific_force_body_m_s2").unwrap().values;
+    let force =
+        &mut log.sources.get_mut("imu").unwrap().channels.get_mut("specific_force_body_m_s2").unwrap().values;
     for (f, q) in force.chunks_exact_mut(3).zip(attitude.chunks_exact(4)) {
         let (w, v) = (q[0], [q[1], q[2], q[3]]);
-        let cross = |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+        let cross = |a: [f64; 3], b: [f64; 3]| {
+            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        };
         let once = cross(v, [f[0], f[1], f[2]]);
         let twice = cross(v, once);
         for i in 0..3 {
@@ -128,7 +173,8 @@ fn a_spoilt_map_is_named_in_measured_flights() {
                     continue;
                 }
             };
-            let good = found.first().is_some_and(|a| channels.contains(&a.channel) && a.words.contains(remedy));
+            let good =
+                found.first().is_some_and(|a| channels.contains(&a.channel) && a.words.contains(remedy));
             right += usize::from(good);
             if !good {
                 println!("  {what}: {name}: {:?}", found.first().map(|a| &a.words));
@@ -143,7 +189,8 @@ fn a_spoilt_map_is_named_in_measured_flights() {
             let mut log = imported("nanobench.toml", file);
             spoil(&mut log);
             let found = check(&vehicle, &[(name.clone(), log)]).unwrap();
-            let good = found.first().is_some_and(|a| channels.contains(&a.channel) && a.words.contains(remedy));
+            let good =
+                found.first().is_some_and(|a| channels.contains(&a.channel) && a.words.contains(remedy));
             right += usize::from(good);
             if !good {
                 println!("  {what}: {name}: {:?}", found.first().map(|a| &a.words));

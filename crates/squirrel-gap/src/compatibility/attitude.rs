@@ -57,7 +57,8 @@ pub(super) fn rates(flight: &Flight) -> Found {
             } else {
                 "put `columns = [...]` into that order".to_owned()
             };
-            let words = format!("fits the attitude's rate better with its axes as {}; {remedy}", axes(naming));
+            let words =
+                format!("fits the attitude's rate better with its axes as {}; {remedy}", axes(naming));
             return Some((OMEGA, words));
         }
         return Some((
@@ -84,7 +85,7 @@ fn worth(flight: &Flight, turn: Turn) -> f64 {
     let (_, pairs): (_, Pairs) = flight.rates(turn);
     let strapdown = flight.strapdown(turn);
     let falls = Flight::mean_acceleration(&strapdown).norm() > MEAN_MAX_M_S2;
-    pairs.own_match(MOVES_RAD_S) + match_of(flight, &strapdown) - if falls { FALLS } else { 0.0 }
+    pairs.own_match(MOVES_RAD_S) + match_of(flight, &strapdown).0 - if falls { FALLS } else { 0.0 }
 }
 
 /// A way to misread a quaternion.

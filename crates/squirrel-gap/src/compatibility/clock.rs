@@ -70,8 +70,11 @@ pub(super) fn steps(flight: &Flight, residual: &[f64]) -> Found {
     let by = step(&flight.residual_time_s(), &joined(&a.0, &f.0), &joined(&a.1, &f.1), &COMMANDS);
     found.extend(by.map(|s| ("rotor.command", Step { by_s: -s.by_s, ..s })));
     // A unit whose own clock steps does so against all others.
-    let others: Vec<f64> =
-        found.iter().filter(|(channel, _)| *channel != "gnss.velocity_ned_m_s").map(|(_, s)| s.by_s).collect();
+    let others: Vec<f64> = found
+        .iter()
+        .filter(|(channel, _)| *channel != "gnss.velocity_ned_m_s")
+        .map(|(_, s)| s.by_s)
+        .collect();
     let is_unit = matches!(others[..], [a, b] if (a - b).abs() < ALIKE_S);
     let (channel, step) = found.first()?;
     let (channel, by_s) = if is_unit { ("imu.omega_body_rad_s", -step.by_s) } else { (*channel, step.by_s) };

@@ -11,6 +11,9 @@ const POSITION: &str = "gnss.position_ned_m";
 /// Time shifts of GNSS that effects can explain, and the longest that are looked for, s.
 const SHIFT_S: (f64, f64) = (-0.08, 0.5);
 const SHIFT_MAX_S: (f64, f64) = (-0.5, 1.0);
+const SHIFT_STEP_S: f64 = 0.05;
+/// How much better a shift that no effect explains must fit, in sums of three correlations.
+const FAR_MARGIN: f64 = 0.3;
 /// Smallest acceleration, m/s^2, and speed, m/s, that say something about axes.
 const MOVES_M_S2: f64 = 0.1;
 const MOVES_M_S: f64 = 0.5;
@@ -25,39 +28,64 @@ const WORLD_MOVES_M_S2: f64 = 0.2;
 const WORLD_MISFIT: f64 = 0.25;
 const WORLD_MATCH: f64 = 0.7;
 
-/// How well fixes go with a strapdown, by the names of their axes and however late up to what effects explain.
-pub(super) fn match_of(flight: &Flight, strapdown: &[Strapdown]) -> f64 {
-    let at = |shift: i32| flight.accelerations(strapdown, 0.1 * f64::from(shift)).1.own_match(MOVES_M_S2);
-    (0..=4).map(at).fold(f64::NEG_INFINITY, f64::max)
+/// How well fixes go with a strapdown, by the names of their axes and however late up to what effects explain: the sum of
+/// correlations, and the shift, s.
+pub(super) fn match_of(flight: &Flight, strapdown: &[Strapdown]) -> (f64, f64) {
+    best(flight, strapdown, SHIFT_S, |pairs| pairs.own_match(MOVES_M_S2))
 }
 
+/// The best fit of a kind over shifts in time, and its shift, s.
+fn best(
+    flight: &Flight,
+    strapdown: &[Strapdown],
+    range_s: (f64, f64),
+    fit: impl Fn(&Pairs) -> f64,
+) -> (f64, f64) {
+    let [first, last] = [range_s.0, range_s.1].map(|s| (s / SHIFT_STEP_S).round() as i32);
+    let at = |i: i32| {
+        let shift_s = f64::from(i) * SHIFT_STEP_S;
+        (fit(&flight.accelerations(strapdown, shift_s).1), shift_s)
+    };
+    (first..=last).map(at).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((0.0, 0.0))
+}
+
+/// Axes and frames of velocity and specific force.
+pub(super) fn frames(flight: &Flight) -> Found {
+    if !flight.has_attitude() {
+        return None;
+    }
+    let strapdown = flight.strapdown(&|q| q);
+    let (own, shift_s) = match_of(flight, &strapdown);
+    let pairs = flight.accelerations(&strapdown, shift_s).1;
+    if let Some(found) = world_frame(flight, &pairs, shift_s) {
+        return Some(found);
+    }
+    // A quarter of a period of a circle looks like other axes: each naming has the shift that is best for it.
+    let named = |pairs: &Pairs| pairs.misnamed_beside(MOVES_M_S2, own).map_or(0.0, |(fit, _)| fit);
+    let (_, shift_s) = best(flight, &strapdown, SHIFT_S, named);
+    let (_, naming) = flight.accelerations(&strapdown, shift_s).1.misnamed_beside(MOVES_M_S2, own)?;
+    let remedy = remedy_of(naming.map(|(axis, sign)| (axis, sign > 0.0)));
+    let words = format!("fits the accelerometer better with its axes as {}; {remedy}", axes(naming));
+    Some((VELOCITY, words))
+}
+
+/// Stamps and unit of velocity.
 pub(super) fn velocities(flight: &Flight) -> Found {
     if !flight.has_attitude() {
         return None;
     }
     let strapdown = flight.strapdown(&|q| q);
-    let (first, last) = ((SHIFT_MAX_S.0 / 0.05).round() as i32, (SHIFT_MAX_S.1 / 0.05).round() as i32);
-    let shifts: Vec<f64> = (first..=last).map(|i| f64::from(i) * 0.05).collect();
-    let pairs_at = |shift_s: f64| flight.accelerations(&strapdown, shift_s).1;
-    let fit: Vec<f64> = shifts.iter().map(|s| pairs_at(*s).best_match(MOVES_M_S2)).collect();
-    let best = (0..shifts.len()).max_by(|a, b| fit[*a].total_cmp(&fit[*b]))?;
-    let pairs = pairs_at(shifts[best]);
-    if let Some(found) = world_frame(flight, &pairs, shifts[best]) {
-        return Some(found);
-    }
-    if let Some((_, naming)) = pairs.misnamed_axes(MOVES_M_S2) {
-        let remedy = remedy_of(naming.map(|(axis, sign)| (axis, sign > 0.0)));
-        let words = format!("fits the accelerometer better with its axes as {}; {remedy}", axes(naming));
-        return Some((VELOCITY, words));
-    }
-    if fit[best] > MATCH && !(SHIFT_S.0..=SHIFT_S.1).contains(&shifts[best]) {
+    let (near, near_s) = match_of(flight, &strapdown);
+    let (far, far_s) = best(flight, &strapdown, SHIFT_MAX_S, |pairs| pairs.own_match(MOVES_M_S2));
+    let moving = flight.accelerations(&strapdown, far_s).1.moving(MOVES_M_S2).max(1) as f64;
+    if far > MATCH * moving && far > near + FAR_MARGIN {
         let words = format!(
             "fits the accelerometer best {:.2} s later than stamped; see `time` of its source, `offset` in s",
-            -shifts[best]
+            -far_s
         );
         return Some((VELOCITY, words));
     }
-    let (low, high) = pairs.slope()?;
+    let (low, high) = flight.accelerations(&strapdown, near_s).1.slope()?;
     (low > SCALE.1 || high < SCALE.0).then(|| {
         let remedy = scale_remedy(low, "m/s");
         (VELOCITY, format!("is {low:.3} to {high:.3} times what the accelerometer gives; {remedy}"))
@@ -72,18 +100,22 @@ pub(super) fn positions(flight: &Flight) -> Found {
         let by_position = |v: &Vector3<f64>| Vector3::from_fn(|i, _| naming[i].1 * v[naming[i].0]);
         let strapdown = flight.strapdown(&|q| q);
         let fits = |turned: bool| {
-            let at = |shift: i32| {
-                let pairs = flight.accelerations(&strapdown, 0.1 * f64::from(shift)).1;
-                pairs.map(|own, other| (if turned { by_position(own) } else { *own }, *other)).own_match(MOVES_M_S2)
-            };
-            (0..=4).map(at).fold(f64::NEG_INFINITY, f64::max)
+            let turn = |own: &Vector3<f64>| if turned { by_position(own) } else { *own };
+            let fit = |pairs: &Pairs| pairs.map(|own, other| (turn(own), *other)).own_match(MOVES_M_S2);
+            best(flight, &strapdown, SHIFT_S, fit).0
         };
         let (channel, other) = if flight.has_attitude() && fits(true) > fits(false) + POSITION_RIGHT {
             (VELOCITY, "position")
         } else {
             (POSITION, "velocity")
         };
-        return Some((channel, format!("its axes are not those of the {other}, which fits better with them as {}; {remedy}", axes(naming))));
+        return Some((
+            channel,
+            format!(
+                "its axes are not those of the {other}, which fits better with them as {}; {remedy}",
+                axes(naming)
+            ),
+        ));
     }
     let (low, high) = moved.slope()?;
     (low > SCALE.1 || high < SCALE.0).then(|| {
@@ -127,7 +159,9 @@ fn remedy_of(naming: [(usize, bool); 3]) -> String {
     let frame = match naming {
         [(1, true), (0, true), (2, false)] => "`world = \"enu\"`, or \"ned\" where the map has that",
         [(0, true), (1, false), (2, false)] => "`world = \"nwu\"`, or \"ned\" where the map has that",
-        [(1, _), (0, _), (2, true)] => "`world = \"enu\"` for \"nwu\" or the other way round, here or of the attitude, or the order of `columns = [...]`",
+        [(1, _), (0, _), (2, true)] => {
+            "`world = \"enu\"` for \"nwu\" or the other way round, here or of the attitude, or the order of `columns = [...]`"
+        }
         _ => "see `world`, and the order of `columns = [...]`",
     };
     frame.to_owned()

@@ -89,7 +89,8 @@ impl<'p> Flight<'p> {
             let attitude = track.attitude()?;
             let mut velocity = vec![Vector3::zeros()];
             for k in 1..attitude.len() {
-                let a = UnitQuaternion::new_normalize(turn(attitude[k])) * track.specific_force()[k] + gravity;
+                let a =
+                    UnitQuaternion::new_normalize(turn(attitude[k])) * track.specific_force()[k] + gravity;
                 velocity.push(velocity[k - 1] + a * track.period_s);
             }
             Some(Strapdown { start_s: track.time_s[0], period_s: track.period_s, velocity })
@@ -153,7 +154,9 @@ impl<'p> Flight<'p> {
 
     /// Angular rates at the rows of the residual, rad/s.
     pub(super) fn omega(&self) -> Vec<Vector3<f64>> {
-        let of = |track: &'p Track| (0..track.measured.len()).map(|i| track.omega()[track.edge() + i * track.every]);
+        let of = |track: &'p Track| {
+            (0..track.measured.len()).map(|i| track.omega()[track.edge() + i * track.every])
+        };
         self.tracks().flat_map(of).collect()
     }
 

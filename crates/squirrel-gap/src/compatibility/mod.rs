@@ -90,6 +90,7 @@ fn problems_of(predictor: &Predictor<'_>, residual: &[f64], logs: &[(String, Fli
             .or_else(|| held::held(log, &flight.spans()))
             .or_else(|| units::force(&flight))
             .or_else(|| attitude::rates(&flight))
+            .or_else(|| fixes::frames(&flight))
             .or_else(|| clock::steps(&flight, residual))
             .or_else(|| fixes::velocities(&flight))
             .or_else(|| fixes::positions(&flight))

@@ -41,7 +41,10 @@ impl Pairs {
     }
 
     /// The pairs with each vector of the second changed.
-    pub(super) fn map(&self, change: impl Fn(&Vector3<f64>, &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>)) -> Self {
+    pub(super) fn map(
+        &self,
+        change: impl Fn(&Vector3<f64>, &Vector3<f64>) -> (Vector3<f64>, Vector3<f64>),
+    ) -> Self {
         Self(self.0.iter().map(|(own, other)| change(own, other)).collect())
     }
 
@@ -104,9 +107,8 @@ impl Pairs {
             .collect()
     }
 
-    /// Correlations of axis `i` of the first with axis `j` of the second and their standard deviations if there is none; both 0
-    /// for an axis that moves less than `least`.
-    pub(super) fn correlations(&self, least: f64) -> ([[f64; 3]; 3], [[f64; 3]; 3]) {
+    /// Correlations of axis `i` of the first with axis `j` of the second; 0 for an axis that moves less than `least`.
+    pub(super) fn correlations(&self, least: f64) -> [[f64; 3]; 3] {
         let (a, b) = self.means();
         let (mut aa, mut bb, mut ab) = ([0.0; 3], [0.0; 3], [[0.0; 3]; 3]);
         for (x, y) in &self.0 {
@@ -121,44 +123,48 @@ impl Pairs {
         }
         let n = self.0.len().max(1) as f64;
         let moves = |sum: f64| (sum / n).sqrt() > least;
-        let [own, other] = [true, false].map(|of_own| [0, 1, 2].map(|axis| self.memory(of_own, axis)));
-        let (mut r, mut sd) = ([[0.0; 3]; 3], [[0.0; 3]; 3]);
-        for i in (0..3).filter(|i| moves(aa[*i])) {
-            for j in (0..3).filter(|j| moves(bb[*j])) {
-                let common: f64 = own[i].iter().zip(&other[j]).map(|(a, b)| a * b).sum();
-                r[i][j] = ab[i][j] / (aa[i] * bb[j]).sqrt();
-                sd[i][j] = ((1.0 + 2.0 * common).max(1.0) / n).sqrt();
-            }
-        }
-        (r, sd)
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| {
+                if moves(aa[i]) && moves(bb[j]) { ab[i][j] / (aa[i] * bb[j]).sqrt() } else { 0.0 }
+            })
+        })
     }
 
     /// As [`Self::correlations`], 0 where one may be chance.
     pub(super) fn significant(&self, least: f64) -> [[f64; 3]; 3] {
-        let (r, sd) = self.correlations(least);
+        let r = self.correlations(least);
+        let n = self.0.len().max(1) as f64;
+        let [own, other] = [true, false].map(|of_own| [0, 1, 2].map(|axis| self.memory(of_own, axis)));
         std::array::from_fn(|i| {
-            std::array::from_fn(|j| if r[i][j].abs() > SIGNIFICANT * sd[i][j] { r[i][j] } else { 0.0 })
+            std::array::from_fn(|j| {
+                let common: f64 = own[i].iter().zip(&other[j]).map(|(a, b)| a * b).sum();
+                let chance = ((1.0 + 2.0 * common).max(1.0) / n).sqrt();
+                if r[i][j].abs() > SIGNIFICANT * chance { r[i][j] } else { 0.0 }
+            })
         })
     }
 
     /// Sum of the correlations of the axes by their names.
     pub(super) fn own_match(&self, least: f64) -> f64 {
-        let (r, _) = self.correlations(least);
+        let r = self.correlations(least);
         r[0][0] + r[1][1] + r[2][2]
     }
 
-    /// Sum of the correlations of the best naming of the axes, over the number of axes that move.
-    pub(super) fn best_match(&self, least: f64) -> f64 {
-        let (r, _) = self.correlations(least);
-        let moving = r.iter().filter(|row| row.iter().any(|x| *x != 0.0)).count();
-        best_naming(&r).0 / moving.max(1) as f64
+    /// Axes by whose names the two go together at all.
+    pub(super) fn moving(&self, least: f64) -> usize {
+        let r = self.correlations(least);
+        (0..3).filter(|i| r[*i][*i] != 0.0).count()
     }
 
     /// The axes of the first as the second would call them and how well they then fit, if that is much better than by
     /// their names.
     pub(super) fn misnamed_axes(&self, least: f64) -> Option<(f64, Naming)> {
+        self.misnamed_beside(least, self.own_match(least))
+    }
+
+    /// As [`Self::misnamed_axes`] beside a fit by their names that is found elsewhere.
+    pub(super) fn misnamed_beside(&self, least: f64, own: f64) -> Option<(f64, Naming)> {
         let (best, naming) = best_naming(&self.significant(least));
-        let own = self.own_match(least);
         (best - own > MARGIN && best > MATCH).then_some((best, naming))
     }
 
@@ -222,8 +228,8 @@ impl Pairs {
 
 /// A naming of axes in words: `(-y, x, z)`.
 pub(super) fn axes(naming: Naming) -> String {
-    let names = naming
-        .map(|(axis, sign)| format!("{}{}", if sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][axis]));
+    let names =
+        naming.map(|(axis, sign)| format!("{}{}", if sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][axis]));
     format!("({})", names.join(", "))
 }
 

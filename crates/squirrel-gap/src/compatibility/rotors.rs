@@ -69,7 +69,8 @@ pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
         return Some(found);
     }
     if let Some((_, naming)) = forces.misnamed_axes(MOVES_M_S2) {
-        let words = format!("fits the model better with its axes as {}; see `columns` and `body`", axes(naming));
+        let words =
+            format!("fits the model better with its axes as {}; see `columns` and `body`", axes(naming));
         return Some((FORCE, words));
     }
     let along_z = forces.map(|own, other| (Vector3::new(0.0, 0.0, own.z), Vector3::new(0.0, 0.0, other.z)));
@@ -95,10 +96,8 @@ fn order(flight: &Flight) -> Found {
     };
     let as_given: Vec<usize> = (0..count).collect();
     let own = score(&as_given);
-    let (best, order) = orders(count)
-        .into_iter()
-        .map(|order| (score(&order), order))
-        .max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (best, order) =
+        orders(count).into_iter().map(|order| (score(&order), order)).max_by(|a, b| a.0.total_cmp(&b.0))?;
     if best - own < ORDER_SD * sums.chance || own > ORDER_SHARE * best {
         return None;
     }
@@ -212,7 +211,8 @@ impl Sums {
                     }
                 }
                 let before = measured[k - 1] - mean;
-                memory += a.dot(&before) / a.norm_squared().max(f64::MIN_POSITIVE).sqrt()
+                memory += a.dot(&before)
+                    / a.norm_squared().max(f64::MIN_POSITIVE).sqrt()
                     / before.norm_squared().max(f64::MIN_POSITIVE).sqrt();
                 rows += 1.0;
             }
@@ -235,7 +235,11 @@ impl Sums {
                         square += lever[axis] * other[axis] * self.square[*slot][*theirs];
                     }
                 }
-                if square > 0.0 && self.own[axis] > 0.0 { cross / (square * self.own[axis]).sqrt() } else { 0.0 }
+                if square > 0.0 && self.own[axis] > 0.0 {
+                    cross / (square * self.own[axis]).sqrt()
+                } else {
+                    0.0
+                }
             })
             .sum()
     }

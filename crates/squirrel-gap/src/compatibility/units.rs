@@ -23,7 +23,9 @@ pub(super) fn voltage(flight: &Flight) -> Found {
     let ratio = sum / n / reference;
     let remedy = match ratio {
         r if (VOLTAGE.0 * 1e3..VOLTAGE.1 * 1e3).contains(&r) => "it is in mV: `scale = 0.001`",
-        r if (VOLTAGE.0 * 1e2..VOLTAGE.1 * 1e2).contains(&r) => "it is in hundredths of a volt: `scale = 0.01`",
+        r if (VOLTAGE.0 * 1e2..VOLTAGE.1 * 1e2).contains(&r) => {
+            "it is in hundredths of a volt: `scale = 0.01`"
+        }
         r if (VOLTAGE.0 * 10.0..VOLTAGE.1 * 10.0).contains(&r) => "it is in tenths of a volt: `scale = 0.1`",
         _ => "is it in volts, and of all cells together? see `scale`",
     };
@@ -44,8 +46,12 @@ pub(super) fn force(flight: &Flight) -> Found {
     let size = all.iter().map(Vector3::norm).sum::<f64>() / all.len() as f64;
     if !(FORCE_G.0..FORCE_G.1).contains(&(size / GRAVITY_M_S2)) {
         let remedy = match size {
-            s if (0.95..FORCE_G.1).contains(&s) && mean.norm() > 0.8 * size => "it is in g: `scale = 9.80665`",
-            s if (FORCE_G.0 * 1e3..FORCE_G.1 * 1e3).contains(&s) => "it is in thousandths of g: `scale = 0.00980665`",
+            s if (0.95..FORCE_G.1).contains(&s) && mean.norm() > 0.8 * size => {
+                "it is in g: `scale = 9.80665`"
+            }
+            s if (FORCE_G.0 * 1e3..FORCE_G.1 * 1e3).contains(&s) => {
+                "it is in thousandths of g: `scale = 0.00980665`"
+            }
             s if s < GRAVITY_M_S2 => {
                 "gravity is taken off: this is the vehicle's acceleration, perhaps in the world frame; import what the accelerometer felt in the body"
             }
