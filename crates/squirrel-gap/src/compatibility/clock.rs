@@ -20,19 +20,20 @@ const SIDE_MIN: usize = 2;
 /// Clocks that run off, ppm: up to, and apart.
 const SKEW_MAX_PPM: i32 = 2000;
 const SKEW_STEP_PPM: i32 = 250;
-/// What a step must show to be believed: F, the correlation on each side, its size, s, and the most that it may leave of what
-/// the line leaves.
+/// What a step must show to be believed: F, the correlation on each side, its size, s, and either the most that it may leave
+/// of what the line leaves, or how many times what the line explains it must explain.
 struct Bar {
     f: f64,
     fit: f64,
     by_s: f64,
     left: f64,
+    explains: f64,
 }
 
-const ATTITUDE: Bar = Bar { f: 25.0, fit: 0.6, by_s: 0.07, left: 0.85 };
-const FIXES: Bar = Bar { f: 25.0, fit: 0.6, by_s: 0.12, left: 0.8 };
+const ATTITUDE: Bar = Bar { f: 25.0, fit: 0.6, by_s: 0.07, left: 0.85, explains: f64::INFINITY };
+const FIXES: Bar = Bar { f: 25.0, fit: 0.6, by_s: 0.12, left: 0.8, explains: f64::INFINITY };
 /// What commands do not explain is mostly noise of the rates' derivative, which has no time.
-const COMMANDS: Bar = Bar { f: 12.0, fit: 0.15, by_s: 0.07, left: 1.0 };
+const COMMANDS: Bar = Bar { f: 12.0, fit: 0.15, by_s: 0.07, left: 0.7, explains: 1.2 };
 /// On one side of it the clock is right: shifts that effects explain, s.
 const RIGHT_S: (f64, f64) = (-0.1, 0.5);
 /// Steps of two sources this close are one, s.
@@ -164,7 +165,7 @@ fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar)
     let is_real = f > bar.f
         && sides > bar.fit * bar.fit
         && by_s.abs() > bar.by_s
-        && 1.0 - stepped <= bar.left * (1.0 - line);
+        && (1.0 - stepped <= bar.left * (1.0 - line) || stepped >= bar.explains * line);
     is_real.then_some(Step { by_s, at_s })
 }
 

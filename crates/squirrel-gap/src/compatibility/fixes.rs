@@ -80,7 +80,7 @@ pub(super) fn velocities(flight: &Flight) -> Found {
     let moving = flight.accelerations(&strapdown, far_s).1.moving(MOVES_M_S2).max(1) as f64;
     if far > MATCH * moving && far > near + FAR_MARGIN {
         let words = format!(
-            "fits the accelerometer best {:.2} s later than stamped; see `time` of its source, `offset` in s",
+            "fits the accelerometer best {:.2} s later than stamped; see `offset_s` in `time` of its source",
             -far_s
         );
         return Some((VELOCITY, words));

@@ -14,8 +14,9 @@ use nalgebra::Vector3;
 const MARGIN: f64 = 0.8;
 /// How well it must fit at all.
 const MATCH: f64 = 0.8;
-/// A correlation below so many of its standard deviations is none.
+/// A correlation below so many of its standard deviations is none, unless it is as large as this.
 const SIGNIFICANT: f64 = 4.0;
+const SURE: f64 = 0.9;
 /// Blocks of a slope, at most, and pairs in each, at least.
 const BLOCKS: usize = 8;
 const BLOCK_MIN: usize = 40;
@@ -139,7 +140,7 @@ impl Pairs {
             std::array::from_fn(|j| {
                 let common: f64 = own[i].iter().zip(&other[j]).map(|(a, b)| a * b).sum();
                 let chance = ((1.0 + 2.0 * common).max(1.0) / n).sqrt();
-                if r[i][j].abs() > SIGNIFICANT * chance { r[i][j] } else { 0.0 }
+                if r[i][j].abs() > (SIGNIFICANT * chance).min(SURE) { r[i][j] } else { 0.0 }
             })
         })
     }

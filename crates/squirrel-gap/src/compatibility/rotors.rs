@@ -56,10 +56,13 @@ pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
         && (shift_s > 0.0 || outside(undamped.best_shift(step_s, SHIFT_MAX_S)))
     {
         let words = if shift_s < 0.0 {
-            format!("acts {:.0} ms before it is given; see `time` of its source", -1e3 * shift_s)
+            format!(
+                "acts {:.0} ms before it is given; see `offset_s` in `time` of its source",
+                -1e3 * shift_s
+            )
         } else {
             format!(
-                "acts {:.0} ms after it is given, more than rotors and a link can be late; see `time` of its source",
+                "acts {:.0} ms after it is given, more than rotors and a link can be late; see `offset_s` in `time` of its source",
                 1e3 * shift_s
             )
         };
