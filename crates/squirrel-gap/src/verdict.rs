@@ -151,3 +151,10 @@ pub struct Verdict {
     /// What the logs lack, and what was taken instead.
     pub notes: Vec<String>,
 }
+
+impl Verdict {
+    /// Whether a flight was looked at, or set aside.
+    pub fn has_looked_at(&self, flight: &str) -> bool {
+        self.set_aside.iter().all(|aside| aside.flight != flight)
+    }
+}

@@ -89,7 +89,7 @@ const SPOILS: [Spoil; 12] = [
     ("world acceleration less gravity", &[FORCE], "gravity", |log| to_world(log, [0.0, 0.0, 9.80665])),
     ("fixes step 0.3 s", &[VELOCITY], "clock steps by +0.", |log| step(log, "gnss", 0.3)),
     ("fixes step 0.8 s", &[VELOCITY], "clock steps by +0.", |log| step(log, "gnss", 0.8)),
-    ("attitude steps 0.1 s", &[ATTITUDE], "clock steps by +0.", |log| step(log, "attitude", 0.1)),
+    ("attitude steps 0.2 s", &[ATTITUDE], "clock steps by +0.", |log| step(log, "attitude", 0.2)),
     ("attitude steps 0.5 s", &[ATTITUDE], "clock steps by +0.", |log| step(log, "attitude", 0.5)),
     ("commands step 0.2 s", &[COMMAND], "clock steps by +0.", |log| step(log, "rotor", 0.2)),
     ("unit steps 0.3 s", &[OMEGA, FORCE], "clock steps by", |log| step(log, "imu", 0.3)),
@@ -157,45 +157,61 @@ fn files() -> Vec<std::path::PathBuf> {
     all
 }
 
+/// How many of the flights name a mistake with a channel and a remedy; prints the others.
+fn named(
+    what: &str,
+    channels: &[&str],
+    remedy: &str,
+    flights: impl Iterator<Item = (String, FlightLog)>,
+) -> (usize, usize) {
+    let vehicle = vehicle("crazyflie21_brushed.toml");
+    let (mut right, mut count) = (0, 0);
+    for (name, log) in flights {
+        let found = check(&vehicle, &[(name.clone(), log)]).unwrap();
+        let first = found.first();
+        if first.is_some_and(|a| channels.contains(&a.channel) && a.words.contains(remedy)) {
+            right += 1;
+        } else {
+            println!("  {what}: {name}: {:?}", first.map(|a| &a.words));
+        }
+        count += 1;
+    }
+    println!("{what}: {right} of {count}");
+    (right, count)
+}
+
+fn name_of(file: &Path) -> String {
+    file.file_stem().unwrap().to_string_lossy().into_owned()
+}
+
+/// One flight of twenty hovers almost still, and some move along one axis alone: what nothing shows is not named.
 #[test]
 fn a_spoilt_map_is_named_in_measured_flights() {
-    let vehicle = vehicle("crazyflie21_brushed.toml");
-    let files = files();
+    let mut missed = Vec::new();
     for (what, from, to, channels, remedy) in MISTAKES {
         let map = map_with(from, to);
-        let mut right = 0;
-        for file in &files {
-            let name = file.file_stem().unwrap().to_string_lossy().into_owned();
-            let found = match check(&vehicle, &[(name.clone(), read(&map, file))]) {
-                Ok(found) => found,
-                Err(error) => {
-                    println!("  {what}: {error}");
-                    continue;
-                }
-            };
-            let good =
-                found.first().is_some_and(|a| channels.contains(&a.channel) && a.words.contains(remedy));
-            right += usize::from(good);
-            if !good {
-                println!("  {what}: {name}: {:?}", found.first().map(|a| &a.words));
-            }
+        let flights = files().into_iter().map(|file| (name_of(&file), read(&map, &file)));
+        let (right, count) = named(what, channels, remedy, flights);
+        if 20 * right < 17 * count {
+            missed.push(format!("{what}: {right} of {count}"));
         }
-        println!("{what}: {right} of {}", files.len());
     }
+    assert!(missed.is_empty(), "{missed:#?}");
+}
+
+#[test]
+fn a_spoilt_source_is_named_in_measured_flights() {
+    let mut missed = Vec::new();
     for (what, channels, remedy, spoil) in SPOILS {
-        let mut right = 0;
-        for file in &files {
-            let name = file.file_stem().unwrap().to_string_lossy().into_owned();
-            let mut log = imported("nanobench.toml", file);
+        let flights = files().into_iter().map(|file| {
+            let mut log = imported("nanobench.toml", &file);
             spoil(&mut log);
-            let found = check(&vehicle, &[(name.clone(), log)]).unwrap();
-            let good =
-                found.first().is_some_and(|a| channels.contains(&a.channel) && a.words.contains(remedy));
-            right += usize::from(good);
-            if !good {
-                println!("  {what}: {name}: {:?}", found.first().map(|a| &a.words));
-            }
+            (name_of(&file), log)
+        });
+        let (right, count) = named(what, channels, remedy, flights);
+        if 20 * right < 16 * count {
+            missed.push(format!("{what}: {right} of {count}"));
         }
-        println!("{what}: {right} of {}", files.len());
     }
+    assert!(missed.is_empty(), "{missed:#?}");
 }

@@ -71,7 +71,7 @@ pub(super) fn rates(flight: &Flight) -> Found {
     }
     let (low, high) = pairs.slope()?;
     (low > SCALE.1 || high < SCALE.0).then(|| {
-        let remedy = if low <= 60.0 && high >= 54.0 {
+        let remedy = if low <= 75.0 && high >= 40.0 {
             "it is in deg/s: `scale = 0.017453292519943295`"
         } else {
             "is it in rad/s? see `scale`"
