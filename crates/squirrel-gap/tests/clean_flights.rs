@@ -120,13 +120,14 @@ fn a_rough_vehicle_file_raises_no_alarm() {
 /// What is said of the flights of a case.
 fn of_case(case: &Case) -> Vec<String> {
     let vehicle = VehicleFile::parse(&case.nominal().to_toml(), "nominal").unwrap();
-    let flights: Vec<(String, FlightLog)> =
-        [0, 2].iter().filter_map(|n| Some((format!("flight {n}"), case.flight(*n).ok()?))).collect();
-    if flights.is_empty() {
-        return Vec::new();
-    }
+    // A few cannot be flown.
+    let Ok(log) = case.flight(0) else { return Vec::new() };
     let hidden = format!("{:?} {:?} {:?}", case.answer.set, case.answer.effects, case.answer.outside);
-    check(&vehicle, &flights).unwrap().into_iter().map(|aside| format!("{hidden}: {}", aside.words)).collect()
+    check(&vehicle, &[("flight".to_owned(), log)])
+        .unwrap()
+        .into_iter()
+        .map(|aside| format!("{hidden}: {}", aside.words))
+        .collect()
 }
 
 /// The largest of many draws of an effect.

@@ -191,10 +191,7 @@ fn complaint(what: &str, channel: &str, verdict: &Verdict) -> Option<String> {
 }
 
 fn complaints(case: &Case) -> Vec<String> {
-    let ask = |(what, channel, mistake): &Mistake| {
-        println!("{what}");
-        complaint(what, channel, &case.with(mistake).verdict())
-    };
+    let ask = |(what, channel, mistake): &Mistake| complaint(what, channel, &case.with(mistake).verdict());
     let mut wrong: Vec<String> = MISTAKES.iter().filter_map(ask).collect();
     // Rotors turn in pairs: some other orders are only a vehicle that is turned by half a turn.
     for order in [[1, 0, 2, 3], [1, 2, 3, 0], [3, 2, 1, 0]] {

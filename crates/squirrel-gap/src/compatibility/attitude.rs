@@ -94,8 +94,11 @@ struct Mistake {
     turn: Box<dyn Fn(Quaternion<f64>) -> Quaternion<f64>>,
 }
 
+/// Name of a frame, and the rotation that takes it in.
+type Frame = (&'static str, Quaternion<f64>);
+
 /// The frames that maps know, as in the import: NED from the world, and the body from FRD.
-fn frames() -> ([(&'static str, Quaternion<f64>); 3], [(&'static str, Quaternion<f64>); 2]) {
+fn frames() -> ([Frame; 3], [Frame; 2]) {
     let half = Quaternion::new(0.0, 1.0, 0.0, 0.0);
     let enu = Quaternion::new(0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0);
     let none = Quaternion::identity();
@@ -139,8 +142,9 @@ fn mistakes() -> Vec<Mistake> {
     let orders: [fn(Quaternion<f64>) -> Quaternion<f64>; 4] = [
         |q| Quaternion::new(q.k, q.w, q.i, q.j),
         |q| Quaternion::new(q.i, q.j, q.k, q.w),
-        |q| Quaternion::new(q.k, -q.w, -q.i, -q.j).conjugate(),
-        |q| Quaternion::new(q.k, q.i, q.j, q.w),
+        // The same where the map turns the file's quaternion round.
+        |q| Quaternion::new(q.k, q.w, -q.i, -q.j),
+        |q| Quaternion::new(-q.i, q.j, q.k, -q.w),
     ];
     for change in orders {
         for (_, w) in worlds {
