@@ -155,6 +155,7 @@ pub(crate) fn decide(
         closed_loop: Vec::new(),
         model_patch: None,
         words: String::new(),
+        set_aside: Vec::new(),
         notes: search.predictor.notes.clone(),
     };
     verdict.words = words::paragraph(&verdict, &blind, curve_hides_sag);

@@ -1,7 +1,7 @@
 //! From flights to a verdict: check that the logs agree with themselves, name what is missing, prove it on other flights.
 
 use crate::GapError;
-use crate::compatibility;
+use crate::compatibility::{self, Ready};
 use crate::decide::{alternatives, close, decide, shared};
 use crate::find;
 use crate::name::{
@@ -10,7 +10,7 @@ use crate::name::{
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
 use crate::proof::{HeldOut, gap, hold, prove};
-use crate::verdict::{Kind, Verdict};
+use crate::verdict::{Kind, SetAside, Verdict};
 use squirrel_core::vehicle::{ThrustCurve, Vehicle};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -64,30 +64,67 @@ pub fn diagnose(
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, GapError> {
     progress("reading");
-    let mut predictor = Predictor::new(vehicle, flights)?;
-    let mut unseen = if held_out.is_empty() { None } else { Some(Predictor::new(vehicle, held_out)?) };
+    let mut diagnosis = sorted(vehicle, flights, held_out, progress)?;
+    let verdict = &mut diagnosis.verdict;
+    compatibility::tell(verdict, flights.len() + held_out.len());
+    Ok(diagnosis)
+}
+
+/// The diagnosis of the flights whose data agree with themselves.
+fn sorted(
+    vehicle: &VehicleFile,
+    flights: &[(String, FlightLog)],
+    held_out: &[(String, FlightLog)],
+    progress: &dyn Fn(&str),
+) -> Result<Diagnosis, GapError> {
+    let without = |aside: Vec<SetAside>| {
+        let [flights, held_out] = [flights, held_out].map(|logs| compatibility::kept(logs, &aside));
+        let mut diagnosis = sorted(vehicle, &flights, &held_out, progress)?;
+        diagnosis.verdict.set_aside.splice(..0, aside);
+        Ok(diagnosis)
+    };
+    let ready = match Ready::new(vehicle, flights, held_out) {
+        Ok(ready) => ready,
+        Err(error) => return without(compatibility::unreadable(vehicle, flights, held_out, error)?),
+    };
     progress("checking the data");
-    let domain = covered(&predictor);
-    let nominal = predictor.residual(&predictor.nominal())?;
-    let places = find::places(&predictor, &nominal)?;
-    if let Some(problem) = compatibility::problem(&predictor, &nominal, unseen.as_ref(), flights, held_out)? {
+    let aside = compatibility::problems(&ready, flights, held_out)?;
+    let is_bad = |(name, _): &(String, FlightLog)| aside.iter().any(|a| a.flight == *name);
+    if let Some(first) = aside.first().filter(|_| flights.iter().all(is_bad)) {
+        let (goes_with, words) = (format!("{}: {}", first.flight, first.channel), first.words.clone());
+        let places = find::places(&ready.predictor, &ready.nominal)?;
         let verdict = Verdict {
             verdict: Kind::DataProblem,
             effects: Vec::new(),
             moved: Vec::new(),
             alternatives: Vec::new(),
             places,
-            goes_with: Some(format!("{}: {}", problem.flight, problem.channel)),
+            goes_with: Some(goes_with),
             fly_next: None,
             gap: None,
             leftover: None,
             closed_loop: Vec::new(),
             model_patch: None,
-            words: problem.words,
-            notes: predictor.notes.clone(),
+            words,
+            set_aside: aside,
+            notes: ready.predictor.notes.clone(),
         };
-        return Ok(Diagnosis { verdict, domain, details: None });
+        return Ok(Diagnosis { verdict, domain: covered(&ready.predictor), details: None });
     }
+    if aside.is_empty() { judged(vehicle, flights, held_out, ready, progress) } else { without(aside) }
+}
+
+/// The diagnosis of flights that agree with themselves.
+fn judged(
+    vehicle: &VehicleFile,
+    flights: &[(String, FlightLog)],
+    held_out: &[(String, FlightLog)],
+    ready: Ready<'_>,
+    progress: &dyn Fn(&str),
+) -> Result<Diagnosis, GapError> {
+    let Ready { mut predictor, nominal, mut unseen } = ready;
+    let domain = covered(&predictor);
+    let places = find::places(&predictor, &nominal)?;
     let nominal = if let Some(parts) = predictor.in_parts(flights)? {
         predictor = parts;
         predictor.residual(&predictor.nominal())?

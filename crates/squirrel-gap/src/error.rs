@@ -157,3 +157,21 @@ pub enum GapError {
         most: f64,
     },
 }
+
+impl GapError {
+    /// The channel of one flight that is to blame, if it is one.
+    pub(crate) fn channel(&self) -> Option<&'static str> {
+        match self {
+            Self::Missing { channel, .. }
+            | Self::Width { channel, .. }
+            | Self::Length { channel, .. }
+            | Self::Time { channel, .. }
+            | Self::Rotation { channel, .. }
+            | Self::Empty { channel, .. }
+            | Self::Rate { channel, .. }
+            | Self::TooShort { channel, .. } => Some(channel),
+            Self::Rotors { .. } => Some("rotor.command"),
+            _ => None,
+        }
+    }
+}

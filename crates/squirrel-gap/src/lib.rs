@@ -1,6 +1,7 @@
 //! The gap workflow: where simulation and measurement disagree, which missing effect explains it, and what adding it is
 //! worth on flights that were not used to find it.
 //!
+//! - [`check()`] tells which flights contradict themselves, and what to change in their import map.
 //! - [`find`](mod@find) measures the disagreement: residual force and moment of flights against a vehicle.
 //! - [`diagnose()`] names what is missing and proves it on held-out flights in open loop.
 //! - [`add()`] writes the vehicle file with it; [`closed_loop()`] flies held-out flights again with both.
@@ -27,9 +28,10 @@ mod words;
 
 pub use add::{add, add_effect, difference, nothing_to_add};
 pub use closed_loop::{ClosedLoop, closed_loop};
+pub use compatibility::check;
 pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::picture;
-pub use verdict::{Alternative, Gap, Kind, Left, Moved, NamedEffect, Value, Verdict};
+pub use verdict::{Alternative, Gap, Kind, Left, Moved, NamedEffect, SetAside, Value, Verdict};
 pub use words::significant;

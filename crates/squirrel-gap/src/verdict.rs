@@ -152,6 +152,17 @@ pub struct Gap {
     pub best_rival_removed_fraction: Option<f64>,
 }
 
+/// A flight that nothing is said about, because its data contradict themselves.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct SetAside {
+    /// Name of the flight.
+    pub flight: String,
+    /// Full name of the channel.
+    pub channel: &'static str,
+    /// What is wrong and what to change, in one line that names both.
+    pub words: String,
+}
+
 /// The verdict on a set of flights.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Verdict {
@@ -180,6 +191,15 @@ pub struct Verdict {
     pub model_patch: Option<String>,
     /// One paragraph in plain words.
     pub words: String,
+    /// Flights that took no part, of those to fit and of those held out.
+    pub set_aside: Vec<SetAside>,
     /// What the logs lack, and what was taken instead.
     pub notes: Vec<String>,
+}
+
+impl Verdict {
+    /// Whether a flight was looked at, or set aside.
+    pub fn has_looked_at(&self, flight: &str) -> bool {
+        self.set_aside.iter().all(|aside| aside.flight != flight)
+    }
 }

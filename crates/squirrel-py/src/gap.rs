@@ -77,6 +77,13 @@ fn diagnose(
 ) -> PyResult<(squirrel_gap::Verdict, Option<VehicleFile>)> {
     let mut diagnosis =
         squirrel_gap::diagnose(vehicle, flights, held_out, &|_| stop.check()).map_err(value)?;
+    let looked_at = |logs: &Logs| -> Vec<(String, log::FlightLog)> {
+        logs.iter().filter(|(name, _)| diagnosis.verdict.has_looked_at(name)).cloned().collect()
+    };
+    // Whole logs are copied only where some are left out.
+    let fewer = (!diagnosis.verdict.set_aside.is_empty()).then(|| [looked_at(flights), looked_at(held_out)]);
+    let (flights, held_out) =
+        fewer.as_ref().map_or((flights, held_out), |[f, h]| (f.as_slice(), h.as_slice()));
     let names = |logs: &Logs| logs.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
     let text = squirrel_gap::nothing_to_add(&diagnosis.verdict)
         .is_none()

@@ -133,7 +133,9 @@ impl Given {
         });
         bar.finish_and_clear();
         let diagnosis = diagnosis.map_err(|e| e.to_string())?;
-        let flights = flights.into_iter().map(|(name, _)| name).collect();
+        let looked_at = |flight: &(String, FlightLog)| diagnosis.verdict.has_looked_at(&flight.0);
+        let held_out = held_out.into_iter().filter(looked_at).collect();
+        let flights = flights.into_iter().filter(looked_at).map(|(name, _)| name).collect();
         Ok(Found { vehicle, flights, held_out, diagnosis })
     }
 

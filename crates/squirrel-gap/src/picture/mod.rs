@@ -140,7 +140,8 @@ pub fn picture(
 ) -> ReportData {
     let verdict = &diagnosis.verdict;
     let said = |text: &str| {
-        let names = flights.iter().chain(held_out);
+        let aside = verdict.set_aside.iter().map(|aside| &aside.flight);
+        let names = flights.iter().chain(held_out).chain(aside);
         names.fold(text.to_owned(), |text, name| text.replace(name, &short(name)))
     };
     let domain = diagnosis.domain.iter().map(|c| DomainRow {

@@ -26,6 +26,10 @@ impl Commands {
         Self { rotor: rotor.collect(), wing: wing.collect(), began_s: recording.pieces[0].0 }
     }
 
+    pub(crate) fn rotor(&self) -> &[(f64, PerRotor<f64>)] {
+        &self.rotor
+    }
+
     pub(crate) fn has_wing(&self) -> bool {
         !self.wing.is_empty()
     }

@@ -24,7 +24,7 @@ use commands::Commands;
 use kept::Kept;
 use nalgebra::Vector6;
 use squirrel_core::effects::Effects;
-use squirrel_core::vehicle::Vehicle;
+use squirrel_core::vehicle::{PerRotor, Vehicle};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::plant::{Plant, PlantState};
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -288,6 +288,11 @@ impl<'a> Predictor<'a> {
         let (rotor, wing) = self.commands[flight].at(time_s);
         let speed: f64 = rotor[..p.rotor_count].iter().map(|u| p.propulsion.target_speed_rad_s(*u)).sum();
         (speed / (p.rotor_count as f64 * p.propulsion.speed_max_rad_s), 0.5 * (wing[0] + wing[1]))
+    }
+
+    /// The rotor commands of a flight with their stamps, s.
+    pub(crate) fn rotor_commands(&self, flight: usize) -> &[(f64, PerRotor<f64>)] {
+        self.commands[flight].rotor()
     }
 
     /// A hypothesis that the plant cannot be stepped with.

@@ -23,6 +23,7 @@ __all__ = [
     "Parameter",
     "Place",
     "Residual",
+    "SetAside",
     "Verdict",
     "find",
     "name",
@@ -228,6 +229,23 @@ class Moved:
 
 
 @dataclass(frozen=True, kw_only=True)
+class SetAside:
+    """A flight that nothing is said about, because its data contradict themselves.
+
+    Attributes
+    ----------
+    flight, channel : str
+        Names of both.
+    words : str
+        What is wrong and what to change, in one line.
+    """
+
+    flight: str
+    channel: str
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Verdict:
     """The answer of the workflow.
 
@@ -252,6 +270,8 @@ class Verdict:
         Path of the vehicle file with the effects, where one was written.
     words : str
         All of it in plain words.
+    set_aside : tuple of SetAside
+        Flights that took no part, of those to fit and of those held out.
     notes : tuple of str
     patched : Vehicle or None
         The vehicle with the effects in it; None where there are none that a file can take.
@@ -270,6 +290,7 @@ class Verdict:
     closed_loop: tuple[ClosedLoop, ...]
     model_patch: str | None
     words: str
+    set_aside: tuple[SetAside, ...]
     notes: tuple[str, ...]
     patched: Vehicle | None
 
@@ -423,6 +444,7 @@ def _verdict(verdict: dict[str, Any], patched: Vehicle | None) -> Verdict:
         closed_loop=tuple(_flown(flown) for flown in verdict["closed_loop"]),
         model_patch=verdict["model_patch"],
         words=verdict["words"],
+        set_aside=tuple(SetAside(**flight) for flight in verdict["set_aside"]),
         notes=tuple(verdict["notes"]),
         patched=patched,
     )

@@ -1,0 +1,43 @@
+//! Flights that are given twice, whole or in part: a flight proves nothing about itself.
+
+use crate::verdict::SetAside;
+use squirrel_sim::log::FlightLog;
+use std::collections::HashSet;
+
+const CHANNEL: &str = "imu.specific_force_body_m_s2";
+
+/// The flights of the second list that repeat one of the first, or an earlier one of their own list.
+pub(super) fn repeated<'a>(flights: impl Iterator<Item = &'a (String, FlightLog)>) -> Vec<SetAside> {
+    let all: Vec<_> = flights.map(|(name, log)| (name, rows(log))).collect();
+    let sets: Vec<HashSet<&[u64; 6]>> = all.iter().map(|(_, rows)| rows.iter().collect()).collect();
+    let mut found: Vec<SetAside> = Vec::new();
+    for (index, (name, own)) in all.iter().enumerate() {
+        let earlier = (0..index).filter(|i| found.iter().all(|aside| aside.flight != *all[*i].0));
+        for other in earlier {
+            let same = own.iter().filter(|row| sets[other].contains(*row)).count();
+            // The shorter flight may lie in the longer one, whichever is given first.
+            if 2 * same > own.len().min(all[other].1.len()) {
+                let share = 100.0 * same as f64 / own.len() as f64;
+                found.push(SetAside {
+                    flight: (*name).clone(),
+                    channel: CHANNEL,
+                    words: format!(
+                        "{name}: {CHANNEL}: {share:.0} % of its samples are those of {}; a flight proves nothing about itself",
+                        all[other].0
+                    ),
+                });
+                break;
+            }
+        }
+    }
+    found
+}
+
+/// What the inertial unit said, to the bit.
+fn rows(log: &FlightLog) -> Vec<[u64; 6]> {
+    let Some((_, forces)) = log.channel(CHANNEL) else { return Vec::new() };
+    let Some((_, rates)) = log.channel("imu.omega_body_rad_s") else { return Vec::new() };
+    let pairs = forces.values.chunks_exact(3).zip(rates.values.chunks_exact(3));
+    let rows = pairs.map(|(f, w)| [f[0], f[1], f[2], w[0], w[1], w[2]]);
+    rows.filter(|row| row.iter().all(|x| x.is_finite())).map(|row| row.map(f64::to_bits)).collect()
+}
