@@ -86,6 +86,7 @@ pub(super) fn note(flight: &str, spans: &[Span]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight::filter::CUTOFF_HZ;
     use squirrel_sim::log::FlightLog;
     use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -115,7 +116,7 @@ mod tests {
 
     fn pieces(log: &FlightLog) -> (Vec<Span>, Vec<String>) {
         let vehicle = VehicleFile::squirrel();
-        let recording = Recording::new(&vehicle, "f", log).unwrap();
+        let recording = Recording::new(&vehicle, "f", log, CUTOFF_HZ).unwrap();
         (recording.pieces, recording.notes)
     }
 

@@ -2,6 +2,7 @@
 
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
 use super::ground;
+use super::inertial::{ATTITUDE, Derived, Inertial, Sources, VELOCITY};
 use super::series::{Series, Span, common};
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
@@ -16,14 +17,20 @@ use squirrel_sim::vehicle_file::VehicleFile;
 const RATE_MIN_HZ: f64 = 4.0 * CUTOFF_HZ;
 /// For so long a monitor of coarse steps may show a battery in flight without a change, s.
 const STUCK_MIN_S: f64 = 10.0;
+/// Longest step of the grid where there is no IMU: a model is asked as often, s.
+const STEP_MAX_S: f64 = 0.01;
 /// Shortest flight worth a number, s.
 const USABLE_MIN_S: f64 = 1.0;
 
 /// The channels of one flight.
 pub(crate) struct Recording<'a> {
     pub(crate) flight: &'a str,
-    /// Step of the grid: the median period of the IMU, s.
+    /// Step of the grid: the median period of the IMU, or of what stands in for it, s.
     pub(crate) period_s: f64,
+    /// Corner of the filter, Hz.
+    pub(crate) cutoff_hz: f64,
+    /// What forces and rates come from where the log has no IMU: they have passed the filter already.
+    pub(crate) derived: Derived,
     pub(crate) filter: LowPass,
     /// Where every channel exists for longer than the filter has edges.
     pub(crate) pieces: Vec<Span>,
@@ -57,10 +64,16 @@ pub(crate) struct Sample {
 impl<'a> Recording<'a> {
     /// # Errors
     /// [`GapError`] with the first channel that is missing, cannot be, or leaves less than a second.
-    pub(crate) fn new(vehicle: &VehicleFile, flight: &'a str, log: &FlightLog) -> Result<Self, GapError> {
+    ///
+    /// * `cutoff_hz` - corner of the filter, see [`common_cutoff_hz`](super::inertial::common_cutoff_hz)
+    pub(crate) fn new(
+        vehicle: &VehicleFile,
+        flight: &'a str,
+        log: &FlightLog,
+        cutoff_hz: f64,
+    ) -> Result<Self, GapError> {
         let parameters = vehicle.vehicle.parameters();
-        let specific_force = Series::need(flight, log, "imu.specific_force_body_m_s2", 3)?;
-        let omega = Series::need(flight, log, "imu.omega_body_rad_s", 3)?;
+        let mut sources = Sources::read(flight, log)?;
         let rotor =
             Series::need(flight, log, "rotor.command", parameters.rotor_count).map_err(|e| match e {
                 GapError::Width { flight, found, needed, .. } => {
@@ -69,12 +82,10 @@ impl<'a> Recording<'a> {
                 other => other,
             })?;
         let optional = |channel, width| Series::read(flight, log, channel, width);
-        let attitude = optional("attitude.q_ned_from_body_wxyz", 4)?;
-        if let Some(attitude) = &attitude {
-            attitude.check_rotations(flight)?;
-        }
-        let velocity = optional("gnss.velocity_ned_m_s", 3)?;
-        let position = optional("gnss.position_ned_m", 3)?;
+        let Inertial { force: specific_force, rates: omega, velocity, mut notes } =
+            sources.inertial(flight, cutoff_hz)?;
+        let Sources { attitude, velocity: logged, position, differences: derived, .. } = sources;
+        let velocity = velocity.or(logged);
         let baro = optional("baro.altitude_m", 1)?;
         let voltage = optional("battery.voltage_v", 1)?;
         let long = voltage.as_ref().filter(|voltage| voltage.duration_s() >= STUCK_MIN_S);
@@ -83,10 +94,7 @@ impl<'a> Recording<'a> {
         let has_wings = vehicle.wing != WingPlant::None;
         let wing = if has_wings { optional("wing.command", 2)? } else { None };
 
-        let mut notes = Vec::new();
-        for (channel, series) in
-            [("attitude.q_ned_from_body_wxyz", &attitude), ("gnss.velocity_ned_m_s", &velocity)]
-        {
+        for (channel, series) in [(ATTITUDE, &attitude), (VELOCITY, &velocity)] {
             if series.is_none() {
                 notes.push(format!(
                     "{flight}: {channel}: missing; drag and wings are those of zero velocity over ground"
@@ -117,7 +125,10 @@ impl<'a> Recording<'a> {
             notes.push(format!("{flight}: wing.command: missing; the wings are taken as folded"));
         }
 
-        let period_s = specific_force.median_period_s();
+        let mut period_s = specific_force.median_period_s();
+        if derived.force.is_some() {
+            period_s = period_s.min(STEP_MAX_S);
+        }
         let rate_hz = 1.0 / period_s;
         if rate_hz < RATE_MIN_HZ {
             let (flight, channel) = (flight.to_owned(), specific_force.channel);
@@ -126,7 +137,9 @@ impl<'a> Recording<'a> {
         let mut recording = Self {
             flight,
             period_s,
-            filter: LowPass::new(rate_hz),
+            cutoff_hz,
+            derived,
+            filter: LowPass::new(rate_hz, cutoff_hz),
             pieces: vec![(f64::NEG_INFINITY, f64::INFINITY)],
             notes,
             rotor,
@@ -244,7 +257,14 @@ impl<'a> Recording<'a> {
 
     /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard deviation.
     pub(crate) fn imu_noise(&self) -> [Vector3<f64>; 2] {
-        [self.specific_force.white_deviation(), self.omega.white_deviation()]
+        // Behind the filter nothing is white; what is left of the noise is as large.
+        let alike = |noise| Vector3::repeat(noise);
+        let force = self.derived.force.as_ref().map(|from| alike(from.passed(self.cutoff_hz)));
+        let rates = self.derived.rates.as_ref().map(|from| alike(from.passed_rate(self.cutoff_hz)));
+        [
+            force.unwrap_or_else(|| self.specific_force.white_deviation()),
+            rates.unwrap_or_else(|| self.omega.white_deviation()),
+        ]
     }
 
     /// Whether the log has an attitude.

@@ -27,6 +27,8 @@ const MOMENTS: [&str; 6] = [
     "rotor_gyro_torque",
     "yaw_torque_coeff",
 ];
+/// Effects on an accelerometer, and on velocities against it.
+const ACCELEROMETER: [&str; 2] = ["accel_bias", "gnss_latency"];
 const HORIZONTAL: [&str; 9] = [
     "accel_bias",
     "added_mass",
@@ -107,6 +109,10 @@ impl Catalogue {
             airframe: airframe(predictor),
         };
         for name in Effects::<f64>::NAMES {
+            // What nobody measured with is off by nothing.
+            if ACCELEROMETER.contains(name) && !predictor.has_accelerometer() {
+                continue;
+            }
             if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
                 continue;
             }

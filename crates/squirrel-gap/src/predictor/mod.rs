@@ -12,12 +12,14 @@
 mod actuators;
 mod commands;
 mod kept;
+mod noise;
 mod spread;
 mod track;
 
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
+use crate::flight::inertial::common_cutoff_hz;
 use crate::flight::recording::Recording;
 use actuators::{Path, Paths, stride};
 use commands::Commands;
@@ -123,11 +125,12 @@ impl<'a> Predictor<'a> {
         }
         let (mut tracks, mut commands, mut notes, mut names) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let cutoff_hz = common_cutoff_hz(flights)?;
         for (index, (flight, log)) in flights.iter().enumerate() {
             if names.contains(&flight.as_str()) {
                 return Err(GapError::SameName { flight: flight.clone() });
             }
-            let recording = Recording::new(vehicle, flight, log)?;
+            let recording = Recording::new(vehicle, flight, log, cutoff_hz)?;
             let spans = spread::spread(&recording, limit_s(index));
             tracks.extend(spans.into_iter().map(|span| Track::new(index, &recording, span)));
             commands.push(Commands::new(&recording));
@@ -150,7 +153,9 @@ impl<'a> Predictor<'a> {
             for channel in 0..DYNAMIC {
                 push(channel, track.measured.len(), track.residual_time_s(0), step_s);
             }
-            if let Some((t0_s, _)) = motion.kinematic.first() {
+            // Where forces are those of the velocity, it agrees with itself.
+            let kinematic = motion.kinematic.first().filter(|_| track.has_accelerometer());
+            if let Some((t0_s, _)) = kinematic {
                 let n = motion.kinematic.len();
                 let step_s = (motion.kinematic[n - 1].0 - t0_s) / (n - 1).max(1) as f64;
                 for channel in DYNAMIC..CHANNELS.len() {
@@ -286,6 +291,14 @@ impl<'a> Predictor<'a> {
     pub(crate) fn has_motion(&self) -> bool {
         self.tracks.iter().all(|t| t.attitude().is_some() && !t.velocity().is_empty())
     }
+    /// Whether every flight has forces that were measured as such.
+    pub(crate) fn has_accelerometer(&self) -> bool {
+        self.tracks.iter().all(Track::has_accelerometer)
+    }
+    /// Whether every flight has rates that were measured as such.
+    pub(crate) fn has_gyroscope(&self) -> bool {
+        self.tracks.iter().all(|t| t.derived.rates.is_none())
+    }
     /// Whether every flight has a height.
     pub(crate) fn has_height(&self) -> bool {
         self.tracks.iter().all(|t| t.attitude().is_some() && !t.altitude_m().is_empty())
@@ -404,7 +417,9 @@ fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<V
             plant.meet(&mut earlier, &motion.body[k], before);
             a = (a + plant.led(&earlier).angular_acceleration) * 0.5;
         }
-        let (f, a) = (led.specific_force.vector, a.vector);
+        let bias = plant.effects().specific_force_bias(state.time_s).vector;
+        let f = track.as_shown(k, led.specific_force.vector, motion, bias);
+        let a = a.vector;
         predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
     });
     let filtered = filter.apply(&predicted, track.edge() - path.first, track.every);

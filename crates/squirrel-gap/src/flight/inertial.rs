@@ -1,0 +1,163 @@
+//! Specific force and angular rates of a flight: of the IMU, or of what else a log has.
+//!
+//! | what is logged | specific force |
+//! |---|---|
+//! | `imu.specific_force_body_m_s2` | itself |
+//! | `imu.acceleration_ned_m_s2`, attitude | `R^T (a - g)`: an accelerometer that a flight controller has turned into the world |
+//! | position or velocity, attitude | differences behind a low-pass ([`smoother`](super::smoother)) |
+//!
+//! Rates are the gyroscope's, or differences of the attitude. One corner serves forces and moments of all flights that are
+//! looked at together, the lowest that one of them needs, so that their residuals are alike.
+
+use super::filter::CUTOFF_HZ;
+use super::series::Series;
+use super::smoother::{self, Differences};
+use crate::GapError;
+use crate::words::significant;
+use nalgebra::{UnitQuaternion, Vector3};
+use squirrel_core::math::GRAVITY_M_S2;
+use squirrel_sim::log::FlightLog;
+
+const FORCE: &str = "imu.specific_force_body_m_s2";
+const RATES: &str = "imu.omega_body_rad_s";
+pub(super) const ATTITUDE: &str = "attitude.q_ned_from_body_wxyz";
+pub(super) const VELOCITY: &str = "gnss.velocity_ned_m_s";
+pub(super) const POSITION: &str = "gnss.position_ned_m";
+/// Accelerometer in the world less gravity.
+const TURNED: &str = "imu.acceleration_ned_m_s2";
+
+/// What a log says of the motion, and what the rest can be had from.
+pub(crate) struct Sources {
+    force: Option<Series>,
+    rates: Option<Series>,
+    pub(super) attitude: Option<Series>,
+    pub(super) velocity: Option<Series>,
+    pub(super) position: Option<Series>,
+    pub(super) differences: Derived,
+}
+
+/// What was differentiated, for want of an IMU.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Derived {
+    pub(crate) force: Option<Differences>,
+    pub(crate) rates: Option<Differences>,
+    /// What the noise of attitudes makes of gravity, m/s^2, one standard deviation of a sample of the force.
+    pub(crate) lean: Vector3<f64>,
+}
+
+/// Forces and rates, whatever they come from.
+pub(crate) struct Inertial {
+    pub(crate) force: Series,
+    pub(crate) rates: Series,
+    pub(crate) velocity: Option<Series>,
+    pub(crate) notes: Vec<String>,
+}
+
+impl Sources {
+    /// # Errors
+    /// [`GapError`]: nothing that forces or rates could be had from, or a channel that cannot be.
+    pub(crate) fn read(flight: &str, log: &FlightLog) -> Result<Self, GapError> {
+        let optional = |channel, width| Series::read(flight, log, channel, width);
+        let attitude = optional(ATTITUDE, 4)?;
+        if let Some(attitude) = &attitude {
+            attitude.check_rotations(flight)?;
+        }
+        let (velocity, position) = (optional(VELOCITY, 3)?, optional(POSITION, 3)?);
+        let neither = |channel, instead| GapError::Neither { flight: flight.to_owned(), channel, instead };
+        let mut differences = Derived::default();
+        let mut force = optional(FORCE, 3)?;
+        if force.is_none() {
+            let instead = "gnss.position_ned_m, gnss.velocity_ned_m_s or imu.acceleration_ned_m_s2 \
+                with attitude.q_ned_from_body_wxyz";
+            let turned = optional(TURNED, 3)?;
+            let attitude = attitude.as_ref().ok_or_else(|| neither(FORCE, instead))?;
+            if let Some(turned) = turned {
+                force = turned_back(&turned, attitude);
+            }
+            if force.is_none() {
+                let from = smoother::force_source(flight, position.as_ref(), velocity.as_ref())?;
+                let from = from.ok_or_else(|| neither(FORCE, instead))?;
+                let more = (attitude.median_period_s() / from.period_s()).sqrt();
+                let tilt = smoother::attitude_white(attitude) * (GRAVITY_M_S2 * more);
+                differences.lean = Vector3::new(tilt.y, tilt.x, 0.0);
+                differences.force = Some(from);
+            }
+        }
+        let rates = optional(RATES, 3)?;
+        if rates.is_none() {
+            let attitude = attitude.as_ref().ok_or_else(|| neither(RATES, ATTITUDE))?;
+            differences.rates = Some(smoother::rate_source(flight, attitude)?);
+        }
+        Ok(Self { force, rates, attitude, velocity, position, differences })
+    }
+
+    /// Highest corner at which there is more motion than noise, Hz.
+    pub(crate) fn cutoff_hz(&self) -> f64 {
+        let all = [&self.differences.force, &self.differences.rates];
+        all.into_iter().flatten().map(|d| d.cutoff_hz).fold(CUTOFF_HZ, f64::min)
+    }
+
+    /// Forces and rates behind a corner.
+    pub(super) fn inertial(&mut self, flight: &str, cutoff_hz: f64) -> Result<Inertial, GapError> {
+        let corner = significant(cutoff_hz, 2);
+        let short =
+            |channel| GapError::TooShort { flight: flight.to_owned(), channel, usable_s: 0.0, least_s: 1.0 };
+        let (mut notes, mut velocity) = (Vec::new(), None);
+        let force = match (self.force.take(), &self.differences.force, &self.attitude) {
+            (None, Some(from), Some(attitude)) => {
+                let source = if from.channel == POSITION { &self.position } else { &self.velocity };
+                let source = source.as_ref().ok_or_else(|| short(FORCE))?;
+                let noise = significant(from.passed(cutoff_hz), 2);
+                notes.push(format!(
+                    "{flight}: {FORCE}: missing; forces are those of {} differentiated, below {corner} Hz, with noise of {noise} m/s^2",
+                    from.channel
+                ));
+                if self.velocity.is_none() {
+                    velocity = Series::computed(VELOCITY, 3, smoother::velocity(source, cutoff_hz));
+                    notes.push(format!("{flight}: {VELOCITY}: missing; that of {POSITION} is taken"));
+                }
+                let rows = smoother::specific_force(from, source, attitude, cutoff_hz);
+                Series::computed(FORCE, 3, rows).ok_or_else(|| short(from.channel))?
+            }
+            (force, ..) => force.ok_or_else(|| short(FORCE))?,
+        };
+        let rates = match (self.rates.take(), &self.differences.rates, &self.attitude) {
+            (None, Some(from), Some(attitude)) => {
+                let noise = significant(from.passed(cutoff_hz), 2);
+                notes.push(format!(
+                    "{flight}: {RATES}: missing; rates are those of {ATTITUDE}, below {corner} Hz, with noise of {noise} rad/s^2 in their derivative; faster moments cannot be judged"
+                ));
+                let rows = smoother::rates(from, attitude, cutoff_hz);
+                Series::computed(RATES, 3, rows).ok_or_else(|| short(ATTITUDE))?
+            }
+            (rates, ..) => rates.ok_or_else(|| short(RATES))?,
+        };
+        Ok(Inertial { force, rates, velocity, notes })
+    }
+}
+
+/// The lowest corner that one of some flights needs, Hz.
+///
+/// # Errors
+/// As [`Sources::read`].
+pub(crate) fn common_cutoff_hz(flights: &[(String, FlightLog)]) -> Result<f64, GapError> {
+    flights
+        .iter()
+        .try_fold(CUTOFF_HZ, |lowest, (flight, log)| Ok(lowest.min(Sources::read(flight, log)?.cutoff_hz())))
+}
+
+/// What an accelerometer felt whose readings were turned into the world and lost gravity there.
+fn turned_back(turned: &Series, attitude: &Series) -> Option<Series> {
+    let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
+    let exists = attitude.spans();
+    let (mut time_s, mut values) = (Vec::new(), Vec::new());
+    for (t, row) in turned.samples() {
+        if exists.iter().any(|span| (span.0..=span.1).contains(&t)) {
+            let q = UnitQuaternion::new_normalize(attitude.rotation(t));
+            let felt = q.inverse_transform_vector(&(Vector3::from_column_slice(row) - gravity));
+            time_s.push(t);
+            values.extend_from_slice(felt.as_slice());
+        }
+    }
+    Series::computed(FORCE, 3, (time_s, values))
+}
