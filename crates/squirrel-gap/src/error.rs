@@ -40,7 +40,7 @@ pub enum GapError {
         channel: &'static str,
     },
     /// A channel without which there is no residual, and all that it could be had from.
-    #[error("{flight}: {channel}: missing, and so is {instead}; the residual needs it or them")]
+    #[error("{flight}: {channel}: missing; the residual needs it, or {instead}")]
     Neither {
         /// Name of the flight.
         flight: String,

@@ -158,9 +158,7 @@ fn neither_imu_nor_position_is_one_error() {
     for missing in [&["gnss"][..], &["attitude"]] {
         assert_eq!(
             without(missing),
-            format!(
-                "f: imu.specific_force_body_m_s2: missing, and so is {instead}; the residual needs it or them"
-            )
+            format!("f: imu.specific_force_body_m_s2: missing; the residual needs it, or {instead}")
         );
     }
 }

@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn a_series_shorter_than_the_filter_gives_nothing() {
         assert!(LowPass::new(100.0, CUTOFF_HZ).apply(&[Vector6::zeros(); 40], 20, 1).is_empty());
-        assert!(LowPass::new(100.0, CUTOFF_HZ).apply(&[], 20, 1).is_empty());
+        assert!(LowPass::new(100.0, CUTOFF_HZ).apply::<6>(&[], 20, 1).is_empty());
     }
 
     #[test]

@@ -126,7 +126,8 @@ fn corner_hz(
     highest_hz: f64,
     noise_power: impl Fn(f64) -> f64,
 ) -> f64 {
-    let length = (WINDOW_S / period_s).round() as usize;
+    let longest = runs.iter().map(Vec::len).max().unwrap_or_default();
+    let length = ((WINDOW_S / period_s).round() as usize).min(longest).max(1);
     let bins = (highest_hz / STEP_HZ).floor() as usize;
     // Windows of Hann, half over each other.
     let hann = |k: usize| 0.5 - 0.5 * (TAU * (k as f64 + 0.5) / length as f64).cos();
@@ -155,7 +156,8 @@ fn corner_hz(
     for (bin, power) in power.iter().enumerate() {
         let frequency_hz = (bin + 1) as f64 * STEP_HZ;
         won += power / f64::max(windows, 1.0) - 2.0 * noise_power(frequency_hz);
-        if won > most {
+        // Without any noise there is no corner.
+        if won >= most {
             (most, best_hz) = (won, frequency_hz);
         }
     }

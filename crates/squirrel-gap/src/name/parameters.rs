@@ -27,6 +27,8 @@ const MOMENTS: [&str; 6] = [
     "rotor_gyro_torque",
     "yaw_torque_coeff",
 ];
+/// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows the rotors' own.
+const MARKERS_RAD: f64 = 0.03;
 /// Effects on an accelerometer, and on velocities against it.
 const ACCELEROMETER: [&str; 2] = ["accel_bias", "gnss_latency"];
 const HORIZONTAL: [&str; 9] = [
@@ -133,6 +135,9 @@ impl Catalogue {
         }
         for parameter in &mut all.parameters {
             let effect = all.candidates[parameter.candidate].effect;
+            if effect == "thrust_misalignment" && !predictor.has_accelerometer() {
+                parameter.tolerance = parameter.tolerance.max(MARKERS_RAD);
+            }
             parameter.spread = match timing_s(predictor, effect) {
                 Some(spread) => spread,
                 // What has no declared number has none to be off.
