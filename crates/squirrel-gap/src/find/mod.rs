@@ -31,7 +31,7 @@ mod places;
 mod residual;
 
 use crate::GapError;
-use crate::flight::inertial::common_cutoff_hz;
+use crate::flight::inertial::Common;
 use crate::flight::recording::Recording;
 use crate::predictor::Predictor;
 use nalgebra::Vector6;
@@ -140,9 +140,9 @@ pub fn find(vehicle: &VehicleFile, flights: &[(String, FlightLog)]) -> Result<Fi
     let mut total = Sum::default();
     let mut per_flight = BTreeMap::new();
     let mut notes = Vec::new();
-    let cutoff_hz = common_cutoff_hz(flights)?;
+    let common = Common::of(flights, vehicle.vehicle.rotors().len())?;
     for (flight, log) in flights {
-        let recording = Recording::new(vehicle, flight, log, cutoff_hz)?;
+        let recording = Recording::new(vehicle, flight, log, common)?;
         let mut sum = Sum::default();
         for piece in &recording.pieces {
             for residual in residual::residuals(vehicle, &recording, *piece)? {

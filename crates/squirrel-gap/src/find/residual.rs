@@ -102,6 +102,7 @@ fn model(
     let dt_s = recording.period_s / steps as f64;
     // Without a battery, whose voltage is measured.
     let plant = Plant::new(vehicle.vehicle, vehicle.effects, vehicle.wing.clone(), None, dt_s)
+        .map(|plant| if recording.speed.is_some() { plant.told_rotor_speeds() } else { plant })
         .map_err(|problem| GapError::Vehicle { vehicle: vehicle.name.clone(), problem })?;
     let follow = |state: &mut PlantState, at_s: f64, voltage_v: f64, next: State<f64>| {
         // A command acts from the step that is nearest to its time.

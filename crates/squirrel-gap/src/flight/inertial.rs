@@ -23,6 +23,11 @@ const RATES: &str = "imu.omega_body_rad_s";
 pub(super) const ATTITUDE: &str = "attitude.q_ned_from_body_wxyz";
 pub(super) const VELOCITY: &str = "gnss.velocity_ned_m_s";
 pub(super) const POSITION: &str = "gnss.position_ned_m";
+pub(super) const ROTOR_SPEED: &str = "rotor.speed_rad_s";
+/// Metadata that only flights of the simulator have.
+const SIMULATED: &str = "scenario_toml";
+/// Samples of rotor speeds to a period of the corner, at least.
+const SPEEDS_OF_CUTOFF: f64 = 4.0;
 /// Accelerometer in the world less gravity.
 const TURNED: &str = "imu.acceleration_ned_m_s2";
 
@@ -136,14 +141,39 @@ impl Sources {
     }
 }
 
-/// The lowest corner that one of some flights needs, Hz.
-///
-/// # Errors
-/// As [`Sources::read`].
-pub(crate) fn common_cutoff_hz(flights: &[(String, FlightLog)]) -> Result<f64, GapError> {
-    flights
-        .iter()
-        .try_fold(CUTOFF_HZ, |lowest, (flight, log)| Ok(lowest.min(Sources::read(flight, log)?.cutoff_hz())))
+/// Measured rotor speeds. A flight of the simulator has those of its plant: they are truth, and no sensor gave them.
+pub(super) fn rotor_speed(flight: &str, log: &FlightLog, rotors: usize) -> Result<Option<Series>, GapError> {
+    if log.metadata.contains_key(SIMULATED) {
+        return Ok(None);
+    }
+    Series::read(flight, log, ROTOR_SPEED, rotors)
+}
+
+/// What is the same for all flights that are looked at together, so that their residuals are alike.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Common {
+    /// Corner of the filter, the lowest that one of them needs, Hz.
+    pub(crate) cutoff_hz: f64,
+    /// Rotors turn as fast as was measured in every flight, whatever they were told.
+    pub(crate) rotor_speeds: bool,
+}
+
+impl Common {
+    /// # Errors
+    /// As [`Sources::read`], or rotor speeds that cannot be.
+    pub(crate) fn of(flights: &[(String, FlightLog)], rotors: usize) -> Result<Self, GapError> {
+        let mut own = Self { cutoff_hz: CUTOFF_HZ, rotor_speeds: true };
+        for (flight, log) in flights {
+            own.cutoff_hz = own.cutoff_hz.min(Sources::read(flight, log)?.cutoff_hz());
+        }
+        for (flight, log) in flights {
+            let speeds = rotor_speed(flight, log, rotors)?;
+            let is_fast =
+                |speeds: &Series| 1.0 / speeds.median_period_s() >= SPEEDS_OF_CUTOFF * own.cutoff_hz;
+            own.rotor_speeds &= speeds.as_ref().is_some_and(is_fast);
+        }
+        Ok(own)
+    }
 }
 
 /// What an accelerometer felt whose readings were turned into the world and lost gravity there.

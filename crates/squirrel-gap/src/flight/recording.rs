@@ -2,7 +2,7 @@
 
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
 use super::ground;
-use super::inertial::{ATTITUDE, Derived, Inertial, Sources, VELOCITY};
+use super::inertial::{self, ATTITUDE, Common, Derived, Inertial, ROTOR_SPEED, Sources, VELOCITY};
 use super::series::{Series, Span, common};
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
@@ -37,6 +37,8 @@ pub(crate) struct Recording<'a> {
     /// What the log lacks, and what was taken instead.
     pub(crate) notes: Vec<String>,
     pub(crate) rotor: Series,
+    /// Measured rotor speeds, rad/s, where they are taken instead of commands.
+    pub(crate) speed: Option<Series>,
     pub(crate) wing: Option<Series>,
     pub(crate) velocity: Option<Series>,
     pub(crate) position: Option<Series>,
@@ -62,16 +64,17 @@ pub(crate) struct Sample {
 }
 
 impl<'a> Recording<'a> {
+    /// * `common` - what the flight shares with those that are looked at together with it
+    ///
     /// # Errors
     /// [`GapError`] with the first channel that is missing, cannot be, or leaves less than a second.
-    ///
-    /// * `cutoff_hz` - corner of the filter, see [`common_cutoff_hz`](super::inertial::common_cutoff_hz)
     pub(crate) fn new(
         vehicle: &VehicleFile,
         flight: &'a str,
         log: &FlightLog,
-        cutoff_hz: f64,
+        common: Common,
     ) -> Result<Self, GapError> {
+        let Common { cutoff_hz, rotor_speeds } = common;
         let parameters = vehicle.vehicle.parameters();
         let mut sources = Sources::read(flight, log)?;
         let rotor =
@@ -82,6 +85,9 @@ impl<'a> Recording<'a> {
                 other => other,
             })?;
         let optional = |channel, width| Series::read(flight, log, channel, width);
+        let logged_speed = inertial::rotor_speed(flight, log, parameters.rotor_count)?;
+        let is_slow = logged_speed.is_some() && !rotor_speeds;
+        let speed = logged_speed.filter(|_| rotor_speeds);
         let Inertial { force: specific_force, rates: omega, velocity, mut notes } =
             sources.inertial(flight, cutoff_hz)?;
         let Sources { attitude, velocity: logged, position, differences: derived, .. } = sources;
@@ -101,7 +107,16 @@ impl<'a> Recording<'a> {
                 ));
             }
         }
-        if voltage.is_none() {
+        if speed.is_some() {
+            notes.push(format!(
+                "{flight}: {ROTOR_SPEED}: measured, and taken instead of what commands make of it; motor_lag, battery_sag, actuation_latency and clock_skew are not judged"
+            ));
+        } else if is_slow {
+            notes.push(format!(
+                "{flight}: {ROTOR_SPEED}: not taken; it is too slow, or another flight lacks it"
+            ));
+        }
+        if voltage.is_none() && speed.is_none() {
             let reference = parameters.propulsion.reference_voltage_v;
             // A battery that flies changes: a monitor that does not says nothing of it.
             let what = stuck_at_v.map_or_else(
@@ -143,6 +158,7 @@ impl<'a> Recording<'a> {
             pieces: vec![(f64::NEG_INFINITY, f64::INFINITY)],
             notes,
             rotor,
+            speed,
             wing,
             velocity,
             position,
@@ -166,7 +182,7 @@ impl<'a> Recording<'a> {
     /// The spans in which every channel exists, without those that the filter eats.
     fn usable(&self) -> Result<Vec<Span>, GapError> {
         let streams = [Some(&self.specific_force), Some(&self.omega), Some(&self.rotor)];
-        let optional = [self.attitude.as_ref(), self.velocity.as_ref()];
+        let optional = [self.attitude.as_ref(), self.velocity.as_ref(), self.speed.as_ref()];
         let mut spans = vec![(f64::NEG_INFINITY, f64::INFINITY)];
         for series in streams.into_iter().chain(optional).flatten() {
             spans = self.usable_with(&spans, series.channel, &series.spans())?;
@@ -238,10 +254,15 @@ impl<'a> Recording<'a> {
         Sample { time_s, specific_force: self.specific_force.vector(time_s), body, voltage_v }
     }
 
-    /// The rotor command in force at a time, in the vehicle's unit.
+    /// The rotor command in force at a time, in the vehicle's unit; measured speeds, rad/s, where they are taken.
     pub(crate) fn rotor_command(&self, time_s: f64) -> PerRotor<f64> {
         let mut command = [0.0; MAX_ROTORS];
-        for (place, u) in command.iter_mut().zip(self.rotor.held(time_s)) {
+        let held = match &self.speed {
+            // A sample stands for the time about it, not for that after it.
+            Some(speed) => speed.held(time_s + 0.5 * speed.median_period_s()),
+            None => self.rotor.held(time_s),
+        };
+        for (place, u) in command.iter_mut().zip(held) {
             *place = *u;
         }
         command

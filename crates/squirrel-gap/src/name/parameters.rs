@@ -29,6 +29,8 @@ const MOMENTS: [&str; 6] = [
 ];
 /// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows the rotors' own.
 const MARKERS_RAD: f64 = 0.03;
+/// Effects between commands and the speeds of rotors.
+const COMMANDS: [&str; 4] = ["actuation_latency", "battery_sag", "clock_skew", "motor_lag"];
 /// Effects on an accelerometer, and on velocities against it.
 const ACCELEROMETER: [&str; 2] = ["accel_bias", "gnss_latency"];
 const HORIZONTAL: [&str; 9] = [
@@ -103,6 +105,7 @@ impl Catalogue {
         let unseen = |name: &str| {
             (MOMENTS.contains(&name) && !predictor.has_channel(3))
                 || (HORIZONTAL.contains(&name) && !predictor.has_channel(0))
+                || (COMMANDS.contains(&name) && predictor.has_rotor_speeds())
         };
         let mut all = Self {
             candidates: Vec::new(),

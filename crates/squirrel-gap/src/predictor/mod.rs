@@ -19,7 +19,7 @@ mod track;
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
-use crate::flight::inertial::common_cutoff_hz;
+use crate::flight::inertial::Common;
 use crate::flight::recording::Recording;
 use actuators::{Path, Paths, stride};
 use commands::Commands;
@@ -75,6 +75,8 @@ pub(crate) struct Predictor<'a> {
     pub(crate) tracks: Vec<Track>,
     pub(crate) segments: Vec<Segment>,
     pub(crate) notes: Vec<String>,
+    /// Rotors turn as fast as was measured.
+    rotor_speeds: bool,
     commands: Vec<Commands>,
     /// The motion of each track for the effects of the vehicle file and errorless sensors, which most hypotheses share.
     plain: Vec<Rc<Motion>>,
@@ -125,12 +127,12 @@ impl<'a> Predictor<'a> {
         }
         let (mut tracks, mut commands, mut notes, mut names) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let cutoff_hz = common_cutoff_hz(flights)?;
+        let common = Common::of(flights, vehicle.vehicle.rotors().len())?;
         for (index, (flight, log)) in flights.iter().enumerate() {
             if names.contains(&flight.as_str()) {
                 return Err(GapError::SameName { flight: flight.clone() });
             }
-            let recording = Recording::new(vehicle, flight, log, cutoff_hz)?;
+            let recording = Recording::new(vehicle, flight, log, common)?;
             let spans = spread::spread(&recording, limit_s(index));
             tracks.extend(spans.into_iter().map(|span| Track::new(index, &recording, span)));
             commands.push(Commands::new(&recording));
@@ -165,7 +167,8 @@ impl<'a> Predictor<'a> {
         }
         let motions = tracks.iter().map(|_| Kept::default()).collect();
         let paths = Paths::default();
-        Ok(Self { vehicle, names, tracks, segments, notes, commands, plain, motions, paths })
+        let rotor_speeds = common.rotor_speeds;
+        Ok(Self { vehicle, names, tracks, segments, notes, rotor_speeds, commands, plain, motions, paths })
     }
 
     /// Number of rows of a residual.
@@ -274,7 +277,8 @@ impl<'a> Predictor<'a> {
     pub(crate) fn commanded(&self, flight: usize, time_s: f64) -> (f64, f64) {
         let p = self.vehicle.vehicle.parameters();
         let (rotor, wing) = self.commands[flight].at(time_s);
-        let speed: f64 = rotor[..p.rotor_count].iter().map(|u| p.propulsion.target_speed_rad_s(*u)).sum();
+        let turns = |u: &f64| if self.rotor_speeds { *u } else { p.propulsion.target_speed_rad_s(*u) };
+        let speed: f64 = rotor[..p.rotor_count].iter().map(turns).sum();
         (speed / (p.rotor_count as f64 * p.propulsion.speed_max_rad_s), 0.5 * (wing[0] + wing[1]))
     }
 
@@ -302,6 +306,10 @@ impl<'a> Predictor<'a> {
     /// Whether every flight has a height.
     pub(crate) fn has_height(&self) -> bool {
         self.tracks.iter().all(|t| t.attitude().is_some() && !t.altitude_m().is_empty())
+    }
+    /// Whether rotors turn as fast as was measured, whatever they were told.
+    pub(crate) fn has_rotor_speeds(&self) -> bool {
+        self.rotor_speeds
     }
     /// Whether every flight has a battery voltage.
     pub(crate) fn has_voltage(&self) -> bool {
@@ -335,6 +343,7 @@ impl<'a> Predictor<'a> {
     /// [`GapError::Vehicle`]: the plant cannot be stepped with these numbers.
     pub(crate) fn plant_at(&self, hypothesis: &Hypothesis, dt_s: f64) -> Result<Plant, GapError> {
         Plant::new(hypothesis.vehicle, hypothesis.effects, self.vehicle.wing.clone(), None, dt_s)
+            .map(|plant| if self.rotor_speeds { plant.told_rotor_speeds() } else { plant })
             .map_err(|problem| self.refused(problem))
     }
 
