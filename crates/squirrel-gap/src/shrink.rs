@@ -267,7 +267,7 @@ fn compared(
         velocity,
         measured(turns, rotation),
         measured(turns, rate),
-        measured(predictor.has_accelerometer(), force),
+        measured(predictor.is_felt(), force),
     ]
 }
 

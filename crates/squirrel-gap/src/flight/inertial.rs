@@ -6,11 +6,14 @@
 //! | `imu.acceleration_ned_m_s2`, attitude | `R^T (a - g)`: an accelerometer that a flight controller has turned into the world |
 //! | position or velocity, attitude | differences behind a low-pass ([`smoother`](super::smoother)) |
 //!
+//! Where roll and yaw are logged and pitch is not, pitch is where thrust must point for the vehicle to move as it did, which
+//! is what estimators that know no drag believe: `tan(pitch) = a_x / a_z` of `a = v' - g`, along the heading.
+//!
 //! Rates are the gyroscope's, or differences of the attitude. One corner serves forces and moments of all flights that are
 //! looked at together, the lowest that one of them needs, so that their residuals are alike.
 
 use super::filter::CUTOFF_HZ;
-use super::series::Series;
+use super::series::{Series, common};
 use super::smoother::{self, Differences};
 use crate::GapError;
 use crate::words::significant;
@@ -21,6 +24,9 @@ use squirrel_sim::log::FlightLog;
 const FORCE: &str = "imu.specific_force_body_m_s2";
 const RATES: &str = "imu.omega_body_rad_s";
 pub(super) const ATTITUDE: &str = "attitude.q_ned_from_body_wxyz";
+const ROLL: &str = "attitude.roll_rad";
+const PITCH: &str = "attitude.pitch_rad";
+const YAW: &str = "attitude.yaw_rad";
 pub(super) const VELOCITY: &str = "gnss.velocity_ned_m_s";
 pub(super) const POSITION: &str = "gnss.position_ned_m";
 pub(super) const ROTOR_SPEED: &str = "rotor.speed_rad_s";
@@ -46,6 +52,10 @@ pub(crate) struct Sources {
 pub(crate) struct Derived {
     pub(crate) force: Option<Differences>,
     pub(crate) rates: Option<Differences>,
+    /// What pitch comes from.
+    pub(crate) pitch: Option<Differences>,
+    /// The accelerometer was turned into the world by an estimate that used it.
+    pub(crate) turned: bool,
     /// What the noise of attitudes makes of gravity, m/s^2, one standard deviation of a sample of the force.
     pub(crate) lean: Vector3<f64>,
 }
@@ -63,13 +73,25 @@ impl Sources {
     /// [`GapError`]: nothing that forces or rates could be had from, or a channel that cannot be.
     pub(crate) fn read(flight: &str, log: &FlightLog) -> Result<Self, GapError> {
         let optional = |channel, width| Series::read(flight, log, channel, width);
-        let attitude = optional(ATTITUDE, 4)?;
-        if let Some(attitude) = &attitude {
-            attitude.check_rotations(flight)?;
-        }
         let (velocity, position) = (optional(VELOCITY, 3)?, optional(POSITION, 3)?);
         let neither = |channel, instead| GapError::Neither { flight: flight.to_owned(), channel, instead };
         let mut differences = Derived::default();
+        let mut attitude = optional(ATTITUDE, 4)?;
+        if let Some(attitude) = &attitude {
+            attitude.check_rotations(flight)?;
+        } else if let (Some(roll), Some(yaw)) = (optional(ROLL, 1)?, optional(YAW, 1)?) {
+            let pitch = match (optional(PITCH, 1)?, &velocity) {
+                (None, Some(velocity)) => {
+                    let from = smoother::force_source(flight, None, Some(velocity))?;
+                    let pitch = from.as_ref().and_then(|from| pitch_of_thrust(from, velocity, &yaw));
+                    differences.pitch = from;
+                    pitch
+                }
+                (pitch, _) => pitch,
+            };
+            let pitch = pitch.ok_or_else(|| neither(ATTITUDE, "attitude.pitch_rad or gnss.velocity_ned_m_s"))?;
+            attitude = of_angles(&roll, &pitch, &yaw);
+        }
         let mut force = optional(FORCE, 3)?;
         if force.is_none() {
             let instead = "gnss.position_ned_m, gnss.velocity_ned_m_s or imu.acceleration_ned_m_s2 \
@@ -78,6 +100,7 @@ impl Sources {
             let attitude = attitude.as_ref().ok_or_else(|| neither(FORCE, instead))?;
             if let Some(turned) = turned {
                 force = turned_back(&turned, attitude);
+                differences.turned = force.is_some();
             }
             if force.is_none() {
                 let from = smoother::force_source(flight, position.as_ref(), velocity.as_ref())?;
@@ -98,7 +121,7 @@ impl Sources {
 
     /// Highest corner at which there is more motion than noise, Hz.
     pub(crate) fn cutoff_hz(&self) -> f64 {
-        let all = [&self.differences.force, &self.differences.rates];
+        let all = [&self.differences.force, &self.differences.rates, &self.differences.pitch];
         all.into_iter().flatten().map(|d| d.cutoff_hz).fold(CUTOFF_HZ, f64::min)
     }
 
@@ -108,6 +131,16 @@ impl Sources {
         let short =
             |channel| GapError::TooShort { flight: flight.to_owned(), channel, usable_s: 0.0, least_s: 1.0 };
         let (mut notes, mut velocity) = (Vec::new(), None);
+        if self.differences.pitch.is_some() {
+            notes.push(format!(
+                "{flight}: {ATTITUDE}: missing; roll and yaw are logged, pitch is where thrust must point for the logged velocity, below {corner} Hz"
+            ));
+        }
+        if self.differences.turned {
+            notes.push(format!(
+                "{flight}: {FORCE}: missing; forces are those of {TURNED}, turned back by the attitude, below {corner} Hz"
+            ));
+        }
         let force = match (self.force.take(), &self.differences.force, &self.attitude) {
             (None, Some(from), Some(attitude)) => {
                 let source = if from.channel == POSITION { &self.position } else { &self.velocity };
@@ -174,6 +207,33 @@ impl Common {
         }
         Ok(own)
     }
+}
+
+/// Pitch, rad, at which thrust alone makes an acceleration along the heading.
+fn pitch_of_thrust(from: &Differences, velocity: &Series, yaw: &Series) -> Option<Series> {
+    // Twice the corner of forces: what passes them is hardly touched.
+    let (time_s, accelerations) = smoother::accelerations(from, velocity, CUTOFF_HZ.min(2.0 * from.cutoff_hz));
+    let pitch = time_s.iter().zip(accelerations.chunks_exact(3)).map(|(t, a)| {
+        let (sin, cos) = yaw.angle(*t).sin_cos();
+        let (along, down) = (a[0] * cos + a[1] * sin, a[2] - GRAVITY_M_S2);
+        (-along).atan2(-down)
+    });
+    let pitch = pitch.collect();
+    Series::computed(PITCH, 1, (time_s, pitch))
+}
+
+/// The attitude at the times of the pitch at which the other angles exist.
+fn of_angles(roll: &Series, pitch: &Series, yaw: &Series) -> Option<Series> {
+    let exists = common(&roll.spans(), &yaw.spans());
+    let inside = |t: f64| exists.iter().any(|span| (span.0..=span.1).contains(&t));
+    let (mut time_s, mut values) = (Vec::new(), Vec::new());
+    for (t, pitch) in pitch.samples().filter(|(t, _)| inside(*t)) {
+        let yaw = yaw.angle(t);
+        let q = UnitQuaternion::from_euler_angles(roll.number(t), pitch[0], yaw);
+        time_s.push(t);
+        values.extend([q.w, q.i, q.j, q.k]);
+    }
+    Series::computed(ATTITUDE, 4, (time_s, values))
 }
 
 /// What an accelerometer felt whose readings were turned into the world and lost gravity there.

@@ -173,6 +173,13 @@ impl Series {
         a[0] + (b[0] - a[0]) * share
     }
 
+    /// An angle between the samples about `t` by the shorter way, rad.
+    pub(crate) fn angle(&self, t: f64) -> f64 {
+        let (a, b, share) = self.about(t);
+        let turn = b[0] - a[0];
+        a[0] + share * turn.sin().atan2(turn.cos())
+    }
+
     /// A vector on the line between the samples about `t`.
     pub(crate) fn vector(&self, t: f64) -> Vector3<f64> {
         let (a, b, share) = self.about(t);

@@ -257,6 +257,12 @@ pub(crate) fn specific_force(
     })
 }
 
+/// Accelerations in the world, m/s^2, behind a low-pass.
+pub(crate) fn accelerations(from: &Differences, series: &Series, cutoff_hz: f64) -> (Vec<f64>, Vec<f64>) {
+    let raw = |span| from.raw(&evenly(series, span, from.period_s));
+    smoothed(from.period_s, cutoff_hz, &series.spans(), raw)
+}
+
 /// Angular rates, rad/s, body frame, behind the low-pass.
 pub(crate) fn rates(from: &Differences, attitude: &Series, cutoff_hz: f64) -> (Vec<f64>, Vec<f64>) {
     smoothed(from.period_s, cutoff_hz, &attitude.spans(), |span| {

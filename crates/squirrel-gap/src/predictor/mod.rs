@@ -299,6 +299,10 @@ impl<'a> Predictor<'a> {
     pub(crate) fn has_accelerometer(&self) -> bool {
         self.tracks.iter().all(Track::has_accelerometer)
     }
+    /// Whether an accelerometer felt the forces of every flight, whoever turned them.
+    pub(crate) fn is_felt(&self) -> bool {
+        self.tracks.iter().all(Track::is_felt)
+    }
     /// Whether every flight has rates that were measured as such.
     pub(crate) fn has_gyroscope(&self) -> bool {
         self.tracks.iter().all(|t| t.derived.rates.is_none())

@@ -199,7 +199,7 @@ impl Track {
     }
     /// What smoothing leaves of it: a local linear fit with Gaussian weights, over fixes at their rate.
     pub(crate) fn velocity_smoothing(&self) -> f64 {
-        if !self.has_accelerometer() {
+        if !self.is_felt() {
             return 1.0;
         }
         let n = self.velocity.len();
@@ -335,7 +335,7 @@ impl Track {
         bias: Vector3<f64>,
     ) -> Vector3<f64> {
         match &self.attitude {
-            Some(measured) if !self.has_accelerometer() => {
+            Some(measured) if !self.is_felt() => {
                 let [measured, own] =
                     [measured[k], motion.body[k].attitude].map(UnitQuaternion::new_unchecked);
                 (measured.inverse() * own) * (force - bias)
@@ -346,6 +346,10 @@ impl Track {
 
     /// Whether forces were measured as such.
     pub(crate) fn has_accelerometer(&self) -> bool {
+        self.is_felt() && !self.derived.turned
+    }
+    /// Whether an accelerometer felt the forces, whoever turned them.
+    pub(crate) fn is_felt(&self) -> bool {
         self.derived.force.is_none()
     }
 
