@@ -39,6 +39,16 @@ pub enum GapError {
         /// Full name of the channel.
         channel: &'static str,
     },
+    /// A channel without which there is no residual, and all that it could be had from.
+    #[error("{flight}: {channel}: missing; the residual needs it, or {instead}")]
+    Neither {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// What would do instead.
+        instead: &'static str,
+    },
     /// A channel of another shape than its name promises.
     #[error("{flight}: {channel}: has {found} numbers a sample, must have {needed}")]
     Width {

@@ -12,7 +12,8 @@
 //! declared tolerance. One flight's noise is not the mean flight's: where the best model is inside two standard deviations
 //! of what noise leaves from flight to flight, the floor of these flights is taken to be where it is. All models share the
 //! numbers that float inside their tolerances, so that the gap is that of the effect. Where moments are left out of what is
-//! explained, the attitude is the measured one and only velocity and specific force are compared.
+//! explained, the attitude is the measured one and only velocity and specific force are compared; what a log without an IMU
+//! does not measure is not compared either.
 
 use crate::GapError;
 use crate::leftover::floor::TURBULENCE_S;
@@ -248,16 +249,21 @@ struct Noise<'a> {
     rng: &'a mut Pcg64Mcg,
 }
 
+/// Whether the attitude is the plant's own: it is the measured one where nothing is said of moments, or where no gyroscope
+/// says how fast the vehicle turned at the start.
+fn flies_freely(predictor: &Predictor) -> bool {
+    predictor.has_channel(3) && predictor.has_gyroscope()
+}
+
 /// The parts that are compared; the others are zero.
 fn compared(
     predictor: &Predictor,
     [velocity, rotation, rate, force]: [Vector3<f64>; 4],
 ) -> [Vector3<f64>; 4] {
-    if predictor.has_channel(3) {
-        [velocity, rotation, rate, force]
-    } else {
-        [velocity, Vector3::zeros(), Vector3::zeros(), force]
-    }
+    // What was differentiated behind a filter is smoother than anything that a plant does.
+    let measured = |is_measured: bool, value| if is_measured { value } else { Vector3::zeros() };
+    let turns = flies_freely(predictor);
+    [velocity, measured(turns, rotation), measured(turns, rate), measured(predictor.is_felt(), force)]
 }
 
 /// One bin of one segment.
@@ -328,7 +334,7 @@ fn segment(
         let [_, rate_noise] = track.imu_noise;
         state.body.omega = In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * START_NOISE);
     }
-    let is_led = !predictor.has_channel(3);
+    let is_led = !flies_freely(predictor);
     let effects = &hypothesis.effects;
     let mut clock = predictor.clock(track.flight, effects, track.time_s[start]);
     let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);

@@ -42,9 +42,9 @@ fn the_map_turns_a_piece_of_a_flight_into_our_frames() {
     close("gnss.position_ned_m", &[5.896473885513842e-05, 0.011082288809120655, -0.5031231641769409]);
     close("gnss.velocity_ned_m_s", &[0.028661735355854034, -0.030340489000082016, -0.07731214165687561]);
     let acceleration_g = [-0.00902516022324562, 0.007438897155225277, 0.021492421627044678];
-    close("control.estimate.acceleration_ned_m_s2", &acceleration_g.map(|g| g * GRAVITY_M_S2));
-    close("control.estimate.roll_rad", &[-0.06214368715882301_f64.to_radians()]);
-    close("control.estimate.yaw_rad", &[-3.140734910964966_f64.to_radians()]);
+    close("imu.acceleration_ned_m_s2", &acceleration_g.map(|g| g * GRAVITY_M_S2));
+    close("attitude.roll_rad", &[-0.06214368715882301_f64.to_radians()]);
+    close("attitude.yaw_rad", &[-3.140734910964966_f64.to_radians()]);
 }
 
 /// All flights, by name; two have no yaw.
@@ -142,20 +142,20 @@ fn every_flight_obeys_physics() {
         assert!(r > 0.7 && (slope - 1.0).abs() < 0.05, "{name}: {r} {slope}");
 
         // Right side down pulls east, by g times the angle: 0.84 to 1.10 times that in these flights.
-        let roll = column(&log, "control.estimate.roll_rad", 0);
-        let east = column(&log, "control.estimate.acceleration_ned_m_s2", 1);
+        let roll = column(&log, "attitude.roll_rad", 0);
+        let east = column(&log, "imu.acceleration_ned_m_s2", 1);
         let (r, slope) = correlation(&roll, &east);
         assert!(r > 0.2 && (0.75..1.25).contains(&(slope / GRAVITY_M_S2)), "{name}: {r} {slope}");
 
         // Rotors 1 to 4 front right, back right, back left, front left; 1 and 3 turn the nose right. The acceleration is
         // noisy as a pitch, but its correlation has the right sign in every flight, 0.016 to 0.5.
-        let nose_down = column(&log, "control.estimate.acceleration_ned_m_s2", 0);
+        let nose_down = column(&log, "imu.acceleration_ned_m_s2", 0);
         let nose_up: Vec<f64> = nose_down.iter().map(|north| -north / GRAVITY_M_S2).collect();
         let by_roll = follows(&log, &roll, [-1.0, -1.0, 1.0, 1.0]);
         let by_pitch = follows(&log, &nose_up, [1.0, -1.0, -1.0, 1.0]);
         assert!(by_roll > 0.3 && by_pitch > 0.01, "{name}: {by_roll} {by_pitch}");
-        if log.channel("control.estimate.yaw_rad").is_some() {
-            let yaw = column(&log, "control.estimate.yaw_rad", 0);
+        if log.channel("attitude.yaw_rad").is_some() {
+            let yaw = column(&log, "attitude.yaw_rad", 0);
             let by_yaw = follows(&log, &yaw, [1.0, -1.0, 1.0, -1.0]);
             assert!(by_yaw > 0.1, "{name}: {by_yaw}");
         }

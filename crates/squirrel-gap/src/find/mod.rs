@@ -31,6 +31,7 @@ mod places;
 mod residual;
 
 use crate::GapError;
+use crate::flight::inertial::Common;
 use crate::flight::recording::Recording;
 use crate::predictor::Predictor;
 use nalgebra::Vector6;
@@ -126,7 +127,8 @@ impl Sum {
 
 /// Residual force and moment of flights against a vehicle; the equations are in the [module](self).
 ///
-/// * `flights` - name and log of each; needs `imu.*` and `rotor.command`, uses attitude, velocity, voltage and wing command
+/// * `flights` - name and log of each; needs `imu.*` (or position or velocity, and attitude) and `rotor.command`,
+///   uses attitude, velocity, voltage and wing command
 ///
 /// # Errors
 /// [`GapError`]: a channel is missing, cannot be, or leaves less than a second of a flight; the log is of a vehicle with
@@ -138,8 +140,9 @@ pub fn find(vehicle: &VehicleFile, flights: &[(String, FlightLog)]) -> Result<Fi
     let mut total = Sum::default();
     let mut per_flight = BTreeMap::new();
     let mut notes = Vec::new();
+    let common = Common::of(flights, vehicle.vehicle.rotors().len())?;
     for (flight, log) in flights {
-        let recording = Recording::new(vehicle, flight, log)?;
+        let recording = Recording::new(vehicle, flight, log, common)?;
         let mut sum = Sum::default();
         for piece in &recording.pieces {
             for residual in residual::residuals(vehicle, &recording, *piece)? {

@@ -38,7 +38,8 @@ pub(super) fn residuals(
         problem: problem.to_string(),
     })?;
     let parameters = airframe.parameters();
-    let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..samples.len() - DERIVATIVE_REACH)
+    let (measured, predicted): (Vec<Vector6<f64>>, Vec<Vector6<f64>>) = (DERIVATIVE_REACH
+        ..samples.len() - DERIVATIVE_REACH)
         .map(|k| {
             let omega = samples[k].body.omega.vector;
             let omega_dot = derivative(|k| samples[k].body.omega.vector, k, recording.period_s);
@@ -46,15 +47,24 @@ pub(super) fn residuals(
             let moment =
                 parameters.inertia_kg_m2 * omega_dot + omega.cross(&(parameters.inertia_kg_m2 * omega));
             let wrench = &model[k];
-            stack(force - wrench.force.vector, moment - wrench.moment.vector)
+            (stack(force, moment), stack(wrench.force.vector, wrench.moment.vector))
         })
-        .collect();
-    let first = recording.edge();
-    recording
-        .filter
-        .apply(&raw, recording.filter.reach(), 1)
-        .into_iter()
-        .zip(&samples[first..])
+        .unzip();
+    let (first, reach) = (recording.edge(), recording.filter.reach());
+    let passed = [&measured, &predicted].map(|rows| recording.filter.apply(rows, reach, 1));
+    let [filtered, predicted] = passed;
+    // What was differentiated has passed the filter.
+    let is_derived = |channel: usize| {
+        let from = [&recording.derived.force, &recording.derived.rates];
+        from[channel / 3].is_some()
+    };
+    let left = (0..predicted.len()).map(|i| {
+        Vector6::from_fn(|channel, _| {
+            let rows = if is_derived(channel) { &measured[reach + i] } else { &filtered[i] };
+            rows[channel] - predicted[i][channel]
+        })
+    });
+    left.zip(&samples[first..])
         .map(|(value, sample)| {
             if let Some(i) = value.iter().position(|x| x.is_nan() || x.abs() >= RESIDUAL_MAX) {
                 let (flight, time_s) = (recording.flight.to_owned(), sample.time_s);
@@ -92,6 +102,7 @@ fn model(
     let dt_s = recording.period_s / steps as f64;
     // Without a battery, whose voltage is measured.
     let plant = Plant::new(vehicle.vehicle, vehicle.effects, vehicle.wing.clone(), None, dt_s)
+        .map(|plant| if recording.speed.is_some() { plant.told_rotor_speeds() } else { plant })
         .map_err(|problem| GapError::Vehicle { vehicle: vehicle.name.clone(), problem })?;
     let follow = |state: &mut PlantState, at_s: f64, voltage_v: f64, next: State<f64>| {
         // A command acts from the step that is nearest to its time.

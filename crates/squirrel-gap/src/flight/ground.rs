@@ -86,6 +86,8 @@ pub(super) fn note(flight: &str, spans: &[Span]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::flight::filter::CUTOFF_HZ;
+    use crate::flight::inertial::Common;
     use squirrel_sim::log::FlightLog;
     use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -115,7 +117,8 @@ mod tests {
 
     fn pieces(log: &FlightLog) -> (Vec<Span>, Vec<String>) {
         let vehicle = VehicleFile::squirrel();
-        let recording = Recording::new(&vehicle, "f", log).unwrap();
+        let common = Common { cutoff_hz: CUTOFF_HZ, rotor_speeds: false };
+        let recording = Recording::new(&vehicle, "f", log, common).unwrap();
         (recording.pieces, recording.notes)
     }
 

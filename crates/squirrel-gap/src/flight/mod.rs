@@ -2,5 +2,7 @@
 
 pub(crate) mod filter;
 mod ground;
+pub(crate) mod inertial;
 pub(crate) mod recording;
 pub(crate) mod series;
+pub(crate) mod smoother;

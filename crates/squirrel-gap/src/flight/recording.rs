@@ -2,6 +2,7 @@
 
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
 use super::ground;
+use super::inertial::{self, ATTITUDE, Common, Derived, Inertial, ROTOR_SPEED, Sources, VELOCITY};
 use super::series::{Series, Span, common};
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
@@ -16,20 +17,28 @@ use squirrel_sim::vehicle_file::VehicleFile;
 const RATE_MIN_HZ: f64 = 4.0 * CUTOFF_HZ;
 /// For so long a monitor of coarse steps may show a battery in flight without a change, s.
 const STUCK_MIN_S: f64 = 10.0;
+/// Longest step of the grid where there is no IMU: a model is asked as often, s.
+const STEP_MAX_S: f64 = 0.01;
 /// Shortest flight worth a number, s.
 const USABLE_MIN_S: f64 = 1.0;
 
 /// The channels of one flight.
 pub(crate) struct Recording<'a> {
     pub(crate) flight: &'a str,
-    /// Step of the grid: the median period of the IMU, s.
+    /// Step of the grid: the median period of the IMU, or of what stands in for it, s.
     pub(crate) period_s: f64,
+    /// Corner of the filter, Hz.
+    pub(crate) cutoff_hz: f64,
+    /// What forces and rates come from where the log has no IMU: they have passed the filter already.
+    pub(crate) derived: Derived,
     pub(crate) filter: LowPass,
     /// Where every channel exists for longer than the filter has edges.
     pub(crate) pieces: Vec<Span>,
     /// What the log lacks, and what was taken instead.
     pub(crate) notes: Vec<String>,
     pub(crate) rotor: Series,
+    /// Measured rotor speeds, rad/s, where they are taken instead of commands.
+    pub(crate) speed: Option<Series>,
     pub(crate) wing: Option<Series>,
     pub(crate) velocity: Option<Series>,
     pub(crate) position: Option<Series>,
@@ -55,12 +64,19 @@ pub(crate) struct Sample {
 }
 
 impl<'a> Recording<'a> {
+    /// * `common` - what the flight shares with those that are looked at together with it
+    ///
     /// # Errors
     /// [`GapError`] with the first channel that is missing, cannot be, or leaves less than a second.
-    pub(crate) fn new(vehicle: &VehicleFile, flight: &'a str, log: &FlightLog) -> Result<Self, GapError> {
+    pub(crate) fn new(
+        vehicle: &VehicleFile,
+        flight: &'a str,
+        log: &FlightLog,
+        common: Common,
+    ) -> Result<Self, GapError> {
+        let Common { cutoff_hz, rotor_speeds } = common;
         let parameters = vehicle.vehicle.parameters();
-        let specific_force = Series::need(flight, log, "imu.specific_force_body_m_s2", 3)?;
-        let omega = Series::need(flight, log, "imu.omega_body_rad_s", 3)?;
+        let mut sources = Sources::read(flight, log)?;
         let rotor =
             Series::need(flight, log, "rotor.command", parameters.rotor_count).map_err(|e| match e {
                 GapError::Width { flight, found, needed, .. } => {
@@ -69,12 +85,13 @@ impl<'a> Recording<'a> {
                 other => other,
             })?;
         let optional = |channel, width| Series::read(flight, log, channel, width);
-        let attitude = optional("attitude.q_ned_from_body_wxyz", 4)?;
-        if let Some(attitude) = &attitude {
-            attitude.check_rotations(flight)?;
-        }
-        let velocity = optional("gnss.velocity_ned_m_s", 3)?;
-        let position = optional("gnss.position_ned_m", 3)?;
+        let logged_speed = inertial::rotor_speed(flight, log, parameters.rotor_count)?;
+        let is_slow = logged_speed.is_some() && !rotor_speeds;
+        let speed = logged_speed.filter(|_| rotor_speeds);
+        let Inertial { force: specific_force, rates: omega, velocity, mut notes } =
+            sources.inertial(flight, cutoff_hz)?;
+        let Sources { attitude, velocity: logged, position, differences: derived, .. } = sources;
+        let velocity = velocity.or(logged);
         let baro = optional("baro.altitude_m", 1)?;
         let voltage = optional("battery.voltage_v", 1)?;
         let long = voltage.as_ref().filter(|voltage| voltage.duration_s() >= STUCK_MIN_S);
@@ -83,17 +100,23 @@ impl<'a> Recording<'a> {
         let has_wings = vehicle.wing != WingPlant::None;
         let wing = if has_wings { optional("wing.command", 2)? } else { None };
 
-        let mut notes = Vec::new();
-        for (channel, series) in
-            [("attitude.q_ned_from_body_wxyz", &attitude), ("gnss.velocity_ned_m_s", &velocity)]
-        {
+        for (channel, series) in [(ATTITUDE, &attitude), (VELOCITY, &velocity)] {
             if series.is_none() {
                 notes.push(format!(
                     "{flight}: {channel}: missing; drag and wings are those of zero velocity over ground"
                 ));
             }
         }
-        if voltage.is_none() {
+        if speed.is_some() {
+            notes.push(format!(
+                "{flight}: {ROTOR_SPEED}: measured, and taken instead of what commands make of it; motor_lag, battery_sag, actuation_latency and clock_skew are not judged"
+            ));
+        } else if is_slow {
+            notes.push(format!(
+                "{flight}: {ROTOR_SPEED}: not taken; it is too slow, or another flight lacks it"
+            ));
+        }
+        if voltage.is_none() && speed.is_none() {
             let reference = parameters.propulsion.reference_voltage_v;
             // A battery that flies changes: a monitor that does not says nothing of it.
             let what = stuck_at_v.map_or_else(
@@ -117,7 +140,10 @@ impl<'a> Recording<'a> {
             notes.push(format!("{flight}: wing.command: missing; the wings are taken as folded"));
         }
 
-        let period_s = specific_force.median_period_s();
+        let mut period_s = specific_force.median_period_s();
+        if derived.force.is_some() {
+            period_s = period_s.min(STEP_MAX_S);
+        }
         let rate_hz = 1.0 / period_s;
         if rate_hz < RATE_MIN_HZ {
             let (flight, channel) = (flight.to_owned(), specific_force.channel);
@@ -126,10 +152,13 @@ impl<'a> Recording<'a> {
         let mut recording = Self {
             flight,
             period_s,
-            filter: LowPass::new(rate_hz),
+            cutoff_hz,
+            derived,
+            filter: LowPass::new(rate_hz, cutoff_hz),
             pieces: vec![(f64::NEG_INFINITY, f64::INFINITY)],
             notes,
             rotor,
+            speed,
             wing,
             velocity,
             position,
@@ -153,7 +182,7 @@ impl<'a> Recording<'a> {
     /// The spans in which every channel exists, without those that the filter eats.
     fn usable(&self) -> Result<Vec<Span>, GapError> {
         let streams = [Some(&self.specific_force), Some(&self.omega), Some(&self.rotor)];
-        let optional = [self.attitude.as_ref(), self.velocity.as_ref()];
+        let optional = [self.attitude.as_ref(), self.velocity.as_ref(), self.speed.as_ref()];
         let mut spans = vec![(f64::NEG_INFINITY, f64::INFINITY)];
         for series in streams.into_iter().chain(optional).flatten() {
             spans = self.usable_with(&spans, series.channel, &series.spans())?;
@@ -225,10 +254,15 @@ impl<'a> Recording<'a> {
         Sample { time_s, specific_force: self.specific_force.vector(time_s), body, voltage_v }
     }
 
-    /// The rotor command in force at a time, in the vehicle's unit.
+    /// The rotor command in force at a time, in the vehicle's unit; measured speeds, rad/s, where they are taken.
     pub(crate) fn rotor_command(&self, time_s: f64) -> PerRotor<f64> {
         let mut command = [0.0; MAX_ROTORS];
-        for (place, u) in command.iter_mut().zip(self.rotor.held(time_s)) {
+        let held = match &self.speed {
+            // A sample stands for the time about it, not for that after it.
+            Some(speed) => speed.held(time_s + 0.5 * speed.median_period_s()),
+            None => self.rotor.held(time_s),
+        };
+        for (place, u) in command.iter_mut().zip(held) {
             *place = *u;
         }
         command
@@ -244,7 +278,14 @@ impl<'a> Recording<'a> {
 
     /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard deviation.
     pub(crate) fn imu_noise(&self) -> [Vector3<f64>; 2] {
-        [self.specific_force.white_deviation(), self.omega.white_deviation()]
+        // Behind the filter nothing is white; what is left of the noise is as large.
+        let alike = |noise| Vector3::repeat(noise);
+        let force = self.derived.force.as_ref().map(|from| alike(from.passed(self.cutoff_hz)));
+        let rates = self.derived.rates.as_ref().map(|from| alike(from.passed_rate(self.cutoff_hz)));
+        [
+            force.unwrap_or_else(|| self.specific_force.white_deviation()),
+            rates.unwrap_or_else(|| self.omega.white_deviation()),
+        ]
     }
 
     /// Whether the log has an attitude.

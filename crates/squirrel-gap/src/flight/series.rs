@@ -57,6 +57,15 @@ impl Series {
         Ok(Some(series))
     }
 
+    /// A channel that is computed from others, at times in order; `None` with fewer than two samples.
+    pub(crate) fn computed(
+        channel: &'static str,
+        width: usize,
+        (time_s, values): (Vec<f64>, Vec<f64>),
+    ) -> Option<Self> {
+        (time_s.len() >= 2).then_some(Self { channel, width, time_s, values })
+    }
+
     /// As [`Self::read`], for a channel that must be there.
     ///
     /// # Errors
@@ -164,11 +173,47 @@ impl Series {
         a[0] + (b[0] - a[0]) * share
     }
 
+    /// An angle between the samples about `t` by the shorter way, rad.
+    pub(crate) fn angle(&self, t: f64) -> f64 {
+        let (a, b, share) = self.about(t);
+        let turn = b[0] - a[0];
+        a[0] + share * turn.sin().atan2(turn.cos())
+    }
+
     /// A vector on the line between the samples about `t`.
     pub(crate) fn vector(&self, t: f64) -> Vector3<f64> {
         let (a, b, share) = self.about(t);
         let [a, b] = [a, b].map(Vector3::from_column_slice);
         a + (b - a) * share
+    }
+
+    /// A vector on the cubic through the four samples about `t` (Lagrange), for what is differentiated.
+    pub(crate) fn cubic<const N: usize>(&self, t: f64) -> [f64; N] {
+        self.through_four(t, |_, _| 1.0)
+    }
+
+    /// As [`Self::cubic`] for rotations, each with the sign that is nearer to the first; not of unit length.
+    pub(crate) fn cubic_turned(&self, t: f64) -> [f64; 4] {
+        self.through_four(t, |first, row| {
+            let dot: f64 = first.iter().zip(row).map(|(a, b)| a * b).sum();
+            1.0_f64.copysign(dot)
+        })
+    }
+
+    fn through_four<const N: usize>(&self, t: f64, sign: impl Fn(&[f64], &[f64]) -> f64) -> [f64; N] {
+        let n = self.time_s.len();
+        let first = self.time_s.partition_point(|&x| x <= t).saturating_sub(2).min(n.saturating_sub(4));
+        let four = first..(first + 4).min(n);
+        let mut sum = [0.0; N];
+        for i in four.clone() {
+            let at = |j: usize| (t - self.time_s[j]) / (self.time_s[i] - self.time_s[j]);
+            let weight: f64 = four.clone().filter(|j| *j != i).map(at).product();
+            let weight = weight * sign(self.row(first), self.row(i));
+            for (sum, x) in sum.iter_mut().zip(self.row(i)) {
+                *sum += weight * x;
+            }
+        }
+        sum
     }
 
     /// A rotation between the samples about `t`, given and wanted as `[w, x, y, z]`.
@@ -221,6 +266,16 @@ mod tests {
             [10.0, 10.0, 15.0, 20.0, 10.0, 0.0, 0.0]
         );
         assert_eq!([0.0, 1.9, 2.0, 9.0].map(|t| s.held(t)[0]), [10.0, 10.0, 20.0, 0.0]);
+    }
+
+    #[test]
+    fn a_cubic_goes_through_uneven_samples() {
+        let cube = |t: f64| 1.0 - 2.0 * t + 0.5 * t.powi(3);
+        let time_s = [0.0, 1.1, 1.9, 3.0, 4.2, 5.0];
+        let s = series(&time_s, &time_s.map(cube));
+        for t in [0.0, 0.4, 1.9, 2.5, 3.3, 4.9, 5.0] {
+            assert!((s.cubic::<1>(t)[0] - cube(t)).abs() < 1e-12, "{t}");
+        }
     }
 
     #[test]

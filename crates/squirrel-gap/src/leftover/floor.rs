@@ -4,9 +4,7 @@
 //! drawn anew, filtered and decimated as the measurement was; turbulence of the tolerance of the wind acts through the
 //! predictor's own model.
 
-use crate::flight::filter::{DERIVATIVE_REACH, derivative};
-use crate::predictor::{DYNAMIC, Predictor, Track};
-use nalgebra::{Vector3, Vector6};
+use crate::predictor::{DYNAMIC, Predictor};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -29,7 +27,7 @@ pub(crate) fn draws(
             let mut rng = Pcg64Mcg::seed_from_u64(draw as u64 + 1);
             let mut rows = vec![0.0; predictor.rows()];
             for (piece, track) in predictor.tracks.iter().enumerate() {
-                let white = filtered_noise(track, &mut rng);
+                let white = track.drawn_noise(&mut rng);
                 let mut winds = [Drift::new(TURBULENCE_S, &mut rng), Drift::new(VELOCITY_ERROR_S, &mut rng)];
                 let step_s = track.every as f64 * track.period_s;
                 let air: Vec<[f64; 3]> = (0..white.len())
@@ -73,21 +71,4 @@ impl Drift {
             *value = *value * keep + noise * (1.0 - keep * keep).sqrt();
         }
     }
-}
-
-/// White noise of the accelerometer and the gyroscope of a track behind the filters.
-fn filtered_noise(track: &Track, rng: &mut Pcg64Mcg) -> Vec<Vector6<f64>> {
-    let [accelerometer, gyroscope] = track.imu_noise;
-    let mut draw = |sd: Vector3<f64>| -> Vec<Vector3<f64>> {
-        let mut one = || -> f64 { StandardNormal.sample(rng) };
-        (0..track.time_s.len()).map(|_| Vector3::new(sd.x * one(), sd.y * one(), sd.z * one())).collect()
-    };
-    let (force, rate) = (draw(accelerometer), draw(gyroscope));
-    let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..force.len() - DERIVATIVE_REACH)
-        .map(|k| {
-            let a = derivative(|k| rate[k], k, track.period_s);
-            Vector6::new(force[k].x, force[k].y, force[k].z, a.x, a.y, a.z)
-        })
-        .collect();
-    track.filter.apply(&raw, track.filter.reach(), track.every)
 }

@@ -31,6 +31,12 @@ const MOMENTS: [&str; 8] = [
     "wing_asymmetry",
     "yaw_torque_coeff",
 ];
+/// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows the rotors' own.
+const MARKERS_RAD: f64 = 0.03;
+/// Effects between commands and the speeds of rotors.
+const COMMANDS: [&str; 4] = ["actuation_latency", "battery_sag", "clock_skew", "motor_lag"];
+/// Effects on an accelerometer, and on velocities against it.
+const ACCELEROMETER: [&str; 2] = ["accel_bias", "gnss_latency"];
 const HORIZONTAL: [&str; 9] = [
     "accel_bias",
     "added_mass",
@@ -107,6 +113,7 @@ impl Catalogue {
         let unseen = |name: &str| {
             (MOMENTS.contains(&name) && !predictor.has_channel(3))
                 || (HORIZONTAL.contains(&name) && !predictor.has_channel(0))
+                || (COMMANDS.contains(&name) && predictor.has_rotor_speeds())
         };
         let mut all = Self {
             candidates: Vec::new(),
@@ -116,6 +123,10 @@ impl Catalogue {
             day_fraction: DAY_FRACTION,
         };
         for name in Effects::<f64>::NAMES {
+            // What nobody measured with is off by nothing.
+            if ACCELEROMETER.contains(name) && !predictor.has_accelerometer() {
+                continue;
+            }
             if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
                 continue;
             }
@@ -138,6 +149,9 @@ impl Catalogue {
             let effect = all.candidates[parameter.candidate].effect;
             if effect == "clock_skew" {
                 parameter.tolerance = parameter.tolerance.max(slip_ppm(predictor));
+            }
+            if effect == "thrust_misalignment" && !predictor.has_accelerometer() {
+                parameter.tolerance = parameter.tolerance.max(MARKERS_RAD);
             }
             parameter.spread = match timing_s(predictor, effect) {
                 Some(spread) => spread,

@@ -155,7 +155,7 @@ pub(super) fn slip_ppm(predictor: &Predictor) -> f64 {
 /// By how much thrust may be off, as a fraction, where the battery's voltage is not logged: it is anywhere between full and
 /// empty, the voltage at which the vehicle's numbers hold may be two of its sd off, and thrust goes with the square of both.
 pub(super) fn unlogged_sag(predictor: &Predictor) -> f64 {
-    if predictor.has_voltage() {
+    if predictor.has_voltage() || predictor.has_rotor_speeds() {
         return 0.0;
     }
     let vehicle = predictor.vehicle;

@@ -72,7 +72,7 @@ impl Key {
             (0..PROBES).map(move |i| {
                 let k = i * (track.time_s.len() - 1) / (PROBES - 1);
                 let (rotor, _) = commands[track.flight].at(track.time_s[k]);
-                RotorDrive::new(plant.vehicle(), effects, &rotor, track.voltage_v[k])
+                plant.rotor_drive(&rotor, track.voltage_v[k])
             })
         });
         let [opening, closing] = effects.wing_extra_time_constant_s();

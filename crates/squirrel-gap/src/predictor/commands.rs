@@ -1,4 +1,5 @@
 //! The logged commands as the vehicle got them: held until the next one, late or on another clock where a hypothesis says so.
+//! Measured rotor speeds stand in for commands where there are any, and are neither late nor on another clock.
 
 use crate::flight::recording::Recording;
 use crate::flight::series::Series;
@@ -13,17 +14,27 @@ pub(crate) struct Commands {
     rotor: Vec<(f64, PerRotor<f64>)>,
     wing: Vec<(f64, [f64; 2])>,
     began_s: f64,
+    /// Rotors have measured speeds for commands.
+    rotor_speeds: bool,
 }
 
 impl Commands {
     pub(crate) fn new(recording: &Recording) -> Self {
-        let rotor = recording.rotor.samples().map(|(t, u)| {
+        let speed = recording.speed.as_ref();
+        // A measured sample stands for the time about it, a command for that after it.
+        let ahead_s = speed.map_or(0.0, |speed| 0.5 * speed.median_period_s());
+        let rotor = speed.unwrap_or(&recording.rotor).samples().map(|(t, u)| {
             let mut all = [0.0; MAX_ROTORS];
             all[..u.len()].copy_from_slice(u);
-            (t, all)
+            (t - ahead_s, all)
         });
         let wing = recording.wing.iter().flat_map(Series::samples).map(|(t, c)| (t, [c[0], c[1]]));
-        Self { rotor: rotor.collect(), wing: wing.collect(), began_s: recording.pieces[0].0 }
+        Self {
+            rotor: rotor.collect(),
+            wing: wing.collect(),
+            began_s: recording.pieces[0].0,
+            rotor_speeds: speed.is_some(),
+        }
     }
 
     pub(crate) fn rotor(&self) -> &[(f64, PerRotor<f64>)] {
@@ -67,9 +78,17 @@ impl Clock<'_> {
     fn acts_s(&self, stamp_s: f64) -> f64 {
         self.commands.began_s + (stamp_s - self.commands.began_s) / self.rate + self.latency_s
     }
+    /// When the rotors do what a sample says, s.
+    fn turns_s(&self, stamp_s: f64) -> f64 {
+        if self.commands.rotor_speeds { stamp_s } else { self.acts_s(stamp_s) }
+    }
     pub(crate) fn advance_to(&mut self, time_s: f64) {
         let until_s = time_s + SNAP_S;
-        while self.commands.rotor.get(self.rotor + 1).is_some_and(|(stamp, _)| self.acts_s(*stamp) <= until_s)
+        while self
+            .commands
+            .rotor
+            .get(self.rotor + 1)
+            .is_some_and(|(stamp, _)| self.turns_s(*stamp) <= until_s)
         {
             self.rotor += 1;
         }
@@ -79,7 +98,7 @@ impl Clock<'_> {
     }
     /// Time of the next change, s; infinite after the last.
     pub(crate) fn next_change_s(&self) -> f64 {
-        let rotor = self.commands.rotor.get(self.rotor + 1).map_or(f64::INFINITY, |(s, _)| self.acts_s(*s));
+        let rotor = self.commands.rotor.get(self.rotor + 1).map_or(f64::INFINITY, |(s, _)| self.turns_s(*s));
         let wing = self.commands.wing.get(self.wing + 1).map_or(f64::INFINITY, |(s, _)| self.acts_s(*s));
         rotor.min(wing)
     }

@@ -12,12 +12,14 @@
 mod actuators;
 mod commands;
 mod kept;
+mod noise;
 mod spread;
 mod track;
 
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
+use crate::flight::inertial::Common;
 use crate::flight::recording::Recording;
 use actuators::{Path, Paths, stride};
 use commands::Commands;
@@ -85,6 +87,8 @@ pub(crate) struct Predictor<'a> {
     pub(crate) tracks: Vec<Track>,
     pub(crate) segments: Vec<Segment>,
     pub(crate) notes: Vec<String>,
+    /// Rotors turn as fast as was measured.
+    rotor_speeds: bool,
     commands: Vec<Commands>,
     /// The motion of each track for the effects of the vehicle file and errorless sensors, which most hypotheses share.
     plain: Vec<Rc<Motion>>,
@@ -135,11 +139,12 @@ impl<'a> Predictor<'a> {
         }
         let (mut tracks, mut commands, mut notes, mut names) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let common = Common::of(flights, vehicle.vehicle.rotors().len())?;
         for (index, (flight, log)) in flights.iter().enumerate() {
             if names.contains(&flight.as_str()) {
                 return Err(GapError::SameName { flight: flight.clone() });
             }
-            let recording = Recording::new(vehicle, flight, log)?;
+            let recording = Recording::new(vehicle, flight, log, common)?;
             let spans = spread::spread(&recording, limit_s(index));
             tracks.extend(spans.into_iter().map(|span| Track::new(index, &recording, span)));
             commands.push(Commands::new(&recording));
@@ -162,7 +167,9 @@ impl<'a> Predictor<'a> {
             for channel in 0..DYNAMIC {
                 push(channel, track.measured.len(), track.residual_time_s(0), step_s);
             }
-            if let Some((t0_s, _)) = motion.kinematic.first() {
+            // Where forces are those of the velocity, it agrees with itself.
+            let kinematic = motion.kinematic.first().filter(|_| track.has_accelerometer());
+            if let Some((t0_s, _)) = kinematic {
                 let n = motion.kinematic.len();
                 let step_s = (motion.kinematic[n - 1].0 - t0_s) / (n - 1).max(1) as f64;
                 for channel in DYNAMIC..CHANNELS.len() {
@@ -172,7 +179,8 @@ impl<'a> Predictor<'a> {
         }
         let motions = tracks.iter().map(|_| Kept::default()).collect();
         let paths = Paths::default();
-        Ok(Self { vehicle, names, tracks, segments, notes, commands, plain, motions, paths })
+        let rotor_speeds = common.rotor_speeds;
+        Ok(Self { vehicle, names, tracks, segments, notes, rotor_speeds, commands, plain, motions, paths })
     }
 
     /// Number of rows of a residual.
@@ -286,7 +294,8 @@ impl<'a> Predictor<'a> {
     pub(crate) fn commanded(&self, flight: usize, time_s: f64) -> (f64, f64) {
         let p = self.vehicle.vehicle.parameters();
         let (rotor, wing) = self.commands[flight].at(time_s);
-        let speed: f64 = rotor[..p.rotor_count].iter().map(|u| p.propulsion.target_speed_rad_s(*u)).sum();
+        let turns = |u: &f64| if self.rotor_speeds { *u } else { p.propulsion.target_speed_rad_s(*u) };
+        let speed: f64 = rotor[..p.rotor_count].iter().map(turns).sum();
         (speed / (p.rotor_count as f64 * p.propulsion.speed_max_rad_s), 0.5 * (wing[0] + wing[1]))
     }
 
@@ -308,9 +317,25 @@ impl<'a> Predictor<'a> {
     pub(crate) fn has_motion(&self) -> bool {
         self.tracks.iter().all(|t| t.attitude().is_some() && !t.velocity().is_empty())
     }
+    /// Whether every flight has forces that were measured as such.
+    pub(crate) fn has_accelerometer(&self) -> bool {
+        self.tracks.iter().all(Track::has_accelerometer)
+    }
+    /// Whether an accelerometer felt the forces of every flight, whoever turned them.
+    pub(crate) fn is_felt(&self) -> bool {
+        self.tracks.iter().all(Track::is_felt)
+    }
+    /// Whether every flight has rates that were measured as such.
+    pub(crate) fn has_gyroscope(&self) -> bool {
+        self.tracks.iter().all(|t| t.derived.rates.is_none())
+    }
     /// Whether every flight has a height.
     pub(crate) fn has_height(&self) -> bool {
         self.tracks.iter().all(|t| t.attitude().is_some() && !t.altitude_m().is_empty())
+    }
+    /// Whether rotors turn as fast as was measured, whatever they were told.
+    pub(crate) fn has_rotor_speeds(&self) -> bool {
+        self.rotor_speeds
     }
     /// Whether every flight has a battery voltage.
     pub(crate) fn has_voltage(&self) -> bool {
@@ -360,6 +385,7 @@ impl<'a> Predictor<'a> {
     /// [`GapError::Vehicle`]: the plant cannot be stepped with these numbers.
     pub(crate) fn plant_at(&self, hypothesis: &Hypothesis, dt_s: f64) -> Result<Plant, GapError> {
         Plant::new(hypothesis.vehicle, hypothesis.effects, self.vehicle.wing.clone(), None, dt_s)
+            .map(|plant| if self.rotor_speeds { plant.told_rotor_speeds() } else { plant })
             .map_err(|problem| self.refused(problem))
     }
 
@@ -442,7 +468,9 @@ fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<V
             plant.meet(&mut earlier, &motion.body[k], before);
             a = (a + plant.led(&earlier).angular_acceleration) * 0.5;
         }
-        let (f, a) = (led.specific_force.vector, a.vector);
+        let bias = plant.effects().specific_force_bias(state.time_s).vector;
+        let f = track.as_shown(k, led.specific_force.vector, motion, bias);
+        let a = a.vector;
         predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
     });
     let filtered = filter.apply(&predicted, track.edge() - path.first, track.every);

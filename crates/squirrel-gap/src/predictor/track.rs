@@ -8,7 +8,8 @@
 //! What the smoother takes away is the second family of residuals, `v_GNSS - v_s`: sensors that lie show there, forces that
 //! the model lacks do not.
 
-use crate::flight::filter::{DERIVATIVE_REACH, LowPass, derivative, model_stride};
+use crate::flight::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass, derivative, model_stride};
+use crate::flight::inertial::Derived;
 use crate::flight::recording::Recording;
 use crate::flight::series::{Series, Span};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector6};
@@ -24,8 +25,8 @@ const BIN_S: f64 = 0.1;
 const SMOOTHER_S: f64 = 0.5;
 /// Over which the gyroscope tells the noise of attitudes, s.
 const ATTITUDE_LAG_S: f64 = 0.5;
-/// Rate of the residual of the dynamics, Hz.
-const RATE_HZ: f64 = 30.0;
+/// Rate of the residual of the dynamics over the corner of the filter: 30 Hz with an IMU.
+const RATE_OF_CUTOFF: f64 = 30.0 / CUTOFF_HZ;
 
 /// Times of a flight at which a hypothesis says how far the barometer is off: its zero wanders.
 pub(crate) const HEIGHT_KNOTS: usize = 8;
@@ -58,6 +59,9 @@ pub(crate) struct Track {
     pub(crate) has_voltage: bool,
     /// White noise of accelerometer, m/s^2, and gyroscope, rad/s, one standard deviation.
     pub(crate) imu_noise: [Vector3<f64>; 2],
+    /// What forces and rates come from where there is no IMU, and the corner of the filter, Hz.
+    pub(super) derived: Derived,
+    pub(super) cutoff_hz: f64,
     /// Samples of the grid to one of the residual.
     pub(crate) every: usize,
     /// Samples of the grid from one prediction to the next, and the filter of predictions.
@@ -88,14 +92,30 @@ impl Track {
     pub(crate) fn new(flight: usize, recording: &Recording, piece: Span) -> Self {
         let samples = recording.grid(piece);
         let period_s = recording.period_s;
-        let every = (1.0 / (RATE_HZ * period_s)).round().max(1.0) as usize;
+        let cutoff_hz = recording.cutoff_hz;
+        let every = (1.0 / (RATE_OF_CUTOFF * cutoff_hz * period_s)).round().max(1.0) as usize;
         let stride = model_stride(period_s);
-        let filter = LowPass::new(1.0 / period_s);
+        let filter = recording.filter.clone();
         let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..samples.len() - DERIVATIVE_REACH)
             .map(|k| {
                 let f = samples[k].specific_force;
                 let a = derivative(|k| samples[k].body.omega.vector, k, period_s);
                 Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z)
+            })
+            .collect();
+        // What was differentiated has passed the filter.
+        let filtered = filter.apply(&raw, filter.reach(), every);
+        let as_it_is = || raw[filter.reach()..].iter().copied().step_by(every);
+        let parts = |force: Vector6<f64>, moment: Vector6<f64>| {
+            Vector6::new(force.x, force.y, force.z, moment.w, moment.a, moment.b)
+        };
+        let derived = recording.derived.clone();
+        let measured = filtered
+            .into_iter()
+            .zip(as_it_is())
+            .map(|(filtered, own)| {
+                let force = if derived.force.is_some() { own } else { filtered };
+                parts(force, if derived.rates.is_some() { own } else { filtered })
             })
             .collect();
         let inside = |t: &f64| (piece.0..=piece.1).contains(t);
@@ -115,7 +135,9 @@ impl Track {
             has_voltage: recording.has_voltage(),
             imu_noise: recording.imu_noise(),
             every,
-            measured: filter.apply(&raw, filter.reach(), every),
+            derived,
+            cutoff_hz,
+            measured,
             stride,
             model_filter: filter.thinned(stride),
             filter,
@@ -166,6 +188,9 @@ impl Track {
     }
     /// White noise of the GNSS velocity, m/s, one standard deviation, from differences of strapdown and fixes.
     pub(crate) fn velocity_noise(&self) -> Vector3<f64> {
+        if let Some(from) = &self.derived.force {
+            return Vector3::repeat(from.passed_rate(self.cutoff_hz));
+        }
         let plain = self.motion(&Effects::none(), &SensorErrors::default()).kinematic;
         let n = plain.len().saturating_sub(3).max(1) as f64;
         let sum: Vector3<f64> = plain
@@ -177,6 +202,9 @@ impl Track {
     }
     /// What smoothing leaves of it: a local linear fit with Gaussian weights, over fixes at their rate.
     pub(crate) fn velocity_smoothing(&self) -> f64 {
+        if !self.is_felt() {
+            return 1.0;
+        }
         let n = self.velocity.len();
         let (Some(first), Some(last)) = (self.velocity.first(), self.velocity.last()) else { return 1.0 };
         let step_s = ((last.0 - first.0) / (n - 1).max(1) as f64).max(BIN_S);
@@ -249,7 +277,7 @@ impl Track {
             .collect();
         let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
         let acceleration = |k: usize| {
-            let bias = effects.specific_force_bias(self.time_s[k] - self.began_s).vector;
+            let bias = self.bias(effects, self.time_s[k] - self.began_s);
             attitude[k] * (self.specific_force[k] - bias) + gravity
         };
         let mut strapdown = Vec::with_capacity(n);
@@ -294,6 +322,39 @@ impl Track {
             *e -= mean;
         }
         Motion { body, kinematic }
+    }
+
+    /// What the accelerometer is off by, m/s^2; nothing where there is none.
+    fn bias(&self, effects: &Effects<f64>, time_s: f64) -> Vector3<f64> {
+        if self.has_accelerometer() { effects.specific_force_bias(time_s).vector } else { Vector3::zeros() }
+    }
+
+    /// A force that the model predicts, as this flight shows it: where it comes from what the vehicle did in the world, the
+    /// axes are those of the measured attitude, whatever a hypothesis says of it, and no accelerometer adds its bias.
+    pub(super) fn as_shown(
+        &self,
+        k: usize,
+        force: Vector3<f64>,
+        motion: &Motion,
+        bias: Vector3<f64>,
+    ) -> Vector3<f64> {
+        match &self.attitude {
+            Some(measured) if !self.is_felt() => {
+                let [measured, own] =
+                    [measured[k], motion.body[k].attitude].map(UnitQuaternion::new_unchecked);
+                (measured.inverse() * own) * (force - bias)
+            }
+            _ => force,
+        }
+    }
+
+    /// Whether forces were measured as such.
+    pub(crate) fn has_accelerometer(&self) -> bool {
+        self.is_felt() && !self.derived.turned
+    }
+    /// Whether an accelerometer felt the forces, whoever turned them.
+    pub(crate) fn is_felt(&self) -> bool {
+        self.derived.force.is_none()
     }
 
     /// The sample of the grid at or before a time, and the share of the way to the next; the ends beyond them.

@@ -41,6 +41,8 @@
 //! - A number becomes `value * scale + offset` (each one number, or one a column) before frames are turned.
 //! - `world` (`ned`, `enu`, `nwu`) belongs to channels with `_ned_` in their name, `body` (`frd`, `flu`) to those with
 //!   `_body_`; an attitude needs both, and `order` and `direction`. `baro.altitude_m` is up.
+//! - `imu.acceleration_ned_m_s2` is what an autopilot logs as acceleration in the world: the accelerometer turned there, less
+//!   gravity. `attitude.yaw_rad`, `attitude.pitch_rad` and `attitude.roll_rad` are for logs that lack one of the angles.
 //! - `rotors[i]` is the number, from 1, of the vehicle's rotor in column `i`; without it columns are in vehicle order.
 //! - `forward_filled` drops rows that only repeat the last sample: a slow sensor written at a fast rate gets its own slow
 //!   time axis. Channels of one log source (`battery.*`) share the axis; a row stays when any of them changes.

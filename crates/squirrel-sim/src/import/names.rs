@@ -18,12 +18,18 @@ pub(super) enum Kind {
 }
 
 /// The fixed names; `truth.*`, `reference.*` and `control.*` are open.
-const FIXED: [(&str, Kind); 15] = [
+const FIXED: [(&str, Kind); 19] = [
     ("imu.omega_body_rad_s", Kind::VectorBody),
     ("imu.specific_force_body_m_s2", Kind::VectorBody),
     ("imu_2.omega_body_rad_s", Kind::VectorBody),
     ("imu_2.specific_force_body_m_s2", Kind::VectorBody),
+    // The accelerometer turned into the world by the logged attitude, less gravity: what autopilots log as acceleration.
+    ("imu.acceleration_ned_m_s2", Kind::VectorNed),
     ("attitude.q_ned_from_body_wxyz", Kind::Attitude),
+    // Angles of logs that lack one of them: nose right, nose up, right side down, in this order from the world.
+    ("attitude.yaw_rad", Kind::Numbers(1)),
+    ("attitude.pitch_rad", Kind::Numbers(1)),
+    ("attitude.roll_rad", Kind::Numbers(1)),
     ("gnss.position_ned_m", Kind::VectorNed),
     ("gnss.velocity_ned_m_s", Kind::VectorNed),
     ("baro.altitude_m", Kind::Numbers(1)),

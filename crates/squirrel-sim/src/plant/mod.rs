@@ -76,6 +76,8 @@ pub struct Plant {
     battery_decay: f64,
     servo_lag: Option<ServoLag>,
     load: Option<Pendulum<f64>>,
+    /// Commands are rotor speeds, rad/s, that the rotors have at once.
+    rotor_speeds: bool,
 }
 
 /// Everything that changes.
@@ -170,7 +172,8 @@ impl Plant {
         };
         let load = effects.pendulum();
         let battery_decay = battery.as_ref().map_or(1.0, |b| 1.0 - (-dt_s / b.tau1_s).exp());
-        Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_lag, load })
+        let rotor_speeds = false;
+        Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_lag, load, rotor_speeds })
     }
 
     /// The airframe, with what effects change of it.
@@ -251,8 +254,24 @@ impl Plant {
         Ok(())
     }
 
+    /// The same plant whose rotor commands are speeds, rad/s, that its rotors have at once: they were measured.
+    #[must_use]
+    pub fn told_rotor_speeds(mut self) -> Self {
+        self.rotor_speeds = true;
+        self
+    }
+
+    /// What a command asks of the rotors at a battery's voltage.
+    pub fn rotor_drive(&self, rotor_command: &PerRotor<f64>, battery_voltage_v: f64) -> RotorDrive<f64> {
+        if self.rotor_speeds {
+            RotorDrive::holding(*rotor_command)
+        } else {
+            RotorDrive::new(&self.vehicle, &self.effects, rotor_command, battery_voltage_v)
+        }
+    }
+
     fn drive(&self, state: &mut PlantState, rotor_command: &PerRotor<f64>) {
-        state.drive = RotorDrive::new(&self.vehicle, &self.effects, rotor_command, state.battery.voltage_v);
+        state.drive = self.rotor_drive(rotor_command, state.battery.voltage_v);
         state.drive.settle(&mut state.body.rotor_speed_rad_s);
     }
 
