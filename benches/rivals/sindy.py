@@ -104,7 +104,7 @@ class Fit:
                 for i in range(3)
             ]
             settings = [*product(THRESHOLDS[self.library.name], RIDGES), (np.inf, 0.0)]
-            best = min(settings, key=lambda setting: self.left_out(folds, model, *setting))  # noqa: B023
+            best = min(settings, key=lambda setting: self.left_out(folds, model, *setting))
             self.settings.append((float(best[0]), best[1]))
             self.coefficients.append(self.sparse(rows, model, *best))
 
