@@ -199,8 +199,9 @@ impl Case {
         other
     }
 
-    /// Flies the case and writes `FOLDER/cases/ID/` (`vehicle.toml`, `train/`, `held-out/`, and `baseline/` where good flights
-    /// are given) and `FOLDER/answers/ID.json`, beside it the true vehicle as `ID.toml` where a patch is compared with it. Returns the case's folder, which appears only when it is whole.
+    /// Flies the case and writes `FOLDER/cases/ID/` (`vehicle.toml`, `train/`, `held-out/`, and `baseline/` where good
+    /// flights are given) and `FOLDER/answers/ID.json`, beside it the true vehicle as `ID.toml` where a patch is compared
+    /// with it. Returns the case's folder, which appears only when it is whole.
     ///
     /// # Errors
     /// [`CaseError`]

@@ -117,8 +117,8 @@ fn lean(log: &mut FlightLog, heading_rad_per_a: f64) {
     }
 }
 
-/// What a clock writes that jumps: from `at_s` on, what was in force at `t` stands under `t + step_s`. The samples keep their
-/// regular stamps, so that these do not give it away; over a gap the last command is held.
+/// What a clock writes that jumps: from `at_s` on, what was in force at `t` stands under `t + step_s`. The samples keep
+/// their regular stamps, so that these do not give it away; over a gap the last command is held.
 fn stepped(source: &Source, step_s: f64, at_s: f64) -> Source {
     let taken = |t: &f64| {
         let real_s = if *t < at_s {
