@@ -19,8 +19,6 @@ use std::collections::BTreeMap;
 const FORM_SHARE: f64 = 0.1;
 /// Part of the held-out gap that a name in another form must remove.
 const FORM_REMOVED: f64 = 0.6;
-/// The same of a name beside which something remains.
-const INCOMPLETE_REMOVED: f64 = 0.05;
 /// How much more of the held-out gap another name must leave to be worse by that alone, and how much if the evidence is against
 /// it, too, by so many nats.
 const RIVAL_GAP: f64 = 3.0;
@@ -102,7 +100,7 @@ pub(crate) fn decide(
         let shrinks = gap.as_ref().is_none_or(|gap| gap.removed_fraction > FORM_REMOVED);
         if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) && shrinks {
             Kind::NamedFormDiffers
-        } else if naming.stands && gap.as_ref().is_none_or(|gap| gap.removed_fraction > INCOMPLETE_REMOVED) {
+        } else if naming.stands && !fails {
             if close.is_empty() { Kind::NamedIncomplete } else { Kind::Ambiguous }
         } else {
             Kind::OutsideCatalogue

@@ -170,7 +170,7 @@ fn judged(
     let mut open = Vec::new();
     if let Some(kept) = shared(&search, &naming, &close) {
         open = alternatives(&search, &naming, std::iter::once(&naming.found.best).chain(close));
-        naming = only(&search, naming, &kept)?;
+        naming = only(&search, &naming, &kept)?;
         (proof, numbers) = proven(&naming, &[])?;
     }
     let verdict = decide(&search, &naming, &rivals, proof.as_ref(), numbers, places, open, curve_hides_sag);

@@ -102,38 +102,51 @@ pub(crate) const STANDS: f64 = 5.0;
 /// What the predictor says.
 pub(crate) fn standing(
     search: &Search<'_>,
-    mut naming: Naming,
-    mut hold: impl FnMut(&Naming) -> Result<Option<Vec<bool>>, GapError>,
+    naming: Naming,
+    hold: impl Fn(&Naming) -> Result<Option<Vec<bool>>, GapError>,
 ) -> Result<Naming, GapError> {
-    loop {
-        let is_candidate = naming.leftover.is_real()
+    let is_candidate = |naming: &Naming| {
+        naming.leftover.is_real()
             && naming.leftover.is_everywhere
             && !naming.leftover.is_foreign()
             && naming.gust_m_s.is_none()
-            && !naming.found.best.members.is_empty();
-        if !is_candidate {
-            return Ok(naming);
-        }
-        let holds = hold(&naming)?;
-        let stand = |index: usize| {
-            holds.as_ref().is_none_or(|holds| holds[index])
-                && search.stands_out(&naming.found.best, index, &naming.deviations) >= STANDS
-        };
-        let kept: Vec<usize> = (0..naming.found.best.members.len()).filter(|i| stand(*i)).collect();
-        if kept.len() == naming.found.best.members.len() {
-            naming.stands = true;
-            return Ok(naming);
-        }
-        naming = only(search, naming, &kept)?;
+            && !naming.found.best.members.is_empty()
+    };
+    if !is_candidate(&naming) {
+        return Ok(naming);
     }
+    let mut kept: Vec<Member> = naming.found.best.members.clone();
+    let mut now = None;
+    loop {
+        let at = now.as_ref().unwrap_or(&naming);
+        let holds = hold(at)?;
+        let clear = |index: usize| search.stands_out(&at.found.best, index, &at.deviations);
+        let falls =
+            |index: &usize| holds.as_ref().is_some_and(|holds| !holds[*index]) || clear(*index) < STANDS;
+        // One at a time, the least clear first: what falls may have stood in for what stands.
+        let weakest = (0..kept.len()).filter(falls).min_by(|a, b| clear(*a).total_cmp(&clear(*b)));
+        let Some(weakest) = weakest else { break };
+        kept.remove(weakest);
+        if kept.is_empty() {
+            return Ok(naming);
+        }
+        let fewer = judge(search, search.with(&at.found, &kept)?)?;
+        kept.clone_from(&fewer.found.best.members);
+        if !is_candidate(&fewer) {
+            return Ok(naming);
+        }
+        now = Some(fewer);
+    }
+    Ok(Naming { stands: true, ..now.unwrap_or(naming) })
 }
 
 /// The same explanation with some of its names alone.
 ///
 /// # Errors
 /// What the predictor says.
-pub(crate) fn only(search: &Search<'_>, naming: Naming, kept: &[usize]) -> Result<Naming, GapError> {
-    judge(search, search.only(naming.found, kept)?)
+pub(crate) fn only(search: &Search<'_>, naming: &Naming, kept: &[usize]) -> Result<Naming, GapError> {
+    let members: Vec<Member> = kept.iter().map(|i| naming.found.best.members[*i].clone()).collect();
+    judge(search, search.with(&naming.found, &members)?)
 }
 
 /// What floats may be off by this many tolerances before a leftover is a leftover.

@@ -7,6 +7,7 @@ use super::point::{Member, Point, hypothesis};
 use super::refine::Scored;
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
+use std::rc::Rc;
 
 /// What an effect must be worth to be named, nats.
 pub(crate) const NATS_MIN: f64 = 6.0;
@@ -49,7 +50,7 @@ pub(crate) struct Search<'a> {
 
 /// What a search found.
 pub(crate) struct Found {
-    pub(crate) linear: Linear,
+    pub(crate) linear: Rc<Linear>,
     pub(crate) null: Scored,
     pub(crate) best: Scored,
     /// The best without each of its members.
@@ -88,7 +89,7 @@ impl Search<'_> {
                 }
                 self.finish(&mut best);
                 let null = self.score(&linear, &[])?;
-                return Ok(Found { linear, null, best, without });
+                return Ok(Found { linear: Rc::new(linear), null, best, without });
             }
             point = self.settled(&best);
             linear = self.linear(&point, Some(linear))?;
@@ -248,16 +249,17 @@ impl Search<'_> {
         Ok(best.members.len() < before)
     }
 
-    /// The same with some of its members alone.
+    /// What was found, with other members.
     ///
     /// # Errors
     /// What the predictor says.
-    pub(crate) fn only(&self, found: Found, kept: &[usize]) -> Result<Found, GapError> {
-        let members: Vec<Member> = kept.iter().map(|i| found.best.members[*i].clone()).collect();
-        let mut best = self.score(&found.linear, &members)?;
-        let without = self.without(&found.linear, &best)?;
+    pub(crate) fn with(&self, found: &Found, members: &[Member]) -> Result<Found, GapError> {
+        let linear = Rc::clone(&found.linear);
+        let mut best = self.score(&linear, members)?;
+        let without = self.without(&linear, &best)?;
         self.finish(&mut best);
-        Ok(Found { best, without, ..found })
+        let null = self.score(&linear, &[])?;
+        Ok(Found { linear, null, best, without })
     }
 
     /// By how many standard deviations a member's number differs from what the vehicle file has, the clearest of them.
