@@ -169,18 +169,14 @@ pub enum GapError {
 }
 
 impl GapError {
-    /// The channel of one flight that is to blame, if it is one.
+    /// The channel of one flight whose samples are to blame, so that the others can go on without it. A log that lacks a
+    /// channel, or is of another vehicle, is a mistake of whoever gave it, and stays an error.
     pub(crate) fn channel(&self) -> Option<&'static str> {
         match self {
-            Self::Missing { channel, .. }
-            | Self::Width { channel, .. }
-            | Self::Length { channel, .. }
-            | Self::Time { channel, .. }
+            Self::Time { channel, .. }
             | Self::Rotation { channel, .. }
-            | Self::Empty { channel, .. }
             | Self::Rate { channel, .. }
             | Self::TooShort { channel, .. } => Some(channel),
-            Self::Rotors { .. } => Some("rotor.command"),
             _ => None,
         }
     }

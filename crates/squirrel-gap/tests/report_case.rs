@@ -104,15 +104,33 @@ fn every_panel_of_a_hidden_effect_holds_data() {
 #[test]
 fn logs_that_contradict_themselves_leave_the_reason_in_every_panel() {
     let mut found = Found::new("report_problem");
-    let twice = (format!("{FOLDER}/train/copy.mcap"), found.flights[0].1.clone());
-    found.flights.push(twice);
+    for (_, log) in &mut found.flights {
+        let voltage = log.source_mut("battery").channels.get_mut("voltage_v").unwrap();
+        voltage.values.iter_mut().for_each(|volt| *volt *= 1e3);
+    }
     let diagnosis = found.diagnosis();
     assert_eq!(diagnosis.verdict.verdict, Kind::DataProblem);
     let html = render(&found.picture(&diagnosis, None));
-    assert!(panel(&html, "panel-h").contains("train/copy.mcap: imu."), "{}", panel(&html, "panel-h"));
+    let verdict = panel(&html, "panel-h");
+    assert!(verdict.contains("train/flight00.mcap: battery.voltage_v: its mean"), "{verdict}");
     assert!(!html.contains(FOLDER));
     for id in PANELS.iter().filter(|id| **id != "panel-h") {
         let text = panel(&html, id);
         assert!(text.contains("contradict themselves") && !text.contains("<svg"), "{id}");
     }
+}
+
+/// A flight given twice is told in the verdict's words, by a name without its folder; the others fill the panels.
+#[test]
+fn a_flight_that_is_set_aside_is_told_in_the_report() {
+    let mut found = Found::new("report_aside");
+    let twice = (format!("{FOLDER}/train/copy.mcap"), found.flights[0].1.clone());
+    found.flights.push(twice);
+    let diagnosis = found.diagnosis();
+    assert_eq!(diagnosis.verdict.set_aside.len(), 1, "{}", diagnosis.verdict.words);
+    assert_eq!(diagnosis.verdict.verdict, Kind::Named, "{}", diagnosis.verdict.words);
+    let html = render(&found.picture(&diagnosis, None));
+    let verdict = panel(&html, "panel-h");
+    assert!(verdict.contains("1 of 4 flights were set aside: train/copy.mcap: imu."), "{verdict}");
+    assert!(!html.contains(FOLDER));
 }
