@@ -134,6 +134,21 @@ fn what_is_added_leaves_the_file_as_it_was() {
     assert_eq!(json(&folder, "v.json")["model_patch"], "out/squirrel.toml");
     folder.succeeds(&["vehicle", "check", "out/squirrel.toml"]);
 
+    // Another explanation is added by its name; one that none has is an error which says what there is, and writes nothing.
+    let verdict = json(&folder, "v.json");
+    let other = verdict["alternatives"][0]["effects"][0].as_str().unwrap();
+    folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "other", "--effect", other]].concat());
+    let chosen = fs::read_to_string(folder.0.join("other/squirrel.toml")).unwrap();
+    assert!(chosen.contains(&format!("[effects.{other}]")), "{chosen}");
+    let output =
+        folder.run(&[&["gap", "add"], &FLIGHTS[..], &["--out", "never", "--effect", "gust"]].concat());
+    let stderr = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{stderr}");
+    let last = stderr.lines().last().unwrap();
+    assert!(last.contains("no explanation of these flights has \"gust\"; they have: "), "{stderr}");
+    assert!(last.contains("motor_lag"), "{stderr}");
+    assert!(!folder.0.join("never").exists(), "nothing is written");
+
     // With it, the flights hold no gap any more.
     let arguments =
         ["gap", "name", "--vehicle", "out/squirrel.toml", "--flights", "train", "--json", "w.json"];

@@ -1,0 +1,120 @@
+//! Models of real vehicles miss a little everywhere, and logs hold what a filter believed: names that stand in spite of it, and
+//! names that are not to be had.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+mod support;
+
+use hidden_effects::case::{Case, Set};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use squirrel_gap::{Diagnosis, Kind, add, diagnose};
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::scenario::Scenario;
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::path::Path;
+use support::vehicle_with;
+
+fn fly(vehicle: &VehicleFile, seed: u64) -> (String, FlightLog) {
+    let mut scenario = Scenario::find("excite_rich").unwrap();
+    scenario.seed = seed;
+    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    (format!("flight {seed}"), setup.fly(true, |_| {}).unwrap().log.unwrap())
+}
+
+fn logs(folder: &Path) -> Vec<(String, FlightLog)> {
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files.iter().map(|file| (file.display().to_string(), FlightLog::read(file).unwrap())).collect()
+}
+
+/// A blind case with its vehicle file.
+fn blind(set: Set, index: usize) -> (Case, VehicleFile, Diagnosis) {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("real-models-{set:?}-{index}"));
+    let (case, path) = Case::draw_and_make(set, index, 11, &folder).unwrap();
+    let vehicle = VehicleFile::load(&path.join("vehicle.toml")).unwrap();
+    let diagnosis =
+        diagnose(&vehicle, &logs(&path.join("train")), &logs(&path.join("held-out")), &|_| {}).unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    println!("{}", diagnosis.verdict.words);
+    (case, vehicle, diagnosis)
+}
+
+/// A coloured force and moment of 10 to 25 % of what was measured lies on every axis beside the effect.
+#[test]
+fn a_name_stands_beside_what_a_model_misses_everywhere() {
+    let (case, vehicle, diagnosis) = blind(Set::Misfit, 0);
+    let verdict = &diagnosis.verdict;
+    assert_eq!(verdict.verdict, Kind::NamedIncomplete, "{}", verdict.words);
+    assert_eq!(verdict.effects[0].name, case.answer.effects[0].name, "{}", verdict.words);
+    let left = verdict.leftover.as_ref().unwrap();
+    assert!((0.08..0.4).contains(&left.share_left), "{left:?}");
+    assert!(left.channels.len() >= 3, "{left:?}");
+    assert!(verdict.words.contains("Something else remains"), "{}", verdict.words);
+    let patched = add(&vehicle, &diagnosis, &["flight".to_owned()]).unwrap();
+    assert!(patched.contains(&format!("[effects.{}]", verdict.effects[0].name)), "{patched}");
+}
+
+/// Where the file overstates what there is, that is found, and what it takes away leaves no less than nothing.
+#[test]
+fn a_drag_that_the_file_overstates_is_found() {
+    let drag = ("linear_n_s_per_m = { value = [0.0, 0.0, 0.0]", "linear_n_s_per_m = { value = [0.1, 0.1, 0.1]");
+    let file = vehicle_with("squirrel.toml", &[drag]);
+    let flown = VehicleFile::squirrel();
+    let verdict = diagnose(&file, &[fly(&flown, 1)], &[fly(&flown, 2)], &|_| {}).unwrap().verdict;
+    assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
+    assert_eq!(verdict.effects[0].name, "linear_drag", "{}", verdict.words);
+    let squirrel_gap::Value::Number { value, .. } = verdict.effects[0].parameters["extra_drag_n_s_per_m"] else {
+        panic!("{}", verdict.words);
+    };
+    assert!((-0.1..-0.09).contains(&value), "{value}");
+}
+
+/// The attitude as a filter has it that takes a lasting acceleration for the vertical: 0.6 deg at a metre per second squared.
+fn levelled(mut log: FlightLog) -> FlightLog {
+    let (times, forces) = {
+        let (times, forces) = log.channel("imu.specific_force_body_m_s2").unwrap();
+        (times.to_vec(), forces.values.clone())
+    };
+    let source = log.source_mut("attitude");
+    let stamps = source.time_s.clone();
+    let values = &mut source.channels.get_mut("q_ned_from_body_wxyz").unwrap().values;
+    let (mut acceleration, mut before_s) = (Vector3::zeros(), stamps[0]);
+    for (q, stamp_s) in values.chunks_exact_mut(4).zip(&stamps) {
+        let i = times.partition_point(|t| t <= stamp_s).saturating_sub(1);
+        let true_attitude = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
+        let force = true_attitude * Vector3::from_column_slice(&forces[3 * i..3 * i + 3]);
+        let keep = (-(stamp_s - before_s) / 1.2_f64).exp();
+        acceleration = acceleration * keep + Vector3::new(force.x, force.y, 0.0) * (1.0 - keep);
+        before_s = *stamp_s;
+        let lean = Vector3::new(acceleration.y, -acceleration.x, 0.0) * 0.01;
+        let believed = UnitQuaternion::from_scaled_axis(lean) * true_attitude;
+        q.copy_from_slice(&[believed.w, believed.i, believed.j, believed.k]);
+    }
+    log
+}
+
+#[test]
+fn an_attitude_that_leans_into_accelerations_is_no_effect() {
+    let file = VehicleFile::squirrel();
+    let [a, b] = [1, 2].map(|seed| {
+        let (name, log) = fly(&file, seed);
+        (name, levelled(log))
+    });
+    let verdict = diagnose(&file, &[a], &[b], &|_| {}).unwrap().verdict;
+    assert_eq!(verdict.verdict, Kind::None, "{}", verdict.words);
+}
+
+/// A held-out flight on propellers that give 0.8 % less thrust: a name that is right is not worse for that.
+#[test]
+fn a_held_out_flight_of_another_day_does_not_take_a_name_away() {
+    let file = VehicleFile::squirrel();
+    let effect = "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n\n[limits]";
+    let worn = "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n\n[effects.thrust_coefficient]\nthrust_fraction = -0.008\n\n[limits]";
+    let flown = vehicle_with("squirrel.toml", &[("[limits]", effect)]);
+    let later = vehicle_with("squirrel.toml", &[("[limits]", worn)]);
+    let verdict = diagnose(&file, &[fly(&flown, 1)], &[fly(&later, 2)], &|_| {}).unwrap().verdict;
+    assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
+    let gap = verdict.gap.as_ref().unwrap();
+    assert!(gap.removed_fraction > 0.98, "{gap:?}");
+}
