@@ -263,12 +263,7 @@ fn compared(
     // What was differentiated behind a filter is smoother than anything that a plant does.
     let measured = |is_measured: bool, value| if is_measured { value } else { Vector3::zeros() };
     let turns = flies_freely(predictor);
-    [
-        velocity,
-        measured(turns, rotation),
-        measured(turns, rate),
-        measured(predictor.is_felt(), force),
-    ]
+    [velocity, measured(turns, rotation), measured(turns, rate), measured(predictor.is_felt(), force)]
 }
 
 /// One bin of one segment.

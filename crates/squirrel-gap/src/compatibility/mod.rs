@@ -57,7 +57,7 @@ pub(crate) fn problem(
             let found = voltage(predictor, track)
                 .or_else(|| force_unit(track))
                 .or_else(|| rates(track))
-                .or_else(|| fixes(track))
+                .or_else(|| track.has_accelerometer().then(|| fixes(track)).flatten())
                 .or_else(|| model(predictor, piece, residual));
             if let Some((channel, words)) = found {
                 let flight = predictor.names[track.flight].to_owned();

@@ -89,7 +89,8 @@ impl Sources {
                 }
                 (pitch, _) => pitch,
             };
-            let pitch = pitch.ok_or_else(|| neither(ATTITUDE, "attitude.pitch_rad or gnss.velocity_ned_m_s"))?;
+            let pitch =
+                pitch.ok_or_else(|| neither(ATTITUDE, "attitude.pitch_rad or gnss.velocity_ned_m_s"))?;
             attitude = of_angles(&roll, &pitch, &yaw);
         }
         let mut force = optional(FORCE, 3)?;
@@ -114,7 +115,11 @@ impl Sources {
         let rates = optional(RATES, 3)?;
         if rates.is_none() {
             let attitude = attitude.as_ref().ok_or_else(|| neither(RATES, ATTITUDE))?;
-            differences.rates = Some(smoother::rate_source(flight, attitude)?);
+            let mut from = smoother::rate_source(flight, attitude)?;
+            if let Some(pitch) = &differences.pitch {
+                from.add_noise(&pitch.leaning(from.period_s()));
+            }
+            differences.rates = Some(from);
         }
         Ok(Self { force, rates, attitude, velocity, position, differences })
     }
@@ -212,7 +217,8 @@ impl Common {
 /// Pitch, rad, at which thrust alone makes an acceleration along the heading.
 fn pitch_of_thrust(from: &Differences, velocity: &Series, yaw: &Series) -> Option<Series> {
     // Twice the corner of forces: what passes them is hardly touched.
-    let (time_s, accelerations) = smoother::accelerations(from, velocity, CUTOFF_HZ.min(2.0 * from.cutoff_hz));
+    let (time_s, accelerations) =
+        smoother::accelerations(from, velocity, CUTOFF_HZ.min(2.0 * from.cutoff_hz));
     let pitch = time_s.iter().zip(accelerations.chunks_exact(3)).map(|(t, a)| {
         let (sin, cos) = yaw.angle(*t).sin_cos();
         let (along, down) = (a[0] * cos + a[1] * sin, a[2] - GRAVITY_M_S2);

@@ -66,6 +66,20 @@ impl Differences {
         self.period_s
     }
 
+    /// White noise of attitudes about the pitch axis, rad, that at the corner is as large as that of an acceleration over
+    /// gravity.
+    ///
+    /// * `period_s` - of the attitudes
+    pub(crate) fn leaning(&self, period_s: f64) -> Vector3<f64> {
+        let power = self.noise_power(self.cutoff_hz) / 3.0;
+        Vector3::new(0.0, (power / (2.0 * period_s)).sqrt() / GRAVITY_M_S2, 0.0)
+    }
+
+    /// More noise of a sample, one standard deviation.
+    pub(crate) fn add_noise(&mut self, more: &Vector3<f64>) {
+        self.white = self.white.zip_map(more, f64::hypot);
+    }
+
     /// Power of the noise of an acceleration, all axes, per Hz.
     fn noise_power(&self, frequency_hz: f64) -> f64 {
         let gain = (TAU * frequency_hz).powi(2 * self.order as i32);
