@@ -3,7 +3,7 @@
 
 mod support;
 
-use squirrel_gap::find;
+use squirrel_gap::{diagnose, find};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use support::{imported, shared, vehicle, vehicle_with};
@@ -87,4 +87,19 @@ fn thrust_disagrees_more_on_an_emptier_battery() {
         }
     }
     assert!(finding.notes.is_empty(), "{:?}", finding.notes);
+}
+
+/// Motion capture alone names what the IMU names: the sag that the file lacks, in flights that it was not fitted to.
+#[test]
+fn without_their_imu_flights_still_name_the_sag() {
+    let Some(folder) = shared("flights/nanobench") else { return };
+    for name in ["B2_circle_medium_rep1", "B9_trefoil_slow_rep1"] {
+        let mut log = imported("nanobench.toml", &folder.join(format!("{name}.csv")));
+        log.sources.remove("imu");
+        let flights = [(name.to_owned(), log)];
+        let verdict = diagnose(&vehicle("crazyflie21_brushed.toml"), &flights, &[], &|_| {}).unwrap().verdict;
+        println!("{name}: {}", verdict.words);
+        assert_eq!(verdict.effects.iter().map(|e| e.name).collect::<Vec<_>>(), ["battery_sag"], "{name}");
+        assert!(verdict.notes.iter().any(|n| n.contains("forces are those of gnss.position_ned_m")));
+    }
 }

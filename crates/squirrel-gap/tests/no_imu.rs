@@ -4,6 +4,7 @@
 
 mod support;
 
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -24,7 +25,11 @@ const ATTITUDE_NOISE_RAD: f64 = 2e-3;
 const RATE_HZ: f64 = 100.0;
 
 fn fly(individual: &VehicleFile, seed: u64) -> FlightLog {
-    let mut scenario = Scenario::find("excite_rich").unwrap();
+    fly_as("excite_rich", individual, seed)
+}
+
+fn fly_as(scenario: &str, individual: &VehicleFile, seed: u64) -> FlightLog {
+    let mut scenario = Scenario::find(scenario).unwrap();
     scenario.seed = seed;
     if let MissionTable::Excite(table) = &mut scenario.mission {
         table.heights_m = vec![1.5, 1.0, 0.7];
@@ -140,6 +145,53 @@ fn names_are_those_of_the_same_flights_with_an_imu() {
             assert!(verdict.gap.unwrap().removed_fraction > 0.95);
         }
     }
+}
+
+/// What an autopilot writes to a card: acceleration in the world less gravity, roll and yaw, velocity; no pitch, no gyroscope.
+fn carded(log: &FlightLog) -> FlightLog {
+    let (time_s, force) = log.channel("imu.specific_force_body_m_s2").unwrap();
+    let (true_s, attitude) = log.channel("truth.q_ned_from_body_wxyz").unwrap();
+    let (_, velocity) = log.channel("truth.velocity_ned_m_s").unwrap();
+    let mut out = log.clone();
+    for source in ["imu", "gnss", "attitude"] {
+        out.sources.remove(source);
+    }
+    for (i, t) in time_s.iter().enumerate().step_by(3) {
+        let at = true_s.partition_point(|s| *s < t - 1e-6).min(true_s.len() - 1);
+        let [w, x, y, z] = *attitude.row(at) else { panic!("four numbers") };
+        let q = UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z));
+        let felt = q * Vector3::from_column_slice(force.row(i)) + Vector3::new(0.0, 0.0, 9.80665);
+        let (roll, _, yaw) = q.euler_angles();
+        out.source_mut("imu").push(*t, &[("acceleration_ned_m_s2", felt.as_slice())]);
+        out.source_mut("attitude").push(*t, &[("roll_rad", &[roll]), ("yaw_rad", &[yaw])]);
+        out.source_mut("gnss").push(*t, &[("velocity_ned_m_s", velocity.row(at))]);
+    }
+    out
+}
+
+/// Pitch is that of the thrust, so that drag along the nose is lost in it; in slow flight thrust is as well known as with an
+/// IMU.
+#[test]
+fn an_acceleration_in_the_world_and_two_angles_are_enough_for_thrust() {
+    let own = vehicle("squirrel.toml");
+    let log = fly_as("excite_calm", &own, 1);
+    let with = find(&own, &[("f".to_owned(), log.clone())]).unwrap();
+    let without = find(&own, &[("f".to_owned(), carded(&log))]).unwrap();
+    let [with_n, without_n] = [&with, &without].map(|f| f.residual.force_body_rms_n[2]);
+    println!("{with_n} N, {without_n} N, {:?}\n{:?}", without.residual, without.notes);
+    // One sample of three leaves the square root of three times the white noise.
+    let over = without_n / (3.0_f64.sqrt() * with_n);
+    assert!((0.8..1.2).contains(&over), "{without_n} N, with the IMU {with_n} N");
+    let notes = without.notes.join("\n");
+    assert!(notes.contains("pitch is where thrust must point"), "{notes}");
+    assert!(notes.contains("forces are those of imu.acceleration_ned_m_s2"), "{notes}");
+
+    let mut log = carded(&log);
+    log.sources.remove("gnss");
+    assert_eq!(
+        find(&own, &[("f".to_owned(), log)]).unwrap_err().to_string(),
+        "f: attitude.q_ned_from_body_wxyz: missing; the residual needs it, or attitude.pitch_rad or gnss.velocity_ned_m_s"
+    );
 }
 
 #[test]

@@ -58,13 +58,15 @@ fn a_name_stands_beside_what_a_model_misses_everywhere() {
 /// Where the file overstates what there is, that is found, and what it takes away leaves no less than nothing.
 #[test]
 fn a_drag_that_the_file_overstates_is_found() {
-    let drag = ("linear_n_s_per_m = { value = [0.0, 0.0, 0.0]", "linear_n_s_per_m = { value = [0.1, 0.1, 0.1]");
+    let drag =
+        ("linear_n_s_per_m = { value = [0.0, 0.0, 0.0]", "linear_n_s_per_m = { value = [0.1, 0.1, 0.1]");
     let file = vehicle_with("squirrel.toml", &[drag]);
     let flown = VehicleFile::squirrel();
     let verdict = diagnose(&file, &[fly(&flown, 1)], &[fly(&flown, 2)], &|_| {}).unwrap().verdict;
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     assert_eq!(verdict.effects[0].name, "linear_drag", "{}", verdict.words);
-    let squirrel_gap::Value::Number { value, .. } = verdict.effects[0].parameters["extra_drag_n_s_per_m"] else {
+    let squirrel_gap::Value::Number { value, .. } = verdict.effects[0].parameters["extra_drag_n_s_per_m"]
+    else {
         panic!("{}", verdict.words);
     };
     assert!((-0.1..-0.09).contains(&value), "{value}");

@@ -78,7 +78,8 @@ fn a_bad_channel_says_what_to_write() {
         (
             "imu.omega",
             format!(r#"{XYZ}, body = "frd""#),
-            "no such channel; nearest: imu.omega_body_rad_s, imu.specific_force_body_m_s2; truth.*, \
+            "no such channel; nearest: imu.omega_body_rad_s, imu.acceleration_ned_m_s2, \
+             imu.specific_force_body_m_s2; truth.*, \
              reference.* and control.* are open",
         ),
         ("time_s", r#"columns = ["t"]"#.into(), "time is not a channel: write `time = { column, unit }`"),

@@ -85,14 +85,16 @@ pub(crate) fn problems(
 fn problems_of(predictor: &Predictor<'_>, residual: &[f64], logs: &[(String, FlightLog)]) -> Vec<SetAside> {
     let first = |(index, (_, log)): (usize, &(String, FlightLog))| {
         let flight = Flight::new(predictor, index);
+        // Without an accelerometer forces come from the fixes themselves, and agree with them.
+        let felt = predictor.has_accelerometer();
         let (channel, words) = units::voltage(&flight)
             .or_else(|| units::commands(&flight))
             .or_else(|| held::held(log, &flight.spans()))
             .or_else(|| units::force(&flight))
             .or_else(|| attitude::rates(&flight))
-            .or_else(|| fixes::frames(&flight))
+            .or_else(|| felt.then(|| fixes::frames(&flight)).flatten())
             .or_else(|| clock::steps(&flight, residual))
-            .or_else(|| fixes::velocities(&flight))
+            .or_else(|| felt.then(|| fixes::velocities(&flight)).flatten())
             .or_else(|| fixes::positions(&flight))
             .or_else(|| rotors::model(&flight, residual))?;
         let flight = flight.name().to_owned();

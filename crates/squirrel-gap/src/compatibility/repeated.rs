@@ -33,10 +33,13 @@ pub(super) fn repeated<'a>(flights: impl Iterator<Item = &'a (String, FlightLog)
     found
 }
 
-/// What the inertial unit said, to the bit.
+/// What the inertial unit said, to the bit; without one, where the vehicle was and how it lay.
 fn rows(log: &FlightLog) -> Vec<[u64; 6]> {
-    let Some((_, forces)) = log.channel(CHANNEL) else { return Vec::new() };
-    let Some((_, rates)) = log.channel("imu.omega_body_rad_s") else { return Vec::new() };
+    let both = |first: &str, second: &str| Some((log.channel(first)?.1, log.channel(second)?.1));
+    let poses = || both("gnss.position_ned_m", "gnss.velocity_ned_m_s");
+    let Some((forces, rates)) = both(CHANNEL, "imu.omega_body_rad_s").or_else(poses) else {
+        return Vec::new();
+    };
     let pairs = forces.values.chunks_exact(3).zip(rates.values.chunks_exact(3));
     let rows = pairs.map(|(f, w)| [f[0], f[1], f[2], w[0], w[1], w[2]]);
     rows.filter(|row| row.iter().all(|x| x.is_finite())).map(|row| row.map(f64::to_bits)).collect()

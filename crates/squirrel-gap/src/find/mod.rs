@@ -9,7 +9,7 @@
 //! ```
 //! `m` and `J` are the vehicle's. `F` and `M` are force without gravity and moment of the simulator's own plant: rotors
 //! behind their lag, drag, wings behind their servos, and the effects of the vehicle file, at the measured motion, height and
-//! voltage in still air; the height is smoothed as `name` does it. `LP` is a zero-phase low-pass at 12 Hz and `D` a derivative, whose taps stand in `filter`;
+//! voltage in still air; the height is smoothed as `name` does it. `LP` is a zero-phase low-pass at 12 Hz (lower without an IMU) and `D` a derivative, whose taps stand in `filter`;
 //! both sides pass the same `LP`, which is linear, so that it is applied once, to their difference.
 //!
 //! **Time.** Each flight has a uniform grid with the median period `T` of the IMU. IMU, attitude (normalised), velocity and

@@ -115,7 +115,11 @@ impl Sources {
         let rates = optional(RATES, 3)?;
         if rates.is_none() {
             let attitude = attitude.as_ref().ok_or_else(|| neither(RATES, ATTITUDE))?;
-            differences.rates = Some(smoother::rate_source(flight, attitude)?);
+            let mut from = smoother::rate_source(flight, attitude)?;
+            if let Some(pitch) = &differences.pitch {
+                from.add_noise(&pitch.leaning(from.period_s()));
+            }
+            differences.rates = Some(from);
         }
         Ok(Self { force, rates, attitude, velocity, position, differences })
     }

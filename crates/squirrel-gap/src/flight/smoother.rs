@@ -36,7 +36,7 @@ const POSITION_SHARE: f64 = 0.5;
 pub(crate) struct Differences {
     /// What is differentiated, how often, and how far its samples are apart, s.
     pub(crate) channel: &'static str,
-    order: usize,
+    order: i32,
     period_s: f64,
     /// White noise of a sample, one standard deviation.
     pub(crate) white: Vector3<f64>,
@@ -49,7 +49,7 @@ impl Differences {
     /// * `runs` - the series on an even grid
     fn new(
         series: &Series,
-        order: usize,
+        order: i32,
         period_s: f64,
         white: Vector3<f64>,
         runs: &[Vec<Vector3<f64>>],
@@ -66,21 +66,35 @@ impl Differences {
         self.period_s
     }
 
+    /// White noise of attitudes about the pitch axis, rad, that at the corner is as large as that of an acceleration over
+    /// gravity.
+    ///
+    /// * `period_s` - of the attitudes
+    pub(crate) fn leaning(&self, period_s: f64) -> Vector3<f64> {
+        let power = self.noise_power(self.cutoff_hz) / 3.0;
+        Vector3::new(0.0, (power / (2.0 * period_s)).sqrt() / GRAVITY_M_S2, 0.0)
+    }
+
+    /// More noise of a sample, one standard deviation.
+    pub(crate) fn add_noise(&mut self, more: &Vector3<f64>) {
+        self.white = self.white.zip_map(more, f64::hypot);
+    }
+
     /// Power of the noise of an acceleration, all axes, per Hz.
     fn noise_power(&self, frequency_hz: f64) -> f64 {
-        let gain = (TAU * frequency_hz).powi(2 * self.order as i32);
+        let gain = (TAU * frequency_hz).powi(2 * self.order);
         2.0 * self.period_s * self.white.norm_squared() * gain
     }
 
     /// Deviation of the noise that a low-pass leaves of an acceleration, of one axis.
     pub(crate) fn passed(&self, cutoff_hz: f64) -> f64 {
-        let n = 2 * self.order as i32 + 1;
+        let n = 2 * self.order + 1;
         (self.noise_power(1.0) * cutoff_hz.powi(n) / f64::from(n) / 3.0).sqrt()
     }
 
     /// Deviation of the noise that a low-pass leaves of the sum over accelerations: of rates, from attitudes.
     pub(crate) fn passed_rate(&self, cutoff_hz: f64) -> f64 {
-        let n = 2 * self.order as i32 - 1;
+        let n = 2 * self.order - 1;
         (self.noise_power(1.0) / TAU.powi(2) * cutoff_hz.powi(n) / f64::from(n) / 3.0).sqrt()
     }
 

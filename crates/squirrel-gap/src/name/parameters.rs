@@ -220,6 +220,9 @@ impl Catalogue {
     }
 }
 
+/// Part of a lag of the vehicle's own that may be taken away: a motor has some.
+const LAG_MOST: f64 = 0.95;
+
 /// How far a number may go: what takes away from one of the vehicle's own leaves it at nothing, and no less.
 pub(super) fn bounds(vehicle: &Vehicle<f64>, effect: &str, key: &str, range: &SizeRange) -> (f64, f64) {
     let times = match range.scale {
@@ -232,8 +235,10 @@ pub(super) fn bounds(vehicle: &Vehicle<f64>, effect: &str, key: &str, range: &Si
         ("linear_drag", "extra_drag_n_s_per_m") => p.drag.linear_n_s_per_m.x,
         ("linear_drag", "extra_drag_z_n_s_per_m") => p.drag.linear_n_s_per_m.z,
         ("quadratic_drag", "extra_drag_area_m2" | "extra_drag_area_z_m2") => p.drag.area_m2,
-        ("motor_lag", "extra_time_constant_s") => p.propulsion.time_constant_up_s,
-        ("wing_servo_lag", "extra_time_constant_s") => p.wing.map_or(0.0, |wing| wing.time_constant_s),
+        ("motor_lag", "extra_time_constant_s") => LAG_MOST * p.propulsion.time_constant_up_s,
+        ("wing_servo_lag", "extra_time_constant_s") => {
+            LAG_MOST * p.wing.map_or(0.0, |wing| wing.time_constant_s)
+        }
         // From a radius of five arms on, the air under a rotor is no ground effect's.
         ("ground_effect", "effective_radius_m") => return (0.0, range.largest),
         _ if range.signed => most,

@@ -7,7 +7,9 @@
 //! The plant is led along the measured motion: rotors, servos and payload run under the logged commands at the measured
 //! voltage, while velocity, attitude and rates are what was measured. A hypothesis changes nothing but the vehicle's effects
 //! and what its sensors do, so that every effect that the simulator can fly can be tested against a log; no regressor is
-//! written twice. Forces show in the first family, sensors that lie in the second.
+//! written twice. Forces show in the first family, sensors that lie in the second. Without an IMU the corner is lower, as
+//! [`smoother`](crate::flight::smoother) has it, and there is no second family; with measured rotor speeds these stand in for
+//! commands, lag and sag.
 
 mod actuators;
 mod commands;
