@@ -100,7 +100,7 @@ pub(crate) fn decide(
         let shrinks = gap.as_ref().is_none_or(|gap| gap.removed_fraction > FORM_REMOVED);
         if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) && shrinks {
             Kind::NamedFormDiffers
-        } else if naming.stands && !fails {
+        } else if naming.stands {
             if close.is_empty() { Kind::NamedIncomplete } else { Kind::Ambiguous }
         } else {
             Kind::OutsideCatalogue

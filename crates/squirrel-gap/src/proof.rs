@@ -98,15 +98,18 @@ pub(crate) fn hold(
     search: &Search<'_>,
     naming: &Naming,
 ) -> Result<Option<Vec<bool>>, GapError> {
-    let errors = |set: &Scored| {
-        let whole = search.whole(set);
-        shrink::errors(unseen, &settled_on(unseen, search, naming, &whole.members, &whole.base)?)
+    // What floats is shared: without a name it would take its place.
+    let whole = search.whole(&naming.found.best);
+    let errors = |members: &[Member]| -> Result<_, GapError> {
+        let at = settled_on(unseen, search, naming, members, &whole.base)?;
+        Ok(shrink::errors(unseen, &at)?.map(|errors| errors.mse()))
     };
-    let found = &naming.found;
-    let Some(with) = errors(&found.best)?.map(|errors| errors.mse()) else { return Ok(None) };
-    let mut all = Vec::with_capacity(found.without.len());
-    for without in &found.without {
-        let Some(without) = errors(without)?.map(|errors| errors.mse()) else { return Ok(None) };
+    let Some(with) = errors(&whole.members)? else { return Ok(None) };
+    let mut all = Vec::with_capacity(whole.members.len());
+    for out in 0..whole.members.len() {
+        let mut rest = whole.members.clone();
+        rest.remove(out);
+        let Some(without) = errors(&rest)? else { return Ok(None) };
         let channels: Vec<f64> = with
             .iter()
             .zip(&without)

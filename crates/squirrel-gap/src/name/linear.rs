@@ -182,6 +182,8 @@ pub(super) fn height_columns(
     Ok(all)
 }
 
+/// Standard deviations that a number may be off by in a flight that nothing was fitted to.
+const INSIDE: f64 = 2.0;
 /// Steps towards the heights of flights.
 const HEIGHT_STEPS: usize = 5;
 
@@ -234,8 +236,8 @@ pub(crate) fn settle_flights(
             }
         }
         let Some(posterior) = Gram::new(&white, &y).posterior(&sd, BETA) else { break };
-        for (column, x) in index.iter().zip(posterior.mean.iter()) {
-            point.base[*column] = *x;
+        for ((column, x), sd) in index.iter().zip(posterior.mean.iter()).zip(&sd) {
+            point.base[*column] = x.clamp(-INSIDE * sd, INSIDE * sd);
         }
         if is_last {
             break;

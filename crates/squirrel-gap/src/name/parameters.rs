@@ -70,6 +70,11 @@ pub(crate) struct Parameter {
 }
 
 impl Parameter {
+    /// What it may be off by without anybody noticing: its tolerance, or of what is there or not, a part of the smallest size.
+    pub(super) fn least(&self) -> f64 {
+        if self.tolerance > 0.0 { self.tolerance } else { SHARE_OF_SMALLEST * self.smallest }
+    }
+
     /// A change of the number, no farther from nothing than a vehicle can be, or than its file has it already.
     ///
     /// * `own` - what the vehicle file has

@@ -17,7 +17,7 @@ const TILT_RAD: f64 = 0.006;
 /// By how much an attitude estimate may lean into an acceleration that lasts, rad per m/s^2: a degree at two of them.
 const LEVELLING_RAD_S2_PER_M: f64 = 0.01;
 /// By how much thrust differs from one flight to the next, as a fraction.
-pub(super) const DAY_FRACTION: f64 = 0.004;
+pub(super) const DAY_FRACTION: f64 = 0.0015;
 /// Tolerance of the barometer's zero, m.
 const HEIGHT_M: f64 = 0.2;
 /// Numbers of a flight before its heights: tilt about north and east, levelling, thrust.

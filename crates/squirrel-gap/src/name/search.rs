@@ -234,8 +234,7 @@ impl Search<'_> {
         let free = self.free_slots(member);
         let mut standard = own.iter().filter(|p| free.contains(&p.slot)).peekable();
         standard.peek().is_none()
-            || standard
-                .any(|p| (member.values[p.slot] - before[p.slot]).abs() >= TOLERANCES_MIN * p.tolerance)
+            || standard.any(|p| (member.values[p.slot] - before[p.slot]).abs() >= TOLERANCES_MIN * p.least())
     }
 
     /// Drops members that refinement has made too small to be off; whether there were any.
