@@ -151,7 +151,7 @@ fn judged(
     let catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
     let tick = || progress("naming");
     let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
-    let wanted = |naming: &_| unseen.as_ref().map_or(Ok(None), |unseen| hold(unseen, &search, naming));
+    let wanted = |naming: &_| hold(unseen.as_ref(), &search, naming);
     let mut naming = standing(&search, explain(&search)?, wanted)?;
     let rivals = search.rivals(&naming.found)?;
     progress("flying the held-out flights");

@@ -6,7 +6,7 @@
 
 use crate::GapError;
 use crate::name::{Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights};
-use crate::predictor::{Hypothesis, Predictor};
+use crate::predictor::{CHANNELS, Hypothesis, Predictor};
 use crate::shrink::{self, Errors12, Floor};
 use crate::verdict::Gap;
 use squirrel_sim::log::FlightLog;
@@ -84,39 +84,50 @@ fn settled_on(
     hypothesis(unseen, catalogue, &point)
 }
 
-/// By how much errors must be smaller with a name for it to hold: mean over channels of the logarithm of mean squares.
+/// By how much residuals must be smaller with a name for it to hold: mean over channels of the logarithm of mean squares.
 const HOLDS: f64 = 1e-3;
 
-/// Of each name, whether held-out flights are predicted better with it, every channel in units of what the model leaves there:
-/// a model that misses a little everywhere is far above the noise of some channels, and a name may act on others. `None` where
-/// no flight can be flown.
+/// Of each name, whether the force and moment of held-out flights are predicted better with it, every channel in units of what
+/// the model leaves there: a model that misses a little everywhere is far above the noise of some channels, and a name may act
+/// on others. Not flown for a second: what is missed carries such a flight away from any name. `None` without such flights.
 ///
 /// # Errors
 /// What the predictor says.
 pub(crate) fn hold(
-    unseen: &Predictor,
+    unseen: Option<&Predictor>,
     search: &Search<'_>,
     naming: &Naming,
 ) -> Result<Option<Vec<bool>>, GapError> {
+    let Some(unseen) = unseen else { return Ok(None) };
     // What floats is shared: without a name it would take its place.
     let whole = search.whole(&naming.found.best);
-    let errors = |members: &[Member]| -> Result<_, GapError> {
-        let at = settled_on(unseen, search, naming, members, &whole.base)?;
-        Ok(shrink::errors(unseen, &at)?.map(|errors| errors.mse()))
+    let residual = |members: &[Member]| -> Result<Vec<f64>, GapError> {
+        let rows = unseen.residual(&settled_on(unseen, search, naming, members, &whole.base)?)?;
+        Ok(mean_squares(unseen, &rows))
     };
-    let Some(with) = errors(&whole.members)? else { return Ok(None) };
+    let with = residual(&whole.members)?;
     let mut all = Vec::with_capacity(whole.members.len());
     for out in 0..whole.members.len() {
         let mut rest = whole.members.clone();
         rest.remove(out);
-        let Some(without) = errors(&rest)? else { return Ok(None) };
-        let channels: Vec<f64> = with
+        let without = residual(&rest)?;
+        let gains: Vec<f64> = with
             .iter()
             .zip(&without)
             .filter(|(w, _)| **w > 0.0)
             .map(|(w, without)| (without / w).ln())
             .collect();
-        all.push(channels.iter().sum::<f64>() > HOLDS * channels.len() as f64);
+        all.push(gains.iter().sum::<f64>() > HOLDS * gains.len() as f64);
     }
     Ok(Some(all))
+}
+
+/// Mean square of a residual by channel; 0 where it has none.
+fn mean_squares(predictor: &Predictor, rows: &[f64]) -> Vec<f64> {
+    let of = |channel: usize| {
+        let own = predictor.segments.iter().filter(move |s| s.channel == channel);
+        let own: Vec<f64> = own.flat_map(|s| &rows[s.rows.clone()]).copied().collect();
+        own.iter().map(|x| x * x).sum::<f64>() / own.len().max(1) as f64
+    };
+    (0..CHANNELS.len()).map(of).collect()
 }
