@@ -29,7 +29,7 @@ fn squirrel(factor: f64, effects: &str) -> VehicleFile {
                 let value = number.get_mut(key).unwrap();
                 match value.as_array_mut() {
                     Some(array) => {
-                        array.iter_mut().for_each(|x| *x = (x.as_float().unwrap() * factor).into())
+                        array.iter_mut().for_each(|x| *x = (x.as_float().unwrap() * factor).into());
                     }
                     None => *value = (value.as_float().unwrap() * factor).into(),
                 }

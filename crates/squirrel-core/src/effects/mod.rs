@@ -205,6 +205,24 @@ impl EffectParameter {
     }
 }
 
+/// The number of the base model that a parameter adds to, with its field in vehicle files, where the sum cannot be less than
+/// nothing: a drag, an area, a lag.
+pub fn base_number(effect: &str, key: &str, vehicle: &Vehicle<f64>) -> Option<(&'static str, f64)> {
+    let p = vehicle.parameters();
+    Some(match (effect, key) {
+        ("linear_drag", "extra_drag_n_s_per_m") => ("drag.linear_n_s_per_m[0]", p.drag.linear_n_s_per_m.x),
+        ("linear_drag", "extra_drag_z_n_s_per_m") => ("drag.linear_n_s_per_m[2]", p.drag.linear_n_s_per_m.z),
+        ("quadratic_drag", "extra_drag_area_m2" | "extra_drag_area_z_m2") => ("drag.area_m2", p.drag.area_m2),
+        ("motor_lag", "extra_time_constant_s") => {
+            ("propulsion.time_constant_s", p.propulsion.time_constant_up_s)
+        }
+        ("wing_servo_lag", "extra_time_constant_s") => {
+            ("wing.time_constant_s", p.wing.map_or(0.0, |wing| wing.time_constant_s))
+        }
+        _ => return None,
+    })
+}
+
 /// The forms that a list of parameters offers, the standard one first; empty for an effect with one form.
 pub fn forms(parameters: &[EffectParameter]) -> &'static [&'static str] {
     match parameters.iter().find(|p| p.key == FORM).map(|p| p.kind) {

@@ -88,7 +88,8 @@ fn problems_of(predictor: &Predictor<'_>, residual: &[f64], logs: &[(String, Fli
         // Without an accelerometer forces come from the fixes themselves, and agree with them.
         let felt = predictor.has_accelerometer();
         let (channel, words) = units::voltage(&flight)
-            .or_else(|| units::commands(&flight))
+            // Measured speeds of rotors are taken for commands then.
+            .or_else(|| (!predictor.has_rotor_speeds()).then(|| units::commands(&flight)).flatten())
             .or_else(|| held::held(log, &flight.spans()))
             .or_else(|| units::force(&flight))
             .or_else(|| attitude::rates(&flight))

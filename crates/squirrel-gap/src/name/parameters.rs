@@ -9,7 +9,7 @@ use super::tolerance::{SHARE_OF_SMALLEST, airframe, slip_ppm, timing_s, toleranc
 use crate::GapError;
 use crate::leftover::Slack;
 use crate::predictor::Predictor;
-use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, Scale, SizeRange};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, Scale, SizeRange, base_number};
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::plant::WingPlant;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -235,19 +235,13 @@ pub(super) fn bounds(vehicle: &Vehicle<f64>, effect: &str, key: &str, range: &Si
         Scale::Mass | Scale::Inertia | Scale::MassTimesArm => GROWING_TIMES,
     };
     let most = times * range.largest;
-    let p = vehicle.parameters();
-    let own = match (effect, key) {
-        ("linear_drag", "extra_drag_n_s_per_m") => p.drag.linear_n_s_per_m.x,
-        ("linear_drag", "extra_drag_z_n_s_per_m") => p.drag.linear_n_s_per_m.z,
-        ("quadratic_drag", "extra_drag_area_m2" | "extra_drag_area_z_m2") => p.drag.area_m2,
-        ("motor_lag", "extra_time_constant_s") => LAG_MOST * p.propulsion.time_constant_up_s,
-        ("wing_servo_lag", "extra_time_constant_s") => {
-            LAG_MOST * p.wing.map_or(0.0, |wing| wing.time_constant_s)
-        }
+    let own = match (base_number(effect, key, vehicle), effect) {
+        (Some((_, own)), "motor_lag" | "wing_servo_lag") => LAG_MOST * own,
+        (Some((_, own)), _) => own,
         // From a radius of five arms on, the air under a rotor is no ground effect's.
-        ("ground_effect", "effective_radius_m") => return (0.0, range.largest),
-        _ if range.signed => most,
-        _ => 0.0,
+        (None, "ground_effect") if key == "effective_radius_m" => return (0.0, range.largest),
+        (None, _) if range.signed => most,
+        (None, _) => 0.0,
     };
     (-own.min(most), most)
 }

@@ -4,7 +4,7 @@ use super::evidence::{BETA, Gram, Posterior, products};
 use super::linear::{Linear, height_columns};
 use super::parameters::{SLAB_OF_LARGEST, bounds};
 use super::point::{Member, Other, Point};
-use super::search::Search;
+use super::search::{LEAST, Search};
 use crate::GapError;
 use nalgebra::DMatrix;
 use squirrel_core::effects::{Effects, Scale, SizeRange};
@@ -86,7 +86,7 @@ impl Search<'_> {
             for (column, (member, slot)) in best.free.iter().enumerate() {
                 let range = self.range(&next[*member], *slot);
                 let (low, most) = self.bounds(&next[*member], *slot);
-                let low = if range.signed { low } else { 0.02 * range.smallest };
+                let low = if range.signed { low } else { LEAST * range.smallest };
                 let smallest = range.smallest;
                 let value = &mut next[*member].values[*slot];
                 let target = best.posterior.mean[column].clamp(low, most);

@@ -20,6 +20,8 @@ const BLOWN_NATS: f64 = 40.0;
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
 const TOLERANCES_MIN: f64 = 3.0;
+/// Part of its smallest size that a number without a sign has at least.
+pub(super) const LEAST: f64 = 0.02;
 /// Part of its bounds at which a number is at its end.
 const AT_ITS_END: f64 = 0.98;
 /// How much larger than the largest plausible size a number may be.
@@ -223,6 +225,12 @@ impl Search<'_> {
             let value = member.values[p.slot];
             // What takes away all that the vehicle file has is no end of anything.
             value >= AT_ITS_END * most || (least == -most && value <= AT_ITS_END * least)
+        }) || self.free_slots(member).into_iter().any(|slot| {
+            // A number that gives an effect its form, and does not want to be there.
+            let range = self.range(member, slot);
+            let shapes = self.catalogue.candidates[member.candidate].parameters.iter();
+            let is_own = shapes.map(|p| &self.catalogue.parameters[*p]).any(|p| p.slot == slot);
+            !is_own && !range.signed && member.values[slot] * AT_ITS_END <= LEAST * range.smallest
         })
     }
 
@@ -356,8 +364,7 @@ impl Search<'_> {
                 let mut rest = best.members.clone();
                 let out = rest.remove(i);
                 let without = self.score(linear, &rest)?;
-                let needed = if best.members.len() > 1 { FURTHER_NATS } else { NATS_MIN };
-                if without.log_evidence > best.log_evidence - self.needed(&out).max(needed) {
+                if without.log_evidence > best.log_evidence - self.needed(&out) {
                     *best = without;
                     changed = true;
                     break;

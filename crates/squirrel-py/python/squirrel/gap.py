@@ -18,6 +18,7 @@ __all__ = [
     "Finding",
     "FlightResidual",
     "Gap",
+    "Left",
     "Moved",
     "NamedEffect",
     "Parameter",
@@ -229,6 +230,29 @@ class Moved:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Left:
+    """What the names leave of the flights that they were fitted to.
+
+    Attributes
+    ----------
+    share_removed : float
+        Part of the mean square above noise, in units of noise, that the names remove, over all channels.
+    share_left : float
+        What is left above noise, as part of what was measured about its mean, rms, in the channels that stand out; 0 where
+        none does.
+    channels : tuple of str
+        The channels that stand out, the worst first.
+    goes_with : str or None
+        What it goes with, where something predicts it.
+    """
+
+    share_removed: float
+    share_left: float
+    channels: tuple[str, ...]
+    goes_with: str | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class SetAside:
     """A flight that nothing is said about, because its data contradict themselves.
 
@@ -265,6 +289,8 @@ class Verdict:
         What a leftover goes with; what to fly to know more.
     gap : Gap or None
         On held-out flights.
+    leftover : Left or None
+        What the names leave; None where nothing was looked for.
     closed_loop : tuple of ClosedLoop
     model_patch : str or None
         Path of the vehicle file with the effects, where one was written.
@@ -278,7 +304,14 @@ class Verdict:
     """
 
     verdict: Literal[
-        "none", "named", "named_form_differs", "ambiguous", "outside_catalogue", "not_identifiable", "data_problem"
+        "none",
+        "named",
+        "named_incomplete",
+        "named_form_differs",
+        "ambiguous",
+        "outside_catalogue",
+        "not_identifiable",
+        "data_problem",
     ]
     effects: tuple[NamedEffect, ...]
     moved: tuple[Moved, ...]
@@ -287,6 +320,7 @@ class Verdict:
     goes_with: str | None
     fly_next: str | None
     gap: Gap | None
+    leftover: Left | None
     closed_loop: tuple[ClosedLoop, ...]
     model_patch: str | None
     words: str
@@ -423,6 +457,15 @@ def _gap(gap: dict[str, Any]) -> Gap:
     return Gap(held_out_flights=tuple(gap.pop("held_out_flights")), **gap)
 
 
+def _left(left: dict[str, Any]) -> Left:
+    return Left(
+        share_removed=left["share_removed"],
+        share_left=left["share_left"],
+        channels=tuple(left["channels"]),
+        goes_with=left["goes_with"],
+    )
+
+
 def _flown(flown: dict[str, Any]) -> ClosedLoop:
     before, after = tuple(flown["before_ned_m"]), tuple(flown["after_ned_m"])
     return ClosedLoop(flight=flown["flight"], before_ned_m=before, after_ned_m=after)
@@ -441,6 +484,7 @@ def _verdict(verdict: dict[str, Any], patched: Vehicle | None) -> Verdict:
         goes_with=verdict["goes_with"],
         fly_next=verdict["fly_next"],
         gap=_gap(verdict["gap"]) if verdict["gap"] else None,
+        leftover=_left(verdict["leftover"]) if verdict["leftover"] else None,
         closed_loop=tuple(_flown(flown) for flown in verdict["closed_loop"]),
         model_patch=verdict["model_patch"],
         words=verdict["words"],

@@ -17,7 +17,7 @@ use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::wing_force::ForceModel;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
-use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, forms};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, base_number, forms};
 use squirrel_core::estimate::navigator::Navigation;
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
@@ -97,7 +97,7 @@ pub(super) fn build(
         control,
         estimator: t.estimation.filter.as_deref().map_or(Ok(Estimator::default()), Estimator::parse)?,
         sensors: t.sensors,
-        effects: effects(t.effects, vehicle.rotors().len())?,
+        effects: effects(t.effects, &vehicle)?,
         provenance: Vec::new(),
     })
 }
@@ -255,8 +255,9 @@ fn battery(t: BatteryTable) -> Result<BatteryParameters, Problem> {
 
 fn effects(
     tables: BTreeMap<String, BTreeMap<String, EffectValue>>,
-    rotor_count: usize,
+    vehicle: &Vehicle<f64>,
 ) -> Result<Effects<f64>, Problem> {
+    let rotor_count = vehicle.rotors().len();
     let mut effects = Effects::none();
     for (name, table) in tables {
         let Some(found) = effects.insert(&name) else {
@@ -281,6 +282,11 @@ fn effects(
             }
             found.values[i] = effect_value(value, found.parameters[i].kind, rotor_count)
                 .map_err(|reason| format!("{field}: {reason}"))?;
+            let sum = base_number(&name, found.parameters[i].key, vehicle);
+            if let Some((own, base)) = sum.filter(|(_, base)| base + found.values[i] < 0.0) {
+                let value = found.values[i];
+                return Err(format!("{field} = {value}: takes away more than there is, {own} = {base}"));
+            }
         }
         let needed = |p: &&EffectParameter| p.key != FORM && p.exists_in(form) && !table.contains_key(p.key);
         if let Some(missing) = found.parameters.iter().find(needed) {
