@@ -14,7 +14,7 @@ const SAMPLE_SHARE: f64 = 0.29;
 const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
 
 /// What sensors may be off by where the vehicle file does not say: m/s^2, and a degree and a quarter in rad.
-const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.04, "m/s^2");
+const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.03, "m/s^2");
 const HEADING: (&str, f64, &str) = ("sensors.attitude.bias_rad", 1.25_f64.to_radians(), "rad");
 
 /// What the vehicle file does not say and is taken instead.
