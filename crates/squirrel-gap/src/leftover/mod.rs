@@ -71,7 +71,8 @@ pub(crate) struct Leftover {
     pub(crate) kurtosis: f64,
     /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above 0.5 Hz.
     pub(crate) line: Option<(f64, f64)>,
-    /// Whether the model misses a little everywhere, as models of real vehicles do, and not one thing.
+    /// Whether the model misses a little everywhere, as models of real vehicles do, and not one thing: in force, or where most
+    /// is left. It may, inside its tolerances.
     pub(crate) is_everywhere: bool,
 }
 
@@ -219,8 +220,9 @@ pub(crate) fn leftover(
         out.families.sort_by(|a, b| b.1.total_cmp(&a.1));
         out.kurtosis = kurtosis(&x).max(kurtosis(&y));
         out.line = line(predictor, left, channel);
-        out.is_everywhere = is_everywhere(predictor, left, &out.bands, channel / 3);
     }
+    let group = out.excess.first().map_or(0, |(channel, _)| channel / 3);
+    out.is_everywhere = is_everywhere(predictor, left, &out.bands, group);
     out
 }
 

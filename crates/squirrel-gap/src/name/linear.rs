@@ -183,7 +183,7 @@ pub(super) fn height_columns(
 }
 
 /// Standard deviations that a number may be off by in a flight that nothing was fitted to.
-const INSIDE: f64 = 2.0;
+const INSIDE: f64 = 3.0;
 /// Steps towards the heights of flights.
 const HEIGHT_STEPS: usize = 5;
 

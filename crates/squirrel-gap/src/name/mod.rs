@@ -94,7 +94,8 @@ pub(crate) fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
 /// Standard deviations, from blocks of the flights, by which a number stands out from a model that misses a little everywhere.
 pub(crate) const STANDS: f64 = 5.0;
 
-/// The explanation with those names alone that stand although something is left; as it was where what is left is one thing.
+/// The explanation with those names alone that stand beside what the model misses everywhere; as it was where that is one
+/// thing, or nothing.
 ///
 /// * `hold` - of each name, whether held-out flights want it; `None` where there are none
 ///
@@ -106,8 +107,7 @@ pub(crate) fn standing(
     hold: impl Fn(&Naming) -> Result<Option<Vec<bool>>, GapError>,
 ) -> Result<Naming, GapError> {
     let is_candidate = |naming: &Naming| {
-        naming.leftover.is_real()
-            && naming.leftover.is_everywhere
+        naming.leftover.is_everywhere
             && !naming.leftover.is_foreign()
             && naming.gust_m_s.is_none()
             && !naming.found.best.members.is_empty()
