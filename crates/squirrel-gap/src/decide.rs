@@ -37,41 +37,40 @@ pub(crate) fn close<'a>(
     rivals: &'a [Scored],
     proof: Option<&HeldOut>,
     gap: Option<&Gap>,
-) -> impl Iterator<Item = &'a Scored> {
+) -> Vec<&'a Scored> {
     let best = naming.found.best.log_evidence;
-    let clearly_worse = move |rival: usize| {
+    let clearly_worse = |rival: usize| {
         let (Some(proof), Some(gap)) = (proof, gap) else { return false };
         let left = proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
         let is_behind = rivals[rival].log_evidence < best - BEHIND_NATS;
         let times = if is_behind { RIVAL_GAP_BEHIND } else { RIVAL_GAP };
         left.is_some_and(|left| left - 1.0 >= times * (gap.after - 1.0).max(HELD_OUT_NOISE))
     };
-    let is_close =
-        move |(i, rival): &(usize, &Scored)| rival.log_evidence > best - NATS_MIN && !clearly_worse(*i);
-    let all: Vec<&Scored> = rivals.iter().enumerate().filter(is_close).map(|(_, rival)| rival).collect();
-    all.into_iter()
+    let is_close = |(i, rival): &(usize, &Scored)| rival.log_evidence > best - NATS_MIN && !clearly_worse(*i);
+    rivals.iter().enumerate().filter(is_close).map(|(_, rival)| rival).collect()
 }
 
 /// The names that an answer shares with all that are as good, if that is a part of it: they stand whichever is right.
-pub(crate) fn shared(search: &Search<'_>, naming: &Naming, close: &[&Scored]) -> Option<Vec<usize>> {
+pub(crate) fn shared(search: &Search<'_>, naming: &Naming, close: &[&Scored]) -> Option<Vec<Member>> {
     let own = &naming.found.best.members;
     let has =
         |set: &Scored, member: &Member| set.members.iter().any(|other| other.candidate == member.candidate);
     let kept: Vec<usize> = (0..own.len()).filter(|i| close.iter().all(|set| has(set, &own[*i]))).collect();
     let stands = |i: usize| search.stands_out(&naming.found.best, i, &naming.deviations) >= STANDS;
     let some = !kept.is_empty() && kept.len() < own.len();
-    (some && kept.iter().all(|i| stands(*i))).then_some(kept)
+    (some && kept.iter().all(|i| stands(*i))).then(|| kept.iter().map(|i| own[*i].clone()).collect())
 }
 
 /// The one answer.
 ///
+/// * `close` - other names that are as good, of [`close`]
 /// * `open` - sets that the flights do not tell apart, of which the answer is what they share
 #[allow(clippy::too_many_arguments, reason = "everything that was found out comes together here")]
 pub(crate) fn decide(
     search: &Search<'_>,
     naming: &Naming,
     rivals: &[Scored],
-    proof: Option<&HeldOut>,
+    close: &[&Scored],
     gap: Option<Gap>,
     places: Vec<Place>,
     open: Vec<Alternative>,
@@ -79,7 +78,6 @@ pub(crate) fn decide(
 ) -> Verdict {
     let found = &naming.found;
     let effects = named(search, naming);
-    let close: Vec<&Scored> = close(naming, rivals, proof, gap.as_ref()).collect();
     let leftover = &naming.leftover;
     let mut blind = search.blind(&found.best);
     if curve_hides_sag && !blind.contains(&"battery_sag") && effects.iter().all(|e| e.name != "battery_sag") {

@@ -166,14 +166,15 @@ fn judged(
     let best = naming.found.best.log_evidence;
     let near = rivals.iter().filter(|rival| rival.log_evidence > best - NATS_MIN).count();
     let (mut proof, mut numbers) = proven(&naming, &rivals[..rivals.len().min(1.max(near))])?;
-    let close: Vec<_> = close(&naming, &rivals, proof.as_ref(), numbers.as_ref()).collect();
+    let close = close(&naming, &rivals, proof.as_ref(), numbers.as_ref());
     let mut open = Vec::new();
     if let Some(kept) = shared(&search, &naming, &close) {
-        open = alternatives(&search, &naming, std::iter::once(&naming.found.best).chain(close));
+        open =
+            alternatives(&search, &naming, std::iter::once(&naming.found.best).chain(close.iter().copied()));
         naming = only(&search, &naming, &kept)?;
         (proof, numbers) = proven(&naming, &[])?;
     }
-    let verdict = decide(&search, &naming, &rivals, proof.as_ref(), numbers, places, open, curve_hides_sag);
+    let verdict = decide(&search, &naming, &rivals, &close, numbers, places, open, curve_hides_sag);
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.null),

@@ -78,8 +78,7 @@ fn settled_on(
     let mut base = base[..catalogue.shared_columns()].to_vec();
     base.resize(catalogue.columns(unseen), 0.0);
     let mut point = Point { members: members.to_vec(), base };
-    let thrust =
-        catalogue.parameters.iter().find(|p| p.key == "thrust_fraction").map_or(0.0, |p| p.tolerance);
+    let thrust = catalogue.tolerance_of("thrust_fraction");
     settle_flights(unseen, catalogue, &naming.found.linear.whitener, thrust, &mut point)?;
     hypothesis(unseen, catalogue, &point)
 }

@@ -12,7 +12,7 @@ use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{imported, shared, vehicle, vehicle_with};
+use support::{hold, imported, shared, step, vehicle, vehicle_with};
 
 type Flights = Vec<(String, FlightLog)>;
 
@@ -109,24 +109,6 @@ fn to_world(log: &mut FlightLog) {
         let q = attitude.row(k);
         let q = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
         f.copy_from_slice((q * Vector3::new(f[0], f[1], f[2])).as_slice());
-    }
-}
-
-/// The clock of a source jumps in the middle of the flight.
-fn step(log: &mut FlightLog, source: &str, by_s: f64) {
-    let time_s = &mut log.sources.get_mut(source).unwrap().time_s;
-    let middle = time_s.len() / 2;
-    time_s[middle..].iter_mut().for_each(|t| *t += by_s);
-}
-
-/// All channels of a source keep each of their values for so many samples.
-fn hold(log: &mut FlightLog, source: &str, samples: usize) {
-    for channel in log.sources.get_mut(source).unwrap().channels.values_mut() {
-        let width = channel.width;
-        let old = channel.values.clone();
-        for (i, x) in channel.values.iter_mut().enumerate() {
-            *x = old[i / width / samples * samples * width + i % width];
-        }
     }
 }
 

@@ -4,19 +4,8 @@
 mod support;
 
 use squirrel_gap::{Kind, diagnose};
-use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
-use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::vehicle_with;
-
-fn fly(vehicle: &VehicleFile, seed: u64) -> (String, FlightLog) {
-    let mut scenario = Scenario::find("excite_rich").unwrap();
-    scenario.seed = seed;
-    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
-    (format!("flight {seed}"), setup.fly(true, |_| {}).unwrap().log.unwrap())
-}
+use support::{fly_rich, vehicle_with};
 
 /// Two flights of a vehicle with an effect, and one of a vehicle without it, which the file describes well.
 #[test]
@@ -24,13 +13,13 @@ fn what_makes_held_out_flights_worse_than_the_file_is_no_name() {
     let file = VehicleFile::squirrel();
     let effect = "[effects.yaw_torque_coeff]\ntorque_fraction = 0.3\n\n[limits]";
     let flown = vehicle_with("squirrel.toml", &[("[limits]", effect)]);
-    let flights = [fly(&flown, 1), fly(&flown, 2)];
+    let flights = [fly_rich(&flown, 1), fly_rich(&flown, 2)];
     let verdict = |held_out| diagnose(&file, &flights, &[held_out], &|_| {}).unwrap().verdict;
 
-    let same = verdict(fly(&flown, 3));
+    let same = verdict(fly_rich(&flown, 3));
     assert_eq!(same.verdict, Kind::Named, "{}", same.words);
 
-    let other = verdict(fly(&file, 3));
+    let other = verdict(fly_rich(&file, 3));
     let gap = other.gap.as_ref().unwrap();
     assert!(gap.after > 1.05 * gap.before, "{gap:?}");
     assert_eq!(other.verdict, Kind::OutsideCatalogue, "{}", other.words);

@@ -7,20 +7,10 @@ mod support;
 use hidden_effects::case::{Case, Set};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_gap::{Diagnosis, Kind, add, diagnose};
-use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
-use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
-use support::vehicle_with;
-
-fn fly(vehicle: &VehicleFile, seed: u64) -> (String, FlightLog) {
-    let mut scenario = Scenario::find("excite_rich").unwrap();
-    scenario.seed = seed;
-    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
-    (format!("flight {seed}"), setup.fly(true, |_| {}).unwrap().log.unwrap())
-}
+use support::{fly_rich, vehicle_with};
 
 fn logs(folder: &Path) -> Vec<(String, FlightLog)> {
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -62,7 +52,7 @@ fn a_drag_that_the_file_overstates_is_found() {
         ("linear_n_s_per_m = { value = [0.0, 0.0, 0.0]", "linear_n_s_per_m = { value = [0.1, 0.1, 0.1]");
     let file = vehicle_with("squirrel.toml", &[drag]);
     let flown = VehicleFile::squirrel();
-    let verdict = diagnose(&file, &[fly(&flown, 1)], &[fly(&flown, 2)], &|_| {}).unwrap().verdict;
+    let verdict = diagnose(&file, &[fly_rich(&flown, 1)], &[fly_rich(&flown, 2)], &|_| {}).unwrap().verdict;
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     assert_eq!(verdict.effects[0].name, "linear_drag", "{}", verdict.words);
     let squirrel_gap::Value::Number { value, .. } = verdict.effects[0].parameters["extra_drag_n_s_per_m"]
@@ -100,7 +90,7 @@ fn levelled(mut log: FlightLog) -> FlightLog {
 fn an_attitude_that_leans_into_accelerations_is_no_effect() {
     let file = VehicleFile::squirrel();
     let [a, b] = [1, 2].map(|seed| {
-        let (name, log) = fly(&file, seed);
+        let (name, log) = fly_rich(&file, seed);
         (name, levelled(log))
     });
     let verdict = diagnose(&file, &[a], &[b], &|_| {}).unwrap().verdict;
@@ -115,7 +105,7 @@ fn a_held_out_flight_of_another_day_does_not_take_a_name_away() {
     let worn = "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n\n[effects.thrust_coefficient]\nthrust_fraction = -0.008\n\n[limits]";
     let flown = vehicle_with("squirrel.toml", &[("[limits]", effect)]);
     let later = vehicle_with("squirrel.toml", &[("[limits]", worn)]);
-    let verdict = diagnose(&file, &[fly(&flown, 1)], &[fly(&later, 2)], &|_| {}).unwrap().verdict;
+    let verdict = diagnose(&file, &[fly_rich(&flown, 1)], &[fly_rich(&later, 2)], &|_| {}).unwrap().verdict;
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     let gap = verdict.gap.as_ref().unwrap();
     assert!(gap.removed_fraction > 0.98, "{gap:?}");

@@ -1,13 +1,13 @@
 //! The same logs explained for a vehicle of an eighth or eight times the mass: no size of the workflow is one of 0.5 kg.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
+mod support;
+
 use squirrel_core::effects::Scale;
 use squirrel_gap::{Kind, Value, Verdict, diagnose};
-use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
-use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
+use support::fly_rich;
 use toml_edit::{DocumentMut, Item, Table};
 
 /// Fields that carry mass: with all of them times a factor, and lengths and times as they are, a vehicle flies the same.
@@ -52,11 +52,7 @@ fn squirrel(factor: f64, effects: &str) -> VehicleFile {
 }
 
 fn flown(effects: &str, seed: u64) -> (String, FlightLog) {
-    let mut scenario = Scenario::find("excite_rich").unwrap();
-    scenario.seed = seed;
-    let vehicle = squirrel(1.0, effects);
-    let setup = Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
-    (format!("flight {seed}"), setup.fly(true, |_| {}).unwrap().log.unwrap())
+    fly_rich(&squirrel(1.0, effects), seed)
 }
 
 /// How a number of the verdict grows with the vehicle's mass where its lengths stay.

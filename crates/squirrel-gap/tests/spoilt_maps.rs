@@ -7,7 +7,7 @@ use squirrel_gap::check;
 use squirrel_sim::import::{ImportMap, import};
 use squirrel_sim::log::FlightLog;
 use std::path::Path;
-use support::{imported, shared, vehicle, vehicles};
+use support::{hold, imported, shared, step, vehicle, vehicles};
 
 const OMEGA: &str = "imu.omega_body_rad_s";
 const FORCE: &str = "imu.specific_force_body_m_s2";
@@ -113,25 +113,6 @@ fn to_world(log: &mut FlightLog, plus: [f64; 3]) {
         let twice = cross(v, once);
         for i in 0..3 {
             f[i] += 2.0 * (w * once[i] + twice[i]) + plus[i];
-        }
-    }
-}
-
-/// The clock of a source jumps in the middle of the flight.
-fn step(log: &mut FlightLog, source: &str, by_s: f64) {
-    let time_s = &mut log.sources.get_mut(source).unwrap().time_s;
-    let middle = time_s.len() / 2;
-    time_s[middle..].iter_mut().for_each(|t| *t += by_s);
-}
-
-/// All channels of a source keep each of their values for so many samples.
-fn hold(log: &mut FlightLog, source: &str, samples: usize) {
-    for channel in log.sources.get_mut(source).unwrap().channels.values_mut() {
-        let width = channel.width;
-        let old = channel.values.clone();
-        for (i, x) in channel.values.iter_mut().enumerate() {
-            let row = i / width / samples * samples;
-            *x = old[row * width + i % width];
         }
     }
 }

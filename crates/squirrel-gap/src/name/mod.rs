@@ -130,7 +130,7 @@ pub(crate) fn standing(
         if kept.is_empty() {
             return Ok(naming);
         }
-        let fewer = judge(search, search.with(&at.found, &kept)?)?;
+        let fewer = only(search, at, &kept)?;
         kept.clone_from(&fewer.found.best.members);
         if !is_candidate(&fewer) {
             return Ok(naming);
@@ -140,13 +140,12 @@ pub(crate) fn standing(
     Ok(Naming { stands: true, ..now.unwrap_or(naming) })
 }
 
-/// The same explanation with some of its names alone.
+/// The same explanation with these of its names alone.
 ///
 /// # Errors
 /// What the predictor says.
-pub(crate) fn only(search: &Search<'_>, naming: &Naming, kept: &[usize]) -> Result<Naming, GapError> {
-    let members: Vec<Member> = kept.iter().map(|i| naming.found.best.members[*i].clone()).collect();
-    judge(search, search.with(&naming.found, &members)?)
+pub(crate) fn only(search: &Search<'_>, naming: &Naming, members: &[Member]) -> Result<Naming, GapError> {
+    judge(search, search.with(&naming.found, members)?)
 }
 
 /// What floats may be off by this many tolerances before a leftover is a leftover.

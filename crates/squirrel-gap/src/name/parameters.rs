@@ -170,8 +170,17 @@ impl Catalogue {
 
     /// By how much the number that a member's slot adds to is off by itself, one standard deviation.
     pub(crate) fn spread(&self, member: &Member, slot: usize) -> f64 {
-        let own = |p: &&Parameter| p.candidate == member.candidate && p.slot == slot;
-        self.parameters.iter().find(own).map_or(0.0, |p| p.spread)
+        self.own(member).find(|p| p.slot == slot).map_or(0.0, |p| p.spread)
+    }
+
+    /// The numbers of a member that act by themselves.
+    pub(super) fn own(&self, member: &Member) -> impl Iterator<Item = &Parameter> {
+        self.candidates[member.candidate].parameters.iter().map(|p| &self.parameters[*p])
+    }
+
+    /// The tolerance of the number with a key; 0 where these flights have no such effect.
+    pub(crate) fn tolerance_of(&self, key: &str) -> f64 {
+        self.parameters.iter().find(|p| p.key == key).map_or(0.0, |p| p.tolerance)
     }
 
     /// Tolerances of what has no number of its own.
@@ -179,8 +188,8 @@ impl Catalogue {
     /// * `timing_s` - by how much commands may act beside their time
     /// * `thrust_fraction` - by how much thrust may drift in a flight
     pub(crate) fn slack(&self, timing_s: f64, thrust_fraction: f64) -> Slack {
-        let of = |key: &str| self.parameters.iter().find(|p| p.key == key).map_or(0.0, |p| p.tolerance);
-        Slack { lever_m: of("cg_x_m"), timing_s, thrust_fraction, drag_n_s_per_m: of("extra_drag_n_s_per_m") }
+        let drag_n_s_per_m = self.tolerance_of("extra_drag_n_s_per_m");
+        Slack { lever_m: self.tolerance_of("cg_x_m"), timing_s, thrust_fraction, drag_n_s_per_m }
     }
 
     fn add(

@@ -53,7 +53,7 @@ pub(crate) struct Search<'a> {
 /// What a search found.
 pub(crate) struct Found {
     pub(crate) linear: Rc<Linear>,
-    pub(crate) null: Scored,
+    pub(crate) null: Rc<Scored>,
     pub(crate) best: Scored,
     /// The best without each of its members.
     pub(crate) without: Vec<Scored>,
@@ -91,7 +91,7 @@ impl Search<'_> {
                 }
                 self.finish(&mut best);
                 let null = self.score(&linear, &[])?;
-                return Ok(Found { linear: Rc::new(linear), null, best, without });
+                return Ok(Found { linear: Rc::new(linear), null: Rc::new(null), best, without });
             }
             point = self.settled(&best);
             linear = self.linear(&point, Some(linear))?;
@@ -219,8 +219,7 @@ impl Search<'_> {
     }
 
     fn is_at_its_end(&self, member: &Member) -> bool {
-        let own = self.catalogue.candidates[member.candidate].parameters.iter();
-        own.map(|p| &self.catalogue.parameters[*p]).any(|p| {
+        self.catalogue.own(member).any(|p| {
             let (least, most) = p.bounds;
             let value = member.values[p.slot];
             // What takes away all that the vehicle file has is no end of anything.
@@ -228,8 +227,7 @@ impl Search<'_> {
         }) || self.free_slots(member).into_iter().any(|slot| {
             // A number that gives an effect its form, and does not want to be there.
             let range = self.range(member, slot);
-            let shapes = self.catalogue.candidates[member.candidate].parameters.iter();
-            let is_own = shapes.map(|p| &self.catalogue.parameters[*p]).any(|p| p.slot == slot);
+            let is_own = self.catalogue.own(member).any(|p| p.slot == slot);
             !is_own && !range.signed && member.values[slot] * AT_ITS_END <= LEAST * range.smallest
         })
     }
@@ -237,10 +235,8 @@ impl Search<'_> {
     /// By the numbers of the standard form, unless this form has others.
     fn is_beyond_tolerance(&self, member: &Member) -> bool {
         let before = self.catalogue.absent(self.predictor, member.candidate).values;
-        let own = self.catalogue.candidates[member.candidate].parameters.iter();
-        let own: Vec<_> = own.map(|p| &self.catalogue.parameters[*p]).collect();
         let free = self.free_slots(member);
-        let mut standard = own.iter().filter(|p| free.contains(&p.slot)).peekable();
+        let mut standard = self.catalogue.own(member).filter(|p| free.contains(&p.slot)).peekable();
         standard.peek().is_none()
             || standard.any(|p| (member.values[p.slot] - before[p.slot]).abs() >= TOLERANCES_MIN * p.least())
     }
@@ -265,8 +261,7 @@ impl Search<'_> {
         let mut best = self.score(&linear, members)?;
         let without = self.without(&linear, &best)?;
         self.finish(&mut best);
-        let null = self.score(&linear, &[])?;
-        Ok(Found { linear, null, best, without })
+        Ok(Found { linear, null: Rc::clone(&found.null), best, without })
     }
 
     /// By how many standard deviations a member's number differs from what the vehicle file has, the clearest of them.

@@ -4,8 +4,11 @@
 
 use std::path::{Path, PathBuf};
 
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::import::{ImportMap, import};
 use squirrel_sim::log::FlightLog;
+use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// A part of the shared folder. It is not in the repository; without it a test says so and passes, except on CI.
@@ -41,4 +44,30 @@ pub(crate) fn vehicle_with(file: &str, changes: &[(&str, &str)]) -> VehicleFile 
 pub(crate) fn imported(map: &str, path: &Path) -> FlightLog {
     let map = ImportMap::load(&vehicles("maps").join(map)).unwrap();
     import(&map, &[path.to_owned()]).unwrap().0
+}
+
+/// The clock of a source jumps in the middle of the flight.
+pub(crate) fn step(log: &mut FlightLog, source: &str, by_s: f64) {
+    let time_s = &mut log.sources.get_mut(source).unwrap().time_s;
+    let middle = time_s.len() / 2;
+    time_s[middle..].iter_mut().for_each(|t| *t += by_s);
+}
+
+/// All channels of a source keep each of their values for so many samples.
+pub(crate) fn hold(log: &mut FlightLog, source: &str, samples: usize) {
+    for channel in log.sources.get_mut(source).unwrap().channels.values_mut() {
+        let width = channel.width;
+        let old = channel.values.clone();
+        for (i, x) in channel.values.iter_mut().enumerate() {
+            *x = old[i / width / samples * samples * width + i % width];
+        }
+    }
+}
+
+/// A flight of the scenario that shows every effect.
+pub(crate) fn fly_rich(vehicle: &VehicleFile, seed: u64) -> (String, FlightLog) {
+    let mut scenario = Scenario::find("excite_rich").unwrap();
+    scenario.seed = seed;
+    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    (format!("flight {seed}"), setup.fly(true, |_| {}).unwrap().log.unwrap())
 }
