@@ -58,7 +58,10 @@ pub(crate) fn shared(search: &Search<'_>, naming: &Naming, close: &[&Scored]) ->
     let kept: Vec<usize> = (0..own.len()).filter(|i| close.iter().all(|set| has(set, &own[*i]))).collect();
     let stands = |i: usize| search.stands_out(&naming.found.best, i, &naming.deviations) >= STANDS;
     let some = !kept.is_empty() && kept.len() < own.len();
-    (some && kept.iter().all(|i| stands(*i))).then(|| kept.iter().map(|i| own[*i].clone()).collect())
+    // Which rotors are weak is one answer, and a part of it is another one.
+    let is_one = search.catalogue.is_of_one_machine;
+    (some && !is_one && kept.iter().all(|i| stands(*i)))
+        .then(|| kept.iter().map(|i| own[*i].clone()).collect())
 }
 
 /// The one answer.

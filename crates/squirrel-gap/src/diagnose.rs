@@ -1,7 +1,8 @@
 //! From flights to a verdict: check that the logs agree with themselves, name what is missing, prove it on other flights.
 
 use crate::GapError;
-use crate::compatibility::{self, Ready};
+use crate::baseline::Baseline;
+use crate::compatibility::{self, Moments, Ready};
 use crate::decide::{alternatives, close, decide, shared};
 use crate::find;
 use crate::name::{
@@ -63,23 +64,49 @@ pub fn diagnose(
     held_out: &[(String, FlightLog)],
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, GapError> {
+    diagnose_against(vehicle, None, flights, held_out, progress)
+}
+
+/// Looks at flights of a machine and says what has changed since those of a baseline.
+///
+/// * arguments as of [`diagnose`]
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn diagnose_since(
+    baseline: &Baseline,
+    flights: &[(String, FlightLog)],
+    held_out: &[(String, FlightLog)],
+    progress: &dyn Fn(&str),
+) -> Result<Diagnosis, GapError> {
+    diagnose_against(&baseline.declared, Some(baseline), flights, held_out, progress)
+}
+
+fn diagnose_against<'a>(
+    vehicle: &'a VehicleFile,
+    baseline: Option<&'a Baseline>,
+    flights: &[(String, FlightLog)],
+    held_out: &[(String, FlightLog)],
+    progress: &dyn Fn(&str),
+) -> Result<Diagnosis, GapError> {
     progress("reading");
-    let mut diagnosis = sorted(vehicle, flights, held_out, progress)?;
+    let mut diagnosis = sorted(vehicle, baseline, flights, held_out, progress)?;
     let verdict = &mut diagnosis.verdict;
     compatibility::tell(verdict, flights.len() + held_out.len());
     Ok(diagnosis)
 }
 
 /// The diagnosis of the flights whose data agree with themselves.
-fn sorted(
-    vehicle: &VehicleFile,
+fn sorted<'a>(
+    vehicle: &'a VehicleFile,
+    baseline: Option<&'a Baseline>,
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, GapError> {
     let without = |aside: Vec<SetAside>| {
         let [flights, held_out] = [flights, held_out].map(|logs| compatibility::kept(logs, &aside));
-        let mut diagnosis = sorted(vehicle, &flights, &held_out, progress)?;
+        let mut diagnosis = sorted(vehicle, baseline, &flights, &held_out, progress)?;
         diagnosis.verdict.set_aside.splice(..0, aside);
         Ok(diagnosis)
     };
@@ -111,12 +138,23 @@ fn sorted(
         };
         return Ok(Diagnosis { verdict, domain: covered(&ready.predictor), details: None });
     }
-    if aside.is_empty() { judged(vehicle, flights, held_out, ready, progress) } else { without(aside) }
+    if !aside.is_empty() {
+        return without(aside);
+    }
+    match baseline {
+        // What a machine's own numbers make of quick moments says nothing of its data.
+        Some(own) => {
+            let ready = Ready::new(&own.vehicle, flights, held_out)?;
+            judged(&own.vehicle, baseline, flights, held_out, ready, progress)
+        }
+        None => judged(vehicle, None, flights, held_out, ready, progress),
+    }
 }
 
 /// The diagnosis of flights that agree with themselves.
 fn judged(
     vehicle: &VehicleFile,
+    baseline: Option<&Baseline>,
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
     ready: Ready<'_>,
@@ -131,14 +169,10 @@ fn judged(
     } else {
         nominal
     };
-    if !predictor.has_motion() {
-        predictor.leave_out_drag();
-    }
-    if !(predictor.has_motion() && compatibility::moments_fit(&predictor, &nominal)) {
-        predictor.leave_out_moments();
-        if let Some(unseen) = &mut unseen {
-            unseen.leave_out_moments();
-        }
+    let moments = baseline.map_or(Moments::IfKnown, |baseline| baseline.moments);
+    compatibility::leave_out(&mut predictor, &nominal, moments);
+    if let Some(unseen) = &mut unseen {
+        unseen.keep_moments_of(&predictor);
     }
     let curve_hides_sag = curve_hides_sag(&predictor, &nominal)?;
     if curve_hides_sag {
@@ -148,7 +182,10 @@ fn judged(
     }
     predictor.notes.extend(silent_tolerances(vehicle));
     progress("naming");
-    let catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
+    let mut catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
+    if let Some(baseline) = baseline {
+        catalogue.take(&baseline.scatter);
+    }
     let tick = || progress("naming");
     let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
     let wanted = |naming: &_| hold(unseen.as_ref(), &search, naming);

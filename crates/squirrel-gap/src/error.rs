@@ -31,6 +31,12 @@ pub enum GapError {
         /// Its value.
         value: f64,
     },
+    /// No flight of a baseline is left.
+    #[error("baseline: no flight is left: {words}")]
+    Baseline {
+        /// What is wrong with the first.
+        words: String,
+    },
     /// A channel without which there is no residual.
     #[error("{flight}: {channel}: missing; the residual needs it")]
     Missing {

@@ -9,6 +9,7 @@
 //! The physics is that of the simulator; nothing of it is written here again.
 
 mod add;
+mod baseline;
 mod closed_loop;
 mod compatibility;
 mod decide;
@@ -27,9 +28,10 @@ mod verdict;
 mod words;
 
 pub use add::{add, add_effect, difference, nothing_to_add};
+pub use baseline::Baseline;
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use compatibility::check;
-pub use diagnose::{Covered, Diagnosis, diagnose};
+pub use diagnose::{Covered, Diagnosis, diagnose, diagnose_since};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::picture;

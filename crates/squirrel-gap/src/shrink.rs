@@ -252,7 +252,7 @@ struct Noise<'a> {
 /// Whether the attitude is the plant's own: it is the measured one where nothing is said of moments, or where no gyroscope
 /// says how fast the vehicle turned at the start.
 fn flies_freely(predictor: &Predictor) -> bool {
-    predictor.has_channel(3) && predictor.has_gyroscope()
+    predictor.has_all_of(3) && predictor.has_gyroscope()
 }
 
 /// The parts that are compared; the others are zero.

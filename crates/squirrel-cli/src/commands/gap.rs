@@ -51,6 +51,10 @@ pub(crate) struct Given {
     /// Flight logs, or folders of them, that it never sees.
     #[arg(long, num_args = 1..)]
     held_out: Vec<PathBuf>,
+    /// Good flights of the same machine, or folders of them: the vehicle's numbers become theirs, and what is named is what has
+    /// changed since.
+    #[arg(long, num_args = 1..)]
+    baseline: Vec<PathBuf>,
     /// Folder for what is written.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -111,8 +115,10 @@ impl Given {
         let reads =
             Paths::default().vehicle("--vehicle", [&self.vehicle]).flights("--flights", &self.flights)?;
         let kept = self.out.as_ref().zip(names.last()).map(|(folder, name)| folder.join(name));
-        let mut paths =
-            reads.flights("--held-out", &self.held_out)?.writes_json(self.json.as_ref(), kept.as_ref());
+        let mut paths = reads
+            .flights("--held-out", &self.held_out)?
+            .flights("--baseline", &self.baseline)?
+            .writes_json(self.json.as_ref(), kept.as_ref());
         if let Some(folder) = &self.out {
             paths = paths.writes_into(folder, names);
         }
@@ -127,10 +133,17 @@ impl Given {
     fn diagnose(&self) -> Result<Found, String> {
         let (vehicle, flights, held_out) = self.read()?;
         let bar = output::spinner();
-        let diagnosis = squirrel_gap::diagnose(&vehicle, &flights, &held_out, &|what| {
+        let tell = |what: &str| {
             bar.set_message(what.to_owned());
             bar.inc(1);
-        });
+        };
+        let diagnosis = if self.baseline.is_empty() {
+            squirrel_gap::diagnose(&vehicle, &flights, &held_out, &tell)
+        } else {
+            let good = logs(&self.baseline)?;
+            squirrel_gap::Baseline::fit(&vehicle, &good, &tell)
+                .and_then(|own| squirrel_gap::diagnose_since(&own, &flights, &held_out, &tell))
+        };
         bar.finish_and_clear();
         let diagnosis = diagnosis.map_err(|e| e.to_string())?;
         let looked_at = |flight: &(String, FlightLog)| diagnosis.verdict.has_looked_at(&flight.0);

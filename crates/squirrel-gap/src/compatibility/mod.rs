@@ -160,6 +160,29 @@ const TOLD: usize = 3;
 /// Correlation of roll and pitch with their commands, however late, below which the model says nothing about moments.
 const MOMENT_FIT: f64 = 0.75;
 
+/// What takes part of the moments of some flights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Moments {
+    /// All of them, where they have to do with those of the vehicle file.
+    IfKnown,
+    /// What lasts of them: the vehicle's numbers are those of this machine.
+    Lasting,
+}
+
+/// Leaves out what is not known of some flights: drag without the motion through the air, and moments that have nothing to do
+/// with those of the vehicle file.
+pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments: Moments) {
+    let has_motion = predictor.has_motion();
+    if !has_motion {
+        predictor.leave_out_drag();
+        predictor.leave_out_moments();
+    } else if moments == Moments::Lasting {
+        predictor.keep_trim();
+    } else if !moments_fit(predictor, residual) {
+        predictor.leave_out_moments();
+    }
+}
+
 /// Whether the vehicle file's moments have to do with the measured ones; where they do not, nothing is named from them.
 pub(crate) fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> bool {
     let fits: Vec<f64> = (0..predictor.tracks.len())

@@ -41,11 +41,12 @@ pub(crate) fn draws(
                     })
                     .collect();
                 for segment in predictor.segments.iter().filter(|s| s.piece == piece && s.channel < DYNAMIC) {
-                    for (i, row) in segment.rows.clone().enumerate() {
-                        rows[row] = white[i][segment.channel]
-                            + wind_columns[0][row] * air[i][0]
-                            + wind_columns[1][row] * air[i][1]
-                            + wind_columns[2][row] * air[i][2];
+                    for (i, (row, noise)) in segment.rows.clone().zip(segment.rows_of(&white)).enumerate() {
+                        let air = air[i * segment.mean_of];
+                        rows[row] = noise
+                            + wind_columns[0][row] * air[0]
+                            + wind_columns[1][row] * air[1]
+                            + wind_columns[2][row] * air[2];
                     }
                 }
             }

@@ -158,7 +158,7 @@ pub(crate) fn leftover(
 ) -> Leftover {
     let mut bands = Vec::new();
     let mut worst = [0.0_f64; DYNAMIC];
-    for segment in predictor.segments.iter().filter(|s| s.channel < DYNAMIC && s.rows.len() >= 4 * BLOCK) {
+    for segment in predictor.segments.iter().filter(|s| is_judged(s)) {
         let rows = |all: &[f64]| all[segment.rows.clone()].to_vec();
         let own = rows(left);
         // What the model says in all: the measurement about its mean, and what the named effects add.
@@ -184,11 +184,13 @@ pub(crate) fn leftover(
             slow_measured: rms_of_means(&about_mean),
         };
         let within = within_tolerance(predictor, &motions[segment.piece], segment, slack);
-        let allowed = |floor: f64, ratio: f64, explained: f64| {
-            ((floor * ratio).powi(2) + (MODEL_ERROR * explained).powi(2) + within.powi(2)).sqrt()
+        let [slow_usual, whole_usual] = slack.usual[segment.channel];
+        let model_error = MODEL_ERROR * rms_of_means(&explained);
+        let allowed = |floor: f64, ratio: f64, usual: f64| {
+            ((floor.max(usual) * ratio).powi(2) + model_error.powi(2) + within.powi(2)).sqrt()
         };
-        let ratio = (band.slow / allowed(band.slow_floor, SLOW_RATIO, rms_of_means(&explained)))
-            .max(band.whole / allowed(band.whole_floor, WHOLE_RATIO, rms_of_means(&explained)));
+        let ratio = (band.slow / allowed(band.slow_floor, SLOW_RATIO, slow_usual))
+            .max(band.whole / allowed(band.whole_floor, WHOLE_RATIO, whole_usual));
         worst[segment.channel] = worst[segment.channel].max(ratio);
         bands.push(band);
     }
@@ -237,6 +239,27 @@ pub(crate) struct Slack {
     pub(crate) thrust_fraction: f64,
     /// When commands act, s.
     pub(crate) timing_s: f64,
+    /// What the model usually leaves of this machine's flights, slow and as a whole, by channel and in its unit.
+    pub(crate) usual: Usual,
+}
+
+/// Rms of what a model leaves of a flight, by channel of the dynamics: of its slow part and of the whole.
+pub(crate) type Usual = [[f64; 2]; DYNAMIC];
+
+/// The largest of what is left of any flight.
+pub(crate) fn usual(predictor: &Predictor, left: &[f64]) -> Usual {
+    let mut most = Usual::default();
+    for segment in predictor.segments.iter().filter(|s| is_judged(s)) {
+        let own = &left[segment.rows.clone()];
+        let [slow, whole] = &mut most[segment.channel];
+        (*slow, *whole) = (slow.max(rms_of_means(own)), whole.max(rms(own)));
+    }
+    most
+}
+
+/// Whether a leftover is looked for in a segment.
+fn is_judged(segment: &Segment) -> bool {
+    segment.channel < DYNAMIC && !segment.is_trim() && segment.rows.len() >= 4 * BLOCK
 }
 
 /// What such tolerances leave in a channel, in its unit: forces that act a little beside their place are moments, and no drag

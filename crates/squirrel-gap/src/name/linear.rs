@@ -27,9 +27,6 @@ pub(crate) struct Linear {
     near: bool,
 }
 
-/// Part of what was measured that no model is trusted with.
-const DOUBT: f64 = 0.01;
-
 impl Linear {
     /// Predicts every number once about a point, fits the whitening to what the fullest model leaves, and whitens.
     ///
@@ -105,6 +102,8 @@ impl Linear {
             tolerance.push(sd);
             raw.push(match (other, &mut before) {
                 (Other::Height { .. }, _) => Vec::new(),
+                // What cannot be off needs no column.
+                _ if sd == 0.0 => Vec::new(),
                 (_, Some(before)) => std::mem::take(&mut before[column]),
                 (other, None) => {
                     let mut moved = point.clone();
@@ -250,7 +249,7 @@ pub(crate) fn settle_flights(
 fn whitener(predictor: &Predictor, columns: &[Vec<f64>], widest: &[f64], residual: &[f64]) -> Whitener {
     // A first whitening by what changes from row to row: one fitted to the whole residual would take whatever is slow in it
     // for noise and never give it back.
-    let doubt: Vec<f64> = predictor.measured().iter().map(|x| x * DOUBT).collect();
+    let doubt = predictor.doubt();
     let mut whitener = Whitener::white(&predictor.segments, residual);
     for _ in 0..3 {
         let white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();

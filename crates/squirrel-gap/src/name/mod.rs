@@ -20,6 +20,7 @@ mod search;
 mod tolerance;
 mod whiten;
 
+pub(crate) use evidence::BETA;
 pub(crate) use linear::settle_flights;
 pub(crate) use parameters::Catalogue;
 pub(crate) use payload::payload_lengths_m;

@@ -7,7 +7,7 @@
 use super::point::{Airframe, DAY_FRACTION, Member};
 use super::tolerance::{SHARE_OF_SMALLEST, airframe, slip_ppm, timing_s, tolerance};
 use crate::GapError;
-use crate::leftover::Slack;
+use crate::leftover::{Slack, Usual};
 use crate::predictor::Predictor;
 use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, Scale, SizeRange, base_number};
 use squirrel_core::vehicle::Vehicle;
@@ -30,6 +30,18 @@ const MOMENTS: [&str; 8] = [
     "weak_rotor",
     "wing_asymmetry",
     "yaw_torque_coeff",
+];
+/// Effects that change what lasts of forces and moments.
+const LASTING: [&str; 9] = [
+    "battery_sag",
+    "cg_offset",
+    "constant_wind",
+    "flapping_moment",
+    "linear_drag",
+    "mass_error",
+    "thrust_coefficient",
+    "thrust_misalignment",
+    "weak_rotor",
 ];
 /// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows the rotors' own.
 const MARKERS_RAD: f64 = 0.03;
@@ -106,6 +118,10 @@ pub(crate) struct Catalogue {
     pub(crate) airframe: Vec<(Airframe, f64)>,
     /// By how much thrust may differ from one flight to the next, as a fraction.
     pub(crate) day_fraction: f64,
+    /// Its tolerances are those of one machine.
+    pub(crate) is_of_one_machine: bool,
+    /// What the model leaves of the flights of a baseline; nothing without one.
+    pub(crate) usual: Usual,
 }
 
 impl Catalogue {
@@ -116,7 +132,8 @@ impl Catalogue {
     pub(crate) fn new(predictor: &Predictor, payload_lengths_m: &[f64]) -> Result<Self, GapError> {
         let vehicle = predictor.vehicle;
         let unseen = |name: &str| {
-            (MOMENTS.contains(&name) && !predictor.has_channel(3))
+            (!predictor.has_all_of(2) && !LASTING.contains(&name))
+                || (MOMENTS.contains(&name) && !predictor.has_channel(3))
                 || (HORIZONTAL.contains(&name) && !predictor.has_channel(0))
                 || (COMMANDS.contains(&name) && predictor.has_rotor_speeds())
         };
@@ -126,6 +143,8 @@ impl Catalogue {
             unseen: Vec::new(),
             airframe: airframe(predictor),
             day_fraction: DAY_FRACTION,
+            is_of_one_machine: false,
+            usual: Usual::default(),
         };
         for name in Effects::<f64>::NAMES {
             // What nobody measured with is off by nothing.
@@ -189,7 +208,8 @@ impl Catalogue {
     /// * `thrust_fraction` - by how much thrust may drift in a flight
     pub(crate) fn slack(&self, timing_s: f64, thrust_fraction: f64) -> Slack {
         let drag_n_s_per_m = self.tolerance_of("extra_drag_n_s_per_m");
-        Slack { lever_m: self.tolerance_of("cg_x_m"), timing_s, thrust_fraction, drag_n_s_per_m }
+        let (lever_m, usual) = (self.tolerance_of("cg_x_m"), self.usual);
+        Slack { lever_m, timing_s, thrust_fraction, drag_n_s_per_m, usual }
     }
 
     fn add(

@@ -6,6 +6,7 @@
 
 use super::parameters::{Candidate, Catalogue};
 use crate::GapError;
+use crate::baseline::Scatter;
 use crate::predictor::{HEIGHT_KNOTS, Hypothesis, Predictor};
 use nalgebra::Vector3;
 use squirrel_core::effects::Effects;
@@ -18,6 +19,8 @@ const TILT_RAD: f64 = 0.006;
 const LEVELLING_RAD_S2_PER_M: f64 = 0.01;
 /// By how much thrust differs from one flight to the next, as a fraction.
 pub(super) const DAY_FRACTION: f64 = 0.0015;
+/// Smallest change of one rotor's torque that is worth reporting, as a fraction: its thrust shows less.
+const TORQUE_FRACTION: f64 = 0.03;
 /// Tolerance of the barometer's zero, m.
 const HEIGHT_M: f64 = 0.2;
 /// Numbers of a flight before its heights: tilt about north and east, levelling, thrust.
@@ -93,7 +96,21 @@ pub(crate) fn hypothesis(
 ) -> Result<Hypothesis, GapError> {
     let mut all = predictor.nominal();
     for member in &point.members {
-        if let Some(found) = all.effects.insert(catalogue.candidates[member.candidate].effect) {
+        let candidate = &catalogue.candidates[member.candidate];
+        // The catalogue has one of each effect: a second weak rotor changes the vehicle's own numbers.
+        if all.effects.has(candidate.effect) && !is_same(&mut all.effects, candidate) {
+            let mut one = Effects::none();
+            if let Some(found) = one.insert(candidate.effect) {
+                found.values.copy_from_slice(&member.values);
+            }
+            let altered =
+                one.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
+            if altered != all.vehicle {
+                all.vehicle = altered;
+                continue;
+            }
+        }
+        if let Some(found) = all.effects.insert(candidate.effect) {
             found.values.copy_from_slice(&member.values);
         }
     }
@@ -109,11 +126,7 @@ pub(crate) fn hypothesis(
         }
         // What changes the airframe's numbers does so in a row, so that two rotors can be weak; the rest adds up, and so does
         // what acts already.
-        let same = all.effects.has(candidate.effect)
-            && all.effects.insert(candidate.effect).is_some_and(|found| {
-                candidate.fixed.iter().all(|(slot, value)| found.values[*slot] == *value)
-            });
-        if same {
+        if all.effects.has(candidate.effect) && is_same(&mut all.effects, candidate) {
             add(&mut all.effects, candidate, parameter.slot, x);
             continue;
         }
@@ -157,6 +170,13 @@ pub(crate) fn hypothesis(
     Ok(all)
 }
 
+/// Whether an effect that acts makes the choices of a candidate.
+fn is_same(effects: &mut Effects<f64>, candidate: &Candidate) -> bool {
+    effects
+        .insert(candidate.effect)
+        .is_some_and(|found| candidate.fixed.iter().all(|(slot, value)| found.values[*slot] == *value))
+}
+
 fn add(effects: &mut Effects<f64>, candidate: &Candidate, slot: usize, x: f64) {
     let present = effects.has(candidate.effect);
     if let Some(found) = effects.insert(candidate.effect) {
@@ -193,6 +213,43 @@ impl Catalogue {
             2 => (Other::Flight { flight, is_thrust: false }, LEVELLING_RAD_S2_PER_M),
             3 => (Other::Flight { flight, is_thrust: true }, self.day_fraction),
             _ => (Other::Height { flight }, HEIGHT_M),
+        }
+    }
+
+    /// The effect that a column changes a number of, with the smallest size of it that is worth reporting; `None` for what
+    /// belongs to a flight, to the place of a rotor, or to no effect.
+    pub(crate) fn group(&self, column: usize) -> Option<(&'static str, f64)> {
+        if let Some(parameter) = self.parameters.get(column) {
+            let flat = self.starts_flat(parameter.candidate);
+            return (!flat).then_some((self.candidates[parameter.candidate].effect, parameter.smallest));
+        }
+        match self.airframe.get(column - self.parameters.len())?.0 {
+            Airframe::Arm { .. } => None,
+            Airframe::Torque { .. } => Some(("yaw_torque_coeff", TORQUE_FRACTION)),
+            Airframe::Drag { .. } => {
+                let drag =
+                    self.parameters.iter().find(|p| self.candidates[p.candidate].effect == "linear_drag")?;
+                Some(("linear_drag", drag.smallest))
+            }
+        }
+    }
+
+    /// Takes the tolerances of one machine: its rotors are where they were.
+    pub(crate) fn take(&mut self, scatter: &Scatter) {
+        self.is_of_one_machine = true;
+        self.usual = scatter.usual;
+        for (number, tolerance) in &mut self.airframe {
+            if matches!(number, Airframe::Arm { .. }) {
+                *tolerance = 0.0;
+            }
+        }
+        for column in 0..self.shared_columns() {
+            let group = self.group(column);
+            let Some(sd) = group.and_then(|(effect, _)| scatter.tolerances.get(effect)) else { continue };
+            match self.parameters.get_mut(column) {
+                Some(parameter) => (parameter.tolerance, parameter.spread) = (*sd, *sd),
+                None => self.airframe[column - self.parameters.len()].1 = *sd,
+            }
         }
     }
 

@@ -2,9 +2,11 @@
 
 use super::evidence::BETA;
 use super::parameters::Candidate;
+use super::point::Member;
 use super::refine::Scored;
 use super::search::{Found, Search};
 use crate::GapError;
+use std::collections::BTreeSet;
 
 /// Rivals that are refined for each named effect.
 const RIVALS: usize = 3;
@@ -34,7 +36,12 @@ impl Search<'_> {
                 }
             }
         }
-        all.retain(|rival| self.is_off(rival));
+        if let Some(beaten) = &found.beaten {
+            all.push(self.score(&found.linear, beaten)?);
+        }
+        let candidates = |members: &[Member]| members.iter().map(|m| m.candidate).collect::<BTreeSet<_>>();
+        let own = candidates(&found.best.members);
+        all.retain(|rival| self.is_off(rival) && candidates(&rival.members) != own);
         all.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         Ok(all)
     }

@@ -17,6 +17,8 @@ const FURTHER_NATS: f64 = 10.0;
 /// deviation, if it acts through moving air, as gusts on average do.
 const BESIDE_GUSTS_NATS: f64 = 12.0;
 const BLOWN_NATS: f64 = 40.0;
+/// The effect of which a vehicle may have several.
+const WEAK_ROTOR: &str = "weak_rotor";
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
 const TOLERANCES_MIN: f64 = 3.0;
@@ -57,6 +59,8 @@ pub(crate) struct Found {
     pub(crate) best: Scored,
     /// The best without each of its members.
     pub(crate) without: Vec<Scored>,
+    /// A set that several weak rotors were better than.
+    pub(crate) beaten: Option<Vec<Member>>,
 }
 
 impl Found {
@@ -83,6 +87,7 @@ impl Search<'_> {
                 best = self.score(&linear, &point.members)?;
             }
             self.extend(&linear, &mut best)?;
+            let beaten = self.several_rotors(&linear, &mut best)?;
             let mut without = self.drop_and_swap(&linear, &mut best)?;
             let settled = round > 1 && self.has_settled(&best, &point.members);
             if settled || round == ROUNDS_MAX {
@@ -91,12 +96,51 @@ impl Search<'_> {
                 }
                 self.finish(&mut best);
                 let null = self.score(&linear, &[])?;
-                return Ok(Found { linear: Rc::new(linear), null: Rc::new(null), best, without });
+                return Ok(Found { linear: Rc::new(linear), null: Rc::new(null), best, without, beaten });
             }
             point = self.settled(&best);
             linear = self.linear(&point, Some(linear))?;
             round += 1;
         }
+    }
+
+    /// Where everything floats to if nothing has a name, from nothing.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn afloat(&self) -> Result<(Point, Scored), GapError> {
+        let base = vec![0.0; self.catalogue.columns(self.predictor)];
+        let linear = self.linear(&Point { members: Vec::new(), base }, None)?;
+        let set = self.score(&linear, &[])?;
+        Ok((self.whole(&set), set))
+    }
+
+    /// As [`Self::afloat`], no farther than the simulator's own model follows.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn towards(&self) -> Result<Point, GapError> {
+        let base = vec![0.0; self.catalogue.columns(self.predictor)];
+        let linear = self.linear(&Point { members: Vec::new(), base }, None)?;
+        let whole = self.whole(&self.score(&linear, &[])?);
+        let cost = |point: &Point| -> Result<f64, GapError> {
+            let rows = self.predictor.residual(&self.hypothesis(point)?)?;
+            let white = linear.whitener.apply(&self.predictor.segments, &rows);
+            let far = point.base.iter().zip(&linear.tolerance).filter(|(_, sd)| **sd > 0.0);
+            Ok(BETA * white.iter().map(|x| x * x).sum::<f64>()
+                + far.map(|(x, sd)| (x / sd).powi(2)).sum::<f64>())
+        };
+        let part =
+            |share: f64| Point { base: whole.base.iter().map(|x| share * x).collect(), ..whole.clone() };
+        let mut best = (cost(&part(0.0))?, part(0.0));
+        for share in [1.0, 0.5, 0.25, 0.1] {
+            let point = part(share);
+            let cost = cost(&point)?;
+            if cost < best.0 {
+                best = (cost, point);
+            }
+        }
+        Ok(best.1)
     }
 
     /// The predictor linearised about a point.
@@ -183,6 +227,61 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// Tries two and more weak rotors at once: one after the other, each alone is less than what looks like all of them. What
+    /// they were better than, if it was a set.
+    fn several_rotors(&self, linear: &Linear, best: &mut Scored) -> Result<Option<Vec<Member>>, GapError> {
+        if !self.catalogue.is_of_one_machine {
+            return Ok(None);
+        }
+        let weak: Vec<usize> = (0..self.catalogue.candidates.len())
+            .filter(|c| self.catalogue.candidates[*c].effect == WEAK_ROTOR)
+            .collect();
+        let none = self.score(linear, &[])?;
+        // What happened to the rotors is one thing: how many of them are weak says the evidence.
+        let needs = |members: &[Member]| -> f64 {
+            let others = members.iter().filter(|m| self.effect(m) != WEAK_ROTOR).count();
+            let things = others + usize::from(others < members.len());
+            NATS_MIN + FURTHER_NATS * (things.max(1) - 1) as f64
+        };
+        let mut sets: Vec<(f64, Vec<Member>)> = Vec::new();
+        for chosen in 0_u32..1 << weak.len() {
+            let count = chosen.count_ones() as usize;
+            if !(2..=MEMBERS_MAX.min(weak.len() - 1)).contains(&count) {
+                continue;
+            }
+            let own = || weak.iter().enumerate().filter(|(i, _)| chosen >> i & 1 == 1).map(|(_, c)| *c);
+            let mut prior = none.prior.clone();
+            let parameters = || own().flat_map(|c| &self.catalogue.candidates[c].parameters);
+            for p in parameters() {
+                prior[*p] = self.catalogue.parameters[*p].slab;
+            }
+            let Some(posterior) = none.gram.posterior(&prior, BETA) else { continue };
+            let members: Vec<Member> = own()
+                .map(|candidate| {
+                    let mut member = self.catalogue.absent(self.predictor, candidate);
+                    for p in &self.catalogue.candidates[candidate].parameters {
+                        let parameter = &self.catalogue.parameters[*p];
+                        let own = member.values[parameter.slot];
+                        member.values[parameter.slot] += parameter.bounded(own, posterior.mean[*p]);
+                    }
+                    member
+                })
+                .collect();
+            sets.push((posterior.log_evidence - needs(&members), members));
+        }
+        sets.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let Some((_, members)) = sets.into_iter().next() else { return Ok(None) };
+        let scored = self.score(linear, &members)?;
+        (self.progress)();
+        let better = scored.log_evidence - needs(&scored.members) > best.log_evidence - needs(&best.members);
+        if !(better && self.is_off(&scored)) {
+            return Ok(None);
+        }
+        let beaten = std::mem::replace(best, scored).members;
+        self.extend(linear, best)?;
+        Ok((!beaten.is_empty()).then_some(beaten))
+    }
+
     /// The best set with one more effect.
     ///
     /// * `beats` - evidence that it must have to matter, nats
@@ -261,7 +360,7 @@ impl Search<'_> {
         let mut best = self.score(&linear, members)?;
         let without = self.without(&linear, &best)?;
         self.finish(&mut best);
-        Ok(Found { linear, null: Rc::clone(&found.null), best, without })
+        Ok(Found { linear, null: Rc::clone(&found.null), best, without, beaten: None })
     }
 
     /// By how many standard deviations a member's number differs from what the vehicle file has, the clearest of them.
@@ -388,5 +487,8 @@ fn excludes(named: &Candidate, other: &Candidate) -> bool {
             || (c.effect == "inertia_error" && c.fixed.iter().any(|(_, axis)| *axis as usize == 2))
     };
     let thrust = |c: &Candidate| ["mass_error", "thrust_coefficient"].contains(&c.effect);
-    named.effect == other.effect || (thrust(named) && thrust(other)) || (yaw(named) && yaw(other))
+    // Two rotors may be weak.
+    let rotors = |c: &Candidate| c.effect == WEAK_ROTOR;
+    let same = named.effect == other.effect && !(rotors(named) && named.fixed != other.fixed);
+    same || (thrust(named) && thrust(other)) || (yaw(named) && yaw(other))
 }

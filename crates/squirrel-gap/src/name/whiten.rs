@@ -1,7 +1,8 @@
 //! Whitening: an autoregression of order 8 per channel, fitted to what the fullest model leaves.
 //!
 //! Residuals of flights are coloured by filters, turbulence and attitude errors. Seen through the same autoregression, the
-//! measurement and every column are as if the noise were white with variance 1, and sums of squares count evidence.
+//! measurement and every column are as if the noise were white with variance 1, and sums of squares count evidence. Means
+//! over seconds are taken as white.
 
 use crate::predictor::{CHANNELS, Segment};
 use nalgebra::{DMatrix, DVector};
@@ -16,9 +17,28 @@ const BURST: f64 = 4.0;
 /// The filters of all channels.
 #[derive(Debug, Clone)]
 pub(crate) struct Whitener {
-    /// By channel: coefficients on the last samples, latest first, and the deviation of what they leave.
-    filters: Vec<Option<([f64; ORDER], f64)>>,
+    /// By channel.
+    filters: Vec<Option<Filter>>,
     rows: usize,
+}
+
+/// Coefficients on the last samples, latest first, and the deviation of what they leave.
+#[derive(Debug, Clone)]
+struct Filter {
+    coefficients: Vec<f64>,
+    deviation: f64,
+}
+
+impl Filter {
+    fn white(deviation: f64) -> Self {
+        Self { coefficients: Vec::new(), deviation }
+    }
+
+    /// First rows of a segment that are lost; `None` where all are.
+    fn order_in(&self, segment: &Segment) -> Option<usize> {
+        let order = self.coefficients.len();
+        (segment.rows.len() > 3 * order).then_some(order)
+    }
 }
 
 impl Whitener {
@@ -27,18 +47,21 @@ impl Whitener {
     /// * `noise` - what the fullest model leaves
     /// * `doubt` - what no model can be trusted with: its power is added to that of the noise
     pub(crate) fn fit(segments: &[Segment], noise: &[f64], doubt: &[f64]) -> Self {
-        let mut rows = 0;
-        let filters = (0..CHANNELS.len())
+        let filters: Vec<Option<Filter>> = (0..CHANNELS.len())
             .map(|channel| {
-                let own: Vec<&Segment> =
-                    segments.iter().filter(|s| s.channel == channel && s.rows.len() > 3 * ORDER).collect();
-                rows += own.iter().map(|s| s.rows.len() - ORDER).sum::<usize>();
+                let all = segments.iter().filter(|s| s.channel == channel);
+                let is_trim = all.clone().any(Segment::is_trim);
+                let own: Vec<&Segment> = all.filter(|s| is_trim || s.rows.len() > 3 * ORDER).collect();
                 let of =
                     |rows: &'_ [f64]| own.iter().map(|s| rows[s.rows.clone()].to_vec()).collect::<Vec<_>>();
-                autoregression(&calm(&of(noise)), &of(doubt))
+                if is_trim {
+                    white(&[of(noise), of(doubt)].concat(), own.iter().map(|s| s.rows.len()).sum())
+                } else {
+                    autoregression(&calm(&of(noise)), &of(doubt))
+                }
             })
             .collect();
-        Self { filters, rows }
+        Self { rows: count_rows(&filters, segments), filters }
     }
 
     /// Fits the first channels anew, to draws of the noise.
@@ -47,10 +70,11 @@ impl Whitener {
             let own = segments.iter().filter(|s| s.channel == channel && s.rows.len() > 3 * ORDER);
             let series: Vec<Vec<f64>> =
                 own.flat_map(|s| draws.iter().map(|draw| draw[s.rows.clone()].to_vec())).collect();
-            if filter.is_some() {
+            if filter.as_ref().is_some_and(|filter| !filter.coefficients.is_empty()) {
                 *filter = autoregression(&series, &[]);
             }
         }
+        self.rows = count_rows(&self.filters, segments);
     }
 
     /// White noise of the size of what changes from one row to the next.
@@ -67,9 +91,10 @@ impl Whitener {
                 segments.iter().filter(|s| s.channel == channel).flat_map(|s| changes[s.rows.clone()].iter());
             let (sum, n) = own.fold((0.0, 0.0), |(sum, n), x| (sum + x * x, n + 1.0));
             if let Some(filter) = filter {
-                *filter = ([0.0; ORDER], f64::sqrt(sum / n));
+                *filter = Filter::white(f64::sqrt(sum / n));
             }
         }
+        out.rows = count_rows(&out.filters, segments);
         out
     }
 
@@ -80,16 +105,18 @@ impl Whitener {
         }
         let mut out = Vec::with_capacity(self.rows);
         for segment in segments {
-            let Some((coefficients, deviation)) = self.filters[segment.channel] else { continue };
-            if segment.rows.len() <= 3 * ORDER {
-                continue;
-            }
+            let Some(filter) = &self.filters[segment.channel] else { continue };
+            let Some(order) = filter.order_in(segment) else { continue };
             let x = &column[segment.rows.clone()];
-            let scale = 1.0 / deviation;
+            let scale = 1.0 / filter.deviation;
+            let Some(coefficients) = filter.coefficients.first_chunk::<ORDER>() else {
+                out.extend(x.iter().map(|x| x * scale));
+                continue;
+            };
             // By the age of samples, each a slice, so that rows are computed side by side.
-            let n = x.len() - ORDER;
+            let n = x.len() - order;
             let aged: [&[f64]; ORDER] = std::array::from_fn(|i| &x[ORDER - 1 - i..][..n]);
-            let now = &x[ORDER..];
+            let now = &x[order..];
             out.extend((0..n).map(|row| {
                 let predicted: f64 = coefficients.iter().zip(aged).map(|(a, x)| a * x[row]).sum();
                 (now[row] - predicted) * scale
@@ -102,15 +129,31 @@ impl Whitener {
     pub(crate) fn places(&self, segments: &[Segment]) -> Vec<(usize, f64, usize)> {
         let mut out = Vec::with_capacity(self.rows);
         for segment in segments {
-            if self.filters[segment.channel].is_some() && segment.rows.len() > 3 * ORDER {
+            let filter = self.filters[segment.channel].as_ref();
+            if let Some(order) = filter.and_then(|filter| filter.order_in(segment)) {
                 out.extend(
-                    (ORDER..segment.rows.len())
+                    (order..segment.rows.len())
                         .map(|i| (segment.flight, segment.t0_s + i as f64 * segment.step_s, segment.channel)),
                 );
             }
         }
         out
     }
+}
+
+/// Number of rows that come out of filters.
+fn count_rows(filters: &[Option<Filter>], segments: &[Segment]) -> usize {
+    let of = |s: &Segment| {
+        let order = filters[s.channel].as_ref().and_then(|filter| filter.order_in(s));
+        order.map_or(0, |order| s.rows.len() - order)
+    };
+    segments.iter().map(of).sum()
+}
+
+/// White noise of the power of some series for a number of rows; `None` where there is nothing.
+fn white(series: &[Vec<f64>], rows: usize) -> Option<Filter> {
+    let power: f64 = series.iter().flatten().map(|x| x * x).sum();
+    (power > 0.0).then(|| Filter::white((power / rows as f64).sqrt()))
 }
 
 /// The stretches of series without bursts.
@@ -139,7 +182,7 @@ fn calm(series: &[Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 /// Least squares over several series, with the power of others added; `None` where there is nothing to fit.
-fn autoregression(series: &[Vec<f64>], doubt: &[Vec<f64>]) -> Option<([f64; ORDER], f64)> {
+fn autoregression(series: &[Vec<f64>], doubt: &[Vec<f64>]) -> Option<Filter> {
     let mut gram = DMatrix::zeros(ORDER, ORDER);
     let mut right = DVector::zeros(ORDER);
     let (mut total, mut n) = (0.0_f64, 0.0_f64);
@@ -169,9 +212,7 @@ fn autoregression(series: &[Vec<f64>], doubt: &[Vec<f64>]) -> Option<([f64; ORDE
     let a = gram.clone().cholesky()?.solve(&right);
     let left: f64 = total - 2.0 * a.dot(&right) + a.dot(&(gram * &a));
     let left = left.max(1e-12 * total);
-    let mut coefficients = [0.0; ORDER];
-    coefficients.copy_from_slice(a.as_slice());
-    Some((coefficients, (left / n).sqrt()))
+    Some(Filter { coefficients: a.as_slice().to_vec(), deviation: (left / n).sqrt() })
 }
 
 #[cfg(test)]
@@ -180,7 +221,7 @@ mod tests {
 
     /// A segment of one channel with `n` rows.
     fn segment(n: usize) -> Segment {
-        Segment { flight: 0, channel: 2, rows: 0..n, piece: 0, t0_s: 0.0, step_s: 1.0 / 30.0 }
+        Segment { flight: 0, channel: 2, rows: 0..n, piece: 0, t0_s: 0.0, step_s: 1.0 / 30.0, mean_of: 1 }
     }
     /// Noise of unit size without memory, the same on every run.
     fn noise(n: usize) -> Vec<f64> {

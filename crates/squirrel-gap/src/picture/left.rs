@@ -32,7 +32,7 @@ fn of_channel(
     let (mut own, mut square, mut n, mut order, mut lag_s) = (vec![0.0; LAGS], 0.0, 0.0, 0, 0.0);
     let names: Vec<&str> = inputs.first()?.iter().map(|(name, _)| *name).collect();
     let mut with = vec![(vec![0.0; LAGS + 1], 0.0); names.len()];
-    for segment in predictor.segments.iter().filter(|s| s.channel == channel) {
+    for segment in predictor.segments.iter().filter(|s| s.channel == channel && !s.is_trim()) {
         let white = naming.found.linear.whitener.apply(std::slice::from_ref(segment), &naming.left);
         if white.len() <= LAGS {
             continue;

@@ -144,7 +144,7 @@ fn of_leftover(predictor: &Predictor, naming: &Naming) -> Vec<Conditional> {
 /// Means of one channel over blocks, and where the vehicle was in them.
 fn blocks(predictor: &Predictor, naming: &Naming, channel: usize) -> Vec<(Moment, Sample)> {
     let mut all = Vec::new();
-    for segment in predictor.segments.iter().filter(|s| s.channel == channel) {
+    for segment in predictor.segments.iter().filter(|s| s.channel == channel && !s.is_trim()) {
         let (track, motion) = (&predictor.tracks[segment.piece], &predictor.plain()[segment.piece]);
         let before = naming.nominal[segment.rows.clone()].chunks_exact(BLOCK);
         let after = naming.left[segment.rows.clone()].chunks_exact(BLOCK);

@@ -1,0 +1,200 @@
+//! A machine's own numbers: the vehicle file fitted to flights in which it flew well, and by how much they differ from one
+//! such flight to the next. What has changed since is what such differences do not explain.
+//!
+//! ```text
+//! theta   the declared numbers of the file, all flights together, wide priors, a few steps of Gauss-Newton
+//! s_g^2 = (nu s0_g^2 + n/(n-1) sum_flights,group (m^2 + v)) / (nu + n k)      m, v: of one flight alone about theta
+//! t_g   = s_g sqrt(1 + 1/n)                                                   the tolerance of another flight
+//! ```
+//! The second line is expectation and maximisation under an inverse-gamma prior: flights that say nothing of a number leave
+//! it at `s0`, half of the smallest size worth reporting. Rotors, and axes, are groups: what scatters on one, scatters on all.
+
+use crate::GapError;
+use crate::compatibility::{self, Moments, Ready};
+use crate::leftover::{Usual, usual};
+use crate::name::{BETA, Catalogue, Scored, Search, hypothesis};
+use crate::predictor::Predictor;
+use crate::verdict::SetAside;
+use squirrel_core::effects::Effects;
+use squirrel_core::vehicle::Vehicle;
+use squirrel_sim::log::FlightLog;
+use squirrel_sim::vehicle_file::VehicleFile;
+use std::collections::BTreeMap;
+
+/// Effects that change numbers which a vehicle file has, and what it has no number for but every machine has.
+const FITTED: [&str; 10] = [
+    "actuation_latency",
+    "battery_sag",
+    "cg_offset",
+    "flapping_moment",
+    "linear_drag",
+    "motor_lag",
+    "thrust_coefficient",
+    "thrust_misalignment",
+    "weak_rotor",
+    "yaw_torque_coeff",
+];
+/// Steps of Gauss-Newton, each about what the last has found.
+const STEPS: usize = 4;
+/// Part of the smallest size worth reporting by which a number differs from one flight to the next, where nothing is known.
+const USUAL_SHARE: f64 = 0.5;
+/// How many times that it may be, and how sure that it is about once, as the deviation of its logarithm.
+const TIMES: [f64; 7] = [0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0];
+const TIMES_SD: f64 = 0.35;
+
+/// A machine as it flew when it flew well.
+#[derive(Debug)]
+pub struct Baseline {
+    /// The vehicle file as it was given.
+    pub declared: VehicleFile,
+    /// The same with its numbers as these flights have them.
+    pub vehicle: VehicleFile,
+    /// Names of the flights.
+    pub flights: Vec<String>,
+    /// Flights that took no part.
+    pub set_aside: Vec<SetAside>,
+    pub(crate) moments: Moments,
+    pub(crate) scatter: Scatter,
+}
+
+/// How flights of one machine differ.
+#[derive(Debug, Default)]
+pub(crate) struct Scatter {
+    /// By effect, in the unit of its number: how much another flight may differ, one standard deviation.
+    pub(crate) tolerances: BTreeMap<&'static str, f64>,
+    /// What the model leaves of one.
+    pub(crate) usual: Usual,
+}
+
+impl Baseline {
+    /// Fits the numbers of a vehicle file to flights in which the machine flew well.
+    ///
+    /// # Errors
+    /// [`GapError`]: a log or vehicle that nothing can be computed with, or no flight whose data agree with themselves.
+    pub fn fit(
+        vehicle: &VehicleFile,
+        flights: &[(String, FlightLog)],
+        progress: &dyn Fn(&str),
+    ) -> Result<Self, GapError> {
+        progress("reading the baseline");
+        let (set_aside, moments) = match Ready::new(vehicle, flights, &[]) {
+            Ok(ready) => {
+                let is_known = ready.predictor.has_gyroscope()
+                    && compatibility::moments_fit(&ready.predictor, &ready.nominal);
+                let moments = if is_known { Moments::IfKnown } else { Moments::Lasting };
+                (compatibility::problems(&ready, flights, &[])?, moments)
+            }
+            Err(error) => (compatibility::unreadable(vehicle, flights, &[], error)?, Moments::IfKnown),
+        };
+        let good = compatibility::kept(flights, &set_aside);
+        if good.is_empty() {
+            return Err(GapError::Baseline { words: set_aside[0].words.clone() });
+        }
+        if set_aside.len() > 0 && good.len() < flights.len() {
+            let mut fewer = Self::fit(vehicle, &good, progress)?;
+            fewer.set_aside.splice(..0, set_aside);
+            return Ok(fewer);
+        }
+        let mut own = vehicle.clone();
+        for _ in 0..STEPS {
+            progress("fitting the baseline");
+            (own.vehicle, own.effects) = step(&own, moments, &good)?;
+        }
+        progress("fitting the baseline");
+        let scatter = scatter(&own, moments, &good)?;
+        let flights = good.into_iter().map(|(name, _)| name).collect();
+        Ok(Self { declared: vehicle.clone(), vehicle: own, flights, set_aside, moments, scatter })
+    }
+}
+
+/// The vehicle and its effects, one step nearer to the flights.
+fn step(
+    vehicle: &VehicleFile,
+    moments: Moments,
+    flights: &[(String, FlightLog)],
+) -> Result<(Vehicle<f64>, Effects<f64>), GapError> {
+    let (predictor, mut catalogue) = prepared(vehicle, moments, flights)?;
+    for parameter in &mut catalogue.parameters {
+        if is_fitted(catalogue.candidates[parameter.candidate].effect) {
+            parameter.tolerance = parameter.tolerance.max(parameter.largest);
+        }
+    }
+    let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &|| () };
+    let mut point = search.towards()?;
+    // What the sensors of these flights did is not the vehicle's.
+    for (x, parameter) in point.base.iter_mut().zip(&catalogue.parameters) {
+        if !is_fitted(catalogue.candidates[parameter.candidate].effect) {
+            *x = 0.0;
+        }
+    }
+    point.base[catalogue.shared_columns()..].fill(0.0);
+    let at = hypothesis(&predictor, &catalogue, &point)?;
+    Ok((at.vehicle, at.effects))
+}
+
+fn is_fitted(effect: &str) -> bool {
+    FITTED.contains(&effect)
+}
+
+/// Flights, and what may be off in them.
+fn prepared<'a>(
+    vehicle: &'a VehicleFile,
+    moments: Moments,
+    flights: &'a [(String, FlightLog)],
+) -> Result<(Predictor<'a>, Catalogue), GapError> {
+    let mut predictor = Predictor::new(vehicle, flights)?;
+    if let Some(parts) = predictor.in_parts(flights)? {
+        predictor = parts;
+    }
+    let nominal = predictor.residual(&predictor.nominal())?;
+    compatibility::leave_out(&mut predictor, &nominal, moments);
+    let catalogue = Catalogue::new(&predictor, &[])?;
+    Ok((predictor, catalogue))
+}
+
+/// How much another flight may differ.
+fn scatter(
+    vehicle: &VehicleFile,
+    moments: Moments,
+    flights: &[(String, FlightLog)],
+) -> Result<Scatter, GapError> {
+    let mut out = Scatter::default();
+    let mut alone = Vec::with_capacity(flights.len());
+    for flight in flights {
+        let (predictor, mut catalogue) = prepared(vehicle, moments, std::slice::from_ref(flight))?;
+        catalogue.take(&Scatter::default());
+        let search =
+            Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &|| () };
+        let (point, set) = search.afloat()?;
+        let left = predictor.residual(&hypothesis(&predictor, &catalogue, &point)?)?;
+        for (most, own) in out.usual.iter_mut().flatten().zip(usual(&predictor, &left).iter().flatten()) {
+            *most = most.max(*own);
+        }
+        let effects: Vec<Option<(&'static str, f64)>> =
+            (0..catalogue.columns(&predictor)).map(|column| catalogue.group(column)).collect();
+        alone.push((set, effects));
+    }
+    out.tolerances = among(&alone);
+    Ok(out)
+}
+
+/// How much the effects of a flight differ from those of others.
+///
+/// * `alone` - of each flight its fit, and of each column its effect and the smallest size of that
+fn among(alone: &[(Scored, Vec<Option<(&'static str, f64)>>)]) -> BTreeMap<&'static str, f64> {
+    let columns = || alone.iter().flat_map(|(_, effects)| effects.iter().flatten());
+    let evidence = |times: f64| -> f64 {
+        let of = |(set, effects): &(Scored, Vec<Option<(&'static str, f64)>>)| {
+            let usual = effects.iter().zip(&set.prior);
+            let sd: Vec<f64> = usual
+                .map(|(effect, sd)| effect.map_or(*sd, |(_, small)| times * USUAL_SHARE * small))
+                .collect();
+            set.gram.posterior(&sd, BETA).map_or(f64::NEG_INFINITY, |posterior| posterior.log_evidence)
+        };
+        alone.iter().map(of).sum::<f64>() - 0.5 * (times.ln() / TIMES_SD).powi(2)
+    };
+    let best = TIMES.into_iter().max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).unwrap_or(1.0);
+    // About their mean, which is not known better.
+    let times = best * (1.0 + 1.0 / alone.len() as f64).sqrt();
+    columns().map(|(effect, smallest)| (*effect, times * USUAL_SHARE * smallest)).collect()
+}
