@@ -1,7 +1,8 @@
 //! The vehicle file with the named effects in it: a patch that keeps every comment and the order of what was there.
 
-use crate::diagnose::Diagnosis;
+use crate::diagnose::{Diagnosis, Own};
 use crate::verdict::{Kind, NamedEffect, Value, Verdict};
+use squirrel_core::effects::{Effects, Kind as ParameterKind};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::fmt::Write;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
@@ -76,6 +77,9 @@ fn with(
     flights: &[String],
 ) -> Result<String, String> {
     let mut document: DocumentMut = vehicle.text.parse().map_err(|e| format!("{}: {e}", vehicle.name))?;
+    if let Some(own) = &diagnosis.own {
+        own_rotors(&mut document, vehicle, own)?;
+    }
     let effects = document.entry("effects").or_insert_with(|| {
         let mut table = Table::new();
         // Only `[effects.<name>]` headers show.
@@ -85,9 +89,18 @@ fn with(
     let Some(effects) = effects.as_table_mut() else {
         return Err(format!("{}: effects: must be a table", vehicle.name));
     };
+    if let Some(own) = &diagnosis.own {
+        own_effects(effects, own);
+    }
     let source = format!("gap: {}", flights.join(", "));
     let domain = domain(diagnosis);
-    for effect in chosen {
+    let mut further = Vec::new();
+    for (index, effect) in chosen.iter().enumerate() {
+        // A file has one table an effect: further weak rotors are numbers of those rotors.
+        if chosen[..index].iter().any(|other| other.name == effect.name) {
+            further.push(effect);
+            continue;
+        }
         let table = effects.entry(effect.name).or_insert_with(|| Item::Table(Table::new()));
         let Some(table) = table.as_table_mut() else {
             return Err(format!("{}: effects.{}: must be a table", vehicle.name, effect.name));
@@ -114,9 +127,83 @@ fn with(
             table.insert(key, item);
         }
     }
+    for effect in further {
+        weaken(&mut document, vehicle, effect, &source)?;
+    }
     let text = document.to_string();
     VehicleFile::parse(&text, &vehicle.name).map_err(|e| format!("the patched vehicle: {e}"))?;
     Ok(text)
+}
+
+/// What each rotor of a machine gives in its good flights.
+fn own_rotors(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) -> Result<(), String> {
+    let (before, now) = (vehicle.vehicle.rotor_factors(), own.vehicle.vehicle.rotor_factors());
+    for rotor in 0..vehicle.vehicle.rotors().len() {
+        for (key, which) in [("thrust_fraction", 0), ("torque_fraction", 1)] {
+            if now[which][rotor] != before[which][rotor] {
+                let number = with_source(now[which][rotor], &own.source());
+                rotor_table(document, vehicle, rotor)?.insert(key, number);
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The effects that act in all good flights of a machine.
+fn own_effects(effects: &mut Table, own: &Own) {
+    let mut fitted = own.vehicle.effects;
+    for name in Effects::<f64>::NAMES {
+        let Some(found) = fitted.has(name).then(|| fitted.insert(name)).flatten() else { continue };
+        let numbers = found.parameters.iter().zip(found.values.iter());
+        for (parameter, number) in numbers.filter(|(_, number)| **number != 0.0) {
+            if matches!(parameter.kind, ParameterKind::Size { .. })
+                && let Some(table) =
+                    effects.entry(name).or_insert_with(|| Item::Table(Table::new())).as_table_mut()
+            {
+                table.insert(parameter.key, with_source(*number, &own.source()));
+            }
+        }
+    }
+}
+
+/// A rotor gives less by the fraction of a weak rotor.
+fn weaken(
+    document: &mut DocumentMut,
+    vehicle: &VehicleFile,
+    effect: &NamedEffect,
+    source: &str,
+) -> Result<(), String> {
+    let number = |key: &str| match effect.parameters.get(key) {
+        Some(Value::Number { value, .. }) => Ok(*value),
+        _ => Err(format!("{}: {} twice: a file takes one", vehicle.name, effect.name)),
+    };
+    let (rotor, loss) = (number("rotor")? as usize - 1, number("thrust_loss_fraction")?);
+    let table = rotor_table(document, vehicle, rotor)?;
+    for key in ["thrust_fraction", "torque_fraction"] {
+        let had = match table.get(key) {
+            Some(item) => item.get("value").unwrap_or(item).as_float().unwrap_or(1.0),
+            None => 1.0,
+        };
+        table.insert(key, with_source(had * (1.0 - loss), source));
+    }
+    Ok(())
+}
+
+fn rotor_table<'a>(
+    document: &'a mut DocumentMut,
+    vehicle: &VehicleFile,
+    rotor: usize,
+) -> Result<&'a mut Table, String> {
+    let tables = document.get_mut("rotor").and_then(Item::as_array_of_tables_mut);
+    let table = tables.and_then(|tables| tables.get_mut(rotor));
+    table.ok_or_else(|| format!("{}: rotor[{rotor}]: must be a table `[[rotor]]`", vehicle.name))
+}
+
+fn with_source(number: f64, source: &str) -> Item {
+    let mut inline = InlineTable::new();
+    inline.insert("value", rounded(number).into());
+    inline.insert("source", source.into());
+    value(inline)
 }
 
 fn standard_form(effect: &str) -> &'static str {

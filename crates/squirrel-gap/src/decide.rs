@@ -10,7 +10,7 @@
 use crate::find::Place;
 use crate::name::{Member, NATS_MIN, Naming, STANDS, Scored, Search};
 use crate::proof::HeldOut;
-use crate::verdict::{Alternative, Gap, Kind, Left, NamedEffect, Value, Verdict};
+use crate::verdict::{Alternative, Gap, Kind, Left, NamedEffect, Since, Value, Verdict};
 use crate::words;
 use squirrel_core::effects::{Effects, Kind as ParameterKind};
 use std::collections::BTreeMap;
@@ -153,6 +153,10 @@ pub(crate) fn decide(
         leftover: Some(left),
         closed_loop: Vec::new(),
         model_patch: None,
+        baseline: search
+            .catalogue
+            .is_of_one_machine
+            .then(|| Since { flights: Vec::new(), rotors: search.rotors(&naming.found.null) }),
         words: String::new(),
         set_aside: Vec::new(),
         notes: search.predictor.notes.clone(),
@@ -209,7 +213,7 @@ fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {
 }
 
 /// 95 % of a normal distribution lies within this many standard deviations.
-const INTERVAL: f64 = 1.96;
+pub(crate) const INTERVAL: f64 = 1.96;
 
 fn parameters(
     search: &Search<'_>,

@@ -23,8 +23,24 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// What the flights covered: name, low, high, unit.
     pub domain: Vec<Covered>,
+    /// The machine as its good flights have it, and these, where flights are compared with them.
+    pub(crate) own: Option<Own>,
     /// For the report.
     pub(crate) details: Option<Details>,
+}
+
+/// A machine as its good flights have it.
+#[derive(Debug)]
+pub(crate) struct Own {
+    pub(crate) vehicle: VehicleFile,
+    flights: Vec<String>,
+}
+
+impl Own {
+    /// Where its numbers come from, as vehicle files say it.
+    pub(crate) fn source(&self) -> String {
+        format!("gap, baseline: {}", self.flights.join(", "))
+    }
 }
 
 /// A range of flight conditions that the flights covered, 2nd to 98th percentile.
@@ -93,6 +109,14 @@ fn diagnose_against<'a>(
     let mut diagnosis = sorted(vehicle, baseline, flights, held_out, progress)?;
     let verdict = &mut diagnosis.verdict;
     compatibility::tell(verdict, flights.len() + held_out.len());
+    if let Some(baseline) = baseline {
+        let aside = baseline.set_aside.iter();
+        verdict.notes.extend(aside.map(|a| format!("set aside of the baseline: {}", a.words)));
+        if let Some(since) = &mut verdict.baseline {
+            since.flights.clone_from(&baseline.flights);
+        }
+        diagnosis.own = Some(Own { vehicle: baseline.vehicle.clone(), flights: baseline.flights.clone() });
+    }
     Ok(diagnosis)
 }
 
@@ -132,11 +156,12 @@ fn sorted<'a>(
             leftover: None,
             closed_loop: Vec::new(),
             model_patch: None,
+            baseline: None,
             words,
             set_aside: aside,
             notes: ready.predictor.notes.clone(),
         };
-        return Ok(Diagnosis { verdict, domain: covered(&ready.predictor), details: None });
+        return Ok(Diagnosis { verdict, domain: covered(&ready.predictor), own: None, details: None });
     }
     if !aside.is_empty() {
         return without(aside);
@@ -218,7 +243,7 @@ fn judged(
         seen: picture::seen(&search, &naming, &rivals)?,
         held_out: proof,
     };
-    Ok(Diagnosis { verdict, domain, details: Some(details) })
+    Ok(Diagnosis { verdict, domain, own: None, details: Some(details) })
 }
 
 /// Whether the thrust curve of the vehicle file, moved by its sd, changes the vertical force more than the smallest sag

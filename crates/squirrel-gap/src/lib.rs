@@ -35,5 +35,7 @@ pub use diagnose::{Covered, Diagnosis, diagnose, diagnose_since};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::picture;
-pub use verdict::{Alternative, Gap, Kind, Left, Moved, NamedEffect, SetAside, Value, Verdict};
+pub use verdict::{
+    Alternative, Gap, Kind, Left, Moved, NamedEffect, RotorHealth, SetAside, Since, Value, Verdict,
+};
 pub use words::significant;

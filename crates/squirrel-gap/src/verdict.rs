@@ -152,6 +152,26 @@ pub struct Gap {
     pub best_rival_removed_fraction: Option<f64>,
 }
 
+/// What flights are compared with, where they are compared with good ones of the same machine.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Since {
+    /// Names of the good flights.
+    pub flights: Vec<String>,
+    /// Each rotor, in command order; empty where the flights do not show it.
+    pub rotors: Vec<RotorHealth>,
+}
+
+/// How one rotor is against the good flights, whatever has a name.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RotorHealth {
+    /// Number, from 1.
+    pub rotor: usize,
+    /// Part of its thrust that it lacks, with its 95 % interval if every rotor may be off.
+    pub thrust_loss_fraction: Value,
+    /// By how much it differs from one good flight to another, one standard deviation.
+    pub usual: f64,
+}
+
 /// A flight that nothing is said about, because its data contradict themselves.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct SetAside {
@@ -189,6 +209,8 @@ pub struct Verdict {
     pub closed_loop: Vec<ClosedLoop>,
     /// Path of the vehicle file with the effects added.
     pub model_patch: Option<String>,
+    /// What the flights are compared with, if not with the vehicle file alone.
+    pub baseline: Option<Since>,
     /// One paragraph in plain words.
     pub words: String,
     /// Flights that took no part, of those to fit and of those held out.

@@ -92,15 +92,19 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
     let effects = effects.join(" and ");
     let others: Vec<String> = verdict.alternatives.iter().map(|a| a.effects.join(" + ")).collect();
     let goes_with = verdict.goes_with.as_deref().unwrap_or("nothing that was tried");
+    let lacks = match verdict.baseline {
+        Some(_) => "Since its good flights the machine has got",
+        None => "The vehicle file lacks",
+    };
     let mut text = match verdict.verdict {
         Kind::None => "No effect above its tolerance: what the flights disagree by is what noise and the declared tolerances explain.".to_owned(),
-        Kind::Named => format!("The vehicle file lacks {effects}."),
+        Kind::Named => format!("{lacks} {effects}."),
         Kind::NamedFormDiffers => format!(
-            "The vehicle file lacks {effects}, but none of the published forms accounts for all of it; the rest goes with {goes_with}."
+            "{lacks} {effects}, but none of the published forms accounts for all of it; the rest goes with {goes_with}."
         ),
-        Kind::NamedIncomplete => format!("The vehicle file lacks {effects}. {}.", remains(verdict)),
+        Kind::NamedIncomplete => format!("{lacks} {effects}. {}.", remains(verdict)),
         Kind::Ambiguous => format!(
-            "The vehicle file lacks {effects}, or one of: {}. These flights do not tell them apart.",
+            "{lacks} {effects}, or one of: {}. These flights do not tell them apart.",
             others.join("; ")
         ),
         Kind::OutsideCatalogue => format!(

@@ -3,7 +3,9 @@
 use super::log_files;
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
-use squirrel_gap::{ClosedLoop, Diagnosis, Kind, Moved, NamedEffect, Value, Verdict, significant};
+use squirrel_gap::{
+    ClosedLoop, Diagnosis, Kind, Moved, NamedEffect, RotorHealth, Value, Verdict, significant,
+};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -324,6 +326,9 @@ fn show(verdict: &Verdict) {
     if !verdict.moved.is_empty() {
         moved(&verdict.moved);
     }
+    if let Some(since) = &verdict.baseline {
+        rotors(&since.rotors);
+    }
     if !verdict.alternatives.is_empty() {
         let mut table = Table::new(&["other explanation", "nats"]);
         for other in &verdict.alternatives {
@@ -343,6 +348,21 @@ fn show(verdict: &Verdict) {
         say(&format!("\nwhat to fly:\n{card}"));
     }
     notes(&verdict.notes);
+}
+
+/// How each rotor is against the good flights.
+fn rotors(all: &[RotorHealth]) {
+    let mut table = Table::new(&["rotor", "thrust lost %", "low", "high", "usual sd %"]);
+    for health in all {
+        let Value::Number { value, low, high } = health.thrust_loss_fraction else { continue };
+        let mut row = vec![health.rotor.to_string()];
+        row.extend([value, low, high, health.usual].map(|x| format!("{:.1}", 100.0 * x)));
+        table.row(row);
+    }
+    if !all.is_empty() {
+        table.print();
+        say("");
+    }
 }
 
 /// What moved with the effects: their numbers hold with these.

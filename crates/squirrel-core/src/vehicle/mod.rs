@@ -211,6 +211,33 @@ impl<T: Real> Vehicle<T> {
         }
         Ok(out)
     }
+    /// Thrust and reaction torque of each rotor over what the propulsion numbers give: rotors of one make scatter.
+    pub fn rotor_factors(&self) -> [PerRotor<T>; 2] {
+        let (own, alike) = (&self.per_speed_squared, RotorWrench::new(&self.parameters));
+        let over = |own: &PerRotor<T>, alike: &PerRotor<T>| {
+            let mut factors = [T::one(); MAX_ROTORS];
+            for ((factor, own), alike) in factors.iter_mut().zip(own).zip(alike) {
+                if *alike != T::zero() {
+                    *factor = *own / *alike;
+                }
+            }
+            factors
+        };
+        [over(&own.thrust, &alike.thrust), over(&own.yaw, &alike.yaw)]
+    }
+    /// The vehicle with rotors that give more or less than the propulsion numbers say.
+    ///
+    /// * `thrust`, `torque` - over what each rotor had
+    ///
+    /// # Errors
+    /// A factor that is not positive, by its field in vehicle files.
+    pub fn with_rotor_factors(&self, [thrust, torque]: [PerRotor<T>; 2]) -> Result<Self, ParameterError> {
+        for (field, factors) in [("rotor[].thrust_fraction", &thrust), ("rotor[].torque_fraction", &torque)] {
+            check::each_positive(field, factors)?;
+        }
+        let p = &self.parameters;
+        self.altered(&Alteration { mass_kg: p.mass_kg, inertia_kg_m2: p.inertia_kg_m2, thrust, torque })
+    }
     /// The vehicle with one rotor beside its place and with another reaction torque: rotors of one make scatter. Out of the
     /// range of [`Self::rotors`], the vehicle itself.
     ///
@@ -297,7 +324,7 @@ impl<T: Real> Vehicle<T> {
                 None => None,
             },
         };
-        Vehicle::new(Parameters {
+        let alike = Vehicle::new(Parameters {
             mass_kg: to(p.mass_kg),
             inertia_kg_m2: p.inertia_kg_m2.map(to),
             rotors: p
@@ -317,7 +344,12 @@ impl<T: Real> Vehicle<T> {
                 thrust_max_n: to(p.limits.thrust_max_n),
                 rotor_thrust_max_n: p.limits.rotor_thrust_max_n.map(to),
             },
-        })
+        })?;
+        let factors = self.rotor_factors();
+        if factors.iter().flatten().all(|factor| *factor == T::one()) {
+            return Ok(alike);
+        }
+        alike.with_rotor_factors(factors.map(|of| of.map(to)))
     }
 }
 

@@ -18,7 +18,7 @@ const FURTHER_NATS: f64 = 10.0;
 const BESIDE_GUSTS_NATS: f64 = 12.0;
 const BLOWN_NATS: f64 = 40.0;
 /// The effect of which a vehicle may have several.
-const WEAK_ROTOR: &str = "weak_rotor";
+pub(super) const WEAK_ROTOR: &str = "weak_rotor";
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
 const TOLERANCES_MIN: f64 = 3.0;

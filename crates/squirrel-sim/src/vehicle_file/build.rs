@@ -4,8 +4,8 @@ use super::VehicleFile;
 use super::quantity::Quantity;
 use super::tables::{
     AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, EffectValue, FormName,
-    InertiaValue, PlusTable, PositionTable, PropulsionTable, ThrustLawName, TriggerName, VehicleTable,
-    WingControlTable, WingName, WingTable, WingTestName,
+    InertiaValue, PlusTable, PositionTable, PropulsionTable, RotorTable, ThrustLawName, TriggerName,
+    VehicleTable, WingControlTable, WingName, WingTable, WingTestName,
 };
 use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ParnnWing, ServoParameters, WingPlant};
@@ -70,7 +70,11 @@ pub(super) fn build(
             rotor_thrust_max_n: t.limits.rotor_thrust_max_n.map(|q| q.0),
         },
     };
-    let vehicle = Vehicle::new(parameters).map_err(|e| e.to_string())?;
+    let mut vehicle = Vehicle::new(parameters).map_err(|e| e.to_string())?;
+    let factors = rotor_factors(&t.rotor);
+    if factors != [[1.0; MAX_ROTORS]; 2] {
+        vehicle = vehicle.with_rotor_factors(factors).map_err(|e| e.to_string())?;
+    }
     let size_body_m = match t.size_body_m {
         Some(size) => size.0,
         None => default_size(&vehicle),
@@ -100,6 +104,17 @@ pub(super) fn build(
         effects: effects(t.effects, &vehicle)?,
         provenance: Vec::new(),
     })
+}
+
+/// Thrust and torque of each rotor over what the propulsion numbers give.
+fn rotor_factors(rotors: &[RotorTable]) -> [[f64; MAX_ROTORS]; 2] {
+    let mut factors = [[1.0; MAX_ROTORS]; 2];
+    for (i, rotor) in rotors.iter().enumerate().take(MAX_ROTORS) {
+        let of = |number: &Option<Quantity<f64>>| number.as_ref().map_or(1.0, |q| q.0);
+        factors[0][i] = of(&rotor.thrust_fraction);
+        factors[1][i] = of(&rotor.torque_fraction);
+    }
+    factors
 }
 
 /// A box that holds all hubs, for a vehicle that states no size.

@@ -72,6 +72,8 @@ pub(super) enum InertiaValue {
 pub(super) struct RotorTable {
     pub(super) position_body_m: Triple,
     pub(super) yaw_sign: Number,
+    pub(super) thrust_fraction: Option<Number>,
+    pub(super) torque_fraction: Option<Number>,
 }
 
 #[derive(Deserialize, Clone, Copy)]
