@@ -32,6 +32,6 @@ pub use compatibility::check;
 pub use diagnose::{Covered, Diagnosis, diagnose};
 pub use error::GapError;
 pub use find::{Finding, find};
-pub use picture::picture;
+pub use picture::{first_screen, picture};
 pub use verdict::{Alternative, Gap, Kind, Left, Moved, NamedEffect, SetAside, Value, Verdict};
 pub use words::significant;

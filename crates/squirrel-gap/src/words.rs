@@ -17,7 +17,7 @@ pub fn significant(value: f64, digits: u8) -> String {
 }
 
 /// The manoeuvre that shows an effect and tells it from those it is confused with.
-fn manoeuvre(effect: &str) -> &'static str {
+pub(crate) fn manoeuvre(effect: &str) -> &'static str {
     match effect {
         "linear_drag" | "quadratic_drag" | "flapping_moment" => {
             "dashes at several speeds from 2 to 9 m/s, both ways"

@@ -1,0 +1,69 @@
+//! The first screen: five answers that a pilot can act on, and a picture of the worst channel before and after.
+
+use super::{FlightPanel, ReportData};
+use squirrel_sim::report::chart::{Axis, Ink, Limit, LineChart, Range, Series, drawable};
+use squirrel_sim::report::page::{Card, Figure, Page};
+
+/// Size of the picture, px.
+const WIDTH: f64 = 400.0;
+const PLOT_HEIGHT: f64 = 250.0;
+/// Remarks about flights that were set aside; the verdict below and its notes have all.
+const REMARKS: usize = 2;
+
+pub(super) fn screen(page: &mut Page, data: &ReportData) {
+    let cards = data.screen.iter().map(|answer| Card {
+        question: answer.question.clone(),
+        answer: answer.answer.clone(),
+        figure: answer.figure.clone(),
+        figure_note: answer.figure_note.clone(),
+        sentences: answer.sentences.clone(),
+    });
+    let mut remarks: Vec<String> =
+        data.set_aside.iter().take(REMARKS).map(|words| format!("Set aside: {words}")).collect();
+    if data.set_aside.len() > REMARKS {
+        remarks.push(format!("Set aside: {} more flights.", data.set_aside.len() - REMARKS));
+    }
+    let picture = worst(data).map(|(flight, channel)| picture(data, flight, channel));
+    page.cards("answers", &cards.collect::<Vec<_>>(), picture.as_slice(), &remarks);
+}
+
+/// The flight and channel whose residual is the largest, in units of its noise.
+fn worst(data: &ReportData) -> Option<(&FlightPanel, usize)> {
+    let all =
+        data.flights.iter().flat_map(|f| f.before.iter().enumerate().map(move |(i, row)| (f, i, mean(row))));
+    let known = all.filter(|(f, _, size)| drawable(*size) && drawable(f.window_s) && drawable(f.start_s));
+    known.max_by(|a, b| a.2.total_cmp(&b.2)).map(|(flight, channel, _)| (flight, channel))
+}
+
+/// Mean of what can be drawn; NaN without.
+fn mean(row: &[f64]) -> f64 {
+    let known: Vec<f64> = row.iter().copied().filter(|x| drawable(*x)).collect();
+    known.iter().sum::<f64>() / known.len() as f64
+}
+
+fn picture(data: &ReportData, flight: &FlightPanel, channel: usize) -> Figure {
+    let name = data.channels.get(channel).map_or("residual", String::as_str);
+    let axis = Axis::new("error over noise", "").with_range(Range::Including(0.0, 2.0));
+    let mut chart = LineChart::new(
+        &format!("{name} of {} over time, before and after", flight.name),
+        Axis::new("time", "s"),
+        axis,
+    );
+    (chart.width, chart.plot_height) = (WIDTH, PLOT_HEIGHT);
+    chart.limits.push(Limit { y: 1.0, label: "noise".to_owned() });
+    let rows =
+        [("before", Ink::Series(1), Some(&flight.before)), ("after", Ink::Series(0), Some(&flight.after))];
+    for (name, ink, rows) in rows {
+        if let Some(row) = rows.and_then(|rows| rows.get(channel)) {
+            let at = (0..row.len()).map(|k| flight.start_s + (k as f64 + 0.5) * flight.window_s);
+            chart.series.push(Series::line(name, ink, at.collect(), row.clone()));
+        }
+    }
+    let after = if flight.after.is_empty() { "; nothing was added to the model" } else { "" };
+    Figure {
+        title: format!("Where model and flight differ most: {name}"),
+        caption: format!("{}, root mean square by window{after}.", flight.name),
+        drawings: vec![chart.svg()],
+        ..Figure::default()
+    }
+}
