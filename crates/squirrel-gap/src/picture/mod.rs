@@ -5,6 +5,7 @@
 //! from the verdict, so that the page cannot say anything else.
 
 mod left;
+mod outlook;
 mod plain;
 mod regressors;
 mod screen;

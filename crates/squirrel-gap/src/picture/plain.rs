@@ -1,6 +1,7 @@
 //! Effects in a pilot's words, and how likely one explanation is beside another.
 
-use super::units::{read_as, three, with_unit};
+use super::units::{grouped, read_as, three, with_unit};
+use crate::report::Answer;
 use crate::verdict::{Alternative, NamedEffect, Value};
 use squirrel_core::effects::{Effects, Kind as ParameterKind};
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -89,6 +90,9 @@ const WORDS: [(&str, &str, &str, &str); 29] = [
     ("payload_swing", "swinging load", "A load swings below", "A lighter load swings below"),
 ];
 
+/// Other explanations and flights set aside that are told on the first screen; the panels below have all.
+pub(super) const TOLD: usize = 3;
+
 fn words(effect: &NamedEffect) -> [String; 3] {
     let which = effect.parameters.iter().find_map(|(key, value)| match (*key, value) {
         ("rotor", Value::Number { value, .. }) => Some(format!("{value:.0}")),
@@ -123,13 +127,15 @@ pub(super) fn nouns(other: &Alternative) -> String {
 
 /// One size of an effect beside that of the vehicle file.
 pub(super) struct Size {
-    /// Value with its unit.
+    /// `thrust loss`, `24.3 %` and `23.1 to 25.5 %`.
+    pub(super) name: String,
     pub(super) value: String,
-    /// Name and interval: `thrust loss, 23.1 to 25.5 % (95 %)`.
-    pub(super) note: String,
+    pub(super) interval: String,
+    /// `; the file has 10.0 %`; empty where the file has none.
+    pub(super) declared: String,
     /// By how many standard deviations it is above the vehicle file; NaN where it has none.
     pub(super) far: f64,
-    /// Half width of the interval over the size; NaN where the size is zero.
+    /// Half width of the interval over the size, or over that of the file where it is larger; NaN where both are zero.
     pub(super) width: f64,
 }
 
@@ -166,12 +172,20 @@ pub(super) fn sizes(effect: &NamedEffect, vehicle: &VehicleFile) -> Vec<Size> {
             let own = if is_same { declared.get(i).copied().unwrap_or_default() } else { 0.0 };
             let (name, unit, times) = read_as(key, value);
             let [of, from, to] = [value, low, high].map(|x| three(times * x));
+            let declared = if own == 0.0 {
+                String::new()
+            } else {
+                format!("; the file has {}", with_unit(&three(times * own), unit))
+            };
             let sd = (high - low) / WIDTH;
+            let larger = value.abs().max(own.abs());
             Some(Size {
+                name,
                 value: with_unit(&of, unit),
-                note: format!("{name}, {} (95 %)", with_unit(&format!("{from} to {to}"), unit)),
+                interval: with_unit(&format!("{from} to {to}"), unit),
+                declared,
                 far: if sd > 0.0 { (value - own) / sd } else { f64::NAN },
-                width: if value == 0.0 { f64::NAN } else { 0.5 * (high - low) / value.abs() },
+                width: 0.5 * (high - low) / larger,
             })
         })
         .collect();
@@ -190,18 +204,42 @@ pub(super) fn statement(effect: &NamedEffect, vehicle: &VehicleFile) -> String {
 /// More than this many times is not counted.
 const COUNTLESS: f64 = 1e6;
 
-/// How many times likelier something is than what is so many nats behind: `400`, or `over a million`.
+/// How many times likelier something is than what is so many nats behind: `400`, or `more than a million`.
 pub(super) fn times(nats: f64) -> String {
     let times = nats.exp();
     if times >= COUNTLESS {
-        "over a million".to_owned()
+        "more than a million".to_owned()
     } else if times >= 10.0 {
         // One digit: nobody knows the second.
         let digit = 10f64.powf(times.log10().floor());
-        format!("{}", (times / digit).round() * digit)
+        grouped(&format!("{}", (times / digit).round() * digit))
     } else {
         format!("{times:.1}")
     }
+}
+
+/// The same as odds: `400 : 1`.
+pub(super) fn odds(nats: f64) -> String {
+    if nats.exp() >= COUNTLESS { "> 1 million : 1".to_owned() } else { format!("{} : 1", times(nats)) }
+}
+
+/// An answer without a number.
+pub(super) fn said(answer: impl Into<String>, sentences: Vec<String>) -> Answer {
+    Answer { answer: answer.into(), sentences, ..Answer::default() }
+}
+
+pub(super) fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+pub(super) fn small(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_lowercase().chain(letters).collect())
+}
+
+pub(super) fn full_stop(text: &str) -> String {
+    if text.ends_with('.') { text.to_owned() } else { format!("{text}.") }
 }
 
 #[cfg(test)]
@@ -218,6 +256,9 @@ mod tests {
     #[test]
     fn odds_are_read_with_one_digit() {
         let said = [0.5, 3.0, 6.0, 12.0, 14.0, 1e4].map(times);
-        assert_eq!(said, ["1.6", "20", "400", "200000", "over a million", "over a million"]);
+        assert_eq!(
+            said,
+            ["1.6", "20", "400", "200\u{202f}000", "more than a million", "more than a million"]
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! Units of keys, channels in a pilot's words, and numbers as they are read aloud: 59 ms, 12 %, 4.2 mm.
+//! Units of keys, and numbers as they are read aloud: 59 ms, 12 %, 4.2 mm.
 
 use crate::words::significant;
 
@@ -45,9 +45,9 @@ const THOUSANDTHS: f64 = 0.1;
 /// * `size` - about as large as the number is, in the unit of the key
 pub(super) fn read_as(key: &str, size: f64) -> (String, &'static str, f64) {
     let name = match key {
-        "cg_x_m" => "centre of mass forward",
-        "cg_y_m" => "centre of mass to the right",
-        "cg_z_m" => "centre of mass down",
+        "cg_x_m" => "forward",
+        "cg_y_m" => "to the right",
+        "cg_z_m" => "down",
         _ => without_unit(key),
     };
     if let Some(name) = name.strip_suffix("_fraction") {
@@ -66,43 +66,33 @@ pub(super) fn read_as(key: &str, size: f64) -> (String, &'static str, f64) {
 
 /// A number with three significant digits, a dash for one that is unknown.
 pub(super) fn three(value: f64) -> String {
-    if value.is_finite() { significant(value, 3).replace('-', "\u{2212}") } else { "\u{2013}".to_owned() }
+    if value.is_finite() {
+        grouped(&significant(value, 3).replace('-', "\u{2212}"))
+    } else {
+        "\u{2013}".to_owned()
+    }
+}
+
+/// A number with narrow spaces between thousands, from five digits on.
+pub(super) fn grouped(number: &str) -> String {
+    let digits = number.chars().take_while(char::is_ascii_digit).count();
+    if digits < 5 || digits != number.len() {
+        return number.to_owned();
+    }
+    let mut text = String::new();
+    for (i, digit) in number.chars().enumerate() {
+        if i > 0 && (digits - i) % 3 == 0 {
+            text.push('\u{202f}');
+        }
+        text.push(digit);
+    }
+    text
 }
 
 /// A number with its unit; degrees and plain numbers stand close.
 pub(super) fn with_unit(number: &str, unit: &str) -> String {
     let space = if unit.is_empty() || unit == "\u{b0}" { "" } else { " " };
     format!("{number}{space}{unit}")
-}
-
-/// Channels as files and panels call them, and as pilots do.
-const CHANNELS: [(&str, &str); 21] = [
-    ("force_body_x_n", "the forward force"),
-    ("force_body_y_n", "the sideways force"),
-    ("force_body_z_n", "the vertical force"),
-    ("moment_body_x_n_m", "the roll moment"),
-    ("moment_body_y_n_m", "the pitch moment"),
-    ("moment_body_z_n_m", "the yaw moment"),
-    ("gnss.velocity_north_m_s", "the velocity north"),
-    ("gnss.velocity_east_m_s", "the velocity east"),
-    ("gnss.velocity_down_m_s", "the velocity down"),
-    ("specific force x", "the forward force"),
-    ("specific force y", "the sideways force"),
-    ("specific force z", "the vertical force"),
-    ("angular acceleration x", "the roll moment"),
-    ("angular acceleration y", "the pitch moment"),
-    ("angular acceleration z", "the yaw moment"),
-    ("attitude x", "the roll angle"),
-    ("attitude y", "the pitch angle"),
-    ("attitude z", "the heading"),
-    ("angular rate x", "the roll rate"),
-    ("angular rate y", "the pitch rate"),
-    ("angular rate z", "the yaw rate"),
-];
-
-/// A text with its channels in a pilot's words.
-pub(super) fn spoken(text: &str) -> String {
-    CHANNELS.iter().fold(text.to_owned(), |text, (name, words)| text.replace(name, words))
 }
 
 #[cfg(test)]
@@ -118,11 +108,11 @@ mod tests {
         assert_eq!(read("thrust_loss_fraction", 0.243), "thrust loss 24.3 %");
         assert_eq!(read("extra_time_constant_s", 0.0594), "extra time constant 59.4 ms");
         assert_eq!(read("latency_s", 0.25), "latency 0.250 s");
-        assert_eq!(read("cg_x_m", -0.0042), "centre of mass forward \u{2212}4.20 mm");
+        assert_eq!(read("cg_x_m", -0.0042), "forward \u{2212}4.20 mm");
         assert_eq!(read("bias_rad", 0.1), "bias 5.73\u{b0}");
         assert_eq!(read("wind_north_m_s", 0.05), "wind north 0.0500 m/s");
         assert_eq!(read("voltage_exponent", 1.08), "voltage exponent 1.08");
+        assert_eq!(three(18_507.9), "18\u{202f}508");
         assert_eq!(three(f64::NAN), "\u{2013}");
-        assert_eq!(spoken("velocity (60 % of force_body_z_n)"), "velocity (60 % of the vertical force)");
     }
 }

@@ -1,16 +1,22 @@
 //! The first screen: five answers that a pilot can act on, and a picture of the worst channel before and after.
 
 use super::{FlightPanel, ReportData};
+use crate::words::spoken;
 use squirrel_sim::report::chart::{Axis, Ink, Limit, LineChart, Range, Series, drawable};
 use squirrel_sim::report::page::{Card, Figure, Page};
 
 /// Size of the picture, px.
 const WIDTH: f64 = 400.0;
 const PLOT_HEIGHT: f64 = 250.0;
+/// Part of its residual that a channel may keep and still be helped.
+const HELPED: f64 = 0.7;
 /// Remarks about flights that were set aside; the verdict below and its notes have all.
 const REMARKS: usize = 2;
 
 pub(super) fn screen(page: &mut Page, data: &ReportData) {
+    if data.screen.is_empty() {
+        return page.panel("answers", "Answers", "", |page| page.missing("No verdict was given."));
+    }
     let cards = data.screen.iter().map(|answer| Card {
         question: answer.question.clone(),
         answer: answer.answer.clone(),
@@ -23,16 +29,28 @@ pub(super) fn screen(page: &mut Page, data: &ReportData) {
     if data.set_aside.len() > REMARKS {
         remarks.push(format!("Set aside: {} more flights.", data.set_aside.len() - REMARKS));
     }
-    let picture = worst(data).map(|(flight, channel)| picture(data, flight, channel));
+    let picture = shown(data).map(|(flight, channel, why)| picture(data, flight, channel, why));
     page.cards("answers", &cards.collect::<Vec<_>>(), picture.as_slice(), &remarks);
 }
 
-/// The flight and channel whose residual is the largest, in units of its noise.
-fn worst(data: &ReportData) -> Option<(&FlightPanel, usize)> {
-    let all =
-        data.flights.iter().flat_map(|f| f.before.iter().enumerate().map(move |(i, row)| (f, i, mean(row))));
-    let known = all.filter(|(f, _, size)| drawable(*size) && drawable(f.window_s) && drawable(f.start_s));
-    known.max_by(|a, b| a.2.total_cmp(&b.2)).map(|(flight, channel, _)| (flight, channel))
+/// The flight and channel that the answer helps most, in units of its noise; where it helps none, the worst.
+fn shown(data: &ReportData) -> Option<(&FlightPanel, usize, &'static str)> {
+    let all = || {
+        let drawn = data.flights.iter().filter(|f| drawable(f.window_s) && drawable(f.start_s));
+        drawn.flat_map(|f| (0..f.before.len()).map(move |i| (f, i)))
+    };
+    let before = |(flight, channel): &(&FlightPanel, usize)| mean(&flight.before[*channel]);
+    let after = |(flight, channel): &(&FlightPanel, usize)| {
+        flight.after.get(*channel).map_or(f64::NAN, |row| mean(row))
+    };
+    let largest = |of: &dyn Fn(&(&FlightPanel, usize)) -> f64| {
+        all().filter(|at| drawable(of(at))).max_by(|a, b| of(a).total_cmp(&of(b)))
+    };
+    let helped = largest(&|at| before(at) - after(at)).filter(|at| after(at) < HELPED * before(at));
+    match helped {
+        Some((flight, channel)) => Some((flight, channel, "Where the answer helps most")),
+        None => largest(&before).map(|(flight, channel)| (flight, channel, "Where they differ most")),
+    }
 }
 
 /// Mean of what can be drawn; NaN without.
@@ -41,8 +59,8 @@ fn mean(row: &[f64]) -> f64 {
     known.iter().sum::<f64>() / known.len() as f64
 }
 
-fn picture(data: &ReportData, flight: &FlightPanel, channel: usize) -> Figure {
-    let name = data.channels.get(channel).map_or("residual", String::as_str);
+fn picture(data: &ReportData, flight: &FlightPanel, channel: usize, why: &str) -> Figure {
+    let name = data.channels.get(channel).map_or_else(|| "a channel".to_owned(), |name| spoken(name));
     let axis = Axis::new("error over noise", "").with_range(Range::Including(0.0, 2.0));
     let mut chart = LineChart::new(
         &format!("{name} of {} over time, before and after", flight.name),
@@ -61,7 +79,7 @@ fn picture(data: &ReportData, flight: &FlightPanel, channel: usize) -> Figure {
     }
     let after = if flight.after.is_empty() { "; nothing was added to the model" } else { "" };
     Figure {
-        title: format!("Where model and flight differ most: {name}"),
+        title: format!("{why}: {name}"),
         caption: format!("{}, root mean square by window{after}.", flight.name),
         drawings: vec![chart.svg()],
         ..Figure::default()
