@@ -4,7 +4,9 @@
 //! only, the channels of the held-out flights, and what the vehicle file has where the answer differs.
 
 use super::outlook::{grows, next, prediction, remains};
-use super::plain::{Size, TOLD, capital, full_stop, noun, nouns, odds as odds_of, said, sizes, small, statement, times};
+use super::plain::{
+    Size, TOLD, capital, full_stop, noun, nouns, odds as odds_of, said, sizes, small, statement, times,
+};
 use super::units::three;
 use crate::name::NATS_MIN;
 use crate::report::{Answer, ReportData};
@@ -195,8 +197,10 @@ fn how_sure(verdict: &Verdict, vehicle: &VehicleFile, behind: Behind<'_>) -> Ans
         Kind::NotIdentifiable if verdict.effects.is_empty() => {
             said("Not sure", vec!["An effect that these flights cannot show may still be there.".to_owned()])
         }
-        Kind::Ambiguous | Kind::NotIdentifiable => let few = format!("Odds below {} do not decide.", odds_of(NATS_MIN));
-            odds(said("Not decided between these", lines(next).into_iter().chain([few]).collect())),
+        Kind::Ambiguous | Kind::NotIdentifiable => {
+            let few = format!("Odds below {} do not decide.", odds_of(NATS_MIN));
+            odds(said("Not decided between these", lines(next).into_iter().chain([few]).collect()))
+        }
         Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers => {
             let nats = behind.map(|(_, nats)| nats).or(worth.map(|(_, nats)| nats)).unwrap_or_default();
             let words = if nats >= VERY_SURE_NATS {

@@ -44,7 +44,7 @@ fn shown(data: &ReportData) -> Option<(&FlightPanel, usize, &'static str)> {
         flight.after.get(*channel).map_or(f64::NAN, |row| mean(row))
     };
     let largest = |of: &dyn Fn(&(&FlightPanel, usize)) -> f64| {
-        all().filter(|at| drawable(of(at))).max_by(|a, b| of(a).total_cmp(&of(b)))
+        all().filter(|at| drawable(of(at))).reduce(|best, at| if of(&at) > of(&best) { at } else { best })
     };
     let helped = largest(&|at| before(at) - after(at)).filter(|at| after(at) < HELPED * before(at));
     match helped {
