@@ -81,7 +81,10 @@ fn verdict(kind: Kind) -> Verdict {
             (verdict.effects, verdict.goes_with) = (vec![sag()], Some(family.to_owned()));
             verdict.leftover = Some(left(vec!["force_body_z_n"], Some(family)));
         }
-        Kind::Ambiguous => verdict.fly_next = Some(asked.to_owned()),
+        Kind::Ambiguous => {
+            verdict.alternatives[0].evidence_nats = 40.2;
+            verdict.fly_next = Some(asked.to_owned());
+        }
         Kind::OutsideCatalogue => {
             verdict.goes_with = Some(family.to_owned());
             verdict.leftover = Some(left(vec!["force_body_z_n"], Some(family)));
@@ -122,11 +125,11 @@ fn report(verdict: &Verdict, vehicle: &VehicleFile) -> ReportData {
     let mut data = ReportData {
         title: "Gap report: squirrel".to_owned(),
         verdict: verdict.words.clone(),
-        set_aside: verdict.set_aside.iter().map(|aside| aside.words.clone()).collect(),
         channels: vec!["specific force x".to_owned(), "specific force z".to_owned()],
         ..ReportData::default()
     };
     if verdict.verdict != Kind::DataProblem {
+        data.set_aside = verdict.set_aside.iter().map(|aside| aside.words.clone()).collect();
         let wave = |gain: f64| (0..40).map(|k| 1.0 + gain * (1.0 + (0.4 * f64::from(k)).sin())).collect();
         let after = if verdict.effects.is_empty() { Vec::new() } else { vec![wave(0.01), wave(0.1)] };
         data.flights = vec![FlightPanel {
@@ -221,13 +224,14 @@ fn each_kind_says_what_is_missing_in_its_own_words() {
     let of = |kind| screen(&verdict(kind)).map(|answer| all(&answer));
     let [missing, sure, .., next] = of(Kind::Ambiguous);
     assert!(missing.contains("Or: thrust of rotor 2 (weak_rotor)."), "{missing}");
-    assert!(sure.contains("Not decided"), "{sure}");
+    assert!(sure.contains("Not decided") && sure.contains("20 : 1"), "{sure}");
+    assert!(sure.contains("Odds below 400 : 1 do not decide."), "{sure}");
     assert!(
-        next.contains("Yaw steps (yaw_torque_coeff).\nHovers; and weigh it (weak_rotor).\n`squirrel fly"),
+        next.contains("Yaw steps (yaw_torque_coeff).\nHovers; and weigh it (weak_rotor).\n\u{201c}squirrel fly --scenario excite_rich\u{201d} flies most of it; its card"),
         "{next}"
     );
     let [.., remains, _] = of(Kind::NamedIncomplete);
-    for words in ["the vertical force, the roll moment", "velocity (60 % of the vertical force)"] {
+    for words in ["the vertical force and the roll moment", "velocity (60 % of the vertical force)"] {
         assert!(remains.contains(words), "{remains}");
     }
     let [missing, _, better, ..] = of(Kind::OutsideCatalogue);

@@ -153,7 +153,7 @@ pub(super) fn remains(verdict: &Verdict) -> Answer {
     Answer {
         figure: format!("{:.0} %", 100.0 * left.share_left),
         figure_note: "of what was measured there, about its mean".to_owned(),
-        ..said(format!("A part of {}", channels.join(", ")), lines)
+        ..said(format!("A part of {}", channels.join(" and ")), lines)
     }
 }
 
@@ -167,7 +167,9 @@ pub(super) fn next(verdict: &Verdict, vehicle: &VehicleFile, held_out: bool) -> 
         if more > 0 {
             lines.push(format!("And {more} more, see below."));
         }
-        lines.extend(rest.map(|rest| format!("`{rest}; its card is below.")));
+        lines.extend(
+            rest.map(|rest| format!("\u{201c}{}; its card is below.", rest.replacen('`', "\u{201d}", 1))),
+        );
         return said("One more flight, with this in it", lines);
     }
     let sharpen = || {

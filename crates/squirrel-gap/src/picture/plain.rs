@@ -239,7 +239,7 @@ pub(super) fn small(text: &str) -> String {
 }
 
 pub(super) fn full_stop(text: &str) -> String {
-    if text.ends_with('.') { text.to_owned() } else { format!("{text}.") }
+    if text.ends_with(['.', '?']) { text.to_owned() } else { format!("{text}.") }
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! The gap report: where simulation and flights disagree, what explains it, and how far that can be trusted.
 //!
-//! One HTML file without network, the same bytes for the same data. The verdict comes first; each panel below answers one
+//! One HTML file without network, the same bytes for the same data. The answers come first; each panel below answers one
 //! question and says in words when nothing was given for it. [`ReportData`] is everything that the page shows.
 //!
 //! | panel | question |
