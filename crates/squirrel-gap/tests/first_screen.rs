@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use squirrel_gap::report::{
-    Answer, Errors, Evidence, FlightPanel, HeldOut, HeldOutChannel, ReportData, render,
+    Answer, Conditional, Errors, Evidence, FlightPanel, HeldOut, HeldOutChannel, ReportData, render,
 };
 use squirrel_gap::{
     Alternative, Gap, Kind, Left, NamedEffect, SetAside, Value, Verdict, first_screen, significant,
@@ -70,7 +70,8 @@ fn verdict(kind: Kind) -> Verdict {
         notes: Vec::new(),
     };
     let family = "velocity (60 % of force_body_z_n)";
-    let asked = "yaw steps (yaw_torque_coeff); hovers; and weigh it (weak_rotor); `squirrel fly --scenario excite_rich` flies most of it";
+    let asked = "yaw steps (yaw_torque_coeff); hovers; and weigh it (weak_rotor); \
+                 `squirrel fly --scenario excite_rich` flies most of it";
     match kind {
         Kind::Named => {}
         Kind::None => (verdict.effects, verdict.alternatives) = (Vec::new(), Vec::new()),
@@ -226,8 +227,9 @@ fn each_kind_says_what_is_missing_in_its_own_words() {
     assert!(missing.contains("Or: thrust of rotor 2 (weak_rotor)."), "{missing}");
     assert!(sure.contains("Not decided") && sure.contains("20 : 1"), "{sure}");
     assert!(sure.contains("Odds below 400 : 1 do not decide."), "{sure}");
+    assert!(next.contains("Yaw steps (yaw_torque_coeff).\nHovers; and weigh it (weak_rotor).\n"), "{next}");
     assert!(
-        next.contains("Yaw steps (yaw_torque_coeff).\nHovers; and weigh it (weak_rotor).\n\u{201c}squirrel fly --scenario excite_rich\u{201d} flies most of it; its card"),
+        next.contains("\u{201c}squirrel fly --scenario excite_rich\u{201d} flies most of it; its card"),
         "{next}"
     );
     let [.., remains, _] = of(Kind::NamedIncomplete);
@@ -294,7 +296,8 @@ fn what_speaks_against_an_answer_is_said() {
     assert!(better.contains("leaves 1.00, which is less"), "{better}");
     let [_, _, better, ..] = gap(&|gap| (gap.before, gap.after) = (1.0, 9.0));
     assert!(better.contains("It predicts worse") && !better.contains("less error"), "{better}");
-    let [.., remains, _] = gap(&|gap| gap.after = 3.5);
+    let [.., remains, next] = gap(&|gap| gap.after = 3.5);
+    assert!(next.contains("put one like them among those to fit"), "{next}");
     assert!(remains.contains("more on held-out flights\n3.50"), "{remains}");
     let [_, sure, ..] = with(&|v| v.alternatives[0].evidence_nats = 41.9);
     assert!(sure.contains("Fairly sure") && sure.contains("3.7 times less likely (1.30 nats)"), "{sure}");
@@ -325,9 +328,41 @@ fn without_a_held_out_flight_the_screen_asks_for_one() {
     let vehicle = VehicleFile::squirrel();
     let mut data = report(&verdict, &vehicle);
     assert!(all(&data.screen[2]).contains("cannot be re-simulated"), "{:?}", data.screen[2]);
+    assert!(all(&data.screen[4]).contains("attitude and velocity throughout"), "{:?}", data.screen[4]);
     data.held_out = None;
     let screen = first_screen(&verdict, &vehicle, &data);
     assert!(all(&screen[2]).contains("--held-out") && all(&screen[4]).contains("held out"), "{screen:?}");
+}
+
+/// Names that all explanations share are the answer; what each has beside them is told as what remains.
+#[test]
+fn what_explanations_share_is_sure_and_the_rest_remains() {
+    let mut verdict = verdict(Kind::NamedIncomplete);
+    verdict.leftover = Some(left(Vec::new(), None));
+    verdict.alternatives =
+        vec![other(&[weak_rotor(3.0, f64::NAN), sag()], 50.0), other(&[weak_rotor(3.0, f64::NAN)], 44.0)];
+    let [_, sure, _, remains, _] = screen(&verdict).map(|answer| all(&answer));
+    assert!(sure.contains("Very sure") && sure.contains("Leaving out weak_rotor"), "{sure}");
+    assert_eq!(remains.matches("Perhaps").count(), 1, "{remains}");
+    assert!(remains.contains("Perhaps thrust that sags with the battery (battery_sag)."), "{remains}");
+}
+
+/// The picture is of the channel that the answer acts on, also where tolerances help another one more.
+#[test]
+fn the_picture_is_of_the_channel_that_the_answer_acts_on() {
+    let mut data = report(&verdict(Kind::Named), &VehicleFile::squirrel());
+    data.flights[0].before[0].iter_mut().for_each(|x| *x *= 100.0);
+    assert!(render(&data).contains("Where the answer acts: the forward force"));
+    data.conditional = vec![Conditional {
+        channel: data.channels[1].clone(),
+        unit: String::new(),
+        regressor: String::new(),
+        regressor_unit: String::new(),
+        bins: Vec::new(),
+    }];
+    assert!(render(&data).contains("Where the answer acts: the vertical force"));
+    data.flights[0].after = data.flights[0].before.clone();
+    assert!(render(&data).contains("Where they differ most: the forward force"));
 }
 
 /// A file that has an effect already: what it overstates is less, and the distance is from the file's own number.

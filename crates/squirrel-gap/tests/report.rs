@@ -258,7 +258,7 @@ fn every_panel_holds_its_data() {
                 "9.30 \u{2192} 1.07",
                 "The answer takes away 99.1 %.",
                 "Dashes at several speeds.",
-                "Where the answer helps most: fx m/s\u{b2}",
+                "Where the answer acts: fx m/s\u{b2}",
                 "rich 0, root mean square",
                 "Set aside: rich 9: imu: held for 3 s",
             ],

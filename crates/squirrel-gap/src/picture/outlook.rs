@@ -3,12 +3,14 @@
 use super::plain::{TOLD, capital, full_stop, noun, nouns, said, sizes};
 use super::units::{three, with_unit};
 use crate::report::{Answer, HeldOut, HeldOutChannel};
-use crate::verdict::{Kind, NamedEffect, Verdict};
+use crate::verdict::{Alternative, Gap, Kind, NamedEffect, Verdict};
 use crate::words::{manoeuvre, spoken};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// An error over that of noise that is worth a word.
 const ABOVE_NOISE: f64 = 1.2;
+/// The same where the held-out flights have something of their own.
+const FAR_ABOVE_NOISE: f64 = 2.0;
 /// Part of the error by which that of a rival may differ and be the same.
 const AS_GOOD: f64 = 0.05;
 /// Part of the error of a force by which it must fall to be told before angles, rates and speeds.
@@ -42,9 +44,9 @@ pub(super) fn prediction(verdict: &Verdict, held_out: Option<&HeldOut>, mass_kg:
     };
     let note = "squared error over that of noise, first second".to_owned();
     if verdict.effects.is_empty() {
+        let times = three(gap.before);
         let line = format!(
-            "The vehicle file as it is leaves {} times the squared error of noise on {flights} that it was not fitted to.",
-            three(gap.before)
+            "On {flights} held out, the file as it is leaves {times} times the squared error of noise."
         );
         let answer = if gap.before > ABOVE_NOISE {
             "Nothing to add"
@@ -121,9 +123,9 @@ pub(super) fn remains(verdict: &Verdict) -> Answer {
     if left.channels.is_empty() {
         // Names that all explanations share may leave what each explains otherwise.
         if verdict.verdict == Kind::NamedIncomplete {
-            lines.extend(
-                verdict.alternatives.iter().take(TOLD).map(|other| format!("Perhaps {}.", nouns(other))),
-            );
+            let beside = verdict.alternatives.iter().map(|other| beside(verdict, other));
+            let beside = beside.filter(|other| !other.effects.is_empty()).take(TOLD);
+            lines.extend(beside.map(|other| format!("Perhaps {}.", nouns(&other))));
             return said("Something that these flights do not tell apart", lines);
         }
         let nothing = "Nothing above noise and the file's tolerances";
@@ -157,6 +159,14 @@ pub(super) fn remains(verdict: &Verdict) -> Answer {
     }
 }
 
+/// What another explanation has beside the answer.
+fn beside(verdict: &Verdict, other: &Alternative) -> Alternative {
+    let is_new = |name: &str| verdict.effects.iter().all(|own| own.name != name);
+    let effects = other.effects.iter().copied().filter(|name| is_new(name)).collect();
+    let numbers = other.numbers.iter().filter(|effect| is_new(effect.name)).cloned().collect();
+    Alternative { effects, evidence_nats: other.evidence_nats, numbers }
+}
+
 pub(super) fn next(verdict: &Verdict, vehicle: &VehicleFile, held_out: bool) -> Answer {
     if let Some(asked) = &verdict.fly_next {
         // The last part names the scenario that flies most of it.
@@ -182,8 +192,18 @@ pub(super) fn next(verdict: &Verdict, vehicle: &VehicleFile, held_out: bool) -> 
             format!("To narrow {} (\u{b1}{:.0} %): {}.", noun(widest), 100.0 * width, manoeuvre(widest.name))
         })
     };
-    let unproven =
-        || (!held_out).then(|| "To prove it: any other flight of the same day, held out.".to_owned());
+    let unproven = || {
+        let differ = |gap: &Gap| gap.after > FAR_ABOVE_NOISE && !verdict.effects.is_empty();
+        let line = match &verdict.gap {
+            None if held_out => "To prove it: held-out logs with attitude and velocity throughout.",
+            None => "To prove it: any other flight of the same day, held out.",
+            Some(gap) if differ(gap) => {
+                "The held-out flights differ by more than these: put one like them among those to fit."
+            }
+            Some(_) => return None,
+        };
+        Some(line.to_owned())
+    };
     match verdict.verdict {
         Kind::DataProblem => said(
             "Nothing new: mend the import first",
@@ -191,21 +211,30 @@ pub(super) fn next(verdict: &Verdict, vehicle: &VehicleFile, held_out: bool) -> 
         ),
         Kind::OutsideCatalogue if grows(verdict) => said(
             "The same flights again",
-            vec!["Fly those to fit and those to hold out with the vehicle unchanged between them.".to_owned()],
+            vec![
+                "Fly those to fit and those to hold out with the vehicle unchanged between them.".to_owned(),
+            ],
         ),
         Kind::OutsideCatalogue => said(
             "No flight can name it",
-            vec!["Look at when and where it acts, below, and at the vehicle: loads, blades, mounts, loose parts.".to_owned()],
+            vec![
+                "Look at when and where it acts, below.".to_owned(),
+                "Look at the vehicle: loads, blades, mounts, loose parts.".to_owned(),
+            ],
         ),
         Kind::NamedIncomplete | Kind::NamedFormDiffers => {
             let line = "No flight can name what remains; the answer may be used where it holds.".to_owned();
-            said("Nothing more for this answer", [Some(line), sharpen(), unproven()].into_iter().flatten().collect())
+            let lines = [Some(line), sharpen(), unproven()].into_iter().flatten();
+            said("Nothing more for this answer", lines.collect())
         }
         _ => {
-            let lines: Vec<String> = [sharpen(), unproven()].into_iter().flatten().collect();
-            let answer = if lines.is_empty() { "Nothing more is needed" } else { "Nothing more is needed to name it" };
-            let all = if lines.is_empty() { vec!["These flights decide the answer.".to_owned()] } else { lines };
-            said(answer, all)
+            let mut lines: Vec<String> = [sharpen(), unproven()].into_iter().flatten().collect();
+            if lines.is_empty() {
+                lines.push("These flights decide the answer.".to_owned());
+                return said("Nothing more is needed", lines);
+            }
+            let to = if verdict.effects.is_empty() { "" } else { " to name it" };
+            said(format!("Nothing more is needed{to}"), lines)
         }
     }
 }

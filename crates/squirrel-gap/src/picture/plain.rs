@@ -6,8 +6,8 @@ use crate::verdict::{Alternative, NamedEffect, Value};
 use squirrel_core::effects::{Effects, Kind as ParameterKind};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Name in the catalogue, what it is, and what it says where its number is above and below that of the vehicle file. `@` stands
-/// for a rotor, an axis or a side.
+/// Name in the catalogue, what it is, and what it says where its number is above and below that of the vehicle file. `@`
+/// stands for a rotor, an axis or a side.
 const WORDS: [(&str, &str, &str, &str); 29] = [
     (
         "linear_drag",

@@ -1,7 +1,8 @@
 //! The first screen of the report: five questions of a pilot, and what the verdict says to each in plain sentences.
 //!
-//! All numbers are the verdict's. Beside it are needed: the evidence of the answer as a whole, which the verdict has by effect
-//! only, the channels of the held-out flights, and what the vehicle file has where the answer differs.
+//! All numbers are the verdict's. Beside it are needed: the evidence of the answer as a whole, which the verdict has by
+//! effect only, the channels of the held-out flights, and what the vehicle file has where the answer differs. A difference
+//! of `n` nats in evidence is one of `e^n` in odds.
 
 use super::outlook::{grows, next, prediction, remains};
 use super::plain::{
@@ -14,7 +15,8 @@ use crate::verdict::{Alternative, Kind, NamedEffect, Verdict};
 use crate::words::spoken;
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Evidence from which on the next explanation is out of the question, nats. Below [`NATS_MIN`], held-out flights have decided.
+/// Evidence from which on the next explanation is out of the question, nats. Below [`NATS_MIN`], held-out flights have
+/// decided.
 const VERY_SURE_NATS: f64 = 10.0;
 
 /// What the first screen says.

@@ -33,8 +33,14 @@ pub(super) fn screen(page: &mut Page, data: &ReportData) {
     page.cards("answers", &cards.collect::<Vec<_>>(), picture.as_slice(), &remarks);
 }
 
-/// The flight and channel that the answer helps most, in units of its noise; where it helps none, the worst.
+/// The flight and channel that the answer helps most, in units of its noise, of the channels that it acts on; where it helps
+/// none, the worst. What floats inside tolerances helps other channels, too.
 fn shown(data: &ReportData) -> Option<(&FlightPanel, usize, &'static str)> {
+    let acts = |channel: &usize| {
+        let name = data.channels.get(*channel);
+        name.is_some_and(|name| data.conditional.iter().any(|c| c.channel == *name))
+    };
+    let known = (0..data.channels.len()).any(|channel| acts(&channel));
     let all = || {
         let drawn = data.flights.iter().filter(|f| drawable(f.window_s) && drawable(f.start_s));
         drawn.flat_map(|f| (0..f.before.len()).map(move |i| (f, i)))
@@ -43,13 +49,17 @@ fn shown(data: &ReportData) -> Option<(&FlightPanel, usize, &'static str)> {
     let after = |(flight, channel): &(&FlightPanel, usize)| {
         flight.after.get(*channel).map_or(f64::NAN, |row| mean(row))
     };
-    let largest = |of: &dyn Fn(&(&FlightPanel, usize)) -> f64| {
-        all().filter(|at| drawable(of(at))).reduce(|best, at| if of(&at) > of(&best) { at } else { best })
+    let largest = |of: &dyn Fn(&(&FlightPanel, usize)) -> f64, among: &dyn Fn(&usize) -> bool| {
+        let drawn = all().filter(|at| among(&at.1) && drawable(of(at)));
+        drawn.reduce(|best, at| if of(&at) > of(&best) { at } else { best })
     };
-    let helped = largest(&|at| before(at) - after(at)).filter(|at| after(at) < HELPED * before(at));
-    match helped {
-        Some((flight, channel)) => Some((flight, channel, "Where the answer helps most")),
-        None => largest(&before).map(|(flight, channel)| (flight, channel, "Where they differ most")),
+    let gain = |at: &(&FlightPanel, usize)| before(at) - after(at);
+    let helped = largest(&gain, &|channel| !known || acts(channel));
+    match helped.filter(|at| after(at) < HELPED * before(at)) {
+        Some((flight, channel)) => Some((flight, channel, "Where the answer acts")),
+        None => {
+            largest(&before, &|_| true).map(|(flight, channel)| (flight, channel, "Where they differ most"))
+        }
     }
 }
 
