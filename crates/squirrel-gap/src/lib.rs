@@ -34,7 +34,7 @@ pub use compatibility::check;
 pub use diagnose::{Covered, Diagnosis, diagnose, diagnose_since};
 pub use error::GapError;
 pub use find::{Finding, find};
-pub use picture::picture;
+pub use picture::{first_screen, picture};
 pub use verdict::{
     Alternative, Gap, Kind, Left, Moved, NamedEffect, RotorHealth, SetAside, Since, Value, Verdict,
 };

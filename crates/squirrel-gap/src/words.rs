@@ -16,8 +16,38 @@ pub fn significant(value: f64, digits: u8) -> String {
     }
 }
 
+/// Channels as files and panels call them, and as pilots do.
+const CHANNELS: [(&str, &str); 21] = [
+    ("force_body_x_n", "the forward force"),
+    ("force_body_y_n", "the sideways force"),
+    ("force_body_z_n", "the vertical force"),
+    ("moment_body_x_n_m", "the roll moment"),
+    ("moment_body_y_n_m", "the pitch moment"),
+    ("moment_body_z_n_m", "the yaw moment"),
+    ("gnss.velocity_north_m_s", "the velocity north"),
+    ("gnss.velocity_east_m_s", "the velocity east"),
+    ("gnss.velocity_down_m_s", "the velocity down"),
+    ("specific force x", "the forward force"),
+    ("specific force y", "the sideways force"),
+    ("specific force z", "the vertical force"),
+    ("angular acceleration x", "the roll moment"),
+    ("angular acceleration y", "the pitch moment"),
+    ("angular acceleration z", "the yaw moment"),
+    ("attitude x", "the roll angle"),
+    ("attitude y", "the pitch angle"),
+    ("attitude z", "the heading"),
+    ("angular rate x", "the roll rate"),
+    ("angular rate y", "the pitch rate"),
+    ("angular rate z", "the yaw rate"),
+];
+
+/// A text with its channels in a pilot's words.
+pub(crate) fn spoken(text: &str) -> String {
+    CHANNELS.iter().fold(text.to_owned(), |text, (name, words)| text.replace(name, words))
+}
+
 /// The manoeuvre that shows an effect and tells it from those it is confused with.
-fn manoeuvre(effect: &str) -> &'static str {
+pub(crate) fn manoeuvre(effect: &str) -> &'static str {
     match effect {
         "linear_drag" | "quadratic_drag" | "flapping_moment" => {
             "dashes at several speeds from 2 to 9 m/s, both ways"
@@ -167,6 +197,11 @@ fn remains(verdict: &Verdict) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn channels_are_spoken_wherever_they_stand() {
+        assert_eq!(spoken("velocity (60 % of force_body_z_n)"), "velocity (60 % of the vertical force)");
+    }
 
     #[test]
     fn numbers_read_as_people_write_them() {

@@ -7,7 +7,7 @@
 use squirrel_core::effects::Effects;
 use squirrel_gap::ClosedLoop;
 use squirrel_gap::report::{
-    Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
+    Answer, Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
     HeldOutChannel, Horizon, InputCorrelation, PANELS, ParameterRow, ReportData, Whiteness, render,
 };
 
@@ -140,8 +140,23 @@ fn example() -> ReportData {
         largest: n[4],
         tolerance: n[5],
     };
+    let answer = |question: &str, answer: &str, figure: &str, sentence: &str| Answer {
+        question: question.to_owned(),
+        answer: answer.to_owned(),
+        figure: figure.to_owned(),
+        figure_note: format!("note of {question}"),
+        sentences: vec![sentence.to_owned()],
+    };
     ReportData {
         stopped: String::new(),
+        screen: vec![
+            answer("What is missing", "More drag, growing with speed", "0.0851 N s/m", "Drag: 0.0823 to 0.0879 N s/m."),
+            answer("How sure", "Very sure", "30 : 1", "The next best is 30 times less likely (3.50 nats)."),
+            answer("How much better it predicts", "98.9 % less error", "9.30 \u{2192} 1.07", "On a flight that it never saw."),
+            answer("What remains", "Nothing", "", "The answer takes away 99.1 %."),
+            answer("What to fly next", "One more flight", "", "Dashes at several speeds."),
+        ],
+        set_aside: vec!["rich 9: imu: held for 3 s".to_owned()],
         title: "Gap report: squirrel, three flights".to_owned(),
         verdict: "The vehicle file lacks linear_drag: a force against the motion of 0.085 N per m/s. On a flight that was \
                   not used to find it, the error of one second of re-simulation falls from 9.3 to 1.07 times the noise \
@@ -176,6 +191,7 @@ fn example() -> ReportData {
                     name: (*name).to_owned(),
                     unit: if i < 3 { "m/s" } else { "rad" }.to_owned(),
                     errors: errors(0.01 * (i + 1) as f64),
+                    second: errors(0.008 * (i + 1) as f64),
                     horizons: vec![Horizon { horizon_s: 0.1, errors: errors(0.01) }],
                 })
                 .collect(),
@@ -234,6 +250,20 @@ fn every_panel_holds_its_data() {
     assert_eq!(html.matches("<section id=").count(), PANELS.len());
     for (id, held) in [
         (
+            "answers",
+            vec![
+                "<h2>What is missing</h2>",
+                "More drag, growing with speed",
+                "<strong>30 : 1</strong>note of How sure",
+                "9.30 \u{2192} 1.07",
+                "The answer takes away 99.1 %.",
+                "Dashes at several speeds.",
+                "Where the answer acts: fx m/s\u{b2}",
+                "rich 0, root mean square",
+                "Set aside: rich 9: imu: held for 3 s",
+            ],
+        ),
+        (
             "panel-h",
             vec!["lacks linear_drag", "0 to 9.20 m/s", "0.180 to 10.9 m", "+extra_drag_n_s_per_m = 0.0851"],
         ),
@@ -279,6 +309,7 @@ fn what_is_missing_is_said_in_words() {
     let html = render(&ReportData::default());
     check(&html);
     for (id, words) in [
+        ("answers", "No verdict"),
         ("panel-h", "No verdict"),
         ("panel-a", "No flight"),
         ("panel-b", "No evidence"),
@@ -294,6 +325,8 @@ fn what_is_missing_is_said_in_words() {
     let mut partial = example();
     partial.closed_loop.clear();
     partial.flights[0].after.clear();
+    partial.flights[1].after.clear();
+    partial.set_aside.clear();
     let untried = Effects::<f64>::NAMES[0];
     partial.evidence.retain(|e| e.name != untried);
     partial.conditional[0].bins.clear();
@@ -301,6 +334,9 @@ fn what_is_missing_is_said_in_words() {
     partial.whiteness[0].inputs.clear();
     let html = render(&partial);
     check(&html);
+    let first = panel(&html, "answers");
+    assert!(first.contains("Where they differ most: fx") && first.contains("nothing was added to the model"));
+    assert!(!first.contains("Set aside"));
     assert!(panel(&html, "panel-a").contains("nothing was added to the model"));
     assert!(panel(&html, "panel-b").contains(untried), "at its place without a bar");
     assert!(panel(&html, "panel-c").contains("fx against forward airspeed: no samples"));
@@ -336,6 +372,11 @@ fn numbers_that_are_none_leave_gaps_and_text_is_escaped() {
         data.domain[0].low = bad;
         data.title = "<script>alert(1)</script>".to_owned();
         data.evidence[1].name = "<b>".to_owned();
+        data.screen[0].answer = "<b>".to_owned();
+        data.screen[0].figure = "<b>".to_owned();
+        data.screen[1].sentences[0] = "<b>".to_owned();
+        data.set_aside[0] = "<b>".to_owned();
+        data.flights[0].name = "<b>".to_owned();
         let html = render(&data);
         check(&html);
         assert!(!html.contains("<script>alert") && !html.contains("<b>"), "{bad}");

@@ -44,6 +44,7 @@ pub(crate) fn gap_find<'py>(
 
 /// What a vehicle lacks, as the JSON of ``squirrel gap run``, and the vehicle with it.
 ///
+/// * `baseline` - good flights of the same machine; empty for none
 /// * `out` - folder for the report and the patched vehicle file
 /// * `fly_again` - whether held-out flights are flown again in closed loop
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
@@ -54,13 +55,15 @@ pub(crate) fn gap_diagnose<'py>(
     vehicle: &Bound<'py, Vehicle>,
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'py, PyDict>,
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] held_out: &Bound<'py, PyDict>,
+    #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] baseline: &Bound<'py, PyDict>,
     fly_again: bool,
     out: Option<PathBuf>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<Vehicle>)> {
     let vehicle = vehicle.get().file.clone();
     let (flights, held_out) = (logs("flights", flights)?, logs("held_out", held_out)?);
+    let baseline = logs("baseline", baseline)?;
     let (verdict, patched) = interruptible(py, move |stop| {
-        diagnose(&vehicle, &flights, &held_out, fly_again, out.as_deref(), stop)
+        diagnose(&vehicle, [&flights, &held_out, &baseline], fly_again, out.as_deref(), stop)
     })??;
     Ok((json(py, &verdict)?, patched.map(|file| Vehicle { file })))
 }
@@ -69,14 +72,19 @@ type Logs = [(String, log::FlightLog)];
 
 fn diagnose(
     vehicle: &VehicleFile,
-    flights: &Logs,
-    held_out: &Logs,
+    [flights, held_out, baseline]: [&Logs; 3],
     fly_again: bool,
     out: Option<&Path>,
     stop: &Stop,
 ) -> PyResult<(squirrel_gap::Verdict, Option<VehicleFile>)> {
-    let mut diagnosis =
-        squirrel_gap::diagnose(vehicle, flights, held_out, &|_| stop.check()).map_err(value)?;
+    let tick = |_: &str| stop.check();
+    let diagnosis = if baseline.is_empty() {
+        squirrel_gap::diagnose(vehicle, flights, held_out, &tick)
+    } else {
+        squirrel_gap::Baseline::fit(vehicle, baseline, &tick)
+            .and_then(|own| squirrel_gap::diagnose_since(&own, flights, held_out, &tick))
+    };
+    let mut diagnosis = diagnosis.map_err(value)?;
     let looked_at = |logs: &Logs| -> Vec<(String, log::FlightLog)> {
         logs.iter().filter(|(name, _)| diagnosis.verdict.has_looked_at(name)).cloned().collect()
     };

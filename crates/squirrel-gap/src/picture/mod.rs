@@ -5,7 +5,11 @@
 //! from the verdict, so that the page cannot say anything else.
 
 mod left;
+mod outlook;
+mod plain;
 mod regressors;
+mod screen;
+mod units;
 mod windows;
 
 use crate::ClosedLoop;
@@ -15,14 +19,17 @@ use crate::name::{Naming, Scored, Search, TURBULENCE_M_S};
 use crate::predictor::DYNAMIC;
 use crate::proof::HeldOut as Flown;
 use crate::report::{
-    Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut, HeldOutChannel,
-    Horizon, ParameterRow, ReportData, Whiteness,
+    Answer, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
+    HeldOutChannel, Horizon, ParameterRow, ReportData, RotorRow, Whiteness,
 };
 use crate::shrink::{BIN_S, BINS, CHANNELS as FLOWN_CHANNELS};
-use crate::verdict::{Kind, NamedEffect, Value};
+use crate::verdict::{Kind, NamedEffect, RotorHealth, Value};
 use squirrel_core::effects::{Effects, Kind as ParameterKind, SizeRange};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
+use units::{unit, without_unit};
+
+pub use screen::first_screen;
 
 /// The rows of the residual with their units, in the order of the predictor.
 const CHANNELS: [(&str, &str); 9] = [
@@ -35,28 +42,6 @@ const CHANNELS: [(&str, &str); 9] = [
     ("velocity north", "m/s"),
     ("velocity east", "m/s"),
     ("velocity down", "m/s"),
-];
-/// Ends of keys that are units, the longest first, and how they are read.
-const UNITS: [(&str, &str); 19] = [
-    ("_n_m_s2_per_rad2", "N m s\u{b2}/rad\u{b2}"),
-    ("_n_m_s_per_rad", "N m s/rad"),
-    ("_n_m_s_per_m", "N m s/m"),
-    ("_n_s_per_m", "N s/m"),
-    ("_s2_per_m2", "s\u{b2}/m\u{b2}"),
-    ("_rad_per_s", "rad/s"),
-    ("_s_per_m", "s/m"),
-    ("_per_s", "1/s"),
-    ("_kg_m2", "kg m\u{b2}"),
-    ("_rad_s", "rad/s"),
-    ("_m_s3", "m/s\u{b3}"),
-    ("_m_s2", "m/s\u{b2}"),
-    ("_m_s", "m/s"),
-    ("_rad", "rad"),
-    ("_ppm", "ppm"),
-    ("_kg", "kg"),
-    ("_m2", "m\u{b2}"),
-    ("_m", "m"),
-    ("_s", "s"),
 ];
 /// The scenario that shows every effect, and whose card a pilot can fly.
 const RICH: &str = "excite_rich";
@@ -154,13 +139,23 @@ pub fn picture(
         title: format!("Gap report: {}", vehicle.name),
         verdict: said(&verdict.words),
         domain: domain.collect(),
+        rotors: verdict.baseline.iter().flat_map(|since| &since.rotors).filter_map(rotor).collect(),
         patch_diff: patched.map_or_else(String::new, |text| said(&crate::difference(&vehicle.text, text))),
         channels: CHANNELS.iter().map(|(name, _)| (*name).to_owned()).collect(),
         ..ReportData::default()
     };
+    let screen = |data: &ReportData| -> Vec<Answer> {
+        let mut screen = first_screen(verdict, vehicle, data);
+        for answer in &mut screen {
+            answer.sentences.iter_mut().for_each(|sentence| *sentence = said(sentence));
+        }
+        screen
+    };
     let Some(details) = &diagnosis.details else {
+        data.screen = screen(&data);
         return ReportData { stopped: CONTRADICTION.to_owned(), ..data };
     };
+    data.set_aside = verdict.set_aside.iter().map(|aside| said(&aside.words)).collect();
     let seen = &details.seen;
     data.flights.clone_from(&seen.flights);
     for flight in &mut data.flights {
@@ -182,7 +177,14 @@ pub fn picture(
     let (names, chi_square) = &details.confusability;
     data.confusability = Some(confusability(names, chi_square));
     data.fly_next = fly_next(verdict.verdict, verdict.fly_next.as_deref(), data.confusability.as_ref());
+    data.screen = screen(&data);
     data
+}
+
+/// A rotor as the page shows it.
+fn rotor(health: &RotorHealth) -> Option<RotorRow> {
+    let Value::Number { value: loss, low, high } = health.thrust_loss_fraction else { return None };
+    Some(RotorRow { rotor: health.rotor, loss, low, high, usual: health.usual })
 }
 
 /// A path as it may be shown: of an absolute one, the last folder and the file.
@@ -193,12 +195,6 @@ fn short(name: &str) -> String {
     }
     let parts: Vec<_> = path.iter().skip(1).map(|part| part.to_string_lossy()).collect();
     parts[parts.len().saturating_sub(2)..].join("/")
-}
-
-/// The unit that a key ends in; empty for a plain number.
-fn unit(key: &str) -> &'static str {
-    let end = |(end, unit): &(&str, &'static str)| key.ends_with(end).then_some(*unit);
-    UNITS.iter().find_map(end).unwrap_or_default()
 }
 
 /// Single effects as the linear search ranks them, in the place of those that were refined their refined evidence.
@@ -232,14 +228,19 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
     let last = bins.last().copied().unwrap_or(0);
     let channels = FLOWN_CHANNELS.iter().enumerate().map(|(channel, key)| {
         let unit = unit(key);
-        let name = UNITS.iter().find_map(|(end, _)| key.strip_suffix(end)).unwrap_or(key);
-        let name = name.replace("omega", "angular rate").replace("_body", "").replace('_', " ");
+        let name = without_unit(key).replace("omega", "angular rate").replace("_body", "").replace('_', " ");
         let horizons =
             bins.iter().map(|bin| Horizon { horizon_s: horizon_s(*bin), errors: at(channel, *bin) });
         HeldOutChannel {
             name,
             unit: unit.to_owned(),
             errors: at(channel, last),
+            second: Errors {
+                nominal: flown.nominal.mse()[channel].sqrt(),
+                rival: flown.rivals.first().map_or(f64::NAN, |rival| rival.mse()[channel].sqrt()),
+                fitted: flown.fitted.mse()[channel].sqrt(),
+                floor: flown.floor.mean.mse()[channel].sqrt(),
+            },
             horizons: horizons.collect(),
         }
     });

@@ -1,6 +1,6 @@
 //! Verdict, evidence, parameters, and what could be confused.
 
-use super::{DomainRow, Evidence, ReportData, WIDTH, figure, lacking, quantity};
+use super::{DomainRow, Evidence, ReportData, RotorRow, WIDTH, figure, lacking, quantity};
 use squirrel_core::effects::Effects;
 use squirrel_sim::report::chart::{
     Axis, ChartRow, Dot, Extent, Ink, Level, Matrix, Range, RowChart, drawable,
@@ -19,6 +19,16 @@ pub(super) fn verdict(page: &mut Page, data: &ReportData) {
             page.missing("No verdict was given.");
         } else {
             page.text(&data.verdict);
+        }
+        if !data.rotors.is_empty() {
+            let line = |r: &RotorRow| {
+                let [loss, low, high, usual] = [r.loss, r.low, r.high, r.usual].map(|x| figure(100.0 * x));
+                let health = format!(
+                    "{loss} % of its thrust lost, {low} to {high} %; {usual} % is usual from flight to flight"
+                );
+                (format!("rotor {}", r.rotor), health)
+            };
+            page.facts(&data.rotors.iter().map(line).collect::<Vec<_>>());
         }
         if data.domain.is_empty() {
             page.missing("No use domain was given: where the answer holds is not known.");

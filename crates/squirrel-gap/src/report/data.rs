@@ -10,10 +10,16 @@ use serde::Serialize;
 pub struct ReportData {
     /// Title of the page.
     pub title: String,
+    /// The first screen: what is missing, how sure, how much better it predicts, what remains, what to fly next.
+    pub screen: Vec<Answer>,
+    /// Flights that were set aside, each with what to change; a line each.
+    pub set_aside: Vec<String>,
     /// The verdict as one paragraph in plain words.
     pub verdict: String,
     /// Why nothing could be computed and the panels are empty; empty where they are not.
     pub stopped: String,
+    /// How each rotor is against good flights of the same machine; empty where there are none.
+    pub rotors: Vec<RotorRow>,
     /// Where the answer holds: what the flights covered.
     pub domain: Vec<DomainRow>,
     /// What changes in the vehicle file, as lines with `+` and `-`.
@@ -38,6 +44,36 @@ pub struct ReportData {
     pub confusability: Option<Confusability>,
     /// What to fly to know more.
     pub fly_next: Vec<FlyNext>,
+}
+
+/// A question of the first screen and what the verdict says to it.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Answer {
+    /// The question, two to four words.
+    pub question: String,
+    /// The answer in a few words.
+    pub answer: String,
+    /// The number that matters, with its unit; empty where there is none.
+    pub figure: String,
+    /// What the number is, and its interval.
+    pub figure_note: String,
+    /// Plain sentences.
+    pub sentences: Vec<String>,
+}
+
+/// One rotor against good flights of the same machine.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RotorRow {
+    /// Number, from 1.
+    pub rotor: usize,
+    /// Part of its thrust that it lacks, with its 95 % interval.
+    pub loss: f64,
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+    /// By how much it differs from one good flight to another, one standard deviation.
+    pub usual: f64,
 }
 
 /// A range that the flights covered.
@@ -139,6 +175,8 @@ pub struct HeldOutChannel {
     pub unit: String,
     /// Errors at the longest horizon.
     pub errors: Errors,
+    /// Errors over the first second, which the gap counts.
+    pub second: Errors,
     /// Errors over the length of the re-simulation, in the unit of the channel.
     pub horizons: Vec<Horizon>,
 }

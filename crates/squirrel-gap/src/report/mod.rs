@@ -1,10 +1,11 @@
 //! The gap report: where simulation and flights disagree, what explains it, and how far that can be trusted.
 //!
-//! One HTML file without network, the same bytes for the same data. The verdict comes first; each panel below answers one
+//! One HTML file without network, the same bytes for the same data. The answers come first; each panel below answers one
 //! question and says in words when nothing was given for it. [`ReportData`] is everything that the page shows.
 //!
 //! | panel | question |
 //! |---|---|
+//! | `answers` | what is missing, how sure, how much better it predicts, what remains, what to fly next: the first screen |
 //! | `panel-h` | what is the answer, where does it hold, what changes in the vehicle file |
 //! | `panel-a` | when and where do simulation and flight disagree, before and after |
 //! | `panel-b` | how much better is the answer than its rivals |
@@ -16,12 +17,13 @@
 
 mod answer;
 mod data;
+mod first;
 mod proof;
 mod residual;
 
 pub use data::{
-    Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
-    HeldOutChannel, Horizon, InputCorrelation, ParameterRow, ReportData, Whiteness,
+    Answer, Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
+    HeldOutChannel, Horizon, InputCorrelation, ParameterRow, ReportData, RotorRow, Whiteness,
 };
 
 use crate::words::significant;
@@ -29,8 +31,8 @@ use squirrel_sim::report::chart::drawable;
 use squirrel_sim::report::page::Page;
 
 /// Identifiers of the panels in the order of the page.
-pub const PANELS: [&str; 8] =
-    ["panel-h", "panel-a", "panel-b", "panel-c", "panel-d", "panel-e", "panel-f", "panel-g"];
+pub const PANELS: [&str; 9] =
+    ["answers", "panel-h", "panel-a", "panel-b", "panel-c", "panel-d", "panel-e", "panel-f", "panel-g"];
 
 /// Width of drawings that span the page, px: narrower than the page, so that their text can still be read on a small screen.
 const WIDTH: f64 = 900.0;
@@ -38,6 +40,7 @@ const WIDTH: f64 = 900.0;
 /// The report as one HTML file.
 pub fn render(data: &ReportData) -> String {
     let mut page = Page::new(&data.title, "");
+    first::screen(&mut page, data);
     answer::verdict(&mut page, data);
     residual::over_time(&mut page, data);
     answer::evidence(&mut page, data);

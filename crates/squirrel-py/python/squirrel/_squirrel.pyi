@@ -1126,10 +1126,11 @@ def forward(model: Model, *, rows: numpy.typing.NDArray[numpy.float32], velocity
         Names the argument, what was expected and what came.
     """
 
-def gap_diagnose(vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog], fly_again: builtins.bool, out: typing.Optional[builtins.str | os.PathLike | pathlib.Path]) -> tuple[dict[str, typing.Any], Vehicle | None]:
+def gap_diagnose(vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog], baseline: dict[str, FlightLog], fly_again: builtins.bool, out: typing.Optional[builtins.str | os.PathLike | pathlib.Path]) -> tuple[dict[str, typing.Any], Vehicle | None]:
     r"""
     What a vehicle lacks, as the JSON of ``squirrel gap run``, and the vehicle with it.
     
+    * `baseline` - good flights of the same machine; empty for none
     * `out` - folder for the report and the patched vehicle file
     * `fly_again` - whether held-out flights are flown again in closed loop
     """

@@ -24,7 +24,9 @@ __all__ = [
     "Parameter",
     "Place",
     "Residual",
+    "RotorHealth",
     "SetAside",
+    "Since",
     "Verdict",
     "find",
     "name",
@@ -270,6 +272,41 @@ class SetAside:
 
 
 @dataclass(frozen=True, kw_only=True)
+class RotorHealth:
+    """How one rotor is against good flights of the same machine, whatever has a name.
+
+    Attributes
+    ----------
+    rotor : int
+        Number, from 1, in the order of commands.
+    thrust_loss_fraction : Parameter
+        Part of its thrust that it lacks, with its 95 % interval if every rotor may be off.
+    usual : float
+        By how much it differs from one good flight to another, one standard deviation.
+    """
+
+    rotor: int
+    thrust_loss_fraction: Parameter
+    usual: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Since:
+    """What flights are compared with: good ones of the same machine.
+
+    Attributes
+    ----------
+    flights : tuple of str
+        Names of the good flights.
+    rotors : tuple of RotorHealth
+        In the order of commands; empty where the flights do not show them.
+    """
+
+    flights: tuple[str, ...]
+    rotors: tuple[RotorHealth, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class Verdict:
     """The answer of the workflow.
 
@@ -294,6 +331,8 @@ class Verdict:
     closed_loop : tuple of ClosedLoop
     model_patch : str or None
         Path of the vehicle file with the effects, where one was written.
+    baseline : Since or None
+        What the flights were compared with, where that is good flights of the same machine.
     words : str
         All of it in plain words.
     set_aside : tuple of SetAside
@@ -323,6 +362,7 @@ class Verdict:
     leftover: Left | None
     closed_loop: tuple[ClosedLoop, ...]
     model_patch: str | None
+    baseline: Since | None
     words: str
     set_aside: tuple[SetAside, ...]
     notes: tuple[str, ...]
@@ -352,7 +392,9 @@ def find(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Finding:
     return Finding(residual=_residual(found["residual"]), where=_places(found["where"]), notes=tuple(found["notes"]))
 
 
-def name(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Verdict:
+def name(
+    *, vehicle: Vehicle, flights: dict[str, FlightLog], baseline: dict[str, FlightLog] | None = None
+) -> Verdict:
     """Say which effect a vehicle file lacks.
 
     Parameters
@@ -361,6 +403,8 @@ def name(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Verdict:
         What is believed; its numbers have tolerances.
     flights : dict of str to FlightLog
         That the explanation is fitted to.
+    baseline : dict of str to FlightLog, optional
+        Good flights of the same machine: what is named is what has changed since.
 
     Returns
     -------
@@ -371,10 +415,16 @@ def name(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Verdict:
     ValueError
         One line that names the flight or the field, and the value.
     """
-    return _verdict(*gap_diagnose(vehicle, flights, {}, False, None))
+    return _verdict(*gap_diagnose(vehicle, flights, {}, baseline or {}, False, None))
 
 
-def shrink(*, vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog]) -> Verdict:
+def shrink(
+    *,
+    vehicle: Vehicle,
+    flights: dict[str, FlightLog],
+    held_out: dict[str, FlightLog],
+    baseline: dict[str, FlightLog] | None = None,
+) -> Verdict:
     """Say what the missing effect is worth on flights that the fit never sees.
 
     Parameters
@@ -385,6 +435,8 @@ def shrink(*, vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[st
         That the explanation is fitted to.
     held_out : dict of str to FlightLog
         For the proof, in open and in closed loop.
+    baseline : dict of str to FlightLog, optional
+        Good flights of the same machine: what is named is what has changed since.
 
     Returns
     -------
@@ -398,7 +450,7 @@ def shrink(*, vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[st
     """
     if not held_out:
         raise ValueError("held_out: none given; shrink needs flights that the fit never sees")
-    return _verdict(*gap_diagnose(vehicle, flights, held_out, True, None))
+    return _verdict(*gap_diagnose(vehicle, flights, held_out, baseline or {}, True, None))
 
 
 def run(
@@ -406,6 +458,7 @@ def run(
     vehicle: Vehicle,
     flights: dict[str, FlightLog],
     held_out: dict[str, FlightLog] | None = None,
+    baseline: dict[str, FlightLog] | None = None,
     out: str | os.PathLike[str] | None = None,
 ) -> Verdict:
     """Find, name, add and shrink.
@@ -418,6 +471,8 @@ def run(
         That the explanation is fitted to.
     held_out : dict of str to FlightLog, optional
         For the proof.
+    baseline : dict of str to FlightLog, optional
+        Good flights of the same machine: what is named is what has changed since.
     out : str or os.PathLike, optional
         Folder for ``report.html`` and the patched ``vehicle.toml``; nothing is written if left out.
 
@@ -432,7 +487,7 @@ def run(
     ValueError
         One line that names the flight or the field, and the value.
     """
-    return _verdict(*gap_diagnose(vehicle, flights, held_out or {}, True, out))
+    return _verdict(*gap_diagnose(vehicle, flights, held_out or {}, baseline or {}, True, out))
 
 
 def _places(places: list[dict[str, Any]]) -> tuple[Place, ...]:
@@ -466,6 +521,14 @@ def _left(left: dict[str, Any]) -> Left:
     )
 
 
+def _since(since: dict[str, Any]) -> Since:
+    rotors = (
+        RotorHealth(**rotor | {"thrust_loss_fraction": Parameter(**rotor["thrust_loss_fraction"])})
+        for rotor in since["rotors"]
+    )
+    return Since(flights=tuple(since["flights"]), rotors=tuple(rotors))
+
+
 def _flown(flown: dict[str, Any]) -> ClosedLoop:
     before, after = tuple(flown["before_ned_m"]), tuple(flown["after_ned_m"])
     return ClosedLoop(flight=flown["flight"], before_ned_m=before, after_ned_m=after)
@@ -487,6 +550,7 @@ def _verdict(verdict: dict[str, Any], patched: Vehicle | None) -> Verdict:
         leftover=_left(verdict["leftover"]) if verdict["leftover"] else None,
         closed_loop=tuple(_flown(flown) for flown in verdict["closed_loop"]),
         model_patch=verdict["model_patch"],
+        baseline=_since(verdict["baseline"]) if verdict["baseline"] else None,
         words=verdict["words"],
         set_aside=tuple(SetAside(**flight) for flight in verdict["set_aside"]),
         notes=tuple(verdict["notes"]),

@@ -50,6 +50,21 @@ pub struct Row {
     pub cells: Vec<String>,
 }
 
+/// A question with its answer, the number that matters, and plain sentences.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Card {
+    /// Question, a few words.
+    pub question: String,
+    /// Answer in a few words.
+    pub answer: String,
+    /// The number that matters, with its unit; empty where there is none.
+    pub figure: String,
+    /// What the number is.
+    pub figure_note: String,
+    /// Plain sentences.
+    pub sentences: Vec<String>,
+}
+
 /// A page under construction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Page {
@@ -151,6 +166,32 @@ impl Page {
             self.add("</figure>\n");
         }
         self.add("</div>\n");
+    }
+
+    /// Adds a section of numbered questions with figures beside them, made to fit the first screen, with remarks below.
+    pub fn cards(&mut self, id: &str, cards: &[Card], figures: &[Figure], remarks: &[String]) {
+        self.add(&format!("<section id=\"{}\">\n<div class=\"screen\">\n<ol class=\"cards\">\n", escape(id)));
+        for card in cards {
+            let [question, answer] = [&card.question, &card.answer].map(|text| escape(text));
+            self.add(&format!("<li>\n<div>\n<h2>{question}</h2>\n<p class=\"answer\">{answer}</p>\n"));
+            for sentence in &card.sentences {
+                self.paragraph("say", sentence);
+            }
+            self.add("</div>\n");
+            if !card.figure.is_empty() {
+                let [figure, note] = [&card.figure, &card.figure_note].map(|text| escape(text));
+                self.add(&format!("<p class=\"number\"><strong>{figure}</strong>{note}</p>\n"));
+            }
+            self.add("</li>\n");
+        }
+        self.add("</ol>\n<div>\n");
+        if !figures.is_empty() {
+            self.figures(Columns::One, figures);
+        }
+        for remark in remarks {
+            self.paragraph("remark", remark);
+        }
+        self.add("</div>\n</div>\n</section>\n");
     }
 
     /// The finished file.
