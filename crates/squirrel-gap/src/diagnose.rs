@@ -5,7 +5,8 @@ use crate::compatibility::{self, Ready};
 use crate::decide::{alternatives, close, decide, shared};
 use crate::find;
 use crate::name::{
-    Catalogue, NATS_MIN, Search, explain, only, payload_lengths_m, sds, silent_tolerances, standing,
+    Catalogue, NATS_MIN, Search, clock_step_s, explain, only, payload_lengths_m, sds, silent_tolerances,
+    standing,
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
@@ -148,7 +149,8 @@ fn judged(
     }
     predictor.notes.extend(silent_tolerances(vehicle));
     progress("naming");
-    let catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
+    let lengths_m = payload_lengths_m(&predictor, &nominal);
+    let catalogue = Catalogue::new(&predictor, &lengths_m, clock_step_s(&predictor, &nominal)?)?;
     let tick = || progress("naming");
     let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
     let wanted = |naming: &_| hold(unseen.as_ref(), &search, naming);

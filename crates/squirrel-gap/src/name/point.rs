@@ -203,7 +203,7 @@ impl Catalogue {
 
     /// Whether the slope of a candidate is another one after a few tolerances: lags and delays.
     pub(super) fn bends(&self, candidate: usize) -> bool {
-        ["motor_lag", "actuation_latency", "clock_skew", "gnss_latency", "wing_servo_lag"]
+        ["motor_lag", "actuation_latency", "clock_skew", "clock_step", "gnss_latency", "wing_servo_lag"]
             .contains(&self.candidates[candidate].effect)
     }
 
