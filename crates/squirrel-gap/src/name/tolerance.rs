@@ -17,7 +17,7 @@ const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
 const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.03, "m/s^2");
 /// Of scales, as fractions, what a file says is the scatter from one switching on to the next.
 const GYRO_SCALE: (&str, f64) = ("sensors.imu.gyro_scale_sd", 0.01);
-const ACCEL_SCALE: (&str, f64) = ("sensors.imu.accel_scale_sd", 0.005);
+const ACCEL_SCALE: (&str, f64) = ("sensors.imu.accel_scale_sd", 0.003);
 /// Heading error in hover of a compass near power leads, rad: about a degree at full throttle.
 const COMPASS_RAD: f64 = 0.006;
 const HEADING: (&str, f64, &str) = ("sensors.attitude.bias_rad", 1.25_f64.to_radians(), "rad");
