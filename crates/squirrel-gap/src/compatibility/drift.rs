@@ -68,8 +68,8 @@ mod tests {
         (0..400)
             .map(|k| {
                 let t = 0.1 * f64::from(k);
-                let noise = 0.05 * (f64::from(k * k % 97) / 97.0 - 0.5);
-                (t, 0.02 + drift_rad_s2 * t + noise + 0.05 * (2.0 * t).sin())
+                let noise = 0.05 * ((0.618_034 * f64::from(k)).fract() - 0.5);
+                (t, 0.02 + drift_rad_s2 * t + noise + 0.05 * (4.0 * t).sin())
             })
             .unzip()
     }
