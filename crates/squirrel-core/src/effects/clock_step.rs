@@ -12,7 +12,7 @@ pub struct ClockStep<T>(pub(super) [T; 2]);
 impl<T: Real> Effect<T> for ClockStep<T> {
     const NAME: &'static str = "clock_step";
     const PARAMETERS: &'static [EffectParameter] =
-        &[EffectParameter::signed("step_s", 0.02, 0.2), EffectParameter::size("at_s", 1.0, 600.0)];
+        &[EffectParameter::signed("step_s", 0.02, 0.2), EffectParameter::size("at_s", 0.3, 600.0)];
 
     fn command_clock(&self, clock: &mut CommandClock<T>) {
         [clock.step_s, clock.at_s] = self.0;
