@@ -44,7 +44,7 @@ mod tests {
     fn stamps_lead_back_to_their_times() {
         let right = CommandClock::<f64>::right();
         assert_eq!((right.stamp_s(3.7), right.time_s(3.7)), (3.7, 3.7));
-        let jumps = |step_s| CommandClock { rate: 1.001, step_s, at_s: 10.0 };
+        let jumps = |step_s: f64| CommandClock { rate: 1.001, step_s, at_s: 10.0 };
         for step_s in [0.05, -0.05] {
             let clock = jumps(step_s);
             for time_s in [0.0, 3.0, 9.98, 10.2, 30.0] {

@@ -117,10 +117,8 @@ pub(super) fn tolerance(
         "compass_current" => COMPASS_RAD,
         "constant_wind" => 0.12,
         "gnss_latency" => VELOCITY_LAG_S,
-        // A vehicle carries a load or it does not; a ground effect of a small radius is none.
-        "payload_swing" | "ground_effect" => 0.0,
-        // A clock jumps or it does not.
-        "clock_step" => 0.0,
+        // A vehicle carries a load or it does not, a clock jumps or it does not; a ground effect of a small radius is none.
+        "payload_swing" | "clock_step" | "ground_effect" => 0.0,
         _ => none,
     })
 }

@@ -68,7 +68,9 @@ impl Turning {
         let mut rows: Vec<Vector3<f64>> =
             means.windows(2).map(|pair| (pair[1] - pair[0]) / self.step_s()).collect();
         let mean = rows.iter().sum::<Vector3<f64>>() / rows.len().max(1) as f64;
-        rows.iter_mut().for_each(|row| *row -= mean);
+        for row in &mut rows {
+            *row -= mean;
+        }
         rows
     }
 }
