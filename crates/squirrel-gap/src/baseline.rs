@@ -39,7 +39,7 @@ const STEPS: usize = 4;
 /// Part of the smallest size worth reporting by which a number differs from one flight to the next, where nothing is known.
 const USUAL_SHARE: f64 = 0.5;
 /// How many times that it may be, and how sure that it is about once, as the deviation of its logarithm.
-const TIMES: [f64; 7] = [0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0];
+const TIMES: [f64; 7] = [0.35, 0.5, 0.7, 0.85, 1.0, 1.4, 2.0];
 const TIMES_SD: f64 = 0.35;
 
 /// A machine as it flew when it flew well.
@@ -148,7 +148,7 @@ fn prepared<'a>(
     }
     let nominal = predictor.residual(&predictor.nominal())?;
     compatibility::leave_out(&mut predictor, &nominal, moments);
-    let catalogue = Catalogue::new(&predictor, &[])?;
+    let catalogue = Catalogue::new(&predictor, &[], None)?;
     Ok((predictor, catalogue))
 }
 

@@ -6,7 +6,8 @@ use crate::compatibility::{self, Moments, Ready};
 use crate::decide::{alternatives, close, decide, shared};
 use crate::find;
 use crate::name::{
-    Catalogue, NATS_MIN, Search, explain, only, payload_lengths_m, sds, silent_tolerances, standing,
+    Catalogue, NATS_MIN, Search, clock_step_s, explain, only, payload_lengths_m, sds, silent_tolerances,
+    standing,
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
@@ -207,7 +208,8 @@ fn judged(
     }
     predictor.notes.extend(silent_tolerances(vehicle));
     progress("naming");
-    let mut catalogue = Catalogue::new(&predictor, &payload_lengths_m(&predictor, &nominal))?;
+    let lengths_m = payload_lengths_m(&predictor, &nominal);
+    let mut catalogue = Catalogue::new(&predictor, &lengths_m, clock_step_s(&predictor, &nominal)?)?;
     if let Some(baseline) = baseline {
         catalogue.take(&baseline.scatter);
     }

@@ -6,7 +6,7 @@
 
 use crate::GapError;
 use crate::name::{Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights};
-use crate::predictor::{CHANNELS, Hypothesis, Predictor};
+use crate::predictor::{CHANNELS, Hypothesis, Predictor, TURNING};
 use crate::shrink::{self, Errors12, Floor};
 use crate::verdict::Gap;
 use squirrel_sim::log::FlightLog;
@@ -113,8 +113,12 @@ pub(crate) fn hold(
         let gains: Vec<f64> = with
             .iter()
             .zip(&without)
-            .filter(|(w, _)| **w > 0.0)
-            .map(|(w, without)| (without / w).ln())
+            .enumerate()
+            .filter(|(_, (w, _))| **w > 0.0)
+            .map(|(channel, (w, without))| (channel, (without / w).ln()))
+            // A gyroscope against the attitude says nothing of most names, and is no vote against them.
+            .filter(|(channel, gain)| *channel < TURNING || gain.abs() > HOLDS)
+            .map(|(_, gain)| gain)
             .collect();
         all.push(gains.iter().sum::<f64>() > HOLDS * gains.len() as f64);
     }

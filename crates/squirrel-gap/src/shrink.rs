@@ -375,12 +375,15 @@ fn segment(
         }
         let samples = per_bin as f64;
         let time_s = track.time_s[start + first + per_bin / 2] - track.began_s;
-        let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * effects.heading_bias_rad(time_s));
+        let load = track.rotor_load[start + first + per_bin / 2];
+        let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * effects.heading_bias_rad(time_s, load));
+        let [rate_scale, force_scale] = track.scales(effects);
         let read = Reading {
             velocity_ned: velocity / samples,
             attitude: heading * middle,
-            omega: rate / samples,
-            specific_force: force / samples + effects.specific_force_bias(time_s).vector,
+            omega: rate.component_mul(&rate_scale) / samples,
+            specific_force: force.component_mul(&force_scale) / samples
+                + effects.specific_force_bias(time_s).vector,
         };
         let acceleration_ned = (state.body.velocity.vector - began) / (samples * track.period_s);
         each(start, bin, Bin { first, last: first + per_bin, read, acceleration_ned });

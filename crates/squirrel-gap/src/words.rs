@@ -71,7 +71,14 @@ pub(crate) fn manoeuvre(effect: &str) -> &'static str {
         "translational_lift" => "dashes to 9 m/s at constant height with the wings folded",
         "axial_inflow" | "added_mass" => "climbs and descents of 3 m/s with heave doublets, wings folded",
         "rotor_gyro_torque" | "yaw_torque_coeff" => "yaw steps",
-        "clock_skew" => "a flight of more than a minute with doublets at its beginning and end",
+        "gyro_scale" => {
+            "doublets about one axis at a time and a few full turns of yaw, with the attitude logged"
+        }
+        "accel_scale" => "climbs with thrust steps, level and banked, with the velocity logged",
+        "compass_current" => "climbs at full thrust and descents at one heading, then at another",
+        "clock_skew" | "clock_step" => {
+            "a flight of more than a minute with doublets at its beginning and end"
+        }
         "wing_membrane" | "wing_asymmetry" | "wing_servo_lag" => {
             "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking"
         }

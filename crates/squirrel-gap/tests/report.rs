@@ -11,8 +11,8 @@ use squirrel_gap::report::{
     HeldOutChannel, Horizon, InputCorrelation, PANELS, ParameterRow, ReportData, Whiteness, render,
 };
 
-/// The catalogue of effects as the report is meant for: 29 names.
-const CATALOGUE: [&str; 29] = [
+/// The catalogue of effects as the report is meant for: 33 names.
+const CATALOGUE: [&str; 33] = [
     "linear_drag",
     "quadratic_drag",
     "constant_wind",
@@ -41,6 +41,10 @@ const CATALOGUE: [&str; 29] = [
     "heading_bias",
     "gnss_latency",
     "clock_skew",
+    "gyro_scale",
+    "accel_scale",
+    "compass_current",
+    "clock_step",
     "payload_swing",
 ];
 

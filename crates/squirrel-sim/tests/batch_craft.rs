@@ -15,7 +15,16 @@ use squirrel_sim::plant::{GustModel, Plant, Wind, WindParameters, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Effects that act on sensors or stamps only.
-const OF_SENSORS: [&str; 4] = ["accel_bias", "clock_skew", "gnss_latency", "heading_bias"];
+const OF_SENSORS: [&str; 8] = [
+    "accel_bias",
+    "accel_scale",
+    "clock_skew",
+    "clock_step",
+    "compass_current",
+    "gnss_latency",
+    "gyro_scale",
+    "heading_bias",
+];
 
 /// Sizes of one effect in one form, between its smallest and its largest.
 fn put(effects: &mut Effects<f64>, name: &str, form: usize, share: f64) {

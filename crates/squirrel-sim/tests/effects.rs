@@ -8,6 +8,7 @@ use squirrel_core::effects::{Effects, FORM, Kind, forms};
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::{Quaternion, Vector3};
+use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Flight, Integrator, Setup};
@@ -199,6 +200,61 @@ fn a_skewed_clock_stamps_commands_and_nothing_else() {
         );
     }
     assert_eq!(log.sources["truth"].time_s, log.sources["frame"].time_s);
+}
+
+/// Forwards nothing has a stamp within the step; backwards what would be stamped a second time is not written.
+#[test]
+fn a_clock_that_jumps_leaves_a_gap_of_its_step() {
+    for (step_s, gap_s) in [(0.05, 0.05), (-0.05, 0.0)] {
+        let log =
+            fly(&format!("[effects.clock_step]\nstep_s = {step_s}\nat_s = 1.0\n"), Arm::Pc, "hover", 2.0);
+        let (stamps, frames) = (&log.sources["rotor"].time_s, &log.sources["frame"].time_s);
+        let period_s = frames[1] - frames[0];
+        let jump = stamps.windows(2).position(|w| w[1] - w[0] > 1.5 * period_s);
+        assert!(stamps.windows(2).all(|w| w[1] > w[0]));
+        assert_eq!(
+            jump.map(|i| stamps[i] < 1.0 && (stamps[i + 1] - 1.0 - gap_s).abs() < period_s),
+            (step_s > 0.0).then_some(true)
+        );
+        let last = (stamps[stamps.len() - 1] - frames[frames.len() - 1] - step_s).abs();
+        assert!(last < 1e-9, "{last}");
+        assert_eq!(log.sources["wing"].time_s, *stamps);
+    }
+}
+
+#[test]
+fn scales_and_current_show_in_the_log() {
+    let scales = "[effects.gyro_scale]\nscale_x_fraction = 0.05\nscale_y_fraction = 0.0\nscale_z_fraction = -0.1\n\
+        [effects.accel_scale]\nscale_x_fraction = 0.0\nscale_y_fraction = 0.0\nscale_z_fraction = 0.03\n\
+        [effects.compass_current]\nheading_in_hover_rad = 0.2\n";
+    let log = fly(scales, Arm::Pc, "track", 3.0);
+    let truth = rows(&log, "truth.omega_body_rad_s");
+    for (t, read) in rows(&log, "imu.omega_body_rad_s") {
+        let turns = at(&truth, t);
+        for (axis, scale) in [1.05, 1.0, 0.9].into_iter().enumerate() {
+            assert!(
+                (read[axis] - scale * turns[axis]).abs() < 1e-6 + 1e-6 * turns[axis].abs(),
+                "{axis} at {t} s"
+            );
+        }
+    }
+    // In hover the heading is off by what the file says; where rotors work harder, by more.
+    let rotation = |row: &[f64]| {
+        Rotation::<Ned, Body, f64>::from_wxyz([row[0], row[1], row[2], row[3]]).unwrap().quaternion
+    };
+    let attitude = rows(&log, "truth.q_ned_from_body_wxyz");
+    let vehicle = parse("").unwrap().vehicle;
+    let speeds = rows(&log, "rotor.speed_rad_s");
+    let mut loads = Vec::new();
+    for (t, measured) in rows(&log, "attitude.q_ned_from_body_wxyz") {
+        let mut speed = [0.0; MAX_ROTORS];
+        speed[..4].copy_from_slice(at(&speeds, t));
+        let load = vehicle.rotor_load(&speed);
+        let error = (rotation(&measured) * rotation(at(&attitude, t)).inverse()).scaled_axis();
+        assert!(error.xy().norm() < 1e-5 && (error.z - 0.2 * load).abs() < 1e-5, "{error}, {load} at {t} s");
+        loads.push(load);
+    }
+    assert!((loads[0] - 1.0).abs() < 0.05 && loads.iter().any(|load| *load > 1.1), "{loads:?}");
 }
 
 #[test]

@@ -4,11 +4,12 @@
 //! and leave them alone where there is no effect.
 
 use super::{
-    AccelBias, ActuationLatency, AddedMass, Alteration, AngularDamping, AxialInflow, BatterySag, CgOffset,
-    ClockSkew, ConstantWind, Effect, EffectParameter, FlappingMoment, GnssLatency, GroundEffect, Gust,
-    GustSpectrum, HeadingBias, InertiaError, LinearDrag, MassError, MotorLag, PayloadSwing, Pendulum,
-    QuadraticDrag, RotorGyroTorque, Situation, Supply, ThrustCoefficient, ThrustMisalignment,
-    TranslationalLift, WeakRotor, WingAsymmetry, WingMembrane, WingServoLag, YawTorqueCoeff,
+    AccelBias, AccelScale, ActuationLatency, AddedMass, Alteration, AngularDamping, AxialInflow, BatterySag,
+    CgOffset, ClockSkew, ClockStep, CommandClock, CompassCurrent, ConstantWind, Effect, EffectParameter,
+    FlappingMoment, GnssLatency, GroundEffect, Gust, GustSpectrum, GyroScale, HeadingBias, InertiaError,
+    LinearDrag, MassError, MotorLag, PayloadSwing, Pendulum, QuadraticDrag, RotorGyroTorque, Situation,
+    Supply, ThrustCoefficient, ThrustMisalignment, TranslationalLift, WeakRotor, WingAsymmetry, WingMembrane,
+    WingServoLag, YawTorqueCoeff,
 };
 use crate::aero::Air;
 use crate::frames::{Body, In, Ned, Wrench};
@@ -113,11 +114,25 @@ macro_rules! catalogue {
                 $(if let Some(effect) = &self.$field { sum += effect.command_latency_s(); })+
                 sum
             }
-            /// What the clock that stamps commands shows at a time since the flight began, s.
-            pub fn command_clock_s(&self, time_s: T) -> T {
-                let mut clock_s = time_s;
-                $(if let Some(effect) = &self.$field { clock_s = effect.command_clock_s(clock_s); })+
-                clock_s
+            /// The clock that stamps commands.
+            pub fn command_clock(&self) -> CommandClock<T> {
+                let mut clock = CommandClock::right();
+                $(if let Some(effect) = &self.$field { effect.command_clock(&mut clock); })+
+                clock
+            }
+            /// What the accelerometer reads too much along each axis, as a fraction.
+            #[inline(never)]
+            pub fn accel_scale(&self) -> In<Body, T> {
+                let mut sum = In::zero();
+                $(if let Some(effect) = &self.$field { sum = sum + effect.accel_scale(); })+
+                sum
+            }
+            /// What the gyroscope reads too much about each axis, as a fraction.
+            #[inline(never)]
+            pub fn gyro_scale(&self) -> In<Body, T> {
+                let mut sum = In::zero();
+                $(if let Some(effect) = &self.$field { sum = sum + effect.gyro_scale(); })+
+                sum
             }
             /// Bias of the accelerometer at a time since the flight began, m/s^2.
             #[inline(never)]
@@ -127,10 +142,12 @@ macro_rules! catalogue {
                 sum
             }
             /// Bias of the measured heading at a time since the flight began, rad.
+            ///
+            /// * `rotor_load` - power of the rotors over that in hover, see [`Vehicle::rotor_load`]
             #[inline(never)]
-            pub fn heading_bias_rad(&self, time_s: T) -> T {
+            pub fn heading_bias_rad(&self, time_s: T, rotor_load: T) -> T {
                 let mut sum = T::zero();
-                $(if let Some(effect) = &self.$field { sum += effect.heading_bias_rad(time_s); })+
+                $(if let Some(effect) = &self.$field { sum += effect.heading_bias_rad(time_s) + effect.heading_per_load_rad() * rotor_load; })+
                 sum
             }
             /// What is added to the latency of the satellite receiver, s.
@@ -195,6 +212,7 @@ macro_rules! catalogue {
 
 catalogue! {
     accel_bias: AccelBias,
+    accel_scale: AccelScale,
     actuation_latency: ActuationLatency,
     added_mass: AddedMass,
     angular_damping: AngularDamping,
@@ -202,11 +220,14 @@ catalogue! {
     battery_sag: BatterySag,
     cg_offset: CgOffset,
     clock_skew: ClockSkew,
+    clock_step: ClockStep,
+    compass_current: CompassCurrent,
     constant_wind: ConstantWind,
     flapping_moment: FlappingMoment,
     gnss_latency: GnssLatency,
     ground_effect: GroundEffect,
     gust: Gust,
+    gyro_scale: GyroScale,
     heading_bias: HeadingBias,
     inertia_error: InertiaError,
     linear_drag: LinearDrag,

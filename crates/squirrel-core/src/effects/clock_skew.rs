@@ -1,6 +1,6 @@
 //! The clock that stamps commands runs fast: a command of the time `t` is stamped `t (1 + s)`.
 
-use super::{Effect, EffectParameter};
+use super::{CommandClock, Effect, EffectParameter};
 use crate::math::{Real, real};
 
 /// How fast, in parts per million.
@@ -11,7 +11,7 @@ impl<T: Real> Effect<T> for ClockSkew<T> {
     const NAME: &'static str = "clock_skew";
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed("skew_ppm", 400.0, 1500.0)];
 
-    fn command_clock_s(&self, time_s: T) -> T {
-        time_s * (T::one() + self.0[0] * real(1e-6))
+    fn command_clock(&self, clock: &mut CommandClock<T>) {
+        clock.rate *= T::one() + self.0[0] * real(1e-6);
     }
 }

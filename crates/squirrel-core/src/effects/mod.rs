@@ -13,6 +13,7 @@
 //! derivative.
 
 mod accel_bias;
+mod accel_scale;
 mod actuation_latency;
 mod added_mass;
 mod angular_damping;
@@ -20,12 +21,16 @@ mod axial_inflow;
 mod battery_sag;
 mod catalogue;
 mod cg_offset;
+mod clock;
 mod clock_skew;
+mod clock_step;
+mod compass_current;
 mod constant_wind;
 mod flapping_moment;
 mod gnss_latency;
 mod ground_effect;
 mod gust;
+mod gyro_scale;
 mod heading_bias;
 mod inertia_error;
 mod linear_drag;
@@ -44,6 +49,7 @@ mod wing_servo_lag;
 mod yaw_torque_coeff;
 
 pub use accel_bias::AccelBias;
+pub use accel_scale::AccelScale;
 pub use actuation_latency::ActuationLatency;
 pub use added_mass::AddedMass;
 pub use angular_damping::AngularDamping;
@@ -51,12 +57,16 @@ pub use axial_inflow::AxialInflow;
 pub use battery_sag::BatterySag;
 pub use catalogue::{Effects, Found};
 pub use cg_offset::CgOffset;
+pub use clock::CommandClock;
 pub use clock_skew::ClockSkew;
+pub use clock_step::ClockStep;
+pub use compass_current::CompassCurrent;
 pub use constant_wind::ConstantWind;
 pub use flapping_moment::FlappingMoment;
 pub use gnss_latency::GnssLatency;
 pub use ground_effect::GroundEffect;
 pub use gust::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, Gust, GustSpectrum};
+pub use gyro_scale::GyroScale;
 pub use heading_bias::HeadingBias;
 pub use inertia_error::InertiaError;
 pub use linear_drag::LinearDrag;
@@ -326,12 +336,18 @@ pub trait Effect<T: Real>: Copy {
     fn command_latency_s(&self) -> T {
         T::zero()
     }
-    /// What the clock that stamps commands shows, s.
-    ///
-    /// * `time_s` - since the flight began
+    /// Changes the clock that stamps commands.
     #[inline(always)]
-    fn command_clock_s(&self, time_s: T) -> T {
-        time_s
+    fn command_clock(&self, _clock: &mut CommandClock<T>) {}
+    /// What the accelerometer reads too much along each axis, as a fraction.
+    #[inline(always)]
+    fn accel_scale(&self) -> In<Body, T> {
+        nothing()
+    }
+    /// What the gyroscope reads too much about each axis, as a fraction.
+    #[inline(always)]
+    fn gyro_scale(&self) -> In<Body, T> {
+        nothing()
     }
     /// Bias of the accelerometer, m/s^2.
     ///
@@ -345,6 +361,12 @@ pub trait Effect<T: Real>: Copy {
     /// * `time_s` - since the flight began
     #[inline(always)]
     fn heading_bias_rad(&self, _time_s: T) -> T {
+        T::zero()
+    }
+    /// Error of the measured heading while the rotors take the power of hover, rad; in proportion to
+    /// [`rotor_load`](crate::vehicle::Vehicle::rotor_load).
+    #[inline(always)]
+    fn heading_per_load_rad(&self) -> T {
         T::zero()
     }
     /// What the effect adds to the latency of the satellite receiver, s.

@@ -56,8 +56,8 @@ fn actions(effects: &Effects<f64>) -> Vec<f64> {
     let mut all = vec![
         gust,
         effects.command_latency_s(),
-        effects.command_clock_s(TIME_S),
-        effects.heading_bias_rad(TIME_S),
+        effects.command_clock().stamp_s(TIME_S),
+        effects.heading_bias_rad(TIME_S, 1.5),
         effects.gnss_latency_s(),
         effects.added_mass_kg(),
         effects.thrust_factor(&air, HEIGHT_M),
@@ -75,6 +75,8 @@ fn actions(effects: &Effects<f64>) -> Vec<f64> {
         wrench.moment.vector,
         effects.wind(HEIGHT_M).vector,
         effects.specific_force_bias(TIME_S).vector,
+        effects.accel_scale().vector,
+        effects.gyro_scale().vector,
         effects.accelerometer_position().vector,
         load,
     ] {
@@ -290,10 +292,18 @@ fn the_other_forms_by_hand() {
 
     assert_eq!(with("actuation_latency", &[0.03]).command_latency_s(), 0.03);
     assert_eq!(with("gnss_latency", &[0.2]).gnss_latency_s(), 0.2);
-    close(with("clock_skew", &[1000.0]).command_clock_s(40.0), 40.04, "a fast clock");
+    close(with("clock_skew", &[1000.0]).command_clock().stamp_s(40.0), 40.04, "a fast clock");
+    let steps = with("clock_step", &[0.05, 20.0]).command_clock();
+    assert_eq!([19.9, 20.1].map(|t| steps.stamp_s(t)), [19.9, 20.1 + 0.05]);
+    assert_eq!(with("gyro_scale", &[0.05, 0.0, -0.02]).gyro_scale().vector, Vector3::new(0.05, 0.0, -0.02));
+    assert_eq!(with("accel_scale", &[0.0, 0.01, 0.03]).accel_scale().vector, Vector3::new(0.0, 0.01, 0.03));
+    assert_eq!(
+        [0.0, 1.0, 2.5].map(|load| with("compass_current", &[0.2]).heading_bias_rad(TIME_S, load)),
+        [0.0, 0.2, 0.5]
+    );
     assert_eq!(with("added_mass", &[0.1]).added_mass_kg(), 0.1);
-    assert_eq!(with("heading_bias", &[0.2, 0.01]).heading_bias_rad(TIME_S), 0.2);
-    close(formed("heading_bias", "drifting", &[0.2, 0.01]).heading_bias_rad(TIME_S), 0.3, "drifting");
+    assert_eq!(with("heading_bias", &[0.2, 0.01]).heading_bias_rad(TIME_S, 1.0), 0.2);
+    close(formed("heading_bias", "drifting", &[0.2, 0.01]).heading_bias_rad(TIME_S, 1.0), 0.3, "drifting");
     let bias = formed("accel_bias", "drifting", &[0.2, 0.3, 0.4, 0.01, 0.0, -0.02]);
     assert!((bias.specific_force_bias(TIME_S).vector - Vector3::new(0.3, 0.3, 0.2)).norm() < 1e-12);
     assert_eq!(with("gust", &[1.0]).gust(), Some(GustSpectrum::GaussMarkov { sigma_m_s: 1.0 }));
@@ -317,7 +327,7 @@ fn forms_choose_among_parameters() {
     assert_eq!(keys("translational_lift", "saturating"), ["gain_s2_per_m2"]);
     assert_eq!(keys("translational_lift", "linear"), ["gain_s_per_m"]);
     assert!(forms(Effects::<f64>::parameters("added_mass").unwrap()).is_empty());
-    assert_eq!(Effects::<f64>::NAMES.len(), 29);
+    assert_eq!(Effects::<f64>::NAMES.len(), 33);
     for name in Effects::<f64>::NAMES {
         let parameters = Effects::<f64>::parameters(name).unwrap();
         let names = forms(parameters);

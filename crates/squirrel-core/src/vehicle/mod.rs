@@ -12,7 +12,7 @@ pub use thrust_curve::ThrustCurve;
 
 use crate::effects::Alteration;
 use crate::frames::{Body, In};
-use crate::math::{Real, real};
+use crate::math::{GRAVITY_M_S2, Real, real};
 use nalgebra::{Matrix3, Vector3};
 
 /// Most rotors a vehicle may have. Rotor loops run over blocks of [`ROTOR_BLOCK`]; unused places are zero.
@@ -276,6 +276,18 @@ impl<T: Real> Vehicle<T> {
     #[inline(always)]
     pub fn inertia_inverse(&self) -> &Matrix3<T> {
         &self.inertia_inverse
+    }
+    /// Power of the rotors over that in hover, as their torque has it: the mean cube of their speeds, 1 in hover.
+    pub fn rotor_load(&self, speed_rad_s: &PerRotor<T>) -> T {
+        let (mut thrust, mut cubes) = (T::zero(), T::zero());
+        for (per_square, speed) in
+            self.per_speed_squared.thrust.iter().zip(speed_rad_s).take(self.parameters.rotor_count)
+        {
+            thrust += *per_square;
+            cubes += *speed * *speed * *speed;
+        }
+        let square = real::<T>(GRAVITY_M_S2) / (self.inverse_mass * thrust);
+        cubes / (real::<T>(self.parameters.rotor_count as f64) * square * square.sqrt())
     }
     /// The rotors in command order.
     pub fn rotors(&self) -> &[Rotor<T>] {

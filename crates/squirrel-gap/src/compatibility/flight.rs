@@ -65,6 +65,10 @@ impl<'p> Flight<'p> {
         !self.pieces.is_empty() && self.tracks().all(|track| track.attitude().is_some())
     }
 
+    pub(super) fn has_gyroscope(&self) -> bool {
+        self.predictor.has_gyroscope()
+    }
+
     /// Gyroscope and rate of the attitude, with the times of the middle, s.
     pub(super) fn rates(&self, turn: Turn) -> (Vec<f64>, Pairs) {
         let (mut time_s, mut pairs) = (Vec::new(), Pairs::default());

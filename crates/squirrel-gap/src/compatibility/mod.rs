@@ -8,6 +8,7 @@
 
 mod attitude;
 mod clock;
+mod drift;
 mod fixes;
 mod flight;
 mod held;
@@ -95,6 +96,7 @@ fn problems_of(predictor: &Predictor<'_>, residual: &[f64], logs: &[(String, Fli
             .or_else(|| attitude::rates(&flight))
             .or_else(|| felt.then(|| fixes::frames(&flight)).flatten())
             .or_else(|| clock::steps(&flight, residual))
+            .or_else(|| drift::bias(&flight))
             .or_else(|| felt.then(|| fixes::velocities(&flight)).flatten())
             .or_else(|| fixes::positions(&flight))
             .or_else(|| rotors::model(&flight, residual))?;

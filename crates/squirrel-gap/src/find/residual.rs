@@ -79,7 +79,7 @@ pub(super) fn residuals(
 /// The measured samples of a piece, at the heights that `name` has: strapdown, held by barometer or GNSS.
 fn samples(vehicle: &VehicleFile, recording: &Recording, piece: Span) -> Vec<Sample> {
     let mut samples = recording.grid(piece);
-    let motion = Track::new(0, recording, piece).motion(&vehicle.effects, &SensorErrors::default());
+    let motion = Track::new(0, vehicle, recording, piece).motion(&vehicle.effects, &SensorErrors::default());
     for (sample, known) in samples.iter_mut().zip(&motion.body) {
         sample.body.position = known.position;
     }

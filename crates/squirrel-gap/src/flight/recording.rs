@@ -109,7 +109,7 @@ impl<'a> Recording<'a> {
         }
         if speed.is_some() {
             notes.push(format!(
-                "{flight}: {ROTOR_SPEED}: measured, and taken instead of what commands make of it; motor_lag, battery_sag, actuation_latency and clock_skew are not judged"
+                "{flight}: {ROTOR_SPEED}: measured, and taken instead of what commands make of it; motor_lag, battery_sag, actuation_latency, clock_skew and clock_step are not judged"
             ));
         } else if is_slow {
             notes.push(format!(

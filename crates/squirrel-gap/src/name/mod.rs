@@ -17,6 +17,7 @@ mod point;
 mod refine;
 mod rivals;
 mod search;
+mod step;
 mod tolerance;
 mod whiten;
 
@@ -27,6 +28,7 @@ pub(crate) use payload::payload_lengths_m;
 pub(crate) use point::{Member, Point, hypothesis};
 pub(crate) use refine::Scored;
 pub(crate) use search::{Found, NATS_MIN, Search};
+pub(crate) use step::clock_step_s;
 use tolerance::unlogged_sag;
 pub(crate) use tolerance::{notes as silent_tolerances, sds};
 
@@ -191,7 +193,7 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
 
 /// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample more or less.
 fn slack(search: &Search<'_>, found: &Found) -> Slack {
-    let skewed = found.best.members.iter().any(|m| search.effect(m) == "clock_skew");
+    let skewed = found.best.members.iter().any(|m| ["clock_skew", "clock_step"].contains(&search.effect(m)));
     let period_s = search.predictor.tracks.first().map_or(0.0, |t| t.period_s);
     search.catalogue.slack(if skewed { period_s } else { 0.0 }, unlogged_sag(search.predictor))
 }

@@ -8,7 +8,7 @@ use super::point::{Airframe, DAY_FRACTION, Member};
 use super::tolerance::{SHARE_OF_SMALLEST, airframe, slip_ppm, timing_s, tolerance};
 use crate::GapError;
 use crate::leftover::{Slack, Usual};
-use crate::predictor::Predictor;
+use crate::predictor::{Predictor, TURNING};
 use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, Scale, SizeRange, base_number};
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::plant::WingPlant;
@@ -46,11 +46,14 @@ const LASTING: [&str; 9] = [
 /// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows the rotors' own.
 const MARKERS_RAD: f64 = 0.03;
 /// Effects between commands and the speeds of rotors.
-const COMMANDS: [&str; 4] = ["actuation_latency", "battery_sag", "clock_skew", "motor_lag"];
+const COMMANDS: [&str; 5] = ["actuation_latency", "battery_sag", "clock_skew", "clock_step", "motor_lag"];
 /// Effects on an accelerometer, and on velocities against it.
-const ACCELEROMETER: [&str; 2] = ["accel_bias", "gnss_latency"];
-const HORIZONTAL: [&str; 9] = [
+const ACCELEROMETER: [&str; 3] = ["accel_bias", "accel_scale", "gnss_latency"];
+/// Effects that a gyroscope shows beside an attitude.
+const TURNS: [&str; 2] = ["compass_current", "gyro_scale"];
+const HORIZONTAL: [&str; 10] = [
     "accel_bias",
+    "accel_scale",
     "added_mass",
     "axial_inflow",
     "constant_wind",
@@ -126,10 +129,15 @@ pub(crate) struct Catalogue {
 
 impl Catalogue {
     /// * `payload_lengths_m` - at which a slung load is looked for: its frequency is not linear in anything
+    /// * `clock_step_s` - when a clock may have jumped, since the beginning of a flight
     ///
     /// # Errors
     /// The vehicle file lacks a tolerance that is needed.
-    pub(crate) fn new(predictor: &Predictor, payload_lengths_m: &[f64]) -> Result<Self, GapError> {
+    pub(crate) fn new(
+        predictor: &Predictor,
+        payload_lengths_m: &[f64],
+        clock_step_s: Option<f64>,
+    ) -> Result<Self, GapError> {
         let vehicle = predictor.vehicle;
         let unseen = |name: &str| {
             (!predictor.has_all_of(2) && !LASTING.contains(&name))
@@ -148,7 +156,9 @@ impl Catalogue {
         };
         for name in Effects::<f64>::NAMES {
             // What nobody measured with is off by nothing.
-            if ACCELEROMETER.contains(name) && !predictor.has_accelerometer() {
+            let is_unmeasured = (ACCELEROMETER.contains(name) && !predictor.has_accelerometer())
+                || (TURNS.contains(name) && !predictor.has_channel(TURNING));
+            if is_unmeasured {
                 continue;
             }
             if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
@@ -160,12 +170,17 @@ impl Catalogue {
             }
             let list = Effects::<f64>::parameters(name).unwrap_or_default();
             for fixed in choices(list, vehicle.vehicle.rotors().len()) {
-                if *name == "payload_swing" {
-                    for length_m in payload_lengths_m {
-                        all.add(vehicle, name, list, fixed.clone(), &[("length_m", *length_m)])?;
+                // What nothing linear finds starts at each of these.
+                let starts: Vec<(&str, f64)> = match *name {
+                    "payload_swing" => payload_lengths_m.iter().map(|length| ("length_m", *length)).collect(),
+                    "clock_step" => clock_step_s.iter().map(|at| ("at_s", *at)).collect(),
+                    _ => {
+                        all.add(vehicle, name, list, fixed, &[])?;
+                        continue;
                     }
-                } else {
-                    all.add(vehicle, name, list, fixed, &[])?;
+                };
+                for start in starts {
+                    all.add(vehicle, name, list, fixed.clone(), &[start])?;
                 }
             }
         }

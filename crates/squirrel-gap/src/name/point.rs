@@ -220,8 +220,9 @@ impl Catalogue {
     /// belongs to a flight, to the place of a rotor, or to no effect.
     pub(crate) fn group(&self, column: usize) -> Option<(&'static str, f64)> {
         if let Some(parameter) = self.parameters.get(column) {
-            let flat = self.starts_flat(parameter.candidate);
-            return (!flat).then_some((self.candidates[parameter.candidate].effect, parameter.smallest));
+            // What is there or not scatters by nothing.
+            let scatters = parameter.tolerance > 0.0;
+            return scatters.then_some((self.candidates[parameter.candidate].effect, parameter.smallest));
         }
         match self.airframe.get(column - self.parameters.len())?.0 {
             Airframe::Arm { .. } => None,
@@ -260,7 +261,7 @@ impl Catalogue {
 
     /// Whether the slope of a candidate is another one after a few tolerances: lags and delays.
     pub(super) fn bends(&self, candidate: usize) -> bool {
-        ["motor_lag", "actuation_latency", "clock_skew", "gnss_latency", "wing_servo_lag"]
+        ["motor_lag", "actuation_latency", "clock_skew", "clock_step", "gnss_latency", "wing_servo_lag"]
             .contains(&self.candidates[candidate].effect)
     }
 

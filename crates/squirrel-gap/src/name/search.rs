@@ -20,6 +20,8 @@ const BLOWN_NATS: f64 = 40.0;
 /// The effect of which a vehicle may have several.
 pub(super) const WEAK_ROTOR: &str = "weak_rotor";
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
+/// What a clock that jumps must be worth: by chance something changes at one of the hundreds of times at which it may.
+const JUMP_NATS: f64 = 40.0;
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
 const TOLERANCES_MIN: f64 = 3.0;
 /// Part of its smallest size that a number without a sign has at least.
@@ -176,6 +178,7 @@ impl Search<'_> {
     /// What a member must be worth, nats.
     fn needed(&self, member: &Member) -> f64 {
         match self.gust_m_s {
+            _ if self.effect(member) == "clock_step" => JUMP_NATS,
             None => NATS_MIN,
             Some(sigma) if BLOWN.contains(&self.effect(member)) => BLOWN_NATS * (sigma * sigma).max(1.0),
             Some(_) => BESIDE_GUSTS_NATS,

@@ -15,6 +15,11 @@ const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
 
 /// What sensors may be off by where the vehicle file does not say: m/s^2, and a degree and a quarter in rad.
 const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.03, "m/s^2");
+/// Of scales, as fractions, what a file says is the scatter from one switching on to the next.
+const GYRO_SCALE: (&str, f64) = ("sensors.imu.gyro_scale_sd", 0.01);
+const ACCEL_SCALE: (&str, f64) = ("sensors.imu.accel_scale_sd", 0.003);
+/// Heading error in hover of a compass near power leads, rad: about a degree at full throttle.
+const COMPASS_RAD: f64 = 0.006;
 const HEADING: (&str, f64, &str) = ("sensors.attitude.bias_rad", 1.25_f64.to_radians(), "rad");
 
 /// What the vehicle file does not say and is taken instead.
@@ -25,6 +30,10 @@ pub(crate) fn notes(vehicle: &VehicleFile) -> Vec<String> {
         .filter(|(field, ..)| silent(field))
         .map(|(field, sd, unit)| format!("{field}: has no sd; {} {unit} is taken", significant(*sd, 2)))
         .collect();
+    let imu = &vehicle.sensors.imu;
+    let scales = [(GYRO_SCALE, imu.gyro_scale_sd), (ACCEL_SCALE, imu.accel_scale_sd)];
+    let silent_scales = scales.iter().filter(|(_, sd)| *sd == 0.0);
+    notes.extend(silent_scales.map(|((field, sd), _)| format!("{field}: is 0; {sd} is taken")));
     let mut rotors = (0..vehicle.vehicle.rotors().len()).map(|i| format!("rotor[{i}].position_body_m"));
     if let Some(field) = rotors.find(|field| silent(field)) {
         notes.push(format!("{field}: has no sd; the rotor is taken to be where the file says"));
@@ -51,6 +60,7 @@ pub(super) fn tolerance(
     let fraction = |field: &str, index: usize, value: f64| {
         Ok(number(field, index, value)?.map_or(none, |sd| sd / value.abs().max(f64::MIN_POSITIVE)))
     };
+    let stated = |sd: f64, fallback: f64| if sd > 0.0 { sd } else { fallback };
     let declared = |field: &str, fallback: f64| {
         Ok(sds(vehicle, field).map_or(fallback, |sd| sd[slot.min(sd.len() - 1)]))
     };
@@ -102,10 +112,13 @@ pub(super) fn tolerance(
         }
         "accel_bias" => declared(ACCEL_BIAS.0, ACCEL_BIAS.1)?,
         "heading_bias" => declared(HEADING.0, HEADING.1)?,
+        "gyro_scale" => stated(vehicle.sensors.imu.gyro_scale_sd, GYRO_SCALE.1),
+        "accel_scale" => stated(vehicle.sensors.imu.accel_scale_sd, ACCEL_SCALE.1),
+        "compass_current" => COMPASS_RAD,
         "constant_wind" => 0.12,
         "gnss_latency" => VELOCITY_LAG_S,
-        // A vehicle carries a load or it does not; a ground effect of a small radius is none.
-        "payload_swing" | "ground_effect" => 0.0,
+        // A vehicle carries a load or it does not, a clock jumps or it does not; a ground effect of a small radius is none.
+        "payload_swing" | "clock_step" | "ground_effect" => 0.0,
         _ => none,
     })
 }

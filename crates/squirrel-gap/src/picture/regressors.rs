@@ -76,7 +76,7 @@ fn of_effect(
 ) -> Vec<Conditional> {
     let raw = &naming.found.best.own_raw[column];
     let mut weight: Vec<(usize, f64)> = (0..CHANNELS.len()).map(|channel| (channel, 0.0)).collect();
-    for segment in &predictor.segments {
+    for segment in predictor.segments.iter().filter(|s| s.channel < CHANNELS.len()) {
         let white = naming.found.linear.whitener.apply(std::slice::from_ref(segment), raw);
         weight[segment.channel].1 += white.iter().map(|x| x * x).sum::<f64>();
     }

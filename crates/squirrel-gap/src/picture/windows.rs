@@ -7,7 +7,7 @@
 use crate::GapError;
 use crate::leftover::floor;
 use crate::name::{Naming, Search, TURBULENCE_M_S};
-use crate::predictor::{CHANNELS, DYNAMIC, Predictor};
+use crate::predictor::{DYNAMIC, Predictor, TURNING};
 use crate::report::FlightPanel;
 
 /// Length of a window, s.
@@ -58,8 +58,8 @@ pub(super) fn panels(search: &Search<'_>, naming: &Naming) -> Result<Vec<FlightP
     Ok((0..predictor.names.len())
         .filter_map(|flight| {
             let windows = windows(predictor, flight)?;
-            let has_fixes = predictor.segments.iter().any(|s| s.channel >= DYNAMIC);
-            let channels = if has_fixes { CHANNELS.len() } else { DYNAMIC };
+            let has_fixes = predictor.has_channel(DYNAMIC);
+            let channels = if has_fixes { TURNING } else { DYNAMIC };
             let rows = |all: &[Vec<(f64, f64)>]| -> Vec<Vec<f64>> {
                 let row = |channel| {
                     let segments = predictor.segments.iter().zip(all);

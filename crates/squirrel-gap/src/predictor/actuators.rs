@@ -36,7 +36,7 @@ struct Key {
     stride: Vec<usize>,
     jumps: bool,
     drives: Vec<RotorDrive<f64>>,
-    clock: [f64; 5],
+    clock: [f64; 6],
 }
 
 /// Paths of a set of flights.
@@ -76,13 +76,8 @@ impl Key {
             })
         });
         let [opening, closing] = effects.wing_extra_time_constant_s();
-        let clock = [
-            effects.command_latency_s(),
-            effects.command_clock_s(0.0),
-            effects.command_clock_s(1.0),
-            opening,
-            closing,
-        ];
+        let runs = effects.command_clock();
+        let clock = [effects.command_latency_s(), runs.rate, runs.step_s, runs.at_s, opening, closing];
         Self {
             stride: tracks.iter().map(stride).collect(),
             jumps: jumps(effects),

@@ -3,7 +3,7 @@
 
 use crate::flight::recording::Recording;
 use crate::flight::series::Series;
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{CommandClock, Effects};
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
 
 /// Commands closer than this to a sample act from that sample on, s.
@@ -55,10 +55,9 @@ impl Commands {
 
     /// A clock that runs forwards from a time.
     pub(crate) fn clock(&self, effects: &Effects<f64>, time_s: f64) -> Clock<'_> {
-        // Stamps run as s = clock(t), a line through the beginning of the flight; a command acts a latency after its time.
-        let rate = effects.command_clock_s(1.0) - effects.command_clock_s(0.0);
-        let mut clock =
-            Clock { commands: self, rate, latency_s: effects.command_latency_s(), rotor: 0, wing: 0 };
+        // A command acts a latency after its time.
+        let (runs, latency_s) = (effects.command_clock(), effects.command_latency_s());
+        let mut clock = Clock { commands: self, runs, latency_s, rotor: 0, wing: 0 };
         clock.advance_to(time_s);
         clock
     }
@@ -67,7 +66,7 @@ impl Commands {
 /// Which command acts.
 pub(crate) struct Clock<'a> {
     commands: &'a Commands,
-    rate: f64,
+    runs: CommandClock<f64>,
     latency_s: f64,
     rotor: usize,
     wing: usize,
@@ -76,7 +75,7 @@ pub(crate) struct Clock<'a> {
 impl Clock<'_> {
     /// When a command with a stamp acts, s.
     fn acts_s(&self, stamp_s: f64) -> f64 {
-        self.commands.began_s + (stamp_s - self.commands.began_s) / self.rate + self.latency_s
+        self.commands.began_s + self.runs.time_s(stamp_s - self.commands.began_s) + self.latency_s
     }
     /// When the rotors do what a sample says, s.
     fn turns_s(&self, stamp_s: f64) -> f64 {

@@ -3,6 +3,7 @@
 //! ```text
 //! dynamics     LP[f - f(plant)]  m/s^2      LP[D[w] - w'(plant)]  rad/s^2     12 Hz zero phase, every 1/30 s
 //! kinematics   v_GNSS - v_strapdown  m/s                                      every 0.1 s, mean of a piece removed
+//!              w(attitude) - w(gyroscope)  rad/s                              every 0.2 s, likewise
 //! ```
 //! The plant is led along the measured motion: rotors, servos and payload run under the logged commands at the measured
 //! voltage, while velocity, attitude and rates are what was measured. A hypothesis changes nothing but the vehicle's effects
@@ -17,6 +18,7 @@ mod kept;
 mod noise;
 mod spread;
 mod track;
+mod turning;
 
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
@@ -26,7 +28,7 @@ use crate::flight::recording::Recording;
 use actuators::{Path, Paths, stride};
 use commands::Commands;
 use kept::Kept;
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::Effects;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::vehicle::{PerRotor, Vehicle};
@@ -36,8 +38,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use std::ops::Range;
 use std::rc::Rc;
 
-/// The channels of a residual, in order: specific force, angular acceleration, velocity.
-pub(crate) const CHANNELS: [&str; 9] = [
+/// The channels of a residual, in order: specific force, angular acceleration, velocity, rate.
+pub(crate) const CHANNELS: [&str; 12] = [
     "force_body_x_n",
     "force_body_y_n",
     "force_body_z_n",
@@ -47,9 +49,14 @@ pub(crate) const CHANNELS: [&str; 9] = [
     "gnss.velocity_north_m_s",
     "gnss.velocity_east_m_s",
     "gnss.velocity_down_m_s",
+    "imu.omega_body_x_rad_s",
+    "imu.omega_body_y_rad_s",
+    "imu.omega_body_z_rad_s",
 ];
 /// Channels of the dynamics; the rest are kinematic.
 pub(crate) const DYNAMIC: usize = 6;
+/// The first channel of the gyroscope against the attitude, which tells of nothing but these two.
+pub(crate) const TURNING: usize = 9;
 
 /// One channel of one piece of a flight within the list of rows.
 #[derive(Debug, Clone)]
@@ -111,7 +118,7 @@ pub(crate) struct Predictor<'a> {
     /// The motion of each track for the effects of the vehicle file and errorless sensors, which most hypotheses share.
     plain: Vec<Rc<Motion>>,
     /// Of each track, the last motions under other errors.
-    motions: Vec<Kept<([f64; 9], SensorErrors), Motion>>,
+    motions: Vec<Kept<(SensorPath, SensorErrors), Motion>>,
     paths: Paths,
 }
 
@@ -164,7 +171,7 @@ impl<'a> Predictor<'a> {
             }
             let recording = Recording::new(vehicle, flight, log, common)?;
             let spans = spread::spread(&recording, limit_s(index));
-            tracks.extend(spans.into_iter().map(|span| Track::new(index, &recording, span)));
+            tracks.extend(spans.into_iter().map(|span| Track::new(index, vehicle, &recording, span)));
             commands.push(Commands::new(&recording));
             notes.extend(recording.notes);
             names.push(flight.as_str());
@@ -191,8 +198,13 @@ impl<'a> Predictor<'a> {
             if let Some((t0_s, _)) = kinematic {
                 let n = motion.kinematic.len();
                 let step_s = (motion.kinematic[n - 1].0 - t0_s) / (n - 1).max(1) as f64;
-                for channel in DYNAMIC..CHANNELS.len() {
+                for channel in DYNAMIC..TURNING {
                     push(channel, n, *t0_s, step_s);
+                }
+            }
+            if let Some(step_s) = track.turning_step_s() {
+                for channel in TURNING..CHANNELS.len() {
+                    push(channel, motion.turning.len(), track.time_s[0] + step_s, step_s);
                 }
             }
         }
@@ -348,6 +360,10 @@ impl<'a> Predictor<'a> {
                     for (row, value) in out.iter_mut().zip(segment.rows_of(&dynamics)) {
                         *row = value;
                     }
+                } else if segment.channel >= TURNING {
+                    for (row, value) in out.iter_mut().zip(&motion.turning) {
+                        *row = value[segment.channel - TURNING];
+                    }
                 } else {
                     // A hypothesis that moves the fixes in time may lose one at an end.
                     for (row, (_, value)) in out.iter_mut().zip(&motion.kinematic) {
@@ -483,11 +499,17 @@ impl<'a> Predictor<'a> {
     }
 }
 
-/// What effects do to the sensors, in numbers; each is a line in time.
-fn sensors(effects: &Effects<f64>) -> [f64; 9] {
-    let [b0, b1] = [0.0, 1.0].map(|t| effects.specific_force_bias(t).vector);
-    let [h0, h1] = [0.0, 1.0].map(|t| effects.heading_bias_rad(t));
-    [b0.x, b0.y, b0.z, b1.x, b1.y, b1.z, h0, h1, effects.gnss_latency_s()]
+/// What effects do to the path of the sensors.
+type SensorPath = ([Vector3<f64>; 4], [f64; 4]);
+
+/// What effects do to the sensors, in numbers; each is a line in time, the heading's in the rotors' load, too.
+fn sensors(effects: &Effects<f64>) -> SensorPath {
+    let bias = |t| effects.specific_force_bias(t).vector;
+    let heading = |t, load| effects.heading_bias_rad(t, load);
+    (
+        [bias(0.0), bias(1.0), effects.accel_scale().vector, effects.gyro_scale().vector],
+        [heading(0.0, 0.0), heading(1.0, 0.0), heading(0.0, 1.0), effects.gnss_latency_s()],
+    )
 }
 
 /// Part of what was measured that no model is trusted with.
@@ -534,6 +556,7 @@ fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<V
     let filter = if path.stride == 1 { &track.filter } else { &track.model_filter };
     let mut jumps = path.before.iter().filter(|_| actuators::jumps(plant.effects())).peekable();
     let mut predicted = Vec::with_capacity(path.moments.len());
+    let [rate_scale, _] = track.scales(plant.effects());
     lead(plant, track, motion, path, |k, state| {
         let led = plant.led(state);
         let mut a = led.angular_acceleration;
@@ -543,9 +566,8 @@ fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<V
             plant.meet(&mut earlier, &motion.body[k], before);
             a = (a + plant.led(&earlier).angular_acceleration) * 0.5;
         }
-        let bias = plant.effects().specific_force_bias(state.time_s).vector;
-        let f = track.as_shown(k, led.specific_force.vector, motion, bias);
-        let a = a.vector;
+        let f = track.as_shown(k, led.specific_force.vector, motion, plant.effects());
+        let a = a.vector.component_mul(&rate_scale);
         predicted.push(Vector6::new(f.x, f.y, f.z, a.x, a.y, a.z));
     });
     let filtered = filter.apply(&predicted, track.edge() - path.first, track.every);

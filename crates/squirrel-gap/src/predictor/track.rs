@@ -1,22 +1,24 @@
 //! The motion of one piece of a flight from its sensors: strapdown integration, held by GNSS and barometer.
 //!
 //! ```text
-//! v_s' = R (f - b) + g          b, heading, GNSS latency, tilt: what a hypothesis says of the path of the sensors
+//! v_s' = R (f - b) / (1 + s) + g   b, s, heading, GNSS latency, tilt: what a hypothesis says of the path of the sensors
 //! v    = v_s + S[v_GNSS - v_s]  S  local linear smoother, Gaussian weights of 0.5 s
 //! h    = h_s + S[h_baro - h_s]  h_s' = -v_z
 //! ```
 //! What the smoother takes away is the second family of residuals, `v_GNSS - v_s`: sensors that lie show there, forces that
-//! the model lacks do not.
+//! the model lacks do not. The third is what a gyroscope says of turns against the attitude ([`turning`](super::turning)).
 
+use super::turning::Turning;
 use crate::flight::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass, derivative, model_stride};
 use crate::flight::inertial::Derived;
 use crate::flight::recording::Recording;
 use crate::flight::series::{Series, Span};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector6};
-use squirrel_core::dynamics::State;
+use squirrel_core::dynamics::{RotorDrive, State};
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
+use squirrel_sim::vehicle_file::VehicleFile;
 use std::f64::consts::PI;
 
 /// Fixes and barometer readings are averaged over this time, s.
@@ -78,6 +80,10 @@ pub(crate) struct Track {
     altitude_m: Vec<(f64, f64)>,
     /// Times of the height errors, s.
     knots_s: [f64; HEIGHT_KNOTS],
+    /// Power of the rotors over that in hover, on the grid.
+    pub(crate) rotor_load: Vec<f64>,
+    /// Turns by the gyroscope, where there is one beside an attitude.
+    turning: Option<Turning>,
 }
 
 /// The motion under one hypothesis about the sensors.
@@ -86,10 +92,12 @@ pub(crate) struct Motion {
     pub(crate) body: Vec<State<f64>>,
     /// Time, s, and GNSS velocity minus strapdown velocity, m/s, whose mean over the piece is removed.
     pub(crate) kinematic: Vec<(f64, Vector3<f64>)>,
+    /// Rate by the attitude minus rate by the gyroscope, rad/s, about its mean.
+    pub(crate) turning: Vec<Vector3<f64>>,
 }
 
 impl Track {
-    pub(crate) fn new(flight: usize, recording: &Recording, piece: Span) -> Self {
+    pub(crate) fn new(flight: usize, vehicle: &VehicleFile, recording: &Recording, piece: Span) -> Self {
         let samples = recording.grid(piece);
         let period_s = recording.period_s;
         let cutoff_hz = recording.cutoff_hz;
@@ -128,7 +136,11 @@ impl Track {
             Some(baro) => baro.samples().filter(|(t, _)| inside(t)).map(|(t, h)| (t, h[0])).collect(),
             None => position.iter().map(|(t, p)| (*t, -p.z)).collect(),
         };
+        let omega: Vec<_> = samples.iter().map(|s| s.body.omega.vector).collect();
+        let turns = recording.has_attitude() && derived.rates.is_none();
         Self {
+            turning: turns.then(|| Turning::new(&omega, period_s)),
+            rotor_load: rotor_load(vehicle, recording, piece.0, samples.iter().map(|s| s.voltage_v)),
             flight,
             period_s,
             began_s: recording.pieces[0].0,
@@ -144,7 +156,7 @@ impl Track {
             time_s: samples.iter().map(|s| s.time_s).collect(),
             voltage_v: samples.iter().map(|s| s.voltage_v).collect(),
             specific_force: samples.iter().map(|s| s.specific_force).collect(),
-            omega: samples.iter().map(|s| s.body.omega.vector).collect(),
+            omega,
             attitude: recording.has_attitude().then(|| samples.iter().map(|s| s.body.attitude).collect()),
             velocity: vectors(recording.velocity.as_ref()),
             position,
@@ -248,16 +260,17 @@ impl Track {
     /// The motion, with what a hypothesis says of the sensors taken off.
     pub(crate) fn motion(&self, effects: &Effects<f64>, errors: &SensorErrors) -> Motion {
         let n = self.time_s.len();
+        let [rate_scale, force_scale] = self.scales(effects);
         let at = |k: usize, velocity, position, attitude| State {
             position: In::new(position),
             velocity: In::new(velocity),
             attitude,
-            omega: In::new(self.omega[k]),
+            omega: In::new(self.omega[k].component_div(&rate_scale)),
             ..State::at_rest()
         };
         let Some(attitude) = &self.attitude else {
             let still = |k| at(k, Vector3::zeros(), Vector3::zeros(), Quaternion::identity());
-            return Motion { body: (0..n).map(still).collect(), kinematic: Vec::new() };
+            return Motion { body: (0..n).map(still).collect(), kinematic: Vec::new(), turning: Vec::new() };
         };
         let [north, east] = errors.tilt_rad;
         let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(-north, -east, 0.0));
@@ -265,8 +278,9 @@ impl Track {
         let attitude: Vec<UnitQuaternion<f64>> = attitude
             .iter()
             .zip(self.time_s.iter().zip(&self.specific_force))
-            .map(|(q, (t, force))| {
-                let heading = effects.heading_bias_rad(t - self.began_s);
+            .zip(&self.rotor_load)
+            .map(|((q, (t, force)), load)| {
+                let heading = effects.heading_bias_rad(t - self.began_s, *load);
                 let turned = leaning.upright(UnitQuaternion::new_unchecked(*q), force);
                 if heading == 0.0 && errors.tilt_rad == [0.0; 2] {
                     turned
@@ -278,7 +292,7 @@ impl Track {
         let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
         let acceleration = |k: usize| {
             let bias = self.bias(effects, self.time_s[k] - self.began_s);
-            attitude[k] * (self.specific_force[k] - bias) + gravity
+            attitude[k] * (self.specific_force[k] - bias).component_div(&force_scale) + gravity
         };
         let mut strapdown = Vec::with_capacity(n);
         let (mut velocity, mut before) = (Vector3::zeros(), acceleration(0));
@@ -321,7 +335,24 @@ impl Track {
         for (_, e) in &mut kinematic {
             *e -= mean;
         }
-        Motion { body, kinematic }
+        let turning =
+            self.turning.as_ref().map_or_else(Vec::new, |turning| turning.rows(&attitude, &rate_scale));
+        Motion { body, kinematic, turning }
+    }
+
+    /// What gyroscope and accelerometer read of the truth, by axis; 1 where there is none.
+    pub(crate) fn scales(&self, effects: &Effects<f64>) -> [Vector3<f64>; 2] {
+        let scale = |is_measured: bool, error: Vector3<f64>| {
+            if is_measured { error.add_scalar(1.0) } else { Vector3::repeat(1.0) }
+        };
+        [
+            scale(self.derived.rates.is_none(), effects.gyro_scale().vector),
+            scale(self.has_accelerometer(), effects.accel_scale().vector),
+        ]
+    }
+    /// Time between the rows of the gyroscope against the attitude, s.
+    pub(super) fn turning_step_s(&self) -> Option<f64> {
+        self.turning.as_ref().map(Turning::step_s)
     }
 
     /// What the accelerometer is off by, m/s^2; nothing where there is none.
@@ -330,19 +361,21 @@ impl Track {
     }
 
     /// A force that the model predicts, as this flight shows it: where it comes from what the vehicle did in the world, the
-    /// axes are those of the measured attitude, whatever a hypothesis says of it, and no accelerometer adds its bias.
+    /// axes are those of the measured attitude, whatever a hypothesis says of it, and no accelerometer adds its scale and bias.
     pub(super) fn as_shown(
         &self,
         k: usize,
         force: Vector3<f64>,
         motion: &Motion,
-        bias: Vector3<f64>,
+        effects: &Effects<f64>,
     ) -> Vector3<f64> {
         match &self.attitude {
             Some(measured) if !self.is_felt() => {
                 let [measured, own] =
                     [measured[k], motion.body[k].attitude].map(UnitQuaternion::new_unchecked);
-                (measured.inverse() * own) * (force - bias)
+                let bias = effects.specific_force_bias(self.time_s[k] - self.began_s).vector;
+                let scale = effects.accel_scale().vector.add_scalar(1.0);
+                (measured.inverse() * own) * (force - bias).component_div(&scale)
             }
             _ => force,
         }
@@ -378,6 +411,27 @@ impl Track {
             *value += p0 + (p1 - p0) * share;
         }
     }
+}
+
+/// Power of the rotors over that in hover along a piece, by commands and their lag, or as fast as they turned.
+fn rotor_load(
+    vehicle: &VehicleFile,
+    recording: &Recording,
+    start_s: f64,
+    voltage_v: impl Iterator<Item = f64>,
+) -> Vec<f64> {
+    let mut speed = None;
+    let along = voltage_v.enumerate().map(|(k, voltage_v)| {
+        let command = recording.rotor_command(start_s + k as f64 * recording.period_s);
+        if recording.speed.is_some() {
+            return vehicle.vehicle.rotor_load(&command);
+        }
+        let drive = RotorDrive::new(&vehicle.vehicle, &vehicle.effects, &command, voltage_v);
+        let speed = speed.get_or_insert(drive.target_rad_s);
+        drive.lead(speed, recording.period_s);
+        vehicle.vehicle.rotor_load(speed)
+    });
+    along.collect()
 }
 
 /// Time over which a filter of attitude trusts its gyroscope, s.

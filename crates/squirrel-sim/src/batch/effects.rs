@@ -16,7 +16,16 @@ use squirrel_core::nalgebra::{Vector2, Vector3};
 use squirrel_core::vehicle::Vehicle;
 
 /// Effects that a batch of vehicles without sensors cannot show.
-const OF_SENSORS: [&str; 4] = ["accel_bias", "clock_skew", "gnss_latency", "heading_bias"];
+const OF_SENSORS: [&str; 8] = [
+    "accel_bias",
+    "accel_scale",
+    "clock_skew",
+    "clock_step",
+    "compass_current",
+    "gnss_latency",
+    "gyro_scale",
+    "heading_bias",
+];
 /// Roughness beyond which the logarithmic law means nothing, m.
 const ROUGHNESS_MAX_M: f64 = 4.0;
 

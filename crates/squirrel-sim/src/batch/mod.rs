@@ -10,7 +10,8 @@
 //! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles ([`Craft`]): flat wings and
 //! membranes (`wing`) with their servos (`servo`), batteries (`battery`), effects (`effects`), gusts (`air`) and late commands (`extra`),
 //! with the equations of [`crate::plant::Plant`]. What no vehicle of the batch has is not computed. A wing that is a network, and
-//! effects that act on sensors or stamps (accel_bias, clock_skew, gnss_latency, heading_bias), are refused.
+//! effects that act on sensors or stamps (accel_bias, accel_scale, clock_skew, clock_step, compass_current, gnss_latency,
+//! gyro_scale, heading_bias), are refused.
 //!
 //! ```
 //! use squirrel_sim::batch::{Batch, Settings};

@@ -401,6 +401,7 @@ fn truth(plant: &Plant, state: &PlantState, air: In<Ned, f64>) -> Truth {
         ),
         rotor_speed_rad_s: state.body.rotor_speed_rad_s,
         rotor_count: plant.vehicle().rotors().len(),
+        rotor_load: plant.vehicle().rotor_load(&state.body.rotor_speed_rad_s),
         deployment: state.deployment(),
         voltage_v: state.battery.voltage_v,
         current_a: state.battery.current_a,

@@ -106,7 +106,7 @@ impl Recorder {
             let rows: &[(&str, &[f64])] = &[("voltage_v", &[b.voltage_v]), ("current_a", &[b.current_a])];
             self.log.source_mut("battery").push(t, rows);
         }
-        let stamp = self.effects.command_clock_s(t);
+        let stamp = self.effects.command_clock().stamp_s(t);
         record_output(&mut self.log, t, stamp, output, self.rotors, Some(state));
         self.plant(t, state, air, wing_force);
     }
@@ -228,8 +228,13 @@ pub(crate) fn record_output(
         rotor.push(("speed_rad_s", &plant.body.rotor_speed_rad_s[..rotors]));
         wing.push(("deployment", deployment));
     }
-    log.source_mut("rotor").push(command_stamp, &rotor);
-    log.source_mut("wing").push(command_stamp, &wing);
+    for (name, rows) in [("rotor", rotor), ("wing", wing)] {
+        let source = log.source_mut(name);
+        // Times of a log increase: what a clock that has jumped back stamps again is not written.
+        if source.time_s.last().is_none_or(|last| *last < command_stamp) {
+            source.push(command_stamp, &rows);
+        }
+    }
     record_reference(log, "reference", t, &output.reference);
     record_estimate(log, t, output);
     // A source of its own, so that a flight without a fault has the log that it always had.

@@ -20,7 +20,7 @@ use squirrel_core::vehicle::PerRotor;
 pub struct Led {
     /// Force and moment without gravity, N and N m.
     pub wrench: Wrench<Body, f64>,
-    /// What the accelerometer reads, m/s^2, its bias by effects included.
+    /// What the accelerometer reads, m/s^2, its scale and bias by effects included.
     pub specific_force: In<Body, f64>,
     /// Angular acceleration, rad/s^2.
     pub angular_acceleration: In<Body, f64>,
@@ -127,7 +127,9 @@ impl Plant {
         let mut specific_force =
             dynamics::specific_force(&self.vehicle, &self.effects, state.body.omega, &wrench);
         if self.effects.any() {
-            specific_force = specific_force + self.effects.specific_force_bias(state.time_s);
+            let scale = self.effects.accel_scale().vector.add_scalar(1.0);
+            specific_force = In::new(specific_force.vector.component_mul(&scale))
+                + self.effects.specific_force_bias(state.time_s);
         }
         Led {
             wrench,

@@ -4,7 +4,8 @@
 //! vibration, `M = diag(1 + s) R(e)` scale errors and the small rotation by which the unit sits askew, `b0` the constant bias, `b` a
 //! bias drawn when the unit is switched on, `w` its random walk (variance `K^2 t`), `n` white noise, then range and steps of the converter.
 //! Terms after IEEE Std 952 (rate random walk, bias, scale factor, misalignment, quantisation). The constant bias is of the
-//! vehicle and the same in both units; what is drawn is each unit's own. The effect `accel_bias` is on the first unit.
+//! vehicle and the same in both units; what is drawn is each unit's own. The effects `accel_bias`,
+//! `accel_scale` and `gyro_scale` are on the first unit.
 //!
 //! Each rotor is a little out of balance: a force that turns with it, of size `m e W^2`. So every axis sees
 //! `a (W / W0)^2 sin(phase + shift)`, the phase the integral of the rotor's speed, the shift drawn for each rotor and axis. The

@@ -53,6 +53,8 @@ pub struct Truth {
     pub rotor_speed_rad_s: PerRotor<f64>,
     /// How many rotors there are.
     pub rotor_count: usize,
+    /// Power of the rotors over that in hover.
+    pub rotor_load: f64,
     /// How far the wings are spread, left and right, 0 to 1.
     pub deployment: [f64; 2],
     /// Battery terminal voltage, V.
@@ -75,6 +77,7 @@ impl Truth {
             specific_force: In::new(Vector3::z() * -GRAVITY_M_S2),
             rotor_speed_rad_s: [0.0; MAX_ROTORS],
             rotor_count: 0,
+            rotor_load: 0.0,
             deployment: [0.0; 2],
             voltage_v: 0.0,
             current_a: 0.0,
@@ -133,15 +136,18 @@ impl Sensors {
         let p = &self.parameters;
         let time_s = time_us as f64 * 1e-6;
         let force_bias = self.effects.specific_force_bias(time_s).vector;
-        let heading_bias =
-            Rotation::<Ned, Ned, f64>::from_euler(0.0, 0.0, self.effects.heading_bias_rad(time_s));
+        let heading_bias_rad = self.effects.heading_bias_rad(time_s, truth.rotor_load);
+        let heading_bias = Rotation::<Ned, Ned, f64>::from_euler(0.0, 0.0, heading_bias_rad);
         let mut frame = SensorFrame::empty(time_us);
         let mut moved = [truth.omega.vector, truth.specific_force.vector];
         if let Some(vibration) = &mut self.vibration {
             let [rate, force] = vibration.shake(&p.imu, time_us, truth);
             moved = [moved[0] + rate, moved[1] + force];
         }
-        frame.imu = self.imu.poll(&p.imu, time_us, moved, force_bias);
+        let scales =
+            [self.effects.gyro_scale(), self.effects.accel_scale()].map(|s| s.vector.add_scalar(1.0));
+        let scaled = [moved[0].component_mul(&scales[0]), moved[1].component_mul(&scales[1])];
+        frame.imu = self.imu.poll(&p.imu, time_us, scaled, force_bias);
         if let Some(unit) = &mut self.imu_2 {
             frame.imu_2 = unit.poll(&p.imu, time_us, moved, Vector3::zeros());
         }

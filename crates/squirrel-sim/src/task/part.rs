@@ -327,6 +327,7 @@ fn truth(state: &State<f32>) -> Truth {
         rotor_speed_rad_s: state.rotor_speed_rad_s.map(f64::from),
         // Those that are not there stand still.
         rotor_count: state.rotor_speed_rad_s.len(),
+        rotor_load: 0.0,
         deployment: [0.0; 2],
         voltage_v: 0.0,
         current_a: 0.0,

@@ -1,0 +1,24 @@
+//! Scale of the accelerometer: along each axis of the body it reads `f_measured = (1 + s) f`, before its bias.
+
+use super::{Effect, EffectParameter};
+use crate::frames::{Body, In};
+use crate::math::Real;
+use nalgebra::Vector3;
+
+/// Scale errors along the body axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AccelScale<T>(pub(super) [T; 3]);
+
+impl<T: Real> Effect<T> for AccelScale<T> {
+    const NAME: &'static str = "accel_scale";
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("scale_x_fraction", 0.01, 0.06),
+        EffectParameter::signed("scale_y_fraction", 0.01, 0.06),
+        EffectParameter::signed("scale_z_fraction", 0.01, 0.06),
+    ];
+
+    #[inline(always)]
+    fn accel_scale(&self) -> In<Body, T> {
+        In::new(Vector3::from(self.0))
+    }
+}

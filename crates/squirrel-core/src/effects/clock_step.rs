@@ -1,0 +1,20 @@
+//! The clock that stamps commands jumps: from the time `t_s` on, what is stamped is `dt` later (or earlier) than it was.
+//!
+//! See [`CommandClock`] for what a log then says.
+
+use super::{CommandClock, Effect, EffectParameter};
+use crate::math::Real;
+
+/// Size and time of the jump.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockStep<T>(pub(super) [T; 2]);
+
+impl<T: Real> Effect<T> for ClockStep<T> {
+    const NAME: &'static str = "clock_step";
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::signed("step_s", 0.02, 0.2), EffectParameter::size("at_s", 0.3, 600.0)];
+
+    fn command_clock(&self, clock: &mut CommandClock<T>) {
+        [clock.step_s, clock.at_s] = self.0;
+    }
+}

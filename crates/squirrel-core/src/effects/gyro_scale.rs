@@ -1,0 +1,24 @@
+//! Scale of the gyroscope: along each axis of the body it reads `w_measured = (1 + s) w`.
+
+use super::{Effect, EffectParameter};
+use crate::frames::{Body, In};
+use crate::math::Real;
+use nalgebra::Vector3;
+
+/// Scale errors along the body axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GyroScale<T>(pub(super) [T; 3]);
+
+impl<T: Real> Effect<T> for GyroScale<T> {
+    const NAME: &'static str = "gyro_scale";
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("scale_x_fraction", 0.02, 0.1),
+        EffectParameter::signed("scale_y_fraction", 0.02, 0.1),
+        EffectParameter::signed("scale_z_fraction", 0.02, 0.1),
+    ];
+
+    #[inline(always)]
+    fn gyro_scale(&self) -> In<Body, T> {
+        In::new(Vector3::from(self.0))
+    }
+}
