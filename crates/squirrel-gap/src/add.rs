@@ -5,7 +5,7 @@ use crate::verdict::{Kind, NamedEffect, Value, Verdict};
 use squirrel_core::effects::{Effects, Kind as ParameterKind};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::fmt::Write;
-use toml_edit::{DocumentMut, InlineTable, Item, Table, value};
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, value};
 
 /// Why a vehicle file has nothing to take from a verdict, in one line; `None` where the verdict names what the file lacks.
 pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
@@ -79,6 +79,7 @@ fn with(
     let mut document: DocumentMut = vehicle.text.parse().map_err(|e| format!("{}: {e}", vehicle.name))?;
     if let Some(own) = &diagnosis.own {
         own_rotors(&mut document, vehicle, own)?;
+        own_airframe(&mut document, vehicle, own);
     }
     let effects = document.entry("effects").or_insert_with(|| {
         let mut table = Table::new();
@@ -135,10 +136,15 @@ fn with(
     Ok(text)
 }
 
-/// What each rotor of a machine gives in its good flights.
+/// Where each rotor of a machine is in its good flights, and what it gives.
 fn own_rotors(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) -> Result<(), String> {
     let (before, now) = (vehicle.vehicle.rotor_factors(), own.vehicle.vehicle.rotor_factors());
     for rotor in 0..vehicle.vehicle.rotors().len() {
+        let [was, is] = [vehicle, &own.vehicle].map(|file| file.vehicle.rotors()[rotor].position.vector);
+        if was != is {
+            let position = &mut rotor_table(document, vehicle, rotor)?["position_body_m"];
+            replace(position, numbers(is.as_slice()), &own.source());
+        }
         for (key, which) in [("thrust_fraction", 0), ("torque_fraction", 1)] {
             if now[which][rotor] != before[which][rotor] {
                 let number = with_source(now[which][rotor], &own.source());
@@ -147,6 +153,38 @@ fn own_rotors(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) -> R
         }
     }
     Ok(())
+}
+
+/// Inertia and drag of a machine in its good flights.
+fn own_airframe(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) {
+    let [was, is] = [vehicle, &own.vehicle].map(|file| *file.vehicle.parameters());
+    let (inertia, drag) = (is.inertia_kg_m2, is.drag.linear_n_s_per_m);
+    if was.inertia_kg_m2 != inertia {
+        let diagonal = numbers(inertia.diagonal().as_slice());
+        let is_full = nalgebra::Matrix3::from_diagonal(&inertia.diagonal()) != inertia;
+        let rows = || (0..3).map(|row| numbers(&[0, 1, 2].map(|column| inertia[(row, column)]))).collect();
+        let now = if is_full { rows() } else { diagonal };
+        replace(&mut document["mass"]["inertia_kg_m2"], now, &own.source());
+    }
+    if was.drag.linear_n_s_per_m != drag {
+        replace(&mut document["drag"]["linear_n_s_per_m"], numbers(drag.as_slice()), &own.source());
+    }
+}
+
+fn numbers(all: &[f64]) -> Array {
+    all.iter().map(|x| rounded(*x)).collect()
+}
+
+/// Replaces a list of numbers, which keeps its sd.
+fn replace(item: &mut Item, numbers: Array, source: &str) {
+    let sd = item.get("sd").and_then(Item::as_value).cloned();
+    let mut inline = InlineTable::new();
+    inline.insert("value", numbers.into());
+    if let Some(sd) = sd {
+        inline.insert("sd", sd);
+    }
+    inline.insert("source", source.into());
+    *item = value(inline);
 }
 
 /// The effects that act in all good flights of a machine.
