@@ -2,12 +2,11 @@
 //! such flight to the next. What has changed since is what such differences do not explain.
 //!
 //! ```text
-//! theta   the declared numbers of the file, all flights together, wide priors, a few steps of Gauss-Newton
-//! s_g^2 = (nu s0_g^2 + n/(n-1) sum_flights,group (m^2 + v)) / (nu + n k)      m, v: of one flight alone about theta
-//! t_g   = s_g sqrt(1 + 1/n)                                                   the tolerance of another flight
+//! theta   the numbers of the file, all flights together, wide priors, a few damped steps of Gauss-Newton
+//! k       maximises  sum_flights ln Z(flight | numbers off theta by sd k s0) - (ln k)^2 / (2 0.35^2)
+//! t       = k s0 sqrt(1 + 1/n)              the tolerance of another flight, n flights in the baseline
 //! ```
-//! The second line is expectation and maximisation under an inverse-gamma prior: flights that say nothing of a number leave
-//! it at `s0`, half of the smallest size worth reporting. Rotors, and axes, are groups: what scatters on one, scatters on all.
+//! `s0` is half of the smallest size worth reporting, of each effect: one factor is all that a few flights tell of scatter.
 
 use crate::GapError;
 use crate::compatibility::{self, Moments, Ready};
@@ -99,7 +98,7 @@ impl Baseline {
         if good.is_empty() {
             return Err(GapError::Baseline { words: set_aside[0].words.clone() });
         }
-        if set_aside.len() > 0 && good.len() < flights.len() {
+        if !set_aside.is_empty() {
             let mut fewer = Self::fit(vehicle, &good, progress)?;
             fewer.set_aside.splice(..0, set_aside);
             return Ok(fewer);
@@ -213,31 +212,40 @@ fn scatter(
         for (most, own) in out.usual.iter_mut().flatten().zip(usual(&predictor, &left).iter().flatten()) {
             *most = most.max(*own);
         }
-        let effects: Vec<Option<(&'static str, f64)>> =
-            (0..catalogue.columns(&predictor)).map(|column| catalogue.group(column)).collect();
-        alone.push((set, effects));
+        let effects = (0..catalogue.columns(&predictor)).map(|column| catalogue.group(column)).collect();
+        alone.push(Alone { set, effects });
     }
     out.tolerances = among(&alone);
     Ok(out)
 }
 
-/// How much the effects of a flight differ from those of others.
-///
-/// * `alone` - of each flight its fit, and of each column its effect and the smallest size of that
-fn among(alone: &[(Scored, Vec<Option<(&'static str, f64)>>)]) -> BTreeMap<&'static str, f64> {
-    let columns = || alone.iter().flat_map(|(_, effects)| effects.iter().flatten());
-    let evidence = |times: f64| -> f64 {
-        let of = |(set, effects): &(Scored, Vec<Option<(&'static str, f64)>>)| {
-            let usual = effects.iter().zip(&set.prior);
-            let sd: Vec<f64> = usual
-                .map(|(effect, sd)| effect.map_or(*sd, |(_, small)| times * USUAL_SHARE * small))
-                .collect();
-            set.gram.posterior(&sd, BETA).map_or(f64::NEG_INFINITY, |posterior| posterior.log_evidence)
+/// One flight by itself.
+struct Alone {
+    /// Its fit, nothing named.
+    set: Scored,
+    /// Of each column the effect that it changes a number of, and the smallest size of that.
+    effects: Vec<Option<(&'static str, f64)>>,
+}
+
+impl Alone {
+    /// Evidence of the flight if the numbers of flights differ by so many times what is usual.
+    fn evidence(&self, times: f64) -> f64 {
+        let of = |(effect, own): (&Option<(&str, f64)>, &f64)| {
+            effect.map_or(*own, |(_, smallest)| times * USUAL_SHARE * smallest)
         };
-        alone.iter().map(of).sum::<f64>() - 0.5 * (times.ln() / TIMES_SD).powi(2)
+        let sd: Vec<f64> = self.effects.iter().zip(&self.set.prior).map(of).collect();
+        self.set.gram.posterior(&sd, BETA).map_or(f64::NEG_INFINITY, |posterior| posterior.log_evidence)
+    }
+}
+
+/// How much the numbers of a flight differ from those of others, by effect.
+fn among(alone: &[Alone]) -> BTreeMap<&'static str, f64> {
+    let evidence = |times: f64| {
+        alone.iter().map(|flight| flight.evidence(times)).sum::<f64>() - 0.5 * (times.ln() / TIMES_SD).powi(2)
     };
     let best = TIMES.into_iter().max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).unwrap_or(1.0);
     // About their mean, which is not known better.
     let times = best * (1.0 + 1.0 / alone.len() as f64).sqrt();
-    columns().map(|(effect, smallest)| (*effect, times * USUAL_SHARE * smallest)).collect()
+    let effects = alone.iter().flat_map(|flight| flight.effects.iter().flatten());
+    effects.map(|(effect, smallest)| (*effect, times * USUAL_SHARE * smallest)).collect()
 }

@@ -65,6 +65,7 @@ fn verdict(kind: Kind) -> Verdict {
         leftover: Some(left(Vec::new(), None)),
         closed_loop: Vec::new(),
         model_patch: None,
+        baseline: None,
         words: "Words of the verdict. More words.".to_owned(),
         set_aside: Vec::new(),
         notes: Vec::new(),

@@ -8,7 +8,7 @@ use squirrel_core::effects::Effects;
 use squirrel_gap::ClosedLoop;
 use squirrel_gap::report::{
     Answer, Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
-    HeldOutChannel, Horizon, InputCorrelation, PANELS, ParameterRow, ReportData, Whiteness, render,
+    HeldOutChannel, Horizon, InputCorrelation, PANELS, ParameterRow, ReportData, RotorRow, Whiteness, render,
 };
 
 /// The catalogue of effects as the report is meant for: 33 names.
@@ -166,6 +166,7 @@ fn example() -> ReportData {
                   not used to find it, the error of one second of re-simulation falls from 9.3 to 1.07 times the noise \
                   floor; the best other name leaves 2.41."
             .to_owned(),
+        rotors: vec![RotorRow { rotor: 3, loss: 0.221, low: 0.175, high: 0.269, usual: 0.01 }],
         domain: vec![
             row("speed", 0.0, 9.2, "m/s"),
             row("height", 0.18, 10.9, "m"),
@@ -421,4 +422,10 @@ fn the_data_serialises_with_null_for_what_is_unknown() {
     data.parameters[0].high = f64::NAN;
     let json = serde_json::to_string(&data).unwrap();
     assert!(json.contains("\"high\":null") && json.contains("\"band_99\":0.0526"));
+}
+
+#[test]
+fn each_rotor_has_a_line_against_good_flights() {
+    let page = render(&example());
+    assert!(page.contains("22.1 % of its thrust lost, 17.5 to 26.9 %; 1"), "the line of rotor 3");
 }

@@ -224,7 +224,7 @@ impl Catalogue {
     pub(crate) fn slack(&self, timing_s: f64, thrust_fraction: f64) -> Slack {
         let drag_n_s_per_m = self.tolerance_of("extra_drag_n_s_per_m");
         let (lever_m, usual) = (self.tolerance_of("cg_x_m"), self.usual);
-        Slack { lever_m, timing_s, thrust_fraction, drag_n_s_per_m, usual }
+        Slack { lever_m, drag_n_s_per_m, thrust_fraction, timing_s, usual }
     }
 
     fn add(

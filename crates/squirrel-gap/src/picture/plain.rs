@@ -8,7 +8,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Name in the catalogue, what it is, and what it says where its number is above and below that of the vehicle file. `@`
 /// stands for a rotor, an axis or a side.
-const WORDS: [(&str, &str, &str, &str); 29] = [
+const WORDS: [(&str, &str, &str, &str); 33] = [
     (
         "linear_drag",
         "drag that grows with speed",
@@ -86,6 +86,25 @@ const WORDS: [(&str, &str, &str, &str); 29] = [
         "clock of the commands",
         "The clock of commands runs fast",
         "The clock of commands runs slow",
+    ),
+    (
+        "clock_step",
+        "jump of the commands' clock",
+        "The clock of commands jumps forwards",
+        "The clock of commands jumps back",
+    ),
+    ("gyro_scale", "gyroscope scale", "The gyroscope reads too much", "The gyroscope reads too little"),
+    (
+        "accel_scale",
+        "accelerometer scale",
+        "The accelerometer reads too much",
+        "The accelerometer reads too little",
+    ),
+    (
+        "compass_current",
+        "heading that follows the motors' current",
+        "The heading follows the motors' current",
+        "The heading follows the motors' current",
     ),
     ("payload_swing", "swinging load", "A load swings below", "A lighter load swings below"),
 ];
