@@ -225,7 +225,8 @@ impl<T: Real> Vehicle<T> {
         };
         [over(&own.thrust, &alike.thrust), over(&own.yaw, &alike.yaw)]
     }
-    /// The vehicle with rotors that give more or less than the propulsion numbers say.
+    /// The vehicle with rotors that give more or less than the propulsion numbers say. What is cast from it, as flight code is,
+    /// takes its rotors for alike.
     ///
     /// * `thrust`, `torque` - over what each rotor had
     ///
@@ -336,7 +337,7 @@ impl<T: Real> Vehicle<T> {
                 None => None,
             },
         };
-        let alike = Vehicle::new(Parameters {
+        Vehicle::new(Parameters {
             mass_kg: to(p.mass_kg),
             inertia_kg_m2: p.inertia_kg_m2.map(to),
             rotors: p
@@ -356,12 +357,7 @@ impl<T: Real> Vehicle<T> {
                 thrust_max_n: to(p.limits.thrust_max_n),
                 rotor_thrust_max_n: p.limits.rotor_thrust_max_n.map(to),
             },
-        })?;
-        let factors = self.rotor_factors();
-        if factors.iter().flatten().all(|factor| *factor == T::one()) {
-            return Ok(alike);
-        }
-        alike.with_rotor_factors(factors.map(|of| of.map(to)))
+        })
     }
 }
 
