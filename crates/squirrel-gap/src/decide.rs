@@ -123,7 +123,8 @@ pub(crate) fn decide(
         let evidence_nats = single.map_or(0.0, |(_, nats)| nats);
         alternatives.push(Alternative { effects: vec!["battery_sag"], evidence_nats, numbers: Vec::new() });
     }
-    let left = Left::of(leftover);
+    // Of what lasts nothing is said beyond the names.
+    let left = (!leftover.bands.is_empty()).then(|| Left::of(leftover));
     let goes_with = if leftover.is_real() {
         Some(leftover.goes_with().unwrap_or_else(|| leftover.channels()))
     } else {
@@ -150,7 +151,7 @@ pub(crate) fn decide(
         goes_with,
         fly_next,
         gap,
-        leftover: Some(left),
+        leftover: left,
         closed_loop: Vec::new(),
         model_patch: None,
         baseline: search

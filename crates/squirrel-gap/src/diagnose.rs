@@ -89,13 +89,17 @@ pub fn diagnose(
 /// * arguments as of [`diagnose`]
 ///
 /// # Errors
-/// As [`diagnose`].
+/// As [`diagnose`]; a flight that is one of the baseline.
 pub fn diagnose_since(
     baseline: &Baseline,
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, GapError> {
+    let is_good = |(name, _): &&(String, FlightLog)| baseline.flights.contains(name);
+    if let Some((flight, _)) = flights.iter().chain(held_out).find(is_good) {
+        return Err(GapError::SameName { flight: flight.clone() });
+    }
     diagnose_against(&baseline.declared, Some(baseline), flights, held_out, progress)
 }
 

@@ -203,7 +203,7 @@ pub struct Verdict {
     pub fly_next: Option<String>,
     /// On held-out flights, if there are any.
     pub gap: Option<Gap>,
-    /// What the names leave; none where nothing was looked for.
+    /// What the names leave; none where nothing was looked for, or only what lasts.
     pub leftover: Option<Left>,
     /// Held-out flights of our own flight code, flown again; empty until somebody does, and for those of other autopilots.
     pub closed_loop: Vec<ClosedLoop>,

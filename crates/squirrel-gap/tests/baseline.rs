@@ -115,3 +115,28 @@ fn what_the_file_has_wrong_has_not_changed() {
     assert_eq!(found.verdict.effects.len(), 1, "{}", found.verdict.words);
     assert!((loss - 0.12).abs() < 0.015, "{loss}");
 }
+
+#[test]
+fn a_good_flight_is_no_flight_to_judge() {
+    let file = VehicleFile::squirrel();
+    let good = vec![fly_rich(&file, 1)];
+    let own = Baseline::fit(&file, &good, &|_| ()).unwrap();
+    let error = diagnose_since(&own, &good, &[], &|_| ()).unwrap_err();
+    assert_eq!(error.to_string(), "flight 1: two flights have this name");
+}
+
+/// A baseline that contradicts itself is one error with what is wrong, and a bad flight beside good ones is left out.
+#[test]
+fn bad_good_flights_are_said() {
+    let file = VehicleFile::squirrel();
+    let (name, mut log) = fly_rich(&file, 1);
+    for value in &mut log.sources.get_mut("imu").unwrap().channels.get_mut("omega_body_rad_s").unwrap().values
+    {
+        *value = value.to_degrees();
+    }
+    let bad = (name, log);
+    let error = Baseline::fit(&file, std::slice::from_ref(&bad), &|_| ()).unwrap_err().to_string();
+    assert!(error.starts_with("baseline: no flight is left: flight 1: imu.omega_body_rad_s"), "{error}");
+    let own = Baseline::fit(&file, &[bad, fly_rich(&file, 2)], &|_| ()).unwrap();
+    assert_eq!((own.flights.len(), own.set_aside.len()), (1, 1));
+}

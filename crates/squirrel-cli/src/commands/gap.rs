@@ -156,9 +156,16 @@ impl Given {
 
     fn find(&self) -> Result<(), String> {
         self.check(&[FIND.as_ref()])?;
-        let (vehicle, flights, held_out) = self.read()?;
-        let logs = [flights, held_out].concat();
-        let finding = squirrel_gap::find(&vehicle, &logs).map_err(|e| e.to_string())?;
+        let (declared, flights, held_out) = self.read()?;
+        let all = [flights, held_out].concat();
+        let own = match &self.baseline[..] {
+            [] => None,
+            good => Some(
+                squirrel_gap::Baseline::fit(&declared, &logs(good)?, &|_| ()).map_err(|e| e.to_string())?,
+            ),
+        };
+        let vehicle = own.as_ref().map_or(&declared, |own| &own.vehicle);
+        let finding = squirrel_gap::find(vehicle, &all).map_err(|e| e.to_string())?;
         let triple = |x: &[f64; 3]| x.map(|v| format!("{v:.4e}")).join("  ");
         say(&format!("residual force, body x y z:   {}  N rms", triple(&finding.residual.force_body_rms_n)));
         say(&format!(

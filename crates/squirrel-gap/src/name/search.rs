@@ -249,7 +249,7 @@ impl Search<'_> {
         let mut sets: Vec<(f64, Vec<Member>)> = Vec::new();
         for chosen in 0_u32..1 << weak.len() {
             let count = chosen.count_ones() as usize;
-            if !(2..=MEMBERS_MAX.min(weak.len() - 1)).contains(&count) {
+            if !(2..=MEMBERS_MAX.min(weak.len().saturating_sub(1))).contains(&count) {
                 continue;
             }
             let own = || weak.iter().enumerate().filter(|(i, _)| chosen >> i & 1 == 1).map(|(_, c)| *c);

@@ -107,7 +107,11 @@ fn largest_gain(channels: &[HeldOutChannel], mass_kg: f64) -> Option<String> {
 
 pub(super) fn remains(verdict: &Verdict) -> Answer {
     let Some(left) = &verdict.leftover else {
-        return said("Not known", vec!["Nothing was looked for in these logs.".to_owned()]);
+        let why = match verdict.verdict {
+            Kind::DataProblem => "Nothing was looked for in these logs.",
+            _ => "What lasts of forces was looked at; these logs say too little of quick ones.",
+        };
+        return said("Not known", vec![why.to_owned()]);
     };
     let mut lines = Vec::new();
     let held_out = verdict.gap.as_ref().filter(|gap| gap.after > ABOVE_NOISE && !verdict.effects.is_empty());

@@ -327,7 +327,7 @@ class Verdict:
     gap : Gap or None
         On held-out flights.
     leftover : Left or None
-        What the names leave; None where nothing was looked for.
+        What the names leave; None where nothing was looked for, or only what lasts.
     closed_loop : tuple of ClosedLoop
     model_patch : str or None
         Path of the vehicle file with the effects, where one was written.
