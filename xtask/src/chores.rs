@@ -69,9 +69,11 @@ pub(crate) fn bench(arguments: &[String]) -> Result<(), String> {
     call(command.arg("--").args(arguments))
 }
 
-/// `cargo xtask batch-gate`.
+/// `cargo xtask batch-gate`: of the whole workspace, as [`bench`].
 pub(crate) fn batch_gate(_: &[String]) -> Result<(), String> {
-    call(cargo()?.args(["run", "--release", "--locked", "-p", "squirrel-sim", "--example", "batch_gate"]))
+    let example = "batch_gate";
+    call(cargo()?.args(["build", "--release", "--locked", "--workspace", "--example", example]))?;
+    call(&mut Command::new(target_directory()?.join("release").join("examples").join(example)))
 }
 
 /// `cargo xtask pictures`: what the README shows, as the program flies it now.

@@ -37,17 +37,15 @@ fn whole(settings: Settings) -> Made {
     Ok(batch)
 }
 
-/// Million vehicle-steps a second, the best of rounds in turn: what disturbs a shared machine only ever takes time away.
+/// Million vehicle-steps a second, the best of rounds in turn: what disturbs a shared machine only ever takes time away. Each
+/// round has batches of its own, since where their memory lies may halve the speed of one.
 fn speeds(make: fn(Settings) -> Made) -> Result<Vec<f64>, Box<dyn Error>> {
-    let mut batches = Vec::new();
-    for path in Path::available() {
-        let mut batch = make(Settings { dt_s: 1e-3, scheme: Scheme::Rk4, threads: 1, path })?;
-        batch.command(&[0.5; 4 * VEHICLES])?;
-        batches.push(batch);
-    }
-    let mut best = vec![0.0_f64; batches.len()];
+    let paths = Path::available();
+    let mut best = vec![0.0_f64; paths.len()];
     for _ in 0..ROUNDS {
-        for (best, batch) in best.iter_mut().zip(&mut batches) {
+        for (best, path) in best.iter_mut().zip(paths.iter().copied()) {
+            let mut batch = make(Settings { dt_s: 1e-3, scheme: Scheme::Rk4, threads: 1, path })?;
+            batch.command(&[0.5; 4 * VEHICLES])?;
             let start = Instant::now();
             for _ in 0..CALLS {
                 batch.step(STEPS);

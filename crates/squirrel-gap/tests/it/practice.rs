@@ -1,10 +1,8 @@
 //! The practice cases: flights of another simulator, each with something hidden in it.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{imported, shared, vehicle};
 use squirrel_gap::find::{CHANNELS, find};
-use support::{imported, shared, vehicle};
 
 /// The channel in which each effect shows most, for effects that the cases hide.
 fn channel_of(effect: &str) -> Option<&'static str> {

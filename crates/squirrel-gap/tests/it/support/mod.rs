@@ -1,5 +1,4 @@
 //! Flights and vehicles for the tests of the gap workflow.
-#![allow(dead_code, reason = "each test binary uses its part")]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use std::path::{Path, PathBuf};

@@ -2,12 +2,10 @@
 //! is known.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{fly_rich, imported, shared, vehicle};
 use squirrel_gap::{Baseline, Diagnosis, Kind, Value, add, diagnose, diagnose_since};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{fly_rich, imported, shared, vehicle};
 
 type Flights = Vec<(String, FlightLog)>;
 

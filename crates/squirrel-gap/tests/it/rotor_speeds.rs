@@ -1,15 +1,13 @@
 //! Flights with measured rotor speeds: thrust is judged by the speeds that the rotors had, whatever they were told.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{vehicle, vehicle_with};
 use squirrel_gap::{Finding, Kind, Value, diagnose, find};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{vehicle, vehicle_with};
 
 type Flights = Vec<(String, FlightLog)>;
 

@@ -1,12 +1,10 @@
 //! Sensors and clocks that err are named as such, and not as the physics that they look like.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::fly_rich;
 use squirrel_gap::{Kind, Value, Verdict, diagnose};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::fly_rich;
 
 /// Two flights of a squirrel with an effect, against its file without. The attitude is measured from outside: one that a
 /// filter has made from the same gyroscope has its errors, too.

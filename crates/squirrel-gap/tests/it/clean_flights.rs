@@ -1,15 +1,13 @@
 //! Flights without a mistake in their maps: nothing is set aside.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{imported, shared, vehicle, vehicle_with};
 use hidden_effects::case::{Case, Set};
 use hidden_effects::catalogue::{CATALOGUE, CLASS_MASS_KG, HiddenEffect, Value};
 use hidden_effects::draw::Draw;
 use squirrel_gap::check;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{imported, shared, vehicle, vehicle_with};
 
 /// A part of a flight.
 fn window(log: &FlightLog, from_s: f64, until_s: f64) -> FlightLog {

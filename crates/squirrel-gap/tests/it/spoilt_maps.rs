@@ -1,13 +1,11 @@
 //! Import maps with one mistake: it is named with the channel and with what to change.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{hold, imported, shared, step, vehicle, vehicles};
 use squirrel_gap::check;
 use squirrel_sim::import::{ImportMap, import};
 use squirrel_sim::log::FlightLog;
 use std::path::Path;
-use support::{hold, imported, shared, step, vehicle, vehicles};
 
 const OMEGA: &str = "imu.omega_body_rad_s";
 const FORCE: &str = "imu.specific_force_body_m_s2";

@@ -2,15 +2,13 @@
 //! one what was changed.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::vehicle_with;
 use squirrel_gap::{Finding, find};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::vehicle_with;
 
 fn fly(vehicle: &VehicleFile, scenario: &str, arm: Arm) -> FlightLog {
     let scenario = Scenario::find(scenario).unwrap();

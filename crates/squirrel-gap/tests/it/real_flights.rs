@@ -3,12 +3,10 @@
 //! The logs stay outside of the repository; without them the tests say so and pass.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{imported, shared, vehicle};
 use squirrel_gap::{Diagnosis, Kind, Verdict, add, diagnose, find};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{imported, shared, vehicle};
 
 type Flights = Vec<(String, FlightLog)>;
 

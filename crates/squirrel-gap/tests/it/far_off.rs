@@ -1,14 +1,12 @@
 //! A vehicle file that is nothing like what flew: the search looks at no vehicle that cannot be, and gives an answer.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
+use crate::support::vehicle_with;
 use squirrel_gap::{Kind, diagnose};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::vehicle_with;
 
 /// Ten times the inertia, and no better known: what is linear at it asks for one below zero.
 #[test]

@@ -2,15 +2,13 @@
 //! names that are not to be had.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{fly_rich, vehicle_with};
 use hidden_effects::case::{Case, Set};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_gap::{Diagnosis, Kind, add, diagnose};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
-use support::{fly_rich, vehicle_with};
 
 fn logs(folder: &Path) -> Vec<(String, FlightLog)> {
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();

@@ -2,8 +2,7 @@
 //! that, with the channel, and never the name of an effect. Commands that are late as a link can be late are an effect.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{hold, imported, shared, step, vehicle, vehicle_with};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_gap::{Kind, Verdict, diagnose};
 use squirrel_sim::arm::Arm;
@@ -12,7 +11,6 @@ use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{hold, imported, shared, step, vehicle, vehicle_with};
 
 type Flights = Vec<(String, FlightLog)>;
 

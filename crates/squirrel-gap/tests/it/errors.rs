@@ -1,12 +1,10 @@
 //! Logs that lack something, or hold what cannot be: an error names flight, channel and value, a note what was taken instead.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{vehicle, vehicle_with};
 use squirrel_gap::{Finding, GapError, find};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{vehicle, vehicle_with};
 
 const SAGGING: (&str, &str) = ("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]");
 
@@ -254,8 +252,8 @@ fn a_vehicle_that_the_plant_cannot_step_is_refused() {
 /// Other vehicles and scales: a flight of a Crazyflie without attitude, velocity, height and battery, each of which is said.
 #[test]
 fn a_log_of_motors_and_imu_alone_is_enough() {
-    let Some(folder) = support::shared("flights/arpl-motorlag") else { return };
-    let log = support::imported("arpl.toml", &folder.join("log10.csv"));
+    let Some(folder) = crate::support::shared("flights/arpl-motorlag") else { return };
+    let log = crate::support::imported("arpl.toml", &folder.join("log10.csv"));
     let finding = run(&vehicle("crazyflie21_brushed.toml"), &log).unwrap();
     println!("{:?}\n{:?}\n{:?}", finding.residual, finding.notes, finding.places[0]);
     assert_eq!(finding.notes.len(), 4);

@@ -1,11 +1,9 @@
 //! A name must hold on flights that it was not fitted to.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod support;
-
+use crate::support::{fly_rich, vehicle_with};
 use squirrel_gap::{Kind, diagnose};
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{fly_rich, vehicle_with};
 
 /// Two flights of a vehicle with an effect, and one of a vehicle without it, which the file describes well.
 #[test]

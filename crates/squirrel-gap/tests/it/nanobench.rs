@@ -1,12 +1,10 @@
 //! Measured flights of a Crazyflie: the residual against an independent computation with NumPy.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{imported, shared, vehicle, vehicle_with};
 use squirrel_gap::{diagnose, find};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use support::{imported, shared, vehicle, vehicle_with};
 
 /// A Python with NumPy: `SQUIRREL_PYTHON`, or else `python3`, or else an environment of its own under `target`.
 fn python() -> PathBuf {

@@ -2,8 +2,7 @@
 //! same flights with their IMU name.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{vehicle, vehicle_with};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -15,7 +14,6 @@ use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::{vehicle, vehicle_with};
 
 type Flights = Vec<(String, FlightLog)>;
 

@@ -1,13 +1,11 @@
 //! The same logs explained for a vehicle of an eighth or eight times the mass: no size of the workflow is one of 0.5 kg.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::fly_rich;
 use squirrel_core::effects::Scale;
 use squirrel_gap::{Kind, Value, Verdict, diagnose};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-use support::fly_rich;
 use toml_edit::{DocumentMut, Item, Table};
 
 /// Fields that carry mass: with all of them times a factor, and lengths and times as they are, a vehicle flies the same.

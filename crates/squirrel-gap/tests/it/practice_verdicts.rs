@@ -3,13 +3,11 @@
 //! The cases are flights of another simulator and stay outside of the repository; without them the test says so and passes.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-mod support;
-
+use crate::support::{imported, shared, vehicle};
 use serde_json::Value as Json;
 use squirrel_gap::{Kind, NamedEffect, Value, Verdict, diagnose};
 use std::collections::BTreeSet;
 use std::path::Path;
-use support::{imported, shared, vehicle};
 
 /// Largest error of a parameter.
 const ERROR_MAX: f64 = 0.1;

@@ -1,0 +1,26 @@
+//! The tests of the gap workflow. One binary: what they share is compiled and linked once.
+
+mod support;
+
+mod baseline;
+mod clean_flights;
+mod data_problems;
+mod errors;
+mod far_off;
+mod file_with_effects;
+mod first_screen;
+mod held_out;
+mod long_flights;
+mod nanobench;
+mod no_imu;
+mod practice;
+mod practice_verdicts;
+mod real_flights;
+mod real_models;
+mod report;
+mod report_case;
+mod rotor_speeds;
+mod scale;
+mod sensors;
+mod simulated;
+mod spoilt_maps;
