@@ -22,6 +22,8 @@ pub(super) const WEAK_ROTOR: &str = "weak_rotor";
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
 /// What a clock that jumps must be worth: by chance something changes at one of the hundreds of times at which it may.
 const JUMP_NATS: f64 = 40.0;
+/// What a scale of the accelerometer must be worth: an attitude that leans into accelerations makes one, too.
+const LEANS_NATS: f64 = 12.0;
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
 const TOLERANCES_MIN: f64 = 3.0;
 /// Part of its smallest size that a number without a sign has at least.
@@ -179,6 +181,7 @@ impl Search<'_> {
     fn needed(&self, member: &Member) -> f64 {
         match self.gust_m_s {
             _ if self.effect(member) == "clock_step" => JUMP_NATS,
+            None if self.effect(member) == "accel_scale" => LEANS_NATS,
             None => NATS_MIN,
             Some(sigma) if BLOWN.contains(&self.effect(member)) => BLOWN_NATS * (sigma * sigma).max(1.0),
             Some(_) => BESIDE_GUSTS_NATS,
