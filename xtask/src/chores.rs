@@ -69,7 +69,7 @@ pub(crate) fn bench(arguments: &[String]) -> Result<(), String> {
     call(command.arg("--").args(arguments))
 }
 
-/// `cargo xtask batch-gate`: of the whole workspace, as [`bench`].
+/// `cargo xtask batch-gate`: of the whole workspace, as [`bench()`].
 pub(crate) fn batch_gate(_: &[String]) -> Result<(), String> {
     let example = "batch_gate";
     call(cargo()?.args(["build", "--release", "--locked", "--workspace", "--example", example]))?;
