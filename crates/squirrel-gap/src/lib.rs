@@ -31,7 +31,7 @@ pub use add::{add, add_effect, difference, nothing_to_add};
 pub use baseline::Baseline;
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use compatibility::check;
-pub use diagnose::{Covered, Diagnosis, diagnose, diagnose_since};
+pub use diagnose::{Covered, Diagnosis, diagnose, diagnose_since, diagnose_with};
 pub use error::GapError;
 pub use find::{Finding, find};
 pub use picture::{first_screen, picture};

@@ -78,13 +78,8 @@ fn diagnose(
     stop: &Stop,
 ) -> PyResult<(squirrel_gap::Verdict, Option<VehicleFile>)> {
     let tick = |_: &str| stop.check();
-    let diagnosis = if baseline.is_empty() {
-        squirrel_gap::diagnose(vehicle, flights, held_out, &tick)
-    } else {
-        squirrel_gap::Baseline::fit(vehicle, baseline, &tick)
-            .and_then(|own| squirrel_gap::diagnose_since(&own, flights, held_out, &tick))
-    };
-    let mut diagnosis = diagnosis.map_err(value)?;
+    let mut diagnosis =
+        squirrel_gap::diagnose_with(vehicle, baseline, flights, held_out, &tick).map_err(value)?;
     let looked_at = |logs: &Logs| -> Vec<(String, log::FlightLog)> {
         logs.iter().filter(|(name, _)| diagnosis.verdict.has_looked_at(name)).cloned().collect()
     };

@@ -134,18 +134,13 @@ impl Given {
 
     fn diagnose(&self) -> Result<Found, String> {
         let (vehicle, flights, held_out) = self.read()?;
+        let good = logs(&self.baseline)?;
         let bar = output::spinner();
         let tell = |what: &str| {
             bar.set_message(what.to_owned());
             bar.inc(1);
         };
-        let diagnosis = if self.baseline.is_empty() {
-            squirrel_gap::diagnose(&vehicle, &flights, &held_out, &tell)
-        } else {
-            let good = logs(&self.baseline)?;
-            squirrel_gap::Baseline::fit(&vehicle, &good, &tell)
-                .and_then(|own| squirrel_gap::diagnose_since(&own, &flights, &held_out, &tell))
-        };
+        let diagnosis = squirrel_gap::diagnose_with(&vehicle, &good, &flights, &held_out, &tell);
         bar.finish_and_clear();
         let diagnosis = diagnosis.map_err(|e| e.to_string())?;
         let looked_at = |flight: &(String, FlightLog)| diagnosis.verdict.has_looked_at(&flight.0);

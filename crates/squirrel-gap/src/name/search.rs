@@ -78,8 +78,7 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn run(&self) -> Result<Found, GapError> {
-        let mut point =
-            Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] };
+        let mut point = self.nothing();
         let mut linear = self.linear(&point, None)?;
         let mut round = 1;
         loop {
@@ -113,10 +112,20 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn afloat(&self) -> Result<(Point, Scored), GapError> {
-        let base = vec![0.0; self.catalogue.columns(self.predictor)];
-        let linear = self.linear(&Point { members: Vec::new(), base }, None)?;
-        let set = self.score(&linear, &[])?;
+        let (_, set) = self.about_nothing()?;
         Ok((self.whole(&set), set))
+    }
+
+    /// The predictor linearised about the vehicle file, and what it says if nothing has a name.
+    fn about_nothing(&self) -> Result<(Linear, Scored), GapError> {
+        let linear = self.linear(&self.nothing(), None)?;
+        let set = self.score(&linear, &[])?;
+        Ok((linear, set))
+    }
+
+    /// The vehicle file as it is.
+    fn nothing(&self) -> Point {
+        Point { members: Vec::new(), base: vec![0.0; self.catalogue.columns(self.predictor)] }
     }
 
     /// As [`Self::afloat`], no farther than the simulator's own model follows.
@@ -124,9 +133,8 @@ impl Search<'_> {
     /// # Errors
     /// What the predictor says.
     pub(crate) fn towards(&self) -> Result<Point, GapError> {
-        let base = vec![0.0; self.catalogue.columns(self.predictor)];
-        let linear = self.linear(&Point { members: Vec::new(), base }, None)?;
-        let whole = self.whole(&self.score(&linear, &[])?);
+        let (linear, set) = self.about_nothing()?;
+        let whole = self.whole(&set);
         let cost = |point: &Point| -> Result<f64, GapError> {
             let rows = self.predictor.residual(&self.hypothesis(point)?)?;
             let white = linear.whitener.apply(&self.predictor.segments, &rows);
