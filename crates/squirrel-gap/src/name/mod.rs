@@ -16,6 +16,7 @@ mod payload;
 mod point;
 mod refine;
 mod rivals;
+mod rotors;
 mod search;
 mod step;
 mod tolerance;

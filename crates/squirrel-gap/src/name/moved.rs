@@ -1,12 +1,9 @@
 //! What floats beside the named effects and moved with them: numbers of effects hold together with these alone.
 
-use super::evidence::BETA;
-use super::parameters::Parameter;
 use super::point::Airframe;
 use super::refine::Scored;
-use super::search::{ACTS, Search, WEAK_ROTOR};
-use crate::decide::INTERVAL;
-use crate::verdict::{Moved, RotorHealth, Value};
+use super::search::{ACTS, Search};
+use crate::verdict::Moved;
 use squirrel_core::effects::{Effects, Kind};
 
 impl Search<'_> {
@@ -29,27 +26,6 @@ impl Search<'_> {
             .collect();
         all.sort_by(|a, b| b.far().total_cmp(&a.far()));
         all
-    }
-
-    /// How each rotor is against what the vehicle file has, if every one may be off; none where the flights do not show it.
-    pub(crate) fn rotors(&self, null: &Scored) -> Vec<RotorHealth> {
-        let catalogue = self.catalogue;
-        let effect = |p: &Parameter| catalogue.candidates[p.candidate].effect;
-        let own: Vec<usize> = (0..catalogue.parameters.len())
-            .filter(|c| effect(&catalogue.parameters[*c]) == WEAK_ROTOR)
-            .collect();
-        let mut prior = null.prior.clone();
-        for column in &own {
-            prior[*column] = catalogue.parameters[*column].slab;
-        }
-        let Some(posterior) = null.gram.posterior(&prior, BETA) else { return Vec::new() };
-        let health = |(i, column): (usize, usize)| {
-            let (value, sd) = (posterior.mean[column], posterior.variance(column).sqrt());
-            let (low, high) = (value - INTERVAL * sd, value + INTERVAL * sd);
-            let usual = catalogue.parameters[column].tolerance;
-            RotorHealth { rotor: i + 1, thrust_loss_fraction: Value::Number { value, low, high }, usual }
-        };
-        own.into_iter().enumerate().map(health).collect()
     }
 
     /// The name of a number that floats: `weak_rotor[2].thrust_loss_fraction`, `rotor[0].position_body_m[1]`.

@@ -12,7 +12,7 @@ use std::rc::Rc;
 /// What an effect must be worth to be named, nats.
 pub(crate) const NATS_MIN: f64 = 6.0;
 /// What each further effect must be worth: a wrong first number leaves a little to explain.
-const FURTHER_NATS: f64 = 10.0;
+pub(super) const FURTHER_NATS: f64 = 10.0;
 /// What an effect must be worth beside gusts, which blow harder at times than at others; and per squared m/s of their
 /// deviation, if it acts through moving air, as gusts on average do.
 const BESIDE_GUSTS_NATS: f64 = 12.0;
@@ -42,7 +42,7 @@ const GIVEN_UP_NATS: f64 = 30.0;
 /// Part of its tolerance by which a number must be off to act in the simulator's own model.
 pub(super) const ACTS: f64 = 0.7;
 /// Most effects in a set.
-const MEMBERS_MAX: usize = 4;
+pub(super) const MEMBERS_MAX: usize = 4;
 /// Most times that the predictor is linearised anew.
 const ROUNDS_MAX: usize = 4;
 
@@ -226,7 +226,7 @@ impl Search<'_> {
     }
 
     /// Adds effects as long as the evidence asks for them.
-    fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
+    pub(super) fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
         while best.members.len() < MEMBERS_MAX {
             let Some(next) = self.best_addition(linear, best, &[], f64::NEG_INFINITY)? else { break };
             let kept = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
@@ -239,61 +239,6 @@ impl Search<'_> {
             self.choose_forms(linear, best)?;
         }
         Ok(())
-    }
-
-    /// Tries two and more weak rotors at once: one after the other, each alone is less than what looks like all of them. What
-    /// they were better than, if it was a set.
-    fn several_rotors(&self, linear: &Linear, best: &mut Scored) -> Result<Option<Vec<Member>>, GapError> {
-        if !self.catalogue.is_of_one_machine {
-            return Ok(None);
-        }
-        let weak: Vec<usize> = (0..self.catalogue.candidates.len())
-            .filter(|c| self.catalogue.candidates[*c].effect == WEAK_ROTOR)
-            .collect();
-        let none = self.score(linear, &[])?;
-        // What happened to the rotors is one thing: how many of them are weak says the evidence.
-        let needs = |members: &[Member]| -> f64 {
-            let others = members.iter().filter(|m| self.effect(m) != WEAK_ROTOR).count();
-            let things = others + usize::from(others < members.len());
-            NATS_MIN + FURTHER_NATS * (things.max(1) - 1) as f64
-        };
-        let mut sets: Vec<(f64, Vec<Member>)> = Vec::new();
-        for chosen in 0_u32..1 << weak.len() {
-            let count = chosen.count_ones() as usize;
-            if !(2..=MEMBERS_MAX.min(weak.len().saturating_sub(1))).contains(&count) {
-                continue;
-            }
-            let own = || weak.iter().enumerate().filter(|(i, _)| chosen >> i & 1 == 1).map(|(_, c)| *c);
-            let mut prior = none.prior.clone();
-            let parameters = || own().flat_map(|c| &self.catalogue.candidates[c].parameters);
-            for p in parameters() {
-                prior[*p] = self.catalogue.parameters[*p].slab;
-            }
-            let Some(posterior) = none.gram.posterior(&prior, BETA) else { continue };
-            let members: Vec<Member> = own()
-                .map(|candidate| {
-                    let mut member = self.catalogue.absent(self.predictor, candidate);
-                    for p in &self.catalogue.candidates[candidate].parameters {
-                        let parameter = &self.catalogue.parameters[*p];
-                        let own = member.values[parameter.slot];
-                        member.values[parameter.slot] += parameter.bounded(own, posterior.mean[*p]);
-                    }
-                    member
-                })
-                .collect();
-            sets.push((posterior.log_evidence - needs(&members), members));
-        }
-        sets.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let Some((_, members)) = sets.into_iter().next() else { return Ok(None) };
-        let scored = self.score(linear, &members)?;
-        (self.progress)();
-        let better = scored.log_evidence - needs(&scored.members) > best.log_evidence - needs(&best.members);
-        if !(better && self.is_off(&scored)) {
-            return Ok(None);
-        }
-        let beaten = std::mem::replace(best, scored).members;
-        self.extend(linear, best)?;
-        Ok((!beaten.is_empty()).then_some(beaten))
     }
 
     /// The best set with one more effect.

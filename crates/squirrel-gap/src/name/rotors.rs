@@ -1,0 +1,93 @@
+//! Weak rotors: several at once as one explanation, and how each is whatever has a name.
+
+use super::evidence::BETA;
+use super::linear::Linear;
+use super::parameters::Parameter;
+use super::point::Member;
+use super::refine::Scored;
+use super::search::{FURTHER_NATS, MEMBERS_MAX, NATS_MIN, Search, WEAK_ROTOR};
+use crate::GapError;
+use crate::decide::INTERVAL;
+use crate::verdict::{RotorHealth, Value};
+
+impl Search<'_> {
+    /// Tries two and more weak rotors at once: one after the other, each alone is less than what looks like all of them. What
+    /// they were better than, if it was a set.
+    pub(super) fn several_rotors(
+        &self,
+        linear: &Linear,
+        best: &mut Scored,
+    ) -> Result<Option<Vec<Member>>, GapError> {
+        if !self.catalogue.is_of_one_machine {
+            return Ok(None);
+        }
+        let weak: Vec<usize> = (0..self.catalogue.candidates.len())
+            .filter(|c| self.catalogue.candidates[*c].effect == WEAK_ROTOR)
+            .collect();
+        let none = self.score(linear, &[])?;
+        // What happened to the rotors is one thing: how many of them are weak says the evidence.
+        let needs = |members: &[Member]| -> f64 {
+            let others = members.iter().filter(|m| self.effect(m) != WEAK_ROTOR).count();
+            let things = others + usize::from(others < members.len());
+            NATS_MIN + FURTHER_NATS * (things.max(1) - 1) as f64
+        };
+        let mut sets: Vec<(f64, Vec<Member>)> = Vec::new();
+        for chosen in 0_u32..1 << weak.len() {
+            let count = chosen.count_ones() as usize;
+            if !(2..=MEMBERS_MAX.min(weak.len().saturating_sub(1))).contains(&count) {
+                continue;
+            }
+            let own = || weak.iter().enumerate().filter(|(i, _)| chosen >> i & 1 == 1).map(|(_, c)| *c);
+            let mut prior = none.prior.clone();
+            let parameters = || own().flat_map(|c| &self.catalogue.candidates[c].parameters);
+            for p in parameters() {
+                prior[*p] = self.catalogue.parameters[*p].slab;
+            }
+            let Some(posterior) = none.gram.posterior(&prior, BETA) else { continue };
+            let members: Vec<Member> = own()
+                .map(|candidate| {
+                    let mut member = self.catalogue.absent(self.predictor, candidate);
+                    for p in &self.catalogue.candidates[candidate].parameters {
+                        let parameter = &self.catalogue.parameters[*p];
+                        let own = member.values[parameter.slot];
+                        member.values[parameter.slot] += parameter.bounded(own, posterior.mean[*p]);
+                    }
+                    member
+                })
+                .collect();
+            sets.push((posterior.log_evidence - needs(&members), members));
+        }
+        sets.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let Some((_, members)) = sets.into_iter().next() else { return Ok(None) };
+        let scored = self.score(linear, &members)?;
+        (self.progress)();
+        let better = scored.log_evidence - needs(&scored.members) > best.log_evidence - needs(&best.members);
+        if !(better && self.is_off(&scored)) {
+            return Ok(None);
+        }
+        let beaten = std::mem::replace(best, scored).members;
+        self.extend(linear, best)?;
+        Ok((!beaten.is_empty()).then_some(beaten))
+    }
+
+    /// How each rotor is against what the vehicle file has, if every one may be off; none where the flights do not show it.
+    pub(crate) fn rotors(&self, null: &Scored) -> Vec<RotorHealth> {
+        let catalogue = self.catalogue;
+        let effect = |p: &Parameter| catalogue.candidates[p.candidate].effect;
+        let own: Vec<usize> = (0..catalogue.parameters.len())
+            .filter(|c| effect(&catalogue.parameters[*c]) == WEAK_ROTOR)
+            .collect();
+        let mut prior = null.prior.clone();
+        for column in &own {
+            prior[*column] = catalogue.parameters[*column].slab;
+        }
+        let Some(posterior) = null.gram.posterior(&prior, BETA) else { return Vec::new() };
+        let health = |(i, column): (usize, usize)| {
+            let (value, sd) = (posterior.mean[column], posterior.variance(column).sqrt());
+            let (low, high) = (value - INTERVAL * sd, value + INTERVAL * sd);
+            let usual = catalogue.parameters[column].tolerance;
+            RotorHealth { rotor: i + 1, thrust_loss_fraction: Value::Number { value, low, high }, usual }
+        };
+        own.into_iter().enumerate().map(health).collect()
+    }
+}
