@@ -54,9 +54,6 @@ def model_key(name: str) -> str | None:
         (r"weak_rotor\[(\d+)\]", lambda m: f"weak_{int(m[1]) - 1}"),
         (r"inertia_error\[([xyz])\]", lambda m: f"inertia_{AXIS[m[1]]}"),
         (r"wing_asymmetry\[(left|right)\]", lambda m: f"wing_loss_{AXIS[m[1]]}"),
-        (r"rotor\[(\d+)\]\.position_body_m\[([01])\]", lambda m: f"arm_{m[1]}_{m[2]}"),
-        (r"rotor\[(\d+)\]\.torque_fraction", lambda m: f"torque_{m[1]}"),
-        (r"drag\.linear_n_s_per_m\[([012])\]", lambda m: f"drag_{m[1]}"),
     )
     for pattern, key in patterns:
         if match := re.match(pattern, name):
@@ -64,34 +61,29 @@ def model_key(name: str) -> str | None:
     return None
 
 
-def patch_of(verdict: dict) -> dict[str, float]:
-    """The named effects as sizes of physics.py; those that it does not have are left out."""
+def sizes_of(effects: dict[str, dict]) -> dict[str, float]:
+    """Effects of a vehicle file as sizes of physics.py; those that it does not have are left out."""
     sizes: dict[str, float] = {}
-    for effect in verdict["effects"]:
-        name, given = effect["name"], effect["parameters"]
-
-        def value(key: str, given: dict = given) -> float:
-            return given[key]["value"]
-
+    for name, given in effects.items():
         if name == "ground_effect":
-            sizes["ground_radius2"] = value("effective_radius_m") ** 2
+            sizes["ground_radius2"] = given["effective_radius_m"] ** 2
         elif name == "payload_swing":
-            sizes[f"payload_{value('length_m'):.4f}"] = value("mass_kg")
+            sizes[f"payload_{given['length_m']:.4f}"] = given["mass_kg"]
         elif name == "clock_skew":
-            sizes["skew"] = 1e-6 * value("skew_ppm")
+            sizes["skew"] = 1e-6 * given["skew_ppm"]
         else:
-            which = next((str(v["value"]) for k, v in given.items() if k in ("rotor", "axis", "side")), None)
+            which = next((str(given[key]) for key in ("rotor", "axis", "side") if key in given), None)
             for key, number in given.items():
                 place = f"{name}[{which}].{key}" if which is not None else f"{name}.{key}"
-                if (model := model_key(place)) and isinstance(number["value"], int | float):
-                    sizes[model] = float(number["value"])
+                if (model := model_key(place)) and isinstance(number, int | float):
+                    sizes[model] = float(number)
     return sizes
 
 
-def moved_of(verdict: dict) -> dict[str, float]:
-    """Numbers inside their tolerance that moved with the named effects."""
-    pairs = ((model_key(moved["name"]), moved["value"]) for moved in verdict.get("moved", []))
-    return {key: value for key, value in pairs if key}
+def named_of(verdict: dict) -> dict[str, float]:
+    """The named effects alone."""
+    values = ({key: number["value"] for key, number in effect["parameters"].items()} for effect in verdict["effects"])
+    return sizes_of(dict(zip((effect["name"] for effect in verdict["effects"]), values, strict=True)))
 
 
 def run(squirrel: Path, arguments: list[str]) -> float:

@@ -41,7 +41,8 @@ pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
 /// # Errors
 /// One line: the text is not TOML, or the patched file would not be a vehicle.
 pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
-    with(vehicle, diagnosis, &diagnosis.verdict.effects, flights)
+    let own = diagnosis.now.as_ref().filter(|_| diagnosis.before.is_none());
+    with(vehicle, diagnosis, own.or(diagnosis.before.as_ref()), &diagnosis.verdict.effects, flights)
 }
 
 /// As [`add`], of the explanations that flights do not tell apart the first with an effect: the answer, then its alternatives.
@@ -67,17 +68,18 @@ pub fn add_effect(
             vehicle.name
         ));
     };
-    with(vehicle, diagnosis, chosen, flights)
+    with(vehicle, diagnosis, diagnosis.before.as_ref(), chosen, flights)
 }
 
 fn with(
     vehicle: &VehicleFile,
     diagnosis: &Diagnosis,
+    own: Option<&Own>,
     chosen: &[NamedEffect],
     flights: &[String],
 ) -> Result<String, String> {
     let mut document: DocumentMut = vehicle.text.parse().map_err(|e| format!("{}: {e}", vehicle.name))?;
-    if let Some(own) = &diagnosis.own {
+    if let Some(own) = own {
         own_rotors(&mut document, vehicle, own)?;
         own_airframe(&mut document, vehicle, own);
     }
@@ -90,7 +92,7 @@ fn with(
     let Some(effects) = effects.as_table_mut() else {
         return Err(format!("{}: effects: must be a table", vehicle.name));
     };
-    if let Some(own) = &diagnosis.own {
+    if let Some(own) = own {
         own_effects(effects, own);
     }
     let source = format!("gap: {}", flights.join(", "));
@@ -136,18 +138,18 @@ fn with(
     Ok(text)
 }
 
-/// Where each rotor of a machine is in its good flights, and what it gives.
+/// Where each rotor of a machine is as flights have it, and what it gives.
 fn own_rotors(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) -> Result<(), String> {
     let (before, now) = (vehicle.vehicle.rotor_factors(), own.vehicle.vehicle.rotor_factors());
     for rotor in 0..vehicle.vehicle.rotors().len() {
         let [was, is] = [vehicle, &own.vehicle].map(|file| file.vehicle.rotors()[rotor].position.vector);
         if was != is {
             let position = &mut rotor_table(document, vehicle, rotor)?["position_body_m"];
-            replace(position, numbers(is.as_slice()), &own.source());
+            replace(position, numbers(is.as_slice()), &own.source);
         }
         for (key, which) in [("thrust_fraction", 0), ("torque_fraction", 1)] {
             if now[which][rotor] != before[which][rotor] {
-                let number = with_source(now[which][rotor], &own.source());
+                let number = with_source(now[which][rotor], &own.source);
                 rotor_table(document, vehicle, rotor)?.insert(key, number);
             }
         }
@@ -155,19 +157,22 @@ fn own_rotors(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) -> R
     Ok(())
 }
 
-/// Inertia and drag of a machine in its good flights.
+/// Mass, inertia and drag of a machine as flights have it.
 fn own_airframe(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) {
     let [was, is] = [vehicle, &own.vehicle].map(|file| *file.vehicle.parameters());
     let (inertia, drag) = (is.inertia_kg_m2, is.drag.linear_n_s_per_m);
+    if was.mass_kg != is.mass_kg {
+        replace(&mut document["mass"]["mass_kg"], rounded(is.mass_kg), &own.source);
+    }
     if was.inertia_kg_m2 != inertia {
         let diagonal = numbers(inertia.diagonal().as_slice());
         let is_full = nalgebra::Matrix3::from_diagonal(&inertia.diagonal()) != inertia;
         let rows = || (0..3).map(|row| numbers(&[0, 1, 2].map(|column| inertia[(row, column)]))).collect();
         let now = if is_full { rows() } else { diagonal };
-        replace(&mut document["mass"]["inertia_kg_m2"], now, &own.source());
+        replace(&mut document["mass"]["inertia_kg_m2"], now, &own.source);
     }
     if was.drag.linear_n_s_per_m != drag {
-        replace(&mut document["drag"]["linear_n_s_per_m"], numbers(drag.as_slice()), &own.source());
+        replace(&mut document["drag"]["linear_n_s_per_m"], numbers(drag.as_slice()), &own.source);
     }
 }
 
@@ -175,11 +180,11 @@ fn numbers(all: &[f64]) -> Array {
     all.iter().map(|x| rounded(*x)).collect()
 }
 
-/// Replaces a list of numbers, which keeps its sd.
-fn replace(item: &mut Item, numbers: Array, source: &str) {
+/// Replaces a number or a list of them, which keeps its sd.
+fn replace(item: &mut Item, number: impl Into<toml_edit::Value>, source: &str) {
     let sd = item.get("sd").and_then(Item::as_value).cloned();
     let mut inline = InlineTable::new();
-    inline.insert("value", numbers.into());
+    inline.insert("value", number.into());
     if let Some(sd) = sd {
         inline.insert("sd", sd);
     }
@@ -187,7 +192,7 @@ fn replace(item: &mut Item, numbers: Array, source: &str) {
     *item = value(inline);
 }
 
-/// The effects that act in all good flights of a machine.
+/// The effects that act in all flights of a machine.
 fn own_effects(effects: &mut Table, own: &Own) {
     let mut fitted = own.vehicle.effects;
     for name in Effects::<f64>::NAMES {
@@ -198,7 +203,7 @@ fn own_effects(effects: &mut Table, own: &Own) {
                 && let Some(table) =
                     effects.entry(name).or_insert_with(|| Item::Table(Table::new())).as_table_mut()
             {
-                table.insert(parameter.key, with_source(*number, &own.source()));
+                table.insert(parameter.key, with_source(*number, &own.source));
             }
         }
     }

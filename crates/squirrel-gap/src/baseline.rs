@@ -10,40 +10,22 @@
 
 use crate::GapError;
 use crate::compatibility::{self, Moments, Ready};
+use crate::fitted;
 use crate::leftover::{Usual, usual};
 use crate::name::{BETA, Catalogue, Scored, Search, hypothesis};
 use crate::predictor::Predictor;
 use crate::verdict::SetAside;
-use squirrel_core::effects::{EffectParameter, Effects};
-use squirrel_core::vehicle::{ParameterError, Vehicle};
+use squirrel_core::effects::Effects;
+use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 
-/// Effects that are no numbers of a vehicle: of its sensors and clocks, of the day, of what it carries; what has no slope at
-/// nothing; and what is either on one side or on the other.
-const NOT_FITTED: [&str; 14] = [
-    "accel_bias",
-    "accel_scale",
-    "clock_skew",
-    "clock_step",
-    "compass_current",
-    "constant_wind",
-    "gnss_latency",
-    "ground_effect",
-    "gust",
-    "gyro_scale",
-    "heading_bias",
-    "mass_error",
-    "payload_swing",
-    "wing_asymmetry",
-];
+/// Effects that a baseline does not tell beside those: what it weighs is known better, and which side gives less is not a matter
+/// of degree.
+const NOT_FITTED: [&str; 2] = ["mass_error", "wing_asymmetry"];
 /// Steps of Gauss-Newton, each about what the last has found.
 const STEPS: usize = 4;
-/// Largest principal moment of a body over the sum of the others.
-const LARGEST_MOMENT: f64 = 0.999;
-/// Part of the smallest size worth reporting below which an effect of a machine is none.
-const NEXT_TO_NOTHING: f64 = 0.1;
 /// Part of the smallest size worth reporting by which a number differs from one flight to the next, where nothing is known.
 const USUAL_SHARE: f64 = 0.5;
 /// How many times that it may be, and how sure that it is about once, as the deviation of its logarithm.
@@ -109,7 +91,7 @@ impl Baseline {
             (own.vehicle, own.effects) = step(&own, moments, &good)?;
         }
         progress("fitting the baseline");
-        own.effects = worth_a_line(&own);
+        own.effects = fitted::worth_a_line(&own);
         let scatter = scatter(&own, moments, &good)?;
         let flights = good.into_iter().map(|(name, _)| name).collect();
         Ok(Self { declared: vehicle.clone(), vehicle: own, flights, set_aside, moments, scatter })
@@ -129,53 +111,11 @@ fn step(
         }
     }
     let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &|| () };
-    let mut point = search.towards()?;
-    // What the sensors of these flights did is not the vehicle's.
-    for (x, parameter) in point.base.iter_mut().zip(&catalogue.parameters) {
-        if !is_fitted(catalogue.candidates[parameter.candidate].effect) {
-            *x = 0.0;
-        }
-    }
-    point.base[catalogue.shared_columns()..].fill(0.0);
-    let at = hypothesis(&predictor, &catalogue, &point)?;
-    let possible = possible(&at.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
-    Ok((possible, at.effects))
-}
-
-/// A vehicle whose numbers a file may have: a drag of less than nothing and an inertia of no body are hypotheses at best.
-fn possible(fitted: &Vehicle<f64>) -> Result<Vehicle<f64>, ParameterError> {
-    let mut p = *fitted.parameters();
-    p.drag.linear_n_s_per_m = p.drag.linear_n_s_per_m.map(|x| x.max(0.0));
-    let moments = p.inertia_kg_m2.diagonal();
-    let largest = moments.imax();
-    let others = moments.sum() - moments[largest];
-    if moments[largest] > others {
-        p.inertia_kg_m2[(largest, largest)] = LARGEST_MOMENT * others;
-    }
-    Vehicle::new(p)?.with_rotor_factors(fitted.rotor_factors())
-}
-
-/// The effects of a machine without what is next to nothing, unless its file has it.
-fn worth_a_line(own: &VehicleFile) -> Effects<f64> {
-    let mut kept = Effects::none();
-    for name in Effects::<f64>::NAMES {
-        let mut all = own.effects;
-        let Some(found) = all.has(name).then(|| all.insert(name)).flatten() else { continue };
-        let is_worth = |(p, value): (&EffectParameter, &f64)| {
-            p.range(&own.vehicle).is_some_and(|range| value.abs() >= NEXT_TO_NOTHING * range.smallest)
-        };
-        let declared = own.provenance.iter().any(|(field, _)| field.starts_with(&format!("effects.{name}.")));
-        if (declared || found.parameters.iter().zip(found.values.iter()).any(is_worth))
-            && let Some(place) = kept.insert(name)
-        {
-            place.values.copy_from_slice(found.values);
-        }
-    }
-    kept
+    fitted::machine(&search, search.towards()?, is_fitted)
 }
 
 fn is_fitted(effect: &str) -> bool {
-    !NOT_FITTED.contains(&effect)
+    !NOT_FITTED.contains(&effect) && !fitted::NOT_ITS_OWN.contains(&effect)
 }
 
 /// Flights, and what may be off in them.

@@ -5,8 +5,9 @@ use crate::baseline::Baseline;
 use crate::compatibility::{self, Moments, Ready};
 use crate::decide::{alternatives, close, decide, shared};
 use crate::find;
+use crate::fitted;
 use crate::name::{
-    Catalogue, NATS_MIN, Search, clock_step_s, explain, only, payload_lengths_m, sds, silent_tolerances,
+    Catalogue, NATS_MIN, Search, clock_step_s, explain_flights, only, payload_lengths_m, sds, silent_tolerances,
     standing,
 };
 use crate::picture;
@@ -24,24 +25,20 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// What the flights covered: name, low, high, unit.
     pub domain: Vec<Covered>,
-    /// The machine as its good flights have it, and these, where flights are compared with them.
-    pub(crate) own: Option<Own>,
+    /// The vehicle with its numbers where good flights of the machine have them, if flights are compared with such.
+    pub(crate) before: Option<Own>,
+    /// The same where these flights have them.
+    pub(crate) now: Option<Own>,
     /// For the report.
     pub(crate) details: Option<Details>,
 }
 
-/// A machine as its good flights have it.
+/// A machine as flights have it.
 #[derive(Debug)]
 pub(crate) struct Own {
     pub(crate) vehicle: VehicleFile,
-    flights: Vec<String>,
-}
-
-impl Own {
     /// Where its numbers come from, as vehicle files say it.
-    pub(crate) fn source(&self) -> String {
-        format!("gap, baseline: {}", self.flights.join(", "))
-    }
+    pub(crate) source: String,
 }
 
 /// A range of flight conditions that the flights covered, 2nd to 98th percentile.
@@ -140,7 +137,8 @@ fn diagnose_against<'a>(
         if let Some(since) = &mut verdict.baseline {
             since.flights.clone_from(&baseline.flights);
         }
-        diagnosis.own = Some(Own { vehicle: baseline.vehicle.clone(), flights: baseline.flights.clone() });
+        let source = format!("gap, baseline: {}", baseline.flights.join(", "));
+        diagnosis.before = Some(Own { vehicle: baseline.vehicle.clone(), source });
     }
     Ok(diagnosis)
 }
@@ -186,7 +184,7 @@ fn sorted<'a>(
             set_aside: aside,
             notes: ready.predictor.notes.clone(),
         };
-        return Ok(Diagnosis { verdict, domain: covered(&ready.predictor), own: None, details: None });
+        return Ok(Diagnosis { verdict, domain: covered(&ready.predictor), before: None, now: None, details: None });
     }
     if !aside.is_empty() {
         return without(aside);
@@ -238,9 +236,10 @@ fn judged(
         catalogue.take(&baseline.scatter);
     }
     let tick = || progress("naming");
+    let naming = explain_flights(&predictor, &mut catalogue, &tick)?;
     let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
     let wanted = |naming: &_| hold(unseen.as_ref(), &search, naming);
-    let mut naming = standing(&search, explain(&search)?, wanted)?;
+    let mut naming = standing(&search, naming, wanted)?;
     let rivals = search.rivals(&naming.found)?;
     progress("flying the held-out flights");
     let proven = |naming: &_, rivals: &[_]| -> Result<_, GapError> {
@@ -262,6 +261,9 @@ fn judged(
         naming = only(&search, &naming, &kept)?;
         (proof, numbers) = proven(&naming, &[])?;
     }
+    let names: Vec<&str> = flights.iter().map(|(name, _)| name.as_str()).collect();
+    let source = format!("gap, inside its tolerance: {}", names.join(", "));
+    let now = Own { vehicle: fitted::of(&search, &naming.found.best)?, source };
     let verdict = decide(&search, &naming, &rivals, &close, numbers, places, open, curve_hides_sag);
     let details = Details {
         evidence: search.single_evidence(&naming.found),
@@ -269,7 +271,7 @@ fn judged(
         seen: picture::seen(&search, &naming, &rivals)?,
         held_out: proof,
     };
-    Ok(Diagnosis { verdict, domain, own: None, details: Some(details) })
+    Ok(Diagnosis { verdict, domain, before: None, now: Some(now), details: Some(details) })
 }
 
 /// Whether the thrust curve of the vehicle file, moved by its sd, changes the vertical force more than the smallest sag

@@ -16,6 +16,7 @@ mod decide;
 mod diagnose;
 mod error;
 pub mod find;
+mod fitted;
 mod flight;
 mod leftover;
 mod name;

@@ -6,6 +6,7 @@
 //!    each of its published forms ([`forms`]).
 //! 3. What is left is held against what noise leaves ([`crate::leftover`]); intervals come from blocks ([`interval`]).
 
+mod day;
 mod evidence;
 mod forms;
 mod interval;
@@ -22,6 +23,7 @@ mod step;
 mod tolerance;
 mod whiten;
 
+pub(crate) use day::explain_flights;
 pub(crate) use evidence::BETA;
 pub(crate) use linear::settle_flights;
 pub(crate) use parameters::Catalogue;
@@ -63,7 +65,7 @@ pub(crate) struct Naming {
 ///
 /// # Errors
 /// What the predictor says.
-pub(crate) fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
+fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
     let naming = judge(search, search.run()?)?;
     if !naming.leftover.is_real() {
         return Ok(naming);

@@ -1,0 +1,96 @@
+//! The vehicle file with its own numbers where flights have them: what floated inside its tolerance, as a point of the search
+//! has it.
+
+use crate::GapError;
+use crate::name::{Point, Scored, Search, hypothesis};
+use squirrel_core::effects::{EffectParameter, Effects};
+use squirrel_core::vehicle::{ParameterError, Vehicle};
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// Largest principal moment of a body over the sum of the others.
+const LARGEST_MOMENT: f64 = 0.999;
+/// Part of the smallest size worth reporting below which an effect of a machine is none.
+const NEXT_TO_NOTHING: f64 = 0.1;
+
+/// Effects of sensors, of clocks and of the day, which are no numbers of a vehicle, and what has no slope at nothing.
+pub(crate) const NOT_ITS_OWN: [&str; 12] = [
+    "accel_bias",
+    "accel_scale",
+    "clock_skew",
+    "clock_step",
+    "compass_current",
+    "constant_wind",
+    "gnss_latency",
+    "ground_effect",
+    "gust",
+    "gyro_scale",
+    "heading_bias",
+    "payload_swing",
+];
+
+/// The vehicle file as an explanation has it, beside what is named.
+///
+/// # Errors
+/// Numbers that no vehicle has.
+pub(crate) fn of(search: &Search<'_>, set: &Scored) -> Result<VehicleFile, GapError> {
+    let mut own = search.predictor.vehicle.clone();
+    let point = Point { members: Vec::new(), ..search.whole(set) };
+    (own.vehicle, own.effects) = machine(search, point, |effect| !NOT_ITS_OWN.contains(&effect))?;
+    own.effects = worth_a_line(&own);
+    Ok(own)
+}
+
+/// The vehicle and its effects at a point, without what the sensors of these flights did.
+///
+/// * `is_its_own` - whether an effect changes a number of the vehicle
+///
+/// # Errors
+/// Numbers that no vehicle has.
+pub(crate) fn machine(
+    search: &Search<'_>,
+    mut point: Point,
+    is_its_own: impl Fn(&str) -> bool,
+) -> Result<(Vehicle<f64>, Effects<f64>), GapError> {
+    let (predictor, catalogue) = (search.predictor, search.catalogue);
+    for (x, parameter) in point.base.iter_mut().zip(&catalogue.parameters) {
+        if !is_its_own(catalogue.candidates[parameter.candidate].effect) {
+            *x = 0.0;
+        }
+    }
+    point.base[catalogue.shared_columns()..].fill(0.0);
+    let at = hypothesis(predictor, catalogue, &point)?;
+    let possible = possible(&at.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
+    Ok((possible, at.effects))
+}
+
+/// A vehicle whose numbers a file may have: a drag of less than nothing and an inertia of no body are hypotheses at best.
+fn possible(fitted: &Vehicle<f64>) -> Result<Vehicle<f64>, ParameterError> {
+    let mut p = *fitted.parameters();
+    p.drag.linear_n_s_per_m = p.drag.linear_n_s_per_m.map(|x| x.max(0.0));
+    let moments = p.inertia_kg_m2.diagonal();
+    let largest = moments.imax();
+    let others = moments.sum() - moments[largest];
+    if moments[largest] > others {
+        p.inertia_kg_m2[(largest, largest)] = LARGEST_MOMENT * others;
+    }
+    Vehicle::new(p)?.with_rotor_factors(fitted.rotor_factors())
+}
+
+/// The effects of a machine without what is next to nothing, unless its file has it.
+pub(crate) fn worth_a_line(own: &VehicleFile) -> Effects<f64> {
+    let mut kept = Effects::none();
+    for name in Effects::<f64>::NAMES {
+        let mut all = own.effects;
+        let Some(found) = all.has(name).then(|| all.insert(name)).flatten() else { continue };
+        let is_worth = |(p, value): (&EffectParameter, &f64)| {
+            p.range(&own.vehicle).is_some_and(|range| value.abs() >= NEXT_TO_NOTHING * range.smallest)
+        };
+        let declared = own.provenance.iter().any(|(field, _)| field.starts_with(&format!("effects.{name}.")));
+        if (declared || found.parameters.iter().zip(found.values.iter()).any(is_worth))
+            && let Some(place) = kept.insert(name)
+        {
+            place.values.copy_from_slice(found.values);
+        }
+    }
+    kept
+}
