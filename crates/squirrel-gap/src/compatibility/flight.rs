@@ -48,6 +48,13 @@ impl<'p> Flight<'p> {
         &self.predictor.vehicle.vehicle
     }
 
+    /// By how much the effects of the vehicle file make rotors late, s: lag and latency beside those of its propulsion.
+    pub(super) fn stated_delay_s(&self) -> f64 {
+        let effects = &self.predictor.vehicle.effects;
+        let [up, down] = effects.rotor_extra_time_constant_s();
+        up.max(down) + effects.command_latency_s()
+    }
+
     pub(super) fn tracks(&self) -> impl Iterator<Item = &'p Track> + '_ {
         self.pieces.iter().map(|piece| &self.predictor.tracks[*piece])
     }

@@ -16,10 +16,14 @@ const APART_HZ: f64 = 0.03;
 /// Lines to look at.
 const LINES: usize = 3;
 
-/// Lengths, m, of loads that swing at the strongest lines of the horizontal force, the strongest first.
+/// Lengths, m, of loads that swing at the strongest lines of the horizontal force, the strongest first; of a vehicle file that
+/// has a load, its length alone.
 ///
 /// * `rows` - residual of the vehicle as it is
 pub(crate) fn payload_lengths_m(predictor: &Predictor, rows: &[f64]) -> Vec<f64> {
+    if let Some(stated) = predictor.vehicle.effects.pendulum() {
+        return vec![stated.length_m];
+    }
     let count = ((BAND_HZ.1 - BAND_HZ.0) / STEP_HZ) as usize;
     let frequency_hz = |i: usize| BAND_HZ.0 + i as f64 * STEP_HZ;
     let mut power = vec![0.0; count];

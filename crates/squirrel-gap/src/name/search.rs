@@ -368,7 +368,12 @@ impl Search<'_> {
             for p in &candidate.parameters {
                 let parameter = &self.catalogue.parameters[*p];
                 let value = &mut member.values[parameter.slot];
+                let own = *value;
                 *value += posterior.mean[offset + p];
+                // Less than a file has may be as little as nothing; what it has not is not there by less than nothing.
+                if !parameter.signed && own > 0.0 {
+                    *value = value.max(LEAST * parameter.smallest);
+                }
                 plausible &= parameter.signed || *value > 0.0;
                 let (least, most) = parameter.bounds;
                 *value = value.clamp(
@@ -380,9 +385,11 @@ impl Search<'_> {
                     *value = value.max(parameter.smallest);
                 }
             }
-            if plausible {
-                all.push((posterior.log_evidence, member));
+            if !plausible {
+                continue;
             }
+            all.extend(self.without_delay(&member).map(|other| (posterior.log_evidence, other)));
+            all.push((posterior.log_evidence, member));
         }
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         // Of the several lines of a payload, the best two.
@@ -392,6 +399,18 @@ impl Search<'_> {
             self.effect(m) != "payload_swing" || payloads <= 2
         });
         all
+    }
+
+    /// A lag or delay of the vehicle file started from nothing: far off, what is quick has no slope that leads there.
+    fn without_delay(&self, member: &Member) -> Option<Member> {
+        let stated = self.catalogue.absent(self.predictor, member.candidate);
+        let own = self.catalogue.own(member).next()?;
+        let is_stated = stated.values[own.slot] >= own.smallest;
+        (self.catalogue.bends(member.candidate) && is_stated).then(|| {
+            let mut other = stated;
+            other.values[own.slot] = LEAST * own.smallest;
+            other
+        })
     }
 
     pub(crate) fn effect(&self, member: &Member) -> &'static str {
