@@ -1,7 +1,7 @@
 //! What a leftover may go with: families of features of the flight, and how well each predicts it where it was not fitted.
 
 use crate::predictor::{Motion, Predictor, Track};
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
 /// Parts of all flights, each left out once.
 const FOLDS: usize = 8;
@@ -177,6 +177,24 @@ pub(super) fn place_share(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
         total += force.norm_squared();
     }
     if total > 0.0 { (1.0 - error / total).clamp(0.0, 1.0) } else { 0.0 }
+}
+
+/// Part of the power of a horizontal force along the axis on which most of it lies, of the body or of the world, 0.5 to 1.
+///
+/// * `force` - body x and y, a number a moment
+pub(super) fn one_way(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
+    let (mut body, mut world) = (Matrix2::zeros(), Matrix2::zeros());
+    for (moment, (x, y)) in moments.iter().zip(force[0].iter().zip(force[1])) {
+        let own = Vector2::new(*x, *y);
+        let turned = moment.ned_from_body * Vector3::new(*x, *y, 0.0);
+        body += own * own.transpose();
+        world += turned.xy() * turned.xy().transpose();
+    }
+    let largest = |power: Matrix2<f64>| {
+        let total = power.trace();
+        if total > 0.0 { power.symmetric_eigenvalues().max() / total } else { 0.5 }
+    };
+    largest(body).max(largest(world))
 }
 
 /// Part of the variance of `y` that a family predicts in blocks that were left out, 0 to 1.

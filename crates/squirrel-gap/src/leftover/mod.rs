@@ -10,7 +10,7 @@ pub(crate) mod floor;
 
 use crate::predictor::{CHANNELS, DYNAMIC, Motion, Predictor, Segment};
 pub(crate) use features::{Moment, moment};
-use features::{families, place_share, predicted_share};
+use features::{families, one_way, place_share, predicted_share};
 use nalgebra::Matrix3;
 use squirrel_core::math::GRAVITY_M_S2;
 use std::rc::Rc;
@@ -37,6 +37,8 @@ const SHARE_MIN: f64 = 0.25;
 /// Part of the variance that a family may predict of gusts by chance.
 const GUST_SHARE_MAX: f64 = 0.45;
 const PLACE_SHARE_MAX: f64 = 0.2;
+/// Gusts of 40 s have 0.54 to 0.70 of their power along one axis.
+const ONE_WAY_MAX: f64 = 0.85;
 /// Gusts are about normal; what acts at one place or time comes in bursts.
 const GUST_KURTOSIS_MAX: f64 = 7.0;
 
@@ -66,6 +68,8 @@ pub(crate) struct Leftover {
     pub(crate) families: Vec<(&'static str, f64)>,
     /// Part of the variance of the horizontal force that its place predicts.
     pub(crate) place_share: f64,
+    /// Part of the horizontal force along one axis of the body or of the world, 0.5 to 1: gusts blow along both.
+    pub(crate) one_way: f64,
     /// Fourth moment of the slow part of the horizontal force, in units of its size by noise, over the square of its second: 3
     /// for a normal distribution.
     pub(crate) kurtosis: f64,
@@ -106,6 +110,7 @@ impl Leftover {
     pub(crate) fn is_predicted(&self) -> bool {
         self.families.first().is_some_and(|(_, share)| *share > GUST_SHARE_MAX)
             || self.place_share > PLACE_SHARE_MAX
+            || self.one_way > ONE_WAY_MAX
             || self.kurtosis > GUST_KURTOSIS_MAX
     }
 
@@ -202,6 +207,7 @@ pub(crate) fn leftover(
         excess,
         families: Vec::new(),
         place_share: 0.0,
+        one_way: 0.5,
         kurtosis: 3.0,
         line: None,
         is_everywhere: false,
@@ -215,7 +221,9 @@ pub(crate) fn leftover(
             let sizes = sizes(predictor, gusts, channel);
             means(predictor, left, channel).iter().zip(sizes).map(|(force, size)| force / size).collect()
         });
-        out.place_share = place_share(&moments_of(predictor, motions, 0), [&x, &y]);
+        let horizontal = moments_of(predictor, motions, 0);
+        out.place_share = place_share(&horizontal, [&x, &y]);
+        out.one_way = one_way(&horizontal, [&x, &y]);
         if channel < 2 {
             out.families.push(("position", out.place_share));
         }

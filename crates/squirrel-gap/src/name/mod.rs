@@ -70,11 +70,18 @@ fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
     if !naming.leftover.is_real() {
         return Ok(naming);
     }
-    let Some(sigma) = gust_of(search, &naming)? else { return Ok(naming) };
+    let (least, most) = GUST_M_S;
+    // What is named in calm air takes a part of the gusts, or makes more of them: the first guess may be out by twice.
+    let Some(guess) = gust_of(search, &naming)?.filter(|sigma| (0.5 * least..=2.0 * most).contains(sigma)) else {
+        return Ok(naming);
+    };
+    let sigma = guess.clamp(least, most);
     // Gusts look like drag or wind for a while: what is named beside them must be worth it in their noise.
     let windy = Search { gust_m_s: Some(sigma), ..*search };
     let mut again = judge(&windy, windy.run()?)?;
-    let Some(sigma) = gust_of(&windy, &again)? else { return Ok(naming) };
+    let Some(sigma) = gust_of(&windy, &again)?.filter(|sigma| (least..=most).contains(sigma)) else {
+        return Ok(naming);
+    };
     let calm = blown(search, &again, TURBULENCE_M_S, sigma)?;
     if calm.is_foreign() || calm.is_predicted() {
         return Ok(naming);
@@ -253,7 +260,7 @@ fn blown(search: &Search<'_>, naming: &Naming, sigma: f64, sizes: f64) -> Result
     Ok(leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, Some(&gusts), slack))
 }
 
-/// The deviation of gusts that would make the leftover of the horizontal force, m/s, if it is one of gusts.
+/// The deviation of gusts that would make the leftover of the horizontal force, m/s; `None` where wind makes none.
 fn gust_of(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError> {
     // The floor is noise and wind, squared; two floors tell them apart.
     let assumed = search.gust_m_s.unwrap_or(TURBULENCE_M_S);
@@ -265,7 +272,7 @@ fn gust_of(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError
         unit += (windier.slow_floor.powi(2) - now.slow_floor.powi(2)) / span;
     }
     let sigma = (excess / unit + assumed.powi(2)).max(0.0).sqrt();
-    Ok((GUST_M_S.0..=GUST_M_S.1).contains(&sigma).then_some(sigma))
+    Ok(sigma.is_finite().then_some(sigma))
 }
 
 /// Independent blocks that a flight counts for in the evidence of gusts: they last longer than a block.
