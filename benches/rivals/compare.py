@@ -49,7 +49,7 @@ def squirrel(program: Path, vehicle: Path, train: list[Path], held_out: Path, pi
     if patch and any(line.startswith("form = ") for line in patch.splitlines()):
         # A form that physics.py does not have.
         channels = checked
-    named = ours.named_of(verdict) if patch else {}
+    named = ours.named_of(verdict) if verdict["verdict"].startswith("named") else {}
     alone = errors(pieces, [physics.predict(piece, read_vehicle(vehicle), named) for piece in pieces])
     names = [effect["name"] for effect in verdict["effects"]] if verdict["verdict"] in SURE else []
     said = {"names": names, "claims": len(names), "cpu_s": cpu_s, "verdict": verdict["verdict"], "patch": bool(patch)}

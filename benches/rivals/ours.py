@@ -117,7 +117,7 @@ def solve(squirrel: Path, vehicle: Path, train: list[Path]) -> tuple[dict, str |
     """The verdict, the text of the patched vehicle file where there is one, and processor time, s."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        arguments = ["gap", "run", "--vehicle", str(vehicle), "--out", name, "--json", str(folder / "verdict.json")]
+        arguments = ["gap", "run", "--fit", "--vehicle", str(vehicle), "--out", name, "--json", str(folder / "verdict.json")]
         seconds = run(squirrel, [*arguments, "--flights", *map(str, train)])
         verdict = json.loads((folder / "verdict.json").read_text())
         patch = verdict.get("model_patch")

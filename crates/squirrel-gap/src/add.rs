@@ -41,8 +41,28 @@ pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
 /// # Errors
 /// One line: the text is not TOML, or the patched file would not be a vehicle.
 pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
-    let own = diagnosis.now.as_ref().filter(|_| diagnosis.before.is_none());
-    with(vehicle, diagnosis, own.or(diagnosis.before.as_ref()), &diagnosis.verdict.effects, flights)
+    with(vehicle, diagnosis, own(diagnosis), &diagnosis.verdict.effects, flights)
+}
+
+/// The text of the vehicle file with its own numbers where these flights have them, each inside its tolerance, and with what is
+/// named; without a name where none stands.
+///
+/// # Errors
+/// One line: something is missing that such numbers would take up; or as [`add`].
+pub fn fit(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
+    let verdict = &diagnosis.verdict;
+    match (nothing_to_add(verdict), verdict.verdict) {
+        (Some(why), Kind::OutsideCatalogue | Kind::DataProblem) => {
+            Err(format!("{}: nothing to fit: {why}", vehicle.name))
+        }
+        (Some(_), _) => with(vehicle, diagnosis, own(diagnosis), &[], flights),
+        (None, _) => add(vehicle, diagnosis, flights),
+    }
+}
+
+/// The numbers that a file is handed over with: those of good flights of the machine, or else of these.
+fn own(diagnosis: &Diagnosis) -> Option<&Own> {
+    diagnosis.before.as_ref().or(diagnosis.now.as_ref())
 }
 
 /// As [`add`], of the explanations that flights do not tell apart the first with an effect: the answer, then its alternatives.

@@ -1,6 +1,7 @@
 //! From flights to a verdict: check that the logs agree with themselves, name what is missing, prove it on other flights.
 
 use crate::GapError;
+use crate::add::nothing_to_add;
 use crate::baseline::Baseline;
 use crate::compatibility::{self, Moments, Ready};
 use crate::decide::{alternatives, close, decide, shared};
@@ -261,10 +262,12 @@ fn judged(
         naming = only(&search, &naming, &kept)?;
         (proof, numbers) = proven(&naming, &[])?;
     }
+    let verdict = decide(&search, &naming, &rivals, &close, numbers, places, open, curve_hides_sag);
     let names: Vec<&str> = flights.iter().map(|(name, _)| name.as_str()).collect();
     let source = format!("gap, inside its tolerance: {}", names.join(", "));
-    let now = Own { vehicle: fitted::of(&search, &naming.found.best)?, source };
-    let verdict = decide(&search, &naming, &rivals, &close, numbers, places, open, curve_hides_sag);
+    let stands = nothing_to_add(&verdict).is_none();
+    let set = if stands { &naming.found.best } else { naming.found.null.as_ref() };
+    let now = Own { vehicle: fitted::of(&search, set)?, source };
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.null),

@@ -31,6 +31,10 @@ pub(crate) enum Gap {
         /// Add this effect, of an answer that is a set of them or not sure enough to be added by itself.
         #[arg(long, value_name = "NAME")]
         effect: Option<String>,
+        /// Also where no effect is missing: the vehicle file with its numbers where these flights have them, inside their
+        /// tolerances.
+        #[arg(long, conflicts_with = "effect")]
+        fit: bool,
         /// Print the patch and write nothing.
         #[arg(long)]
         dry_run: bool,
@@ -38,7 +42,14 @@ pub(crate) enum Gap {
     /// What the missing effect is worth on held-out flights, re-simulated.
     Shrink(Given),
     /// All of it, with a report.
-    Run(Given),
+    Run {
+        #[command(flatten)]
+        flights: Given,
+        /// Hand over a vehicle file also where no effect is missing: with its numbers where these flights have them, inside
+        /// their tolerances.
+        #[arg(long)]
+        fit: bool,
+    },
 }
 
 /// What every step is given.
@@ -77,7 +88,12 @@ struct Found {
 
 impl Found {
     /// Text of the vehicle file with the named effects, or why the verdict has none that a file can take.
-    fn patched(&self) -> Result<Result<String, String>, String> {
+    ///
+    /// * `fit` - whether a file with its numbers where these flights have them will do
+    fn patched(&self, fit: bool) -> Result<Result<String, String>, String> {
+        if fit {
+            return Ok(squirrel_gap::fit(&self.vehicle, &self.diagnosis, &self.flights));
+        }
         match squirrel_gap::nothing_to_add(&self.diagnosis.verdict) {
             Some(why) => Ok(Err(format!("{}: nothing to add: {why}", self.vehicle.name))),
             None => squirrel_gap::add(&self.vehicle, &self.diagnosis, &self.flights).map(Ok),
@@ -104,9 +120,9 @@ impl Gap {
         match self {
             Self::Find(flights) => flights.find(),
             Self::Name(flights) => flights.name(),
-            Self::Add { flights, effect, dry_run } => flights.add(effect.as_deref(), *dry_run),
+            Self::Add { flights, effect, fit, dry_run } => flights.add(effect.as_deref(), *fit, *dry_run),
             Self::Shrink(flights) => flights.shrink(),
-            Self::Run(flights) => flights.everything(),
+            Self::Run { flights, fit } => flights.everything(*fit),
         }
     }
 }
@@ -189,7 +205,7 @@ impl Given {
         }
         self.check(&[REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
-        let text = found.patched()?.ok();
+        let text = found.patched(false)?.ok();
         if let Some(text) = &text {
             found.fly_again(text)?;
         }
@@ -198,7 +214,7 @@ impl Given {
         self.write(&found.diagnosis.verdict)
     }
 
-    fn add(&self, effect: Option<&str>, dry_run: bool) -> Result<(), String> {
+    fn add(&self, effect: Option<&str>, fit: bool, dry_run: bool) -> Result<(), String> {
         if dry_run {
             self.check(&[])?;
         } else {
@@ -211,7 +227,7 @@ impl Given {
             Some(effect) => {
                 Ok(squirrel_gap::add_effect(&found.vehicle, &found.diagnosis, effect, &found.flights)?)
             }
-            None => found.patched()?,
+            None => found.patched(fit)?,
         };
         if dry_run {
             if let Ok(text) = &text {
@@ -227,11 +243,11 @@ impl Given {
         text.map(drop)
     }
 
-    fn everything(&self) -> Result<(), String> {
+    fn everything(&self, fit: bool) -> Result<(), String> {
         self.patch_path()?;
         self.check(&[self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
-        let text = found.patched()?;
+        let text = found.patched(fit)?;
         if let Ok(text) = &text {
             found.fly_again(text)?;
         }
@@ -277,7 +293,12 @@ impl Given {
         output::write_file(&path, text.as_bytes())?;
         verdict.model_patch = Some(path.display().to_string());
         let names: Vec<&str> = verdict.effects.iter().map(|effect| effect.name).collect();
-        say(&format!("vehicle with {}: {}", names.join(" and "), path.display()));
+        let what = if squirrel_gap::nothing_to_add(verdict).is_none() {
+            format!("vehicle with {}", names.join(" and "))
+        } else {
+            "vehicle with its numbers as these flights have them".to_owned()
+        };
+        say(&format!("{what}: {}", path.display()));
         Ok(())
     }
 
