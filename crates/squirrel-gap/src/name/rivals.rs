@@ -36,6 +36,7 @@ impl Search<'_> {
                 }
             }
         }
+        all.extend(self.more_rotors(found)?);
         if let Some(beaten) = &found.beaten {
             all.push(self.score(&found.linear, beaten)?);
         }
