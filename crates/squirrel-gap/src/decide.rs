@@ -20,10 +20,10 @@ const FORM_SHARE: f64 = 0.1;
 /// Part of the held-out gap that a name in another form must remove.
 const FORM_REMOVED: f64 = 0.6;
 /// How much more of the held-out gap another name must leave to be worse by that alone, and how much if the evidence is against
-/// it, too, by so many nats.
+/// it, too, by so many nats: twenty to one.
 const RIVAL_GAP: f64 = 3.0;
 const RIVAL_GAP_BEHIND: f64 = 1.5;
-const BEHIND_NATS: f64 = 3.0;
+pub(crate) const BEHIND_NATS: f64 = 3.0;
 /// Part of an error on held-out flights by which another one may be larger and no worse: the floor takes what noise is beyond it.
 const HELD_OUT_NOISE: f64 = 0.05;
 /// More alternatives than this within the evidence of a name are no answer.
@@ -38,11 +38,13 @@ pub(crate) fn close<'a>(
     proof: Option<&HeldOut>,
     gap: Option<&Gap>,
 ) -> Vec<&'a Scored> {
-    let best = naming.found.best.log_evidence;
+    let named = naming.found.best.log_evidence;
+    // A set that was not named may have more evidence than what was: too little for each of its names.
+    let best = rivals.iter().map(|rival| rival.log_evidence).fold(named, f64::max);
     let clearly_worse = |rival: usize| {
         let (Some(proof), Some(gap)) = (proof, gap) else { return false };
         let left = proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
-        let is_behind = rivals[rival].log_evidence < best - BEHIND_NATS;
+        let is_behind = rivals[rival].log_evidence < named - BEHIND_NATS;
         let times = if is_behind { RIVAL_GAP_BEHIND } else { RIVAL_GAP };
         left.is_some_and(|left| left - 1.0 >= times * (gap.after - 1.0).max(HELD_OUT_NOISE))
     };

@@ -290,3 +290,29 @@ fn the_way_a_csv_is_written_does_not_matter() {
         assert_eq!(read(&csv), expected, "{csv:?}");
     }
 }
+
+#[test]
+fn a_file_without_an_optional_channel_is_imported_and_said_to_lack_it() {
+    let with = "t,v,r,y\n0,3.7,0.1,0.2\n1,3.6,0.1,0.2\n";
+    let without = "t,v,r\n0,3.7,0.1\n1,3.6,0.1\n";
+    let flight = Flight::new("optional", &[("with.csv", with), ("without.csv", without)]);
+    let channels = |optional: &str| {
+        one_source(&format!(
+            r#""battery.voltage_v" = {{ columns = ["v"] }}
+"attitude.roll_rad" = {{ columns = ["r"] }}
+"attitude.yaw_rad" = {{ columns = ["y"]{optional} }}"#
+        ))
+    };
+    let (log, report) = flight.import(&channels(", optional = true"), &["with.csv"]).unwrap();
+    assert_eq!(log.channel("attitude.yaw_rad").unwrap().1.values, [0.2, 0.2]);
+    assert!(report.absent.is_empty());
+
+    let (log, report) = flight.import(&channels(", optional = true"), &["without.csv"]).unwrap();
+    assert!(log.channel("attitude.yaw_rad").is_none());
+    assert_eq!(log.channel("attitude.roll_rad").unwrap().1.values, [0.1, 0.1]);
+    let said = report.to_string();
+    assert!(said.ends_with("attitude.yaw_rad: left out, the file has no column `y`\n"), "{said}");
+
+    let error = flight.import(&channels(""), &["without.csv"]).unwrap_err();
+    assert!(flight.message(&error).contains("no column `y`"), "{error}");
+}

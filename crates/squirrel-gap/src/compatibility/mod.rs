@@ -174,7 +174,8 @@ pub(crate) enum Moments {
 /// Leaves out what is not known of some flights: drag without the motion through the air, and moments that have nothing to do
 /// with those of the vehicle file.
 pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments: Moments) {
-    let has_motion = predictor.has_motion();
+    // A heading that is taken as held does for what lasts.
+    let has_motion = predictor.has_motion() && (predictor.has_heading() || moments == Moments::Lasting);
     if !has_motion {
         predictor.leave_out_drag();
         predictor.leave_out_moments();

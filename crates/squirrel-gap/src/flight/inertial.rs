@@ -9,10 +9,13 @@
 //! Where roll and yaw are logged and pitch is not, pitch is where thrust must point for the vehicle to move as it did, which
 //! is what estimators that know no drag believe: `tan(pitch) = a_x / a_z` of `a = v' - g`, along the heading.
 //!
+//! Where yaw is missing, too, the vehicle is taken to have held one heading ([`heading`]), and only what lasts is looked at.
+//!
 //! Rates are the gyroscope's, or differences of the attitude. One corner serves forces and moments of all flights that are
 //! looked at together, the lowest that one of them needs, so that their residuals are alike.
 
 use super::filter::CUTOFF_HZ;
+use super::heading::{self, Held};
 use super::series::{Series, common};
 use super::smoother::{self, Differences};
 use crate::GapError;
@@ -54,6 +57,8 @@ pub(crate) struct Derived {
     pub(crate) rates: Option<Differences>,
     /// What pitch comes from.
     pub(crate) pitch: Option<Differences>,
+    /// The heading that stands in for yaw.
+    pub(crate) heading: Option<Held>,
     /// The accelerometer was turned into the world by an estimate that used it.
     pub(crate) turned: bool,
     /// What the noise of attitudes makes of gravity, m/s^2, one standard deviation of a sample of the force.
@@ -79,19 +84,31 @@ impl Sources {
         let mut attitude = optional(ATTITUDE, 4)?;
         if let Some(attitude) = &attitude {
             attitude.check_rotations(flight)?;
-        } else if let (Some(roll), Some(yaw)) = (optional(ROLL, 1)?, optional(YAW, 1)?) {
-            let pitch = match (optional(PITCH, 1)?, &velocity) {
-                (None, Some(velocity)) => {
-                    let from = smoother::force_source(flight, None, Some(velocity))?;
-                    let pitch = from.as_ref().and_then(|from| pitch_of_thrust(from, velocity, &yaw));
-                    differences.pitch = from;
-                    pitch
-                }
-                (pitch, _) => pitch,
+        } else if let Some(roll) = optional(ROLL, 1)? {
+            let logged_pitch = optional(PITCH, 1)?;
+            let from = match &velocity {
+                Some(velocity) => smoother::force_source(flight, None, Some(velocity))?,
+                None => None,
             };
-            let pitch =
-                pitch.ok_or_else(|| neither(ATTITUDE, "attitude.pitch_rad or gnss.velocity_ned_m_s"))?;
-            attitude = of_angles(&roll, &pitch, &yaw);
+            // Twice the corner of forces: what passes them is hardly touched.
+            let accelerations = from.as_ref().zip(velocity.as_ref()).map(|(from, velocity)| {
+                smoother::accelerations(from, velocity, CUTOFF_HZ.min(2.0 * from.cutoff_hz))
+            });
+            let mut yaw = optional(YAW, 1)?;
+            // An accelerometer of the body needs no heading.
+            if yaw.is_none() && log.channel(FORCE).is_none() {
+                differences.heading = accelerations.as_ref().and_then(|a| heading::held(&roll, a));
+                yaw = differences.heading.and_then(|held| held_all_along(held, &roll));
+            }
+            if let Some(yaw) = yaw {
+                let pitch = logged_pitch.or_else(|| {
+                    differences.pitch = from;
+                    accelerations.and_then(|accelerations| pitch_of_thrust(&accelerations, &yaw))
+                });
+                let pitch =
+                    pitch.ok_or_else(|| neither(ATTITUDE, "attitude.pitch_rad or gnss.velocity_ned_m_s"))?;
+                attitude = of_angles(&roll, &pitch, &yaw);
+            }
         }
         let mut force = optional(FORCE, 3)?;
         if force.is_none() {
@@ -136,9 +153,15 @@ impl Sources {
         let short =
             |channel| GapError::TooShort { flight: flight.to_owned(), channel, usable_s: 0.0, least_s: 1.0 };
         let (mut notes, mut velocity) = (Vec::new(), None);
+        if let Some(held) = self.differences.heading {
+            let [heading, sd] = [held.heading_rad, held.sd_rad].map(|x| significant(x.to_degrees(), 2));
+            notes.push(format!(
+                "{flight}: {YAW}: missing; the vehicle is taken to have held one heading, {heading} deg (sd {sd}), at which its roll makes its acceleration; what is quick about z cannot be judged"
+            ));
+        }
         if self.differences.pitch.is_some() {
             notes.push(format!(
-                "{flight}: {ATTITUDE}: missing; roll and yaw are logged, pitch is where thrust must point for the logged velocity, below {corner} Hz"
+                "{flight}: {ATTITUDE}: missing; roll and heading are taken, pitch is where thrust must point for the logged velocity, below {corner} Hz"
             ));
         }
         if self.differences.turned {
@@ -215,17 +238,21 @@ impl Common {
 }
 
 /// Pitch, rad, at which thrust alone makes an acceleration along the heading.
-fn pitch_of_thrust(from: &Differences, velocity: &Series, yaw: &Series) -> Option<Series> {
-    // Twice the corner of forces: what passes them is hardly touched.
-    let (time_s, accelerations) =
-        smoother::accelerations(from, velocity, CUTOFF_HZ.min(2.0 * from.cutoff_hz));
+fn pitch_of_thrust((time_s, accelerations): &(Vec<f64>, Vec<f64>), yaw: &Series) -> Option<Series> {
     let pitch = time_s.iter().zip(accelerations.chunks_exact(3)).map(|(t, a)| {
         let (sin, cos) = yaw.angle(*t).sin_cos();
         let (along, down) = (a[0] * cos + a[1] * sin, a[2] - GRAVITY_M_S2);
         (-along).atan2(-down)
     });
     let pitch = pitch.collect();
-    Series::computed(PITCH, 1, (time_s, pitch))
+    Series::computed(PITCH, 1, (time_s.clone(), pitch))
+}
+
+/// One heading for as long as there is a roll.
+fn held_all_along(held: Held, roll: &Series) -> Option<Series> {
+    let spans = roll.spans();
+    let (first, last) = (spans.first()?, spans.last()?);
+    Series::computed(YAW, 1, (vec![first.0, last.1], vec![held.heading_rad; 2]))
 }
 
 /// The attitude at the times of the pitch at which the other angles exist.

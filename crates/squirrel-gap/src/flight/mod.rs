@@ -2,6 +2,7 @@
 
 pub(crate) mod filter;
 mod ground;
+pub(crate) mod heading;
 pub(crate) mod inertial;
 pub(crate) mod recording;
 pub(crate) mod series;

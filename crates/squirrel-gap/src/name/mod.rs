@@ -11,6 +11,7 @@ mod evidence;
 mod forms;
 mod interval;
 mod linear;
+mod load;
 mod moved;
 mod parameters;
 mod payload;

@@ -36,12 +36,23 @@ impl Search<'_> {
                 }
             }
         }
+        all.extend(self.more_rotors(found)?);
         if let Some(beaten) = &found.beaten {
             all.push(self.score(&found.linear, beaten)?);
         }
         let candidates = |members: &[Member]| members.iter().map(|m| m.candidate).collect::<BTreeSet<_>>();
         let own = candidates(&found.best.members);
         all.retain(|rival| self.is_off(rival) && candidates(&rival.members) != own);
+        if !own.is_empty()
+            && let Some(load) = self.load(found)?
+        {
+            let both = candidates(&load.members);
+            // A part of it is the same answer, and the shorter one where it was found.
+            if !own.is_subset(&both) {
+                all.retain(|rival| !candidates(&rival.members).is_subset(&both));
+                all.push(load);
+            }
+        }
         all.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
         Ok(all)
     }

@@ -5,9 +5,9 @@ use super::linear::Linear;
 use super::parameters::Parameter;
 use super::point::Member;
 use super::refine::Scored;
-use super::search::{FURTHER_NATS, MEMBERS_MAX, NATS_MIN, Search, WEAK_ROTOR};
+use super::search::{FURTHER_NATS, Found, MEMBERS_MAX, NATS_MIN, Search, WEAK_ROTOR};
 use crate::GapError;
-use crate::decide::INTERVAL;
+use crate::decide::{BEHIND_NATS, INTERVAL};
 use crate::verdict::{RotorHealth, Value};
 
 impl Search<'_> {
@@ -18,6 +18,41 @@ impl Search<'_> {
         linear: &Linear,
         best: &mut Scored,
     ) -> Result<Option<Vec<Member>>, GapError> {
+        let Some(scored) = self.best_rotors(linear)? else { return Ok(None) };
+        (self.progress)();
+        let better =
+            scored.log_evidence - self.needs(&scored.members) > best.log_evidence - self.needs(&best.members);
+        if !(better && self.is_off(&scored)) {
+            return Ok(None);
+        }
+        let beaten = std::mem::replace(best, scored).members;
+        self.extend(linear, best)?;
+        Ok((!beaten.is_empty()).then_some(beaten))
+    }
+
+    /// A set with more weak rotors than were named, each of the others too little for a name and all of them twenty to one in the
+    /// evidence: the flights leave open how many are weak.
+    pub(super) fn more_rotors(&self, found: &Found) -> Result<Option<Scored>, GapError> {
+        let own = &found.best.members;
+        if own.is_empty() || own.iter().any(|member| self.effect(member) != WEAK_ROTOR) {
+            return Ok(None);
+        }
+        let Some(scored) = self.best_rotors(&found.linear)? else { return Ok(None) };
+        let has = |member: &Member| scored.members.iter().any(|other| other.candidate == member.candidate);
+        let is_more = scored.members.len() > own.len() && own.iter().all(has);
+        let is_better = scored.log_evidence >= found.best.log_evidence + BEHIND_NATS;
+        Ok((is_more && is_better && self.is_off(&scored)).then_some(scored))
+    }
+
+    /// What a set must be worth, nats. What happened to the rotors is one thing: how many of them are weak says the evidence.
+    fn needs(&self, members: &[Member]) -> f64 {
+        let others = members.iter().filter(|m| self.effect(m) != WEAK_ROTOR).count();
+        let things = others + usize::from(others < members.len());
+        NATS_MIN + FURTHER_NATS * (things.max(1) - 1) as f64
+    }
+
+    /// The best set of several weak rotors and nothing else; `None` where the vehicle is no machine with good flights.
+    fn best_rotors(&self, linear: &Linear) -> Result<Option<Scored>, GapError> {
         if !self.catalogue.is_of_one_machine {
             return Ok(None);
         }
@@ -25,12 +60,6 @@ impl Search<'_> {
             .filter(|c| self.catalogue.candidates[*c].effect == WEAK_ROTOR)
             .collect();
         let none = self.score(linear, &[])?;
-        // What happened to the rotors is one thing: how many of them are weak says the evidence.
-        let needs = |members: &[Member]| -> f64 {
-            let others = members.iter().filter(|m| self.effect(m) != WEAK_ROTOR).count();
-            let things = others + usize::from(others < members.len());
-            NATS_MIN + FURTHER_NATS * (things.max(1) - 1) as f64
-        };
         let mut sets: Vec<(f64, Vec<Member>)> = Vec::new();
         for chosen in 0_u32..1 << weak.len() {
             let count = chosen.count_ones() as usize;
@@ -55,19 +84,11 @@ impl Search<'_> {
                     member
                 })
                 .collect();
-            sets.push((posterior.log_evidence - needs(&members), members));
+            sets.push((posterior.log_evidence, members));
         }
         sets.sort_by(|a, b| b.0.total_cmp(&a.0));
         let Some((_, members)) = sets.into_iter().next() else { return Ok(None) };
-        let scored = self.score(linear, &members)?;
-        (self.progress)();
-        let better = scored.log_evidence - needs(&scored.members) > best.log_evidence - needs(&best.members);
-        if !(better && self.is_off(&scored)) {
-            return Ok(None);
-        }
-        let beaten = std::mem::replace(best, scored).members;
-        self.extend(linear, best)?;
-        Ok((!beaten.is_empty()).then_some(beaten))
+        self.score(linear, &members).map(Some)
     }
 
     /// How each rotor is against what the vehicle file has, if every one may be off; none where the flights do not show it.

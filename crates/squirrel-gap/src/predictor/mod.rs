@@ -355,6 +355,10 @@ impl<'a> Predictor<'a> {
     pub(crate) fn has_gyroscope(&self) -> bool {
         self.tracks.iter().all(|t| t.derived.rates.is_none())
     }
+    /// Whether the heading of every flight was measured, and not taken as held.
+    pub(crate) fn has_heading(&self) -> bool {
+        self.tracks.iter().all(|t| t.derived.heading.is_none())
+    }
     /// Whether every flight has a height.
     pub(crate) fn has_height(&self) -> bool {
         self.tracks.iter().all(|t| t.attitude().is_some() && !t.altitude_m().is_empty())

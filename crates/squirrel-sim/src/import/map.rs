@@ -48,6 +48,8 @@ pub(super) struct ChannelMap {
     pub(super) offset: Vec<f64>,
     pub(super) conversion: Conversion,
     pub(super) forward_filled: bool,
+    /// A file without these columns is imported without the channel.
+    pub(super) optional: bool,
 }
 
 /// How the scaled columns become the numbers of the channel.
@@ -110,6 +112,8 @@ struct ChannelToml {
     direction: Option<Direction>,
     rotors: Option<Vec<usize>>,
     repeats: Option<Repeats>,
+    #[serde(default)]
+    optional: bool,
 }
 
 #[derive(Deserialize)]
@@ -273,7 +277,8 @@ fn channel_map(name: String, toml: ChannelToml) -> Result<ChannelMap, String> {
         return Err(format!("`{key}` means nothing for this channel: leave it out"));
     }
     let forward_filled = toml.repeats.is_some_and(|Repeats::ForwardFilled| true);
-    Ok(ChannelMap { name, columns: toml.columns, scale, offset, conversion, forward_filled })
+    let (columns, optional) = (toml.columns, toml.optional);
+    Ok(ChannelMap { name, columns, scale, offset, conversion, forward_filled, optional })
 }
 
 fn choices(key: &str) -> &'static str {

@@ -14,6 +14,7 @@
 //! "attitude.q_ned_from_body_wxyz" = { columns = ["qx", "qy", "qz", "qw"], order = "xyzw", world = "nwu", body = "flu", direction = "world_from_body" }
 //! "rotor.command"                 = { columns = ["m1", "m2", "m3", "m4"], rotors = [1, 3, 2, 4] }
 //! "battery.voltage_v"             = { columns = ["vbat"], repeats = "forward_filled" }
+//! "attitude.yaw_rad"              = { columns = ["yaw"], optional = true }
 //! ```
 //!
 //! ULog files of PX4 (`.ulg`), MCAP files with JSON messages (`.mcap`) and the micro-SD logs of a Crazyflie have topics: a
@@ -46,6 +47,7 @@
 //! - `rotors[i]` is the number, from 1, of the vehicle's rotor in column `i`; without it columns are in vehicle order.
 //! - `forward_filled` drops rows that only repeat the last sample: a slow sensor written at a fast rate gets its own slow
 //!   time axis. Channels of one log source (`battery.*`) share the axis; a row stays when any of them changes.
+//! - `optional = true` imports a file that lacks a column of the channel without it; the report says so.
 //! - `keep` may join parts with `and` that look at different files. A part drops rows of each file or topic that has its
 //!   columns, and of all others, by time: their rows outside the spans in which it keeps consecutive rows of the first. One
 //!   that has the columns itself, as topics have an `x` each, is no exception: its rows must hold by themselves, too.
@@ -78,7 +80,7 @@ use std::path::PathBuf;
 pub use board::{BoardReport, import_board};
 pub use error::ImportError;
 pub use map::ImportMap;
-pub use report::{ChannelReport, FileReport, ImportReport};
+pub use report::{AbsentChannel, ChannelReport, FileReport, ImportReport};
 
 use crate::log::FlightLog;
 use map::SourceMap;
@@ -124,25 +126,26 @@ pub fn import_watched(
     let opened = (0..).zip(&found).map(|(index, path)| table::open(map, index, path, &meter));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
     check_mask_columns(map, &opened)?;
-    let tables = map
-        .sources
+    let mut report = ImportReport::default();
+    let present = map.sources.iter().zip(&opened).map(|(source, file)| present(source, &**file, &mut report));
+    let sources: Vec<SourceMap> = present.collect();
+    let tables = sources
         .iter()
         .zip(opened)
         .map(|(source, file)| read(source, &map.keep, file))
         .collect::<Result<Vec<_>, _>>()?;
     let times: Vec<Vec<f64>> =
-        map.sources.iter().zip(&tables).map(|(s, table)| seconds(s, table)).collect::<Result<_, _>>()?;
+        sources.iter().zip(&tables).map(|(s, table)| seconds(s, table)).collect::<Result<_, _>>()?;
     let kept = kept_rows(&map.keep, &tables, &times);
-    for ((source, table), (rows, time_s)) in map.sources.iter().zip(&tables).zip(kept.iter().zip(&times)) {
+    for ((source, table), (rows, time_s)) in sources.iter().zip(&tables).zip(kept.iter().zip(&times)) {
         check_order(source, table, rows, time_s)?;
     }
     // Times increase, so each file's first kept row is its earliest.
     let zero_s = kept.iter().zip(&times).map(|(rows, time_s)| time_s[rows[0]]).fold(f64::INFINITY, f64::min);
 
     let names = files::names(&found);
-    let mut report = ImportReport::default();
     let mut log = FlightLog::default();
-    for (index, source) in map.sources.iter().enumerate() {
+    for (index, source) in sources.iter().enumerate() {
         let (table, rows) = (&tables[index], &kept[index]);
         report.files.push(FileReport {
             file: names[index].clone(),
@@ -163,6 +166,20 @@ pub fn import_watched(
         ("time_zero_s".to_owned(), zero_s.to_string()),
     ]);
     Ok((log, report))
+}
+
+/// A source without those of its optional channels that its file lacks.
+fn present(source: &SourceMap, file: &dyn TableFile, report: &mut ImportReport) -> SourceMap {
+    let mut own = source.clone();
+    own.channels.retain(|channel| {
+        let lacks = |column: &&String| !has_all(file, &[column.as_str()]);
+        let absent = channel.columns.iter().find(lacks).filter(|_| channel.optional);
+        report.absent.extend(
+            absent.map(|column| AbsentChannel { channel: channel.name.clone(), column: column.clone() }),
+        );
+        absent.is_none()
+    });
+    own
 }
 
 /// Every part of the mask needs one file that has all of its columns.

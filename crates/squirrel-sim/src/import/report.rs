@@ -9,6 +9,17 @@ pub struct ImportReport {
     pub files: Vec<FileReport>,
     /// One entry a channel.
     pub channels: Vec<ChannelReport>,
+    /// Optional channels that the files lack.
+    pub absent: Vec<AbsentChannel>,
+}
+
+/// An optional channel of the map that the log does not have.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct AbsentChannel {
+    /// Canonical name.
+    pub channel: String,
+    /// The first of its columns that the file lacks.
+    pub column: String,
 }
 
 /// Rows of one file, or of one topic of a file.
@@ -74,6 +85,9 @@ impl fmt::Display for ImportReport {
                 write!(f, ", {} repeats dropped", report.repeats_dropped)?;
             }
             writeln!(f)?;
+        }
+        for AbsentChannel { channel, column } in &self.absent {
+            writeln!(f, "{channel}: left out, the file has no column `{column}`")?;
         }
         Ok(())
     }
