@@ -7,6 +7,7 @@
 //! 3. What is left is held against what noise leaves ([`crate::leftover`]); intervals come from blocks ([`interval`]).
 
 mod evidence;
+mod factor;
 mod forms;
 mod interval;
 mod linear;
