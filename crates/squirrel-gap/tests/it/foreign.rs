@@ -15,6 +15,11 @@ use std::collections::BTreeSet;
 /// Largest error of a parameter.
 const ERROR_MAX: f64 = 0.1;
 
+pub(crate) type Flights = Vec<(String, FlightLog)>;
+
+/// An effect, its form, and its numbers by key.
+type Hidden<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
+
 /// A case of the other simulator that hides nothing.
 pub(crate) fn nothing() -> Case {
     let case = Case::draw(Set::None, 0, 2);
@@ -23,14 +28,14 @@ pub(crate) fn nothing() -> Case {
 }
 
 /// The vehicle as its file has it, two flights to fit and one held out.
-pub(crate) fn flown(case: &Case) -> (VehicleFile, Vec<(String, FlightLog)>, Vec<(String, FlightLog)>) {
+pub(crate) fn flown(case: &Case) -> (VehicleFile, Flights, Flights) {
     let flight = |number: usize| (case.flight_names()[number].to_owned(), case.flight(number).unwrap());
     let vehicle = VehicleFile::parse(&case.vehicle_toml(), "vehicle").unwrap();
     (vehicle, vec![flight(0), flight(1)], vec![flight(2)])
 }
 
-fn hiding(effects: &[(&str, &str, &[(&str, f64)])]) -> Case {
-    let effect = |(name, form, parameters): &(&str, &str, &[(&str, f64)])| HiddenEffect {
+fn hiding(effects: &[Hidden<'_>]) -> Case {
+    let effect = |(name, form, parameters): &Hidden<'_>| HiddenEffect {
         name: (*name).to_owned(),
         form: (*form).to_owned(),
         parameters: parameters
