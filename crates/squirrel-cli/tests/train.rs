@@ -217,16 +217,10 @@ fn an_imported_flight_gives_what_the_flight_itself_gives() {
     assert!((imported - native).abs() < 1e-3 * native, "{imported} N, from the flight itself {native} N");
 }
 
-/// The flights are not in the repository; without them the test says so and passes, except on CI.
 #[test]
 fn a_measured_flight_without_wings_says_what_it_lacks() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let flight = root.join("../shared/flights/nanobench/B3_figure8_fast_rep1.csv");
-    if !flight.exists() {
-        assert!(std::env::var_os("CI").is_none(), "{} is needed on CI", flight.display());
-        println!("skipped: no {}", flight.display());
-        return;
-    }
+    let flight = root.join("tests/data/flights/nanobench/B3_figure8_fast_rep1.csv");
     let folder = Folder::new("measured");
     let text = |path: PathBuf| path.canonicalize().unwrap().to_str().unwrap().to_owned();
     let map = text(root.join("vehicles/maps/nanobench.toml"));

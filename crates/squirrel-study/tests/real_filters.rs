@@ -1,6 +1,4 @@
 //! The default estimator on measured flights, beside the estimate that the autopilot made on board.
-//!
-//! The logs stay outside of the repository; without them the test says so and passes, but never in CI.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::disallowed_methods, reason = "tests")]
 
 use squirrel_core::estimate::eskf::{Eskf, EskfParameters};
@@ -11,15 +9,11 @@ use squirrel_core::stack::{Gnss, Imu};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Flights of a Crazyflie 2.1 in a motion-capture room (NanoBench, Ullah and Baca 2026); `None` without the logs.
-fn nanobench() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/flights/nanobench");
-    if !folder.exists() {
-        assert!(std::env::var_os("CI").is_none_or(|ci| ci.is_empty()), "{}: missing in CI", folder.display());
-        println!("skipped: {} is not there", folder.display());
-        return None;
-    }
-    Some(folder)
+/// Flights of a Crazyflie 2.1 in a motion-capture room (NanoBench, Ullah and Baca 2026): the cut-outs in `tests/data/flights`, or
+/// the whole ones in the folder `SQUIRREL_FLIGHTS`.
+fn nanobench() -> PathBuf {
+    let cut_outs = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
+    std::env::var_os("SQUIRREL_FLIGHTS").map_or_else(cut_outs, PathBuf::from).join("nanobench")
 }
 
 /// Columns of a CSV file by their names.
@@ -70,7 +64,7 @@ fn misfit_deg(estimate: &[Vector3<f64>], truth: &[Vector3<f64>], flies: &[bool])
 /// Motion-capture position ten times a second is all the aid there is. The autopilot had the motion capture at full rate.
 #[test]
 fn inclination_on_measured_flights_is_as_good_as_the_autopilots() {
-    let Some(folder) = nanobench() else { return };
+    let folder = nanobench();
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     for name in ["B2_circle_medium_rep1", "B3_figure8_fast_rep1", "B8_star_slow_rep1", "B9_trefoil_slow_rep1"]
     {

@@ -204,35 +204,42 @@ pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
     if n < 4 * k || n < 4 * FOLDS {
         return 0.0;
     }
-    // Features in units of their spread, with a constant.
-    let mut x = DMatrix::from_element(n, k, 1.0);
+    // Features in units of their spread, with a constant; a column a moment.
+    let mut x = DMatrix::from_element(k, n, 1.0);
     for column in 1..k {
         let values: Vec<f64> = family.rows.iter().map(|row| row[column - 1]).collect();
         let mean = values.iter().sum::<f64>() / n as f64;
         let spread = (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
         for (row, value) in values.iter().enumerate() {
-            x[(row, column)] = if spread > 1e-9 { (value - mean) / spread } else { 0.0 };
+            x[(column, row)] = if spread > 1e-9 { (value - mean) / spread } else { 0.0 };
         }
     }
     let (mut error, mut total) = (0.0, 0.0);
     let size = n.div_ceil(FOLDS);
+    let block = |fold: usize| (fold * size).min(n)..((fold + 1) * size).min(n);
+    let products: Vec<_> = (0..FOLDS)
+        .map(|fold| {
+            let (mut gram, mut right) = (DMatrix::zeros(k, k), DVector::zeros(k));
+            for row in block(fold) {
+                right.axpy(y[row], &x.column(row), 1.0);
+                gram.syger(1.0, &x.column(row), &x.column(row), 1.0);
+            }
+            (gram, right)
+        })
+        .collect();
     for fold in 0..FOLDS {
-        let held = fold * size..((fold + 1) * size).min(n);
+        let held = block(fold);
         let mut gram = DMatrix::identity(k, k) * (0.01 * n as f64);
         gram[(0, 0)] = 1e-6;
         let mut right = DVector::zeros(k);
-        for row in (0..n).filter(|row| !held.contains(row)) {
-            for i in 0..k {
-                right[i] += x[(row, i)] * y[row];
-                for j in 0..k {
-                    gram[(i, j)] += x[(row, i)] * x[(row, j)];
-                }
-            }
+        for (_, (others, theirs)) in products.iter().enumerate().filter(|(other, _)| *other != fold) {
+            gram += others;
+            right += theirs;
         }
         let Some(factor) = gram.cholesky() else { return 0.0 };
         let theta = factor.solve(&right);
         for row in held {
-            let predicted: f64 = (0..k).map(|i| x[(row, i)] * theta[i]).sum();
+            let predicted: f64 = x.column(row).dot(&theta);
             error += (y[row] - predicted).powi(2);
             total += y[row] * y[row];
         }

@@ -7,8 +7,10 @@
 //! `beta < 1` tempers the likelihood: a model of a flight is never right to the last bit, and the error of a wrong one does
 //! not average away like noise.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use super::factor::Factor;
+use nalgebra::{DMatrix, DVector};
 use squirrel_sim::batch::simd::{BLOCK, Kernel, Lanes, Path, Paths};
+use std::ops::Range;
 
 /// Tempering of the likelihood.
 pub(crate) const BETA: f64 = 0.3;
@@ -26,8 +28,10 @@ pub(crate) struct Posterior {
     /// Logarithm of the evidence up to a constant of the data, nats.
     pub(crate) log_evidence: f64,
     pub(crate) mean: DVector<f64>,
-    factor: Cholesky<f64, nalgebra::Dyn>,
+    factor: Factor,
     sd: DVector<f64>,
+    /// Where in the factor each parameter is; one that is left out is not.
+    places: Vec<Option<usize>>,
 }
 
 /// Rows that are taken at a time, so that a piece of every column stays in the cache.
@@ -57,25 +61,33 @@ impl Kernel<f64> for Products<'_> {
     fn run<L: Lanes<Weight = f64>>(self) -> DMatrix<f64> {
         let Self { columns, others, lower, mut out } = self;
         let rows = columns.iter().map(|column| column.len()).max().unwrap_or_default();
+        // A column of one flight is zero in all others, and zeros add nothing.
+        let spans = |columns: &[&[f64]]| columns.iter().map(|column| span(column)).collect::<Vec<_>>();
+        let (own, theirs) = (spans(columns), spans(others));
         for start in (0..rows).step_by(PIECE) {
             let piece = start..(start + PIECE).min(rows);
-            for (i, column) in columns.iter().enumerate().filter(|(_, column)| !column.is_empty()) {
+            let acts = |span: &Range<usize>| span.start < piece.end && piece.start < span.end;
+            let acting: Vec<usize> = (0..others.len()).filter(|j| acts(&theirs[*j])).collect();
+            for (i, column) in columns.iter().enumerate().filter(|(i, _)| acts(&own[*i])) {
                 let a = &column[piece.clone()];
-                let end = if lower { i + 1 } else { others.len() };
-                for first in (0..end).step_by(WIDE) {
-                    // What is missing of the last few, or has no rows, is multiplied by its own column and forgotten.
-                    let of = |j: usize| others[..end].get(first + j).filter(|other| !other.is_empty());
-                    let b = [0, 1, 2, 3].map(|j| of(j).map_or(a, |other| &other[piece.clone()]));
-                    for (j, sum) in side_by_side::<L>(a, b).into_iter().enumerate() {
-                        if of(j).is_some() {
-                            out[(i, first + j)] += sum;
-                        }
+                let end = if lower { acting.partition_point(|j| *j <= i) } else { acting.len() };
+                for some in acting[..end].chunks(WIDE) {
+                    // What is missing of the last few is multiplied by its own column and forgotten.
+                    let b = [0, 1, 2, 3].map(|j| some.get(j).map_or(a, |j| &others[*j][piece.clone()]));
+                    for (j, sum) in some.iter().zip(side_by_side::<L>(a, b)) {
+                        out[(i, *j)] += sum;
                     }
                 }
             }
         }
         out
     }
+}
+
+/// From the first row that is not zero to the last.
+fn span(column: &[f64]) -> Range<usize> {
+    let first = column.iter().position(|x| *x != 0.0).unwrap_or(column.len());
+    first..column.iter().rposition(|x| *x != 0.0).map_or(first, |last| last + 1)
 }
 
 /// Inner products of one series with four.
@@ -126,23 +138,29 @@ impl Gram {
 
     /// The posterior under prior deviations; a deviation of 0 leaves a parameter out.
     pub(crate) fn posterior(&self, sd: &[f64], beta: f64) -> Option<Posterior> {
-        let n = sd.len();
         let sd = DVector::from_column_slice(sd);
-        let mut a = DMatrix::identity(n, n);
-        for i in 0..n {
-            for j in 0..n {
-                a[(i, j)] += beta * sd[i] * self.g[(i, j)] * sd[j];
-            }
+        // The last first: what is of one flight alone begins a block of the factor, and what all share stands below the blocks.
+        let order: Vec<usize> = (0..sd.len()).rev().filter(|i| sd[*i] != 0.0).collect();
+        let mut places = vec![None; sd.len()];
+        for (place, i) in order.iter().enumerate() {
+            places[*i] = Some(place);
         }
-        let factor = a.cholesky()?;
-        let scaled = sd.component_mul(&self.b) * beta;
+        let factor = Factor::new(order.len(), |row, column| {
+            let (i, j) = (order[row], order[column]);
+            f64::from(u8::from(i == j)) + beta * sd[i] * self.g[(i, j)] * sd[j]
+        })?;
+        let scaled = DVector::from_iterator(order.len(), order.iter().map(|i| sd[*i] * self.b[*i] * beta));
         let solved = factor.solve(&scaled);
-        let log_det: f64 = factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>() * 2.0;
+        let mut mean = DVector::zeros(sd.len());
+        for (i, x) in order.iter().zip(solved.iter()) {
+            mean[*i] = sd[*i] * x;
+        }
         Some(Posterior {
-            log_evidence: -0.5 * beta * self.yy - 0.5 * log_det + 0.5 * scaled.dot(&solved),
-            mean: sd.component_mul(&solved),
+            log_evidence: -0.5 * beta * self.yy - 0.5 * factor.log_determinant() + 0.5 * scaled.dot(&solved),
+            mean,
             factor,
             sd,
+            places,
         })
     }
 }
@@ -150,10 +168,6 @@ impl Gram {
 impl Posterior {
     /// Posterior variance of one parameter: `s_i^2 |L^-1 e_i|^2` where `A = L L'`.
     pub(crate) fn variance(&self, i: usize) -> f64 {
-        let mut column = DVector::zeros(self.sd.len());
-        column[i] = 1.0;
-        // The factor of a positive definite matrix has no zero on its diagonal.
-        self.factor.l_dirty().solve_lower_triangular_unchecked_mut(&mut column);
-        self.sd[i] * self.sd[i] * column.norm_squared()
+        self.places[i].map_or(0.0, |place| self.sd[i] * self.sd[i] * self.factor.inverse_diagonal(place))
     }
 }

@@ -8,6 +8,7 @@
 
 mod day;
 mod evidence;
+mod factor;
 mod forms;
 mod interval;
 mod linear;

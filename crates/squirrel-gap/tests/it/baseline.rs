@@ -2,7 +2,7 @@
 //! is known.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::support::{fly_rich, imported, shared, vehicle};
+use crate::support::{flights, fly_rich, imported, vehicle};
 use squirrel_gap::{Baseline, Diagnosis, Kind, Value, add, diagnose, diagnose_since};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -31,12 +31,12 @@ fn weak(diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
     all
 }
 
-/// Flights of `CrazyPAD` by the ends of their names; `None` without the shared folder.
-fn crazypad(names: &[&str]) -> Option<Flights> {
-    let folder = shared("flights/crazypad-dev")?;
+/// Flights of `CrazyPAD` by their names.
+fn crazypad(names: &[&str]) -> Flights {
+    let folder = flights("crazypad-dev");
     let read =
         |name: &&str| ((*name).to_owned(), imported("crazypad.toml", &folder.join(format!("{name}.bin"))));
-    Some(names.iter().map(read).collect())
+    names.iter().map(read).collect()
 }
 
 const NORMAL_E8: [&str; 4] = [
@@ -51,10 +51,7 @@ const NORMAL_E9: [&str; 3] =
 /// Both blades of the propeller of motor 3 were cut by 3.5 mm; nothing of the kind was seen before.
 #[test]
 fn a_cut_propeller_is_its_rotor() {
-    let (Some(good), Some(now)) = (crazypad(&NORMAL_E8), crazypad(&["cut_M3_3.5mm_3.5mm_40mm__E8_log02"]))
-    else {
-        return;
-    };
+    let (good, now) = (crazypad(&NORMAL_E8), crazypad(&["cut_M3_3.5mm_3.5mm_40mm__E8_log02"]));
     let found = since(&vehicle("crazyflie21_brushed.toml"), &good, &now);
     let [(3, loss)] = weak(&found)[..] else { panic!("{:?}", found.verdict.effects) };
     assert_eq!((found.verdict.verdict, found.verdict.effects.len()), (Kind::Named, 1));
@@ -67,7 +64,7 @@ fn a_cut_propeller_is_its_rotor() {
 #[test]
 fn two_cut_propellers_are_both_named() {
     let name = "pair_cut_M2_3.5mm_3.0mm_40.5mm_M1_3.5mm_3.0mm_40.5mm__E9_log05";
-    let (Some(good), Some(now)) = (crazypad(&NORMAL_E9), crazypad(&[name])) else { return };
+    let (good, now) = (crazypad(&NORMAL_E9), crazypad(&[name]));
     let file = vehicle("crazyflie21_brushed.toml");
     let found = since(&file, &good, &now);
     let [(1, first), (2, second)] = weak(&found)[..] else { panic!("{:?}", found.verdict.effects) };
@@ -85,7 +82,7 @@ fn two_cut_propellers_are_both_named() {
 
 #[test]
 fn a_good_flight_has_no_name() {
-    let Some(mut good) = crazypad(&NORMAL_E8) else { return };
+    let mut good = crazypad(&NORMAL_E8);
     for _ in 0..good.len() {
         let now = vec![good.remove(0)];
         let found = since(&vehicle("crazyflie21_brushed.toml"), &good, &now);

@@ -2,7 +2,8 @@
 //! that, with the channel, and never the name of an effect. Commands that are late as a link can be late are an effect.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::support::{hold, imported, shared, step, vehicle, vehicle_with};
+use crate::foreign;
+use crate::support::{hold, step, vehicle, vehicle_with};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_gap::{Kind, Verdict, diagnose};
 use squirrel_sim::arm::Arm;
@@ -57,15 +58,10 @@ impl Case {
         }
     }
 
-    /// The practice case in which nothing is hidden; `None` where the shared folder is not.
-    fn practice() -> Option<Self> {
-        let case = shared("gap-practice/cases/ff290cd742")?;
-        let read = |part: &str| (part.to_owned(), imported("practice.toml", &case.join(part)));
-        Some(Self {
-            vehicle: vehicle("practice.toml"),
-            flights: vec![read("train/flight00"), read("train/flight01")],
-            held_out: vec![read("holdout/flight00")],
-        })
+    /// Flights of another simulator, in which nothing is hidden.
+    fn foreign() -> Self {
+        let (vehicle, flights, held_out) = foreign::flown(&foreign::nothing());
+        Self { vehicle, flights, held_out }
     }
 
     /// The same with a mistake in every log, as a wrong line of an import map makes it.
@@ -194,8 +190,7 @@ fn a_mistake_in_simulated_logs_is_found_with_its_channel() {
 
 #[test]
 fn a_mistake_in_foreign_logs_is_found_with_its_channel() {
-    let Some(case) = Case::practice() else { return };
-    let wrong = complaints(&case);
+    let wrong = complaints(&Case::foreign());
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 

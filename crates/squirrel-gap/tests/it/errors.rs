@@ -252,8 +252,8 @@ fn a_vehicle_that_the_plant_cannot_step_is_refused() {
 /// Other vehicles and scales: a flight of a Crazyflie without attitude, velocity, height and battery, each of which is said.
 #[test]
 fn a_log_of_motors_and_imu_alone_is_enough() {
-    let Some(folder) = crate::support::shared("flights/arpl-motorlag") else { return };
-    let log = crate::support::imported("arpl.toml", &folder.join("log10.csv"));
+    let flight = crate::support::flights("arpl-motorlag").join("log10.csv");
+    let log = crate::support::imported("arpl.toml", &flight);
     let finding = run(&vehicle("crazyflie21_brushed.toml"), &log).unwrap();
     println!("{:?}\n{:?}\n{:?}", finding.residual, finding.notes, finding.places[0]);
     assert_eq!(finding.notes.len(), 4);

@@ -1,7 +1,7 @@
 //! Measured flights of a Crazyflie: the residual against an independent computation with NumPy.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::support::{imported, shared, vehicle, vehicle_with};
+use crate::support::{flights, imported, vehicle, vehicle_with};
 use squirrel_gap::{diagnose, find};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -31,8 +31,7 @@ fn python() -> PathBuf {
 
 #[test]
 fn numpy_finds_the_same_residual_force() {
-    let Some(folder) = shared("flights/nanobench") else { return };
-    let csv = folder.join("B2_circle_medium_rep1.csv");
+    let csv = flights("nanobench").join("B2_circle_medium_rep1.csv");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/residual_numpy.py");
     let shipped = vehicle("crazyflie21_brushed.toml");
     // The shipped numbers have no drag, so that attitude and velocity would go unchecked.
@@ -71,7 +70,7 @@ fn numpy_finds_the_same_residual_force() {
 /// flights at 3.17 to 3.54 V disagree more along z.
 #[test]
 fn thrust_disagrees_more_on_an_emptier_battery() {
-    let Some(folder) = shared("flights/nanobench") else { return };
+    let folder = flights("nanobench");
     let flights: Vec<_> =
         ["B8_star_slow_rep1", "B3_figure8_fast_rep1", "B9_trefoil_slow_rep1", "B2_circle_medium_rep1"]
             .map(|name| (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv")))))
@@ -90,7 +89,7 @@ fn thrust_disagrees_more_on_an_emptier_battery() {
 /// Motion capture alone names what the IMU names: the sag that the file lacks, in flights that it was not fitted to.
 #[test]
 fn without_their_imu_flights_still_name_the_sag() {
-    let Some(folder) = shared("flights/nanobench") else { return };
+    let folder = flights("nanobench");
     for name in ["B2_circle_medium_rep1", "B9_trefoil_slow_rep1"] {
         let mut log = imported("nanobench.toml", &folder.join(format!("{name}.csv")));
         log.sources.remove("imu");

@@ -1,23 +1,21 @@
 //! Measured flights of Crazyflies through the whole workflow.
-//!
-//! The logs stay outside of the repository; without them the tests say so and pass.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::support::{imported, shared, vehicle};
+use crate::support::{flights, imported, vehicle};
 use squirrel_gap::{Diagnosis, Kind, Verdict, add, diagnose, find};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 type Flights = Vec<(String, FlightLog)>;
 
-/// Flights that train on a full battery and are held out on an emptier one; `None` without the logs.
-fn nanobench() -> Option<(Flights, Flights)> {
-    let folder = shared("flights/nanobench")?;
+/// Flights that train on a full battery and are held out on an emptier one.
+fn nanobench() -> (Flights, Flights) {
+    let folder = flights("nanobench");
     let read =
         |name: &str| (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv"))));
     let train = ["B8_star_slow_rep1", "B3_figure8_fast_rep1"].map(read);
     let held_out = ["B9_trefoil_slow_rep1", "B2_circle_medium_rep1"].map(read);
-    Some((train.into(), held_out.into()))
+    (train.into(), held_out.into())
 }
 
 fn diagnosed(vehicle: &VehicleFile, flights: &Flights, held_out: &Flights) -> Diagnosis {
@@ -35,7 +33,7 @@ fn names(verdict: &Verdict) -> Vec<&'static str> {
 /// Thrust is a constant times the sum of squares there, fitted at 3.42 to 3.78 V; the held-out flights are at 3.17 to 3.54 V.
 #[test]
 fn thrust_sags_with_the_battery_of_a_crazyflie() {
-    let Some((flights, held_out)) = nanobench() else { return };
+    let (flights, held_out) = nanobench();
     let nominal = vehicle("crazyflie21_brushed.toml");
     let diagnosis = diagnosed(&nominal, &flights, &held_out);
     assert_eq!(diagnosis.verdict.effects[0].name, "battery_sag");
@@ -52,7 +50,7 @@ fn thrust_sags_with_the_battery_of_a_crazyflie() {
 /// Where the thrust curve is free, the same flights cannot tell the curve from the sag.
 #[test]
 fn sag_and_a_free_thrust_curve_are_confounded() {
-    let Some((flights, held_out)) = nanobench() else { return };
+    let (flights, held_out) = nanobench();
     let verdict = diagnosed(&vehicle("crazyflie21_brushed_curve.toml"), &flights, &held_out).verdict;
     assert!(matches!(verdict.verdict, Kind::Ambiguous | Kind::NotIdentifiable), "{:?}", verdict.verdict);
     assert!(names(&verdict).contains(&"battery_sag"), "{:?}", names(&verdict));
@@ -63,7 +61,7 @@ fn sag_and_a_free_thrust_curve_are_confounded() {
 /// No attitude, position or battery: the specific force alone shows how late the rotors are.
 #[test]
 fn rotors_lag_in_logs_that_hold_nothing_but_the_inertial_unit() {
-    let Some(folder) = shared("flights/arpl-motorlag") else { return };
+    let folder = flights("arpl-motorlag");
     let read = |name: &str| (name.to_owned(), imported("arpl.toml", &folder.join(format!("{name}.csv"))));
     let verdict =
         diagnosed(&vehicle("crazyflie2_arpl.toml"), &vec![read("log10")], &vec![read("log16")]).verdict;

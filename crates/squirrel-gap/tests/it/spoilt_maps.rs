@@ -1,7 +1,7 @@
 //! Import maps with one mistake: it is named with the channel and with what to change.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::support::{hold, imported, shared, step, vehicle, vehicles};
+use crate::support::{hold, imported, nanobench, step, vehicle, vehicles};
 use squirrel_gap::check;
 use squirrel_sim::import::{ImportMap, import};
 use squirrel_sim::log::FlightLog;
@@ -125,17 +125,6 @@ fn read(map: &ImportMap, file: &Path) -> FlightLog {
     import(map, &[file.to_owned()]).unwrap().0
 }
 
-fn files() -> Vec<std::path::PathBuf> {
-    let mut all = Vec::new();
-    for folder in ["flights/nanobench", "flights/nanobench-more"] {
-        let Some(folder) = shared(folder) else { continue };
-        all.extend(std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()));
-    }
-    all.retain(|path| path.extension().is_some_and(|e| e == "csv"));
-    all.sort();
-    all
-}
-
 /// How many of the flights name a mistake with a channel and a remedy; prints the others.
 fn named(
     what: &str,
@@ -169,7 +158,7 @@ fn a_spoilt_map_is_named_in_measured_flights() {
     let mut missed = Vec::new();
     for (what, from, to, channels, remedy) in MISTAKES {
         let map = map_with(from, to);
-        let flights = files().into_iter().map(|file| (name_of(&file), read(&map, &file)));
+        let flights = nanobench().into_iter().map(|file| (name_of(&file), read(&map, &file)));
         let (right, count) = named(what, channels, remedy, flights);
         if 20 * right < 17 * count {
             missed.push(format!("{what}: {right} of {count}"));
@@ -182,7 +171,7 @@ fn a_spoilt_map_is_named_in_measured_flights() {
 fn a_spoilt_source_is_named_in_measured_flights() {
     let mut missed = Vec::new();
     for (what, channels, remedy, spoil) in SPOILS {
-        let flights = files().into_iter().map(|file| {
+        let flights = nanobench().into_iter().map(|file| {
             let mut log = imported("nanobench.toml", &file);
             spoil(&mut log);
             (name_of(&file), log)

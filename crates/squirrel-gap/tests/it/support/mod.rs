@@ -10,15 +10,25 @@ use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// A part of the shared folder. It is not in the repository; without it a test says so and passes, except on CI.
-pub(crate) fn shared(part: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared").join(part);
-    if path.exists() {
-        return Some(path);
-    }
-    assert!(std::env::var_os("CI").is_none(), "{} is needed on CI", path.display());
-    println!("skipped: no {}", path.display());
-    None
+/// A set of measured flights: the cut-outs in `tests/data/flights`, or the whole flights in the folder `SQUIRREL_FLIGHTS`.
+pub(crate) fn flights(set: &str) -> PathBuf {
+    let cut_outs = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
+    std::env::var_os("SQUIRREL_FLIGHTS").map_or_else(cut_outs, PathBuf::from).join(set)
+}
+
+/// The measured flights of NanoBench. The whole flights are in two folders, the cut-outs in one.
+pub(crate) fn nanobench() -> Vec<PathBuf> {
+    let more = flights("nanobench-more").exists().then(|| csv_files("nanobench-more"));
+    csv_files("nanobench").into_iter().chain(more.unwrap_or_default()).collect()
+}
+
+/// The CSV files of a set, sorted.
+pub(crate) fn csv_files(set: &str) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(flights(set)).unwrap();
+    let mut files: Vec<_> = entries.map(|entry| entry.unwrap().path()).collect();
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "csv"));
+    files.sort();
+    files
 }
 
 /// A file of the folder `vehicles`.
