@@ -8,8 +8,8 @@ use crate::decide::{alternatives, close, decide, shared};
 use crate::find;
 use crate::fitted;
 use crate::name::{
-    Catalogue, NATS_MIN, Search, clock_step_s, explain_flights, only, payload_lengths_m, sds, silent_tolerances,
-    standing,
+    Catalogue, NATS_MIN, Search, clock_step_s, explain_flights, only, payload_lengths_m, sds,
+    silent_tolerances, standing,
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
@@ -185,7 +185,13 @@ fn sorted<'a>(
             set_aside: aside,
             notes: ready.predictor.notes.clone(),
         };
-        return Ok(Diagnosis { verdict, domain: covered(&ready.predictor), before: None, now: None, details: None });
+        return Ok(Diagnosis {
+            verdict,
+            domain: covered(&ready.predictor),
+            before: None,
+            now: None,
+            details: None,
+        });
     }
     if !aside.is_empty() {
         return without(aside);

@@ -4,9 +4,7 @@ Standard library only. README.md says what is kept.
 """
 
 import csv
-import struct
 import sys
-import zlib
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -34,8 +32,7 @@ ARPL_COLUMNS = (
     | {f"gyro.{axis}": 2 for axis in "xyz"}
     | {f"motor.m{i}": 0 for i in (1, 2, 3, 4)}
 )
-# Rows of the topic fixedFrequency.
-CRAZYPAD_ROWS = (300, 1400)
+# Whole flights: what lasts shows in the mean of all of one.
 CRAZYPAD = [
     "normal_flight__E8_log00",
     "normal_flight__E8_log01",
@@ -45,7 +42,10 @@ CRAZYPAD = [
     "normal_flight__E9_log03",
     "normal_flight__E9_log04",
     "cut_M3_3.5mm_3.5mm_40mm__E8_log02",
+    "cut_M3_3mm__E8_log02",
+    "add_weight_W1_at_M3_M4__E8_log02",
     "pair_cut_M2_3.5mm_3.0mm_40.5mm_M1_3.5mm_3.0mm_40.5mm__E9_log05",
+    "pair_cut_M2_0.5mm_46.5mm_M1_0.5mm_46.5mm__E9_log02",
 ]
 
 
@@ -82,34 +82,10 @@ def arpl(sets, flight, from_s, until_s):
 
 
 def crazypad(sets, flight):
-    """Header and rows as recorded, byte for byte; the CRC-32 at the end is made anew. Rows of other topics are left out."""
-    whole = (sets / f"crazypad-dev/{flight}.bin").read_bytes()
-    magic, version, topics = struct.unpack_from("<BHH", whole)
-    assert (magic, version) == (0xBC, 2), flight
-    at, sizes, wanted = 5, {}, None
-    for _ in range(topics):
-        (number,) = struct.unpack_from("<H", whole, at)
-        end = whole.index(b"\0", at + 2)
-        name, at = whole[at + 2 : end].decode(), end + 1
-        (columns,) = struct.unpack_from("<H", whole, at)
-        at, sizes[number] = at + 2, 0
-        for _ in range(columns):
-            end = whole.index(b"\0", at)
-            column, at = whole[at:end].decode(), end + 1
-            sizes[number] += struct.calcsize("<" + column[column.index("(") + 1 : -1])
-        if name == "fixedFrequency":
-            wanted = number
-    header, rows = whole[:at], []
-    while at < len(whole) - 4:
-        (number,) = struct.unpack_from("<H", whole, at)
-        size = 10 + sizes[number]
-        if number == wanted:
-            rows.append(whole[at : at + size])
-        at += size
-    cut = header + b"".join(rows[slice(*CRAZYPAD_ROWS)])
+    """As recorded."""
     path = HERE / f"crazypad-dev/{flight}.bin"
     path.parent.mkdir(exist_ok=True)
-    path.write_bytes(cut + struct.pack("<I", zlib.crc32(cut)))
+    path.write_bytes((sets / f"crazypad-dev/{flight}.bin").read_bytes())
 
 
 def main():

@@ -246,3 +246,42 @@ pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
     }
     if total > 0.0 { (1.0 - error / total).clamp(0.0, 1.0) } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A vehicle that turns once while a force comes from one side of it, or of the world, or from all.
+    #[test]
+    fn a_force_along_one_axis_of_body_or_world_is_told_from_gusts() {
+        let moments: Vec<Moment> =
+            (0..400).map(|i| turned(f64::from(i) * std::f64::consts::TAU / 400.0)).collect();
+        let blow = |i: usize| (0.7 * i as f64).sin();
+        let along = |force: &dyn Fn(usize, &Moment) -> Vector3<f64>| {
+            let body: Vec<Vector3<f64>> = moments.iter().enumerate().map(|(i, m)| force(i, m)).collect();
+            let [x, y] = [0, 1].map(|axis| body.iter().map(|f| f[axis]).collect::<Vec<_>>());
+            one_way(&moments, [&x, &y])
+        };
+        assert!(along(&|i, _| Vector3::new(0.6, 0.8, 0.0) * blow(i)) > 0.99);
+        assert!(along(&|i, m| m.ned_from_body.tr_mul(&Vector3::new(0.6, 0.8, 0.0)) * blow(i)) > 0.99);
+        assert!(along(&|i, _| Vector3::new(blow(i), blow(3 * i + 1), 0.0)) < 0.6);
+    }
+
+    fn turned(heading_rad: f64) -> Moment {
+        let turn = nalgebra::Rotation3::from_euler_angles(0.0, 0.0, heading_rad);
+        Moment {
+            flight: 0,
+            time_s: 0.0,
+            duration_s: 1.0,
+            position: Vector3::zeros(),
+            velocity_body: Vector3::zeros(),
+            velocity_ned: Vector3::zeros(),
+            omega: Vector3::zeros(),
+            heading_rad,
+            ned_from_body: turn.into_inner(),
+            throttle: 0.5,
+            wings: 0.0,
+            voltage_v: 16.0,
+        }
+    }
+}

@@ -21,8 +21,10 @@ pub(crate) fn explain_flights(
     catalogue: &mut Catalogue,
     progress: &dyn Fn(),
 ) -> Result<Naming, GapError> {
-    let explained = |catalogue: &Catalogue| explain(&Search { predictor, catalogue, gust_m_s: None, progress });
-    let leaves_force = |naming: &Naming| naming.leftover.excess.iter().any(|(channel, _)| *channel == FORCE_Z);
+    let explained =
+        |catalogue: &Catalogue| explain(&Search { predictor, catalogue, gust_m_s: None, progress });
+    let leaves_force =
+        |naming: &Naming| naming.leftover.excess.iter().any(|(channel, _)| *channel == FORCE_Z);
     let together = explained(catalogue)?;
     let most = SHARE_OF_TOLERANCE * catalogue.tolerance_of("thrust_fraction");
     let usual = catalogue.day_fraction;

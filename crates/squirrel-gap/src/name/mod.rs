@@ -74,7 +74,8 @@ fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
     }
     let (least, most) = GUST_M_S;
     // What is named in calm air takes a part of the gusts, or makes more of them: the first guess may be out by twice.
-    let Some(guess) = gust_of(search, &naming)?.filter(|sigma| (0.5 * least..=2.0 * most).contains(sigma)) else {
+    let Some(guess) = gust_of(search, &naming)?.filter(|sigma| (0.5 * least..=2.0 * most).contains(sigma))
+    else {
         return Ok(naming);
     };
     let sigma = guess.clamp(least, most);

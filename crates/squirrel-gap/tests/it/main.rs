@@ -9,6 +9,7 @@ mod errors;
 mod far_off;
 mod file_with_effects;
 mod first_screen;
+mod fit;
 mod foreign;
 mod held_out;
 mod long_flights;

@@ -60,6 +60,57 @@ fn a_drag_that_the_file_overstates_is_found() {
     assert!((-0.1..-0.09).contains(&value), "{value}");
 }
 
+/// A lag or delay that the file has and the vehicle has not looks like commands that act before they are given, and a load that
+/// is not there like one that weighs less than nothing.
+#[test]
+fn a_lag_a_latency_or_a_load_that_is_not_there_is_found() {
+    let flown = VehicleFile::squirrel();
+    let flights = [fly_rich(&flown, 1)];
+    for (effect, numbers, key) in [
+        ("motor_lag", "extra_time_constant_s = 0.045", "extra_time_constant_s"),
+        ("actuation_latency", "latency_s = 0.033", "latency_s"),
+        ("payload_swing", "mass_kg = 0.1\nlength_m = 0.45", "mass_kg"),
+    ] {
+        let stated = format!("[effects.{effect}]\n{numbers}\n\n[limits]");
+        let file = vehicle_with("squirrel.toml", &[("[limits]", &stated)]);
+        let verdict = diagnose(&file, &flights, &[], &|_| {}).unwrap().verdict;
+        assert_eq!(verdict.effects.first().map(|e| e.name), Some(effect), "{}", verdict.words);
+        assert_eq!(verdict.effects.len(), 1, "{}", verdict.words);
+        let squirrel_gap::Value::Number { value, .. } = verdict.effects[0].parameters[key] else {
+            panic!("{}", verdict.words);
+        };
+        assert!(value.abs() < 0.005, "{effect}: {value}");
+    }
+}
+
+/// Three flights on motors and propellers that give 2.5 % more or less: that is no reason to doubt what holds in each of them.
+#[test]
+fn flights_that_differ_in_thrust_lack_the_same_effect() {
+    let sd = |text: &str| {
+        let line = text.lines().find(|line| line.starts_with("thrust_coefficient_n_s2")).unwrap();
+        let value: f64 = line.split(&['=', ','][..]).nth(2).unwrap().trim().parse().unwrap();
+        let tolerant = format!("thrust_coefficient_n_s2 = {{ value = {value:e}, sd = {:e} }}", 0.05 * value);
+        (line.to_owned(), tolerant)
+    };
+    let (line, tolerant) = sd(&VehicleFile::squirrel().text);
+    let file = vehicle_with("squirrel.toml", &[(&line, &tolerant)]);
+    let day = |seed: u64, fraction: f64| {
+        let effects = format!(
+            "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n\n[effects.thrust_coefficient]\nthrust_fraction = {fraction}\n\n[limits]"
+        );
+        fly_rich(&vehicle_with("squirrel.toml", &[("[limits]", &effects)]), seed)
+    };
+    let verdict =
+        diagnose(&file, &[day(1, -0.025), day(2, 0.0), day(3, 0.025)], &[], &|_| {}).unwrap().verdict;
+    assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
+    assert_eq!(
+        verdict.effects.iter().map(|e| e.name).collect::<Vec<_>>(),
+        ["linear_drag"],
+        "{}",
+        verdict.words
+    );
+}
+
 /// The attitude as a filter has it that takes a lasting acceleration for the vertical: 0.6 deg at a metre per second squared.
 fn levelled(mut log: FlightLog) -> FlightLog {
     let (times, forces) = {
