@@ -21,11 +21,13 @@ use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 
-/// Effects that a baseline does not tell beside those: what it weighs is known better, and which side gives less is not a matter
-/// of degree.
-const NOT_FITTED: [&str; 2] = ["mass_error", "wing_asymmetry"];
+/// Effects that a baseline does not tell beside those: what is the day's, what is known better, and which side gives less, which is
+/// no matter of degree.
+const NOT_FITTED: [&str; 3] = ["accel_bias", "mass_error", "wing_asymmetry"];
 /// Steps of Gauss-Newton, each about what the last has found.
 const STEPS: usize = 4;
+/// Part of the smallest size worth reporting below which an effect of a machine is none.
+const NEXT_TO_NOTHING: f64 = 0.1;
 /// Part of the smallest size worth reporting by which a number differs from one flight to the next, where nothing is known.
 const USUAL_SHARE: f64 = 0.5;
 /// How many times that it may be, and how sure that it is about once, as the deviation of its logarithm.
@@ -91,7 +93,7 @@ impl Baseline {
             (own.vehicle, own.effects) = step(&own, moments, &good)?;
         }
         progress("fitting the baseline");
-        own.effects = fitted::worth_a_line(&own);
+        own.effects = fitted::worth_a_line(&own, NEXT_TO_NOTHING);
         let scatter = scatter(&own, moments, &good)?;
         let flights = good.into_iter().map(|(name, _)| name).collect();
         Ok(Self { declared: vehicle.clone(), vehicle: own, flights, set_aside, moments, scatter })

@@ -9,12 +9,12 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Largest principal moment of a body over the sum of the others.
 const LARGEST_MOMENT: f64 = 0.999;
-/// Part of the smallest size worth reporting below which an effect of a machine is none.
-const NEXT_TO_NOTHING: f64 = 0.1;
+/// Part of the smallest size worth reporting below which an effect changes no prediction.
+const NEXT_TO_NOTHING: f64 = 0.01;
 
-/// Effects of sensors, of clocks and of the day, which are no numbers of a vehicle, and what has no slope at nothing.
-pub(crate) const NOT_ITS_OWN: [&str; 12] = [
-    "accel_bias",
+/// Effects of sensors, of clocks and of the day, which are no numbers of a vehicle, and what has no slope at nothing. The zero of
+/// the accelerometer is one: it goes with the machine.
+pub(crate) const NOT_ITS_OWN: [&str; 11] = [
     "accel_scale",
     "clock_skew",
     "clock_step",
@@ -36,7 +36,7 @@ pub(crate) fn of(search: &Search<'_>, set: &Scored) -> Result<VehicleFile, GapEr
     let mut own = search.predictor.vehicle.clone();
     let point = Point { members: Vec::new(), ..search.whole(set) };
     (own.vehicle, own.effects) = machine(search, point, |effect| !NOT_ITS_OWN.contains(&effect))?;
-    own.effects = worth_a_line(&own);
+    own.effects = worth_a_line(&own, NEXT_TO_NOTHING);
     Ok(own)
 }
 
@@ -77,13 +77,15 @@ fn possible(fitted: &Vehicle<f64>) -> Result<Vehicle<f64>, ParameterError> {
 }
 
 /// The effects of a machine without what is next to nothing, unless its file has it.
-pub(crate) fn worth_a_line(own: &VehicleFile) -> Effects<f64> {
+///
+/// * `share` - of the smallest size worth reporting, which is not nothing
+pub(crate) fn worth_a_line(own: &VehicleFile, share: f64) -> Effects<f64> {
     let mut kept = Effects::none();
     for name in Effects::<f64>::NAMES {
         let mut all = own.effects;
         let Some(found) = all.has(name).then(|| all.insert(name)).flatten() else { continue };
         let is_worth = |(p, value): (&EffectParameter, &f64)| {
-            p.range(&own.vehicle).is_some_and(|range| value.abs() >= NEXT_TO_NOTHING * range.smallest)
+            p.range(&own.vehicle).is_some_and(|range| value.abs() >= share * range.smallest)
         };
         let declared = own.provenance.iter().any(|(field, _)| field.starts_with(&format!("effects.{name}.")));
         if (declared || found.parameters.iter().zip(found.values.iter()).any(is_worth))
