@@ -17,7 +17,7 @@ const BLOCK_S: f64 = 5.0;
 /// Standard deviations of the free numbers of a set, in its order.
 pub(super) fn deviations(predictor: &Predictor, linear: &Linear, set: &Scored) -> Vec<f64> {
     let k = set.free.len();
-    let columns: Vec<&Vec<f64>> = set.own.iter().map(|column| &**column).chain(&linear.columns).collect();
+    let columns = set.columns(linear);
     let live: Vec<usize> = (0..columns.len()).filter(|i| set.prior[*i] > 0.0).collect();
     let mut left = set.y.clone();
     for &i in &live {

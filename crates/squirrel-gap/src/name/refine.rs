@@ -43,6 +43,15 @@ pub(crate) struct Scored {
     pub(crate) y: Vec<f64>,
 }
 
+impl Scored {
+    /// Whitened columns in the order of the posterior: of the free numbers, then of everything else, heights as they act here.
+    pub(super) fn columns<'a>(&'a self, linear: &'a Linear) -> Vec<&'a Vec<f64>> {
+        let others = linear.columns.iter().enumerate();
+        let here = others.map(|(index, column)| self.heights.get(&index).map_or(column, |here| &**here));
+        self.own.iter().map(|column| &**column).chain(here).collect()
+    }
+}
+
 impl Search<'_> {
     /// Refines the numbers of a set by Gauss-Newton through the simulator, everything else floating with its tolerance.
     ///
