@@ -2,7 +2,7 @@
 
 use crate::diagnose::{Diagnosis, Own};
 use crate::verdict::{Kind, NamedEffect, Value, Verdict};
-use squirrel_core::effects::{Effects, Kind as ParameterKind};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind as ParameterKind};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::fmt::Write;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, value};
@@ -217,16 +217,38 @@ fn own_effects(effects: &mut Table, own: &Own) {
     let mut fitted = own.vehicle.effects;
     for name in Effects::<f64>::NAMES {
         let Some(found) = fitted.has(name).then(|| fitted.insert(name)).flatten() else { continue };
-        let numbers = found.parameters.iter().zip(found.values.iter());
-        for (parameter, number) in numbers.filter(|(_, number)| **number != 0.0) {
-            if matches!(parameter.kind, ParameterKind::Size { .. })
-                && let Some(table) =
-                    effects.entry(name).or_insert_with(|| Item::Table(Table::new())).as_table_mut()
-            {
-                table.insert(parameter.key, with_source(*number, &own.source));
+        let entry = effects.entry(name).or_insert_with(|| Item::Table(Table::new()));
+        let Some(table) = entry.as_table_mut() else { continue };
+        let form = chosen_form(found.parameters, found.values);
+        for (parameter, number) in found.parameters.iter().zip(found.values.iter()) {
+            match parameter.kind {
+                ParameterKind::OneOf(_) if parameter.key == FORM => {
+                    if form != "standard" && (form != standard_form(name) || table.contains_key(FORM)) {
+                        table.insert(FORM, value(form));
+                    }
+                }
+                ParameterKind::OneOf(names) => {
+                    table.insert(parameter.key, value(names[*number as usize]));
+                }
+                ParameterKind::Rotor => {
+                    table.insert(parameter.key, value(*number as i64));
+                }
+                ParameterKind::Size { .. } if parameter.exists_in(form) => {
+                    table.insert(parameter.key, with_source(*number, &own.source));
+                }
+                ParameterKind::Size { .. } => {}
             }
         }
     }
+}
+
+/// The form that an effect has among its numbers.
+fn chosen_form(parameters: &[EffectParameter], values: &[f64]) -> &'static str {
+    let chosen = parameters.iter().zip(values).find_map(|(parameter, number)| match parameter.kind {
+        ParameterKind::OneOf(names) if parameter.key == FORM => names.get(*number as usize).copied(),
+        _ => None,
+    });
+    chosen.unwrap_or("standard")
 }
 
 /// A rotor gives less by the fraction of a weak rotor.
@@ -270,11 +292,10 @@ fn with_source(number: f64, source: &str) -> Item {
 }
 
 fn standard_form(effect: &str) -> &'static str {
-    use squirrel_core::effects::{Effects, FORM, Kind};
     let list = Effects::<f64>::parameters(effect).unwrap_or_default();
     list.iter()
         .find_map(|p| match p.kind {
-            Kind::OneOf(names) if p.key == FORM => Some(names[0]),
+            ParameterKind::OneOf(names) if p.key == FORM => Some(names[0]),
             _ => None,
         })
         .unwrap_or("standard")

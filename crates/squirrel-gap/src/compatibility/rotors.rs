@@ -46,9 +46,9 @@ pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
         ));
     }
     let step_s = flight.step_s();
-    // A clock that runs off is late by more and more; what is late from the start is something else.
     // A file may say more of a lag than there is: what acts before its model does may still act after it is given.
     let earliest_s = SHIFT_S.0 - flight.stated_delay_s();
+    // A clock that runs off is late by more and more; what is late from the start is something else.
     let outside = |(shift_s, fit): (f64, f64)| fit > MATCH && !(earliest_s..=SHIFT_S.1).contains(&shift_s);
     let (shift_s, fit) = moments.best_shift(step_s, SHIFT_MAX_S);
     // Air that damps the rates makes moments look early; rates alone never make them look so.

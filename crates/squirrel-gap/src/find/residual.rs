@@ -7,8 +7,8 @@ use super::{CHANNELS, GapError};
 use crate::flight::filter::{DERIVATIVE_REACH, derivative};
 use crate::flight::recording::{Recording, Sample};
 use crate::flight::series::{Span, between};
-use crate::predictor::{SensorErrors, Track};
-use nalgebra::{Vector3, Vector6};
+use crate::predictor::{Commands, SensorErrors, Track};
+use nalgebra::{UnitQuaternion, Vector3, Vector6};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_sim::flight::PLANT_STEP_US;
@@ -76,12 +76,29 @@ pub(super) fn residuals(
         .collect()
 }
 
-/// The measured samples of a piece, at the heights that `name` has: strapdown, held by barometer or GNSS.
+/// The measured samples of a piece with what the vehicle file says of the sensors taken off, at the heights that `name` has:
+/// strapdown, held by barometer or GNSS.
 fn samples(vehicle: &VehicleFile, recording: &Recording, piece: Span) -> Vec<Sample> {
+    let effects = &vehicle.effects;
     let mut samples = recording.grid(piece);
-    let motion = Track::new(0, vehicle, recording, piece).motion(&vehicle.effects, &SensorErrors::default());
-    for (sample, known) in samples.iter_mut().zip(&motion.body) {
+    let track = Track::new(0, vehicle, recording, piece);
+    let motion = track.motion(effects, &SensorErrors::default());
+    let [rate_scale, force_scale] = track.scales(effects);
+    for ((sample, known), load) in samples.iter_mut().zip(&motion.body).zip(&track.rotor_load) {
+        let since_s = sample.time_s - track.began_s;
         sample.body.position = known.position;
+        // Late fixes are put where they belong by the accelerometer.
+        if effects.gnss_latency_s() != 0.0 {
+            sample.body.velocity = known.velocity;
+        }
+        let heading_rad = effects.heading_bias_rad(since_s, *load);
+        if heading_rad != 0.0 {
+            let back = UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, -heading_rad));
+            sample.body.attitude = back.into_inner() * sample.body.attitude;
+        }
+        sample.body.omega.vector.component_div_assign(&rate_scale);
+        sample.specific_force =
+            (sample.specific_force - track.bias(effects, since_s)).component_div(&force_scale);
     }
     samples
 }
@@ -104,10 +121,13 @@ fn model(
     let plant = Plant::new(vehicle.vehicle, vehicle.effects, vehicle.wing.clone(), None, dt_s)
         .map(|plant| if recording.speed.is_some() { plant.told_rotor_speeds() } else { plant })
         .map_err(|problem| GapError::Vehicle { vehicle: vehicle.name.clone(), problem })?;
-    let follow = |state: &mut PlantState, at_s: f64, voltage_v: f64, next: State<f64>| {
+    let commands = Commands::new(recording);
+    let first = &samples[0];
+    let mut clock = commands.clock(&vehicle.effects, first.time_s);
+    let mut follow = |state: &mut PlantState, at_s: f64, voltage_v: f64, next: State<f64>| {
         // A command acts from the step that is nearest to its time.
-        let command_s = at_s + 0.5 * dt_s;
-        let (rotor, wing) = (recording.rotor_command(command_s), recording.wing_command(command_s));
+        clock.advance_to(at_s + 0.5 * dt_s);
+        let (rotor, wing) = clock.now();
         let mut now = Wrench::zero();
         state.battery.voltage_v = voltage_v;
         let Ok(()) = plant.step_with::<Infallible>(state, &rotor, wing, In::zero(), |_, wrench| {
@@ -117,7 +137,6 @@ fn model(
         now
     };
 
-    let first = &samples[0];
     let mut state = plant.initial_state(first.body, 1.0);
     for _ in 0..(SETTLE_S / dt_s) as usize {
         follow(&mut state, first.time_s, first.voltage_v, first.body);

@@ -268,14 +268,6 @@ impl<'a> Recording<'a> {
         command
     }
 
-    /// The wing command in force at a time, left and right, 0 to 1.
-    pub(crate) fn wing_command(&self, time_s: f64) -> [f64; 2] {
-        self.wing.as_ref().map_or([0.0; 2], |wing| {
-            let row = wing.held(time_s);
-            [row[0], row[1]]
-        })
-    }
-
     /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard deviation.
     pub(crate) fn imu_noise(&self) -> [Vector3<f64>; 2] {
         // Behind the filter nothing is white; what is left of the noise is as large.

@@ -21,13 +21,13 @@ mod track;
 mod trim;
 mod turning;
 
+pub(crate) use commands::Commands;
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
 use crate::flight::inertial::Common;
 use crate::flight::recording::Recording;
 use actuators::{Path, Paths, stride};
-use commands::Commands;
 use kept::Kept;
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::Effects;

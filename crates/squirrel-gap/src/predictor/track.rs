@@ -356,7 +356,7 @@ impl Track {
     }
 
     /// What the accelerometer is off by, m/s^2; nothing where there is none.
-    fn bias(&self, effects: &Effects<f64>, time_s: f64) -> Vector3<f64> {
+    pub(crate) fn bias(&self, effects: &Effects<f64>, time_s: f64) -> Vector3<f64> {
         if self.has_accelerometer() { effects.specific_force_bias(time_s).vector } else { Vector3::zeros() }
     }
 

@@ -1,7 +1,8 @@
 //! A vehicle file may carry effects already; the workflow looks for what is missing beside them.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use squirrel_gap::{Kind, diagnose};
+use crate::support::{fly_rich, vehicle_with};
+use squirrel_gap::{Kind, diagnose, find};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
@@ -36,4 +37,42 @@ fn an_effect_of_the_file_acts_once() {
     let nats = [&plain, &light].map(|verdict| verdict.effects[0].evidence_nats);
     println!("{nats:?}");
     assert!((nats[0] - nats[1]).abs() < 0.02 * nats[0], "{nats:?}");
+}
+
+/// What the file says of sensors, clocks and links is taken off before force and moment are compared: a patched file leaves what a
+/// file leaves of which nothing is missing.
+#[test]
+fn find_knows_sensors_and_clocks_of_the_file() {
+    let file = VehicleFile::squirrel();
+    let with =
+        |effect: &str| vehicle_with("squirrel.toml", &[("[limits]", &format!("{effect}\n\n[limits]"))]);
+    let left = |vehicle: &VehicleFile, flown: &VehicleFile| {
+        let residual = find(vehicle, &[fly_rich(flown, 1)]).unwrap().residual;
+        let norm = |x: [f64; 3]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        [norm(residual.force_body_rms_n), norm(residual.moment_body_rms_n_m)]
+    };
+    let usual = left(&file, &file);
+    // Which of force and moment it acts on, and how many times what is usual it leaves of them at least.
+    for (effect, channel, times) in [
+        ("[effects.actuation_latency]\nlatency_s = 0.04", 1, 5.0),
+        ("[effects.clock_skew]\nskew_ppm = 600.0", 1, 2.0),
+        ("[effects.accel_bias]\nbias_x_m_s2 = 0.3\nbias_y_m_s2 = 0.0\nbias_z_m_s2 = -0.4", 0, 2.0),
+        (
+            "[effects.accel_scale]\nscale_x_fraction = 0.0\nscale_y_fraction = 0.0\nscale_z_fraction = 0.03",
+            0,
+            2.0,
+        ),
+        (
+            "[effects.gyro_scale]\nscale_x_fraction = 0.2\nscale_y_fraction = 0.0\nscale_z_fraction = 0.0",
+            1,
+            1.3,
+        ),
+        ("[effects.gnss_latency]\nlatency_s = 0.08", 0, 1.05),
+    ] {
+        let flown = with(effect);
+        let (known, unknown) = (left(&flown, &flown)[channel], left(&file, &flown)[channel]);
+        println!("{effect}: {known:.2e} known, {unknown:.2e} unknown, {:.2e} usual", usual[channel]);
+        assert!(unknown > times * usual[channel], "{effect}");
+        assert!(known < 2.0 * usual[channel] && known < 0.8 * unknown, "{effect}");
+    }
 }
