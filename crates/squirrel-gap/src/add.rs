@@ -41,28 +41,24 @@ pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
 /// # Errors
 /// One line: the text is not TOML, or the patched file would not be a vehicle.
 pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
-    with(vehicle, diagnosis, own(diagnosis), &diagnosis.verdict.effects, flights)
+    with(vehicle, diagnosis, diagnosis.before.as_ref(), &diagnosis.verdict.effects, flights)
 }
 
-/// The text of the vehicle file with its own numbers where these flights have them, each inside its tolerance, and with what is
-/// named; without a name where none stands.
+/// As [`add`], and with the file's own numbers where these flights have them, each inside its tolerance; without a name where none
+/// stands. What is proven on held-out flights is this whole explanation.
 ///
 /// # Errors
 /// One line: something is missing that such numbers would take up; or as [`add`].
 pub fn fit(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
     let verdict = &diagnosis.verdict;
+    let own = diagnosis.before.as_ref().or(diagnosis.now.as_ref());
     match (nothing_to_add(verdict), verdict.verdict) {
         (Some(why), Kind::OutsideCatalogue | Kind::DataProblem) => {
             Err(format!("{}: nothing to fit: {why}", vehicle.name))
         }
-        (Some(_), _) => with(vehicle, diagnosis, own(diagnosis), &[], flights),
-        (None, _) => add(vehicle, diagnosis, flights),
+        (Some(_), _) => with(vehicle, diagnosis, own, &[], flights),
+        (None, _) => with(vehicle, diagnosis, own, &verdict.effects, flights),
     }
-}
-
-/// The numbers that a file is handed over with: those of good flights of the machine, or else of these.
-fn own(diagnosis: &Diagnosis) -> Option<&Own> {
-    diagnosis.before.as_ref().or(diagnosis.now.as_ref())
 }
 
 /// As [`add`], of the explanations that flights do not tell apart the first with an effect: the answer, then its alternatives.

@@ -3,7 +3,7 @@
 
 use crate::GapError;
 use crate::name::{Point, Scored, Search, hypothesis};
-use squirrel_core::effects::{EffectParameter, Effects};
+use squirrel_core::effects::{EffectParameter, Effects, Kind};
 use squirrel_core::vehicle::{ParameterError, Vehicle};
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -84,6 +84,12 @@ pub(crate) fn worth_a_line(own: &VehicleFile, share: f64) -> Effects<f64> {
     for name in Effects::<f64>::NAMES {
         let mut all = own.effects;
         let Some(found) = all.has(name).then(|| all.insert(name)).flatten() else { continue };
+        for (p, value) in found.parameters.iter().zip(found.values.iter_mut()) {
+            // What floats may be a little less than nothing, and no file can say so.
+            if matches!(p.kind, Kind::Size { signed: false, .. }) {
+                *value = value.max(0.0);
+            }
+        }
         let is_worth = |(p, value): (&EffectParameter, &f64)| {
             p.range(&own.vehicle).is_some_and(|range| value.abs() >= share * range.smallest)
         };

@@ -31,8 +31,8 @@ pub(crate) enum Gap {
         /// Add this effect, of an answer that is a set of them or not sure enough to be added by itself.
         #[arg(long, value_name = "NAME")]
         effect: Option<String>,
-        /// Also where no effect is missing: the vehicle file with its numbers where these flights have them, inside their
-        /// tolerances.
+        /// Write the file's own numbers, too, where these flights have them, inside their tolerances; also where no effect is
+        /// missing.
         #[arg(long, conflicts_with = "effect")]
         fit: bool,
         /// Print the patch and write nothing.
@@ -45,8 +45,8 @@ pub(crate) enum Gap {
     Run {
         #[command(flatten)]
         flights: Given,
-        /// Hand over a vehicle file also where no effect is missing: with its numbers where these flights have them, inside
-        /// their tolerances.
+        /// Write the file's own numbers, too, where these flights have them, inside their tolerances; also where no effect is
+        /// missing.
         #[arg(long)]
         fit: bool,
     },

@@ -1,5 +1,5 @@
-//! The file that is handed over has its own numbers where the flights have them: what is proven is the whole explanation, and
-//! not its names alone.
+//! A file that is fitted has its own numbers where the flights have them: what is proven is the whole explanation, and not its
+//! names alone.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{fly_rich, vehicle_with};
@@ -26,16 +26,16 @@ fn parse(text: &str) -> VehicleFile {
 }
 
 #[test]
-fn a_patch_predicts_held_out_flights_better_than_its_names_alone() {
+fn a_fitted_file_predicts_held_out_flights_better_than_its_names_alone() {
     let (file, drag) = (VehicleFile::squirrel(), "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n");
     let flown = flown(drag);
     let diagnosis = diagnose(&file, &[fly_rich(&flown, 1)], &[], &|_| {}).unwrap();
     assert_eq!(diagnosis.verdict.verdict, Kind::Named, "{}", diagnosis.verdict.words);
-    let patched = parse(&add(&file, &diagnosis, &["flight 1".to_owned()]).unwrap());
-    let names_alone = parse(&format!("{}\n{drag}", file.text));
+    let [fitted, names_alone] =
+        [fit, add].map(|patch| parse(&patch(&file, &diagnosis, &["flight 1".to_owned()]).unwrap()));
     let unseen = [fly_rich(&flown, 2)];
     let roll = |vehicle: &VehicleFile| find(vehicle, &unseen).unwrap().residual.moment_body_rms_n_m[0];
-    let (with_numbers, without) = (roll(&patched), roll(&names_alone));
+    let (with_numbers, without) = (roll(&fitted), roll(&names_alone));
     println!("{with_numbers:.2e} N m with the file's numbers, {without:.2e} without");
     assert!(with_numbers < 0.7 * without, "{with_numbers:.2e} {without:.2e}");
 }
