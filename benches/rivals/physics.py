@@ -62,7 +62,7 @@ def behind(piece: Piece, source: str, tau_s: float, e: Mapping[str, float], scal
     steps = max(int(np.ceil(piece.period_s / STEP_S)), 1)
     dt_s = piece.period_s / steps
     t = piece.t[0] + dt_s * np.arange(1 - steps, steps * (len(piece.t) - 1) + 1) - 0.5 * dt_s
-    late = t - e["latency"] - e["skew"] * (t - piece.t[0])
+    late = t - e["latency"] + e["skew"] * (t - piece.t[0])
     log = piece.log[source]
     target = np.clip(held(late, log["time_s"], log["command"]), 0.0, 1.0)
     target = target * np.repeat(np.broadcast_to(scale, (len(piece.t), 1)), steps, axis=0)
@@ -168,5 +168,8 @@ def predict(piece: Piece, p: dict, given: Mapping[str, float] | None = None) -> 
         if key.startswith("payload_") and mass_kg:
             load = pendulum(piece, float(key.removeprefix("payload_")))
             f = f + mass_kg / m * np.einsum("nji,nj->ni", piece.R, load)
+    # The accelerometer stays where it was: beside the centre of mass it feels the vehicle turn about it.
+    lever = np.broadcast_to(-np.array([e["cg_0"], e["cg_1"], 0.0]), V.shape)
+    f = f + np.cross(piece.alpha, lever) + np.cross(omega, np.cross(omega, lever))
     f = f + np.array([e[f"bias_{i}"] for i in range(3)])
     return np.hstack([f, (M - np.cross(omega, J * omega)) / J])

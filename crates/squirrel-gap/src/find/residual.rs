@@ -38,12 +38,16 @@ pub(super) fn residuals(
         problem: problem.to_string(),
     })?;
     let parameters = airframe.parameters();
+    let is_felt = recording.derived.force.is_none();
+    let lever = if is_felt { vehicle.effects.accelerometer_position().vector } else { Vector3::zeros() };
     let (measured, predicted): (Vec<Vector6<f64>>, Vec<Vector6<f64>>) = (DERIVATIVE_REACH
         ..samples.len() - DERIVATIVE_REACH)
         .map(|k| {
             let omega = samples[k].body.omega.vector;
             let omega_dot = derivative(|k| samples[k].body.omega.vector, k, recording.period_s);
-            let force = samples[k].specific_force * parameters.mass_kg;
+            // An accelerometer beside the centre of mass feels the vehicle turn about it.
+            let turning = omega_dot.cross(&lever) + omega.cross(&omega.cross(&lever));
+            let force = (samples[k].specific_force - turning) * parameters.mass_kg;
             let moment =
                 parameters.inertia_kg_m2 * omega_dot + omega.cross(&(parameters.inertia_kg_m2 * omega));
             let wrench = &model[k];

@@ -52,9 +52,10 @@ fn find_knows_sensors_and_clocks_of_the_file() {
         [norm(residual.force_body_rms_n), norm(residual.moment_body_rms_n_m)]
     };
     let usual = left(&file, &file);
-    // Which of force and moment it acts on, and how many times what is usual it leaves of them at least.
+    // So small that the vehicle flies on as it did. Which of force and moment it acts on, and how many times what is usual it leaves
+    // of them at least.
     for (effect, channel, times) in [
-        ("[effects.actuation_latency]\nlatency_s = 0.04", 1, 5.0),
+        ("[effects.actuation_latency]\nlatency_s = 0.012", 1, 2.0),
         ("[effects.clock_skew]\nskew_ppm = 600.0", 1, 2.0),
         ("[effects.accel_bias]\nbias_x_m_s2 = 0.3\nbias_y_m_s2 = 0.0\nbias_z_m_s2 = -0.4", 0, 2.0),
         (
@@ -62,12 +63,7 @@ fn find_knows_sensors_and_clocks_of_the_file() {
             0,
             2.0,
         ),
-        (
-            "[effects.gyro_scale]\nscale_x_fraction = 0.2\nscale_y_fraction = 0.0\nscale_z_fraction = 0.0",
-            1,
-            1.3,
-        ),
-        ("[effects.gnss_latency]\nlatency_s = 0.08", 0, 1.05),
+        ("[effects.gnss_latency]\nlatency_s = 0.06", 0, 1.05),
     ] {
         let flown = with(effect);
         let (known, unknown) = (left(&flown, &flown)[channel], left(&file, &flown)[channel]);
