@@ -124,11 +124,7 @@ fn with(
         let Some(table) = table.as_table_mut() else {
             return Err(format!("{}: effects.{}: must be a table", vehicle.name, effect.name));
         };
-        if effect.form != "standard"
-            && (effect.form != standard_form(effect.name) || table.contains_key("form"))
-        {
-            table.insert("form", value(effect.form));
-        }
+        write_form(table, effect.name, effect.form);
         for (key, number) in &effect.parameters {
             let item = match *number {
                 Value::Choice { value: name, .. } => value(name),
@@ -218,11 +214,7 @@ fn own_effects(effects: &mut Table, own: &Own) {
         let form = chosen_form(found.parameters, found.values);
         for (parameter, number) in found.parameters.iter().zip(found.values.iter()) {
             match parameter.kind {
-                ParameterKind::OneOf(_) if parameter.key == FORM => {
-                    if form != "standard" && (form != standard_form(name) || table.contains_key(FORM)) {
-                        table.insert(FORM, value(form));
-                    }
-                }
+                ParameterKind::OneOf(_) if parameter.key == FORM => write_form(table, name, form),
                 ParameterKind::OneOf(names) => {
                     table.insert(parameter.key, value(names[*number as usize]));
                 }
@@ -235,6 +227,13 @@ fn own_effects(effects: &mut Table, own: &Own) {
                 ParameterKind::Size { .. } => {}
             }
         }
+    }
+}
+
+/// Says which form an effect has, where that is not the one which a file without a word has.
+fn write_form(table: &mut Table, effect: &str, form: &'static str) {
+    if form != "standard" && (form != standard_form(effect) || table.contains_key(FORM)) {
+        table.insert(FORM, value(form));
     }
 }
 
