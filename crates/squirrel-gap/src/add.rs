@@ -61,6 +61,25 @@ pub fn fit(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> 
     }
 }
 
+/// The vehicle file that an answer asks for, or why it asks for none.
+///
+/// * `with_its_numbers` - as [`fit`] has it, instead of [`add`]
+///
+/// # Errors
+/// As [`add`].
+pub fn patched(
+    vehicle: &VehicleFile,
+    diagnosis: &Diagnosis,
+    flights: &[String],
+    with_its_numbers: bool,
+) -> Result<Result<String, String>, String> {
+    match nothing_to_add(&diagnosis.verdict) {
+        _ if with_its_numbers => Ok(fit(vehicle, diagnosis, flights)),
+        Some(why) => Ok(Err(format!("{}: nothing to add: {why}", vehicle.name))),
+        None => add(vehicle, diagnosis, flights).map(Ok),
+    }
+}
+
 /// As [`add`], of the explanations that flights do not tell apart the first with an effect: the answer, then its alternatives.
 ///
 /// # Errors

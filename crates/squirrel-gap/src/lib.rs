@@ -28,7 +28,7 @@ mod shrink;
 mod verdict;
 mod words;
 
-pub use add::{add, add_effect, difference, fit, nothing_to_add};
+pub use add::{add, add_effect, difference, fit, nothing_to_add, patched};
 pub use baseline::Baseline;
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use compatibility::check;

@@ -45,6 +45,7 @@ pub(crate) fn gap_find<'py>(
 /// What a vehicle lacks, as the JSON of ``squirrel gap run``, and the vehicle with it.
 ///
 /// * `baseline` - good flights of the same machine; empty for none
+/// * `fit` - whether the file gets its numbers as these flights have them, too
 /// * `out` - folder for the report and the patched vehicle file
 /// * `fly_again` - whether held-out flights are flown again in closed loop
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
@@ -56,6 +57,7 @@ pub(crate) fn gap_diagnose<'py>(
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'py, PyDict>,
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] held_out: &Bound<'py, PyDict>,
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] baseline: &Bound<'py, PyDict>,
+    fit: bool,
     fly_again: bool,
     out: Option<PathBuf>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<Vehicle>)> {
@@ -63,7 +65,7 @@ pub(crate) fn gap_diagnose<'py>(
     let (flights, held_out) = (logs("flights", flights)?, logs("held_out", held_out)?);
     let baseline = logs("baseline", baseline)?;
     let (verdict, patched) = interruptible(py, move |stop| {
-        diagnose(&vehicle, [&flights, &held_out, &baseline], fly_again, out.as_deref(), stop)
+        diagnose(&vehicle, [&flights, &held_out, &baseline], [fit, fly_again], out.as_deref(), stop)
     })??;
     Ok((json(py, &verdict)?, patched.map(|file| Vehicle { file })))
 }
@@ -73,7 +75,7 @@ type Logs = [(String, log::FlightLog)];
 fn diagnose(
     vehicle: &VehicleFile,
     [flights, held_out, baseline]: [&Logs; 3],
-    fly_again: bool,
+    [fit, fly_again]: [bool; 2],
     out: Option<&Path>,
     stop: &Stop,
 ) -> PyResult<(squirrel_gap::Verdict, Option<VehicleFile>)> {
@@ -88,11 +90,7 @@ fn diagnose(
     let (flights, held_out) =
         fewer.as_ref().map_or((flights, held_out), |[f, h]| (f.as_slice(), h.as_slice()));
     let names = |logs: &Logs| logs.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    let text = squirrel_gap::nothing_to_add(&diagnosis.verdict)
-        .is_none()
-        .then(|| squirrel_gap::add(vehicle, &diagnosis, &names(flights)))
-        .transpose()
-        .map_err(value)?;
+    let text = squirrel_gap::patched(vehicle, &diagnosis, &names(flights), fit).map_err(value)?.ok();
     let patched = text
         .as_ref()
         .map(|text| VehicleFile::parse_with(text, &vehicle.name, vehicle.weights.clone()))

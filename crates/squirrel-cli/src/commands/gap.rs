@@ -91,13 +91,7 @@ impl Found {
     ///
     /// * `fit` - whether a file with its numbers where these flights have them will do
     fn patched(&self, fit: bool) -> Result<Result<String, String>, String> {
-        if fit {
-            return Ok(squirrel_gap::fit(&self.vehicle, &self.diagnosis, &self.flights));
-        }
-        match squirrel_gap::nothing_to_add(&self.diagnosis.verdict) {
-            Some(why) => Ok(Err(format!("{}: nothing to add: {why}", self.vehicle.name))),
-            None => squirrel_gap::add(&self.vehicle, &self.diagnosis, &self.flights).map(Ok),
-        }
+        squirrel_gap::patched(&self.vehicle, &self.diagnosis, &self.flights, fit)
     }
 
     /// Flies held-out flights again with the effects added.

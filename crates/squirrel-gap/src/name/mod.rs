@@ -187,10 +187,7 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
         (as_it_is, looser) if as_it_is.worst() < looser.worst() => (left, as_it_is),
         (_, looser) => (loose, looser),
     };
-    let mut deviations = interval::deviations(predictor, &found.linear, &found.best);
-    for (sd, (member, slot)) in deviations.iter_mut().zip(&found.best.free) {
-        *sd = sd.hypot(catalogue.spread(&found.best.members[*member], *slot));
-    }
+    let deviations = interval::deviations(search, &found.linear, &found.best);
     Ok(Naming {
         found,
         hypothesis: about,

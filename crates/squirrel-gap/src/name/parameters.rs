@@ -5,7 +5,7 @@
 //! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
 
 use super::point::{Airframe, DAY_FRACTION, Member};
-use super::tolerance::{SHARE_OF_SMALLEST, airframe, slip_ppm, timing_s, tolerance};
+use super::tolerance::{SHARE_OF_SMALLEST, airframe, middle_m, slip_ppm, timing_s, tolerance};
 use crate::GapError;
 use crate::leftover::{Slack, Usual};
 use crate::predictor::{Predictor, TURNING};
@@ -194,6 +194,7 @@ impl Catalogue {
             }
             parameter.spread = match timing_s(predictor, effect) {
                 Some(spread) => spread,
+                None if effect == "cg_offset" => middle_m(vehicle, parameter.slot),
                 // What has no declared number has none to be off.
                 None if parameter.tolerance == SHARE_OF_SMALLEST * parameter.smallest => 0.0,
                 None => parameter.tolerance,

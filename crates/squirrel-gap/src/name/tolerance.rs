@@ -8,8 +8,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.
 pub(super) const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
-/// Part of a sample to which times are known, one standard deviation: it is held for all of it.
-const SAMPLE_SHARE: f64 = 0.29;
+/// Part of a sample to which times are known, one standard deviation.
+const SAMPLE_SHARE: f64 = 0.1;
 /// Voltage of a full cell, of one at rest, and of an empty one under load, V.
 const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
 
@@ -103,10 +103,7 @@ pub(super) fn tolerance(
             None => none,
         },
         "cg_offset" => {
-            let all: Vec<f64> = (0..vehicle.vehicle.rotors().len())
-                .filter_map(|i| sds(vehicle, &format!("rotor[{i}].position_body_m")))
-                .map(|sd| sd[slot.min(sd.len() - 1)])
-                .collect();
+            let all = arms_m(vehicle, slot);
             let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
             mean.max(none)
         }
@@ -121,6 +118,19 @@ pub(super) fn tolerance(
         "payload_swing" | "clock_step" | "ground_effect" => 0.0,
         _ => none,
     })
+}
+
+/// The declared sds of the rotors' places along an axis.
+fn arms_m(vehicle: &VehicleFile, axis: usize) -> Vec<f64> {
+    let rotors = 0..vehicle.vehicle.rotors().len();
+    let declared = rotors.filter_map(|i| sds(vehicle, &format!("rotor[{i}].position_body_m")));
+    declared.map(|sd| sd[axis.min(sd.len() - 1)]).collect()
+}
+
+/// By how much the middle of the rotors, which a centre of mass is beside, is off by itself: each by its own.
+pub(super) fn middle_m(vehicle: &VehicleFile, axis: usize) -> f64 {
+    let all = arms_m(vehicle, axis);
+    all.iter().map(|sd| sd * sd).sum::<f64>().sqrt() / all.len().max(1) as f64
 }
 
 /// The declared sd of a number; `None` where the number is zero and the file declares none.

@@ -1126,11 +1126,12 @@ def forward(model: Model, *, rows: numpy.typing.NDArray[numpy.float32], velocity
         Names the argument, what was expected and what came.
     """
 
-def gap_diagnose(vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog], baseline: dict[str, FlightLog], fly_again: builtins.bool, out: typing.Optional[builtins.str | os.PathLike | pathlib.Path]) -> tuple[dict[str, typing.Any], Vehicle | None]:
+def gap_diagnose(vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog], baseline: dict[str, FlightLog], fit: builtins.bool, fly_again: builtins.bool, out: typing.Optional[builtins.str | os.PathLike | pathlib.Path]) -> tuple[dict[str, typing.Any], Vehicle | None]:
     r"""
     What a vehicle lacks, as the JSON of ``squirrel gap run``, and the vehicle with it.
     
     * `baseline` - good flights of the same machine; empty for none
+    * `fit` - whether the file gets its numbers as these flights have them, too
     * `out` - folder for the report and the patched vehicle file
     * `fly_again` - whether held-out flights are flown again in closed loop
     """

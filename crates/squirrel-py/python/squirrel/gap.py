@@ -339,7 +339,7 @@ class Verdict:
         Flights that took no part, of those to fit and of those held out.
     notes : tuple of str
     patched : Vehicle or None
-        The vehicle with the effects in it; None where there are none that a file can take.
+        The vehicle with the effects in it; None where there are none that a file can take, and nothing was fitted.
     """
 
     verdict: Literal[
@@ -415,7 +415,7 @@ def name(
     ValueError
         One line that names the flight or the field, and the value.
     """
-    return _verdict(*gap_diagnose(vehicle, flights, {}, baseline or {}, False, None))
+    return _verdict(*gap_diagnose(vehicle, flights, {}, baseline or {}, False, False, None))
 
 
 def shrink(
@@ -450,7 +450,7 @@ def shrink(
     """
     if not held_out:
         raise ValueError("held_out: none given; shrink needs flights that the fit never sees")
-    return _verdict(*gap_diagnose(vehicle, flights, held_out, baseline or {}, True, None))
+    return _verdict(*gap_diagnose(vehicle, flights, held_out, baseline or {}, False, True, None))
 
 
 def run(
@@ -459,6 +459,7 @@ def run(
     flights: dict[str, FlightLog],
     held_out: dict[str, FlightLog] | None = None,
     baseline: dict[str, FlightLog] | None = None,
+    fit: bool = False,
     out: str | os.PathLike[str] | None = None,
 ) -> Verdict:
     """Find, name, add and shrink.
@@ -473,6 +474,9 @@ def run(
         For the proof.
     baseline : dict of str to FlightLog, optional
         Good flights of the same machine: what is named is what has changed since.
+    fit : bool, optional
+        Whether `Verdict.patched` has the file's own numbers where these flights have them, each inside its tolerance,
+        beside the names and also where nothing is missing.
     out : str or os.PathLike, optional
         Folder for ``report.html`` and the patched ``vehicle.toml``; nothing is written if left out.
 
@@ -487,7 +491,7 @@ def run(
     ValueError
         One line that names the flight or the field, and the value.
     """
-    return _verdict(*gap_diagnose(vehicle, flights, held_out or {}, baseline or {}, True, out))
+    return _verdict(*gap_diagnose(vehicle, flights, held_out or {}, baseline or {}, fit, True, out))
 
 
 def _places(places: list[dict[str, Any]]) -> tuple[Place, ...]:
