@@ -12,10 +12,11 @@ use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
 
 /// Vehicle files that are part of the package.
-const BUNDLED: [(&str, &str); 4] = [
+const BUNDLED: [(&str, &str); 5] = [
     ("squirrel", squirrel_sim::vehicle_file::SQUIRREL_TOML),
     ("crazyflie21_brushed", include_str!("../../../vehicles/crazyflie21_brushed.toml")),
     ("crazyflie21_brushed_curve", include_str!("../../../vehicles/crazyflie21_brushed_curve.toml")),
+    ("crazyflie21_datasheet", include_str!("../../../vehicles/crazyflie21_datasheet.toml")),
     ("crazyflie2_arpl", include_str!("../../../vehicles/crazyflie2_arpl.toml")),
 ];
 
@@ -68,7 +69,8 @@ impl Vehicle {
     /// Parameters
     /// ----------
     /// name : str
-    ///     ``squirrel`` (the paper's), ``crazyflie21_brushed``, ``crazyflie21_brushed_curve`` or ``crazyflie2_arpl``.
+    ///     ``squirrel`` (the paper's), ``crazyflie21_brushed``, ``crazyflie21_brushed_curve``,
+    ///     ``crazyflie21_datasheet`` or ``crazyflie2_arpl``.
     ///
     /// Returns
     /// -------

@@ -10,7 +10,8 @@ import squirrel
 
 
 def test_bundled_vehicles_are_those_of_the_repository() -> None:
-    for name in ["squirrel", "crazyflie21_brushed", "crazyflie21_brushed_curve", "crazyflie2_arpl"]:
+    crazyflies = ["crazyflie21_brushed", "crazyflie21_brushed_curve", "crazyflie21_datasheet", "crazyflie2_arpl"]
+    for name in ["squirrel", *crazyflies]:
         vehicle = squirrel.Vehicle.bundled(name)
         assert vehicle.text == (ROOT / f"vehicles/{name}.toml").read_text()
     with pytest.raises(ValueError, match=r"name = hawk: no such vehicle; known are squirrel, "):

@@ -24,7 +24,7 @@ fn hover_stays_within_the_sensors_noise() {
 
 #[test]
 fn the_shipped_practice_and_crazyflie_vehicles_are_sound_and_every_number_has_a_source() {
-    for name in ["squirrel", "crazyflie21_brushed", "practice"] {
+    for name in ["squirrel", "crazyflie21_brushed", "crazyflie21_datasheet", "practice"] {
         let path = format!("{}/../../vehicles/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let file = VehicleFile::load(path.as_ref()).unwrap();
         // Counts and signs are not measured: they are how the vehicle is built.

@@ -1,5 +1,6 @@
 //! The tests of the gap workflow. One binary: what they share is compiled and linked once.
 
+mod datasheet;
 mod support;
 
 mod baseline;

@@ -965,7 +965,8 @@ class Vehicle:
         Parameters
         ----------
         name : str
-            ``squirrel`` (the paper's), ``crazyflie21_brushed``, ``crazyflie21_brushed_curve`` or ``crazyflie2_arpl``.
+            ``squirrel`` (the paper's), ``crazyflie21_brushed``, ``crazyflie21_brushed_curve``,
+            ``crazyflie21_datasheet`` or ``crazyflie2_arpl``.
         
         Returns
         -------
