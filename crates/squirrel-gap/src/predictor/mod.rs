@@ -21,7 +21,7 @@ mod track;
 mod trim;
 mod turning;
 
-pub(crate) use commands::Commands;
+pub(crate) use commands::{Clock, Commands};
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
@@ -282,13 +282,15 @@ impl<'a> Predictor<'a> {
         rows: &mut [f64],
     ) -> Result<(), GapError> {
         let plant = self.plant_at(hypothesis, LED_STEP_S)?;
+        let is_asked = |own: usize| flight.is_none_or(|flight| flight == own);
         let days: Vec<Option<Plant>> = (0..self.names.len())
-            .map(|flight| hypothesis.in_flight(flight).map(|own| self.plant_at(&own, LED_STEP_S)).transpose())
+            .map(|flight| hypothesis.in_flight(flight).filter(|_| is_asked(flight)))
+            .map(|own| own.map(|own| self.plant_at(&own, LED_STEP_S)).transpose())
             .collect::<Result<_, _>>()?;
         let paths = self.paths.of(&plant, &self.tracks, &self.commands, |t| stride(plant.effects(), t));
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
-            if flight.is_some_and(|flight| flight != track.flight) {
+            if !is_asked(track.flight) {
                 while segments.next_if(|s| s.piece == piece).is_some() {}
                 continue;
             }
@@ -314,6 +316,34 @@ impl<'a> Predictor<'a> {
             }
         }
         Ok(())
+    }
+
+    /// What a step of a hypothesis takes from the rows of a residual, over the step; zero in the rows of other flights than
+    /// the one that it belongs to.
+    ///
+    /// # Errors
+    /// As [`Self::residual`].
+    pub(crate) fn slope(
+        &self,
+        residual: &[f64],
+        moved: &Hypothesis,
+        step: f64,
+        flight: Option<usize>,
+    ) -> Result<Vec<f64>, GapError> {
+        let own = || self.segments.iter().filter(|s| flight.is_none_or(|flight| flight == s.flight));
+        // Zeros that nothing writes cost no memory: with many flights, most of such a column.
+        let mut rows = vec![0.0; residual.len()];
+        for segment in own() {
+            rows[segment.rows.clone()].copy_from_slice(&residual[segment.rows.clone()]);
+        }
+        self.residual_of(moved, flight, &mut rows)?;
+        for segment in own() {
+            let before = &residual[segment.rows.clone()];
+            for (row, before) in rows[segment.rows.clone()].iter_mut().zip(before) {
+                *row = (before - *row) / step;
+            }
+        }
+        Ok(rows)
     }
 
     /// Mean commanded rotor speed over top speed, and mean wing command, 0 to 1, at a time of a flight.
@@ -420,7 +450,7 @@ impl<'a> Predictor<'a> {
     }
 
     /// The commands of a flight as the vehicle got them, from a time on.
-    pub(crate) fn clock(&self, flight: usize, effects: &Effects<f64>, time_s: f64) -> commands::Clock<'_> {
+    pub(crate) fn clock(&self, flight: usize, effects: &Effects<f64>, time_s: f64) -> Clock<'_> {
         self.commands[flight].clock(effects, time_s)
     }
 
