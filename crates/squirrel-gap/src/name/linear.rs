@@ -159,15 +159,15 @@ pub(super) fn height_columns(
         for column in &heights {
             moved.base[*column] += step;
         }
-        let all_knots =
-            predictor.slope(residual, &hypothesis(predictor, catalogue, &moved)?, step, Some(flight))?;
+        let change =
+            predictor.slope(residual, &hypothesis(predictor, catalogue, &moved)?, 1.0, Some(flight))?;
         for (knot, column) in heights.into_iter().enumerate() {
             let mut slope = vec![0.0; residual.len()];
             for segment in predictor.segments.iter().filter(|s| s.flight == flight) {
                 let track = &predictor.tracks[segment.piece];
                 for (i, row) in segment.rows.clone().enumerate() {
                     let share = track.height_share(knot, segment.t0_s + i as f64 * segment.step_s);
-                    slope[row] = share * all_knots[row];
+                    slope[row] = share * change[row] / step;
                 }
             }
             all.push((column, slope));
