@@ -40,3 +40,6 @@ pub use verdict::{
     Alternative, Gap, Kind, Left, Moved, NamedEffect, RotorHealth, SetAside, Since, Value, Verdict,
 };
 pub use words::significant;
+
+/// The sources of a flight log that the workflow looks at.
+pub const SOURCES: [&str; 7] = ["attitude", "baro", "battery", "gnss", "imu", "rotor", "wing"];

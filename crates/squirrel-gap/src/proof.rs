@@ -7,7 +7,7 @@
 use crate::GapError;
 use crate::name::{Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights};
 use crate::predictor::{CHANNELS, Hypothesis, Predictor, TURNING};
-use crate::shrink::{self, Errors12, Floor};
+use crate::shrink::{Errors12, Floor, Flown};
 use crate::verdict::Gap;
 use squirrel_sim::log::FlightLog;
 
@@ -33,17 +33,16 @@ pub(crate) fn prove(
     let at = |members: &[Member], base: &[f64]| settled_on(unseen, search, naming, members, base);
     let whole = search.whole(&naming.found.best);
     let fitted_at = at(&whole.members, &whole.base)?;
-    let Some(fitted) = shrink::errors(unseen, &fitted_at)? else { return Ok(None) };
-    let Some(nominal) = shrink::errors(unseen, &at(&[], &whole.base)?)? else { return Ok(None) };
+    let flown = Flown::new(unseen, &fitted_at)?;
+    let errors = |hypothesis: Hypothesis| Ok::<_, GapError>(Flown::new(unseen, &hypothesis)?.errors());
+    let Some(fitted) = flown.errors() else { return Ok(None) };
+    let Some(nominal) = errors(at(&[], &whole.base)?)? else { return Ok(None) };
     let mut rivals = Vec::with_capacity(others.len());
     for rival in others {
-        rivals.extend(shrink::errors(unseen, &at(&rival.members, &search.whole(rival).base)?)?);
+        rivals.extend(errors(at(&rival.members, &search.whole(rival).base)?)?);
     }
-    let calm = shrink::floor(unseen, &fitted_at, TURBULENCE_M_S)?;
-    let floor = match naming.gust_m_s {
-        Some(sigma) => shrink::floor(unseen, &fitted_at, sigma)?,
-        None => calm.clone(),
-    };
+    let calm = flown.floor(TURBULENCE_M_S);
+    let floor = naming.gust_m_s.map_or_else(|| calm.clone(), |sigma| flown.floor(sigma));
     Ok(Some(HeldOut { nominal, rivals, fitted, floor, calm }))
 }
 

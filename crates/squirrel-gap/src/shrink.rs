@@ -17,7 +17,7 @@
 
 use crate::GapError;
 use crate::leftover::floor::TURBULENCE_S;
-use crate::predictor::{Hypothesis, Motion, Predictor};
+use crate::predictor::{Clock, Hypothesis, Motion, Predictor, Track};
 use nalgebra::{SVector, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -25,6 +25,7 @@ use rand_pcg::Pcg64Mcg;
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_sim::plant::{Plant, PlantState};
+use std::rc::Rc;
 
 /// Channels of the comparison.
 pub(crate) const CHANNELS: [&str; 12] = [
@@ -131,114 +132,94 @@ struct Reading {
     specific_force: Vector3<f64>,
 }
 
-/// Errors of a hypothesis on flights; `None` where no flight has attitude and velocity.
-///
-/// # Errors
-/// A hypothesis that the plant cannot be stepped with.
-pub(crate) fn errors(predictor: &Predictor, hypothesis: &Hypothesis) -> Result<Option<Errors12>, GapError> {
-    let mut all = Errors12::new();
-    for piece in 0..predictor.tracks.len() {
-        let track = &predictor.tracks[piece];
-        let Some(measured_attitude) = track.attitude() else { continue };
-        if track.velocity().is_empty() {
-            continue;
-        }
-        let motion = predictor.motion(piece, hypothesis);
-        let latency_s = hypothesis.effects.gnss_latency_s();
-        fly(predictor, hypothesis, piece, &motion, None, |start, bin, reading| {
-            let Some(last) = (start + reading.last).checked_sub(1) else { return };
-            let (a, b) =
-                (track.time_s[start + reading.first], track.time_s[last.min(track.time_s.len() - 1)]);
-            // The fix that speaks of this bin has its stamp a latency later.
-            let fixes = track.velocity();
-            let from = fixes.partition_point(|(t, _)| *t - latency_s < a - 1e-6);
-            // Up to the next bin: a fix between two samples belongs to one of them.
-            let until = fixes.partition_point(|(t, _)| *t - latency_s < b + track.period_s - 1e-6);
-            if from == until {
-                return;
-            }
-            let n = (until - from) as f64;
-            let velocity = fixes[from..until].iter().map(|(_, v)| v).sum::<Vector3<f64>>() / n;
-            let at = fixes[from..until].iter().map(|(t, _)| t - latency_s).sum::<f64>() / n;
-            let middle = start + usize::midpoint(reading.first, reading.last);
-            let range = start + reading.first..(start + reading.last).min(track.time_s.len());
-            let mean = |v: &[Vector3<f64>]| {
-                v[range.clone()].iter().sum::<Vector3<f64>>() / range.len().max(1) as f64
-            };
-            let q = UnitQuaternion::new_unchecked(measured_attitude[middle.min(measured_attitude.len() - 1)]);
-            let read = &reading.read;
-            let slope = reading.acceleration_ned;
-            let velocity_then = read.velocity_ned + slope * (at - 0.5 * (a + b));
-            let rotation = (read.attitude.inverse() * q).scaled_axis();
-            let rate = mean(track.omega()) - read.omega;
-            let force = mean(track.specific_force()) - read.specific_force;
-            let velocity = velocity - velocity_then;
-            all.add(bin, compared(predictor, [velocity, rotation, rate, force]));
-        })?;
-    }
-    Ok((all.count[0] > 0.0).then_some(all))
+/// A hypothesis on flights, flown without noise: its errors and its floor are both told from that.
+pub(crate) struct Flown<'a> {
+    pieces: Vec<(Segments<'a>, Vec<Bin>)>,
 }
 
-/// Errors that a hypothesis would have if it were true: started, read and blown about with noise.
-///
-/// # Errors
-/// As [`errors`].
-pub(crate) fn floor(
-    predictor: &Predictor,
-    hypothesis: &Hypothesis,
-    turbulence_m_s: f64,
-) -> Result<Floor, GapError> {
-    let mut all = Errors12::new();
-    // Mean errors of each segment over the first second.
-    let mut segments: Vec<Errors> = Vec::new();
-    for (piece, track) in predictor.tracks.iter().enumerate() {
-        if track.attitude().is_none() || track.velocity().is_empty() {
-            continue;
+impl<'a> Flown<'a> {
+    /// Flies the pieces that have attitude and velocity.
+    ///
+    /// # Errors
+    /// A hypothesis that the plant cannot be stepped with.
+    pub(crate) fn new(predictor: &'a Predictor<'a>, hypothesis: &'a Hypothesis) -> Result<Self, GapError> {
+        let mut pieces = Vec::new();
+        for (piece, track) in predictor.tracks.iter().enumerate() {
+            if track.attitude().is_none() || track.velocity().is_empty() {
+                continue;
+            }
+            let segments = Segments::new(predictor, hypothesis, piece)?;
+            let mut bins = Vec::new();
+            segments.fly(None, |bin| bins.push(bin));
+            pieces.push((segments, bins));
         }
-        let motion = predictor.motion(piece, hypothesis);
-        let mut clean = Vec::new();
-        fly(predictor, hypothesis, piece, &motion, None, |_, _, reading| clean.push(reading.read))?;
-        let [force_noise, rate_noise] = track.imu_noise;
-        let velocity_noise = track.velocity_noise();
-        let attitude_noise = track.attitude_noise();
-        let white = (BIN_S / track.period_s).max(1.0).sqrt();
-        for draw in 0..DRAWS {
-            let mut rng = Pcg64Mcg::seed_from_u64(1000 * draw + piece as u64 + 11);
-            let mut noise = Pcg64Mcg::seed_from_u64(1000 * draw + piece as u64 + 29);
-            let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise)) };
-            let noise = Noise {
-                turbulence_m_s,
-                velocity_m_s: velocity_noise * track.velocity_smoothing(),
-                attitude_rad: attitude_noise,
-                rng: &mut rng,
-            };
-            let mut still = clean.iter();
-            fly(predictor, hypothesis, piece, &motion, Some(noise), |_, bin, reading| {
-                let (Some(own), other) = (still.next(), &reading.read) else { return };
-                let velocity = other.velocity_ned - own.velocity_ned + draw().component_mul(&velocity_noise);
-                let rotation = (own.attitude.inverse() * other.attitude).scaled_axis()
-                    + draw().component_mul(&attitude_noise);
-                let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
-                let force =
-                    other.specific_force - own.specific_force + draw().component_mul(&force_noise) / white;
-                let parts = compared(predictor, [velocity, rotation, rate, force]);
-                if bin == 0 {
-                    segments.push(Errors::zeros());
-                }
-                if let Some(segment) = segments.last_mut().filter(|_| bin < COUNTED) {
-                    let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
-                    *segment += error.component_mul(&error) / COUNTED as f64;
-                }
-                all.add(bin, parts);
-            })?;
-        }
+        Ok(Self { pieces })
     }
-    let n = segments.len().max(1) as f64;
-    let mean = segments.iter().sum::<Errors>() / n;
-    let square: Errors = segments.iter().map(|s| (s - mean).component_mul(&(s - mean))).sum::<Errors>() / n;
-    // Segments overlap by half: each counts for half in the mean of one flight.
-    let deviation = (square * (2.0 * DRAWS as f64 / n)).map(f64::sqrt);
-    Ok(Floor { mean: all, deviation })
+
+    /// Errors of the hypothesis; `None` where no flight has attitude and velocity.
+    pub(crate) fn errors(&self) -> Option<Errors12> {
+        let mut all = Errors12::new();
+        for (segments, bins) in &self.pieces {
+            for bin in bins {
+                segments.compare(bin, &mut all);
+            }
+        }
+        (all.count[0] > 0.0).then_some(all)
+    }
+
+    /// Errors that the hypothesis would have if it were true: started, read and blown about with noise.
+    pub(crate) fn floor(&self, turbulence_m_s: f64) -> Floor {
+        let mut all = Errors12::new();
+        // Mean errors of each segment over the first second.
+        let mut segments: Vec<Errors> = Vec::new();
+        for (own, clean) in &self.pieces {
+            let (predictor, piece, track) = (own.predictor, own.piece as u64, own.track());
+            let [force_noise, rate_noise] = track.imu_noise;
+            let velocity_noise = track.velocity_noise();
+            let attitude_noise = track.attitude_noise();
+            let white = (BIN_S / track.period_s).max(1.0).sqrt();
+            for draw in 0..DRAWS {
+                let mut rng = Pcg64Mcg::seed_from_u64(1000 * draw + piece + 11);
+                let mut noise = Pcg64Mcg::seed_from_u64(1000 * draw + piece + 29);
+                let mut draw =
+                    || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise)) };
+                let noise = Noise {
+                    turbulence_m_s,
+                    velocity_m_s: velocity_noise * track.velocity_smoothing(),
+                    attitude_rad: attitude_noise,
+                    rng: &mut rng,
+                };
+                let mut still = clean.iter();
+                own.fly(Some(noise), |blown| {
+                    let Some(still) = still.next() else { return };
+                    let (own, other) = (&still.read, &blown.read);
+                    let velocity =
+                        other.velocity_ned - own.velocity_ned + draw().component_mul(&velocity_noise);
+                    let rotation = (own.attitude.inverse() * other.attitude).scaled_axis()
+                        + draw().component_mul(&attitude_noise);
+                    let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
+                    let force = other.specific_force - own.specific_force
+                        + draw().component_mul(&force_noise) / white;
+                    let parts = compared(predictor, [velocity, rotation, rate, force]);
+                    if blown.bin == 0 {
+                        segments.push(Errors::zeros());
+                    }
+                    if let Some(segment) = segments.last_mut().filter(|_| blown.bin < COUNTED) {
+                        let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
+                        *segment += error.component_mul(&error) / COUNTED as f64;
+                    }
+                    all.add(blown.bin, parts);
+                });
+            }
+        }
+        let n = segments.len().max(1) as f64;
+        let mean = segments.iter().sum::<Errors>() / n;
+        let square: Errors =
+            segments.iter().map(|s| (s - mean).component_mul(&(s - mean))).sum::<Errors>() / n;
+        // Segments overlap by half: each counts for half in the mean of one flight.
+        let deviation = (square * (2.0 * DRAWS as f64 / n)).map(f64::sqrt);
+        Floor { mean: all, deviation }
+    }
 }
 
 /// What a flight is blown about with, and what its start state is off by.
@@ -268,126 +249,170 @@ fn compared(
 
 /// One bin of one segment.
 struct Bin {
-    /// Samples from the start of the segment.
+    bin: usize,
+    /// Samples of the grid.
     first: usize,
     last: usize,
     read: Reading,
     acceleration_ned: Vector3<f64>,
 }
 
-/// Flies every segment of a piece and hands over what the sensors would read, bin by bin.
-fn fly(
-    predictor: &Predictor,
-    hypothesis: &Hypothesis,
+/// The segments of a piece, ready to be flown again and again.
+struct Segments<'a> {
+    predictor: &'a Predictor<'a>,
+    hypothesis: &'a Hypothesis,
     piece: usize,
-    motion: &Motion,
-    mut noise: Option<Noise<'_>>,
-    mut each: impl FnMut(usize, usize, Bin),
-) -> Result<(), GapError> {
-    let track = &predictor.tracks[piece];
-    let n = track.time_s.len();
-    let dt_s = track.period_s / substeps(track.period_s) as f64;
-    let plant = predictor.plant_in(hypothesis, track.flight, dt_s)?;
-    let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
-    let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
-    let starts: Vec<usize> = (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();
-    let actuators = predictor.led_states(&plant, piece, motion, &starts);
-    for (start, state) in starts.into_iter().zip(actuators) {
-        segment(predictor, hypothesis, &plant, piece, motion, start, state, &mut noise, per_bin, &mut each);
+    motion: Rc<Motion>,
+    plant: Plant,
+    /// Samples at which they start, and the plant there.
+    starts: Vec<(usize, PlantState)>,
+    per_bin: usize,
+}
+
+impl<'a> Segments<'a> {
+    fn new(predictor: &'a Predictor<'a>, hypothesis: &'a Hypothesis, piece: usize) -> Result<Self, GapError> {
+        let track = &predictor.tracks[piece];
+        let n = track.time_s.len();
+        let motion = predictor.motion(piece, hypothesis);
+        let dt_s = track.period_s / substeps(track.period_s) as f64;
+        let plant = predictor.plant_in(hypothesis, track.flight, dt_s)?;
+        let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
+        let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
+        let starts: Vec<usize> = (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();
+        let states = predictor.led_states(&plant, piece, &motion, &starts);
+        let starts = starts.into_iter().zip(states).collect();
+        Ok(Self { predictor, hypothesis, piece, motion, plant, starts, per_bin })
     }
-    Ok(())
+
+    fn track(&self) -> &'a Track {
+        &self.predictor.tracks[self.piece]
+    }
+
+    /// Flies every segment and hands over what the sensors would read, bin by bin.
+    fn fly(&self, mut noise: Option<Noise<'_>>, mut each: impl FnMut(Bin)) {
+        let Some((first, _)) = self.starts.first() else { return };
+        let (track, effects) = (self.track(), &self.hypothesis.effects);
+        let mut clock = self.predictor.clock(track.flight, effects, track.time_s[*first]);
+        for (start, state) in &self.starts {
+            clock.advance_to(track.time_s[*start]);
+            self.segment(*start, *state, clock.clone(), &mut noise, &mut each);
+        }
+    }
+
+    fn segment(
+        &self,
+        start: usize,
+        mut state: PlantState,
+        mut clock: Clock<'_>,
+        noise: &mut Option<Noise<'_>>,
+        each: &mut impl FnMut(Bin),
+    ) {
+        let Self { predictor, plant, motion, per_bin, .. } = self;
+        let (track, per_bin) = (self.track(), *per_bin);
+        let n = track.time_s.len();
+        if start >= 4 && start + 4 < n {
+            let weighted = START_WEIGHTS.iter().zip(&motion.body[start - 4..]);
+            state.body.omega = In::new(weighted.map(|(w, body)| body.omega.vector * (w / START_SUM)).sum());
+        }
+        let mut wind = Vector3::zeros();
+        let mut turbulence = 0.0;
+        if let Some(noise) = noise {
+            let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng)) };
+            turbulence = noise.turbulence_m_s;
+            wind = draw() * turbulence;
+            state.body.velocity =
+                In::new(state.body.velocity.vector + draw().component_mul(&noise.velocity_m_s));
+            let turn = UnitQuaternion::from_scaled_axis(draw().component_mul(&noise.attitude_rad));
+            state.body.attitude = (state.body.ned_from_body().quaternion * turn).into_inner();
+            let [_, rate_noise] = track.imu_noise;
+            state.body.omega =
+                In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * START_NOISE);
+        }
+        let is_led = !flies_freely(predictor);
+        let effects = &self.hypothesis.effects;
+        let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
+        let keep = (-track.period_s / TURBULENCE_S).exp();
+        let [rate_scale, force_scale] = track.scales(effects);
+        for bin in 0..BINS {
+            let first = start + bin * per_bin;
+            let (last, half) = (first + per_bin, first + per_bin / 2);
+            if last >= n {
+                break;
+            }
+            let (mut velocity, mut rate, mut force) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
+            let mut middle = state.body.ned_from_body().quaternion;
+            let began = state.body.velocity.vector;
+            for sample in first..last {
+                if sample == half {
+                    middle = state.body.ned_from_body().quaternion;
+                }
+                if is_led {
+                    state.body.attitude = motion.body[sample].attitude;
+                    state.body.omega = motion.body[sample].omega;
+                }
+                let before = state.body;
+                velocity += before.velocity.vector;
+                rate += before.omega.vector;
+                state.battery.voltage_v = track.voltage_v[sample];
+                for step in 0..substeps(track.period_s) {
+                    // The command that acts in the middle of the step.
+                    clock.advance_to(track.time_s[sample] + (step as f64 + 0.5) * plant.dt_s());
+                    let (rotor, wing) = clock.now();
+                    plant.step(&mut state, &rotor, wing, In::new(wind));
+                }
+                let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
+                force += before.ned_from_body().quaternion.inverse() * (slope - gravity);
+                if let Some(noise) = noise {
+                    let fresh: Vector3<f64> = Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng));
+                    wind = wind * keep + fresh * (turbulence * (1.0 - keep * keep).sqrt());
+                }
+            }
+            let samples = per_bin as f64;
+            let time_s = track.time_s[half] - track.began_s;
+            let heading = effects.heading_bias_rad(time_s, track.rotor_load[half]);
+            let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * heading);
+            let read = Reading {
+                velocity_ned: velocity / samples,
+                attitude: heading * middle,
+                omega: rate.component_mul(&rate_scale) / samples,
+                specific_force: force.component_mul(&force_scale) / samples
+                    + effects.specific_force_bias(time_s).vector,
+            };
+            let acceleration_ned = (state.body.velocity.vector - began) / (samples * track.period_s);
+            each(Bin { bin, first, last, read, acceleration_ned });
+        }
+    }
+
+    /// Adds what the sensors read in a bin, minus what they should have read.
+    fn compare(&self, Bin { bin, first, last, read, acceleration_ned }: &Bin, all: &mut Errors12) {
+        let track = self.track();
+        let (Some(measured_attitude), Some(end)) = (track.attitude(), last.checked_sub(1)) else { return };
+        let latency_s = self.hypothesis.effects.gnss_latency_s();
+        let (a, b) = (track.time_s[*first], track.time_s[end]);
+        // The fix that speaks of this bin has its stamp a latency later.
+        let fixes = track.velocity();
+        let from = fixes.partition_point(|(t, _)| *t - latency_s < a - 1e-6);
+        // Up to the next bin: a fix between two samples belongs to one of them.
+        let until = fixes.partition_point(|(t, _)| *t - latency_s < b + track.period_s - 1e-6);
+        if from == until {
+            return;
+        }
+        let n = (until - from) as f64;
+        let velocity = fixes[from..until].iter().map(|(_, v)| v).sum::<Vector3<f64>>() / n;
+        let at = fixes[from..until].iter().map(|(t, _)| t - latency_s).sum::<f64>() / n;
+        let q = UnitQuaternion::new_unchecked(measured_attitude[usize::midpoint(*first, *last)]);
+        let mean = |v: &[Vector3<f64>]| v[*first..*last].iter().sum::<Vector3<f64>>() / (last - first) as f64;
+        let velocity_then = read.velocity_ned + acceleration_ned * (at - 0.5 * (a + b));
+        let rotation = (read.attitude.inverse() * q).scaled_axis();
+        let rate = mean(track.omega()) - read.omega;
+        let force = mean(track.specific_force()) - read.specific_force;
+        all.add(*bin, compared(self.predictor, [velocity - velocity_then, rotation, rate, force]));
+    }
 }
 
 /// Steps of the plant to a sample: commands may change between samples.
 fn substeps(period_s: f64) -> usize {
     (period_s / STEP_MAX_S).ceil().max(1.0) as usize
-}
-
-#[allow(clippy::too_many_arguments, reason = "the inner loop of `fly`, apart to keep both readable")]
-fn segment(
-    predictor: &Predictor,
-    hypothesis: &Hypothesis,
-    plant: &Plant,
-    piece: usize,
-    motion: &Motion,
-    start: usize,
-    mut state: PlantState,
-    noise: &mut Option<Noise<'_>>,
-    per_bin: usize,
-    each: &mut impl FnMut(usize, usize, Bin),
-) {
-    let track = &predictor.tracks[piece];
-    let n = track.time_s.len();
-    if start >= 4 && start + 4 < n {
-        let weighted = START_WEIGHTS.iter().zip(&motion.body[start - 4..]);
-        state.body.omega = In::new(weighted.map(|(w, body)| body.omega.vector * (w / START_SUM)).sum());
-    }
-    let mut wind = Vector3::zeros();
-    let mut turbulence = 0.0;
-    if let Some(noise) = noise {
-        let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng)) };
-        turbulence = noise.turbulence_m_s;
-        wind = draw() * turbulence;
-        state.body.velocity = In::new(state.body.velocity.vector + draw().component_mul(&noise.velocity_m_s));
-        let turn = UnitQuaternion::from_scaled_axis(draw().component_mul(&noise.attitude_rad));
-        state.body.attitude = (state.body.ned_from_body().quaternion * turn).into_inner();
-        let [_, rate_noise] = track.imu_noise;
-        state.body.omega = In::new(state.body.omega.vector + draw().component_mul(&rate_noise) * START_NOISE);
-    }
-    let is_led = !flies_freely(predictor);
-    let effects = &hypothesis.effects;
-    let mut clock = predictor.clock(track.flight, effects, track.time_s[start]);
-    let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
-    let keep = (-track.period_s / TURBULENCE_S).exp();
-    for bin in 0..BINS {
-        let first = bin * per_bin;
-        if start + first + per_bin >= n {
-            break;
-        }
-        let (mut velocity, mut rate, mut force) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
-        let mut middle = state.body.ned_from_body().quaternion;
-        let began = state.body.velocity.vector;
-        for k in first..first + per_bin {
-            if k == first + per_bin / 2 {
-                middle = state.body.ned_from_body().quaternion;
-            }
-            let sample = start + k;
-            if is_led {
-                state.body.attitude = motion.body[sample].attitude;
-                state.body.omega = motion.body[sample].omega;
-            }
-            let before = state.body;
-            velocity += before.velocity.vector;
-            rate += before.omega.vector;
-            state.battery.voltage_v = track.voltage_v[sample];
-            for step in 0..substeps(track.period_s) {
-                // The command that acts in the middle of the step.
-                clock.advance_to(track.time_s[sample] + (step as f64 + 0.5) * plant.dt_s());
-                let (rotor, wing) = clock.now();
-                plant.step(&mut state, &rotor, wing, In::new(wind));
-            }
-            let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
-            force += before.ned_from_body().quaternion.inverse() * (slope - gravity);
-            if let Some(noise) = noise {
-                let fresh: Vector3<f64> = Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng));
-                wind = wind * keep + fresh * (turbulence * (1.0 - keep * keep).sqrt());
-            }
-        }
-        let samples = per_bin as f64;
-        let time_s = track.time_s[start + first + per_bin / 2] - track.began_s;
-        let load = track.rotor_load[start + first + per_bin / 2];
-        let heading = UnitQuaternion::from_scaled_axis(Vector3::z() * effects.heading_bias_rad(time_s, load));
-        let [rate_scale, force_scale] = track.scales(effects);
-        let read = Reading {
-            velocity_ned: velocity / samples,
-            attitude: heading * middle,
-            omega: rate.component_mul(&rate_scale) / samples,
-            specific_force: force.component_mul(&force_scale) / samples
-                + effects.specific_force_bias(time_s).vector,
-        };
-        let acceleration_ned = (state.body.velocity.vector - began) / (samples * track.period_s);
-        each(start, bin, Bin { first, last: first + per_bin, read, acceleration_ned });
-    }
 }
 
 #[cfg(test)]

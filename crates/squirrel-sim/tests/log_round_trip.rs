@@ -67,6 +67,15 @@ proptest! {
     }
 }
 
+#[test]
+fn sources_that_nobody_asked_for_are_left_out_and_the_others_come_back() {
+    let (file, mut log) = (path("some_sources.mcap"), small_flight());
+    log.write(&file).unwrap();
+    let kept = log.sources.keys().next().unwrap().clone();
+    log.sources.retain(|name, _| *name == kept);
+    assert_same_bits(&log, &FlightLog::read_where(&file, |name| name == kept).unwrap());
+}
+
 /// Two sources of different rate, 2.5 s.
 fn small_flight() -> FlightLog {
     let mut log = FlightLog::default();

@@ -309,7 +309,10 @@ impl Given {
 fn logs(paths: &[PathBuf]) -> Result<Logs, String> {
     log_files(paths)?
         .iter()
-        .map(|path| Ok((path.display().to_string(), FlightLog::read(path).map_err(|e| e.to_string())?)))
+        .map(|path| {
+            let log = FlightLog::read_where(path, |source| squirrel_gap::SOURCES.contains(&source));
+            Ok((path.display().to_string(), log.map_err(|e| e.to_string())?))
+        })
         .collect()
 }
 

@@ -2,19 +2,31 @@
 
 use crate::verdict::SetAside;
 use squirrel_sim::log::FlightLog;
-use std::collections::HashSet;
+use std::collections::HashMap;
 
 const CHANNEL: &str = "imu.specific_force_body_m_s2";
 
 /// The flights of the second list that repeat one of the first, or an earlier one of their own list.
 pub(super) fn repeated<'a>(flights: impl Iterator<Item = &'a (String, FlightLog)>) -> Vec<SetAside> {
-    let all: Vec<_> = flights.map(|(name, log)| (name, rows(log))).collect();
-    let sets: Vec<HashSet<&[u64; 6]>> = all.iter().map(|(_, rows)| rows.iter().collect()).collect();
+    let all: Vec<(&String, Vec<[u64; 6]>)> = flights.map(|(name, log)| (name, rows(log))).collect();
+    // The flights in which a row was until now.
+    let mut holders: HashMap<&[u64; 6], Vec<usize>> = HashMap::new();
     let mut found: Vec<SetAside> = Vec::new();
     for (index, (name, own)) in all.iter().enumerate() {
+        let mut same = vec![0; index];
+        for row in own {
+            for other in holders.get(row).into_iter().flatten() {
+                same[*other] += 1;
+            }
+        }
+        for row in own {
+            let flights = holders.entry(row).or_default();
+            if flights.last() != Some(&index) {
+                flights.push(index);
+            }
+        }
         let earlier = (0..index).filter(|i| found.iter().all(|aside| aside.flight != *all[*i].0));
-        for other in earlier {
-            let same = own.iter().filter(|row| sets[other].contains(*row)).count();
+        for (other, same) in earlier.map(|i| (i, same[i])).collect::<Vec<_>>() {
             // The shorter flight may lie in the longer one, whichever is given first.
             if 2 * same > own.len().min(all[other].1.len()) {
                 let share = 100.0 * same as f64 / own.len() as f64;

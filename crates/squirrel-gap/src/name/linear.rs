@@ -51,12 +51,7 @@ impl Linear {
         let (mut raw, mut tolerance, mut widest) = (Vec::new(), Vec::new(), Vec::new());
         // A column is the change of the residual for a step, of one flight or of all.
         let difference = |moved: &Point, step: f64, flight| -> Result<Vec<f64>, GapError> {
-            let mut after = residual.clone();
-            predictor.residual_of(&hypothesis(predictor, catalogue, moved)?, flight, &mut after)?;
-            for (after, before) in after.iter_mut().zip(&residual) {
-                *after = (before - *after) / step;
-            }
-            Ok(after)
+            predictor.slope(&residual, &hypothesis(predictor, catalogue, moved)?, step, flight)
         };
         for (column, parameter) in catalogue.parameters.iter().enumerate() {
             let mut moved = point.clone();
@@ -164,15 +159,15 @@ pub(super) fn height_columns(
         for column in &heights {
             moved.base[*column] += step;
         }
-        let mut after = residual.to_vec();
-        predictor.residual_of(&hypothesis(predictor, catalogue, &moved)?, Some(flight), &mut after)?;
+        let change =
+            predictor.slope(residual, &hypothesis(predictor, catalogue, &moved)?, 1.0, Some(flight))?;
         for (knot, column) in heights.into_iter().enumerate() {
             let mut slope = vec![0.0; residual.len()];
             for segment in predictor.segments.iter().filter(|s| s.flight == flight) {
                 let track = &predictor.tracks[segment.piece];
                 for (i, row) in segment.rows.clone().enumerate() {
                     let share = track.height_share(knot, segment.t0_s + i as f64 * segment.step_s);
-                    slope[row] = share * (residual[row] - after[row]) / step;
+                    slope[row] = share * change[row] / step;
                 }
             }
             all.push((column, slope));
@@ -208,9 +203,8 @@ pub(crate) fn settle_flights(
         let sd = if is_thrust { thrust_fraction.max(sd) } else { sd };
         let mut moved = point.clone();
         moved.base[column] += sd;
-        let mut after = residual.clone();
-        predictor.residual_of(&hypothesis(predictor, catalogue, &moved)?, Some(flight), &mut after)?;
-        let slope: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / sd).collect();
+        let slope =
+            predictor.slope(&residual, &hypothesis(predictor, catalogue, &moved)?, sd, Some(flight))?;
         of_flights.push((column, sd, whitener.apply(segments, &slope)));
     }
     for _ in 0..HEIGHT_STEPS {

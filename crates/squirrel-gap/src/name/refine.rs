@@ -244,8 +244,7 @@ impl Search<'_> {
                     let step = 0.1 * smallest;
                     let mut moved = point.clone();
                     moved.members[index].values[slot] += step;
-                    let after = self.predictor.residual(&self.hypothesis(&moved)?)?;
-                    let column: Vec<f64> = residual.iter().zip(&after).map(|(b, a)| (b - a) / step).collect();
+                    let column = self.predictor.slope(&residual, &self.hypothesis(&moved)?, step, None)?;
                     let white = linear.whitener.apply(segments, &column);
                     (Rc::new(column), Rc::new(white))
                 };

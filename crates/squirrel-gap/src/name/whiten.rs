@@ -19,7 +19,6 @@ const BURST: f64 = 4.0;
 pub(crate) struct Whitener {
     /// By channel.
     filters: Vec<Option<Filter>>,
-    rows: usize,
 }
 
 /// Coefficients on the last samples, latest first, and the deviation of what they leave.
@@ -61,7 +60,7 @@ impl Whitener {
                 }
             })
             .collect();
-        Self { rows: count_rows(&filters, segments), filters }
+        Self { filters }
     }
 
     /// Fits the first channels anew, to draws of the noise.
@@ -74,7 +73,6 @@ impl Whitener {
                 *filter = autoregression(&series, &[]);
             }
         }
-        self.rows = count_rows(&self.filters, segments);
     }
 
     /// White noise of the size of what changes from one row to the next.
@@ -94,7 +92,6 @@ impl Whitener {
                 *filter = Filter::white(f64::sqrt(sum / n));
             }
         }
-        out.rows = count_rows(&out.filters, segments);
         out
     }
 
@@ -103,31 +100,39 @@ impl Whitener {
         if column.is_empty() {
             return Vec::new();
         }
-        let mut out = Vec::with_capacity(self.rows);
+        let mut out = vec![0.0; self.rows(segments)];
+        let mut rest = out.as_mut_slice();
         for segment in segments {
             let Some(filter) = &self.filters[segment.channel] else { continue };
             let Some(order) = filter.order_in(segment) else { continue };
             let x = &column[segment.rows.clone()];
+            let own = rest.split_off_mut(..x.len() - order).unwrap_or_default();
+            // Most of a column of one flight; zeros that nothing writes cost no memory.
+            if x.iter().all(|x| *x == 0.0) {
+                continue;
+            }
             let scale = 1.0 / filter.deviation;
             let Some(coefficients) = filter.coefficients.first_chunk::<ORDER>() else {
-                out.extend(x.iter().map(|x| x * scale));
+                for (own, x) in own.iter_mut().zip(x) {
+                    *own = x * scale;
+                }
                 continue;
             };
             // By the age of samples, each a slice, so that rows are computed side by side.
-            let n = x.len() - order;
+            let n = own.len();
             let aged: [&[f64]; ORDER] = std::array::from_fn(|i| &x[ORDER - 1 - i..][..n]);
-            let now = &x[order..];
-            out.extend((0..n).map(|row| {
+            let now = &x[order..][..n];
+            for (row, own) in (0..n).zip(own) {
                 let predicted: f64 = coefficients.iter().zip(aged).map(|(a, x)| a * x[row]).sum();
-                (now[row] - predicted) * scale
-            }));
+                *own = (now[row] - predicted) * scale;
+            }
         }
         out
     }
 
     /// Of each whitened row: its flight and time, s, and channel.
     pub(crate) fn places(&self, segments: &[Segment]) -> Vec<(usize, f64, usize)> {
-        let mut out = Vec::with_capacity(self.rows);
+        let mut out = Vec::with_capacity(self.rows(segments));
         for segment in segments {
             let filter = self.filters[segment.channel].as_ref();
             if let Some(order) = filter.and_then(|filter| filter.order_in(segment)) {
@@ -139,15 +144,15 @@ impl Whitener {
         }
         out
     }
-}
 
-/// Number of rows that come out of filters.
-fn count_rows(filters: &[Option<Filter>], segments: &[Segment]) -> usize {
-    let of = |s: &Segment| {
-        let order = filters[s.channel].as_ref().and_then(|filter| filter.order_in(s));
-        order.map_or(0, |order| s.rows.len() - order)
-    };
-    segments.iter().map(of).sum()
+    /// Number of rows that come out of the filters.
+    fn rows(&self, segments: &[Segment]) -> usize {
+        let of = |s: &Segment| {
+            let order = self.filters[s.channel].as_ref().and_then(|filter| filter.order_in(s));
+            order.map_or(0, |order| s.rows.len() - order)
+        };
+        segments.iter().map(of).sum()
+    }
 }
 
 /// White noise of the power of some series for a number of rows; `None` where there is nothing.

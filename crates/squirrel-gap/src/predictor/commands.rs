@@ -64,6 +64,7 @@ impl Commands {
 }
 
 /// Which command acts.
+#[derive(Clone)]
 pub(crate) struct Clock<'a> {
     commands: &'a Commands,
     runs: CommandClock<f64>,

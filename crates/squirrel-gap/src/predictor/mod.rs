@@ -16,12 +16,13 @@ mod actuators;
 mod commands;
 mod kept;
 mod noise;
+mod slope;
 mod spread;
 mod track;
 mod trim;
 mod turning;
 
-pub(crate) use commands::Commands;
+pub(crate) use commands::{Clock, Commands};
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;
@@ -282,13 +283,15 @@ impl<'a> Predictor<'a> {
         rows: &mut [f64],
     ) -> Result<(), GapError> {
         let plant = self.plant_at(hypothesis, LED_STEP_S)?;
+        let is_asked = |own: usize| flight.is_none_or(|flight| flight == own);
         let days: Vec<Option<Plant>> = (0..self.names.len())
-            .map(|flight| hypothesis.in_flight(flight).map(|own| self.plant_at(&own, LED_STEP_S)).transpose())
+            .map(|flight| hypothesis.in_flight(flight).filter(|_| is_asked(flight)))
+            .map(|own| own.map(|own| self.plant_at(&own, LED_STEP_S)).transpose())
             .collect::<Result<_, _>>()?;
         let paths = self.paths.of(&plant, &self.tracks, &self.commands, |t| stride(plant.effects(), t));
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
-            if flight.is_some_and(|flight| flight != track.flight) {
+            if !is_asked(track.flight) {
                 while segments.next_if(|s| s.piece == piece).is_some() {}
                 continue;
             }
@@ -420,7 +423,7 @@ impl<'a> Predictor<'a> {
     }
 
     /// The commands of a flight as the vehicle got them, from a time on.
-    pub(crate) fn clock(&self, flight: usize, effects: &Effects<f64>, time_s: f64) -> commands::Clock<'_> {
+    pub(crate) fn clock(&self, flight: usize, effects: &Effects<f64>, time_s: f64) -> Clock<'_> {
         self.commands[flight].clock(effects, time_s)
     }
 

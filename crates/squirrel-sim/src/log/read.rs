@@ -38,10 +38,23 @@ impl FlightLog {
     /// [`LogError`]: the file cannot be read, is empty, is no MCAP file, is no log of squirrel, is truncated, or any of
     /// its bytes or values does not match its checksum.
     pub fn read(path: &Path) -> Result<Self, LogError> {
-        let (log, recovery, cut) = load(path)?;
+        Self::read_where(path, |_| true)
+    }
+
+    /// As [`FlightLog::read`], of some sources alone: a log holds several times what most of its readers look at.
+    ///
+    /// * `wanted` - whether a source is asked for, by its name; what is in the others stays packed and unchecked, but for the
+    ///   checksums of the file
+    ///
+    /// # Errors
+    /// As [`FlightLog::read`], with the sources that are read.
+    pub fn read_where(path: &Path, wanted: impl Fn(&str) -> bool) -> Result<Self, LogError> {
+        let (log, _, cut) = load(path, &wanted)?;
         if !cut {
             return Ok(log);
         }
+        // What is said of a cut file is said of all of it.
+        let (log, recovery) = Self::recover(path)?;
         let start_s = log.sources.values().map(|source| source.time_s[0]).reduce(f64::min);
         Err(LogError::Truncated {
             file: path.display().to_string(),
@@ -58,7 +71,7 @@ impl FlightLog {
     /// [`LogError`] as [`FlightLog::read`], but for the missing end; [`LogError::NothingWhole`] if the cut is before
     /// the end of the metadata.
     pub fn recover(path: &Path) -> Result<(Self, Recovery), LogError> {
-        let (log, recovery, _) = load(path)?;
+        let (log, recovery, _) = load(path, &|_| true)?;
         Ok((log, recovery))
     }
 }
@@ -83,14 +96,14 @@ fn open(path: &Path) -> Result<(String, Vec<u8>), LogError> {
 }
 
 /// Reads a file that is whole, or else what is whole of a file that was cut; the flag says that it was.
-fn load(path: &Path) -> Result<(FlightLog, Recovery, bool), LogError> {
+fn load(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<(FlightLog, Recovery, bool), LogError> {
     let (file, bytes) = open(path)?;
     let cut = match envelope::check(&bytes) {
         Ok(()) => false,
         Err(Damage::Cut) => true,
         Err(Damage::Corrupt(what)) => return Err(LogError::Corrupt { file, what }),
     };
-    let mut reader = Reader::new(&file);
+    let mut reader = Reader::new(&file, wanted);
     let mut whole = MAGIC.len().min(bytes.len());
     for frame in envelope::frames(&bytes) {
         match reader.frame(frame) {
@@ -117,6 +130,7 @@ fn load(path: &Path) -> Result<(FlightLog, Recovery, bool), LogError> {
 /// Gathers a flight from the records of a file.
 struct Reader<'a> {
     file: &'a str,
+    wanted: &'a dyn Fn(&str) -> bool,
     metadata: Option<BTreeMap<String, String>>,
     schemas: BTreeMap<u16, Schema>,
     topics: BTreeMap<u16, Topic>,
@@ -129,14 +143,14 @@ struct Schema {
 }
 
 enum Topic {
-    /// For a viewer; says nothing that the sources do not say.
-    Foxglove,
+    /// Not asked for, or for a viewer, which says nothing that the sources do not say.
+    Skipped,
     Source(SourceReader),
 }
 
 impl<'a> Reader<'a> {
-    fn new(file: &'a str) -> Self {
-        Self { file, metadata: None, schemas: BTreeMap::new(), topics: BTreeMap::new() }
+    fn new(file: &'a str, wanted: &'a dyn Fn(&str) -> bool) -> Self {
+        Self { file, wanted, metadata: None, schemas: BTreeMap::new(), topics: BTreeMap::new() }
     }
 
     fn corrupt(&self, what: impl std::fmt::Display) -> LogError {
@@ -201,7 +215,7 @@ impl<'a> Reader<'a> {
             }
             Record::Message { header, data } => match self.topics.get_mut(&header.channel_id) {
                 Some(Topic::Source(source)) => source.push(self.file, &data)?,
-                Some(Topic::Foxglove) => {}
+                Some(Topic::Skipped) => {}
                 None => return Err(self.corrupt(format!("message of unknown channel {}", header.channel_id))),
             },
             _ => {}
@@ -214,7 +228,7 @@ impl<'a> Reader<'a> {
         let schema = self.schemas.get(&channel.schema_id);
         let (name, encoding) = schema.map_or(("", ""), |schema| (&schema.name, &schema.encoding));
         if [foxglove::TRANSFORM_SCHEMA, foxglove::SCENE_SCHEMA].contains(&name) {
-            return Ok(Topic::Foxglove);
+            return Ok(Topic::Skipped);
         }
         if channel.message_encoding != "protobuf" || encoding != "protobuf" || !schema::is_source(name) {
             let encoding = &channel.message_encoding;
@@ -223,6 +237,9 @@ impl<'a> Reader<'a> {
         if self.topics.values().any(|other| matches!(other, Topic::Source(source) if source.name() == topic))
         {
             return Err(self.foreign(format!("topic `{topic}` has two channels")));
+        }
+        if !(self.wanted)(topic) {
+            return Ok(Topic::Skipped);
         }
         let set = schema.map_or(&[][..], |schema| &schema.set);
         SourceReader::new(topic, name, set).map(Topic::Source).map_err(|what| self.corrupt(what))
