@@ -201,14 +201,14 @@ impl<'a> Flown<'a> {
                     let force = other.specific_force - own.specific_force
                         + draw().component_mul(&force_noise) / white;
                     let parts = compared(predictor, [velocity, rotation, rate, force]);
-                    if blown.bin == 0 {
+                    if blown.number == 0 {
                         segments.push(Errors::zeros());
                     }
-                    if let Some(segment) = segments.last_mut().filter(|_| blown.bin < COUNTED) {
+                    if let Some(segment) = segments.last_mut().filter(|_| blown.number < COUNTED) {
                         let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
                         *segment += error.component_mul(&error) / COUNTED as f64;
                     }
-                    all.add(blown.bin, parts);
+                    all.add(blown.number, parts);
                 });
             }
         }
@@ -249,7 +249,8 @@ fn compared(
 
 /// One bin of one segment.
 struct Bin {
-    bin: usize,
+    /// In its segment.
+    number: usize,
     /// Samples of the grid.
     first: usize,
     last: usize,
@@ -379,12 +380,12 @@ impl<'a> Segments<'a> {
                     + effects.specific_force_bias(time_s).vector,
             };
             let acceleration_ned = (state.body.velocity.vector - began) / (samples * track.period_s);
-            each(Bin { bin, first, last, read, acceleration_ned });
+            each(Bin { number: bin, first, last, read, acceleration_ned });
         }
     }
 
     /// Adds what the sensors read in a bin, minus what they should have read.
-    fn compare(&self, Bin { bin, first, last, read, acceleration_ned }: &Bin, all: &mut Errors12) {
+    fn compare(&self, Bin { number, first, last, read, acceleration_ned }: &Bin, all: &mut Errors12) {
         let track = self.track();
         let (Some(measured_attitude), Some(end)) = (track.attitude(), last.checked_sub(1)) else { return };
         let latency_s = self.hypothesis.effects.gnss_latency_s();
@@ -406,7 +407,7 @@ impl<'a> Segments<'a> {
         let rotation = (read.attitude.inverse() * q).scaled_axis();
         let rate = mean(track.omega()) - read.omega;
         let force = mean(track.specific_force()) - read.specific_force;
-        all.add(*bin, compared(self.predictor, [velocity - velocity_then, rotation, rate, force]));
+        all.add(*number, compared(self.predictor, [velocity - velocity_then, rotation, rate, force]));
     }
 }
 

@@ -20,7 +20,8 @@ const BLOWN_NATS: f64 = 40.0;
 /// The effect of which a vehicle may have several.
 pub(super) const WEAK_ROTOR: &str = "weak_rotor";
 const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
-/// What a clock that jumps must be worth: by chance something changes at one of the hundreds of times at which it may.
+/// What a clock that jumps must be worth for each flight that it jumps in, which are all: by chance something changes at one of
+/// the hundreds of times at which it may.
 const JUMP_NATS: f64 = 40.0;
 /// What a scale of the accelerometer must be worth: an attitude that leans into accelerations makes one, too.
 const LEANS_NATS: f64 = 12.0;
@@ -188,7 +189,7 @@ impl Search<'_> {
     /// What a member must be worth, nats.
     fn needed(&self, member: &Member) -> f64 {
         match self.gust_m_s {
-            _ if self.effect(member) == "clock_step" => JUMP_NATS,
+            _ if self.effect(member) == "clock_step" => JUMP_NATS * self.predictor.names.len() as f64,
             None if self.effect(member) == "accel_scale" => LEANS_NATS,
             None => NATS_MIN,
             Some(sigma) if BLOWN.contains(&self.effect(member)) => BLOWN_NATS * (sigma * sigma).max(1.0),
