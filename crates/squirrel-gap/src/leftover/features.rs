@@ -197,7 +197,7 @@ pub(super) fn one_way(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
     largest(body).max(largest(world))
 }
 
-/// Part of the variance of `y` that a family predicts in blocks that were left out, 0 to 1.
+/// Part of the variance of `y` that a family predicts in blocks that were left out, 0 to 1: what lasts goes with nothing.
 pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
     let n = y.len();
     let k = family.rows.first().map_or(0, Vec::len) + 1;
@@ -238,10 +238,11 @@ pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
         }
         let Some(factor) = gram.cholesky() else { return 0.0 };
         let theta = factor.solve(&right);
+        let mean = (y.iter().sum::<f64>() - y[held.clone()].iter().sum::<f64>()) / (n - held.len()) as f64;
         for row in held {
             let predicted: f64 = x.column(row).dot(&theta);
             error += (y[row] - predicted).powi(2);
-            total += y[row] * y[row];
+            total += (y[row] - mean).powi(2);
         }
     }
     if total > 0.0 { (1.0 - error / total).clamp(0.0, 1.0) } else { 0.0 }
@@ -265,6 +266,19 @@ mod tests {
         assert!(along(&|i, _| Vector3::new(0.6, 0.8, 0.0) * blow(i)) > 0.99);
         assert!(along(&|i, m| m.ned_from_body.tr_mul(&Vector3::new(0.6, 0.8, 0.0)) * blow(i)) > 0.99);
         assert!(along(&|i, _| Vector3::new(blow(i), blow(3 * i + 1), 0.0)) < 0.6);
+    }
+
+    /// A constant is predicted by any family that has one, and goes with none.
+    #[test]
+    fn what_lasts_goes_with_nothing() {
+        let wave = |i: usize| (0.3 * i as f64).sin();
+        let family = Family { name: "wave", rows: (0..400).map(|i| vec![wave(i)]).collect() };
+        let share = |of: f64| {
+            // Without a rhythm, so that no block knows of another.
+            let y: Vec<f64> = (0..400).map(|i| 5.0 + (37.7 * (i * i) as f64).sin() + of * wave(i)).collect();
+            predicted_share(&family, &y)
+        };
+        assert!(share(0.0) < 0.02 && share(10.0) > 0.95, "{} {}", share(0.0), share(10.0));
     }
 
     fn turned(heading_rad: f64) -> Moment {

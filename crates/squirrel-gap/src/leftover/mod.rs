@@ -304,6 +304,12 @@ const MISSED: f64 = 2.0;
 /// Part of the variance of three axes, each in units of its own size, that one cause behind all has at least.
 const ONE_CAUSE: f64 = 0.8;
 
+fn centred(mut x: Vec<f64>) -> Vec<f64> {
+    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    x.iter_mut().for_each(|x| *x -= mean);
+    x
+}
+
 /// Whether all three axes of force or moment are left with something, and not the same thing: one missing effect leaves the
 /// others at their noise, or moves all as one.
 fn is_everywhere(predictor: &Predictor, left: &[f64], bands: &[Band], group: usize) -> bool {
@@ -319,7 +325,8 @@ fn is_everywhere(predictor: &Predictor, left: &[f64], bands: &[Band], group: usi
     }) {
         return false;
     }
-    let all = axes.map(|channel| means(predictor, left, channel));
+    // What lasts in each axis has nothing to do with the others for that.
+    let all = axes.map(|channel| centred(means(predictor, left, channel)));
     let size = all.each_ref().map(|x| rms(x));
     let correlation = Matrix3::from_fn(|i, j| {
         let sum: f64 = all[i].iter().zip(&all[j]).map(|(a, b)| a * b).sum();
@@ -377,13 +384,19 @@ fn rms_of_means(x: &[f64]) -> f64 {
     rms(&means)
 }
 
+/// Bins on each side of a line that it stands above.
+const SIDES: usize = 8;
+
 /// The strongest line between 0.5 and 12 Hz, and its part of the power there, in the longest segment of a channel.
 fn line(predictor: &Predictor, left: &[f64], channel: usize) -> Option<(f64, f64)> {
     let segment = predictor.segments.iter().filter(|s| s.channel == channel).max_by_key(|s| s.rows.len())?;
     let x = &left[segment.rows.clone()];
     let n = x.len();
     let duration_s = n as f64 * segment.step_s;
-    let bins = (0.5 * duration_s) as usize..(12.0_f64.min(0.45 / segment.step_s) * duration_s) as usize;
+    // Where slow noise begins to fall is no line: what is below the band is looked at as its neighbour.
+    let below = SIDES.min((0.5 * duration_s) as usize);
+    let bins =
+        (0.5 * duration_s) as usize - below..(12.0_f64.min(0.45 / segment.step_s) * duration_s) as usize;
     let power: Vec<f64> = bins
         .clone()
         .map(|bin| {
@@ -396,13 +409,14 @@ fn line(predictor: &Predictor, left: &[f64], channel: usize) -> Option<(f64, f64
             a * a + b * b - 2.0 * w.cos() * a * b
         })
         .collect();
-    let total: f64 = power.iter().sum();
-    let (at, _) = power.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    let total: f64 = power.iter().skip(below).sum();
+    let (at, _) = power.iter().enumerate().skip(below).max_by(|a, b| a.1.total_cmp(b.1))?;
     // A line that wanders a little spreads over neighbours, and stands above those further off: slow noise does not.
     let around = |reach: usize| at.saturating_sub(reach)..(at + reach + 1).min(power.len());
     let own: f64 = power[around(2)].iter().sum();
-    let sides: f64 = power[around(8)].iter().sum::<f64>() - own;
-    let (own_bins, side_bins) = (around(2).len() as f64, (around(8).len() - around(2).len()).max(1) as f64);
+    let sides: f64 = power[around(SIDES)].iter().sum::<f64>() - own;
+    let (own_bins, side_bins) =
+        (around(2).len() as f64, (around(SIDES).len() - around(2).len()).max(1) as f64);
     if own / own_bins < LINE_CONTRAST * sides / side_bins {
         return None;
     }
