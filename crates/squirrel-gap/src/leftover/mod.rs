@@ -304,10 +304,9 @@ const MISSED: f64 = 2.0;
 /// Part of the variance of three axes, each in units of its own size, that one cause behind all has at least.
 const ONE_CAUSE: f64 = 0.8;
 
-fn centred(mut x: Vec<f64>) -> Vec<f64> {
+fn centred(x: &[f64]) -> Vec<f64> {
     let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
-    x.iter_mut().for_each(|x| *x -= mean);
-    x
+    x.iter().map(|x| x - mean).collect()
 }
 
 /// Whether all three axes of force or moment are left with something, and not the same thing: one missing effect leaves the
@@ -326,7 +325,7 @@ fn is_everywhere(predictor: &Predictor, left: &[f64], bands: &[Band], group: usi
         return false;
     }
     // What lasts in each axis has nothing to do with the others for that.
-    let all = axes.map(|channel| centred(means(predictor, left, channel)));
+    let all = axes.map(|channel| centred(&means(predictor, left, channel)));
     let size = all.each_ref().map(|x| rms(x));
     let correlation = Matrix3::from_fn(|i, j| {
         let sum: f64 = all[i].iter().zip(&all[j]).map(|(a, b)| a * b).sum();
