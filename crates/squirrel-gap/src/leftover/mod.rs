@@ -232,7 +232,7 @@ pub(crate) fn leftover(
         out.line = line(predictor, left, channel);
     }
     let group = out.excess.first().map_or(0, |(channel, _)| channel / 3);
-    out.is_everywhere = is_everywhere(predictor, left, &out.bands, group);
+    out.is_everywhere = is_everywhere(predictor, left, &out, group);
     out
 }
 
@@ -311,16 +311,17 @@ fn centred(x: &[f64]) -> Vec<f64> {
 
 /// Whether all three axes of force or moment are left with something, and not the same thing: one missing effect leaves the
 /// others at their noise, or moves all as one.
-fn is_everywhere(predictor: &Predictor, left: &[f64], bands: &[Band], group: usize) -> bool {
+fn is_everywhere(predictor: &Predictor, left: &[f64], found: &Leftover, group: usize) -> bool {
     let axes = [0, 1, 2].map(|axis| 3 * group + axis);
     let rms_of = |channel: usize, of: fn(&Band) -> f64| {
-        let own = bands.iter().filter(|b| b.channel == channel);
+        let own = found.bands.iter().filter(|b| b.channel == channel);
         let (sum, n) = own.fold((0.0, 0.0_f64), |(sum, n), b| (sum + of(b).powi(2), n + 1.0));
         (sum / n.max(1.0)).sqrt()
     };
     if !axes.iter().all(|channel| {
         let floor = rms_of(*channel, |b| b.slow_floor);
-        floor > 0.0 && rms_of(*channel, |b| b.slow) > MISSED * floor
+        let stands_out = found.excess.iter().any(|(other, _)| other == channel);
+        stands_out || (floor > 0.0 && rms_of(*channel, |b| b.slow) > MISSED * floor)
     }) {
         return false;
     }
