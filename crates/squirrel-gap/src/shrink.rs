@@ -1,7 +1,7 @@
 //! The gap on flights that the fit never saw: the plant re-simulated in open loop under the logged commands.
 //!
-//! Every half second the plant is put where the vehicle was measured to be and flown for two seconds under the logged
-//! commands at the measured voltage. What the sensors should then have read, under the hypothesis, is compared with what
+//! Every half second the plant is put where the vehicle was measured to be and flown for a second, and every fourth time for
+//! two, under the logged commands at the measured voltage. What the sensors should then have read, under the hypothesis, is compared with what
 //! they read, in bins of 0.1 s: velocity, attitude, angular rate and specific force, three channels each.
 //!
 //! ```text
@@ -45,6 +45,8 @@ pub(crate) const CHANNELS: [&str; 12] = [
 /// Bins of a segment, and how many of them count for the gap.
 pub(crate) const BINS: usize = 20;
 const COUNTED: usize = 10;
+/// Of so many segments one is flown beyond what counts, to show how errors grow.
+const LONG_EVERY: usize = 4;
 /// Length of a bin and distance of segments, s.
 pub(crate) const BIN_S: f64 = 0.1;
 const RESTART_S: f64 = 0.5;
@@ -294,15 +296,17 @@ impl<'a> Segments<'a> {
         let Some((first, _)) = self.starts.first() else { return };
         let (track, effects) = (self.track(), &self.hypothesis.effects);
         let mut clock = self.predictor.clock(track.flight, effects, track.time_s[*first]);
-        for (start, state) in &self.starts {
+        for (index, (start, state)) in self.starts.iter().enumerate() {
             clock.advance_to(track.time_s[*start]);
-            self.segment(*start, *state, clock.clone(), &mut noise, &mut each);
+            let bins = if index % LONG_EVERY == 0 { BINS } else { COUNTED };
+            self.segment(*start, bins, *state, clock.clone(), &mut noise, &mut each);
         }
     }
 
     fn segment(
         &self,
         start: usize,
+        bins: usize,
         mut state: PlantState,
         mut clock: Clock<'_>,
         noise: &mut Option<Noise<'_>>,
@@ -334,7 +338,7 @@ impl<'a> Segments<'a> {
         let gravity = Vector3::new(0.0, 0.0, GRAVITY_M_S2);
         let keep = (-track.period_s / TURBULENCE_S).exp();
         let [rate_scale, force_scale] = track.scales(effects);
-        for bin in 0..BINS {
+        for bin in 0..bins {
             let first = start + bin * per_bin;
             let (last, half) = (first + per_bin, first + per_bin / 2);
             if last >= n {

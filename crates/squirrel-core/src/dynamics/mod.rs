@@ -124,14 +124,19 @@ fn affected<T: Real>(
     rotors.moment.vector.y *= factor;
     let base = rotors + rest;
     let speed = &state.rotor_speed_rad_s;
+    let [spin, spin_rate] = if effects.feel_rotor_spin() {
+        [*speed, held.drive.rates(vehicle.rotor_blocks(), speed)].map(|all| rotors::spin(vehicle, &all))
+    } else {
+        [T::zero(); 2]
+    };
     let mut sum = base
         + effects.wrench(&Situation {
             air,
             height_m,
             thrust_n: -rotors.force.vector.z,
             force: base.force,
-            rotor_spin_rad_s: rotors::spin(vehicle, speed),
-            rotor_spin_rate_rad_s2: rotors::spin(vehicle, &held.drive.rates(vehicle.rotor_blocks(), speed)),
+            rotor_spin_rad_s: spin,
+            rotor_spin_rate_rad_s2: spin_rate,
             wing: vehicle.parameters().wing.as_ref(),
             deployment: held.deployment,
         });

@@ -199,6 +199,11 @@ macro_rules! catalogue {
                 $(if let Some(effect) = &self.$field { sum = sum + effect.accelerometer_position(); })+
                 sum
             }
+            /// Whether the wrench of any effect depends on how fast the rotors spin.
+            #[inline(always)]
+            pub(crate) fn feel_rotor_spin(&self) -> bool {
+                $(self.$field.as_ref().is_some_and(Effect::feels_rotor_spin) ||)+ false
+            }
             /// Sum of forces and moments.
             #[inline(never)]
             pub fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {

@@ -276,9 +276,10 @@ pub struct Situation<'a, T: Real> {
     pub thrust_n: T,
     /// Force of rotors, drag and wings, N, before effects that add to it.
     pub force: In<Body, T>,
-    /// Sum of the rotor speeds about +z, each with the sign of its spin, rad/s.
+    /// Sum of the rotor speeds about +z, each with the sign of its spin, rad/s; 0 where no effect
+    /// [feels it](Effect::feels_rotor_spin).
     pub rotor_spin_rad_s: T,
-    /// Its rate, rad/s^2.
+    /// Its rate, rad/s^2; likewise.
     pub rotor_spin_rate_rad_s2: T,
     /// The vehicle's wings, if it has any.
     pub wing: Option<&'a Wing<T>>,
@@ -398,6 +399,11 @@ pub trait Effect<T: Real>: Copy {
     #[inline(always)]
     fn added_mass_kg(&self) -> T {
         T::zero()
+    }
+    /// Whether its wrench depends on how fast the rotors spin, which is dear to sum up.
+    #[inline(always)]
+    fn feels_rotor_spin(&self) -> bool {
+        false
     }
     /// Force and moment that the effect adds.
     #[inline(always)]

@@ -18,6 +18,10 @@ impl<T: Real> Effect<T> for RotorGyroTorque<T> {
         &[EffectParameter::size("rotor_inertia_kg_m2", 4e-6, 2e-5).growing_with(Scale::Inertia)];
 
     #[inline(always)]
+    fn feels_rotor_spin(&self) -> bool {
+        true
+    }
+    #[inline(always)]
     fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
         let [inertia] = self.0;
         let w = situation.air.omega.vector;

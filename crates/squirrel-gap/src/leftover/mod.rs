@@ -78,6 +78,8 @@ pub(crate) struct Leftover {
     /// Whether the model misses a little everywhere, as models of real vehicles do, and not one thing: in force, or where most
     /// is left. It may, inside its tolerances.
     pub(crate) is_everywhere: bool,
+    /// Whether it does so in every channel of force and moment that is looked at.
+    pub(crate) is_in_all: bool,
 }
 
 impl Leftover {
@@ -211,6 +213,7 @@ pub(crate) fn leftover(
         kurtosis: 3.0,
         line: None,
         is_everywhere: false,
+        is_in_all: false,
     };
     if let Some(&(channel, _)) = out.excess.first() {
         let y = means(predictor, left, channel);
@@ -233,6 +236,10 @@ pub(crate) fn leftover(
     }
     let group = out.excess.first().map_or(0, |(channel, _)| channel / 3);
     out.is_everywhere = is_everywhere(predictor, left, &out, group);
+    out.is_in_all = (0..DYNAMIC).all(|channel| {
+        let is_judged = out.bands.iter().any(|b| b.channel == channel);
+        !is_judged || misses_in(&out, channel)
+    });
     out
 }
 
@@ -309,20 +316,23 @@ fn centred(x: &[f64]) -> Vec<f64> {
     x.iter().map(|x| x - mean).collect()
 }
 
-/// Whether all three axes of force or moment are left with something, and not the same thing: one missing effect leaves the
-/// others at their noise, or moves all as one.
-fn is_everywhere(predictor: &Predictor, left: &[f64], found: &Leftover, group: usize) -> bool {
-    let axes = [0, 1, 2].map(|axis| 3 * group + axis);
-    let rms_of = |channel: usize, of: fn(&Band) -> f64| {
+/// Whether a model misses something in a channel: it stands out, or is well above noise.
+fn misses_in(found: &Leftover, channel: usize) -> bool {
+    let rms_of = |of: fn(&Band) -> f64| {
         let own = found.bands.iter().filter(|b| b.channel == channel);
         let (sum, n) = own.fold((0.0, 0.0_f64), |(sum, n), b| (sum + of(b).powi(2), n + 1.0));
         (sum / n.max(1.0)).sqrt()
     };
-    if !axes.iter().all(|channel| {
-        let floor = rms_of(*channel, |b| b.slow_floor);
-        let stands_out = found.excess.iter().any(|(other, _)| other == channel);
-        stands_out || (floor > 0.0 && rms_of(*channel, |b| b.slow) > MISSED * floor)
-    }) {
+    let floor = rms_of(|b| b.slow_floor);
+    let stands_out = found.excess.iter().any(|(other, _)| *other == channel);
+    stands_out || (floor > 0.0 && rms_of(|b| b.slow) > MISSED * floor)
+}
+
+/// Whether all three axes of force or moment are left with something, and not the same thing: one missing effect leaves the
+/// others at their noise, or moves all as one.
+fn is_everywhere(predictor: &Predictor, left: &[f64], found: &Leftover, group: usize) -> bool {
+    let axes = [0, 1, 2].map(|axis| 3 * group + axis);
+    if !axes.iter().all(|channel| misses_in(found, *channel)) {
         return false;
     }
     // What lasts in each axis has nothing to do with the others for that.

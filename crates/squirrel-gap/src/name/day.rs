@@ -8,9 +8,12 @@ use crate::predictor::Predictor;
 /// The channel that shows it.
 const FORCE_Z: usize = 2;
 /// Part of the tolerance of thrust by which it may differ among flights of one machine.
-const SHARE_OF_TOLERANCE: f64 = 0.5;
+const SHARE_OF_TOLERANCE: f64 = 1.0;
 
-/// The best explanation, of several flights with a thrust of their own if one thrust leaves a force along z and theirs do not.
+/// How much less of the force must be left with a thrust for each flight, as a part of what one thrust leaves.
+const MUCH_LESS: f64 = 0.6;
+
+/// The best explanation, of several flights with a thrust of their own if one thrust leaves a force along z and theirs leave much less.
 ///
 /// * `progress` - called after each piece of work
 ///
@@ -23,17 +26,20 @@ pub(crate) fn explain_flights(
 ) -> Result<Naming, GapError> {
     let explained =
         |catalogue: &Catalogue| explain(&Search { predictor, catalogue, gust_m_s: None, progress });
-    let leaves_force =
-        |naming: &Naming| naming.leftover.excess.iter().any(|(channel, _)| *channel == FORCE_Z);
+    // Over what is allowed; 0 where it is not above that.
+    let force_left = |naming: &Naming| {
+        let own = naming.leftover.excess.iter().find(|(channel, _)| *channel == FORCE_Z);
+        own.map_or(0.0, |(_, ratio)| *ratio)
+    };
     let together = explained(catalogue)?;
     let most = SHARE_OF_TOLERANCE * catalogue.tolerance_of("thrust_fraction");
     let usual = catalogue.day_fraction;
-    if predictor.names.len() < 2 || most <= usual || !leaves_force(&together) {
+    if predictor.names.len() < 2 || most <= usual || force_left(&together) == 0.0 {
         return Ok(together);
     }
     catalogue.day_fraction = most;
     let apart = explained(catalogue)?;
-    if leaves_force(&apart) {
+    if force_left(&apart) > MUCH_LESS * force_left(&together) {
         catalogue.day_fraction = usual;
         return Ok(together);
     }

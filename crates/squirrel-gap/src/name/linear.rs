@@ -12,10 +12,11 @@ use crate::predictor::{DYNAMIC, HEIGHT_KNOTS, Predictor};
 use nalgebra::{DMatrix, DVector};
 
 /// The predictor as a linear model about a point.
+#[derive(Clone)]
 pub(crate) struct Linear {
     pub(crate) point: Point,
     pub(crate) whitener: Whitener,
-    /// Columns as they are, in the units of the rows: as in [`Point::base`].
+    /// Columns as they are, in the units of the rows: as in [`Point::base`], and then what no hypothesis has ([`super::slow`]).
     pub(crate) raw: Vec<Vec<f64>>,
     /// The same, whitened.
     pub(crate) columns: Vec<Vec<f64>>,

@@ -21,6 +21,7 @@ mod refine;
 mod rivals;
 mod rotors;
 mod search;
+mod slow;
 mod step;
 mod tolerance;
 mod whiten;
@@ -39,7 +40,9 @@ pub(crate) use tolerance::{notes as silent_tolerances, sds};
 
 use crate::GapError;
 use crate::leftover::{Leftover, Slack, gusts, leftover, noise};
-use crate::predictor::Hypothesis;
+use crate::predictor::{Hypothesis, Motion};
+use crate::verdict::Left;
+use std::rc::Rc;
 
 /// Deviation of the air's own motion that is no wind worth a name, m/s.
 pub(crate) const TURBULENCE_M_S: f64 = 0.12;
@@ -110,8 +113,11 @@ fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
 /// Standard deviations, from blocks of the flights, by which a number stands out from a model that misses a little everywhere.
 pub(crate) const STANDS: f64 = 5.0;
 
-/// The explanation with those names alone that stand beside what the model misses everywhere; as it was where that is one
-/// thing, or nothing.
+/// Part of what is above noise that names explain which leave something in forces alone, or in moments.
+const MOST: f64 = 0.5;
+
+/// The explanation with those names alone that stand beside what the model misses everywhere, or with all of them where they
+/// stand beside what is slow in each flight; as it was where what is left is another thing, or nothing.
 ///
 /// * `hold` - of each name, whether held-out flights want it; `None` where there are none
 ///
@@ -122,14 +128,25 @@ pub(crate) fn standing(
     naming: Naming,
     hold: impl Fn(&Naming) -> Result<Option<Vec<bool>>, GapError>,
 ) -> Result<Naming, GapError> {
+    // What is left of forces alone, or of moments, may be one missing effect: names must explain most of what is there.
+    let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
     let is_candidate = |naming: &Naming| {
         naming.leftover.is_everywhere
+            && most(&naming.leftover)
             && !naming.leftover.is_foreign()
             && naming.gust_m_s.is_none()
             && !naming.found.best.members.is_empty()
     };
     if !is_candidate(&naming) {
-        return Ok(naming);
+        let is_refused = naming.leftover.is_real() && naming.gust_m_s.is_none();
+        if !is_refused || naming.found.best.members.is_empty() {
+            return Ok(naming);
+        }
+        let clear = |index| search.stands_out(&naming.found.best, index, &naming.deviations) >= STANDS;
+        let stands = (0..naming.found.best.members.len()).all(clear)
+            && slow::leaves_nothing_else(search, &naming)?
+            && hold(&naming)?.is_none_or(|holds| holds.iter().all(|holds| *holds));
+        return Ok(Naming { stands, ..naming });
     }
     let mut kept: Vec<Member> = naming.found.best.members.clone();
     let mut now = None;
@@ -173,16 +190,20 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     let (predictor, catalogue) = (search.predictor, search.catalogue);
     let point = search.settled(&found.best);
     let about = hypothesis(predictor, catalogue, &point)?;
-    let left = predictor.residual(&about)?;
+    let mut left = predictor.residual(&about)?;
     let without = Point { members: Vec::new(), base: point.base.clone() };
     let nominal = predictor.residual(&hypothesis(predictor, catalogue, &without)?)?;
-    let motions: Vec<_> = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &about)).collect();
-    let wind = predictor.wind_columns(&about)?;
-    let slack = slack(search, &found);
-    let draws = noise(predictor, &wind, search.gust_m_s.unwrap_or(TURBULENCE_M_S));
-    let judged = |left: &[f64]| leftover(predictor, &motions, left, &nominal, &draws, None, slack);
+    // What no hypothesis has is linear alone.
+    let beyond = catalogue.columns(predictor)..point.base.len();
+    for (column, x) in found.linear.raw[beyond.clone()].iter().zip(&point.base[beyond]) {
+        for (left, c) in left.iter_mut().zip(column) {
+            *left -= c * x;
+        }
+    }
     // Where little is known, a looser fit of what is seen well may be a worse one of the rest.
     let loose = loosened(&found, &point, left.clone());
+    let seen = Surroundings::of(search, &about)?;
+    let judged = |left: &[f64]| left_over(search, &found, &seen, left, &nominal);
     let (left, leftover) = match (judged(&left), judged(&loose)) {
         (as_it_is, looser) if as_it_is.worst() < looser.worst() => (left, as_it_is),
         (_, looser) => (loose, looser),
@@ -199,6 +220,33 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
         gust_nats: 0.0,
         stands: false,
     })
+}
+
+/// How flights move under a hypothesis, and what noise and turbulence leave of them.
+struct Surroundings {
+    motions: Vec<Rc<Motion>>,
+    draws: Vec<Vec<f64>>,
+}
+
+impl Surroundings {
+    fn of(search: &Search<'_>, about: &Hypothesis) -> Result<Self, GapError> {
+        let predictor = search.predictor;
+        let motions = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, about)).collect();
+        let wind = predictor.wind_columns(about)?;
+        let draws = noise(predictor, &wind, search.gust_m_s.unwrap_or(TURBULENCE_M_S));
+        Ok(Self { motions, draws })
+    }
+}
+
+/// What an explanation leaves, against noise and turbulence.
+fn left_over(
+    search: &Search<'_>,
+    found: &Found,
+    Surroundings { motions, draws }: &Surroundings,
+    left: &[f64],
+    nominal: &[f64],
+) -> Leftover {
+    leftover(search.predictor, motions, left, nominal, draws, None, slack(search, found))
 }
 
 /// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample more or less.

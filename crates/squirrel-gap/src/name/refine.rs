@@ -147,7 +147,7 @@ impl Search<'_> {
             all.extend(bending.map(|(column, p)| (column, p.tolerance)));
         }
         if catalogue.feels_height(members) {
-            let sensors = catalogue.shared_columns()..linear.point.base.len();
+            let sensors = catalogue.shared_columns()..catalogue.columns(self.predictor);
             all.extend(sensors.filter_map(|column| match catalogue.other(column) {
                 (Other::Height { .. }, sd) => Some((column, sd)),
                 _ => None,
@@ -209,9 +209,10 @@ impl Search<'_> {
         let mut y = linear.whitener.apply(segments, &residual);
         // Height matters where an effect of it acts, and as much as it acts.
         if !self.catalogue.feels_height(members) {
-            for (column, spike) in spikes.iter_mut().enumerate().skip(self.catalogue.shared_columns()) {
+            let of_flights = self.catalogue.shared_columns()..self.catalogue.columns(self.predictor);
+            for column in of_flights {
                 if matches!(self.catalogue.other(column).0, Other::Height { .. }) {
-                    *spike = 0.0;
+                    spikes[column] = 0.0;
                 }
             }
         }

@@ -187,7 +187,7 @@ impl Search<'_> {
     }
 
     /// What a member must be worth, nats.
-    fn needed(&self, member: &Member) -> f64 {
+    pub(super) fn needed(&self, member: &Member) -> f64 {
         match self.gust_m_s {
             _ if self.effect(member) == "clock_step" => JUMP_NATS * self.predictor.names.len() as f64,
             None if self.effect(member) == "accel_scale" => LEANS_NATS,
