@@ -226,6 +226,7 @@ fn judged(
     };
     let moments = baseline.map_or(Moments::IfKnown, |baseline| baseline.moments);
     compatibility::leave_out(&mut predictor, &nominal, moments);
+    let has_other_moments = predictor.has_motion() && !predictor.has_channel(3);
     if let Some(unseen) = &mut unseen {
         unseen.keep_moments_of(&predictor);
     }
@@ -270,10 +271,18 @@ fn judged(
     }
     let verdict = decide(&search, &naming, &rivals, &close, numbers, places, open, curve_hides_sag);
     let names: Vec<&str> = flights.iter().map(|(name, _)| name.as_str()).collect();
-    let source = format!("gap, inside its tolerance: {}", names.join(", "));
     let stands = nothing_to_add(&verdict).is_none();
     let set = if stands { &naming.found.best } else { naming.found.null.as_ref() };
-    let now = Own { vehicle: fitted::of(&search, set)?, source };
+    let own = fitted::of(&search, set)?;
+    let fits_moments = has_other_moments && search.predictor.has_gyroscope() && baseline.is_none();
+    // Under priors as wide as what is plausible, flights may ask for a body that cannot be: then its moments stay the file's.
+    let with_moments = if fits_moments { fitted::with_moments(&search, set, flights).ok() } else { None };
+    let tolerance = match with_moments {
+        Some(_) => "inside its tolerance, moments beyond it",
+        None => "inside its tolerance",
+    };
+    let source = format!("gap, {tolerance}: {}", names.join(", "));
+    let now = Own { vehicle: with_moments.unwrap_or(own), source };
     let details = Details {
         evidence: search.single_evidence(&naming.found),
         confusability: search.confusability(&naming.found.null),

@@ -1,10 +1,15 @@
 //! The vehicle file with its own numbers where flights have them: what floated inside its tolerance, as a point of the search
 //! has it.
+//!
+//! Where the file explains next to nothing of the moments, nothing is named from them, and no tolerance holds. Its numbers of
+//! moments are then fitted to them afterwards, under wide priors and by themselves: they predict, and are no finding.
 
 use crate::GapError;
-use crate::name::{Point, Scored, Search, hypothesis};
+use crate::name::{Catalogue, Point, Scored, Search, hypothesis};
+use crate::predictor::Predictor;
 use squirrel_core::effects::{EffectParameter, Effects, Kind};
 use squirrel_core::vehicle::{ParameterError, Vehicle};
+use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Largest principal moment of a body over the sum of the others.
@@ -27,6 +32,53 @@ pub(crate) const NOT_ITS_OWN: [&str; 11] = [
     "heading_bias",
     "payload_swing",
 ];
+
+/// Numbers that make moments and next to no force.
+const OF_MOMENTS: [&str; 7] = [
+    "angular_damping",
+    "cg_offset",
+    "flapping_moment",
+    "inertia_error",
+    "motor_lag",
+    "rotor_gyro_torque",
+    "yaw_torque_coeff",
+];
+/// Steps of their fit, each about what the last has found.
+const STEPS: usize = 3;
+
+/// The vehicle file as an explanation has it, with what it names, and with the moments of the flights.
+///
+/// # Errors
+/// Numbers that no vehicle has, or what the predictor says.
+pub(crate) fn with_moments(
+    search: &Search<'_>,
+    set: &Scored,
+    flights: &[(String, FlightLog)],
+) -> Result<VehicleFile, GapError> {
+    let mut own = search.predictor.vehicle.clone();
+    let named = |effect: &str| set.members.iter().any(|member| search.effect(member) == effect);
+    let is_its_own = |effect: &str| named(effect) || !NOT_ITS_OWN.contains(&effect);
+    (own.vehicle, own.effects) = machine(search, search.whole(set), is_its_own)?;
+    for _ in 0..STEPS {
+        let mut predictor = Predictor::new(&own, flights)?;
+        if let Some(parts) = predictor.in_parts(flights)? {
+            predictor = parts;
+        }
+        predictor.keep_moments();
+        let mut catalogue = Catalogue::new(&predictor, &[], None)?;
+        catalogue.free_alone(&OF_MOMENTS);
+        let moments = Search {
+            predictor: &predictor,
+            catalogue: &catalogue,
+            gust_m_s: None,
+            progress: search.progress,
+        };
+        let (vehicle, effects) = machine(&moments, moments.towards()?, |_| true)?;
+        (own.vehicle, own.effects) = (vehicle, effects);
+    }
+    own.effects = worth_a_line(&own, NEXT_TO_NOTHING);
+    Ok(own)
+}
 
 /// The vehicle file as an explanation has it, beside what is named.
 ///

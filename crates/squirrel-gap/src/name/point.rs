@@ -21,6 +21,8 @@ const LEVELLING_RAD_S2_PER_M: f64 = 0.01;
 pub(super) const DAY_FRACTION: f64 = 0.0015;
 /// Smallest change of one rotor's torque that is worth reporting, as a fraction: its thrust shows less.
 const TORQUE_FRACTION: f64 = 0.03;
+/// By how much torques of rotors may differ where nothing is known of them, as a fraction.
+const FREE_TORQUE_FRACTION: f64 = 0.2;
 /// Tolerance of the barometer's zero, m.
 const HEIGHT_M: f64 = 0.2;
 /// Numbers of a flight before its heights: tilt about north and east, levelling, thrust.
@@ -232,6 +234,17 @@ impl Catalogue {
                     self.parameters.iter().find(|p| self.candidates[p.candidate].effect == "linear_drag")?;
                 Some(("linear_drag", drag.smallest))
             }
+        }
+    }
+
+    /// Lets numbers of these effects be as large as is plausible, and those of rotors' torques with them, and nothing else be off.
+    pub(crate) fn free_alone(&mut self, effects: &[&str]) {
+        for parameter in &mut self.parameters {
+            let is_free = effects.contains(&self.candidates[parameter.candidate].effect);
+            parameter.tolerance = if is_free { parameter.largest } else { 0.0 };
+        }
+        for (number, tolerance) in &mut self.airframe {
+            *tolerance = if matches!(number, Airframe::Torque { .. }) { FREE_TORQUE_FRACTION } else { 0.0 };
         }
     }
 

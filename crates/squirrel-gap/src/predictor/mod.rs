@@ -216,6 +216,11 @@ impl<'a> Predictor<'a> {
         );
     }
 
+    /// Leaves everything but the moments out of everything that follows.
+    pub(crate) fn keep_moments(&mut self) {
+        self.segments.retain(|s| (3..DYNAMIC).contains(&s.channel));
+    }
+
     /// Leaves the horizontal force out of everything that follows: without velocity and attitude nothing is known of drag.
     pub(crate) fn leave_out_drag(&mut self) {
         self.segments.retain(|s| !(0..2).contains(&s.channel));
