@@ -12,6 +12,8 @@ use squirrel_core::vehicle::{ParameterError, Vehicle};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
+/// Least part of its thrust or torque that a rotor gives.
+const LEAST_FACTOR: f64 = 0.01;
 /// Largest principal moment of a body over the sum of the others.
 const LARGEST_MOMENT: f64 = 0.999;
 /// Part of the smallest size worth reporting below which an effect changes no prediction.
@@ -115,7 +117,7 @@ pub(crate) fn machine(
     Ok((possible, at.effects))
 }
 
-/// A vehicle whose numbers a file may have: a drag of less than nothing and an inertia of no body are hypotheses at best.
+/// A vehicle whose numbers a file may have: a drag or a torque of less than nothing and an inertia of no body are hypotheses at best.
 fn possible(fitted: &Vehicle<f64>) -> Result<Vehicle<f64>, ParameterError> {
     let mut p = *fitted.parameters();
     p.drag.linear_n_s_per_m = p.drag.linear_n_s_per_m.map(|x| x.max(0.0));
@@ -125,7 +127,8 @@ fn possible(fitted: &Vehicle<f64>) -> Result<Vehicle<f64>, ParameterError> {
     if moments[largest] > others {
         p.inertia_kg_m2[(largest, largest)] = LARGEST_MOMENT * others;
     }
-    Vehicle::new(p)?.with_rotor_factors(fitted.rotor_factors())
+    let factors = fitted.rotor_factors().map(|all| all.map(|x| x.max(LEAST_FACTOR)));
+    Vehicle::new(p)?.with_rotor_factors(factors)
 }
 
 /// The effects of a machine without what is next to nothing, unless its file has it.

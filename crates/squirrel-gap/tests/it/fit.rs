@@ -2,7 +2,7 @@
 //! names alone.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::support::{fly_rich, vehicle_with};
+use crate::support::{flights, fly_rich, imported, vehicle, vehicle_with};
 use squirrel_gap::{Kind, add, diagnose, find, fit, nothing_to_add};
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -81,4 +81,33 @@ fn numbers_do_not_take_up_what_no_name_fits() {
     assert_eq!(diagnosis.verdict.verdict, Kind::OutsideCatalogue, "{}", diagnosis.verdict.words);
     let error = fit(&file, &diagnosis, &[]).unwrap_err();
     assert!(error.contains("nothing to fit: something is missing"), "{error}");
+}
+
+/// Of a Crazyflie's moments its file explains next to nothing, and nothing is named from them. Fitted to three flights, it predicts
+/// those of a fourth.
+#[test]
+fn moments_that_a_file_knows_nothing_of_are_fitted_and_predict() {
+    let file = vehicle("crazyflie21_brushed.toml");
+    let read = |name: &str| {
+        let csv = flights("nanobench").join(format!("{name}.csv"));
+        (name.to_owned(), imported("nanobench.toml", &csv))
+    };
+    let seen = ["B2_circle_medium_rep1", "B3_figure8_fast_rep1", "B9_trefoil_slow_rep1"].map(read);
+    let diagnosis = diagnose(&file, &seen, &[], &|_| {}).unwrap();
+    assert!(
+        diagnosis.verdict.notes.iter().any(|note| note.starts_with("moments:")),
+        "{:?}",
+        diagnosis.verdict.notes
+    );
+    let text = fit(&file, &diagnosis, &["three flights".to_owned()]).unwrap();
+    assert!(text.contains("moments beyond it"), "the file says where its numbers are from");
+    let unseen = [read("B8_star_slow_rep1")];
+    let residual = |vehicle: &VehicleFile| find(vehicle, &unseen).unwrap().residual;
+    let (before, after) = (residual(&file), residual(&parse(&text)));
+    for axis in 0..3 {
+        let ratio = after.moment_body_rms_n_m[axis] / before.moment_body_rms_n_m[axis];
+        println!("axis {axis}: {ratio:.2} of the moment");
+        assert!(ratio < 0.6, "axis {axis}: {ratio}");
+        assert!(after.force_body_rms_n[axis] < before.force_body_rms_n[axis], "axis {axis}");
+    }
 }
