@@ -77,6 +77,11 @@ impl Pairs {
         Self(pairs.map(|((own, other), rate)| (own + damping.component_mul(rate), *other)).collect())
     }
 
+    /// What changes from one row to the next: what is quick.
+    pub(super) fn changes(&self) -> Self {
+        Self(self.0.windows(2).map(|w| (w[1].0 - w[0].0, w[1].1 - w[0].1)).collect())
+    }
+
     fn means(&self) -> (Vector3<f64>, Vector3<f64>) {
         let n = self.0.len().max(1) as f64;
         self.0.iter().fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (x, y)| (a + x / n, b + y / n))
