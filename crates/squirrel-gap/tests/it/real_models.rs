@@ -43,6 +43,22 @@ fn a_name_stands_beside_what_a_model_misses_everywhere() {
     assert!(patched.contains(&format!("[effects.{}]", verdict.effects[0].name)), "{patched}");
 }
 
+/// A moment that no effect of the catalogue makes, so large that the file explains little of all: quick moments still follow the
+/// commands, so that they take part and it is seen.
+#[test]
+fn a_large_moment_that_no_name_fits_is_seen() {
+    let is_one =
+        |index: &usize| outside(*index).is_some_and(|outside| outside.name() == "formula_product_moment");
+    let (_, _, diagnosis) = blind(Set::Outside, (0..40).find(is_one).unwrap());
+    assert_eq!(diagnosis.verdict.verdict, Kind::OutsideCatalogue, "{}", diagnosis.verdict.words);
+    let channels = diagnosis.verdict.leftover.unwrap().channels;
+    assert!(channels.iter().any(|channel| channel.starts_with("moment")), "{channels:?}");
+}
+
+fn outside(index: usize) -> Option<hidden_effects::outside::Outside> {
+    Case::draw(Set::Outside, index, 11).answer.outside
+}
+
 /// Where the file overstates what there is, that is found, and what it takes away leaves no less than nothing.
 #[test]
 fn a_drag_that_the_file_overstates_is_found() {
