@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | nothing above noise and tolerances | lead | `named`, `ambiguous` |
 //! | a little of what they explain | another form would do | `named_form_differs` |
-//! | a little everywhere, as models do | lead and hold on held-out flights | `named_incomplete` |
+//! | a little everywhere, as models do, or what is slow in each flight | lead and hold on held-out flights | `named_incomplete` |
 //! | something of its own | - | `outside_catalogue` |
 
 use crate::find::Place;
@@ -101,10 +101,13 @@ pub(crate) fn decide(
         if fails { Kind::OutsideCatalogue } else { Kind::NamedIncomplete }
     } else if leftover.is_real() {
         let shrinks = gap.as_ref().is_none_or(|gap| gap.removed_fraction > FORM_REMOVED);
-        if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) && shrinks {
+        if naming.stands && close.is_empty() {
+            Kind::NamedIncomplete
+        } else if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) && shrinks
+        {
             Kind::NamedFormDiffers
         } else if naming.stands {
-            if close.is_empty() { Kind::NamedIncomplete } else { Kind::Ambiguous }
+            Kind::Ambiguous
         } else {
             Kind::OutsideCatalogue
         }

@@ -2,7 +2,7 @@
 //! names that are not to be had.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-use crate::support::{fly_rich, vehicle_with};
+use crate::support::{fly, fly_rich, vehicle_with};
 use hidden_effects::case::{Case, Set};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_gap::{Diagnosis, Kind, add, diagnose};
@@ -57,6 +57,47 @@ fn a_large_moment_that_no_name_fits_is_seen() {
 
 fn outside(index: usize) -> Option<hidden_effects::outside::Outside> {
     Case::draw(Set::Outside, index, 11).answer.outside
+}
+
+/// The thrust of each flight drifts by itself, as with a pack that warms up: a drag that the file lacks is named beside it, and the
+/// force that is left is told. A thrust that drifts by itself has no name.
+#[test]
+fn a_name_stands_beside_a_slow_force_of_each_flight() {
+    let drag =
+        ("linear_n_s_per_m = { value = [0.0, 0.0, 0.0]", "linear_n_s_per_m = { value = [0.2, 0.2, 0.0]");
+    let (file, flown) = (VehicleFile::squirrel(), vehicle_with("squirrel.toml", &[drag]));
+    let answer = |vehicle: &VehicleFile| {
+        let drifts = [(1, 0.004), (2, -0.004), (3, 0.003)];
+        let flights = drifts.map(|(seed, drift)| drifting(fly("track", vehicle, seed), drift));
+        let verdict = diagnose(&file, &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
+        println!("{}", verdict.words);
+        verdict
+    };
+    let verdict = answer(&flown);
+    assert_eq!(verdict.verdict, Kind::NamedIncomplete, "{}", verdict.words);
+    assert_eq!(
+        verdict.effects.iter().map(|e| e.name).collect::<Vec<_>>(),
+        ["linear_drag"],
+        "{}",
+        verdict.words
+    );
+    assert!(verdict.leftover.unwrap().channels.contains(&"force_body_z_n"), "{}", verdict.words);
+    assert_eq!(answer(&file).verdict, Kind::OutsideCatalogue);
+}
+
+/// A flight whose rotors were told less and less of what the log says, or more and more.
+fn drifting((name, mut log): (String, FlightLog), drift: f64) -> (String, FlightLog) {
+    let rotor = log.sources.get_mut("rotor").unwrap();
+    let (start_s, end_s) = (rotor.time_s[0], rotor.time_s[rotor.time_s.len() - 1]);
+    let times = rotor.time_s.clone();
+    let command = rotor.channels.get_mut("command").unwrap();
+    for (own, time_s) in command.values.chunks_exact_mut(command.width).zip(times) {
+        let share = 2.0 * (time_s - start_s) / (end_s - start_s) - 1.0;
+        for u in own {
+            *u *= 1.0 + drift * share;
+        }
+    }
+    (name, log)
 }
 
 /// Where the file overstates what there is, that is found, and what it takes away leaves no less than nothing.

@@ -75,7 +75,12 @@ pub(crate) fn hold(log: &mut FlightLog, source: &str, samples: usize) {
 
 /// A flight of the scenario that shows every effect.
 pub(crate) fn fly_rich(vehicle: &VehicleFile, seed: u64) -> (String, FlightLog) {
-    let mut scenario = Scenario::find("excite_rich").unwrap();
+    fly("excite_rich", vehicle, seed)
+}
+
+/// A flight of a scenario.
+pub(crate) fn fly(scenario: &str, vehicle: &VehicleFile, seed: u64) -> (String, FlightLog) {
+    let mut scenario = Scenario::find(scenario).unwrap();
     scenario.seed = seed;
     let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
     (format!("flight {seed}"), setup.fly(true, |_| {}).unwrap().log.unwrap())
