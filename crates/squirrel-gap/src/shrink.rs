@@ -1,8 +1,8 @@
 //! The gap on flights that the fit never saw: the plant re-simulated in open loop under the logged commands.
 //!
 //! Every half second the plant is put where the vehicle was measured to be and flown for a second, and every fourth time for
-//! two, under the logged commands at the measured voltage. What the sensors should then have read, under the hypothesis, is compared with what
-//! they read, in bins of 0.1 s: velocity, attitude, angular rate and specific force, three channels each.
+//! two, under the logged commands at the measured voltage. What the sensors should then have read, under the hypothesis, is
+//! compared with what they read, in bins of 0.1 s: velocity, attitude, angular rate and specific force, three channels each.
 //!
 //! ```text
 //! J = mean over channels of MSE(model) / MSE(floor), over the first second      1: nothing but noise

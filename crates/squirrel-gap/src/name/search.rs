@@ -198,7 +198,7 @@ impl Search<'_> {
     }
 
     /// A set without each of its members in turn.
-    fn without(&self, linear: &Linear, set: &Scored) -> Result<Vec<Scored>, GapError> {
+    pub(super) fn without(&self, linear: &Linear, set: &Scored) -> Result<Vec<Scored>, GapError> {
         (0..set.members.len())
             .map(|i| {
                 let mut rest = set.members.clone();

@@ -10,6 +10,7 @@
 use super::evidence::inner;
 use super::linear::Linear;
 use super::point::Member;
+use super::refine::Scored;
 use super::search::{Found, Search};
 use super::{Naming, judge};
 use crate::GapError;
@@ -27,19 +28,11 @@ const SIZE_TIMES: f64 = 2.0;
 /// What the predictor says.
 pub(super) fn leaves_nothing_else(search: &Search<'_>, naming: &Naming) -> Result<bool, GapError> {
     let linear = Rc::new(with_slow(search.predictor, naming));
-    let score = |members: &[Member]| search.score(&linear, members);
-    let best = score(&naming.found.best.members)?;
-    let mut without = Vec::with_capacity(best.members.len());
-    for out in 0..best.members.len() {
-        let mut rest = best.members.clone();
-        let member = rest.remove(out);
-        let rest = score(&rest)?;
-        if best.log_evidence < rest.log_evidence + search.needed(&member) {
-            return Ok(false);
-        }
-        without.push(rest);
-    }
-    if !search.is_off(&best) {
+    let best = search.score(&linear, &naming.found.best.members)?;
+    let without = search.without(&linear, &best)?;
+    let is_asked_for =
+        |(member, rest): (&Member, &Scored)| best.log_evidence >= rest.log_evidence + search.needed(member);
+    if !(best.members.iter().zip(&without).all(is_asked_for) && search.is_off(&best)) {
         return Ok(false);
     }
     let null = Rc::clone(&naming.found.null);
