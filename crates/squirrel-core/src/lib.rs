@@ -10,6 +10,7 @@
 //! - [`effects`]: physics that a vehicle may have on top of the base model, one file an effect.
 //! - [`aero`], [`dynamics`]: the base model: plate, rotors, drag, rigid body, RK4. Generic over the scalar.
 //! - [`vehicle`]: the numbers of one airframe, checked once.
+//! - [`lane`]: the scalar that physics and networks are written over: one number, a register of them, or a dual number.
 //! - [`frames`], [`math`]: vectors that know their frame, and arithmetic whose bits do not depend on the target.
 //!
 //! No allocation, no clock, no panic in a step; all memory of a controller is one plain `Copy` struct. SI units and
@@ -26,6 +27,7 @@ pub mod effects;
 pub mod estimate;
 pub mod frames;
 pub mod guidance;
+pub mod lane;
 pub mod math;
 pub mod policy;
 pub mod rnn;

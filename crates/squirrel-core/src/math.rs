@@ -3,6 +3,7 @@
 //! `f32::min` and `f32::max` differ between x86-64 and Cortex-M7 on NaN and on the sign of zero, and the platform's
 //! `sin` differs in the last bit. Flight code therefore uses the compare-select helpers and the `libm` calls below.
 
+use crate::lane::Lane;
 use nalgebra::{RealField, Vector3};
 
 /// Standard gravity, m/s^2.
@@ -10,9 +11,9 @@ pub const GRAVITY_M_S2: f64 = 9.80665;
 /// Air density at sea level in the standard atmosphere, kg/m^3. The paper states none.
 pub const AIR_DENSITY_KG_M3: f64 = 1.225;
 
-/// A scalar that the dynamics can be evaluated in: `f32` on the target, `f64` in the simulator.
-pub trait Real: RealField + Copy {}
-impl<T: RealField + Copy> Real for T {}
+/// One number: `f32` on the target, `f64` in the simulator. What formulas are written over is [`Lane`].
+pub trait Real: RealField + Copy + Lane<Element = Self> {}
+impl<T: RealField + Copy + Lane<Element = T>> Real for T {}
 
 /// The constant `x` in the scalar type `T`.
 #[inline(always)]

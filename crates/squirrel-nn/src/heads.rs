@@ -5,8 +5,8 @@
 
 use nalgebra::{Vector3, convert};
 use squirrel_core::frames::In;
+use squirrel_core::math::Real;
 use squirrel_core::rnn::head::{Correction, Flow, TurnedNormal};
-use squirrel_core::rnn::lane::NetScalar;
 use squirrel_core::rnn::parnn::{INPUTS, WINDOW};
 
 /// A window as a model sees it.
@@ -26,7 +26,7 @@ impl<S> AsRef<[[S; INPUTS]]> for Sample<S> {
     }
 }
 
-impl<S: NetScalar> Sample<S> {
+impl<S: Real> Sample<S> {
     /// * `velocity_body_m_s` - relative to the air, at the last row
     pub(crate) fn new(rows: [[S; INPUTS]; WINDOW], velocity_body_m_s: [S; 3], target: [S; 3]) -> Self {
         Self { rows, flow: Flow::new(In::new(Vector3::from(velocity_body_m_s))), target }
@@ -40,7 +40,7 @@ pub(crate) struct Force<S, const OUT: usize> {
 }
 
 /// What makes a force of the outputs of a network.
-pub(crate) trait Head<S: NetScalar, const OUT: usize>: Copy {
+pub(crate) trait Head<S: Real, const OUT: usize>: Copy {
     /// Force and derivatives.
     fn force(self, outputs: &[S; OUT], flow: &Flow<S>) -> Force<S, OUT>;
 
@@ -58,7 +58,7 @@ pub(crate) trait Head<S: NetScalar, const OUT: usize>: Copy {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Direct;
 
-impl<S: NetScalar> Head<S, 3> for Direct {
+impl<S: Real> Head<S, 3> for Direct {
     #[inline]
     fn force(self, outputs: &[S; 3], _: &Flow<S>) -> Force<S, 3> {
         let (one, zero) = (convert(1.0), convert(0.0));
@@ -72,7 +72,7 @@ pub(crate) struct Plane<S> {
     pub(crate) area_m2: S,
 }
 
-impl<S: NetScalar> Head<S, 2> for Plane<S> {
+impl<S: Real> Head<S, 2> for Plane<S> {
     #[inline]
     fn force(self, outputs: &[S; 2], flow: &Flow<S>) -> Force<S, 2> {
         let size = flow.impedance(self.area_m2) * flow.speed;
@@ -90,7 +90,7 @@ pub(crate) struct Corrected<S> {
     pub(crate) area_m2: S,
 }
 
-impl<S: NetScalar> Head<S, 2> for Corrected<S> {
+impl<S: Real> Head<S, 2> for Corrected<S> {
     /// With `f = -Q |v| sin(alpha_est) gamma n_f`: by `gamma` it is `f / gamma`; by `alpha_w` it is
     /// `-Q gamma |v| (cos(alpha_est) n_f + sin(alpha_est) (cos(beta) e_t - sin(beta) n))`, and 0 where clipped.
     #[inline]

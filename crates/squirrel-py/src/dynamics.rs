@@ -9,7 +9,7 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_core::dynamics::{self, Held, RotorDrive, State, rk4};
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::Acting;
 use squirrel_core::frames::{In, Wrench};
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_core::{nalgebra::Vector3, vehicle};
@@ -21,7 +21,7 @@ const STEPS_A_LOOK: usize = 100_000;
 /// What a call is about.
 struct Model<'py> {
     vehicle: vehicle::Vehicle<f64>,
-    effects: Effects<f64>,
+    effects: Acting<f64>,
     states: Rows<'py, f64>,
     commands: Rows<'py, f64>,
     winds: Option<Rows<'py, f64>>,
@@ -52,7 +52,8 @@ impl<'py> Model<'py> {
             return Err(value(format!("voltage_v = {voltage_v}: must be finite")));
         }
         let vehicle = file.effects.alter(&file.vehicle).map_err(value)?;
-        Ok(Self { vehicle, effects: file.effects, states, commands, winds, voltage_v, rotors })
+        let effects = Acting::new(&file.effects, &vehicle);
+        Ok(Self { vehicle, effects, states, commands, winds, voltage_v, rotors })
     }
 
     fn held(&self, i: usize) -> Held<f64> {

@@ -197,7 +197,7 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
         let air = |winds: &[Wind]| winds.iter().fold(In::zero(), |sum, wind| sum + wind.velocity());
         for step in 0..steps {
             if step * 300 >= tick * 1000 {
-                let through = state.body.velocity - total_wind(plant.effects(), &state.body, air(&winds));
+                let through = state.body.velocity - total_wind(plant.acting(), &state.body, air(&winds));
                 for wind in &mut winds {
                     wind.advance((step - last) as f64 * 1e-3, || through.vector.norm());
                 }

@@ -6,7 +6,7 @@ mod batch_support;
 use batch_support::{Thrown, bits};
 use nalgebra::{Vector3, convert};
 use squirrel_core::dynamics::{Held, RotorDrive, State, VectorSpace, derivative, rk4};
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Acting, Effects};
 use squirrel_core::frames::{In, Wrench};
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_sim::batch::simd::{Path, Paths};
@@ -117,7 +117,8 @@ fn a_vehicle_alone_is_the_same_among_a_thousand() {
 /// Steps of the functions that the plant and the gap workflow use.
 fn a_batch_is_the_core<T: Paths>() {
     let thrown = Thrown::<T>::new(21);
-    let (dt, none) = (convert::<f64, T>(1e-3), Effects::none());
+    let dt = convert::<f64, T>(1e-3);
+    let none = Acting::new(&Effects::none(), &thrown.vehicles[0]);
     for scheme in SCHEMES {
         let mut batch = thrown.batch(settings(scheme));
         let mut states = thrown.states.clone();

@@ -5,7 +5,7 @@ mod world_fixture;
 
 use proptest::prelude::*;
 use squirrel_core::dynamics::{Held, RotorDrive, State, derivative, rk4};
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Acting, Effects};
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::Vector3;
@@ -151,11 +151,12 @@ fn two_runs_give_the_same_bits() {
 fn a_flight_that_changes_from_rk4_to_the_world_lands() {
     let vehicle = vehicle();
     let mut world = World::new(&vehicle, &open_field()).unwrap();
-    let drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.0; 8], 14.8);
+    let calm = Acting::new(&Effects::none(), &vehicle);
+    let drive = RotorDrive::new(&vehicle, &calm, &[0.0; 8], 14.8);
     let free = |state: State<f64>| {
         rk4(state, 1e-3, |s| {
             let held = Held { drive, wind: In::zero(), deployment: [0.0; 2], tether_force: In::zero() };
-            derivative(&vehicle, &Effects::none(), s, &held, |_| Wrench::zero())
+            derivative(&vehicle, &calm, s, &held, |_| Wrench::zero())
         })
         .normalised()
     };

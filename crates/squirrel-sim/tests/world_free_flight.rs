@@ -6,7 +6,7 @@ mod world_fixture;
 
 use squirrel_core::aero::Air;
 use squirrel_core::dynamics::{Held, RotorDrive, State, derivative, rk4, wrench};
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Acting, Effects};
 use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::nalgebra::Vector3;
 use squirrel_sim::world::{Contact, World};
@@ -31,11 +31,12 @@ fn tumbling() -> State<f64> {
 fn by_rk4(steps: usize) -> State<f64> {
     let vehicle = vehicle();
     let mut state = tumbling();
-    let mut drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.5; 8], 14.8);
+    let calm = Acting::new(&Effects::none(), &vehicle);
+    let mut drive = RotorDrive::new(&vehicle, &calm, &[0.5; 8], 14.8);
     drive.target_rad_s = state.rotor_speed_rad_s;
     for _ in 0..steps {
         state = rk4(state, 1.0 / steps as f64, |s| {
-            derivative(&vehicle, &Effects::none(), s, &in_still_air(drive), no_surfaces)
+            derivative(&vehicle, &calm, s, &in_still_air(drive), no_surfaces)
         })
         .normalised();
     }
@@ -48,7 +49,13 @@ fn by_rapier(steps: usize) -> State<f64> {
     let mut state = tumbling();
     for _ in 0..steps {
         let drive = RotorDrive::holding(state.rotor_speed_rad_s);
-        let held = wrench(&vehicle, &Effects::none(), &state, &in_still_air(drive), no_surfaces);
+        let held = wrench(
+            &vehicle,
+            &Acting::new(&Effects::none(), &vehicle),
+            &state,
+            &in_still_air(drive),
+            no_surfaces,
+        );
         let (next, contact) = world.step(&state, &held, 1.0 / steps as f64).expect("a possible step");
         assert_eq!(contact, Contact::default());
         state = next;

@@ -3,11 +3,12 @@
 //! A normal-force coefficient of `2 sin(alpha)` on `1/2 rho |v|^2 A`; no tangential part. `v` is relative to the air here
 //! (the paper takes the ground velocity; docs/equations.md T6).
 
-use crate::aero::Air;
+use crate::aero::{Air, Airflow, BodyWrench};
 use crate::frames::{Body, Frame, In, Wrench};
+use crate::lane::Lane;
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
+use crate::numbers;
 use crate::vehicle::Wing;
-use nalgebra::Vector3;
 
 /// Force of the air on the plate, N, in the frame of its arguments.
 ///
@@ -20,40 +21,58 @@ pub fn force<F: Frame, T: Real>(velocity: In<F, T>, normal: In<F, T>, area_m2: T
     In::new(n * (-real::<T>(AIR_DENSITY_KG_M3) * area_m2 * v.norm() * n.dot(&v)))
 }
 
-/// Wrench of a left and a right plate, with [`normal_forces`].
+/// Wrench of a left and a right plate.
 ///
 /// * `deployment` - left, right, 0..1
 #[inline(always)]
 pub fn wing_pair<T: Real>(wing: &Wing<T>, air: &Air<T>, deployment: [T; 2]) -> Wrench<Body, T> {
-    pair_wrench(wing, normal_forces(wing, air, deployment))
+    let pair = Pair::new(wing);
+    pair.wrench(pair.normal_forces(&Airflow::from(air), &deployment)).into()
 }
 
-/// Normal force of one spread side over the speed of the air along z, `1/2 rho S c_N |v|`, N s/m.
-#[inline(always)]
-pub fn normal_slope<T: Real>(wing: &Wing<T>, air: &Air<T>) -> T {
-    real::<T>(0.5 * AIR_DENSITY_KG_M3) * wing.area_per_side_m2 * wing.normal_force_slope * air.speed
+numbers! {
+    /// A flat plate on each side.
+    Pair {
+        /// `1/2 rho S c_N`, N s^2/m^2; 0 for no wing.
+        per_square,
+        /// Distance of each side's centre from the x axis, m.
+        arm_m
+    }
 }
 
-/// Forces along -z of a left and a right plate, N: `N = 1/2 rho S c_N |v| w`, with `w` the z component of the air's velocity at
-/// that side, so that roll is damped.
-///
-/// * `deployment` - left, right, 0..1
-#[inline(always)]
-pub fn normal_forces<T: Real>(wing: &Wing<T>, air: &Air<T>, deployment: [T; 2]) -> [T; 2] {
-    let slope = normal_slope(wing, air);
-    let roll_down = air.omega.vector.x * wing.lateral_arm_m;
-    let left = slope * (air.velocity.vector.z - roll_down) * deployment[0];
-    let right = slope * (air.velocity.vector.z + roll_down) * deployment[1];
-    [left, right]
+impl<T: Real> Pair<T> {
+    /// Of a vehicle's wings.
+    #[inline(always)]
+    pub fn new(wing: &Wing<T>) -> Self {
+        let per_square = real::<T>(0.5 * AIR_DENSITY_KG_M3) * wing.area_per_side_m2 * wing.normal_force_slope;
+        Self { per_square, arm_m: wing.lateral_arm_m }
+    }
 }
 
-/// Wrench of forces along -z at `y = -+ arm`, left and right, N.
-#[inline(always)]
-pub fn pair_wrench<T: Real>(wing: &Wing<T>, [left, right]: [T; 2]) -> Wrench<Body, T> {
-    Wrench {
-        force: In::new(Vector3::new(T::zero(), T::zero(), -(left + right))),
+impl<L: Lane> Pair<L> {
+    /// Forces along -z of a left and a right plate, N: `N = 1/2 rho S c_N |v| w`, with `w` the z component of the air's velocity
+    /// at that side, so that roll is damped.
+    ///
+    /// * `deployment` - left, right, 0..1
+    #[inline(always)]
+    pub fn normal_forces(&self, flow: &Airflow<L>, deployment: &[L; 2]) -> [L; 2] {
+        let slope = self.per_square * flow.speed;
+        let roll_down = flow.omega[0] * self.arm_m;
+        [
+            slope * (flow.velocity[2] - roll_down) * deployment[0],
+            slope * (flow.velocity[2] + roll_down) * deployment[1],
+        ]
+    }
+
+    /// Wrench of forces along -z at `y = -+ arm`, left and right, N.
+    #[inline(always)]
+    pub fn wrench(&self, [left, right]: [L; 2]) -> BodyWrench<L> {
+        let none = L::of(0.0);
         // (0, -+arm, 0) x (0, 0, -N)
-        moment: In::new(Vector3::new((left - right) * wing.lateral_arm_m, T::zero(), T::zero())),
+        BodyWrench {
+            force: [none, none, none - (left + right)],
+            moment: [(left - right) * self.arm_m, none, none],
+        }
     }
 }
 
@@ -61,6 +80,7 @@ pub fn pair_wrench<T: Real>(wing: &Wing<T>, [left, right]: [T; 2]) -> Wrench<Bod
 mod tests {
     use super::*;
     use crate::frames::{Ned, Rotation};
+    use nalgebra::Vector3;
 
     const AREA_M2: f64 = 0.04;
 

@@ -7,17 +7,22 @@
 //! Air enters only through the air-relative velocity `R^T (v - wind)` (the paper writes the ground velocity; docs/equations.md
 //! T6). Wings are a caller's closure, because their own states belong to the plant.
 
+pub mod battery;
+pub mod body;
 mod rk4;
-mod rotors;
+pub mod rotors;
+pub mod servo;
 mod state;
 
 pub use rk4::{VectorSpace, rk4};
 pub use rotors::RotorDrive;
 pub use state::State;
 
-use crate::aero::Air;
-use crate::effects::{Effects, Situation};
+use crate::aero::{self, Air, Airflow, BodyWrench, flat_plate};
+use crate::effects::{Acting, Effects, Prepared, Present, Situation};
 use crate::frames::{Body, In, Ned, Wrench};
+use crate::lane::Lane;
+use crate::lane::vector::{cross, plus, rotation, transposed_times};
 use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
 use crate::vehicle::Vehicle;
 use nalgebra::{Matrix3, Vector3};
@@ -44,16 +49,17 @@ fn air_in<T: Real>(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T
 /// The attitude as a matrix: two products with it cost less, and wait less, than two with the quaternion.
 #[inline(always)]
 fn rotation_matrix<T: Real>(state: &State<T>) -> Matrix3<T> {
-    state.ned_from_body().quaternion.to_rotation_matrix().into_inner()
+    let q = &state.attitude;
+    Matrix3::from(rotation(&[q.w, q.i, q.j, q.k]))
 }
 
 /// Base drag of the airframe, body frame: `F = -(D v + 1/2 rho C_d A |v| v)`.
 #[inline(always)]
 pub fn drag<T: Real>(vehicle: &Vehicle<T>, air: &Air<T>) -> In<Body, T> {
     let drag = &vehicle.parameters().drag;
-    let quadratic = real::<T>(0.5 * AIR_DENSITY_KG_M3) * drag.area_m2 * air.speed;
-    let v = air.velocity.vector;
-    In::new(-(drag.linear_n_s_per_m.component_mul(&v) + v * quadratic))
+    let flow = Airflow::from(air);
+    let per_square = real::<T>(0.5 * AIR_DENSITY_KG_M3) * drag.area_m2;
+    -In::new(Vector3::from(aero::drag(&drag.linear_n_s_per_m.into(), per_square, &flow)))
 }
 
 /// What is held over a step.
@@ -71,12 +77,13 @@ pub struct Held<T: Real> {
 
 /// Force and moment on the airframe without gravity, body frame.
 ///
-/// * `vehicle` - with what effects change once, see [`Effects::alter`]
+/// * `vehicle` - with what effects change once, see [`Effects::alter`](crate::effects::Effects::alter)
+/// * `effects` - of this vehicle
 /// * `surfaces` - wrench of the wings for a given motion through the air
 #[inline(always)]
 pub fn wrench<T: Real>(
     vehicle: &Vehicle<T>,
-    effects: &Effects<T>,
+    effects: &Acting<T>,
     state: &State<T>,
     held: &Held<T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
@@ -89,7 +96,7 @@ pub fn wrench<T: Real>(
 #[inline(always)]
 fn wrench_in<T: Real>(
     vehicle: &Vehicle<T>,
-    effects: &Effects<T>,
+    effects: &Acting<T>,
     state: &State<T>,
     held: &Held<T>,
     air: &Air<T>,
@@ -110,53 +117,107 @@ fn wrench_in<T: Real>(
 #[inline(never)]
 fn affected<T: Real>(
     vehicle: &Vehicle<T>,
-    effects: &Effects<T>,
+    effects: &Acting<T>,
     state: &State<T>,
     held: &Held<T>,
     air: &Air<T>,
     ned_from_body: &Matrix3<T>,
-    [mut rotors, rest]: [Wrench<Body, T>; 2],
+    wrenches: [Wrench<Body, T>; 2],
 ) -> Wrench<Body, T> {
-    let height_m = -state.position.vector.z;
-    let factor = effects.thrust_factor(air, height_m);
-    rotors.force = rotors.force * factor;
-    rotors.moment.vector.x *= factor;
-    rotors.moment.vector.y *= factor;
-    let base = rotors + rest;
+    let (present, numbers) = (effects.present(), effects.numbers());
     let speed = &state.rotor_speed_rad_s;
-    let [spin, spin_rate] = if effects.feel_rotor_spin() {
-        [*speed, held.drive.rates(vehicle.rotor_blocks(), speed)].map(|all| rotors::spin(vehicle, &all))
+    let rotor_spin = if Prepared::<T>::feel_rotor_spin(present) {
+        let signs = rotors::spin_signs(vehicle);
+        [*speed, held.drive.rates(vehicle.rotor_blocks(), speed)].map(|all| rotors::spin(&signs, &all))
     } else {
         [T::zero(); 2]
     };
-    let mut sum = base
-        + effects.wrench(&Situation {
-            air,
-            height_m,
-            thrust_n: -rotors.force.vector.z,
+    let none = flat_plate::Pair::all(T::zero());
+    let at = Surroundings {
+        flow: &Airflow::from(air),
+        ned_from_body: &(*ned_from_body).into(),
+        height_m: -state.position.vector.z,
+        inverse_mass: vehicle.inverse_mass(),
+        rotor_spin,
+        wings: &vehicle.parameters().wing.as_ref().map_or(none, flat_plate::Pair::new),
+        deployment: held.deployment,
+        tether_force: Some(held.tether_force.vector.into()),
+    };
+    let [rotors, rest] = wrenches.map(BodyWrench::from);
+    with_effects(numbers, present, [&rotors, &rest], &at).into()
+}
+
+/// What effects may look at in a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a, L> {
+    /// Motion through the air.
+    pub flow: &'a Airflow<L>,
+    /// By columns.
+    pub ned_from_body: &'a [[L; 3]; 3],
+    /// Above the origin's level, m.
+    pub height_m: L,
+    /// 1/kg.
+    pub inverse_mass: L,
+    /// Sum of the rotor speeds about +z, rad/s, and its rate, rad/s^2, where an effect feels them.
+    pub rotor_spin: [L; 2],
+    /// The flat wings that the vehicle declares.
+    pub wings: &'a flat_plate::Pair<L>,
+    /// Left and right, 0..1.
+    pub deployment: [L; 2],
+    /// Pull of a load at the centre of mass, world frame, N.
+    pub tether_force: Option<[L; 3]>,
+}
+
+/// The wrench of `[rotors, rest]` with everything that effects do to it.
+#[inline(always)]
+pub fn with_effects<L: Lane>(
+    numbers: &Prepared<L>,
+    present: Present,
+    [rotors, rest]: [&BodyWrench<L>; 2],
+    at: &Surroundings<'_, L>,
+) -> BodyWrench<L> {
+    let factor = numbers.thrust_factor(present, at.flow, at.height_m);
+    let ([x, y, z], [roll, pitch, yaw]) = (rotors.force, rotors.moment);
+    let lifted = BodyWrench {
+        force: [x * factor, y * factor, z * factor],
+        moment: [roll * factor, pitch * factor, yaw],
+    };
+    let base = lifted.plus(rest);
+    let mut sum = base.plus(&numbers.wrench(
+        present,
+        &Situation {
+            flow: at.flow,
+            thrust_n: L::of(0.0) - lifted.force[2],
             force: base.force,
-            rotor_spin_rad_s: spin,
-            rotor_spin_rate_rad_s2: spin_rate,
-            wing: vehicle.parameters().wing.as_ref(),
-            deployment: held.deployment,
-        });
-    sum.force.vector += ned_from_body.tr_mul(&held.tether_force.vector);
-    let added_mass_kg = effects.added_mass_kg();
-    if added_mass_kg > T::zero() {
-        let force_z = &mut sum.force.vector.z;
-        let gravity_z = ned_from_body[(2, 2)] * real(GRAVITY_M_S2);
-        let turning = air.omega.vector.cross(&air.velocity.vector).z;
-        let rate = (*force_z * vehicle.inverse_mass() + gravity_z - turning)
-            / (T::one() + added_mass_kg * vehicle.inverse_mass());
-        *force_z -= added_mass_kg * rate;
+            rotor_spin: at.rotor_spin,
+            wings: at.wings,
+            deployment: at.deployment,
+        },
+    ));
+    if let Some(tether_force) = &at.tether_force {
+        sum.force = plus(&sum.force, &transposed_times(at.ned_from_body, tether_force));
+    }
+    if present.has_added_mass() {
+        let added_mass_kg = numbers.added_mass_kg(present);
+        let gravity_z = at.ned_from_body[2][2] * L::of(GRAVITY_M_S2);
+        let turning = cross(&at.flow.omega, &at.flow.velocity)[2];
+        let rate = (sum.force[2] * at.inverse_mass + gravity_z - turning)
+            / (L::of(1.0) + added_mass_kg * at.inverse_mass);
+        sum.force[2] = sum.force[2] - added_mass_kg * rate;
     }
     sum
 }
 
 /// Wind with what effects add to it where the vehicle is, m/s.
 #[inline(always)]
-pub fn total_wind<T: Real>(effects: &Effects<T>, state: &State<T>, wind: In<Ned, T>) -> In<Ned, T> {
-    if effects.any() { wind + effects.wind(-state.position.vector.z) } else { wind }
+pub fn total_wind<T: Real>(effects: &Acting<T>, state: &State<T>, wind: In<Ned, T>) -> In<Ned, T> {
+    if effects.any() { wind + wind_of(effects, -state.position.vector.z) } else { wind }
+}
+
+#[inline(never)]
+fn wind_of<T: Real>(effects: &Acting<T>, height_m: T) -> In<Ned, T> {
+    let [north, east] = effects.numbers().wind(effects.present(), height_m);
+    In::new(Vector3::new(north, east, T::zero()))
 }
 
 /// Time derivative of the state: each field of the result is the rate of the field of the same name.
@@ -165,7 +226,7 @@ pub fn total_wind<T: Real>(effects: &Effects<T>, state: &State<T>, wind: In<Ned,
 #[inline(always)]
 pub fn derivative<T: Real>(
     vehicle: &Vehicle<T>,
-    effects: &Effects<T>,
+    effects: &Acting<T>,
     state: &State<T>,
     held: &Held<T>,
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
@@ -173,10 +234,11 @@ pub fn derivative<T: Real>(
     let ned_from_body = rotation_matrix(state);
     let air = air_in(state, total_wind(effects, state, held.wind), &ned_from_body);
     let wrench = wrench_in(vehicle, effects, state, held, &air, &ned_from_body, surfaces);
-    let gravity_ned = Vector3::new(T::zero(), T::zero(), real(GRAVITY_M_S2));
+    let columns = ned_from_body.into();
+    let acceleration = body::acceleration(&columns, &wrench.force.vector.into(), vehicle.inverse_mass());
     State {
         position: state.velocity,
-        velocity: In::new(gravity_ned + ned_from_body * (wrench.force.vector * vehicle.inverse_mass())),
+        velocity: In::new(Vector3::from(acceleration)),
         attitude: state.attitude_rate(),
         omega: angular_acceleration(vehicle, state.omega, &wrench),
         rotor_speed_rad_s: held.drive.rates(vehicle.rotor_blocks(), &state.rotor_speed_rad_s),
@@ -192,8 +254,11 @@ pub fn angular_acceleration<T: Real>(
     omega: In<Body, T>,
     wrench: &Wrench<Body, T>,
 ) -> In<Body, T> {
-    let spin = vehicle.parameters().inertia_kg_m2 * omega.vector;
-    In::new(vehicle.inertia_inverse() * (wrench.moment.vector - omega.vector.cross(&spin)))
+    let columns: [[[T; 3]; 3]; 2] =
+        [vehicle.parameters().inertia_kg_m2.into(), (*vehicle.inertia_inverse()).into()];
+    let moment = wrench.moment.vector.into();
+    let rate = body::angular_acceleration([&columns[0], &columns[1]], &omega.vector.into(), &moment);
+    In::new(Vector3::from(rate))
 }
 
 /// What an accelerometer reads without noise, m/s^2: `f / m + w' x r + w x (w x r)`, with `r` from the centre of mass, on
@@ -222,6 +287,10 @@ mod tests {
     use crate::vehicle::MAX_ROTORS;
     use crate::vehicle::fixtures::squirrel;
 
+    fn acting(effects: &Effects<f64>) -> Acting<f64> {
+        Acting::new(effects, &Vehicle::new(squirrel::<f64>()).unwrap())
+    }
+
     fn no_surfaces(_: &Air<f64>) -> Wrench<Body, f64> {
         Wrench::zero()
     }
@@ -235,12 +304,13 @@ mod tests {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
         let share = vehicle.weight_n() / 4.0;
         let command = vehicle.parameters().propulsion.command_for_thrust(share);
-        let drive = RotorDrive::new(&vehicle, &Effects::none(), &[command; 8], 14.8);
+        let drive = RotorDrive::new(&vehicle, &acting(&Effects::none()), &[command; 8], 14.8);
         let mut state = State::at_rest();
         state.rotor_speed_rad_s = drive.target_rad_s;
         for _ in 0..1000 {
-            state =
-                rk4(state, 1e-3, |s| derivative(&vehicle, &Effects::none(), s, &still(drive), no_surfaces));
+            state = rk4(state, 1e-3, |s| {
+                derivative(&vehicle, &acting(&Effects::none()), s, &still(drive), no_surfaces)
+            });
         }
         assert!(state.position.vector.norm() < 1e-9 && state.omega.vector.norm() < 1e-9);
     }
@@ -251,7 +321,7 @@ mod tests {
         p.inertia_kg_m2 = Matrix3::from_diagonal(&Vector3::new(0.01, 0.02, 0.028));
         p.drag.area_m2 = 0.0;
         let vehicle = Vehicle::new(p).unwrap();
-        let drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.0; 8], 14.8);
+        let drive = RotorDrive::new(&vehicle, &acting(&Effects::none()), &[0.0; 8], 14.8);
         let mut state = State { omega: In::new(Vector3::new(3.0, 0.05, 8.0)), ..State::at_rest() };
         let invariants = |s: &State<f64>| {
             let momentum = p.inertia_kg_m2 * s.omega.vector;
@@ -260,9 +330,10 @@ mod tests {
         };
         let (energy, momentum_ned) = invariants(&state);
         for _ in 0..10_000 {
-            state =
-                rk4(state, 1e-3, |s| derivative(&vehicle, &Effects::none(), s, &still(drive), no_surfaces))
-                    .normalised();
+            state = rk4(state, 1e-3, |s| {
+                derivative(&vehicle, &acting(&Effects::none()), s, &still(drive), no_surfaces)
+            })
+            .normalised();
         }
         let (energy_end, momentum_end) = invariants(&state);
         assert!((energy_end / energy - 1.0).abs() < 1e-9, "energy drifted by {}", energy_end / energy - 1.0);
@@ -272,13 +343,17 @@ mod tests {
     #[test]
     fn rk4_is_of_fourth_order() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
-        let drive =
-            RotorDrive::new(&vehicle, &Effects::none(), &[0.7, 0.6, 0.72, 0.66, 0.0, 0.0, 0.0, 0.0], 14.8);
+        let drive = RotorDrive::new(
+            &vehicle,
+            &acting(&Effects::none()),
+            &[0.7, 0.6, 0.72, 0.66, 0.0, 0.0, 0.0, 0.0],
+            14.8,
+        );
         let fly = |steps: usize| {
             let mut state = State { velocity: In::new(Vector3::new(3.0, -1.0, 0.5)), ..State::at_rest() };
             for _ in 0..steps {
                 state = rk4(state, 0.4 / steps as f64, |s| {
-                    derivative(&vehicle, &Effects::none(), s, &still(drive), no_surfaces)
+                    derivative(&vehicle, &acting(&Effects::none()), s, &still(drive), no_surfaces)
                 });
             }
             state.position.vector
@@ -295,7 +370,7 @@ mod tests {
         let speed = (vehicle.weight_n() / 4.0 / 6.0e-7).sqrt();
         state.rotor_speed_rad_s = [speed, speed, speed, speed, 0.0, 0.0, 0.0, 0.0];
         let held = still(RotorDrive::holding(state.rotor_speed_rad_s));
-        let w = wrench(&vehicle, &Effects::none(), &state, &held, no_surfaces);
+        let w = wrench(&vehicle, &acting(&Effects::none()), &state, &held, no_surfaces);
         let read = specific_force(&vehicle, &Effects::none(), state.omega, &w);
         assert!((read.vector - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).norm() < 1e-9);
     }
@@ -316,7 +391,7 @@ mod tests {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
         let mut effects = Effects::none();
         effects.insert(name).unwrap().values[..values.len()].copy_from_slice(values);
-        wrench(&vehicle, &effects, state, held, no_surfaces)
+        wrench(&vehicle, &Acting::new(&effects, &vehicle), state, held, no_surfaces)
     }
 
     /// Dropped, all of `m + m_a` accelerates, but only `m` has weight: `w' = m g / (m + m_a)`, so `F_z = -m_a w'`.
@@ -329,8 +404,13 @@ mod tests {
         assert!((force + 0.1 * fall).abs() < 1e-12, "{force}");
         // Rolling at 2 rad/s while slipping to the right at 3 m/s: the velocity along z grows by g - w_x v.
         (state.omega.vector.x, state.velocity.vector.y) = (2.0, 3.0);
-        let drag =
-            wrench(&Vehicle::new(squirrel::<f64>()).unwrap(), &Effects::none(), &state, &held, no_surfaces);
+        let drag = wrench(
+            &Vehicle::new(squirrel::<f64>()).unwrap(),
+            &acting(&Effects::none()),
+            &state,
+            &held,
+            no_surfaces,
+        );
         let turned = affected_by("added_mass", &[0.1], &state, &held).force - drag.force;
         let rate = (GRAVITY_M_S2 - 6.0) / (1.0 + 0.1 / 0.548);
         assert!((turned.vector.z + 0.1 * rate).abs() < 1e-12, "{turned:?}");
@@ -345,11 +425,15 @@ mod tests {
     #[test]
     fn rotors_that_speed_up_push_the_airframe_back() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
-        let drive =
-            RotorDrive::new(&vehicle, &Effects::none(), &[0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0], 14.8);
+        let drive = RotorDrive::new(
+            &vehicle,
+            &acting(&Effects::none()),
+            &[0.5, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+            14.8,
+        );
         let mut state = State { omega: In::new(Vector3::new(0.5, -0.2, 0.0)), ..State::at_rest() };
         state.rotor_speed_rad_s[0] = 900.0;
-        let base = wrench(&vehicle, &Effects::none(), &state, &still(drive), no_surfaces);
+        let base = wrench(&vehicle, &acting(&Effects::none()), &state, &still(drive), no_surfaces);
         let more = affected_by("rotor_gyro_torque", &[1e-5], &state, &still(drive)).moment - base.moment;
         let by_hand = Vector3::new(0.2 * 900.0, 0.5 * 900.0, -600.0 / 0.03) * 1e-5;
         assert!((more.vector - by_hand).norm() < 1e-12, "{more:?}");

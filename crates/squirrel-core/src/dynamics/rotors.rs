@@ -3,8 +3,9 @@
 //! `T_i = k_f Omega_i^2` along -z, `Q_i = yaw_sign_i k_m Omega_i^2` about +z, `Omega_i' = (target_i - Omega_i) / tau`
 //! with its own `tau` for speeding up and slowing down (docs/equations.md D.5).
 
-use crate::effects::{Effects, Supply};
+use crate::effects::Acting;
 use crate::frames::{Body, In, Wrench};
+use crate::lane::Lane;
 use crate::math::Real;
 use crate::vehicle::{MAX_ROTORS, PerRotor, ROTOR_BLOCK, Vehicle};
 use nalgebra::Vector3;
@@ -25,7 +26,7 @@ impl<T: Real> RotorDrive<T> {
     /// * `battery_voltage_v` - felt only through the `battery_sag` effect
     pub fn new(
         vehicle: &Vehicle<T>,
-        effects: &Effects<T>,
+        effects: &Acting<T>,
         command: &PerRotor<T>,
         battery_voltage_v: T,
     ) -> Self {
@@ -34,16 +35,10 @@ impl<T: Real> RotorDrive<T> {
         for (target, u) in target_rad_s.iter_mut().zip(command).take(vehicle.parameters().rotor_count) {
             *target = propulsion.target_speed_rad_s(*u);
         }
-        let mut extra_s = [T::zero(); 2];
         if effects.any() {
-            let supply = Supply {
-                voltage_v: battery_voltage_v,
-                reference_voltage_v: propulsion.reference_voltage_v,
-                speed_max_rad_s: propulsion.speed_max_rad_s,
-            };
-            effects.rotor_target(&mut target_rad_s, &supply);
-            extra_s = effects.rotor_extra_time_constant_s();
+            effects.numbers().rotor_targets(effects.present(), &mut target_rad_s, battery_voltage_v);
         }
+        let extra_s = effects.rotor_extra_time_constant_s();
         let inverse = |tau: T| if tau > T::zero() { T::one() / tau } else { T::zero() };
         Self {
             target_rad_s,
@@ -65,16 +60,9 @@ impl<T: Real> RotorDrive<T> {
     #[inline(always)]
     pub(super) fn rates(&self, blocks: usize, speed: &PerRotor<T>) -> PerRotor<T> {
         let mut rate = [T::zero(); MAX_ROTORS];
-        for block in 0..blocks {
-            for i in block * ROTOR_BLOCK..(block + 1) * ROTOR_BLOCK {
-                let gap = self.target_rad_s[i] - speed[i];
-                let inverse = if gap > T::zero() {
-                    self.inverse_time_constant_up
-                } else {
-                    self.inverse_time_constant_down
-                };
-                rate[i] = gap * inverse;
-            }
+        let inverse = [self.inverse_time_constant_up, self.inverse_time_constant_down];
+        for i in 0..blocks * ROTOR_BLOCK {
+            rate[i] = lag_rate(self.target_rad_s[i], speed[i], inverse);
         }
         rate
     }
@@ -98,50 +86,107 @@ impl<T: Real> RotorDrive<T> {
     /// Rotor speeds at the start of a step: a rotor without lag is at its target at once.
     #[inline(always)]
     pub fn settle(&self, speed: &mut PerRotor<T>) {
+        let inverse = [self.inverse_time_constant_up, self.inverse_time_constant_down];
         for (speed, target) in speed.iter_mut().zip(&self.target_rad_s) {
-            let inverse = if *target > *speed {
-                self.inverse_time_constant_up
-            } else {
-                self.inverse_time_constant_down
-            };
-            if inverse == T::zero() {
-                *speed = *target;
-            }
+            *speed = lag_start(*target, *speed, inverse);
         }
     }
+}
+
+/// Rate of one rotor's speed, rad/s^2.
+///
+/// * `inverse` - of the time constants of speeding up and of slowing down, 1/s; 0 for no lag
+#[inline(always)]
+pub fn lag_rate<L: Lane>(target: L, speed: L, inverse: [L; 2]) -> L {
+    let gap = target - speed;
+    gap * gap.where_positive(inverse[0], inverse[1])
+}
+
+/// Speed of one rotor at the start of a step: without lag it is at its target at once.
+///
+/// * `inverse` - as of [`lag_rate`]
+#[inline(always)]
+pub fn lag_start<L: Lane>(target: L, speed: L, inverse: [L; 2]) -> L {
+    (target - speed).where_positive(inverse[0], inverse[1]).where_positive(speed, target)
+}
+
+/// Thrust and the three moments of all rotors, N and N m.
+///
+/// * `per_square` - thrust, roll, pitch and yaw of each over its speed squared
+/// * `speed` - rad/s
+#[inline(always)]
+pub fn thrust_and_moment<L: Lane, const ROTORS: usize>(
+    [thrust, roll, pitch, yaw]: [&[L; ROTORS]; 4],
+    speed: &[L; ROTORS],
+) -> (L, [L; 3]) {
+    let square = speed[0] * speed[0];
+    let mut sum = square * thrust[0];
+    let mut moment = [square * roll[0], square * pitch[0], square * yaw[0]];
+    for i in 1..ROTORS {
+        let square = speed[i] * speed[i];
+        sum = sum + square * thrust[i];
+        moment[0] = moment[0] + square * roll[i];
+        moment[1] = moment[1] + square * pitch[i];
+        moment[2] = moment[2] + square * yaw[i];
+    }
+    (sum, moment)
 }
 
 /// Force and moment of all rotors, body frame.
 #[inline(always)]
 pub(super) fn wrench<T: Real>(vehicle: &Vehicle<T>, speed: &PerRotor<T>) -> Wrench<Body, T> {
-    let per_square = vehicle.rotor_wrench_per_speed_squared();
-    let (mut thrust, mut roll, mut pitch, mut yaw) = (T::zero(), T::zero(), T::zero(), T::zero());
-    for block in 0..vehicle.rotor_blocks() {
-        for i in block * ROTOR_BLOCK..(block + 1) * ROTOR_BLOCK {
-            let square = speed[i] * speed[i];
-            thrust += square * per_square.thrust[i];
-            roll += square * per_square.roll[i];
-            pitch += square * per_square.pitch[i];
-            yaw += square * per_square.yaw[i];
-        }
-    }
+    let p = vehicle.rotor_wrench_per_speed_squared();
+    let all = [&p.thrust, &p.roll, &p.pitch, &p.yaw];
+    // Mostly there are four.
+    let (thrust, moment) = if vehicle.rotor_blocks() == 1 {
+        thrust_and_moment(all.map(first_block), first_block(speed))
+    } else {
+        thrust_and_moment(all, speed)
+    };
     Wrench {
         force: In::new(Vector3::new(T::zero(), T::zero(), -thrust)),
-        moment: In::new(Vector3::new(roll, pitch, yaw)),
+        moment: In::new(Vector3::from(moment)),
     }
 }
 
-/// Sum of the rotor speeds about +z, rad/s: a rotor spins against its reaction torque.
 #[inline(always)]
-pub(super) fn spin<T: Real>(vehicle: &Vehicle<T>, speed: &PerRotor<T>) -> T {
-    let pairs = vehicle.rotors().iter().zip(speed);
-    pairs.fold(T::zero(), |sum, (rotor, speed)| sum - rotor.yaw_sign * *speed)
+fn first_block<T>(all: &PerRotor<T>) -> &[T; ROTOR_BLOCK] {
+    const { assert!(ROTOR_BLOCK <= MAX_ROTORS) };
+    match all.first_chunk() {
+        Some(block) => block,
+        None => unreachable!(),
+    }
+}
+
+/// Signs of the rotors' spin about +z: a rotor spins against its reaction torque.
+#[inline(always)]
+pub fn spin_signs<T: Real>(vehicle: &Vehicle<T>) -> PerRotor<T> {
+    let mut signs = [T::zero(); MAX_ROTORS];
+    for (sign, rotor) in signs.iter_mut().zip(vehicle.rotors()) {
+        *sign = -rotor.yaw_sign;
+    }
+    signs
+}
+
+/// Sum of the rotor speeds about +z, rad/s.
+#[inline(always)]
+pub fn spin<L: Lane, const ROTORS: usize>(signs: &[L; ROTORS], speed: &[L; ROTORS]) -> L {
+    let mut sum = L::of(0.0);
+    for i in 0..ROTORS {
+        sum = sum + signs[i] * speed[i];
+    }
+    sum
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::Effects;
     use crate::vehicle::fixtures::squirrel;
+
+    fn acting(effects: &Effects<f64>) -> Acting<f64> {
+        Acting::new(effects, &Vehicle::new(squirrel::<f64>()).unwrap())
+    }
 
     /// Which rotor does what follows from geometry alone: left pair rolls right, front pair pitches up, the rotors whose
     /// reaction is positive yaw right (clockwise from above).
@@ -162,7 +207,7 @@ mod tests {
     #[test]
     fn speeding_up_and_slowing_down_have_their_own_lag() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
-        let drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.5; MAX_ROTORS], 14.8);
+        let drive = RotorDrive::new(&vehicle, &acting(&Effects::none()), &[0.5; MAX_ROTORS], 14.8);
         let up = drive.rates(1, &[1000.0; MAX_ROTORS]);
         let down = drive.rates(1, &[2000.0; MAX_ROTORS]);
         assert!((up[0] - 500.0 / 0.03).abs() < 1e-6 && (down[0] + 500.0 / 0.04).abs() < 1e-6);
@@ -172,7 +217,7 @@ mod tests {
     #[test]
     fn leading_is_exact_for_any_time() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
-        let drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.5; MAX_ROTORS], 14.8);
+        let drive = RotorDrive::new(&vehicle, &acting(&Effects::none()), &[0.5; MAX_ROTORS], 14.8);
         let mut speed = [1000.0, 2000.0, 1500.0, 1000.0, 0.0, 0.0, 0.0, 0.0];
         drive.lead(&mut speed, 0.0);
         assert_eq!(speed[..2], [1000.0, 2000.0]);
@@ -187,7 +232,7 @@ mod tests {
         let mut p = squirrel::<f64>();
         p.propulsion.time_constant_up_s = 0.0;
         let vehicle = Vehicle::new(p).unwrap();
-        let drive = RotorDrive::new(&vehicle, &Effects::none(), &[0.5; MAX_ROTORS], 14.8);
+        let drive = RotorDrive::new(&vehicle, &acting(&Effects::none()), &[0.5; MAX_ROTORS], 14.8);
         let mut speed = [1000.0; MAX_ROTORS];
         drive.settle(&mut speed);
         assert_eq!(speed[..4], [1500.0; 4]);

@@ -1,8 +1,9 @@
 //! The rigid-body state with its rotor speeds.
 
-use super::VectorSpace;
+use super::{VectorSpace, body};
 use crate::frames::{Body, In, Ned, Rotation};
-use crate::math::{Real, real};
+use crate::lane::vector;
+use crate::math::Real;
 use crate::vehicle::{MAX_ROTORS, PerRotor};
 use nalgebra::{Quaternion, UnitQuaternion};
 
@@ -41,13 +42,17 @@ impl<T: Real> State<T> {
     #[inline(always)]
     #[must_use]
     pub fn normalised(mut self) -> Self {
-        self.attitude *= T::one() / self.attitude.norm();
+        let q = &self.attitude;
+        let [w, i, j, k] = vector::unit(&[q.w, q.i, q.j, q.k]);
+        self.attitude = Quaternion::new(w, i, j, k);
         self
     }
     /// `q' = 1/2 q (0, omega)`.
     #[inline(always)]
     pub(super) fn attitude_rate(&self) -> Quaternion<T> {
-        self.attitude * Quaternion::from_imag(self.omega.vector * real::<T>(0.5))
+        let q = &self.attitude;
+        let [w, i, j, k] = body::attitude_rate(&[q.w, q.i, q.j, q.k], &self.omega.vector.into());
+        Quaternion::new(w, i, j, k)
     }
     /// True where every number is finite.
     pub fn is_finite(&self) -> bool {

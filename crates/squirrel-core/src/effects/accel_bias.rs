@@ -15,6 +15,7 @@ pub struct AccelBias<T>(pub(super) [T; 7]);
 
 impl<T: Real> Effect<T> for AccelBias<T> {
     const NAME: &'static str = "accel_bias";
+    const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("bias_x_m_s2", 0.15, 0.6),
         EffectParameter::signed("bias_y_m_s2", 0.15, 0.6),

@@ -11,6 +11,7 @@ pub struct AccelScale<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for AccelScale<T> {
     const NAME: &'static str = "accel_scale";
+    const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("scale_x_fraction", 0.01, 0.06),
         EffectParameter::signed("scale_y_fraction", 0.01, 0.06),

@@ -2,10 +2,13 @@
 //!
 //! Form `quadratic`: `M -= k (|p| p, |q| q, |r| r / 2)`.
 
-use super::{Effect, EffectParameter, Scale, Situation, is};
-use crate::frames::{Body, In, Wrench};
-use crate::math::{Real, real};
-use nalgebra::Vector3;
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
+use crate::lane::functions::size;
+use crate::math::Real;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 const QUADRATIC: usize = 1;
 
@@ -24,13 +27,37 @@ impl<T: Real> Effect<T> for AngularDamping<T> {
             .only_in(&["quadratic"]),
         EffectParameter::form(&["linear", "quadratic"]),
     ];
+}
 
-    #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
+numbers! {
+    /// Moment over angular rate and over its square; about z half of it.
+    Numbers {
+        /// N m s/rad.
+        linear,
+        /// N m s^2/rad^2.
+        quadratic
+    }
+}
+
+impl<T: Real> AngularDamping<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [linear, quadratic, form] = self.0;
-        let w = situation.air.omega.vector;
-        let damped = if is(form, QUADRATIC) { w.component_mul(&w.abs()) * quadratic } else { w * linear };
-        let moment = -Vector3::new(damped.x, damped.y, damped.z * real(0.5));
-        Wrench { force: In::zero(), moment: In::new(moment) }
+        if is(form, QUADRATIC) {
+            Numbers { linear: T::zero(), quadratic }
+        } else {
+            Numbers { linear, quadratic: T::zero() }
+        }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        let mut moment = at.flow.omega;
+        for rate in &mut moment {
+            *rate = absent::<L>() - (*rate * self.linear + *rate * size(*rate) * self.quadratic);
+        }
+        moment[2] = moment[2] * L::of(0.5);
+        BodyWrench::from_moment(moment)
     }
 }

@@ -2,9 +2,13 @@
 //!
 //! Form `quadratic`: `T (1 + k w + k_2 w |w|)`.
 
-use super::{Effect, EffectParameter, is};
-use crate::aero::Air;
+use super::{Acts, Effect, EffectParameter, Forms, is};
+use crate::aero::Airflow;
+use crate::lane::Lane;
+use crate::lane::functions::size;
 use crate::math::Real;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 const QUADRATIC: usize = 1;
 
@@ -19,12 +23,29 @@ impl<T: Real> Effect<T> for AxialInflow<T> {
         EffectParameter::signed("quadratic_s2_per_m2", 4e-3, 0.03).only_in(&["quadratic"]),
         EffectParameter::form(&["linear", "quadratic"]),
     ];
+}
 
-    #[inline(always)]
-    fn thrust_factor(&self, air: &Air<T>, _height_m: T) -> T {
+numbers! {
+    /// Gain of thrust.
+    Numbers {
+        /// Over speed, s/m.
+        gain,
+        /// Over its square, s^2/m^2.
+        quadratic
+    }
+}
+
+impl<T: Real> AxialInflow<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [gain, quadratic, form] = self.0;
-        let w = air.velocity.vector.z;
-        let factor = T::one() + gain * w;
-        if is(form, QUADRATIC) { factor + quadratic * w * w.abs() } else { factor }
+        Numbers { gain, quadratic: if is(form, QUADRATIC) { quadratic } else { T::zero() } }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn thrust_factor(&self, flow: &Airflow<L>, _height_m: L, _: Forms) -> L {
+        let w = flow.velocity[2];
+        L::of(1.0) + self.gain * w + self.quadratic * w * size(w)
     }
 }

@@ -4,17 +4,18 @@
 //! and leave them alone where there is no effect.
 
 use super::{
-    AccelBias, AccelScale, ActuationLatency, AddedMass, Alteration, AngularDamping, AxialInflow, BatterySag,
-    CgOffset, ClockSkew, ClockStep, CommandClock, CompassCurrent, ConstantWind, Effect, EffectParameter,
-    FlappingMoment, GnssLatency, GroundEffect, Gust, GustSpectrum, GyroScale, HeadingBias, InertiaError,
-    LinearDrag, MassError, MotorLag, PayloadSwing, Pendulum, QuadraticDrag, RotorGyroTorque, Situation,
-    Supply, ThrustCoefficient, ThrustMisalignment, TranslationalLift, WeakRotor, WingAsymmetry, WingMembrane,
-    WingServoLag, YawTorqueCoeff,
+    AccelBias, AccelScale, Acts, ActuationLatency, AddedMass, Alteration, AngularDamping, AxialInflow,
+    BatterySag, CgOffset, ClockSkew, ClockStep, CommandClock, CompassCurrent, ConstantWind, Effect,
+    EffectParameter, FORM, FlappingMoment, Forms, GnssLatency, GroundEffect, Gust, GustSpectrum, GyroScale,
+    HeadingBias, InertiaError, LinearDrag, MassError, MotorLag, PayloadSwing, Pendulum, QuadraticDrag,
+    RotorGyroTorque, Situation, ThrustCoefficient, ThrustMisalignment, TranslationalLift, WeakRotor,
+    WingAsymmetry, WingMembrane, WingServoLag, YawTorqueCoeff, is,
 };
-use crate::aero::Air;
-use crate::frames::{Body, In, Ned, Wrench};
+use crate::aero::{Airflow, BodyWrench};
+use crate::frames::{Body, In};
+use crate::lane::{Lane, Register, Row};
 use crate::math::Real;
-use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
+use crate::vehicle::{MAX_ROTORS, ParameterError, Vehicle};
 
 /// A set of parameters found by effect name.
 #[derive(Debug)]
@@ -26,7 +27,7 @@ pub struct Found<'a, T> {
 }
 
 macro_rules! catalogue {
-    ($($field:ident: $effect:ident,)+) => {
+    ($($field:ident: $effect:ident $(=> $module:ident)?,)+) => {
         /// The effects that a vehicle has.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct Effects<T: Real> {
@@ -76,22 +77,10 @@ macro_rules! catalogue {
                 self.get_mut(name)
             }
 
-            /// Wind of all present effects at a height above the origin's level, m/s.
-            #[inline(never)]
-            pub fn wind(&self, height_m: T) -> In<Ned, T> {
-                let mut sum = In::zero();
-                $(if let Some(effect) = &self.$field { sum = sum + effect.wind(height_m); })+
-                sum
-            }
             /// Gusts of the effects; several would be independent, and only the first is given.
             pub fn gust(&self) -> Option<GustSpectrum<T>> {
                 $(if let Some(gust) = self.$field.as_ref().and_then(Effect::gust) { return Some(gust); })+
                 None
-            }
-            /// Changes steady rotor speeds, rad/s, by what feeds the rotors.
-            #[inline(never)]
-            pub fn rotor_target(&self, target_rad_s: &mut PerRotor<T>, supply: &Supply<T>) {
-                $(if let Some(effect) = &self.$field { effect.rotor_target(target_rad_s, supply); })+
             }
             /// What is added to the rotor lag, s: speeding up, slowing down.
             #[inline(never)]
@@ -163,13 +152,6 @@ macro_rules! catalogue {
                 $(if let Some(load) = self.$field.as_ref().and_then(Effect::pendulum) { return Some(load); })+
                 None
             }
-            /// Mass of the air that moves with the vehicle along body z, kg.
-            #[inline(never)]
-            pub fn added_mass_kg(&self) -> T {
-                let mut sum = T::zero();
-                $(if let Some(effect) = &self.$field { sum += effect.added_mass_kg(); })+
-                sum
-            }
             /// The vehicle with the numbers that effects change.
             ///
             /// # Errors
@@ -185,13 +167,6 @@ macro_rules! catalogue {
                 $(if let Some(effect) = &self.$field { effect.alter(&mut airframe); })+
                 vehicle.altered(&airframe)
             }
-            /// Product of the factors on thrust.
-            #[inline(never)]
-            pub fn thrust_factor(&self, air: &Air<T>, height_m: T) -> T {
-                let mut product = T::one();
-                $(if let Some(effect) = &self.$field { product *= effect.thrust_factor(air, height_m); })+
-                product
-            }
             /// Where the accelerometer sits, from the centre of mass, m.
             #[inline(never)]
             pub fn accelerometer_position(&self) -> In<Body, T> {
@@ -199,54 +174,235 @@ macro_rules! catalogue {
                 $(if let Some(effect) = &self.$field { sum = sum + effect.accelerometer_position(); })+
                 sum
             }
+        }
+
+        /// Which effects there are, and in which forms; of one vehicle, or of any of a batch.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+        pub struct Present {
+            $($field: Forms,)+
+        }
+
+        impl Present {
+            /// Those of a vehicle.
+            pub fn of<T: Real>(effects: &Effects<T>) -> Self {
+                Self { $($field: effects.$field.as_ref().map_or_else(Forms::default, |effect| {
+                    form_of(<$effect<T> as Effect<T>>::PARAMETERS, &effect.0)
+                }),)+ }
+            }
+            /// Those of either.
+            #[must_use]
+            pub fn or(self, other: Self) -> Self {
+                Self { $($field: self.$field.or(other.$field),)+ }
+            }
+            /// The name of an effect that is here in a form that the other lacks.
+            pub fn beyond(self, other: Self) -> Option<&'static str> {
+                $(if self.$field.is_beyond(other.$field) { return Some(<$effect<f64> as Effect<f64>>::NAME); })+
+                None
+            }
+            /// The name of an effect that acts on sensors alone.
+            pub fn of_sensors(self) -> Option<&'static str> {
+                $(if <$effect<f64> as Effect<f64>>::IS_OF_SENSORS && self.$field.any() {
+                    return Some(<$effect<f64> as Effect<f64>>::NAME);
+                })+
+                None
+            }
+            /// Whether any has an equation in every step, see [`Acts`].
+            pub fn act_in_steps(self) -> bool {
+                $($(self.$module.any() ||)?)+ false
+            }
+            /// Whether air moves with the vehicle along body z.
+            #[inline(always)]
+            pub fn has_added_mass(self) -> bool {
+                self.added_mass.any()
+            }
+            /// Whether a load swings under the vehicle.
+            #[inline(always)]
+            pub fn has_load(self) -> bool {
+                self.payload_swing.any()
+            }
+            /// Forms of the effect of a name; none for an unknown name.
+            pub fn forms(self, name: &str) -> Forms {
+                $(if name == <$effect<f64> as Effect<f64>>::NAME { return self.$field; })+
+                Forms::default()
+            }
+        }
+
+        /// What the equations of all effects that [act](Acts) need, made of parameters once; of effects that are absent, what makes no
+        /// difference.
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub struct Prepared<X: Copy> {
+            $($($module: super::$module::Numbers<X>,)?)+
+        }
+
+        impl<T: Real> Prepared<T> {
+            /// Of a vehicle's effects.
+            pub fn new(effects: &Effects<T>, vehicle: &Vehicle<T>) -> Self {
+                Self { $($($module: effects.$field.unwrap_or_else(|| $effect(core::array::from_fn(|_| T::zero()))).prepare(vehicle),)?)+ }
+            }
+        }
+
+        impl<X: Copy> Prepared<X> {
+            /// The same numbers in another form.
+            pub fn map<Y: Copy>(&self, f: impl Fn(X) -> Y) -> Prepared<Y> {
+                Prepared { $($($module: self.$module.map(&f),)?)+ }
+            }
+        }
+
+        impl<S: Copy> Prepared<Row<S>> {
+            /// Puts the numbers of a vehicle into column `lane`.
+            pub fn put(&mut self, lane: usize, numbers: &Prepared<S>) {
+                $($(self.$module.put(lane, &numbers.$module);)?)+
+            }
+            /// The numbers in column `lane`.
+            pub fn take(&self, lane: usize) -> Prepared<S> {
+                Prepared { $($($module: self.$module.take(lane),)?)+ }
+            }
+        }
+
+        impl<L: Register> Prepared<L> {
+            /// Registers from column `start` and on.
+            #[inline(always)]
+            pub fn load(rows: &Prepared<Row<L::Element>>, start: usize) -> Self {
+                Self { $($($module: super::$module::Numbers::load(&rows.$module, start),)?)+ }
+            }
+        }
+
+        impl<L: Lane> Prepared<L> {
+            /// Wind of all effects, north and east, m/s.
+            ///
+            /// * `height_m` - above the origin's level
+            #[inline(always)]
+            pub fn wind(&self, present: Present, height_m: L) -> [L; 2] {
+                let mut sum = [L::of(0.0); 2];
+                $($(if present.$module.any() {
+                    let [north, east] = self.$module.wind(height_m, present.$module);
+                    sum = [sum[0] + north, sum[1] + east];
+                })?)+
+                sum
+            }
+            /// Changes steady rotor speeds, rad/s, by the voltage that feeds the rotors.
+            #[inline(always)]
+            pub fn rotor_targets<const ROTORS: usize>(&self, present: Present, targets: &mut [L; ROTORS], voltage_v: L) {
+                $($(if present.$module.any() {
+                    self.$module.rotor_targets(targets, voltage_v, present.$module);
+                })?)+
+            }
+            /// Product of the factors on thrust.
+            #[inline(always)]
+            pub fn thrust_factor(&self, present: Present, flow: &Airflow<L>, height_m: L) -> L {
+                let mut product = L::of(1.0);
+                $($(if present.$module.any() {
+                    product = product * self.$module.thrust_factor(flow, height_m, present.$module);
+                })?)+
+                product
+            }
+            /// Mass of the air that moves with the vehicle along body z, kg.
+            #[inline(always)]
+            pub fn added_mass_kg(&self, present: Present) -> L {
+                let mut sum = L::of(0.0);
+                $($(if present.$module.any() { sum = sum + self.$module.added_mass_kg(); })?)+
+                sum
+            }
             /// Whether the wrench of any effect depends on how fast the rotors spin.
             #[inline(always)]
-            pub(crate) fn feel_rotor_spin(&self) -> bool {
-                $(self.$field.as_ref().is_some_and(Effect::feels_rotor_spin) ||)+ false
+            pub fn feel_rotor_spin(present: Present) -> bool {
+                $($((<super::$module::Numbers<L> as Acts<L>>::FEELS_ROTOR_SPIN && present.$module.any()) ||)?)+ false
             }
             /// Sum of forces and moments.
-            #[inline(never)]
-            pub fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
-                let mut sum = Wrench::zero();
-                $(if let Some(effect) = &self.$field { sum = sum + effect.wrench(situation); })+
+            #[inline(always)]
+            pub fn wrench(&self, present: Present, at: &Situation<'_, L>) -> BodyWrench<L> {
+                let mut sum = BodyWrench::zero();
+                $($(if present.$module.any() { sum = sum.plus(&self.$module.wrench(at, present.$module)); })?)+
                 sum
             }
         }
     };
 }
 
+/// The form of a present effect.
+fn form_of<T: Real>(parameters: &[EffectParameter], values: &[T]) -> Forms {
+    let place = parameters.iter().position(|p| p.key == FORM);
+    let value = place.and_then(|place| values.get(place));
+    Forms::only(value.map_or(0, |value| (0..8).find(|number| is(*value, *number)).unwrap_or(0)))
+}
+
+/// The effects of one vehicle, ready to act in its steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Acting<T: Real> {
+    any: bool,
+    present: Present,
+    numbers: Prepared<T>,
+    rotor_extra_time_constant_s: [T; 2],
+}
+
+impl<T: Real> Acting<T> {
+    /// Of a vehicle with these effects.
+    ///
+    /// * `vehicle` - with what effects change once, see [`Effects::alter`]
+    pub fn new(effects: &Effects<T>, vehicle: &Vehicle<T>) -> Self {
+        let present = Present::of(effects);
+        Self {
+            any: present.act_in_steps() || present.has_load(),
+            present,
+            numbers: Prepared::new(effects, vehicle),
+            rotor_extra_time_constant_s: effects.rotor_extra_time_constant_s(),
+        }
+    }
+    /// Whether any acts. The hot loops ask this once.
+    #[inline(always)]
+    pub fn any(&self) -> bool {
+        self.any
+    }
+    /// Which there are.
+    #[inline(always)]
+    pub fn present(&self) -> Present {
+        self.present
+    }
+    /// Their numbers.
+    #[inline(always)]
+    pub fn numbers(&self) -> &Prepared<T> {
+        &self.numbers
+    }
+    /// What is added to the rotor lag, s: speeding up, slowing down.
+    #[inline(always)]
+    pub fn rotor_extra_time_constant_s(&self) -> [T; 2] {
+        self.rotor_extra_time_constant_s
+    }
+}
+
+// `=> module` behind an effect that has an equation in every step: its `Numbers` there.
 catalogue! {
     accel_bias: AccelBias,
     accel_scale: AccelScale,
     actuation_latency: ActuationLatency,
-    added_mass: AddedMass,
-    angular_damping: AngularDamping,
-    axial_inflow: AxialInflow,
-    battery_sag: BatterySag,
-    cg_offset: CgOffset,
+    added_mass: AddedMass => added_mass,
+    angular_damping: AngularDamping => angular_damping,
+    axial_inflow: AxialInflow => axial_inflow,
+    battery_sag: BatterySag => battery_sag,
+    cg_offset: CgOffset => cg_offset,
     clock_skew: ClockSkew,
     clock_step: ClockStep,
     compass_current: CompassCurrent,
-    constant_wind: ConstantWind,
-    flapping_moment: FlappingMoment,
+    constant_wind: ConstantWind => constant_wind,
+    flapping_moment: FlappingMoment => flapping_moment,
     gnss_latency: GnssLatency,
-    ground_effect: GroundEffect,
+    ground_effect: GroundEffect => ground_effect,
     gust: Gust,
     gyro_scale: GyroScale,
     heading_bias: HeadingBias,
     inertia_error: InertiaError,
-    linear_drag: LinearDrag,
+    linear_drag: LinearDrag => linear_drag,
     mass_error: MassError,
     motor_lag: MotorLag,
     payload_swing: PayloadSwing,
-    quadratic_drag: QuadraticDrag,
-    rotor_gyro_torque: RotorGyroTorque,
+    quadratic_drag: QuadraticDrag => quadratic_drag,
+    rotor_gyro_torque: RotorGyroTorque => rotor_gyro_torque,
     thrust_coefficient: ThrustCoefficient,
-    thrust_misalignment: ThrustMisalignment,
-    translational_lift: TranslationalLift,
+    thrust_misalignment: ThrustMisalignment => thrust_misalignment,
+    translational_lift: TranslationalLift => translational_lift,
     weak_rotor: WeakRotor,
-    wing_asymmetry: WingAsymmetry,
-    wing_membrane: WingMembrane,
+    wing_asymmetry: WingAsymmetry => wing_asymmetry,
+    wing_membrane: WingMembrane => wing_membrane,
     wing_servo_lag: WingServoLag,
     yaw_torque_coeff: YawTorqueCoeff,
 }

@@ -3,9 +3,14 @@
 //!
 //! The accelerometer stays at the geometric centre, at `-r` from the centre of mass, and feels the rotation there.
 
-use super::{Effect, EffectParameter, Scale, Situation, is};
-use crate::frames::{Body, In, Wrench};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use crate::aero::BodyWrench;
+use crate::frames::{Body, In};
+use crate::lane::Lane;
+use crate::lane::vector::{cross, minus};
 use crate::math::Real;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 use nalgebra::Vector3;
 
 const SPATIAL: usize = 1;
@@ -27,11 +32,6 @@ impl<T: Real> Effect<T> for CgOffset<T> {
     fn accelerometer_position(&self) -> In<Body, T> {
         In::new(-self.offset())
     }
-    #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
-        let moment = -self.offset().cross(&situation.force.vector);
-        Wrench { force: In::zero(), moment: In::new(moment) }
-    }
 }
 
 impl<T: Real> CgOffset<T> {
@@ -39,5 +39,24 @@ impl<T: Real> CgOffset<T> {
     fn offset(&self) -> Vector3<T> {
         let [x, y, z, form] = self.0;
         Vector3::new(x, y, if is(form, SPATIAL) { z } else { T::zero() })
+    }
+
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
+        Numbers { offset_m: self.offset().into() }
+    }
+}
+
+numbers! {
+    /// Where the centre of mass lies.
+    Numbers {
+        /// From the point that the vehicle file's positions refer to, m.
+        offset_m [3]
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        BodyWrench::from_moment(minus(&[absent(); 3], &cross(&self.offset_m, &at.force)))
     }
 }

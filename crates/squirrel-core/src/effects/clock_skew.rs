@@ -9,6 +9,7 @@ pub struct ClockSkew<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for ClockSkew<T> {
     const NAME: &'static str = "clock_skew";
+    const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed("skew_ppm", 400.0, 1500.0)];
 
     fn command_clock(&self, clock: &mut CommandClock<T>) {

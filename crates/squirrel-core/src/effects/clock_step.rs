@@ -11,6 +11,7 @@ pub struct ClockStep<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for ClockStep<T> {
     const NAME: &'static str = "clock_step";
+    const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::signed("step_s", 0.02, 0.2), EffectParameter::size("at_s", 0.3, 600.0)];
 

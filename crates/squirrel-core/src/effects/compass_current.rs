@@ -12,6 +12,7 @@ pub struct CompassCurrent<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for CompassCurrent<T> {
     const NAME: &'static str = "compass_current";
+    const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::signed("heading_in_hover_rad", 0.05, 0.35)];
 

@@ -3,10 +3,12 @@
 //! Form `log_profile`: the wind is that at 10 m, times `ln(h / z0) / ln(10 / z0)` at the height `h` (logarithmic law of the
 //! surface layer, Stull 1988), with `h` not below `2 z0`. Roughness acts up to 4 m, beyond which the law means nothing.
 
-use super::{Effect, EffectParameter, is};
-use crate::frames::{In, Ned};
-use crate::math::{Real, lower, real, upper};
-use nalgebra::Vector3;
+use super::{Acts, Effect, EffectParameter, Forms, is};
+use crate::lane::Lane;
+use crate::lane::functions::ln;
+use crate::math::{Real, lower, real};
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 const LOG_PROFILE: usize = 1;
 
@@ -22,16 +24,42 @@ impl<T: Real> Effect<T> for ConstantWind<T> {
         EffectParameter::size("roughness_m", 0.01, 0.5).only_in(&["log_profile"]),
         EffectParameter::form(&["constant", "log_profile"]),
     ];
+}
 
-    #[inline(always)]
-    fn wind(&self, height_m: T) -> In<Ned, T> {
+numbers! {
+    /// The wind, and its profile over the height.
+    Numbers {
+        /// North and east, m/s.
+        wind [2],
+        /// Factor of the wind: the first, and the second times `ln(max(h, floor) / z0)`.
+        profile [2],
+        /// `2 z0`, m.
+        floor_m,
+        /// `1 / z0`, 1/m.
+        per_roughness
+    }
+}
+
+impl<T: Real> ConstantWind<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [north, east, roughness_m, form] = self.0;
-        let mut factor = T::one();
+        let (one, wind) = (T::one(), [north, east]);
         if is(form, LOG_PROFILE) && roughness_m > T::zero() {
             let z0 = lower(roughness_m, real(4.0));
-            let height = upper(height_m, z0 * real(2.0));
-            factor = (height / z0).ln() / (real::<T>(10.0) / z0).ln();
+            let profile = [T::zero(), one / (real::<T>(10.0) / z0).ln()];
+            return Numbers { wind, profile, floor_m: z0 * real(2.0), per_roughness: one / z0 };
         }
-        In::new(Vector3::new(north, east, T::zero()) * factor)
+        Numbers { wind, profile: [one, T::zero()], floor_m: one, per_roughness: one }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn wind(&self, height_m: L, forms: Forms) -> [L; 2] {
+        let [mut factor, slope] = self.profile;
+        if forms.has(LOG_PROFILE) {
+            factor = factor + slope * ln(height_m.upper(self.floor_m) * self.per_roughness);
+        }
+        [self.wind[0] * factor, self.wind[1] * factor]
     }
 }

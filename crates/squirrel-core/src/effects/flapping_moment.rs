@@ -2,10 +2,12 @@
 //!
 //! Form `saturating`: the velocity is divided by `1 + V_h / scale`, `V_h` the airspeed in the rotor plane.
 
-use super::{Effect, EffectParameter, Scale, Situation, is};
-use crate::frames::{Body, In, Wrench};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
 use crate::math::Real;
-use nalgebra::Vector3;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 const SATURATING: usize = 1;
 
@@ -20,17 +22,41 @@ impl<T: Real> Effect<T> for FlappingMoment<T> {
         EffectParameter::size("speed_scale_m_s", 3.0, 20.0).only_in(&["saturating"]),
         EffectParameter::form(&["linear", "saturating"]),
     ];
+}
 
-    #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
+numbers! {
+    /// Moment over speed.
+    Numbers {
+        /// N m s/m.
+        gain,
+        /// Over the speed at which it saturates, s/m; 0 for a gain that stays.
+        per_scale
+    }
+}
+
+impl<T: Real> FlappingMoment<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [gain, scale, form] = self.0;
-        let v = situation.air.velocity.vector;
-        let mut slope = gain;
-        if is(form, SATURATING) {
-            // A scale of 0 saturates at once.
-            let across = v.xy().norm();
-            slope = if scale > T::zero() { gain * scale / (scale + across) } else { T::zero() };
+        if !is(form, SATURATING) {
+            return Numbers { gain, per_scale: T::zero() };
         }
-        Wrench { force: In::zero(), moment: In::new(Vector3::new(-v.y, v.x, T::zero()) * slope) }
+        // A scale of 0 saturates at once.
+        if scale > T::zero() {
+            Numbers { gain, per_scale: T::one() / scale }
+        } else {
+            Numbers::all(T::zero())
+        }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn wrench(&self, at: &Situation<'_, L>, forms: Forms) -> BodyWrench<L> {
+        let [u, v, _] = at.flow.velocity;
+        let mut slope = self.gain;
+        if forms.has(SATURATING) {
+            slope = slope / (L::of(1.0) + (u * u + v * v).root() * self.per_scale);
+        }
+        BodyWrench::from_moment([absent::<L>() - v * slope, u * slope, absent()])
     }
 }

@@ -9,6 +9,7 @@ pub struct GnssLatency<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for GnssLatency<T> {
     const NAME: &'static str = "gnss_latency";
+    const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::size("latency_s", 0.08, 0.35)];
 
     fn gnss_latency_s(&self) -> T {

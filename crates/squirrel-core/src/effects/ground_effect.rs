@@ -3,10 +3,15 @@
 //! `h` is the height above the origin's level, not below `R / 2`. Form `exponential`: `T <- T (1 + g exp(-h / R))`, as fitted
 //! to multirotors, with `h` not below 0.
 
-use super::{Effect, EffectParameter, Scale, is};
-use crate::aero::Air;
-use crate::math::{Real, real, upper};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, is};
+use crate::aero::Airflow;
+use crate::lane::Lane;
+use crate::lane::functions::exp;
+use crate::math::{Real, real};
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
+const CHEESEMAN_BENNETT: usize = 0;
 const EXPONENTIAL: usize = 1;
 
 /// Effective radius of the rotors together.
@@ -20,17 +25,49 @@ impl<T: Real> Effect<T> for GroundEffect<T> {
         EffectParameter::size("gain", 0.1, 0.5).only_in(&["exponential"]),
         EffectParameter::form(&["cheeseman_bennett", "exponential"]),
     ];
+}
 
-    #[inline(always)]
-    fn thrust_factor(&self, _air: &Air<T>, height_m: T) -> T {
-        let [radius, gain, form] = self.0;
-        if radius == T::zero() {
-            return T::one();
+numbers! {
+    /// Of either form; those of the other make no difference.
+    Numbers {
+        /// `R`, m.
+        radius_m,
+        /// Lowest height that counts, m.
+        floor_m,
+        /// Of the exponential.
+        gain,
+        /// `1 / R` of the exponential, 1/m.
+        per_radius
+    }
+}
+
+impl<T: Real> GroundEffect<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
+        let [radius_m, gain, form] = self.0;
+        let none = Numbers { floor_m: T::one(), ..Numbers::all(T::zero()) };
+        if !(radius_m > T::zero()) {
+            return none;
         }
         if is(form, EXPONENTIAL) {
-            return T::one() + gain * (-upper(height_m, T::zero()) / radius).exp();
+            return Numbers { gain, per_radius: T::one() / radius_m, ..none };
         }
-        let ratio = radius / upper(height_m, radius * real(0.5));
-        T::one() / (T::one() - ratio * ratio * real(1.0 / 16.0))
+        Numbers { radius_m, floor_m: radius_m * real(0.5), ..none }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn thrust_factor(&self, _flow: &Airflow<L>, height_m: L, forms: Forms) -> L {
+        let one = L::of(1.0);
+        let mut factor = one;
+        if forms.has(CHEESEMAN_BENNETT) {
+            let ratio = self.radius_m / height_m.upper(self.floor_m);
+            factor = one / (one - ratio * ratio * L::of(1.0 / 16.0));
+        }
+        if forms.has(EXPONENTIAL) {
+            let radii = height_m.upper(L::of(0.0)) * self.per_radius;
+            factor = factor * (one + self.gain * exp(L::of(0.0) - radii));
+        }
+        factor
     }
 }

@@ -11,6 +11,7 @@ pub struct GyroScale<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for GyroScale<T> {
     const NAME: &'static str = "gyro_scale";
+    const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("scale_x_fraction", 0.02, 0.1),
         EffectParameter::signed("scale_y_fraction", 0.02, 0.1),

@@ -13,6 +13,7 @@ pub struct HeadingBias<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for HeadingBias<T> {
     const NAME: &'static str = "heading_bias";
+    const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("bias_rad", 0.087, 0.35),
         EffectParameter::signed("drift_rad_per_s", 2e-3, 0.01).only_in(&["drifting"]),

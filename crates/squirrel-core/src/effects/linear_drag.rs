@@ -3,10 +3,12 @@
 //! Form `anisotropic`: `F -= (D (1 + e) u, D (1 - e) v, D_z w)`, for rotors or an airframe longer than wide (Svacha et al.
 //! 2017 identify such a drag matrix).
 
-use super::{Effect, EffectParameter, Scale, Situation, is};
-use crate::frames::{Body, In, Wrench};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
 use crate::math::Real;
-use nalgebra::Vector3;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 const ANISOTROPIC: usize = 1;
 
@@ -24,16 +26,33 @@ impl<T: Real> Effect<T> for LinearDrag<T> {
             .only_in(&["anisotropic"]),
         EffectParameter::form(&["isotropic", "anisotropic"]),
     ];
+}
 
-    #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
+numbers! {
+    /// Drag over speed, N s/m.
+    Numbers {
+        /// Along each axis.
+        slope [3]
+    }
+}
+
+impl<T: Real> LinearDrag<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [drag, anisotropy, drag_z, form] = self.0;
-        let v = situation.air.velocity.vector;
-        let slope = if is(form, ANISOTROPIC) {
-            Vector3::new(drag * (T::one() + anisotropy), drag * (T::one() - anisotropy), drag_z)
-        } else {
-            Vector3::new(drag, drag, T::zero())
-        };
-        Wrench::from_force(In::new(-slope.component_mul(&v)))
+        Numbers {
+            slope: if is(form, ANISOTROPIC) {
+                [drag * (T::one() + anisotropy), drag * (T::one() - anisotropy), drag_z]
+            } else {
+                [drag, drag, T::zero()]
+            },
+        }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        let ([x, y, z], [u, v, w]) = (self.slope, at.flow.velocity);
+        BodyWrench::from_force([absent::<L>() - x * u, absent::<L>() - y * v, absent::<L>() - z * w])
     }
 }

@@ -2,8 +2,9 @@
 //!
 //! One effect, one file: equation, parameters with unit and plausible range, name. The name is the table
 //! `[effects.<name>]` of a vehicle file. Every effect is an increment on the base model; zero means absent. Where an
-//! effect acts is a method of [`Effect`] that it overrides; the dynamics call [`Effects`], which sums over those present.
-//! A new effect is a file and a line in the `catalogue!` of `catalogue.rs`.
+//! effect acts is a method that it overrides: of [`Effect`] what it does once, on sensors, commands and servos; of [`Acts`] its
+//! equation in every step, written on lanes once for flight alone and in batches. The dynamics call [`Acting`] and [`Prepared`],
+//! which sum over those present. A new effect is a file and a line in the `catalogue!` of `catalogue.rs`.
 //!
 //! An effect may have several published forms: then its last parameter is `form`, and a parameter may exist in some forms only.
 //! Without `form` in a file it is the first, the standard form.
@@ -55,7 +56,7 @@ pub use added_mass::AddedMass;
 pub use angular_damping::AngularDamping;
 pub use axial_inflow::AxialInflow;
 pub use battery_sag::BatterySag;
-pub use catalogue::{Effects, Found};
+pub use catalogue::{Acting, Effects, Found, Prepared, Present};
 pub use cg_offset::CgOffset;
 pub use clock::CommandClock;
 pub use clock_skew::ClockSkew;
@@ -72,7 +73,7 @@ pub use inertia_error::InertiaError;
 pub use linear_drag::LinearDrag;
 pub use mass_error::MassError;
 pub use motor_lag::MotorLag;
-pub use payload_swing::{PayloadSwing, Pendulum, PendulumState};
+pub use payload_swing::{PayloadSwing, Pendulum, PendulumState, Swing};
 pub use quadratic_drag::QuadraticDrag;
 pub use rotor_gyro_torque::RotorGyroTorque;
 pub use thrust_coefficient::ThrustCoefficient;
@@ -84,10 +85,11 @@ pub use wing_membrane::WingMembrane;
 pub use wing_servo_lag::WingServoLag;
 pub use yaw_torque_coeff::YawTorqueCoeff;
 
-use crate::aero::Air;
-use crate::frames::{Body, Frame, In, Ned, Wrench};
+use crate::aero::{Airflow, BodyWrench, flat_plate};
+use crate::frames::{Body, Frame, In};
+use crate::lane::Lane;
 use crate::math::{Real, real};
-use crate::vehicle::{PerRotor, Vehicle, Wing};
+use crate::vehicle::{PerRotor, Vehicle};
 use nalgebra::{Matrix3, Vector3};
 
 /// What a parameter of an effect is.
@@ -254,37 +256,22 @@ fn up_and_down<T: Real>(lag_s: T, asymmetry: T) -> [T; 2] {
     [lag_s * (T::one() - asymmetry), lag_s * (T::one() + asymmetry)]
 }
 
-/// What feeds the rotors.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Supply<T> {
-    /// Battery voltage, V.
-    pub voltage_v: T,
-    /// Voltage at which the vehicle's propulsion numbers hold, V.
-    pub reference_voltage_v: T,
-    /// Top rotor speed at that voltage, rad/s.
-    pub speed_max_rad_s: T,
-}
-
 /// What an effect that makes a force may look at.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Situation<'a, T: Real> {
+#[derive(Debug, Clone, Copy)]
+pub struct Situation<'a, L> {
     /// Motion through the air.
-    pub air: &'a Air<T>,
-    /// Height above the origin's level, m.
-    pub height_m: T,
+    pub flow: &'a Airflow<L>,
     /// Thrust of all rotors, N, effects on thrust included.
-    pub thrust_n: T,
-    /// Force of rotors, drag and wings, N, before effects that add to it.
-    pub force: In<Body, T>,
-    /// Sum of the rotor speeds about +z, each with the sign of its spin, rad/s; 0 where no effect
-    /// [feels it](Effect::feels_rotor_spin).
-    pub rotor_spin_rad_s: T,
-    /// Its rate, rad/s^2; likewise.
-    pub rotor_spin_rate_rad_s2: T,
-    /// The vehicle's wings, if it has any.
-    pub wing: Option<&'a Wing<T>>,
+    pub thrust_n: L,
+    /// Force of rotors, drag and wings, body frame, N, before effects that add to it.
+    pub force: [L; 3],
+    /// Sum of the rotor speeds about +z, each with the sign of its spin, rad/s, and its rate, rad/s^2; 0 where no effect
+    /// [feels it](Acts::FEELS_ROTOR_SPIN).
+    pub rotor_spin: [L; 2],
+    /// The vehicle's wings; without area where it has none.
+    pub wings: &'a flat_plate::Pair<L>,
     /// Deployment of the left and the right wing, 0..1.
-    pub deployment: [T; 2],
+    pub deployment: [L; 2],
 }
 
 /// Numbers of the airframe that effects change once.
@@ -306,22 +293,14 @@ pub trait Effect<T: Real>: Copy {
     const NAME: &'static str;
     /// The parameters, in the order in which the effect stores them.
     const PARAMETERS: &'static [EffectParameter];
+    /// Whether it acts on sensors and stamps alone, which a flight without them does not show.
+    const IS_OF_SENSORS: bool = false;
 
-    /// Wind that the effect adds, m/s.
-    ///
-    /// * `height_m` - above the origin's level
-    #[inline(always)]
-    fn wind(&self, _height_m: T) -> In<Ned, T> {
-        nothing()
-    }
     /// Gusts that the effect adds to the air.
     #[inline(always)]
     fn gust(&self) -> Option<GustSpectrum<T>> {
         None
     }
-    /// Changes the steady rotor speeds, rad/s.
-    #[inline(always)]
-    fn rotor_target(&self, _target_rad_s: &mut PerRotor<T>, _supply: &Supply<T>) {}
     /// What the effect adds to the rotor lag, s: speeding up, slowing down.
     #[inline(always)]
     fn rotor_extra_time_constant_s(&self) -> [T; 2] {
@@ -383,32 +362,80 @@ pub trait Effect<T: Real>: Copy {
     /// Changes numbers of the airframe.
     #[inline(always)]
     fn alter(&self, _airframe: &mut Alteration<T>) {}
-    /// Factor on the thrust of all rotors, and so on their roll and pitch moments.
-    ///
-    /// * `height_m` - above the origin's level
-    #[inline(always)]
-    fn thrust_factor(&self, _air: &Air<T>, _height_m: T) -> T {
-        T::one()
-    }
     /// Where the effect puts the accelerometer, from the centre of mass, m.
     #[inline(always)]
     fn accelerometer_position(&self) -> In<Body, T> {
         nothing()
     }
+}
+
+/// Which forms of an effect there are, a bit each; none where the effect is absent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Forms(u8);
+
+impl Forms {
+    /// One form, by its number; 0 for the standard one, and for an effect that has no forms.
+    #[inline(always)]
+    pub fn only(form: usize) -> Self {
+        Self(1 << (form & 7))
+    }
+    /// Whether the effect is there in any form.
+    #[inline(always)]
+    pub fn any(self) -> bool {
+        self.0 != 0
+    }
+    /// Whether a form is there.
+    #[inline(always)]
+    pub fn has(self, form: usize) -> bool {
+        self.0 & Self::only(form).0 != 0
+    }
+    /// Those of either.
+    #[inline(always)]
+    #[must_use]
+    pub fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+    /// Whether there is one that the other lacks.
+    #[inline(always)]
+    pub fn is_beyond(self, other: Self) -> bool {
+        self.0 & !other.0 != 0
+    }
+}
+
+/// What an effect does in every step: its equation, over the numbers that its `prepare` makes of its parameters once.
+///
+/// On registers the vehicles of a batch may have it in several forms: `forms` are those that any of them has, and the numbers of
+/// a form that a vehicle does not have make no difference to it.
+pub trait Acts<L: Lane>: Copy {
+    /// Whether its wrench depends on how fast the rotors spin, which is dear to sum up.
+    const FEELS_ROTOR_SPIN: bool = false;
+
+    /// Wind that the effect adds, north and east, m/s.
+    ///
+    /// * `height_m` - above the origin's level
+    #[inline(always)]
+    fn wind(&self, _height_m: L, _forms: Forms) -> [L; 2] {
+        [absent(); 2]
+    }
+    /// Changes the steady rotor speeds, rad/s.
+    #[inline(always)]
+    fn rotor_targets<const ROTORS: usize>(&self, _targets: &mut [L; ROTORS], _voltage_v: L, _forms: Forms) {}
+    /// Factor on the thrust of all rotors, and so on their roll and pitch moments.
+    ///
+    /// * `height_m` - above the origin's level
+    #[inline(always)]
+    fn thrust_factor(&self, _flow: &Airflow<L>, _height_m: L, _forms: Forms) -> L {
+        L::of(1.0)
+    }
     /// Mass of the air that moves with the vehicle along body z, kg.
     #[inline(always)]
-    fn added_mass_kg(&self) -> T {
-        T::zero()
-    }
-    /// Whether its wrench depends on how fast the rotors spin, which is dear to sum up.
-    #[inline(always)]
-    fn feels_rotor_spin(&self) -> bool {
-        false
+    fn added_mass_kg(&self) -> L {
+        absent()
     }
     /// Force and moment that the effect adds.
     #[inline(always)]
-    fn wrench(&self, _situation: &Situation<'_, T>) -> Wrench<Body, T> {
-        Wrench { force: nothing(), moment: nothing() }
+    fn wrench(&self, _at: &Situation<'_, L>, _forms: Forms) -> BodyWrench<L> {
+        BodyWrench { force: [absent(); 3], moment: [absent(); 3] }
     }
 }
 
@@ -417,6 +444,12 @@ pub trait Effect<T: Real>: Copy {
 #[inline(always)]
 fn nothing<F: Frame, T: Real>() -> In<F, T> {
     In::new(Vector3::repeat(-T::zero()))
+}
+
+/// The same for a lane.
+#[inline(always)]
+fn absent<L: Lane>() -> L {
+    L::of(-0.0)
 }
 
 #[cfg(test)]

@@ -4,9 +4,9 @@
 //! `c = 0.1 1/s`, in the form `damped` a parameter. The tether is fixed at the centre of mass. A length of 0 is no load.
 
 use super::{Effect, EffectParameter, Scale, is};
-use crate::frames::{In, Ned};
+use crate::lane::Lane;
 use crate::math::{GRAVITY_M_S2, Real, real};
-use nalgebra::{Vector2, Vector3};
+use crate::numbers;
 
 const DAMPED: usize = 1;
 
@@ -41,32 +41,46 @@ pub struct Pendulum<T> {
     pub damping_per_s: T,
 }
 
-/// Where the load hangs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PendulumState<T: Real> {
-    /// Offset from the vehicle, north and east, m.
-    pub offset_m: Vector2<T>,
-    /// Its rate, m/s.
-    pub velocity_m_s: Vector2<T>,
+numbers! {
+    /// Where the load hangs.
+    PendulumState {
+        /// Offset from the vehicle, north and east, m.
+        offset_m [2],
+        /// Its rate, m/s.
+        velocity_m_s [2]
+    }
 }
 
-impl<T: Real> PendulumState<T> {
+impl<L: Lane> PendulumState<L> {
     /// Hanging straight down.
     pub fn at_rest() -> Self {
-        Self { offset_m: Vector2::zeros(), velocity_m_s: Vector2::zeros() }
+        Self::all(L::of(0.0))
+    }
+}
+
+numbers! {
+    /// A load over steps of one length: what it does in one is linear in where it hangs.
+    Swing {
+        /// `m_l g`, N.
+        weight_n,
+        /// Pull across over offset, N/m.
+        pull_per_m,
+        /// Where the load trails, over the vehicle's acceleration, s^2.
+        trail,
+        /// `g / l`, 1/s^2.
+        stiffness,
+        /// `c / 2`, 1/s.
+        decay,
+        /// Decaying cosine of a step.
+        cosine,
+        /// Decaying sine of a step over its frequency, s.
+        sine
     }
 }
 
 impl<T: Real> Pendulum<T> {
-    /// Force of the tether on the vehicle, N.
-    pub fn force(&self, state: &PendulumState<T>) -> In<Ned, T> {
-        let weight = self.mass_kg * real(GRAVITY_M_S2);
-        let across = state.offset_m * (weight / self.length_m);
-        In::new(Vector3::new(across.x, across.y, weight))
-    }
-
-    /// Moves the load exactly over a time of any length, s, while the vehicle accelerates evenly, m/s^2.
-    pub fn lead(&self, state: &mut PendulumState<T>, acceleration: In<Ned, T>, dt_s: T) {
+    /// The load over steps of any length, s.
+    pub fn over(&self, dt_s: T) -> Swing<T> {
         let stiffness = real::<T>(GRAVITY_M_S2) / self.length_m;
         let decay = self.damping_per_s * real(0.5);
         let squared = stiffness - decay * decay;
@@ -81,38 +95,60 @@ impl<T: Real> Pendulum<T> {
             let sine = if root > T::zero() { (slow - fast) / (root * real(2.0)) } else { slow * dt_s };
             ((slow + fast) * real(0.5), sine)
         };
-        // Evenly accelerated, the load swings about where it trails.
-        let trail = acceleration.vector.xy() * (-T::one() / stiffness);
-        let (x, v) = (state.offset_m - trail, state.velocity_m_s);
-        state.offset_m = trail + x * cosine + (v + x * decay) * sine;
-        state.velocity_m_s = v * cosine - (v * decay + x * stiffness) * sine;
+        let weight_n = self.mass_kg * real(GRAVITY_M_S2);
+        let (pull_per_m, trail) = (weight_n / self.length_m, -T::one() / stiffness);
+        Swing { weight_n, pull_per_m, trail, stiffness, decay, cosine, sine }
+    }
+}
+
+impl<L: Lane> Swing<L> {
+    /// Force of the tether on the vehicle, world frame, N.
+    #[inline(always)]
+    pub fn force(&self, state: &PendulumState<L>) -> [L; 3] {
+        let [north, east] = state.offset_m;
+        [north * self.pull_per_m, east * self.pull_per_m, self.weight_n]
+    }
+
+    /// Moves the load exactly over a step, in which the vehicle accelerates evenly.
+    ///
+    /// * `acceleration` - north and east, m/s^2
+    #[inline(always)]
+    pub fn lead(&self, state: &mut PendulumState<L>, acceleration: [L; 2]) {
+        for i in 0..2 {
+            // Evenly accelerated, the load swings about where it trails.
+            let trail = acceleration[i] * self.trail;
+            let (x, v) = (state.offset_m[i] - trail, state.velocity_m_s[i]);
+            state.offset_m[i] = trail + x * self.cosine + (v + x * self.decay) * self.sine;
+            state.velocity_m_s[i] = v * self.cosine - (v * self.decay + x * self.stiffness) * self.sine;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector2;
 
     /// The exact solution against many small steps, lightly damped, critically and beyond.
     #[test]
     fn long_steps_are_exact() {
         for damping_per_s in [0.1, 2.0 * (GRAVITY_M_S2 / 0.5).sqrt(), 40.0] {
             let load = Pendulum { mass_kg: 0.1, length_m: 0.5, damping_per_s };
-            let acceleration = In::new(Vector3::new(2.0, -1.0, 5.0));
-            let start =
-                PendulumState { offset_m: Vector2::new(0.1, 0.0), velocity_m_s: Vector2::new(0.0, 0.3) };
-            let (mut long, mut rate) = (start, start);
-            load.lead(&mut long, acceleration, 0.7);
+            let acceleration = Vector2::new(2.0, -1.0);
+            let mut long = PendulumState { offset_m: [0.1, 0.0], velocity_m_s: [0.0, 0.3] };
+            let (mut offset_m, mut velocity_m_s) = (Vector2::new(0.1, 0.0), Vector2::new(0.0, 0.3));
+            load.over(0.7).lead(&mut long, acceleration.into());
             let h = 1e-6;
             for _ in 0..700_000 {
-                let pull = rate.offset_m * (-GRAVITY_M_S2 / 0.5) - rate.velocity_m_s * damping_per_s;
-                rate.velocity_m_s += (pull - acceleration.vector.xy()) * h;
-                rate.offset_m += rate.velocity_m_s * h;
+                let pull = offset_m * (-GRAVITY_M_S2 / 0.5) - velocity_m_s * damping_per_s;
+                velocity_m_s += (pull - acceleration) * h;
+                offset_m += velocity_m_s * h;
             }
-            assert!((long.offset_m - rate.offset_m).norm() < 1e-5, "{damping_per_s}: {long:?} {rate:?}");
-            assert!((long.velocity_m_s - rate.velocity_m_s).norm() < 1e-4, "{damping_per_s}");
-            load.lead(&mut long, acceleration, 1e6);
-            assert!((long.offset_m - acceleration.vector.xy() * (-0.5 / GRAVITY_M_S2)).norm() < 1e-9);
+            assert!((Vector2::from(long.offset_m) - offset_m).norm() < 1e-5, "{damping_per_s}: {long:?}");
+            assert!((Vector2::from(long.velocity_m_s) - velocity_m_s).norm() < 1e-4, "{damping_per_s}");
+            load.over(1e6).lead(&mut long, acceleration.into());
+            let trails = acceleration * (-0.5 / GRAVITY_M_S2);
+            assert!((Vector2::from(long.offset_m) - trails).norm() < 1e-9);
         }
     }
 
@@ -120,8 +156,9 @@ mod tests {
     fn a_load_that_hangs_back_pulls_back() {
         let load = Pendulum { mass_kg: 0.1, length_m: 0.5, damping_per_s: 0.1 };
         let mut state = PendulumState::at_rest();
-        assert_eq!(load.force(&state).vector, Vector3::new(0.0, 0.0, 0.1 * GRAVITY_M_S2));
-        load.lead(&mut state, In::new(Vector3::new(1.0, 0.0, 0.0)), 0.1);
-        assert!(state.offset_m.x < 0.0 && load.force(&state).vector.x < 0.0);
+        let swing = load.over(0.1);
+        assert_eq!(swing.force(&state), [0.0, 0.0, 0.1 * GRAVITY_M_S2]);
+        swing.lead(&mut state, [1.0, 0.0]);
+        assert!(state.offset_m[0] < 0.0 && swing.force(&state)[0] < 0.0);
     }
 }

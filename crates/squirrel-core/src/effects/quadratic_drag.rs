@@ -2,10 +2,12 @@
 //!
 //! Form `anisotropic`: its own drag area along each body axis, `A (1 + e)`, `A (1 - e)`, `A_z`.
 
-use super::{Effect, EffectParameter, Scale, Situation, is};
-use crate::frames::{Body, In, Wrench};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
-use nalgebra::Vector3;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 const ANISOTROPIC: usize = 1;
 
@@ -23,16 +25,35 @@ impl<T: Real> Effect<T> for QuadraticDrag<T> {
             .only_in(&["anisotropic"]),
         EffectParameter::form(&["isotropic", "anisotropic"]),
     ];
+}
 
-    #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
+numbers! {
+    /// Drag over speed squared, N s^2/m^2.
+    Numbers {
+        /// Along each axis.
+        per_square [3]
+    }
+}
+
+impl<T: Real> QuadraticDrag<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [area, anisotropy, area_z, form] = self.0;
         let areas = if is(form, ANISOTROPIC) {
-            Vector3::new(area * (T::one() + anisotropy), area * (T::one() - anisotropy), area_z)
+            [area * (T::one() + anisotropy), area * (T::one() - anisotropy), area_z]
         } else {
-            Vector3::repeat(area)
+            [area; 3]
         };
-        let scale = real::<T>(-0.5 * AIR_DENSITY_KG_M3) * situation.air.speed;
-        Wrench::from_force(In::new(areas.component_mul(&situation.air.velocity.vector) * scale))
+        Numbers { per_square: areas.map(|area| real::<T>(0.5 * AIR_DENSITY_KG_M3) * area) }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        let mut force = at.flow.velocity;
+        for i in 0..3 {
+            force[i] = absent::<L>() - self.per_square[i] * at.flow.velocity[i] * at.flow.speed;
+        }
+        BodyWrench::from_force(force)
     }
 }

@@ -3,10 +3,12 @@
 //! `s_i` is the rotor's `yaw_sign`, the sign of its reaction torque about +z, so it spins the other way: `I_r H e3` is the
 //! angular momentum of all rotors in the body frame, and its rate there is taken from the airframe.
 
-use super::{Effect, EffectParameter, Scale, Situation};
-use crate::frames::{Body, In, Wrench};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
 use crate::math::Real;
-use nalgebra::Vector3;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 /// Inertia of one rotor with its motor's bell about the spin axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,17 +18,32 @@ impl<T: Real> Effect<T> for RotorGyroTorque<T> {
     const NAME: &'static str = "rotor_gyro_torque";
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::size("rotor_inertia_kg_m2", 4e-6, 2e-5).growing_with(Scale::Inertia)];
+}
+
+numbers! {
+    /// Inertia of one rotor.
+    Numbers {
+        /// About the spin axis, kg m^2.
+        inertia
+    }
+}
+
+impl<T: Real> RotorGyroTorque<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
+        Numbers { inertia: self.0[0] }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    const FEELS_ROTOR_SPIN: bool = true;
 
     #[inline(always)]
-    fn feels_rotor_spin(&self) -> bool {
-        true
-    }
-    #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
-        let [inertia] = self.0;
-        let w = situation.air.omega.vector;
-        let (spin, rate) = (situation.rotor_spin_rad_s, situation.rotor_spin_rate_rad_s2);
-        let moment = Vector3::new(w.y * spin, -w.x * spin, rate) * -inertia;
-        Wrench { force: In::zero(), moment: In::new(moment) }
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        let ([p, q, _], [spin, rate]) = (at.flow.omega, at.rotor_spin);
+        BodyWrench::from_moment([
+            absent::<L>() - q * spin * self.inertia,
+            p * spin * self.inertia,
+            absent::<L>() - rate * self.inertia,
+        ])
     }
 }

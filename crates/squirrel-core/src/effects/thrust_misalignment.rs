@@ -1,9 +1,11 @@
 //! Thrust that is not along body z: `F_xy -= T (e_x, e_y)`.
 
-use super::{Effect, EffectParameter, Situation};
-use crate::frames::{Body, In, Wrench};
+use super::{Acts, Effect, EffectParameter, Forms, Situation, absent};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
 use crate::math::Real;
-use nalgebra::Vector3;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 /// Tilt of the thrust.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,10 +17,26 @@ impl<T: Real> Effect<T> for ThrustMisalignment<T> {
         EffectParameter::signed("tilt_x_rad", 0.017, 0.07),
         EffectParameter::signed("tilt_y_rad", 0.017, 0.07),
     ];
+}
 
+numbers! {
+    /// Tilt of the thrust.
+    Numbers {
+        /// Towards -x and -y, rad.
+        tilt [2]
+    }
+}
+
+impl<T: Real> ThrustMisalignment<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
+        Numbers { tilt: self.0 }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
-        let t = situation.thrust_n;
-        Wrench::from_force(In::new(Vector3::new(-t * self.0[0], -t * self.0[1], T::zero())))
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        let [x, y] = self.tilt;
+        BodyWrench::from_force([absent::<L>() - at.thrust_n * x, absent::<L>() - at.thrust_n * y, absent()])
     }
 }

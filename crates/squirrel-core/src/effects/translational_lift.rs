@@ -2,9 +2,12 @@
 //!
 //! Form `linear`: `T (1 + k V_h)`. Form `quadratic`: `T (1 + k V_h^2)`, without saturation.
 
-use super::{Effect, EffectParameter, is};
-use crate::aero::Air;
+use super::{Acts, Effect, EffectParameter, Forms, is};
+use crate::aero::Airflow;
+use crate::lane::Lane;
 use crate::math::{Real, real};
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 const LINEAR: usize = 1;
 const QUADRATIC: usize = 2;
@@ -20,18 +23,40 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
         EffectParameter::signed("gain_s_per_m", 3e-3, 0.02).only_in(&["linear"]),
         EffectParameter::form(&["saturating", "linear", "quadratic"]),
     ];
+}
 
+numbers! {
+    /// Gain of thrust.
+    Numbers {
+        /// Over speed squared, s^2/m^2.
+        gain,
+        /// Where that saturates, s^2/m^2; 0 for a gain that stays.
+        limit,
+        /// Over speed, s/m.
+        linear
+    }
+}
+
+impl<T: Real> TranslationalLift<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
+        let [gain, linear, form] = self.0;
+        if is(form, LINEAR) {
+            return Numbers { linear, ..Numbers::all(T::zero()) };
+        }
+        let limit = if is(form, QUADRATIC) { T::zero() } else { real(0.004) };
+        Numbers { gain, limit, linear: T::zero() }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
-    fn thrust_factor(&self, air: &Air<T>, _height_m: T) -> T {
-        let [gain, linear_gain, form] = self.0;
-        let across = air.velocity.vector.xy().norm_squared();
-        let rise = if is(form, LINEAR) {
-            linear_gain * across.sqrt()
-        } else if is(form, QUADRATIC) {
-            gain * across
-        } else {
-            gain * across / (T::one() + across * real(0.004))
-        };
-        T::one() + rise
+    fn thrust_factor(&self, flow: &Airflow<L>, _height_m: L, forms: Forms) -> L {
+        let ([u, v, _], one) = (flow.velocity, L::of(1.0));
+        let across = u * u + v * v;
+        let mut factor = one + self.gain * across / (one + across * self.limit);
+        if forms.has(LINEAR) {
+            factor = factor + self.linear * across.root();
+        }
+        factor
     }
 }

@@ -1,9 +1,11 @@
 //! One wing gives less: `N (1 - e)` on its side, taken from the flat plate's force.
 
-use super::{Effect, EffectParameter, Kind, Situation, is};
-use crate::aero::flat_plate;
-use crate::frames::{Body, Wrench};
+use super::{Acts, Effect, EffectParameter, Forms, Kind, Situation, absent, is};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
 use crate::math::Real;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 /// Which side, and the fraction that it lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,15 +17,27 @@ impl<T: Real> Effect<T> for WingAsymmetry<T> {
         EffectParameter::new("side", Kind::OneOf(&["left", "right"])),
         EffectParameter::size("loss_fraction", 0.12, 0.5),
     ];
+}
 
-    #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
-        let Some(wing) = situation.wing else { return Wrench::zero() };
+numbers! {
+    /// What each side lacks.
+    Numbers {
+        /// Left and right, as a fraction.
+        loss [2]
+    }
+}
+
+impl<T: Real> WingAsymmetry<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [side, loss] = self.0;
-        let mut less =
-            flat_plate::normal_forces(wing, situation.air, situation.deployment).map(|n| -n * loss);
-        // The other side keeps its force.
-        less[usize::from(is(side, 0))] = T::zero();
-        flat_plate::pair_wrench(wing, less)
+        Numbers { loss: if is(side, 0) { [loss, T::zero()] } else { [T::zero(), loss] } }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        let [left, right] = at.wings.normal_forces(at.flow, &at.deployment);
+        at.wings.wrench([absent::<L>() - left * self.loss[0], absent::<L>() - right * self.loss[1]])
     }
 }

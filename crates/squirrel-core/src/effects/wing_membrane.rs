@@ -4,10 +4,12 @@
 //! whatever wing the vehicle flies, as a difference to the flat plate. Form `speed_dependent`: the gain grows with airspeed,
 //! `g min(V / V_full, 1)`, as the membrane fills.
 
-use super::{Effect, EffectParameter, Situation, is};
-use crate::aero::flat_plate;
-use crate::frames::{Body, Wrench};
+use super::{Acts, Effect, EffectParameter, Forms, Situation, is};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
 use crate::math::Real;
+use crate::numbers;
+use crate::vehicle::Vehicle;
 
 const SPEED_DEPENDENT: usize = 1;
 
@@ -23,19 +25,40 @@ impl<T: Real> Effect<T> for WingMembrane<T> {
         EffectParameter::size("full_speed_m_s", 5.0, 15.0).only_in(&["speed_dependent"]),
         EffectParameter::form(&["constant", "speed_dependent"]),
     ];
+}
 
+numbers! {
+    /// Gain and offset.
+    Numbers {
+        /// Once the membrane is full.
+        gain,
+        /// Of the angle of attack, rad.
+        offset_rad,
+        /// How full it is without airspeed, and over airspeed, s/m.
+        filled [2]
+    }
+}
+
+impl<T: Real> WingMembrane<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
+        let [gain, offset_rad, full_speed_m_s, form] = self.0;
+        let filled = if is(form, SPEED_DEPENDENT) && full_speed_m_s > T::zero() {
+            [T::zero(), T::one() / full_speed_m_s]
+        } else {
+            [T::one(), T::zero()]
+        };
+        Numbers { gain, offset_rad, filled }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
-    fn wrench(&self, situation: &Situation<'_, T>) -> Wrench<Body, T> {
-        let Some(wing) = situation.wing else { return Wrench::zero() };
-        let [mut gain, offset, full_speed_m_s, form] = self.0;
-        let speed = situation.air.speed;
-        if is(form, SPEED_DEPENDENT) && speed < full_speed_m_s {
-            gain *= speed / full_speed_m_s;
-        }
-        let flat = flat_plate::normal_forces(wing, situation.air, situation.deployment);
-        let per_w = flat_plate::normal_slope(wing, situation.air);
-        let turned = per_w * situation.air.velocity.vector.x * offset * (T::one() + gain);
-        let more = [0, 1].map(|side| flat[side] * gain + turned * situation.deployment[side]);
-        flat_plate::pair_wrench(wing, more)
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        let (wings, flow) = (at.wings, at.flow);
+        let [empty, per_speed] = self.filled;
+        let gain = self.gain * (empty + flow.speed * per_speed).lower(L::of(1.0));
+        let [left, right] = wings.normal_forces(flow, &at.deployment);
+        let turned = wings.per_square * flow.speed * flow.velocity[0] * self.offset_rad * (L::of(1.0) + gain);
+        wings.wrench([left * gain + turned * at.deployment[0], right * gain + turned * at.deployment[1]])
     }
 }

@@ -7,7 +7,7 @@
 //! side, which is what a compiler puts into vector registers. A sum starts at the bias and takes inputs in order, then
 //! hidden states in order; this order is part of the meaning, because the bits depend on it.
 
-use super::lane::Lane;
+use crate::lane::Lane;
 
 /// A linear layer, `weight[input][output]`. Plain data, so that weights can be a `const`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +55,7 @@ impl<const HIDDEN: usize, L: Lane> Hidden<HIDDEN, L> {
     /// Nothing seen yet.
     #[inline(always)]
     pub fn new() -> Self {
-        Self { first: [L::zero(); HIDDEN], second: [L::zero(); HIDDEN] }
+        Self { first: [L::of(0.0); HIDDEN], second: [L::of(0.0); HIDDEN] }
     }
 }
 
@@ -69,7 +69,7 @@ impl<const HIDDEN: usize, L: Lane> Default for Hidden<HIDDEN, L> {
 #[inline(always)]
 fn accumulate<const IN: usize, const OUT: usize, L: Lane>(
     sums: &mut [L; OUT],
-    weight: &[[L::Weight; OUT]; IN],
+    weight: &[[L::Element; OUT]; IN],
     values: &[L; IN],
 ) {
     for i in 0..IN {
@@ -80,8 +80,8 @@ fn accumulate<const IN: usize, const OUT: usize, L: Lane>(
 }
 
 #[inline(always)]
-fn start<const OUT: usize, L: Lane>(bias: &[L::Weight; OUT]) -> [L; OUT] {
-    let mut sums = [L::zero(); OUT];
+fn start<const OUT: usize, L: Lane>(bias: &[L::Element; OUT]) -> [L; OUT] {
+    let mut sums = [L::of(0.0); OUT];
     for o in 0..OUT {
         sums[o] = L::splat(bias[o]);
     }
@@ -100,7 +100,7 @@ fn activate<const N: usize, L: Lane>(mut sums: [L; N]) -> [L; N] {
 impl<const IN: usize, const OUT: usize, T: Copy> Dense<IN, OUT, T> {
     /// The outputs for these inputs.
     #[inline(always)]
-    pub fn evaluate<L: Lane<Weight = T>>(&self, inputs: &[L; IN]) -> [L; OUT] {
+    pub fn evaluate<L: Lane<Element = T>>(&self, inputs: &[L; IN]) -> [L; OUT] {
         let mut sums = start(&self.bias);
         accumulate(&mut sums, &self.weight, inputs);
         sums
@@ -108,7 +108,7 @@ impl<const IN: usize, const OUT: usize, T: Copy> Dense<IN, OUT, T> {
 
     /// The outputs behind tanh.
     #[inline(always)]
-    pub fn neurons<L: Lane<Weight = T>>(&self, inputs: &[L; IN]) -> [L; OUT] {
+    pub fn neurons<L: Lane<Element = T>>(&self, inputs: &[L; IN]) -> [L; OUT] {
         activate(self.evaluate(inputs))
     }
 }
@@ -116,7 +116,7 @@ impl<const IN: usize, const OUT: usize, T: Copy> Dense<IN, OUT, T> {
 impl<const IN: usize, const OUT: usize, T: Copy> Recurrent<IN, OUT, T> {
     /// The next state, `tanh(input^T x + hidden^T h + bias)`.
     #[inline(always)]
-    pub fn step<L: Lane<Weight = T>>(&self, inputs: &[L; IN], hidden: &[L; OUT]) -> [L; OUT] {
+    pub fn step<L: Lane<Element = T>>(&self, inputs: &[L; IN], hidden: &[L; OUT]) -> [L; OUT] {
         let mut sums = start(&self.bias);
         accumulate(&mut sums, &self.input, inputs);
         accumulate(&mut sums, &self.hidden, hidden);
@@ -175,20 +175,20 @@ impl<const IN: usize, const HIDDEN: usize, const OUT: usize, T: Copy> Elman<IN, 
 
     /// Streaming: one step with what was remembered. The output may be read after any step.
     #[inline(always)]
-    pub fn step<L: Lane<Weight = T>>(&self, hidden: &mut Hidden<HIDDEN, L>, inputs: &[L; IN]) {
+    pub fn step<L: Lane<Element = T>>(&self, hidden: &mut Hidden<HIDDEN, L>, inputs: &[L; IN]) {
         hidden.first = self.first.step(inputs, &hidden.first);
         hidden.second = self.second.step(&hidden.first, &hidden.second);
     }
 
     /// The output for the present state.
     #[inline(always)]
-    pub fn read<L: Lane<Weight = T>>(&self, hidden: &Hidden<HIDDEN, L>) -> [L; OUT] {
+    pub fn read<L: Lane<Element = T>>(&self, hidden: &Hidden<HIDDEN, L>) -> [L; OUT] {
         self.output.evaluate(&hidden.second)
     }
 
     /// The output after a window of inputs, oldest first, with nothing remembered from before.
     #[inline(always)]
-    pub fn window<L: Lane<Weight = T>>(&self, inputs: &[[L; IN]]) -> [L; OUT] {
+    pub fn window<L: Lane<Element = T>>(&self, inputs: &[[L; IN]]) -> [L; OUT] {
         let mut hidden = Hidden::new();
         for row in inputs {
             self.step(&mut hidden, row);
@@ -200,7 +200,7 @@ impl<const IN: usize, const HIDDEN: usize, const OUT: usize, T: Copy> Elman<IN, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rnn::lane::tanh;
+    use crate::lane::net_tanh as tanh;
 
     /// Any numbers of order 0.3, all different; const, as a firmware would have them.
     const NET: Elman<2, 3, 1> = Elman {

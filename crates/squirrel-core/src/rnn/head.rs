@@ -10,8 +10,8 @@
 //! needed: clipped means `cos(alpha + alpha_w) < 0`, and then `n_f` lies along the motion. Where `alpha_w = 0` and
 //! `gamma = 1` what remains is, bit for bit, [`flat_plate::force`](crate::aero::flat_plate::force).
 
-use super::lane::NetScalar;
 use crate::frames::{Body, In};
+use crate::math::Real;
 use crate::math::{AIR_DENSITY_KG_M3, real, upper};
 use nalgebra::Vector3;
 
@@ -37,7 +37,7 @@ pub struct Flow<T> {
     pub direction: [T; 2],
 }
 
-impl<T: NetScalar> Flow<T> {
+impl<T: Real> Flow<T> {
     /// Of a velocity relative to the air, m/s.
     pub fn new(velocity: In<Body, T>) -> Self {
         let (v, zero) = (velocity.vector, real(0.0));
@@ -75,7 +75,7 @@ pub struct Correction<T> {
     pub gamma: T,
 }
 
-impl<T: NetScalar> Correction<T> {
+impl<T: Real> Correction<T> {
     /// `alpha_w = pi/2 tanh(y0)`, `gamma = softplus(y1)`, so that both stay in their range whatever the network says.
     pub fn from_outputs([y0, y1]: [T; 2]) -> Self {
         let softplus = upper(y1, real(0.0)) + (-y1.abs()).exp().ln_1p();
@@ -96,7 +96,7 @@ pub struct TurnedNormal<T> {
     pub clipped: bool,
 }
 
-impl<T: NetScalar> TurnedNormal<T> {
+impl<T: Real> TurnedNormal<T> {
     /// Turns the normal in this flow.
     pub fn new(flow: &Flow<T>, alpha_w_rad: T) -> Self {
         let (sin, cos) = alpha_w_rad.sin_cos();
@@ -129,7 +129,7 @@ impl<T: NetScalar> TurnedNormal<T> {
 /// Force of the air on the wing, N, by the corrected flat plate.
 ///
 /// * `area_m2` - plate area
-pub fn force<T: NetScalar>(flow: &Flow<T>, correction: Correction<T>, area_m2: T) -> In<Body, T> {
+pub fn force<T: Real>(flow: &Flow<T>, correction: Correction<T>, area_m2: T) -> In<Body, T> {
     let turned = TurnedNormal::new(flow, correction.alpha_w_rad);
     let size = flow.impedance(area_m2) * turned.sine_m_s * correction.gamma;
     flow.body(size * turned.direction[0], size * turned.direction[1])

@@ -1,7 +1,7 @@
 //! A network without memory: two layers of tanh neurons and a linear output.
 
 use super::elman::Dense;
-use super::lane::Lane;
+use crate::lane::Lane;
 
 /// Two layers of tanh neurons and a linear output. Plain data, so that weights can be a `const`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,7 +53,7 @@ impl<const IN: usize, const HIDDEN: usize, const OUT: usize, T: Copy> Mlp<IN, HI
 
     /// The output for these inputs.
     #[inline(always)]
-    pub fn evaluate<L: Lane<Weight = T>>(&self, inputs: &[L; IN]) -> [L; OUT] {
+    pub fn evaluate<L: Lane<Element = T>>(&self, inputs: &[L; IN]) -> [L; OUT] {
         self.output.evaluate(&self.second.neurons(&self.first.neurons(inputs)))
     }
 }

@@ -1,6 +1,6 @@
 //! Small recurrent networks that fly: fixed sizes, no allocation, no panic, the same bits wherever they run.
 //!
-//! - [`lane`]: the arithmetic of a network. One `f32` in flight, a register of them in training; one tanh for all.
+//! A network computes with [lanes](crate::lane): one `f32` in flight, a register of them in training; one tanh for all.
 //! - [`elman`]: the two-layer recurrent network of the paper, over a window or step by step.
 //! - [`mlp`]: a network without memory.
 //! - [`head`]: from the two outputs of the paper's network to a force on the wing, and the flow that it needs.
@@ -10,6 +10,5 @@
 
 pub mod elman;
 pub mod head;
-pub mod lane;
 pub mod mlp;
 pub mod parnn;

@@ -9,7 +9,7 @@
 
 use super::factor::Factor;
 use nalgebra::{DMatrix, DVector};
-use squirrel_sim::batch::simd::{BLOCK, Kernel, Lanes, Path, Paths};
+use squirrel_sim::batch::simd::{BLOCK, Kernel, Path, Paths, Register};
 use std::ops::Range;
 
 /// Tempering of the likelihood.
@@ -58,7 +58,7 @@ impl Kernel<f64> for Products<'_> {
     type Output = DMatrix<f64>;
 
     #[inline(always)]
-    fn run<L: Lanes<Weight = f64>>(self) -> DMatrix<f64> {
+    fn run<L: Register<Element = f64>>(self) -> DMatrix<f64> {
         let Self { columns, others, lower, mut out } = self;
         let rows = columns.iter().map(|column| column.len()).max().unwrap_or_default();
         // A column of one flight is zero in all others, and zeros add nothing.
@@ -92,10 +92,10 @@ fn span(column: &[f64]) -> Range<usize> {
 
 /// Inner products of one series with four.
 #[inline(always)]
-fn side_by_side<L: Lanes<Weight = f64>>(a: &[f64], b: [&[f64]; WIDE]) -> [f64; WIDE] {
+fn side_by_side<L: Register<Element = f64>>(a: &[f64], b: [&[f64]; WIDE]) -> [f64; WIDE] {
     // A register holds fewer numbers than a block of some path has; each has its own sum.
     let registers = BLOCK / L::WIDTH;
-    let mut sums = [[L::zero(); BLOCK]; WIDE];
+    let mut sums = [[L::of(0.0); BLOCK]; WIDE];
     let whole = a.len() / BLOCK * BLOCK;
     let b = b.map(|b| &b[..a.len()]);
     for row in (0..whole).step_by(BLOCK) {

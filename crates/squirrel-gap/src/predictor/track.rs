@@ -15,7 +15,7 @@ use crate::flight::recording::Recording;
 use crate::flight::series::{Series, Span};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3, Vector6};
 use squirrel_core::dynamics::{RotorDrive, State};
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Acting, Effects};
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -421,12 +421,13 @@ fn rotor_load(
     voltage_v: impl Iterator<Item = f64>,
 ) -> Vec<f64> {
     let mut speed = None;
+    let acting = Acting::new(&vehicle.effects, &vehicle.vehicle);
     let along = voltage_v.enumerate().map(|(k, voltage_v)| {
         let command = recording.rotor_command(start_s + k as f64 * recording.period_s);
         if recording.speed.is_some() {
             return vehicle.vehicle.rotor_load(&command);
         }
-        let drive = RotorDrive::new(&vehicle.vehicle, &vehicle.effects, &command, voltage_v);
+        let drive = RotorDrive::new(&vehicle.vehicle, &acting, &command, voltage_v);
         let speed = speed.get_or_insert(drive.target_rad_s);
         drive.lead(speed, recording.period_s);
         vehicle.vehicle.rotor_load(speed)

@@ -11,9 +11,9 @@ mod tape;
 mod tests;
 
 use crate::heads::{Head, Sample};
-use simd::{BLOCK, Kernel, Lanes, Path, Paths};
+use simd::{BLOCK, Kernel, Path, Paths, Register};
+use squirrel_core::lane::Lane;
 use squirrel_core::rnn::elman::{Elman, Hidden};
-use squirrel_core::rnn::lane::Lane;
 use squirrel_core::rnn::parnn::{HIDDEN, INPUTS};
 use tape::Tape;
 
@@ -46,8 +46,8 @@ impl<S: Paths, W: AsRef<[[S; INPUTS]]>, const STEPS: usize, const OUT: usize> Ke
     type Output = Vec<[S; OUT]>;
 
     #[inline(always)]
-    fn run<L: Lanes<Weight = S>>(self) -> Self::Output {
-        let mut outputs = vec![[<S as Lane>::zero(); OUT]; self.windows.len()];
+    fn run<L: Register<Element = S>>(self) -> Self::Output {
+        let mut outputs = vec![[<S as Lane>::of(0.0); OUT]; self.windows.len()];
         for (windows, outputs) in self.windows.chunks(L::WIDTH).zip(outputs.chunks_mut(L::WIDTH)) {
             let rows = gather::<L, STEPS>(windows.iter().map(AsRef::as_ref));
             let mut hidden = Hidden::new();
@@ -67,13 +67,13 @@ impl<S: Paths, W: AsRef<[[S; INPUTS]]>, const STEPS: usize, const OUT: usize> Ke
 
 /// The last rows of windows side by side; zero where there are fewer windows than lanes.
 #[inline(always)]
-fn gather<'a, L: Lanes, const STEPS: usize>(
-    windows: impl Iterator<Item = &'a [[L::Weight; INPUTS]]>,
+fn gather<'a, L: Register, const STEPS: usize>(
+    windows: impl Iterator<Item = &'a [[L::Element; INPUTS]]>,
 ) -> [[L; INPUTS]; STEPS]
 where
-    L::Weight: 'a,
+    L::Element: 'a,
 {
-    let mut columns = [[[<L::Weight as Lane>::zero(); BLOCK]; INPUTS]; STEPS];
+    let mut columns = [[[<L::Element as Lane>::of(0.0); BLOCK]; INPUTS]; STEPS];
     for (lane, window) in windows.take(L::WIDTH).enumerate() {
         let last = &window[window.len() - STEPS..];
         for t in 0..STEPS {
@@ -82,7 +82,7 @@ where
             }
         }
     }
-    let mut rows = [[L::zero(); INPUTS]; STEPS];
+    let mut rows = [[L::of(0.0); INPUTS]; STEPS];
     for t in 0..STEPS {
         for i in 0..INPUTS {
             rows[t][i] = L::load(&columns[t][i]);
@@ -91,10 +91,10 @@ where
     rows
 }
 
-/// The numbers of each register, the first [`Lanes::WIDTH`] of them.
+/// The numbers of each register, the first [`Register::WIDTH`] of them.
 #[inline(always)]
-fn scatter<L: Lanes, const N: usize>(registers: &[L; N]) -> [[L::Weight; BLOCK]; N] {
-    let mut columns = [[<L::Weight as Lane>::zero(); BLOCK]; N];
+fn scatter<L: Register, const N: usize>(registers: &[L; N]) -> [[L::Element; BLOCK]; N] {
+    let mut columns = [[<L::Element as Lane>::of(0.0); BLOCK]; N];
     for n in 0..N {
         registers[n].store(&mut columns[n]);
     }
@@ -117,8 +117,8 @@ impl<S: Paths, H: Head<S, OUT>, const STEPS: usize, const OUT: usize> Kernel<S>
     type Output = (f64, Net<S, OUT>);
 
     #[inline(always)]
-    fn run<L: Lanes<Weight = S>>(self) -> Self::Output {
-        let mut sums = vec![Net::<L, OUT>::filled(L::zero()); BLOCK / L::WIDTH];
+    fn run<L: Register<Element = S>>(self) -> Self::Output {
+        let mut sums = vec![Net::<L, OUT>::filled(L::of(0.0)); BLOCK / L::WIDTH];
         let mut tape = Tape::<L, STEPS>::new();
         let per_window = nalgebra::convert::<f64, S>(2.0 / self.members.len() as f64);
         let mut loss = 0.0;
@@ -128,9 +128,9 @@ impl<S: Paths, H: Head<S, OUT>, const STEPS: usize, const OUT: usize> Kernel<S>
                 let members = &block[start..block.len().min(start + L::WIDTH)];
                 let windows = members.iter().map(|&k| self.samples[k as usize].rows.as_slice());
                 let outputs = scatter(&tape.forward(self.net, gather(windows)));
-                let mut pulls = [[<S as Lane>::zero(); BLOCK]; OUT];
+                let mut pulls = [[<S as Lane>::of(0.0); BLOCK]; OUT];
                 for (lane, &k) in members.iter().enumerate() {
-                    let mut output = [<S as Lane>::zero(); OUT];
+                    let mut output = [<S as Lane>::of(0.0); OUT];
                     for o in 0..OUT {
                         output[o] = outputs[o][lane];
                     }
@@ -140,7 +140,7 @@ impl<S: Paths, H: Head<S, OUT>, const STEPS: usize, const OUT: usize> Kernel<S>
                         pulls[o][lane] = pull[o] * per_window;
                     }
                 }
-                let mut pull = [L::zero(); OUT];
+                let mut pull = [L::of(0.0); OUT];
                 for o in 0..OUT {
                     pull[o] = L::load(&pulls[o]);
                 }
@@ -153,8 +153,8 @@ impl<S: Paths, H: Head<S, OUT>, const STEPS: usize, const OUT: usize> Kernel<S>
 
 /// The sum over the columns, as a tree.
 #[inline(always)]
-fn reduce<L: Lanes, const OUT: usize>(sums: &[Net<L, OUT>]) -> Net<L::Weight, OUT> {
-    let zero = <L::Weight as Lane>::zero();
+fn reduce<L: Register, const OUT: usize>(sums: &[Net<L, OUT>]) -> Net<L::Element, OUT> {
+    let zero = <L::Element as Lane>::of(0.0);
     let mut total = Net::filled(zero);
     for (tensor, to) in total.tensors_mut().into_iter().enumerate() {
         for (k, to) in to.iter_mut().enumerate() {

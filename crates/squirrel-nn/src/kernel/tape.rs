@@ -11,7 +11,7 @@
 //! Both passes run in time; the sums over time come after them, a tile of weights at once, so that a tile stays in registers.
 
 use super::Net;
-use super::simd::Lanes;
+use super::simd::Register;
 use squirrel_core::rnn::elman::{Hidden, Recurrent};
 use squirrel_core::rnn::parnn::{HIDDEN, INPUTS};
 
@@ -24,12 +24,12 @@ pub(super) struct Tape<L, const STEPS: usize> {
     second_pull: [[L; HIDDEN]; STEPS],
 }
 
-impl<L: Lanes, const STEPS: usize> Tape<L, STEPS> {
+impl<L: Register, const STEPS: usize> Tape<L, STEPS> {
     #[inline(always)]
     pub(super) fn new() -> Self {
-        let layer = [[L::zero(); HIDDEN]; STEPS];
+        let layer = [[L::of(0.0); HIDDEN]; STEPS];
         Self {
-            inputs: [[L::zero(); INPUTS]; STEPS],
+            inputs: [[L::of(0.0); INPUTS]; STEPS],
             first: layer,
             second: layer,
             first_pull: layer,
@@ -41,7 +41,7 @@ impl<L: Lanes, const STEPS: usize> Tape<L, STEPS> {
     #[inline(always)]
     pub(super) fn forward<const OUT: usize>(
         &mut self,
-        net: &Net<L::Weight, OUT>,
+        net: &Net<L::Element, OUT>,
         inputs: [[L; INPUTS]; STEPS],
     ) -> [L; OUT] {
         self.inputs = inputs;
@@ -60,20 +60,20 @@ impl<L: Lanes, const STEPS: usize> Tape<L, STEPS> {
     #[inline(always)]
     pub(super) fn backward<const OUT: usize>(
         &mut self,
-        net: &Net<L::Weight, OUT>,
+        net: &Net<L::Element, OUT>,
         pull: &[L; OUT],
         sum: &mut Net<L, OUT>,
     ) {
-        let mut to_first = [L::zero(); HIDDEN];
-        let mut to_second = [L::zero(); HIDDEN];
+        let mut to_first = [L::of(0.0); HIDDEN];
+        let mut to_second = [L::of(0.0); HIDDEN];
         pull_back(&mut to_second, &net.output.weight, pull);
         for t in (0..STEPS).rev() {
             self.second_pull[t] = through_tanh(&to_second, &self.second[t]);
             pull_back(&mut to_first, &net.second.input, &self.second_pull[t]);
             self.first_pull[t] = through_tanh(&to_first, &self.first[t]);
-            to_first = [L::zero(); HIDDEN];
+            to_first = [L::of(0.0); HIDDEN];
             pull_back(&mut to_first, &net.first.hidden, &self.first_pull[t]);
-            to_second = [L::zero(); HIDDEN];
+            to_second = [L::of(0.0); HIDDEN];
             pull_back(&mut to_second, &net.second.hidden, &self.second_pull[t]);
         }
         outer::<L, HIDDEN, OUT, 4, 1>(&mut sum.output.weight, &self.second[STEPS - 1..], &[*pull]);
@@ -87,9 +87,9 @@ impl<L: Lanes, const STEPS: usize> Tape<L, STEPS> {
 
 /// `sums += weight pulls`: what the outputs ask of the inputs.
 #[inline(always)]
-fn pull_back<L: Lanes, const IN: usize, const OUT: usize>(
+fn pull_back<L: Register, const IN: usize, const OUT: usize>(
     sums: &mut [L; IN],
-    weight: &[[L::Weight; OUT]; IN],
+    weight: &[[L::Element; OUT]; IN],
     pulls: &[L; OUT],
 ) {
     for o in 0..OUT {
@@ -101,7 +101,7 @@ fn pull_back<L: Lanes, const IN: usize, const OUT: usize>(
 
 /// Times the derivative of tanh, by its value.
 #[inline(always)]
-fn through_tanh<L: Lanes, const N: usize>(pulls: &[L; N], values: &[L; N]) -> [L; N] {
+fn through_tanh<L: Register, const N: usize>(pulls: &[L; N], values: &[L; N]) -> [L; N] {
     let one = L::splat(nalgebra::convert(1.0));
     let mut through = *pulls;
     for n in 0..N {
@@ -112,7 +112,7 @@ fn through_tanh<L: Lanes, const N: usize>(pulls: &[L; N], values: &[L; N]) -> [L
 
 /// Gradients of one layer from all steps. There is no state before the first step.
 #[inline(always)]
-fn layer<L: Lanes, const IN: usize, const ROWS: usize>(
+fn layer<L: Register, const IN: usize, const ROWS: usize>(
     sum: &mut Recurrent<IN, HIDDEN, L>,
     inputs: &[[L; IN]],
     states: &[[L; HIDDEN]],
@@ -130,7 +130,7 @@ fn layer<L: Lanes, const IN: usize, const ROWS: usize>(
 /// `sum += sum over steps of values[t] pulls[t]^T`, in tiles of `ROWS` x `COLUMNS` that divide the matrix. Steps that only one
 /// of the two has are left out.
 #[inline(always)]
-fn outer<L: Lanes, const IN: usize, const OUT: usize, const ROWS: usize, const COLUMNS: usize>(
+fn outer<L: Register, const IN: usize, const OUT: usize, const ROWS: usize, const COLUMNS: usize>(
     sum: &mut [[L; OUT]; IN],
     values: &[[L; IN]],
     pulls: &[[L; OUT]],
@@ -138,7 +138,7 @@ fn outer<L: Lanes, const IN: usize, const OUT: usize, const ROWS: usize, const C
     const { assert!(IN.is_multiple_of(ROWS) && OUT.is_multiple_of(COLUMNS)) };
     for row in (0..IN).step_by(ROWS) {
         for column in (0..OUT).step_by(COLUMNS) {
-            let mut tile = [[L::zero(); COLUMNS]; ROWS];
+            let mut tile = [[L::of(0.0); COLUMNS]; ROWS];
             for (value, pull) in values.iter().zip(pulls) {
                 for r in 0..ROWS {
                     for c in 0..COLUMNS {

@@ -3,11 +3,11 @@
 //! Air moves between steps, at the rate of the flight code. Gusts that do not ask how fast a vehicle meets them are known beforehand:
 //! a [`Forecast`] hands them to the steps, which then need not be cut where air moves.
 
-use super::rows::{Row, put};
 use super::simd::{BLOCK, Paths};
 use crate::flight::CONTROL_RATE_HZ;
 use crate::plant::Wind;
 use squirrel_core::frames::{In, Ned};
+use squirrel_core::lane::{Row, put};
 use squirrel_core::math::real;
 
 /// Winds that a forecast has room for.

@@ -4,17 +4,19 @@
 //! polynomials instead of libm: torques agree to 1e-5 of their size, not to the bit. The mixer is [`Allocation`], which differs
 //! from the core's where rotors are at their limits: yaw torque is given up before roll and pitch are, but never used to save them.
 
-use super::dynamics::cross;
-use super::maths::{all, half_turn_sine_and_cosine, limit, size, wrap};
-use super::rows::{Block, Row, load, put, rows, store};
-use super::simd::{BLOCK, Kernel, Lanes, Paths};
+use super::rows::Block;
+use super::simd::{BLOCK, Kernel, Paths, Register};
 use super::{Batch, BatchError, CHUNK, Call, Settings, Work, place, shape};
 use nalgebra::convert;
 use squirrel_core::control::backstepping::AttitudeGains;
 use squirrel_core::control::backstepping::quaternion::Law;
 use squirrel_core::control::mixer::Mixer;
 use squirrel_core::dynamics::State;
+use squirrel_core::lane::functions::{all, half_turn_sine_and_cosine, limit, size, wrap};
+use squirrel_core::lane::vector::cross;
+use squirrel_core::lane::{Row, load, put, store};
 use squirrel_core::math::real;
+use squirrel_core::numbers;
 use squirrel_core::vehicle::Vehicle;
 use std::slice;
 
@@ -27,7 +29,7 @@ pub enum SetPoint {
     BodyRate,
 }
 
-rows! {
+numbers! {
     /// What the loop is told and remembers.
     Course {
         set_point [4],
@@ -42,7 +44,7 @@ rows! {
     }
 }
 
-rows! {
+numbers! {
     /// What it knows of the vehicle, and its gains.
     Gains {
         c1 [3], c2 [3], lambda [3], k, integral_max,
@@ -119,7 +121,7 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
             rotor_thrust_max: f64::from(mixer.rotor_thrust_max_n()),
             inverse_thrust_coefficient: 1.0 / f64::from(p.propulsion.thrust_coefficient_n_s2),
         };
-        self.gains.put(lane, &numbers.cast());
+        self.gains.put(lane, &numbers.map(real));
         let inverse = |x: f32| if x == 0.0 { 0.0 } else { 1.0 / f64::from(x) };
         let to = &mut self.allocation;
         for i in 0..ROTORS {
@@ -167,7 +169,7 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Act<'_, S, ROTORS> {
     type Output = ();
 
     #[inline(always)]
-    fn run<L: Lanes<Weight = S>>(self) {
+    fn run<L: Register<Element = S>>(self) {
         let Self { block, set_point, period_s } = self;
         let starts = block.starts::<L>();
         let Block { motion, held, autopilots: Some(autopilots), .. } = block else { return };
@@ -203,8 +205,14 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Act<'_, S, ROTORS> {
 
 /// Torque for the attitude that is asked for, by way of the command filter.
 #[inline(always)]
-fn attitude<L: Lanes>(gains: &Gains<L>, course: &mut Course<L>, q: &[L; 4], omega: &[L; 3], dt: L) -> [L; 3] {
-    let none = L::zero();
+fn attitude<L: Register>(
+    gains: &Gains<L>,
+    course: &mut Course<L>,
+    q: &[L; 4],
+    omega: &[L; 3],
+    dt: L,
+) -> [L; 3] {
+    let none = L::of(0.0);
     let mut acceleration = [none; 3];
     for i in 0..3 {
         let gap = wrap(course.set_point[i] - course.angle[i]);
@@ -275,7 +283,7 @@ fn attitude<L: Lanes>(gains: &Gains<L>, course: &mut Course<L>, q: &[L; 4], omeg
 
 /// Torque for the body rates that are asked for: the innermost part of the attitude law.
 #[inline(always)]
-fn body_rate<L: Lanes>(gains: &Gains<L>, course: &Course<L>, omega: &[L; 3]) -> [L; 3] {
+fn body_rate<L: Register>(gains: &Gains<L>, course: &Course<L>, omega: &[L; 3]) -> [L; 3] {
     let mut torque = cross(omega, &gains.momentum(omega));
     for i in 0..3 {
         torque[i] = torque[i] + gains.c2[i] * (course.set_point[i] - omega[i]);
@@ -283,7 +291,7 @@ fn body_rate<L: Lanes>(gains: &Gains<L>, course: &Course<L>, omega: &[L; 3]) -> 
     torque
 }
 
-impl<L: Lanes> Gains<L> {
+impl<L: Register> Gains<L> {
     /// Inertia times a vector.
     #[inline(always)]
     fn momentum(&self, v: &[L; 3]) -> [L; 3] {
@@ -304,7 +312,7 @@ struct Kinematics<L> {
     cos_pitch: L,
 }
 
-impl<L: Lanes> Kinematics<L> {
+impl<L: Register> Kinematics<L> {
     #[inline(always)]
     fn body_rate(&self, rate: &[L; 3]) -> [L; 3] {
         let Self { sin_roll: sr, cos_roll: cr, sin_pitch: sp, cos_pitch: cp } = *self;
@@ -325,12 +333,12 @@ impl<L: Lanes> Kinematics<L> {
     }
 }
 
-impl<L: Lanes, const ROTORS: usize> Allocation<L, ROTORS> {
+impl<L: Register, const ROTORS: usize> Allocation<L, ROTORS> {
     /// Rotor thrusts, N, each within its limits: the largest share of roll and pitch torque, then the nearest thrust, then the
     /// nearest yaw torque.
     #[inline(always)]
     fn thrusts(&self, gains: &Gains<L>, course: &mut Course<L>, torque: &[L; 3]) -> [L; ROTORS] {
-        let (none, most) = (L::zero(), gains.rotor_thrust_max);
+        let (none, most) = (L::of(0.0), gains.rotor_thrust_max);
         let thrust = course.set_point[3].upper(none);
         // In units of each rotor's part of the collective.
         let (mut tilt, mut smallest) = ([none; ROTORS], none);
@@ -501,7 +509,7 @@ pub(super) fn euler<T: Paths>(state: &State<T>) -> [f64; 3] {
 
 /// A vector in the frame that a rotation leads to: its inverse, applied.
 #[inline(always)]
-fn back<L: Lanes>(imaginary: &[L; 3], real_part: L, v: &[L; 3]) -> [L; 3] {
+fn back<L: Register>(imaginary: &[L; 3], real_part: L, v: &[L; 3]) -> [L; 3] {
     let once = cross(v, imaginary);
     let two = all::<L>(2.0);
     let t = [once[0] * two, once[1] * two, once[2] * two];

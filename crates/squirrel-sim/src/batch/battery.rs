@@ -1,36 +1,17 @@
-//! Batteries on registers: `crate::plant::BatteryParameters`, the table of open-circuit voltages by selection.
+//! Batteries of a block: `squirrel_core::dynamics::battery`, the table of open-circuit voltages by selection.
 
-use super::maths::{all, limit};
-use super::rows::{Row, rows};
-use super::simd::{BLOCK, Lanes, Paths};
+use super::simd::{BLOCK, Paths, Register};
 use crate::plant::BatteryParameters;
-use squirrel_core::math::real;
-
-rows! {
-    /// What does not change.
-    Pack {
-        torque, efficiency, floor_v, idle_a, r0_ohm, r1_ohm,
-        /// `1 - exp(-dt / tau1)`.
-        decay,
-        /// Charge of the full pack, A s.
-        capacity_as, cells
-    }
-}
-
-rows! {
-    /// What changes, as `crate::plant::BatteryState`.
-    Charge { charge, rc_voltage_v, voltage_v, current_a }
-}
-
-rows! {
-    /// A stretch of the table: it begins at a charge, and what voltage does on it.
-    Stretch { from, width, volt, rise }
-}
+use squirrel_core::dynamics::battery::{Charge, Pack, Stretch, shaft_power_w};
+use squirrel_core::lane::Row;
+use squirrel_core::math::{Real, real};
 
 /// The packs of a block.
 #[derive(Debug, Clone)]
 pub(super) struct Packs<S: Copy> {
-    pub(super) pack: Pack<Row<S>>,
+    /// Torque coefficient of the rotors.
+    torque: Row<S>,
+    pack: Pack<Row<S>>,
     pub(super) charge: Charge<Row<S>>,
     /// At least one; those that a vehicle lacks begin at infinity.
     pub(super) table: Vec<Stretch<Row<S>>>,
@@ -42,6 +23,7 @@ impl<S: Paths> Packs<S> {
         let none = [real::<S>(0.0); BLOCK];
         let one = [real::<S>(1.0); BLOCK];
         Self {
+            torque: none,
             pack: Pack { efficiency: one, capacity_as: one, ..Pack::all(none) },
             charge: Charge::all(none),
             table: vec![Stretch { width: one, ..Stretch::all(none) }; stretches.max(1)],
@@ -70,83 +52,51 @@ impl<S: Paths> Packs<S> {
             idle_current_a: 0.0,
         };
         let b = battery.unwrap_or(&constant);
-        let cells = f64::from(b.cells);
-        self.pack.put(
-            lane,
-            &Pack {
-                torque,
-                efficiency: real(b.efficiency),
-                floor_v: real(0.5 * cells * b.ocv_v_of_charge[0][1]),
-                idle_a: real(b.idle_current_a),
-                r0_ohm: real(b.r0_ohm),
-                r1_ohm: real(b.r1_ohm),
-                decay: real(1.0 - (-dt_s / b.tau1_s).exp()),
-                capacity_as: real(3600.0 * b.capacity_ah),
-                cells: real(cells),
-            },
-        );
-        for (number, stretch) in self.table.iter_mut().enumerate() {
-            let [from, to] = match b.ocv_v_of_charge.get(number..number + 2) {
-                Some([from, to]) => [*from, *to],
-                _ => [[f64::INFINITY, 0.0], [f64::INFINITY, 0.0]],
-            };
-            let width = if from[0].is_finite() { to[0] - from[0] } else { 1.0 };
-            let numbers = [from[0], width, from[1], to[1] - from[1]].map(real);
-            let [from, width, volt, rise] = numbers;
-            stretch.put(lane, &Stretch { from, width, volt, rise });
+        self.torque[lane] = torque;
+        self.pack.put(lane, &b.pack(dt_s).map(real));
+        let mut stretches = b.stretches();
+        for rows in &mut self.table {
+            let beyond = Stretch { from: f64::INFINITY, width: 1.0, volt: 0.0, rise: 0.0 };
+            rows.put(lane, &stretches.next().unwrap_or(beyond).map(real));
         }
     }
 
     /// A rested pack in column `lane`.
     pub(super) fn rest(&mut self, lane: usize, charge: S) {
         let none = real::<S>(0.0);
-        let mut volt = none;
-        for (number, stretch) in self.table.iter().enumerate() {
-            let s = stretch.take(lane);
-            if number == 0 || !(s.from > charge) {
-                volt = s.volt + s.rise * limit((charge - s.from) / s.width, none, real(1.0));
-            }
+        let mut on = self.table[0].take(lane);
+        for rows in &self.table[1..] {
+            on = on.or_next(&rows.take(lane), charge);
         }
+        let volt = on.volt_at(charge);
         let voltage_v = self.pack.cells[lane] * volt;
         self.charge.put(lane, &Charge { charge, rc_voltage_v: none, voltage_v, current_a: none });
     }
 }
 
-impl<L: Lanes> Pack<L> {
-    /// One step.
+impl<S: Real> Packs<S> {
+    /// One step of the vehicles from column `start` and on.
     ///
     /// * `speeds` - of the rotors before it, rad/s
     #[inline(always)]
-    pub(super) fn step<const ROTORS: usize>(
+    pub(super) fn step<L: Register<Element = S>, const ROTORS: usize>(
         &self,
         state: &mut Charge<L>,
-        table: &[Stretch<Row<L::Weight>>],
         start: usize,
         speeds: &[L; ROTORS],
         dt: L,
     ) {
-        let mut power = self.torque * speeds[0] * speeds[0] * speeds[0];
+        let torque = L::load(&self.torque[start..]);
+        let mut power_w = shaft_power_w(torque, speeds[0]);
         for i in 1..ROTORS {
-            power = power + self.torque * speeds[i] * speeds[i] * speeds[i];
+            power_w = power_w + shaft_power_w(torque, speeds[i]);
         }
-        let none = L::zero();
-        let current = power / (self.efficiency * state.voltage_v.upper(self.floor_v)) + self.idle_a;
-        state.rc_voltage_v = state.rc_voltage_v + (current * self.r1_ohm - state.rc_voltage_v) * self.decay;
-        state.charge = (state.charge - current * dt / self.capacity_as).upper(none);
-        state.current_a = current;
-        let mut on = Stretch::<L>::load(&table[0], start);
-        for rows in &table[1..] {
-            let next = Stretch::<L>::load(rows, start);
-            let ahead = next.from - state.charge;
-            on = Stretch {
-                from: ahead.where_positive(on.from, next.from),
-                width: ahead.where_positive(on.width, next.width),
-                volt: ahead.where_positive(on.volt, next.volt),
-                rise: ahead.where_positive(on.rise, next.rise),
-            };
+        let pack = Pack::<L>::load(&self.pack, start);
+        pack.discharge(state, power_w, dt);
+        let mut on = Stretch::<L>::load(&self.table[0], start);
+        for rows in &self.table[1..] {
+            on = on.or_next(&Stretch::load(rows, start), state.charge);
         }
-        let share = limit((state.charge - on.from) / on.width, none, all(1.0));
-        let open = self.cells * (on.volt + on.rise * share);
-        state.voltage_v = (open - current * self.r0_ohm - state.rc_voltage_v).upper(none);
+        pack.settle(state, &on);
     }
 }

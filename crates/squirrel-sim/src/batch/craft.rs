@@ -1,12 +1,17 @@
 //! A vehicle with all that it may have in a batch, and what the batch must be fitted with for it.
 
-use super::effects::Present;
 use super::error::BatchError;
-use super::wing::{FLAT, MEMBRANE, NONE};
 use crate::plant::{BatteryParameters, WingPlant};
 use crate::vehicle_file::VehicleFile;
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Effects, Present};
 use squirrel_core::vehicle::Vehicle;
+
+/// No wing.
+pub(super) const NONE: u8 = 0;
+/// Flat plate.
+pub(super) const FLAT: u8 = 1;
+/// Membrane.
+pub(super) const MEMBRANE: u8 = 2;
 
 /// What flies: airframe, effects, wings, battery, as [`crate::plant::Plant::new`] takes them.
 #[derive(Debug, Clone)]
@@ -69,7 +74,11 @@ impl Fitted {
             WingPlant::Parnn { .. } => return Err(BatchError::Network { vehicle }),
         };
         let stretches = craft.battery.as_ref().map_or(0, |b| b.ocv_v_of_charge.len().saturating_sub(1));
-        Ok(Self { wing, stretches, present: Present::of(&craft.effects, vehicle)? })
+        let present = Present::of(&craft.effects);
+        if let Some(effect) = present.of_sensors() {
+            return Err(BatchError::Effect { vehicle, effect });
+        }
+        Ok(Self { wing, stretches, present })
     }
 
     /// Whether the base model is all.

@@ -6,13 +6,16 @@
 use super::air::{Airs, Forecast};
 use super::battery::Packs;
 use super::craft::Fitted;
-use super::effects::{Payload, Present, Sizes};
-use super::rows::{Block, Row, put, take};
-use super::servo::{Deployment, Servo};
+use super::rows::Block;
 use super::simd::{BLOCK, Paths};
-use super::wing::{Membrane, Plate, Sides};
 use nalgebra::{Vector3, try_convert};
+use squirrel_core::aero::flat_plate;
+use squirrel_core::aero::membrane::{Membrane, Side};
+use squirrel_core::dynamics::servo::{Servo, ServoState};
+use squirrel_core::effects::{Effects, PendulumState, Prepared, Present, Swing};
+use squirrel_core::lane::{Row, put, take};
 use squirrel_core::math::real;
+use squirrel_core::vehicle::Vehicle;
 use std::collections::VecDeque;
 
 /// A command for one vehicle.
@@ -37,19 +40,22 @@ struct Late<S, const ROTORS: usize> {
 pub(super) struct Extra<S: Copy, const ROTORS: usize> {
     /// `NONE`, `FLAT` or `MEMBRANE` of `wing`, for the whole batch.
     pub(super) wing: u8,
-    pub(super) plate: Plate<Row<S>>,
+    pub(super) plate: flat_plate::Pair<Row<S>>,
     pub(super) membrane: Membrane<Row<S>>,
-    pub(super) sides: Sides<Row<S>>,
+    /// Left and right, as all that has two of a thing.
+    pub(super) sides: [Side<Row<S>>; 2],
     /// Angle of attack of each side at the last step.
     pub(super) wing_angle: [Row<S>; 2],
     pub(super) servo: Servo<Row<S>>,
-    pub(super) deployment: Deployment<Row<S>>,
+    pub(super) deployment: [ServoState<Row<S>>; 2],
     pub(super) packs: Option<Packs<S>>,
     pub(super) present: Present,
-    pub(super) sizes: Sizes<Row<S>>,
+    pub(super) effects: Prepared<Row<S>>,
     /// Signs of the rotors' spin about +z.
     pub(super) spin: [Row<S>; ROTORS],
-    pub(super) load: Payload<Row<S>>,
+    /// A load over a step; without weight where there is none.
+    pub(super) swing: Swing<Row<S>>,
+    pub(super) load: PendulumState<Row<S>>,
     pub(super) latency_steps: [u64; BLOCK],
     late: VecDeque<Late<S, ROTORS>>,
     /// Steps that the block has taken.
@@ -58,27 +64,26 @@ pub(super) struct Extra<S: Copy, const ROTORS: usize> {
 }
 
 impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
-    pub(super) fn empty(fitted: &Fitted) -> Self {
+    ///
+    /// * `vehicle` - any, of whose numbers none matter without effects
+    pub(super) fn empty(fitted: &Fitted, vehicle: &Vehicle<f64>) -> Self {
+        let without_effects = Prepared::new(&Effects::none(), vehicle);
         let none = [real::<S>(0.0); BLOCK];
         let one = [real::<S>(1.0); BLOCK];
         Self {
             wing: fitted.wing,
-            plate: Plate::all(none),
+            plate: flat_plate::Pair::all(none),
             membrane: Membrane::all(none),
-            sides: Sides { attached: [one; 2], ..Sides::all(none) },
+            sides: [Side { attached: one, ..Side::all(none) }; 2],
             wing_angle: [none; 2],
-            servo: Servo { rate_max: one, opening_s: one, closing_s: one, ..Servo::all(none) },
-            deployment: Deployment::all(none),
+            servo: Servo { rate_max_per_s: one, opening_s: one, closing_s: one, ..Servo::all(none) },
+            deployment: [ServoState::all(none); 2],
             packs: (fitted.stretches > 0).then(|| Packs::empty(fitted.stretches)),
             present: fitted.present,
-            sizes: Sizes {
-                per_reference_voltage: one,
-                per_speed_max: one,
-                ground_floor: one,
-                ..Sizes::all(none)
-            },
+            effects: without_effects.map(|number| [real(number); BLOCK]),
             spin: [none; ROTORS],
-            load: Payload::all(none),
+            swing: Swing::all(none),
+            load: PendulumState::all(none),
             latency_steps: [0; BLOCK],
             late: VecDeque::new(),
             clock: 0,
@@ -90,9 +95,11 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
     ///
     /// * `charge` - of the battery, 0..1
     pub(super) fn rest(&mut self, lane: usize, charge: S) {
-        self.sides.put(lane, &Sides::at_rest());
-        self.deployment.put(lane, &Deployment::at_rest());
-        self.load.put(lane, &Payload::all(real(0.0)));
+        for side in 0..2 {
+            self.sides[side].put(lane, &Side::at_rest());
+            self.deployment[side].put(lane, &ServoState::at_rest());
+        }
+        self.load.put(lane, &PendulumState::at_rest());
         put(&mut self.wing_angle, lane, [real(0.0); 2]);
         self.late.retain(|late| late.lane != lane);
         if let Some(packs) = &mut self.packs {
@@ -108,12 +115,10 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
 
     /// Tells the servos of a vehicle where to go; a command that changes within the dead time replaces the one that waits.
     pub(super) fn ask_wings(&mut self, lane: usize, command: [S; 2]) {
-        let state = &mut self.deployment;
-        for side in 0..2 {
-            if command[side] != state.waiting[side][lane] {
-                state.waiting[side][lane] = command[side];
-                state.wait_s[side][lane] = self.servo.dead_time[lane];
-            }
+        for (rows, command) in self.deployment.iter_mut().zip(command) {
+            let mut state = rows.take(lane);
+            state.ask(command, self.servo.dead_time_s[lane]);
+            rows.put(lane, &state);
         }
     }
 }
@@ -140,11 +145,12 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 Command::Wings(wings) => extra.ask_wings(lane, wings),
             }
         }
-        let Extra { airs, sizes, present, clock, .. } = &mut **extra;
+        let Extra { airs, effects, present, clock, .. } = &mut **extra;
         let (motion, wind) = (&self.motion, self.held.wind);
         let airspeed_m_s = |lane| {
             let through = through_air(&take(&motion.velocity, lane), &take(&wind, lane));
-            let [north, east] = sizes.take(lane).wind_at(*present, real::<S>(0.0) - motion.position[2][lane]);
+            let wind = effects.take(lane).wind(*present, real::<S>(0.0) - motion.position[2][lane]);
+            let [north, east] = wind.map(|x| try_convert::<S, f64>(x).unwrap_or(f64::NAN));
             (through - Vector3::new(north, east, 0.0)).norm()
         };
         until = airs.advance(*clock, until, &mut self.held.wind, forecast, airspeed_m_s);
@@ -155,18 +161,13 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
 
     /// Where the block has wings, what the vehicle in column `lane` shows of them: deployment, left and right.
     pub(super) fn deployment(&self, lane: usize) -> [S; 2] {
-        self.extra.as_ref().map_or([real(0.0); 2], |extra| take(&extra.deployment.now, lane))
+        self.extra
+            .as_ref()
+            .map_or([real(0.0); 2], |extra| [0, 1].map(|side| extra.deployment[side].deployment[lane]))
     }
 }
 
 /// Velocity through the air, m/s.
 fn through_air<S: Paths>(velocity: &[S; 3], wind: &[S; 3]) -> Vector3<f64> {
     Vector3::from_fn(|i, _| try_convert::<S, f64>(velocity[i] - wind[i]).unwrap_or(f64::NAN))
-}
-
-impl<S: Paths> Sizes<S> {
-    /// Wind that the effects of one vehicle add, north and east, m/s.
-    fn wind_at(&self, present: Present, height: S) -> [f64; 2] {
-        self.wind(present, height).map(|x| try_convert::<S, f64>(x).unwrap_or(f64::NAN))
-    }
 }

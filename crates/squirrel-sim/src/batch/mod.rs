@@ -8,8 +8,8 @@
 //! `squirrel_core::dynamics` in the same scalar.
 //!
 //! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles ([`Craft`]): flat wings and
-//! membranes (`wing`) with their servos (`servo`), batteries (`battery`), effects (`effects`), gusts (`air`) and late commands (`extra`),
-//! with the equations of [`crate::plant::Plant`]. What no vehicle of the batch has is not computed. A wing that is a network, and
+//! membranes with their servos, batteries (`battery`), effects, gusts (`air`) and late commands (`extra`), with the equations of
+//! [`crate::plant::Plant`], which `squirrel_core` has once for both. What no vehicle of the batch has is not computed. A wing that is a network, and
 //! effects that act on sensors or stamps (accel_bias, accel_scale, clock_skew, clock_step, compass_current, gnss_latency,
 //! gyro_scale, heading_bias), are refused.
 //!
@@ -31,23 +31,19 @@ mod autopilot;
 mod battery;
 mod craft;
 mod dynamics;
-mod effects;
 mod error;
 mod exchange;
 mod extra;
-mod maths;
 pub(crate) mod pool;
 mod rows;
-mod servo;
 pub mod simd;
-mod wing;
 
 pub use autopilot::{Autopilot, SetPoint, Tuned};
 pub use craft::Craft;
 pub use error::BatchError;
 
 use crate::plant::{MembraneParameters, ServoParameters, WingPlant};
-use craft::Fitted;
+use craft::{FLAT, Fitted};
 use dynamics::{Advance, AdvanceWhole};
 use exchange::{Chunk, Job, do_job};
 use extra::Extra;
@@ -55,9 +51,11 @@ use nalgebra::convert;
 use pool::Pool;
 use rows::{Block, Drive, Tuning};
 use simd::{BLOCK, Path, Paths};
+use squirrel_core::aero::flat_plate;
 use squirrel_core::dynamics::State;
+use squirrel_core::effects::{Prepared, Swing};
+use squirrel_core::math::real;
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
-use wing::{Membrane, Plate};
 
 /// Blocks that a thread takes at once: little enough to share out evenly, enough to be worth claiming.
 const CHUNK: usize = 4;
@@ -148,7 +146,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// no threads.
     pub fn new(vehicles: &[Vehicle<T>], settings: Settings) -> Result<Self, BatchError> {
         let drives: Vec<Drive<T>> = vehicles.iter().map(Drive::new).collect();
-        let mut batch = Self::empty(&drives, Fitted::all(&[])?, settings, plain)?;
+        let mut batch = Self::empty(&drives, Fitted::all(&[])?, None, settings, plain)?;
         for (number, vehicle) in vehicles.iter().enumerate() {
             batch.put(number, vehicle, &Tuning::none())?;
         }
@@ -176,7 +174,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             kinds.push(Drive::new(&airframe(number, craft)?.0));
         }
         let drives: Vec<Drive<T>> = kinds.iter().copied().cycle().take(count).collect();
-        let mut batch = Self::empty(&drives, fitted, settings, whole)?;
+        let mut batch =
+            Self::empty(&drives, fitted, crafts.first().map(|craft| &craft.vehicle), settings, whole)?;
         for (number, craft) in crafts.iter().cycle().take(count).enumerate() {
             batch.refit(number, craft)?;
             batch.reset(number, &State::at_rest())?;
@@ -187,6 +186,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     fn empty(
         drives: &[Drive<T>],
         fitted: Fitted,
+        vehicle: Option<&Vehicle<f64>>,
         settings: Settings,
         work: Work<T, ROTORS>,
     ) -> Result<Self, BatchError> {
@@ -204,7 +204,9 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             return Err(BatchError::NoThreads);
         }
         let mut block = Block::empty();
-        block.extra = (!fitted.is_plain()).then(|| Box::new(Extra::empty(&fitted)));
+        if let Some(vehicle) = vehicle.filter(|_| !fitted.is_plain()) {
+            block.extra = Some(Box::new(Extra::empty(&fitted, vehicle)));
+        }
         let each = BLOCK * CHUNK;
         let chunks = drives.chunks(each).enumerate();
         let chunks = chunks.map(|(number, drives)| Chunk::new(number * each, &block, drives));
@@ -255,17 +257,18 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             WingPlant::None | WingPlant::Parnn { .. } => (own, None, &still),
         };
         // Without wings in the plant there is nothing that air could push, but effects still see the declared wing.
-        let plate = if self.fitted.wing == wing::FLAT && matches!(craft.wing, WingPlant::None) {
-            None
-        } else {
-            plate
-        };
-        extra.plate.put(lane, &Plate::new(plate));
+        let plate =
+            if self.fitted.wing == FLAT && matches!(craft.wing, WingPlant::None) { None } else { plate };
+        let none = flat_plate::Pair::all(0.0);
+        extra.plate.put(lane, &plate.as_ref().map_or(none, flat_plate::Pair::new).map(real));
         let gain = if membrane.is_some() { 1.0 } else { 0.0 };
-        let membrane = membrane.unwrap_or_else(|| MembraneParameters::new(0.01, 0.1));
-        extra.membrane.put(lane, &Membrane::new(&membrane, gain));
-        extra.servo.put(lane, &servo::Servo::new(servo, effects.wing_extra_time_constant_s(), dt_s));
-        extra.sizes.put(lane, &effects::Sizes::new(effects, &whole, dt_s));
+        let mut numbers = membrane.unwrap_or_else(|| MembraneParameters::new(0.01, 0.1)).numbers();
+        numbers.force_scale *= gain;
+        extra.membrane.put(lane, &numbers.map(real));
+        extra.servo.put(lane, &servo.over(effects.wing_extra_time_constant_s(), dt_s).map(real));
+        extra.effects.put(lane, &Prepared::new(effects, &whole).map(real));
+        let swing = effects.pendulum().map_or(Swing::all(0.0), |load| load.over(dt_s));
+        extra.swing.put(lane, &swing.map(real));
         for (i, row) in extra.spin.iter_mut().enumerate() {
             row[lane] = convert(whole.rotors().get(i).map_or(0.0, |rotor| -rotor.yaw_sign));
         }

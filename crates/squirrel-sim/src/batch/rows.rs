@@ -5,107 +5,15 @@
 use super::BODY_NUMBERS;
 use super::autopilot::Autopilots;
 use super::extra::{Command, Extra};
-use super::simd::{BLOCK, Lanes, Paths};
+use super::simd::{BLOCK, Paths, Register};
 use nalgebra::{Matrix3, Quaternion, Vector3};
 use squirrel_core::dynamics::{self, RotorDrive, State};
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Acting, Effects};
 use squirrel_core::frames::{Body, In, Ned, Wrench};
+use squirrel_core::lane::Lane;
+use squirrel_core::lane::{Row, load, put, store, take};
 use squirrel_core::math::{AIR_DENSITY_KG_M3, limit, real};
-use squirrel_core::rnn::lane::Lane;
 use squirrel_core::vehicle::{CommandKind, MAX_ROTORS, Propulsion, Vehicle};
-
-/// One number of each vehicle of a block.
-pub(super) type Row<S> = [S; BLOCK];
-
-/// A structure of numbers of a vehicle: once as they are, once as rows of a block, once as registers.
-///
-/// `[n]` behind a name makes it an array of `n` numbers.
-macro_rules! rows {
-    ($(#[$about:meta])* $name:ident { $($(#[$doc:meta])* $field:ident $([$n:literal])?),* $(,)? }) => {
-        $(#[$about])*
-        #[allow(clippy::struct_field_names, reason = "a charge is a part of the state of charge")]
-        pub(super) struct $name<X> { $($(#[$doc])* pub(super) $field: rows!(@type X $($n)?)),* }
-
-        impl<X: Copy> Copy for $name<X> {}
-        #[allow(clippy::expl_impl_clone_on_copy, reason = "`derive` does not look into the types of fields")]
-        impl<X: Copy> Clone for $name<X> {
-            #[inline(always)]
-            fn clone(&self) -> Self {
-                *self
-            }
-        }
-        impl<X: core::fmt::Debug> core::fmt::Debug for $name<X> {
-            fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-                f.debug_struct(stringify!($name))$(.field(stringify!($field), &self.$field))*.finish()
-            }
-        }
-
-        #[allow(dead_code, reason = "not every structure needs every way")]
-        impl<X: Copy> $name<X> {
-            /// The same everywhere.
-            pub(super) fn all(x: X) -> Self {
-                Self { $($field: rows!(@all x $($n)?)),* }
-            }
-        }
-
-        #[allow(dead_code, reason = "not every structure needs every way")]
-        impl $name<f64> {
-            /// The same numbers in another scalar.
-            pub(super) fn cast<S: crate::batch::simd::Paths>(&self) -> $name<S> {
-                $name { $($field: rows!(@cast self $field $($n)?)),* }
-            }
-        }
-
-        #[allow(dead_code, reason = "not every structure needs every way")]
-        impl<S: crate::batch::simd::Paths> $name<crate::batch::rows::Row<S>> {
-            /// Puts the numbers of a vehicle into column `lane`.
-            pub(super) fn put(&mut self, lane: usize, numbers: &$name<S>) {
-                $(rows!(@put self numbers $field lane $($n)?);)*
-            }
-            /// The numbers in column `lane`.
-            pub(super) fn take(&self, lane: usize) -> $name<S> {
-                $name { $($field: rows!(@take self $field lane $($n)?)),* }
-            }
-        }
-
-        #[allow(dead_code, reason = "not every structure needs every way")]
-        impl<L: crate::batch::simd::Lanes> $name<L> {
-            /// Registers from column `start` and on.
-            #[inline(always)]
-            pub(super) fn load(rows: &$name<crate::batch::rows::Row<L::Weight>>, start: usize) -> Self {
-                Self { $($field: rows!(@load rows $field start $($n)?)),* }
-            }
-            /// Registers to column `start` and on.
-            #[inline(always)]
-            pub(super) fn store(&self, rows: &mut $name<crate::batch::rows::Row<L::Weight>>, start: usize) {
-                $(rows!(@store self rows $field start $($n)?);)*
-            }
-        }
-    };
-    (@type $x:ident) => { $x };
-    (@type $x:ident $n:literal) => { [$x; $n] };
-    (@all $x:ident) => { $x };
-    (@all $x:ident $n:literal) => { [$x; $n] };
-    (@cast $self:ident $field:ident) => { squirrel_core::math::real($self.$field) };
-    (@cast $self:ident $field:ident $n:literal) => { $self.$field.map(squirrel_core::math::real) };
-    (@put $self:ident $numbers:ident $field:ident $lane:ident) => { $self.$field[$lane] = $numbers.$field };
-    (@put $self:ident $numbers:ident $field:ident $lane:ident $n:literal) => {
-        crate::batch::rows::put(&mut $self.$field, $lane, $numbers.$field)
-    };
-    (@take $self:ident $field:ident $lane:ident) => { $self.$field[$lane] };
-    (@take $self:ident $field:ident $lane:ident $n:literal) => { crate::batch::rows::take(&$self.$field, $lane) };
-    (@load $rows:ident $field:ident $start:ident) => { L::load(&$rows.$field[$start..]) };
-    (@load $rows:ident $field:ident $start:ident $n:literal) => {
-        crate::batch::rows::load(&$rows.$field, $start)
-    };
-    (@store $self:ident $rows:ident $field:ident $start:ident) => {
-        $self.$field.store(&mut $rows.$field[$start..])
-    };
-    (@store $self:ident $rows:ident $field:ident $start:ident $n:literal) => {
-        crate::batch::rows::store(&$self.$field, &mut $rows.$field, $start)
-    };
-}
-pub(super) use rows;
 
 /// Rigid body and rotor speeds, in the units and frames of [`State`]; as a rate, the derivative of each.
 #[derive(Debug, Clone, Copy)]
@@ -133,9 +41,8 @@ pub(super) struct Airframe<L, const ROTORS: usize> {
     pub(super) roll: [L; ROTORS],
     pub(super) pitch: [L; ROTORS],
     pub(super) yaw: [L; ROTORS],
-    /// Inverse time constants of rotor speed, 1/s; 0 for no lag.
-    pub(super) speeding_up: L,
-    pub(super) slowing_down: L,
+    /// Inverse time constants of rotor speed, speeding up and slowing down, 1/s; 0 for no lag.
+    pub(super) inverse_lag: [L; 2],
 }
 
 /// What is held from call to call.
@@ -172,7 +79,7 @@ impl<S: Paths> Drive<S> {
 
     /// `number` where rotor `i` is one, zero where it is not.
     pub(super) fn only(&self, i: usize, number: S) -> S {
-        if i < self.rotors { number } else { <S as Lane>::zero() }
+        if i < self.rotors { number } else { <S as Lane>::of(0.0) }
     }
 }
 
@@ -216,7 +123,8 @@ fn rotor_alone<S: Paths>(vehicle: &Vehicle<S>, i: usize) -> Wrench<Body, S> {
         deployment: [real(0.0); 2],
         tether_force: In::zero(),
     };
-    dynamics::wrench(vehicle, &Effects::none(), &state, &held, |_| Wrench::zero())
+    let calm = Acting::new(&Effects::none(), vehicle);
+    dynamics::wrench(vehicle, &calm, &state, &held, |_| Wrench::zero())
 }
 
 /// Sixteen vehicles. Aligned so that no load of a row touches two lines of the cache.
@@ -243,52 +151,19 @@ pub(super) struct Block<S: Copy, const ROTORS: usize> {
 impl<S: Copy, const ROTORS: usize> Block<S, ROTORS> {
     /// Where registers begin between which all its vehicles are.
     #[inline(always)]
-    pub(super) fn starts<L: Lanes<Weight = S>>(&self) -> impl Iterator<Item = usize> + use<L, S, ROTORS> {
+    pub(super) fn starts<L: Register<Element = S>>(&self) -> impl Iterator<Item = usize> + use<L, S, ROTORS> {
         (0..self.vehicles.div_ceil(L::WIDTH)).map(|group| group * L::WIDTH)
     }
 }
 
-/// Registers from columns `start` and on of rows.
 #[inline(always)]
-pub(super) fn load<L: Lanes, const N: usize>(rows: &[Row<L::Weight>; N], start: usize) -> [L; N] {
-    let mut registers = [L::zero(); N];
-    for n in 0..N {
-        registers[n] = L::load(&rows[n][start..]);
-    }
-    registers
-}
-
-#[inline(always)]
-fn load_columns<L: Lanes>(rows: &[[Row<L::Weight>; 3]; 3], start: usize) -> [[L; 3]; 3] {
+fn load_columns<L: Register>(rows: &[[Row<L::Element>; 3]; 3], start: usize) -> [[L; 3]; 3] {
     [load(&rows[0], start), load(&rows[1], start), load(&rows[2], start)]
 }
 
-#[inline(always)]
-pub(super) fn store<L: Lanes, const N: usize>(
-    registers: &[L; N],
-    rows: &mut [Row<L::Weight>; N],
-    start: usize,
-) {
-    for n in 0..N {
-        registers[n].store(&mut rows[n][start..]);
-    }
-}
-
-/// Puts numbers into column `lane`.
-pub(super) fn put<S: Copy, const N: usize>(rows: &mut [Row<S>; N], lane: usize, numbers: [S; N]) {
-    for n in 0..N {
-        rows[n][lane] = numbers[n];
-    }
-}
-
-/// The numbers in column `lane`.
-pub(super) fn take<S: Copy, const N: usize>(rows: &[Row<S>; N], lane: usize) -> [S; N] {
-    core::array::from_fn(|n| rows[n][lane])
-}
-
-impl<L: Lanes, const ROTORS: usize> Motion<L, ROTORS> {
+impl<L: Register, const ROTORS: usize> Motion<L, ROTORS> {
     #[inline(always)]
-    pub(super) fn load(rows: &Motion<Row<L::Weight>, ROTORS>, start: usize) -> Self {
+    pub(super) fn load(rows: &Motion<Row<L::Element>, ROTORS>, start: usize) -> Self {
         Self {
             position: load(&rows.position, start),
             velocity: load(&rows.velocity, start),
@@ -299,7 +174,7 @@ impl<L: Lanes, const ROTORS: usize> Motion<L, ROTORS> {
     }
 
     #[inline(always)]
-    pub(super) fn store(&self, rows: &mut Motion<Row<L::Weight>, ROTORS>, start: usize) {
+    pub(super) fn store(&self, rows: &mut Motion<Row<L::Element>, ROTORS>, start: usize) {
         store(&self.position, &mut rows.position, start);
         store(&self.velocity, &mut rows.velocity, start);
         store(&self.attitude, &mut rows.attitude, start);
@@ -308,9 +183,9 @@ impl<L: Lanes, const ROTORS: usize> Motion<L, ROTORS> {
     }
 }
 
-impl<L: Lanes, const ROTORS: usize> Airframe<L, ROTORS> {
+impl<L: Register, const ROTORS: usize> Airframe<L, ROTORS> {
     #[inline(always)]
-    pub(super) fn load(rows: &Airframe<Row<L::Weight>, ROTORS>, start: usize) -> Self {
+    pub(super) fn load(rows: &Airframe<Row<L::Element>, ROTORS>, start: usize) -> Self {
         Self {
             inverse_mass: L::load(&rows.inverse_mass[start..]),
             inertia: load_columns(&rows.inertia, start),
@@ -321,15 +196,14 @@ impl<L: Lanes, const ROTORS: usize> Airframe<L, ROTORS> {
             roll: load(&rows.roll, start),
             pitch: load(&rows.pitch, start),
             yaw: load(&rows.yaw, start),
-            speeding_up: L::load(&rows.speeding_up[start..]),
-            slowing_down: L::load(&rows.slowing_down[start..]),
+            inverse_lag: load(&rows.inverse_lag, start),
         }
     }
 }
 
-impl<L: Lanes, const ROTORS: usize> Held<L, ROTORS> {
+impl<L: Register, const ROTORS: usize> Held<L, ROTORS> {
     #[inline(always)]
-    pub(super) fn load(rows: &Held<Row<L::Weight>, ROTORS>, start: usize) -> Self {
+    pub(super) fn load(rows: &Held<Row<L::Element>, ROTORS>, start: usize) -> Self {
         Self { wind: load(&rows.wind, start), target_speed: load(&rows.target_speed, start) }
     }
 }
@@ -337,7 +211,7 @@ impl<L: Lanes, const ROTORS: usize> Held<L, ROTORS> {
 impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
     /// Columns without a vehicle: nothing moves, nothing pulls, and no number ever becomes slow or infinite.
     pub(super) fn empty() -> Self {
-        let none = [<S as Lane>::zero(); BLOCK];
+        let none = [<S as Lane>::of(0.0); BLOCK];
         let one = [real::<S>(1.0); BLOCK];
         Self {
             motion: Motion {
@@ -357,8 +231,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 roll: [none; ROTORS],
                 pitch: [none; ROTORS],
                 yaw: [none; ROTORS],
-                speeding_up: one,
-                slowing_down: one,
+                inverse_lag: [one; 2],
             },
             held: Held { wind: [none; 3], target_speed: [none; ROTORS] },
             vehicles: BLOCK,
@@ -375,7 +248,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
     /// * `extra` - what it adds to the vehicle
     pub(super) fn put_vehicle(&mut self, lane: usize, vehicle: &Vehicle<S>, extra: &Tuning<S>) {
         let p = vehicle.parameters();
-        let zero = <S as Lane>::zero();
+        let zero = <S as Lane>::of(0.0);
         let inverse = |tau: S| if tau > zero { real::<S>(1.0) / tau } else { zero };
         let columns = |m: &Matrix3<S>| -> [[S; 3]; 3] { (*m).into() };
         let rows = &mut self.airframe;
@@ -395,10 +268,9 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
             rows.pitch[i][lane] = moment.vector.y * thrust;
             rows.yaw[i][lane] = moment.vector.z * torque;
         }
-        rows.speeding_up[lane] = inverse(p.propulsion.time_constant_up_s + extra.lag_s[0]);
-        rows.slowing_down[lane] = inverse(p.propulsion.time_constant_down_s + extra.lag_s[1]);
-        let all = rows.speeding_up.iter().chain(&rows.slowing_down);
-        self.lagless = all.copied().any(|rate| rate == zero);
+        rows.inverse_lag[0][lane] = inverse(p.propulsion.time_constant_up_s + extra.lag_s[0]);
+        rows.inverse_lag[1][lane] = inverse(p.propulsion.time_constant_down_s + extra.lag_s[1]);
+        self.lagless = rows.inverse_lag.as_flattened().iter().any(|rate| *rate == zero);
         self.full_speed[lane] = Drive::new(vehicle).full_speed::<ROTORS>().unwrap_or(real(f64::NAN));
         self.commands_are_parts = self.full_speed[..self.vehicles].iter().all(S::is_finite);
         for i in p.rotor_count..ROTORS {
@@ -422,7 +294,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
     pub(super) fn state(&self, lane: usize) -> State<S> {
         let rows = &self.motion;
         let [w, x, y, z] = take(&rows.attitude, lane);
-        let mut rotor_speed_rad_s = [<S as Lane>::zero(); MAX_ROTORS];
+        let mut rotor_speed_rad_s = [<S as Lane>::of(0.0); MAX_ROTORS];
         rotor_speed_rad_s[..ROTORS].copy_from_slice(&take(&rows.rotor_speed, lane));
         State {
             position: In::new(Vector3::from(take(&rows.position, lane))),
@@ -452,7 +324,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
             self.extra.as_ref().is_some_and(|extra| extra.latency_steps.iter().any(|steps| *steps > 0));
         if self.commands_are_parts && self.vehicles == BLOCK && !is_late {
             // What `Drive::targets` does, in an order that the compiler makes registers of.
-            let (none, one) = (<S as Lane>::zero(), real::<S>(1.0));
+            let (none, one) = (<S as Lane>::of(0.0), real::<S>(1.0));
             for (i, targets) in self.held.target_speed.iter_mut().enumerate() {
                 for (lane, target) in targets.iter_mut().enumerate() {
                     *target = limit(commands[lane * ROTORS + i], none, one) * self.full_speed[lane];

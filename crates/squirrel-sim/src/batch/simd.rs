@@ -1,60 +1,16 @@
 //! Registers, and the one place that asks the processor what it can do.
 //!
-//! A register ([`Lanes`]) holds one number of each of several vehicles, or of several windows of a network. Work that is
+//! A register ([`Register`]) holds one number of each of several vehicles, or of several windows of a network. Work that is
 //! generic over it ([`Kernel`]) is run on the widest registers there are, without being compiled for one machine. All
 //! operations are rounded the same way on every path and there is no fused multiply-add, so the paths differ in speed only.
 //!
 //! `unsafe` is here, because intrinsics may run only where the processor has them, and in `batch/exchange.rs`. The types of a path
 //! are private to this module and only [`Paths::run`] hands them out, and a [`Path`] that the processor lacks cannot be made.
 
-use core::ops::{Add, Div, Mul, Sub};
-use squirrel_core::rnn::lane::{Lane, NetScalar, tanh};
+pub use squirrel_core::lane::{BLOCK, Register};
 
-/// Vehicles, or windows, that are held side by side. Fixed, because the order of a sum over them decides its bits.
-pub const BLOCK: usize = 16;
-
-/// A register.
-pub trait Lanes: Lane<Weight: NetScalar + Bits> {
-    /// Numbers in it; a divisor of [`BLOCK`].
-    const WIDTH: usize;
-    /// From the first [`Self::WIDTH`] numbers.
-    ///
-    /// # Panics
-    /// If there are fewer.
-    fn load(from: &[Self::Weight]) -> Self;
-    /// To the first [`Self::WIDTH`] numbers.
-    ///
-    /// # Panics
-    /// If there are fewer.
-    fn store(self, to: &mut [Self::Weight]);
-    /// Square root.
-    #[must_use]
-    fn root(self) -> Self;
-    /// `then` where a number is above zero, `otherwise` where it is not or is NaN.
-    #[must_use]
-    fn where_positive(self, then: Self, otherwise: Self) -> Self;
-    /// `2^n` from [`Bits::ROUND`]` + n`, for whole `n` of normal numbers: its low bits are those of `n`.
-    #[must_use]
-    fn power_of_two(self) -> Self;
-    /// A third of the exponent and the leading bits of a positive normal number: its power -1/3 to 4 %.
-    #[must_use]
-    fn inverse_cube_root_guess(self) -> Self;
-    /// Of a positive normal number `m 2^e` with `m` in `[1, 2)`: `m` and `e`.
-    #[must_use]
-    fn mantissa_and_exponent(self) -> (Self, Self);
-}
-
-/// Scalars whose bits `Lanes` looks at.
-pub trait Bits: Sized {
-    /// 1.5 times the number whose last bit is one: adding it rounds to an integer.
-    const ROUND: Self;
-}
-impl Bits for f32 {
-    const ROUND: Self = 12_582_912.0;
-}
-impl Bits for f64 {
-    const ROUND: Self = 6_755_399_441_055_744.0;
-}
+use squirrel_core::lane::Portable;
+use squirrel_core::math::Real;
 
 /// Work that is the same on registers of any width.
 pub trait Kernel<S> {
@@ -62,7 +18,7 @@ pub trait Kernel<S> {
     type Output;
     /// The work. To be marked `inline(always)`, as all that it calls in its inner loops: code is compiled for the features of
     /// the function that it ends up in.
-    fn run<L: Lanes<Weight = S>>(self) -> Self::Output;
+    fn run<L: Register<Element = S>>(self) -> Self::Output;
 }
 
 /// Registers that the processor has. All give the same bits.
@@ -125,13 +81,13 @@ impl Path {
 }
 
 /// Scalars that have paths.
-pub trait Paths: NetScalar + Bits + Lanes<Weight = Self> {
+pub trait Paths: Real + Register<Element = Self> {
     /// Runs a kernel on the registers of a path.
     fn run<K: Kernel<Self>>(path: Path, kernel: K) -> K::Output;
 }
 
 macro_rules! paths {
-    ($scalar:ty, $width:literal, $avx2:ident, $avx512:ident, $mantissa:literal, $bias:literal, $guess:expr) => {
+    ($scalar:ty, $width:literal, $avx2:ident, $avx512:ident) => {
         impl Paths for $scalar {
             fn run<K: Kernel<Self>>(path: Path, kernel: K) -> K::Output {
                 match path.0 {
@@ -144,161 +100,27 @@ macro_rules! paths {
                 }
             }
         }
-
-        /// One number: what wider registers are compared with.
-        impl Lanes for $scalar {
-            const WIDTH: usize = 1;
-            #[inline(always)]
-            fn load(from: &[Self]) -> Self {
-                from[0]
-            }
-            #[inline(always)]
-            fn store(self, to: &mut [Self]) {
-                to[0] = self;
-            }
-            #[inline(always)]
-            fn root(self) -> Self {
-                self.sqrt()
-            }
-            #[inline(always)]
-            fn where_positive(self, then: Self, otherwise: Self) -> Self {
-                if self > 0.0 { then } else { otherwise }
-            }
-            #[inline(always)]
-            fn power_of_two(self) -> Self {
-                Self::from_bits((self.to_bits() << $mantissa).wrapping_add((1.0 as $scalar).to_bits()))
-            }
-            #[inline(always)]
-            fn inverse_cube_root_guess(self) -> Self {
-                $guess(self)
-            }
-            #[inline(always)]
-            fn mantissa_and_exponent(self) -> (Self, Self) {
-                let one = (1.0 as $scalar).to_bits();
-                let bits = self.to_bits();
-                let mantissa = Self::from_bits((bits & ((1 << $mantissa) - 1)) | one);
-                // An integer in the low bits of a number whose last bit is one.
-                let whole = (Self::ROUND / 1.5).to_bits() | (bits >> $mantissa);
-                (mantissa, Self::from_bits(whole) - (Self::ROUND / 1.5 + $bias))
-            }
-        }
     };
 }
-paths!(f32, 4, avx2_f32, avx512_f32, 23, 127.0, |x: f32| {
-    // By numbers instead of integers: registers have no product of 32 bits by 32 bits to shift down.
-    f32::from_bits((THIRDS_F32 - x.to_bits().cast_signed() as f32 * THIRD_F32) as i32 as u32)
-});
-paths!(f64, 2, avx2_f64, avx512_f64, 52, 1023.0, |x: f64| {
-    let third = ((x.to_bits() >> 32) * 0x5555_5556) >> 32;
-    f64::from_bits(0x553e_eaa8_u64.wrapping_sub(third) << 32)
-});
-
-/// Bits of the guess of a power -1/3, as a number, for 1: four thirds of the exponent's bias.
-const THIRDS_F32: f32 = 1_419_967_100.0;
-const THIRD_F32: f32 = 1.0 / 3.0;
-
-/// 128 bits of numbers in plain Rust; compilers make SSE2 or NEON of it.
-#[derive(Clone, Copy)]
-struct Portable<S, const N: usize>([S; N]);
-
-macro_rules! portable {
-    ($scalar:ty, $width:literal, $activation:expr, $($a:ident $b:ident $c:ident),*) => {
-        portable!(@operator $scalar, $width, ($($a $b),*), Add add);
-        portable!(@operator $scalar, $width, ($($a $b),*), Sub sub);
-        portable!(@operator $scalar, $width, ($($a $b),*), Mul mul);
-        portable!(@operator $scalar, $width, ($($a $b),*), Div div);
-
-        impl Lane for Portable<$scalar, $width> {
-            type Weight = $scalar;
-            #[inline(always)]
-            fn splat(weight: $scalar) -> Self {
-                Self([weight; $width])
-            }
-            #[inline(always)]
-            fn zero() -> Self {
-                Self([0.0; $width])
-            }
-            #[inline(always)]
-            fn lower(self, bound: Self) -> Self {
-                let ([$($a),*], [$($b),*]) = (self.0, bound.0);
-                Self([$($a.lower($b)),*])
-            }
-            #[inline(always)]
-            fn upper(self, bound: Self) -> Self {
-                let ([$($a),*], [$($b),*]) = (self.0, bound.0);
-                Self([$($a.upper($b)),*])
-            }
-            #[inline(always)]
-            fn activation(self) -> Self {
-                $activation(self)
-            }
-        }
-
-        impl Lanes for Portable<$scalar, $width> {
-            const WIDTH: usize = $width;
-            #[inline(always)]
-            fn load(from: &[$scalar]) -> Self {
-                let mut numbers = [0.0; $width];
-                numbers.copy_from_slice(&from[..$width]);
-                Self(numbers)
-            }
-            #[inline(always)]
-            fn store(self, to: &mut [$scalar]) {
-                to[..$width].copy_from_slice(&self.0);
-            }
-            #[inline(always)]
-            fn root(self) -> Self {
-                let [$($a),*] = self.0;
-                Self([$($a.root()),*])
-            }
-            #[inline(always)]
-            fn where_positive(self, then: Self, otherwise: Self) -> Self {
-                let ([$($a),*], [$($b),*], [$($c),*]) = (self.0, then.0, otherwise.0);
-                Self([$($a.where_positive($b, $c)),*])
-            }
-            #[inline(always)]
-            fn power_of_two(self) -> Self {
-                Self(self.0.map(Lanes::power_of_two))
-            }
-            #[inline(always)]
-            fn inverse_cube_root_guess(self) -> Self {
-                Self(self.0.map(Lanes::inverse_cube_root_guess))
-            }
-            #[inline(always)]
-            fn mantissa_and_exponent(self) -> (Self, Self) {
-                let [$(($a, $b)),*] = self.0.map(Lanes::mantissa_and_exponent);
-                (Self([$($a),*]), Self([$($b),*]))
-            }
-        }
-    };
-    (@operator $scalar:ty, $width:literal, ($($a:ident $b:ident),*), $trait:ident $method:ident) => {
-        impl $trait for Portable<$scalar, $width> {
-            type Output = Self;
-            #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                let ([$($a),*], [$($b),*]) = (self.0, other.0);
-                Self([$($a.$method($b)),*])
-            }
-        }
-    };
-}
-portable!(f32, 4, tanh, a e i, b f j, c g k, d h l);
-portable!(f64, 2, |x: Self| Self(x.0.map(Lane::activation)), a c e, b d f);
+paths!(f32, 4, avx2_f32, avx512_f32);
+paths!(f64, 2, avx2_f64, avx512_f64);
 
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "intrinsics; each use says why the processor has them")]
 mod x86 {
-    use super::{Add, BLOCK, Div, Kernel, Lane, Lanes, Mul, Sub, tanh};
+    use super::Kernel;
     use core::arch::x86_64 as intrinsic;
+    use core::ops::{Add, Div, Mul, Sub};
+    use squirrel_core::lane::{BLOCK, Lane, ROUND_F32, ROUND_F64, Register, THIRD_F32, THIRDS_F32, net_tanh};
 
     macro_rules! register {
         (
             $entry:ident $feature:literal $register:ident($inner:ident) [$scalar:ident; $width:literal]
-            $splat:ident $zero:ident $lower:ident $upper:ident $load:ident $store:ident $root:ident
+            $splat:ident $lower:ident $upper:ident $load:ident $store:ident $root:ident
             $($trait:ident $method:ident $operation:ident),*;
             $activation:expr;
             ($zeros:ident, $x:ident, $then:ident, $otherwise:ident) => $select:expr;
-            $power:expr; $guess:expr; $split:expr
+            $round:ident $power:expr; $guess:expr; $split:expr
         ) => {
             /// A value of this type exists only inside of the entry beside it.
             #[derive(Clone, Copy)]
@@ -324,16 +146,15 @@ mod x86 {
             })*
 
             impl Lane for $register {
-                type Weight = $scalar;
+                type Element = $scalar;
                 #[inline(always)]
-                fn splat(weight: $scalar) -> Self {
+                fn splat(element: $scalar) -> Self {
                     // SAFETY: called by kernels only, and those run on this type only inside of its entry.
-                    Self(unsafe { intrinsic::$splat(weight) })
+                    Self(unsafe { intrinsic::$splat(element) })
                 }
                 #[inline(always)]
-                fn zero() -> Self {
-                    // SAFETY: as for `splat`.
-                    Self(unsafe { intrinsic::$zero() })
+                fn of(constant: f64) -> Self {
+                    Self::splat(constant as $scalar)
                 }
                 #[inline(always)]
                 fn lower(self, bound: Self) -> Self {
@@ -347,12 +168,40 @@ mod x86 {
                     Self(unsafe { intrinsic::$upper(self.0, bound.0) })
                 }
                 #[inline(always)]
+                fn root(self) -> Self {
+                    // SAFETY: as for `lower`.
+                    Self(unsafe { intrinsic::$root(self.0) })
+                }
+                #[inline(always)]
+                fn where_positive(self, then: Self, otherwise: Self) -> Self {
+                    let ($zeros, $x, $then, $otherwise) = (Self::of(0.0).0, self.0, then.0, otherwise.0);
+                    // SAFETY: as for `lower`.
+                    Self(unsafe { $select })
+                }
+                #[inline(always)]
+                fn nearest_and_power_of_two(self) -> (Self, Self) {
+                    let rounded = self + Self::splat($round);
+                    // SAFETY: as for `lower`.
+                    (rounded - Self::splat($round), Self(unsafe { $power(rounded.0) }))
+                }
+                #[inline(always)]
+                fn inverse_cube_root_guess(self) -> Self {
+                    // SAFETY: as for `lower`.
+                    Self(unsafe { $guess(self.0) })
+                }
+                #[inline(always)]
+                fn mantissa_and_exponent(self) -> (Self, Self) {
+                    // SAFETY: as for `lower`.
+                    let (mantissa, exponent) = unsafe { $split(self.0) };
+                    (Self(mantissa), Self(exponent))
+                }
+                #[inline(always)]
                 fn activation(self) -> Self {
                     $activation(self)
                 }
             }
 
-            impl Lanes for $register {
+            impl Register for $register {
                 const WIDTH: usize = $width;
                 #[inline(always)]
                 fn load(from: &[$scalar]) -> Self {
@@ -366,33 +215,6 @@ mod x86 {
                     // SAFETY: the slice has as many numbers as are written, alignment is not needed; else as for `lower`.
                     unsafe { intrinsic::$store(to.as_mut_ptr(), self.0) };
                 }
-                #[inline(always)]
-                fn root(self) -> Self {
-                    // SAFETY: as for `lower`.
-                    Self(unsafe { intrinsic::$root(self.0) })
-                }
-                #[inline(always)]
-                fn where_positive(self, then: Self, otherwise: Self) -> Self {
-                    let ($zeros, $x, $then, $otherwise) = (Self::zero().0, self.0, then.0, otherwise.0);
-                    // SAFETY: as for `lower`.
-                    Self(unsafe { $select })
-                }
-                #[inline(always)]
-                fn power_of_two(self) -> Self {
-                    // SAFETY: as for `lower`.
-                    Self(unsafe { $power(self.0) })
-                }
-                #[inline(always)]
-                fn inverse_cube_root_guess(self) -> Self {
-                    // SAFETY: as for `lower`.
-                    Self(unsafe { $guess(self.0) })
-                }
-                #[inline(always)]
-                fn mantissa_and_exponent(self) -> (Self, Self) {
-                    // SAFETY: as for `lower`.
-                    let (mantissa, exponent) = unsafe { $split(self.0) };
-                    (Self(mantissa), Self(exponent))
-                }
             }
         };
     }
@@ -402,7 +224,7 @@ mod x86 {
         (
             $power:ident $guess:ident $split:ident $feature:literal $register:ident
             $to:ident $from:ident $left:ident $right:ident $and:ident $or:ident $add:ident $sub:ident $splat:ident $set:ident
-            $mantissa:literal $scalar:ty, $bias:literal;
+            $mantissa:literal $whole:ident $scalar:ty, $bias:literal;
             ($bits:ident) => $guessed:expr
         ) => {
             #[target_feature(enable = $feature)]
@@ -420,7 +242,7 @@ mod x86 {
             #[target_feature(enable = $feature)]
             #[inline]
             fn $split(x: intrinsic::$register) -> (intrinsic::$register, intrinsic::$register) {
-                let round = <$scalar as super::Bits>::ROUND / 1.5;
+                let round = $whole / 1.5;
                 let one = intrinsic::$splat((1.0 as $scalar).to_bits().cast_signed());
                 let low = intrinsic::$splat((1 << $mantissa) - 1);
                 let bits = intrinsic::$to(x);
@@ -434,25 +256,25 @@ mod x86 {
     bits!(
         avx2_power_f32 avx2_guess_f32 avx2_split_f32 "avx2" __m256
         _mm256_castps_si256 _mm256_castsi256_ps _mm256_slli_epi32 _mm256_srli_epi32 _mm256_and_si256 _mm256_or_si256
-        _mm256_add_epi32 _mm256_sub_ps _mm256_set1_epi32 _mm256_set1_ps 23 f32, 127.0;
+        _mm256_add_epi32 _mm256_sub_ps _mm256_set1_epi32 _mm256_set1_ps 23 ROUND_F32 f32, 127.0;
         (bits) => {
-            let third = intrinsic::_mm256_mul_ps(intrinsic::_mm256_cvtepi32_ps(bits), intrinsic::_mm256_set1_ps(super::THIRD_F32));
-            intrinsic::_mm256_cvttps_epi32(intrinsic::_mm256_sub_ps(intrinsic::_mm256_set1_ps(super::THIRDS_F32), third))
+            let third = intrinsic::_mm256_mul_ps(intrinsic::_mm256_cvtepi32_ps(bits), intrinsic::_mm256_set1_ps(THIRD_F32));
+            intrinsic::_mm256_cvttps_epi32(intrinsic::_mm256_sub_ps(intrinsic::_mm256_set1_ps(THIRDS_F32), third))
         }
     );
     bits!(
         avx512_power_f32 avx512_guess_f32 avx512_split_f32 "avx512f" __m512
         _mm512_castps_si512 _mm512_castsi512_ps _mm512_slli_epi32 _mm512_srli_epi32 _mm512_and_si512 _mm512_or_si512
-        _mm512_add_epi32 _mm512_sub_ps _mm512_set1_epi32 _mm512_set1_ps 23 f32, 127.0;
+        _mm512_add_epi32 _mm512_sub_ps _mm512_set1_epi32 _mm512_set1_ps 23 ROUND_F32 f32, 127.0;
         (bits) => {
-            let third = intrinsic::_mm512_mul_ps(intrinsic::_mm512_cvtepi32_ps(bits), intrinsic::_mm512_set1_ps(super::THIRD_F32));
-            intrinsic::_mm512_cvttps_epi32(intrinsic::_mm512_sub_ps(intrinsic::_mm512_set1_ps(super::THIRDS_F32), third))
+            let third = intrinsic::_mm512_mul_ps(intrinsic::_mm512_cvtepi32_ps(bits), intrinsic::_mm512_set1_ps(THIRD_F32));
+            intrinsic::_mm512_cvttps_epi32(intrinsic::_mm512_sub_ps(intrinsic::_mm512_set1_ps(THIRDS_F32), third))
         }
     );
     bits!(
         avx2_power_f64 avx2_guess_f64 avx2_split_f64 "avx2" __m256d
         _mm256_castpd_si256 _mm256_castsi256_pd _mm256_slli_epi64 _mm256_srli_epi64 _mm256_and_si256 _mm256_or_si256
-        _mm256_add_epi64 _mm256_sub_pd _mm256_set1_epi64x _mm256_set1_pd 52 f64, 1023.0;
+        _mm256_add_epi64 _mm256_sub_pd _mm256_set1_epi64x _mm256_set1_pd 52 ROUND_F64 f64, 1023.0;
         (bits) => {
             let third = intrinsic::_mm256_mul_epu32(intrinsic::_mm256_srli_epi64::<32>(bits), intrinsic::_mm256_set1_epi64x(0x5555_5556));
             let third = intrinsic::_mm256_srli_epi64::<32>(third);
@@ -462,7 +284,7 @@ mod x86 {
     bits!(
         avx512_power_f64 avx512_guess_f64 avx512_split_f64 "avx512f" __m512d
         _mm512_castpd_si512 _mm512_castsi512_pd _mm512_slli_epi64 _mm512_srli_epi64 _mm512_and_si512 _mm512_or_si512
-        _mm512_add_epi64 _mm512_sub_pd _mm512_set1_epi64 _mm512_set1_pd 52 f64, 1023.0;
+        _mm512_add_epi64 _mm512_sub_pd _mm512_set1_epi64 _mm512_set1_pd 52 ROUND_F64 f64, 1023.0;
         (bits) => {
             let third = intrinsic::_mm512_mul_epu32(intrinsic::_mm512_srli_epi64::<32>(bits), intrinsic::_mm512_set1_epi64(0x5555_5556));
             let third = intrinsic::_mm512_srli_epi64::<32>(third);
@@ -472,7 +294,7 @@ mod x86 {
 
     /// The exact activation, one number after the other: gradient checks have time.
     #[inline(always)]
-    fn one_by_one<L: Lanes<Weight = f64>>(x: L) -> L {
+    fn one_by_one<L: Register<Element = f64>>(x: L) -> L {
         let mut numbers = [0.0; BLOCK];
         x.store(&mut numbers);
         for number in &mut numbers[..L::WIDTH] {
@@ -483,42 +305,42 @@ mod x86 {
 
     register!(
         avx2_f32 "avx2" Avx2F32(__m256) [f32; 8]
-        _mm256_set1_ps _mm256_setzero_ps _mm256_min_ps _mm256_max_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_sqrt_ps
+        _mm256_set1_ps _mm256_min_ps _mm256_max_ps _mm256_loadu_ps _mm256_storeu_ps _mm256_sqrt_ps
         Add add _mm256_add_ps, Sub sub _mm256_sub_ps, Mul mul _mm256_mul_ps, Div div _mm256_div_ps;
-        tanh;
+        net_tanh;
         (zero, x, then, otherwise) => intrinsic::_mm256_blendv_ps(
             otherwise, then, intrinsic::_mm256_cmp_ps::<{ intrinsic::_CMP_GT_OQ }>(x, zero)
         );
-        avx2_power_f32; avx2_guess_f32; avx2_split_f32
+        ROUND_F32 avx2_power_f32; avx2_guess_f32; avx2_split_f32
     );
     register!(
         avx2_f64 "avx2" Avx2F64(__m256d) [f64; 4]
-        _mm256_set1_pd _mm256_setzero_pd _mm256_min_pd _mm256_max_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_sqrt_pd
+        _mm256_set1_pd _mm256_min_pd _mm256_max_pd _mm256_loadu_pd _mm256_storeu_pd _mm256_sqrt_pd
         Add add _mm256_add_pd, Sub sub _mm256_sub_pd, Mul mul _mm256_mul_pd, Div div _mm256_div_pd;
         one_by_one;
         (zero, x, then, otherwise) => intrinsic::_mm256_blendv_pd(
             otherwise, then, intrinsic::_mm256_cmp_pd::<{ intrinsic::_CMP_GT_OQ }>(x, zero)
         );
-        avx2_power_f64; avx2_guess_f64; avx2_split_f64
+        ROUND_F64 avx2_power_f64; avx2_guess_f64; avx2_split_f64
     );
     register!(
         avx512_f32 "avx512f" Avx512F32(__m512) [f32; 16]
-        _mm512_set1_ps _mm512_setzero_ps _mm512_min_ps _mm512_max_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_sqrt_ps
+        _mm512_set1_ps _mm512_min_ps _mm512_max_ps _mm512_loadu_ps _mm512_storeu_ps _mm512_sqrt_ps
         Add add _mm512_add_ps, Sub sub _mm512_sub_ps, Mul mul _mm512_mul_ps, Div div _mm512_div_ps;
-        tanh;
+        net_tanh;
         (zero, x, then, otherwise) => intrinsic::_mm512_mask_blend_ps(
             intrinsic::_mm512_cmp_ps_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero), otherwise, then
         );
-        avx512_power_f32; avx512_guess_f32; avx512_split_f32
+        ROUND_F32 avx512_power_f32; avx512_guess_f32; avx512_split_f32
     );
     register!(
         avx512_f64 "avx512f" Avx512F64(__m512d) [f64; 8]
-        _mm512_set1_pd _mm512_setzero_pd _mm512_min_pd _mm512_max_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_sqrt_pd
+        _mm512_set1_pd _mm512_min_pd _mm512_max_pd _mm512_loadu_pd _mm512_storeu_pd _mm512_sqrt_pd
         Add add _mm512_add_pd, Sub sub _mm512_sub_pd, Mul mul _mm512_mul_pd, Div div _mm512_div_pd;
         one_by_one;
         (zero, x, then, otherwise) => intrinsic::_mm512_mask_blend_pd(
             intrinsic::_mm512_cmp_pd_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero), otherwise, then
         );
-        avx512_power_f64; avx512_guess_f64; avx512_split_f64
+        ROUND_F64 avx512_power_f64; avx512_guess_f64; avx512_split_f64
     );
 }

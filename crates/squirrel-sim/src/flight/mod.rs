@@ -280,7 +280,7 @@ impl Setup {
             let time_us = step * PLANT_STEP_US;
             let plant = plant_at(&failing, time_us);
             if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
-                let through_air = state.body.velocity - total_wind(plant.effects(), &state.body, air);
+                let through_air = state.body.velocity - total_wind(plant.acting(), &state.body, air);
                 for wind in &mut winds {
                     wind.advance((time_us - last_tick_us) as f64 * 1e-6, || through_air.vector.norm());
                 }
@@ -315,7 +315,7 @@ impl Setup {
                         battery,
                         &output,
                         &state,
-                        total_wind(plant.effects(), &state.body, air),
+                        total_wind(plant.acting(), &state.body, air),
                         plant.wing_force(&state, air, state.deployment()),
                     );
                 }
@@ -386,7 +386,7 @@ fn velocity_of(winds: &[Wind]) -> In<Ned, f64> {
 }
 
 fn truth(plant: &Plant, state: &PlantState, air: In<Ned, f64>) -> Truth {
-    let through_air = state.body.velocity - total_wind(plant.effects(), &state.body, air);
+    let through_air = state.body.velocity - total_wind(plant.acting(), &state.body, air);
     Truth {
         position: state.body.position,
         velocity: state.body.velocity,

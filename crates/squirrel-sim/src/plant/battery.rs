@@ -1,8 +1,8 @@
-//! Battery: open-circuit voltage over charge, inner resistance, one RC pair (docs/equations.md D.5).
+//! The numbers of a battery; its equations are [`squirrel_core::dynamics::battery`].
 //!
-//! `V = OCV(charge) - I R0 - V1`, `V1' = (I R1 - V1) / tau1`, `charge' = -I / capacity`. The current carries the rotors'
-//! shaft power: `I = sum(Q_i Omega_i) / (efficiency V) + idle`. The simulator always computes the voltage; thrust feels it
-//! only through the `battery_sag` effect.
+//! The simulator always computes the voltage; thrust feels it only through the `battery_sag` effect.
+
+use squirrel_core::dynamics::battery::{self, Pack, Stretch};
 
 /// Numbers of a battery pack.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,17 +26,7 @@ pub struct BatteryParameters {
 }
 
 /// What a battery remembers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BatteryState {
-    /// Charge, 1 full to 0 empty.
-    pub charge: f64,
-    /// Voltage of the RC pair, V.
-    pub rc_voltage_v: f64,
-    /// Terminal voltage, V.
-    pub voltage_v: f64,
-    /// Current, A.
-    pub current_a: f64,
-}
+pub type BatteryState = battery::Charge<f64>;
 
 impl BatteryParameters {
     pub(crate) fn check(&self) -> Result<(), String> {
@@ -78,28 +68,48 @@ impl BatteryParameters {
         BatteryState { charge, rc_voltage_v: 0.0, voltage_v: self.open_circuit_v(charge), current_a: 0.0 }
     }
 
+    /// What does not change in steps of a length, s.
+    pub fn pack(&self, dt_s: f64) -> Pack<f64> {
+        let cells = f64::from(self.cells);
+        Pack {
+            efficiency: self.efficiency,
+            floor_v: 0.5 * cells * self.ocv_v_of_charge[0][1],
+            idle_a: self.idle_current_a,
+            r0_ohm: self.r0_ohm,
+            r1_ohm: self.r1_ohm,
+            decay: 1.0 - (-dt_s / self.tau1_s).exp(),
+            capacity_as: 3600.0 * self.capacity_ah,
+            cells,
+        }
+    }
+
+    /// The table of voltages, stretch by stretch.
+    pub fn stretches(&self) -> impl Iterator<Item = Stretch<f64>> + '_ {
+        self.ocv_v_of_charge.windows(2).map(|ends| Stretch {
+            from: ends[0][0],
+            width: ends[1][0] - ends[0][0],
+            volt: ends[0][1],
+            rise: ends[1][1] - ends[0][1],
+        })
+    }
+
     /// Open-circuit voltage of the pack, V; held beyond the ends of the table.
     pub fn open_circuit_v(&self, charge: f64) -> f64 {
-        let table = &self.ocv_v_of_charge;
-        let i = table.iter().rposition(|[c, _]| *c <= charge).unwrap_or(0).min(table.len() - 2);
-        let ([c0, v0], [c1, v1]) = (table[i], table[i + 1]);
-        let share = ((charge - c0) / (c1 - c0)).clamp(0.0, 1.0);
-        f64::from(self.cells) * (v0 + (v1 - v0) * share)
+        f64::from(self.cells) * self.stretch(charge).volt_at(charge)
+    }
+
+    fn stretch(&self, charge: f64) -> Stretch<f64> {
+        let nowhere = Stretch { from: 0.0, width: 1.0, volt: 0.0, rise: 0.0 };
+        self.stretches().reduce(|on, next| on.or_next(&next, charge)).unwrap_or(nowhere)
     }
 
     /// One step.
     ///
+    /// * `pack` - see [`Self::pack`]
     /// * `shaft_power_w` - of all rotors
-    /// * `decay` - `1 - exp(-dt / tau1)`
-    pub fn step(&self, state: &mut BatteryState, shaft_power_w: f64, dt_s: f64, decay: f64) {
-        // Below half of a cell's lowest voltage the power law would ask for unbounded current.
-        let floor = 0.5 * f64::from(self.cells) * self.ocv_v_of_charge[0][1];
-        let current = shaft_power_w / (self.efficiency * state.voltage_v.max(floor)) + self.idle_current_a;
-        state.rc_voltage_v += (current * self.r1_ohm - state.rc_voltage_v) * decay;
-        state.charge = (state.charge - current * dt_s / (3600.0 * self.capacity_ah)).max(0.0);
-        state.current_a = current;
-        state.voltage_v =
-            (self.open_circuit_v(state.charge) - current * self.r0_ohm - state.rc_voltage_v).max(0.0);
+    pub fn step(&self, pack: &Pack<f64>, state: &mut BatteryState, shaft_power_w: f64, dt_s: f64) {
+        pack.discharge(state, shaft_power_w, dt_s);
+        pack.settle(state, &self.stretch(state.charge));
     }
 }
 
@@ -125,12 +135,12 @@ mod tests {
         let b = battery();
         let mut s = b.rested(1.0);
         assert!((s.voltage_v - 16.8).abs() < 1e-12);
-        let decay = 1.0 - (-1e-3_f64 / b.tau1_s).exp();
-        b.step(&mut s, 200.0, 1e-3, decay);
+        let pack = b.pack(1e-3);
+        b.step(&pack, &mut s, 200.0, 1e-3);
         let first = s.voltage_v;
         assert!((16.8 - first - s.current_a * 0.03).abs() < 1e-3, "first drop is ohmic");
         for _ in 0..20_000 {
-            b.step(&mut s, 200.0, 1e-3, decay);
+            b.step(&pack, &mut s, 200.0, 1e-3);
         }
         let slow = b.open_circuit_v(s.charge) - s.current_a * (0.03 + 0.01);
         assert!((s.voltage_v - slow).abs() < 0.01 && s.voltage_v < first);
@@ -142,7 +152,7 @@ mod tests {
         let mut s = b.rested(1.0);
         let mut ampere_seconds = 0.0;
         for _ in 0..10_000 {
-            b.step(&mut s, 150.0, 1e-2, 1.0 - (-1e-2_f64 / 4.0).exp());
+            b.step(&b.pack(1e-2), &mut s, 150.0, 1e-2);
             ampere_seconds += s.current_a * 1e-2;
         }
         assert!((1.0 - s.charge - ampere_seconds / 3600.0).abs() < 1e-9);
@@ -153,7 +163,7 @@ mod tests {
         let b = battery();
         let mut s = b.rested(0.0);
         for _ in 0..1000 {
-            b.step(&mut s, 1e4, 1e-2, 0.01);
+            b.step(&b.pack(1e-2), &mut s, 1e4, 1e-2);
         }
         assert!(s.voltage_v >= 0.0 && s.current_a.is_finite() && s.charge == 0.0);
     }

@@ -99,12 +99,14 @@ impl Plant {
                 return;
             };
             // Mostly both are, and an exponential is dear.
-            if state.servo.iter().zip(wing_command).all(|(state, command)| servo.rests(state, command)) {
+            let wing_command = wing_command.map(|command| command.clamp(0.0, 1.0));
+            if state.servo.iter().zip(wing_command).all(|(state, command)| state.rests(command)) {
                 return;
             }
-            let lag = servo.lag(self.effects.wing_extra_time_constant_s(), dt_s);
-            for (servo_state, command) in state.servo.iter_mut().zip(wing_command) {
-                servo.lead(servo_state, command, &lag);
+            let servo = servo.over(self.effects.wing_extra_time_constant_s(), dt_s);
+            for (state, command) in state.servo.iter_mut().zip(wing_command) {
+                state.ask(command, servo.dead_time_s);
+                servo.lead(state, dt_s);
             }
         }
     }
@@ -115,7 +117,7 @@ impl Plant {
             && state.led_s > 0.0
         {
             let acceleration = (motion.velocity - state.body.velocity) * (1.0 / state.led_s);
-            load.lead(&mut state.load, acceleration, state.led_s);
+            load.over(state.led_s).lead(&mut state.load, acceleration.vector.xy().into());
         }
         state.body = State { rotor_speed_rad_s: actuators.rotor_speed_rad_s, ..*motion };
         (state.drive, state.servo) = (actuators.drive, actuators.servo);
@@ -158,7 +160,7 @@ impl Plant {
         state.led_s = dt_s;
         state.time_s += dt_s;
         let Some([before, after]) = deployment.filter(|_| dt_s > 0.0) else { return };
-        let air = || dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, In::zero()));
+        let air = || dynamics::air(&state.body, dynamics::total_wind(&self.acting, &state.body, In::zero()));
         match &self.wing {
             WingPlant::None | WingPlant::Flat { .. } => {}
             WingPlant::Membrane { membrane, .. } => {

@@ -4,7 +4,6 @@
 //! speeds and membrane together by RK4. Battery, servos, load and wind are stepped exactly beside it.
 
 mod battery;
-mod fast_math;
 mod lead;
 mod membrane;
 mod parnn_wing;
@@ -15,14 +14,17 @@ pub use battery::{BatteryParameters, BatteryState};
 pub use lead::{Actuators, Led};
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
 pub use parnn_wing::{ParnnWing, ParnnWingState};
-pub use servo::{ServoLag, ServoParameters, ServoState};
+pub use servo::{ServoParameters, ServoState};
 pub use wind::{GustModel, Wind, WindParameters};
 
 use squirrel_core::aero::Air;
 use squirrel_core::aero::flat_plate;
+use squirrel_core::dynamics::battery::{Pack, shaft_power_w};
+use squirrel_core::dynamics::servo::Servo;
 use squirrel_core::dynamics::{self, Held, RotorDrive, State, VectorSpace, rk4};
-use squirrel_core::effects::{Effects, Pendulum, PendulumState};
+use squirrel_core::effects::{Acting, Effects, Pendulum, PendulumState, Swing};
 use squirrel_core::frames::{Body, In, Ned, Wrench};
+use squirrel_core::nalgebra::Vector3;
 use squirrel_core::vehicle::{PerRotor, Vehicle, Wing};
 
 /// How the wings of the plant behave. Independent of what the controller believes.
@@ -70,12 +72,14 @@ impl WingPlant {
 pub struct Plant {
     vehicle: Vehicle<f64>,
     effects: Effects<f64>,
+    acting: Acting<f64>,
     wing: WingPlant,
-    battery: Option<BatteryParameters>,
+    battery: Option<(BatteryParameters, Pack<f64>)>,
     dt_s: f64,
-    battery_decay: f64,
-    servo_lag: Option<ServoLag>,
+    servo: Option<Servo<f64>>,
     load: Option<Pendulum<f64>>,
+    /// The load over a step.
+    swing: Option<Swing<f64>>,
     /// Commands are rotor speeds, rad/s, that the rotors have at once.
     rotor_speeds: bool,
 }
@@ -164,16 +168,16 @@ impl Plant {
             }
         }
         let vehicle = effects.alter(&vehicle).map_err(|e| format!("with effects, {e}"))?;
-        let servo_lag = match &wing {
-            WingPlant::None => None,
-            WingPlant::Flat { servo, .. }
-            | WingPlant::Membrane { servo, .. }
-            | WingPlant::Parnn { servo, .. } => Some(servo.lag(effects.wing_extra_time_constant_s(), dt_s)),
-        };
+        let servo = wing.servo().map(|servo| servo.over(effects.wing_extra_time_constant_s(), dt_s));
         let load = effects.pendulum();
-        let battery_decay = battery.as_ref().map_or(1.0, |b| 1.0 - (-dt_s / b.tau1_s).exp());
+        let swing = load.map(|load| load.over(dt_s));
+        let battery = battery.map(|battery| {
+            let pack = battery.pack(dt_s);
+            (battery, pack)
+        });
+        let acting = Acting::new(&effects, &vehicle);
         let rotor_speeds = false;
-        Ok(Self { vehicle, effects, wing, battery, dt_s, battery_decay, servo_lag, load, rotor_speeds })
+        Ok(Self { vehicle, effects, acting, wing, battery, dt_s, servo, load, swing, rotor_speeds })
     }
 
     /// The airframe, with what effects change of it.
@@ -183,6 +187,10 @@ impl Plant {
     /// The effects that act.
     pub fn effects(&self) -> &Effects<f64> {
         &self.effects
+    }
+    /// What of them acts in every step.
+    pub fn acting(&self) -> &Acting<f64> {
+        &self.acting
     }
     /// Step, s.
     pub fn dt_s(&self) -> f64 {
@@ -194,7 +202,7 @@ impl Plant {
     /// * `charge` - of the battery, 0..1
     pub fn initial_state(&self, body: State<f64>, charge: f64) -> PlantState {
         let battery = match &self.battery {
-            Some(battery) => battery.rested(charge),
+            Some((battery, _)) => battery.rested(charge),
             None => BatteryState {
                 charge,
                 rc_voltage_v: 0.0,
@@ -208,7 +216,7 @@ impl Plant {
             parnn: ParnnWingState::new(),
             wing_angle_rad: [0.0; 2],
             wing_angle_rate_rad_s: [0.0; 2],
-            servo: [ServoState::default(); 2],
+            servo: [ServoState::at_rest(); 2],
             battery,
             time_s: 0.0,
             load: PendulumState::at_rest(),
@@ -266,7 +274,7 @@ impl Plant {
         if self.rotor_speeds {
             RotorDrive::holding(*rotor_command)
         } else {
-            RotorDrive::new(&self.vehicle, &self.effects, rotor_command, battery_voltage_v)
+            RotorDrive::new(&self.vehicle, &self.acting, rotor_command, battery_voltage_v)
         }
     }
 
@@ -277,7 +285,8 @@ impl Plant {
 
     #[inline(always)]
     fn held(&self, state: &PlantState, wind: In<Ned, f64>, deployment: [f64; 2]) -> Held<f64> {
-        let tether_force = self.load.map_or(In::zero(), |load| load.force(&state.load));
+        let tether_force =
+            self.swing.map_or(In::zero(), |swing| In::new(Vector3::from(swing.force(&state.load))));
         Held { drive: state.drive, wind, deployment, tether_force }
     }
 
@@ -289,15 +298,15 @@ impl Plant {
         wind: In<Ned, f64>,
         body: impl FnOnce(State<f64>) -> State<f64>,
     ) {
-        let (vehicle, effects, dt) = (&self.vehicle, &self.effects, self.dt_s);
+        let (vehicle, effects, dt) = (&self.vehicle, &self.acting, self.dt_s);
         let before = state.body;
         let next = match &self.wing {
             WingPlant::None => {
                 let held = self.held(state, wind, [0.0; 2]);
                 rk4(before, dt, |s| dynamics::derivative(vehicle, effects, s, &held, |_| Wrench::zero()))
             }
-            WingPlant::Flat { wing, servo } => {
-                let deployment = self.deploy(state, servo, wing_command);
+            WingPlant::Flat { wing, .. } => {
+                let deployment = self.deploy(state, wing_command);
                 let held = self.held(state, wind, deployment);
                 rk4(before, dt, |s| {
                     dynamics::derivative(vehicle, effects, s, &held, |air| {
@@ -305,8 +314,8 @@ impl Plant {
                     })
                 })
             }
-            WingPlant::Membrane { membrane, servo } => {
-                let deployment = self.deploy(state, servo, wing_command);
+            WingPlant::Membrane { membrane, .. } => {
+                let deployment = self.deploy(state, wing_command);
                 let held = self.held(state, wind, deployment);
                 let air = dynamics::air(&before, dynamics::total_wind(effects, &before, wind));
                 state.turn_wings(membrane.angle_of_attack(&air), dt);
@@ -323,8 +332,8 @@ impl Plant {
                 state.membrane = moved.membrane;
                 moved.body
             }
-            WingPlant::Parnn { parnn, servo } => {
-                let deployment = self.deploy(state, servo, wing_command);
+            WingPlant::Parnn { parnn, .. } => {
+                let deployment = self.deploy(state, wing_command);
                 let held = self.held(state, wind, deployment);
                 let said = &state.parnn;
                 rk4(before, dt, |s| {
@@ -339,14 +348,14 @@ impl Plant {
             let air = dynamics::air(&state.body, dynamics::total_wind(effects, &state.body, wind));
             parnn.pass(&mut state.parnn, &air, dt);
         }
-        if let Some(battery) = &self.battery {
+        if let Some((battery, pack)) = &self.battery {
             let k_m = vehicle.parameters().propulsion.torque_coefficient_n_m_s2;
-            let power: f64 = before.rotor_speed_rad_s.iter().map(|w| k_m * w * w * w).sum();
-            battery.step(&mut state.battery, power, dt, self.battery_decay);
+            let power: f64 = before.rotor_speed_rad_s.iter().map(|w| shaft_power_w(k_m, *w)).sum();
+            battery.step(pack, &mut state.battery, power, dt);
         }
-        if let Some(load) = &self.load {
+        if let Some(swing) = &self.swing {
             let acceleration = (state.body.velocity - before.velocity) * (1.0 / dt);
-            load.lead(&mut state.load, acceleration, dt);
+            swing.lead(&mut state.load, acceleration.vector.xy().into());
         }
         state.time_s += dt;
         state.led_s = 0.0;
@@ -354,13 +363,13 @@ impl Plant {
 
     /// Mean deployment over a step.
     #[inline(always)]
-    fn deploy(&self, state: &mut PlantState, servo: &ServoParameters, command: [f64; 2]) -> [f64; 2] {
+    fn deploy(&self, state: &mut PlantState, command: [f64; 2]) -> [f64; 2] {
         let mut mean = [0.0; 2];
-        let Some(lag) = &self.servo_lag else { return mean };
+        let Some(servo) = &self.servo else { return mean };
         for side in 0..2 {
-            let before = state.servo[side].deployment;
-            servo.lead(&mut state.servo[side], command[side], lag);
-            mean[side] = 0.5 * (before + state.servo[side].deployment);
+            let state = &mut state.servo[side];
+            state.ask(command[side].clamp(0.0, 1.0), servo.dead_time_s);
+            mean[side] = servo.lead(state, self.dt_s);
         }
         mean
     }
@@ -381,14 +390,14 @@ impl Plant {
     pub fn wrench(&self, state: &PlantState, wind: In<Ned, f64>) -> Wrench<Body, f64> {
         let deployment = state.deployment();
         let held = self.held(state, wind, deployment);
-        dynamics::wrench(&self.vehicle, &self.effects, &state.body, &held, |air| {
+        dynamics::wrench(&self.vehicle, &self.acting, &state.body, &held, |air| {
             self.wing_wrench(state, air, deployment)
         })
     }
 
     /// Force of the wings at a deployment, left and right, N: [`PlantState::deployment`] for now, 1 for as if spread.
     pub fn wing_force(&self, state: &PlantState, wind: In<Ned, f64>, deployment: [f64; 2]) -> In<Body, f64> {
-        let air = dynamics::air(&state.body, dynamics::total_wind(&self.effects, &state.body, wind));
+        let air = dynamics::air(&state.body, dynamics::total_wind(&self.acting, &state.body, wind));
         self.wing_wrench(state, &air, deployment).force
     }
 }
