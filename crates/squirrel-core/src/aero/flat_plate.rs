@@ -6,9 +6,11 @@
 use crate::aero::{Air, Airflow, BodyWrench};
 use crate::frames::{Body, Frame, In, Wrench};
 use crate::lane::Lane;
+use crate::lane::vector::{dot, scaled};
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
 use crate::numbers;
 use crate::vehicle::Wing;
+use nalgebra::Vector3;
 
 /// Force of the air on the plate, N, in the frame of its arguments.
 ///
@@ -17,8 +19,20 @@ use crate::vehicle::Wing;
 /// * `area_m2` - plate area
 #[inline(always)]
 pub fn force<F: Frame, T: Real>(velocity: In<F, T>, normal: In<F, T>, area_m2: T) -> In<F, T> {
-    let (v, n) = (velocity.vector, normal.vector);
-    In::new(n * (-real::<T>(AIR_DENSITY_KG_M3) * area_m2 * v.norm() * n.dot(&v)))
+    In::new(Vector3::from(plate(&velocity.vector.into(), &normal.vector.into(), area_m2)))
+}
+
+/// [`force`] on lanes.
+#[inline(always)]
+pub fn plate<L: Lane>(velocity: &[L; 3], normal: &[L; 3], area_m2: L) -> [L; 3] {
+    let impedance = impedance(area_m2, dot(velocity, velocity).root());
+    scaled(normal, impedance * dot(normal, velocity))
+}
+
+/// `-rho A |v|`, N s/m: times a speed through the plate it is the plate's force.
+#[inline(always)]
+pub fn impedance<L: Lane>(area_m2: L, speed: L) -> L {
+    L::of(-AIR_DENSITY_KG_M3) * area_m2 * speed
 }
 
 /// Wrench of a left and a right plate.
@@ -80,7 +94,6 @@ impl<L: Lane> Pair<L> {
 mod tests {
     use super::*;
     use crate::frames::{Ned, Rotation};
-    use nalgebra::Vector3;
 
     const AREA_M2: f64 = 0.04;
 

@@ -23,7 +23,7 @@ use crate::effects::{Acting, Effects, Prepared, Present, Situation};
 use crate::frames::{Body, In, Ned, Wrench};
 use crate::lane::Lane;
 use crate::lane::vector::{cross, plus, rotation, transposed_times};
-use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
+use crate::math::{GRAVITY_M_S2, Real};
 use crate::vehicle::Vehicle;
 use nalgebra::{Matrix3, Vector3};
 
@@ -58,8 +58,7 @@ fn rotation_matrix<T: Real>(state: &State<T>) -> Matrix3<T> {
 pub fn drag<T: Real>(vehicle: &Vehicle<T>, air: &Air<T>) -> In<Body, T> {
     let drag = &vehicle.parameters().drag;
     let flow = Airflow::from(air);
-    let per_square = real::<T>(0.5 * AIR_DENSITY_KG_M3) * drag.area_m2;
-    -In::new(Vector3::from(aero::drag(&drag.linear_n_s_per_m.into(), per_square, &flow)))
+    -In::new(Vector3::from(aero::drag(&drag.linear_n_s_per_m.into(), drag.per_square(), &flow)))
 }
 
 /// What is held over a step.

@@ -8,11 +8,11 @@
 //!
 //! `sin(alpha)` and `cos(alpha)` are ratios of velocities, so neither an arc sine nor the printed inverse of a matrix is
 //! needed: clipped means `cos(alpha + alpha_w) < 0`, and then `n_f` lies along the motion. Where `alpha_w = 0` and
-//! `gamma = 1` what remains is, bit for bit, [`flat_plate::force`](crate::aero::flat_plate::force).
+//! `gamma = 1` what remains is, bit for bit, [`flat_plate::force`].
 
+use crate::aero::flat_plate;
 use crate::frames::{Body, In};
-use crate::math::Real;
-use crate::math::{AIR_DENSITY_KG_M3, real, upper};
+use crate::math::{Real, real, upper};
 use nalgebra::Vector3;
 
 /// Below this speed, m/s, the direction of the flow means nothing and the wing has no force.
@@ -55,7 +55,7 @@ impl<T: Real> Flow<T> {
     /// * `area_m2` - plate area
     #[inline(always)]
     pub fn impedance(&self, area_m2: T) -> T {
-        -real::<T>(AIR_DENSITY_KG_M3) * area_m2 * self.speed
+        flat_plate::impedance(area_m2, self.speed)
     }
 
     /// The body vector with these components along `e_t` and along the normal.
@@ -138,7 +138,6 @@ pub fn force<T: Real>(flow: &Flow<T>, correction: Correction<T>, area_m2: T) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::aero::flat_plate;
     use core::f64::consts::{FRAC_PI_2, PI};
 
     const AREA_M2: f64 = 0.04;

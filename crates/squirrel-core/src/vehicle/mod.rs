@@ -12,7 +12,7 @@ pub use thrust_curve::ThrustCurve;
 
 use crate::effects::Alteration;
 use crate::frames::{Body, In};
-use crate::math::{GRAVITY_M_S2, Real, real};
+use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
 use nalgebra::{Matrix3, Vector3};
 
 /// Most rotors a vehicle may have. Rotor loops run over blocks of [`ROTOR_BLOCK`]; unused places are zero.
@@ -73,6 +73,14 @@ pub struct Drag<T: Real> {
     pub linear_n_s_per_m: Vector3<T>,
     /// Drag area `C_d A`, m^2: `F = -1/2 rho C_d A |v| v`.
     pub area_m2: T,
+}
+
+impl<T: Real> Drag<T> {
+    /// `1/2 rho C_d A`, N s^2/m^2.
+    #[inline(always)]
+    pub fn per_square(&self) -> T {
+        real::<T>(0.5 * AIR_DENSITY_KG_M3) * self.area_m2
+    }
 }
 
 /// A pair of wings that lie in the body's x-y plane when spread.

@@ -6,8 +6,8 @@
 
 use crate::wing::WingForce;
 use nalgebra::Vector3;
+use squirrel_core::aero::flat_plate;
 use squirrel_core::frames::In;
-use squirrel_core::math::AIR_DENSITY_KG_M3;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Intervals between nodes; a line misses the membrane by less than a millinewton.
@@ -34,7 +34,7 @@ impl Polar {
     /// * `speed_m_s` - through the air
     pub(super) fn new(wing: &WingForce, speed_m_s: f64) -> Self {
         if let WingForce::Flat { area_m2 } = wing {
-            return Self::Flat { force_n: AIR_DENSITY_KG_M3 * area_m2 * speed_m_s * speed_m_s };
+            return Self::Flat { force_n: -flat_plate::impedance(*area_m2, speed_m_s) * speed_m_s };
         }
         let step = PI / INTERVALS as f64;
         let middle = INTERVALS / 2;

@@ -10,8 +10,12 @@
 
 use crate::wing::{WingForce, WingModel};
 use nalgebra::{Matrix3, Vector3};
+use squirrel_core::aero::flat_plate::plate;
+use squirrel_core::aero::{self, Airflow};
 use squirrel_core::frames::In;
-use squirrel_core::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2};
+use squirrel_core::lane::vector::dot;
+use squirrel_core::lane::{Dual, Lane};
+use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Rounds in which the acceleration at the end of a step is found, which depends on the velocity there. Each gains a factor of a hundred.
@@ -116,7 +120,7 @@ impl Craft {
             tilt_rate_max_rad_s: TILT_RATE_MAX_RAD_S,
             thrust_rate_max_n_s: thrust_max_n / THRUST_TIME_S,
             drag_n_s_m: 0.5 * (linear.x + linear.y),
-            drag_n_s2_m2: 0.5 * AIR_DENSITY_KG_M3 * p.drag.area_m2,
+            drag_n_s2_m2: p.drag.per_square(),
             wing: wing.map(|model| WingForce::of(vehicle, model)).transpose()?,
             wing_rate_max_per_s: 1.0 / servo_s,
             air: Air::calm(),
@@ -135,7 +139,7 @@ impl Craft {
     /// * `spread` - deployment of the wings, 0 to 1
     pub fn acceleration(&self, v: &Vector3<f64>, thrust: &Vector3<f64>, spread: f64) -> Vector3<f64> {
         let through = v - self.air.wind;
-        let mut force = -thrust - through * (self.drag_n_s_m + self.drag_n_s2_m2 * through.norm());
+        let mut force = -thrust - Vector3::from(self.drag(&through.into()));
         if spread > 0.0 {
             force += self.wing_force(&through, &unit(thrust)) * spread;
         }
@@ -150,10 +154,8 @@ impl Craft {
     /// How the acceleration changes with velocity, thrust and wings, at a place in that space.
     pub fn slopes(&self, v: &Vector3<f64>, thrust: &Vector3<f64>, spread: f64) -> Slopes {
         let v = v - self.air.wind;
-        let speed = v.norm();
-        let along = if speed > 1e-6 { v * v.transpose() / speed } else { Matrix3::zeros() };
-        let mut by_velocity = (Matrix3::identity() * speed + along) * -self.drag_n_s2_m2
-            - Matrix3::identity() * self.drag_n_s_m;
+        let through = [0, 1, 2].map(|axis| Dual::<3>::variable(v[axis], axis));
+        let mut by_velocity = -jacobian(&self.drag(&through));
         let mut by_thrust = -Matrix3::identity();
         let n = unit(thrust);
         let force = self.wing_force(&v, &n);
@@ -170,6 +172,13 @@ impl Craft {
         }
     }
 
+    /// Drag, world axes, against the motion, N: the airframe's is taken for the same along all axes.
+    fn drag<L: Lane<Element = f64>>(&self, through: &[L; 3]) -> [L; 3] {
+        let flow =
+            Airflow { velocity: *through, speed: dot(through, through).root(), omega: [L::of(0.0); 3] };
+        aero::drag(&[L::splat(self.drag_n_s_m); 3], L::splat(self.drag_n_s2_m2), &flow)
+    }
+
     /// Derivatives of the spread wings' force by velocity and by normal.
     fn wing_slopes(
         &self,
@@ -178,11 +187,11 @@ impl Craft {
         force: &Vector3<f64>,
     ) -> (Matrix3<f64>, Matrix3<f64>) {
         if let Some(WingForce::Flat { area_m2 }) = self.wing {
-            let (scale, speed, through) = (-AIR_DENSITY_KG_M3 * area_m2, v.norm(), n.dot(v));
-            let direction = v / speed.max(1e-9);
-            let by_velocity = n * (direction * through + n * speed).transpose() * scale;
-            let by_normal = (n * v.transpose() + Matrix3::identity() * through) * (scale * speed);
-            return (by_velocity, by_normal);
+            let along = |v: &Vector3<f64>| [0, 1, 2].map(|axis| Dual::<3>::variable(v[axis], axis));
+            let fixed = |v: &Vector3<f64>| [0, 1, 2].map(|axis| Dual::<3>::constant(v[axis]));
+            let area_m2 = Dual::constant(area_m2);
+            let by_velocity = jacobian(&plate(&along(v), &fixed(n), area_m2));
+            return (by_velocity, jacobian(&plate(&fixed(v), &along(n), area_m2)));
         }
         let (mut by_velocity, mut by_normal) = (Matrix3::zeros(), Matrix3::zeros());
         for axis in 0..3 {
@@ -235,6 +244,11 @@ fn turning_s2(vehicle: &VehicleFile) -> [f64; 2] {
     let inertia = p.inertia_kg_m2;
     [(1, 0), (0, 1)]
         .map(|(about, along)| inertia[(about, about)] / (arm_m(along) * vehicle.vehicle.weight_n()))
+}
+
+/// A row each component, a column each variable.
+fn jacobian(of: &[Dual<3>; 3]) -> Matrix3<f64> {
+    Matrix3::from_fn(|row, column| of[row].by[column])
 }
 
 /// Derivatives of the acceleration.

@@ -12,7 +12,7 @@ use squirrel_core::effects::{Acting, Effects};
 use squirrel_core::frames::{Body, In, Ned, Wrench};
 use squirrel_core::lane::Lane;
 use squirrel_core::lane::{Row, load, put, store, take};
-use squirrel_core::math::{AIR_DENSITY_KG_M3, limit, real};
+use squirrel_core::math::{limit, real};
 use squirrel_core::vehicle::{CommandKind, MAX_ROTORS, Propulsion, Vehicle};
 
 /// Rigid body and rotor speeds, in the units and frames of [`State`]; as a rate, the derivative of each.
@@ -259,7 +259,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
             put(&mut rows.inertia_inverse[c], lane, inverse_inertia[c]);
         }
         put(&mut rows.linear_drag, lane, p.drag.linear_n_s_per_m.into());
-        rows.quadratic_drag[lane] = real::<S>(0.5 * AIR_DENSITY_KG_M3) * p.drag.area_m2;
+        rows.quadratic_drag[lane] = p.drag.per_square();
         for i in 0..ROTORS {
             let Wrench { force, moment } = rotor_alone(vehicle, i);
             let [thrust, torque] = extra.rotor[i];
@@ -270,7 +270,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         }
         rows.inverse_lag[0][lane] = inverse(p.propulsion.time_constant_up_s + extra.lag_s[0]);
         rows.inverse_lag[1][lane] = inverse(p.propulsion.time_constant_down_s + extra.lag_s[1]);
-        self.lagless = rows.inverse_lag.as_flattened().iter().any(|rate| *rate == zero);
+        self.lagless = rows.inverse_lag.as_flattened().contains(&zero);
         self.full_speed[lane] = Drive::new(vehicle).full_speed::<ROTORS>().unwrap_or(real(f64::NAN));
         self.commands_are_parts = self.full_speed[..self.vehicles].iter().all(S::is_finite);
         for i in p.rotor_count..ROTORS {

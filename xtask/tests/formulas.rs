@@ -1,0 +1,154 @@
+//! One formula, one place: what is written in each of these files is written in no other, and who needs it calls it.
+//!
+//! A formula is known by a piece of its text or by a constant that only it has. Comments and tests do not count.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Formula, pieces of its text without spaces, and where it stands.
+const FORMULAS: [(&str, &[&str], &str); 27] = [
+    ("drag of the airframe", &["linear[i]*flow.velocity[i]"], "core/src/aero/mod.rs"),
+    (
+        "flat plate",
+        &["L::of(-AIR_DENSITY_KG_M3)*", "self.per_square*flow.speed"],
+        "core/src/aero/flat_plate.rs",
+    ),
+    ("thrust and moment of rotors", &["square*thrust[0]", "square*roll["], "core/src/dynamics/rotors.rs"),
+    ("rotor lag", &["gap*gap.where_positive"], "core/src/dynamics/rotors.rs"),
+    ("rigid body", &["cross(omega,&times(inertia,omega))", "w*p+j*r-k*q"], "core/src/dynamics/body.rs"),
+    ("rotation matrix", &["ww+ii-jj-kk"], "core/src/lane/vector.rs"),
+    ("membrane", &["0.56)+", "steady-state.fast_camber", "c2*(c2+l)+l2"], "core/src/aero/membrane.rs"),
+    (
+        "battery",
+        &["current*self.r1_ohm", "torque_coefficient*speed*speed*speed"],
+        "core/src/dynamics/battery.rs",
+    ),
+    ("servo", &["target-(target-moved)*keep"], "core/src/dynamics/servo.rs"),
+    ("exponential of lanes", &["0.041_666_294_947_198_99"], "core/src/lane/functions.rs"),
+    ("what effects do to a wrench", &["numbers.thrust_factor("], "core/src/dynamics/mod.rs"),
+    ("added_mass", &["added_mass_kg*at.inverse_mass"], "core/src/dynamics/mod.rs"),
+    ("angular_damping", &["size(*rate)*self.quadratic"], "core/src/effects/angular_damping.rs"),
+    ("axial_inflow", &["self.quadratic*w*size(w)"], "core/src/effects/axial_inflow.rs"),
+    ("battery_sag", &["self.load_gain*(load-"], "core/src/effects/battery_sag.rs"),
+    ("cg_offset", &["cross(&self.offset_m,&at.force)"], "core/src/effects/cg_offset.rs"),
+    ("constant_wind", &["ln(height_m.upper("], "core/src/effects/constant_wind.rs"),
+    ("flapping_moment", &["(u*u+v*v).root()*self.per_scale"], "core/src/effects/flapping_moment.rs"),
+    ("ground_effect", &["L::of(1.0/16.0)", "self.radius_m/height_m"], "core/src/effects/ground_effect.rs"),
+    ("linear_drag", &["-x*u,"], "core/src/effects/linear_drag.rs"),
+    ("payload_swing", &["v*self.decay+x*self.stiffness"], "core/src/effects/payload_swing.rs"),
+    ("quadratic_drag", &["self.per_square[i]*at.flow"], "core/src/effects/quadratic_drag.rs"),
+    ("rotor_gyro_torque", &["q*spin*self.inertia"], "core/src/effects/rotor_gyro_torque.rs"),
+    ("thrust_misalignment", &["at.thrust_n*x"], "core/src/effects/thrust_misalignment.rs"),
+    ("translational_lift", &["one+across*self.limit"], "core/src/effects/translational_lift.rs"),
+    ("wing_asymmetry", &["left*self.loss[0]"], "core/src/effects/wing_asymmetry.rs"),
+    ("wing_membrane", &["flow.speed*per_speed).lower("], "core/src/effects/wing_membrane.rs"),
+];
+
+/// Files in which the density of the air becomes a force: one a law.
+const DENSITY: [&str; 5] = [
+    "core/src/aero/flat_plate.rs",
+    "core/src/effects/quadratic_drag.rs",
+    "core/src/math.rs",
+    "core/src/vehicle/mod.rs",
+    "sim/src/plant/membrane.rs",
+];
+
+/// What a file calls, without spaces, instead of writing it again.
+const CALLS: [(&str, &[&str]); 5] = [
+    (
+        "sim/src/batch/dynamics.rs",
+        &[
+            "drag(&airframe.linear_drag",
+            "thrust_and_moment(",
+            "lag_rate(",
+            "body::acceleration(",
+            "body::angular_acceleration(",
+            "body::attitude_rate(",
+            "membrane.evaluate(",
+            "plate.normal_forces(",
+            "servo.lead(",
+            "with_effects(",
+        ],
+    ),
+    ("sim/src/batch/battery.rs", &["pack.discharge(", "pack.settle("]),
+    (
+        "sim/src/plant/mod.rs",
+        &["dynamics::derivative(", "membrane.evaluate(", "servo.lead(", "battery.step("],
+    ),
+    ("core/src/dynamics/mod.rs", &["aero::drag(", "rotors::wrench(", "body::acceleration(", "with_effects("]),
+    ("plan/src/trajectory/model.rs", &["aero::drag(", "plate("]),
+];
+
+fn crates() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("crates")
+}
+
+fn sources(folder: &Path, into: &mut BTreeMap<String, String>) {
+    for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = entry.file_name().unwrap().to_str().unwrap();
+        if entry.is_dir() && name != "tests" {
+            sources(&entry, into);
+        } else if name.ends_with(".rs") && name != "tests.rs" {
+            let text = fs::read_to_string(&entry).unwrap();
+            let (product, _) = text.split_once("#[cfg(test)]\nmod tests").unwrap_or((&text, ""));
+            let code = product.lines().map(|line| line.split("//").next().unwrap());
+            let code: String = code.flat_map(str::chars).filter(|c| !c.is_whitespace()).collect();
+            let path = entry.strip_prefix(crates()).unwrap().to_str().unwrap();
+            into.insert(path.replace("squirrel-", ""), code);
+        }
+    }
+}
+
+fn product() -> BTreeMap<String, String> {
+    let mut all = BTreeMap::new();
+    for entry in fs::read_dir(crates()).unwrap().map(|entry| entry.unwrap().path()) {
+        sources(&entry.join("src"), &mut all);
+    }
+    all
+}
+
+/// Files that hold a piece of text.
+fn holding<'a>(all: &'a BTreeMap<String, String>, piece: &str) -> Vec<&'a str> {
+    all.iter().filter(|(_, code)| code.contains(piece)).map(|(path, _)| path.as_str()).collect()
+}
+
+#[test]
+fn each_formula_stands_in_one_file() {
+    let all = product();
+    for (formula, pieces, home) in FORMULAS {
+        for piece in pieces {
+            assert_eq!(holding(&all, piece), [home], "{formula}: {piece}");
+        }
+    }
+}
+
+#[test]
+fn every_effect_with_an_equation_is_on_the_list() {
+    let effects = crates().join("squirrel-core/src/effects");
+    for entry in fs::read_dir(effects).unwrap().map(|entry| entry.unwrap().path()) {
+        let name = entry.file_stem().unwrap().to_str().unwrap();
+        if fs::read_to_string(&entry).unwrap().contains("Acts<L> for Numbers<L>") {
+            assert!(FORMULAS.iter().any(|(formula, ..)| *formula == name), "{name}");
+        }
+    }
+}
+
+#[test]
+fn the_density_of_air_is_asked_where_a_law_of_the_air_stands() {
+    let all = product();
+    let strangers = holding(&all, "AIR_DENSITY_KG_M3");
+    let strangers: Vec<&str> = strangers.into_iter().filter(|path| !DENSITY.contains(path)).collect();
+    assert!(strangers.is_empty(), "{strangers:?}");
+}
+
+#[test]
+fn batch_plant_and_plan_call_them() {
+    let all = product();
+    for (file, calls) in CALLS {
+        for call in calls {
+            assert!(all[file].contains(call), "{file} does not call {call}");
+        }
+    }
+}
