@@ -10,6 +10,7 @@ pub mod allocation;
 pub mod backstepping;
 pub mod command_filter;
 pub mod follow;
+pub mod mix;
 pub mod mixer;
 pub mod plus;
 pub mod position;

@@ -114,6 +114,10 @@ impl<const N: usize> Lane for Dual<N> {
     fn where_positive(self, then: Self, otherwise: Self) -> Self {
         if self.value > 0.0 { then } else { otherwise }
     }
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self.value > 0.0
+    }
     /// Both are constant between jumps.
     #[inline(always)]
     fn nearest_and_power_of_two(self) -> (Self, Self) {

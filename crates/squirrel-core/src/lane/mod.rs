@@ -54,6 +54,9 @@ pub trait Lane:
     /// `then` where a number is above zero, `otherwise` where it is not or is NaN.
     #[must_use]
     fn where_positive(self, then: Self, otherwise: Self) -> Self;
+    /// Whether any number in it is above zero. For work that can be left out where none is; what is left out must be selected by
+    /// the same numbers, so that no number depends on those beside it.
+    fn any_positive(self) -> bool;
     /// The nearest whole number `n`, and `2^n`; for sizes up to 120.
     #[must_use]
     fn nearest_and_power_of_two(self) -> (Self, Self);
@@ -120,6 +123,10 @@ macro_rules! one_number {
             #[inline(always)]
             fn where_positive(self, then: Self, otherwise: Self) -> Self {
                 if self > 0.0 { then } else { otherwise }
+            }
+            #[inline(always)]
+            fn any_positive(self) -> bool {
+                self > 0.0
             }
             #[inline(always)]
             fn nearest_and_power_of_two(self) -> (Self, Self) {

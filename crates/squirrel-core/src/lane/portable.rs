@@ -46,6 +46,11 @@ macro_rules! portable {
                 Self([$($a.where_positive($b, $c)),*])
             }
             #[inline(always)]
+            fn any_positive(self) -> bool {
+                let [$($a),*] = self.0;
+                $($a.any_positive())|*
+            }
+            #[inline(always)]
             fn nearest_and_power_of_two(self) -> (Self, Self) {
                 let [$(($a, $b)),*] = self.0.map(Lane::nearest_and_power_of_two);
                 (Self([$($a),*]), Self([$($b),*]))

@@ -1,8 +1,8 @@
 //! The inner loop of the flight code on registers: set points to rotor speeds, between steps of the batch.
 //!
 //! Command filter, quaternion backstepping and rates as in `squirrel_core::control` (docs/equations.md B.3), with sines by
-//! polynomials instead of libm: torques agree to 1e-5 of their size, not to the bit. The mixer is [`Allocation`], which differs
-//! from the core's where rotors are at their limits: yaw torque is given up before roll and pitch are, but never used to save them.
+//! polynomials instead of libm: torques agree to 1e-5 of their size, not to the bit. The mixer is the flight code's own
+//! (`squirrel_core::control::mix`).
 
 use super::rows::Block;
 use super::simd::{BLOCK, Kernel, Paths, Register};
@@ -10,6 +10,7 @@ use super::{Batch, BatchError, CHUNK, Call, Settings, Work, place, shape};
 use nalgebra::convert;
 use squirrel_core::control::backstepping::AttitudeGains;
 use squirrel_core::control::backstepping::quaternion::Law;
+use squirrel_core::control::mix::Table;
 use squirrel_core::control::mixer::Mixer;
 use squirrel_core::dynamics::State;
 use squirrel_core::lane::functions::{all, half_turn_sine_and_cosine, limit, size, wrap};
@@ -52,20 +53,8 @@ numbers! {
         stiffness, damping,
         /// By columns.
         inertia [9],
-        rotor_thrust_max, inverse_thrust_coefficient
+        inverse_thrust_coefficient
     }
-}
-
-/// Rotor thrusts for thrust and torque: `f = s (roll, pitch) + u + y` along the columns of `T^+`.
-#[derive(Debug, Clone, Copy)]
-struct Allocation<L, const ROTORS: usize> {
-    collective: [L; ROTORS],
-    roll: [L; ROTORS],
-    pitch: [L; ROTORS],
-    yaw: [L; ROTORS],
-    /// 0 for a rotor that is not there, as for all that follows.
-    inverse_collective: [L; ROTORS],
-    inverse_yaw: [L; ROTORS],
 }
 
 /// The loops of a block.
@@ -73,7 +62,7 @@ struct Allocation<L, const ROTORS: usize> {
 pub(super) struct Autopilots<S: Copy, const ROTORS: usize> {
     course: Course<Row<S>>,
     gains: Gains<Row<S>>,
-    allocation: Allocation<Row<S>, ROTORS>,
+    mixer: Table<Row<S>, ROTORS>,
     /// Steps until the loops act again.
     wait: usize,
 }
@@ -85,14 +74,7 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
         Self {
             course: Course { sign: one, free: one, ..Course::all(none) },
             gains: Gains::all(none),
-            allocation: Allocation {
-                collective: [none; ROTORS],
-                roll: [none; ROTORS],
-                pitch: [none; ROTORS],
-                yaw: [none; ROTORS],
-                inverse_collective: [none; ROTORS],
-                inverse_yaw: [none; ROTORS],
-            },
+            mixer: Table::all(none),
             wait: 0,
         }
     }
@@ -118,22 +100,10 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
             stiffness: frequency * frequency,
             damping: 2.0 * f64::from(gains.filter_damping) * frequency,
             inertia,
-            rotor_thrust_max: f64::from(mixer.rotor_thrust_max_n()),
             inverse_thrust_coefficient: 1.0 / f64::from(p.propulsion.thrust_coefficient_n_s2),
         };
         self.gains.put(lane, &numbers.map(real));
-        let inverse = |x: f32| if x == 0.0 { 0.0 } else { 1.0 / f64::from(x) };
-        let to = &mut self.allocation;
-        for i in 0..ROTORS {
-            let [collective, roll, pitch, yaw] =
-                if i < p.rotor_count { mixer.rotor_of_demand(i) } else { [0.0; 4] };
-            to.collective[i][lane] = convert(f64::from(collective));
-            to.roll[i][lane] = convert(f64::from(roll));
-            to.pitch[i][lane] = convert(f64::from(pitch));
-            to.yaw[i][lane] = convert(f64::from(yaw));
-            to.inverse_collective[i][lane] = convert(inverse(collective));
-            to.inverse_yaw[i][lane] = convert(inverse(yaw));
-        }
+        self.mixer.put(lane, mixer.table());
     }
 
     /// Forgets what was; the filter starts at this attitude.
@@ -184,16 +154,10 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Act<'_, S, ROTORS> {
                 }
                 SetPoint::BodyRate => body_rate(&gains, &course, &omega),
             };
-            let rows = &autopilots.allocation;
-            let allocation = Allocation::<L, ROTORS> {
-                collective: load(&rows.collective, start),
-                roll: load(&rows.roll, start),
-                pitch: load(&rows.pitch, start),
-                yaw: load(&rows.yaw, start),
-                inverse_collective: load(&rows.inverse_collective, start),
-                inverse_yaw: load(&rows.inverse_yaw, start),
-            };
-            let mut speed = allocation.thrusts(&gains, &mut course, &torque);
+            let mixer = Table::<L, ROTORS>::load(&autopilots.mixer, start);
+            let mixed = mixer.mix(ROTORS, course.set_point[3], torque);
+            course.free = L::of(1.0) - mixed.saturated;
+            let mut speed = mixed.rotor_thrust_n;
             for i in 0..ROTORS {
                 speed[i] = (speed[i] * gains.inverse_thrust_coefficient).root();
             }
@@ -330,53 +294,6 @@ impl<L: Register> Kinematics<L> {
             q - sr * roll * pitch + (cr * cp * roll - sr * sp * pitch) * yaw,
             r - cr * roll * pitch - (sr * cp * roll + cr * sp * pitch) * yaw,
         ]
-    }
-}
-
-impl<L: Register, const ROTORS: usize> Allocation<L, ROTORS> {
-    /// Rotor thrusts, N, each within its limits: the largest share of roll and pitch torque, then the nearest thrust, then the
-    /// nearest yaw torque.
-    #[inline(always)]
-    fn thrusts(&self, gains: &Gains<L>, course: &mut Course<L>, torque: &[L; 3]) -> [L; ROTORS] {
-        let (none, most) = (L::of(0.0), gains.rotor_thrust_max);
-        let thrust = course.set_point[3].upper(none);
-        // In units of each rotor's part of the collective.
-        let (mut tilt, mut smallest) = ([none; ROTORS], none);
-        for i in 0..ROTORS {
-            tilt[i] = (self.roll[i] * torque[0] + self.pitch[i] * torque[1]) * self.inverse_collective[i];
-            smallest = smallest.lower(tilt[i]);
-        }
-        let mut share = all::<L>(1.0);
-        for i in 0..ROTORS {
-            let span = tilt[i] - smallest;
-            let full = most * self.inverse_collective[i];
-            let bound = (span - full).where_positive(full / span, all(1.0));
-            share = share.lower(bound);
-        }
-        let (lowest, mut highest) = (none - share * smallest, thrust.upper(none - share * smallest));
-        for i in 0..ROTORS {
-            let room = most * self.inverse_collective[i] - share * tilt[i];
-            highest = self.inverse_collective[i].where_positive(highest.lower(room), highest);
-        }
-        let collective = thrust.upper(lowest).lower(highest);
-
-        let mut rotor = [none; ROTORS];
-        let (mut up, mut down) = (size(torque[2]), size(torque[2]));
-        for i in 0..ROTORS {
-            rotor[i] = (share * tilt[i] + collective) * self.collective[i];
-            let slope = size(self.inverse_yaw[i]);
-            let (rest, left) = (rotor[i].upper(none) * slope, (most - rotor[i]).upper(none) * slope);
-            let rising = self.inverse_yaw[i];
-            up = slope.where_positive(up.lower(rising.where_positive(left, rest)), up);
-            down = slope.where_positive(down.lower(rising.where_positive(rest, left)), down);
-        }
-        let yaw = limit(torque[2], none - down, up);
-        for i in 0..ROTORS {
-            rotor[i] = limit(rotor[i] + self.yaw[i] * yaw, none, most);
-        }
-        let missed = (all::<L>(1.0) - share) + size(thrust - collective) + size(torque[2] - yaw);
-        course.free = missed.where_positive(none, all(1.0));
-        rotor
     }
 }
 

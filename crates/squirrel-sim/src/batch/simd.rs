@@ -119,7 +119,7 @@ mod x86 {
             $splat:ident $lower:ident $upper:ident $load:ident $store:ident $root:ident
             $($trait:ident $method:ident $operation:ident),*;
             $activation:expr;
-            ($zeros:ident, $x:ident, $then:ident, $otherwise:ident) => $select:expr;
+            ($zeros:ident, $x:ident, $then:ident, $otherwise:ident) => $select:expr, $any:expr;
             $round:ident $power:expr; $guess:expr; $split:expr
         ) => {
             /// A value of this type exists only inside of the entry beside it.
@@ -177,6 +177,12 @@ mod x86 {
                     let ($zeros, $x, $then, $otherwise) = (Self::of(0.0).0, self.0, then.0, otherwise.0);
                     // SAFETY: as for `lower`.
                     Self(unsafe { $select })
+                }
+                #[inline(always)]
+                fn any_positive(self) -> bool {
+                    let ($zeros, $x) = (Self::of(0.0).0, self.0);
+                    // SAFETY: as for `lower`.
+                    unsafe { $any }
                 }
                 #[inline(always)]
                 fn nearest_and_power_of_two(self) -> (Self, Self) {
@@ -310,7 +316,7 @@ mod x86 {
         net_tanh;
         (zero, x, then, otherwise) => intrinsic::_mm256_blendv_ps(
             otherwise, then, intrinsic::_mm256_cmp_ps::<{ intrinsic::_CMP_GT_OQ }>(x, zero)
-        );
+        ), intrinsic::_mm256_movemask_ps(intrinsic::_mm256_cmp_ps::<{ intrinsic::_CMP_GT_OQ }>(x, zero)) != 0;
         ROUND_F32 avx2_power_f32; avx2_guess_f32; avx2_split_f32
     );
     register!(
@@ -320,7 +326,7 @@ mod x86 {
         one_by_one;
         (zero, x, then, otherwise) => intrinsic::_mm256_blendv_pd(
             otherwise, then, intrinsic::_mm256_cmp_pd::<{ intrinsic::_CMP_GT_OQ }>(x, zero)
-        );
+        ), intrinsic::_mm256_movemask_pd(intrinsic::_mm256_cmp_pd::<{ intrinsic::_CMP_GT_OQ }>(x, zero)) != 0;
         ROUND_F64 avx2_power_f64; avx2_guess_f64; avx2_split_f64
     );
     register!(
@@ -330,7 +336,7 @@ mod x86 {
         net_tanh;
         (zero, x, then, otherwise) => intrinsic::_mm512_mask_blend_ps(
             intrinsic::_mm512_cmp_ps_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero), otherwise, then
-        );
+        ), intrinsic::_mm512_cmp_ps_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero) != 0;
         ROUND_F32 avx512_power_f32; avx512_guess_f32; avx512_split_f32
     );
     register!(
@@ -340,7 +346,7 @@ mod x86 {
         one_by_one;
         (zero, x, then, otherwise) => intrinsic::_mm512_mask_blend_pd(
             intrinsic::_mm512_cmp_pd_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero), otherwise, then
-        );
+        ), intrinsic::_mm512_cmp_pd_mask::<{ intrinsic::_CMP_GT_OQ }>(x, zero) != 0;
         ROUND_F64 avx512_power_f64; avx512_guess_f64; avx512_split_f64
     );
 }
