@@ -2,6 +2,5 @@
 
 #![no_std]
 
-pub mod draws;
 pub mod host;
 pub mod instructions;

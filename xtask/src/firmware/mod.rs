@@ -4,12 +4,10 @@
 //!    same hashes. So it must for a hundred pieces of flight in which a sensor fails.
 //! 2. A flight with the flight code in QEMU must leave the same log, byte for byte, as one without.
 //! 3. Negative controls: another mass by one bit must change the hashes, a step that may panic must not link.
-//! 4. The weighted allocation, which no flight has, answers random demands with the host's bits.
-//! 5. The workspace is linted; the image for the real part is built and sized, and what of it needs no hardware is tested.
-//! 6. Instructions of control, of the estimator and of the allocation, size of the images that hold nothing but one of them or the whole
+//! 4. The workspace is linted; the image for the real part is built and sized, and what of it needs no hardware is tested.
+//! 5. Instructions of control and of the estimator, size of the images that hold nothing but one of them or the whole
 //!    step, worst-case stack, against `firmware/figures.txt` and the budget; `--write` takes the new ones.
 
-mod allocation;
 mod board;
 mod elf;
 mod figures;
@@ -117,7 +115,7 @@ fn measure() -> Result<Figures, String> {
     eprintln!("negative control: a step that may panic does not link");
 
     let images = build(&["--package=squirrel-m7"])?;
-    eprintln!("no panic can be reached from control, the allocation nor the whole step: their images link");
+    eprintln!("no panic can be reached from control nor the whole step: their images link");
     let mut flights = squirrel.play("flights")?;
     // The mass is nothing to a flight that is commanded, so that it is no part of the negative control.
     let commanded = squirrel.play("commanded")?;
@@ -134,12 +132,9 @@ fn measure() -> Result<Figures, String> {
     eprintln!("fly --hil qemu: the same log, byte for byte");
 
     let mut figures = flights.figures()?;
-    allocation::measure(&mut figures)?;
-    for (image, function, names) in [
-        ("control", "squirrel_control", figures::OF_CONTROL),
-        ("allocation", "squirrel_allocation", figures::OF_ALLOCATION),
-        ("step", "squirrel_step", figures::OF_STEP),
-    ] {
+    for (image, function, names) in
+        [("control", "squirrel_control", figures::OF_CONTROL), ("step", "squirrel_step", figures::OF_STEP)]
+    {
         let path = images.join(image);
         let bytes = std::fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let elf = Elf::parse(&bytes).map_err(|error| format!("{}: {error}", path.display()))?;

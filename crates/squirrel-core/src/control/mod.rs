@@ -4,9 +4,8 @@
 //! spread wings would do, [`woeg`] says whether that would help, [`wiic`] takes over where the angles are at their limit. Or
 //! [`plus`], which chooses angles, thrust and wings together. Or [`follow`], outside of the step, on a plan.
 //! Inner loop, 300 Hz: [`command_filter`] smooths the 10 Hz steps, [`backstepping`] turns attitude error into torque,
-//! [`mixer`] turns thrust and torque into rotor thrusts; [`allocation`] does so for who has weak rotors or weights of his own.
+//! [`mixer`] turns thrust and torque into rotor thrusts, by the rule in [`mix`].
 
-pub mod allocation;
 pub mod backstepping;
 pub mod command_filter;
 pub mod follow;
