@@ -9,10 +9,12 @@
 
 pub mod battery;
 pub mod body;
+pub mod lanes;
 mod rk4;
 pub mod rotors;
 pub mod servo;
 mod state;
+pub mod whole;
 
 pub use rk4::{VectorSpace, rk4};
 pub use rotors::RotorDrive;

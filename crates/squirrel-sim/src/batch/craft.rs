@@ -3,15 +3,9 @@
 use super::error::BatchError;
 use crate::plant::{BatteryParameters, WingPlant};
 use crate::vehicle_file::VehicleFile;
+use squirrel_core::dynamics::whole::{FLAT, MEMBRANE, NONE};
 use squirrel_core::effects::{Effects, Present};
 use squirrel_core::vehicle::Vehicle;
-
-/// No wing.
-pub(super) const NONE: u8 = 0;
-/// Flat plate.
-pub(super) const FLAT: u8 = 1;
-/// Membrane.
-pub(super) const MEMBRANE: u8 = 2;
 
 /// What flies: airframe, effects, wings, battery, as [`crate::plant::Plant::new`] takes them.
 #[derive(Debug, Clone)]

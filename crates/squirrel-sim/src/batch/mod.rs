@@ -43,7 +43,7 @@ pub use craft::Craft;
 pub use error::BatchError;
 
 use crate::plant::{MembraneParameters, ServoParameters, WingPlant};
-use craft::{FLAT, Fitted};
+use craft::Fitted;
 use dynamics::{Advance, AdvanceWhole};
 use exchange::{Chunk, Job, do_job};
 use extra::Extra;
@@ -53,6 +53,7 @@ use rows::{Block, Drive, Tuning};
 use simd::{BLOCK, Path, Paths};
 use squirrel_core::aero::flat_plate;
 use squirrel_core::dynamics::State;
+use squirrel_core::dynamics::whole::FLAT;
 use squirrel_core::effects::{Prepared, Swing};
 use squirrel_core::math::real;
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};

@@ -1,56 +1,21 @@
 //! How vehicles lie in memory: sixteen side by side, one row a number.
 //!
-//! Each structure is used twice: on rows, of [`BLOCK`] vehicles in memory, and on registers, of as many as one of them holds.
+//! The structures are those of `squirrel_core::dynamics`, each used twice: on rows, of [`BLOCK`] vehicles in memory, and on
+//! registers, of as many as one of them holds.
 
 use super::BODY_NUMBERS;
 use super::autopilot::Autopilots;
 use super::extra::{Command, Extra};
 use super::simd::{BLOCK, Paths, Register};
-use nalgebra::{Matrix3, Quaternion, Vector3};
-use squirrel_core::dynamics::{self, RotorDrive, State};
-use squirrel_core::effects::{Acting, Effects};
-use squirrel_core::frames::{Body, In, Ned, Wrench};
+use nalgebra::{Quaternion, Vector3};
+use squirrel_core::dynamics::State;
+use squirrel_core::dynamics::lanes::{Airframe, Held, Motion};
+use squirrel_core::effects::Effects;
+use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::Lane;
-use squirrel_core::lane::{Row, load, put, store, take};
+use squirrel_core::lane::{Row, put, take};
 use squirrel_core::math::{limit, real};
 use squirrel_core::vehicle::{CommandKind, MAX_ROTORS, Propulsion, Vehicle};
-
-/// Rigid body and rotor speeds, in the units and frames of [`State`]; as a rate, the derivative of each.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Motion<L, const ROTORS: usize> {
-    pub(super) position: [L; 3],
-    pub(super) velocity: [L; 3],
-    /// w x y z.
-    pub(super) attitude: [L; 4],
-    pub(super) omega: [L; 3],
-    pub(super) rotor_speed: [L; ROTORS],
-}
-
-/// What does not change in flight, SI.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Airframe<L, const ROTORS: usize> {
-    pub(super) inverse_mass: L,
-    /// By columns, as its inverse.
-    pub(super) inertia: [[L; 3]; 3],
-    pub(super) inertia_inverse: [[L; 3]; 3],
-    pub(super) linear_drag: [L; 3],
-    /// `1/2 rho C_d A`.
-    pub(super) quadratic_drag: L,
-    /// Over speed squared.
-    pub(super) thrust: [L; ROTORS],
-    pub(super) roll: [L; ROTORS],
-    pub(super) pitch: [L; ROTORS],
-    pub(super) yaw: [L; ROTORS],
-    /// Inverse time constants of rotor speed, speeding up and slowing down, 1/s; 0 for no lag.
-    pub(super) inverse_lag: [L; 2],
-}
-
-/// What is held from call to call.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Held<L, const ROTORS: usize> {
-    pub(super) wind: [L; 3],
-    pub(super) target_speed: [L; ROTORS],
-}
 
 /// How one vehicle's commands become rotor speeds.
 #[derive(Debug, Clone, Copy)]
@@ -101,30 +66,14 @@ impl<S: Paths> Tuning<S> {
     /// What is between a vehicle as declared and with its effects.
     pub(super) fn between(declared: &Vehicle<f64>, altered: &Vehicle<f64>, effects: &Effects<f64>) -> Self {
         let mut out = Self { lag_s: effects.rotor_extra_time_constant_s().map(real), ..Self::none() };
+        let of = |vehicle| Airframe::<f64, MAX_ROTORS>::new(vehicle, [0.0; 2]);
+        let (now, before) = (of(altered), of(declared));
+        let ratio = |now: f64, before: f64| real(if before == 0.0 { 1.0 } else { now / before });
         for (i, factors) in out.rotor.iter_mut().enumerate().take(declared.rotors().len()) {
-            let (now, before) = (rotor_alone(altered, i), rotor_alone(declared, i));
-            let ratio = |now: f64, before: f64| real(if before == 0.0 { 1.0 } else { now / before });
-            *factors = [
-                ratio(now.force.vector.z, before.force.vector.z),
-                ratio(now.moment.vector.z, before.moment.vector.z),
-            ];
+            *factors = [ratio(now.thrust[i], before.thrust[i]), ratio(now.yaw[i], before.yaw[i])];
         }
         out
     }
-}
-
-/// What rotor `i` gives over speed squared, whatever was changed of it since the vehicle was declared.
-fn rotor_alone<S: Paths>(vehicle: &Vehicle<S>, i: usize) -> Wrench<Body, S> {
-    let mut state = State::at_rest();
-    state.rotor_speed_rad_s[i] = real(1.0);
-    let held = dynamics::Held {
-        drive: RotorDrive::holding(state.rotor_speed_rad_s),
-        wind: In::zero(),
-        deployment: [real(0.0); 2],
-        tether_force: In::zero(),
-    };
-    let calm = Acting::new(&Effects::none(), vehicle);
-    dynamics::wrench(vehicle, &calm, &state, &held, |_| Wrench::zero())
 }
 
 /// Sixteen vehicles. Aligned so that no load of a row touches two lines of the cache.
@@ -153,58 +102,6 @@ impl<S: Copy, const ROTORS: usize> Block<S, ROTORS> {
     #[inline(always)]
     pub(super) fn starts<L: Register<Element = S>>(&self) -> impl Iterator<Item = usize> + use<L, S, ROTORS> {
         (0..self.vehicles.div_ceil(L::WIDTH)).map(|group| group * L::WIDTH)
-    }
-}
-
-#[inline(always)]
-fn load_columns<L: Register>(rows: &[[Row<L::Element>; 3]; 3], start: usize) -> [[L; 3]; 3] {
-    [load(&rows[0], start), load(&rows[1], start), load(&rows[2], start)]
-}
-
-impl<L: Register, const ROTORS: usize> Motion<L, ROTORS> {
-    #[inline(always)]
-    pub(super) fn load(rows: &Motion<Row<L::Element>, ROTORS>, start: usize) -> Self {
-        Self {
-            position: load(&rows.position, start),
-            velocity: load(&rows.velocity, start),
-            attitude: load(&rows.attitude, start),
-            omega: load(&rows.omega, start),
-            rotor_speed: load(&rows.rotor_speed, start),
-        }
-    }
-
-    #[inline(always)]
-    pub(super) fn store(&self, rows: &mut Motion<Row<L::Element>, ROTORS>, start: usize) {
-        store(&self.position, &mut rows.position, start);
-        store(&self.velocity, &mut rows.velocity, start);
-        store(&self.attitude, &mut rows.attitude, start);
-        store(&self.omega, &mut rows.omega, start);
-        store(&self.rotor_speed, &mut rows.rotor_speed, start);
-    }
-}
-
-impl<L: Register, const ROTORS: usize> Airframe<L, ROTORS> {
-    #[inline(always)]
-    pub(super) fn load(rows: &Airframe<Row<L::Element>, ROTORS>, start: usize) -> Self {
-        Self {
-            inverse_mass: L::load(&rows.inverse_mass[start..]),
-            inertia: load_columns(&rows.inertia, start),
-            inertia_inverse: load_columns(&rows.inertia_inverse, start),
-            linear_drag: load(&rows.linear_drag, start),
-            quadratic_drag: L::load(&rows.quadratic_drag[start..]),
-            thrust: load(&rows.thrust, start),
-            roll: load(&rows.roll, start),
-            pitch: load(&rows.pitch, start),
-            yaw: load(&rows.yaw, start),
-            inverse_lag: load(&rows.inverse_lag, start),
-        }
-    }
-}
-
-impl<L: Register, const ROTORS: usize> Held<L, ROTORS> {
-    #[inline(always)]
-    pub(super) fn load(rows: &Held<Row<L::Element>, ROTORS>, start: usize) -> Self {
-        Self { wind: load(&rows.wind, start), target_speed: load(&rows.target_speed, start) }
     }
 }
 
@@ -249,27 +146,15 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
     pub(super) fn put_vehicle(&mut self, lane: usize, vehicle: &Vehicle<S>, extra: &Tuning<S>) {
         let p = vehicle.parameters();
         let zero = <S as Lane>::of(0.0);
-        let inverse = |tau: S| if tau > zero { real::<S>(1.0) / tau } else { zero };
-        let columns = |m: &Matrix3<S>| -> [[S; 3]; 3] { (*m).into() };
+        let mut airframe = Airframe::<S, ROTORS>::new(vehicle, extra.lag_s);
+        for (i, [thrust, torque]) in extra.rotor.iter().enumerate().take(ROTORS) {
+            airframe.thrust[i] *= *thrust;
+            airframe.roll[i] *= *thrust;
+            airframe.pitch[i] *= *thrust;
+            airframe.yaw[i] *= *torque;
+        }
         let rows = &mut self.airframe;
-        rows.inverse_mass[lane] = vehicle.inverse_mass();
-        let (inertia, inverse_inertia) = (columns(&p.inertia_kg_m2), columns(vehicle.inertia_inverse()));
-        for c in 0..3 {
-            put(&mut rows.inertia[c], lane, inertia[c]);
-            put(&mut rows.inertia_inverse[c], lane, inverse_inertia[c]);
-        }
-        put(&mut rows.linear_drag, lane, p.drag.linear_n_s_per_m.into());
-        rows.quadratic_drag[lane] = p.drag.per_square();
-        for i in 0..ROTORS {
-            let Wrench { force, moment } = rotor_alone(vehicle, i);
-            let [thrust, torque] = extra.rotor[i];
-            rows.thrust[i][lane] = (zero - force.vector.z) * thrust;
-            rows.roll[i][lane] = moment.vector.x * thrust;
-            rows.pitch[i][lane] = moment.vector.y * thrust;
-            rows.yaw[i][lane] = moment.vector.z * torque;
-        }
-        rows.inverse_lag[0][lane] = inverse(p.propulsion.time_constant_up_s + extra.lag_s[0]);
-        rows.inverse_lag[1][lane] = inverse(p.propulsion.time_constant_down_s + extra.lag_s[1]);
+        rows.put(lane, &airframe);
         self.lagless = rows.inverse_lag.as_flattened().contains(&zero);
         self.full_speed[lane] = Drive::new(vehicle).full_speed::<ROTORS>().unwrap_or(real(f64::NAN));
         self.commands_are_parts = self.full_speed[..self.vehicles].iter().all(S::is_finite);

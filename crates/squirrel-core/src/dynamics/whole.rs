@@ -1,0 +1,159 @@
+//! Whole vehicles on lanes: wings and effects on top of the base model of [`lanes`](super::lanes), and a step of all.
+//!
+//! Wings and effects that a batch does not have are constants of the code, so that they cost nothing.
+
+use super::lanes::{Airframe, Held, Motion, airflow, body_rate, plus_scaled, rotor_rates, rotors};
+use super::rotors::spin;
+use super::{Surroundings, with_effects};
+use crate::aero::membrane::{Membrane, Side};
+use crate::aero::{Airflow, BodyWrench, drag, flat_plate};
+use crate::effects::{PendulumState, Prepared, Present, Swing};
+use crate::lane::Lane;
+use crate::lane::vector::{self, minus, rotation, unit};
+
+/// No wing.
+pub const NONE: u8 = 0;
+/// Flat plate.
+pub const FLAT: u8 = 1;
+/// Membrane.
+pub const MEMBRANE: u8 = 2;
+
+/// What the derivative looks at of a vehicle that has more than the base model.
+#[derive(Debug, Clone, Copy)]
+pub struct Whole<L: Lane, const ROTORS: usize> {
+    /// What does not change.
+    pub airframe: Airframe<L, ROTORS>,
+    /// Wind and rotor targets.
+    pub held: Held<L, ROTORS>,
+    /// Flat wings.
+    pub plate: flat_plate::Pair<L>,
+    /// Membrane wings.
+    pub membrane: Membrane<L>,
+    /// Which effects there are.
+    pub present: Present,
+    /// Their numbers.
+    pub effects: Prepared<L>,
+    /// Signs of the rotors' spin about +z.
+    pub spin: [L; ROTORS],
+    /// A load over a step.
+    pub swing: Swing<L>,
+    /// Where it hangs.
+    pub load: PendulumState<L>,
+    /// Mean deployment over the step, left and right.
+    pub deployment: [L; 2],
+    /// Rate of the angle of attack of each side, rad/s, held over a step.
+    pub angle_rate: [L; 2],
+}
+
+/// Time ahead to where each next rate is taken, and weight of each in the step, both s.
+pub type Stages<L, const STAGES: usize> = [[L; 2]; STAGES];
+
+/// One step: the motion and the membranes at its end. Servos, battery, load and air are stepped beside it.
+#[inline(always)]
+pub fn step<L: Lane, const ROTORS: usize, const STAGES: usize, const WING: u8, const EFFECTS: bool>(
+    whole: &Whole<L, ROTORS>,
+    stages: &Stages<L, STAGES>,
+    state: &Motion<L, ROTORS>,
+    sides: &[Side<L>; 2],
+) -> (Motion<L, ROTORS>, [Side<L>; 2]) {
+    let (mut stage, mut next, mut sides_stage, mut sides_next) = (*state, *state, *sides, *sides);
+    for k in 0..STAGES {
+        let (rate, sides_rate) = derivative::<L, ROTORS, WING, EFFECTS>(whole, &stage, &sides_stage);
+        let [ahead, weight] = stages[k];
+        if k + 1 < STAGES {
+            stage = plus_scaled(state, ahead, &rate);
+            if WING == MEMBRANE {
+                sides_stage = moved(sides, ahead, &sides_rate);
+            }
+        }
+        next = plus_scaled(&next, weight, &rate);
+        if WING == MEMBRANE {
+            sides_next = moved(&sides_next, weight, &sides_rate);
+        }
+    }
+    next.attitude = unit(&next.attitude);
+    (next, sides_next)
+}
+
+/// The stages of Runge and Kutta's fourth order.
+#[inline(always)]
+pub fn runge_kutta<L: Lane>(dt: L) -> Stages<L, 4> {
+    let (half, sixth, third) = (dt * L::of(0.5), dt * L::of(1.0 / 6.0), dt * L::of(1.0 / 3.0));
+    [[half, sixth], [half, third], [dt, third], [L::of(0.0), sixth]]
+}
+
+/// Each side's distance from the x axis, m.
+#[inline(always)]
+pub fn lateral<L: Lane>(arm_m: L) -> [L; 2] {
+    [L::of(0.0) - arm_m, arm_m]
+}
+
+#[inline(always)]
+fn moved<L: Lane>(sides: &[Side<L>; 2], h: L, rate: &[Side<L>; 2]) -> [Side<L>; 2] {
+    [sides[0].plus_scaled(h, &rate[0]), sides[1].plus_scaled(h, &rate[1])]
+}
+
+/// Motion through the air.
+#[inline(always)]
+pub fn air<L: Lane, const ROTORS: usize, const EFFECTS: bool>(
+    whole: &Whole<L, ROTORS>,
+    state: &Motion<L, ROTORS>,
+    columns: &[[L; 3]; 3],
+) -> Airflow<L> {
+    let mut wind = whole.held.wind;
+    if EFFECTS {
+        let [north, east] = whole.effects.wind(whole.present, L::of(0.0) - state.position[2]);
+        (wind[0], wind[1]) = (wind[0] + north, wind[1] + east);
+    }
+    airflow(state, &wind, columns)
+}
+
+/// Rate of the motion and of the membranes.
+#[inline(always)]
+fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>(
+    whole: &Whole<L, ROTORS>,
+    state: &Motion<L, ROTORS>,
+    sides: &[Side<L>; 2],
+) -> (Motion<L, ROTORS>, [Side<L>; 2]) {
+    let none = L::of(0.0);
+    let columns = rotation(&state.attitude);
+    let air = air::<L, ROTORS, EFFECTS>(whole, state, &columns);
+    let airframe = &whole.airframe;
+    let rotors = rotors(airframe, &state.rotor_speed);
+
+    let mut sides_rate = *sides;
+    let mut rest = BodyWrench::zero();
+    if WING == FLAT {
+        rest = whole.plate.wrench(whole.plate.normal_forces(&air, &whole.deployment));
+    }
+    if WING == MEMBRANE {
+        let y = lateral(whole.membrane.arm_m);
+        let (rate, open) = (&whole.angle_rate, &whole.deployment);
+        let ([f, m], left) = whole.membrane.evaluate(&air, y[0], rate[0], open[0], &sides[0]);
+        let ([g, n], right) = whole.membrane.evaluate(&air, y[1], rate[1], open[1], &sides[1]);
+        rest = BodyWrench { force: vector::plus(&f, &g), moment: vector::plus(&m, &n) };
+        sides_rate = [left, right];
+    }
+    rest.force = minus(&rest.force, &drag(&airframe.linear_drag, airframe.quadratic_drag, &air));
+    let rotor_rate = rotor_rates(airframe, &whole.held, &state.rotor_speed);
+    let sum = if EFFECTS {
+        let mut rotor_spin = [none; 2];
+        if Prepared::<L>::feel_rotor_spin(whole.present) {
+            rotor_spin = [spin(&whole.spin, &state.rotor_speed), spin(&whole.spin, &rotor_rate)];
+        }
+        let at = Surroundings {
+            flow: &air,
+            ned_from_body: &columns,
+            height_m: none - state.position[2],
+            inverse_mass: airframe.inverse_mass,
+            rotor_spin,
+            wings: &whole.plate,
+            deployment: whole.deployment,
+            tether_force: if whole.present.has_load() { Some(whole.swing.force(&whole.load)) } else { None },
+        };
+        with_effects(&whole.effects, whole.present, [&rotors, &rest], &at)
+    } else {
+        rotors.plus(&rest)
+    };
+    (body_rate(airframe, state, &columns, &sum, rotor_rate), sides_rate)
+}
