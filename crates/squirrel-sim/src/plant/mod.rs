@@ -4,6 +4,7 @@
 //! speeds and membrane together by RK4. Battery, servos, load and wind are stepped exactly beside it.
 
 mod battery;
+mod jacobian;
 mod lead;
 mod membrane;
 mod parnn_wing;
@@ -11,6 +12,7 @@ mod servo;
 mod wind;
 
 pub use battery::{BatteryParameters, BatteryState};
+pub use jacobian::{Jacobian, VARIABLES};
 pub use lead::{Actuators, Led};
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
 pub use parnn_wing::{ParnnWing, ParnnWingState};
