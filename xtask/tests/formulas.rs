@@ -90,7 +90,7 @@ fn sources(folder: &Path, into: &mut BTreeMap<String, String>) {
         let name = entry.file_name().unwrap().to_str().unwrap();
         if entry.is_dir() && name != "tests" {
             sources(&entry, into);
-        } else if name.ends_with(".rs") && name != "tests.rs" {
+        } else if entry.extension().is_some_and(|extension| extension == "rs") && name != "tests.rs" {
             let text = fs::read_to_string(&entry).unwrap();
             let (product, _) = text.split_once("#[cfg(test)]\nmod tests").unwrap_or((&text, ""));
             let code = product.lines().map(|line| line.split("//").next().unwrap());

@@ -148,6 +148,7 @@ fn steep<L: Lane>(slope: L) -> L {
 }
 
 /// `x`, or 0 where it is not finite.
+#[allow(clippy::eq_op, reason = "zero for a number, NaN for what is none")]
 #[inline(always)]
 fn finite<L: Lane>(x: L) -> L {
     (L::of(1.0) - (x - x)).where_positive(x, L::of(0.0))
