@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Formula, pieces of its text without spaces, and where it stands.
-const FORMULAS: [(&str, &[&str], &str); 27] = [
+const FORMULAS: [(&str, &[&str], &str); 28] = [
     ("drag of the airframe", &["linear[i]*flow.velocity[i]"], "core/src/aero/mod.rs"),
     (
         "flat plate",
@@ -27,6 +27,7 @@ const FORMULAS: [(&str, &[&str], &str); 27] = [
     ),
     ("servo", &["target-(target-moved)*keep"], "core/src/dynamics/servo.rs"),
     ("exponential of lanes", &["0.041_666_294_947_198_99"], "core/src/lane/functions.rs"),
+    ("mixer", &["w_i*a[i]+w_j*a[j]", "s*tilt[i]+u*self.collective[i]"], "core/src/control/mix.rs"),
     ("what effects do to a wrench", &["numbers.thrust_factor("], "core/src/dynamics/mod.rs"),
     ("added_mass", &["added_mass_kg*at.inverse_mass"], "core/src/dynamics/mod.rs"),
     ("angular_damping", &["size(*rate)*self.quadratic"], "core/src/effects/angular_damping.rs"),
@@ -56,28 +57,26 @@ const DENSITY: [&str; 5] = [
 ];
 
 /// What a file calls, without spaces, instead of writing it again.
-const CALLS: [(&str, &[&str]); 5] = [
+const CALLS: [(&str, &[&str]); 8] = [
     (
         "sim/src/batch/dynamics.rs",
-        &[
-            "drag(&airframe.linear_drag",
-            "thrust_and_moment(",
-            "lag_rate(",
-            "body::acceleration(",
-            "body::angular_acceleration(",
-            "body::attitude_rate(",
-            "membrane.evaluate(",
-            "plate.normal_forces(",
-            "servo.lead(",
-            "with_effects(",
-        ],
+        &["derivative(&airframe", "whole::step::<", "whole::air::<", "servo.lead(", "packs.step("],
     ),
     ("sim/src/batch/battery.rs", &["pack.discharge(", "pack.settle("]),
+    ("sim/src/batch/autopilot.rs", &["mixer.mix("]),
     (
         "sim/src/plant/mod.rs",
         &["dynamics::derivative(", "membrane.evaluate(", "servo.lead(", "battery.step("],
     ),
     ("core/src/dynamics/mod.rs", &["aero::drag(", "rotors::wrench(", "body::acceleration(", "with_effects("]),
+    (
+        "core/src/dynamics/lanes.rs",
+        &["drag(&airframe.linear_drag", "thrust_and_moment(", "lag_rate(", "body::acceleration("],
+    ),
+    (
+        "core/src/dynamics/whole.rs",
+        &["drag(&airframe", "membrane.evaluate(", "plate.normal_forces(", "with_effects("],
+    ),
     ("plan/src/trajectory/model.rs", &["aero::drag(", "plate("]),
 ];
 
