@@ -1,11 +1,35 @@
 //! What a command reads and what it writes, compared before it begins: nothing that is read is overwritten, and no two results go into one
 //! file.
 
-use crate::commands::log_files;
 use squirrel_sim::files::{self, FileId};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// Flight logs by path; a folder stands for the logs in it, in the order of their names.
+pub(crate) fn log_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let at = |e: std::io::Error| format!("{}: {e}", path.display());
+        let mut inside = Vec::new();
+        for entry in std::fs::read_dir(path).map_err(at)? {
+            let file = entry.map_err(at)?.path();
+            if file.extension().is_some_and(|e| e == "mcap") {
+                inside.push(file);
+            }
+        }
+        if inside.is_empty() {
+            return Err(format!("{}: no .mcap file in this folder", path.display()));
+        }
+        inside.sort();
+        files.extend(inside);
+    }
+    Ok(files)
+}
 
 /// The files of a command, by the arguments that give them.
 #[derive(Default)]

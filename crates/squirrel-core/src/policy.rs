@@ -15,7 +15,8 @@
 //! | 22..24 | from the vehicle to its axis, north and east | its range |
 //! | 24 | wing command that holds | 1 |
 
-use crate::control::{AttitudeThrust, Reference};
+pub use crate::command::PilotCommand;
+use crate::command::{AttitudeThrust, Reference};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::sensing::{Obstacle, Sensing};
 use crate::math::{limit, lower};
@@ -78,15 +79,6 @@ pub fn observe(sight: &Sight, reference: &Reference) -> [f32; OBSERVATION] {
     }
     seen[OBSERVATION - 1] = sight.wing;
     seen
-}
-
-/// What to fly: the outer loop's command, from outside of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PilotCommand {
-    /// Attitude and thrust.
-    pub attitude: AttitudeThrust,
-    /// Both wings, 0 folded to 1 spread.
-    pub wing: f32,
 }
 
 /// What the numbers of an action span.

@@ -1,37 +1,11 @@
 //! The vehicle file with the named effects in it: a patch that keeps every comment and the order of what was there.
 
-use crate::diagnose::{Diagnosis, Own};
-use crate::verdict::{Kind, NamedEffect, Value, Verdict};
+use crate::diagnosis::{Diagnosis, Own};
+use crate::verdict::{Kind, NamedEffect, Value, nothing_to_add};
 use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind as ParameterKind};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::fmt::Write;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, value};
-
-/// Why a vehicle file has nothing to take from a verdict, in one line; `None` where the verdict names what the file lacks.
-pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
-    Some(match verdict.verdict {
-        Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers => return None,
-        Kind::None => "no effect is above its tolerance".to_owned(),
-        Kind::Ambiguous => {
-            let own: Vec<&str> = verdict.effects.iter().map(|effect| effect.name).collect();
-            let others = verdict.alternatives.iter().map(|other| other.effects.join(" + "));
-            let sets: Vec<String> = std::iter::once(own.join(" + ")).chain(others).collect();
-            format!(
-                "these flights do not tell apart {}; `gap add --effect NAME` takes one of them",
-                sets.join(", ")
-            )
-        }
-        Kind::OutsideCatalogue => "something is missing that the catalogue does not have".to_owned(),
-        Kind::NotIdentifiable if verdict.effects.is_empty() => {
-            "nothing is above its tolerance, in flights that would not show every effect".to_owned()
-        }
-        Kind::NotIdentifiable => "too many names explain these flights".to_owned(),
-        Kind::DataProblem => match &verdict.goes_with {
-            Some(channel) => format!("the log contradicts itself, {channel}"),
-            None => "the log contradicts itself".to_owned(),
-        },
-    })
-}
 
 /// The text of the vehicle file with the effects of a diagnosis added, each number with its interval, the flights that it
 /// comes from, and what they covered.

@@ -11,8 +11,8 @@
 use crate::GapError;
 use crate::compatibility::{self, Moments, Ready};
 use crate::fitted;
-use crate::leftover::{Usual, usual};
-use crate::name::{BETA, Catalogue, Scored, Search, hypothesis};
+use crate::leftover::usual;
+use crate::name::{BETA, Catalogue, Scatter, Scored, Search, hypothesis};
 use crate::predictor::Predictor;
 use crate::verdict::SetAside;
 use squirrel_core::effects::Effects;
@@ -47,15 +47,6 @@ pub struct Baseline {
     pub set_aside: Vec<SetAside>,
     pub(crate) moments: Moments,
     pub(crate) scatter: Scatter,
-}
-
-/// How flights of one machine differ.
-#[derive(Debug, Default)]
-pub(crate) struct Scatter {
-    /// By effect, in the unit of its number: how much another flight may differ, one standard deviation.
-    pub(crate) tolerances: BTreeMap<&'static str, f64>,
-    /// What the model leaves of one.
-    pub(crate) usual: Usual,
 }
 
 impl Baseline {

@@ -8,7 +8,7 @@
 //! | something of its own | - | `outside_catalogue` |
 
 use crate::find::Place;
-use crate::name::{Member, NATS_MIN, Naming, STANDS, Scored, Search};
+use crate::name::{BEHIND_NATS, INTERVAL, Member, NATS_MIN, Naming, STANDS, Scored, Search};
 use crate::proof::HeldOut;
 use crate::verdict::{Alternative, Gap, Kind, Left, NamedEffect, Since, Value, Verdict};
 use crate::words;
@@ -23,7 +23,6 @@ const FORM_REMOVED: f64 = 0.6;
 /// it, too, by so many nats: twenty to one.
 const RIVAL_GAP: f64 = 3.0;
 const RIVAL_GAP_BEHIND: f64 = 1.5;
-pub(crate) const BEHIND_NATS: f64 = 3.0;
 /// Part of an error on held-out flights by which another one may be larger and no worse: the floor takes what noise is beyond it.
 const HELD_OUT_NOISE: f64 = 0.05;
 /// More alternatives than this within the evidence of a name are no answer.
@@ -217,9 +216,6 @@ fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {
     all.sort_by(|a, b| b.evidence_nats.total_cmp(&a.evidence_nats));
     all
 }
-
-/// 95 % of a normal distribution lies within this many standard deviations.
-pub(crate) const INTERVAL: f64 = 1.96;
 
 fn parameters(
     search: &Search<'_>,

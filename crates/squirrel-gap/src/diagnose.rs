@@ -1,10 +1,10 @@
 //! From flights to a verdict: check that the logs agree with themselves, name what is missing, prove it on other flights.
 
 use crate::GapError;
-use crate::add::nothing_to_add;
 use crate::baseline::Baseline;
 use crate::compatibility::{self, Moments, Ready};
 use crate::decide::{alternatives, close, decide, shared};
+use crate::diagnosis::{Covered, Details, Diagnosis, Own};
 use crate::find;
 use crate::fitted;
 use crate::name::{
@@ -13,56 +13,11 @@ use crate::name::{
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
-use crate::proof::{HeldOut, gap, hold, prove};
-use crate::verdict::{Kind, SetAside, Verdict};
+use crate::proof::{gap, hold, prove};
+use crate::verdict::{Kind, SetAside, Verdict, nothing_to_add};
 use squirrel_core::vehicle::{ThrustCurve, Vehicle};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
-
-/// Everything that the workflow found out.
-#[derive(Debug)]
-pub struct Diagnosis {
-    /// The answer.
-    pub verdict: Verdict,
-    /// What the flights covered: name, low, high, unit.
-    pub domain: Vec<Covered>,
-    /// The vehicle with its numbers where good flights of the machine have them, if flights are compared with such.
-    pub(crate) before: Option<Own>,
-    /// The same where these flights have them.
-    pub(crate) now: Option<Own>,
-    /// For the report.
-    pub(crate) details: Option<Details>,
-}
-
-/// A machine as flights have it.
-#[derive(Debug)]
-pub(crate) struct Own {
-    pub(crate) vehicle: VehicleFile,
-    /// Where its numbers come from, as vehicle files say it.
-    pub(crate) source: String,
-}
-
-/// A range of flight conditions that the flights covered, 2nd to 98th percentile.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Covered {
-    /// What: speed, height, tilt, voltage.
-    pub name: &'static str,
-    /// Lower end.
-    pub low: f64,
-    /// Upper end.
-    pub high: f64,
-    /// Unit of both.
-    pub unit: &'static str,
-}
-
-/// What the pictures are made of.
-#[derive(Debug)]
-pub(crate) struct Details {
-    pub(crate) evidence: Vec<(&'static str, f64)>,
-    pub(crate) confusability: (Vec<&'static str>, Vec<Vec<f64>>),
-    pub(crate) held_out: Option<HeldOut>,
-    pub(crate) seen: picture::Seen,
-}
 
 /// Looks at flights of a vehicle and says which effect its file lacks.
 ///

@@ -14,12 +14,14 @@ mod closed_loop;
 mod compatibility;
 mod decide;
 mod diagnose;
+mod diagnosis;
 mod error;
 pub mod find;
 mod fitted;
 mod flight;
 mod leftover;
 mod name;
+mod number;
 mod picture;
 mod predictor;
 mod proof;
@@ -28,18 +30,20 @@ mod shrink;
 mod verdict;
 mod words;
 
-pub use add::{add, add_effect, difference, fit, nothing_to_add, patched};
+pub use add::{add, add_effect, difference, fit, patched};
 pub use baseline::Baseline;
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use compatibility::check;
-pub use diagnose::{Covered, Diagnosis, diagnose, diagnose_since, diagnose_with};
+pub use diagnose::{diagnose, diagnose_since, diagnose_with};
+pub use diagnosis::{Covered, Diagnosis};
 pub use error::GapError;
 pub use find::{Finding, find};
+pub use number::significant;
 pub use picture::{first_screen, picture};
 pub use verdict::{
     Alternative, Gap, Kind, Left, Moved, NamedEffect, RotorHealth, SetAside, Since, Value, Verdict,
+    nothing_to_add,
 };
-pub use words::significant;
 
 /// The sources of a flight log that the workflow looks at.
 pub const SOURCES: [&str; 7] = ["attitude", "baro", "battery", "gnss", "imu", "rotor", "wing"];

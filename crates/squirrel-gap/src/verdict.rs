@@ -225,3 +225,29 @@ impl Verdict {
         self.set_aside.iter().all(|aside| aside.flight != flight)
     }
 }
+
+/// Why a vehicle file has nothing to take from a verdict, in one line; `None` where the verdict names what the file lacks.
+pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
+    Some(match verdict.verdict {
+        Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers => return None,
+        Kind::None => "no effect is above its tolerance".to_owned(),
+        Kind::Ambiguous => {
+            let own: Vec<&str> = verdict.effects.iter().map(|effect| effect.name).collect();
+            let others = verdict.alternatives.iter().map(|other| other.effects.join(" + "));
+            let sets: Vec<String> = std::iter::once(own.join(" + ")).chain(others).collect();
+            format!(
+                "these flights do not tell apart {}; `gap add --effect NAME` takes one of them",
+                sets.join(", ")
+            )
+        }
+        Kind::OutsideCatalogue => "something is missing that the catalogue does not have".to_owned(),
+        Kind::NotIdentifiable if verdict.effects.is_empty() => {
+            "nothing is above its tolerance, in flights that would not show every effect".to_owned()
+        }
+        Kind::NotIdentifiable => "too many names explain these flights".to_owned(),
+        Kind::DataProblem => match &verdict.goes_with {
+            Some(channel) => format!("the log contradicts itself, {channel}"),
+            None => "the log contradicts itself".to_owned(),
+        },
+    })
+}

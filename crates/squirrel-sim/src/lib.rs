@@ -17,6 +17,7 @@ pub mod flight;
 pub mod import;
 pub mod log;
 pub mod plant;
+mod quantity;
 pub mod replay;
 pub mod report;
 pub mod scenario;

@@ -4,9 +4,9 @@
 //! `setup-K.bin` is the setup of flight K alone, a file of vectors without frames, for a board to fly with. Before anything
 //! is written the host flies all of them again: vectors whose outputs are not the log's would test nothing.
 
-use super::log_files;
 use crate::output::{self, Table, talk};
 use crate::paths::Paths;
+use crate::paths::log_files;
 use serde::Serialize;
 use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Record, Wire, hash, written};
 use squirrel_core::stack::{SensorFrame, Stack, StackState};

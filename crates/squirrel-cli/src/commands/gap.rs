@@ -1,8 +1,8 @@
 //! `squirrel gap`: where simulation and measurement disagree, what is missing, and what adding it is worth.
 
-use super::log_files;
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
+use crate::paths::log_files;
 use squirrel_gap::{
     ClosedLoop, Diagnosis, Kind, Moved, NamedEffect, RotorHealth, Value, Verdict, significant,
 };

@@ -17,7 +17,7 @@ use squirrel_sim::flight::{Metrics, Setup};
 use squirrel_sim::log::FlightLog;
 use squirrel_sim::report::flight::FlightView;
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The vehicle of a `--vehicle` option: a file, or the shipped squirrel.
 fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
@@ -25,31 +25,6 @@ fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
         None => Ok(VehicleFile::squirrel()),
         Some(path) => VehicleFile::load(path).map_err(|e| e.to_string()),
     }
-}
-
-/// Flight logs by path; a folder stands for the logs in it, in the order of their names.
-pub(crate) fn log_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, String> {
-    let mut files = Vec::new();
-    for path in paths {
-        if !path.is_dir() {
-            files.push(path.clone());
-            continue;
-        }
-        let at = |e: std::io::Error| format!("{}: {e}", path.display());
-        let mut inside = Vec::new();
-        for entry in std::fs::read_dir(path).map_err(at)? {
-            let file = entry.map_err(at)?.path();
-            if file.extension().is_some_and(|e| e == "mcap") {
-                inside.push(file);
-            }
-        }
-        if inside.is_empty() {
-            return Err(format!("{}: no .mcap file in this folder", path.display()));
-        }
-        inside.sort();
-        files.extend(inside);
-    }
-    Ok(files)
 }
 
 /// Writes a log that says which commit of the program flew.

@@ -1,8 +1,9 @@
 //! `squirrel train`: from flight logs to the weights of a wing-force model.
 
-use super::{log_files, vehicle};
+use super::vehicle;
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
+use crate::paths::log_files;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use squirrel_nn::NnError;

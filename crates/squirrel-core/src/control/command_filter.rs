@@ -6,28 +6,7 @@
 use crate::math::wrap_angle;
 use nalgebra::Vector3;
 
-/// Roll, pitch and yaw reference with its derivatives.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct EulerReference {
-    /// Roll, pitch, yaw, rad.
-    pub angle: Vector3<f32>,
-    /// First derivative, rad/s.
-    pub rate: Vector3<f32>,
-    /// Second derivative, rad/s^2.
-    pub acceleration: Vector3<f32>,
-}
-
-impl EulerReference {
-    /// The sum of two references; angles are wrapped.
-    #[must_use]
-    pub fn plus(&self, other: &Self) -> Self {
-        Self {
-            angle: (self.angle + other.angle).map(wrap_angle),
-            rate: self.rate + other.rate,
-            acceleration: self.acceleration + other.acceleration,
-        }
-    }
-}
+pub use crate::command::EulerReference;
 
 /// One step towards `target`, semi-implicit.
 ///

@@ -9,9 +9,9 @@
 use super::AttitudeThrust;
 use super::position::{Motion, heading_frame};
 use super::twcc::Airframe;
+use crate::command::PilotCommand;
 use crate::frames::{In, Ned};
 use crate::math::{GRAVITY_M_S2, limit, limit_norm, lower, sqrt, upper};
-use crate::policy::PilotCommand;
 use crate::vehicle::{ParameterError, positive};
 use nalgebra::Vector3;
 

@@ -18,28 +18,4 @@ pub mod wiic;
 pub mod wing_force;
 pub mod woeg;
 
-use crate::frames::{In, Ned};
-
-/// What to follow at one instant.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Reference {
-    /// Position, m.
-    pub position: In<Ned, f32>,
-    /// Velocity, m/s.
-    pub velocity: In<Ned, f32>,
-    /// Acceleration, m/s^2.
-    pub acceleration: In<Ned, f32>,
-    /// Heading, rad, clockwise from north.
-    pub yaw_rad: f32,
-}
-
-/// Roll, pitch and collective thrust that the outer loop asks of the inner loop.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct AttitudeThrust {
-    /// Roll, rad.
-    pub roll_rad: f32,
-    /// Pitch, rad.
-    pub pitch_rad: f32,
-    /// Collective thrust, N.
-    pub thrust_n: f32,
-}
+pub use crate::command::{AttitudeThrust, Reference};

@@ -89,8 +89,9 @@ use crate::aero::{Airflow, BodyWrench, flat_plate};
 use crate::frames::{Body, Frame, In};
 use crate::lane::Lane;
 use crate::math::{Real, real};
-use crate::vehicle::{PerRotor, Vehicle};
-use nalgebra::{Matrix3, Vector3};
+pub use crate::vehicle::Alteration;
+use crate::vehicle::Vehicle;
+use nalgebra::Vector3;
 
 /// What a parameter of an effect is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -272,19 +273,6 @@ pub struct Situation<'a, L> {
     pub wings: &'a flat_plate::Pair<L>,
     /// Deployment of the left and the right wing, 0..1.
     pub deployment: [L; 2],
-}
-
-/// Numbers of the airframe that effects change once.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Alteration<T: Real> {
-    /// Mass, kg.
-    pub mass_kg: T,
-    /// Inertia, kg m^2.
-    pub inertia_kg_m2: Matrix3<T>,
-    /// Factor on the thrust of each rotor.
-    pub thrust: PerRotor<T>,
-    /// Factor on the reaction torque of each rotor.
-    pub torque: PerRotor<T>,
 }
 
 /// A physical effect: what it is called, its numbers, and where it acts.

@@ -26,9 +26,9 @@ pub mod rest;
 pub mod rkf;
 pub mod voting;
 
+use crate::frame::{Gnss, Imu};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::limit_norm;
-use crate::stack::{Gnss, Imu};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
 /// What an estimator hears in one step.

@@ -8,9 +8,9 @@
 
 use super::navigator::Health;
 use crate::control::mixer::ThrustTorque;
+use crate::frame::Imu;
 use crate::frames::{Body, Ned, Rotation};
 use crate::math::{all_finite, lower};
-use crate::stack::Imu;
 use crate::vehicle::Vehicle;
 use nalgebra::Vector3;
 

@@ -13,9 +13,9 @@ use super::mekf::{Mekf, MekfParameters};
 use super::rkf::{Rkf, RkfParameters};
 use super::voting::Voter;
 use super::{Estimate, Estimator, STEP_MAX_S, Sensed};
+use crate::frame::{Gnss, Imu, SensorFrame};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{GRAVITY_M_S2, lower};
-use crate::stack::{Gnss, Imu, SensorFrame};
 use crate::vehicle::{ParameterError, not_negative, positive};
 use nalgebra::Vector3;
 

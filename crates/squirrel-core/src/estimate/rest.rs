@@ -5,11 +5,11 @@
 use super::navigator::Start;
 use super::voting::Voter;
 use super::{heading_error, levelled};
+use crate::frame::Imu;
+use crate::frame::SensorFrame;
 use crate::frames::Rotation;
 use crate::frames::{Body, In, Ned};
 use crate::math::GRAVITY_M_S2;
-use crate::stack::Imu;
-use crate::stack::SensorFrame;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// What counts as rest.

@@ -5,8 +5,8 @@
 //! other moves, does not count. What the units constantly differ by is learnt and halved between them, so that nothing jumps when one of
 //! them goes. A unit that is alone may spike: what no vehicle turns or feels from one sample to the next is replaced by the sample before.
 
+use crate::frame::Imu;
 use crate::frames::{Body, In};
-use crate::stack::Imu;
 use nalgebra::Vector3;
 
 /// Units differ by more than noise beyond this rate, rad/s.

@@ -7,8 +7,8 @@
 //! (orthogonal multisines: Klein and Morelli, Aircraft System Identification).
 
 use super::mission::scramble;
-use crate::control::Reference;
-use crate::control::command_filter::EulerReference;
+use crate::command::EulerReference;
+use crate::command::Reference;
 use crate::frames::{In, Ned};
 use crate::math::{limit, lower, upper, wrap_angle};
 use crate::vehicle::{ParameterError, positive};

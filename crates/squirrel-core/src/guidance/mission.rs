@@ -7,7 +7,7 @@
 use super::excite::{Excitation, Programme};
 use super::sensing::{Obstacle, Sensing, offset};
 use super::trajectory::Trajectory;
-use crate::control::Reference;
+use crate::command::Reference;
 use crate::frames::{In, Ned};
 use crate::math::{whole, wrap_angle};
 use crate::vehicle::ParameterError;

@@ -3,7 +3,7 @@
 //! Paper, section V.B; the coefficients are not printed. docs/equations.md T20: `s(t) = V (t^2 / T - t^3 / (3 T^2))` for `t < T`,
 //! then `s = V (t - T/3)`: starts at rest, reaches `V` at `T` without a step in acceleration, peak acceleration `2 V / T`.
 
-use crate::control::Reference;
+use crate::command::Reference;
 use crate::frames::{In, Ned};
 use crate::math::upper;
 use nalgebra::Vector3;

@@ -168,8 +168,8 @@ mod tests {
                 ("activation", x.activation(), 1.0 - at.tanh().powi(2)),
             ];
             for (name, dual, slope) in cases {
-                // What an error of 2e-9, that oscillates, has as its slope.
-                assert!((dual.by[0] - slope).abs() < 5e-7 * slope.abs().max(1.0), "{name} at {at}: {dual:?}");
+                // What an error of 2e-9, that oscillates, has as its slope; the largest at the end of a polynomial's range.
+                assert!((dual.by[0] - slope).abs() < 1e-6 * slope.abs().max(1.0), "{name} at {at}: {dual:?}");
             }
         }
     }

@@ -16,14 +16,15 @@ mod dual;
 pub mod functions;
 mod numbers;
 mod portable;
+mod real;
 pub mod vector;
 
 pub use dual::Dual;
 pub use functions::net_tanh;
 pub use numbers::{load, put, store, take};
 pub use portable::Portable;
+pub use real::{Real, lower, real, sqrt, upper};
 
-use crate::math::{Real, lower, upper};
 use core::ops::{Add, Div, Mul, Sub};
 
 /// Numbers that lie side by side in memory. Fixed, because the order of a sum over them decides its bits.
@@ -118,7 +119,7 @@ macro_rules! one_number {
             }
             #[inline(always)]
             fn root(self) -> Self {
-                crate::math::sqrt(self)
+                sqrt(self)
             }
             #[inline(always)]
             fn where_positive(self, then: Self, otherwise: Self) -> Self {

@@ -18,7 +18,7 @@
 //! When all is well again for [`RECOVERY_US`], control resumes without any memory of the time before.
 
 use super::Known;
-use super::frame::{Heard, Merged};
+use super::merge::{Heard, Merged};
 use crate::math::{GRAVITY_M_S2, limit};
 use nalgebra::Vector3;
 

@@ -10,10 +10,10 @@
 //! not finite is rejected and the last valid one kept.
 
 pub mod failsafe;
-mod frame;
+mod merge;
 pub mod wire;
 
-pub use frame::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
+pub use crate::frame::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
 
 use crate::control::backstepping::{AttitudeGains, AttitudeState, AttitudeTerms, INNER_STEP_MAX_S};
 use crate::control::command_filter::{self, EulerReference};

@@ -10,7 +10,6 @@ pub use check::ParameterError;
 pub(crate) use check::{each_not_negative, each_positive, not_negative, positive};
 pub use thrust_curve::ThrustCurve;
 
-use crate::effects::Alteration;
 use crate::frames::{Body, In};
 use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
 use nalgebra::{Matrix3, Vector3};
@@ -126,6 +125,19 @@ pub struct Parameters<T: Real> {
     pub wing: Option<Wing<T>>,
     /// Limits for the flight code.
     pub limits: Limits<T>,
+}
+
+/// Numbers of the airframe that effects change once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Alteration<T: Real> {
+    /// Mass, kg.
+    pub mass_kg: T,
+    /// Inertia, kg m^2.
+    pub inertia_kg_m2: Matrix3<T>,
+    /// Factor on the thrust of each rotor.
+    pub thrust: PerRotor<T>,
+    /// Factor on the reaction torque of each rotor.
+    pub torque: PerRotor<T>,
 }
 
 /// A checked airframe with what the loops derive from it.

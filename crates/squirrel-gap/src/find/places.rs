@@ -19,7 +19,7 @@ const WINDOW_S: f64 = 1.0;
 /// What the predictor says.
 pub(crate) fn places(predictor: &Predictor, rows: &[f64]) -> Result<Vec<Place>, GapError> {
     let wind = predictor.wind_columns(&predictor.nominal())?;
-    let draws = floor::draws(predictor, &wind, crate::name::TURBULENCE_M_S, 2);
+    let draws = floor::draws(predictor, &wind, crate::predictor::TURBULENCE_M_S, 2);
     let mut total = [0.0; DYNAMIC];
     let mut all: Vec<(f64, Place)> = Vec::new();
     for segment in predictor.segments.iter().filter(|s| s.channel < DYNAMIC) {

@@ -19,7 +19,7 @@ use super::heading::{self, Held};
 use super::series::{Series, common};
 use super::smoother::{self, Differences};
 use crate::GapError;
-use crate::words::significant;
+use crate::number::significant;
 use nalgebra::{UnitQuaternion, Vector3};
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_sim::log::FlightLog;

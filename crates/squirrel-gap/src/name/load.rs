@@ -6,12 +6,12 @@
 //! A rotor that lost thrust and a load near it ask the same of roll and pitch; the load lets yaw be and adds weight. Each of
 //! its two numbers may be too small for a name by itself, so that no search by single effects meets it.
 
+use super::INTERVAL;
 use super::evidence::BETA;
 use super::point::Member;
 use super::refine::Scored;
 use super::search::{Found, Search};
 use crate::GapError;
-use crate::decide::INTERVAL;
 
 const MASS: &str = "mass_error";
 const CENTRE: &str = "cg_offset";

@@ -31,7 +31,7 @@ pub(crate) use evidence::BETA;
 pub(crate) use linear::settle_flights;
 pub(crate) use parameters::Catalogue;
 pub(crate) use payload::payload_lengths_m;
-pub(crate) use point::{Member, Point, hypothesis};
+pub(crate) use point::{Member, Point, Scatter, hypothesis};
 pub(crate) use refine::Scored;
 pub(crate) use search::{Found, NATS_MIN, Search};
 pub(crate) use step::clock_step_s;
@@ -40,12 +40,14 @@ pub(crate) use tolerance::{notes as silent_tolerances, sds};
 
 use crate::GapError;
 use crate::leftover::{Leftover, Slack, gusts, leftover, noise};
+pub(crate) use crate::predictor::TURBULENCE_M_S;
 use crate::predictor::{Hypothesis, Motion};
 use crate::verdict::Left;
 use std::rc::Rc;
 
-/// Deviation of the air's own motion that is no wind worth a name, m/s.
-pub(crate) const TURBULENCE_M_S: f64 = 0.12;
+pub(crate) const BEHIND_NATS: f64 = 3.0;
+/// 95 % of a normal distribution lies within this many standard deviations.
+pub(crate) const INTERVAL: f64 = 1.96;
 
 /// The best explanation of a set of flights, and what it leaves.
 pub(crate) struct Naming {

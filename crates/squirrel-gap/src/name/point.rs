@@ -6,12 +6,22 @@
 
 use super::parameters::{Candidate, Catalogue};
 use crate::GapError;
-use crate::baseline::Scatter;
+use crate::leftover::Usual;
 use crate::predictor::{HEIGHT_KNOTS, Hypothesis, Predictor};
 use nalgebra::Vector3;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::In;
 use squirrel_core::vehicle::Vehicle;
+use std::collections::BTreeMap;
+
+/// How flights of one machine differ.
+#[derive(Debug, Default)]
+pub(crate) struct Scatter {
+    /// By effect, in the unit of its number: how much another flight may differ, one standard deviation.
+    pub(crate) tolerances: BTreeMap<&'static str, f64>,
+    /// What the model leaves of one.
+    pub(crate) usual: Usual,
+}
 
 /// Tolerance of the tilt of an attitude estimate, rad.
 const TILT_RAD: f64 = 0.006;

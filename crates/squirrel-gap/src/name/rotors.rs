@@ -6,8 +6,8 @@ use super::parameters::Parameter;
 use super::point::Member;
 use super::refine::Scored;
 use super::search::{FURTHER_NATS, Found, MEMBERS_MAX, NATS_MIN, Search, WEAK_ROTOR};
+use super::{BEHIND_NATS, INTERVAL};
 use crate::GapError;
-use crate::decide::{BEHIND_NATS, INTERVAL};
 use crate::verdict::{RotorHealth, Value};
 
 impl Search<'_> {

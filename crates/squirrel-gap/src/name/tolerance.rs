@@ -2,8 +2,8 @@
 
 use super::point::Airframe;
 use crate::GapError;
+use crate::number::significant;
 use crate::predictor::Predictor;
-use crate::words::significant;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.

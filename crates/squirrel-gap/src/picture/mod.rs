@@ -14,13 +14,13 @@ mod windows;
 
 use crate::ClosedLoop;
 use crate::GapError;
-use crate::diagnose::{Details, Diagnosis};
+use crate::diagnosis::{Details, Diagnosis, Seen};
 use crate::name::{Naming, Scored, Search, TURBULENCE_M_S};
 use crate::predictor::DYNAMIC;
 use crate::proof::HeldOut as Flown;
 use crate::report::{
-    Answer, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
-    HeldOutChannel, Horizon, ParameterRow, ReportData, RotorRow, Whiteness,
+    Answer, Confusability, DomainRow, Errors, Evidence, FlyNext, HeldOut, HeldOutChannel, Horizon,
+    ParameterRow, ReportData, RotorRow,
 };
 use crate::shrink::{BIN_S, BINS, CHANNELS as FLOWN_CHANNELS};
 use crate::verdict::{Kind, NamedEffect, RotorHealth, Value};
@@ -51,20 +51,6 @@ const SEPARATED: f64 = 9.0;
 /// Why the panels of a data problem are empty.
 const CONTRADICTION: &str =
     "Empty: the logs contradict themselves, and nothing is computed from such logs. The verdict says where.";
-
-/// What only the predictor and the search know.
-#[derive(Debug)]
-pub(crate) struct Seen {
-    flights: Vec<FlightPanel>,
-    conditional: Vec<Conditional>,
-    whiteness: Vec<Whiteness>,
-    /// Refined sets by name with their evidence over none, nats; the answer first, if there is one.
-    sets: Vec<(String, f64)>,
-    has_answer: bool,
-    rival: String,
-    /// Effect, key and declared tolerance of the numbers of the answer.
-    tolerances: Vec<(&'static str, &'static str, f64)>,
-}
 
 /// Keeps what the report needs of the predictor.
 ///

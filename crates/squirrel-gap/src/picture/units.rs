@@ -1,6 +1,6 @@
 //! Units of keys, and numbers as they are read aloud: 59 ms, 12 %, 4.2 mm.
 
-use crate::words::significant;
+use crate::number::significant;
 
 /// Ends of keys that are units, the longest first, and how they are read.
 const UNITS: [(&str, &str); 19] = [

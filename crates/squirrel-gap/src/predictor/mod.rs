@@ -23,6 +23,7 @@ mod trim;
 mod turning;
 
 pub(crate) use commands::{Clock, Commands};
+pub(crate) use noise::TURBULENCE_M_S;
 pub(crate) use track::{HEIGHT_KNOTS, Motion, SensorErrors, Track};
 
 use crate::GapError;

@@ -6,6 +6,9 @@ use nalgebra::{Vector3, Vector6};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 
+/// Deviation of the air's own motion that is no wind worth a name, m/s.
+pub(crate) const TURBULENCE_M_S: f64 = 0.12;
+
 impl Track {
     /// Noise behind the filters, a row each: white in accelerometer and gyroscope, or in what stands in for them.
     pub(crate) fn drawn_noise(&self, rng: &mut impl Rng) -> Vec<Vector6<f64>> {

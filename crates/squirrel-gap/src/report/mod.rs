@@ -26,7 +26,7 @@ pub use data::{
     HeldOutChannel, Horizon, InputCorrelation, ParameterRow, ReportData, RotorRow, Whiteness,
 };
 
-use crate::words::significant;
+use crate::number::significant;
 use squirrel_sim::report::chart::drawable;
 use squirrel_sim::report::page::Page;
 

@@ -5,7 +5,7 @@
 
 use super::devices;
 use super::table::{DEVICE, Field, Limit, Slot, Table};
-use crate::vehicle_file::plain;
+use crate::quantity::plain;
 use Limit::{AboveZero, Signed, Size, Within};
 use serde::Deserialize;
 

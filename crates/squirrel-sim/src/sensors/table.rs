@@ -3,7 +3,7 @@
 //! What a table says is kept until all of it is known, because `device` acts before the other keys wherever it stands.
 
 use super::parameters::Timing;
-use crate::vehicle_file::plain;
+use crate::quantity::plain;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
 use std::fmt;
 

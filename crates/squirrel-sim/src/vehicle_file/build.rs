@@ -1,7 +1,6 @@
 //! From the tables of a vehicle file to checked parameters. Errors are `field = value: reason`.
 
 use super::VehicleFile;
-use super::quantity::Quantity;
 use super::tables::{
     AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, EffectValue, FormName,
     InertiaValue, PlusTable, PositionTable, PropulsionTable, RotorTable, ThrustLawName, TriggerName,
@@ -9,6 +8,7 @@ use super::tables::{
 };
 use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ParnnWing, ServoParameters, WingPlant};
+use crate::quantity::Quantity;
 use crate::weights::ParnnWeights;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
 use squirrel_core::control::plus::Plus;

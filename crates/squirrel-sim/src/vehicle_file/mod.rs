@@ -4,11 +4,9 @@
 //! the field and the value.
 
 mod build;
-mod quantity;
 mod tables;
 
-pub use quantity::Provenance;
-pub(crate) use quantity::plain;
+pub use crate::quantity::Provenance;
 
 use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, ParnnWing, WingPlant};
@@ -166,7 +164,7 @@ impl VehicleFile {
         let mut built =
             built.map_err(|problem| VehicleFileError::Field { file: file.to_owned(), problem })?;
         text.clone_into(&mut built.text);
-        built.provenance = quantity::provenance(&raw);
+        built.provenance = crate::quantity::provenance(&raw);
         Ok(built)
     }
 

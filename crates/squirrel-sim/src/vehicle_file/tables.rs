@@ -1,6 +1,6 @@
 //! The shape of a vehicle file, table by table; unknown keys are refused.
 
-use super::quantity::Quantity;
+use crate::quantity::Quantity;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 

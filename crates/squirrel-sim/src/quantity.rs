@@ -7,7 +7,7 @@ use std::marker::PhantomData;
 
 /// A value with its tolerance and where it comes from.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Quantity<V>(pub(super) V);
+pub(crate) struct Quantity<V>(pub(crate) V);
 
 /// The long form. `low`, `high` and `domain` are what the gap workflow writes; they do not act here.
 #[derive(serde::Deserialize)]
@@ -80,7 +80,7 @@ pub struct Provenance {
 }
 
 /// Every number of a vehicle file by its field, with provenance where it has any.
-pub(super) fn provenance(table: &toml::Table) -> Vec<(String, Provenance)> {
+pub(crate) fn provenance(table: &toml::Table) -> Vec<(String, Provenance)> {
     let mut all = Vec::new();
     walk(&toml::Value::Table(table.clone()), String::new(), &mut all);
     all
