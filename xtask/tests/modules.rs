@@ -51,7 +51,7 @@ fn arrows(source: &Path) -> Arrows {
         let own = module(path);
         let names = named(&fs::read_to_string(path).unwrap());
         let others = names.intersection(&all).filter(|name| **name != own).cloned();
-        arrows.entry(own).or_default().extend(others);
+        arrows.entry(own.clone()).or_default().extend(others);
     }
     // The root of a crate names all of them.
     arrows.remove("lib");
@@ -70,7 +70,9 @@ fn cycles(mut arrows: Arrows) -> Arrows {
         arrows.retain(|name, _| needed.contains(name));
         if arrows.len() == before {
             let there: BTreeSet<String> = arrows.keys().cloned().collect();
-            arrows.values_mut().for_each(|needs| needs.retain(|name| there.contains(name)));
+            for needs in arrows.values_mut() {
+                needs.retain(|name| there.contains(name));
+            }
             return arrows;
         }
     }
