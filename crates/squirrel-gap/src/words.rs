@@ -2,6 +2,7 @@
 
 use crate::number::significant;
 use crate::verdict::{Kind, NamedEffect, Value, Verdict};
+use squirrel_core::effects::Effects;
 use std::fmt::Write;
 
 /// Channels as files and panels call them, and as pilots do.
@@ -36,43 +37,7 @@ pub(crate) fn spoken(text: &str) -> String {
 
 /// The manoeuvre that shows an effect and tells it from those it is confused with.
 pub(crate) fn manoeuvre(effect: &str) -> &'static str {
-    match effect {
-        "linear_drag" | "quadratic_drag" | "flapping_moment" => {
-            "dashes at several speeds from 2 to 9 m/s, both ways"
-        }
-        "constant_wind" | "thrust_misalignment" | "accel_bias" => {
-            "hover through a full turn of yaw and at two or more headings, then dash at two headings"
-        }
-        "heading_bias" | "gnss_latency" => "hard horizontal accelerations along and across the heading",
-        "gust" => "the same flight again on another day",
-        "ground_effect" => {
-            "a ladder of hovers from 0.2 to 1.5 m above the ground, with a range finder if there is one"
-        }
-        "battery_sag" => "climbs at full thrust with a full and with a half empty battery, voltage logged",
-        "thrust_coefficient" | "mass_error" | "weak_rotor" | "cg_offset" => {
-            "roll and pitch doublets, yaw steps and thrust steps in hover; and weigh the vehicle"
-        }
-        "motor_lag" | "actuation_latency" | "angular_damping" => {
-            "a multisine from 0.3 to 6 Hz in roll and pitch"
-        }
-        "inertia_error" => "doublets about one axis at a time",
-        "translational_lift" => "dashes to 9 m/s at constant height with the wings folded",
-        "axial_inflow" | "added_mass" => "climbs and descents of 3 m/s with heave doublets, wings folded",
-        "rotor_gyro_torque" | "yaw_torque_coeff" => "yaw steps",
-        "gyro_scale" => {
-            "doublets about one axis at a time and a few full turns of yaw, with the attitude logged"
-        }
-        "accel_scale" => "climbs with thrust steps, level and banked, with the velocity logged",
-        "compass_current" => "climbs at full thrust and descents at one heading, then at another",
-        "clock_skew" | "clock_step" => {
-            "a flight of more than a minute with doublets at its beginning and end"
-        }
-        "wing_membrane" | "wing_asymmetry" | "wing_servo_lag" => {
-            "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking"
-        }
-        "payload_swing" => "stop and go along one axis at 0.6 to 0.9 Hz, then hover",
-        _ => "the excite_rich scenario",
-    }
+    Effects::<f64>::words(effect).map_or("the excite_rich scenario", |words| words.fly)
 }
 
 /// What to fly to see or to separate some effects.

@@ -2,7 +2,7 @@
 //!
 //! Form `drifting`: `b + drift t`, `t` the time since the flight began.
 
-use super::{Effect, EffectParameter, is};
+use super::{Effect, EffectParameter, Shown, Words, is};
 use crate::frames::{Body, In};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -11,7 +11,7 @@ const DRIFTING: usize = 1;
 
 /// Bias along the body axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AccelBias<T>(pub(super) [T; 7]);
+pub(super) struct AccelBias<T>(pub(super) [T; 7]);
 
 impl<T: Real> Effect<T> for AccelBias<T> {
     const NAME: &'static str = "accel_bias";
@@ -25,6 +25,13 @@ impl<T: Real> Effect<T> for AccelBias<T> {
         EffectParameter::signed("drift_z_m_s3", 3e-3, 0.03).only_in(&["drifting"]),
         EffectParameter::form(&["constant", "drifting"]),
     ];
+    const WORDS: Words = Words {
+        what: "accelerometer bias",
+        more: "The accelerometer reads off",
+        less: "The accelerometer reads off",
+        fly: "hover through a full turn of yaw and at two or more headings, then dash at two headings",
+    };
+    const SHOWN: Shown = Shown::ACCELEROMETER.and(Shown::HORIZONTAL);
 
     #[inline(always)]
     fn specific_force_bias(&self, time_s: T) -> In<Body, T> {

@@ -4,7 +4,7 @@
 //! `w'` depends on the force, so the dynamics solve for both: with all other forces `F_z`,
 //! `w' = (F_z / m + g_z - (w x V)_z) / (1 + m_a / m)`. Unlike `mass_error` it has no weight.
 
-use super::{Acts, Effect, EffectParameter, Scale};
+use super::{Acts, Effect, EffectParameter, Scale, Shown, Words};
 use crate::lane::Lane;
 use crate::math::Real;
 use crate::numbers;
@@ -12,12 +12,19 @@ use crate::vehicle::Vehicle;
 
 /// Mass of that air.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AddedMass<T>(pub(super) [T; 1]);
+pub(super) struct AddedMass<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for AddedMass<T> {
     const NAME: &'static str = "added_mass";
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::size("mass_kg", 0.03, 0.15).growing_with(Scale::Mass)];
+    const WORDS: Words = Words {
+        what: "air that moves along",
+        more: "More air moves with the vehicle",
+        less: "Less air moves with the vehicle",
+        fly: "climbs and descents of 3 m/s with heave doublets, wings folded",
+    };
+    const SHOWN: Shown = Shown::HORIZONTAL;
 }
 
 numbers! {

@@ -2,7 +2,7 @@
 //!
 //! Form `quadratic`: `M -= k (|p| p, |q| q, |r| r / 2)`.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::lane::functions::size;
@@ -14,7 +14,7 @@ const QUADRATIC: usize = 1;
 
 /// Moment per angular rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AngularDamping<T>(pub(super) [T; 3]);
+pub(super) struct AngularDamping<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for AngularDamping<T> {
     const NAME: &'static str = "angular_damping";
@@ -27,6 +27,13 @@ impl<T: Real> Effect<T> for AngularDamping<T> {
             .only_in(&["quadratic"]),
         EffectParameter::form(&["linear", "quadratic"]),
     ];
+    const WORDS: Words = Words {
+        what: "damping of rotation",
+        more: "Air damps rotation more",
+        less: "Air damps rotation less",
+        fly: "a multisine from 0.3 to 6 Hz in roll and pitch",
+    };
+    const SHOWN: Shown = Shown::MOMENTS;
 }
 
 numbers! {

@@ -2,7 +2,7 @@
 //!
 //! Form `quadratic`: `T (1 + k w + k_2 w |w|)`.
 
-use super::{Acts, Effect, EffectParameter, Forms, is};
+use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::lane::functions::size;
@@ -14,7 +14,7 @@ const QUADRATIC: usize = 1;
 
 /// Gain of thrust with speed along the rotor axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AxialInflow<T>(pub(super) [T; 3]);
+pub(super) struct AxialInflow<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for AxialInflow<T> {
     const NAME: &'static str = "axial_inflow";
@@ -23,6 +23,13 @@ impl<T: Real> Effect<T> for AxialInflow<T> {
         EffectParameter::signed("quadratic_s2_per_m2", 4e-3, 0.03).only_in(&["quadratic"]),
         EffectParameter::form(&["linear", "quadratic"]),
     ];
+    const WORDS: Words = Words {
+        what: "inflow in climbs",
+        more: "Climbing costs more thrust",
+        less: "Climbing costs less thrust",
+        fly: "climbs and descents of 3 m/s with heave doublets, wings folded",
+    };
+    const SHOWN: Shown = Shown::HORIZONTAL;
 }
 
 numbers! {

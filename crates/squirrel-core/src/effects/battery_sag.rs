@@ -4,7 +4,7 @@
 //! `1 + kappa (V / V_ref - 1)`. Form `load_dependent`: the exponent of each rotor is `kappa (1 + g (x - 0.5))`, with `x` its
 //! target over the top speed: a loaded motor loses more.
 
-use super::{Acts, Effect, EffectParameter, Forms, is};
+use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
 use crate::lane::Lane;
 use crate::lane::functions::{exp, ln};
 use crate::math::Real;
@@ -16,7 +16,7 @@ const LOAD_DEPENDENT: usize = 2;
 
 /// How strongly rotor speed follows the battery voltage.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BatterySag<T>(pub(super) [T; 3]);
+pub(super) struct BatterySag<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for BatterySag<T> {
     const NAME: &'static str = "battery_sag";
@@ -25,6 +25,13 @@ impl<T: Real> Effect<T> for BatterySag<T> {
         EffectParameter::signed("load_gain", 0.3, 1.5).only_in(&["load_dependent"]),
         EffectParameter::form(&["power", "linear", "load_dependent"]),
     ];
+    const WORDS: Words = Words {
+        what: "thrust that sags with the battery",
+        more: "Thrust sags with the battery",
+        less: "Thrust sags less with the battery",
+        fly: "climbs at full thrust with a full and with a half empty battery, voltage logged",
+    };
+    const SHOWN: Shown = Shown::LASTING.and(Shown::COMMANDS);
 }
 
 numbers! {

@@ -4,12 +4,8 @@
 //! and leave them alone where there is no effect.
 
 use super::{
-    AccelBias, AccelScale, Acts, ActuationLatency, AddedMass, Alteration, AngularDamping, AxialInflow,
-    BatterySag, CgOffset, ClockSkew, ClockStep, CommandClock, CompassCurrent, ConstantWind, Effect,
-    EffectParameter, FORM, FlappingMoment, Forms, GnssLatency, GroundEffect, Gust, GustSpectrum, GyroScale,
-    HeadingBias, InertiaError, LinearDrag, MassError, MotorLag, PayloadSwing, Pendulum, QuadraticDrag,
-    RotorGyroTorque, Situation, ThrustCoefficient, ThrustMisalignment, TranslationalLift, WeakRotor,
-    WingAsymmetry, WingMembrane, WingServoLag, YawTorqueCoeff, is,
+    Acts, Alteration, CommandClock, Effect, EffectParameter, FORM, Forms, GustSpectrum, Pendulum, Shown,
+    Situation, Words, is,
 };
 use crate::aero::{Airflow, BodyWrench};
 use crate::frames::{Body, In};
@@ -32,12 +28,12 @@ macro_rules! catalogue {
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct Effects<T: Real> {
             any: bool,
-            $($field: Option<$effect<T>>,)+
+            $($field: Option<super::$field::$effect<T>>,)+
         }
 
         impl<T: Real> Effects<T> {
             /// Names of all effects of the catalogue.
-            pub const NAMES: &'static [&'static str] = &[$(<$effect<f64> as Effect<f64>>::NAME,)+];
+            pub const NAMES: &'static [&'static str] = &[$(<super::$field::$effect<f64> as Effect<f64>>::NAME,)+];
 
             /// No effect.
             pub fn none() -> Self {
@@ -51,28 +47,42 @@ macro_rules! catalogue {
             }
             /// The parameters of the effect of a name, present or not; `None` for an unknown name. See [`forms`](super::forms).
             pub fn parameters(name: &str) -> Option<&'static [EffectParameter]> {
-                $(if name == <$effect<T> as Effect<T>>::NAME {
-                    return Some(<$effect<T> as Effect<T>>::PARAMETERS);
+                $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
+                    return Some(<super::$field::$effect<T> as Effect<T>>::PARAMETERS);
                 })+
                 None
             }
+            /// How the effect of a name is spoken of; `None` for an unknown name.
+            pub fn words(name: &str) -> Option<Words> {
+                $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
+                    return Some(<super::$field::$effect<T> as Effect<T>>::WORDS);
+                })+
+                None
+            }
+            /// What the effect of a name is known by; nothing for an unknown name.
+            pub fn shown(name: &str) -> Shown {
+                $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
+                    return <super::$field::$effect<T> as Effect<T>>::SHOWN;
+                })+
+                Shown::NOTHING
+            }
             /// Whether the effect of a name is present.
             pub fn has(&self, name: &str) -> bool {
-                $((name == <$effect<T> as Effect<T>>::NAME && self.$field.is_some()) ||)+ false
+                $((name == <super::$field::$effect<T> as Effect<T>>::NAME && self.$field.is_some()) ||)+ false
             }
             /// The parameters of a present effect by name.
             pub fn get_mut(&mut self, name: &str) -> Option<Found<'_, T>> {
-                $(if name == <$effect<T> as Effect<T>>::NAME {
+                $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
                     let values: &mut [T] = &mut self.$field.as_mut()?.0;
-                    return Some(Found { parameters: <$effect<T> as Effect<T>>::PARAMETERS, values });
+                    return Some(Found { parameters: <super::$field::$effect<T> as Effect<T>>::PARAMETERS, values });
                 })+
                 None
             }
             /// The parameters of an effect by name, which is added with zeros (in its standard form) if absent; `None` for an unknown name.
             pub fn insert(&mut self, name: &str) -> Option<Found<'_, T>> {
-                $(if name == <$effect<T> as Effect<T>>::NAME {
+                $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
                     self.any = true;
-                    self.$field.get_or_insert_with(|| $effect(core::array::from_fn(|_| T::zero())));
+                    self.$field.get_or_insert_with(|| super::$field::$effect(core::array::from_fn(|_| T::zero())));
                 })+
                 self.get_mut(name)
             }
@@ -186,7 +196,7 @@ macro_rules! catalogue {
             /// Those of a vehicle.
             pub fn of<T: Real>(effects: &Effects<T>) -> Self {
                 Self { $($field: effects.$field.as_ref().map_or_else(Forms::default, |effect| {
-                    form_of(<$effect<T> as Effect<T>>::PARAMETERS, &effect.0)
+                    form_of(<super::$field::$effect<T> as Effect<T>>::PARAMETERS, &effect.0)
                 }),)+ }
             }
             /// Those of either.
@@ -196,13 +206,13 @@ macro_rules! catalogue {
             }
             /// The name of an effect that is here in a form that the other lacks.
             pub fn beyond(self, other: Self) -> Option<&'static str> {
-                $(if self.$field.is_beyond(other.$field) { return Some(<$effect<f64> as Effect<f64>>::NAME); })+
+                $(if self.$field.is_beyond(other.$field) { return Some(<super::$field::$effect<f64> as Effect<f64>>::NAME); })+
                 None
             }
             /// The name of an effect that acts on sensors alone.
             pub fn of_sensors(self) -> Option<&'static str> {
-                $(if <$effect<f64> as Effect<f64>>::IS_OF_SENSORS && self.$field.any() {
-                    return Some(<$effect<f64> as Effect<f64>>::NAME);
+                $(if <super::$field::$effect<f64> as Effect<f64>>::IS_OF_SENSORS && self.$field.any() {
+                    return Some(<super::$field::$effect<f64> as Effect<f64>>::NAME);
                 })+
                 None
             }
@@ -222,7 +232,7 @@ macro_rules! catalogue {
             }
             /// Forms of the effect of a name; none for an unknown name.
             pub fn forms(self, name: &str) -> Forms {
-                $(if name == <$effect<f64> as Effect<f64>>::NAME { return self.$field; })+
+                $(if name == <super::$field::$effect<f64> as Effect<f64>>::NAME { return self.$field; })+
                 Forms::default()
             }
         }
@@ -237,7 +247,7 @@ macro_rules! catalogue {
         impl<T: Real> Prepared<T> {
             /// Of a vehicle's effects.
             pub fn new(effects: &Effects<T>, vehicle: &Vehicle<T>) -> Self {
-                Self { $($($module: effects.$field.unwrap_or_else(|| $effect(core::array::from_fn(|_| T::zero()))).prepare(vehicle),)?)+ }
+                Self { $($($module: effects.$field.unwrap_or_else(|| super::$field::$effect(core::array::from_fn(|_| T::zero()))).prepare(vehicle),)?)+ }
             }
         }
 
@@ -370,7 +380,7 @@ impl<T: Real> Acting<T> {
     }
 }
 
-// `=> module` behind an effect that has an equation in every step: its `Numbers` there.
+// Module and type of each effect; `=> module` behind one that has an equation in every step, its `Numbers` there.
 catalogue! {
     accel_bias: AccelBias,
     accel_scale: AccelScale,

@@ -3,7 +3,7 @@
 //!
 //! The accelerometer stays at the geometric centre, at `-r` from the centre of mass, and feels the rotation there.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::frames::{Body, In};
 use crate::lane::Lane;
@@ -17,7 +17,7 @@ const SPATIAL: usize = 1;
 
 /// Where the centre of mass lies, from the point that the vehicle file's positions refer to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CgOffset<T>(pub(super) [T; 4]);
+pub(super) struct CgOffset<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for CgOffset<T> {
     const NAME: &'static str = "cg_offset";
@@ -27,6 +27,13 @@ impl<T: Real> Effect<T> for CgOffset<T> {
         EffectParameter::signed("cg_z_m", 0.003, 0.012).growing_with(Scale::Arm).only_in(&["spatial"]),
         EffectParameter::form(&["planar", "spatial"]),
     ];
+    const WORDS: Words = Words {
+        what: "centre of mass",
+        more: "The centre of mass is elsewhere",
+        less: "The centre of mass is elsewhere",
+        fly: "roll and pitch doublets, yaw steps and thrust steps in hover; and weigh the vehicle",
+    };
+    const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
 
     #[inline(always)]
     fn accelerometer_position(&self) -> In<Body, T> {

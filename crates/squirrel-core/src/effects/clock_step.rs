@@ -2,18 +2,25 @@
 //!
 //! See [`CommandClock`] for what a log then says.
 
-use super::{CommandClock, Effect, EffectParameter};
+use super::{CommandClock, Effect, EffectParameter, Shown, Words};
 use crate::math::Real;
 
 /// Size and time of the jump.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClockStep<T>(pub(super) [T; 2]);
+pub(super) struct ClockStep<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for ClockStep<T> {
     const NAME: &'static str = "clock_step";
     const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::signed("step_s", 0.02, 0.2), EffectParameter::size("at_s", 0.3, 600.0)];
+    const WORDS: Words = Words {
+        what: "jump of the commands' clock",
+        more: "The clock of commands jumps forwards",
+        less: "The clock of commands jumps back",
+        fly: "a flight of more than a minute with doublets at its beginning and end",
+    };
+    const SHOWN: Shown = Shown::COMMANDS;
 
     fn command_clock(&self, clock: &mut CommandClock<T>) {
         [clock.step_s, clock.at_s] = self.0;

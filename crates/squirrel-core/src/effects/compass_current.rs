@@ -3,18 +3,25 @@
 //! Power leads make a field in proportion to their current, which turns the heading in proportion to it while it is small. At
 //! one voltage the current goes as the rotors' power, with the cube of their speed, so that any log with commands tells it.
 
-use super::{Effect, EffectParameter};
+use super::{Effect, EffectParameter, Shown, Words};
 use crate::math::Real;
 
 /// Heading error in hover.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CompassCurrent<T>(pub(super) [T; 1]);
+pub(super) struct CompassCurrent<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for CompassCurrent<T> {
     const NAME: &'static str = "compass_current";
     const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::signed("heading_in_hover_rad", 0.05, 0.35)];
+    const WORDS: Words = Words {
+        what: "heading that follows the motors' current",
+        more: "The heading follows the motors' current",
+        less: "The heading follows the motors' current",
+        fly: "climbs at full thrust and descents at one heading, then at another",
+    };
+    const SHOWN: Shown = Shown::TURNS;
 
     fn heading_per_load_rad(&self) -> T {
         self.0[0]

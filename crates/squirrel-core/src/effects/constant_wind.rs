@@ -3,7 +3,7 @@
 //! Form `log_profile`: the wind is that at 10 m, times `ln(h / z0) / ln(10 / z0)` at the height `h` (logarithmic law of the
 //! surface layer, Stull 1988), with `h` not below `2 z0`. Roughness acts up to 4 m, beyond which the law means nothing.
 
-use super::{Acts, Effect, EffectParameter, Forms, is};
+use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
 use crate::lane::Lane;
 use crate::lane::functions::ln;
 use crate::math::{Real, lower, real};
@@ -14,7 +14,7 @@ const LOG_PROFILE: usize = 1;
 
 /// Wind velocity: where the air moves to, not where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ConstantWind<T>(pub(super) [T; 4]);
+pub(super) struct ConstantWind<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for ConstantWind<T> {
     const NAME: &'static str = "constant_wind";
@@ -24,6 +24,13 @@ impl<T: Real> Effect<T> for ConstantWind<T> {
         EffectParameter::size("roughness_m", 0.01, 0.5).only_in(&["log_profile"]),
         EffectParameter::form(&["constant", "log_profile"]),
     ];
+    const WORDS: Words = Words {
+        what: "steady wind",
+        more: "A steady wind",
+        less: "A steady wind",
+        fly: "hover through a full turn of yaw and at two or more headings, then dash at two headings",
+    };
+    const SHOWN: Shown = Shown::LASTING.and(Shown::HORIZONTAL);
 }
 
 numbers! {

@@ -2,7 +2,7 @@
 //!
 //! Form `saturating`: the velocity is divided by `1 + V_h / scale`, `V_h` the airspeed in the rotor plane.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -13,7 +13,7 @@ const SATURATING: usize = 1;
 
 /// Moment per speed across the rotors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FlappingMoment<T>(pub(super) [T; 3]);
+pub(super) struct FlappingMoment<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for FlappingMoment<T> {
     const NAME: &'static str = "flapping_moment";
@@ -22,6 +22,13 @@ impl<T: Real> Effect<T> for FlappingMoment<T> {
         EffectParameter::size("speed_scale_m_s", 3.0, 20.0).only_in(&["saturating"]),
         EffectParameter::form(&["linear", "saturating"]),
     ];
+    const WORDS: Words = Words {
+        what: "blade flapping",
+        more: "Forward flight pitches the nose up more",
+        less: "Forward flight pitches the nose up less",
+        fly: "dashes at several speeds from 2 to 9 m/s, both ways",
+    };
+    const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
 }
 
 numbers! {

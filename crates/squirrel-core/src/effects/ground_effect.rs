@@ -3,7 +3,7 @@
 //! `h` is the height above the origin's level, not below `R / 2`. Form `exponential`: `T <- T (1 + g exp(-h / R))`, as fitted
 //! to multirotors, with `h` not below 0.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, is};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::lane::functions::exp;
@@ -16,7 +16,7 @@ const EXPONENTIAL: usize = 1;
 
 /// Effective radius of the rotors together.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GroundEffect<T>(pub(super) [T; 3]);
+pub(super) struct GroundEffect<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for GroundEffect<T> {
     const NAME: &'static str = "ground_effect";
@@ -25,6 +25,13 @@ impl<T: Real> Effect<T> for GroundEffect<T> {
         EffectParameter::size("gain", 0.1, 0.5).only_in(&["exponential"]),
         EffectParameter::form(&["cheeseman_bennett", "exponential"]),
     ];
+    const WORDS: Words = Words {
+        what: "lift near the ground",
+        more: "More lift near the ground",
+        less: "Less lift near the ground",
+        fly: "a ladder of hovers from 0.2 to 1.5 m above the ground, with a range finder if there is one",
+    };
+    const SHOWN: Shown = Shown::NOTHING;
 }
 
 numbers! {

@@ -1,13 +1,13 @@
 //! Scale of the gyroscope: along each axis of the body it reads `w_measured = (1 + s) w`.
 
-use super::{Effect, EffectParameter};
+use super::{Effect, EffectParameter, Shown, Words};
 use crate::frames::{Body, In};
 use crate::math::Real;
 use nalgebra::Vector3;
 
 /// Scale errors along the body axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GyroScale<T>(pub(super) [T; 3]);
+pub(super) struct GyroScale<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for GyroScale<T> {
     const NAME: &'static str = "gyro_scale";
@@ -17,6 +17,13 @@ impl<T: Real> Effect<T> for GyroScale<T> {
         EffectParameter::signed("scale_y_fraction", 0.02, 0.1),
         EffectParameter::signed("scale_z_fraction", 0.02, 0.1),
     ];
+    const WORDS: Words = Words {
+        what: "gyroscope scale",
+        more: "The gyroscope reads too much",
+        less: "The gyroscope reads too little",
+        fly: "doublets about one axis at a time and a few full turns of yaw, with the attitude logged",
+    };
+    const SHOWN: Shown = Shown::TURNS;
 
     #[inline(always)]
     fn gyro_scale(&self) -> In<Body, T> {

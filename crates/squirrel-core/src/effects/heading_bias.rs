@@ -2,14 +2,14 @@
 //!
 //! Form `drifting`: `b + drift t`, `t` the time since the flight began.
 
-use super::{Effect, EffectParameter, is};
+use super::{Effect, EffectParameter, Shown, Words, is};
 use crate::math::Real;
 
 const DRIFTING: usize = 1;
 
 /// Heading error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeadingBias<T>(pub(super) [T; 3]);
+pub(super) struct HeadingBias<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for HeadingBias<T> {
     const NAME: &'static str = "heading_bias";
@@ -19,6 +19,13 @@ impl<T: Real> Effect<T> for HeadingBias<T> {
         EffectParameter::signed("drift_rad_per_s", 2e-3, 0.01).only_in(&["drifting"]),
         EffectParameter::form(&["constant", "drifting"]),
     ];
+    const WORDS: Words = Words {
+        what: "heading bias",
+        more: "The heading reads off",
+        less: "The heading reads off",
+        fly: "hard horizontal accelerations along and across the heading",
+    };
+    const SHOWN: Shown = Shown::NOTHING;
 
     fn heading_bias_rad(&self, time_s: T) -> T {
         let [bias, drift, form] = self.0;

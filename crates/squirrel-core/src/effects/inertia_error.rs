@@ -1,11 +1,11 @@
 //! Inertia about one axis off by a fraction: `J_ii (1 + e)`.
 
-use super::{Alteration, Effect, EffectParameter, Kind, is};
+use super::{Alteration, Effect, EffectParameter, Kind, Shown, Words, is};
 use crate::math::Real;
 
 /// Which axis, and the fraction by which its inertia exceeds the nominal.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct InertiaError<T>(pub(super) [T; 2]);
+pub(super) struct InertiaError<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for InertiaError<T> {
     const NAME: &'static str = "inertia_error";
@@ -13,6 +13,13 @@ impl<T: Real> Effect<T> for InertiaError<T> {
         EffectParameter::new("axis", Kind::OneOf(&["x", "y", "z"])),
         EffectParameter::signed("inertia_fraction", 0.12, 0.4),
     ];
+    const WORDS: Words = Words {
+        what: "inertia in @",
+        more: "More inertia in @",
+        less: "Less inertia in @",
+        fly: "doublets about one axis at a time",
+    };
+    const SHOWN: Shown = Shown::MOMENTS;
 
     fn alter(&self, airframe: &mut Alteration<T>) {
         let [axis, fraction] = self.0;

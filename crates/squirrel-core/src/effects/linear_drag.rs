@@ -3,7 +3,7 @@
 //! Form `anisotropic`: `F -= (D (1 + e) u, D (1 - e) v, D_z w)`, for rotors or an airframe longer than wide (Svacha et al.
 //! 2017 identify such a drag matrix).
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -14,7 +14,7 @@ const ANISOTROPIC: usize = 1;
 
 /// Drag in the rotor plane on top of the vehicle's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinearDrag<T>(pub(super) [T; 4]);
+pub(super) struct LinearDrag<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for LinearDrag<T> {
     const NAME: &'static str = "linear_drag";
@@ -26,6 +26,13 @@ impl<T: Real> Effect<T> for LinearDrag<T> {
             .only_in(&["anisotropic"]),
         EffectParameter::form(&["isotropic", "anisotropic"]),
     ];
+    const WORDS: Words = Words {
+        what: "drag that grows with speed",
+        more: "More drag, growing with speed",
+        less: "Less drag than the file has",
+        fly: "dashes at several speeds from 2 to 9 m/s, both ways",
+    };
+    const SHOWN: Shown = Shown::LASTING.and(Shown::HORIZONTAL);
 }
 
 numbers! {

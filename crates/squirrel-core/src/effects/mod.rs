@@ -3,8 +3,10 @@
 //! One effect, one file: equation, parameters with unit and plausible range, name. The name is the table
 //! `[effects.<name>]` of a vehicle file. Every effect is an increment on the base model; zero means absent. Where an
 //! effect acts is a method that it overrides: of [`Effect`] what it does once, on sensors, commands and servos; of [`Acts`] its
-//! equation in every step, written on lanes once for flight alone and in batches. The dynamics call [`Acting`] and [`Prepared`],
-//! which sum over those present. A new effect is a file and a line in the `catalogue!` of `catalogue.rs`.
+//! equation in every step, written on lanes once for flight alone and in batches. How it is spoken of and what it is known by
+//! stand with it. The dynamics call [`Acting`] and [`Prepared`],
+//! which sum over those present. A new effect is a file, its `mod` below and a line in
+//! the `catalogue!` of `catalogue.rs`.
 //!
 //! An effect may have several published forms: then its last parameter is `form`, and a parameter may exist in some forms only.
 //! Without `form` in a file it is the first, the standard form.
@@ -49,41 +51,10 @@ mod wing_membrane;
 mod wing_servo_lag;
 mod yaw_torque_coeff;
 
-pub use accel_bias::AccelBias;
-pub use accel_scale::AccelScale;
-pub use actuation_latency::ActuationLatency;
-pub use added_mass::AddedMass;
-pub use angular_damping::AngularDamping;
-pub use axial_inflow::AxialInflow;
-pub use battery_sag::BatterySag;
 pub use catalogue::{Acting, Effects, Found, Prepared, Present};
-pub use cg_offset::CgOffset;
 pub use clock::CommandClock;
-pub use clock_skew::ClockSkew;
-pub use clock_step::ClockStep;
-pub use compass_current::CompassCurrent;
-pub use constant_wind::ConstantWind;
-pub use flapping_moment::FlappingMoment;
-pub use gnss_latency::GnssLatency;
-pub use ground_effect::GroundEffect;
-pub use gust::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, Gust, GustSpectrum};
-pub use gyro_scale::GyroScale;
-pub use heading_bias::HeadingBias;
-pub use inertia_error::InertiaError;
-pub use linear_drag::LinearDrag;
-pub use mass_error::MassError;
-pub use motor_lag::MotorLag;
-pub use payload_swing::{PayloadSwing, Pendulum, PendulumState, Swing};
-pub use quadratic_drag::QuadraticDrag;
-pub use rotor_gyro_torque::RotorGyroTorque;
-pub use thrust_coefficient::ThrustCoefficient;
-pub use thrust_misalignment::ThrustMisalignment;
-pub use translational_lift::TranslationalLift;
-pub use weak_rotor::WeakRotor;
-pub use wing_asymmetry::WingAsymmetry;
-pub use wing_membrane::WingMembrane;
-pub use wing_servo_lag::WingServoLag;
-pub use yaw_torque_coeff::YawTorqueCoeff;
+pub use gust::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, GustSpectrum};
+pub use payload_swing::{Pendulum, PendulumState, Swing};
 
 use crate::aero::{Airflow, BodyWrench, flat_plate};
 use crate::frames::{Body, Frame, In};
@@ -257,6 +228,50 @@ fn up_and_down<T: Real>(lag_s: T, asymmetry: T) -> [T; 2] {
     [lag_s * (T::one() - asymmetry), lag_s * (T::one() + asymmetry)]
 }
 
+/// How an effect is spoken of. `@` stands for a rotor, an axis or a side.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Words {
+    /// What it is: `drag that grows with speed`.
+    pub what: &'static str,
+    /// What is said where its number is above that of the vehicle file.
+    pub more: &'static str,
+    /// What is said where it is below.
+    pub less: &'static str,
+    /// The manoeuvre that shows it and tells it from those it is confused with.
+    pub fly: &'static str,
+}
+
+/// What an effect is known by; several at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shown(u8);
+
+impl Shown {
+    /// Nothing in particular.
+    pub const NOTHING: Self = Self(0);
+    /// Its moments, and by the horizontal force; without these channels nothing is said of it.
+    pub const MOMENTS: Self = Self(1);
+    /// What lasts of forces and moments.
+    pub const LASTING: Self = Self(1 << 1);
+    /// What lies between commands and the speeds of rotors.
+    pub const COMMANDS: Self = Self(1 << 2);
+    /// An accelerometer, or velocities against one.
+    pub const ACCELEROMETER: Self = Self(1 << 3);
+    /// A gyroscope beside an attitude.
+    pub const TURNS: Self = Self(1 << 4);
+    /// Horizontal forces.
+    pub const HORIZONTAL: Self = Self(1 << 5);
+
+    /// Both.
+    #[must_use]
+    pub const fn and(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+    /// Whether all of `other` is in it.
+    pub const fn has(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+}
+
 /// What an effect that makes a force may look at.
 #[derive(Debug, Clone, Copy)]
 pub struct Situation<'a, L> {
@@ -281,6 +296,10 @@ pub trait Effect<T: Real>: Copy {
     const NAME: &'static str;
     /// The parameters, in the order in which the effect stores them.
     const PARAMETERS: &'static [EffectParameter];
+    /// How it is spoken of.
+    const WORDS: Words;
+    /// What it is known by.
+    const SHOWN: Shown;
     /// Whether it acts on sensors and stamps alone, which a flight without them does not show.
     const IS_OF_SENSORS: bool = false;
 

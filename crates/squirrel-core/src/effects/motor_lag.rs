@@ -3,14 +3,14 @@
 //! Form `asymmetric`: `extra (1 - e)` when speeding up and `extra (1 + e)` when slowing down: a rotor is braked by its drag
 //! alone.
 
-use super::{Effect, EffectParameter, is, up_and_down};
+use super::{Effect, EffectParameter, Shown, Words, is, up_and_down};
 use crate::math::Real;
 
 const ASYMMETRIC: usize = 1;
 
 /// Extra first-order lag of every rotor.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MotorLag<T>(pub(super) [T; 3]);
+pub(super) struct MotorLag<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for MotorLag<T> {
     const NAME: &'static str = "motor_lag";
@@ -19,6 +19,13 @@ impl<T: Real> Effect<T> for MotorLag<T> {
         EffectParameter::signed("asymmetry", 0.2, 0.8).only_in(&["asymmetric"]),
         EffectParameter::form(&["symmetric", "asymmetric"]),
     ];
+    const WORDS: Words = Words {
+        what: "motor lag",
+        more: "Motors respond more slowly",
+        less: "Motors respond faster",
+        fly: "a multisine from 0.3 to 6 Hz in roll and pitch",
+    };
+    const SHOWN: Shown = Shown::COMMANDS;
 
     #[inline(always)]
     fn rotor_extra_time_constant_s(&self) -> [T; 2] {

@@ -3,7 +3,7 @@
 //! `s` is the load's horizontal offset from the vehicle, whose horizontal acceleration is `a`; small angles, damping
 //! `c = 0.1 1/s`, in the form `damped` a parameter. The tether is fixed at the centre of mass. A length of 0 is no load.
 
-use super::{Effect, EffectParameter, Scale, is};
+use super::{Effect, EffectParameter, Scale, Shown, Words, is};
 use crate::lane::Lane;
 use crate::math::{GRAVITY_M_S2, Real, real};
 use crate::numbers;
@@ -12,7 +12,7 @@ const DAMPED: usize = 1;
 
 /// Mass and tether of the load.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PayloadSwing<T>(pub(super) [T; 4]);
+pub(super) struct PayloadSwing<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for PayloadSwing<T> {
     const NAME: &'static str = "payload_swing";
@@ -22,6 +22,13 @@ impl<T: Real> Effect<T> for PayloadSwing<T> {
         EffectParameter::size("damping_per_s", 0.2, 2.0).only_in(&["damped"]),
         EffectParameter::form(&["light", "damped"]),
     ];
+    const WORDS: Words = Words {
+        what: "swinging load",
+        more: "A load swings below",
+        less: "A lighter load swings below",
+        fly: "stop and go along one axis at 0.6 to 0.9 Hz, then hover",
+    };
+    const SHOWN: Shown = Shown::HORIZONTAL;
 
     fn pendulum(&self) -> Option<Pendulum<T>> {
         let [mass_kg, length_m, damping_per_s, form] = self.0;

@@ -2,7 +2,7 @@
 //!
 //! Form `anisotropic`: its own drag area along each body axis, `A (1 + e)`, `A (1 - e)`, `A_z`.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent, is};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
@@ -13,7 +13,7 @@ const ANISOTROPIC: usize = 1;
 
 /// Drag area on top of the vehicle's own.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct QuadraticDrag<T>(pub(super) [T; 4]);
+pub(super) struct QuadraticDrag<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for QuadraticDrag<T> {
     const NAME: &'static str = "quadratic_drag";
@@ -25,6 +25,13 @@ impl<T: Real> Effect<T> for QuadraticDrag<T> {
             .only_in(&["anisotropic"]),
         EffectParameter::form(&["isotropic", "anisotropic"]),
     ];
+    const WORDS: Words = Words {
+        what: "drag with the square of speed",
+        more: "More drag at high speed",
+        less: "Less drag at high speed",
+        fly: "dashes at several speeds from 2 to 9 m/s, both ways",
+    };
+    const SHOWN: Shown = Shown::HORIZONTAL;
 }
 
 numbers! {

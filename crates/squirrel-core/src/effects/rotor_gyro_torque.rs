@@ -3,7 +3,7 @@
 //! `s_i` is the rotor's `yaw_sign`, the sign of its reaction torque about +z, so it spins the other way: `I_r H e3` is the
 //! angular momentum of all rotors in the body frame, and its rate there is taken from the airframe.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Situation, absent};
+use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -12,12 +12,19 @@ use crate::vehicle::Vehicle;
 
 /// Inertia of one rotor with its motor's bell about the spin axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RotorGyroTorque<T>(pub(super) [T; 1]);
+pub(super) struct RotorGyroTorque<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for RotorGyroTorque<T> {
     const NAME: &'static str = "rotor_gyro_torque";
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::size("rotor_inertia_kg_m2", 4e-6, 2e-5).growing_with(Scale::Inertia)];
+    const WORDS: Words = Words {
+        what: "gyroscopic torque of rotors",
+        more: "Rotors act as gyroscopes",
+        less: "Rotors act less as gyroscopes",
+        fly: "yaw steps",
+    };
+    const SHOWN: Shown = Shown::MOMENTS;
 }
 
 numbers! {

@@ -1,6 +1,6 @@
 //! Thrust that is not along body z: `F_xy -= T (e_x, e_y)`.
 
-use super::{Acts, Effect, EffectParameter, Forms, Situation, absent};
+use super::{Acts, Effect, EffectParameter, Forms, Shown, Situation, Words, absent};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -9,7 +9,7 @@ use crate::vehicle::Vehicle;
 
 /// Tilt of the thrust.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ThrustMisalignment<T>(pub(super) [T; 2]);
+pub(super) struct ThrustMisalignment<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for ThrustMisalignment<T> {
     const NAME: &'static str = "thrust_misalignment";
@@ -17,6 +17,13 @@ impl<T: Real> Effect<T> for ThrustMisalignment<T> {
         EffectParameter::signed("tilt_x_rad", 0.017, 0.07),
         EffectParameter::signed("tilt_y_rad", 0.017, 0.07),
     ];
+    const WORDS: Words = Words {
+        what: "tilted thrust",
+        more: "Thrust is tilted",
+        less: "Thrust is tilted",
+        fly: "hover through a full turn of yaw and at two or more headings, then dash at two headings",
+    };
+    const SHOWN: Shown = Shown::LASTING.and(Shown::HORIZONTAL);
 }
 
 numbers! {

@@ -2,7 +2,7 @@
 //!
 //! Form `linear`: `T (1 + k V_h)`. Form `quadratic`: `T (1 + k V_h^2)`, without saturation.
 
-use super::{Acts, Effect, EffectParameter, Forms, is};
+use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::math::{Real, real};
@@ -14,7 +14,7 @@ const QUADRATIC: usize = 2;
 
 /// Gain of thrust with speed across the rotors.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TranslationalLift<T>(pub(super) [T; 3]);
+pub(super) struct TranslationalLift<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for TranslationalLift<T> {
     const NAME: &'static str = "translational_lift";
@@ -23,6 +23,13 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
         EffectParameter::signed("gain_s_per_m", 3e-3, 0.02).only_in(&["linear"]),
         EffectParameter::form(&["saturating", "linear", "quadratic"]),
     ];
+    const WORDS: Words = Words {
+        what: "lift in forward flight",
+        more: "Rotors lift more in forward flight",
+        less: "Rotors lift less in forward flight",
+        fly: "dashes to 9 m/s at constant height with the wings folded",
+    };
+    const SHOWN: Shown = Shown::HORIZONTAL;
 }
 
 numbers! {

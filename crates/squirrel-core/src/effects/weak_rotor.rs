@@ -1,11 +1,11 @@
 //! One rotor gives less: `T_i (1 - e)` and `Q_i (1 - e)`.
 
-use super::{Alteration, Effect, EffectParameter, Kind, is};
+use super::{Alteration, Effect, EffectParameter, Kind, Shown, Words, is};
 use crate::math::Real;
 
 /// Which rotor, and the fraction that it lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WeakRotor<T>(pub(super) [T; 2]);
+pub(super) struct WeakRotor<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for WeakRotor<T> {
     const NAME: &'static str = "weak_rotor";
@@ -13,6 +13,13 @@ impl<T: Real> Effect<T> for WeakRotor<T> {
         EffectParameter::new("rotor", Kind::Rotor),
         EffectParameter::signed("thrust_loss_fraction", 0.05, 0.2),
     ];
+    const WORDS: Words = Words {
+        what: "thrust of rotor @",
+        more: "Rotor @ gives less thrust",
+        less: "Rotor @ gives more thrust",
+        fly: "roll and pitch doublets, yaw steps and thrust steps in hover; and weigh the vehicle",
+    };
+    const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
 
     fn alter(&self, airframe: &mut Alteration<T>) {
         let [rotor, loss] = self.0;

@@ -1,6 +1,6 @@
 //! One wing gives less: `N (1 - e)` on its side, taken from the flat plate's force.
 
-use super::{Acts, Effect, EffectParameter, Forms, Kind, Situation, absent, is};
+use super::{Acts, Effect, EffectParameter, Forms, Kind, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -9,7 +9,7 @@ use crate::vehicle::Vehicle;
 
 /// Which side, and the fraction that it lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WingAsymmetry<T>(pub(super) [T; 2]);
+pub(super) struct WingAsymmetry<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for WingAsymmetry<T> {
     const NAME: &'static str = "wing_asymmetry";
@@ -17,6 +17,13 @@ impl<T: Real> Effect<T> for WingAsymmetry<T> {
         EffectParameter::new("side", Kind::OneOf(&["left", "right"])),
         EffectParameter::size("loss_fraction", 0.12, 0.5),
     ];
+    const WORDS: Words = Words {
+        what: "force of the @ wing",
+        more: "The @ wing gives less force",
+        less: "The @ wing gives more force",
+        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+    };
+    const SHOWN: Shown = Shown::MOMENTS;
 }
 
 numbers! {

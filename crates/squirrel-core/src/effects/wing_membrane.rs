@@ -4,7 +4,7 @@
 //! whatever wing the vehicle flies, as a difference to the flat plate. Form `speed_dependent`: the gain grows with airspeed,
 //! `g min(V / V_full, 1)`, as the membrane fills.
 
-use super::{Acts, Effect, EffectParameter, Forms, Situation, is};
+use super::{Acts, Effect, EffectParameter, Forms, Shown, Situation, Words, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -15,7 +15,7 @@ const SPEED_DEPENDENT: usize = 1;
 
 /// Gain and angle-of-attack offset of both wings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WingMembrane<T>(pub(super) [T; 4]);
+pub(super) struct WingMembrane<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for WingMembrane<T> {
     const NAME: &'static str = "wing_membrane";
@@ -25,6 +25,13 @@ impl<T: Real> Effect<T> for WingMembrane<T> {
         EffectParameter::size("full_speed_m_s", 5.0, 15.0).only_in(&["speed_dependent"]),
         EffectParameter::form(&["constant", "speed_dependent"]),
     ];
+    const WORDS: Words = Words {
+        what: "force of the soft wings",
+        more: "The wings give more force",
+        less: "The wings give less force",
+        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+    };
+    const SHOWN: Shown = Shown::NOTHING;
 }
 
 numbers! {

@@ -2,14 +2,14 @@
 //!
 //! Form `asymmetric`: `extra (1 - e)` when opening and `extra (1 + e)` when closing.
 
-use super::{Effect, EffectParameter, is, up_and_down};
+use super::{Effect, EffectParameter, Shown, Words, is, up_and_down};
 use crate::math::Real;
 
 const ASYMMETRIC: usize = 1;
 
 /// Extra first-order lag of deployment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WingServoLag<T>(pub(super) [T; 3]);
+pub(super) struct WingServoLag<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for WingServoLag<T> {
     const NAME: &'static str = "wing_servo_lag";
@@ -18,6 +18,13 @@ impl<T: Real> Effect<T> for WingServoLag<T> {
         EffectParameter::signed("asymmetry", 0.2, 0.8).only_in(&["asymmetric"]),
         EffectParameter::form(&["symmetric", "asymmetric"]),
     ];
+    const WORDS: Words = Words {
+        what: "lag of the wing servos",
+        more: "Wings open and close more slowly",
+        less: "Wings open and close faster",
+        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+    };
+    const SHOWN: Shown = Shown::NOTHING;
 
     #[inline(always)]
     fn wing_extra_time_constant_s(&self) -> [T; 2] {

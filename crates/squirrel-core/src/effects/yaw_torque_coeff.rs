@@ -1,15 +1,22 @@
 //! Reaction torque coefficient off by a fraction: `k_m (1 + e)`.
 
-use super::{Alteration, Effect, EffectParameter};
+use super::{Alteration, Effect, EffectParameter, Shown, Words};
 use crate::math::Real;
 
 /// Fraction by which the reaction torque exceeds the nominal.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct YawTorqueCoeff<T>(pub(super) [T; 1]);
+pub(super) struct YawTorqueCoeff<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for YawTorqueCoeff<T> {
     const NAME: &'static str = "yaw_torque_coeff";
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed("torque_fraction", 0.12, 0.4)];
+    const WORDS: Words = Words {
+        what: "yaw torque of rotors",
+        more: "Rotors give more yaw torque",
+        less: "Rotors give less yaw torque",
+        fly: "yaw steps",
+    };
+    const SHOWN: Shown = Shown::MOMENTS;
 
     fn alter(&self, airframe: &mut Alteration<T>) {
         for factor in &mut airframe.torque {

@@ -9,7 +9,7 @@ use super::tolerance::{SHARE_OF_SMALLEST, airframe, middle_m, slip_ppm, timing_s
 use crate::GapError;
 use crate::leftover::{Slack, Usual};
 use crate::predictor::{Predictor, TURNING};
-use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, Scale, SizeRange, base_number};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, Scale, Shown, SizeRange, base_number};
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::plant::WingPlant;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -20,49 +20,8 @@ pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
 /// mass or an inertia would be below zero. Forces differ more from one design to another.
 const LARGEST_TIMES: f64 = 2.0;
 const GROWING_TIMES: f64 = 8.0;
-/// Effects that are known by their moments, and by the horizontal force; without these channels nothing is said of them.
-const MOMENTS: [&str; 8] = [
-    "angular_damping",
-    "cg_offset",
-    "flapping_moment",
-    "inertia_error",
-    "rotor_gyro_torque",
-    "weak_rotor",
-    "wing_asymmetry",
-    "yaw_torque_coeff",
-];
-/// Effects that change what lasts of forces and moments.
-const LASTING: [&str; 9] = [
-    "battery_sag",
-    "cg_offset",
-    "constant_wind",
-    "flapping_moment",
-    "linear_drag",
-    "mass_error",
-    "thrust_coefficient",
-    "thrust_misalignment",
-    "weak_rotor",
-];
 /// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows the rotors' own.
 const MARKERS_RAD: f64 = 0.03;
-/// Effects between commands and the speeds of rotors.
-const COMMANDS: [&str; 5] = ["actuation_latency", "battery_sag", "clock_skew", "clock_step", "motor_lag"];
-/// Effects on an accelerometer, and on velocities against it.
-const ACCELEROMETER: [&str; 3] = ["accel_bias", "accel_scale", "gnss_latency"];
-/// Effects that a gyroscope shows beside an attitude.
-const TURNS: [&str; 2] = ["compass_current", "gyro_scale"];
-const HORIZONTAL: [&str; 10] = [
-    "accel_bias",
-    "accel_scale",
-    "added_mass",
-    "axial_inflow",
-    "constant_wind",
-    "linear_drag",
-    "payload_swing",
-    "quadratic_drag",
-    "thrust_misalignment",
-    "translational_lift",
-];
 
 /// One number of one effect.
 #[derive(Debug, Clone)]
@@ -139,11 +98,12 @@ impl Catalogue {
         clock_step_s: Option<f64>,
     ) -> Result<Self, GapError> {
         let vehicle = predictor.vehicle;
+        let shows = |name: &str, what| Effects::<f64>::shown(name).has(what);
         let unseen = |name: &str| {
-            (!predictor.has_all_of(2) && !LASTING.contains(&name))
-                || (MOMENTS.contains(&name) && !predictor.has_channel(3))
-                || (HORIZONTAL.contains(&name) && !predictor.has_channel(0))
-                || (COMMANDS.contains(&name) && predictor.has_rotor_speeds())
+            (!predictor.has_all_of(2) && !shows(name, Shown::LASTING))
+                || (shows(name, Shown::MOMENTS) && !predictor.has_channel(3))
+                || (shows(name, Shown::HORIZONTAL) && !predictor.has_channel(0))
+                || (shows(name, Shown::COMMANDS) && predictor.has_rotor_speeds())
         };
         let mut all = Self {
             candidates: Vec::new(),
@@ -156,8 +116,8 @@ impl Catalogue {
         };
         for name in Effects::<f64>::NAMES {
             // What nobody measured with is off by nothing.
-            let is_unmeasured = (ACCELEROMETER.contains(name) && !predictor.has_accelerometer())
-                || (TURNS.contains(name) && !predictor.has_channel(TURNING));
+            let is_unmeasured = (shows(name, Shown::ACCELEROMETER) && !predictor.has_accelerometer())
+                || (shows(name, Shown::TURNS) && !predictor.has_channel(TURNING));
             if is_unmeasured {
                 continue;
             }

@@ -6,109 +6,6 @@ use crate::verdict::{Alternative, NamedEffect, Value};
 use squirrel_core::effects::{Effects, Kind as ParameterKind};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Name in the catalogue, what it is, and what it says where its number is above and below that of the vehicle file. `@`
-/// stands for a rotor, an axis or a side.
-const WORDS: [(&str, &str, &str, &str); 33] = [
-    (
-        "linear_drag",
-        "drag that grows with speed",
-        "More drag, growing with speed",
-        "Less drag than the file has",
-    ),
-    ("quadratic_drag", "drag with the square of speed", "More drag at high speed", "Less drag at high speed"),
-    ("constant_wind", "steady wind", "A steady wind", "A steady wind"),
-    ("gust", "gusts", "Gusts", "Gusts"),
-    ("ground_effect", "lift near the ground", "More lift near the ground", "Less lift near the ground"),
-    (
-        "battery_sag",
-        "thrust that sags with the battery",
-        "Thrust sags with the battery",
-        "Thrust sags less with the battery",
-    ),
-    (
-        "thrust_coefficient",
-        "thrust of all rotors",
-        "All rotors give more thrust",
-        "All rotors give less thrust",
-    ),
-    ("motor_lag", "motor lag", "Motors respond more slowly", "Motors respond faster"),
-    ("weak_rotor", "thrust of rotor @", "Rotor @ gives less thrust", "Rotor @ gives more thrust"),
-    ("mass_error", "mass", "The vehicle is heavier", "The vehicle is lighter"),
-    ("inertia_error", "inertia in @", "More inertia in @", "Less inertia in @"),
-    ("cg_offset", "centre of mass", "The centre of mass is elsewhere", "The centre of mass is elsewhere"),
-    ("thrust_misalignment", "tilted thrust", "Thrust is tilted", "Thrust is tilted"),
-    (
-        "translational_lift",
-        "lift in forward flight",
-        "Rotors lift more in forward flight",
-        "Rotors lift less in forward flight",
-    ),
-    ("axial_inflow", "inflow in climbs", "Climbing costs more thrust", "Climbing costs less thrust"),
-    (
-        "flapping_moment",
-        "blade flapping",
-        "Forward flight pitches the nose up more",
-        "Forward flight pitches the nose up less",
-    ),
-    (
-        "rotor_gyro_torque",
-        "gyroscopic torque of rotors",
-        "Rotors act as gyroscopes",
-        "Rotors act less as gyroscopes",
-    ),
-    (
-        "yaw_torque_coeff",
-        "yaw torque of rotors",
-        "Rotors give more yaw torque",
-        "Rotors give less yaw torque",
-    ),
-    ("angular_damping", "damping of rotation", "Air damps rotation more", "Air damps rotation less"),
-    ("actuation_latency", "late commands", "Commands act late", "Commands act sooner"),
-    ("wing_membrane", "force of the soft wings", "The wings give more force", "The wings give less force"),
-    ("wing_asymmetry", "force of the @ wing", "The @ wing gives less force", "The @ wing gives more force"),
-    (
-        "wing_servo_lag",
-        "lag of the wing servos",
-        "Wings open and close more slowly",
-        "Wings open and close faster",
-    ),
-    (
-        "added_mass",
-        "air that moves along",
-        "More air moves with the vehicle",
-        "Less air moves with the vehicle",
-    ),
-    ("accel_bias", "accelerometer bias", "The accelerometer reads off", "The accelerometer reads off"),
-    ("heading_bias", "heading bias", "The heading reads off", "The heading reads off"),
-    ("gnss_latency", "late position fixes", "Position fixes come late", "Position fixes come sooner"),
-    (
-        "clock_skew",
-        "clock of the commands",
-        "The clock of commands runs fast",
-        "The clock of commands runs slow",
-    ),
-    (
-        "clock_step",
-        "jump of the commands' clock",
-        "The clock of commands jumps forwards",
-        "The clock of commands jumps back",
-    ),
-    ("gyro_scale", "gyroscope scale", "The gyroscope reads too much", "The gyroscope reads too little"),
-    (
-        "accel_scale",
-        "accelerometer scale",
-        "The accelerometer reads too much",
-        "The accelerometer reads too little",
-    ),
-    (
-        "compass_current",
-        "heading that follows the motors' current",
-        "The heading follows the motors' current",
-        "The heading follows the motors' current",
-    ),
-    ("payload_swing", "swinging load", "A load swings below", "A lighter load swings below"),
-];
-
 /// Other explanations and flights set aside that are told on the first screen; the panels below have all.
 pub(super) const TOLD: usize = 3;
 
@@ -121,8 +18,8 @@ fn words(effect: &NamedEffect) -> [String; 3] {
         ("side", Value::Choice { value, .. }) => Some((*value).to_owned()),
         _ => None,
     });
-    let own = WORDS.iter().find(|(name, ..)| *name == effect.name);
-    let all = own.map_or([effect.name; 3], |(_, noun, more, less)| [noun, more, less]);
+    let own = Effects::<f64>::words(effect.name);
+    let all = own.map_or([effect.name; 3], |own| [own.what, own.more, own.less]);
     all.map(|words| words.replace('@', which.as_deref().unwrap_or("?")))
 }
 
@@ -137,8 +34,9 @@ pub(super) fn nouns(other: &Alternative) -> String {
     let nouns = if other.numbers.len() == other.effects.len() {
         other.numbers.iter().map(noun).collect()
     } else {
-        let find = |name: &str| WORDS.iter().find(|(own, ..)| *own == name).filter(|w| !w.1.contains('@'));
-        let noun = |name: &&str| find(name).map_or((*name).to_owned(), |w| format!("{} ({name})", w.1));
+        let find = |name: &str| Effects::<f64>::words(name).filter(|words| !words.what.contains('@'));
+        let noun =
+            |name: &&str| find(name).map_or((*name).to_owned(), |words| format!("{} ({name})", words.what));
         other.effects.iter().map(noun).collect::<Vec<_>>()
     };
     nouns.join(" with ")
@@ -264,13 +162,6 @@ pub(super) fn full_stop(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn every_effect_of_the_catalogue_has_words() {
-        for name in Effects::<f64>::NAMES {
-            assert!(WORDS.iter().any(|(own, ..)| own == name), "{name}");
-        }
-    }
 
     #[test]
     fn odds_are_read_with_one_digit() {
