@@ -8,7 +8,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Formula, pieces of its text without spaces, and where it stands.
-const FORMULAS: [(&str, &[&str], &str); 28] = [
+const FORMULAS: [(&str, &[&str], &str); 30] = [
     ("drag of the airframe", &["linear[i]*flow.velocity[i]"], "core/src/aero/mod.rs"),
     (
         "flat plate",
@@ -27,6 +27,12 @@ const FORMULAS: [(&str, &[&str], &str); 28] = [
     ),
     ("servo", &["target-(target-moved)*keep"], "core/src/dynamics/servo.rs"),
     ("exponential of lanes", &["0.041_666_294_947_198_99"], "core/src/lane/functions.rs"),
+    (
+        "quaternion law",
+        &["omega_e[i]*(eta*sign)", "cr*cp*cy+sr*sp*sy"],
+        "core/src/control/backstepping/quaternion.rs",
+    ),
+    ("Euler kinematics", &["cr*cp*roll-sr*sp*pitch"], "core/src/control/backstepping/mod.rs"),
     ("mixer", &["w_i*a[i]+w_j*a[j]", "s*tilt[i]+u*self.collective[i]"], "core/src/control/mix.rs"),
     ("what effects do to a wrench", &["numbers.thrust_factor("], "core/src/dynamics/mod.rs"),
     ("added_mass", &["added_mass_kg*at.inverse_mass"], "core/src/dynamics/mod.rs"),
@@ -63,7 +69,7 @@ const CALLS: [(&str, &[&str]); 8] = [
         &["derivative(&airframe", "whole::step::<", "whole::air::<", "servo.lead(", "packs.step("],
     ),
     ("sim/src/batch/battery.rs", &["pack.discharge(", "pack.settle("]),
-    ("sim/src/batch/autopilot.rs", &["mixer.mix("]),
+    ("sim/src/batch/autopilot.rs", &["law.torque(", "mixer.mix("]),
     (
         "sim/src/plant/mod.rs",
         &["dynamics::derivative(", "membrane.evaluate(", "servo.lead(", "battery.step("],

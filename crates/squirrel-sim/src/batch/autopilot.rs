@@ -8,13 +8,13 @@ use super::rows::Block;
 use super::simd::{BLOCK, Kernel, Paths, Register};
 use super::{Batch, BatchError, CHUNK, Call, Settings, Work, place, shape};
 use nalgebra::convert;
-use squirrel_core::control::backstepping::AttitudeGains;
-use squirrel_core::control::backstepping::quaternion::Law;
+use squirrel_core::control::backstepping::quaternion::{self, Law, Wanted, attitude_of_halves};
+use squirrel_core::control::backstepping::{AttitudeGains, Tilt};
 use squirrel_core::control::mix::Table;
 use squirrel_core::control::mixer::Mixer;
 use squirrel_core::dynamics::State;
-use squirrel_core::lane::functions::{all, half_turn_sine_and_cosine, limit, size, wrap};
-use squirrel_core::lane::vector::cross;
+use squirrel_core::lane::functions::{all, half_turn_sine_and_cosine, limit, wrap};
+use squirrel_core::lane::vector::{cross, times};
 use squirrel_core::lane::{Row, load, put, store};
 use squirrel_core::math::real;
 use squirrel_core::numbers;
@@ -185,70 +185,32 @@ fn attitude<L: Register>(
         course.angle[i] = wrap(course.angle[i] + course.rate[i] * dt);
     }
     let half = all::<L>(0.5);
-    let (sr, cr) = half_turn_sine_and_cosine(course.angle[0] * half);
-    let (sp, cp) = half_turn_sine_and_cosine(course.angle[1] * half);
-    let (sy, cy) = half_turn_sine_and_cosine(course.angle[2] * half);
-    let wanted = [
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
+    let [roll, pitch, yaw] = [
+        half_turn_sine_and_cosine(course.angle[0] * half),
+        half_turn_sine_and_cosine(course.angle[1] * half),
+        half_turn_sine_and_cosine(course.angle[2] * half),
     ];
-    let two = all::<L>(2.0);
-    let (sin_roll, cos_roll) = (two * sr * cr, cr * cr - sr * sr);
-    let (sin_pitch, cos_pitch) = (two * sp * cp, cp * cp - sp * sp);
-    let kinematics = Kinematics { sin_roll, cos_roll, sin_pitch, cos_pitch };
-    let omega_d = kinematics.body_rate(&course.rate);
-    let omega_d_dot = kinematics.body_acceleration(&course.rate, &acceleration);
-
-    // q_e = q_d^-1 q
-    let [w, x, y, z] = wanted;
-    let [qw, qx, qy, qz] = *q;
-    let eta = w * qw + x * qx + y * qy + z * qz;
-    let error = [
-        w * qx - x * qw - y * qz + z * qy,
-        w * qy + x * qz - y * qw - z * qx,
-        w * qz - x * qy + y * qx - z * qw,
-    ];
-    let near = all::<L>(0.1) - size(eta);
-    let sign = eta.where_positive(all(1.0), all(-1.0));
-    course.sign = near.where_positive(course.sign, sign);
-    let sign = course.sign;
-
-    let omega_d = back(&error, eta, &omega_d);
-    let omega_d_dot = back(&error, eta, &omega_d_dot);
-    let (mut z1, mut omega_e) = (error, *omega);
+    let tilt = Tilt::of_halves(roll, pitch);
+    let target = Wanted {
+        attitude: attitude_of_halves([roll, pitch, yaw]),
+        omega: tilt.body_rate(&course.rate),
+        omega_dot: tilt.body_acceleration(&course.rate, &acceleration),
+    };
+    let law = gains.law();
+    let answer = law.torque(q, omega, &target, &course.integral, course.sign);
+    course.sign = answer.sign;
     for i in 0..3 {
-        z1[i] = error[i] * sign;
-        omega_e[i] = omega[i] - omega_d[i];
-    }
-    let turning = cross(&z1, &omega_e);
-    let carried = cross(&omega_e, &omega_d);
-    let mut omega_dot = [none; 3];
-    let mut damping = [none; 3];
-    for i in 0..3 {
-        let z1_dot = (omega_e[i] * (eta * sign) + turning[i]) * half;
-        let z2 = omega_e[i] + gains.c1[i] * z1[i] + gains.lambda[i] * course.integral[i];
-        omega_dot[i] = omega_d_dot[i] - carried[i] - gains.c1[i] * z1_dot - gains.lambda[i] * z1[i];
-        damping[i] = z1[i] * gains.k + gains.c2[i] * z2;
-    }
-    for i in 0..3 {
-        let next = limit(course.integral[i] + z1[i] * dt, none - gains.integral_max, gains.integral_max);
+        let next = course.integral[i] + answer.z1[i] * dt;
+        let next = limit(next, none - gains.integral_max, gains.integral_max);
         course.integral[i] = course.free.where_positive(next, course.integral[i]);
     }
-    let gyroscopic = cross(omega, &gains.momentum(omega));
-    let wanted = gains.momentum(&omega_dot);
-    let mut torque = gyroscopic;
-    for i in 0..3 {
-        torque[i] = gyroscopic[i] + wanted[i] - damping[i];
-    }
-    torque
+    answer.torque
 }
 
 /// Torque for the body rates that are asked for: the innermost part of the attitude law.
 #[inline(always)]
 fn body_rate<L: Register>(gains: &Gains<L>, course: &Course<L>, omega: &[L; 3]) -> [L; 3] {
-    let mut torque = cross(omega, &gains.momentum(omega));
+    let mut torque = cross(omega, &times(&gains.law().inertia, omega));
     for i in 0..3 {
         torque[i] = torque[i] + gains.c2[i] * (course.set_point[i] - omega[i]);
     }
@@ -256,44 +218,11 @@ fn body_rate<L: Register>(gains: &Gains<L>, course: &Course<L>, omega: &[L; 3]) 
 }
 
 impl<L: Register> Gains<L> {
-    /// Inertia times a vector.
     #[inline(always)]
-    fn momentum(&self, v: &[L; 3]) -> [L; 3] {
-        let mut product = *v;
-        for row in 0..3 {
-            product[row] =
-                self.inertia[row] * v[0] + self.inertia[3 + row] * v[1] + self.inertia[6 + row] * v[2];
-        }
-        product
-    }
-}
-
-/// Of Euler angles, see `squirrel_core::control::backstepping`.
-struct Kinematics<L> {
-    sin_roll: L,
-    cos_roll: L,
-    sin_pitch: L,
-    cos_pitch: L,
-}
-
-impl<L: Register> Kinematics<L> {
-    #[inline(always)]
-    fn body_rate(&self, rate: &[L; 3]) -> [L; 3] {
-        let Self { sin_roll: sr, cos_roll: cr, sin_pitch: sp, cos_pitch: cp } = *self;
-        let [roll, pitch, yaw] = *rate;
-        [roll - sp * yaw, cr * pitch + sr * cp * yaw, cr * cp * yaw - sr * pitch]
-    }
-
-    #[inline(always)]
-    fn body_acceleration(&self, rate: &[L; 3], acceleration: &[L; 3]) -> [L; 3] {
-        let Self { sin_roll: sr, cos_roll: cr, sin_pitch: sp, cos_pitch: cp } = *self;
-        let [roll, pitch, yaw] = *rate;
-        let [p, q, r] = self.body_rate(acceleration);
-        [
-            p - cp * pitch * yaw,
-            q - sr * roll * pitch + (cr * cp * roll - sr * sp * pitch) * yaw,
-            r - cr * roll * pitch - (sr * cp * roll + cr * sp * pitch) * yaw,
-        ]
+    fn law(&self) -> quaternion::Gains<L> {
+        let [a, b, c, d, e, f, g, h, i] = self.inertia;
+        let inertia = [[a, b, c], [d, e, f], [g, h, i]];
+        quaternion::Gains { c1: self.c1, c2: self.c2, lambda: self.lambda, k: self.k, inertia }
     }
 }
 
@@ -422,18 +351,4 @@ impl Tuned {
 pub(super) fn euler<T: Paths>(state: &State<T>) -> [f64; 3] {
     let (roll, pitch, yaw) = state.ned_from_body().euler();
     [roll, pitch, yaw].map(|x| nalgebra::try_convert(x).unwrap_or(f64::NAN))
-}
-
-/// A vector in the frame that a rotation leads to: its inverse, applied.
-#[inline(always)]
-fn back<L: Register>(imaginary: &[L; 3], real_part: L, v: &[L; 3]) -> [L; 3] {
-    let once = cross(v, imaginary);
-    let two = all::<L>(2.0);
-    let t = [once[0] * two, once[1] * two, once[2] * two];
-    let twice = cross(&t, imaginary);
-    let mut out = *v;
-    for i in 0..3 {
-        out[i] = v[i] + t[i] * real_part + twice[i];
-    }
-    out
 }

@@ -63,7 +63,7 @@ impl<T: Real> Law<T> {
             let (c1, c2, l) = (self.c1[i], self.c2[i], self.lambda[i]);
             nu[i] += (T::one() - c1 * c1 + l) * e1[i] + (c1 + c2) * e2[i] - c1 * l * chi[i];
         }
-        let omega_dot = tilt.body_acceleration(&rate, &nu);
+        let omega_dot = Vector3::from(tilt.body_acceleration(&rate.into(), &nu.into()));
         Answer { e1, e2, torque: omega.cross(&(inertia * omega)) + inertia * omega_dot }
     }
 }

@@ -8,6 +8,7 @@ pub mod quaternion;
 
 use super::command_filter::EulerReference;
 use crate::frames::{Body, Ned, Rotation};
+use crate::lane::Lane;
 use crate::math::{Real, limit, real, wrap_angle};
 use crate::vehicle::{ParameterError, each_positive, positive};
 use nalgebra::{Matrix3, Vector3};
@@ -199,12 +200,43 @@ impl AttitudeGains {
 }
 
 /// Sines and cosines of roll and pitch, and with them the kinematics of Euler angles, `omega = E(angle) rate`.
-#[derive(Clone, Copy)]
-struct Tilt<T> {
+#[derive(Debug, Clone, Copy)]
+pub struct Tilt<T> {
     sr: T,
     cr: T,
     sp: T,
     cp: T,
+}
+
+impl<L: Lane> Tilt<L> {
+    /// From sine and cosine of half the angles: a few products instead of two sines more.
+    #[inline(always)]
+    pub fn of_halves((sr, cr): (L, L), (sp, cp): (L, L)) -> Self {
+        let (one, two) = (L::of(1.0), L::of(2.0));
+        Self { sr: two * sr * cr, cr: one - two * sr * sr, sp: two * sp * cp, cp: one - two * sp * sp }
+    }
+
+    /// `E rate`: the body rate of Euler angle rates.
+    #[inline(always)]
+    pub fn body_rate(&self, rate: &[L; 3]) -> [L; 3] {
+        let Self { sr, cr, sp, cp } = *self;
+        let [roll, pitch, yaw] = *rate;
+        [roll - sp * yaw, cr * pitch + sr * cp * yaw, cr * cp * yaw - sr * pitch]
+    }
+
+    /// `E acceleration + E' rate`: the derivative of [`Self::body_rate`].
+    #[inline(always)]
+    pub fn body_acceleration(&self, rate: &[L; 3], acceleration: &[L; 3]) -> [L; 3] {
+        let Self { sr, cr, sp, cp } = *self;
+        let [roll, pitch, yaw] = *rate;
+        let [p, q, r] = self.body_rate(acceleration);
+        let none = L::of(0.0);
+        [
+            p - cp * pitch * yaw,
+            q + ((cr * cp * roll - sr * sp * pitch) * yaw - sr * roll * pitch),
+            r + ((none - sr * cp * roll - cr * sp * pitch) * yaw - cr * roll * pitch),
+        ]
+    }
 }
 
 impl<T: Real> Tilt<T> {
@@ -212,30 +244,6 @@ impl<T: Real> Tilt<T> {
         let (sr, cr) = angle.x.sin_cos();
         let (sp, cp) = angle.y.sin_cos();
         Self { sr, cr, sp, cp }
-    }
-
-    /// From sine and cosine of half the angles: a few products instead of two sines more.
-    fn of_halves((sr, cr): (T, T), (sp, cp): (T, T)) -> Self {
-        let (one, two) = (T::one(), real::<T>(2.0));
-        Self { sr: two * sr * cr, cr: one - two * sr * sr, sp: two * sp * cp, cp: one - two * sp * sp }
-    }
-
-    /// `E rate`: the body rate of Euler angle rates.
-    fn body_rate(&self, rate: &Vector3<T>) -> Vector3<T> {
-        let Self { sr, cr, sp, cp } = *self;
-        Vector3::new(rate.x - sp * rate.z, cr * rate.y + sr * cp * rate.z, -sr * rate.y + cr * cp * rate.z)
-    }
-
-    /// `E acceleration + E' rate`: the derivative of [`Self::body_rate`].
-    fn body_acceleration(&self, rate: &Vector3<T>, acceleration: &Vector3<T>) -> Vector3<T> {
-        let Self { sr, cr, sp, cp } = *self;
-        let (r, p) = (rate.x, rate.y);
-        self.body_rate(acceleration)
-            + Vector3::new(
-                -cp * p * rate.z,
-                -sr * r * rate.y + (cr * cp * r - sr * sp * p) * rate.z,
-                -cr * r * rate.y + (-sr * cp * r - cr * sp * p) * rate.z,
-            )
     }
 
     /// Euler angle rates of a body rate; total: the cosine of pitch is kept away from 0.

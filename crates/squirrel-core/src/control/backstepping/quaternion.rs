@@ -11,6 +11,9 @@
 //! The sign is kept while `|eta| < 0.1`, so that noise at 180 deg does not make it chatter.
 
 use super::Tilt;
+use crate::lane::Lane;
+use crate::lane::functions::size;
+use crate::lane::vector::{cross, minus, scaled, times};
 use crate::math::{Real, real};
 use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
@@ -58,16 +61,12 @@ impl<T: Real> Target<T> {
         let (roll, pitch, yaw) = (half(angle.x), half(angle.y), half(angle.z));
         let tilt = Tilt::of_halves(roll, pitch);
         let ((sr, cr), (sp, cp), (sy, cy)) = (roll, pitch, yaw);
-        let attitude = Quaternion::new(
-            cr * cp * cy + sr * sp * sy,
-            sr * cp * cy - cr * sp * sy,
-            cr * sp * cy + sr * cp * sy,
-            cr * cp * sy - sr * sp * cy,
-        );
+        let [w, x, y, z] = attitude_of_halves([(sr, cr), (sp, cp), (sy, cy)]);
+        let attitude = Quaternion::new(w, x, y, z);
         Self {
             attitude: UnitQuaternion::new_unchecked(attitude),
-            omega: tilt.body_rate(rate),
-            omega_dot: tilt.body_acceleration(rate, acceleration),
+            omega: Vector3::from(tilt.body_rate(&(*rate).into())),
+            omega_dot: Vector3::from(tilt.body_acceleration(&(*rate).into(), &(*acceleration).into())),
         }
     }
 }
@@ -98,23 +97,134 @@ impl<T: Real> Law<T> {
         chi: &Vector3<T>,
         negative_sign: bool,
     ) -> Answer<T> {
-        let q_e = target.attitude.inverse() * attitude;
-        let eta = q_e.w;
-        let negative_sign = if eta.abs() < real(0.1) { negative_sign } else { eta < T::zero() };
+        let four = |q: &UnitQuaternion<T>| [q.w, q.i, q.j, q.k];
+        let law = Gains {
+            c1: self.c1.into(),
+            c2: self.c2.into(),
+            lambda: self.lambda.into(),
+            k: self.k,
+            inertia: (*inertia).into(),
+        };
+        let wanted = Wanted {
+            attitude: four(&target.attitude),
+            omega: target.omega.into(),
+            omega_dot: target.omega_dot.into(),
+        };
         let sign = if negative_sign { -T::one() } else { T::one() };
-        let z1 = q_e.imag() * sign;
-        let omega_d = q_e.inverse() * target.omega;
-        let omega_e = omega - omega_d;
-        let z1_dot = (omega_e * (eta * sign) + z1.cross(&omega_e)) * real::<T>(0.5);
-        let z2 = omega_e + self.c1.component_mul(&z1) + self.lambda.component_mul(chi);
-        let omega_dot = q_e.inverse() * target.omega_dot
-            - omega_e.cross(&omega_d)
-            - self.c1.component_mul(&z1_dot)
-            - self.lambda.component_mul(&z1);
-        let torque =
-            omega.cross(&(inertia * omega)) + inertia * omega_dot - z1 * self.k - self.c2.component_mul(&z2);
-        Answer { z1, z2, torque, negative_sign }
+        let out = law.torque(&four(attitude), &(*omega).into(), &wanted, &(*chi).into(), sign);
+        Answer {
+            z1: out.z1.into(),
+            z2: out.z2.into(),
+            torque: out.torque.into(),
+            negative_sign: out.sign < T::zero(),
+        }
     }
+}
+
+/// The attitude of Euler angles, `[w, x, y, z]`, from sine and cosine of half of each.
+#[inline(always)]
+pub fn attitude_of_halves<L: Lane>([(sr, cr), (sp, cp), (sy, cy)]: [(L, L); 3]) -> [L; 4] {
+    [
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    ]
+}
+
+/// [`Law`] on lanes, with the inertia that it is for.
+#[derive(Debug, Clone, Copy)]
+pub struct Gains<L> {
+    /// 1/s.
+    pub c1: [L; 3],
+    /// N m s.
+    pub c2: [L; 3],
+    /// 1/s^2.
+    pub lambda: [L; 3],
+    /// N m.
+    pub k: L,
+    /// By columns, kg m^2.
+    pub inertia: [[L; 3]; 3],
+}
+
+/// [`Target`] on lanes.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<L> {
+    /// Body to NED, `[w, x, y, z]`.
+    pub attitude: [L; 4],
+    /// rad/s.
+    pub omega: [L; 3],
+    /// rad/s^2.
+    pub omega_dot: [L; 3],
+}
+
+/// [`Answer`] on lanes.
+#[derive(Debug, Clone, Copy)]
+pub struct Torque<L> {
+    /// Vector part of the error quaternion, the short way round.
+    pub z1: [L; 3],
+    /// Rate error, rad/s.
+    pub z2: [L; 3],
+    /// Body torque, N m.
+    pub torque: [L; 3],
+    /// The sign used, 1 or -1, to be handed in at the next step.
+    pub sign: L,
+}
+
+impl<L: Lane> Gains<L> {
+    /// * `attitude` - body to NED; `omega` - body rate, rad/s
+    /// * `chi` - integral of `z1`, s
+    /// * `sign` - of the last step
+    #[inline(always)]
+    pub fn torque(
+        &self,
+        attitude: &[L; 4],
+        omega: &[L; 3],
+        target: &Wanted<L>,
+        chi: &[L; 3],
+        sign: L,
+    ) -> Torque<L> {
+        let (none, one, half) = (L::of(0.0), L::of(1.0), L::of(0.5));
+        // q_e = q_d^-1 q
+        let ([w, x, y, z], [qw, qx, qy, qz]) = (target.attitude, *attitude);
+        let eta = w * qw + x * qx + y * qy + z * qz;
+        let error = [
+            w * qx - x * qw - y * qz + z * qy,
+            w * qy + x * qz - y * qw - z * qx,
+            w * qz - x * qy + y * qx - z * qw,
+        ];
+        let clear = (none - eta).where_positive(none - one, one);
+        let sign = (L::of(0.1) - size(eta)).where_positive(sign, clear);
+        let omega_d = back(&error, eta, &target.omega);
+        let omega_d_dot = back(&error, eta, &target.omega_dot);
+        let z1 = scaled(&error, sign);
+        let omega_e = minus(omega, &omega_d);
+        let (turning, carried) = (cross(&z1, &omega_e), cross(&omega_e, &omega_d));
+        let (mut z2, mut omega_dot) = (z1, z1);
+        for i in 0..3 {
+            let z1_dot = (omega_e[i] * (eta * sign) + turning[i]) * half;
+            z2[i] = omega_e[i] + self.c1[i] * z1[i] + self.lambda[i] * chi[i];
+            omega_dot[i] = omega_d_dot[i] - carried[i] - self.c1[i] * z1_dot - self.lambda[i] * z1[i];
+        }
+        let gyroscopic = cross(omega, &times(&self.inertia, omega));
+        let mut torque = times(&self.inertia, &omega_dot);
+        for i in 0..3 {
+            torque[i] = gyroscopic[i] + torque[i] - z1[i] * self.k - self.c2[i] * z2[i];
+        }
+        Torque { z1, z2, torque, sign }
+    }
+}
+
+/// A vector in the frame that a rotation `[real, imaginary]` leads to: its inverse, applied.
+#[inline(always)]
+fn back<L: Lane>(imaginary: &[L; 3], real_part: L, v: &[L; 3]) -> [L; 3] {
+    let t = scaled(&cross(v, imaginary), L::of(2.0));
+    let twice = cross(&t, imaginary);
+    let mut out = *v;
+    for i in 0..3 {
+        out[i] = t[i] * real_part + twice[i] + v[i];
+    }
+    out
 }
 
 #[cfg(test)]
