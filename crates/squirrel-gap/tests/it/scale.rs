@@ -82,7 +82,9 @@ fn same_answer(hidden: &str) {
     };
     let own = verdict(1.0);
     println!("{}", own.words);
-    assert_eq!(own.verdict, Kind::Named, "{hidden}: {}", own.words);
+    // Whether a form is said to fit all of it depends on the noise of the flight; what is scaled here is the answer.
+    let patches = [Kind::Named, Kind::NamedFormDiffers, Kind::NamedIncomplete];
+    assert!(patches.contains(&own.verdict), "{hidden}: {}", own.words);
     for factor in [0.125, 8.0] {
         let other = verdict(factor);
         assert_eq!(other.verdict, own.verdict, "{hidden} x {factor}: {}", other.words);
