@@ -20,7 +20,7 @@
 //! No allocation, no clock, no panic in a step; all memory of a controller is one plain `Copy` struct. SI units and
 //! radians. World frame NED, body frame FRD, quaternions Hamilton, body to world.
 
-#![cfg_attr(not(test), no_std)]
+#![cfg_attr(not(any(test, feature = "std")), no_std)]
 #![deny(unsafe_code)]
 #![cfg_attr(not(feature = "vfp"), forbid(unsafe_code))]
 

@@ -98,7 +98,7 @@ pub const THIRDS_F32: f32 = 1_419_967_100.0;
 pub const THIRD_F32: f32 = 1.0 / 3.0;
 
 macro_rules! one_number {
-    ($scalar:ident, $round:ident, $mantissa:literal, $bias:literal, $activation:path, $root:path, $guess:expr) => {
+    ($scalar:ident, $round:ident, $mantissa:literal, $bias:literal, $activation:path, $guess:expr) => {
         impl Lane for $scalar {
             type Element = Self;
             #[inline(always)]
@@ -119,7 +119,13 @@ macro_rules! one_number {
             }
             #[inline(always)]
             fn root(self) -> Self {
-                $root(self)
+                // The instruction, that registers have too; `libm`'s, which nalgebra takes, is a call.
+                #[cfg(any(test, feature = "std"))]
+                {
+                    $scalar::sqrt(self)
+                }
+                #[cfg(not(any(test, feature = "std")))]
+                sqrt(self)
             }
             #[inline(always)]
             fn where_positive(self, then: Self, otherwise: Self) -> Self {
@@ -169,11 +175,11 @@ macro_rules! one_number {
         }
     };
 }
-one_number!(f32, ROUND_F32, 23, 127.0, net_tanh, real::root_f32, |x: f32| {
+one_number!(f32, ROUND_F32, 23, 127.0, net_tanh, |x: f32| {
     // By numbers instead of integers: registers have no product of 32 bits by 32 bits to shift down.
     f32::from_bits((THIRDS_F32 - x.to_bits().cast_signed() as f32 * THIRD_F32) as i32 as u32)
 });
-one_number!(f64, ROUND_F64, 52, 1023.0, libm::tanh, real::root_f64, |x: f64| {
+one_number!(f64, ROUND_F64, 52, 1023.0, libm::tanh, |x: f64| {
     let third = ((x.to_bits() >> 32) * 0x5555_5556) >> 32;
     f64::from_bits(0x553e_eaa8_u64.wrapping_sub(third) << 32)
 });

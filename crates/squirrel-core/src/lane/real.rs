@@ -58,28 +58,3 @@ fn vsqrt(x: f32) -> f32 {
     }
     root
 }
-
-/// [`sqrt`] of an f32 as a register's instruction where every processor of the target has one: `libm`'s, which nalgebra takes, is
-/// a call.
-#[inline(always)]
-pub(super) fn root_f32(x: f32) -> f32 {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use core::arch::x86_64::{_mm_cvtss_f32, _mm_set_ss, _mm_sqrt_ss};
-        _mm_cvtss_f32(_mm_sqrt_ss(_mm_set_ss(x)))
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    sqrt(x)
-}
-
-/// See [`root_f32`].
-#[inline(always)]
-pub(super) fn root_f64(x: f64) -> f64 {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use core::arch::x86_64::{_mm_cvtsd_f64, _mm_set_sd, _mm_sqrt_sd};
-        _mm_cvtsd_f64(_mm_sqrt_sd(_mm_set_sd(x), _mm_set_sd(x)))
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    sqrt(x)
-}
