@@ -1,8 +1,11 @@
 //! No test asks a clock: on a busy machine it would fail without anything being wrong. Tests count work, benches measure time.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod repository;
+
+use repository::{files, root};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Where sources are.
 const FOLDERS: [&str; 5] = ["crates", "tests", "examples", "xtask", "firmware"];
@@ -16,17 +19,6 @@ const CLOCKS: [&str; 7] = [
     "monotonic(",
     "time.time(",
 ];
-
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() && !path.ends_with("target") {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|ending| ending == "rs" || ending == "py") {
-            found.push(path);
-        }
-    }
-}
 
 /// The first line that is a test's: of a file in a folder `tests` of a package the first, of another the one that begins its module of tests.
 fn first_line_of_tests(path: &Path, text: &str) -> Option<usize> {
@@ -47,11 +39,8 @@ fn clocks(path: &Path, text: &str) -> Vec<String> {
 
 #[test]
 fn no_test_asks_a_clock() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let mut files = Vec::new();
-    for folder in FOLDERS {
-        sources(&root.join(folder), &mut files);
-    }
+    let root = root();
+    let files: Vec<_> = FOLDERS.iter().flat_map(|folder| files(&root.join(folder), &["rs", "py"])).collect();
     let own = root.join("xtask/tests/clocks.rs");
     let (mut asked, mut tests) = (Vec::new(), 0);
     for file in files.iter().filter(|file| **file != own) {

@@ -3,9 +3,11 @@
 //! A formula is known by a piece of its text or by a constant that only it has. Comments and tests do not count.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod repository;
+
+use repository::{crates, product, products, root};
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::{Path, PathBuf};
 
 /// Formula, pieces of its text without spaces, and where it stands.
 const FORMULAS: [(&str, &[&str], &str); 30] = [
@@ -86,30 +88,14 @@ const CALLS: [(&str, &[&str]); 8] = [
     ("plan/src/trajectory/model.rs", &["aero::drag(", "plate("]),
 ];
 
-fn crates() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("crates")
-}
-
-fn sources(folder: &Path, into: &mut BTreeMap<String, String>) {
-    for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-        let name = entry.file_name().unwrap().to_str().unwrap();
-        if entry.is_dir() && name != "tests" {
-            sources(&entry, into);
-        } else if entry.extension().is_some_and(|extension| extension == "rs") && name != "tests.rs" {
-            let text = fs::read_to_string(&entry).unwrap();
-            let (product, _) = text.split_once("#[cfg(test)]\nmod tests").unwrap_or((&text, ""));
-            let code = product.lines().map(|line| line.split("//").next().unwrap());
-            let code: String = code.flat_map(str::chars).filter(|c| !c.is_whitespace()).collect();
-            let path = entry.strip_prefix(crates()).unwrap().to_str().unwrap();
-            into.insert(path.replace("squirrel-", ""), code);
-        }
-    }
-}
-
-fn product() -> BTreeMap<String, String> {
+/// Code of all crates without blanks, by path.
+fn code() -> BTreeMap<String, String> {
     let mut all = BTreeMap::new();
-    for entry in fs::read_dir(crates()).unwrap().map(|entry| entry.unwrap().path()) {
-        sources(&entry.join("src"), &mut all);
+    for path in crates().iter().flat_map(|package| products(&package.join("src"))) {
+        let text = fs::read_to_string(&path).unwrap();
+        let code: String = product(&text).into_iter().flat_map(str::split_whitespace).collect();
+        let name = path.strip_prefix(root().join("crates")).unwrap().to_str().unwrap();
+        all.insert(name.replace("squirrel-", ""), code);
     }
     all
 }
@@ -121,7 +107,7 @@ fn holding<'a>(all: &'a BTreeMap<String, String>, piece: &str) -> Vec<&'a str> {
 
 #[test]
 fn each_formula_stands_in_one_file() {
-    let all = product();
+    let all = code();
     for (formula, pieces, home) in FORMULAS {
         for piece in pieces {
             assert_eq!(holding(&all, piece), [home], "{formula}: {piece}");
@@ -131,10 +117,9 @@ fn each_formula_stands_in_one_file() {
 
 #[test]
 fn every_effect_with_an_equation_is_on_the_list() {
-    let effects = crates().join("squirrel-core/src/effects");
-    for entry in fs::read_dir(effects).unwrap().map(|entry| entry.unwrap().path()) {
-        let name = entry.file_stem().unwrap().to_str().unwrap();
-        if fs::read_to_string(&entry).unwrap().contains("Acts<L> for Numbers<L>") {
+    for path in products(&root().join("crates/squirrel-core/src/effects")) {
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        if fs::read_to_string(&path).unwrap().contains("Acts<L> for Numbers<L>") {
             assert!(FORMULAS.iter().any(|(formula, ..)| *formula == name), "{name}");
         }
     }
@@ -142,7 +127,7 @@ fn every_effect_with_an_equation_is_on_the_list() {
 
 #[test]
 fn the_density_of_air_is_asked_where_a_law_of_the_air_stands() {
-    let all = product();
+    let all = code();
     let strangers = holding(&all, "AIR_DENSITY_KG_M3");
     let strangers: Vec<&str> = strangers.into_iter().filter(|path| !DENSITY.contains(path)).collect();
     assert!(strangers.is_empty(), "{strangers:?}");
@@ -150,7 +135,7 @@ fn the_density_of_air_is_asked_where_a_law_of_the_air_stands() {
 
 #[test]
 fn batch_plant_and_plan_call_them() {
-    let all = product();
+    let all = code();
     for (file, calls) in CALLS {
         for call in calls {
             assert!(all[file].contains(call), "{file} does not call {call}");

@@ -2,9 +2,12 @@
 //! point downwards only.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod repository;
+
+use repository::{files, root};
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Which of our crates a crate may depend on, top down.
 const ARROWS: [(&str, &[&str]); 10] = [
@@ -46,10 +49,6 @@ const KEPT_IN: [(&str, &[&str]); 6] = [
     ("clarabel", &["squirrel-plan"]),
     ("pyo3", &["squirrel-py"]),
 ];
-
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
-}
 
 fn page() -> String {
     fs::read_to_string(root().join("docs/ARCHITECTURE.md")).unwrap()
@@ -112,17 +111,6 @@ fn upward_arrows(package: &str, manifest: &str) -> Vec<String> {
     dependencies(manifest).into_iter().filter(wrong).map(|name| format!("{package} -> {name}")).collect()
 }
 
-fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() && !path.ends_with("target") {
-            sources(&path, found);
-        } else if path.extension().is_some_and(|ending| ending == "rs") {
-            found.push(path);
-        }
-    }
-}
-
 #[test]
 fn every_path_on_the_page_exists() {
     let root = root();
@@ -166,11 +154,10 @@ fn dependencies_point_downwards() {
 
 #[test]
 fn rapier_stays_in_its_room() {
-    let (root, mut files) = (root(), Vec::new());
-    sources(&root.join("crates"), &mut files);
+    let root = root();
     let world = root.join("crates/squirrel-sim/src/world");
     let mut speakers = 0;
-    for file in files {
+    for file in files(&root.join("crates"), &["rs"]) {
         let text = fs::read_to_string(&file).unwrap();
         assert!(!text.contains("glam::"), "{}: glam; nalgebra is our mathematics", file.display());
         if text.contains("rapier3d_f64") {

@@ -1,31 +1,19 @@
 //! Modules of a crate know only what lies below them: no two need each other, by whatever way round.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod repository;
+
+use repository::{crates, product, products};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// For each module of a crate, the modules that it names.
 type Arrows = BTreeMap<String, BTreeSet<String>>;
 
-fn crates() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join("crates")
-}
-
-fn files(folder: &Path, found: &mut Vec<PathBuf>) {
-    for path in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
-        if path.is_dir() && !path.ends_with("tests") {
-            files(&path, found);
-        } else if path.extension().is_some_and(|ending| ending == "rs") && !path.ends_with("tests.rs") {
-            found.push(path);
-        }
-    }
-}
-
 /// First names of all paths that begin at the crate, without comments and tests.
 fn named(text: &str) -> BTreeSet<String> {
-    let product = text.split("#[cfg(test)]\nmod ").next().unwrap();
-    let code: String = product.lines().filter(|line| !line.trim_start().starts_with("//")).collect();
+    let code = product(text).concat();
     let mut names = BTreeSet::new();
     for rest in code.split("crate::").skip(1) {
         let word = |text: &str| -> String {
@@ -40,8 +28,7 @@ fn named(text: &str) -> BTreeSet<String> {
 }
 
 fn arrows(source: &Path) -> Arrows {
-    let (mut found, mut arrows) = (Vec::new(), Arrows::new());
-    files(source, &mut found);
+    let (found, mut arrows) = (products(source), Arrows::new());
     let module = |path: &Path| {
         let first = path.strip_prefix(source).unwrap().iter().next().unwrap().to_str().unwrap();
         first.trim_end_matches(".rs").to_owned()
@@ -80,9 +67,9 @@ fn cycles(mut arrows: Arrows) -> Arrows {
 
 #[test]
 fn no_module_needs_itself_by_way_of_another() {
-    for entry in fs::read_dir(crates()).unwrap().map(|entry| entry.unwrap()) {
-        let name = entry.file_name().into_string().unwrap();
-        let cycles = cycles(arrows(&entry.path().join("src")));
+    for package in crates() {
+        let name = package.file_name().unwrap().display();
+        let cycles = cycles(arrows(&package.join("src")));
         assert!(cycles.is_empty(), "{name}: {cycles:#?}");
     }
 }

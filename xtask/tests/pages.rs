@@ -1,26 +1,14 @@
 //! The pages that a newcomer reads: what they link to is there, and the first one stays short.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod repository;
+
+use repository::{files, root};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Longest README, lines.
 const README_LINES: usize = 150;
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
-}
-
-fn pages(folder: &Path, found: &mut Vec<PathBuf>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            pages(&path, found);
-        } else if path.extension().is_some_and(|ending| ending == "md") {
-            found.push(path);
-        }
-    }
-}
 
 /// Targets of links and pictures outside of code that are no addresses of the network.
 fn links(page: &str) -> Vec<&str> {
@@ -47,7 +35,7 @@ fn leads_somewhere(page: &Path, link: &str) -> bool {
 #[test]
 fn every_link_and_picture_of_the_pages_is_there() {
     let mut all = vec![root().join("README.md"), root().join("CONTRIBUTING.md")];
-    pages(&root().join("docs"), &mut all);
+    all.extend(files(&root().join("docs"), &["md"]));
     let (mut count, mut gone) = (0, Vec::new());
     for page in &all {
         let text = fs::read_to_string(page).unwrap();

@@ -4,7 +4,7 @@
 use core::f64::consts::{PI, TAU};
 use squirrel_core::control::mix::Table;
 use squirrel_core::control::mixer::{Mixer, ThrustTorque};
-use squirrel_core::lane::functions::{all, angle, cbrt, exp, half_turn_sine_and_cosine, ln, tanh, wrap};
+use squirrel_core::lane::functions::{angle, cbrt, exp, half_turn_sine_and_cosine, ln, tanh, wrap};
 use squirrel_core::lane::{BLOCK, Register, Row, load, store};
 use squirrel_core::math::real;
 use squirrel_core::nalgebra::Vector3;
@@ -22,18 +22,18 @@ impl<S: Paths> Kernel<S> for Functions<S> {
         let mut out = [self.0; 8];
         for start in (0..BLOCK).step_by(L::WIDTH) {
             let x = L::load(&self.0[start..]);
-            let fraction = x / (x + all(1.0));
-            let cosine = (all::<L>(1.0) - fraction * fraction).root();
-            let (half_sine, half_cosine) = half_turn_sine_and_cosine((fraction - all(0.5)) * all(PI));
+            let fraction = x / (x + L::of(1.0));
+            let cosine = (L::of(1.0) - fraction * fraction).root();
+            let (half_sine, half_cosine) = half_turn_sine_and_cosine((fraction - L::of(0.5)) * L::of(PI));
             let results = [
-                exp(all::<L>(0.0) - x),
+                exp(L::of(0.0) - x),
                 ln(x),
-                tanh(x - all(3.0)),
+                tanh(x - L::of(3.0)),
                 angle(fraction, cosine),
                 cbrt(x),
                 half_sine,
                 half_cosine,
-                wrap(x * all(0.25) - all(4.0)),
+                wrap(x * L::of(0.25) - L::of(4.0)),
             ];
             for (row, result) in out.iter_mut().zip(results) {
                 result.store(&mut row[start..]);
@@ -112,7 +112,7 @@ impl Kernel<f32> for Mixes<'_> {
 fn the_mixer_is_the_flight_codes_on_every_path() {
     let mixer = Mixer::new(&VehicleFile::squirrel().vehicle.cast().unwrap()).unwrap();
     let mut table = Table::all([0.0; BLOCK]);
-    (0..BLOCK).for_each(|lane| table.put(lane, mixer.table()));
+    (0..BLOCK).for_each(|lane| table.put(lane, &mixer.table().first()));
     let mut state = 1_u64;
     let mut draw = |size: f32| {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -9,9 +9,10 @@
 //!
 //! Elements of a register select; work that none of them needs is left out, which changes no element.
 
+use crate::lane::Lane;
 use crate::lane::functions::{limit, size};
-use crate::lane::{Lane, Register, Row, load};
 use crate::math::{Real, real};
+use crate::numbers;
 
 /// Slopes below this count as zero; all slopes are of order one by scaling.
 pub(super) const FLAT: f32 = 1e-4;
@@ -20,88 +21,49 @@ const SLACK: f64 = 1e-5;
 /// Below this, nothing bounds an interval.
 const NOWHERE: f64 = -3e38;
 
-/// The numbers of one layout.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Table<L, const ROTORS: usize> {
-    /// 1, or 0 for a place without a rotor; there all other numbers are 0.
-    pub is_there: [L; ROTORS],
-    /// Columns of `T^+`: thrust per newton of collective, per newton metre of roll, pitch, and of scaled yaw.
-    pub collective: [L; ROTORS],
-    /// See `collective`.
-    pub roll: [L; ROTORS],
-    /// See `collective`.
-    pub pitch: [L; ROTORS],
-    /// See `collective`.
-    pub yaw: [L; ROTORS],
-    /// Scaled yaw over the rotor's part of the collective.
-    pub yaw_share: [L; ROTORS],
-    /// Thrust limit over the rotor's part of the collective, N.
-    pub full_share_n: [L; ROTORS],
-    /// Limit of each rotor, N.
-    pub thrust_max_n: L,
-    /// Newton metres of yaw torque per unit of the scaled yaw variable; 0 for a layout without yaw.
-    pub yaw_unit_n_m: L,
-    /// 1 where three rotors differ in `yaw_share`: not where all turn one way or the other with equal strength.
-    pub three_kinds: L,
-}
-
-impl<X: Copy, const ROTORS: usize> Table<X, ROTORS> {
-    /// The same everywhere.
-    pub fn all(x: X) -> Self {
-        let each = [x; ROTORS];
-        Self {
-            is_there: each,
-            collective: each,
-            roll: each,
-            pitch: each,
-            yaw: each,
-            yaw_share: each,
-            full_share_n: each,
-            thrust_max_n: x,
-            yaw_unit_n_m: x,
-            three_kinds: x,
-        }
+numbers! {
+    /// The numbers of one layout.
+    Table<ROTORS> {
+        /// 1, or 0 for a place without a rotor; there all other numbers are 0.
+        is_there [ROTORS],
+        /// Columns of `T^+`: thrust per newton of collective, per newton metre of roll, pitch, and of scaled yaw.
+        collective [ROTORS],
+        /// See `collective`.
+        roll [ROTORS],
+        /// See `collective`.
+        pitch [ROTORS],
+        /// See `collective`.
+        yaw [ROTORS],
+        /// Scaled yaw over the rotor's part of the collective.
+        yaw_share [ROTORS],
+        /// Thrust limit over the rotor's part of the collective, N.
+        full_share_n [ROTORS],
+        /// Limit of each rotor, N.
+        thrust_max_n,
+        /// Newton metres of yaw torque per unit of the scaled yaw variable; 0 for a layout without yaw.
+        yaw_unit_n_m,
+        /// 1 where three rotors differ in `yaw_share`: not where all turn one way or the other with equal strength.
+        three_kinds,
     }
 }
 
-impl<S: Real, const ROTORS: usize> Table<Row<S>, ROTORS> {
-    /// Puts the first rotors of a layout into column `lane`.
-    pub fn put<const PLACES: usize>(&mut self, lane: usize, table: &Table<f32, PLACES>) {
+impl<const PLACES: usize> Table<f32, PLACES> {
+    /// The first rotors alone, in another scalar.
+    pub fn first<S: Real, const ROTORS: usize>(&self) -> Table<S, ROTORS> {
+        const { assert!(ROTORS <= PLACES) };
         let single = |x: f32| real(f64::from(x));
-        for (rows, numbers) in [
-            (&mut self.is_there, &table.is_there),
-            (&mut self.collective, &table.collective),
-            (&mut self.roll, &table.roll),
-            (&mut self.pitch, &table.pitch),
-            (&mut self.yaw, &table.yaw),
-            (&mut self.yaw_share, &table.yaw_share),
-            (&mut self.full_share_n, &table.full_share_n),
-        ] {
-            for (row, number) in rows.iter_mut().zip(numbers) {
-                row[lane] = single(*number);
-            }
-        }
-        self.thrust_max_n[lane] = single(table.thrust_max_n);
-        self.yaw_unit_n_m[lane] = single(table.yaw_unit_n_m);
-        self.three_kinds[lane] = single(table.three_kinds);
-    }
-}
-
-impl<L: Register, const ROTORS: usize> Table<L, ROTORS> {
-    /// Registers from column `start` and on.
-    #[inline(always)]
-    pub fn load(rows: &Table<Row<L::Element>, ROTORS>, start: usize) -> Self {
-        Self {
-            is_there: load(&rows.is_there, start),
-            collective: load(&rows.collective, start),
-            roll: load(&rows.roll, start),
-            pitch: load(&rows.pitch, start),
-            yaw: load(&rows.yaw, start),
-            yaw_share: load(&rows.yaw_share, start),
-            full_share_n: load(&rows.full_share_n, start),
-            thrust_max_n: L::load(&rows.thrust_max_n[start..]),
-            yaw_unit_n_m: L::load(&rows.yaw_unit_n_m[start..]),
-            three_kinds: L::load(&rows.three_kinds[start..]),
+        let first = |all: &[f32; PLACES]| core::array::from_fn(|i| single(all[i]));
+        Table {
+            is_there: first(&self.is_there),
+            collective: first(&self.collective),
+            roll: first(&self.roll),
+            pitch: first(&self.pitch),
+            yaw: first(&self.yaw),
+            yaw_share: first(&self.yaw_share),
+            full_share_n: first(&self.full_share_n),
+            thrust_max_n: single(self.thrust_max_n),
+            yaw_unit_n_m: single(self.yaw_unit_n_m),
+            three_kinds: single(self.three_kinds),
         }
     }
 }

@@ -16,7 +16,7 @@ pub mod servo;
 mod state;
 pub mod whole;
 
-pub use rk4::{VectorSpace, rk4};
+pub use rk4::{Stages, VectorSpace, rk4, runge_kutta};
 pub use rotors::RotorDrive;
 pub use state::State;
 
@@ -51,8 +51,7 @@ fn air_in<T: Real>(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T
 /// The attitude as a matrix: two products with it cost less, and wait less, than two with the quaternion.
 #[inline(always)]
 fn rotation_matrix<T: Real>(state: &State<T>) -> Matrix3<T> {
-    let q = &state.attitude;
-    Matrix3::from(rotation(&[q.w, q.i, q.j, q.k]))
+    Matrix3::from(rotation(&state.attitude_wxyz()))
 }
 
 /// Base drag of the airframe, body frame: `F = -(D v + 1/2 rho C_d A |v| v)`.

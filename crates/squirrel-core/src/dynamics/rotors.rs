@@ -7,7 +7,7 @@ use crate::effects::Acting;
 use crate::frames::{Body, In, Wrench};
 use crate::lane::Lane;
 use crate::math::Real;
-use crate::vehicle::{MAX_ROTORS, PerRotor, ROTOR_BLOCK, Vehicle};
+use crate::vehicle::{MAX_ROTORS, PerRotor, Propulsion, ROTOR_BLOCK, Vehicle};
 use nalgebra::Vector3;
 
 /// Rotor targets and lags for one held command.
@@ -39,12 +39,8 @@ impl<T: Real> RotorDrive<T> {
             effects.numbers().rotor_targets(effects.present(), &mut target_rad_s, battery_voltage_v);
         }
         let extra_s = effects.rotor_extra_time_constant_s();
-        let inverse = |tau: T| if tau > T::zero() { T::one() / tau } else { T::zero() };
-        Self {
-            target_rad_s,
-            inverse_time_constant_up: inverse(propulsion.time_constant_up_s + extra_s[0]),
-            inverse_time_constant_down: inverse(propulsion.time_constant_down_s + extra_s[1]),
-        }
+        let [up, down] = inverse_lag(propulsion, extra_s);
+        Self { target_rad_s, inverse_time_constant_up: up, inverse_time_constant_down: down }
     }
 
     /// No change of these speeds, rad/s.
@@ -91,6 +87,15 @@ impl<T: Real> RotorDrive<T> {
             *speed = lag_start(*target, *speed, inverse);
         }
     }
+}
+
+/// Inverse time constants of the rotors, speeding up and slowing down, 1/s; 0 for no lag.
+///
+/// * `extra_s` - on top of the propulsion's own
+#[inline(always)]
+pub(super) fn inverse_lag<T: Real>(propulsion: &Propulsion<T>, [up_s, down_s]: [T; 2]) -> [T; 2] {
+    [propulsion.time_constant_up_s + up_s, propulsion.time_constant_down_s + down_s]
+        .map(|tau| if tau > T::zero() { T::one() / tau } else { T::zero() })
 }
 
 /// Rate of one rotor's speed, rad/s^2.

@@ -38,20 +38,24 @@ impl<T: Real> State<T> {
     pub fn ned_from_body(&self) -> Rotation<Ned, Body, T> {
         Rotation::new(UnitQuaternion::new_unchecked(self.attitude))
     }
+    /// The attitude as formulas on lanes take it.
+    #[inline(always)]
+    pub fn attitude_wxyz(&self) -> [T; 4] {
+        let q = &self.attitude;
+        [q.w, q.i, q.j, q.k]
+    }
     /// The state with a unit quaternion.
     #[inline(always)]
     #[must_use]
     pub fn normalised(mut self) -> Self {
-        let q = &self.attitude;
-        let [w, i, j, k] = vector::unit(&[q.w, q.i, q.j, q.k]);
+        let [w, i, j, k] = vector::unit(&self.attitude_wxyz());
         self.attitude = Quaternion::new(w, i, j, k);
         self
     }
     /// `q' = 1/2 q (0, omega)`.
     #[inline(always)]
     pub(super) fn attitude_rate(&self) -> Quaternion<T> {
-        let q = &self.attitude;
-        let [w, i, j, k] = body::attitude_rate(&[q.w, q.i, q.j, q.k], &self.omega.vector.into());
+        let [w, i, j, k] = body::attitude_rate(&self.attitude_wxyz(), &self.omega.vector.into());
         Quaternion::new(w, i, j, k)
     }
     /// True where every number is finite.

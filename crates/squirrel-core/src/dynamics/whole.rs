@@ -4,7 +4,7 @@
 
 use super::lanes::{Airframe, Held, Motion, airflow, body_rate, plus_scaled, rotor_rates, rotors};
 use super::rotors::spin;
-use super::{Surroundings, with_effects};
+use super::{Stages, Surroundings, with_effects};
 use crate::aero::membrane::{Membrane, Side};
 use crate::aero::{Airflow, BodyWrench, drag, flat_plate};
 use crate::effects::{PendulumState, Prepared, Present, Swing};
@@ -45,9 +45,6 @@ pub struct Whole<L: Lane, const ROTORS: usize> {
     pub angle_rate: [L; 2],
 }
 
-/// Time ahead to where each next rate is taken, and weight of each in the step, both s.
-pub type Stages<L, const STAGES: usize> = [[L; 2]; STAGES];
-
 /// One step: the motion and the membranes at its end. Servos, battery, load and air are stepped beside it.
 #[inline(always)]
 pub fn step<L: Lane, const ROTORS: usize, const STAGES: usize, const WING: u8, const EFFECTS: bool>(
@@ -73,13 +70,6 @@ pub fn step<L: Lane, const ROTORS: usize, const STAGES: usize, const WING: u8, c
     }
     next.attitude = unit(&next.attitude);
     (next, sides_next)
-}
-
-/// The stages of Runge and Kutta's fourth order.
-#[inline(always)]
-pub fn runge_kutta<L: Lane>(dt: L) -> Stages<L, 4> {
-    let (half, sixth, third) = (dt * L::of(0.5), dt * L::of(1.0 / 6.0), dt * L::of(1.0 / 3.0));
-    [[half, sixth], [half, third], [dt, third], [L::of(0.0), sixth]]
 }
 
 /// Each side's distance from the x axis, m.

@@ -216,9 +216,9 @@ macro_rules! catalogue {
                 })+
                 None
             }
-            /// Whether any has an equation in every step, see [`Acts`].
+            /// Whether any acts in steps: has an equation in every one, see [`Acts`], or pulls as a load.
             pub fn act_in_steps(self) -> bool {
-                $($(self.$module.any() ||)?)+ false
+                $($(self.$module.any() ||)?)+ self.has_load()
             }
             /// Whether air moves with the vehicle along body z.
             #[inline(always)]
@@ -229,11 +229,6 @@ macro_rules! catalogue {
             #[inline(always)]
             pub fn has_load(self) -> bool {
                 self.payload_swing.any()
-            }
-            /// Forms of the effect of a name; none for an unknown name.
-            pub fn forms(self, name: &str) -> Forms {
-                $(if name == <super::$field::$effect<f64> as Effect<f64>>::NAME { return self.$field; })+
-                Forms::default()
             }
         }
 
@@ -352,7 +347,7 @@ impl<T: Real> Acting<T> {
     pub fn new(effects: &Effects<T>, vehicle: &Vehicle<T>) -> Self {
         let present = Present::of(effects);
         Self {
-            any: present.act_in_steps() || present.has_load(),
+            any: present.act_in_steps(),
             present,
             numbers: Prepared::new(effects, vehicle),
             rotor_extra_time_constant_s: effects.rotor_extra_time_constant_s(),

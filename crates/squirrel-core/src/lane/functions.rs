@@ -7,12 +7,6 @@
 use super::Lane;
 use core::f64::consts::{FRAC_PI_2, LN_2, LOG2_E, SQRT_2, TAU};
 
-/// A constant; see [`Lane::of`].
-#[inline(always)]
-pub fn all<L: Lane>(x: f64) -> L {
-    L::of(x)
-}
-
 /// Absolute value.
 #[inline(always)]
 pub fn size<L: Lane>(x: L) -> L {
@@ -22,7 +16,7 @@ pub fn size<L: Lane>(x: L) -> L {
 /// 1 or, where `x` is below zero, -1.
 #[inline(always)]
 pub fn sign<L: Lane>(x: L) -> L {
-    (L::of(0.0) - x).where_positive(all(-1.0), all(1.0))
+    (L::of(0.0) - x).where_positive(L::of(-1.0), L::of(1.0))
 }
 
 /// Limited to `[low, high]`; `low` where `x` is NaN.
@@ -34,41 +28,41 @@ pub fn limit<L: Lane>(x: L, low: L, high: L) -> L {
 /// `e^x`, relative error below 6e-11 or, in f32, a few units of the last place; of -80 or 80 for what is beyond.
 #[inline(always)]
 pub fn exp<L: Lane>(x: L) -> L {
-    let x = limit(x, all(-80.0), all(80.0));
-    let (nearest, power_of_two) = (x * all(LOG2_E)).nearest_and_power_of_two();
-    let r = x - nearest * all(LN_2);
+    let x = limit(x, L::of(-80.0), L::of(80.0));
+    let (nearest, power_of_two) = (x * L::of(LOG2_E)).nearest_and_power_of_two();
+    let r = x - nearest * L::of(LN_2);
     let r2 = r * r;
-    let low = all::<L>(0.500_000_006_768_206_7) + r * all(0.166_666_658_689_516_24);
-    let middle = all::<L>(0.041_666_294_947_198_99) + r * all(0.008_333_497_072_160_372);
-    let high = all::<L>(0.001_394_465_963_836_813) + r * all(0.000_197_903_426_467_583_04);
-    power_of_two * (all::<L>(1.0) + (r + r2 * (low + r2 * (middle + r2 * high))))
+    let low = L::of(0.500_000_006_768_206_7) + r * L::of(0.166_666_658_689_516_24);
+    let middle = L::of(0.041_666_294_947_198_99) + r * L::of(0.008_333_497_072_160_372);
+    let high = L::of(0.001_394_465_963_836_813) + r * L::of(0.000_197_903_426_467_583_04);
+    power_of_two * (L::of(1.0) + (r + r2 * (low + r2 * (middle + r2 * high))))
 }
 
 /// Natural logarithm of `x`; of 1e-30 for what is below.
 #[inline(always)]
 pub fn ln<L: Lane>(x: L) -> L {
-    let (mantissa, exponent) = x.upper(all(1e-30)).mantissa_and_exponent();
-    let one = all::<L>(1.0);
-    let beyond = mantissa - all(SQRT_2);
-    let mantissa = beyond.where_positive(mantissa * all(0.5), mantissa);
+    let (mantissa, exponent) = x.upper(L::of(1e-30)).mantissa_and_exponent();
+    let one = L::of(1.0);
+    let beyond = mantissa - L::of(SQRT_2);
+    let mantissa = beyond.where_positive(mantissa * L::of(0.5), mantissa);
     let exponent = beyond.where_positive(exponent + one, exponent);
     // ln m = 2 artanh z; |z| <= 0.172, so that eleven terms leave 1e-17.
     let z = (mantissa - one) / (mantissa + one);
     let z2 = z * z;
-    let mut sum = all::<L>(1.0 / 21.0);
+    let mut sum = L::of(1.0 / 21.0);
     let mut n = 19;
     while n > 0 {
-        sum = sum * z2 + all(1.0 / f64::from(n));
+        sum = sum * z2 + L::of(1.0 / f64::from(n));
         n -= 2;
     }
-    exponent * all(LN_2) + z * sum * all(2.0)
+    exponent * L::of(LN_2) + z * sum * L::of(2.0)
 }
 
 /// Hyperbolic tangent, absolute error below 4e-11 or, in f32, 2e-7; exactly 0 at 0, exactly -1 or 1 beyond 20; -1 for NaN.
 #[inline(always)]
 pub fn tanh<L: Lane>(x: L) -> L {
-    let limited = limit(x, all(-20.0), all(20.0));
-    all::<L>(1.0) - all::<L>(2.0) / (all::<L>(1.0) + exp(all::<L>(2.0) * limited))
+    let limited = limit(x, L::of(-20.0), L::of(20.0));
+    L::of(1.0) - L::of(2.0) / (L::of(1.0) + exp(L::of(2.0) * limited))
 }
 
 /// The angle in [0, pi/2] that has this sine and cosine, rad, absolute error below 2e-9 or, in f32, 2e-7; 0 for (0, 0).
@@ -80,45 +74,45 @@ pub fn angle<L: Lane>(sine: L, cosine: L) -> L {
     let m = sine.lower(cosine);
     let t = m * m;
     let t2 = t * t;
-    let p0 = all::<L>(0.166_666_210_387_971_6) + t * all(0.075_027_880_005_406_35);
-    let p2 = all::<L>(0.044_063_777_230_506_78) + t * all(0.036_137_560_418_011_58);
-    let p4 = all::<L>(-0.008_694_689_086_504_67) + t * all(0.111_854_674_160_772_31);
-    let p6 = all::<L>(-0.141_860_824_635_768_32) + t * all(0.127_066_817_961_721_6);
+    let p0 = L::of(0.166_666_210_387_971_6) + t * L::of(0.075_027_880_005_406_35);
+    let p2 = L::of(0.044_063_777_230_506_78) + t * L::of(0.036_137_560_418_011_58);
+    let p4 = L::of(-0.008_694_689_086_504_67) + t * L::of(0.111_854_674_160_772_31);
+    let p6 = L::of(-0.141_860_824_635_768_32) + t * L::of(0.127_066_817_961_721_6);
     let arc = m + m * t * ((p0 + t2 * p2) + t2 * t2 * (p4 + t2 * p6));
-    (sine - cosine).where_positive(all::<L>(FRAC_PI_2) - arc, arc)
+    (sine - cosine).where_positive(L::of(FRAC_PI_2) - arc, arc)
 }
 
 /// Cube root of a positive normal number, relative error below 1e-13 or, in f32, 3e-7.
 #[inline(always)]
 pub fn cbrt<L: Lane>(x: L) -> L {
-    let one = all::<L>(1.0);
+    let one = L::of(1.0);
     let r = x.inverse_cube_root_guess();
     // With e = 1 - x r^3, r (1 - e)^(-1/3) would be exact; its series leaves 2e-5, then 4e-14. No division.
     let e = one - x * r * (r * r);
-    let r = r + r * e * (all::<L>(1.0 / 3.0) + e * (all::<L>(2.0 / 9.0) + e * all(14.0 / 81.0)));
+    let r = r + r * e * (L::of(1.0 / 3.0) + e * (L::of(2.0 / 9.0) + e * L::of(14.0 / 81.0)));
     let e = one - x * r * (r * r);
-    let r = r + r * e * (all::<L>(1.0 / 3.0) + e * all(2.0 / 9.0));
+    let r = r + r * e * (L::of(1.0 / 3.0) + e * L::of(2.0 / 9.0));
     x * r * r
 }
 
 /// An angle in [-pi, pi], rad, as [`wrap_angle`](crate::math::wrap_angle) but for the sign of half a turn.
 #[inline(always)]
 pub fn wrap<L: Lane>(x: L) -> L {
-    let (turns, _) = (x * all(1.0 / TAU)).nearest_and_power_of_two();
-    x - turns * all(TAU)
+    let (turns, _) = (x * L::of(1.0 / TAU)).nearest_and_power_of_two();
+    x - turns * L::of(TAU)
 }
 
 /// Sine and cosine of an angle in [-pi/2, pi/2], absolute error below 7e-11 or, in f32, 2e-7.
 #[inline(always)]
 pub fn half_turn_sine_and_cosine<L: Lane>(x: L) -> (L, L) {
     let t = x * x;
-    let (mut sine, mut cosine) = (all::<L>(1.0), all::<L>(1.0));
+    let (mut sine, mut cosine) = (L::of(1.0), L::of(1.0));
     let mut n = 7;
     while n > 0 {
         let k = 2.0 * f64::from(n);
         // Taylor's series from its far end, to the powers 15 and 14.
-        sine = all::<L>(1.0) - sine * t * all(1.0 / (k * (k + 1.0)));
-        cosine = all::<L>(1.0) - cosine * t * all(1.0 / (k * (k - 1.0)));
+        sine = L::of(1.0) - sine * t * L::of(1.0 / (k * (k + 1.0)));
+        cosine = L::of(1.0) - cosine * t * L::of(1.0 / (k * (k - 1.0)));
         n -= 1;
     }
     (x * sine, cosine)

@@ -13,7 +13,7 @@ use squirrel_core::control::backstepping::{AttitudeGains, Tilt};
 use squirrel_core::control::mix::Table;
 use squirrel_core::control::mixer::Mixer;
 use squirrel_core::dynamics::State;
-use squirrel_core::lane::functions::{all, half_turn_sine_and_cosine, limit, wrap};
+use squirrel_core::lane::functions::{half_turn_sine_and_cosine, limit, wrap};
 use squirrel_core::lane::vector::{cross, times};
 use squirrel_core::lane::{Row, load, put, store};
 use squirrel_core::math::real;
@@ -103,7 +103,7 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
             inverse_thrust_coefficient: 1.0 / f64::from(p.propulsion.thrust_coefficient_n_s2),
         };
         self.gains.put(lane, &numbers.map(real));
-        self.mixer.put(lane, mixer.table());
+        self.mixer.put(lane, &mixer.table().first());
     }
 
     /// Forgets what was; the filter starts at this attitude.
@@ -184,7 +184,7 @@ fn attitude<L: Register>(
         course.rate[i] = course.rate[i] + acceleration[i] * dt;
         course.angle[i] = wrap(course.angle[i] + course.rate[i] * dt);
     }
-    let half = all::<L>(0.5);
+    let half = L::of(0.5);
     let [roll, pitch, yaw] = [
         half_turn_sine_and_cosine(course.angle[0] * half),
         half_turn_sine_and_cosine(course.angle[1] * half),

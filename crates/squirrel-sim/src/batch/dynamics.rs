@@ -1,7 +1,6 @@
 //! Steps of blocks: the equations of `squirrel_core::dynamics` on registers of vehicles.
 //!
-//! Written out, operation by operation in the order of the core, so that a vehicle in a batch has the numbers of a vehicle
-//! alone. No closures and no iterators in here: code must end up in the function that was compiled for the registers.
+//! The core's own, so that a vehicle in a batch has the numbers of a vehicle alone. No closures and no iterators in here: code must end up in the function that was compiled for the registers.
 
 use super::Scheme;
 use super::air::Forecast;
@@ -12,7 +11,8 @@ use squirrel_core::aero::membrane::{Membrane, Side, angle_of_attack};
 use squirrel_core::dynamics::battery::Charge;
 use squirrel_core::dynamics::lanes::{Airframe, Held, Motion, derivative, plus_scaled, settle};
 use squirrel_core::dynamics::servo::{Servo, ServoState};
-use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, NONE, Stages, Whole, lateral, runge_kutta};
+use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, NONE, Whole, lateral};
+use squirrel_core::dynamics::{Stages, runge_kutta};
 use squirrel_core::effects::{PendulumState, Prepared, Swing};
 use squirrel_core::lane::vector::{minus, rotation, unit};
 use squirrel_core::lane::{Row, load, store};
@@ -72,10 +72,7 @@ impl<S: Paths, const ROTORS: usize> AdvanceWhole<'_, S, ROTORS> {
         let Advance { blocks, dt_s: dt, steps, .. } = self.0;
         let mut forecast = Forecast::empty();
         for block in blocks {
-            let Some(kind) = block
-                .extra
-                .as_ref()
-                .map(|extra| (extra.wing, extra.present.act_in_steps() || extra.present.has_load()))
+            let Some(kind) = block.extra.as_ref().map(|extra| (extra.wing, extra.present.act_in_steps()))
             else {
                 continue;
             };

@@ -38,7 +38,7 @@ struct Late<S, const ROTORS: usize> {
 /// See the module.
 #[derive(Debug, Clone)]
 pub(super) struct Extra<S: Copy, const ROTORS: usize> {
-    /// `NONE`, `FLAT` or `MEMBRANE` of `wing`, for the whole batch.
+    /// `NONE`, `FLAT` or `MEMBRANE` of `dynamics::whole`, for the whole batch.
     pub(super) wing: u8,
     pub(super) plate: flat_plate::Pair<Row<S>>,
     pub(super) membrane: Membrane<Row<S>>,
@@ -64,6 +64,7 @@ pub(super) struct Extra<S: Copy, const ROTORS: usize> {
 }
 
 impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
+    /// With nothing in any column that is used.
     ///
     /// * `vehicle` - any, of whose numbers none matter without effects
     pub(super) fn empty(fitted: &Fitted, vehicle: &Vehicle<f64>) -> Self {

@@ -111,26 +111,9 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         let none = [<S as Lane>::of(0.0); BLOCK];
         let one = [real::<S>(1.0); BLOCK];
         Self {
-            motion: Motion {
-                position: [none; 3],
-                velocity: [none; 3],
-                attitude: [one, none, none, none],
-                omega: [none; 3],
-                rotor_speed: [none; ROTORS],
-            },
-            airframe: Airframe {
-                inverse_mass: none,
-                inertia: [[none; 3]; 3],
-                inertia_inverse: [[none; 3]; 3],
-                linear_drag: [none; 3],
-                quadratic_drag: none,
-                thrust: [none; ROTORS],
-                roll: [none; ROTORS],
-                pitch: [none; ROTORS],
-                yaw: [none; ROTORS],
-                inverse_lag: [one; 2],
-            },
-            held: Held { wind: [none; 3], target_speed: [none; ROTORS] },
+            motion: Motion { attitude: [one, none, none, none], ..Motion::all(none) },
+            airframe: Airframe { inverse_lag: [one; 2], ..Airframe::all(none) },
+            held: Held::all(none),
             vehicles: BLOCK,
             lagless: false,
             full_speed: [real(f64::NAN); BLOCK],
@@ -166,26 +149,22 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
 
     /// The motion in column `lane`, rotors only where there are any.
     pub(super) fn put_state(&mut self, lane: usize, state: &State<S>, drive: &Drive<S>) {
-        let q = &state.attitude;
-        let rows = &mut self.motion;
-        put(&mut rows.position, lane, state.position.vector.into());
-        put(&mut rows.velocity, lane, state.velocity.vector.into());
-        put(&mut rows.attitude, lane, [q.w, q.i, q.j, q.k]);
-        put(&mut rows.omega, lane, state.omega.vector.into());
-        put(&mut rows.rotor_speed, lane, core::array::from_fn(|i| drive.only(i, state.rotor_speed_rad_s[i])));
+        let mut motion = Motion::from(state);
+        motion.rotor_speed = core::array::from_fn(|i| drive.only(i, motion.rotor_speed[i]));
+        self.motion.put(lane, &motion);
     }
 
     /// The motion in column `lane`.
     pub(super) fn state(&self, lane: usize) -> State<S> {
-        let rows = &self.motion;
-        let [w, x, y, z] = take(&rows.attitude, lane);
+        let motion = self.motion.take(lane);
+        let [w, x, y, z] = motion.attitude;
         let mut rotor_speed_rad_s = [<S as Lane>::of(0.0); MAX_ROTORS];
-        rotor_speed_rad_s[..ROTORS].copy_from_slice(&take(&rows.rotor_speed, lane));
+        rotor_speed_rad_s[..ROTORS].copy_from_slice(&motion.rotor_speed);
         State {
-            position: In::new(Vector3::from(take(&rows.position, lane))),
-            velocity: In::new(Vector3::from(take(&rows.velocity, lane))),
+            position: In::new(Vector3::from(motion.position)),
+            velocity: In::new(Vector3::from(motion.velocity)),
             attitude: Quaternion::new(w, x, y, z),
-            omega: In::new(Vector3::from(take(&rows.omega, lane))),
+            omega: In::new(Vector3::from(motion.omega)),
             rotor_speed_rad_s,
         }
     }

@@ -9,7 +9,8 @@ use squirrel_core::aero::flat_plate;
 use squirrel_core::aero::membrane::{Membrane, Side, angle_of_attack};
 use squirrel_core::dynamics::lanes::{Airframe, Held, Motion};
 use squirrel_core::dynamics::rotors::spin_signs;
-use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, NONE, Whole, lateral, runge_kutta};
+use squirrel_core::dynamics::runge_kutta;
+use squirrel_core::dynamics::whole::{self, FLAT, MEMBRANE, NONE, Whole, lateral};
 use squirrel_core::effects::{PendulumState, Swing};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::vector::rotation;
@@ -67,7 +68,7 @@ impl Plant {
         let mut craft = Whole::<Variable, ROTORS> {
             airframe: Airframe::new(vehicle, extra_s).map(constant),
             held: Held {
-                wind: [wind.vector.x, wind.vector.y, wind.vector.z].map(constant),
+                wind: <[f64; 3]>::from(wind.vector).map(constant),
                 target_speed: first(&state.drive.target_rad_s),
             },
             plate: plate.map(constant),
