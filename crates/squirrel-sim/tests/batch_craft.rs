@@ -5,7 +5,7 @@ mod batch_support;
 
 use batch_support::{Thrown, bits};
 use nalgebra::{Vector3, convert, try_convert};
-use squirrel_core::dynamics::total_wind;
+use squirrel_core::dynamics::{State, total_wind};
 use squirrel_core::effects::{Effects, FORM, Kind, forms};
 use squirrel_core::frames::In;
 use squirrel_core::vehicle::MAX_ROTORS;
@@ -282,5 +282,57 @@ fn what_does_not_fly_in_a_batch_is_named() {
     put(&mut heavy.effects, "added_mass", 0, 0.5);
     let text = batch.refit(0, &heavy).unwrap_err().to_string();
     assert!(text.starts_with("vehicles[0]: added_mass: the batch was made without"), "{text}");
+    put(&mut heavy.effects, "actuation_latency", 0, 0.5);
+    let text = batch.refit(0, &heavy).unwrap_err().to_string();
+    assert!(text.starts_with("vehicles[0]: added_mass: the batch was made without"), "steps first: {text}");
+    // What changes the airframe once has a place everywhere.
+    let mut other = craft("none");
+    put(&mut other.effects, "mass_error", 0, 0.5);
+    put(&mut other.effects, "motor_lag", 0, 0.5);
+    batch.refit(0, &other).unwrap();
     assert_eq!(batch.set_charge(0, 1.5).unwrap_err().to_string(), "charge of vehicle 0: 1.5, must be 0 to 1");
+}
+
+/// A vehicle may come into a batch with another form of an effect that is there: it then flies as in a batch made with it, and its
+/// neighbour does not notice. A form that is an equation of its own has no place.
+#[test]
+fn another_form_may_come_later() {
+    let formed = |name: &str, form: usize| {
+        let mut craft = craft("membrane");
+        put(&mut craft.effects, name, form, 0.5);
+        craft
+    };
+    let fly = |mut batch: Batch<f64>| {
+        for number in 0..2 {
+            let mut state = State::at_rest();
+            (state.velocity.vector.x, state.velocity.vector.y) = (5.0, 2.0);
+            batch.reset(number, &state).unwrap();
+        }
+        batch.command(&[0.6; 8]).unwrap();
+        batch.step(200);
+        [0, 1].map(|number| batch.state(number).unwrap())
+    };
+    for (name, form) in [
+        ("battery_sag", 1),
+        ("battery_sag", 2),
+        ("flapping_moment", 1),
+        ("linear_drag", 1),
+        ("translational_lift", 1),
+    ] {
+        let (first, other) = (formed(name, 0), formed(name, form));
+        let made = Batch::with(&[first.clone(), other.clone()], Settings::default()).unwrap();
+        let mut refitted = Batch::with(&[first.clone(), first.clone()], Settings::default()).unwrap();
+        refitted.refit(1, &other).unwrap();
+        let (expected, alike) =
+            (fly(made), fly(Batch::with(&[first.clone(), first], Settings::default()).unwrap()));
+        assert_eq!(fly(refitted), expected, "{name}");
+        assert!(alike[0] == expected[0] && alike[1] != expected[1], "{name}");
+    }
+    for name in ["constant_wind", "ground_effect"] {
+        let mut batch = Batch::<f64>::with(&[formed(name, 0)], Settings::default()).unwrap();
+        let text = batch.refit(0, &formed(name, 1)).unwrap_err().to_string();
+        assert!(text.starts_with(&format!("vehicles[0]: {name}: the batch was made without")), "{text}");
+        let mut batch = Batch::<f64>::with(&[formed(name, 1)], Settings::default()).unwrap();
+        batch.refit(0, &formed(name, 0)).unwrap();
+    }
 }

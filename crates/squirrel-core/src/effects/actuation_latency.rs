@@ -11,6 +11,7 @@ pub(super) struct ActuationLatency<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for ActuationLatency<T> {
     const NAME: &'static str = "actuation_latency";
+    const ACTS_BETWEEN_STEPS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::size("latency_s", 0.015, 0.06)];
     const WORDS: Words = Words {
         what: "late commands",

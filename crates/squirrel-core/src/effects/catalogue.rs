@@ -204,9 +204,23 @@ macro_rules! catalogue {
             pub fn or(self, other: Self) -> Self {
                 Self { $($field: self.$field.or(other.$field),)+ }
             }
-            /// The name of an effect that is here in a form that the other lacks.
+            /// Those that act in flight, in steps and between them; not those that change the airframe once.
+            #[must_use]
+            pub fn in_flight(self) -> Self {
+                let mut out = Self { payload_swing: self.payload_swing, ..Self::default() };
+                $($(out.$module = self.$module;)?)+
+                $(if <super::$field::$effect<f64> as Effect<f64>>::ACTS_BETWEEN_STEPS { out.$field = self.$field; })+
+                out
+            }
+            /// The name of an effect that a batch with the others has no place for; first of those that act in steps.
             pub fn beyond(self, other: Self) -> Option<&'static str> {
-                $(if self.$field.is_beyond(other.$field) { return Some(<super::$field::$effect<f64> as Effect<f64>>::NAME); })+
+                for between in [false, true] {
+                    $(if <super::$field::$effect<f64> as Effect<f64>>::ACTS_BETWEEN_STEPS == between
+                        && self.$field.are_beyond(other.$field, <super::$field::$effect<f64> as Effect<f64>>::FORMS_APART)
+                    {
+                        return Some(<super::$field::$effect<f64> as Effect<f64>>::NAME);
+                    })+
+                }
                 None
             }
             /// The name of an effect that acts on sensors alone.

@@ -18,6 +18,7 @@ pub(super) struct ConstantWind<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for ConstantWind<T> {
     const NAME: &'static str = "constant_wind";
+    const FORMS_APART: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("wind_north_m_s", 1.5, 6.0),
         EffectParameter::signed("wind_east_m_s", 1.5, 6.0),

@@ -20,6 +20,7 @@ pub(super) struct GroundEffect<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for GroundEffect<T> {
     const NAME: &'static str = "ground_effect";
+    const FORMS_APART: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::size("effective_radius_m", 0.25, 0.55).growing_with(Scale::Arm),
         EffectParameter::size("gain", 0.1, 0.5).only_in(&["exponential"]),

@@ -33,6 +33,7 @@ pub(super) struct Gust<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for Gust<T> {
     const NAME: &'static str = "gust";
+    const ACTS_BETWEEN_STEPS: bool = true;
     const PARAMETERS: &'static [EffectParameter] =
         &[EffectParameter::size("sigma_m_s", 0.8, 2.5), EffectParameter::form(&["gauss_markov", "dryden"])];
     const WORDS: Words =

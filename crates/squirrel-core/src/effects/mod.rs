@@ -302,6 +302,10 @@ pub trait Effect<T: Real>: Copy {
     const SHOWN: Shown;
     /// Whether it acts on sensors and stamps alone, which a flight without them does not show.
     const IS_OF_SENSORS: bool = false;
+    /// Whether it acts between steps, on commands or on the air.
+    const ACTS_BETWEEN_STEPS: bool = false;
+    /// Whether each form beyond the standard one is an equation of its own, that a batch has a place for or not.
+    const FORMS_APART: bool = false;
 
     /// Gusts that the effect adds to the air.
     #[inline(always)]
@@ -402,10 +406,12 @@ impl Forms {
     pub fn or(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
-    /// Whether there is one that the other lacks.
-    #[inline(always)]
-    pub fn is_beyond(self, other: Self) -> bool {
-        self.0 & !other.0 != 0
+    /// Whether a batch that has the others has no place for these.
+    ///
+    /// * `apart` - see [`Effect::FORMS_APART`]
+    fn are_beyond(self, other: Self, apart: bool) -> bool {
+        let special = self.0 & !Self::only(0).0;
+        self.any() && (!other.any() || apart && special & !other.0 != 0)
     }
 }
 

@@ -72,7 +72,7 @@ impl Fitted {
         if let Some(effect) = present.of_sensors() {
             return Err(BatchError::Effect { vehicle, effect });
         }
-        Ok(Self { wing, stretches, present })
+        Ok(Self { wing, stretches, present: present.in_flight() })
     }
 
     /// Whether the base model is all.
@@ -80,11 +80,11 @@ impl Fitted {
         *self == Self { wing: NONE, stretches: 0, present: Present::default() }
     }
 
-    /// Whether another craft fits.
+    /// The effects of another craft, if it fits.
     ///
     /// # Errors
     /// What there is no place for.
-    pub(super) fn fits(&self, craft: &Craft, vehicle: usize) -> Result<(), BatchError> {
+    pub(super) fn fits(&self, craft: &Craft, vehicle: usize) -> Result<Present, BatchError> {
         let needs = Self::one(craft, vehicle)?;
         let what = if needs.wing != NONE && needs.wing != self.wing {
             Some("wing")
@@ -93,6 +93,6 @@ impl Fitted {
         } else {
             needs.present.beyond(self.present)
         };
-        what.map_or(Ok(()), |what| Err(BatchError::NotFitted { vehicle, what }))
+        what.map_or(Ok(needs.present), |what| Err(BatchError::NotFitted { vehicle, what }))
     }
 }

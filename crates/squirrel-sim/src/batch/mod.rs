@@ -242,7 +242,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// As [`Self::with`]; something that the batch has no place for; no such vehicle.
     pub fn refit(&mut self, number: usize, craft: &Craft) -> Result<(), BatchError> {
         self.check(number)?;
-        self.fitted.fits(craft, number)?;
+        let present = self.fitted.fits(craft, number)?;
         let (vehicle, whole) = airframe::<T>(number, craft)?;
         let effects = &craft.effects;
         self.put(number, &vehicle, &Tuning::between(&craft.vehicle, &whole, effects))?;
@@ -250,6 +250,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         let dt_s = self.settings.dt_s;
         let mut chunk = self.pool.chunk(chunk);
         let Some(extra) = &mut chunk.blocks[block].extra else { return Ok(()) };
+        // It may be the first in a form of an effect that others have.
+        extra.present = extra.present.or(present);
         let own = whole.parameters().wing;
         let still = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.0 };
         let (plate, membrane, servo) = match &craft.wing {
