@@ -10,9 +10,9 @@
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
 use squirrel_examples::Outcome;
+use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Flight, Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 

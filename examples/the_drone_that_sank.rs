@@ -12,10 +12,10 @@
 
 use squirrel_examples::Outcome;
 use squirrel_gap::{Finding, Verdict, add, diagnose, find};
+use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};
 

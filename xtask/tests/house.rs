@@ -10,12 +10,20 @@ use std::fs;
 use std::path::Path;
 
 /// Which of our crates a crate may depend on, top down.
-const ARROWS: [(&str, &[&str]); 10] = [
+const ARROWS: [(&str, &[&str]); 12] = [
     (
         "squirrel-examples",
-        &["squirrel-study", "squirrel-gap", "squirrel-plan", "squirrel-sim", "squirrel-core"],
+        &[
+            "squirrel-study",
+            "squirrel-gap",
+            "squirrel-plan",
+            "squirrel-sim",
+            "squirrel-report",
+            "squirrel-log",
+            "squirrel-core",
+        ],
     ),
-    ("hidden-effects", &["squirrel-sim"]),
+    ("hidden-effects", &["squirrel-sim", "squirrel-log"]),
     (
         "squirrel-py",
         &[
@@ -25,24 +33,50 @@ const ARROWS: [(&str, &[&str]); 10] = [
             "squirrel-nn",
             "squirrel-plan",
             "squirrel-sim",
+            "squirrel-report",
+            "squirrel-log",
             "squirrel-core",
         ],
     ),
     (
         "squirrel-cli",
-        &["squirrel-study", "squirrel-gap", "squirrel-nn", "squirrel-plan", "squirrel-sim", "squirrel-core"],
+        &[
+            "squirrel-study",
+            "squirrel-gap",
+            "squirrel-nn",
+            "squirrel-plan",
+            "squirrel-sim",
+            "squirrel-report",
+            "squirrel-log",
+            "squirrel-core",
+        ],
     ),
-    ("squirrel-study", &["squirrel-gap", "squirrel-nn", "squirrel-plan", "squirrel-sim", "squirrel-core"]),
-    ("squirrel-gap", &["squirrel-sim", "squirrel-core"]),
-    ("squirrel-nn", &["squirrel-sim", "squirrel-core"]),
-    ("squirrel-plan", &["squirrel-sim", "squirrel-core"]),
-    ("squirrel-sim", &["squirrel-core"]),
+    (
+        "squirrel-study",
+        &[
+            "squirrel-gap",
+            "squirrel-nn",
+            "squirrel-plan",
+            "squirrel-sim",
+            "squirrel-report",
+            "squirrel-log",
+            "squirrel-core",
+        ],
+    ),
+    ("squirrel-gap", &["squirrel-sim", "squirrel-report", "squirrel-log", "squirrel-core"]),
+    ("squirrel-nn", &["squirrel-sim", "squirrel-log", "squirrel-core"]),
+    ("squirrel-plan", &["squirrel-sim", "squirrel-report", "squirrel-log", "squirrel-core"]),
+    ("squirrel-sim", &["squirrel-log", "squirrel-core"]),
+    ("squirrel-report", &["squirrel-log"]),
+    ("squirrel-log", &["squirrel-core"]),
     ("squirrel-core", &[]),
 ];
 
 /// Foreign crates that only some of ours may depend on; tests and benches may use any.
-const KEPT_IN: [(&str, &[&str]); 6] = [
+const KEPT_IN: [(&str, &[&str]); 8] = [
     ("rapier3d-f64", &["squirrel-sim"]),
+    ("mcap", &["squirrel-log"]),
+    ("parquet", &["squirrel-log"]),
     ("glam", &[]),
     ("glamx", &[]),
     ("clap", &["squirrel-cli"]),
@@ -129,7 +163,9 @@ fn every_crate_and_every_room_of_core_and_sim_is_on_the_page() {
         .collect();
     let mut rooms: BTreeSet<String> =
         folders(&root.join("crates")).iter().map(|name| format!("crates/{name}")).collect();
-    for package in ["crates/squirrel-core", "crates/squirrel-sim"] {
+    for package in
+        ["crates/squirrel-core", "crates/squirrel-log", "crates/squirrel-report", "crates/squirrel-sim"]
+    {
         rooms.extend(
             folders(&root.join(package).join("src")).iter().map(|room| format!("{package}/src/{room}/")),
         );

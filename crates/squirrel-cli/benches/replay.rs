@@ -1,11 +1,11 @@
 //! What the commands `fly --out`, `replay` and `fly --report` cost for the demo's flight.
 
 use criterion::{Criterion, criterion_group, criterion_main};
+use squirrel_log::FlightLog;
+use squirrel_report::flight::{FlightView, Heading, render};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay;
-use squirrel_sim::report::flight::{FlightView, Heading, render};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 

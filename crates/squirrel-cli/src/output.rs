@@ -3,7 +3,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is where the program speaks")]
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use squirrel_sim::files;
+use squirrel_log::files;
 use std::fmt::Write as _;
 use std::io::{IsTerminal, Write};
 use std::path::Path;

@@ -1,7 +1,7 @@
 //! What a command reads and what it writes, compared before it begins: nothing that is read is overwritten, and no two results go into one
 //! file.
 
-use squirrel_sim::files::{self, FileId};
+use squirrel_log::files::{self, FileId};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

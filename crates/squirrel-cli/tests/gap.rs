@@ -5,7 +5,7 @@
 
 mod support;
 
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use std::fs;
 use support::{Folder, SQUIRREL, json};
 

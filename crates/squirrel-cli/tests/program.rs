@@ -5,7 +5,7 @@
 mod support;
 
 use squirrel_core::policy::Policy;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::weights::PolicyWeights;
 use std::fs;
 use support::{Folder, MAP, SQUIRREL, json};

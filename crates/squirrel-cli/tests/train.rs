@@ -4,8 +4,8 @@
 
 mod support;
 
+use squirrel_log::FlightLog;
 use squirrel_nn::trained::Trained;
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
 use std::fmt::Write as _;
 use std::fs;

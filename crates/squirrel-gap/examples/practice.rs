@@ -8,8 +8,8 @@
 
 use serde_json::Value as Json;
 use squirrel_gap::{Kind, NamedEffect, Value, Verdict, diagnose};
-use squirrel_sim::import::{ImportMap, import};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
+use squirrel_log::import::{ImportMap, import};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeSet;
 use std::error::Error;

@@ -17,7 +17,7 @@ use crate::predictor::Predictor;
 use crate::verdict::SetAside;
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::Vehicle;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 

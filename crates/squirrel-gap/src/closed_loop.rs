@@ -7,8 +7,8 @@
 use crate::GapError;
 use crate::flight::series::Series;
 use serde::Serialize;
+use squirrel_log::FlightLog;
 use squirrel_sim::flight::Setup;
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay;
 use squirrel_sim::vehicle_file::VehicleFile;
 

@@ -16,7 +16,7 @@ use crate::predictor::{Hypothesis, Predictor};
 use crate::proof::{gap, hold, prove};
 use crate::verdict::{Kind, SetAside, Verdict, nothing_to_add};
 use squirrel_core::vehicle::{ThrustCurve, Vehicle};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Looks at flights of a vehicle and says which effect its file lacks.

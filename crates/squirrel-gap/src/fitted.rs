@@ -9,7 +9,7 @@ use crate::name::{Catalogue, Point, Scored, Search, hypothesis};
 use crate::predictor::Predictor;
 use squirrel_core::effects::{EffectParameter, Effects, Kind};
 use squirrel_core::vehicle::{ParameterError, Vehicle};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Least part of its thrust or torque that a rotor gives.

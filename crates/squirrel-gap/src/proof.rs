@@ -9,7 +9,7 @@ use crate::name::{Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothe
 use crate::predictor::{CHANNELS, Hypothesis, Predictor, TURNING};
 use crate::shrink::{Errors12, Floor, Flown};
 use crate::verdict::Gap;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 
 /// Errors on held-out flights.
 #[derive(Debug)]

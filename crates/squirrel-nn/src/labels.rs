@@ -15,7 +15,7 @@ use squirrel_core::dynamics::State;
 use squirrel_core::frames::In;
 use squirrel_core::rnn::parnn::{INPUTS, WINDOW, features};
 use squirrel_core::vehicle::MAX_ROTORS;
-use squirrel_sim::log::{Channel, FlightLog};
+use squirrel_log::{Channel, FlightLog};
 use squirrel_sim::plant::{Plant, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 

@@ -4,12 +4,12 @@
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_core::math::AIR_DENSITY_KG_M3;
 use squirrel_core::rnn::parnn::WINDOW;
+use squirrel_log::FlightLog;
 use squirrel_nn::NnError;
 use squirrel_nn::labels::windows;
 use squirrel_nn::windows::Windows;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 

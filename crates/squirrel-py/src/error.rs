@@ -3,8 +3,8 @@
 
 use pyo3::PyErr;
 use pyo3::exceptions::PyValueError;
+use squirrel_log::LogError;
 use squirrel_nn::NnError;
-use squirrel_sim::log::LogError;
 use squirrel_sim::vehicle_file::VehicleFileError;
 use squirrel_sim::weights::WeightsError;
 use std::io;

@@ -8,12 +8,14 @@ use crate::vehicle::{Vehicle, write_file};
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
-use squirrel_sim::log;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::{Path, PathBuf};
 
 /// Names and logs in the order of the dictionary.
-pub(crate) fn logs(argument: &str, flights: &Bound<'_, PyDict>) -> PyResult<Vec<(String, log::FlightLog)>> {
+pub(crate) fn logs(
+    argument: &str,
+    flights: &Bound<'_, PyDict>,
+) -> PyResult<Vec<(String, squirrel_log::FlightLog)>> {
     let named = flights.iter().map(|(name, log)| {
         let wrong = || {
             value(format!(
@@ -70,7 +72,7 @@ pub(crate) fn gap_diagnose<'py>(
     Ok((json(py, &verdict)?, patched.map(|file| Vehicle { file })))
 }
 
-type Logs = [(String, log::FlightLog)];
+type Logs = [(String, squirrel_log::FlightLog)];
 
 fn diagnose(
     vehicle: &VehicleFile,
@@ -82,7 +84,7 @@ fn diagnose(
     let tick = |_: &str| stop.check();
     let mut diagnosis =
         squirrel_gap::diagnose_with(vehicle, baseline, flights, held_out, &tick).map_err(value)?;
-    let looked_at = |logs: &Logs| -> Vec<(String, log::FlightLog)> {
+    let looked_at = |logs: &Logs| -> Vec<(String, squirrel_log::FlightLog)> {
         logs.iter().filter(|(name, _)| diagnosis.verdict.has_looked_at(name)).cloned().collect()
     };
     // Whole logs are copied only where some are left out.

@@ -8,7 +8,6 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_sim::flight::Metrics;
-use squirrel_sim::log;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -27,16 +26,16 @@ use std::path::PathBuf;
 #[pyclass(frozen, module = "squirrel._squirrel", mapping)]
 #[derive(Debug)]
 pub(crate) struct FlightLog {
-    pub(crate) log: log::FlightLog,
+    pub(crate) log: squirrel_log::FlightLog,
     metrics: Option<Metrics>,
 }
 
 impl FlightLog {
-    pub(crate) fn new(log: log::FlightLog, metrics: Option<Metrics>) -> Self {
+    pub(crate) fn new(log: squirrel_log::FlightLog, metrics: Option<Metrics>) -> Self {
         Self { log, metrics }
     }
 
-    fn source(&self, name: &str) -> PyResult<&log::Source> {
+    fn source(&self, name: &str) -> PyResult<&squirrel_log::Source> {
         self.log.sources.get(name).ok_or_else(|| {
             let names: Vec<&str> = self.log.sources.keys().map(String::as_str).collect();
             PyKeyError::new_err(format!("source {name}: not in this log, which has {}", names.join(", ")))
@@ -66,7 +65,7 @@ impl FlightLog {
     ///     One line that names the file and what is wrong with it: not a flight log, truncated, changed since it was written.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let log = py.detach(|| log::FlightLog::read(&path)).map_err(|e| error::log(&e))?;
+        let log = py.detach(|| squirrel_log::FlightLog::read(&path)).map_err(|e| error::log(&e))?;
         Ok(Self::new(log, None))
     }
 
@@ -91,7 +90,7 @@ impl FlightLog {
     /// -------
     /// list of str
     fn keys(&self) -> Vec<String> {
-        let channels = |(source, of): (&String, &log::Source)| {
+        let channels = |(source, of): (&String, &squirrel_log::Source)| {
             of.channels.keys().map(|channel| format!("{source}.{channel}")).collect::<Vec<_>>()
         };
         self.log.sources.iter().flat_map(channels).collect()

@@ -5,7 +5,7 @@ use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
-use squirrel_sim::files::write_whole;
+use squirrel_log::files::write_whole;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

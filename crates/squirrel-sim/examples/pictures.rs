@@ -3,11 +3,11 @@
 //! Flies the manoeuvre of `squirrel demo` (scenario `avoid`, seed 1) with a little less thrust, and writes `avoidance.svg` into the folder that is its argument: the
 //! tracks from above, and height over time. `twcc_plus` stands for `twcc_oracle`, whose track hides that of `twcc_flat`.
 
+use squirrel_log::FlightLog;
+use squirrel_report::chart::{Axis, Ink, Note, Obstacle, Range, Svg, Track, TrackChart};
+use squirrel_report::picture::picture;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
-use squirrel_sim::report::chart::{Axis, Ink, Note, Obstacle, Range, Svg, Track, TrackChart};
-use squirrel_sim::report::picture::picture;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::error::Error;

@@ -6,16 +6,17 @@
 use crate::arm::Arm;
 use crate::estimator::Estimator;
 use crate::flight::{self, Integrator, Setup};
-use crate::log::FlightLog;
 use crate::scenario::Scenario;
 use crate::vehicle_file::VehicleFile;
 use crate::weights::ParnnWeights;
 use squirrel_core::stack::StackState;
+use squirrel_log::FlightLog;
+use squirrel_log::flight_code::{ESTIMATE, frames, record_output};
 
 /// Sources that the flight code writes, causes before consequences: of two that differ at one time, the first is named.
 pub const OUTPUT_SOURCES: [&str; 10] = [
     "control.status",
-    flight::ESTIMATE,
+    ESTIMATE,
     "control.failsafe",
     "reference",
     "control.excitation",
@@ -81,14 +82,14 @@ pub fn setup(log: &FlightLog) -> Result<Setup, String> {
 /// One line that names what the log lacks or what cannot be used.
 pub fn replay(log: &FlightLog, setup: &Setup) -> Result<Replay, String> {
     let stack = setup.stack().map_err(|e| e.to_string())?;
-    let frames = flight::frames(log)?;
+    let frames = frames(log).map_err(|error| error.to_string())?;
     let mut state = StackState::default();
     let mut again = FlightLog::default();
     let rotors = stack.vehicle().rotors().len();
     for frame in &frames {
         let output = stack.step(&mut state, frame);
         let t = frame.time_us as f64 * 1e-6;
-        flight::record_output(&mut again, t, t, &output, rotors, None);
+        record_output(&mut again, t, t, &output, rotors, None);
     }
     let mut replay = Replay { steps: frames.len(), values: 0, first_difference: None };
     for name in OUTPUT_SOURCES {

@@ -174,7 +174,7 @@ impl Scenario {
     /// One line that names `file`, field and value.
     pub fn parse(text: &str, file: &str) -> Result<Self, String> {
         let scenario: Self = toml::from_str(text).map_err(|e| {
-            let place = crate::toml_text::place(text, &e);
+            let place = squirrel_log::toml_text::place(text, &e);
             format!("{file}, line {}: {} (in `{}`)", place.line, place.message, place.text)
         })?;
         scenario.check().map_err(|problem| format!("{file}: {problem}"))?;

@@ -3,9 +3,9 @@
 //! In a log it is the source `plan`. Any log with `reference.position_ned_m`, `reference.velocity_ned_m_s` and
 //! `reference.acceleration_ned_m_s2` will do too: then the rotors give all of the acceleration, and wings stay folded.
 
-use crate::log::FlightLog;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::Vector3;
+use squirrel_log::FlightLog;
 
 /// Source of a plan in a log.
 const PLAN: &str = "plan";

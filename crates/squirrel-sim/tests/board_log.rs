@@ -3,10 +3,11 @@
 
 use squirrel_core::stack::wire::{HASH_START, Record, Wire, hash, written};
 use squirrel_core::stack::{Stack, StackState};
+use squirrel_log::FlightLog;
+use squirrel_log::flight_code::frames;
+use squirrel_log::import::{BoardReport, import_board};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{Integrator, Setup, frames};
-use squirrel_sim::import::{BoardReport, import_board};
-use squirrel_sim::log::FlightLog;
+use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::PathBuf;

@@ -4,10 +4,10 @@
 
 use squirrel_core::guidance::excite::LINES;
 use squirrel_core::guidance::mission::Mission;
+use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay::{replay, setup};
 use squirrel_sim::scenario::{Scenario, pilot_card};
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};

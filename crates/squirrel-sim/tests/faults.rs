@@ -4,10 +4,11 @@
 
 use squirrel_core::stack::StackState;
 use squirrel_core::stack::failsafe::{Failsafe, FailsafeReason as Reason, RECOVERY_US};
+use squirrel_log::flight_code::frames;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::faults::{Fault, Kind, Sensor};
-use squirrel_sim::flight::{Integrator, Setup, frames};
+use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 

@@ -5,10 +5,10 @@
 mod weights_support;
 
 use squirrel_core::control::wing_force::Guard;
+use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Flight, Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay::{OUTPUT_SOURCES, replay, setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};

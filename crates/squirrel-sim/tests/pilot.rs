@@ -6,11 +6,10 @@ use squirrel_core::nalgebra::Vector3;
 use squirrel_core::policy::{Policy, Span};
 use squirrel_core::stack::failsafe::{COMMAND_LIMIT_US, FailsafeReason};
 use squirrel_core::stack::{SensorFrame, StackOutput};
+use squirrel_log::FlightLog;
+use squirrel_log::flight_code::INPUT_SOURCES;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{
-    Flight, FlightComputer, FlightError, INPUT_SOURCES, InProcess, Integrator, Pilot, Setup,
-};
-use squirrel_sim::log::FlightLog;
+use squirrel_sim::flight::{Flight, FlightComputer, FlightError, InProcess, Integrator, Pilot, Setup};
 use squirrel_sim::replay::{replay, setup as setup_of};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;

@@ -2,10 +2,11 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use squirrel_log::FlightLog;
+use squirrel_log::flight_code::INPUT_SOURCES;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{INPUT_SOURCES, Integrator, Setup};
-use squirrel_sim::log::FlightLog;
+use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::replay::{OUTPUT_SOURCES, replay, setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;

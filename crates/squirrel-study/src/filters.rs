@@ -18,10 +18,11 @@ use squirrel_core::estimate::{Estimator as Estimates, Sensed};
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::Imu;
+use squirrel_log::FlightLog;
+use squirrel_log::flight_code::frames;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{FlightError, Integrator, Setup, frames};
-use squirrel_sim::log::FlightLog;
+use squirrel_sim::flight::{FlightError, Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::sensors::SUITES;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -179,7 +180,7 @@ fn fly(plan: &Plan, trial: u32) -> Result<FlightLog, FlightError> {
 
 /// What a filter makes of a flight.
 fn heard(plan: &Plan, log: &FlightLog, filter: Estimator, calibrated: bool) -> Result<Errors, FlightError> {
-    let frames = frames(log).map_err(FlightError)?;
+    let frames = frames(log).map_err(|error| FlightError(error.to_string()))?;
     let Some((time_s, truth)) = log.channel("truth.q_ned_from_body_wxyz") else {
         return Err(FlightError("truth.q_ned_from_body_wxyz: missing".to_owned()));
     };

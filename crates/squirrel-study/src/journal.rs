@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use squirrel_core::stack::wire::{HASH_START, hash, written};
-use squirrel_sim::files::write_whole;
+use squirrel_log::files::write_whole;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;

@@ -11,7 +11,7 @@ use crate::set::forms;
 pub use crate::set::{Generator, Set};
 use crate::squirrel_made;
 use serde::{Deserialize, Serialize};
-use squirrel_sim::log::{FlightLog, LogError};
+use squirrel_log::{FlightLog, LogError};
 use std::fs;
 use std::path::{Path, PathBuf};
 

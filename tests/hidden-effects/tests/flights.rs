@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use hidden_effects::case::{Answer, Case, FLIGHTS, Set};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::{Path, PathBuf};
 

@@ -9,9 +9,9 @@ use hidden_effects::catalogue::{CATALOGUE, CLASS_MASS_KG};
 use hidden_effects::draw::Draw;
 use hidden_effects::squirrel_made::effect_table;
 use squirrel_gap::{Kind, add, diagnose};
+use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Flight, Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};
 

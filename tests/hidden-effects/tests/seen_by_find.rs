@@ -9,7 +9,7 @@ use hidden_effects::draw::Draw;
 use hidden_effects::independent::white;
 use hidden_effects::outside::Outside;
 use hidden_effects::squirrel_made::effect_table;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Residual of a flight against a vehicle file: force, N, and moment, N m.

@@ -10,9 +10,9 @@ use crate::paths::log_files;
 use serde::Serialize;
 use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Record, Wire, hash, written};
 use squirrel_core::stack::{SensorFrame, Stack, StackState};
+use squirrel_log::FlightLog;
+use squirrel_log::flight_code::frames;
 use squirrel_sim::faults::Fault;
-use squirrel_sim::flight;
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::replay;
 use std::path::PathBuf;
 
@@ -73,7 +73,7 @@ impl ExportVectors {
                 ));
             }
             let stack = setup.stack().map_err(|e| at(e.to_string()))?;
-            let frames = flight::frames(&log).map_err(at)?;
+            let frames = frames(&log).map_err(|e| at(e.to_string()))?;
             let setup_file = setup_file(setups.len());
             let alone = Header { sequences: 1, frames: 0 };
             setups.push([wire(&alone)?, record(&Record::Setup(stack))?].concat());

@@ -6,7 +6,7 @@ use crate::paths::log_files;
 use squirrel_gap::{
     ClosedLoop, Diagnosis, Kind, Moved, NamedEffect, RotorHealth, Value, Verdict, significant,
 };
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::ffi::OsStr;

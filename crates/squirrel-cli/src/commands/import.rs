@@ -2,8 +2,8 @@
 
 use crate::output::{self, say, talk};
 use crate::paths::Paths;
-use squirrel_sim::import::{ImportMap, files_of, import_board, import_watched};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
+use squirrel_log::import::{ImportMap, files_of, import_board, import_watched};
 use std::path::{Path, PathBuf};
 
 /// Smaller files are read before a progress bar could be seen.

@@ -13,9 +13,9 @@ pub(crate) mod study;
 pub(crate) mod train;
 pub(crate) mod vehicle;
 
+use squirrel_log::FlightLog;
+use squirrel_report::flight::FlightView;
 use squirrel_sim::flight::{Metrics, Setup};
-use squirrel_sim::log::FlightLog;
-use squirrel_sim::report::flight::FlightView;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
 

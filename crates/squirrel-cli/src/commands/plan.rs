@@ -4,13 +4,13 @@ use super::{vehicle, write_log};
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use serde::Serialize;
+use squirrel_log::FlightLog;
 use squirrel_plan::pilot::{SPARE_M, half_width_m};
 use squirrel_plan::trajectory::{self, Air, Craft, Plan, Planner, RESERVE, Shown, Task};
 use squirrel_plan::wing::WingModel;
+use squirrel_report::flight::FlightView;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
-use squirrel_sim::report::flight::FlightView;
 use squirrel_sim::scenario::Scenario;
 use std::path::PathBuf;
 

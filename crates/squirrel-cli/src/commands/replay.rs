@@ -3,7 +3,7 @@
 use crate::output::{self, say};
 use crate::paths::Paths;
 use serde::Serialize;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::replay;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::PathBuf;

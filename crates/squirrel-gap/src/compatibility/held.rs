@@ -5,7 +5,7 @@
 
 use super::Found;
 use crate::flight::series::Span;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 
 /// Part of the samples that must differ from the one before.
 const FRESH_MIN: f64 = 0.5;

@@ -22,7 +22,7 @@ use crate::predictor::Predictor;
 use crate::verdict::{Kind, SetAside, Verdict};
 use flight::Flight;
 use pairs::Pairs;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 type Flights = Vec<(String, FlightLog)>;

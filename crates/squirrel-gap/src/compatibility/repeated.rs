@@ -1,7 +1,7 @@
 //! Flights that are given twice, whole or in part: a flight proves nothing about itself.
 
 use crate::verdict::SetAside;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use std::collections::HashMap;
 
 const CHANNEL: &str = "imu.specific_force_body_m_s2";

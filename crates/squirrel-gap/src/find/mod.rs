@@ -37,7 +37,7 @@ use crate::predictor::Predictor;
 use nalgebra::Vector6;
 pub(crate) use places::places;
 use serde::Serialize;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
     use crate::flight::filter::CUTOFF_HZ;
     use crate::flight::inertial::Common;
-    use squirrel_sim::log::FlightLog;
+    use squirrel_log::FlightLog;
     use squirrel_sim::vehicle_file::VehicleFile;
 
     /// Ten seconds, low from 6 to 8 s; a jolt at a time, of a size.

@@ -22,7 +22,7 @@ use crate::GapError;
 use crate::number::significant;
 use nalgebra::{UnitQuaternion, Vector3};
 use squirrel_core::math::GRAVITY_M_S2;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 
 const FORCE: &str = "imu.specific_force_body_m_s2";
 const RATES: &str = "imu.omega_body_rad_s";

@@ -9,7 +9,7 @@ use nalgebra::{Quaternion, Vector3};
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::In;
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::plant::WingPlant;
 use squirrel_sim::vehicle_file::VehicleFile;
 

@@ -5,7 +5,7 @@
 
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 
 /// Longest distance of two samples that still belong together, in median periods.
 const GAP_PERIODS: f64 = 5.0;

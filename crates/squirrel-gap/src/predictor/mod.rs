@@ -34,7 +34,7 @@ use kept::Kept;
 use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::Effects;
 use squirrel_core::vehicle::{PerRotor, Vehicle};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::plant::{Plant, PlantState};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::ops::Range;

@@ -2,10 +2,8 @@
 
 use super::{DomainRow, Evidence, ReportData, RotorRow, WIDTH, figure, lacking, quantity};
 use squirrel_core::effects::Effects;
-use squirrel_sim::report::chart::{
-    Axis, ChartRow, Dot, Extent, Ink, Level, Matrix, Range, RowChart, drawable,
-};
-use squirrel_sim::report::page::{Columns, Figure, Page, Row};
+use squirrel_report::chart::{Axis, ChartRow, Dot, Extent, Ink, Level, Matrix, Range, RowChart, drawable};
+use squirrel_report::page::{Columns, Figure, Page, Row};
 use squirrel_sim::scenario::pilot_card;
 
 /// Hypotheses this close to the best one are not decided.

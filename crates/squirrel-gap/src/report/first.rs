@@ -2,8 +2,8 @@
 
 use super::{FlightPanel, ReportData};
 use crate::words::spoken;
-use squirrel_sim::report::chart::{Axis, Ink, Limit, LineChart, Range, Series, drawable};
-use squirrel_sim::report::page::{Card, Figure, Page};
+use squirrel_report::chart::{Axis, Ink, Limit, LineChart, Range, Series, drawable};
+use squirrel_report::page::{Card, Figure, Page};
 
 /// Size of the picture, px.
 const WIDTH: f64 = 400.0;

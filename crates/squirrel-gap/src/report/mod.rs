@@ -27,8 +27,8 @@ pub use data::{
 };
 
 use crate::number::significant;
-use squirrel_sim::report::chart::drawable;
-use squirrel_sim::report::page::Page;
+use squirrel_report::chart::drawable;
+use squirrel_report::page::Page;
 
 /// Identifiers of the panels in the order of the page.
 pub const PANELS: [&str; 9] =

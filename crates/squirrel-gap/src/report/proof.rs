@@ -1,10 +1,10 @@
 //! Proof: errors on flights that were not used, and whether what is left is noise.
 
 use super::{Errors, HeldOut, Horizon, ReportData, Whiteness, figure, lacking, quantity};
-use squirrel_sim::report::chart::{
+use squirrel_report::chart::{
     Axis, ChartRow, Dot, Extent, Ink, Limit, LineChart, Range, RowChart, Series, Svg, drawable,
 };
-use squirrel_sim::report::page::{Columns, Figure, Page, Row};
+use squirrel_report::page::{Columns, Figure, Page, Row};
 
 /// The models with their colours, in the order of [`parts`].
 const INKS: [Ink; 4] = [Ink::Series(1), Ink::Series(5), Ink::Series(0), Ink::Muted];

@@ -1,10 +1,10 @@
 //! The residual over time and against what explains it.
 
 use super::{Conditional, FlightPanel, ReportData, WIDTH, lacking};
-use squirrel_sim::report::chart::{
+use squirrel_report::chart::{
     Axis, HeatGroup, HeatMap, Ink, LineChart, Range, Series, Strip, Values, drawable,
 };
-use squirrel_sim::report::page::{Columns, Figure, Page};
+use squirrel_report::page::{Columns, Figure, Page};
 
 /// Most cells over time; longer flights show the root mean square of several windows in a cell.
 const CELLS: usize = 160;

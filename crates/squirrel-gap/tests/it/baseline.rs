@@ -4,7 +4,7 @@
 
 use crate::support::{flights, fly_rich, imported, vehicle};
 use squirrel_gap::{Baseline, Diagnosis, Kind, Value, add, diagnose, diagnose_since};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 type Flights = Vec<(String, FlightLog)>;

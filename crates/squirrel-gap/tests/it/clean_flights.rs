@@ -6,7 +6,7 @@ use hidden_effects::case::{Case, Set};
 use hidden_effects::catalogue::{CATALOGUE, CLASS_MASS_KG, HiddenEffect, Value};
 use hidden_effects::draw::Draw;
 use squirrel_gap::check;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::PathBuf;
 

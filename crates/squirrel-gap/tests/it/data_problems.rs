@@ -6,10 +6,10 @@ use crate::foreign;
 use crate::support::{hold, step, vehicle, vehicle_with};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_gap::{Kind, Verdict, diagnose};
+use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 

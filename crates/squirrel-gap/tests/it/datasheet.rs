@@ -3,7 +3,7 @@
 
 use crate::support::{flights, imported, vehicle};
 use squirrel_gap::{Verdict, diagnose};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 const FLIGHTS: [&str; 4] =

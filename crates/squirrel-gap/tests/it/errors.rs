@@ -3,7 +3,7 @@
 
 use crate::support::{vehicle, vehicle_with};
 use squirrel_gap::{Finding, GapError, find};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 const SAGGING: (&str, &str) = ("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]");

@@ -8,7 +8,7 @@ use hidden_effects::independent::Excitation;
 use hidden_effects::outside::Outside;
 use squirrel_gap::find::{CHANNELS, find};
 use squirrel_gap::{Kind, NamedEffect, Value, Verdict, diagnose};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeSet;
 

@@ -8,10 +8,10 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use squirrel_gap::{Kind, Value, Verdict, diagnose, find};
+use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 

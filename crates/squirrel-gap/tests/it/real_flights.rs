@@ -3,7 +3,7 @@
 
 use crate::support::{flights, imported, vehicle};
 use squirrel_gap::{Diagnosis, Kind, Verdict, add, diagnose, find};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 type Flights = Vec<(String, FlightLog)>;

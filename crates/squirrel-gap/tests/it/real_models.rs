@@ -6,7 +6,7 @@ use crate::support::{fly, fly_rich, vehicle_with};
 use hidden_effects::case::{Case, Set};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use squirrel_gap::{Diagnosis, Kind, add, diagnose};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
 

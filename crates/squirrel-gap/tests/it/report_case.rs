@@ -4,7 +4,7 @@
 use hidden_effects::case::{Case, Set};
 use squirrel_gap::report::{PANELS, ReportData, render};
 use squirrel_gap::{Diagnosis, Kind, Value, add, diagnose, picture};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
 

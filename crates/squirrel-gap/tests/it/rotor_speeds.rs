@@ -3,9 +3,9 @@
 
 use crate::support::{vehicle, vehicle_with};
 use squirrel_gap::{Finding, Value, diagnose, find, nothing_to_add};
+use squirrel_log::FlightLog;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 

@@ -4,7 +4,7 @@
 use crate::support::fly_rich;
 use squirrel_core::effects::Scale;
 use squirrel_gap::{Kind, Value, Verdict, diagnose};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use toml_edit::{DocumentMut, Item, Table};
 

@@ -3,7 +3,7 @@
 
 use crate::support::fly_rich;
 use squirrel_gap::{Kind, Value, Verdict, diagnose};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Two flights of a squirrel with an effect, against its file without. The attitude is measured from outside: one that a

@@ -3,8 +3,8 @@
 
 use crate::support::{hold, imported, nanobench, step, vehicle, vehicles};
 use squirrel_gap::check;
-use squirrel_sim::import::{ImportMap, import};
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
+use squirrel_log::import::{ImportMap, import};
 use std::path::Path;
 
 const OMEGA: &str = "imu.omega_body_rad_s";

@@ -4,8 +4,8 @@ use super::{Case, Compared, Question, Reach, Wings};
 use nalgebra::Vector3;
 use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
-use squirrel_sim::report::chart::{Axis, Ink, LineChart, Range, Scene, SceneTrack, Series};
-use squirrel_sim::report::page::{Columns, Figure, Page, Row};
+use squirrel_report::chart::{Axis, Ink, LineChart, Range, Scene, SceneTrack, Series};
+use squirrel_report::page::{Columns, Figure, Page, Row};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Wires of a hull around the vertical and from below to above.

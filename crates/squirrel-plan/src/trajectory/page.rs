@@ -2,9 +2,9 @@
 
 use super::task::{Plan, Task};
 use nalgebra::Vector3;
-use squirrel_sim::report::chart::{Axis, Ink, Limit, LineChart, Range, Series};
-use squirrel_sim::report::flight::{FlightView, tracks};
-use squirrel_sim::report::page::{Columns, Figure, Page, Row};
+use squirrel_report::chart::{Axis, Ink, Limit, LineChart, Range, Series};
+use squirrel_report::flight::{FlightView, tracks};
+use squirrel_report::page::{Columns, Figure, Page, Row};
 use squirrel_sim::track::TrackPoint;
 
 /// A plan with what stands beside it.

@@ -17,12 +17,10 @@ pub use integrator::Integrator;
 pub use metrics::{Flags, Metrics, OVER_RAD};
 pub use offboard::{Follower, Offboard};
 pub use pilot::Pilot;
-pub(crate) use record::{ESTIMATE, ESTIMATOR, FOLLOWED, FORMAT, Inputs, PARNN_WEIGHTS, record_output};
-pub use record::{INPUT_SOURCES, frames};
+pub(crate) use record::{ESTIMATOR, PARNN_WEIGHTS};
 
 use crate::arm::Arm;
 use crate::estimator::Estimator;
-use crate::log::FlightLog;
 use crate::plant::{Plant, PlantState, Wind, WindParameters, WingPlant};
 use crate::scenario::{FaultKind, Scenario};
 use crate::sensors::{SensorParameters, Sensors, Truth};
@@ -38,6 +36,7 @@ use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::{Gnss, Imu, SensorFrame, Stack, StackOutput, StackState};
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
+use squirrel_log::FlightLog;
 use surroundings::Surroundings;
 
 /// Rate of the flight code, Hz (paper, section III.A).

@@ -148,7 +148,7 @@ impl VehicleFile {
         weights: impl FnOnce(&str) -> Result<Option<ParnnWeights>, WeightsError>,
     ) -> Result<Self, VehicleFileError> {
         let syntax = |error: &toml::de::Error| {
-            let place = crate::toml_text::place(text, error);
+            let place = squirrel_log::toml_text::place(text, error);
             VehicleFileError::Syntax {
                 file: file.to_owned(),
                 line: place.line,

@@ -1,10 +1,10 @@
 //! Writing safetensors files of `f32` with one metadata record; [`Contents`](super::Contents) reads them.
 
 use super::{RECORD, WeightsError};
-use crate::files::write_whole;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde::Serialize;
+use squirrel_log::files::write_whole;
 use std::path::Path;
 
 /// A named tensor to write.

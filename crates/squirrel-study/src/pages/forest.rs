@@ -4,11 +4,11 @@ use super::{begin, chart_row, figure, head, ink, log, percent, row};
 use crate::campaign::Plan;
 use crate::forest::{BAND_M, Forest, Row, scenario, words};
 use crate::statistics::Share;
+use squirrel_log::FlightLog;
+use squirrel_report::chart::{Axis, Ink, Range, RowChart, Svg, Track, TrackChart, Values};
+use squirrel_report::page::{Columns, Figure, Page};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
-use squirrel_sim::log::FlightLog;
-use squirrel_sim::report::chart::{Axis, Ink, Range, RowChart, Svg, Track, TrackChart, Values};
-use squirrel_sim::report::page::{Columns, Figure, Page};
 use std::f64::consts::TAU;
 
 /// The study as a page without network.

@@ -13,13 +13,13 @@ pub use tracking::{table3, thrust};
 use crate::campaign::Plan;
 use crate::statistics::Estimate;
 use crate::tracking::{Condition, setup};
+use squirrel_log::FlightLog;
 use squirrel_plan::pilot;
+use squirrel_report::chart::{ChartRow, Dot, Extent, Ink, Svg};
+use squirrel_report::flight::{self, FlightView};
+use squirrel_report::page::{Figure, Page, Row};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Setup};
-use squirrel_sim::log::FlightLog;
-use squirrel_sim::report::chart::{ChartRow, Dot, Extent, Ink, Svg};
-use squirrel_sim::report::flight::{self, FlightView};
-use squirrel_sim::report::page::{Figure, Page, Row};
 
 /// A page that begins with what was flown and with what it says, in words.
 fn begin(title: &str, lead: &str, facts: &[(&str, String)], words: &[String]) -> Page {

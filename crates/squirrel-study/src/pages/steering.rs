@@ -5,10 +5,10 @@ use crate::campaign::Plan;
 use crate::steering::{
     ANGLES_DEG, Mean, SPEEDS_M_S, Steering, THRUST_TO_WEIGHT, Wings, conditions, ratio, words,
 };
+use squirrel_report::chart::{Axis, Limit, Range, Svg, Wheel, WheelLine};
+use squirrel_report::page::{Columns, Figure, Page};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
-use squirrel_sim::report::chart::{Axis, Limit, Range, Svg, Wheel, WheelLine};
-use squirrel_sim::report::page::{Columns, Figure, Page};
 
 /// Where tracks are shown: scarce thrust, the paper's angle and about its speed.
 const SHOWN_DEG: f64 = 120.0;

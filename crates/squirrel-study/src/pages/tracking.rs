@@ -6,10 +6,10 @@ use crate::statistics::Estimate;
 use crate::table3::{self, Table3};
 use crate::thrust::{self, PAPER_GAIN, Point, Thrust};
 use crate::tracking::Row;
+use squirrel_report::chart::{Axis, Extent, Ink, Limit, LineChart, Range, RowChart, Series, Svg};
+use squirrel_report::page::{self, Columns, Figure, Page};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
-use squirrel_sim::report::chart::{Axis, Extent, Ink, Limit, LineChart, Range, RowChart, Series, Svg};
-use squirrel_sim::report::page::{self, Columns, Figure, Page};
 
 /// Arms whose tracks are shown.
 const SHOWN: [Arm; 4] = [Arm::Pc, Arm::TwccParnn, Arm::TwccPlus, Arm::PcPlus];

@@ -2,10 +2,8 @@
 
 use super::{ERRORS, Spread, Table2};
 use squirrel_nn::model::Model;
-use squirrel_sim::report::chart::{
-    Axis, ChartRow, Dot, Extent, Ink, LineChart, Range, RowChart, Series, Svg,
-};
-use squirrel_sim::report::page::{self, Columns, Figure, Page};
+use squirrel_report::chart::{Axis, ChartRow, Dot, Extent, Ink, LineChart, Range, RowChart, Series, Svg};
+use squirrel_report::page::{self, Columns, Figure, Page};
 
 /// The study as a page without network, the same bytes for the same study.
 pub fn render(study: &Table2) -> String {

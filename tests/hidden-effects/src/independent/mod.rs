@@ -37,7 +37,7 @@ use nalgebra::{Quaternion, Vector2, Vector3, Vector4};
 use physics::{Input, World};
 use programme::{DURATION_S, Programme};
 use sensors::Inertial;
-use squirrel_sim::log::FlightLog;
+use squirrel_log::FlightLog;
 use state::State;
 
 /// Rate of the inertial unit and of the autopilot.

@@ -11,7 +11,7 @@ use crate::airframe::SensorErrors;
 use crate::draw::Draw;
 use crate::recorder::TRUTH;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use squirrel_sim::log::{FlightLog, Source};
+use squirrel_log::{FlightLog, Source};
 
 /// White noise, one standard deviation a sample.
 pub mod white {

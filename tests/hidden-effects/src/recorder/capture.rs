@@ -4,7 +4,7 @@ use super::{TRUTH, attitude, vector, wxyz};
 use crate::draw::Draw;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use squirrel_sim::log::{FlightLog, Source};
+use squirrel_log::{FlightLog, Source};
 
 /// Noise of the poses, and whether somebody has taken differences already.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

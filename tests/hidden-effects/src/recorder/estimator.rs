@@ -9,7 +9,7 @@ use crate::airframe::GRAVITY_M_S2;
 use crate::draw::Draw;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use squirrel_sim::log::{FlightLog, Source};
+use squirrel_log::{FlightLog, Source};
 
 /// Sizes of what it gets wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use super::{at, rotation, wxyz};
 use crate::draw::Draw;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use squirrel_sim::log::{Channel, FlightLog, Source};
+use squirrel_log::{Channel, FlightLog, Source};
 
 /// One kind with its sizes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

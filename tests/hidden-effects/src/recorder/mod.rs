@@ -13,7 +13,7 @@ pub use fault::SensorFault;
 use crate::draw::Draw;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
-use squirrel_sim::log::{FlightLog, Source};
+use squirrel_log::{FlightLog, Source};
 
 /// What is written down.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]

@@ -11,9 +11,9 @@ use crate::airframe::{Airframe, SensorErrors};
 use crate::catalogue::HiddenEffect;
 use crate::independent::Excitation;
 use crate::recorder::TRUTH;
+use squirrel_log::{Channel, FlightLog, Source};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::log::{Channel, FlightLog, Source};
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 

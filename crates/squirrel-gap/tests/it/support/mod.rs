@@ -3,10 +3,10 @@
 
 use std::path::{Path, PathBuf};
 
+use squirrel_log::FlightLog;
+use squirrel_log::import::{ImportMap, import};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::import::{ImportMap, import};
-use squirrel_sim::log::FlightLog;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 

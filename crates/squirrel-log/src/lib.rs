@@ -1,0 +1,115 @@
+//! Flight logs: what a flight looks like in memory and in an MCAP file.
+//!
+//! A [`FlightLog`] is a set of sources (`imu`, `gnss`, `control.inner`, ...), each with its own time axis, each with
+//! named channels (`imu.omega_body_rad_s`). Sources run at their own rate; a log may lack any of them.
+//!
+//! In the file each source is a topic whose messages are described by a protobuf schema in the file, so that Foxglove
+//! and the MCAP libraries of other languages read it without squirrel.
+//!
+//! - [`flight_code`] records what the flight code was given and what it answered, and rebuilds its frames from a log.
+//! - [`import`] makes a log of foreign files by a map.
+//! - [`files`] writes whatever is written, whole or not at all, and tells which paths are one file.
+
+pub mod files;
+pub mod flight_code;
+pub mod import;
+pub mod toml_text;
+
+mod check;
+mod envelope;
+mod error;
+mod foxglove;
+mod message;
+mod read;
+mod schema;
+mod write;
+
+use std::collections::BTreeMap;
+
+pub use error::LogError;
+pub use read::Recovery;
+
+/// Name of the MCAP metadata record that holds [`FlightLog::metadata`].
+const METADATA_NAME: &str = "squirrel";
+
+/// One channel of a source: `width` numbers a sample, row after row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Channel {
+    /// Numbers per sample, at least 1.
+    pub width: usize,
+    /// `time_s.len() * width` numbers, sample-major. NaN marks a sample that the source did not give.
+    pub values: Vec<f64>,
+}
+
+/// One source of a flight: a time axis and the channels that share it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Source {
+    /// Time of each sample, s, strictly increasing.
+    pub time_s: Vec<f64>,
+    /// Channels by their short name (`omega_body_rad_s`).
+    pub channels: BTreeMap<String, Channel>,
+}
+
+/// A flight in memory.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FlightLog {
+    /// Free text that describes the flight: `vehicle_toml`, `parnn_weights_hex`, `arm`, `scenario_toml`, `seed`,
+    /// `version`, `git`.
+    pub metadata: BTreeMap<String, String>,
+    /// Sources by name (`imu`, `control.inner`).
+    pub sources: BTreeMap<String, Source>,
+}
+
+impl Channel {
+    /// Sample `i` as a slice of `width` numbers.
+    ///
+    /// # Panics
+    /// If `i` is past the last sample.
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.values[i * self.width..(i + 1) * self.width]
+    }
+}
+
+impl FlightLog {
+    /// The time axis and the channel of a full name such as `imu.omega_body_rad_s`; `None` if the log lacks it.
+    pub fn channel(&self, name: &str) -> Option<(&[f64], &Channel)> {
+        let (source, channel) = name.rsplit_once('.')?;
+        let source = self.sources.get(source)?;
+        Some((&source.time_s, source.channels.get(channel)?))
+    }
+
+    /// The source of that name, made empty if the log lacks it.
+    pub fn source_mut(&mut self, name: &str) -> &mut Source {
+        self.sources.entry(name.to_owned()).or_default()
+    }
+}
+
+impl Source {
+    /// Appends one sample: its time, s, and a row of every channel. The first sample makes the channels.
+    ///
+    /// # Panics
+    /// If a later sample has other channels or widths than the first, or a row is empty: the caller builds the rows, so
+    /// that is a mistake in the program. Times are checked when the log is written.
+    pub fn push(&mut self, time_s: f64, rows: &[(&str, &[f64])]) {
+        if self.time_s.is_empty() {
+            let channel = |&(name, row): &(&str, &[f64])| {
+                (name.to_owned(), Channel { width: row.len(), values: Vec::new() })
+            };
+            self.channels = rows.iter().map(channel).collect();
+        }
+        assert_eq!(rows.len(), self.channels.len(), "a sample has every channel of its source once");
+        for &(name, row) in rows {
+            let Some(channel) = self.channels.get_mut(name) else {
+                panic!("`{name}` is not in the first sample")
+            };
+            assert!(
+                !row.is_empty() && row.len() == channel.width,
+                "`{name}` has {} numbers, in the first sample {}",
+                row.len(),
+                channel.width
+            );
+            channel.values.extend_from_slice(row);
+        }
+        self.time_s.push(time_s);
+    }
+}

@@ -1,0 +1,13 @@
+//! The tests of logs and imports. One binary: what they share is compiled and linked once.
+
+mod files;
+mod import_crazypad;
+mod import_csv;
+mod import_errors;
+mod import_formats;
+mod import_support;
+mod import_topics;
+mod import_usd;
+mod log_damage;
+mod log_foxglove;
+mod log_round_trip;
