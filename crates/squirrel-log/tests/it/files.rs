@@ -1,6 +1,5 @@
 //! Files are written whole, under their name, through links, and into what is open.
 #![cfg(unix)]
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use squirrel_log::files::{FileId, writable, write_whole};
 use std::fs::{self, File};

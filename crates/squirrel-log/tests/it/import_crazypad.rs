@@ -1,6 +1,6 @@
 //! The map of CrazyPAD: a piece of one flight by hand, and all flights that are at hand against physics in NED and FRD. At hand are
 //! the cut-outs in `tests/data/flights`, or the whole flights in the folder `SQUIRREL_FLIGHTS`.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+#![allow(clippy::print_stdout, reason = "tests")]
 #![allow(clippy::unreadable_literal, reason = "numbers as another decoder prints them")]
 
 use std::path::{Path, PathBuf};

@@ -1,5 +1,4 @@
 //! Import of small CSVs written for the purpose: conventions, masks, time axes.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_6};
 use std::fmt::Write;

@@ -1,5 +1,4 @@
 //! Every way an import can fail says in one line what is wrong, where, and with which value.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::import_support::{Flight, OMEGA, one_source};
 

@@ -1,6 +1,5 @@
 //! One flight written as CSV, Parquet, ULog, MCAP and a Crazyflie's micro-SD log: it must come out the same, and damage must
 //! come out as an error.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::fmt::Write;
 

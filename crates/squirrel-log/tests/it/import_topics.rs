@@ -1,5 +1,4 @@
 //! Topics and types: what only ULog, MCAP or Parquet has.
-#![allow(clippy::unwrap_used, reason = "tests")]
 
 use super::import_support::Flight;
 use super::import_support::formats::{Cells, McapMessage, Ulog, mcap_bytes, parquet_bytes};

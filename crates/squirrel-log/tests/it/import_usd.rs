@@ -1,6 +1,5 @@
 //! Micro-SD logs of a Crazyflie: a piece of a real one against other decoders' numbers, every type and version, every
 //! damage.
-#![allow(clippy::unwrap_used, reason = "tests")]
 #![allow(clippy::unreadable_literal, reason = "numbers as another decoder prints them")]
 
 use super::import_support::Flight;

@@ -1,5 +1,4 @@
 //! Damaged, cut, re-written and foreign files: each is found, named in one line, and as much as is whole is recovered.
-#![expect(clippy::unwrap_used, reason = "a test may panic, its helpers too")]
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,5 +1,4 @@
 //! A flight with a true pose opens in Foxglove's 3-D panel: frames in ENU, at most 50 a second, obstacles as cylinders.
-#![expect(clippy::unwrap_used, reason = "a test may panic, its helpers too")]
 
 use std::fs;
 use std::path::PathBuf;

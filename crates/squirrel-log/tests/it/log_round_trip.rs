@@ -1,5 +1,4 @@
 //! A flight log comes back from its file with the same bits, and the file is what MCAP tools expect.
-#![expect(clippy::unwrap_used, reason = "a test may panic, its helpers too")]
 
 use std::fs;
 use std::path::PathBuf;

@@ -1,4 +1,5 @@
 //! The tests of logs and imports. One binary: what they share is compiled and linked once.
+#![allow(clippy::unwrap_used, reason = "tests")]
 
 mod files;
 mod import_crazypad;

@@ -1,7 +1,5 @@
 //! The chart toolkit: scales for any two numbers, curves that lose neither peaks nor gaps.
 
-#![allow(clippy::unwrap_used, reason = "a helper of a test fails the test")]
-
 use proptest::prelude::*;
 use squirrel_report::chart::{
     Axis, BINS, Ink, LARGEST, LineChart, Note, Range, Scale, Series, Svg, Track, TrackChart, Values, escape,

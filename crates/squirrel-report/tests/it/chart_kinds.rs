@@ -1,7 +1,5 @@
 //! Heat maps, matrices, row charts and wheels: cells, rows and spokes where the numbers say, and nothing drawn for what is no number.
 
-#![allow(clippy::unwrap_used, reason = "a helper of a test fails the test")]
-
 use proptest::prelude::*;
 use squirrel_report::chart::{
     Axis, ChartRow, Dot, Extent, HeatGroup, HeatMap, Ink, Level, Limit, LineChart, Matrix, Range, RowChart,

@@ -1,7 +1,5 @@
 //! The flight report: every panel is there and holds data, and no log makes it fail or lie.
 
-#![allow(clippy::unwrap_used, reason = "a helper of a test fails the test")]
-
 use std::collections::BTreeMap;
 
 use super::support::{ARMS, heading, logs, views};
