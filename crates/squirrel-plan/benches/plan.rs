@@ -2,7 +2,7 @@
 
 #![allow(missing_docs, clippy::unwrap_used, reason = "a bench")]
 
-#[path = "../tests/tasks/mod.rs"]
+#[path = "../tests/it/tasks/mod.rs"]
 mod tasks;
 
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -9,7 +9,7 @@ use squirrel_core::nalgebra::Vector3;
 use squirrel_sim::world::{Cylinder, World, WorldParameters};
 use std::hint::black_box;
 
-#[path = "../tests/world_fixture/mod.rs"]
+#[path = "../tests/it/world_fixture/mod.rs"]
 mod world_fixture;
 
 /// Trees on a bent grid over 100 m x 100 m, radius 0.15 m to 0.45 m.

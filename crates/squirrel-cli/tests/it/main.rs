@@ -1,0 +1,11 @@
+//! The tests of the command line. One binary: what they share is compiled and linked once.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod export_vectors;
+mod gap;
+mod overwrite;
+mod plan;
+mod program;
+mod reach;
+mod support;
+mod train;

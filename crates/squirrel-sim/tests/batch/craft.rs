@@ -1,0 +1,335 @@
+//! Whole vehicles in batches: wings, battery, moving air and every effect fly as in the plant, and have one result.
+
+use super::support::{Thrown, bits};
+use nalgebra::{Vector3, convert, try_convert};
+use squirrel_core::dynamics::{State, total_wind};
+use squirrel_core::effects::{Effects, FORM, Kind, forms};
+use squirrel_core::frames::In;
+use squirrel_core::vehicle::MAX_ROTORS;
+use squirrel_sim::batch::simd::{Path, Paths};
+use squirrel_sim::batch::{Batch, Craft, Scheme, Settings};
+use squirrel_sim::plant::{GustModel, Plant, Wind, WindParameters, WingPlant};
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// Effects that act on sensors or stamps only.
+const OF_SENSORS: [&str; 8] = [
+    "accel_bias",
+    "accel_scale",
+    "clock_skew",
+    "clock_step",
+    "compass_current",
+    "gnss_latency",
+    "gyro_scale",
+    "heading_bias",
+];
+
+/// Sizes of one effect in one form, between its smallest and its largest.
+fn put(effects: &mut Effects<f64>, name: &str, form: usize, share: f64) {
+    let found = effects.insert(name).unwrap();
+    let chosen = forms(found.parameters).get(form).copied().unwrap_or("");
+    for (p, value) in found.parameters.iter().zip(found.values) {
+        *value = match p.kind {
+            _ if p.key == FORM => form as f64,
+            Kind::Size { smallest, largest, .. } if chosen.is_empty() || p.exists_in(chosen) => {
+                smallest + share * (largest - smallest)
+            }
+            Kind::Size { .. } => 0.0,
+            Kind::Rotor => 2.0,
+            Kind::OneOf(_) => 1.0,
+        };
+    }
+}
+
+fn craft(wing: &str) -> Craft {
+    let mut craft = Craft::from(&VehicleFile::squirrel());
+    let WingPlant::Membrane { servo, .. } = &craft.wing else { panic!("the squirrel has membranes") };
+    match wing {
+        "none" => craft.wing = WingPlant::None,
+        "flat" => {
+            craft.wing = WingPlant::Flat { wing: craft.vehicle.parameters().wing.unwrap(), servo: *servo }
+        }
+        _ => {}
+    }
+    craft
+}
+
+/// Crafts with these wings, each with the airframe of a thrown vehicle and its share of effects, in turn of their forms.
+fn crafts<T: Paths>(thrown: &Thrown<T>, wing: &str, names: &[&str]) -> Vec<Craft> {
+    let mut out = Vec::new();
+    for (number, vehicle) in thrown.vehicles.iter().enumerate() {
+        let mut craft = Craft { vehicle: vehicle.cast().unwrap(), ..craft(wing) };
+        for name in names {
+            let count = forms(Effects::<f64>::parameters(name).unwrap()).len().max(1);
+            put(&mut craft.effects, name, number % count, (number % 7) as f64 / 7.0);
+        }
+        out.push(craft);
+    }
+    out
+}
+
+const WIND: WindParameters = WindParameters {
+    mean_ned_m_s: [2.0, -1.0, 0.3],
+    gust_sigma_m_s: 1.2,
+    gust: GustModel::Dryden { scale_length_m: 6.0 },
+};
+
+fn batch<T: Paths>(thrown: &Thrown<T>, crafts: &[Craft], settings: Settings) -> Batch<T> {
+    let mut batch = Batch::with(crafts, settings).unwrap();
+    for (number, craft) in crafts.iter().enumerate() {
+        batch.reset(number, &thrown.states[number]).unwrap();
+        batch.set_charge(number, 0.5 + 0.4 * (number % 2) as f64).unwrap();
+        batch.set_air(number, craft, WIND, number as u64).unwrap();
+    }
+    batch.command(&thrown.commands[..4 * crafts.len()]).unwrap();
+    batch
+}
+
+fn wings<T: Paths>(count: usize, step: usize) -> Vec<T> {
+    let open = if (step / 200).is_multiple_of(2) { [1.0, 0.7] } else { [0.0, 0.2] };
+    (0..count).flat_map(|_| open).map(convert).collect()
+}
+
+/// Flies in calls of `call` steps, wings moving every 100 ms.
+fn flown<T: Paths>(thrown: &Thrown<T>, crafts: &[Craft], settings: Settings, call: usize) -> Vec<Vec<u64>> {
+    let mut batch = batch(thrown, crafts, settings);
+    for step in (0..400).step_by(100) {
+        batch.command_wings(&wings::<T>(crafts.len(), step)).unwrap();
+        for _ in 0..100 / call {
+            batch.step(call);
+        }
+    }
+    bits(&mut batch)
+}
+
+fn all_effects() -> Vec<&'static str> {
+    Effects::<f64>::NAMES.iter().copied().filter(|name| !OF_SENSORS.contains(name)).collect()
+}
+
+fn neither_registers_nor_threads_nor_calls_matter<T: Paths>(wing: &str) {
+    let thrown = Thrown::<T>::new(130);
+    let crafts = crafts(&thrown, wing, &all_effects());
+    for scheme in [Scheme::Rk4, Scheme::Euler] {
+        let settings = Settings { scheme, threads: 1, ..Settings::default() };
+        let expected = flown(&thrown, &crafts, settings, 100);
+        assert!(expected.iter().flatten().all(|bits| f64::from_bits(*bits).is_finite()));
+        for path in Path::available() {
+            for (threads, call) in [(2, 100), (1, 1), (5, 20)] {
+                let other = Settings { path, threads, ..settings };
+                let same = flown(&thrown, &crafts, other, call) == expected;
+                assert!(same, "{wing}, {scheme:?}, {}, {threads} threads, {call} steps a call", path.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn membranes_in_f32_have_one_result() {
+    neither_registers_nor_threads_nor_calls_matter::<f32>("membrane");
+}
+
+#[test]
+fn membranes_in_f64_have_one_result() {
+    neither_registers_nor_threads_nor_calls_matter::<f64>("membrane");
+}
+
+#[test]
+fn plates_and_no_wings_have_one_result() {
+    neither_registers_nor_threads_nor_calls_matter::<f32>("flat");
+    neither_registers_nor_threads_nor_calls_matter::<f32>("none");
+}
+
+#[test]
+fn a_craft_alone_is_the_same_among_a_thousand() {
+    let all = Thrown::<f32>::new(1000);
+    let crafts = crafts(&all, "membrane", &all_effects());
+    let settings = Settings { threads: 1, ..Settings::default() };
+    let thousand = flown(&all, &crafts, settings, 100);
+    for count in [1, 17] {
+        assert!(flown(&all, &crafts[..count], settings, 100)[..] == thousand[..count], "{count}");
+    }
+}
+
+/// Largest difference of position (m), velocity (m/s) and voltage (V) between a batch and plants that fly the same.
+fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
+    let thrown = Thrown::<T>::new(21);
+    let crafts = crafts(&thrown, wing, names);
+    let mut batch = batch(&thrown, &crafts, Settings { threads: 1, ..Settings::default() });
+    let states: Vec<_> = crafts
+        .iter()
+        .enumerate()
+        .map(|(number, craft)| {
+            let plant =
+                Plant::new(craft.vehicle, craft.effects, craft.wing.clone(), craft.battery.clone(), 1e-3);
+            let plant = plant.unwrap();
+            let start = &thrown.states[number];
+            let to = |x: T| try_convert::<T, f64>(x).unwrap();
+            let mut body = squirrel_core::dynamics::State::at_rest();
+            body.position = In::new(start.position.vector.map(to));
+            body.velocity = In::new(start.velocity.vector.map(to));
+            body.attitude.coords = start.attitude.coords.map(to);
+            body.omega = In::new(start.omega.vector.map(to));
+            body.rotor_speed_rad_s = start.rotor_speed_rad_s.map(to);
+            let state = plant.initial_state(body, 0.5 + 0.4 * (number % 2) as f64);
+            let seed = number as u64;
+            let mut winds = vec![Wind::new(WIND, seed ^ 0x5851_F42D_4C95_7F2D)];
+            if let Some(gusts) = craft.effects.gust() {
+                winds.push(Wind::new(WindParameters::of_gusts(gusts), seed ^ 0x9E6C_63D0_876A_3F1B));
+            }
+            let mut command = [0.0; MAX_ROTORS];
+            for i in 0..4 {
+                command[i] = to(thrown.commands[4 * number + i]);
+            }
+            (plant, state, winds, command)
+        })
+        .collect();
+    for step in (0..steps).step_by(100) {
+        batch.command_wings(&wings::<T>(crafts.len(), step)).unwrap();
+        batch.step(100.min(steps - step));
+    }
+    let mut worst = 0.0_f64;
+    for (number, (plant, mut state, mut winds, command)) in states.into_iter().enumerate() {
+        let late = (plant.effects().command_latency_s() * 1e3).round() as usize;
+        let hold = [0.0; MAX_ROTORS];
+        let (mut tick, mut last) = (0, 0);
+        let air = |winds: &[Wind]| winds.iter().fold(In::zero(), |sum, wind| sum + wind.velocity());
+        for step in 0..steps {
+            if step * 300 >= tick * 1000 {
+                let through = state.body.velocity - total_wind(plant.acting(), &state.body, air(&winds));
+                for wind in &mut winds {
+                    wind.advance((step - last) as f64 * 1e-3, || through.vector.norm());
+                }
+                (tick, last) = (tick + 1, step);
+            }
+            let (rotor, wing) = match step.checked_sub(late) {
+                Some(sent) => (command, wings::<f64>(1, sent)),
+                None => (hold, vec![0.0; 2]),
+            };
+            plant.step(&mut state, &rotor, [wing[0], wing[1]], air(&winds));
+        }
+        let flown = batch.state(number).unwrap();
+        let off = |a: Vector3<T>, b: Vector3<f64>| {
+            (a.map(|x| try_convert::<T, f64>(x).unwrap()) - b).norm() / b.norm().max(1.0)
+        };
+        worst = worst.max(off(flown.position.vector, state.body.position.vector));
+        worst = worst.max(off(flown.velocity.vector, state.body.velocity.vector));
+        worst = worst.max(off(flown.omega.vector, state.body.omega.vector));
+        let [_, volt, _] = batch.battery(number).unwrap().unwrap();
+        worst = worst.max((try_convert::<T, f64>(volt).unwrap() - state.battery.voltage_v).abs());
+    }
+    worst
+}
+
+/// In f64 the operations are the plant's, but for its servo within the step in which a rate limit ends (a polynomial there, relative
+/// error 6e-11) and for factors of rotors; a tumbling vehicle makes these larger.
+#[test]
+fn crafts_in_f64_fly_as_the_plant_does() {
+    for wing in ["none", "flat", "membrane"] {
+        let worst = off_the_plant::<f64>(wing, &[], 400);
+        assert!(worst < 1e-8, "{wing}: {worst:e}");
+    }
+}
+
+#[test]
+fn every_effect_acts_as_in_the_plant() {
+    for name in all_effects() {
+        for wing in ["membrane", "flat"] {
+            let worst = off_the_plant::<f64>(wing, &[name], 300);
+            assert!(worst < 1e-7, "{name}, {wing}: {worst:e}");
+        }
+    }
+}
+
+#[test]
+fn in_f32_a_craft_stays_near_the_plant() {
+    let worst = off_the_plant::<f32>("membrane", &["battery_sag", "ground_effect", "payload_swing"], 200);
+    assert!(worst < 5e-3, "{worst:e}");
+}
+
+#[test]
+fn effects_make_a_difference() {
+    let thrown = Thrown::<f64>::new(21);
+    let settings = Settings { threads: 1, ..Settings::default() };
+    let without = flown(&thrown, &crafts(&thrown, "membrane", &[]), settings, 100);
+    for name in all_effects() {
+        let with = flown(&thrown, &crafts(&thrown, "membrane", &[name]), settings, 100);
+        assert_ne!(with[20], without[20], "{name}");
+    }
+}
+
+#[test]
+fn what_does_not_fly_in_a_batch_is_named() {
+    let refused = |change: &dyn Fn(&mut Craft)| {
+        let mut crafts = vec![craft("membrane"), craft("membrane")];
+        change(&mut crafts[1]);
+        Batch::<f32>::with(&crafts, Settings::default()).unwrap_err().to_string()
+    };
+    for name in OF_SENSORS {
+        let text = refused(&|craft| put(&mut craft.effects, name, 0, 0.5));
+        assert!(text.starts_with(&format!("vehicles[1]: effects.{name}: ")), "{text}");
+    }
+    let text = refused(&|c| c.wing = craft("flat").wing);
+    assert_eq!(text, "vehicles[1]: wing.model: flat and membrane do not fly in one batch");
+    let text = refused(&|c| put(&mut c.effects, "mass_error", 0, -20.0));
+    assert!(text.starts_with("vehicles[1]: with effects, mass.mass_kg = "), "{text}");
+
+    let mut batch = Batch::<f32>::with(&[craft("none")], Settings::default()).unwrap();
+    let text = batch.refit(0, &craft("membrane")).unwrap_err().to_string();
+    assert!(text.starts_with("vehicles[0]: wing: the batch was made without"), "{text}");
+    let mut heavy = craft("none");
+    put(&mut heavy.effects, "added_mass", 0, 0.5);
+    let text = batch.refit(0, &heavy).unwrap_err().to_string();
+    assert!(text.starts_with("vehicles[0]: added_mass: the batch was made without"), "{text}");
+    put(&mut heavy.effects, "actuation_latency", 0, 0.5);
+    let text = batch.refit(0, &heavy).unwrap_err().to_string();
+    assert!(text.starts_with("vehicles[0]: added_mass: the batch was made without"), "steps first: {text}");
+    // What changes the airframe once has a place everywhere.
+    let mut other = craft("none");
+    put(&mut other.effects, "mass_error", 0, 0.5);
+    put(&mut other.effects, "motor_lag", 0, 0.5);
+    batch.refit(0, &other).unwrap();
+    assert_eq!(batch.set_charge(0, 1.5).unwrap_err().to_string(), "charge of vehicle 0: 1.5, must be 0 to 1");
+}
+
+/// A vehicle may come into a batch with another form of an effect that is there: it then flies as in a batch made with it, and its
+/// neighbour does not notice. A form that is an equation of its own has no place.
+#[test]
+fn another_form_may_come_later() {
+    let formed = |name: &str, form: usize| {
+        let mut craft = craft("membrane");
+        put(&mut craft.effects, name, form, 0.5);
+        craft
+    };
+    let fly = |mut batch: Batch<f64>| {
+        for number in 0..2 {
+            let mut state = State::at_rest();
+            (state.velocity.vector.x, state.velocity.vector.y) = (5.0, 2.0);
+            batch.reset(number, &state).unwrap();
+        }
+        batch.command(&[0.6; 8]).unwrap();
+        batch.step(200);
+        [0, 1].map(|number| batch.state(number).unwrap())
+    };
+    for (name, form) in [
+        ("battery_sag", 1),
+        ("battery_sag", 2),
+        ("flapping_moment", 1),
+        ("linear_drag", 1),
+        ("translational_lift", 1),
+    ] {
+        let (first, other) = (formed(name, 0), formed(name, form));
+        let made = Batch::with(&[first.clone(), other.clone()], Settings::default()).unwrap();
+        let mut refitted = Batch::with(&[first.clone(), first.clone()], Settings::default()).unwrap();
+        refitted.refit(1, &other).unwrap();
+        let (expected, alike) =
+            (fly(made), fly(Batch::with(&[first.clone(), first], Settings::default()).unwrap()));
+        assert_eq!(fly(refitted), expected, "{name}");
+        assert!(alike[0] == expected[0] && alike[1] != expected[1], "{name}");
+    }
+    for name in ["constant_wind", "ground_effect"] {
+        let mut batch = Batch::<f64>::with(&[formed(name, 0)], Settings::default()).unwrap();
+        let text = batch.refit(0, &formed(name, 1)).unwrap_err().to_string();
+        assert!(text.starts_with(&format!("vehicles[0]: {name}: the batch was made without")), "{text}");
+        let mut batch = Batch::<f64>::with(&[formed(name, 1)], Settings::default()).unwrap();
+        batch.refit(0, &formed(name, 0)).unwrap();
+    }
+}

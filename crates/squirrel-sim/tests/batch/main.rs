@@ -1,0 +1,10 @@
+//! The tests of batches and of environments over them. One binary: what they share is compiled and linked once.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod autopilot;
+mod craft;
+mod errors;
+mod identity;
+mod lanes;
+mod support;
+mod tasks;

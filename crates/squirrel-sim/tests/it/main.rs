@@ -1,0 +1,21 @@
+//! The tests of the simulator. One binary: what they share is compiled and linked once.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod beside_pc;
+mod board_log;
+mod effects;
+mod excitation;
+mod faults;
+mod flights;
+mod import_flights;
+mod parnn_flights;
+mod pilot;
+mod policy_weights;
+mod replays;
+mod weights;
+mod weights_support;
+mod world_clearance;
+mod world_contact;
+mod world_errors;
+mod world_fixture;
+mod world_free_flight;

@@ -1,0 +1,94 @@
+//! Replay: the same bits from the same inputs, and the first thing that differs where something was changed.
+
+use squirrel_log::FlightLog;
+use squirrel_log::flight_code::INPUT_SOURCES;
+use squirrel_sim::arm::Arm;
+use squirrel_sim::estimator::Estimator;
+use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::replay::{OUTPUT_SOURCES, replay, setup};
+use squirrel_sim::scenario::Scenario;
+use squirrel_sim::vehicle_file::VehicleFile;
+
+fn flown(arm: Arm) -> FlightLog {
+    flown_by(VehicleFile::squirrel(), arm)
+}
+
+fn flown_by(vehicle: VehicleFile, arm: Arm) -> FlightLog {
+    let mut scenario = Scenario::find("avoid").unwrap();
+    scenario.seed = 7;
+    scenario.wind.gust_sigma_m_s = 0.5;
+    let setup = Setup { vehicle, arm, scenario, integrator: Integrator::Rk4 };
+    setup.fly(true, |_| {}).unwrap().log.unwrap()
+}
+
+#[test]
+fn every_arm_replays_bit_for_bit_through_a_file() {
+    let folder = std::env::temp_dir().join(format!("squirrel-replays-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    for arm in Arm::ALONE {
+        let path = folder.join(arm.name()).with_extension("mcap");
+        flown(arm).write(&path).unwrap();
+        let log = FlightLog::read(&path).unwrap();
+        let result = replay(&log, &setup(&log).unwrap()).unwrap();
+        assert_eq!(result.first_difference, None, "{arm:?}");
+        assert!(result.steps > 3000 && result.values > 100_000);
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn a_changed_gain_is_found_at_the_first_output_that_it_reaches() {
+    let mut log = flown(Arm::TwccFlat);
+    let changed =
+        log.metadata["vehicle_toml"].replace("c1_per_s = { value = [9.0,", "c1_per_s = { value = [9.001,");
+    assert_ne!(changed, log.metadata["vehicle_toml"]);
+    log.metadata.insert("vehicle_toml".to_owned(), changed);
+    let difference = replay(&log, &setup(&log).unwrap()).unwrap().first_difference.unwrap();
+    assert!(difference.time_s < 0.1 && difference.channel.starts_with("control.inner."), "{difference:?}");
+}
+
+/// Every input source matters: a changed number changes an output.
+#[test]
+fn a_changed_input_changes_an_output() {
+    let mut outside = VehicleFile::squirrel();
+    outside.estimator = Estimator::External;
+    let logs = [flown(Arm::TwccOracle), flown_by(outside, Arm::TwccOracle)];
+    for (log, channel, row) in [
+        (&logs[0], "imu.omega_body_rad_s", 1000),
+        (&logs[0], "imu.specific_force_body_m_s2", 1000),
+        (&logs[0], "imu_2.omega_body_rad_s", 1000),
+        (&logs[1], "attitude.q_ned_from_body_wxyz", 1000),
+        (&logs[0], "gnss.position_ned_m", 50),
+        (&logs[0], "gnss.velocity_ned_m_s", 50),
+        (&logs[0], "baro.altitude_m", 250),
+        (&logs[0], "magnetometer.field_body_ut", 250),
+        (&logs[0], "wing_force.as_if_spread_ned_n", 1500),
+    ] {
+        let (source, name) = channel.rsplit_once('.').unwrap();
+        assert!(INPUT_SOURCES.contains(&source));
+        let mut changed = log.clone();
+        let c = changed.sources.get_mut(source).unwrap().channels.get_mut(name).unwrap();
+        let i = row * c.width;
+        c.values[i] = f64::from(c.values[i] as f32 * 1.001 + 1e-4);
+        let t = log.sources[source].time_s[row];
+        let difference = replay(&changed, &setup(log).unwrap()).unwrap().first_difference;
+        let difference = difference.unwrap_or_else(|| panic!("{channel} does not matter"));
+        assert!(difference.time_s >= t && difference.time_s <= t + 0.11, "{channel} at {t}: {difference:?}");
+    }
+}
+
+#[test]
+fn a_log_without_what_replay_needs_is_refused_by_name() {
+    let log = flown(Arm::Pc);
+    let mut bare = log.clone();
+    bare.metadata.remove("vehicle_toml");
+    assert!(setup(&bare).unwrap_err().starts_with("metadata vehicle_toml: missing"));
+    let mut frameless = log.clone();
+    frameless.sources.remove("frame");
+    assert!(replay(&frameless, &setup(&log).unwrap()).unwrap_err().starts_with("frame.time_us: missing"));
+    let mut outputless = log.clone();
+    outputless.sources.remove(OUTPUT_SOURCES[0]);
+    assert!(
+        replay(&outputless, &setup(&log).unwrap()).unwrap_err().starts_with("control.status: in only one")
+    );
+}

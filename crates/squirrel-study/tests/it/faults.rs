@@ -1,0 +1,66 @@
+//! Flights in which one thing fails, and studies that are stopped.
+
+use squirrel_sim::vehicle_file::VehicleFile;
+use squirrel_study::faults::{Faults, Plan, run};
+use squirrel_study::journal::Keep;
+use std::path::Path;
+
+fn study(trials: u32, folder: Option<&Path>) -> Faults {
+    let plan = Plan { vehicle: VehicleFile::squirrel(), trials, seed: 3 };
+    run(&plan, &Keep { folder, ..Keep::default() }, || ()).unwrap().unwrap()
+}
+
+#[test]
+fn nine_of_ten_survivable_faults_are_survived_and_what_is_lost_is_flagged() {
+    let study = study(1000, None);
+    assert!(study.survived_share >= 0.9, "{:#?}", study.rows);
+    assert_eq!(study.rows.len(), 10);
+    for row in &study.rows {
+        assert!(row.not_finite == 0 && row.lost_unflagged == 0, "{row:?}");
+        // A hundred flights of each; about half of the weak rotors have too little thrust to spare.
+        assert!(row.flights == 100 && row.survivable >= 35, "{row:?}");
+    }
+    let flagged = |fault: &str| study.rows.iter().find(|row| row.fault == fault).unwrap().flagged;
+    for fault in ["imu_spike", "imu_stuck", "imu_nan", "imu_dead", "motor_weak"] {
+        assert!(flagged(fault) >= 95, "{fault}: {}", flagged(fault));
+    }
+    for (k, flight) in study.flights.iter().enumerate() {
+        let names = |flag: &str| flight.flags.iter().any(|f| f == flag);
+        // A unit that is gone is named by its number.
+        if flight.fault.name() == "imu_dead" {
+            let which = flight.table.which.unwrap();
+            assert!(names(&format!("imu_{which}_out")), "{k}: {flight:?}");
+        }
+        if flight.fault.name() == "gnss_lost" && flight.table.duration_s.is_none() {
+            assert!(names("gnss_lost") && names("position_lost"), "{k}: {flight:?}");
+        }
+    }
+}
+
+#[test]
+fn a_study_that_was_stopped_goes_on_to_the_same_bytes() {
+    let folder = std::env::temp_dir().join(format!("squirrel-faults-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let json = |study: &Faults| serde_json::to_string(study).unwrap();
+    let whole = json(&study(24, None));
+    assert_eq!(json(&study(24, Some(&folder))), whole);
+    let file = folder.join("faults.trials.jsonl");
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(text.lines().count(), 25);
+    // Stopped in the middle of a line.
+    std::fs::write(&file, &text[..text.len() / 2]).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(json(&pool.install(|| study(24, Some(&folder)))), whole);
+    assert_eq!(std::fs::read_to_string(&file).unwrap().lines().count(), 25);
+    // Nothing is flown again: what is in the file is what comes out.
+    let changed = std::fs::read_to_string(&file).unwrap().replace("\"survived\":true", "\"survived\":false");
+    std::fs::write(&file, changed).unwrap();
+    assert_eq!(study(24, Some(&folder)).survived_share, 0.0);
+    let other = Plan { vehicle: VehicleFile::squirrel(), trials: 24, seed: 4 };
+    let there = Keep { folder: Some(&folder), ..Keep::default() };
+    let error = run(&other, &there, || ()).unwrap_err().to_string();
+    assert!(error.contains("faults.trials.jsonl: is of another plan"), "{error}");
+    std::fs::write(&file, "not a journal\n").unwrap();
+    assert!(run(&other, &there, || ()).unwrap_err().to_string().contains("faults.trials.jsonl"));
+    std::fs::remove_dir_all(&folder).unwrap();
+}

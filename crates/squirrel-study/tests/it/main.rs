@@ -1,0 +1,12 @@
+//! The tests of the experiments. One binary: what they share is compiled and linked once.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+mod claims;
+mod faults;
+mod filters;
+mod pages;
+mod parts;
+mod planning;
+mod real_filters;
+mod table2;
+mod thrust;

@@ -1,0 +1,208 @@
+//! Studies that were stopped, flown on other numbers of threads, or in parts that were merged, leave the same bytes.
+
+use serde::Serialize;
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::FlightError;
+use squirrel_sim::vehicle_file::VehicleFile;
+use squirrel_study::campaign::Plan;
+use squirrel_study::journal::{Keep, Part};
+use squirrel_study::merge::merge;
+use squirrel_study::{faults, filters, forest, planning, steering, table2, table3, thrust};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// The study's result as JSON, where it has one.
+type Study = fn(&Keep<'_>) -> Result<Option<String>, FlightError>;
+
+fn json<T: Serialize>(study: Option<T>) -> Option<String> {
+    study.map(|study| serde_json::to_string(&study).unwrap())
+}
+
+fn plan(trials: u32) -> Plan {
+    Plan { vehicle: VehicleFile::squirrel(), arms: vec![Arm::Pc, Arm::TwccPlus], trials, seed: 5 }
+}
+
+const STUDIES: [(&str, Study); 8] = [
+    ("faults", |keep| {
+        let plan = faults::Plan { vehicle: VehicleFile::squirrel(), trials: 9, seed: 5 };
+        faults::run(&plan, keep, || ()).map(json)
+    }),
+    ("filters", |keep| {
+        let plan = filters::Plan { vehicle: VehicleFile::squirrel(), trials: 2, seed: 5 };
+        filters::run(&plan, keep, || ()).map(json)
+    }),
+    ("forest", |keep| forest::run(&plan(3), 2.0, keep, || ()).map(json)),
+    ("planning", |keep| {
+        let plan = Plan { arms: planning::ARMS.to_vec(), ..plan(1) };
+        planning::run(&plan, keep, || ()).map(json)
+    }),
+    ("steering", |keep| steering::run(&plan(1), keep, || ()).map(json)),
+    ("table2", |keep| {
+        let plan = table2::Plan { vehicle: VehicleFile::squirrel(), trials: 2, seed: 5, epochs: 1 };
+        table2::run(&plan, keep, |_| ()).map(json)
+    }),
+    ("table3", |keep| table3::run(&plan(2), keep, || ()).map(json)),
+    ("thrust", |keep| thrust::run(&plan(2), keep, || ()).map(json)),
+];
+
+/// A folder that is gone afterwards.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("squirrel-parts-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        Self(folder)
+    }
+
+    fn below(&self, name: &str) -> PathBuf {
+        let folder = self.0.join(name);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// Names and bytes of all journals in a folder.
+fn journals(folder: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut all: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|entry| entry.unwrap())
+        .map(|entry| (entry.file_name().into_string().unwrap(), fs::read(entry.path()).unwrap()))
+        .collect();
+    all.sort();
+    all
+}
+
+#[test]
+fn stopped_threaded_and_merged_studies_leave_the_same_bytes() {
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let command = ["a".to_owned(), "study".to_owned()];
+    for (name, study) in STUDIES {
+        let folder = Folder::new(name);
+        let keep = |folder, part| Keep { folder: Some(folder), part, command: &command };
+        let whole = folder.below("whole");
+        let result = pool(2).install(|| study(&keep(&whole, Part::All))).unwrap();
+        assert!(result.is_some(), "{name}");
+        assert_eq!(study(&Keep::default()).unwrap(), result, "{name}: kept nowhere");
+
+        // Stopped in the middle of a line, and gone on with one thread.
+        let stopped = folder.below("stopped");
+        for (file, bytes) in journals(&whole) {
+            fs::write(stopped.join(file), &bytes[..bytes.len() / 2]).unwrap();
+        }
+        assert_eq!(pool(1).install(|| study(&keep(&stopped, Part::All))).unwrap(), result, "{name}: stopped");
+        assert_eq!(journals(&stopped), journals(&whole), "{name}: stopped");
+
+        let parts: Vec<PathBuf> = (1..=4).map(|k| folder.below(&format!("part{k}"))).collect();
+        for (k, part) in parts.iter().enumerate() {
+            let shard = format!("{}/4", k + 1).parse().unwrap();
+            assert_eq!(study(&keep(part, Part::Shard(shard))).unwrap(), None, "{name}: a part has no result");
+        }
+        let merged = folder.below("merged");
+        assert_eq!(merge(&parts, &merged).unwrap(), command);
+        assert_eq!(study(&keep(&merged, Part::Merged)).unwrap(), result, "{name}: merged");
+        assert_eq!(journals(&merged), journals(&whole), "{name}: merged");
+
+        // Without one of them the missing trial is named.
+        let three = folder.below("three");
+        merge(&parts[1..], &three).unwrap();
+        let error = study(&keep(&three, Part::Merged)).unwrap_err().to_string();
+        assert!(error.contains("flight = 0: missing, in none of the merged folders"), "{name}: {error}");
+    }
+}
+
+/// More trials than before: the parts say so, and the whole has them all. Other weights: another plan. What cannot be flown leaves nothing.
+#[test]
+fn a_study_that_changes_does_not_go_on_as_it_was() {
+    let folder = Folder::new("changed");
+    let parts: Vec<PathBuf> = (1..=2).map(|k| folder.below(&format!("part{k}"))).collect();
+    for trials in [1, 2] {
+        let command = ["thrust".to_owned(), format!("--trials={trials}")];
+        for (k, part) in parts.iter().enumerate() {
+            let part = Keep {
+                folder: Some(part),
+                part: Part::Shard(format!("{}/2", k + 1).parse().unwrap()),
+                command: &command,
+            };
+            thrust::run(&plan(trials), &part, || ()).unwrap();
+        }
+    }
+    let merged = folder.below("merged");
+    assert_eq!(merge(&parts, &merged).unwrap(), ["thrust", "--trials=2"]);
+    let whole = Keep { folder: Some(&merged), part: Part::Merged, ..Keep::default() };
+    assert_eq!(thrust::run(&plan(2), &whole, || ()).unwrap().unwrap().trials, 2);
+
+    let kept = Keep { folder: Some(&merged), ..Keep::default() };
+    let other =
+        VehicleFile::parse(&plan(1).vehicle.text.replace("parnn_weights", "# parnn_weights"), "v").unwrap();
+    let mut changed = plan(2);
+    changed.vehicle.weights = other.weights;
+    let error = thrust::run(&changed, &kept, || ()).unwrap_err().to_string();
+    assert!(error.contains("is of another plan"), "{error}");
+
+    let empty = folder.below("empty");
+    let nothing = Keep { folder: Some(&empty), ..Keep::default() };
+    assert!(forest::run(&plan(1), 0.5, &nothing, || ()).is_err());
+    let mut bare = plan(1);
+    bare.vehicle.control = None;
+    assert!(table3::run(&bare, &nothing, || ()).is_err());
+    assert!(
+        thrust::run(&plan(100_001), &nothing, || ()).unwrap_err().to_string().starts_with("trials = 100001")
+    );
+    assert!(journals(&empty).is_empty(), "what cannot be flown is not begun");
+}
+
+#[test]
+fn a_damaged_line_is_named() {
+    let folder = Folder::new("damaged");
+    let keep = Keep { folder: Some(&folder.0), ..Keep::default() };
+    table3::run(&plan(1), &keep, || ()).unwrap();
+    let file = folder.0.join("table3.trials.jsonl");
+    let text = fs::read_to_string(&file).unwrap();
+    let damage = |from: &str, to: &str| {
+        fs::write(&file, text.replacen(from, to, 1)).unwrap();
+        table3::run(&plan(1), &keep, || ()).unwrap_err().to_string()
+    };
+    let error = damage("\"rmse_m\":", "\"rmse_m\":NaN,\"x\":");
+    assert!(error.contains("table3.trials.jsonl: line 2, from its begin:"), "{error}");
+    let error = damage("\"rmse_m\":", "\"rsme_m\":");
+    assert!(error.contains("{\"trial\":0...: missing field `rmse_m`"), "{error}");
+}
+
+#[test]
+fn what_cannot_be_merged_is_named() {
+    let folder = Folder::new("wrong");
+    let (one, other, into) = (folder.below("one"), folder.below("other"), folder.below("into"));
+    let command = ["thrust".to_owned()];
+    let fly = |folder: &Path, trials| {
+        let keep = Keep { folder: Some(folder), part: Part::All, command: &command };
+        thrust::run(&Plan { seed: u64::from(trials), ..plan(trials) }, &keep, || ()).unwrap();
+    };
+    let error = |folders: &[PathBuf]| merge(folders, &into).unwrap_err().to_string();
+    assert!(error(std::slice::from_ref(&one)).contains("one: holds no part of a study"));
+    fly(&one, 1);
+    fly(&other, 2);
+    let both = [one.clone(), other.clone()];
+    assert!(error(&both).contains("is of another plan"), "{}", error(&both));
+    assert!(journals(&into).is_empty(), "nothing is half merged");
+    let file = "thrust.trials.jsonl";
+    let text = fs::read_to_string(one.join(file)).unwrap();
+    fs::write(other.join(file), text.replacen("\"rmse_m\":", "\"rmse_m\":1", 1)).unwrap();
+    assert!(error(&both).contains("flight = 0: has another result in another folder"), "{}", error(&both));
+    fs::write(other.join(file), "").unwrap();
+    assert!(error(&both).contains("thrust.trials.jsonl: holds nothing"));
+    for bad in ["0/4", "5/4", "4", "a/b", "1/0"] {
+        assert!(bad.parse::<squirrel_study::journal::Shard>().is_err(), "{bad}");
+    }
+    let keep = Keep { part: Part::Shard("1/2".parse().unwrap()), ..Keep::default() };
+    assert!(
+        thrust::run(&plan(1), &keep, || ()).unwrap_err().to_string().starts_with("shard: needs a folder")
+    );
+}
