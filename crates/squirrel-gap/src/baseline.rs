@@ -15,15 +15,12 @@ use crate::leftover::usual;
 use crate::name::{BETA, Catalogue, Scatter, Scored, Search, hypothesis};
 use crate::predictor::Predictor;
 use crate::verdict::SetAside;
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Effects, Fitted};
 use squirrel_core::vehicle::Vehicle;
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 
-/// Effects that a baseline does not tell beside those: what is the day's, what is known better, and which side gives less, which is
-/// no matter of degree.
-const NOT_FITTED: [&str; 3] = ["accel_bias", "mass_error", "wing_asymmetry"];
 /// Steps of Gauss-Newton, each about what the last has found.
 const STEPS: usize = 4;
 /// Part of the smallest size worth reporting below which an effect of a machine is none.
@@ -108,7 +105,7 @@ fn step(
 }
 
 fn is_fitted(effect: &str) -> bool {
-    !NOT_FITTED.contains(&effect) && !fitted::NOT_ITS_OWN.contains(&effect)
+    Effects::<f64>::profile(effect).is_some_and(|profile| profile.fitted == Fitted::Always)
 }
 
 /// Flights, and what may be off in them.

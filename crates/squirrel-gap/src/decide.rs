@@ -12,7 +12,7 @@ use crate::name::{BEHIND_NATS, INTERVAL, Member, NATS_MIN, Naming, STANDS, Score
 use crate::proof::HeldOut;
 use crate::verdict::{Alternative, Gap, Kind, Left, NamedEffect, Since, Value, Verdict};
 use crate::words;
-use squirrel_core::effects::{Effects, Kind as ParameterKind};
+use squirrel_core::effects::{BatterySag, Effect, Effects, Gust, Kind as ParameterKind, forms};
 use std::collections::BTreeMap;
 
 /// Part of what the nominal model leaves that a form which differs may leave; more is outside the catalogue.
@@ -84,8 +84,11 @@ pub(crate) fn decide(
     let effects = named(search, naming);
     let leftover = &naming.leftover;
     let mut blind = search.blind(&found.best);
-    if curve_hides_sag && !blind.contains(&"battery_sag") && effects.iter().all(|e| e.name != "battery_sag") {
-        blind.push("battery_sag");
+    if curve_hides_sag
+        && !blind.contains(&BatterySag::<f64>::NAME)
+        && effects.iter().all(|e| e.name != BatterySag::<f64>::NAME)
+    {
+        blind.push(BatterySag::<f64>::NAME);
     }
     let share = left_share(naming);
     // What explains some flights and makes others worse is no name for what the vehicle lacks.
@@ -123,9 +126,14 @@ pub(crate) fn decide(
     let mut alternatives =
         if is_open { open } else { alternatives(search, naming, rivals.iter().take(SHOWN)) };
     if curve_hides_sag && effects.is_empty() {
-        let single = search.single_evidence(found).into_iter().find(|(name, _)| *name == "battery_sag");
+        let single =
+            search.single_evidence(found).into_iter().find(|(name, _)| *name == BatterySag::<f64>::NAME);
         let evidence_nats = single.map_or(0.0, |(_, nats)| nats);
-        alternatives.push(Alternative { effects: vec!["battery_sag"], evidence_nats, numbers: Vec::new() });
+        alternatives.push(Alternative {
+            effects: vec![BatterySag::<f64>::NAME],
+            evidence_nats,
+            numbers: Vec::new(),
+        });
     }
     // Of what lasts nothing is said beyond the names.
     let left = (!leftover.bands.is_empty()).then(|| Left::of(leftover));
@@ -207,10 +215,10 @@ fn named(search: &Search<'_>, naming: &Naming) -> Vec<NamedEffect> {
     if let Some(sigma) = naming.gust_m_s {
         let number = Value::Number { value: sigma, low: 0.8 * sigma, high: 1.25 * sigma };
         all.push(NamedEffect {
-            name: "gust",
-            form: "gauss_markov",
+            name: Gust::<f64>::NAME,
+            form: forms(Gust::<f64>::PARAMETERS)[0],
             evidence_nats: naming.gust_nats,
-            parameters: BTreeMap::from([("sigma_m_s", number)]),
+            parameters: BTreeMap::from([(Gust::<f64>::PARAMETERS[0].key, number)]),
         });
     }
     all.sort_by(|a, b| b.evidence_nats.total_cmp(&a.evidence_nats));

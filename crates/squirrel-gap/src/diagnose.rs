@@ -15,6 +15,7 @@ use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
 use crate::proof::{gap, hold, prove};
 use crate::verdict::{Kind, SetAside, Verdict, nothing_to_add};
+use squirrel_core::effects::{BatterySag, Effect};
 use squirrel_core::vehicle::{ThrustCurve, Vehicle};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -265,7 +266,7 @@ fn curve_hides_sag(predictor: &Predictor, nominal: &[f64]) -> Result<bool, GapEr
         Ok(own.map(|row| (rows[row] - nominal[row]).powi(2)).sum())
     };
     let mut sag = predictor.nominal();
-    if let Some(found) = sag.effects.insert("battery_sag") {
+    if let Some(found) = sag.effects.insert(BatterySag::<f64>::NAME) {
         found.values[0] += 0.4;
     }
     let sag = change(&sag)?;

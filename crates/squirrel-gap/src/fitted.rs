@@ -7,7 +7,7 @@
 use crate::GapError;
 use crate::name::{Catalogue, Point, Scored, Search, hypothesis};
 use crate::predictor::Predictor;
-use squirrel_core::effects::{EffectParameter, Effects, Kind};
+use squirrel_core::effects::{EffectParameter, Effects, Fitted, Kind};
 use squirrel_core::vehicle::{ParameterError, Vehicle};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -19,32 +19,6 @@ const LARGEST_MOMENT: f64 = 0.999;
 /// Part of the smallest size worth reporting below which an effect changes no prediction.
 const NEXT_TO_NOTHING: f64 = 0.01;
 
-/// Effects of sensors, of clocks and of the day, which are no numbers of a vehicle, and what has no slope at nothing. The zero of
-/// the accelerometer is one: it goes with the machine.
-pub(crate) const NOT_ITS_OWN: [&str; 11] = [
-    "accel_scale",
-    "clock_skew",
-    "clock_step",
-    "compass_current",
-    "constant_wind",
-    "gnss_latency",
-    "ground_effect",
-    "gust",
-    "gyro_scale",
-    "heading_bias",
-    "payload_swing",
-];
-
-/// Numbers that make moments and next to no force.
-const OF_MOMENTS: [&str; 7] = [
-    "angular_damping",
-    "cg_offset",
-    "flapping_moment",
-    "inertia_error",
-    "motor_lag",
-    "rotor_gyro_torque",
-    "yaw_torque_coeff",
-];
 /// Steps of their fit, each about what the last has found.
 const STEPS: usize = 3;
 
@@ -59,7 +33,7 @@ pub(crate) fn with_moments(
 ) -> Result<VehicleFile, GapError> {
     let mut own = search.predictor.vehicle.clone();
     let named = |effect: &str| set.members.iter().any(|member| search.effect(member) == effect);
-    let is_its_own = |effect: &str| named(effect) || !NOT_ITS_OWN.contains(&effect);
+    let is_its_own = |effect: &str| named(effect) || lasts(effect);
     (own.vehicle, own.effects) = machine(search, search.whole(set), is_its_own)?;
     for _ in 0..STEPS {
         let mut predictor = Predictor::new(&own, flights)?;
@@ -68,7 +42,7 @@ pub(crate) fn with_moments(
         }
         predictor.keep_moments();
         let mut catalogue = Catalogue::new(&predictor, &[], None)?;
-        catalogue.free_alone(&OF_MOMENTS);
+        catalogue.free_moments_alone();
         let moments = Search {
             predictor: &predictor,
             catalogue: &catalogue,
@@ -89,9 +63,14 @@ pub(crate) fn with_moments(
 pub(crate) fn of(search: &Search<'_>, set: &Scored) -> Result<VehicleFile, GapError> {
     let mut own = search.predictor.vehicle.clone();
     let point = Point { members: Vec::new(), ..search.whole(set) };
-    (own.vehicle, own.effects) = machine(search, point, |effect| !NOT_ITS_OWN.contains(&effect))?;
+    (own.vehicle, own.effects) = machine(search, point, lasts)?;
     own.effects = worth_a_line(&own, NEXT_TO_NOTHING);
     Ok(own)
+}
+
+/// Whether a fit to flights may move the numbers of an effect.
+fn lasts(effect: &str) -> bool {
+    Effects::<f64>::profile(effect).is_some_and(|profile| profile.fitted != Fitted::Never)
 }
 
 /// The vehicle and its effects at a point, without what the sensors of these flights did.

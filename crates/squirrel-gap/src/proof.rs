@@ -9,6 +9,7 @@ use crate::name::{Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothe
 use crate::predictor::{CHANNELS, Hypothesis, Predictor, TURNING};
 use crate::shrink::{Errors12, Floor, Flown};
 use crate::verdict::Gap;
+use squirrel_core::effects::Declared;
 use squirrel_log::FlightLog;
 
 /// Errors on held-out flights.
@@ -77,7 +78,7 @@ fn settled_on(
     let mut base = base[..catalogue.shared_columns()].to_vec();
     base.resize(catalogue.columns(unseen), 0.0);
     let mut point = Point { members: members.to_vec(), base };
-    let thrust = catalogue.tolerance_of("thrust_fraction");
+    let thrust = catalogue.tolerance_of(Declared::Thrust);
     settle_flights(unseen, catalogue, &naming.found.linear.whitener, thrust, &mut point)?;
     hypothesis(unseen, catalogue, &point)
 }

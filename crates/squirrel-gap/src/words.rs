@@ -37,7 +37,7 @@ pub(crate) fn spoken(text: &str) -> String {
 
 /// The manoeuvre that shows an effect and tells it from those it is confused with.
 pub(crate) fn manoeuvre(effect: &str) -> &'static str {
-    Effects::<f64>::words(effect).map_or("the excite_rich scenario", |words| words.fly)
+    Effects::<f64>::profile(effect).map_or("the excite_rich scenario", |profile| profile.words.fly)
 }
 
 /// What to fly to see or to separate some effects.

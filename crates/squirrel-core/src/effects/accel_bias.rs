@@ -2,7 +2,7 @@
 //!
 //! Form `drifting`: `b + drift t`, `t` the time since the flight began.
 
-use super::{Effect, EffectParameter, Shown, Words, is};
+use super::{Declared, Effect, EffectParameter, Fitted, Shown, Words, is};
 use crate::frames::{Body, In};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -17,9 +17,9 @@ impl<T: Real> Effect<T> for AccelBias<T> {
     const NAME: &'static str = "accel_bias";
     const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("bias_x_m_s2", 0.15, 0.6),
-        EffectParameter::signed("bias_y_m_s2", 0.15, 0.6),
-        EffectParameter::signed("bias_z_m_s2", 0.15, 0.6),
+        EffectParameter::signed("bias_x_m_s2", 0.15, 0.6).declared(Declared::AccelBias),
+        EffectParameter::signed("bias_y_m_s2", 0.15, 0.6).declared(Declared::AccelBias),
+        EffectParameter::signed("bias_z_m_s2", 0.15, 0.6).declared(Declared::AccelBias),
         EffectParameter::signed("drift_x_m_s3", 3e-3, 0.03).only_in(&["drifting"]),
         EffectParameter::signed("drift_y_m_s3", 3e-3, 0.03).only_in(&["drifting"]),
         EffectParameter::signed("drift_z_m_s3", 3e-3, 0.03).only_in(&["drifting"]),
@@ -32,6 +32,7 @@ impl<T: Real> Effect<T> for AccelBias<T> {
         fly: "hover through a full turn of yaw and at two or more headings, then dash at two headings",
     };
     const SHOWN: Shown = Shown::ACCELEROMETER.and(Shown::HORIZONTAL);
+    const FITTED: Fitted = Fitted::ExceptToBaselines;
 
     #[inline(always)]
     fn specific_force_bias(&self, time_s: T) -> In<Body, T> {

@@ -1,6 +1,6 @@
 //! Scale of the accelerometer: along each axis of the body it reads `f_measured = (1 + s) f`, before its bias.
 
-use super::{Effect, EffectParameter, Shown, Words};
+use super::{Declared, Effect, EffectParameter, Fitted, Mimic, Shown, Words};
 use crate::frames::{Body, In};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -13,9 +13,9 @@ impl<T: Real> Effect<T> for AccelScale<T> {
     const NAME: &'static str = "accel_scale";
     const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("scale_x_fraction", 0.01, 0.06),
-        EffectParameter::signed("scale_y_fraction", 0.01, 0.06),
-        EffectParameter::signed("scale_z_fraction", 0.01, 0.06),
+        EffectParameter::signed("scale_x_fraction", 0.01, 0.06).declared(Declared::AccelScale),
+        EffectParameter::signed("scale_y_fraction", 0.01, 0.06).declared(Declared::AccelScale),
+        EffectParameter::signed("scale_z_fraction", 0.01, 0.06).declared(Declared::AccelScale),
     ];
     const WORDS: Words = Words {
         what: "accelerometer scale",
@@ -24,6 +24,8 @@ impl<T: Real> Effect<T> for AccelScale<T> {
         fly: "climbs with thrust steps, level and banked, with the velocity logged",
     };
     const SHOWN: Shown = Shown::ACCELEROMETER.and(Shown::HORIZONTAL);
+    const FITTED: Fitted = Fitted::Never;
+    const MIMIC: Mimic = Mimic::LeaningAttitude;
 
     #[inline(always)]
     fn accel_scale(&self) -> In<Body, T> {

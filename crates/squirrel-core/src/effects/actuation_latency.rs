@@ -2,12 +2,12 @@
 //!
 //! Whoever hands commands to the plant holds them back; a lag (`motor_lag`) also smooths, a latency only shifts.
 
-use super::{Effect, EffectParameter, Shown, Words};
+use super::{Effect, EffectParameter, Response, Shown, Timing, Words};
 use crate::math::Real;
 
 /// Time from a command to its effect.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ActuationLatency<T>(pub(super) [T; 1]);
+pub struct ActuationLatency<T>(pub(super) [T; 1]);
 
 impl<T: Real> Effect<T> for ActuationLatency<T> {
     const NAME: &'static str = "actuation_latency";
@@ -20,6 +20,8 @@ impl<T: Real> Effect<T> for ActuationLatency<T> {
         fly: "a multisine from 0.3 to 6 Hz in roll and pitch",
     };
     const SHOWN: Shown = Shown::COMMANDS;
+    const RESPONSE: Response = Response::Bends;
+    const TIMING: Option<Timing> = Some(Timing::Latency);
 
     fn command_latency_s(&self) -> T {
         self.0[0]

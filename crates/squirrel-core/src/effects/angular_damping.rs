@@ -34,6 +34,7 @@ impl<T: Real> Effect<T> for AngularDamping<T> {
         fly: "a multisine from 0.3 to 6 Hz in roll and pitch",
     };
     const SHOWN: Shown = Shown::MOMENTS;
+    const IS_OF_MOMENTS: bool = true;
 }
 
 numbers! {

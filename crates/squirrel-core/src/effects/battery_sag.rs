@@ -16,7 +16,7 @@ const LOAD_DEPENDENT: usize = 2;
 
 /// How strongly rotor speed follows the battery voltage.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct BatterySag<T>(pub(super) [T; 3]);
+pub struct BatterySag<T>(pub(super) [T; 3]);
 
 impl<T: Real> Effect<T> for BatterySag<T> {
     const NAME: &'static str = "battery_sag";

@@ -4,8 +4,8 @@
 //! and leave them alone where there is no effect.
 
 use super::{
-    Acts, Alteration, CommandClock, Effect, EffectParameter, FORM, Forms, GustSpectrum, Pendulum, Shown,
-    Situation, Words, is,
+    Acts, Alteration, CommandClock, Effect, EffectParameter, FORM, Forms, GustSpectrum, Pendulum, Profile,
+    Situation, is,
 };
 use crate::aero::{Airflow, BodyWrench};
 use crate::frames::{Body, In};
@@ -52,19 +52,12 @@ macro_rules! catalogue {
                 })+
                 None
             }
-            /// How the effect of a name is spoken of; `None` for an unknown name.
-            pub fn words(name: &str) -> Option<Words> {
+            /// What the effect of a name is known by; `None` for an unknown name.
+            pub fn profile(name: &str) -> Option<Profile> {
                 $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
-                    return Some(<super::$field::$effect<T> as Effect<T>>::WORDS);
+                    return Some(Profile::of::<T, super::$field::$effect<T>>());
                 })+
                 None
-            }
-            /// What the effect of a name is known by; nothing for an unknown name.
-            pub fn shown(name: &str) -> Shown {
-                $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
-                    return <super::$field::$effect<T> as Effect<T>>::SHOWN;
-                })+
-                Shown::NOTHING
             }
             /// Whether the effect of a name is present.
             pub fn has(&self, name: &str) -> bool {

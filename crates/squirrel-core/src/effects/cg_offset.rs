@@ -3,7 +3,7 @@
 //!
 //! The accelerometer stays at the geometric centre, at `-r` from the centre of mass, and feels the rotation there.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::frames::{Body, In};
 use crate::lane::Lane;
@@ -17,14 +17,21 @@ const SPATIAL: usize = 1;
 
 /// Where the centre of mass lies, from the point that the vehicle file's positions refer to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct CgOffset<T>(pub(super) [T; 4]);
+pub struct CgOffset<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for CgOffset<T> {
     const NAME: &'static str = "cg_offset";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("cg_x_m", 0.003, 0.012).growing_with(Scale::Arm),
-        EffectParameter::signed("cg_y_m", 0.003, 0.012).growing_with(Scale::Arm),
-        EffectParameter::signed("cg_z_m", 0.003, 0.012).growing_with(Scale::Arm).only_in(&["spatial"]),
+        EffectParameter::signed("cg_x_m", 0.003, 0.012)
+            .growing_with(Scale::Arm)
+            .declared(Declared::RotorPlaces),
+        EffectParameter::signed("cg_y_m", 0.003, 0.012)
+            .growing_with(Scale::Arm)
+            .declared(Declared::RotorPlaces),
+        EffectParameter::signed("cg_z_m", 0.003, 0.012)
+            .growing_with(Scale::Arm)
+            .declared(Declared::RotorPlaces)
+            .only_in(&["spatial"]),
         EffectParameter::form(&["planar", "spatial"]),
     ];
     const WORDS: Words = Words {
@@ -34,6 +41,7 @@ impl<T: Real> Effect<T> for CgOffset<T> {
         fly: "roll and pitch doublets, yaw steps and thrust steps in hover; and weigh the vehicle",
     };
     const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
+    const IS_OF_MOMENTS: bool = true;
 
     #[inline(always)]
     fn accelerometer_position(&self) -> In<Body, T> {

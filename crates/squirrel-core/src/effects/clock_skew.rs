@@ -1,6 +1,6 @@
 //! The clock that stamps commands runs fast: a command of the time `t` is stamped `t (1 + s)`.
 
-use super::{CommandClock, Effect, EffectParameter, Shown, Words};
+use super::{CommandClock, Effect, EffectParameter, Fitted, Response, Shown, Timing, Words};
 use crate::math::{Real, real};
 
 /// How fast, in parts per million.
@@ -18,6 +18,9 @@ impl<T: Real> Effect<T> for ClockSkew<T> {
         fly: "a flight of more than a minute with doublets at its beginning and end",
     };
     const SHOWN: Shown = Shown::COMMANDS;
+    const RESPONSE: Response = Response::Bends;
+    const FITTED: Fitted = Fitted::Never;
+    const TIMING: Option<Timing> = Some(Timing::ClockRate);
 
     fn command_clock(&self, clock: &mut CommandClock<T>) {
         clock.rate *= T::one() + self.0[0] * real(1e-6);

@@ -2,7 +2,7 @@
 //!
 //! See [`CommandClock`] for what a log then says.
 
-use super::{CommandClock, Effect, EffectParameter, Shown, Words};
+use super::{CommandClock, Effect, EffectParameter, Fitted, Response, Shown, Timing, Tolerance, Words};
 use crate::math::Real;
 
 /// Size and time of the jump.
@@ -12,8 +12,10 @@ pub(super) struct ClockStep<T>(pub(super) [T; 2]);
 impl<T: Real> Effect<T> for ClockStep<T> {
     const NAME: &'static str = "clock_step";
     const IS_OF_SENSORS: bool = true;
-    const PARAMETERS: &'static [EffectParameter] =
-        &[EffectParameter::signed("step_s", 0.02, 0.2), EffectParameter::size("at_s", 0.3, 600.0)];
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("step_s", 0.02, 0.2).within(Tolerance::Nothing),
+        EffectParameter::size("at_s", 0.3, 600.0),
+    ];
     const WORDS: Words = Words {
         what: "jump of the commands' clock",
         more: "The clock of commands jumps forwards",
@@ -21,6 +23,9 @@ impl<T: Real> Effect<T> for ClockStep<T> {
         fly: "a flight of more than a minute with doublets at its beginning and end",
     };
     const SHOWN: Shown = Shown::COMMANDS;
+    const RESPONSE: Response = Response::Jumps { at: "at_s" };
+    const FITTED: Fitted = Fitted::Never;
+    const TIMING: Option<Timing> = Some(Timing::ClockJump);
 
     fn command_clock(&self, clock: &mut CommandClock<T>) {
         [clock.step_s, clock.at_s] = self.0;

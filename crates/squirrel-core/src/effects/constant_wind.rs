@@ -3,7 +3,7 @@
 //! Form `log_profile`: the wind is that at 10 m, times `ln(h / z0) / ln(10 / z0)` at the height `h` (logarithmic law of the
 //! surface layer, Stull 1988), with `h` not below `2 z0`. Roughness acts up to 4 m, beyond which the law means nothing.
 
-use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
+use super::{Acts, Effect, EffectParameter, Fitted, Forms, Mimic, Shown, Tolerance, Words, is};
 use crate::lane::Lane;
 use crate::lane::functions::ln;
 use crate::math::{Real, lower, real};
@@ -11,6 +11,9 @@ use crate::numbers;
 use crate::vehicle::Vehicle;
 
 const LOG_PROFILE: usize = 1;
+
+/// Wind that a calm day may have, m/s.
+const WIND_M_S: f64 = 0.12;
 
 /// Wind velocity: where the air moves to, not where it comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,8 +23,8 @@ impl<T: Real> Effect<T> for ConstantWind<T> {
     const NAME: &'static str = "constant_wind";
     const FORMS_APART: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("wind_north_m_s", 1.5, 6.0),
-        EffectParameter::signed("wind_east_m_s", 1.5, 6.0),
+        EffectParameter::signed("wind_north_m_s", 1.5, 6.0).within(Tolerance::Usual(WIND_M_S)),
+        EffectParameter::signed("wind_east_m_s", 1.5, 6.0).within(Tolerance::Usual(WIND_M_S)),
         EffectParameter::size("roughness_m", 0.01, 0.5).only_in(&["log_profile"]),
         EffectParameter::form(&["constant", "log_profile"]),
     ];
@@ -32,6 +35,8 @@ impl<T: Real> Effect<T> for ConstantWind<T> {
         fly: "hover through a full turn of yaw and at two or more headings, then dash at two headings",
     };
     const SHOWN: Shown = Shown::LASTING.and(Shown::HORIZONTAL);
+    const FITTED: Fitted = Fitted::Never;
+    const MIMIC: Mimic = Mimic::Gusts;
 }
 
 numbers! {

@@ -29,6 +29,7 @@ impl<T: Real> Effect<T> for FlappingMoment<T> {
         fly: "dashes at several speeds from 2 to 9 m/s, both ways",
     };
     const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
+    const IS_OF_MOMENTS: bool = true;
 }
 
 numbers! {

@@ -3,7 +3,7 @@
 //! `h` is the height above the origin's level, not below `R / 2`. Form `exponential`: `T <- T (1 + g exp(-h / R))`, as fitted
 //! to multirotors, with `h` not below 0.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Words, is};
+use super::{Acts, Effect, EffectParameter, Fitted, Forms, Response, Scale, Shown, Tolerance, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::lane::functions::exp;
@@ -22,7 +22,10 @@ impl<T: Real> Effect<T> for GroundEffect<T> {
     const NAME: &'static str = "ground_effect";
     const FORMS_APART: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("effective_radius_m", 0.25, 0.55).growing_with(Scale::Arm),
+        EffectParameter::size("effective_radius_m", 0.25, 0.55)
+            .growing_with(Scale::Arm)
+            .within(Tolerance::Nothing)
+            .capped(),
         EffectParameter::size("gain", 0.1, 0.5).only_in(&["exponential"]),
         EffectParameter::form(&["cheeseman_bennett", "exponential"]),
     ];
@@ -33,6 +36,9 @@ impl<T: Real> Effect<T> for GroundEffect<T> {
         fly: "a ladder of hovers from 0.2 to 1.5 m above the ground, with a range finder if there is one",
     };
     const SHOWN: Shown = Shown::NOTHING;
+    const RESPONSE: Response = Response::StartsFlat;
+    const FITTED: Fitted = Fitted::Never;
+    const FEELS_HEIGHT: bool = true;
 }
 
 numbers! {

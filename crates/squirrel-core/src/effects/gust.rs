@@ -3,7 +3,7 @@
 //! Form `gauss_markov`: correlation time 1.5 s. Form `dryden`: Dryden spectra (MIL-F-8785C) with a scale length of 6 m, which
 //! are that long at 4 m/s. The random process itself is the simulator's; a model cannot predict it.
 
-use super::{Effect, EffectParameter, Shown, Words, is};
+use super::{Effect, EffectParameter, Fitted, Response, Shown, Words, is};
 use crate::math::Real;
 
 /// Correlation time of Gauss-Markov gusts, s.
@@ -29,7 +29,7 @@ pub enum GustSpectrum<T> {
 
 /// Size of the gusts.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Gust<T>(pub(super) [T; 2]);
+pub struct Gust<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for Gust<T> {
     const NAME: &'static str = "gust";
@@ -39,6 +39,8 @@ impl<T: Real> Effect<T> for Gust<T> {
     const WORDS: Words =
         Words { what: "gusts", more: "Gusts", less: "Gusts", fly: "the same flight again on another day" };
     const SHOWN: Shown = Shown::NOTHING;
+    const RESPONSE: Response = Response::Random;
+    const FITTED: Fitted = Fitted::Never;
 
     fn gust(&self) -> Option<GustSpectrum<T>> {
         let [sigma_m_s, form] = self.0;

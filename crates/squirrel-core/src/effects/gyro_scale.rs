@@ -1,6 +1,6 @@
 //! Scale of the gyroscope: along each axis of the body it reads `w_measured = (1 + s) w`.
 
-use super::{Effect, EffectParameter, Shown, Words};
+use super::{Declared, Effect, EffectParameter, Fitted, Shown, Words};
 use crate::frames::{Body, In};
 use crate::math::Real;
 use nalgebra::Vector3;
@@ -13,9 +13,9 @@ impl<T: Real> Effect<T> for GyroScale<T> {
     const NAME: &'static str = "gyro_scale";
     const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("scale_x_fraction", 0.02, 0.1),
-        EffectParameter::signed("scale_y_fraction", 0.02, 0.1),
-        EffectParameter::signed("scale_z_fraction", 0.02, 0.1),
+        EffectParameter::signed("scale_x_fraction", 0.02, 0.1).declared(Declared::GyroScale),
+        EffectParameter::signed("scale_y_fraction", 0.02, 0.1).declared(Declared::GyroScale),
+        EffectParameter::signed("scale_z_fraction", 0.02, 0.1).declared(Declared::GyroScale),
     ];
     const WORDS: Words = Words {
         what: "gyroscope scale",
@@ -24,6 +24,7 @@ impl<T: Real> Effect<T> for GyroScale<T> {
         fly: "doublets about one axis at a time and a few full turns of yaw, with the attitude logged",
     };
     const SHOWN: Shown = Shown::TURNS;
+    const FITTED: Fitted = Fitted::Never;
 
     #[inline(always)]
     fn gyro_scale(&self) -> In<Body, T> {

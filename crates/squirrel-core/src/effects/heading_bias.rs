@@ -2,7 +2,7 @@
 //!
 //! Form `drifting`: `b + drift t`, `t` the time since the flight began.
 
-use super::{Effect, EffectParameter, Shown, Words, is};
+use super::{Declared, Effect, EffectParameter, Fitted, Shown, Words, is};
 use crate::math::Real;
 
 const DRIFTING: usize = 1;
@@ -15,7 +15,7 @@ impl<T: Real> Effect<T> for HeadingBias<T> {
     const NAME: &'static str = "heading_bias";
     const IS_OF_SENSORS: bool = true;
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("bias_rad", 0.087, 0.35),
+        EffectParameter::signed("bias_rad", 0.087, 0.35).declared(Declared::HeadingBias),
         EffectParameter::signed("drift_rad_per_s", 2e-3, 0.01).only_in(&["drifting"]),
         EffectParameter::form(&["constant", "drifting"]),
     ];
@@ -26,6 +26,7 @@ impl<T: Real> Effect<T> for HeadingBias<T> {
         fly: "hard horizontal accelerations along and across the heading",
     };
     const SHOWN: Shown = Shown::NOTHING;
+    const FITTED: Fitted = Fitted::Never;
 
     fn heading_bias_rad(&self, time_s: T) -> T {
         let [bias, drift, form] = self.0;

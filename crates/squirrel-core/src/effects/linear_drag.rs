@@ -3,7 +3,7 @@
 //! Form `anisotropic`: `F -= (D (1 + e) u, D (1 - e) v, D_z w)`, for rotors or an airframe longer than wide (Svacha et al.
 //! 2017 identify such a drag matrix).
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -19,10 +19,13 @@ pub(super) struct LinearDrag<T>(pub(super) [T; 4]);
 impl<T: Real> Effect<T> for LinearDrag<T> {
     const NAME: &'static str = "linear_drag";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("extra_drag_n_s_per_m", 0.04, 0.25).growing_with(Scale::Mass),
+        EffectParameter::signed("extra_drag_n_s_per_m", 0.04, 0.25)
+            .growing_with(Scale::Mass)
+            .declared(Declared::LinearDrag(0)),
         EffectParameter::signed("anisotropy", 0.1, 0.5).only_in(&["anisotropic"]),
         EffectParameter::signed("extra_drag_z_n_s_per_m", 0.04, 0.25)
             .growing_with(Scale::Mass)
+            .declared(Declared::LinearDrag(2))
             .only_in(&["anisotropic"]),
         EffectParameter::form(&["isotropic", "anisotropic"]),
     ];

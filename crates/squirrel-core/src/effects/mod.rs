@@ -40,6 +40,7 @@ mod linear_drag;
 mod mass_error;
 mod motor_lag;
 mod payload_swing;
+mod profile;
 mod quadratic_drag;
 mod rotor_gyro_torque;
 mod thrust_coefficient;
@@ -51,10 +52,21 @@ mod wing_membrane;
 mod wing_servo_lag;
 mod yaw_torque_coeff;
 
+pub use actuation_latency::ActuationLatency;
+pub use battery_sag::BatterySag;
 pub use catalogue::{Acting, Effects, Found, Prepared, Present};
+pub use cg_offset::CgOffset;
 pub use clock::CommandClock;
-pub use gust::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, GustSpectrum};
+pub use gust::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, Gust, GustSpectrum};
+pub use mass_error::MassError;
 pub use payload_swing::{Pendulum, PendulumState, Swing};
+pub use profile::{
+    Declared, Fitted, Mimic, Profile, Ratio, Response, Shown, SideOf, Timing, Tolerance, Words,
+};
+pub use thrust_coefficient::ThrustCoefficient;
+pub use weak_rotor::WeakRotor;
+pub use wing_asymmetry::WingAsymmetry;
+pub use wing_membrane::WingMembrane;
 
 use crate::aero::{Airflow, BodyWrench, flat_plate};
 use crate::frames::{Body, Frame, In};
@@ -145,6 +157,10 @@ pub struct EffectParameter {
     pub kind: Kind,
     /// The forms of the effect in which it exists; `None` for all.
     pub forms: Option<&'static [&'static str]>,
+    /// How far it may be off without being worth a name.
+    pub tolerance: Tolerance,
+    /// Whether it is never larger than its largest plausible size, whatever flights ask for.
+    pub is_capped: bool,
 }
 
 /// Key of the parameter that chooses the form of an effect.
@@ -152,7 +168,7 @@ pub const FORM: &str = "form";
 
 impl EffectParameter {
     const fn new(key: &'static str, kind: Kind) -> Self {
-        Self { key, kind, forms: None }
+        Self { key, kind, forms: None, tolerance: Tolerance::PartOfSmallest, is_capped: false }
     }
     /// A size that is not negative.
     const fn size(key: &'static str, smallest: f64, largest: f64) -> Self {
@@ -177,34 +193,45 @@ impl EffectParameter {
         self.forms = Some(forms);
         self
     }
+    /// The same, changing a number of the vehicle file.
+    const fn declared(self, number: Declared) -> Self {
+        self.within(Tolerance::Declared(number))
+    }
+    /// The same with a tolerance.
+    const fn within(mut self, tolerance: Tolerance) -> Self {
+        self.tolerance = tolerance;
+        self
+    }
+    /// The same, never larger than plausible.
+    const fn capped(mut self) -> Self {
+        self.is_capped = true;
+        self
+    }
     /// Its plausible sizes on a vehicle; `None` for what counts or chooses.
     pub fn range(&self, vehicle: &Vehicle<f64>) -> Option<SizeRange> {
         let Kind::Size { smallest, largest, signed, scale } = self.kind else { return None };
         let times = scale.of(vehicle);
         Some(SizeRange { smallest: smallest * times, largest: largest * times, signed, scale })
     }
+    /// The number of the base model that it adds to, with its field in vehicle files, where the sum cannot be less than nothing:
+    /// a drag, an area, a lag.
+    pub fn base_number(&self, vehicle: &Vehicle<f64>) -> Option<(&'static str, f64)> {
+        let p = vehicle.parameters();
+        let Tolerance::Declared(number) = self.tolerance else { return None };
+        Some(match number {
+            Declared::LinearDrag(0) => ("drag.linear_n_s_per_m[0]", p.drag.linear_n_s_per_m.x),
+            Declared::LinearDrag(1) => ("drag.linear_n_s_per_m[1]", p.drag.linear_n_s_per_m.y),
+            Declared::LinearDrag(_) => ("drag.linear_n_s_per_m[2]", p.drag.linear_n_s_per_m.z),
+            Declared::DragArea => ("drag.area_m2", p.drag.area_m2),
+            Declared::RotorLag => ("propulsion.time_constant_s", p.propulsion.time_constant_up_s),
+            Declared::WingLag => ("wing.time_constant_s", p.wing.map_or(0.0, |wing| wing.time_constant_s)),
+            _ => return None,
+        })
+    }
     /// Whether it exists in a form.
     pub fn exists_in(&self, form: &str) -> bool {
         self.forms.is_none_or(|forms| forms.contains(&form))
     }
-}
-
-/// The number of the base model that a parameter adds to, with its field in vehicle files, where the sum cannot be less than
-/// nothing: a drag, an area, a lag.
-pub fn base_number(effect: &str, key: &str, vehicle: &Vehicle<f64>) -> Option<(&'static str, f64)> {
-    let p = vehicle.parameters();
-    Some(match (effect, key) {
-        ("linear_drag", "extra_drag_n_s_per_m") => ("drag.linear_n_s_per_m[0]", p.drag.linear_n_s_per_m.x),
-        ("linear_drag", "extra_drag_z_n_s_per_m") => ("drag.linear_n_s_per_m[2]", p.drag.linear_n_s_per_m.z),
-        ("quadratic_drag", "extra_drag_area_m2" | "extra_drag_area_z_m2") => ("drag.area_m2", p.drag.area_m2),
-        ("motor_lag", "extra_time_constant_s") => {
-            ("propulsion.time_constant_s", p.propulsion.time_constant_up_s)
-        }
-        ("wing_servo_lag", "extra_time_constant_s") => {
-            ("wing.time_constant_s", p.wing.map_or(0.0, |wing| wing.time_constant_s))
-        }
-        _ => return None,
-    })
 }
 
 /// The forms that a list of parameters offers, the standard one first; empty for an effect with one form.
@@ -226,50 +253,6 @@ fn is<T: Real>(value: T, number: usize) -> bool {
 #[inline(always)]
 fn up_and_down<T: Real>(lag_s: T, asymmetry: T) -> [T; 2] {
     [lag_s * (T::one() - asymmetry), lag_s * (T::one() + asymmetry)]
-}
-
-/// How an effect is spoken of. `@` stands for a rotor, an axis or a side.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Words {
-    /// What it is: `drag that grows with speed`.
-    pub what: &'static str,
-    /// What is said where its number is above that of the vehicle file.
-    pub more: &'static str,
-    /// What is said where it is below.
-    pub less: &'static str,
-    /// The manoeuvre that shows it and tells it from those it is confused with.
-    pub fly: &'static str,
-}
-
-/// What an effect is known by; several at once.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shown(u8);
-
-impl Shown {
-    /// Nothing in particular.
-    pub const NOTHING: Self = Self(0);
-    /// Its moments, and by the horizontal force; without these channels nothing is said of it.
-    pub const MOMENTS: Self = Self(1);
-    /// What lasts of forces and moments.
-    pub const LASTING: Self = Self(1 << 1);
-    /// What lies between commands and the speeds of rotors.
-    pub const COMMANDS: Self = Self(1 << 2);
-    /// An accelerometer, or velocities against one.
-    pub const ACCELEROMETER: Self = Self(1 << 3);
-    /// A gyroscope beside an attitude.
-    pub const TURNS: Self = Self(1 << 4);
-    /// Horizontal forces.
-    pub const HORIZONTAL: Self = Self(1 << 5);
-
-    /// Both.
-    #[must_use]
-    pub const fn and(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-    /// Whether all of `other` is in it.
-    pub const fn has(self, other: Self) -> bool {
-        self.0 & other.0 == other.0
-    }
 }
 
 /// What an effect that makes a force may look at.
@@ -300,6 +283,22 @@ pub trait Effect<T: Real>: Copy {
     const WORDS: Words;
     /// What it is known by.
     const SHOWN: Shown;
+    /// How what it does grows with its numbers.
+    const RESPONSE: Response = Response::Linear;
+    /// Which fits may move its numbers without naming it.
+    const FITTED: Fitted = Fitted::Always;
+    /// What is no effect and makes the same.
+    const MIMIC: Mimic = Mimic::Nothing;
+    /// The ratio that flights show instead of what it changes.
+    const SIDE_OF: Option<SideOf> = None;
+    /// What time it is about.
+    const TIMING: Option<Timing> = None;
+    /// Whether it makes moments and next to no force.
+    const IS_OF_MOMENTS: bool = false;
+    /// Whether only a vehicle with wings can have it.
+    const IS_OF_WINGS: bool = false;
+    /// Whether it fades with height, so that the zero of the barometer matters to it.
+    const FEELS_HEIGHT: bool = false;
     /// Whether it acts on sensors and stamps alone, which a flight without them does not show.
     const IS_OF_SENSORS: bool = false;
     /// Whether it acts between steps, on commands or on the air.

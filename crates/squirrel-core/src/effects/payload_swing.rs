@@ -3,7 +3,7 @@
 //! `s` is the load's horizontal offset from the vehicle, whose horizontal acceleration is `a`; small angles, damping
 //! `c = 0.1 1/s`, in the form `damped` a parameter. The tether is fixed at the centre of mass. A length of 0 is no load.
 
-use super::{Effect, EffectParameter, Scale, Shown, Words, is};
+use super::{Effect, EffectParameter, Fitted, Response, Scale, Shown, Tolerance, Words, is};
 use crate::lane::Lane;
 use crate::math::{GRAVITY_M_S2, Real, real};
 use crate::numbers;
@@ -17,7 +17,7 @@ pub(super) struct PayloadSwing<T>(pub(super) [T; 4]);
 impl<T: Real> Effect<T> for PayloadSwing<T> {
     const NAME: &'static str = "payload_swing";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("mass_kg", 0.03, 0.12).growing_with(Scale::Mass),
+        EffectParameter::size("mass_kg", 0.03, 0.12).growing_with(Scale::Mass).within(Tolerance::Nothing),
         EffectParameter::size("length_m", 0.3, 0.9),
         EffectParameter::size("damping_per_s", 0.2, 2.0).only_in(&["damped"]),
         EffectParameter::form(&["light", "damped"]),
@@ -29,6 +29,8 @@ impl<T: Real> Effect<T> for PayloadSwing<T> {
         fly: "stop and go along one axis at 0.6 to 0.9 Hz, then hover",
     };
     const SHOWN: Shown = Shown::HORIZONTAL;
+    const RESPONSE: Response = Response::Swings { length: "length_m" };
+    const FITTED: Fitted = Fitted::Never;
 
     fn pendulum(&self) -> Option<Pendulum<T>> {
         let [mass_kg, length_m, damping_per_s, form] = self.0;

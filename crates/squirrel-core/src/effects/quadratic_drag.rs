@@ -2,7 +2,7 @@
 //!
 //! Form `anisotropic`: its own drag area along each body axis, `A (1 + e)`, `A (1 - e)`, `A_z`.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
@@ -18,10 +18,13 @@ pub(super) struct QuadraticDrag<T>(pub(super) [T; 4]);
 impl<T: Real> Effect<T> for QuadraticDrag<T> {
     const NAME: &'static str = "quadratic_drag";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("extra_drag_area_m2", 0.008, 0.05).growing_with(Scale::Mass),
+        EffectParameter::signed("extra_drag_area_m2", 0.008, 0.05)
+            .growing_with(Scale::Mass)
+            .declared(Declared::DragArea),
         EffectParameter::signed("anisotropy", 0.1, 0.5).only_in(&["anisotropic"]),
         EffectParameter::signed("extra_drag_area_z_m2", 0.008, 0.05)
             .growing_with(Scale::Mass)
+            .declared(Declared::DragArea)
             .only_in(&["anisotropic"]),
         EffectParameter::form(&["isotropic", "anisotropic"]),
     ];

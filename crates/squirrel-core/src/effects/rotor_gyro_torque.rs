@@ -25,6 +25,7 @@ impl<T: Real> Effect<T> for RotorGyroTorque<T> {
         fly: "yaw steps",
     };
     const SHOWN: Shown = Shown::MOMENTS;
+    const IS_OF_MOMENTS: bool = true;
 }
 
 numbers! {

@@ -340,7 +340,6 @@ fn forms_choose_among_parameters() {
     assert_eq!(keys("translational_lift", "saturating"), ["gain_s2_per_m2"]);
     assert_eq!(keys("translational_lift", "linear"), ["gain_s_per_m"]);
     assert!(forms(Effects::<f64>::parameters("added_mass").unwrap()).is_empty());
-    assert_eq!(Effects::<f64>::NAMES.len(), 33);
     for name in Effects::<f64>::NAMES {
         let parameters = Effects::<f64>::parameters(name).unwrap();
         let names = forms(parameters);

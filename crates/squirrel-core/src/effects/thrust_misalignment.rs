@@ -1,6 +1,6 @@
 //! Thrust that is not along body z: `F_xy -= T (e_x, e_y)`.
 
-use super::{Acts, Effect, EffectParameter, Forms, Shown, Situation, Words, absent};
+use super::{Acts, Effect, EffectParameter, Forms, Shown, Situation, Tolerance, Words, absent};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -14,8 +14,8 @@ pub(super) struct ThrustMisalignment<T>(pub(super) [T; 2]);
 impl<T: Real> Effect<T> for ThrustMisalignment<T> {
     const NAME: &'static str = "thrust_misalignment";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("tilt_x_rad", 0.017, 0.07),
-        EffectParameter::signed("tilt_y_rad", 0.017, 0.07),
+        EffectParameter::signed("tilt_x_rad", 0.017, 0.07).within(Tolerance::RotorAxes),
+        EffectParameter::signed("tilt_y_rad", 0.017, 0.07).within(Tolerance::RotorAxes),
     ];
     const WORDS: Words = Words {
         what: "tilted thrust",

@@ -1,17 +1,17 @@
 //! One rotor gives less: `T_i (1 - e)` and `Q_i (1 - e)`.
 
-use super::{Alteration, Effect, EffectParameter, Kind, Shown, Words, is};
+use super::{Alteration, Declared, Effect, EffectParameter, Kind, Shown, Words, is};
 use crate::math::Real;
 
 /// Which rotor, and the fraction that it lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct WeakRotor<T>(pub(super) [T; 2]);
+pub struct WeakRotor<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for WeakRotor<T> {
     const NAME: &'static str = "weak_rotor";
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::new("rotor", Kind::Rotor),
-        EffectParameter::signed("thrust_loss_fraction", 0.05, 0.2),
+        EffectParameter::signed("thrust_loss_fraction", 0.05, 0.2).declared(Declared::Thrust),
     ];
     const WORDS: Words = Words {
         what: "thrust of rotor @",

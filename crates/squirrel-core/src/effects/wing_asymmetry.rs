@@ -1,6 +1,8 @@
 //! One wing gives less: `N (1 - e)` on its side, taken from the flat plate's force.
 
-use super::{Acts, Effect, EffectParameter, Forms, Kind, Shown, Situation, Words, absent, is};
+use super::{
+    Acts, Declared, Effect, EffectParameter, Fitted, Forms, Kind, Mimic, Shown, Situation, Words, absent, is,
+};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -9,13 +11,13 @@ use crate::vehicle::Vehicle;
 
 /// Which side, and the fraction that it lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct WingAsymmetry<T>(pub(super) [T; 2]);
+pub struct WingAsymmetry<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for WingAsymmetry<T> {
     const NAME: &'static str = "wing_asymmetry";
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::new("side", Kind::OneOf(&["left", "right"])),
-        EffectParameter::size("loss_fraction", 0.12, 0.5),
+        EffectParameter::size("loss_fraction", 0.12, 0.5).declared(Declared::WingForce),
     ];
     const WORDS: Words = Words {
         what: "force of the @ wing",
@@ -24,6 +26,9 @@ impl<T: Real> Effect<T> for WingAsymmetry<T> {
         fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
     };
     const SHOWN: Shown = Shown::MOMENTS;
+    const FITTED: Fitted = Fitted::ExceptToBaselines;
+    const MIMIC: Mimic = Mimic::Gusts;
+    const IS_OF_WINGS: bool = true;
 }
 
 numbers! {

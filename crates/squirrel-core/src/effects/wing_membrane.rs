@@ -4,7 +4,7 @@
 //! whatever wing the vehicle flies, as a difference to the flat plate. Form `speed_dependent`: the gain grows with airspeed,
 //! `g min(V / V_full, 1)`, as the membrane fills.
 
-use super::{Acts, Effect, EffectParameter, Forms, Shown, Situation, Words, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Mimic, Shown, Situation, Words, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -15,12 +15,12 @@ const SPEED_DEPENDENT: usize = 1;
 
 /// Gain and angle-of-attack offset of both wings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct WingMembrane<T>(pub(super) [T; 4]);
+pub struct WingMembrane<T>(pub(super) [T; 4]);
 
 impl<T: Real> Effect<T> for WingMembrane<T> {
     const NAME: &'static str = "wing_membrane";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("gain", 0.12, 0.45),
+        EffectParameter::signed("gain", 0.12, 0.45).declared(Declared::WingForce),
         EffectParameter::signed("angle_of_attack_offset_rad", 0.026, 0.105),
         EffectParameter::size("full_speed_m_s", 5.0, 15.0).only_in(&["speed_dependent"]),
         EffectParameter::form(&["constant", "speed_dependent"]),
@@ -32,6 +32,8 @@ impl<T: Real> Effect<T> for WingMembrane<T> {
         fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
     };
     const SHOWN: Shown = Shown::NOTHING;
+    const MIMIC: Mimic = Mimic::Gusts;
+    const IS_OF_WINGS: bool = true;
 }
 
 numbers! {

@@ -2,7 +2,7 @@
 //!
 //! Form `asymmetric`: `extra (1 - e)` when opening and `extra (1 + e)` when closing.
 
-use super::{Effect, EffectParameter, Shown, Words, is, up_and_down};
+use super::{Declared, Effect, EffectParameter, Response, Shown, Words, is, up_and_down};
 use crate::math::Real;
 
 const ASYMMETRIC: usize = 1;
@@ -14,7 +14,7 @@ pub(super) struct WingServoLag<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for WingServoLag<T> {
     const NAME: &'static str = "wing_servo_lag";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("extra_time_constant_s", 0.12, 0.5),
+        EffectParameter::signed("extra_time_constant_s", 0.12, 0.5).declared(Declared::WingLag),
         EffectParameter::signed("asymmetry", 0.2, 0.8).only_in(&["asymmetric"]),
         EffectParameter::form(&["symmetric", "asymmetric"]),
     ];
@@ -25,6 +25,8 @@ impl<T: Real> Effect<T> for WingServoLag<T> {
         fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
     };
     const SHOWN: Shown = Shown::NOTHING;
+    const RESPONSE: Response = Response::Bends;
+    const IS_OF_WINGS: bool = true;
 
     #[inline(always)]
     fn wing_extra_time_constant_s(&self) -> [T; 2] {

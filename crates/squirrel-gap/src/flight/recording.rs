@@ -7,6 +7,7 @@ use super::series::{Series, Span, common};
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
 use squirrel_core::dynamics::State;
+use squirrel_core::effects::{BatterySag, Effect, Effects, Shown};
 use squirrel_core::frames::In;
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
 use squirrel_log::FlightLog;
@@ -63,6 +64,21 @@ pub(crate) struct Sample {
     pub(crate) voltage_v: f64,
 }
 
+/// What is said where rotors turn as they were measured: effects that only commands show cannot be seen.
+fn taken_as_measured(flight: &str) -> String {
+    let is_one = |name: &&&str| {
+        Effects::<f64>::profile(name).is_some_and(|profile| profile.shown.has(Shown::COMMANDS))
+    };
+    let all: Vec<&str> = Effects::<f64>::NAMES.iter().filter(is_one).copied().collect();
+    let all = match all.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        _ => all.concat(),
+    };
+    format!(
+        "{flight}: {ROTOR_SPEED}: measured, and taken instead of what commands make of it; {all} are not judged"
+    )
+}
+
 impl<'a> Recording<'a> {
     /// * `common` - what the flight shares with those that are looked at together with it
     ///
@@ -108,9 +124,7 @@ impl<'a> Recording<'a> {
             }
         }
         if speed.is_some() {
-            notes.push(format!(
-                "{flight}: {ROTOR_SPEED}: measured, and taken instead of what commands make of it; motor_lag, battery_sag, actuation_latency, clock_skew and clock_step are not judged"
-            ));
+            notes.push(taken_as_measured(flight));
         } else if is_slow {
             notes.push(format!(
                 "{flight}: {ROTOR_SPEED}: not taken; it is too slow, or another flight lacks it"
@@ -123,7 +137,7 @@ impl<'a> Recording<'a> {
                 || "missing".to_owned(),
                 |volt| format!("{volt} V in every sample, a monitor that is stuck"),
             );
-            notes.push(if vehicle.effects.has("battery_sag") {
+            notes.push(if vehicle.effects.has(BatterySag::<f64>::NAME) {
                 format!(
                     "{flight}: battery.voltage_v: {what}; battery_sag is that of the reference voltage, {reference} V"
                 )

@@ -4,6 +4,7 @@
 use super::{Catalogue, Naming, Search, explain};
 use crate::GapError;
 use crate::predictor::Predictor;
+use squirrel_core::effects::Declared;
 
 /// The channel that shows it.
 const FORCE_Z: usize = 2;
@@ -32,7 +33,7 @@ pub(crate) fn explain_flights(
         own.map_or(0.0, |(_, ratio)| *ratio)
     };
     let together = explained(catalogue)?;
-    let most = SHARE_OF_TOLERANCE * catalogue.tolerance_of("thrust_fraction");
+    let most = SHARE_OF_TOLERANCE * catalogue.tolerance_of(Declared::Thrust);
     let usual = catalogue.day_fraction;
     if predictor.names.len() < 2 || most <= usual || force_left(&together) == 0.0 {
         return Ok(together);

@@ -12,9 +12,10 @@ use super::point::Member;
 use super::refine::Scored;
 use super::search::{Found, Search};
 use crate::GapError;
+use squirrel_core::effects::{CgOffset, Effect, MassError};
 
-const MASS: &str = "mass_error";
-const CENTRE: &str = "cg_offset";
+const MASS: &str = MassError::<f64>::NAME;
+const CENTRE: &str = CgOffset::<f64>::NAME;
 
 impl Search<'_> {
     /// A load in place of what was found, if these flights allow one that is within the vehicle's outline.

@@ -43,6 +43,7 @@ use crate::leftover::{Leftover, Slack, gusts, leftover, noise};
 pub(crate) use crate::predictor::TURBULENCE_M_S;
 use crate::predictor::{Hypothesis, Motion};
 use crate::verdict::Left;
+use squirrel_core::effects::Timing;
 use std::rc::Rc;
 
 pub(crate) const BEHIND_NATS: f64 = 3.0;
@@ -253,7 +254,9 @@ fn left_over(
 
 /// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample more or less.
 fn slack(search: &Search<'_>, found: &Found) -> Slack {
-    let skewed = found.best.members.iter().any(|m| ["clock_skew", "clock_step"].contains(&search.effect(m)));
+    let is_of_clock =
+        |m: &Member| matches!(search.profile(m).timing, Some(Timing::ClockRate | Timing::ClockJump));
+    let skewed = found.best.members.iter().any(is_of_clock);
     let period_s = search.predictor.tracks.first().map_or(0.0, |t| t.period_s);
     search.catalogue.slack(if skewed { period_s } else { 0.0 }, unlogged_sag(search.predictor))
 }

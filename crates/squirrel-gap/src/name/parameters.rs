@@ -5,11 +5,14 @@
 //! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
 
 use super::point::{Airframe, DAY_FRACTION, Member};
-use super::tolerance::{SHARE_OF_SMALLEST, airframe, middle_m, slip_ppm, timing_s, tolerance};
+use super::tolerance::{SHARE_OF_SMALLEST, airframe, middle_m, slip_ppm, spread_s, tolerance};
 use crate::GapError;
 use crate::leftover::{Slack, Usual};
 use crate::predictor::{Predictor, TURNING};
-use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, Scale, Shown, SizeRange, base_number};
+use squirrel_core::effects::{
+    Declared, EffectParameter, Effects, FORM, Kind, Profile, Response, Scale, Shown, SizeRange, Timing,
+    Tolerance,
+};
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::plant::WingPlant;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -30,6 +33,8 @@ pub(crate) struct Parameter {
     /// Place in the effect's list of parameters.
     pub(crate) slot: usize,
     pub(crate) key: &'static str,
+    /// What its tolerance comes from.
+    pub(crate) within: Tolerance,
     pub(crate) smallest: f64,
     pub(crate) largest: f64,
     pub(crate) signed: bool,
@@ -44,6 +49,11 @@ pub(crate) struct Parameter {
 }
 
 impl Parameter {
+    /// Whether it changes a number that the vehicle file declares.
+    pub(super) fn is_behind(&self, number: Declared) -> bool {
+        self.within == Tolerance::Declared(number)
+    }
+
     /// What it may be off by without anybody noticing: its tolerance, or of what is there or not, a part of the smallest size.
     pub(super) fn least(&self) -> f64 {
         if self.tolerance > 0.0 { self.tolerance } else { SHARE_OF_SMALLEST * self.smallest }
@@ -62,6 +72,7 @@ impl Parameter {
 #[derive(Debug, Clone)]
 pub(crate) struct Candidate {
     pub(crate) effect: &'static str,
+    pub(crate) profile: Profile,
     /// Slots with a fixed value, and slots where a search starts.
     pub(crate) fixed: Vec<(usize, f64)>,
     /// Indices of its parameters in [`Catalogue::parameters`] that act by themselves, from zero.
@@ -98,12 +109,11 @@ impl Catalogue {
         clock_step_s: Option<f64>,
     ) -> Result<Self, GapError> {
         let vehicle = predictor.vehicle;
-        let shows = |name: &str, what| Effects::<f64>::shown(name).has(what);
-        let unseen = |name: &str| {
-            (!predictor.has_all_of(2) && !shows(name, Shown::LASTING))
-                || (shows(name, Shown::MOMENTS) && !predictor.has_channel(3))
-                || (shows(name, Shown::HORIZONTAL) && !predictor.has_channel(0))
-                || (shows(name, Shown::COMMANDS) && predictor.has_rotor_speeds())
+        let unseen = |shown: Shown| {
+            (!predictor.has_all_of(2) && !shown.has(Shown::LASTING))
+                || (shown.has(Shown::MOMENTS) && !predictor.has_channel(3))
+                || (shown.has(Shown::HORIZONTAL) && !predictor.has_channel(0))
+                || (shown.has(Shown::COMMANDS) && predictor.has_rotor_speeds())
         };
         let mut all = Self {
             candidates: Vec::new(),
@@ -115,46 +125,46 @@ impl Catalogue {
             usual: Usual::default(),
         };
         for name in Effects::<f64>::NAMES {
+            let Some(profile) = Effects::<f64>::profile(name) else { continue };
+            let shown = profile.shown;
             // What nobody measured with is off by nothing.
-            let is_unmeasured = (shows(name, Shown::ACCELEROMETER) && !predictor.has_accelerometer())
-                || (shows(name, Shown::TURNS) && !predictor.has_channel(TURNING));
-            if is_unmeasured {
+            let is_unmeasured = (shown.has(Shown::ACCELEROMETER) && !predictor.has_accelerometer())
+                || (shown.has(Shown::TURNS) && !predictor.has_channel(TURNING));
+            let lacks_wings = profile.is_of_wings && vehicle.wing == WingPlant::None;
+            if is_unmeasured || lacks_wings || profile.response == Response::Random {
                 continue;
             }
-            if *name == "gust" || (vehicle.wing == WingPlant::None && name.starts_with("wing_")) {
-                continue;
-            }
-            if unseen(name) {
+            if unseen(shown) {
                 all.unseen.push(*name);
                 continue;
             }
             let list = Effects::<f64>::parameters(name).unwrap_or_default();
             for fixed in choices(list, vehicle.vehicle.rotors().len()) {
                 // What nothing linear finds starts at each of these.
-                let starts: Vec<(&str, f64)> = match *name {
-                    "payload_swing" => payload_lengths_m.iter().map(|length| ("length_m", *length)).collect(),
-                    "clock_step" => clock_step_s.iter().map(|at| ("at_s", *at)).collect(),
+                let starts: Vec<(&str, f64)> = match profile.response {
+                    Response::Swings { length } => payload_lengths_m.iter().map(|m| (length, *m)).collect(),
+                    Response::Jumps { at } => clock_step_s.iter().map(|s| (at, *s)).collect(),
                     _ => {
-                        all.add(vehicle, name, list, fixed, &[])?;
+                        all.add(vehicle, (name, profile), list, fixed, &[])?;
                         continue;
                     }
                 };
                 for start in starts {
-                    all.add(vehicle, name, list, fixed.clone(), &[start])?;
+                    all.add(vehicle, (name, profile), list, fixed.clone(), &[start])?;
                 }
             }
         }
         for parameter in &mut all.parameters {
-            let effect = all.candidates[parameter.candidate].effect;
-            if effect == "clock_skew" {
+            let timing = all.candidates[parameter.candidate].profile.timing;
+            if timing == Some(Timing::ClockRate) {
                 parameter.tolerance = parameter.tolerance.max(slip_ppm(predictor));
             }
-            if effect == "thrust_misalignment" && !predictor.has_accelerometer() {
+            if parameter.within == Tolerance::RotorAxes && !predictor.has_accelerometer() {
                 parameter.tolerance = parameter.tolerance.max(MARKERS_RAD);
             }
-            parameter.spread = match timing_s(predictor, effect) {
+            parameter.spread = match spread_s(predictor, timing) {
                 Some(spread) => spread,
-                None if effect == "cg_offset" => middle_m(vehicle, parameter.slot),
+                None if parameter.is_behind(Declared::RotorPlaces) => middle_m(vehicle, parameter.slot),
                 // What has no declared number has none to be off.
                 None if parameter.tolerance == SHARE_OF_SMALLEST * parameter.smallest => 0.0,
                 None => parameter.tolerance,
@@ -173,9 +183,9 @@ impl Catalogue {
         self.candidates[member.candidate].parameters.iter().map(|p| &self.parameters[*p])
     }
 
-    /// The tolerance of the number with a key; 0 where these flights have no such effect.
-    pub(crate) fn tolerance_of(&self, key: &str) -> f64 {
-        self.parameters.iter().find(|p| p.key == key).map_or(0.0, |p| p.tolerance)
+    /// The tolerance of what changes a declared number; 0 where these flights show no such effect.
+    pub(crate) fn tolerance_of(&self, number: Declared) -> f64 {
+        self.parameters.iter().find(|p| p.is_behind(number)).map_or(0.0, |p| p.tolerance)
     }
 
     /// Tolerances of what has no number of its own.
@@ -183,15 +193,15 @@ impl Catalogue {
     /// * `timing_s` - by how much commands may act beside their time
     /// * `thrust_fraction` - by how much thrust may drift in a flight
     pub(crate) fn slack(&self, timing_s: f64, thrust_fraction: f64) -> Slack {
-        let drag_n_s_per_m = self.tolerance_of("extra_drag_n_s_per_m");
-        let (lever_m, usual) = (self.tolerance_of("cg_x_m"), self.usual);
+        let drag_n_s_per_m = self.tolerance_of(Declared::LinearDrag(0));
+        let (lever_m, usual) = (self.tolerance_of(Declared::RotorPlaces), self.usual);
         Slack { lever_m, drag_n_s_per_m, thrust_fraction, timing_s, usual }
     }
 
     fn add(
         &mut self,
         vehicle: &VehicleFile,
-        effect: &'static str,
+        (effect, profile): (&'static str, Profile),
         list: &'static [EffectParameter],
         fixed: Vec<(usize, f64)>,
         shape: &[(&str, f64)],
@@ -216,16 +226,17 @@ impl Catalogue {
                 candidate,
                 slot,
                 key: parameter.key,
+                within: parameter.tolerance,
                 smallest: range.smallest,
                 largest: range.largest,
                 signed: range.signed,
-                bounds: bounds(&vehicle.vehicle, effect, parameter.key, &range),
-                tolerance: tolerance(vehicle, effect, slot, &fixed, range.smallest)?,
+                bounds: bounds(&vehicle.vehicle, parameter, &range),
+                tolerance: tolerance(vehicle, parameter.tolerance, slot, &fixed, range.smallest)?,
                 slab: SLAB_OF_LARGEST * range.largest,
                 spread: 0.0,
             });
         }
-        self.candidates.push(Candidate { effect, fixed, parameters: own, shape: started });
+        self.candidates.push(Candidate { effect, profile, fixed, parameters: own, shape: started });
         Ok(())
     }
 }
@@ -234,19 +245,21 @@ impl Catalogue {
 const LAG_MOST: f64 = 0.95;
 
 /// How far a number may go: what takes away from one of the vehicle's own leaves it at nothing, and no less.
-pub(super) fn bounds(vehicle: &Vehicle<f64>, effect: &str, key: &str, range: &SizeRange) -> (f64, f64) {
+pub(super) fn bounds(vehicle: &Vehicle<f64>, parameter: &EffectParameter, range: &SizeRange) -> (f64, f64) {
+    if parameter.is_capped {
+        return (if range.signed { -range.largest } else { 0.0 }, range.largest);
+    }
     let times = match range.scale {
         Scale::Fixed | Scale::Arm => LARGEST_TIMES,
         Scale::Mass | Scale::Inertia | Scale::MassTimesArm => GROWING_TIMES,
     };
     let most = times * range.largest;
-    let own = match (base_number(effect, key, vehicle), effect) {
-        (Some((_, own)), "motor_lag" | "wing_servo_lag") => LAG_MOST * own,
-        (Some((_, own)), _) => own,
-        // From a radius of five arms on, the air under a rotor is no ground effect's.
-        (None, "ground_effect") if key == "effective_radius_m" => return (0.0, range.largest),
-        (None, _) if range.signed => most,
-        (None, _) => 0.0,
+    let is_lag = matches!(parameter.tolerance, Tolerance::Declared(number) if number.is_lag());
+    let own = match parameter.base_number(vehicle) {
+        Some((_, own)) if is_lag => LAG_MOST * own,
+        Some((_, own)) => own,
+        None if range.signed => most,
+        None => 0.0,
     };
     (-own.min(most), most)
 }

@@ -9,7 +9,9 @@ use crate::GapError;
 use crate::leftover::Usual;
 use crate::predictor::{HEIGHT_KNOTS, Hypothesis, Predictor};
 use nalgebra::Vector3;
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{
+    Declared, Effect, EffectParameter, Effects, Tolerance, WingAsymmetry, WingMembrane,
+};
 use squirrel_core::frames::In;
 use squirrel_core::vehicle::Vehicle;
 use std::collections::BTreeMap;
@@ -132,7 +134,7 @@ pub(crate) fn hypothesis(
             continue;
         }
         let candidate = &catalogue.candidates[parameter.candidate];
-        if candidate.effect == "wing_asymmetry" {
+        if candidate.effect == WingAsymmetry::<f64>::NAME {
             sides[candidate.fixed[0].1 as usize] = x;
             continue;
         }
@@ -155,14 +157,14 @@ pub(crate) fn hypothesis(
     // A loss on both sides is a change of the gain and a loss on one side.
     if sides != [0.0; 2] {
         let of = |effect: &str| catalogue.candidates.iter().find(|c| c.effect == effect);
-        let gain = match of("wing_asymmetry") {
-            Some(left) if !all.effects.has("wing_asymmetry") => {
+        let gain = match of(WingAsymmetry::<f64>::NAME) {
+            Some(left) if !all.effects.has(left.effect) => {
                 add(&mut all.effects, left, 1, sides[0] - sides[1]);
                 -sides[1]
             }
             _ => -0.5 * (sides[0] + sides[1]),
         };
-        if let Some(membrane) = of("wing_membrane") {
+        if let Some(membrane) = of(WingMembrane::<f64>::NAME) {
             add(&mut all.effects, membrane, 0, gain);
         }
     }
@@ -180,6 +182,13 @@ pub(crate) fn hypothesis(
         errors.height_m.copy_from_slice(&x[SHORT..]);
     }
     Ok(all)
+}
+
+/// The effect that changes a number of the vehicle file.
+fn behind(number: Declared) -> Option<&'static str> {
+    let is_it = |p: &EffectParameter| p.tolerance == Tolerance::Declared(number);
+    let has = |name: &&&str| Effects::<f64>::parameters(name).is_some_and(|list| list.iter().any(is_it));
+    Effects::<f64>::NAMES.iter().find(has).copied()
 }
 
 /// Whether an effect that acts makes the choices of a candidate.
@@ -238,19 +247,19 @@ impl Catalogue {
         }
         match self.airframe.get(column - self.parameters.len())?.0 {
             Airframe::Arm { .. } => None,
-            Airframe::Torque { .. } => Some(("yaw_torque_coeff", TORQUE_FRACTION)),
+            Airframe::Torque { .. } => Some((behind(Declared::Torque)?, TORQUE_FRACTION)),
             Airframe::Drag { .. } => {
-                let drag =
-                    self.parameters.iter().find(|p| self.candidates[p.candidate].effect == "linear_drag")?;
-                Some(("linear_drag", drag.smallest))
+                let drag = self.parameters.iter().find(|p| p.is_behind(Declared::LinearDrag(0)))?;
+                Some((self.candidates[drag.candidate].effect, drag.smallest))
             }
         }
     }
 
-    /// Lets numbers of these effects be as large as is plausible, and those of rotors' torques with them, and nothing else be off.
-    pub(crate) fn free_alone(&mut self, effects: &[&str]) {
+    /// Lets numbers that make moments and next to no force be as large as is plausible, and those of rotors' torques with them,
+    /// and nothing else be off.
+    pub(crate) fn free_moments_alone(&mut self) {
         for parameter in &mut self.parameters {
-            let is_free = effects.contains(&self.candidates[parameter.candidate].effect);
+            let is_free = self.candidates[parameter.candidate].profile.is_of_moments;
             parameter.tolerance = if is_free { parameter.largest } else { 0.0 };
         }
         for (number, tolerance) in &mut self.airframe {
@@ -279,18 +288,17 @@ impl Catalogue {
 
     /// Whether a candidate has no slope at zero, so that nothing linear holds near it.
     pub(crate) fn starts_flat(&self, candidate: usize) -> bool {
-        ["ground_effect", "payload_swing"].contains(&self.candidates[candidate].effect)
+        self.candidates[candidate].profile.starts_flat()
     }
 
     /// Whether the slope of a candidate is another one after a few tolerances: lags and delays.
     pub(super) fn bends(&self, candidate: usize) -> bool {
-        ["motor_lag", "actuation_latency", "clock_skew", "clock_step", "gnss_latency", "wing_servo_lag"]
-            .contains(&self.candidates[candidate].effect)
+        self.candidates[candidate].profile.bends()
     }
 
     /// Whether height is worth something: an effect of it acts.
     pub(super) fn feels_height(&self, members: &[Member]) -> bool {
-        members.iter().any(|member| self.candidates[member.candidate].effect == "ground_effect")
+        members.iter().any(|member| self.candidates[member.candidate].profile.feels_height)
     }
 
     /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the same choices.

@@ -173,8 +173,8 @@ impl Search<'_> {
 
     /// How far a number of a member may go.
     fn bounds(&self, member: &Member, slot: usize) -> (f64, f64) {
-        let key = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default()[slot].key;
-        bounds(&self.predictor.vehicle.vehicle, self.effect(member), key, &self.range(member, slot))
+        let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
+        bounds(&self.predictor.vehicle.vehicle, &list[slot], &self.range(member, slot))
     }
 
     /// Evidence of a set, linearised in its free numbers where they are.

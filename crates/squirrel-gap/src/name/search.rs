@@ -7,6 +7,7 @@ use super::point::{Member, Point, hypothesis};
 use super::refine::Scored;
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
+use squirrel_core::effects::{Effect, Mimic, Profile, Ratio, Response, WeakRotor};
 use std::rc::Rc;
 
 /// What an effect must be worth to be named, nats.
@@ -18,8 +19,7 @@ pub(super) const FURTHER_NATS: f64 = 10.0;
 const BESIDE_GUSTS_NATS: f64 = 12.0;
 const BLOWN_NATS: f64 = 40.0;
 /// The effect of which a vehicle may have several.
-pub(super) const WEAK_ROTOR: &str = "weak_rotor";
-const BLOWN: [&str; 3] = ["constant_wind", "wing_asymmetry", "wing_membrane"];
+pub(super) const WEAK_ROTOR: &str = WeakRotor::<f64>::NAME;
 /// What a clock that jumps must be worth for each flight that it jumps in, which are all: by chance something changes at one of
 /// the hundreds of times at which it may.
 const JUMP_NATS: f64 = 40.0;
@@ -188,11 +188,14 @@ impl Search<'_> {
 
     /// What a member must be worth, nats.
     pub(super) fn needed(&self, member: &Member) -> f64 {
+        let profile = self.profile(member);
         match self.gust_m_s {
-            _ if self.effect(member) == "clock_step" => JUMP_NATS * self.predictor.names.len() as f64,
-            None if self.effect(member) == "accel_scale" => LEANS_NATS,
+            _ if matches!(profile.response, Response::Jumps { .. }) => {
+                JUMP_NATS * self.predictor.names.len() as f64
+            }
+            None if profile.mimic == Mimic::LeaningAttitude => LEANS_NATS,
             None => NATS_MIN,
-            Some(sigma) if BLOWN.contains(&self.effect(member)) => BLOWN_NATS * (sigma * sigma).max(1.0),
+            Some(sigma) if profile.mimic == Mimic::Gusts => BLOWN_NATS * (sigma * sigma).max(1.0),
             Some(_) => BESIDE_GUSTS_NATS,
         }
     }
@@ -255,7 +258,8 @@ impl Search<'_> {
         let mut best: Option<Scored> = None;
         for (log_evidence, member) in self.ranked(set, except).into_iter().take(REFINED) {
             // What explains nothing along its slope is worth a flight only where the slope may be another one.
-            let straight = !self.catalogue.bends(member.candidate) && self.effect(&member) != "ground_effect";
+            let profile = self.profile(&member);
+            let straight = !profile.bends() && profile.response != Response::StartsFlat;
             if log_evidence <= set.log_evidence && (straight || linear.knows(&set.members)) {
                 continue;
             }
@@ -353,9 +357,9 @@ impl Search<'_> {
                 continue;
             }
             let mut prior = set.prior.clone();
-            if candidate.effect == "payload_swing" {
+            if swings(&candidate.profile) {
                 for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
-                    if self.catalogue.candidates[parameter.candidate].effect == "payload_swing" {
+                    if self.catalogue.candidates[parameter.candidate].effect == candidate.effect {
                         prior[offset + p] = 0.0;
                     }
                 }
@@ -396,8 +400,9 @@ impl Search<'_> {
         // Of the several lines of a payload, the best two.
         let mut payloads = 0;
         all.retain(|(_, m)| {
-            payloads += usize::from(self.effect(m) == "payload_swing");
-            self.effect(m) != "payload_swing" || payloads <= 2
+            let is_payload = swings(self.profile(m));
+            payloads += usize::from(is_payload);
+            !is_payload || payloads <= 2
         });
         all
     }
@@ -416,6 +421,10 @@ impl Search<'_> {
 
     pub(crate) fn effect(&self, member: &Member) -> &'static str {
         self.catalogue.candidates[member.candidate].effect
+    }
+
+    pub(super) fn profile(&self, member: &Member) -> &Profile {
+        &self.catalogue.candidates[member.candidate].profile
     }
 
     pub(super) fn hypothesis(&self, point: &Point) -> Result<Hypothesis, GapError> {
@@ -461,13 +470,20 @@ impl Search<'_> {
 
 /// Whether an effect leaves no room for another: itself, and where flights show a ratio alone, what stands on its other side.
 fn excludes(named: &Candidate, other: &Candidate) -> bool {
-    let yaw = |c: &Candidate| {
-        c.effect == "yaw_torque_coeff"
-            || (c.effect == "inertia_error" && c.fixed.iter().any(|(_, axis)| *axis as usize == 2))
-    };
-    let thrust = |c: &Candidate| ["mass_error", "thrust_coefficient"].contains(&c.effect);
+    let on_one_ratio = ratio(named).is_some() && ratio(named) == ratio(other);
     // Two rotors may be weak.
     let rotors = |c: &Candidate| c.effect == WEAK_ROTOR;
     let same = named.effect == other.effect && !(rotors(named) && named.fixed != other.fixed);
-    same || (thrust(named) && thrust(other)) || (yaw(named) && yaw(other))
+    same || on_one_ratio
+}
+
+/// The ratio of which a candidate, with the choices that it makes, changes one side.
+fn ratio(candidate: &Candidate) -> Option<Ratio> {
+    let side = candidate.profile.side_of?;
+    let makes = |choice: usize| candidate.fixed.iter().any(|(_, value)| *value as usize == choice);
+    side.choice.is_none_or(makes).then_some(side.ratio)
+}
+
+fn swings(profile: &Profile) -> bool {
+    matches!(profile.response, Response::Swings { .. })
 }

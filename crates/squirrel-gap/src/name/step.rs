@@ -9,6 +9,7 @@
 use super::whiten::Whitener;
 use crate::GapError;
 use crate::predictor::Predictor;
+use squirrel_core::effects::{ActuationLatency, Effect};
 
 /// Delay for which the residual changes, s: a small step.
 const DELAY_S: f64 = 0.02;
@@ -35,7 +36,7 @@ pub(crate) fn clock_step_s(predictor: &Predictor, rows: &[f64]) -> Result<Option
     let white = |rows: &[f64]| whitener.apply(&predictor.segments, rows);
     let late = |delay_s: f64| -> Result<Vec<f64>, GapError> {
         let mut late = predictor.nominal();
-        if let Some(found) = late.effects.insert("actuation_latency") {
+        if let Some(found) = late.effects.insert(ActuationLatency::<f64>::NAME) {
             found.values[0] += delay_s;
         }
         Ok(white(&predictor.residual(&late)?))

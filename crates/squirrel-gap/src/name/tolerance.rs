@@ -4,6 +4,7 @@ use super::point::Airframe;
 use crate::GapError;
 use crate::number::significant;
 use crate::predictor::Predictor;
+use squirrel_core::effects::{Declared, Timing, Tolerance};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.
@@ -18,8 +19,6 @@ const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.03, "m/s
 /// Of scales, as fractions, what a file says is the scatter from one switching on to the next.
 const GYRO_SCALE: (&str, f64) = ("sensors.imu.gyro_scale_sd", 0.01);
 const ACCEL_SCALE: (&str, f64) = ("sensors.imu.accel_scale_sd", 0.003);
-/// Heading error in hover of a compass near power leads, rad: about a degree at full throttle.
-const COMPASS_RAD: f64 = 0.006;
 const HEADING: (&str, f64, &str) = ("sensors.attitude.bias_rad", 1.25_f64.to_radians(), "rad");
 
 /// What the vehicle file does not say and is taken instead.
@@ -41,83 +40,76 @@ pub(crate) fn notes(vehicle: &VehicleFile) -> Vec<String> {
     notes
 }
 
-/// By how much a filter's velocity is late, one standard deviation, s.
-const VELOCITY_LAG_S: f64 = 0.02;
-
 /// How far the number that an effect changes may be off, one standard deviation, in the unit of the effect's parameter.
 pub(super) fn tolerance(
     vehicle: &VehicleFile,
-    effect: &str,
+    within: Tolerance,
     slot: usize,
     fixed: &[(usize, f64)],
     smallest: f64,
 ) -> Result<f64, GapError> {
+    let none = SHARE_OF_SMALLEST * smallest;
+    let declared = match within {
+        Tolerance::PartOfSmallest | Tolerance::RotorAxes => return Ok(none),
+        Tolerance::Nothing => return Ok(0.0),
+        Tolerance::Usual(sd) => return Ok(sd),
+        Tolerance::Declared(number) => number,
+    };
     let p = vehicle.vehicle.parameters();
     let propulsion = &p.propulsion;
-    let none = SHARE_OF_SMALLEST * smallest;
-    let number = |field: &str, index: usize, value: f64| deviation(vehicle, field, index, value);
+    let number = |field: &str, value: f64| Ok(deviation(vehicle, field, 0, value)?.unwrap_or(none));
     // The sd of a number that the file must give where the number is not zero, over that number.
     let fraction = |field: &str, index: usize, value: f64| {
-        Ok(number(field, index, value)?.map_or(none, |sd| sd / value.abs().max(f64::MIN_POSITIVE)))
+        let sd = deviation(vehicle, field, index, value)?;
+        Ok(sd.map_or(none, |sd| sd / value.abs().max(f64::MIN_POSITIVE)))
     };
-    let stated = |sd: f64, fallback: f64| if sd > 0.0 { sd } else { fallback };
-    let declared = |field: &str, fallback: f64| {
+    let stated = |sd: f64, fallback: f64| Ok(if sd > 0.0 { sd } else { fallback });
+    let of_sensor = |field: &str, fallback: f64| {
         Ok(sds(vehicle, field).map_or(fallback, |sd| sd[slot.min(sd.len() - 1)]))
     };
-    Ok(match effect {
-        "mass_error" => fraction("mass.mass_kg", 0, p.mass_kg)?,
-        "inertia_error" => {
+    match declared {
+        Declared::Mass => fraction("mass.mass_kg", 0, p.mass_kg),
+        Declared::Inertia => {
             let axis = fixed.first().map_or(0, |(_, axis)| *axis as usize);
-            fraction("mass.inertia_kg_m2", axis, p.inertia_kg_m2[(axis, axis)])?
+            fraction("mass.inertia_kg_m2", axis, p.inertia_kg_m2[(axis, axis)])
         }
-        "thrust_coefficient" | "weak_rotor" => {
-            fraction("propulsion.thrust_coefficient_n_s2", 0, propulsion.thrust_coefficient_n_s2)?
+        Declared::Thrust => {
+            fraction("propulsion.thrust_coefficient_n_s2", 0, propulsion.thrust_coefficient_n_s2)
         }
-        "yaw_torque_coeff" => {
-            fraction("propulsion.torque_coefficient_n_m_s2", 0, propulsion.torque_coefficient_n_m_s2)?
+        Declared::Torque => {
+            fraction("propulsion.torque_coefficient_n_m_s2", 0, propulsion.torque_coefficient_n_m_s2)
         }
-        "motor_lag" => {
-            let single = sds(vehicle, "propulsion.time_constant_s");
-            match single {
-                Some(sd) => sd[0],
-                None if vehicle.provenance.iter().any(|(f, _)| f == "propulsion.time_constant_up_s") => {
-                    number("propulsion.time_constant_up_s", 0, propulsion.time_constant_up_s)?.unwrap_or(none)
-                }
-                None => {
-                    number("propulsion.time_constant_s", 0, propulsion.time_constant_up_s)?.unwrap_or(none)
-                }
+        Declared::RotorLag => {
+            if let Some(single) = sds(vehicle, "propulsion.time_constant_s") {
+                return Ok(single[0]);
             }
+            let up = "propulsion.time_constant_up_s";
+            let has_two = vehicle.provenance.iter().any(|(field, _)| field == up);
+            number(if has_two { up } else { "propulsion.time_constant_s" }, propulsion.time_constant_up_s)
         }
-        "linear_drag" => number("drag.linear_n_s_per_m", 0, p.drag.linear_n_s_per_m.x)?.unwrap_or(none),
-        "quadratic_drag" => number("drag.area_m2", 0, p.drag.area_m2)?.unwrap_or(none),
-        "wing_membrane" if slot == 0 => match p.wing {
-            Some(wing) => fraction("wing.normal_force_slope", 0, wing.normal_force_slope)?,
-            None => none,
+        Declared::LinearDrag(axis) => {
+            let drag = "drag.linear_n_s_per_m";
+            Ok(deviation(vehicle, drag, axis, p.drag.linear_n_s_per_m[axis])?.unwrap_or(none))
+        }
+        Declared::DragArea => number("drag.area_m2", p.drag.area_m2),
+        Declared::WingForce => match p.wing {
+            Some(wing) => fraction("wing.normal_force_slope", 0, wing.normal_force_slope),
+            None => Ok(none),
         },
-        "wing_asymmetry" => match p.wing {
-            Some(wing) => fraction("wing.normal_force_slope", 0, wing.normal_force_slope)?,
-            None => none,
+        Declared::WingLag => match p.wing {
+            Some(wing) => number("wing.time_constant_s", wing.time_constant_s),
+            None => Ok(none),
         },
-        "wing_servo_lag" => match p.wing {
-            Some(wing) => number("wing.time_constant_s", 0, wing.time_constant_s)?.unwrap_or(none),
-            None => none,
-        },
-        "cg_offset" => {
+        Declared::RotorPlaces => {
             let all = arms_m(vehicle, slot);
             let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
-            mean.max(none)
+            Ok(mean.max(none))
         }
-        "accel_bias" => declared(ACCEL_BIAS.0, ACCEL_BIAS.1)?,
-        "heading_bias" => declared(HEADING.0, HEADING.1)?,
-        "gyro_scale" => stated(vehicle.sensors.imu.gyro_scale_sd, GYRO_SCALE.1),
-        "accel_scale" => stated(vehicle.sensors.imu.accel_scale_sd, ACCEL_SCALE.1),
-        "compass_current" => COMPASS_RAD,
-        "constant_wind" => 0.12,
-        "gnss_latency" => VELOCITY_LAG_S,
-        // A vehicle carries a load or it does not, a clock jumps or it does not; a ground effect of a small radius is none.
-        "payload_swing" | "clock_step" | "ground_effect" => 0.0,
-        _ => none,
-    })
+        Declared::AccelBias => of_sensor(ACCEL_BIAS.0, ACCEL_BIAS.1),
+        Declared::HeadingBias => of_sensor(HEADING.0, HEADING.1),
+        Declared::GyroScale => stated(vehicle.sensors.imu.gyro_scale_sd, GYRO_SCALE.1),
+        Declared::AccelScale => stated(vehicle.sensors.imu.accel_scale_sd, ACCEL_SCALE.1),
+    }
 }
 
 /// The declared sds of the rotors' places along an axis.
@@ -158,12 +150,12 @@ pub(crate) fn sds(vehicle: &VehicleFile, field: &str) -> Option<Vec<f64>> {
 
 /// How well a log tells when things happen, in the unit of an effect that is about time: a part of a sample, a clock's over
 /// its flight.
-pub(super) fn timing_s(predictor: &Predictor, effect: &str) -> Option<f64> {
+pub(super) fn spread_s(predictor: &Predictor, timing: Option<Timing>) -> Option<f64> {
     let period_s = predictor.tracks.iter().map(|track| track.period_s).fold(0.0, f64::max);
-    match effect {
-        "actuation_latency" | "gnss_latency" => Some(SAMPLE_SHARE * period_s),
-        "clock_skew" => Some(SAMPLE_SHARE * slip_ppm(predictor)),
-        _ => None,
+    match timing? {
+        Timing::Latency => Some(SAMPLE_SHARE * period_s),
+        Timing::ClockRate => Some(SAMPLE_SHARE * slip_ppm(predictor)),
+        Timing::ClockJump => None,
     }
 }
 

@@ -24,7 +24,7 @@ use crate::report::{
 };
 use crate::shrink::{BIN_S, BINS, CHANNELS as FLOWN_CHANNELS};
 use crate::verdict::{Kind, NamedEffect, RotorHealth, Value};
-use squirrel_core::effects::{Effects, Kind as ParameterKind, SizeRange};
+use squirrel_core::effects::{Effect, Effects, Gust, Kind as ParameterKind, SizeRange};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
 use units::{unit, without_unit};
@@ -69,7 +69,7 @@ pub(crate) fn seen(search: &Search<'_>, naming: &Naming, rivals: &[Scored]) -> R
     }
     if naming.gust_m_s.is_some() {
         let (beside, worth) = sets.pop().map_or((String::new(), 0.0), |(n, x)| (n + " + ", x));
-        sets.push((beside + "gust", worth + naming.gust_nats));
+        sets.push((beside + Gust::<f64>::NAME, worth + naming.gust_nats));
     }
     let has_answer = !sets.is_empty();
     for rival in rivals {
@@ -80,7 +80,7 @@ pub(crate) fn seen(search: &Search<'_>, naming: &Naming, rivals: &[Scored]) -> R
     }
     let catalogue = search.catalogue;
     let own = |p: &usize| &catalogue.parameters[*p];
-    let mut tolerances = vec![("gust", "sigma_m_s", TURBULENCE_M_S)];
+    let mut tolerances = vec![(Gust::<f64>::NAME, Gust::<f64>::PARAMETERS[0].key, TURBULENCE_M_S)];
     for member in &found.best.members {
         let all = catalogue.candidates[member.candidate].parameters.iter().map(own);
         tolerances.extend(all.map(|p| (search.effect(member), p.key, p.tolerance)));

@@ -18,7 +18,7 @@ fn words(effect: &NamedEffect) -> [String; 3] {
         ("side", Value::Choice { value, .. }) => Some((*value).to_owned()),
         _ => None,
     });
-    let own = Effects::<f64>::words(effect.name);
+    let own = Effects::<f64>::profile(effect.name).map(|profile| profile.words);
     let all = own.map_or([effect.name; 3], |own| [own.what, own.more, own.less]);
     all.map(|words| words.replace('@', which.as_deref().unwrap_or("?")))
 }
@@ -34,7 +34,8 @@ pub(super) fn nouns(other: &Alternative) -> String {
     let nouns = if other.numbers.len() == other.effects.len() {
         other.numbers.iter().map(noun).collect()
     } else {
-        let find = |name: &str| Effects::<f64>::words(name).filter(|words| !words.what.contains('@'));
+        let words = |name: &str| Effects::<f64>::profile(name).map(|profile| profile.words);
+        let find = |name: &str| words(name).filter(|words| !words.what.contains('@'));
         let noun =
             |name: &&str| find(name).map_or((*name).to_owned(), |words| format!("{} ({name})", words.what));
         other.effects.iter().map(noun).collect::<Vec<_>>()

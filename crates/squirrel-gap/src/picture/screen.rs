@@ -13,6 +13,7 @@ use crate::name::NATS_MIN;
 use crate::report::{Answer, ReportData};
 use crate::verdict::{Alternative, Kind, NamedEffect, Verdict};
 use crate::words::spoken;
+use squirrel_core::effects::{Effect, Gust};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Evidence from which on the next explanation is out of the question, nats. Below [`NATS_MIN`], held-out flights have
@@ -41,7 +42,8 @@ type Behind<'a> = Option<(&'a Alternative, f64)>;
 /// explanations stand beside the answer without them.
 fn behind<'a>(verdict: &'a Verdict, data: &ReportData) -> Behind<'a> {
     let whole = data.evidence.iter().find(|e| e.is_answer)?.nats;
-    let gusts: f64 = verdict.effects.iter().filter(|e| e.name == "gust").map(|e| e.evidence_nats).sum();
+    let gusts: f64 =
+        verdict.effects.iter().filter(|e| e.name == Gust::<f64>::NAME).map(|e| e.evidence_nats).sum();
     let has = |other: &Alternative, effect: &NamedEffect| {
         let same = |own: &NamedEffect| own.name == effect.name && noun(own) == noun(effect);
         if other.numbers.is_empty() {
@@ -50,7 +52,7 @@ fn behind<'a>(verdict: &'a Verdict, data: &ReportData) -> Behind<'a> {
             other.numbers.iter().any(same)
         }
     };
-    let calm = || verdict.effects.iter().filter(|e| e.name != "gust");
+    let calm = || verdict.effects.iter().filter(|e| e.name != Gust::<f64>::NAME);
     let rival = verdict.alternatives.iter().find(|other| !calm().all(|effect| has(other, effect)))?;
     let nats = whole - gusts - rival.evidence_nats;
     nats.is_finite().then_some((rival, nats))

@@ -5,7 +5,7 @@ use super::commands::Commands;
 use super::kept::Kept;
 use super::{SETTLE_S, Track};
 use squirrel_core::dynamics::RotorDrive;
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Effects, Prepared, Present};
 use squirrel_sim::plant::{Actuators, Plant};
 use std::rc::Rc;
 
@@ -133,5 +133,5 @@ pub(crate) fn stride(effects: &Effects<f64>, track: &Track) -> usize {
 
 /// Whether moments jump with the rotors' acceleration, and that with their commands.
 pub(crate) fn jumps(effects: &Effects<f64>) -> bool {
-    effects.has("rotor_gyro_torque")
+    Prepared::<f64>::feel_rotor_spin(Present::of(effects))
 }

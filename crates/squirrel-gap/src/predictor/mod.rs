@@ -32,7 +32,7 @@ use crate::flight::recording::Recording;
 use actuators::{Path, Paths, stride};
 use kept::Kept;
 use nalgebra::{Vector3, Vector6};
-use squirrel_core::effects::Effects;
+use squirrel_core::effects::{Effect, Effects, ThrustCoefficient};
 use squirrel_core::vehicle::{PerRotor, Vehicle};
 use squirrel_log::FlightLog;
 use squirrel_sim::plant::{Plant, PlantState};
@@ -89,7 +89,7 @@ impl Hypothesis {
     fn in_flight(&self, flight: usize) -> Option<Self> {
         let fraction = *self.thrust.get(flight).filter(|fraction| **fraction != 0.0)?;
         let mut day = Effects::none();
-        day.insert("thrust_coefficient")?.values[0] = fraction;
+        day.insert(ThrustCoefficient::<f64>::NAME)?.values[0] = fraction;
         Some(Self { vehicle: day.alter(&self.vehicle).ok()?, ..self.clone() })
     }
 }

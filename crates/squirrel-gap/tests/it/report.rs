@@ -11,43 +11,6 @@ use squirrel_gap::report::{
     HeldOutChannel, Horizon, InputCorrelation, PANELS, ParameterRow, ReportData, RotorRow, Whiteness, render,
 };
 
-/// The catalogue of effects as the report is meant for: 33 names.
-const CATALOGUE: [&str; 33] = [
-    "linear_drag",
-    "quadratic_drag",
-    "constant_wind",
-    "gust",
-    "ground_effect",
-    "battery_sag",
-    "thrust_coefficient",
-    "motor_lag",
-    "weak_rotor",
-    "mass_error",
-    "inertia_error",
-    "cg_offset",
-    "thrust_misalignment",
-    "translational_lift",
-    "axial_inflow",
-    "flapping_moment",
-    "rotor_gyro_torque",
-    "yaw_torque_coeff",
-    "angular_damping",
-    "actuation_latency",
-    "wing_membrane",
-    "wing_asymmetry",
-    "wing_servo_lag",
-    "added_mass",
-    "accel_bias",
-    "heading_bias",
-    "gnss_latency",
-    "clock_skew",
-    "gyro_scale",
-    "accel_scale",
-    "compass_current",
-    "clock_step",
-    "payload_swing",
-];
-
 /// Reproducible, between -1 and 1.
 fn noise(i: usize) -> f64 {
     let bits = (i as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
@@ -80,7 +43,7 @@ fn flight(name: &str, windows: usize) -> FlightPanel {
 
 #[allow(clippy::too_many_lines, reason = "one example that fills every panel")]
 fn example() -> ReportData {
-    let names = CATALOGUE;
+    let names = Effects::<f64>::NAMES;
     let evidence = |(i, name): (usize, &&str)| Evidence {
         name: (*name).to_owned(),
         nats: match i {
@@ -176,7 +139,7 @@ fn example() -> ReportData {
             .to_owned(),
         channels: channels.map(str::to_owned).to_vec(),
         flights: vec![flight("rich 0", 80), flight("rich 1", 80)],
-        evidence: CATALOGUE.iter().enumerate().map(evidence).collect(),
+        evidence: names.iter().enumerate().map(evidence).collect(),
         conditional: vec![
             conditional("fx", "forward airspeed"),
             conditional("fy", "sideways airspeed"),

@@ -17,7 +17,7 @@ use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::wing_force::ForceModel;
 use squirrel_core::control::woeg::{WingEvents, WingTest};
-use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, base_number, forms};
+use squirrel_core::effects::{EffectParameter, Effects, FORM, Kind, forms};
 use squirrel_core::estimate::navigator::Navigation;
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
@@ -297,7 +297,7 @@ fn effects(
             }
             found.values[i] = effect_value(value, found.parameters[i].kind, rotor_count)
                 .map_err(|reason| format!("{field}: {reason}"))?;
-            let sum = base_number(&name, found.parameters[i].key, vehicle);
+            let sum = found.parameters[i].base_number(vehicle);
             if let Some((own, base)) = sum.filter(|(_, base)| base + found.values[i] < 0.0) {
                 let value = found.values[i];
                 return Err(format!("{field} = {value}: takes away more than there is, {own} = {base}"));
