@@ -5,6 +5,7 @@
 //! - [`find`](mod@find) measures the disagreement: residual force and moment of flights against a vehicle.
 //! - [`diagnose()`] names what is missing and proves it on held-out flights in open loop.
 //! - [`add()`] writes the vehicle file with it; [`closed_loop()`] flies held-out flights again with both.
+//! - [`Workflow`] is all of that in a row, with a report.
 //!
 //! The physics is that of the simulator; nothing of it is written here again.
 
@@ -29,6 +30,7 @@ pub mod report;
 mod shrink;
 mod verdict;
 mod words;
+mod workflow;
 
 pub use add::{add, add_effect, difference, fit, patched};
 pub use baseline::Baseline;
@@ -44,6 +46,7 @@ pub use verdict::{
     Alternative, Gap, Kind, Left, Moved, NamedEffect, RotorHealth, SetAside, Since, Value, Verdict,
     nothing_to_add,
 };
+pub use workflow::{Flights, Patched, Workflow};
 
 /// The sources of a flight log that the workflow looks at.
 pub const SOURCES: [&str; 7] = ["attitude", "baro", "battery", "gnss", "imu", "rotor", "wing"];

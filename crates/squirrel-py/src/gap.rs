@@ -8,14 +8,12 @@ use crate::vehicle::{Vehicle, write_file};
 use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
+use squirrel_gap::{Flights, Verdict, Workflow};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::{Path, PathBuf};
 
 /// Names and logs in the order of the dictionary.
-pub(crate) fn logs(
-    argument: &str,
-    flights: &Bound<'_, PyDict>,
-) -> PyResult<Vec<(String, squirrel_log::FlightLog)>> {
+pub(crate) fn logs(argument: &str, flights: &Bound<'_, PyDict>) -> PyResult<Flights> {
     let named = flights.iter().map(|(name, log)| {
         let wrong = || {
             value(format!(
@@ -67,55 +65,36 @@ pub(crate) fn gap_diagnose<'py>(
     let (flights, held_out) = (logs("flights", flights)?, logs("held_out", held_out)?);
     let baseline = logs("baseline", baseline)?;
     let (verdict, patched) = interruptible(py, move |stop| {
-        diagnose(&vehicle, [&flights, &held_out, &baseline], [fit, fly_again], out.as_deref(), stop)
+        diagnose(vehicle, [flights, held_out, baseline], [fit, fly_again], out.as_deref(), stop)
     })??;
     Ok((json(py, &verdict)?, patched.map(|file| Vehicle { file })))
 }
 
-type Logs = [(String, squirrel_log::FlightLog)];
-
+/// * `out` - folder for the report and the patched vehicle file
 fn diagnose(
-    vehicle: &VehicleFile,
-    [flights, held_out, baseline]: [&Logs; 3],
+    vehicle: VehicleFile,
+    [flights, held_out, baseline]: [Flights; 3],
     [fit, fly_again]: [bool; 2],
     out: Option<&Path>,
     stop: &Stop,
-) -> PyResult<(squirrel_gap::Verdict, Option<VehicleFile>)> {
+) -> PyResult<(Verdict, Option<VehicleFile>)> {
     let tick = |_: &str| stop.check();
-    let mut diagnosis =
-        squirrel_gap::diagnose_with(vehicle, baseline, flights, held_out, &tick).map_err(value)?;
-    let looked_at = |logs: &Logs| -> Vec<(String, squirrel_log::FlightLog)> {
-        logs.iter().filter(|(name, _)| diagnosis.verdict.has_looked_at(name)).cloned().collect()
-    };
-    // Whole logs are copied only where some are left out.
-    let fewer = (!diagnosis.verdict.set_aside.is_empty()).then(|| [looked_at(flights), looked_at(held_out)]);
-    let (flights, held_out) =
-        fewer.as_ref().map_or((flights, held_out), |[f, h]| (f.as_slice(), h.as_slice()));
-    let names = |logs: &Logs| logs.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    let text = squirrel_gap::patched(vehicle, &diagnosis, &names(flights), fit).map_err(value)?.ok();
-    let patched = text
-        .as_ref()
-        .map(|text| VehicleFile::parse_with(text, &vehicle.name, vehicle.weights.clone()))
-        .transpose()
-        .map_err(|e| crate::error::vehicle(&e))?;
+    let mut found = Workflow::diagnose(vehicle, &baseline, flights, held_out, &tick).map_err(value)?;
+    let patched = found.patched(fit).map_err(value)?.ok();
     if fly_again && let Some(patched) = &patched {
         stop.check();
-        let (flown, notes) = squirrel_gap::closed_loop(vehicle, patched, held_out).map_err(value)?;
-        diagnosis.verdict.closed_loop = flown;
-        diagnosis.verdict.notes.extend(notes);
+        found.fly_again(patched).map_err(value)?;
     }
     stop.check();
     if let Some(folder) = out {
         let fail = |e: std::io::Error| crate::error::system(e.kind(), format!("{}: {e}", folder.display()));
         std::fs::create_dir_all(folder).map_err(fail)?;
-        if let Some(text) = &text {
+        if let Some(patched) = &patched {
             let path = folder.join("vehicle.toml");
-            write_file(&path, text.as_bytes())?;
-            diagnosis.verdict.model_patch = Some(path.display().to_string());
+            write_file(&path, patched.text.as_bytes())?;
+            found.diagnosis.verdict.model_patch = Some(path.display().to_string());
         }
-        let picture =
-            squirrel_gap::picture(vehicle, &diagnosis, &names(flights), &names(held_out), text.as_deref());
-        write_file(&folder.join("report.html"), squirrel_gap::report::render(&picture).as_bytes())?;
+        write_file(&folder.join("report.html"), found.report(patched.as_ref()).as_bytes())?;
     }
-    Ok((diagnosis.verdict, patched))
+    Ok((found.diagnosis.verdict, patched.map(|patched| patched.vehicle)))
 }

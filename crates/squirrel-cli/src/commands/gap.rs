@@ -4,7 +4,8 @@ use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use crate::paths::log_files;
 use squirrel_gap::{
-    ClosedLoop, Diagnosis, Kind, Moved, NamedEffect, RotorHealth, Value, Verdict, significant,
+    ClosedLoop, Flights, Kind, Moved, NamedEffect, Patched, RotorHealth, Value, Verdict, Workflow,
+    significant,
 };
 use squirrel_log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
@@ -76,39 +77,6 @@ pub(crate) struct Given {
     json: Option<PathBuf>,
 }
 
-type Logs = Vec<(String, FlightLog)>;
-
-/// A diagnosis with what it is of.
-struct Found {
-    vehicle: VehicleFile,
-    flights: Vec<String>,
-    held_out: Logs,
-    diagnosis: Diagnosis,
-}
-
-impl Found {
-    /// Text of the vehicle file with the named effects, or why the verdict has none that a file can take.
-    ///
-    /// * `fit` - whether a file with its numbers where these flights have them will do
-    fn patched(&self, fit: bool) -> Result<Result<String, String>, String> {
-        squirrel_gap::patched(&self.vehicle, &self.diagnosis, &self.flights, fit)
-    }
-
-    /// Flies held-out flights again with the effects added.
-    fn fly_again(&mut self, patched: &str) -> Result<(), String> {
-        let patched = VehicleFile::parse(patched, &self.vehicle.name).map_err(|e| e.to_string())?;
-        let bar = output::spinner();
-        bar.set_message("flying in closed loop");
-        let flown = squirrel_gap::closed_loop(&self.vehicle, &patched, &self.held_out);
-        bar.finish_and_clear();
-        let (flown, notes) = flown.map_err(|e| e.to_string())?;
-        let verdict = &mut self.diagnosis.verdict;
-        verdict.closed_loop = flown;
-        verdict.notes.extend(notes);
-        Ok(())
-    }
-}
-
 impl Gap {
     pub(crate) fn run(&self) -> Result<(), String> {
         match self {
@@ -137,12 +105,12 @@ impl Given {
         paths.check()
     }
 
-    fn read(&self) -> Result<(VehicleFile, Logs, Logs), String> {
+    fn read(&self) -> Result<(VehicleFile, Flights, Flights), String> {
         let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
         Ok((vehicle, logs(&self.flights)?, logs(&self.held_out)?))
     }
 
-    fn diagnose(&self) -> Result<Found, String> {
+    fn diagnose(&self) -> Result<Workflow, String> {
         let (vehicle, flights, held_out) = self.read()?;
         let good = logs(&self.baseline)?;
         let bar = output::spinner();
@@ -150,13 +118,9 @@ impl Given {
             bar.set_message(what.to_owned());
             bar.inc(1);
         };
-        let diagnosis = squirrel_gap::diagnose_with(&vehicle, &good, &flights, &held_out, &tell);
+        let found = Workflow::diagnose(vehicle, &good, flights, held_out, &tell);
         bar.finish_and_clear();
-        let diagnosis = diagnosis.map_err(|e| e.to_string())?;
-        let looked_at = |flight: &(String, FlightLog)| diagnosis.verdict.has_looked_at(&flight.0);
-        let held_out = held_out.into_iter().filter(looked_at).collect();
-        let flights = flights.into_iter().filter(looked_at).map(|(name, _)| name).collect();
-        Ok(Found { vehicle, flights, held_out, diagnosis })
+        found.map_err(|e| e.to_string())
     }
 
     fn find(&self) -> Result<(), String> {
@@ -199,12 +163,12 @@ impl Given {
         }
         self.check(&[REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
-        let text = found.patched(false)?.ok();
-        if let Some(text) = &text {
-            found.fly_again(text)?;
+        let patched = found.patched(false)?.ok();
+        if let Some(patched) = &patched {
+            fly_again(&mut found, patched)?;
         }
         show(&found.diagnosis.verdict);
-        self.report(&found, text.as_deref())?;
+        self.report(&found, patched.as_ref())?;
         self.write(&found.diagnosis.verdict)
     }
 
@@ -217,52 +181,47 @@ impl Given {
         }
         let mut found = self.diagnose()?;
         show(&found.diagnosis.verdict);
-        let text = match effect {
-            Some(effect) => {
-                Ok(squirrel_gap::add_effect(&found.vehicle, &found.diagnosis, effect, &found.flights)?)
-            }
+        let patched = match effect {
+            Some(effect) => Ok(found.with_effect(effect)?),
             None => found.patched(fit)?,
         };
         if dry_run {
-            if let Ok(text) = &text {
-                say(&squirrel_gap::difference(&found.vehicle.text, text));
+            if let Ok(patched) = &patched {
+                say(&squirrel_gap::difference(&found.vehicle().text, &patched.text));
             }
             output::write_json(self.json.as_deref(), &found.diagnosis.verdict)?;
         } else {
-            if let Ok(text) = &text {
-                self.patch(text, &mut found.diagnosis.verdict)?;
+            if let Ok(patched) = &patched {
+                self.patch(&patched.text, &mut found.diagnosis.verdict)?;
             }
             self.write(&found.diagnosis.verdict)?;
         }
-        text.map(drop)
+        patched.map(drop)
     }
 
     fn everything(&self, fit: bool) -> Result<(), String> {
         self.patch_path()?;
         self.check(&[self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
-        let text = found.patched(fit)?;
-        if let Ok(text) = &text {
-            found.fly_again(text)?;
+        let patched = found.patched(fit)?;
+        if let Ok(patched) = &patched {
+            fly_again(&mut found, patched)?;
         }
         show(&found.diagnosis.verdict);
-        match &text {
-            Ok(text) => self.patch(text, &mut found.diagnosis.verdict)?,
+        match &patched {
+            Ok(patched) => self.patch(&patched.text, &mut found.diagnosis.verdict)?,
             Err(why) => say(why),
         }
-        self.report(&found, text.as_deref().ok())?;
+        self.report(&found, patched.as_ref().ok())?;
         self.write(&found.diagnosis.verdict)
     }
 
     /// Writes the report, if there is a folder for it.
-    fn report(&self, found: &Found, patched: Option<&str>) -> Result<(), String> {
+    fn report(&self, found: &Workflow, patched: Option<&Patched>) -> Result<(), String> {
         let Some(folder) = &self.out else { return Ok(()) };
         output::folder(folder)?;
-        let held_out: Vec<String> = found.held_out.iter().map(|(name, _)| name.clone()).collect();
-        let data =
-            squirrel_gap::picture(&found.vehicle, &found.diagnosis, &found.flights, &held_out, patched);
         let path = folder.join(REPORT);
-        output::write_file(&path, squirrel_gap::report::render(&data).as_bytes())?;
+        output::write_file(&path, found.report(patched).as_bytes())?;
         say(&format!("report: {}", path.display()));
         Ok(())
     }
@@ -305,8 +264,17 @@ impl Given {
     }
 }
 
+/// Flies held-out flights again with the effects added.
+fn fly_again(found: &mut Workflow, patched: &Patched) -> Result<(), String> {
+    let bar = output::spinner();
+    bar.set_message("flying in closed loop");
+    let flown = found.fly_again(patched);
+    bar.finish_and_clear();
+    flown.map_err(|e| e.to_string())
+}
+
 /// Logs by path; a folder stands for the logs in it.
-fn logs(paths: &[PathBuf]) -> Result<Logs, String> {
+fn logs(paths: &[PathBuf]) -> Result<Flights, String> {
     log_files(paths)?
         .iter()
         .map(|path| {

@@ -1,0 +1,105 @@
+//! The workflow as a whole: flights to a diagnosis, and what follows from it: the vehicle file with what was found, held-out
+//! flights flown again with that, and the report. The command line and Python call it; they differ in where they write.
+
+use crate::GapError;
+use crate::add::{add_effect, patched};
+use crate::closed_loop::closed_loop;
+use crate::diagnose::diagnose_with;
+use crate::diagnosis::Diagnosis;
+use crate::picture::picture;
+use crate::report;
+use squirrel_log::FlightLog;
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// Flights with their names.
+pub type Flights = Vec<(String, FlightLog)>;
+
+/// A diagnosis with the vehicle and the flights that it is of.
+#[derive(Debug)]
+pub struct Workflow {
+    /// What was found out.
+    pub diagnosis: Diagnosis,
+    vehicle: VehicleFile,
+    flights: Vec<String>,
+    held_out: Flights,
+}
+
+/// A vehicle file with what was found.
+#[derive(Debug, Clone)]
+pub struct Patched {
+    /// Its text, with the comments and the order of the file before.
+    pub text: String,
+    /// The same, read.
+    pub vehicle: VehicleFile,
+}
+
+impl Workflow {
+    /// Finds out what a vehicle lacks, see [`diagnose_with`]. Flights that are set aside take no part in what follows.
+    ///
+    /// * `baseline` - good flights of the same machine; none for a vehicle that is taken as its file has it
+    ///
+    /// # Errors
+    /// As [`diagnose_with`].
+    pub fn diagnose(
+        vehicle: VehicleFile,
+        baseline: &[(String, FlightLog)],
+        flights: Flights,
+        mut held_out: Flights,
+        progress: &dyn Fn(&str),
+    ) -> Result<Self, GapError> {
+        let diagnosis = diagnose_with(&vehicle, baseline, &flights, &held_out, progress)?;
+        let looked_at = |flight: &str| diagnosis.verdict.has_looked_at(flight);
+        held_out.retain(|(name, _)| looked_at(name));
+        let flights = flights.into_iter().map(|(name, _)| name).filter(|name| looked_at(name)).collect();
+        Ok(Self { diagnosis, vehicle, flights, held_out })
+    }
+
+    /// The vehicle file as it was given.
+    pub fn vehicle(&self) -> &VehicleFile {
+        &self.vehicle
+    }
+
+    /// The vehicle file with what the verdict names, or why it names nothing that a file can take.
+    ///
+    /// * `fit` - whether the file gets its numbers as these flights have them, too
+    ///
+    /// # Errors
+    /// As [`add`](crate::add()).
+    pub fn patched(&self, fit: bool) -> Result<Result<Patched, String>, String> {
+        let text = patched(&self.vehicle, &self.diagnosis, &self.flights, fit)?;
+        text.map(|text| self.read(text)).map_or_else(|why| Ok(Err(why)), |patched| patched.map(Ok))
+    }
+
+    /// The vehicle file with one effect of an answer that is several.
+    ///
+    /// # Errors
+    /// As [`add_effect`].
+    pub fn with_effect(&self, effect: &str) -> Result<Patched, String> {
+        self.read(add_effect(&self.vehicle, &self.diagnosis, effect, &self.flights)?)
+    }
+
+    fn read(&self, text: String) -> Result<Patched, String> {
+        let weights = self.vehicle.weights.clone();
+        let vehicle =
+            VehicleFile::parse_with(&text, &self.vehicle.name, weights).map_err(|e| e.to_string())?;
+        Ok(Patched { text, vehicle })
+    }
+
+    /// Flies held-out flights again in closed loop, as the vehicle was and with what was found; the verdict then has both.
+    ///
+    /// # Errors
+    /// As [`closed_loop`].
+    pub fn fly_again(&mut self, patched: &Patched) -> Result<(), GapError> {
+        let (flown, notes) = closed_loop(&self.vehicle, &patched.vehicle, &self.held_out)?;
+        self.diagnosis.verdict.closed_loop = flown;
+        self.diagnosis.verdict.notes.extend(notes);
+        Ok(())
+    }
+
+    /// The report, a page of HTML.
+    pub fn report(&self, patched: Option<&Patched>) -> String {
+        let held_out: Vec<String> = self.held_out.iter().map(|(name, _)| name.clone()).collect();
+        let text = patched.map(|patched| patched.text.as_str());
+        report::render(&picture(&self.vehicle, &self.diagnosis, &self.flights, &held_out, text))
+    }
+}
