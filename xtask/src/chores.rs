@@ -4,7 +4,7 @@
 //! the build scripts and procedural macros; `test`, `bench` and the demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
-use crate::{firmware, python, thumb, weights, wheel};
+use crate::{effect, firmware, python, thumb, weights, wheel};
 use std::path::Path;
 use std::process::Command;
 
@@ -33,9 +33,10 @@ const LINT: [Step; 4] = [
     },
 ];
 
-const TEST: [Step; 9] = [
+const TEST: [Step; 10] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
+    Step { name: "effect", action: Action::Function(effect::step) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
     Step { name: "firmware", action: Action::Function(firmware::step) },
     Step { name: "deny", action: Action::Function(deny) },

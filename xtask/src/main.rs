@@ -3,6 +3,7 @@
 //! No dependency, so that the first command on a fresh machine starts within seconds. Talk goes to stderr.
 
 mod chores;
+mod effect;
 mod firmware;
 mod fresh;
 mod png;
@@ -17,7 +18,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 12] = [
+const CHORES: [Chore; 13] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
@@ -57,6 +58,12 @@ const CHORES: [Chore; 12] = [
         "[HTML [PNG [WIDTHxHEIGHT]]]",
         "draw a report with a headless Chromium; without a file, the gap report of a hidden effect",
         png::chore,
+    ),
+    (
+        "effect",
+        "",
+        "one more effect, as docs/adding-an-effect.md adds it, in a copy: it flies and is named",
+        effect::chore,
     ),
     ("pictures", "", "fly the README's picture again, into docs/pictures", chores::pictures),
     (

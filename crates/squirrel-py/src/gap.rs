@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyAny, PyDict};
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_gap::{Flights, Verdict, Workflow};
-use squirrel_sim::vehicle_file::VehicleFile;
+use squirrel_sim::vehicle_file::{VehicleFile, listed_effects};
 use std::path::{Path, PathBuf};
 
 /// Names and logs in the order of the dictionary.
@@ -26,6 +26,14 @@ pub(crate) fn logs(argument: &str, flights: &Bound<'_, PyDict>) -> PyResult<Flig
         Ok((name, log.get().log.clone()))
     });
     named.collect()
+}
+
+/// The effects that a vehicle file may name.
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+#[gen_stub(override_return_type(type_repr = "list[dict[str, typing.Any]]", imports = ("typing")))]
+pub(crate) fn gap_effects(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+    json(py, &listed_effects())
 }
 
 /// Where flights disagree with a vehicle, as the JSON of ``squirrel gap find``.

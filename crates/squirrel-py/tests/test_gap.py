@@ -25,6 +25,16 @@ def test_find_says_where(vehicle: squirrel.Vehicle, sagging: dict[str, squirrel.
     assert "force_body_z_n" in {place.channel for place in finding.where}
 
 
+def test_effects_are_those_that_a_vehicle_file_may_name(vehicle: squirrel.Vehicle) -> None:
+    listed = {effect["name"]: effect for effect in squirrel.gap.effects()}
+    assert list(listed) == sorted(listed)
+    sag = listed["battery_sag"]
+    assert sag["forms"][0] == "power" and sag["parameters"][0]["range"] == [0.4, 1.0]
+    with pytest.raises(ValueError, match=r"no such effect") as unknown:
+        vehicle.edited({"effects.no_such_effect.size": 1.0})
+    assert all(name in str(unknown.value) for name in listed)
+
+
 def test_run_names_what_is_missing(
     vehicle: squirrel.Vehicle, sagging: dict[str, squirrel.FlightLog], tmp_path: Path
 ) -> None:

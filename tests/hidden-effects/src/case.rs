@@ -392,9 +392,10 @@ mod tests {
             assert!(hidden(Set::Outside).outside.is_some() && hidden(Set::Outside).effects.is_empty());
             assert_eq!(hidden(Set::NoiseX3).noise, 3.0);
         }
-        let names: BTreeSet<_> =
-            (0..29).map(|index| Case::draw(Set::Single, index, 1).answer.effects[0].name.clone()).collect();
-        assert_eq!(names.len(), 29);
+        let names: BTreeSet<_> = (0..CATALOGUE.len())
+            .map(|index| Case::draw(Set::Single, index, 1).answer.effects[0].name.clone())
+            .collect();
+        assert_eq!(names.len(), CATALOGUE.len());
     }
 
     /// Half of the cases of a half set hide one effect, half of them nothing; the other new sets hide what they say.

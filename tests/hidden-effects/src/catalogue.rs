@@ -4,6 +4,7 @@
 //! for vehicles heavier than the class that the ranges were made for.
 
 use crate::draw::Draw;
+use crate::independent::twins::{Equation, angular_damping, flapping_moment};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -78,7 +79,7 @@ impl HiddenEffect {
 
 /// How a parameter, or a few together, are drawn.
 #[derive(Debug, Clone, Copy)]
-enum Quantity {
+pub(crate) enum Quantity {
     /// Between two positive sizes.
     Size { key: &'static str, smallest: f64, largest: f64 },
     /// The same, larger for a heavy vehicle.
@@ -97,7 +98,7 @@ enum Quantity {
 
 /// Effects of one kind explain much the same; two hidden effects are of different kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+pub(crate) enum Kind {
     Drag,
     SlowForce,
     Thrust,
@@ -111,32 +112,46 @@ enum Kind {
 }
 
 /// One effect of the catalogue.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Entry {
     /// Standard name.
     pub name: &'static str,
     /// Other published forms that the independent generator can fly.
     pub forms: &'static [&'static str],
+    /// Channels of the residual that it must show in, where its equation has a file of its own: force x, y, z, moment x, y, z.
+    pub shows: &'static [usize],
+    /// That equation.
+    pub(crate) equation: Option<Equation>,
     kind: Kind,
     quantities: &'static [Quantity],
 }
 
-const fn size(key: &'static str, smallest: f64, largest: f64) -> Quantity {
+pub(crate) const fn size(key: &'static str, smallest: f64, largest: f64) -> Quantity {
     Quantity::Size { key, smallest, largest }
 }
-const fn extensive(key: &'static str, smallest: f64, largest: f64) -> Quantity {
+pub(crate) const fn extensive(key: &'static str, smallest: f64, largest: f64) -> Quantity {
     Quantity::Extensive { key, smallest, largest }
 }
-const fn signed(key: &'static str, smallest: f64, largest: f64) -> Quantity {
+pub(crate) const fn signed(key: &'static str, smallest: f64, largest: f64) -> Quantity {
     Quantity::Signed { key, smallest, largest }
 }
-const fn entry(
+pub(crate) const fn entry(
     name: &'static str,
     kind: Kind,
     forms: &'static [&'static str],
     quantities: &'static [Quantity],
 ) -> Entry {
-    Entry { name, forms, kind, quantities }
+    Entry { name, forms, shows: &[], equation: None, kind, quantities }
+}
+
+impl Entry {
+    /// The same with an equation that stands in a file of its own.
+    ///
+    /// * `shows` - channels of the residual that it must show in
+    pub(crate) const fn flown_by(mut self, equation: Equation, shows: &'static [usize]) -> Self {
+        (self.equation, self.shows) = (Some(equation), shows);
+        self
+    }
 }
 
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
@@ -152,7 +167,7 @@ const BIAS: Quantity =
     Quantity::Space { keys: ["bias_x_m_s2", "bias_y_m_s2", "bias_z_m_s2"], smallest: 0.15, largest: 0.6 };
 
 /// The whole catalogue.
-pub const CATALOGUE: [Entry; 29] = [
+pub const CATALOGUE: &[Entry] = &[
     entry("linear_drag", Kind::Drag, &["anisotropic"], &[extensive("extra_drag_n_s_per_m", 0.04, 0.25)]),
     entry("quadratic_drag", Kind::Drag, &["anisotropic"], &[extensive("extra_drag_area_m2", 0.008, 0.05)]),
     entry("constant_wind", Kind::SlowForce, &["log_profile"], &[WIND]),
@@ -168,10 +183,10 @@ pub const CATALOGUE: [Entry; 29] = [
     entry("thrust_misalignment", Kind::SlowForce, &[], &[TILT]),
     entry("translational_lift", Kind::Lift, &["linear", "quadratic"], &[size("gain_s2_per_m2", 6e-4, 3e-3)]),
     entry("axial_inflow", Kind::Lift, &[], &[size("gain_s_per_m", 0.012, 0.06)]),
-    entry("flapping_moment", Kind::Moment, &[], &[extensive("gain_n_m_s_per_m", 1e-3, 6e-3)]),
+    flapping_moment::ENTRY,
     entry("rotor_gyro_torque", Kind::Yaw, &[], &[extensive("rotor_inertia_kg_m2", 4e-6, 2e-5)]),
     entry("yaw_torque_coeff", Kind::Yaw, &[], &[signed("torque_fraction", 0.12, 0.4)]),
-    entry("angular_damping", Kind::Moment, &["quadratic"], &[extensive("damping_n_m_s_per_rad", 4e-3, 0.03)]),
+    angular_damping::ENTRY,
     entry("actuation_latency", Kind::Actuation, &[], &[size("latency_s", 0.015, 0.06)]),
     entry(
         "wing_membrane",
@@ -289,7 +304,7 @@ mod tests {
         let mut names: Vec<_> = CATALOGUE.iter().map(|e| e.name).collect();
         names.sort_unstable();
         names.dedup();
-        assert_eq!(names.len(), 29);
+        assert_eq!(names.len(), CATALOGUE.len());
         assert!(CATALOGUE.iter().map(|e| e.forms.len()).sum::<usize>() >= 12);
         for pair in CONFOUNDED {
             assert!(pair.iter().all(|name| names.contains(name)), "{pair:?}");
@@ -318,7 +333,7 @@ mod tests {
 
     #[test]
     fn nothing_goes_with_itself_and_everything_with_something() {
-        for entry in &CATALOGUE {
+        for entry in CATALOGUE {
             assert!(!entry.goes_with(entry));
             let partners = CATALOGUE.iter().filter(|other| entry.goes_with(other));
             assert!(partners.count() >= 15, "{}", entry.name);

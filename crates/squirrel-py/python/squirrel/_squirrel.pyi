@@ -21,6 +21,7 @@ __all__ = [
     "derivative",
     "forward",
     "gap_diagnose",
+    "gap_effects",
     "gap_find",
     "load",
     "plan_reach",
@@ -1135,6 +1136,11 @@ def gap_diagnose(vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict
     * `fit` - whether the file gets its numbers as these flights have them, too
     * `out` - folder for the report and the patched vehicle file
     * `fly_again` - whether held-out flights are flown again in closed loop
+    """
+
+def gap_effects() -> list[dict[str, typing.Any]]:
+    r"""
+    The effects that a vehicle file may name.
     """
 
 def gap_find(vehicle: Vehicle, flights: dict[str, FlightLog]) -> dict[str, typing.Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from squirrel._squirrel import gap_diagnose, gap_find
+from squirrel._squirrel import gap_diagnose, gap_effects, gap_find
 
 if TYPE_CHECKING:
     import os
@@ -28,6 +28,7 @@ __all__ = [
     "SetAside",
     "Since",
     "Verdict",
+    "effects",
     "find",
     "name",
     "run",
@@ -367,6 +368,19 @@ class Verdict:
     set_aside: tuple[SetAside, ...]
     notes: tuple[str, ...]
     patched: Vehicle | None
+
+
+def effects() -> list[dict[str, Any]]:
+    """List the effects that a vehicle file may name, and that this workflow looks for.
+
+    Returns
+    -------
+    list of dict
+        Of each effect ``name``, ``what`` it is, the manoeuvre to ``fly`` that shows it, its ``forms`` (the standard one first), and
+        its ``parameters``: ``key``, ``forms`` that have it, ``names`` to choose from, the plausible ``range`` on a vehicle of
+        0.548 kg, what that ``grows_with``, and whether it is ``signed``.
+    """
+    return gap_effects()
 
 
 def find(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Finding:

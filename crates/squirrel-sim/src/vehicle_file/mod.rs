@@ -4,9 +4,11 @@
 //! the field and the value.
 
 mod build;
+mod effects;
 mod tables;
 
 pub use crate::quantity::Provenance;
+pub use effects::{ListedEffect, ListedParameter, effects_page, listed_effects};
 
 use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, ParnnWing, WingPlant};

@@ -14,7 +14,7 @@ use squirrel_sim::flight::{Flight, Integrator, Setup};
 use squirrel_sim::plant::Plant;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::sensors::SensorParameters;
-use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};
+use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile, effects_page, listed_effects};
 use std::fmt::Write;
 
 fn parse(effect: &str) -> Result<VehicleFile, String> {
@@ -64,6 +64,23 @@ fn every_effect_and_form_can_be_written_in_a_file() {
             assert_eq!(parse(&unsaid).unwrap().effects, parse(&table(name, standard)).unwrap().effects);
         }
     }
+}
+
+/// `SQUIRREL_EFFECTS_WRITE=1` writes the page anew.
+#[test]
+fn the_page_of_the_docs_has_every_effect() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/guide/effects.md");
+    if std::env::var_os("SQUIRREL_EFFECTS_WRITE").is_some() {
+        std::fs::write(path, effects_page()).unwrap();
+    }
+    let page = std::fs::read_to_string(path).unwrap();
+    assert!(
+        page == effects_page(),
+        "docs/guide/effects.md is not what the code has: SQUIRREL_EFFECTS_WRITE=1 writes it"
+    );
+    let names: Vec<&str> = listed_effects().iter().map(|effect| effect.name).collect();
+    assert_eq!(names, Effects::<f64>::NAMES);
+    assert!(names.iter().all(|name| page.contains(&format!("| `{name}` |"))));
 }
 
 #[test]

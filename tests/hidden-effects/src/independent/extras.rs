@@ -1,7 +1,8 @@
 //! Sizes of all effects as the equations of this generator take them; zero means absent.
 
+use super::twins::{Equation, Sight};
 use crate::airframe::MAX_ROTORS;
-use crate::catalogue::HiddenEffect;
+use crate::catalogue::{CATALOGUE, HiddenEffect};
 use nalgebra::{Vector2, Vector3};
 
 /// A thrust gain over the speed across the rotors, m/s.
@@ -69,11 +70,7 @@ pub(super) struct Extras {
     pub(super) tilt: Vector2<f64>,
     pub(super) lift: Lift,
     pub(super) inflow: f64,
-    pub(super) flapping: f64,
     pub(super) rotor_inertia: f64,
-    /// Damping, N m s/rad, and whether it grows with the rate (then over 1 rad/s).
-    pub(super) damping: f64,
-    pub(super) quadratic_damping: bool,
     pub(super) wing_gain: f64,
     /// Airspeed from which the gain is full, m/s.
     pub(super) wing_gain_speed_m_s: f64,
@@ -90,9 +87,16 @@ pub(super) struct Extras {
     pub(super) payload_kg: f64,
     pub(super) payload_length_m: f64,
     pub(super) payload_damping_per_s: f64,
+    /// Those whose equation stands in a file of its own.
+    own: Vec<(HiddenEffect, Equation)>,
 }
 
 impl Extras {
+    /// Force and moment of those whose equation stands in a file of its own.
+    pub(super) fn wrenches(&self, at: Sight) -> impl Iterator<Item = [Vector3<f64>; 2]> {
+        self.own.iter().map(move |(effect, equation)| equation(effect, &at))
+    }
+
     pub(super) fn new(effects: &[HiddenEffect]) -> Self {
         let mut extras = Self {
             linear_drag: Vector3::zeros(),
@@ -112,10 +116,8 @@ impl Extras {
             tilt: Vector2::zeros(),
             lift: Lift::None,
             inflow: 0.0,
-            flapping: 0.0,
+            own: Vec::new(),
             rotor_inertia: 0.0,
-            damping: 0.0,
-            quadratic_damping: false,
             wing_gain: 0.0,
             wing_gain_speed_m_s: 0.0,
             wing_angle_rad: 0.0,
@@ -198,13 +200,8 @@ impl Extras {
                 };
             }
             "axial_inflow" => self.inflow = x("gain_s_per_m"),
-            "flapping_moment" => self.flapping = x("gain_n_m_s_per_m"),
             "rotor_gyro_torque" => self.rotor_inertia = x("rotor_inertia_kg_m2"),
             "yaw_torque_coeff" => self.torque.iter_mut().for_each(|q| *q *= 1.0 + x("torque_fraction")),
-            "angular_damping" => {
-                self.damping = x("damping_n_m_s_per_rad");
-                self.quadratic_damping = !standard;
-            }
             "actuation_latency" => self.latency_s = x("latency_s"),
             "wing_membrane" => {
                 self.wing_gain = x("gain");
@@ -228,7 +225,11 @@ impl Extras {
                 self.payload_length_m = x("length_m");
                 self.payload_damping_per_s = if standard { PAYLOAD_DAMPING_PER_S } else { 1.2 };
             }
-            other => panic!("no equation for the effect `{other}`"),
+            other => {
+                let own = CATALOGUE.iter().find(|entry| entry.name == other).and_then(|entry| entry.equation);
+                let Some(equation) = own else { panic!("no equation for the effect `{other}`") };
+                self.own.push((effect.clone(), equation));
+            }
         }
     }
 }

@@ -13,6 +13,7 @@ mod physics;
 mod programme;
 mod sensors;
 mod state;
+pub(crate) mod twins;
 mod unknown;
 mod unmodelled;
 

@@ -3,6 +3,7 @@
 use super::extras::{Extras, Ground, Lift, Sag};
 use super::features::{self, FEATURES};
 use super::state::State;
+use super::twins::Sight;
 use super::unknown::{self, Motion};
 use super::unmodelled::Unmodelled;
 use crate::airframe::{AIR_DENSITY_KG_M3, Airframe, GRAVITY_M_S2, MAX_ROTORS};
@@ -180,9 +181,10 @@ impl World {
         // The centre of mass is off the point that all this refers to.
         moment -= x.cg_m.cross(&force);
         force -= thrust * Vector3::new(x.tilt.x, x.tilt.y, 0.0);
-        moment += x.flapping * Vector3::new(-v.y, v.x, 0.0);
-        let damped = Vector3::new(omega.x, omega.y, 0.5 * omega.z);
-        moment -= x.damping * if x.quadratic_damping { damped.component_mul(&omega.abs()) } else { damped };
+        for [own_force, own_moment] in x.wrenches(Sight { air_body: v, omega }) {
+            force += own_force;
+            moment += own_moment;
+        }
         let e3 = Vector3::z();
         moment -= x.rotor_inertia * (omega.cross(&e3) * spin + e3 * spin_rate);
         force += unknown.force_body + rotation.tr_mul(&unknown.force_ned);

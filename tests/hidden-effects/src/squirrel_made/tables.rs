@@ -168,7 +168,7 @@ mod tests {
     #[test]
     fn squirrel_knows_every_effect_and_form_of_the_bench() {
         let nominal = Airframe::draw(&mut Draw::new(1));
-        for entry in &CATALOGUE {
+        for entry in CATALOGUE {
             for form in ["standard"].iter().chain(entry.forms) {
                 let effect = entry.draw(&mut Draw::new(2), form, 0.5, 4);
                 let text = nominal.to_toml() + &effect_table(&effect);

@@ -6,3 +6,4 @@ mod flights;
 mod identify_then_fly;
 mod seen_by_find;
 mod squirrel_made;
+mod twins;

@@ -1,0 +1,187 @@
+//! One more effect, as `docs/adding-an-effect.md` adds it, in a copy of the repository: that page is true, and an effect is a file
+//! and a line.
+
+use crate::run::{call, output, root, target_directory};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::SystemTime;
+
+const PAGE: &str = "docs/adding-an-effect.md";
+/// Below it lies the effect, whose file has its name.
+const EFFECTS: &str = "crates/squirrel-core/src/effects/";
+const LIST: &str = "docs/guide/effects.md";
+/// Most lines that the page may add beside its new files: two of the compiler, two of the catalogues.
+const LINES_MAX: usize = 4;
+/// What is asked of the copy, by module. The last two ask for one effect by `SQUIRREL_EFFECT`.
+const TESTS: [&str; 4] = ["effects::", "craft::", "seen_by_find::", "twins::"];
+
+/// `cargo xtask effect`.
+pub(crate) fn chore(_: &[String]) -> Result<(), String> {
+    step().map(|note| eprintln!("ok, {note}"))
+}
+
+/// As [`chore`], with a note for the table.
+///
+/// # Errors
+/// The page is no patch, adds more than it says, or the effect misses something.
+pub(crate) fn step() -> Result<String, String> {
+    let (root, copy) = (root()?, target_directory()?.join("effect"));
+    let page = read(&root.join(PAGE))?;
+    let page = Page::of(&page);
+    let name = page.effect().ok_or(format!("{PAGE}: no file below {EFFECTS}"))?;
+    let lines = page.changed_lines();
+    if lines.iter().any(|line| line.starts_with('-')) || lines.len() > LINES_MAX {
+        return Err(format!("{PAGE}: an effect is a file and a line, and changes {lines:#?}"));
+    }
+    copied(&root, &copy)?;
+    for (path, text) in &page.files {
+        write(&copy.join(path), text.as_bytes())?;
+    }
+    let patch = copy.join("effect.patch");
+    write(&patch, page.patch.as_bytes())?;
+    // The copy may lie in a repository, of which it is no part.
+    call(
+        Command::new("git")
+            .current_dir(&copy)
+            .env("GIT_CEILING_DIRECTORIES", copy.parent().unwrap_or(&copy))
+            .args(["apply", "effect.patch"]),
+    )?;
+    let since = modified(&root.join(PAGE))?;
+    for path in page.paths() {
+        keep_time(&copy.join(path), modified(&root.join(path)).map_or(since, |time| time.max(since)))?;
+    }
+    tested(&copy, name)?;
+    if !read(&copy.join(LIST))?.contains(&format!("| `{name}` |")) {
+        return Err(format!("{LIST}: does not list {name}"));
+    }
+    Ok(format!("{name} in {} lines and {} files", lines.len(), page.files.len()))
+}
+
+/// Runs the tests in the copy, with the features of the simulator that the whole workspace has.
+fn tested(copy: &Path, name: &str) -> Result<(), String> {
+    let mut command = Command::new("cargo");
+    command.current_dir(copy).env("CARGO_TARGET_DIR", target_directory()?);
+    command.env("SQUIRREL_EFFECT", name).env("SQUIRREL_EFFECTS_WRITE", "1");
+    command.args(["test", "--release", "--locked", "-p", "squirrel-sim", "-p", "hidden-effects"]);
+    command.args(["--features", "squirrel-sim/rapier", "--test", "it", "--test", "batch", "--"]).args(TESTS);
+    let done = command.stderr(Stdio::inherit()).output().map_err(|error| format!("cargo: {error}"))?;
+    let said = String::from_utf8_lossy(&done.stdout);
+    eprint!("{said}");
+    if !done.status.success() {
+        return Err(format!("the tests in {}: {}", copy.display(), done.status));
+    }
+    // What is filtered by a name that is gone runs nothing, and fails nothing.
+    let missing = TESTS.iter().find(|module| !said.contains(&format!("test {module}")));
+    missing.map_or(Ok(()), |module| Err(format!("no test of {module} ran")))
+}
+
+/// What the blocks of a page say: new files, whose path stands behind the language, and one patch.
+#[derive(Debug, Default)]
+struct Page {
+    files: Vec<(String, String)>,
+    patch: String,
+}
+
+impl Page {
+    fn of(text: &str) -> Self {
+        let mut page = Self::default();
+        let mut lines = text.lines();
+        while let Some(line) = lines.next() {
+            let Some(head) = line.strip_prefix("```") else { continue };
+            let block: String =
+                lines.by_ref().take_while(|line| *line != "```").flat_map(|line| [line, "\n"]).collect();
+            match head.split_once(' ') {
+                Some((_, path)) => page.files.push((path.to_owned(), block)),
+                None if head == "diff" => page.patch += &block,
+                None => {}
+            }
+        }
+        page
+    }
+
+    /// The name of the effect: its file's.
+    fn effect(&self) -> Option<&str> {
+        self.files.iter().find_map(|(path, _)| path.strip_prefix(EFFECTS)?.strip_suffix(".rs"))
+    }
+
+    /// Paths of all files that are new or changed.
+    fn paths(&self) -> impl Iterator<Item = &str> {
+        let changed = self.patch.lines().filter_map(|line| line.strip_prefix("+++ b/"));
+        self.files.iter().map(|(path, _)| path.as_str()).chain(changed)
+    }
+
+    /// Lines that the patch adds or takes away.
+    fn changed_lines(&self) -> Vec<&str> {
+        let is_head = |line: &&str| line.starts_with("+++ ") || line.starts_with("--- ");
+        self.patch.lines().filter(|line| line.starts_with(['+', '-']) && !is_head(line)).collect()
+    }
+}
+
+/// Copies what git knows, and what it does not ignore, as it lies there now. Times are kept, so that cargo builds again what the
+/// page changes and no more.
+fn copied(root: &Path, copy: &Path) -> Result<(), String> {
+    if copy.exists() {
+        fs::remove_dir_all(copy).map_err(|error| format!("{}: {error}", copy.display()))?;
+    }
+    let list = ["ls-files", "--cached", "--others", "--exclude-standard"];
+    let names = output(Command::new("git").current_dir(root).args(list)).ok_or("git ls-files: failed")?;
+    for name in names.lines() {
+        let (from, to) = (root.join(name), copy.join(name));
+        // One that was taken away and is not committed is none.
+        if from.is_file() {
+            write(&to, &fs::read(&from).map_err(|error| format!("{name}: {error}"))?)?;
+            keep_time(&to, modified(&from)?)?;
+        }
+    }
+    Ok(())
+}
+
+fn modified(path: &Path) -> Result<SystemTime, String> {
+    path.metadata().and_then(|is| is.modified()).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn keep_time(path: &Path, time: SystemTime) -> Result<(), String> {
+    let file = fs::File::options().write(true).open(path);
+    file.and_then(|file| file.set_modified(time)).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), String> {
+    let folder = path.parent().map(PathBuf::from).unwrap_or_default();
+    fs::create_dir_all(&folder)
+        .and_then(|()| fs::write(path, bytes))
+        .map_err(|error| format!("{}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_files_and_one_patch() {
+        let page = Page::of(
+            "# Page\n```rust crates/squirrel-core/src/effects/tail.rs\nmod a;\n\n```\ntext\n```diff\n--- a/x\n+++ b/x\n@@ -1 +1,2 @@\n y\n+z\n```\n```text\n$ ls\n```\n```diff\n--- a/v\n+++ b/v\n@@ -1 +1 @@\n-w\n+u\n```\n",
+        );
+        assert_eq!(page.effect(), Some("tail"));
+        assert_eq!(page.files[0].1, "mod a;\n\n");
+        assert_eq!(page.files.len(), 1);
+        assert_eq!(page.changed_lines(), ["+z", "-w", "+u"]);
+        assert_eq!(page.paths().collect::<Vec<_>>(), ["crates/squirrel-core/src/effects/tail.rs", "x", "v"]);
+        assert!(page.patch.starts_with("--- a/x\n") && page.patch.ends_with("+u\n"));
+    }
+
+    #[test]
+    fn the_page_adds_a_file_and_a_line() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+        let page = read(&folder.join(PAGE)).unwrap();
+        let page = Page::of(&page);
+        let name = page.effect().unwrap();
+        assert!(!folder.join(EFFECTS).join(format!("{name}.rs")).exists(), "{name} is there already");
+        assert_eq!(page.files.len(), 2, "an effect and its twin");
+        assert_eq!(page.changed_lines().len(), LINES_MAX);
+    }
+}
