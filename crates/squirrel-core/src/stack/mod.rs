@@ -188,8 +188,7 @@ impl Stack {
     pub fn heading_rad(&self, time_us: u64, ned_from_body: &Rotation<Ned, Body, f32>) -> f32 {
         // Headings of missions do not depend on what was met.
         let commanded_rad = self.mission.reference(&MissionState::default(), time_us).yaw_rad;
-        let (.., measured_rad) = ned_from_body.euler();
-        self.parameters.attitude.form.heading_rad(measured_rad, commanded_rad)
+        self.parameters.attitude.form.heading_rad(ned_from_body.heading(), commanded_rad)
     }
 
     /// The same vehicle, gains and mission, from where a flight begins.
@@ -347,8 +346,7 @@ impl Stack {
     ) -> Option<InnerTerms> {
         let (Some(imu), Some(ned_from_body)) = (state.known.imu, state.known.attitude) else { return None };
         let gains = &self.parameters.attitude;
-        let (.., measured_rad) = ned_from_body.euler();
-        let yaw_rad = gains.form.yaw_target_rad(measured_rad, commanded_rad);
+        let yaw_rad = gains.form.yaw_target_rad(ned_from_body.heading(), commanded_rad);
         let target = Vector3::new(state.command.roll_rad, state.command.pitch_rad, yaw_rad);
         command_filter::step(
             &mut state.filter,

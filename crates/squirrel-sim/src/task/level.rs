@@ -2,6 +2,7 @@
 //! folded to 1 spread.
 
 use crate::batch::SetPoint;
+use squirrel_core::control::wiic::Envelope;
 use squirrel_core::math::{limit, lower};
 use squirrel_core::policy::{ACTION, Span};
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor, Vehicle};
@@ -54,7 +55,14 @@ impl Level {
     }
 
     /// * `action` - [`Self::numbers`] long
-    pub(super) fn told(self, action: &[f32], span: &Span, vehicle: &Vehicle<f32>) -> Told {
+    /// * `envelope` - to which the flight code limits attitude commands
+    pub(super) fn told(
+        self,
+        action: &[f32],
+        span: &Span,
+        envelope: &Envelope,
+        vehicle: &Vehicle<f32>,
+    ) -> Told {
         let number = |i: usize| limit(action.get(i).copied().unwrap_or(f32::NAN), -1.0, 1.0);
         let mut rotors = [0.0; MAX_ROTORS];
         let mut wing = 0.5 * (1.0 + number(action.len().wrapping_sub(1)));
@@ -74,7 +82,7 @@ impl Level {
             }
             Self::AttitudeWing => {
                 let command = span.command(&[number(0), number(1), number(2), number(3)]);
-                let attitude = command.attitude;
+                let attitude = envelope.limit(&command.attitude);
                 (rotors[0], rotors[1], rotors[3]) =
                     (attitude.roll_rad, attitude.pitch_rad, attitude.thrust_n);
                 wing = command.wing;

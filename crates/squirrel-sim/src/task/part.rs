@@ -9,6 +9,8 @@ use crate::vehicle_file::VehicleFile;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use squirrel_core::control::Reference;
+use squirrel_core::control::twcc::Airframe;
+use squirrel_core::control::wiic::Envelope;
 use squirrel_core::dynamics::State;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
@@ -29,6 +31,7 @@ pub(super) struct Candidate {
     tuned: Tuned,
     sensors: SensorParameters,
     span: Span,
+    envelope: Envelope,
     hover_speed_rad_s: f32,
 }
 
@@ -78,10 +81,12 @@ impl Candidate {
         let fail = |problem| BatchError::Airframe { vehicle: number, problem };
         let vehicle = file.vehicle.cast::<f32>().map_err(fail)?;
         let span = Span::of(&vehicle);
+        let tilt_max_rad = vehicle.parameters().limits.tilt_max_rad;
+        let envelope = Airframe::new(&vehicle, control.twcc.thrust_min_n, tilt_max_rad).envelope;
         let each = span.weight_n / vehicle.rotors().len() as f32;
         let hover_speed_rad_s = (each / vehicle.parameters().propulsion.thrust_coefficient_n_s2).sqrt();
         let tuned = Tuned { vehicle, gains: control.attitude };
-        Ok(Self { craft: Craft::from(file), tuned, sensors: file.sensors, span, hover_speed_rad_s })
+        Ok(Self { craft: Craft::from(file), tuned, sensors: file.sensors, span, envelope, hover_speed_rad_s })
     }
 }
 
@@ -173,7 +178,7 @@ impl<const ROTORS: usize> Part<ROTORS> {
         for (number, action) in self.actions.chunks_exact(level.numbers(ROTORS)).enumerate() {
             let episode = &mut self.episodes[number];
             let candidate = &self.candidates[episode.candidate];
-            let told = level.told(action, &candidate.span, &candidate.tuned.vehicle);
+            let told = level.told(action, &candidate.span, &candidate.envelope, &candidate.tuned.vehicle);
             self.set_points[width * number..][..width].copy_from_slice(&told.rotors[..width]);
             self.wings[2 * number..][..2].fill(told.wing);
             episode.wing = told.wing;

@@ -1,8 +1,15 @@
 //! Environments: what happens in one depends on nothing but its seed, and rewards are for what they say.
 
-use squirrel_core::policy::OBSERVATION;
-use squirrel_sim::batch::Scheme;
+use squirrel_core::dynamics::State;
+use squirrel_core::frames::In;
+use squirrel_core::nalgebra::Vector3;
+use squirrel_core::policy::{OBSERVATION, PilotCommand, Span};
+use squirrel_core::stack::{Gnss, Imu, SensorFrame, StackState};
+use squirrel_sim::arm::Arm;
 use squirrel_sim::batch::simd::Path;
+use squirrel_sim::batch::{Batch, Craft, Scheme, Settings};
+use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::scenario::Scenario;
 use squirrel_sim::task::course::Kind;
 use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks};
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -67,6 +74,59 @@ fn fly(tasks: &mut Tasks, steps: usize, pilot: impl Fn(&[f32]) -> Vec<f32>) -> V
         all.push(seen);
     }
     all
+}
+
+/// The flight code beside a task: the same actions on the same plant, the same bits after each. It gets true attitude and rates at
+/// 500 Hz, as the task's inner loop has them.
+#[test]
+fn an_action_turns_the_rotors_in_a_task_as_in_the_flight_code() {
+    let vehicle = VehicleFile::squirrel();
+    let scenario = Scenario::find("hover").unwrap();
+    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    let stack = setup.stack().unwrap();
+    let span = Span::of(stack.vehicle());
+    let settings = TaskSettings { threads: 1, ..settings(Kind::Track, Level::AttitudeWing) };
+    let mut tasks = Tasks::<4>::new(std::slice::from_ref(&vehicle), 1, 5, settings).unwrap();
+    let mut observation = vec![0.0; OBSERVATION];
+    tasks.reset(|_| false, &mut observation).unwrap();
+
+    let batch = Settings { dt_s: 2e-3, scheme: Scheme::Rk4, threads: 1, path: Path::best() };
+    let mut plant: Batch<f32> = Batch::with(&[Craft::from(&vehicle)], batch).unwrap();
+    plant.reset(0, &tasks.state(0).unwrap().0).unwrap();
+    let mut known = StackState::default();
+    let mut control = |time_us: u64, state: &State<f32>, command: Option<PilotCommand>| {
+        let mut frame = SensorFrame::empty(time_us);
+        frame.imu = Some(Imu { omega: state.omega, specific_force: In::new(Vector3::new(0.0, 0.0, -9.8)) });
+        frame.attitude = Some(state.ned_from_body());
+        frame.gnss = Some(Gnss { position: state.position, velocity: state.velocity });
+        frame.command = command;
+        stack.control(&mut known, &frame)
+    };
+    // A first frame takes no time, and hover takes no rotor to its limit.
+    control(0, &plant.state(0).unwrap(), Some(span.command(&[0.0, 0.0, 0.0, -1.0])));
+    let (mut time_us, mut beyond, mut spread) = (2000, 0, 0.0_f32);
+    for count in 0..300 {
+        // Leans, throws, and cuts thrust below what the flight code allows.
+        let k = count as f32;
+        let throw = [0.9 * (k * 0.5).sin(), 0.9 * (k * 0.3).cos(), 1.2 * (k * 0.11).sin(), (k * 0.05).sin()];
+        let action = if count % 50 < 25 { lean(&observation) } else { throw };
+        let command = span.command(&action);
+        for tick in 0..10 {
+            let output = control(time_us, &plant.state(0).unwrap(), (tick == 0).then_some(command));
+            time_us += 2000;
+            beyond += u32::from(output.inner.unwrap().mixer.saturated);
+            plant.command(&output.rotor_command[..4]).unwrap();
+            plant.command_wings(&output.wing_command).unwrap();
+            plant.step(1);
+        }
+        let seen = step(&mut tasks, &action);
+        assert!(!seen.terminated[0], "action {count}");
+        let (one, other) = (tasks.state(0).unwrap().0, plant.state(0).unwrap());
+        assert_eq!(one, other, "action {count}");
+        spread = spread.max(plant.deployment(0).unwrap()[0]);
+        observation.clone_from(&seen.observation);
+    }
+    assert!(beyond > 100 && spread > 0.9, "{beyond} {spread}");
 }
 
 #[test]
