@@ -78,7 +78,10 @@ const CALLS: [(&str, &[&str]); 8] = [
         &["derivative(&airframe", "whole::step::<", "whole::air::<", "servo.lead(", "packs.step("],
     ),
     ("sim/src/batch/battery.rs", &["pack.discharge(", "pack.settle("]),
-    ("sim/src/batch/autopilot.rs", &["filter.step(", "Target::from_euler(", "yaw_target(", "integrated(", ".torque(q,", "mixer.mix("]),
+    (
+        "sim/src/batch/autopilot.rs",
+        &["filter.step(", "Target::from_euler(", "yaw_target(", "integrated(", ".torque(q,", "mixer.mix("],
+    ),
     (
         "sim/src/plant/mod.rs",
         &["dynamics::derivative(", "membrane.evaluate(", "servo.lead(", "battery.step("],

@@ -32,7 +32,7 @@ pub enum SetPoint {
 }
 
 numbers! {
-    /// What the loop is told and remembers.
+    /// Set point and memory of the loop.
     Course {
         set_point [4],
         /// Filtered roll, pitch, yaw, and their rates.
@@ -129,7 +129,7 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
     }
 
     /// Set points of the first vehicles.
-    fn tell(&mut self, rows: &[S]) {
+    fn set(&mut self, rows: &[S]) {
         for (lane, row) in rows.chunks_exact(4).enumerate() {
             for (place, number) in self.course.set_point.iter_mut().zip(row) {
                 place[lane] = *number;
@@ -249,7 +249,7 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
 /// How the loops of a batch act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Autopilot {
-    /// What they are told.
+    /// What their set points are.
     pub set_point: SetPoint,
     /// Steps of the batch from one act to the next.
     pub period_steps: usize,
@@ -353,7 +353,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             let mut chunk = self.pool.chunk(chunk);
             for (block, rows) in chunk.blocks.iter_mut().zip(rows.chunks(4 * BLOCK)) {
                 let Some(autopilots) = &mut block.autopilots else { return Err(BatchError::NoAutopilot) };
-                autopilots.tell(rows);
+                autopilots.set(rows);
             }
         }
         Ok(())

@@ -207,7 +207,7 @@ impl<'a> Meter<'a> {
         if state.deployment().iter().sum::<f64>() > 1.0 {
             self.wings_us += step_us;
         }
-        if self.mode == Mode::Wiic {
+        if self.mode == Mode::WingsOpen {
             self.wiic_us += step_us;
         }
     }

@@ -21,10 +21,10 @@ pub enum Level {
     AttitudeWing,
 }
 
-/// What an action tells.
+/// What an action commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Told {
-    /// Set point or rotor commands, as many as [`Level::told_numbers`].
+pub(super) struct ActionCommand {
+    /// Set point or rotor commands, as many as [`Level::command_numbers`].
     pub(super) rotors: PerRotor<f32>,
     /// Both wings, 0..1.
     pub(super) wing: f32,
@@ -40,12 +40,12 @@ impl Level {
         }
     }
 
-    /// Numbers that the batch is told.
-    pub(super) fn told_numbers(self, rotors: usize) -> usize {
+    /// Numbers of a set point or of rotor commands.
+    pub(super) fn command_numbers(self, rotors: usize) -> usize {
         if self == Self::Motor { rotors } else { 4 }
     }
 
-    /// What the autopilot is told; none where rotors are.
+    /// What set points are; none where rotors are commanded.
     pub(super) fn set_point(self) -> Option<SetPoint> {
         match self {
             Self::Motor => None,
@@ -56,13 +56,13 @@ impl Level {
 
     /// * `action` - [`Self::numbers`] long
     /// * `envelope` - to which the flight code limits attitude commands
-    pub(super) fn told(
+    pub(super) fn command(
         self,
         action: &[f32],
         span: &Span,
         envelope: &Envelope,
         vehicle: &Vehicle<f32>,
-    ) -> Told {
+    ) -> ActionCommand {
         let number = |i: usize| limit(action.get(i).copied().unwrap_or(f32::NAN), -1.0, 1.0);
         let mut rotors = [0.0; MAX_ROTORS];
         let mut wing = 0.5 * (1.0 + number(action.len().wrapping_sub(1)));
@@ -81,13 +81,13 @@ impl Level {
                 rotors[3] = lower((1.0 + number(3)) * span.weight_n, span.thrust_max_n);
             }
             Self::AttitudeWing => {
-                let command = span.command(&[number(0), number(1), number(2), number(3)]);
-                let attitude = envelope.limit(&command.attitude);
+                let pilot = span.command(&[number(0), number(1), number(2), number(3)]);
+                let attitude = envelope.limit(&pilot.attitude);
                 (rotors[0], rotors[1], rotors[3]) =
                     (attitude.roll_rad, attitude.pitch_rad, attitude.thrust_n);
-                wing = command.wing;
+                wing = pilot.wing;
             }
         }
-        Told { rotors, wing }
+        ActionCommand { rotors, wing }
     }
 }

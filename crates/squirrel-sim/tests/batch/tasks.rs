@@ -7,14 +7,14 @@ use squirrel_core::policy::{OBSERVATION, PilotCommand, Span};
 use squirrel_core::stack::{Gnss, Imu, SensorFrame, StackState};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::batch::simd::Path;
-use squirrel_sim::batch::{Batch, Craft, Scheme, Settings};
+use squirrel_sim::batch::{Batch, BatchVehicle, Scheme, Settings};
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
-use squirrel_sim::task::course::Kind;
+use squirrel_sim::task::course::CourseKind;
 use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-fn settings(kind: Kind, level: Level) -> TaskSettings {
+fn settings(kind: CourseKind, level: Level) -> TaskSettings {
     TaskSettings {
         kind,
         level,
@@ -85,13 +85,13 @@ fn an_action_turns_the_rotors_in_a_task_as_in_the_flight_code() {
     let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
     let stack = setup.stack().unwrap();
     let span = Span::of(stack.vehicle());
-    let settings = TaskSettings { threads: 1, ..settings(Kind::Track, Level::AttitudeWing) };
+    let settings = TaskSettings { threads: 1, ..settings(CourseKind::Track, Level::AttitudeWing) };
     let mut tasks = Tasks::<4>::new(std::slice::from_ref(&vehicle), 1, 5, settings).unwrap();
     let mut observation = vec![0.0; OBSERVATION];
     tasks.reset(|_| false, &mut observation).unwrap();
 
     let batch = Settings { dt_s: 2e-3, scheme: Scheme::Rk4, threads: 1, path: Path::best() };
-    let mut plant: Batch<f32> = Batch::with(&[Craft::from(&vehicle)], batch).unwrap();
+    let mut plant: Batch<f32> = Batch::with(&[BatchVehicle::from(&vehicle)], batch).unwrap();
     plant.reset(0, &tasks.state(0).unwrap().0).unwrap();
     let mut known = StackState::default();
     let mut control = |time_us: u64, state: &State<f32>, command: Option<PilotCommand>| {
@@ -131,7 +131,7 @@ fn an_action_turns_the_rotors_in_a_task_as_in_the_flight_code() {
 
 #[test]
 fn an_environment_is_the_same_among_many_and_on_any_registers() {
-    for (kind, level) in [(Kind::Avoid, Level::AttitudeWing), (Kind::Track, Level::Motor)] {
+    for (kind, level) in [(CourseKind::Avoid, Level::AttitudeWing), (CourseKind::Track, Level::Motor)] {
         for sensors in [false, true] {
             let settings = TaskSettings { sensors, ..settings(kind, level) };
             let pilot = |observation: &[f32]| match level {
@@ -167,12 +167,12 @@ fn an_environment_is_the_same_among_many_and_on_any_registers() {
 #[test]
 fn who_follows_is_paid_and_who_falls_is_lost() {
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 50, 3, settings(CourseKind::Track, Level::AttitudeWing)).unwrap();
     let good = fly(&mut tasks, 499, |observation| lean(observation).to_vec());
     let total: f32 = good.iter().flat_map(|seen| &seen.reward).sum::<f32>() / 50.0;
     assert!(total > 6.0, "{total}");
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 50, 3, settings(CourseKind::Track, Level::AttitudeWing)).unwrap();
     let bad = fly(&mut tasks, 200, |_| vec![0.0, 0.0, -1.0, -1.0]);
     let lost = (0..50).filter(|k| bad.iter().any(|seen| seen.terminated[*k])).count();
     assert_eq!(lost, 50);
@@ -181,7 +181,7 @@ fn who_follows_is_paid_and_who_falls_is_lost() {
 /// An episode ends at its time; the step after it starts another one, whatever the action, and pays nothing.
 #[test]
 fn episodes_end_in_time_and_begin_again() {
-    let short = TaskSettings { episode_s: 0.1, ..settings(Kind::Avoid, Level::AttitudeWing) };
+    let short = TaskSettings { episode_s: 0.1, ..settings(CourseKind::Avoid, Level::AttitudeWing) };
     let mut tasks: Tasks = Tasks::new(&vehicles()[..1], 3, 1, short).unwrap();
     let before = tasks.obstacles(1).unwrap();
     let seen = fly(&mut tasks, 7, |observation| lean(observation).to_vec());
@@ -196,7 +196,7 @@ fn episodes_end_in_time_and_begin_again() {
 #[test]
 fn trunks_are_solid_and_seen_before_they_are_hit() {
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 100, 5, settings(Kind::Avoid, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 100, 5, settings(CourseKind::Avoid, Level::AttitudeWing)).unwrap();
     let trunks: Vec<_> = (0..100).map(|k| tasks.obstacles(k).unwrap()).collect();
     let seen = fly(&mut tasks, 450, |observation| lean(observation).to_vec());
     let (mut hits, mut warned) = (0, 0);
@@ -213,7 +213,7 @@ fn trunks_are_solid_and_seen_before_they_are_hit() {
 #[test]
 fn what_cannot_be_learned_is_named() {
     let bad = |vehicles: &[VehicleFile], count, episode_s| {
-        let settings = TaskSettings { episode_s, ..settings(Kind::Avoid, Level::Motor) };
+        let settings = TaskSettings { episode_s, ..settings(CourseKind::Avoid, Level::Motor) };
         Tasks::<4>::new(vehicles, count, 0, settings).unwrap_err().to_string()
     };
     assert_eq!(bad(&vehicles(), 0, 1.0), "num_envs = 0: must be at least 1");
@@ -222,7 +222,7 @@ fn what_cannot_be_learned_is_named() {
     let mut uncontrolled = vehicles();
     uncontrolled[1].control = None;
     assert!(bad(&uncontrolled, 1, 1.0).starts_with("vehicles[1]: [control] is missing"));
-    let mut tasks: Tasks = Tasks::new(&vehicles(), 2, 0, settings(Kind::Avoid, Level::Motor)).unwrap();
+    let mut tasks: Tasks = Tasks::new(&vehicles(), 2, 0, settings(CourseKind::Avoid, Level::Motor)).unwrap();
     let error = tasks.reset(|_| true, &mut [0.0; 3]).unwrap_err().to_string();
     assert_eq!(error, "observation: 3 numbers, must be 50");
 }
