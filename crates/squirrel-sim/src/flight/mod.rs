@@ -334,7 +334,7 @@ impl Setup {
             });
         }
         Ok(Flight {
-            metrics: metrics.finish().map_err(FlightError)?,
+            metrics: metrics.finish().map_err(|e| FlightError(e.to_string()))?,
             log: recorder.map(record::Recorder::finish),
         })
     }

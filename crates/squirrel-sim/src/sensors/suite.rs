@@ -8,6 +8,7 @@ use super::parameters::{
     AttitudeSensor, BaroSensor, BatterySensor, GnssSensor, ImuSensor, MagnetometerSensor,
 };
 use super::table::{OneOf, Reader, Said, Table};
+use crate::setting::SettingError;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use std::fmt;
 
@@ -163,7 +164,7 @@ impl SensorParameters {
 
     /// # Errors
     /// The first number that cannot be, with its field.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), SettingError> {
         let mut copy = *self;
         for name in KEYS {
             if let Some(table) = copy.table(name) {
