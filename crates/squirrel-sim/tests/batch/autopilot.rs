@@ -31,7 +31,7 @@ fn set_point(number: usize, half_second: usize) -> [f32; 4] {
 
 /// The squirrel with commands of another kind.
 fn commanded(kind: &str) -> Tuned {
-    let text = include_str!("../../../vehicles/squirrel.toml").replace("\"speed_fraction\"", kind);
+    let text = include_str!("../../../../vehicles/squirrel.toml").replace("\"speed_fraction\"", kind);
     let vehicle = VehicleFile::parse(&text, "test").unwrap().vehicle.cast().unwrap();
     Tuned { vehicle, ..squirrel() }
 }

@@ -2,7 +2,6 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod autopilot;
-
 mod errors;
 mod identity;
 mod lanes;

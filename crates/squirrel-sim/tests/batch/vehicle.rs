@@ -144,7 +144,7 @@ fn plates_and_no_wings_have_one_result() {
 }
 
 #[test]
-fn a_craft_alone_is_the_same_among_a_thousand() {
+fn a_vehicle_alone_is_the_same_among_a_thousand() {
     let all = Thrown::<f32>::new(1000);
     let members = members(&all, "membrane", &all_effects());
     let settings = Settings { threads: 1, ..Settings::default() };
@@ -224,7 +224,7 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
 /// In f64 the operations are the plant's, but for its servo within the step in which a rate limit ends (a polynomial there, relative
 /// error 6e-11) and for factors of rotors; a tumbling vehicle makes these larger.
 #[test]
-fn crafts_in_f64_fly_as_the_plant_does() {
+fn vehicles_in_f64_fly_as_the_plant_does() {
     for wing in ["none", "flat", "membrane"] {
         let worst = off_the_plant::<f64>(wing, &[], 400);
         assert!(worst < 1e-8, "{wing}: {worst:e}");
@@ -242,7 +242,7 @@ fn every_effect_acts_as_in_the_plant() {
 }
 
 #[test]
-fn in_f32_a_craft_stays_near_the_plant() {
+fn in_f32_a_vehicle_stays_near_the_plant() {
     let worst = off_the_plant::<f32>("membrane", &["battery_sag", "ground_effect", "payload_swing"], 200);
     assert!(worst < 5e-3, "{worst:e}");
 }
