@@ -278,8 +278,8 @@ fn the_default_needs_no_calibration() {
 fn late_fixes_are_compared_with_where_the_filter_was() {
     let flight = Flight::agile(4);
     let wrong = Wrong { latency_s: 0.15, ..Wrong::uncalibrated(4) };
-    let error = |told_s: f32| {
-        let parameters = EskfParameters { gnss_latency_s: told_s, ..EskfParameters::default() };
+    let error = |assumed_s: f32| {
+        let parameters = EskfParameters { gnss_latency_s: assumed_s, ..EskfParameters::default() };
         let mut filter = eskf(&flight, parameters);
         let (mut sum, mut count) = (0.0, 0.0);
         fly(&flight, wrong, 40, &mut filter, |now, moment, estimate| {

@@ -25,7 +25,7 @@ use std::slice;
 /// What the numbers of a set point are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SetPoint {
-    /// Roll, pitch, yaw, rad, and collective thrust, N.
+    /// Roll, pitch, yaw, rad, and collective thrust, N. Yaw is turned to as in flight: by 20 deg ahead of the measured one at most.
     Attitude,
     /// Body rates, rad/s, and collective thrust, N.
     BodyRate,

@@ -288,7 +288,7 @@ impl Setup {
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
                 failing.spoil(&mut frame);
                 frame.set_obstacles(&obstacles.seen(&state.body, believed.as_ref()));
-                if self.arm.is_told_the_force() {
+                if self.arm.is_given_the_force() {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
