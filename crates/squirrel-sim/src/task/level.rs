@@ -17,7 +17,8 @@ pub enum Level {
     Motor,
     /// Rates of roll, pitch and yaw in [`RATE_MAX_RAD_S`], thrust in weights above hover, and wings.
     BodyRate,
-    /// As [`Span::command`]: roll, pitch, thrust and wings; heading is held north. What [`squirrel_core::policy`] flies.
+    /// As [`Span::command`]: roll, pitch, thrust and wings; heading is held north; limited as the flight code limits commands. What
+    /// [`squirrel_core::policy`] flies.
     AttitudeWing,
 }
 
