@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fs;
 
 /// Formula, pieces of its text without spaces, and where it stands.
-const FORMULAS: [(&str, &[&str], &str); 30] = [
+const FORMULAS: [(&str, &[&str], &str); 33] = [
     ("drag of the airframe", &["linear[i]*flow.velocity[i]"], "core/src/aero/mod.rs"),
     (
         "flat plate",
@@ -34,6 +34,13 @@ const FORMULAS: [(&str, &[&str], &str); 30] = [
         &["omega_e[i]*(eta*sign)", "cr*cp*cy+sr*sp*sy"],
         "core/src/control/backstepping/quaternion.rs",
     ),
+    (
+        "command filter",
+        &["gap*poles.stiffness-self.rate[i]*poles.damping"],
+        "core/src/control/command_filter.rs",
+    ),
+    ("integral of the error", &["integral[i]+error[i]*dt_s"], "core/src/control/backstepping/mod.rs"),
+    ("yaw to turn to", &["wrap(commanded_rad-measured_rad)"], "core/src/control/backstepping/mod.rs"),
     ("Euler kinematics", &["cr*cp*roll-sr*sp*pitch"], "core/src/control/backstepping/mod.rs"),
     ("mixer", &["w_i*a[i]+w_j*a[j]", "s*tilt[i]+u*self.collective[i]"], "core/src/control/mix.rs"),
     ("what effects do to a wrench", &["numbers.thrust_factor("], "core/src/dynamics/mod.rs"),
@@ -71,7 +78,10 @@ const CALLS: [(&str, &[&str]); 8] = [
         &["derivative(&airframe", "whole::step::<", "whole::air::<", "servo.lead(", "packs.step("],
     ),
     ("sim/src/batch/battery.rs", &["pack.discharge(", "pack.settle("]),
-    ("sim/src/batch/autopilot.rs", &["law.torque(", "mixer.mix("]),
+    (
+        "sim/src/batch/autopilot.rs",
+        &["filter.step(", "Target::from_euler(", "yaw_target(", "integrated(", ".torque(q,", "mixer.mix("],
+    ),
     (
         "sim/src/plant/mod.rs",
         &["dynamics::derivative(", "membrane.evaluate(", "servo.lead(", "battery.step("],

@@ -18,6 +18,7 @@
 //! let wrong = In::<Body, f64>::zero() + In::<Ned, f64>::zero();
 //! ```
 
+use crate::lane::vector::heading;
 use crate::math::Real;
 use core::marker::PhantomData;
 use core::ops::{Add, Mul, Neg, Sub};
@@ -141,6 +142,10 @@ impl<To: Frame, From: Frame, T: Real> Rotation<To, From, T> {
     pub fn euler(&self) -> (T, T, T) {
         self.quaternion.euler_angles()
     }
+    /// Yaw alone, rad.
+    pub fn heading(&self) -> T {
+        heading(&self.wxyz())
+    }
     /// The rotation the other way round.
     #[inline(always)]
     pub fn inverse(self) -> Rotation<From, To, T> {
@@ -200,6 +205,23 @@ mod tests {
         let ned_from_body = Rotation::<Ned, Body, f64>::from_euler(0.0, 0.3, 0.0);
         let forward_ned = ned_from_body * In::new(Vector3::x());
         assert!((forward_ned.vector.z + 0.3f64.sin()).abs() < 1e-12, "down is positive, so up is negative");
+    }
+
+    #[test]
+    fn the_heading_is_the_yaw_of_the_euler_angles() {
+        for k in -62..=62 {
+            let yaw = f64::from(k) * 0.05;
+            for (roll, pitch) in [(0.0, 0.0), (0.6, -0.4), (-2.0, 1.2), (3.0, -1.5)] {
+                let attitude = Rotation::<Ned, Body, f64>::from_euler(roll, pitch, yaw);
+                assert!(
+                    (attitude.heading() - yaw).abs() < 1e-8,
+                    "{roll} {pitch} {yaw}: {}",
+                    attitude.heading()
+                );
+            }
+        }
+        let up = Rotation::<Ned, Body, f64>::from_wxyz([0.5_f64.sqrt(), 0.0, 0.5_f64.sqrt(), 0.0]).unwrap();
+        assert!(up.heading().is_finite());
     }
 
     #[test]

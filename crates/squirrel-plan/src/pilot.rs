@@ -11,7 +11,7 @@ use crate::wing::WingModel;
 use nalgebra::{Vector2, Vector3};
 use squirrel_core::control::Reference;
 use squirrel_core::control::follow::FollowGains;
-use squirrel_core::control::position::Motion;
+use squirrel_core::control::position::MeasuredMotion;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::mission::{Mission, MissionState};
 use squirrel_core::guidance::sensing::{Obstacle, Sensing};
@@ -97,7 +97,7 @@ impl Replanner {
         })
     }
 
-    fn plan(&mut self, motion: &Motion, frame: &SensorFrame) {
+    fn plan(&mut self, motion: &MeasuredMotion, frame: &SensorFrame) {
         let time_us = frame.time_us;
         self.mission.sense(&mut self.state, time_us, motion.position, motion.velocity, frame.obstacles());
         self.look(motion, frame.obstacles());
@@ -133,7 +133,7 @@ impl Replanner {
     }
 
     /// What the last moments say about the air.
-    fn feel(&mut self, motion: &Motion, time_us: u64) {
+    fn feel(&mut self, motion: &MeasuredMotion, time_us: u64) {
         let (before, before_us) = self.felt.unwrap_or((motion.velocity, time_us));
         let now = begin(motion, self.thrust_n, self.spread(time_us));
         self.air.predict(&-now.thrust, now.spread, time_us.saturating_sub(before_us) as f64 * 1e-6);
@@ -145,7 +145,7 @@ impl Replanner {
     }
 
     /// Remembers obstacles that are in range and in view, as the mission's own sensing does.
-    fn look(&mut self, motion: &Motion, obstacles: &[Obstacle]) {
+    fn look(&mut self, motion: &MeasuredMotion, obstacles: &[Obstacle]) {
         let Some(sensing) = &self.sensing else { return };
         let far = |o: &Obstacle| {
             let (north, east) = (o.north_m - motion.position.vector.x, o.east_m - motion.position.vector.y);
@@ -171,7 +171,7 @@ impl Replanner {
 ///
 /// * `thrust_n` - asked for last
 /// * `spread` - deployment of the wings
-pub fn begin(motion: &Motion, thrust_n: f64, spread: f64) -> Begin {
+pub fn begin(motion: &MeasuredMotion, thrust_n: f64, spread: f64) -> Begin {
     let attitude =
         Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, motion.heading_rad);
     let down = attitude * In::new(Vector3::z());

@@ -10,6 +10,7 @@ use squirrel_core::dynamics::VectorSpace;
 use squirrel_core::frames::{Body, In, Ned};
 use squirrel_core::rnn::parnn::{Parnn, WINDOW, features};
 use squirrel_sim::plant::{Membrane, MembraneState, WingPlant};
+use squirrel_sim::setting::SettingError;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Longest step in which the membrane is led to its steady state, s.
@@ -63,11 +64,31 @@ impl WingModel {
     ///
     /// # Errors
     /// One line that lists the names.
-    pub fn parse(name: &str) -> Result<Self, String> {
+    pub fn parse(name: &str) -> Result<Self, SettingError> {
         Self::ALL.into_iter().find(|model| model.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("wing = {name}: no such model; known are {names}")
+            let known = Self::ALL.map(Self::name).join(", ");
+            SettingError::Name { field: "wing", name: name.to_owned(), what: "model", known }
         })
+    }
+}
+
+/// What a model of the wing force needs of a vehicle file and does not find; with the file's name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum WingError {
+    /// No wings.
+    #[error("{0}: [wing] is missing; without wings there is nothing to compare")]
+    NoWing(String),
+    /// Wings of another model.
+    #[error("{0}: wing.model: is not a membrane")]
+    NoMembrane(String),
+    /// No network.
+    #[error("{0}: wing.parnn_weights: names none that were read")]
+    NoWeights(String),
+}
+
+impl From<WingError> for String {
+    fn from(error: WingError) -> Self {
+        error.to_string()
     }
 }
 
@@ -76,10 +97,10 @@ impl WingForce {
     ///
     /// # Errors
     /// One line that names what of the vehicle file the model needs and does not find.
-    pub fn of(vehicle: &VehicleFile, model: WingModel) -> Result<Self, String> {
-        let name = &vehicle.name;
+    pub fn of(vehicle: &VehicleFile, model: WingModel) -> Result<Self, WingError> {
+        let name = || vehicle.name.clone();
         let Some(wing) = vehicle.vehicle.parameters().wing else {
-            return Err(format!("{name}: [wing] is missing; without wings there is nothing to compare"));
+            return Err(WingError::NoWing(name()));
         };
         match (model, &vehicle.wing, &vehicle.weights) {
             (WingModel::Flat, _, _) => {
@@ -88,11 +109,9 @@ impl WingForce {
             (WingModel::Membrane, WingPlant::Membrane { membrane, .. }, _) => {
                 Ok(Self::Membrane(membrane.clone()))
             }
-            (WingModel::Membrane, _, _) => Err(format!("{name}: wing.model: is not a membrane")),
+            (WingModel::Membrane, _, _) => Err(WingError::NoMembrane(name())),
             (WingModel::Parnn, _, Some(weights)) => Ok(Self::Parnn(Box::new(*weights.parnn()))),
-            (WingModel::Parnn, _, None) => {
-                Err(format!("{name}: wing.parnn_weights: names none that were read"))
-            }
+            (WingModel::Parnn, _, None) => Err(WingError::NoWeights(name())),
         }
     }
 
@@ -197,7 +216,7 @@ mod tests {
         let start = text.find("[wing]").unwrap();
         let end = text.find("[battery]").unwrap();
         let bare = VehicleFile::parse(&format!("{}{}", &text[..start], &text[end..]), "bare.toml").unwrap();
-        assert!(WingForce::of(&bare, WingModel::Flat).unwrap_err().contains("[wing]"));
-        assert!(WingModel::parse("paper").unwrap_err().contains("membrane"));
+        assert!(WingForce::of(&bare, WingModel::Flat).unwrap_err().to_string().contains("[wing]"));
+        assert!(WingModel::parse("paper").unwrap_err().to_string().contains("membrane"));
     }
 }

@@ -14,8 +14,8 @@ use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::control::Reference;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains, AttitudeState};
 use squirrel_core::control::command_filter::EulerReference;
-use squirrel_core::control::position::Motion;
-use squirrel_core::control::twcc::{Airframe, TwccParameters, TwccState};
+use squirrel_core::control::position::MeasuredMotion;
+use squirrel_core::control::twcc::{OuterAirframe, TwccParameters, TwccState};
 use squirrel_core::frames::In;
 use squirrel_core::stack::StackParameters;
 use squirrel_core::vehicle::Vehicle as Checked;
@@ -200,7 +200,7 @@ impl Backstepping {
 pub(crate) struct Twcc {
     parameters: TwccParameters,
     form: AttitudeForm,
-    airframe: Airframe,
+    airframe: OuterAirframe,
     memory: Mutex<Vec<TwccState>>,
 }
 
@@ -216,7 +216,7 @@ impl Twcc {
         let weights = vehicle.get().file.weights.as_ref();
         Arm::parse(arm).and_then(|arm| arm.configure(&mut parameters, weights)).map_err(value)?;
         parameters.check(limits.thrust_max_n).map_err(value)?;
-        let airframe = Airframe::new(&airframe, parameters.thrust_min_n, limits.tilt_max_rad);
+        let airframe = OuterAirframe::new(&airframe, parameters.thrust_min_n, limits.tilt_max_rad);
         Ok(Self { parameters, form, airframe, memory: memory(count)? })
     }
 
@@ -285,7 +285,7 @@ impl Twcc {
         let mut terms = Terms::default();
         for (i, state) in memory.iter_mut().enumerate() {
             let (.., yaw_rad) = attitudes[i].euler();
-            let motion = Motion::new(
+            let motion = MeasuredMotion::new(
                 In::new(Vector3::from(position.row(i))),
                 In::new(Vector3::from(velocity.row(i))),
                 &attitudes[i],

@@ -12,7 +12,7 @@ use pyo3::sync::MutexExt;
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::policy::OBSERVATION;
 use squirrel_sim::batch::Settings;
-use squirrel_sim::task::course::Kind;
+use squirrel_sim::task::course::CourseKind;
 use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks as Environments};
 use std::sync::{Mutex, MutexGuard};
 
@@ -105,8 +105,8 @@ impl Tasks {
         registers: Option<&str>,
     ) -> PyResult<Self> {
         let kind = match task {
-            "avoid" => Kind::Avoid,
-            "track" => Kind::Track,
+            "avoid" => CourseKind::Avoid,
+            "track" => CourseKind::Track,
             other => return Err(value(format!("task = {other}: must be avoid or track"))),
         };
         let level = match action {

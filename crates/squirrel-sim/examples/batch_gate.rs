@@ -5,7 +5,7 @@
 #![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "prints a table of measured times")]
 
 use squirrel_sim::batch::simd::Path;
-use squirrel_sim::batch::{Batch, Craft, Scheme, Settings};
+use squirrel_sim::batch::{Batch, BatchVehicle, Scheme, Settings};
 use squirrel_sim::plant::{GustModel, WindParameters};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::error::Error;
@@ -28,10 +28,10 @@ fn base(settings: Settings) -> Made {
 }
 
 fn whole(settings: Settings) -> Made {
-    let craft = Craft::from(&VehicleFile::squirrel());
-    let mut batch = Batch::with(&vec![craft.clone(); VEHICLES], settings)?;
+    let member = BatchVehicle::from(&VehicleFile::squirrel());
+    let mut batch = Batch::with(&vec![member.clone(); VEHICLES], settings)?;
     for number in 0..VEHICLES {
-        batch.set_air(number, &craft, WIND, number as u64)?;
+        batch.set_air(number, &member, WIND, number as u64)?;
     }
     batch.command_wings(&[1.0; 2 * VEHICLES])?;
     Ok(batch)

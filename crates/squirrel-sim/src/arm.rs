@@ -115,7 +115,7 @@ impl Arm {
                     "arm = {name}: needs weights; wing.parnn_weights of the vehicle names none that were read"
                 ));
             }
-            (arm, _) if arm.is_told_the_force() => ForceModel::Given,
+            (arm, _) if arm.is_given_the_force() => ForceModel::Given,
             _ => ForceModel::FlatPlate,
         };
         if !self.is_plus() && !self.plans() {
@@ -140,7 +140,7 @@ impl Arm {
     }
 
     /// Whether the simulator tells the flight code what the wings would do.
-    pub fn is_told_the_force(self) -> bool {
+    pub fn is_given_the_force(self) -> bool {
         self == Self::TwccOracle
     }
 }

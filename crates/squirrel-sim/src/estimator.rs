@@ -4,6 +4,7 @@
 //! the truth, to see what estimation costs.
 
 use crate::sensors::SensorParameters;
+use crate::setting::SettingError;
 use squirrel_core::estimate::altitude::AltitudeParameters;
 use squirrel_core::estimate::eskf::EskfParameters;
 use squirrel_core::estimate::mahony::MahonyParameters;
@@ -71,10 +72,10 @@ impl Estimator {
     ///
     /// # Errors
     /// One line that lists the names.
-    pub fn parse(name: &str) -> Result<Self, String> {
+    pub fn parse(name: &str) -> Result<Self, SettingError> {
         Self::ALL.into_iter().find(|estimator| estimator.name() == name).ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("estimation.filter = {name}: no such filter; known are {names}")
+            let known = Self::ALL.map(Self::name).join(", ");
+            SettingError::Name { field: "estimation.filter", name: name.to_owned(), what: "filter", known }
         })
     }
 
@@ -163,6 +164,6 @@ mod tests {
         for estimator in Estimator::ALL {
             assert_eq!(Estimator::parse(estimator.name()), Ok(estimator));
         }
-        assert!(Estimator::parse("ekf").unwrap_err().contains("rkf_mtf"));
+        assert!(Estimator::parse("ekf").unwrap_err().to_string().contains("rkf_mtf"));
     }
 }

@@ -25,7 +25,7 @@ pub enum Sensor {
 
 /// How it fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum SensorFaultKind {
     /// One number is NaN.
     NotANumber,
     /// One number is infinite.
@@ -44,7 +44,7 @@ pub struct Fault {
     /// What fails.
     pub sensor: Sensor,
     /// How.
-    pub kind: Kind,
+    pub kind: SensorFaultKind,
     /// From this time, us.
     pub start_us: u64,
     /// Up to this time, us.
@@ -52,7 +52,13 @@ pub struct Fault {
 }
 
 const SENSORS: [Sensor; 5] = [Sensor::Imu, Sensor::Attitude, Sensor::Gnss, Sensor::Altitude, Sensor::All];
-const KINDS: [Kind; 5] = [Kind::NotANumber, Kind::Infinite, Kind::Stuck, Kind::Late, Kind::Missing];
+const KINDS: [SensorFaultKind; 5] = [
+    SensorFaultKind::NotANumber,
+    SensorFaultKind::Infinite,
+    SensorFaultKind::Stuck,
+    SensorFaultKind::Late,
+    SensorFaultKind::Missing,
+];
 /// Before and after the fault the flight is well for this long, us.
 const WELL_US: [u64; 2] = [500_000, 1_000_000];
 /// Longest fault, us.
@@ -106,7 +112,7 @@ impl Fault {
                 continue;
             }
             let old = match self.kind {
-                Kind::Late => {
+                SensorFaultKind::Late => {
                     let sent = frame.time_us.saturating_sub(late_us).max(self.start_us);
                     let then = frames.partition_point(|f| f.time_us < sent);
                     (frame.time_us >= self.start_us + late_us).then(|| frames[then])
@@ -114,15 +120,15 @@ impl Fault {
                 _ => None,
             };
             let whole = self.sensor == Sensor::All && old.is_none();
-            if whole && matches!(self.kind, Kind::Late | Kind::Missing) {
+            if whole && matches!(self.kind, SensorFaultKind::Late | SensorFaultKind::Missing) {
                 continue;
             }
             let mut broken = *frame;
             let hit = |sensor| self.sensor == sensor || self.sensor == Sensor::All;
-            let bad = if self.kind == Kind::Infinite { f32::INFINITY } else { f32::NAN };
+            let bad = if self.kind == SensorFaultKind::Infinite { f32::INFINITY } else { f32::NAN };
             let old = old.unwrap_or(SensorFrame::empty(0));
             match self.kind {
-                Kind::NotANumber | Kind::Infinite => {
+                SensorFaultKind::NotANumber | SensorFaultKind::Infinite => {
                     for imu in [&mut broken.imu, &mut broken.imu_2] {
                         if let Some(imu) = imu.as_mut().filter(|_| hit(Sensor::Imu)) {
                             imu.omega = In::new(Vector3::new(imu.omega.vector.x, bad, 0.0));
@@ -138,7 +144,7 @@ impl Fault {
                         broken.altitude_m = broken.altitude_m.map(|_| bad);
                     }
                 }
-                Kind::Stuck => {
+                SensorFaultKind::Stuck => {
                     if hit(Sensor::Imu) {
                         broken.imu = broken.imu.and(good.imu);
                         broken.imu_2 = broken.imu_2.and(good.imu_2);
@@ -153,7 +159,7 @@ impl Fault {
                         broken.altitude_m = broken.altitude_m.and(good.altitude_m);
                     }
                 }
-                Kind::Late | Kind::Missing => {
+                SensorFaultKind::Late | SensorFaultKind::Missing => {
                     if hit(Sensor::Imu) {
                         (broken.imu, broken.imu_2) = (old.imu, old.imu_2);
                     }

@@ -16,6 +16,7 @@ mod quantity;
 pub mod replay;
 pub mod scenario;
 pub mod sensors;
+pub mod setting;
 pub mod task;
 pub mod track;
 pub mod vehicle_file;

@@ -16,6 +16,55 @@ const SHORTEST_S: f64 = 0.1;
 /// Largest number of any kind that a plan may hold.
 const LARGEST: f64 = 1e5;
 
+/// Why a log is no motion to follow; one line.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TrackError {
+    /// No source of a motion.
+    #[error("has neither a `plan` nor a `reference` to follow")]
+    Nothing,
+    /// Not even a beginning and an end.
+    #[error("{from}: has {samples} samples, must have at least 2")]
+    Samples {
+        /// Source in the log.
+        from: &'static str,
+        /// How many there are.
+        samples: usize,
+    },
+    /// Over at once.
+    #[error("{from}: lasts {duration_s} s, must last {SHORTEST_S} s or more")]
+    Short {
+        /// Source in the log.
+        from: &'static str,
+        /// From the first to the last sample, s.
+        duration_s: f64,
+    },
+    /// A channel is missing.
+    #[error("lacks {0}")]
+    Lacks(String),
+    /// A channel of another width.
+    #[error("{channel}: has {given} numbers a sample, must have {needed}")]
+    Width {
+        /// Its name.
+        channel: String,
+        /// Numbers a sample.
+        given: usize,
+        /// What it must have.
+        needed: usize,
+    },
+    /// A number that cannot be flown.
+    #[error("{channel} = {value} at {time_s} s: must be finite and within {largest}")]
+    Value {
+        /// Its channel.
+        channel: String,
+        /// The number.
+        value: f64,
+        /// When, s.
+        time_s: f64,
+        /// The limit.
+        largest: f64,
+    },
+}
+
 /// A planned motion at an instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackPoint {
@@ -99,37 +148,39 @@ impl Track {
     ///
     /// # Errors
     /// One line that names the channel, the sample and its value.
-    pub fn of(log: &FlightLog, mass_kg: f64) -> Result<Self, String> {
+    pub fn of(log: &FlightLog, mass_kg: f64) -> Result<Self, TrackError> {
         let is_plan = log.sources.contains_key(PLAN);
         let source = if is_plan { PLAN } else { REFERENCE };
         let time_s = match log.sources.get(source) {
             Some(source) => source.time_s.clone(),
-            None => return Err("has neither a `plan` nor a `reference` to follow".to_owned()),
+            None => return Err(TrackError::Nothing),
         };
         let (Some(first), Some(last), true) = (time_s.first(), time_s.last(), time_s.len() > 1) else {
-            return Err(format!("{source}: has {} samples, must have at least 2", time_s.len()));
+            return Err(TrackError::Samples { from: source, samples: time_s.len() });
         };
         let first = *first;
         if !(last - first >= SHORTEST_S) {
-            return Err(format!("{source}: lasts {} s, must last {SHORTEST_S} s or more", last - first));
+            return Err(TrackError::Short { from: source, duration_s: last - first });
         }
         let column = |channel: &str, width: usize, largest: f64| {
             let name = format!("{source}.{channel}");
-            let Some((_, found)) = log.channel(&name) else { return Err(format!("lacks {name}")) };
+            let Some((_, found)) = log.channel(&name) else { return Err(TrackError::Lacks(name)) };
             if found.width != width {
-                return Err(format!("{name}: has {} numbers a sample, must have {width}", found.width));
+                return Err(TrackError::Width { channel: name, given: found.width, needed: width });
             }
             match found.values.iter().position(|x| !(x.abs() <= largest)) {
                 Some(i) => {
-                    let (time_s, x) = (time_s[i / width], found.values[i]);
-                    Err(format!("{name} = {x} at {time_s} s: must be finite and within {largest}"))
+                    let (time_s, value) = (time_s[i / width], found.values[i]);
+                    Err(TrackError::Value { channel: name, value, time_s, largest })
                 }
                 None => Ok(found),
             }
         };
         let vector = |channel: &str| {
             let found = column(channel, 3, LARGEST)?;
-            Ok::<_, String>(found.values.chunks_exact(3).map(Vector3::from_column_slice).collect::<Vec<_>>())
+            Ok::<_, TrackError>(
+                found.values.chunks_exact(3).map(Vector3::from_column_slice).collect::<Vec<_>>(),
+            )
         };
         let (position, velocity) = (vector("position_ned_m")?, vector("velocity_ned_m_s")?);
         let acceleration = vector("acceleration_ned_m_s2")?;
@@ -212,7 +263,7 @@ mod tests {
             let mut log = FlightLog::default();
             track().record(&mut log);
             change(&mut log);
-            Track::of(&log, 0.5).unwrap_err()
+            Track::of(&log, 0.5).unwrap_err().to_string()
         };
         let channel = |log: &mut FlightLog, name: &str, i: usize, x: f64| {
             log.source_mut("plan").channels.get_mut(name).unwrap().values[i] = x;

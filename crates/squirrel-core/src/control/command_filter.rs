@@ -3,12 +3,58 @@
 //! `x'' = w^2 (u - x) - 2 zeta w x'` per axis (docs/equations.md B.2): steps must not be differentiated, and the backstepping law
 //! wants the first and second derivative of its reference.
 
-use crate::math::wrap_angle;
+use crate::lane::Lane;
+use crate::lane::functions::wrap;
 use nalgebra::Vector3;
 
 pub use crate::command::EulerReference;
 
-/// One step towards `target`, semi-implicit.
+/// Where the filter is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Filter<L> {
+    /// Roll, pitch, yaw, rad.
+    pub angle: [L; 3],
+    /// Their rates, rad/s.
+    pub rate: [L; 3],
+}
+
+/// What the filter is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Poles<L> {
+    /// Square of the frequency, rad^2/s^2.
+    pub stiffness: L,
+    /// Twice the damping times the frequency, rad/s.
+    pub damping: L,
+}
+
+impl<L: Lane> Poles<L> {
+    /// * `frequency_rad_s`, `damping` - of the filter
+    #[inline(always)]
+    pub fn new(frequency_rad_s: L, damping: L) -> Self {
+        let twice = L::of(2.0) * damping;
+        Self { stiffness: frequency_rad_s * frequency_rad_s, damping: twice * frequency_rad_s }
+    }
+}
+
+impl<L: Lane> Filter<L> {
+    /// One step towards `target`, semi-implicit; the acceleration that it took, rad/s^2.
+    ///
+    /// * `target` - roll, pitch, yaw command, rad; each is reached the short way round
+    /// * `dt_s` - step
+    #[inline(always)]
+    pub fn step(&mut self, target: &[L; 3], poles: &Poles<L>, dt_s: L) -> [L; 3] {
+        let mut acceleration = *target;
+        for i in 0..3 {
+            let gap = wrap(target[i] - self.angle[i]);
+            acceleration[i] = gap * poles.stiffness - self.rate[i] * poles.damping;
+            self.rate[i] = self.rate[i] + acceleration[i] * dt_s;
+            self.angle[i] = wrap(self.angle[i] + self.rate[i] * dt_s);
+        }
+        acceleration
+    }
+}
+
+/// [`Filter::step`] of one vehicle.
 ///
 /// * `target` - roll, pitch, yaw command, rad
 /// * `frequency_rad_s`, `damping` - of the filter
@@ -20,14 +66,13 @@ pub fn step(
     damping: f32,
     dt_s: f32,
 ) {
-    let mut gap = target - filter.angle;
-    // Pitch never comes near half a turn.
-    (gap.x, gap.z) = (wrap_angle(gap.x), wrap_angle(gap.z));
-    filter.acceleration =
-        gap * (frequency_rad_s * frequency_rad_s) - filter.rate * (2.0 * damping * frequency_rad_s);
-    filter.rate += filter.acceleration * dt_s;
-    filter.angle += filter.rate * dt_s;
-    (filter.angle.x, filter.angle.z) = (wrap_angle(filter.angle.x), wrap_angle(filter.angle.z));
+    let mut moved = Filter { angle: filter.angle.into(), rate: filter.rate.into() };
+    let acceleration = moved.step(&(*target).into(), &Poles::new(frequency_rad_s, damping), dt_s);
+    *filter = EulerReference {
+        angle: moved.angle.into(),
+        rate: moved.rate.into(),
+        acceleration: acceleration.into(),
+    };
 }
 
 #[cfg(test)]

@@ -7,8 +7,8 @@
 //! has for them when their servo will have moved. Where the thrust does not suffice, height goes first.
 
 use super::AttitudeThrust;
-use super::position::{Motion, heading_frame};
-use super::twcc::Airframe;
+use super::position::{MeasuredMotion, heading_frame};
+use super::twcc::OuterAirframe;
 use crate::command::PilotCommand;
 use crate::frames::{In, Ned};
 use crate::math::{GRAVITY_M_S2, limit, limit_norm, lower, sqrt, upper};
@@ -85,8 +85,8 @@ impl FollowGains {
     /// * `wing` - its deployment [`Self::wing_delay_s`] later
     pub fn command(
         &self,
-        airframe: &Airframe,
-        motion: &Motion,
+        airframe: &OuterAirframe,
+        motion: &MeasuredMotion,
         now: &PlanPoint,
         ahead: In<Ned, f32>,
         wing: f32,
@@ -131,7 +131,7 @@ mod tests {
     fn on_the_plan_the_thrust_is_the_plans() {
         for heading_rad in [0.0, 0.8, -2.0] {
             let thrust = Vector3::new(1.1, -0.8, -5.5);
-            let motion = Motion { heading_rad, ..still() };
+            let motion = MeasuredMotion { heading_rad, ..still() };
             let gains = FollowGains::default();
             let command = gains.command(&airframe(), &motion, &hovering(), In::new(thrust), 1.0);
             let a = command.attitude;

@@ -23,7 +23,7 @@
 //! wings it is the same controller: the fair rival.
 
 use super::position::PositionGains;
-use super::twcc::Airframe;
+use super::twcc::OuterAirframe;
 use super::wiic::Envelope;
 use super::{AttitudeThrust, Reference};
 use crate::aero::flat_plate;
@@ -64,7 +64,7 @@ pub struct Plus {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Demand<'a> {
     /// What flies.
-    pub(super) airframe: &'a Airframe,
+    pub(super) airframe: &'a OuterAirframe,
     /// Acceleration command: forward, right, down, m/s^2.
     pub(super) acceleration: Vector3<f32>,
     /// Velocity: forward, right, down, m/s.
@@ -107,7 +107,7 @@ impl Plus {
     }
 
     /// With what the way to the reference can be braked without wings while height is held and the reference's own acceleration is flown, m/s^2.
-    pub(super) fn approach_m_s2(&self, airframe: &Airframe, reference: &Reference) -> f32 {
+    pub(super) fn approach_m_s2(&self, airframe: &OuterAirframe, reference: &Reference) -> f32 {
         let Envelope { tilt_max_rad, thrust_max_n, .. } = airframe.envelope;
         let weight_n = airframe.mass_kg * GRAVITY_M_S2 as f32;
         let spare = sqrt(upper(thrust_max_n * thrust_max_n - weight_n * weight_n, 0.0)) / airframe.mass_kg;
@@ -118,7 +118,7 @@ impl Plus {
     /// `W_z^2` for a height error and its rate: it grows with the error that is foreseen at the turn of a climb or sink.
     ///
     /// * `down_m`, `down_m_s` - position and velocity less those of the reference
-    pub(super) fn weight(&self, airframe: &Airframe, down_m: f32, down_m_s: f32) -> f32 {
+    pub(super) fn weight(&self, airframe: &OuterAirframe, down_m: f32, down_m_s: f32) -> f32 {
         // Gravity ends a climb; a sink is ended by what thrust there is above the weight.
         let spare = airframe.envelope.thrust_max_n / airframe.mass_kg - GRAVITY_M_S2 as f32;
         let turn = if down_m_s > 0.0 { limit(spare, TURN_MIN_M_S2, TURN_M_S2) } else { TURN_M_S2 };
@@ -140,7 +140,7 @@ pub(super) fn saved(folded: &Choice, spread: &Choice) -> f32 {
 ///
 /// * `wings` - 0 folded to 1 spread
 pub(super) fn acceleration(
-    airframe: &Airframe,
+    airframe: &OuterAirframe,
     velocity: &Vector3<f32>,
     command: &AttitudeThrust,
     wings: f32,
@@ -150,7 +150,11 @@ pub(super) fn acceleration(
 }
 
 /// Force of the air on spread wings at an attitude, heading frame, N.
-pub(super) fn wing_force(airframe: &Airframe, velocity: &Vector3<f32>, at: &AttitudeThrust) -> Vector3<f32> {
+pub(super) fn wing_force(
+    airframe: &OuterAirframe,
+    velocity: &Vector3<f32>,
+    at: &AttitudeThrust,
+) -> Vector3<f32> {
     let n = normal(at.roll_rad, at.pitch_rad);
     flat_plate::force::<Ned, f32>(In::new(*velocity), In::new(n), airframe.wing_area_m2).vector
 }
@@ -172,7 +176,7 @@ fn normal(roll_rad: f32, pitch_rad: f32) -> Vector3<f32> {
 
 /// Gravity and wings, m/s^2.
 fn free_of_thrust(
-    airframe: &Airframe,
+    airframe: &OuterAirframe,
     velocity: &Vector3<f32>,
     n: &Vector3<f32>,
     wings: f32,
@@ -184,7 +188,7 @@ fn free_of_thrust(
 impl Demand<'_> {
     /// The best thrust at an attitude, and what is left.
     pub(super) fn at(&self, roll_rad: f32, pitch_rad: f32, wings: f32) -> Choice {
-        let Airframe { mass_kg, envelope, .. } = *self.airframe;
+        let OuterAirframe { mass_kg, envelope, .. } = *self.airframe;
         let n = normal(roll_rad, pitch_rad);
         let need = free_of_thrust(self.airframe, &self.velocity, &n, wings) - self.acceleration;
         let weighted = Vector3::new(n.x, n.y, self.weight * n.z);
@@ -223,7 +227,7 @@ impl Demand<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::position::fixtures::{at, gains, still};
-    use super::super::position::{AngleLaw, Motion};
+    use super::super::position::{AngleLaw, MeasuredMotion};
     use super::super::twcc::fixtures::{airframe, parameters};
     use super::super::twcc::{Reason, TwccParameters, TwccState, TwccTerms, WingPolicy};
     use super::*;
@@ -249,13 +253,13 @@ mod tests {
         }
     }
 
-    fn demand(airframe: &Airframe, acceleration: [f32; 3], velocity: [f32; 3]) -> Demand<'_> {
+    fn demand(airframe: &OuterAirframe, acceleration: [f32; 3], velocity: [f32; 3]) -> Demand<'_> {
         Demand { airframe, acceleration: acceleration.into(), velocity: velocity.into(), weight: 0.25 }
     }
 
     /// Braking from 7 m/s, level, the goal here.
     fn tick(p: &TwccParameters, state: &mut TwccState, thrust_max_n: f32) -> TwccTerms {
-        let motion = Motion { velocity: In::new(Vector3::new(7.0, 0.0, 0.0)), ..still() };
+        let motion = MeasuredMotion { velocity: In::new(Vector3::new(7.0, 0.0, 0.0)), ..still() };
         let mut airframe = airframe();
         airframe.envelope.thrust_max_n = thrust_max_n;
         p.update(

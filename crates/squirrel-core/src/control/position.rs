@@ -86,7 +86,7 @@ pub struct PositionTerms {
 
 /// Measured motion at a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Motion {
+pub struct MeasuredMotion {
     /// Position, m.
     pub position: In<Ned, f32>,
     /// Velocity over ground, m/s.
@@ -100,7 +100,7 @@ pub struct Motion {
     pub heading_rad: f32,
 }
 
-impl Motion {
+impl MeasuredMotion {
     /// With the thrust axis of an attitude, as roll and pitch at a heading that need not be the measured one.
     pub fn new(
         position: In<Ned, f32>,
@@ -155,7 +155,7 @@ impl PositionGains {
         &self,
         state: &mut PositionState,
         mass_kg: f32,
-        motion: &Motion,
+        motion: &MeasuredMotion,
         reference: &Reference,
         hold_integral: bool,
         dt_s: f32,
@@ -217,7 +217,12 @@ pub(super) fn heading_frame(v_ned: &Vector3<f32>, heading_rad: f32) -> Vector2<f
     Vector2::new(c * v_ned.x + s * v_ned.y, -s * v_ned.x + c * v_ned.y)
 }
 
-fn request(law: AngleLaw, mass_kg: f32, acceleration_ned: &Vector3<f32>, motion: &Motion) -> AttitudeThrust {
+fn request(
+    law: AngleLaw,
+    mass_kg: f32,
+    acceleration_ned: &Vector3<f32>,
+    motion: &MeasuredMotion,
+) -> AttitudeThrust {
     let a = heading_frame(acceleration_ned, motion.heading_rad);
     // Thrust never asks for free fall or less: a downward command stronger than that keeps a tenth of g.
     let lift = upper(GRAVITY_M_S2 as f32 - acceleration_ned.z, 0.1 * GRAVITY_M_S2 as f32);
@@ -253,8 +258,14 @@ pub(super) mod fixtures {
             angle_law: AngleLaw::Exact,
         }
     }
-    pub(in super::super) fn still() -> Motion {
-        Motion { position: In::zero(), velocity: In::zero(), roll_rad: 0.0, pitch_rad: 0.0, heading_rad: 0.0 }
+    pub(in super::super) fn still() -> MeasuredMotion {
+        MeasuredMotion {
+            position: In::zero(),
+            velocity: In::zero(),
+            roll_rad: 0.0,
+            pitch_rad: 0.0,
+            heading_rad: 0.0,
+        }
     }
     pub(in super::super) fn at(north: f32, east: f32, down: f32) -> Reference {
         Reference {
@@ -271,7 +282,7 @@ mod tests {
     use super::fixtures::*;
     use super::*;
 
-    fn tick(gains: &PositionGains, motion: &Motion, reference: &Reference) -> PositionTerms {
+    fn tick(gains: &PositionGains, motion: &MeasuredMotion, reference: &Reference) -> PositionTerms {
         gains.update(&mut PositionState::default(), 0.548, motion, reference, false, 0.1)
     }
 
@@ -294,7 +305,7 @@ mod tests {
     #[test]
     fn the_exact_law_inverts_the_dynamics_at_any_yaw() {
         for yaw in [-3.0, -1.0, 0.0, 0.7, 2.5] {
-            let motion = Motion { heading_rad: yaw, ..still() };
+            let motion = MeasuredMotion { heading_rad: yaw, ..still() };
             let terms = tick(&gains(), &motion, &at(1.0, -0.7, -0.3));
             let r = terms.request;
             let ned_from_body = Rotation::<Ned, Body, f32>::from_euler(r.roll_rad, r.pitch_rad, yaw);
@@ -313,7 +324,7 @@ mod tests {
     fn roll_and_pitch_at_any_heading_have_the_thrust_axis_of_the_attitude() {
         for (yaw, heading) in [(0.0, 0.0), (0.3, 0.3), (0.0, 0.5), (1.5, 0.0), (-3.0, 2.0)] {
             let attitude = Rotation::<Ned, Body, f32>::from_euler(0.4, -0.3, yaw);
-            let motion = Motion::new(In::zero(), In::zero(), &attitude, heading);
+            let motion = MeasuredMotion::new(In::zero(), In::zero(), &attitude, heading);
             let same = Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, heading);
             let axis = |of: Rotation<Ned, Body, f32>| (of * In::new(Vector3::z())).vector;
             assert!((axis(attitude) - axis(same)).norm() < 1e-5, "yaw {yaw}, heading {heading}: {motion:?}");

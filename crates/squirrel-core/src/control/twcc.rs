@@ -10,7 +10,7 @@
 //! - every decision has a [`Reason`].
 
 use super::plus::{self, Demand, Plus};
-use super::position::{Motion, PositionGains, PositionState, PositionTerms, heading_frame};
+use super::position::{MeasuredMotion, PositionGains, PositionState, PositionTerms, heading_frame};
 use super::wiic::{self, Envelope, ThrustLaw};
 use super::wing_force::{ForceModel, ParnnTerms};
 use super::woeg::{WingEvents, WingFlag};
@@ -52,8 +52,8 @@ pub enum Mode {
     /// PC.
     #[default]
     Primary = 0,
-    /// WIIC.
-    Wiic = 1,
+    /// Wings open: WIIC, or the answer of [`plus`](super::plus) with wings. Files and logs call it `wiic`.
+    WingsOpen = 1,
     /// PC's angles at full thrust.
     FullThrust = 2,
 }
@@ -149,7 +149,7 @@ pub struct TwccTerms {
 
 /// What the outer loop knows of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Airframe {
+pub struct OuterAirframe {
     /// Mass, kg.
     pub mass_kg: f32,
     /// Area of both wings, m^2; 0 for none.
@@ -158,7 +158,7 @@ pub struct Airframe {
     pub envelope: Envelope,
 }
 
-impl Airframe {
+impl OuterAirframe {
     /// Of a vehicle.
     ///
     /// * `tilt_max_rad` - what the outer loop may ask for of the vehicle's limit
@@ -208,8 +208,8 @@ impl TwccParameters {
     pub fn update(
         &self,
         state: &mut TwccState,
-        airframe: &Airframe,
-        motion: &Motion,
+        airframe: &OuterAirframe,
+        motion: &MeasuredMotion,
         ned_from_body: &Rotation<Ned, Body, f32>,
         given_force: Option<In<Ned, f32>>,
         reference: &Reference,
@@ -218,7 +218,7 @@ impl TwccParameters {
         if let Some(plus) = &self.plus {
             return self.update_plus(plus, state, airframe, motion, ned_from_body, reference, dt_s);
         }
-        let hold = state.clamped || state.mode == Mode::Wiic;
+        let hold = state.clamped || state.mode == Mode::WingsOpen;
         let position =
             self.position.update(&mut state.position, airframe.mass_kg, motion, reference, hold, dt_s);
         let normal = *ned_from_body * In::new(Vector3::z());
@@ -240,7 +240,7 @@ impl TwccParameters {
         let primary = envelope.limit(request);
         // WIIC's law belongs to a request beyond the limits. While only the dwell time keeps the wings open, PC flies; and on
         // thrust alone PC's thrust is at its limit already.
-        let command = if mode == Mode::Wiic && reason != Reason::Dwell {
+        let command = if mode == Mode::WingsOpen && reason != Reason::Dwell {
             wiic::command(
                 self.thrust_law,
                 airframe.mass_kg,
@@ -281,8 +281,8 @@ impl TwccParameters {
         &self,
         plus: &Plus,
         state: &mut TwccState,
-        airframe: &Airframe,
-        motion: &Motion,
+        airframe: &OuterAirframe,
+        motion: &MeasuredMotion,
         ned_from_body: &Rotation<Ned, Body, f32>,
         reference: &Reference,
         dt_s: f32,
@@ -331,7 +331,7 @@ impl TwccParameters {
             helpful_n = airframe.mass_kg * saved;
             let threshold = if state.mode == Mode::Primary { plus.open_above_m_s2 } else { 0.0 };
             let open = saved > threshold;
-            let wanted = if open { Mode::Wiic } else { Mode::Primary };
+            let wanted = if open { Mode::WingsOpen } else { Mode::Primary };
             state.mode_age_s = state.mode_age_s.map(|age| age + dt_s);
             reason = if open { Reason::WingsComeCloser } else { Reason::InsideLimits };
             if wanted != state.mode {
@@ -384,7 +384,7 @@ impl TwccParameters {
         if matches!(self.policy, WingPolicy::Folded | WingPolicy::Open) {
             return (Mode::Primary, Reason::PolicyFixed);
         }
-        let held = if state.mode == Mode::Wiic { RELEASE } else { 1.0 };
+        let held = if state.mode == Mode::WingsOpen { RELEASE } else { 1.0 };
         let pitch_beyond = request.pitch_rad.abs() > held * envelope.tilt_max_rad;
         let roll_beyond = request.roll_rad.abs() > held * envelope.tilt_max_rad;
         let held_thrust = if state.mode == Mode::FullThrust { RELEASE } else { 1.0 };
@@ -394,9 +394,9 @@ impl TwccParameters {
             (false, false, _) => (Mode::Primary, Reason::InsideLimits),
             (_, _, false) => (Mode::Primary, Reason::WingsWouldNotHelp),
             (true, ..) if request.pitch_rad.abs() >= request.roll_rad.abs() => {
-                (Mode::Wiic, Reason::PitchLimit)
+                (Mode::WingsOpen, Reason::PitchLimit)
             }
-            (true, ..) => (Mode::Wiic, Reason::RollLimit),
+            (true, ..) => (Mode::WingsOpen, Reason::RollLimit),
             (false, true, true) => (Mode::FullThrust, Reason::ThrustLimit),
         };
         state.mode_age_s = state.mode_age_s.map(|age| age + dt_s);
@@ -431,10 +431,10 @@ pub(crate) mod fixtures {
             plus: None,
         }
     }
-    pub(crate) fn airframe() -> Airframe {
+    pub(crate) fn airframe() -> OuterAirframe {
         let envelope =
             Envelope { tilt_max_rad: core::f32::consts::FRAC_PI_6, thrust_min_n: 0.5, thrust_max_n: 10.0 };
-        Airframe { mass_kg: 0.548, wing_area_m2: 0.04, envelope }
+        OuterAirframe { mass_kg: 0.548, wing_area_m2: 0.04, envelope }
     }
 }
 
@@ -445,8 +445,8 @@ mod tests {
     use super::*;
 
     /// Fast northward flight with the goal behind: PC wants to brake harder than 30 deg of pitch.
-    fn braking(pitch_rad: f32) -> (Motion, Rotation<Ned, Body, f32>) {
-        let motion = Motion { velocity: In::new(Vector3::new(7.0, 0.0, 0.0)), pitch_rad, ..still() };
+    fn braking(pitch_rad: f32) -> (MeasuredMotion, Rotation<Ned, Body, f32>) {
+        let motion = MeasuredMotion { velocity: In::new(Vector3::new(7.0, 0.0, 0.0)), pitch_rad, ..still() };
         (motion, Rotation::from_euler(0.0, pitch_rad, 0.0))
     }
 
@@ -461,7 +461,7 @@ mod tests {
         let level = tick(&parameters(), &mut state, 0.0, 0.0);
         assert_eq!((level.mode, level.reason), (Mode::Primary, Reason::WingsWouldNotHelp));
         let nose_up = tick(&parameters(), &mut state, 0.4, 0.0);
-        assert_eq!((nose_up.mode, nose_up.reason), (Mode::Wiic, Reason::PitchLimit));
+        assert_eq!((nose_up.mode, nose_up.reason), (Mode::WingsOpen, Reason::PitchLimit));
         assert_eq!(nose_up.wing_command, 1.0);
         assert_eq!(nose_up.command.pitch_rad, airframe().envelope.tilt_max_rad);
         assert!(nose_up.wing_force.vector.x < 0.0, "the wing brakes");
@@ -471,7 +471,7 @@ mod tests {
     fn a_decision_is_kept_for_the_dwell_time() {
         let p = parameters();
         let mut state = TwccState::default();
-        assert_eq!(tick(&p, &mut state, 0.4, 0.0).mode, Mode::Wiic);
+        assert_eq!(tick(&p, &mut state, 0.4, 0.0).mode, Mode::WingsOpen);
         // The goal jumps ahead: PC's request is inside the limits, yet the wings stay for 0.3 s.
         let modes: Vec<_> = (0..4).map(|_| tick(&p, &mut state, 0.4, 4.4)).collect();
         assert_eq!(modes[0].reason, Reason::Dwell);
@@ -480,7 +480,7 @@ mod tests {
             modes[0].command.pitch_rad, modes[0].position.request.pitch_rad,
             "PC flies, not WIIC's limit angle"
         );
-        assert_eq!(modes[1].mode, Mode::Wiic);
+        assert_eq!(modes[1].mode, Mode::WingsOpen);
         assert_eq!(modes[3].mode, Mode::Primary);
         // And once folded they stay folded for as long.
         let again = tick(&p, &mut state, 0.4, 0.0);
@@ -512,14 +512,14 @@ mod tests {
     fn the_law_without_wings_flies_wiic_with_wings_folded() {
         let p = TwccParameters { policy: WingPolicy::CoordinatedWithoutWings, ..parameters() };
         let terms = tick(&p, &mut TwccState::default(), 0.0, 0.0);
-        assert_eq!((terms.mode, terms.wing_command), (Mode::Wiic, 0.0));
+        assert_eq!((terms.mode, terms.wing_command), (Mode::WingsOpen, 0.0));
         assert_eq!(terms.wing_force, In::zero());
     }
 
     /// T22: thrust beyond its limit, angles inside: full thrust, PC's angles, wings if they help.
     #[test]
     fn the_thrust_trigger_keeps_the_angles() {
-        let sinking = Motion { velocity: In::new(Vector3::new(0.0, 0.0, 4.0)), ..still() };
+        let sinking = MeasuredMotion { velocity: In::new(Vector3::new(0.0, 0.0, 4.0)), ..still() };
         let mut weak = airframe();
         weak.envelope.thrust_max_n = 6.0;
         let attitude = Rotation::identity();

@@ -14,8 +14,8 @@ pub(super) const GYRO_BIAS: usize = 12;
 
 /// Covariance of the error.
 pub type Covariance = SMatrix<f32, STATES, STATES>;
-/// What a measured number is made of, or what moves the state.
-pub(super) type Row = SVector<f32, STATES>;
+/// The Jacobian of a measured number, or a correction of the state.
+pub(super) type StateVector = SVector<f32, STATES>;
 
 /// How a step carries an error on: what F differs from the identity by.
 pub(super) struct Carry {
@@ -69,15 +69,15 @@ fn times(m: &Matrix3<f32>, [x, y, z]: [f32; 3]) -> [f32; 3] {
     [m.m11 * x + m.m12 * y + m.m13 * z, m.m21 * x + m.m22 * y + m.m23 * z, m.m31 * x + m.m32 * y + m.m33 * z]
 }
 
-/// The covariance times a row, most of which is zero.
-pub(super) fn across(covariance: &Covariance, row: &Row) -> Row {
-    let mut across = Row::zeros();
+/// `P H'`: the covariance of the state and a measured number, whose Jacobian is zero for most of the state.
+pub(super) fn cross_covariance(covariance: &Covariance, row: &StateVector) -> StateVector {
+    let mut cross_covariance = StateVector::zeros();
     for (column, share) in covariance.column_iter().zip(row.iter()) {
         if *share != 0.0 {
-            across.axpy(*share, &column, 1.0);
+            cross_covariance.axpy(*share, &column, 1.0);
         }
     }
-    across
+    cross_covariance
 }
 
 /// What rounding made of a symmetric covariance, symmetric again.
@@ -94,7 +94,7 @@ pub(super) fn symmetrise(covariance: &mut Covariance) {
 }
 
 /// One number of a row.
-pub(super) fn set(row: &mut Row, at: usize, value: f32) {
+pub(super) fn set(row: &mut StateVector, at: usize, value: f32) {
     if let Some(x) = row.get_mut(at) {
         *x = value;
     }
@@ -137,11 +137,11 @@ mod tests {
     #[test]
     fn products_and_means_are_those_of_matrices() {
         let mut covariance = Covariance::from_fn(number);
-        let mut row = Row::zeros();
+        let mut row = StateVector::zeros();
         set(&mut row, TURN, 0.5);
         set(&mut row, POSITION, -2.0);
         set(&mut row, STATES, 1.0);
-        assert_eq!(across(&covariance, &row), covariance * row);
+        assert_eq!(cross_covariance(&covariance, &row), covariance * row);
         let mean = (covariance + covariance.transpose()) * 0.5;
         symmetrise(&mut covariance);
         assert_eq!(covariance, mean);

@@ -8,13 +8,13 @@
 //! d_p' = d_v,  d_v' = -R [f - b_a]x d - R d_ba,  d' = -[w - b_g]x d - d_bg
 //! ```
 //! A satellite fix is late: it is compared with where the filter was then, which it remembers (`Past`), and errors of velocity,
-//! turn and bias have carried the state along since. Measurements are taken in number by number, each with a gate of some deviations, so that an outlier
-//! costs nothing. Fixes that are refused for long are believed in the end. A barometer that is, has jumped: its zero is moved to where the
-//! filter is. A compass never is believed against the rest. Where all fixes contradict for seconds the filter itself is wrong, and starts anew from the
-//! accelerometer and the next fix.
+//! turn and bias have carried the state along since. Measurements are fused number by number, each with an innovation gate, so
+//! that an outlier costs nothing. Fixes that are rejected for long are fused after all. A barometer that is rejected for long has
+//! jumped: its zero is moved to where the filter is. A compass is never fused against the rest. Where all fixes contradict the
+//! filter for seconds, the filter is wrong: it starts anew from the accelerometer and the next fix.
 
-use super::covariance::{ACCEL_BIAS, GYRO_BIAS, POSITION, Row, TURN, VELOCITY};
-use super::covariance::{Carry, across, on_diagonal, set, symmetrise};
+use super::covariance::{ACCEL_BIAS, GYRO_BIAS, POSITION, StateVector, TURN, VELOCITY};
+use super::covariance::{Carry, cross_covariance, on_diagonal, set, symmetrise};
 pub use super::covariance::{Covariance, STATES};
 use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, heading_error, levelled, turned};
 use crate::frames::{Body, In, Ned, Rotation};
@@ -25,26 +25,26 @@ use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 const MOMENTS: usize = 32;
 const MOMENT_S: f32 = 0.01;
 /// Without a fix for so long, s, the accelerometer is all that says where down is.
-const ALONE_S: f32 = 0.5;
+const NO_FIX_S: f32 = 0.5;
 /// Variance beyond which nothing is known, SI.
 const VARIANCE_MAX: f32 = 1e8;
 /// A compass errs by its vehicle's iron: so many times the deviation of a reading stands for many that err alike.
 const COMPASS_MEMORY: f32 = 10.0;
-/// A fix's normalised innovation squared, over its numbers, counts for so much at most: some outliers are no doubt.
-const SURPRISE_MAX: f32 = 30.0;
-/// Share of a fix's surprise in the mean.
-const UNEASE_SHARE: f32 = 0.05;
-/// Mean surprise at which the filter is wrong: after two seconds of fixes beyond their gate.
-const UNEASE_MAX: f32 = 20.0;
+/// A fix's normalised innovation squared, over its numbers, counts for so much at most in the mean: a few outliers are no fault of the filter.
+const NIS_MAX: f32 = 30.0;
+/// Share of a fix's normalised innovation squared (NIS) in the filtered one.
+const NIS_FILTER_GAIN: f32 = 0.05;
+/// Filtered NIS at which the filter starts anew: after two seconds of fixes beyond their gate.
+const NIS_RESTART: f32 = 20.0;
 /// Biases beyond these are errors of something else, m/s^2 and rad/s.
 const ACCEL_BIAS_MAX_M_S2: f32 = 1.0;
 const GYRO_BIAS_MAX_RAD_S: f32 = 0.3;
-/// What is then known of the attitude, rad.
-const START_ANEW_RAD: f32 = 0.5;
-/// Refusals in a row after which a sensor is right.
-const STUBBORN: u8 = 20;
-/// And after which it is doubted.
-const DOUBTED: u8 = 3;
+/// Standard deviation of the attitude after that, rad.
+const RESTART_ATTITUDE_SD_RAD: f32 = 0.5;
+/// Rejections in a row after which the sensor is right and the filter wrong.
+const REJECTIONS_BEFORE_RESET: u8 = 20;
+/// Rejections in a row after which the aid is reported as faulty.
+const REJECTIONS_BEFORE_FAULT: u8 = 3;
 
 /// Numbers of the filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +77,7 @@ pub struct EskfParameters {
     pub heading_noise_rad: f32,
     /// What the accelerometer may be off gravity where there are no fixes, m/s^2.
     pub alone_noise_m_s2: f32,
-    /// Deviations beyond which a measurement is refused.
+    /// Deviations beyond which a measurement is rejected.
     pub gate: f32,
 }
 
@@ -169,23 +169,23 @@ pub struct Eskf {
     /// A fix has said where it is.
     placed: bool,
     /// Since the last fix, s.
-    alone_s: f32,
-    refused: Refused,
+    time_since_fix_s: f32,
+    rejected: Rejected,
     /// What the barometer has jumped by, m.
     baro_offset_m: f32,
-    /// Refused since the start.
-    refusals: u32,
-    /// How much fixes surprise, on the whole: 1 where the filter errs as it says.
-    unease: f32,
+    /// Rejected since the start.
+    rejections: u32,
+    /// Low-passed NIS of fixes, over their numbers: 1 where the filter errs as it says.
+    filtered_nis: f32,
     /// How often it started anew.
     restarts: u32,
-    /// Squares of the last step's innovations over their variances, and how many there were.
-    surprise: (f32, u32),
+    /// Sum of the last step's innovations squared over their variances, and how many there were.
+    nis: (f32, u32),
 }
 
 /// In a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct Refused {
+struct Rejected {
     fixes: u8,
     altitudes: u8,
     fields: u8,
@@ -193,7 +193,7 @@ struct Refused {
 
 /// Which of the filter's aids contradict it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Doubts {
+pub struct AidFaults {
     /// Satellite fixes.
     pub gnss: bool,
     /// Barometer.
@@ -223,13 +223,13 @@ impl Eskf {
             covariance: at_start(&parameters),
             past: Past { moments: [here; MOMENTS], newest: 0, known: 0, age_s: 0.0 },
             placed: false,
-            alone_s: 0.0,
-            refused: Refused::default(),
+            time_since_fix_s: 0.0,
+            rejected: Rejected::default(),
             baro_offset_m: 0.0,
-            refusals: 0,
-            unease: 1.0,
+            rejections: 0,
+            filtered_nis: 1.0,
             restarts: 0,
-            surprise: (0.0, 0),
+            nis: (0.0, 0),
         }
     }
 
@@ -259,15 +259,19 @@ impl Eskf {
         In::new(self.accel_bias)
     }
 
-    /// Measurements that were too far off to be believed, so far.
-    pub fn refusals(&self) -> u32 {
-        self.refusals
+    /// Measurements that were too far off to be fused, so far.
+    pub fn rejections(&self) -> u32 {
+        self.rejections
     }
 
     /// Which aids contradict the filter now.
-    pub fn doubts(&self) -> Doubts {
-        let Refused { fixes, altitudes, fields } = self.refused;
-        Doubts { gnss: fixes >= DOUBTED, baro: altitudes >= DOUBTED, compass: fields >= DOUBTED }
+    pub fn aid_faults(&self) -> AidFaults {
+        let Rejected { fixes, altitudes, fields } = self.rejected;
+        AidFaults {
+            gnss: fixes >= REJECTIONS_BEFORE_FAULT,
+            baro: altitudes >= REJECTIONS_BEFORE_FAULT,
+            compass: fields >= REJECTIONS_BEFORE_FAULT,
+        }
     }
 
     /// How often everything contradicted the filter for so long that it started anew.
@@ -275,35 +279,35 @@ impl Eskf {
         self.restarts
     }
 
-    /// Time since the last fix that was believed, s.
-    pub fn alone_s(&self) -> f32 {
-        self.alone_s
+    /// Time since the last fix that was fused, s.
+    pub fn time_since_fix_s(&self) -> f32 {
+        self.time_since_fix_s
     }
 
-    /// Normalised innovations squared of the last step: their sum, and how many numbers were measured.
-    pub fn surprise(&self) -> (f32, u32) {
-        self.surprise
+    /// Normalised innovation squared of the last step: the sum, and how many numbers were measured.
+    pub fn nis(&self) -> (f32, u32) {
+        self.nis
     }
 
-    /// Takes notice of how much the fix of this step surprised, which was the first to be measured.
-    fn note_surprise(&mut self) {
-        let (squares, numbers) = self.surprise;
-        let mean = limit(squares / upper(numbers as f32, 1.0), 0.0, SURPRISE_MAX);
-        self.unease += (mean - self.unease) * UNEASE_SHARE;
+    /// Low-passes the NIS of this step's fix, which is the first to be fused.
+    fn filter_nis(&mut self) {
+        let (squares, numbers) = self.nis;
+        let mean = limit(squares / upper(numbers as f32, 1.0), 0.0, NIS_MAX);
+        self.filtered_nis += (mean - self.filtered_nis) * NIS_FILTER_GAIN;
     }
 
     /// From where it is, level by the accelerometer; the next fix says the rest.
-    fn restart(&mut self, felt: &Vector3<f32>) {
-        if let Some(down) = (-felt).try_normalize(1.0) {
+    fn restart(&mut self, specific_force: &Vector3<f32>) {
+        if let Some(down) = (-specific_force).try_normalize(1.0) {
             self.attitude = levelled(&self.attitude, &down);
         }
-        let turn = START_ANEW_RAD;
+        let turn = RESTART_ATTITUDE_SD_RAD;
         let p = EskfParameters { start_turn_rad: turn, start_heading_rad: turn, ..self.parameters };
         self.covariance = at_start(&p);
         (self.accel_bias, self.gyro_bias) = (Vector3::zeros(), self.start_bias);
         self.placed = false;
-        self.refused = Refused { altitudes: STUBBORN - 1, ..Refused::default() };
-        self.unease = 1.0;
+        self.rejected = Rejected { altitudes: REJECTIONS_BEFORE_RESET - 1, ..Rejected::default() };
+        self.filtered_nis = 1.0;
         self.restarts = self.restarts.saturating_add(1);
     }
 
@@ -331,29 +335,39 @@ impl Eskf {
         }
     }
 
-    /// One number that was measured, `row` times the error plus noise; by how much the state is to move, `moved` so far.
+    /// Fuses one measured number, `row` times the error plus noise, into the `correction` so far.
     ///
-    /// Whether it was believed.
-    fn update(&mut self, moved: &mut Row, row: &Row, residual: f32, noise: f32, is_gated: bool) -> bool {
-        let across = across(&self.covariance, row);
-        let variance = row.dot(&across) + square(noise);
-        let left = residual - row.dot(moved);
-        // What is no number is refused, too.
-        let near = square(left) <= square(self.parameters.gate) * variance;
-        self.surprise.0 += square(left) / variance;
-        self.surprise.1 += 1;
-        if !(near || (!is_gated && left.is_finite() && variance > 0.0)) {
+    /// * `residual` - measured less predicted, before any correction of this step
+    /// * `is_gated` - reject it beyond the gate
+    ///
+    /// Whether it was fused.
+    fn update(
+        &mut self,
+        correction: &mut StateVector,
+        row: &StateVector,
+        residual: f32,
+        noise: f32,
+        is_gated: bool,
+    ) -> bool {
+        let cross_covariance = cross_covariance(&self.covariance, row);
+        let innovation_variance = row.dot(&cross_covariance) + square(noise);
+        let innovation = residual - row.dot(correction);
+        // NaN is rejected, too.
+        let inside_gate = square(innovation) <= square(self.parameters.gate) * innovation_variance;
+        self.nis.0 += square(innovation) / innovation_variance;
+        self.nis.1 += 1;
+        if !(inside_gate || (!is_gated && innovation.is_finite() && innovation_variance > 0.0)) {
             return false;
         }
-        let gain = across / variance;
-        *moved += gain * left;
-        self.covariance.ger(-1.0, &gain, &across, 1.0);
+        let gain = cross_covariance / innovation_variance;
+        *correction += gain * innovation;
+        self.covariance.ger(-1.0, &gain, &cross_covariance, 1.0);
         true
     }
 
     /// Puts an error into the state.
-    fn inject(&mut self, moved: &Row, of_turn: &Matrix3<f32>, of_bias: &Matrix3<f32>) {
-        let part = |at: usize| moved.fixed_rows::<3>(at).into_owned();
+    fn inject(&mut self, correction: &StateVector, of_turn: &Matrix3<f32>, of_bias: &Matrix3<f32>) {
+        let part = |at: usize| correction.fixed_rows::<3>(at).into_owned();
         self.position += part(POSITION);
         self.velocity += part(VELOCITY);
         self.attitude = turned(&self.attitude, &part(TURN));
@@ -365,10 +379,10 @@ impl Eskf {
         }
     }
 
-    /// Counts a refusal; how many they are in a row now.
-    fn count(&mut self, before: u8, believed: bool) -> u8 {
-        self.refusals = self.refusals.saturating_add(u32::from(!believed));
-        if believed { 0 } else { before.saturating_add(1) }
+    /// Counts a rejection; how many they are in a row now.
+    fn count(&mut self, before: u8, fused: bool) -> u8 {
+        self.rejections = self.rejections.saturating_add(u32::from(!fused));
+        if fused { 0 } else { before.saturating_add(1) }
     }
 }
 
@@ -380,15 +394,15 @@ impl Estimator for Eskf {
         let force = sensed.imu.specific_force.vector - self.accel_bias;
         self.predict(&omega, &force, dt_s);
         self.past.remember([self.position, self.velocity], dt_s);
-        self.alone_s = lower(self.alone_s + dt_s, 1e6);
-        self.surprise = (0.0, 0);
+        self.time_since_fix_s = lower(self.time_since_fix_s + dt_s, 1e6);
+        self.nis = (0.0, 0);
 
         // What a turn and a bias do to the acceleration.
         let ned_from_body = self.attitude.to_rotation_matrix().into_inner();
         let (of_turn, of_bias) = (-(ned_from_body * cross(&force)), -ned_from_body);
-        let mut moved = Row::zeros();
+        let mut correction = StateVector::zeros();
         let unit = |at: usize| {
-            let mut row = Row::zeros();
+            let mut row = StateVector::zeros();
             set(&mut row, at, 1.0);
             row
         };
@@ -399,8 +413,8 @@ impl Estimator for Eskf {
             }
             let then = self.past.at([self.position, self.velocity], late_s);
             let (position, velocity) = (gnss.position.vector - then[0], gnss.velocity.vector - then[1]);
-            let is_gated = self.refused.fixes < STUBBORN;
-            let mut believed = true;
+            let is_gated = self.rejected.fixes < REJECTIONS_BEFORE_RESET;
+            let mut fused = true;
             // The error was smaller then by what an acceleration makes that errs by turn and bias.
             let by_turn = of_turn * late_s;
             let by_bias = of_bias * late_s;
@@ -411,7 +425,7 @@ impl Estimator for Eskf {
                     set(&mut row, ACCEL_BIAS + k, -by_bias[(i, k)]);
                 }
                 let noise = p.gnss_velocity_noise_m_s;
-                believed &= self.update(&mut moved, &row, velocity[i], noise, is_gated);
+                fused &= self.update(&mut correction, &row, velocity[i], noise, is_gated);
             }
             for i in 0..3 {
                 let mut row = unit(POSITION + i);
@@ -421,55 +435,56 @@ impl Estimator for Eskf {
                     set(&mut row, ACCEL_BIAS + k, 0.5 * late_s * by_bias[(i, k)]);
                 }
                 let noise = p.gnss_position_noise_m;
-                believed &= self.update(&mut moved, &row, position[i], noise, is_gated);
+                fused &= self.update(&mut correction, &row, position[i], noise, is_gated);
             }
-            self.refused.fixes = self.count(self.refused.fixes, believed);
-            self.note_surprise();
-            if believed {
-                self.alone_s = 0.0;
+            self.rejected.fixes = self.count(self.rejected.fixes, fused);
+            self.filter_nis();
+            if fused {
+                self.time_since_fix_s = 0.0;
             }
         }
         if let Some(altitude_m) = sensed.altitude_m {
             let residual = self.baro_offset_m - altitude_m - self.position.z;
-            let believed = self.update(&mut moved, &unit(POSITION + 2), residual, p.baro_noise_m, true);
-            self.refused.altitudes = self.count(self.refused.altitudes, believed);
-            if self.refused.altitudes >= STUBBORN && residual.is_finite() {
+            let fused = self.update(&mut correction, &unit(POSITION + 2), residual, p.baro_noise_m, true);
+            self.rejected.altitudes = self.count(self.rejected.altitudes, fused);
+            if self.rejected.altitudes >= REJECTIONS_BEFORE_RESET && residual.is_finite() {
                 self.baro_offset_m -= residual;
-                self.refused.altitudes = 0;
+                self.rejected.altitudes = 0;
             }
         }
         if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
-            let mut row = Row::zeros();
+            let mut row = StateVector::zeros();
             row.fixed_rows_mut::<3>(TURN).copy_from(&down(&self.attitude));
-            let variance = row.dot(&across(&self.covariance, &row)) + square(p.heading_noise_rad);
-            let believed = square(error) <= square(p.gate) * variance
-                && self.update(&mut moved, &row, -error, COMPASS_MEMORY * p.heading_noise_rad, true);
-            self.refused.fields = self.count(self.refused.fields, believed);
+            let innovation_variance =
+                row.dot(&cross_covariance(&self.covariance, &row)) + square(p.heading_noise_rad);
+            let fused = square(error) <= square(p.gate) * innovation_variance
+                && self.update(&mut correction, &row, -error, COMPASS_MEMORY * p.heading_noise_rad, true);
+            self.rejected.fields = self.count(self.rejected.fields, fused);
         }
-        if self.alone_s > ALONE_S {
+        if self.time_since_fix_s > NO_FIX_S {
             let expected = down(&self.attitude) * GRAVITY_M_S2 as f32;
             let slope = cross(&expected);
             for i in 0..3 {
-                let mut row = Row::zeros();
+                let mut row = StateVector::zeros();
                 row.fixed_rows_mut::<3>(TURN).copy_from(&slope.row(i).transpose());
-                self.update(&mut moved, &row, -force[i] - expected[i], p.alone_noise_m_s2, true);
+                self.update(&mut correction, &row, -force[i] - expected[i], p.alone_noise_m_s2, true);
             }
         }
-        if self.surprise.1 > 0 {
-            self.inject(&moved, &of_turn, &of_bias);
+        if self.nis.1 > 0 {
+            self.inject(&correction, &of_turn, &of_bias);
         }
         symmetrise(&mut self.covariance);
-        let felt = sensed.imu.specific_force.vector;
-        // After what no vehicle does, the covariance may be none any more.
-        let is_one =
+        let specific_force = sensed.imu.specific_force.vector;
+        // After what no vehicle does, the covariance may have lost its meaning.
+        let is_covariance =
             self.covariance.diagonal().iter().all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX);
         // Nor does any unit have such biases; at rest, one of the accelerometer hides a tilt from every fix. (Alone the filter cannot tell,
         // and nothing would lead it back.)
         let is_far = self.accel_bias.norm_squared() > square(ACCEL_BIAS_MAX_M_S2)
             || self.gyro_bias.norm_squared() > square(GYRO_BIAS_MAX_RAD_S);
-        let is_biased = is_far && self.alone_s <= ALONE_S;
-        if !is_one || is_biased || self.unease > UNEASE_MAX {
-            self.restart(&felt);
+        let is_biased = is_far && self.time_since_fix_s <= NO_FIX_S;
+        if !is_covariance || is_biased || self.filtered_nis > NIS_RESTART {
+            self.restart(&specific_force);
         }
     }
 

@@ -91,8 +91,8 @@ impl Mekf {
 
     /// One number that was measured; what the state should move by.
     fn update(&mut self, row: &RowVector6<f32>, residual: f32, variance: f32) -> Vector6<f32> {
-        let across = self.covariance * row.transpose();
-        let gain = across / ((row * across).x + variance);
+        let cross_covariance = self.covariance * row.transpose();
+        let gain = cross_covariance / ((row * cross_covariance).x + variance);
         let keep = Matrix6::identity() - gain * row;
         self.covariance = keep * self.covariance * keep.transpose() + gain * gain.transpose() * variance;
         gain * residual
@@ -126,39 +126,39 @@ impl Estimator for Mekf {
             fix.felt += self.attitude.transform_vector(&force) * dt_s;
         }
         self.fix = self.fix.filter(|fix| fix.ago_s < FIX_GAP_MAX_S);
-        let mut moved = Vector6::zeros();
-        let mut heard = None;
+        let mut correction = Vector6::zeros();
+        let mut measured = None;
         if let (Some(fix), Some(gnss)) = (&self.fix, &sensed.gnss)
             && fix.ago_s > 0.0
         {
             let felt = fix.felt / fix.ago_s;
             let pulled = (gnss.velocity.vector - fix.velocity) / fix.ago_s - Vector3::new(0.0, 0.0, g);
             let slope = -cross(&felt) * self.attitude.to_rotation_matrix().into_inner();
-            heard = Some((slope, pulled - felt, p.fix_noise_m_s2));
+            measured = Some((slope, pulled - felt, p.fix_noise_m_s2));
         }
         if let Some(gnss) = &sensed.gnss {
             self.fix = Some(Fix { velocity: gnss.velocity.vector, ago_s: 0.0, felt: Vector3::zeros() });
         }
         if self.fix.is_none() && (force.norm() - g).abs() < p.gate_m_s2 {
             let expected = super::down(&self.attitude) * g;
-            heard = Some((cross(&expected), -force - expected, p.alone_noise_m_s2));
+            measured = Some((cross(&expected), -force - expected, p.alone_noise_m_s2));
         }
-        if let Some((slope, residual, noise)) = heard {
+        if let Some((slope, residual, noise)) = measured {
             for i in 0..3 {
                 let row = RowVector6::new(slope[(i, 0)], slope[(i, 1)], slope[(i, 2)], 0.0, 0.0, 0.0);
-                let left = residual[i] - (row * moved).x;
-                moved += self.update(&row, left, noise * noise);
+                let innovation = residual[i] - (row * correction).x;
+                correction += self.update(&row, innovation, noise * noise);
             }
         }
         if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
             let axis = super::down(&self.attitude);
             let row = RowVector6::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0);
-            let left = -error - (row * moved).x;
-            moved += self.update(&row, left, p.heading_noise_rad * p.heading_noise_rad);
+            let innovation = -error - (row * correction).x;
+            correction += self.update(&row, innovation, p.heading_noise_rad * p.heading_noise_rad);
         }
         self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
-        self.attitude = turned(&self.attitude, &Vector3::new(moved.x, moved.y, moved.z));
-        self.gyro_bias += Vector3::new(moved.w, moved.a, moved.b);
+        self.attitude = turned(&self.attitude, &Vector3::new(correction.x, correction.y, correction.z));
+        self.gyro_bias += Vector3::new(correction.w, correction.a, correction.b);
     }
 
     fn estimate(&self) -> Estimate {

@@ -1,4 +1,4 @@
-//! Whether rotors push as they were told to: what the inertial unit feels against what the mixer promised.
+//! Whether rotors push as they were commanded to: what the inertial unit feels against what the mixer promised.
 //!
 //! ```text
 //! thrust:  -m f_z - T           torque:  J w' + w x J w - tau
@@ -28,7 +28,7 @@ const FOLDED_S: f32 = 0.7;
 /// What is remembered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Monitor {
-    told: ThrustTorque,
+    commanded: ThrustTorque,
     omega: Option<Vector3<f32>>,
     missing_n: f32,
     torque_n_m: Vector3<f32>,
@@ -40,7 +40,7 @@ pub struct Monitor {
 impl Default for Monitor {
     fn default() -> Self {
         Self {
-            told: ThrustTorque { thrust_n: 0.0, torque_n_m: Vector3::zeros() },
+            commanded: ThrustTorque { thrust_n: 0.0, torque_n_m: Vector3::zeros() },
             omega: None,
             missing_n: 0.0,
             torque_n_m: Vector3::zeros(),
@@ -78,18 +78,19 @@ impl Monitor {
         let before = self.omega.replace(omega);
         self.spread_ago_s = if wings > 0.0 { 0.0 } else { lower(self.spread_ago_s + dt_s, FOLDED_S) };
         let (Some(before), true) = (before, dt_s > 0.0) else {
-            self.told = *achieved;
+            self.commanded = *achieved;
             return;
         };
         let follow = dt_s / (dt_s + p.propulsion.time_constant_up_s);
-        self.told.thrust_n += (achieved.thrust_n - self.told.thrust_n) * follow;
-        self.told.torque_n_m += (achieved.torque_n_m - self.told.torque_n_m) * follow;
+        self.commanded.thrust_n += (achieved.thrust_n - self.commanded.thrust_n) * follow;
+        self.commanded.torque_n_m += (achieved.torque_n_m - self.commanded.torque_n_m) * follow;
         let learn = dt_s / (dt_s + MEAN_S);
         let is_folded = self.spread_ago_s >= FOLDED_S;
         let missing_n =
-            if is_folded { self.told.thrust_n + p.mass_kg * imu.specific_force.vector.z } else { 0.0 };
+            if is_folded { self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z } else { 0.0 };
         let spin = p.inertia_kg_m2 * omega;
-        let turned = p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin) - self.told.torque_n_m;
+        let turned =
+            p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin) - self.commanded.torque_n_m;
         self.missing_n += (missing_n - self.missing_n) * learn;
         self.torque_n_m += (if is_folded { turned } else { Vector3::zeros() } - self.torque_n_m) * learn;
         if !(self.missing_n.is_finite() && all_finite(&self.torque_n_m)) {

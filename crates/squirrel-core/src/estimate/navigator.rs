@@ -7,7 +7,7 @@
 //! [`Filter::External`] somebody else estimates, and frames pass as they are but for the vote.
 
 use super::altitude::{AltitudeFilter, AltitudeParameters};
-use super::eskf::{Doubts, Eskf, EskfParameters};
+use super::eskf::{AidFaults, Eskf, EskfParameters};
 use super::mahony::{Mahony, MahonyParameters};
 use super::mekf::{Mekf, MekfParameters};
 use super::rkf::{Rkf, RkfParameters};
@@ -230,9 +230,9 @@ impl NavigationState {
     }
 }
 
-/// What control is told.
+/// A step of navigation: the frame that control gets, and what is logged of it.
 #[derive(Debug, Clone, Copy)]
-pub struct Told {
+pub struct Navigated {
     /// The step's frame, estimated.
     pub frame: SensorFrame,
     pub(crate) terms: Option<NavigationTerms>,
@@ -322,11 +322,16 @@ impl Navigation {
     /// Hears a frame.
     ///
     /// * `elapsed_us` - since the frame before; 0 for the first
-    pub(crate) fn step(&self, state: &mut NavigationState, frame: &SensorFrame, elapsed_us: u32) -> Told {
-        let mut told = *frame;
-        let rejected = told.drop_what_is_no_reading();
-        told.imu = state.voter.vote([told.imu, told.imu_2], elapsed_us);
-        told.imu_2 = None;
+    pub(crate) fn step(
+        &self,
+        state: &mut NavigationState,
+        frame: &SensorFrame,
+        elapsed_us: u32,
+    ) -> Navigated {
+        let mut for_control = *frame;
+        let rejected = for_control.drop_what_is_no_reading();
+        for_control.imu = state.voter.vote([for_control.imu, for_control.imu_2], elapsed_us);
+        for_control.imu_2 = None;
         let [first, second] = state.voter.left_out();
         state.imu_hangs = state.voter.hangs();
         let health = Health::default()
@@ -337,50 +342,53 @@ impl Navigation {
         if self.filter == Filter::External {
             // Control rejects and counts by itself.
             let mut as_it_was = *frame;
-            as_it_was.imu = told.imu.or(frame.imu);
-            return Told { frame: as_it_was, terms: None, rejected: 0, elapsed_us };
+            as_it_was.imu = for_control.imu.or(frame.imu);
+            return Navigated { frame: as_it_was, terms: None, rejected: 0, elapsed_us };
         }
         if matches!(state.running, Running::None) {
             self.begin(state);
         }
-        if let Some(fix) = &mut told.gnss {
+        if let Some(fix) = &mut for_control.gnss {
             fix.position = fix.position - self.start.fix_offset;
         }
-        told.altitude_m = told.altitude_m.map(|altitude| altitude - self.start.altitude_offset_m);
+        for_control.altitude_m =
+            for_control.altitude_m.map(|altitude| altitude - self.start.altitude_offset_m);
         let dt_s = elapsed_us as f32 * 1e-6;
         let waiting = &mut state.waiting;
         waiting.dt_s = lower(waiting.dt_s + dt_s, STEP_MAX_S);
-        if let Some(fix) = &told.gnss {
+        if let Some(fix) = &for_control.gnss {
             let again = state.fix.as_ref() == Some(fix);
             state.fix_repeats = if again { state.fix_repeats.saturating_add(1) } else { 0 };
             // A receiver that hangs would be believed in the end, were it heard.
-            let is_doubted = matches!(&state.running, Running::Eskf(filter) if filter.doubts().gnss);
-            if state.fix_repeats >= HANGS && is_doubted {
-                told.gnss = None;
+            let is_faulty = matches!(&state.running, Running::Eskf(filter) if filter.aid_faults().gnss);
+            if state.fix_repeats >= HANGS && is_faulty {
+                for_control.gnss = None;
             }
         }
         let [baro, compass] = &mut state.silent_s;
-        for (silent_s, spoke) in [(baro, told.altitude_m.is_some()), (compass, told.magnetic.is_some())] {
+        for (silent_s, spoke) in
+            [(baro, for_control.altitude_m.is_some()), (compass, for_control.magnetic.is_some())]
+        {
             *silent_s = if spoke { Some(0.0) } else { silent_s.map(|s| lower(s + dt_s, 1e6)) };
         }
-        waiting.gnss = told.gnss.or(waiting.gnss);
-        waiting.altitude_m = told.altitude_m.or(waiting.altitude_m);
-        waiting.magnetic = told.magnetic.or(waiting.magnetic);
-        state.fix_age_s = if told.gnss.is_some() { 0.0 } else { lower(state.fix_age_s + dt_s, 1e6) };
-        state.fix = told.gnss.or(state.fix);
-        told.attitude = None;
-        let Some(imu) = told.imu else {
-            return Told { frame: told.without_motion(), terms: None, rejected, elapsed_us };
+        waiting.gnss = for_control.gnss.or(waiting.gnss);
+        waiting.altitude_m = for_control.altitude_m.or(waiting.altitude_m);
+        waiting.magnetic = for_control.magnetic.or(waiting.magnetic);
+        state.fix_age_s = if for_control.gnss.is_some() { 0.0 } else { lower(state.fix_age_s + dt_s, 1e6) };
+        state.fix = for_control.gnss.or(state.fix);
+        for_control.attitude = None;
+        let Some(imu) = for_control.imu else {
+            return Navigated { frame: for_control.without_motion(), terms: None, rejected, elapsed_us };
         };
         let Some(terms) = self.hear(state, &imu) else {
-            return Told { frame: told.without_motion(), terms: None, rejected, elapsed_us };
+            return Navigated { frame: for_control.without_motion(), terms: None, rejected, elapsed_us };
         };
-        told.imu = Some(Imu { omega: imu.omega - terms.gyro_bias, ..imu });
-        told.attitude = Some(terms.ned_from_body);
-        told.altitude_m = None;
-        told.gnss = Some(Gnss { position: terms.position, velocity: terms.velocity })
+        for_control.imu = Some(Imu { omega: imu.omega - terms.gyro_bias, ..imu });
+        for_control.attitude = Some(terms.ned_from_body);
+        for_control.altitude_m = None;
+        for_control.gnss = Some(Gnss { position: terms.position, velocity: terms.velocity })
             .filter(|_| !state.health.has(Health::POSITION_LOST));
-        Told { frame: told, terms: Some(terms), rejected, elapsed_us }
+        Navigated { frame: for_control, terms: Some(terms), rejected, elapsed_us }
     }
 
     /// A filter from the start. Apart, because it is built on the stack, and once in a flight.
@@ -395,9 +403,9 @@ impl Navigation {
     fn hear(&self, state: &mut NavigationState, imu: &Imu) -> Option<NavigationTerms> {
         let Waiting { dt_s, gnss, altitude_m, magnetic } = core::mem::take(&mut state.waiting);
         let estimate = state.running.step(&Sensed { dt_s, imu: *imu, gnss, altitude_m, magnetic })?;
-        let (position, velocity, doubts, alone_s) =
+        let (position, velocity, aid_faults, time_since_fix_s) =
             if let (Some((position, velocity)), Running::Eskf(filter)) = (estimate.motion, &state.running) {
-                (position, velocity, filter.doubts(), filter.alone_s())
+                (position, velocity, filter.aid_faults(), filter.time_since_fix_s())
             } else {
                 let force = estimate.ned_from_body * imu.specific_force;
                 let height = state
@@ -408,7 +416,7 @@ impl Navigation {
                 let (mut position, mut velocity) = (fix.position, fix.velocity);
                 position.vector.z = -height.altitude_m();
                 velocity.vector.z = -height.climb_m_s();
-                (position, velocity, Doubts::default(), state.fix_age_s)
+                (position, velocity, AidFaults::default(), state.fix_age_s)
             };
         // Where the filter leaves the numbers, control is told nothing.
         let all: Vector3<f32> = position.vector + velocity.vector + estimate.gyro_bias.vector;
@@ -418,16 +426,16 @@ impl Navigation {
             return None;
         }
         state.descent_m_s = Some(velocity.vector.z);
-        let is_silent = alone_s > SILENT_S;
+        let is_silent = time_since_fix_s > SILENT_S;
         let [baro_is_silent, compass_is_silent] =
             state.silent_s.map(|silent_s| silent_s.is_some_and(|s| s > SILENT_S));
         state.health = state
             .health
-            .with(Health::GNSS_OUT, doubts.gnss || is_silent)
+            .with(Health::GNSS_OUT, aid_faults.gnss || is_silent)
             .with(Health::RESTARTED, matches!(&state.running, Running::Eskf(filter) if filter.restarts() > 0))
-            .with(Health::BARO_OUT, doubts.baro || baro_is_silent)
-            .with(Health::COMPASS_OUT, doubts.compass || compass_is_silent)
-            .with(Health::POSITION_LOST, alone_s > LOST_S);
+            .with(Health::BARO_OUT, aid_faults.baro || baro_is_silent)
+            .with(Health::COMPASS_OUT, aid_faults.compass || compass_is_silent)
+            .with(Health::POSITION_LOST, time_since_fix_s > LOST_S);
         Some(NavigationTerms {
             ned_from_body: estimate.ned_from_body,
             gyro_bias: estimate.gyro_bias,

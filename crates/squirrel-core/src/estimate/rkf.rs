@@ -1,7 +1,7 @@
 //! Inclination by the robust Kalman filter with multiple tuning factors (RKF-MTF), the paper's attitude estimator.
 //!
 //! Source: the paper, section II.C, after Candan and Soken, IEEE TIM 2021; docs/equations.md C.1. The state is down in the body frame, `x`;
-//! what the accelerometer feels beside gravity is an acceleration `a` that fades by `c` a step and whose surprise, per axis, is added to
+//! what the accelerometer feels beside gravity is an acceleration `a` that fades by `c` a step and whose innovation, per axis, is added to
 //! the measurement's variance:
 //!
 //! ```text
@@ -9,7 +9,7 @@
 //! e = -f - c a - g x-,    S = diag(max(0, e_i^2 - g^2 P-_ii - sigma_a^2))
 //! K = g P- (g^2 P- + S + sigma_a^2)^-1,   x = unit(x- + K e),   a = -f - g x
 //! ```
-//! It has no bias of its own and trusts the gyro wherever the accelerometer surprises, so an uncalibrated gyro drags it off: give it the
+//! It has no bias of its own and trusts the gyro wherever innovations of the accelerometer are large, so an uncalibrated gyro drags it off: give it the
 //! bias that [`super::rest`] finds. Differs from the source: specific force in FRD, Joseph's form, and heading is carried by the gyro.
 
 use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, levelled, turned};
@@ -41,7 +41,7 @@ pub struct RkfParameters {
     pub accel_noise_m_s2: f32,
     /// Part of an external acceleration that is still there in the next step, 0 to 1.
     pub external_memory: f32,
-    /// How surprises are treated.
+    /// How large innovations are treated.
     pub fading: Fading,
 }
 
@@ -84,12 +84,14 @@ impl Rkf {
     }
 
     /// What is added to the variance of each axis, (m/s^2)^2.
-    fn distrust(&self, surprise: &Vector3<f32>, expected: &Matrix3<f32>) -> Vector3<f32> {
+    fn distrust(&self, innovation: &Vector3<f32>, expected: &Matrix3<f32>) -> Vector3<f32> {
         match self.parameters.fading {
             Fading::None => Vector3::zeros(),
-            Fading::Single => Vector3::repeat(upper((surprise.norm_squared() - expected.trace()) / 3.0, 0.0)),
+            Fading::Single => {
+                Vector3::repeat(upper((innovation.norm_squared() - expected.trace()) / 3.0, 0.0))
+            }
             Fading::Multiple => {
-                (surprise.component_mul(surprise) - expected.diagonal()).map(|x| upper(x, 0.0))
+                (innovation.component_mul(innovation) - expected.diagonal()).map(|x| upper(x, 0.0))
             }
         }
     }
@@ -107,14 +109,14 @@ impl Estimator for Rkf {
         let predicted = transition * self.down;
 
         let felt = -sensed.imu.specific_force.vector;
-        let surprise = felt - self.external_m_s2 * p.external_memory - predicted * g;
+        let innovation = felt - self.external_m_s2 * p.external_memory - predicted * g;
         let noise = Matrix3::from_diagonal_element(p.accel_noise_m_s2 * p.accel_noise_m_s2);
         let expected = covariance * (g * g) + noise;
-        let noise = noise + Matrix3::from_diagonal(&self.distrust(&surprise, &expected));
+        let noise = noise + Matrix3::from_diagonal(&self.distrust(&innovation, &expected));
         let mut corrected = predicted;
         if let Some(inverse) = (covariance * (g * g) + noise).try_inverse() {
             let gain = covariance * inverse * g;
-            corrected += gain * surprise;
+            corrected += gain * innovation;
             let keep = Matrix3::identity() - gain * g;
             covariance = keep * covariance * keep.transpose() + gain * noise * gain.transpose();
         }

@@ -273,13 +273,13 @@ fn the_default_needs_no_calibration() {
     }
 }
 
-/// Position, velocity and bias are found, and latency that is not told shows as an error of position.
+/// Position, velocity and bias are found, and latency that is not corrected shows as an error of position.
 #[test]
 fn late_fixes_are_compared_with_where_the_filter_was() {
     let flight = Flight::agile(4);
     let wrong = Wrong { latency_s: 0.15, ..Wrong::uncalibrated(4) };
-    let error = |told_s: f32| {
-        let parameters = EskfParameters { gnss_latency_s: told_s, ..EskfParameters::default() };
+    let error = |assumed_s: f32| {
+        let parameters = EskfParameters { gnss_latency_s: assumed_s, ..EskfParameters::default() };
         let mut filter = eskf(&flight, parameters);
         let (mut sum, mut count) = (0.0, 0.0);
         fly(&flight, wrong, 40, &mut filter, |now, moment, estimate| {
@@ -292,8 +292,8 @@ fn late_fixes_are_compared_with_where_the_filter_was() {
         let off = filter.estimate().gyro_bias.vector.map(f64::from) - wrong.gyro_bias;
         (f64::sqrt(sum / count), off.norm())
     };
-    let ((told, bias_off), (untold, _)) = (error(0.15), error(0.0));
-    assert!(told < 0.15 && untold > 4.0 * told, "{told:.3} and {untold:.3} m");
+    let ((corrected, bias_off), (uncorrected, _)) = (error(0.15), error(0.0));
+    assert!(corrected < 0.15 && uncorrected > 4.0 * corrected, "{corrected:.3} and {uncorrected:.3} m");
     assert!(bias_off < 0.002, "bias off by {bias_off} rad/s");
 }
 
@@ -324,7 +324,7 @@ fn the_default_errs_as_much_as_it_says() {
 
 /// Normalised innovation squared of a fix and an altitude over 50 seeds, against chi-squared of 7 numbers.
 #[test]
-fn the_default_is_surprised_as_often_as_it_says() {
+fn innovations_of_the_default_are_as_large_as_it_says() {
     struct Deaf(Eskf);
     impl Estimator for Deaf {
         fn step(&mut self, sensed: &Sensed) {
@@ -341,7 +341,7 @@ fn the_default_is_surprised_as_often_as_it_says() {
         let flight = Flight::agile(seed);
         let mut filter = Deaf(eskf(&flight, EskfParameters::default()));
         fly(&flight, Wrong::uncalibrated(seed), 20, &mut filter, |_, _, _| {});
-        let (squares, numbers) = filter.0.surprise();
+        let (squares, numbers) = filter.0.nis();
         assert_eq!(numbers, 7);
         sum += f64::from(squares);
     }
@@ -379,7 +379,7 @@ fn outliers_cost_nothing() {
         }
     });
     assert!(worst < 0.3, "{worst:.2} m");
-    assert_eq!(liar.0.refusals(), 20, "of 400 fixes");
+    assert_eq!(liar.0.rejections(), 20, "of 400 fixes");
 }
 
 /// A barometer of 0.2 m and an accelerometer that is 0.3 m/s^2 off, on a flight that climbs and sinks; and the deviation that it

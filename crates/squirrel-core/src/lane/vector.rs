@@ -4,6 +4,8 @@
 //! end up in the function that was compiled for them, so there are no closures and no iterators in here.
 
 use super::Lane;
+use super::functions::{angle, sign, size};
+use core::f64::consts::PI;
 
 /// `a - b`.
 #[inline(always)]
@@ -74,6 +76,18 @@ pub fn rotation<L: Lane>(attitude: &[L; 4]) -> [[L; 3]; 3] {
         [ij - wk, ww - ii + jj - kk, wi + jk],
         [wj + ik, jk - wi, ww - ii - jj + kk],
     ]
+}
+
+/// Heading of an attitude, rad, in [-pi, pi]; 0 where the nose points straight up or down.
+#[inline(always)]
+pub fn heading<L: Lane>(attitude: &[L; 4]) -> L {
+    let [w, i, j, k] = *attitude;
+    let north = w * w + i * i - j * j - k * k;
+    let east = (i * j + w * k) * L::of(2.0);
+    let length = (north * north + east * east).root().upper(L::of(1e-12));
+    let turned = angle(size(east) / length, size(north) / length);
+    let turned = (L::of(0.0) - north).where_positive(L::of(PI) - turned, turned);
+    turned * sign(east)
 }
 
 /// The quaternion of length one.

@@ -18,11 +18,11 @@ pub use crate::frame::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
 use crate::control::backstepping::{AttitudeGains, AttitudeState, AttitudeTerms, INNER_STEP_MAX_S};
 use crate::control::command_filter::{self, EulerReference};
 use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
-use crate::control::position::Motion;
-use crate::control::twcc::{Airframe, TwccParameters, TwccState, TwccTerms};
+use crate::control::position::MeasuredMotion;
+use crate::control::twcc::{OuterAirframe, TwccParameters, TwccState, TwccTerms};
 use crate::control::{AttitudeThrust, Reference};
 use crate::estimate::monitor::Monitor;
-use crate::estimate::navigator::{Health, Navigation, NavigationState, NavigationTerms, Start, Told};
+use crate::estimate::navigator::{Health, Navigated, Navigation, NavigationState, NavigationTerms, Start};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
@@ -50,7 +50,7 @@ pub struct StackParameters {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stack {
     vehicle: Vehicle<f32>,
-    airframe: Airframe,
+    airframe: OuterAirframe,
     mixer: Mixer,
     parameters: StackParameters,
     mission: Mission,
@@ -85,7 +85,7 @@ impl Known {
 pub struct StackState {
     /// Estimation.
     pub navigation: NavigationState,
-    /// Whether rotors push as they are told.
+    /// Whether rotors push as they are commanded.
     pub monitor: Monitor,
     /// Latest valid measurements.
     pub known: Known,
@@ -170,7 +170,7 @@ impl Stack {
             let reason = "must be above what the mission's multisine adds";
             return Err(ParameterError::of("limits.tilt_max_rad", p.limits.tilt_max_rad, reason));
         }
-        let airframe = Airframe::new(&vehicle, parameters.twcc.thrust_min_n, tilt_max_rad);
+        let airframe = OuterAirframe::new(&vehicle, parameters.twcc.thrust_min_n, tilt_max_rad);
         Ok(Self { mixer: Mixer::new(&vehicle)?, vehicle, airframe, parameters, mission })
     }
 
@@ -188,8 +188,7 @@ impl Stack {
     pub fn heading_rad(&self, time_us: u64, ned_from_body: &Rotation<Ned, Body, f32>) -> f32 {
         // Headings of missions do not depend on what was met.
         let commanded_rad = self.mission.reference(&MissionState::default(), time_us).yaw_rad;
-        let (.., measured_rad) = ned_from_body.euler();
-        self.parameters.attitude.form.heading_rad(measured_rad, commanded_rad)
+        self.parameters.attitude.form.heading_rad(ned_from_body.heading(), commanded_rad)
     }
 
     /// The same vehicle, gains and mission, from where a flight begins.
@@ -207,30 +206,30 @@ impl Stack {
     ///
     /// It is [`Self::navigate`], [`Self::control`] on what that believes, and [`Self::watch`].
     pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
-        let told = self.navigate(state, frame);
-        let mut output = self.control(state, &told.frame);
-        self.watch(state, &told, &mut output);
+        let navigated = self.navigate(state, frame);
+        let mut output = self.control(state, &navigated.frame);
+        self.watch(state, &navigated, &mut output);
         output
     }
 
     /// The first part of a step: what the sensors say, estimated, as a frame for [`Self::control`].
     // Apart, so that what it takes of the stack is free again when control runs.
     #[inline(never)]
-    pub fn navigate(&self, state: &mut StackState, frame: &SensorFrame) -> Told {
+    pub fn navigate(&self, state: &mut StackState, frame: &SensorFrame) -> Navigated {
         let elapsed_us = elapsed_us(state, frame).unwrap_or(0);
-        let told = self.parameters.navigation.step(&mut state.navigation, frame, elapsed_us);
-        state.rejected = state.rejected.saturating_add(told.rejected);
-        told
+        let navigated = self.parameters.navigation.step(&mut state.navigation, frame, elapsed_us);
+        state.rejected = state.rejected.saturating_add(navigated.rejected);
+        navigated
     }
 
     /// The last part of a step: whether the rotors push as control told them, and what is to be logged of the estimate.
-    pub fn watch(&self, state: &mut StackState, told: &Told, output: &mut StackOutput) {
+    pub fn watch(&self, state: &mut StackState, navigated: &Navigated, output: &mut StackOutput) {
         let achieved = output.inner.as_ref().map(|inner| &inner.mixer.achieved);
-        let dt_s = lower(told.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
-        state.monitor.look(&self.vehicle, achieved, told.frame.imu.as_ref(), state.wing_command, dt_s);
+        let dt_s = lower(navigated.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
+        state.monitor.look(&self.vehicle, achieved, navigated.frame.imu.as_ref(), state.wing_command, dt_s);
         output.health =
-            state.monitor.judge(&self.vehicle, told.frame.attitude.as_ref(), state.navigation.health);
-        output.navigation = told.terms;
+            state.monitor.judge(&self.vehicle, navigated.frame.attitude.as_ref(), state.navigation.health);
+        output.navigation = navigated.terms;
     }
 
     /// One inner step on the attitude, position and velocity that the frame brings; as total as [`Self::step`].
@@ -323,7 +322,7 @@ impl Stack {
         self.mission.sense(&mut state.mission, frame.time_us, position, gnss.velocity, frame.obstacles());
         let reference = self.mission.reference(&state.mission, frame.time_us);
         let heading_rad = self.heading_rad(frame.time_us, &ned_from_body);
-        let motion = Motion::new(position, gnss.velocity, &ned_from_body, heading_rad);
+        let motion = MeasuredMotion::new(position, gnss.velocity, &ned_from_body, heading_rad);
         let terms = self.parameters.twcc.update(
             &mut state.twcc,
             &self.airframe,
@@ -347,8 +346,7 @@ impl Stack {
     ) -> Option<InnerTerms> {
         let (Some(imu), Some(ned_from_body)) = (state.known.imu, state.known.attitude) else { return None };
         let gains = &self.parameters.attitude;
-        let (.., measured_rad) = ned_from_body.euler();
-        let yaw_rad = gains.form.yaw_target_rad(measured_rad, commanded_rad);
+        let yaw_rad = gains.form.yaw_target_rad(ned_from_body.heading(), commanded_rad);
         let target = Vector3::new(state.command.roll_rad, state.command.pitch_rad, yaw_rad);
         command_filter::step(
             &mut state.filter,

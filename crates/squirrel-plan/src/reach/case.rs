@@ -3,6 +3,7 @@
 use super::{Extremes, Question, Reach, Volumes};
 use serde::Serialize;
 use squirrel_core::math::GRAVITY_M_S2;
+use squirrel_sim::setting::SettingError;
 
 /// What wings change at a velocity and a thrust-to-weight ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -28,7 +29,7 @@ impl Case {
     ///
     /// # Errors
     /// As [`Reach::new`].
-    pub fn of(question: &Question) -> Result<Self, String> {
+    pub fn of(question: &Question) -> Result<Self, SettingError> {
         let reach = Reach::new(question)?;
         let v = question.velocity.vector;
         Ok(Self {

@@ -31,6 +31,7 @@ use nalgebra::Vector3;
 use polar::Polar;
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::math::GRAVITY_M_S2;
+use squirrel_sim::setting::SettingError;
 use tilt::Region;
 use turned::Search;
 
@@ -102,22 +103,30 @@ impl Reach {
     ///
     /// # Errors
     /// One line with the field and the value that is out of range.
-    pub fn new(question: &Question) -> Result<Self, String> {
+    pub fn new(question: &Question) -> Result<Self, SettingError> {
         let Question { mass_kg, thrust_max_n, tilt, velocity, wing } = question;
         for (name, value) in [("mass_kg", *mass_kg), ("thrust_max_n", *thrust_max_n)] {
             if !(value > 0.0 && value <= LARGEST) {
-                return Err(format!("{name} = {value}: must be finite, > 0 and within {LARGEST}"));
+                return Err(SettingError::value(
+                    name,
+                    value,
+                    format!("must be finite, > 0 and within {LARGEST}"),
+                ));
             }
         }
         let velocity_ned = velocity.vector;
         if let Some(wrong) = velocity_ned.iter().find(|x| !(x.abs() <= FASTEST_M_S)) {
-            return Err(format!("velocity_ned_m_s = {wrong}: must be finite and within {FASTEST_M_S}"));
+            return Err(SettingError::value(
+                "velocity_ned_m_s",
+                wrong,
+                format!("must be finite and within {FASTEST_M_S}"),
+            ));
         }
         tilt.check()?;
         if let WingForce::Flat { area_m2 } = wing
             && !(*area_m2 >= 0.0 && area_m2.is_finite())
         {
-            return Err(format!("wing.area_m2 = {area_m2}: must be finite and >= 0"));
+            return Err(SettingError::value("wing.area_m2", area_m2, "must be finite and >= 0"));
         }
         let speed_m_s = velocity_ned.norm();
         let (motion, polar) = match velocity_ned.try_normalize(SPEED_MIN_M_S) {

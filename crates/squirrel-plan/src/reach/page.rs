@@ -6,6 +6,7 @@ use squirrel_core::frames::In;
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_report::chart::{Axis, Ink, LineChart, Range, Scene, SceneTrack, Series};
 use squirrel_report::page::{Columns, Figure, Page, Row};
+use squirrel_sim::setting::SettingError;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Wires of a hull around the vertical and from below to above.
@@ -24,7 +25,7 @@ const CHOICE: Ink = Ink::Series(1);
 ///
 /// # Errors
 /// As [`Reach::new`].
-pub fn page(question: &Question, facts: &[(String, String)], cases: &[Case]) -> Result<String, String> {
+pub fn page(question: &Question, facts: &[(String, String)], cases: &[Case]) -> Result<String, SettingError> {
     let lead = "Every acceleration that thrust, attitude and wings can make at once. Folded wings are compared with a choice of folded or \
                 spread; spread wings push whether wanted or not.";
     let mut page = Page::new("What wings reach", lead);
@@ -87,7 +88,7 @@ fn wires(reach: &Reach, wings: Wings) -> Vec<Vec<[f64; 3]>> {
 }
 
 /// A chart over the thrust-to-weight ratio for each figure that is compared.
-fn curves(question: &Question) -> Result<Vec<Figure>, String> {
+fn curves(question: &Question) -> Result<Vec<Figure>, SettingError> {
     let weight_n = question.mass_kg * GRAVITY_M_S2;
     let case = |ratio: f64| Case::of(&Question { thrust_max_n: ratio * weight_n, ..question.clone() });
     let cases = RATIOS.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;

@@ -5,6 +5,7 @@
 //! bounds the set are then circles, and a linear function is largest in its own direction, on one of those circles, or where two meet.
 
 use nalgebra::Vector3;
+use squirrel_sim::setting::SettingError;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Rounding that a point on an edge is allowed.
@@ -34,21 +35,26 @@ impl Tilt {
     ///
     /// # Errors
     /// One line that lists the names.
-    pub fn named(name: &str, max_rad: f64, yaw_rad: f64) -> Result<Self, String> {
+    pub fn named(name: &str, max_rad: f64, yaw_rad: f64) -> Result<Self, SettingError> {
         match name {
             "box" => Ok(Self::Box { roll_max_rad: max_rad, pitch_max_rad: max_rad, yaw_rad }),
             "cone" => Ok(Self::Cone { max_rad }),
-            other => Err(format!("tilt = {other}: no such limit; known are box, cone")),
+            other => Err(SettingError::Name {
+                field: "tilt",
+                name: other.to_owned(),
+                what: "limit",
+                known: "box, cone".to_owned(),
+            }),
         }
     }
 
     /// Names the first number out of range.
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), SettingError> {
         let angle = |name: &str, rad: f64| {
             if rad > 0.0 && rad < FRAC_PI_2 {
                 Ok(())
             } else {
-                Err(format!("{name} = {rad}: must be above 0 and below pi/2"))
+                Err(SettingError::value(name, rad, "must be above 0 and below pi/2"))
             }
         };
         match *self {
@@ -56,7 +62,7 @@ impl Tilt {
                 angle("tilt.roll_max_rad", roll_max_rad)?;
                 angle("tilt.pitch_max_rad", pitch_max_rad)?;
                 if !yaw_rad.is_finite() {
-                    return Err(format!("tilt.yaw_rad = {yaw_rad}: must be finite"));
+                    return Err(SettingError::value("tilt.yaw_rad", yaw_rad, "must be finite"));
                 }
                 Ok(())
             }

@@ -2,6 +2,7 @@
 
 use super::model::{Air, Motion};
 use nalgebra::{Vector2, Vector3};
+use squirrel_sim::setting::SettingError;
 use squirrel_sim::track::Track;
 
 /// Most steps of a plan.
@@ -48,9 +49,9 @@ pub struct Task {
     speed_max_m_s: f64,
 }
 
-fn finite(field: &str, x: &Vector3<f64>, bound: f64) -> Result<(), String> {
+fn finite(field: &str, x: &Vector3<f64>, bound: f64) -> Result<(), SettingError> {
     match x.iter().find(|x| !(x.abs() <= bound)) {
-        Some(x) => Err(format!("{field} = {x}: must be finite and within {bound}")),
+        Some(x) => Err(SettingError::value(field, x, format!("must be finite and within {bound}"))),
         None => Ok(()),
     }
 }
@@ -60,7 +61,7 @@ impl Air {
     ///
     /// # Errors
     /// A number that is no wind.
-    pub fn windy(wind: Vector3<f64>) -> Result<Self, String> {
+    pub fn windy(wind: Vector3<f64>) -> Result<Self, SettingError> {
         finite("wind_ned_m_s", &wind, 100.0)?;
         Ok(Self { wind, ..Self::calm() })
     }

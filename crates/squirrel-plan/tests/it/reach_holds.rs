@@ -152,7 +152,7 @@ fn what_cannot_be_asked_is_named() {
         (Question { wing: WingForce::Flat { area_m2: -1.0 }, ..good.clone() }, "wing.area_m2 = -1"),
     ];
     for (question, line) in cases {
-        assert!(Reach::new(&question).unwrap_err().starts_with(line), "{line}");
+        assert!(Reach::new(&question).unwrap_err().to_string().starts_with(line), "{line}");
     }
     let still = Reach::new(&Question { velocity: In::zero(), ..good }).unwrap();
     let extremes = still.extremes();

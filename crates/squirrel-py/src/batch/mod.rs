@@ -1,18 +1,18 @@
 //! Many vehicles at once: `squirrel_sim::batch` behind one class for both scalars and all numbers of rotors.
 
-mod flock;
+mod any_batch;
 pub(crate) mod rollout;
 
 use crate::arguments::{Array64, ArrayAny, Float, Indices, Numbers, rows};
 use crate::error::value;
 use crate::vehicle::Vehicle;
-use flock::{AnyFlock, advance, air, flock};
+use any_batch::{AnyBatch, advance, air, any_batch};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_sim::batch::simd::Path;
-use squirrel_sim::batch::{Craft, Scheme, Settings};
+use squirrel_sim::batch::{BatchVehicle, Scheme, Settings};
 use squirrel_sim::plant::WingPlant;
 use std::sync::{Mutex, MutexGuard};
 
@@ -86,7 +86,7 @@ pub(crate) fn settings(
 #[gen_stub_pyclass]
 #[pyclass(frozen, module = "squirrel._squirrel")]
 pub(crate) struct Batch {
-    fleet: Mutex<Fleet>,
+    locked: Mutex<Locked>,
     vehicles: usize,
     settings: Settings,
     whole: bool,
@@ -96,8 +96,8 @@ pub(crate) struct Batch {
 }
 
 /// What the lock is for.
-struct Fleet {
-    flock: Box<dyn AnyFlock>,
+struct Locked {
+    batch: Box<dyn AnyBatch>,
     /// Whose gusts `set_air` asks for.
     vehicles: Vec<Py<Vehicle>>,
 }
@@ -109,25 +109,25 @@ impl Batch {
         in_32: bool,
         whole: bool,
     ) -> PyResult<Self> {
-        let mut flock = flock(&vehicles, settings, in_32, whole)?;
+        let mut batch = any_batch(&vehicles, settings, in_32, whole)?;
         let any = |has: fn(&Vehicle) -> bool| whole && vehicles.iter().any(|vehicle| has(vehicle.get()));
         let has_wings = any(|vehicle| !matches!(vehicle.file.wing, WingPlant::None));
         let has_battery = any(|vehicle| vehicle.file.battery.is_some());
         for (number, vehicle) in vehicles.iter().enumerate() {
             let file = &vehicle.get().file;
             if whole && file.effects.gust().is_some() {
-                flock.set_air(number, &Craft::from(file), air([0.0; 3], 0.0), number as u64)?;
+                batch.set_air(number, &BatchVehicle::from(file), air([0.0; 3], 0.0), number as u64)?;
             }
         }
         let count = vehicles.len();
         let vehicles = vehicles.into_iter().map(Bound::unbind).collect();
-        let fleet = Mutex::new(Fleet { flock, vehicles });
-        Ok(Self { fleet, vehicles: count, settings, whole, has_wings, has_battery })
+        let locked = Mutex::new(Locked { batch, vehicles });
+        Ok(Self { locked, vehicles: count, settings, whole, has_wings, has_battery })
     }
 
-    fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Fleet>> {
+    fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Locked>> {
         let broken = |_| PyRuntimeError::new_err("a call on this batch has panicked; make a new one");
-        self.fleet.lock_py_attached(py).map_err(broken)
+        self.locked.lock_py_attached(py).map_err(broken)
     }
 
     /// The vehicles that a call is about: those it names, or all.
@@ -187,7 +187,7 @@ impl Batch {
     /// ValueError
     ///     Another dtype or shape, a number that is not finite.
     fn command(&self, py: Python<'_>, command: ArrayAny<'_>) -> PyResult<()> {
-        self.lock(py)?.flock.command(&command.0)
+        self.lock(py)?.batch.command(&command.0)
     }
 
     /// Tell the wings what to do from now on.
@@ -203,7 +203,7 @@ impl Batch {
     ///     Another dtype or shape, a number that is not finite, a batch without wings.
     fn command_wings(&self, py: Python<'_>, command: ArrayAny<'_>) -> PyResult<()> {
         self.needs(self.has_wings, "wings")?;
-        self.lock(py)?.flock.command_wings(&command.0)
+        self.lock(py)?.batch.command_wings(&command.0)
     }
 
     /// Fly on, commands held.
@@ -216,7 +216,7 @@ impl Batch {
     ///     How many steps of `dt_s`.
     #[pyo3(signature = (steps = 1))]
     fn step(&self, py: Python<'_>, steps: usize) -> PyResult<()> {
-        advance(py, &mut *self.lock(py)?.flock, steps)
+        advance(py, &mut *self.lock(py)?.batch, steps)
     }
 
     /// Command, fly on, and look: `command`, `step` and `states` in one call, with the same bits and in less time.
@@ -248,7 +248,7 @@ impl Batch {
         steps: usize,
         out: Option<ArrayAny<'py>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        self.lock(py)?.flock.fly(py, &command.0, steps, out.map(|out| out.0))
+        self.lock(py)?.batch.fly(py, &command.0, steps, out.map(|out| out.0))
     }
 
     /// Motions of all vehicles.
@@ -270,7 +270,7 @@ impl Batch {
     #[pyo3(signature = (out = None))]
     #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
     fn states<'py>(&self, py: Python<'py>, out: Option<ArrayAny<'py>>) -> PyResult<Bound<'py, PyAny>> {
-        self.lock(py)?.flock.states(py, out.map(|out| out.0))
+        self.lock(py)?.batch.states(py, out.map(|out| out.0))
     }
 
     /// How far the wings of all vehicles are open.
@@ -287,7 +287,7 @@ impl Batch {
     #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
     fn deployments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.needs(self.has_wings, "wings")?;
-        self.lock(py)?.flock.deployments(py)
+        self.lock(py)?.batch.deployments(py)
     }
 
     /// Batteries of all vehicles.
@@ -304,7 +304,7 @@ impl Batch {
     #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
     fn battery<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.needs(self.has_battery, "battery")?;
-        self.lock(py)?.flock.battery(py)
+        self.lock(py)?.batch.battery(py)
     }
 
     /// Put vehicles somewhere else: wings folded, batteries full. Their air stays and so does what their rotors are told; commands on
@@ -326,7 +326,7 @@ impl Batch {
     #[pyo3(signature = (state, *, vehicles = None))]
     fn reset(&self, py: Python<'_>, state: ArrayAny<'_>, vehicles: Option<Indices>) -> PyResult<()> {
         let vehicles = self.numbers(vehicles)?;
-        self.lock(py)?.flock.reset(&state.0, &vehicles)
+        self.lock(py)?.batch.reset(&state.0, &vehicles)
     }
 
     /// Rest batteries at a charge.
@@ -348,7 +348,7 @@ impl Batch {
     fn set_charge(&self, py: Python<'_>, charge: ArrayAny<'_>, vehicles: Option<Indices>) -> PyResult<()> {
         self.needs(self.has_battery, "battery")?;
         let vehicles = self.numbers(vehicles)?;
-        self.lock(py)?.flock.set_charge(&charge.0, &vehicles)
+        self.lock(py)?.batch.set_charge(&charge.0, &vehicles)
     }
 
     /// Velocity of the air about each vehicle from now on; gusts end, those of the effect ``gust`` too.
@@ -362,7 +362,7 @@ impl Batch {
     /// ValueError
     ///     Another dtype or shape, a number that is not finite.
     fn set_wind(&self, py: Python<'_>, wind_ned_m_s: ArrayAny<'_>) -> PyResult<()> {
-        self.lock(py)?.flock.set_wind(&wind_ned_m_s.0)
+        self.lock(py)?.batch.set_wind(&wind_ned_m_s.0)
     }
 
     /// Moving air about vehicles from now on, as a flight of `simulate` with the same seed has it.
@@ -409,11 +409,11 @@ impl Batch {
         if seeds.len() != n {
             return Err(value(format!("seed: expected {n}, got {}", seeds.len())));
         }
-        let mut fleet = self.lock(py)?;
-        let Fleet { flock, vehicles: fitted } = &mut *fleet;
+        let mut locked = self.lock(py)?;
+        let Locked { batch, vehicles: fitted } = &mut *locked;
         for (i, number) in vehicles.into_iter().enumerate() {
-            let craft = Craft::from(&fitted[number].get().file);
-            flock.set_air(number, &craft, air(wind.row(i), sigma[i]), seeds[i] as u64)?;
+            let member = BatchVehicle::from(&fitted[number].get().file);
+            batch.set_air(number, &member, air(wind.row(i), sigma[i]), seeds[i] as u64)?;
         }
         Ok(())
     }
@@ -437,17 +437,17 @@ impl Batch {
     fn replace(&self, py: Python<'_>, index: usize, vehicle: &Bound<'_, Vehicle>) -> PyResult<()> {
         self.check(index)?;
         let file = &vehicle.get().file;
-        let mut fleet = self.lock(py)?;
-        let (has, must) = (file.vehicle.rotors().len(), fleet.flock.rotors());
+        let mut locked = self.lock(py)?;
+        let (has, must) = (file.vehicle.rotors().len(), locked.batch.rotors());
         if has != must {
             return Err(value(format!("vehicle: {has} rotors, this batch holds vehicles of {must}")));
         }
         if self.whole {
-            fleet.flock.refit(index, &Craft::from(file))?;
+            locked.batch.refit(index, &BatchVehicle::from(file))?;
         } else {
-            fleet.flock.replace(index, &file.vehicle)?;
+            locked.batch.replace(index, &file.vehicle)?;
         }
-        fleet.vehicles[index] = vehicle.clone().unbind();
+        locked.vehicles[index] = vehicle.clone().unbind();
         Ok(())
     }
 
@@ -472,7 +472,7 @@ impl Batch {
     /// ``float32`` or ``float64``.
     #[getter]
     fn dtype(&self, py: Python<'_>) -> PyResult<&'static str> {
-        Ok(if self.lock(py)?.flock.is_32() { f32::NAME } else { f64::NAME })
+        Ok(if self.lock(py)?.batch.is_32() { f32::NAME } else { f64::NAME })
     }
 
     fn __len__(&self) -> usize {

@@ -82,7 +82,7 @@ fn periods<'py, T: Float>(
     wing_command: Option<&ArrayAny<'py>>,
     steps: usize,
 ) -> PyResult<Bound<'py, PyAny>> {
-    let rotors = batch.lock(py)?.flock.rotors();
+    let rotors = batch.lock(py)?.batch.rotors();
     let (n, width) = (batch.vehicles, BODY_NUMBERS + rotors);
     let commands = rows::<T>("command", &command.0, &[None, Some(n), Some(rotors)], Numbers::Finite)?;
     let count = commands.numbers().len() / (n * rotors);
@@ -100,7 +100,7 @@ fn periods<'py, T: Float>(
         }
         batch.step(py, steps)?;
         let row = out.get_item(period)?;
-        batch.lock(py)?.flock.states(py, Some(row))?;
+        batch.lock(py)?.batch.states(py, Some(row))?;
         py.check_signals()?;
     }
     Ok(out.into_any())

@@ -3,7 +3,7 @@
 use super::exchange::Chunk;
 use super::extra::Command;
 use super::simd::{BLOCK, Paths};
-use super::{Batch, BatchError, CHUNK, Craft, autopilot, place, shape};
+use super::{Batch, BatchError, BatchVehicle, CHUNK, autopilot, place, shape};
 use crate::plant::{Wind, WindParameters};
 use nalgebra::convert;
 use squirrel_core::dynamics::State;
@@ -120,14 +120,14 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// Moving air about one vehicle from now on, as in a flight with this wind and seed: steady wind, its gusts, and those of the
     /// vehicle's `gust` effect. Gusts move at the rate of the flight code, 300 Hz.
     ///
-    /// * `craft` - the vehicle, for its effect
+    /// * `member` - the vehicle, for its effect
     ///
     /// # Errors
     /// A number that is not finite, a batch of the base model alone, no such vehicle.
     pub fn set_air(
         &mut self,
         number: usize,
-        craft: &Craft,
+        member: &BatchVehicle,
         wind: WindParameters,
         seed: u64,
     ) -> Result<(), BatchError> {
@@ -135,10 +135,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         if !wind.mean_ned_m_s.iter().chain([&wind.gust_sigma_m_s]).all(|x| x.is_finite()) {
             return Err(BatchError::NotFinite { what: "wind", vehicle: number });
         }
-        let mut airs = vec![Wind::new(wind, seed ^ 0x5851_F42D_4C95_7F2D)];
-        if let Some(gusts) = craft.effects.gust() {
-            airs.push(Wind::new(WindParameters::of_gusts(gusts), seed ^ 0x9E6C_63D0_876A_3F1B));
-        }
+        let airs = Wind::of_flight(wind, &member.effects, seed);
         let (chunk, block, lane) = place(number);
         let mut chunk = self.pool.chunk(chunk);
         let block = &mut chunk.blocks[block];

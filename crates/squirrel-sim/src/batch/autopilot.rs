@@ -1,37 +1,38 @@
 //! The inner loop of the flight code on registers: set points to rotor speeds, between steps of the batch.
 //!
-//! Command filter, quaternion backstepping and rates as in `squirrel_core::control` (docs/equations.md B.3), with sines by
-//! polynomials instead of libm: torques agree to 1e-5 of their size, not to the bit. The mixer is the flight code's own
-//! (`squirrel_core::control::mix`).
+//! Yaw lead, command filter, quaternion backstepping (docs/equations.md B.3) and mixer are those of `squirrel_core::control`, and
+//! what rotors are told is what they make of the flight code's commands: in `f32` a vehicle has the flight code's bits
+//! (`tests/batch_autopilot.rs`, `tests/tasks.rs`).
 
 use super::rows::Block;
 use super::simd::{BLOCK, Kernel, Paths, Register};
 use super::{Batch, BatchError, CHUNK, Call, Settings, Work, place, shape};
 use nalgebra::convert;
-use squirrel_core::control::backstepping::quaternion::{self, Law, Wanted, attitude_of_halves};
-use squirrel_core::control::backstepping::{AttitudeGains, Tilt};
+use squirrel_core::control::backstepping::quaternion::{Law, Target};
+use squirrel_core::control::backstepping::{AttitudeGains, integrated, yaw_target};
+use squirrel_core::control::command_filter::{Filter, Poles};
 use squirrel_core::control::mix::Table;
 use squirrel_core::control::mixer::Mixer;
 use squirrel_core::dynamics::State;
-use squirrel_core::lane::functions::{half_turn_sine_and_cosine, limit, wrap};
-use squirrel_core::lane::vector::{cross, times};
+use squirrel_core::lane::functions::limit;
+use squirrel_core::lane::vector::{cross, heading, times};
 use squirrel_core::lane::{Row, load, put, store};
 use squirrel_core::math::real;
 use squirrel_core::numbers;
-use squirrel_core::vehicle::Vehicle;
+use squirrel_core::vehicle::{CommandKind, Vehicle};
 use std::slice;
 
 /// What the numbers of a set point are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SetPoint {
-    /// Roll, pitch, yaw, rad, and collective thrust, N.
+    /// Roll, pitch, yaw, rad, and collective thrust, N. Yaw is turned to as in flight: by 20 deg ahead of the measured one at most.
     Attitude,
     /// Body rates, rad/s, and collective thrust, N.
     BodyRate,
 }
 
 numbers! {
-    /// What the loop is told and remembers.
+    /// Set point and memory of the loop.
     Course {
         set_point [4],
         /// Filtered roll, pitch, yaw, and their rates.
@@ -52,8 +53,10 @@ numbers! {
         /// Square of the filter's frequency, and twice its damping times frequency.
         stiffness, damping,
         /// By columns.
-        inertia [9],
-        inverse_thrust_coefficient
+        inertia [3] [3],
+        thrust_coefficient,
+        /// Speed at full command, rad/s, or 0 where a command is not a part of it.
+        full_speed
     }
 }
 
@@ -63,6 +66,10 @@ pub(super) struct Autopilots<S: Copy, const ROTORS: usize> {
     course: Course<Row<S>>,
     gains: Gains<Row<S>>,
     mixer: Table<Row<S>, ROTORS>,
+    /// What the mixer gave last, N.
+    thrust: [Row<S>; ROTORS],
+    /// Of vehicles whose commands are pulses or voltages: these are rounded on the way from a thrust to a speed.
+    rounding: [Option<Box<Vehicle<f32>>>; BLOCK],
     /// Steps until the loops act again.
     wait: usize,
 }
@@ -75,6 +82,8 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
             course: Course { sign: one, free: one, ..Course::all(none) },
             gains: Gains::all(none),
             mixer: Table::all(none),
+            thrust: [none; ROTORS],
+            rounding: [const { None }; BLOCK],
             wait: 0,
         }
     }
@@ -82,27 +91,28 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
     /// The loop of another vehicle in column `lane`.
     fn fit(&mut self, lane: usize, vehicle: &Vehicle<f32>, gains: &AttitudeGains, mixer: &Mixer) {
         let p = vehicle.parameters();
-        let law =
-            Law::from_euler_gains(&gains.c1_per_s, &gains.c2_per_s, &gains.lambda_per_s2, &p.inertia_kg_m2);
-        let frequency = f64::from(gains.filter_frequency_rad_s);
-        let all3 = |v: nalgebra::Vector3<f32>| [v.x, v.y, v.z].map(f64::from);
-        let mut inertia = [0.0; 9];
-        for (place, number) in inertia.iter_mut().zip(p.inertia_kg_m2.iter()) {
-            *place = f64::from(*number);
-        }
+        let [c1, c2, lambda] = [gains.c1_per_s, gains.c2_per_s, gains.lambda_per_s2].map(Into::into);
+        let law = Law::<f32>::from_euler_gains(&c1, &c2, &lambda, &p.inertia_kg_m2.into());
+        let poles = Poles::new(gains.filter_frequency_rad_s, gains.filter_damping);
+        let is_part = matches!(p.propulsion.command, CommandKind::SpeedFraction | CommandKind::Duty);
+        let rounds =
+            p.propulsion.thrust_curve.is_some() || p.propulsion.command == CommandKind::PwmMicroseconds;
+        self.rounding[lane] = rounds.then(|| Box::new(*vehicle));
         let numbers = Gains {
-            c1: all3(law.c1),
-            c2: all3(law.c2),
-            lambda: all3(law.lambda),
-            k: f64::from(law.k),
+            c1: law.c1,
+            c2: law.c2,
+            lambda: law.lambda,
+            k: law.k,
             // The core limits the integral of the angle, which is twice the vector part.
-            integral_max: 0.5 * f64::from(gains.integral_max_rad_s),
-            stiffness: frequency * frequency,
-            damping: 2.0 * f64::from(gains.filter_damping) * frequency,
-            inertia,
-            inverse_thrust_coefficient: 1.0 / f64::from(p.propulsion.thrust_coefficient_n_s2),
+            integral_max: 0.5 * gains.integral_max_rad_s,
+            stiffness: poles.stiffness,
+            damping: poles.damping,
+            inertia: law.inertia,
+            thrust_coefficient: p.propulsion.thrust_coefficient_n_s2,
+            full_speed: if is_part { p.propulsion.speed_max_rad_s } else { 0.0 },
         };
-        self.gains.put(lane, &numbers.map(real));
+        let numbers = numbers.map(|number: f32| real(f64::from(number)));
+        self.gains.put(lane, &numbers);
         self.mixer.put(lane, &mixer.table().first());
     }
 
@@ -119,7 +129,7 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
     }
 
     /// Set points of the first vehicles.
-    fn tell(&mut self, rows: &[S]) {
+    fn set(&mut self, rows: &[S]) {
         for (lane, row) in rows.chunks_exact(4).enumerate() {
             for (place, number) in self.course.set_point.iter_mut().zip(row) {
                 place[lane] = *number;
@@ -159,8 +169,9 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Act<'_, S, ROTORS> {
             course.free = L::of(1.0) - mixed.saturated;
             let mut speed = mixed.rotor_thrust_n;
             for i in 0..ROTORS {
-                speed[i] = (speed[i] * gains.inverse_thrust_coefficient).root();
+                speed[i] = gains.target_speed(mixed.rotor_thrust_n[i]);
             }
+            store(&mixed.rotor_thrust_n, &mut autopilots.thrust, start);
             store(&speed, &mut held.target_speed, start);
             course.store(&mut autopilots.course, start);
         }
@@ -176,33 +187,18 @@ fn attitude<L: Register>(
     omega: &[L; 3],
     dt: L,
 ) -> [L; 3] {
-    let none = L::of(0.0);
-    let mut acceleration = [none; 3];
-    for i in 0..3 {
-        let gap = wrap(course.set_point[i] - course.angle[i]);
-        acceleration[i] = gap * gains.stiffness - course.rate[i] * gains.damping;
-        course.rate[i] = course.rate[i] + acceleration[i] * dt;
-        course.angle[i] = wrap(course.angle[i] + course.rate[i] * dt);
-    }
-    let half = L::of(0.5);
-    let [roll, pitch, yaw] = [
-        half_turn_sine_and_cosine(course.angle[0] * half),
-        half_turn_sine_and_cosine(course.angle[1] * half),
-        half_turn_sine_and_cosine(course.angle[2] * half),
-    ];
-    let tilt = Tilt::of_halves(roll, pitch);
-    let target = Wanted {
-        attitude: attitude_of_halves([roll, pitch, yaw]),
-        omega: tilt.body_rate(&course.rate),
-        omega_dot: tilt.body_acceleration(&course.rate, &acceleration),
-    };
-    let law = gains.law();
-    let answer = law.torque(q, omega, &target, &course.integral, course.sign);
+    let [roll, pitch, yaw, _] = course.set_point;
+    let target = [roll, pitch, yaw_target(heading(q), yaw)];
+    let mut filter = Filter { angle: course.angle, rate: course.rate };
+    let poles = Poles { stiffness: gains.stiffness, damping: gains.damping };
+    let acceleration = filter.step(&target, &poles, dt);
+    Filter { angle: course.angle, rate: course.rate } = filter;
+    let target = Target::from_euler(&filter.angle, &filter.rate, &acceleration);
+    let answer = gains.law().torque(q, omega, &target, &course.integral, course.sign);
     course.sign = answer.sign;
+    let next = integrated(&course.integral, &answer.z1, gains.integral_max, dt);
     for i in 0..3 {
-        let next = course.integral[i] + answer.z1[i] * dt;
-        let next = limit(next, none - gains.integral_max, gains.integral_max);
-        course.integral[i] = course.free.where_positive(next, course.integral[i]);
+        course.integral[i] = course.free.where_positive(next[i], course.integral[i]);
     }
     answer.torque
 }
@@ -219,17 +215,41 @@ fn body_rate<L: Register>(gains: &Gains<L>, course: &Course<L>, omega: &[L; 3]) 
 
 impl<L: Register> Gains<L> {
     #[inline(always)]
-    fn law(&self) -> quaternion::Gains<L> {
-        let [a, b, c, d, e, f, g, h, i] = self.inertia;
-        let inertia = [[a, b, c], [d, e, f], [g, h, i]];
-        quaternion::Gains { c1: self.c1, c2: self.c2, lambda: self.lambda, k: self.k, inertia }
+    fn law(&self) -> Law<L> {
+        let Self { c1, c2, lambda, k, inertia, .. } = *self;
+        Law { c1, c2, lambda, k, inertia }
+    }
+
+    /// What a rotor makes of the command for a thrust, as `Propulsion` does with a part of the full speed or with the thrust itself.
+    #[inline(always)]
+    fn target_speed(&self, thrust_n: L) -> L {
+        let (none, one) = (L::of(0.0), L::of(1.0));
+        let speed = (thrust_n / self.thrust_coefficient).root();
+        let part = limit(speed / self.full_speed, none, one) * self.full_speed;
+        self.full_speed.where_positive(part, speed)
+    }
+}
+
+impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
+    /// Speeds of rotors whose commands are rounded on the way to them.
+    fn round_commands(&mut self) {
+        let Some(autopilots) = &self.autopilots else { return };
+        for (lane, vehicle) in autopilots.rounding.iter().enumerate() {
+            let Some(vehicle) = vehicle else { continue };
+            let (propulsion, rotors) = (&vehicle.parameters().propulsion, vehicle.rotors().len());
+            for (speed, thrust) in self.held.target_speed.iter_mut().zip(&autopilots.thrust).take(rotors) {
+                let thrust_n = nalgebra::try_convert(thrust[lane]).unwrap_or(f64::NAN) as f32;
+                let command = propulsion.command_for_thrust(thrust_n);
+                speed[lane] = real(f64::from(propulsion.target_speed_rad_s(command)));
+            }
+        }
     }
 }
 
 /// How the loops of a batch act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Autopilot {
-    /// What they are told.
+    /// What their set points are.
     pub set_point: SetPoint,
     /// Steps of the batch from one act to the next.
     pub period_steps: usize,
@@ -261,6 +281,7 @@ pub(super) fn flown<T: Paths, const ROTORS: usize>(
                 autopilots.wait = autopilot.period_steps;
                 let before = block.held.target_speed;
                 T::run(path, Act { block, set_point: autopilot.set_point, period_s });
+                block.round_commands();
                 block.delay(&before);
             }
             let Some(autopilots) = &mut block.autopilots else { return };
@@ -332,7 +353,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             let mut chunk = self.pool.chunk(chunk);
             for (block, rows) in chunk.blocks.iter_mut().zip(rows.chunks(4 * BLOCK)) {
                 let Some(autopilots) = &mut block.autopilots else { return Err(BatchError::NoAutopilot) };
-                autopilots.tell(rows);
+                autopilots.set(rows);
             }
         }
         Ok(())

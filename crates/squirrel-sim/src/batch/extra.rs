@@ -5,9 +5,9 @@
 
 use super::air::{Airs, Forecast};
 use super::battery::Packs;
-use super::craft::Fitted;
 use super::rows::Block;
 use super::simd::{BLOCK, Paths};
+use super::vehicle::Fitted;
 use nalgebra::{Vector3, try_convert};
 use squirrel_core::aero::flat_plate;
 use squirrel_core::aero::membrane::{Membrane, Side};

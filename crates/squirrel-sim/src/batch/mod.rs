@@ -7,11 +7,16 @@
 //! of any size, at any place in it, on any registers, on any number of threads, in one call or in many, and the numbers of
 //! `squirrel_core::dynamics` in the same scalar.
 //!
-//! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles ([`Craft`]): flat wings and
+//! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles ([`BatchVehicle`]): flat wings and
 //! membranes with their servos, batteries (`battery`), effects, gusts (`air`) and late commands (`extra`), with the equations of
 //! [`crate::plant::Plant`], which `squirrel_core` has once for both. What no vehicle of the batch has is not computed. A wing that is a network, and
 //! effects that act on sensors or stamps (accel_bias, accel_scale, clock_skew, clock_step, compass_current, gnss_latency,
 //! gyro_scale, heading_bias), are refused.
+//!
+//! - [`Batch`]: vehicles side by side, in one scalar, of up to so many rotors
+//! - [`BatchVehicle`]: one of them, with all that it may have
+//! - `Block`: sixteen of them, a register or more; `Chunk`: blocks that a thread takes at once
+//! - `AnyBatch`, in `squirrel-py`: a batch of any scalar and any number of rotors
 //!
 //! ```
 //! use squirrel_sim::batch::{Batch, Settings};
@@ -29,7 +34,6 @@ mod access;
 mod air;
 mod autopilot;
 mod battery;
-mod craft;
 mod dynamics;
 mod error;
 mod exchange;
@@ -37,13 +41,13 @@ mod extra;
 pub(crate) mod pool;
 mod rows;
 pub mod simd;
+mod vehicle;
 
 pub use autopilot::{Autopilot, SetPoint, Tuned};
-pub use craft::Craft;
 pub use error::BatchError;
+pub use vehicle::BatchVehicle;
 
 use crate::plant::{MembraneParameters, ServoParameters, WingPlant};
-use craft::Fitted;
 use dynamics::{Advance, AdvanceWhole};
 use exchange::{Chunk, Job, do_job};
 use extra::Extra;
@@ -57,6 +61,7 @@ use squirrel_core::dynamics::whole::FLAT;
 use squirrel_core::effects::{Prepared, Swing};
 use squirrel_core::math::real;
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
+use vehicle::Fitted;
 
 /// Blocks that a thread takes at once: little enough to share out evenly, enough to be worth claiming.
 const CHUNK: usize = 4;
@@ -160,25 +165,25 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// # Errors
     /// As [`Self::new`]; a wing that is a network, flat wings beside membranes, an effect that does not act in a batch, effects
     /// that leave no airframe.
-    pub fn with(crafts: &[Craft], settings: Settings) -> Result<Self, BatchError> {
-        Self::with_room(crafts.len(), crafts, settings)
+    pub fn with(members: &[BatchVehicle], settings: Settings) -> Result<Self, BatchError> {
+        Self::with_room(members.len(), members, settings)
     }
 
-    /// As [`Self::with`], of `count` vehicles, in turn those of `crafts`; there is room for any of these at any place.
+    /// As [`Self::with`], of `count` vehicles, in turn those of `members`; there is room for any of these at any place.
     ///
     /// # Errors
     /// As [`Self::with`].
-    pub fn with_room(count: usize, crafts: &[Craft], settings: Settings) -> Result<Self, BatchError> {
-        let fitted = Fitted::all(crafts)?;
-        let mut kinds = Vec::with_capacity(crafts.len());
-        for (number, craft) in crafts.iter().enumerate() {
-            kinds.push(Drive::new(&airframe(number, craft)?.0));
+    pub fn with_room(count: usize, members: &[BatchVehicle], settings: Settings) -> Result<Self, BatchError> {
+        let fitted = Fitted::all(members)?;
+        let mut kinds = Vec::with_capacity(members.len());
+        for (number, member) in members.iter().enumerate() {
+            kinds.push(Drive::new(&airframe(number, member)?.0));
         }
         let drives: Vec<Drive<T>> = kinds.iter().copied().cycle().take(count).collect();
         let mut batch =
-            Self::empty(&drives, fitted, crafts.first().map(|craft| &craft.vehicle), settings, whole)?;
-        for (number, craft) in crafts.iter().cycle().take(count).enumerate() {
-            batch.refit(number, craft)?;
+            Self::empty(&drives, fitted, members.first().map(|member| &member.vehicle), settings, whole)?;
+        for (number, member) in members.iter().cycle().take(count).enumerate() {
+            batch.refit(number, member)?;
             batch.reset(number, &State::at_rest())?;
         }
         Ok(batch)
@@ -240,12 +245,12 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     ///
     /// # Errors
     /// As [`Self::with`]; something that the batch has no place for; no such vehicle.
-    pub fn refit(&mut self, number: usize, craft: &Craft) -> Result<(), BatchError> {
+    pub fn refit(&mut self, number: usize, member: &BatchVehicle) -> Result<(), BatchError> {
         self.check(number)?;
-        let present = self.fitted.fits(craft, number)?;
-        let (vehicle, whole) = airframe::<T>(number, craft)?;
-        let effects = &craft.effects;
-        self.put(number, &vehicle, &Tuning::between(&craft.vehicle, &whole, effects))?;
+        let present = self.fitted.fits(member, number)?;
+        let (vehicle, whole) = airframe::<T>(number, member)?;
+        let effects = &member.effects;
+        self.put(number, &vehicle, &Tuning::between(&member.vehicle, &whole, effects))?;
         let (chunk, block, lane) = place(number);
         let dt_s = self.settings.dt_s;
         let mut chunk = self.pool.chunk(chunk);
@@ -254,14 +259,14 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         extra.present = extra.present.or(present);
         let own = whole.parameters().wing;
         let still = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.0 };
-        let (plate, membrane, servo) = match &craft.wing {
+        let (plate, membrane, servo) = match &member.wing {
             WingPlant::Flat { wing, servo } => (Some(*wing), None, servo),
             WingPlant::Membrane { membrane, servo } => (own, Some(*membrane.parameters()), servo),
             WingPlant::None | WingPlant::Parnn { .. } => (own, None, &still),
         };
         // Without wings in the plant there is nothing that air could push, but effects still see the declared wing.
         let plate =
-            if self.fitted.wing == FLAT && matches!(craft.wing, WingPlant::None) { None } else { plate };
+            if self.fitted.wing == FLAT && matches!(member.wing, WingPlant::None) { None } else { plate };
         let none = flat_plate::Pair::all(0.0);
         extra.plate.put(lane, &plate.as_ref().map_or(none, flat_plate::Pair::new).map(real));
         let gain = if membrane.is_some() { 1.0 } else { 0.0 };
@@ -279,7 +284,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         if let Some(packs) = &mut extra.packs {
             let p = &whole.parameters().propulsion;
             let torque = convert(p.torque_coefficient_n_m_s2);
-            packs.put(lane, craft.battery.as_ref(), p.reference_voltage_v, torque, dt_s);
+            packs.put(lane, member.battery.as_ref(), p.reference_voltage_v, torque, dt_s);
         }
         Ok(())
     }
@@ -313,9 +318,12 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
 }
 
 /// The airframe with what effects change once, in the batch's scalar and as it is.
-fn airframe<T: Paths>(number: usize, craft: &Craft) -> Result<(Vehicle<T>, Vehicle<f64>), BatchError> {
+fn airframe<T: Paths>(
+    number: usize,
+    member: &BatchVehicle,
+) -> Result<(Vehicle<T>, Vehicle<f64>), BatchError> {
     let fail = |problem| BatchError::Airframe { vehicle: number, problem };
-    let altered = craft.effects.alter(&craft.vehicle).map_err(fail)?;
+    let altered = member.effects.alter(&member.vehicle).map_err(fail)?;
     // A cast declares the vehicle anew, without what effects did to its rotors: `Tuning` has that.
     Ok((altered.cast().map_err(fail)?, altered))
 }

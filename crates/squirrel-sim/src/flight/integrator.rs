@@ -5,6 +5,7 @@
 
 use super::{FlightError, Setup};
 use crate::plant::{Plant, PlantState};
+use crate::setting::SettingError;
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::vehicle::PerRotor;
 
@@ -29,11 +30,13 @@ impl Integrator {
     ///
     /// # Errors
     /// One line that lists the names.
-    pub fn parse(name: &str) -> Result<Self, String> {
-        [Self::Rk4, Self::Rapier]
-            .into_iter()
-            .find(|i| i.name() == name)
-            .ok_or_else(|| format!("integrator = {name}: no such integrator; known are rk4, rapier"))
+    pub fn parse(name: &str) -> Result<Self, SettingError> {
+        [Self::Rk4, Self::Rapier].into_iter().find(|i| i.name() == name).ok_or_else(|| SettingError::Name {
+            field: "integrator",
+            name: name.to_owned(),
+            what: "integrator",
+            known: "rk4, rapier".to_owned(),
+        })
     }
 }
 

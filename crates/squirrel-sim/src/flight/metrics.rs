@@ -4,6 +4,7 @@ use super::integrator::Contact;
 use super::surroundings::Surroundings;
 use crate::plant::PlantState;
 use crate::scenario::Scenario;
+use crate::setting::SettingError;
 use serde::Serialize;
 use squirrel_core::control::Reference;
 use squirrel_core::control::twcc::Mode;
@@ -207,7 +208,7 @@ impl<'a> Meter<'a> {
         if state.deployment().iter().sum::<f64>() > 1.0 {
             self.wings_us += step_us;
         }
-        if self.mode == Mode::Wiic {
+        if self.mode == Mode::WingsOpen {
             self.wiic_us += step_us;
         }
     }
@@ -251,12 +252,10 @@ impl<'a> Meter<'a> {
 
     /// # Errors
     /// The measured window never began: a flight without an encounter has no error to report.
-    pub(super) fn finish(mut self) -> Result<Metrics, String> {
+    pub(super) fn finish(mut self) -> Result<Metrics, SettingError> {
         if self.samples == 0 {
-            return Err(format!(
-                "duration_s = {}: no encounter in that time, so there is nothing to measure",
-                self.scenario.duration_s
-            ));
+            let reason = "no encounter in that time, so there is nothing to measure";
+            return Err(SettingError::value("duration_s", self.scenario.duration_s, reason));
         }
         let n = self.samples as f64;
         self.metrics.rmse_m = (self.square / n).sqrt();

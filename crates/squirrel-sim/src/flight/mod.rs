@@ -21,7 +21,7 @@ pub(crate) use record::{ESTIMATOR, PARNN_WEIGHTS};
 
 use crate::arm::Arm;
 use crate::estimator::Estimator;
-use crate::plant::{Plant, PlantState, Wind, WindParameters, WingPlant};
+use crate::plant::{Plant, PlantState, Wind, WingPlant};
 use crate::scenario::{FaultKind, Scenario};
 use crate::sensors::{SensorParameters, Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
@@ -259,10 +259,7 @@ impl Setup {
         let mut mover = Mover::new(self, obstacles.all())?;
         let mut state = plant.initial_state(self.hovering(plant), self.scenario.start_charge());
         let seed = self.scenario.seed;
-        let mut winds = vec![Wind::new(self.scenario.wind(), seed ^ 0x5851_F42D_4C95_7F2D)];
-        if let Some(gusts) = plant.effects().gust() {
-            winds.push(Wind::new(WindParameters::of_gusts(gusts), seed ^ 0x9E6C_63D0_876A_3F1B));
-        }
+        let mut winds = Wind::of_flight(self.scenario.wind(), plant.effects(), seed);
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
         let mut metrics = metrics::Meter::new(&self.scenario);
@@ -291,13 +288,13 @@ impl Setup {
                 let (mut frame, battery) = sensors.poll(time_us, &truth);
                 failing.spoil(&mut frame);
                 frame.set_obstacles(&obstacles.seen(&state.body, believed.as_ref()));
-                if self.arm.is_told_the_force() {
+                if self.arm.is_given_the_force() {
                     let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
                 if let Some(pilot) = &mut pilot {
-                    let told = if estimates { seen(&frame, believed.as_ref()) } else { frame };
-                    frame.command = pilot.command(tick, &told);
+                    let known = if estimates { seen(&frame, believed.as_ref()) } else { frame };
+                    frame.command = pilot.command(tick, &known);
                 }
                 let (output, met) = computer.step(&frame)?;
                 believed = output.navigation.or(believed);
@@ -337,7 +334,7 @@ impl Setup {
             });
         }
         Ok(Flight {
-            metrics: metrics.finish().map_err(FlightError)?,
+            metrics: metrics.finish().map_err(|e| FlightError(e.to_string()))?,
             log: recorder.map(record::Recorder::finish),
         })
     }

@@ -4,8 +4,8 @@ use super::{CONTROL_RATE_HZ, FlightError, Setup};
 use crate::track::{Track, TrackPoint};
 use squirrel_core::control::Reference;
 use squirrel_core::control::follow::{FollowGains, PlanPoint};
-use squirrel_core::control::position::Motion;
-use squirrel_core::control::twcc::Airframe;
+use squirrel_core::control::position::MeasuredMotion;
+use squirrel_core::control::twcc::OuterAirframe;
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::policy::PilotCommand;
@@ -47,7 +47,7 @@ pub struct Follower {
     /// When the plan begins, us.
     begin_us: u64,
     gains: FollowGains,
-    airframe: Airframe,
+    airframe: OuterAirframe,
     stack: Stack,
     known: Known,
     time_us: u64,
@@ -64,7 +64,7 @@ impl Follower {
         let stack = setup.stack()?;
         let vehicle = stack.vehicle();
         let tilt_max_rad = vehicle.parameters().limits.tilt_max_rad;
-        let airframe = Airframe::new(vehicle, stack.parameters().twcc.thrust_min_n, tilt_max_rad);
+        let airframe = OuterAirframe::new(vehicle, stack.parameters().twcc.thrust_min_n, tilt_max_rad);
         Ok(Self {
             track: Track::default(),
             begin_us: 0,
@@ -83,7 +83,7 @@ impl Follower {
     }
 
     /// What flies it.
-    pub fn airframe(&self) -> &Airframe {
+    pub fn airframe(&self) -> &OuterAirframe {
         &self.airframe
     }
 
@@ -94,14 +94,14 @@ impl Follower {
     }
 
     /// Motion as known from the frames so far, at the heading that the flight code takes commands to be of.
-    pub fn motion(&self) -> Option<Motion> {
+    pub fn motion(&self) -> Option<MeasuredMotion> {
         let (gnss, attitude) = (self.known.gnss?, self.known.attitude?);
         let mut position = gnss.position;
         if let Some(altitude_m) = self.known.altitude_m {
             position.vector.z = -altitude_m;
         }
         let heading_rad = self.stack.heading_rad(self.time_us, &attitude);
-        Some(Motion::new(position, gnss.velocity, &attitude, heading_rad))
+        Some(MeasuredMotion::new(position, gnss.velocity, &attitude, heading_rad))
     }
 
     /// The plan at a time of the flight.

@@ -2,6 +2,7 @@
 //!
 //! The simulator always computes the voltage; thrust feels it only through the `battery_sag` effect.
 
+use crate::setting::SettingError;
 use squirrel_core::dynamics::battery::{self, Pack, Stretch};
 
 /// Numbers of a battery pack.
@@ -29,7 +30,7 @@ pub struct BatteryParameters {
 pub type BatteryState = battery::Charge<f64>;
 
 impl BatteryParameters {
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), SettingError> {
         let positive = [
             ("cells", f64::from(self.cells)),
             ("capacity_ah", self.capacity_ah),
@@ -40,23 +41,26 @@ impl BatteryParameters {
         ];
         for (key, x) in positive {
             if !(x.is_finite() && x > 0.0) {
-                return Err(format!("battery.{key} = {x}: must be finite and > 0"));
+                return Err(SettingError::value(format!("battery.{key}"), x, "must be finite and > 0"));
             }
         }
         if self.efficiency > 1.0 {
-            return Err(format!("battery.efficiency = {}: must be <= 1", self.efficiency));
+            return Err(SettingError::value("battery.efficiency", self.efficiency, "must be <= 1"));
         }
         if !(0.0..=100.0).contains(&self.idle_current_a) {
-            return Err(format!("battery.idle_current_a = {}: must be 0 to 100", self.idle_current_a));
+            return Err(SettingError::value(
+                "battery.idle_current_a",
+                self.idle_current_a,
+                "must be 0 to 100",
+            ));
         }
         let table = &self.ocv_v_of_charge;
         let rising = table.windows(2).all(|w| w[0][0] < w[1][0] && w[0][1] <= w[1][1]);
         let plausible =
             |[charge, volt]: &[f64; 2]| (0.0..=1.0).contains(charge) && (0.5..=6.0).contains(volt);
         if table.len() < 2 || !rising || !table.iter().all(plausible) {
-            return Err(format!(
-                "battery.ocv_v_of_charge = {table:?}: must be at least two rising pairs [charge 0..1, cell volt 0.5..6]"
-            ));
+            let reason = "must be at least two rising pairs [charge 0..1, cell volt 0.5..6]";
+            return Err(SettingError::value("battery.ocv_v_of_charge", format!("{table:?}"), reason));
         }
         Ok(())
     }
@@ -171,6 +175,6 @@ mod tests {
     #[test]
     fn a_falling_table_is_refused_by_name() {
         let bad = BatteryParameters { ocv_v_of_charge: vec![[0.0, 4.0], [1.0, 3.0]], ..battery() };
-        assert!(bad.check().unwrap_err().starts_with("battery.ocv_v_of_charge"));
+        assert!(bad.check().unwrap_err().to_string().starts_with("battery.ocv_v_of_charge"));
     }
 }

@@ -65,7 +65,7 @@ impl Plant {
         };
         let plate = plate.as_ref().map_or(flat_plate::Pair::all(0.0), flat_plate::Pair::new);
         let extra_s = self.acting().rotor_extra_time_constant_s();
-        let mut craft = Whole::<Variable, ROTORS> {
+        let mut vehicle = Whole::<Variable, ROTORS> {
             airframe: Airframe::new(vehicle, extra_s).map(constant),
             held: Held {
                 wind: <[f64; 3]>::from(wind.vector).map(constant),
@@ -90,20 +90,20 @@ impl Plant {
         };
         let sides = [side(0), side(1)];
         if membrane.is_some() {
-            let air = whole::air::<_, ROTORS, true>(&craft, &before, &rotation(&before.attitude));
-            let y = lateral(craft.membrane.arm_m);
+            let air = whole::air::<_, ROTORS, true>(&vehicle, &before, &rotation(&before.attitude));
+            let y = lateral(vehicle.membrane.arm_m);
             for side in 0..2 {
                 let turned = angle_of_attack(&air, y[side]) - constant(state.wing_angle_rad[side]);
-                craft.angle_rate[side] = turned / constant(self.dt_s());
+                vehicle.angle_rate[side] = turned / constant(self.dt_s());
             }
         }
         let stages = runge_kutta(constant(self.dt_s()));
         let (after, _) = match self.wing {
-            WingPlant::None => whole::step::<_, ROTORS, 4, NONE, true>(&craft, &stages, &before, &sides),
+            WingPlant::None => whole::step::<_, ROTORS, 4, NONE, true>(&vehicle, &stages, &before, &sides),
             WingPlant::Flat { .. } => {
-                whole::step::<_, ROTORS, 4, FLAT, true>(&craft, &stages, &before, &sides)
+                whole::step::<_, ROTORS, 4, FLAT, true>(&vehicle, &stages, &before, &sides)
             }
-            _ => whole::step::<_, ROTORS, 4, MEMBRANE, true>(&craft, &stages, &before, &sides),
+            _ => whole::step::<_, ROTORS, 4, MEMBRANE, true>(&vehicle, &stages, &before, &sides),
         };
         Some(rows(&after))
     }

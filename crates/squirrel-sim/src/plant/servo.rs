@@ -1,5 +1,6 @@
 //! The numbers of the wing servos; their equations are [`squirrel_core::dynamics::servo`].
 
+use crate::setting::SettingError;
 use squirrel_core::dynamics::servo::{self, SHORTEST_S, Servo};
 
 /// Numbers of a wing servo with its crank.
@@ -17,12 +18,12 @@ pub struct ServoParameters {
 pub type ServoState = servo::ServoState<f64>;
 
 impl ServoParameters {
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), SettingError> {
         if !(0.0..=1.0).contains(&self.dead_time_s) {
-            return Err(format!("wing.dead_time_s = {}: must be 0 to 1", self.dead_time_s));
+            return Err(SettingError::value("wing.dead_time_s", self.dead_time_s, "must be 0 to 1"));
         }
         if !(self.rate_max_per_s > 0.0) {
-            return Err(format!("wing.rate_max_per_s = {}: must be > 0", self.rate_max_per_s));
+            return Err(SettingError::value("wing.rate_max_per_s", self.rate_max_per_s, "must be > 0"));
         }
         Ok(())
     }

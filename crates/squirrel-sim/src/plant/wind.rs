@@ -7,7 +7,7 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
-use squirrel_core::effects::{GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, GustSpectrum};
+use squirrel_core::effects::{Effects, GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, GustSpectrum};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::nalgebra::Vector3;
 
@@ -107,6 +107,16 @@ impl Wind {
             GustModel::Dryden { .. } => {}
         }
         wind
+    }
+
+    /// All winds of a flight: the steady one with its gusts, and those of the `gust` effect. Each has a stream of its own, which the
+    /// flight's seed starts.
+    pub fn of_flight(wind: WindParameters, effects: &Effects<f64>, seed: u64) -> Vec<Self> {
+        const STEADY: u64 = 0x5851_F42D_4C95_7F2D;
+        const GUST_EFFECT: u64 = 0x9E6C_63D0_876A_3F1B;
+        let gusts =
+            effects.gust().map(|gusts| Self::new(WindParameters::of_gusts(gusts), seed ^ GUST_EFFECT));
+        [Self::new(wind, seed ^ STEADY)].into_iter().chain(gusts).collect()
     }
 
     /// Velocity of the air now, m/s.

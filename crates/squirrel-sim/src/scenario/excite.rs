@@ -4,6 +4,7 @@
 //! moves and hovers there, and climbs back. The dashes go out and back along both horizontal axes, wings spread in the middle
 //! of each. The seed also draws directions, the sense of turning, the moments of the wings and the multisine's phases.
 
+use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::guidance::excite::{BAND_HZ, Leg, MAX_LEGS, Multisine, Programme};
@@ -93,20 +94,21 @@ impl ExciteTable {
         }
     }
 
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), SettingError> {
         if !(self.speed_m_s > 0.0 && self.speed_m_s <= 30.0) {
-            return Err(format!("speed_m_s = {}: must be > 0 and <= 30", self.speed_m_s));
+            return Err(SettingError::value("speed_m_s", self.speed_m_s, "must be > 0 and <= 30"));
         }
         if self.heights_m.is_empty() || self.heights_m.len() > MAX_HEIGHTS {
-            return Err(format!("heights_m = {:?}: must be 1 to {MAX_HEIGHTS} heights", self.heights_m));
+            let reason = format!("must be 1 to {MAX_HEIGHTS} heights");
+            return Err(SettingError::value("heights_m", format!("{:?}", self.heights_m), reason));
         }
         if let Some(x) = self.heights_m.iter().find(|x| !(x.is_finite() && **x > 0.0 && **x <= 1e5)) {
-            return Err(format!("heights_m = {x}: must be > 0 and <= 1e5"));
+            return Err(SettingError::value("heights_m", x, "must be > 0 and <= 1e5"));
         }
         if !(0.0..=1.0).contains(&self.even_seed_charge) {
-            return Err(format!("even_seed_charge = {}: must be 0 to 1", self.even_seed_charge));
+            return Err(SettingError::value("even_seed_charge", self.even_seed_charge, "must be 0 to 1"));
         }
-        self.multisine(0).map(|_| ()).map_err(|e| e.to_string())
+        Ok(self.multisine(0).map(|_| ())?)
     }
 
     fn multisine(&self, seed: u32) -> Result<Multisine, ParameterError> {

@@ -1,5 +1,6 @@
 //! `[faults]` of a scenario: what fails in flight, from when, for how long.
 
+use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 
 /// What can fail.
@@ -112,33 +113,37 @@ impl FaultTable {
 
     /// # Errors
     /// `faults.kind.field = value: reason`.
-    pub(crate) fn check(&self, kind: FaultKind, rotors: usize) -> Result<(), String> {
+    pub(crate) fn check(&self, kind: FaultKind, rotors: usize) -> Result<(), SettingError> {
         let name = kind.name();
         for (field, x) in [("start_s", Some(self.start_s)), ("duration_s", self.duration_s)] {
             if let Some(x) = x.filter(|x| !(0.0..=1e5).contains(x)) {
-                return Err(format!("faults.{name}.{field} = {x}: must be 0 to 1e5"));
+                return Err(SettingError::value(format!("faults.{name}.{field}"), x, "must be 0 to 1e5"));
             }
         }
         match (kind.sizes(), self.size) {
             (None, None) => {}
             (None, Some(x)) => {
-                return Err(format!("faults.{name}.size = {x}: given, but this fault has no size"));
+                return Err(SettingError::value(
+                    format!("faults.{name}.size"),
+                    x,
+                    "given, but this fault has no size",
+                ));
             }
             (Some((low, high, unit)), x) => {
                 let x = x.unwrap_or(f64::NAN);
                 if !(low..=high).contains(&x) {
-                    return Err(format!("faults.{name}.size = {x}: must be {low} to {high} ({unit})"));
+                    let reason = format!("must be {low} to {high} ({unit})");
+                    return Err(SettingError::value(format!("faults.{name}.size"), x, reason));
                 }
             }
         }
+        let refused = |which, reason| SettingError::value(format!("faults.{name}.which"), which, reason);
         match (kind.count(rotors), self.which) {
             (Some(count), Some(which)) if (1..=count).contains(&(which as usize)) => Ok(()),
-            (Some(count), Some(which)) => Err(format!("faults.{name}.which = {which}: must be 1 to {count}")),
-            (None, Some(which)) => {
-                Err(format!("faults.{name}.which = {which}: given, but there is only one"))
-            }
+            (Some(count), Some(which)) => Err(refused(which, format!("must be 1 to {count}"))),
+            (None, Some(which)) => Err(refused(which, "given, but there is only one".to_owned())),
             (_, None) if kind == FaultKind::MotorWeak => {
-                Err(format!("faults.{name}.which: missing; a rotor's number"))
+                Err(SettingError::Missing { field: format!("faults.{name}.which"), what: "a rotor's number" })
             }
             (_, None) => Ok(()),
         }

@@ -3,6 +3,7 @@
 //! Rows lie one after the other northwards, trunks of a row one after the other eastwards, each interval drawn anew. The flight begins in
 //! the middle, where there is a gap, and ends with the first contact or after its way.
 
+use crate::setting::SettingError;
 use squirrel_core::guidance::mission::scramble;
 
 use serde::{Deserialize, Serialize};
@@ -31,7 +32,7 @@ impl ForestTable {
         Self { size_m: 820.0, spacing_m: [10.5, 13.5], radius_m: 0.5, path_m: 400.0 }
     }
 
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), SettingError> {
         let [low, high] = self.spacing_m;
         for (field, x, most) in [
             ("size_m", self.size_m, 1e3),
@@ -39,11 +40,12 @@ impl ForestTable {
             ("radius_m", self.radius_m, 0.25 * low),
         ] {
             if !(x > 0.0 && x <= most) {
-                return Err(format!("{field} = {x}: must be > 0 and <= {most}"));
+                return Err(SettingError::value(field, x, format!("must be > 0 and <= {most}")));
             }
         }
         if !(low >= 1.0 && low <= high && high.is_finite()) {
-            return Err(format!("spacing_m = [{low}, {high}]: must be 1 or more, the shortest first"));
+            let value = format!("[{low}, {high}]");
+            return Err(SettingError::value("spacing_m", value, "must be 1 or more, the shortest first"));
         }
         Ok(())
     }
@@ -99,8 +101,8 @@ mod tests {
     #[test]
     fn a_number_that_cannot_be_is_named() {
         let bad = ForestTable { spacing_m: [13.5, 10.5], ..ForestTable::built_in() };
-        assert!(bad.check().unwrap_err().starts_with("spacing_m = [13.5, 10.5]"));
+        assert!(bad.check().unwrap_err().to_string().starts_with("spacing_m = [13.5, 10.5]"));
         let bad = ForestTable { path_m: f64::NAN, ..ForestTable::built_in() };
-        assert!(bad.check().unwrap_err().starts_with("path_m = NaN"));
+        assert!(bad.check().unwrap_err().to_string().starts_with("path_m = NaN"));
     }
 }

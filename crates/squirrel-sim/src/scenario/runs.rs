@@ -5,6 +5,7 @@
 //! through all speeds up to its top speed and through braking, where the air hits the belly.
 
 use super::excite::Draw;
+use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
 use squirrel_core::frames::{In, Ned, Rotation};
 use squirrel_core::guidance::excite::{Leg, MAX_LEGS, Multisine, Programme};
@@ -44,14 +45,14 @@ impl RunsTable {
         Self { speed_m_s: 10.0, climb_m_s: 4.0, sway_rad: 0.01 }
     }
 
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), SettingError> {
         for (field, x) in [("speed_m_s", self.speed_m_s), ("climb_m_s", self.climb_m_s)] {
             if !(x > 0.0 && x <= 30.0) {
-                return Err(format!("{field} = {x}: must be > 0 and <= 30"));
+                return Err(SettingError::value(field, x, "must be > 0 and <= 30"));
             }
         }
         if !(0.0..=0.05).contains(&self.sway_rad) {
-            return Err(format!("sway_rad = {}: must be 0 to 0.05", self.sway_rad));
+            return Err(SettingError::value("sway_rad", self.sway_rad, "must be 0 to 0.05"));
         }
         Ok(())
     }
@@ -99,7 +100,7 @@ mod tests {
             (RunsTable { climb_m_s: 0.0, ..good.clone() }, "climb_m_s = 0"),
             (RunsTable { sway_rad: 0.06, ..good.clone() }, "sway_rad = 0.06"),
         ] {
-            assert!(broken.check().unwrap_err().starts_with(field), "{broken:?}");
+            assert!(broken.check().unwrap_err().to_string().starts_with(field), "{broken:?}");
         }
     }
 

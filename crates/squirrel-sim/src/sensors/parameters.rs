@@ -6,6 +6,7 @@
 use super::devices;
 use super::table::{DEVICE, Field, Limit, Slot, Table};
 use crate::quantity::plain;
+use crate::setting::SettingError;
 use Limit::{AboveZero, Signed, Size, Within};
 use serde::Deserialize;
 
@@ -30,13 +31,21 @@ impl Timing {
     }
 
     /// * `sensor` - name of the table, for the error
-    pub(super) fn check(&self, sensor: &str) -> Result<(), String> {
+    pub(super) fn check(&self, sensor: &str) -> Result<(), SettingError> {
         let Self { rate_hz, latency_s, .. } = self;
         if !(*rate_hz > 0.0 && *rate_hz <= 1e5) {
-            return Err(format!("sensors.{sensor}.timing.rate_hz = {rate_hz}: must be > 0 and <= 1e5"));
+            return Err(SettingError::value(
+                format!("sensors.{sensor}.timing.rate_hz"),
+                rate_hz,
+                "must be > 0 and <= 1e5",
+            ));
         }
         if !(0.0..=10.0).contains(latency_s) {
-            return Err(format!("sensors.{sensor}.timing.latency_s = {latency_s}: must be 0 to 10"));
+            return Err(SettingError::value(
+                format!("sensors.{sensor}.timing.latency_s"),
+                latency_s,
+                "must be 0 to 10",
+            ));
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ use super::parameters::{
     AttitudeSensor, BaroSensor, BatterySensor, GnssSensor, ImuSensor, MagnetometerSensor,
 };
 use super::table::{OneOf, Reader, Said, Table};
+use crate::setting::SettingError;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use std::fmt;
 
@@ -36,7 +37,7 @@ const SUITE: &str = "suite";
 const KEYS: [&str; 7] = ["imu", "attitude", "gnss", "baro", "battery", "magnetometer", SUITE];
 
 /// What the airframe of a suite does to its devices.
-struct Airframe {
+struct SuiteAirframe {
     devices: [&'static str; 4],
     /// One rotor at 1000 rad/s, behind the filter of the device: rate, rad/s, and specific force, m/s^2.
     vibration: [f64; 2],
@@ -80,7 +81,7 @@ impl SensorParameters {
     /// - `research`: good devices, damped and calibrated.
     /// - `rtk`: as `research`, with a receiver that has corrections, and a better barometer and magnetometer.
     pub fn suite(name: &str) -> Option<Self> {
-        let research = Airframe {
+        let research = SuiteAirframe {
             devices: ["icm_42688_p", "neo_m9n", "bmp390", "ist8310"],
             vibration: [0.006, 1.0],
             walk: [5e-5, 5e-4],
@@ -99,7 +100,7 @@ impl SensorParameters {
                 p.magnetometer = Some(MagnetometerSensor { noise_ut: 0.5, ..MagnetometerSensor::default() });
                 Some(p)
             }
-            "hobby" => Some(Self::of(&Airframe {
+            "hobby" => Some(Self::of(&SuiteAirframe {
                 devices: ["mpu_6000", "neo_m9n", "ms5611", "qmc5883l"],
                 vibration: [0.02, 4.0],
                 walk: [2e-4, 2e-3],
@@ -112,7 +113,7 @@ impl SensorParameters {
                 current_ut_per_a: [0.1, -0.05, 0.15],
             })),
             "research" => Some(Self::of(&research)),
-            "rtk" => Some(Self::of(&Airframe {
+            "rtk" => Some(Self::of(&SuiteAirframe {
                 devices: ["icm_42688_p", "zed_f9p_rtk", "dps310", "rm3100"],
                 // A solution that is lost for a fix is off by a wavelength or two.
                 outliers: [0.001, 0.4],
@@ -122,7 +123,7 @@ impl SensorParameters {
         }
     }
 
-    fn of(airframe: &Airframe) -> Self {
+    fn of(airframe: &SuiteAirframe) -> Self {
         let mut p = Self::default();
         let mut compass = MagnetometerSensor::default();
         let [imu, gnss, baro, magnetometer] = airframe.devices;
@@ -163,7 +164,7 @@ impl SensorParameters {
 
     /// # Errors
     /// The first number that cannot be, with its field.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    pub(crate) fn check(&self) -> Result<(), SettingError> {
         let mut copy = *self;
         for name in KEYS {
             if let Some(table) = copy.table(name) {

@@ -4,6 +4,7 @@
 
 use super::parameters::Timing;
 use crate::quantity::plain;
+use crate::setting::SettingError;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
 use std::fmt;
 
@@ -24,14 +25,15 @@ pub(super) enum Limit {
 }
 
 impl Limit {
-    fn check(self, x: f64) -> Result<(), String> {
+    /// What a number outside must be.
+    fn broken(self, x: f64) -> Option<String> {
         let (holds, reason) = match self {
             Self::Signed => (x.is_finite(), "must be finite".to_owned()),
             Self::Size => (x.is_finite() && x >= 0.0, "must be finite and >= 0".to_owned()),
             Self::AboveZero => (x > 0.0, "must be > 0".to_owned()),
             Self::Within(low, high) => ((low..=high).contains(&x), format!("must be {low} to {high}")),
         };
-        if holds { Ok(()) } else { Err(reason) }
+        (!holds).then_some(reason)
     }
 }
 
@@ -68,7 +70,7 @@ pub(super) struct Field<'a> {
 
 impl Field<'_> {
     /// * `sensor` - name of the table, for the error
-    pub(super) fn check(&self, sensor: &str) -> Result<(), String> {
+    pub(super) fn check(&self, sensor: &str) -> Result<(), SettingError> {
         let numbers: &[f64] = match &self.slot {
             Slot::Count(n) => &[f64::from(**n)],
             Slot::Number(x) => std::slice::from_ref(&**x),
@@ -76,9 +78,9 @@ impl Field<'_> {
             Slot::Timing(timing) => return timing.check(sensor),
         };
         for x in numbers {
-            self.limit
-                .check(*x)
-                .map_err(|reason| format!("sensors.{sensor}.{} = {x}: {reason}", self.key))?;
+            if let Some(reason) = self.limit.broken(*x) {
+                return Err(SettingError::value(format!("sensors.{sensor}.{}", self.key), x, reason));
+            }
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Courses: what an episode asks for, and what it is worth.
 //!
-//! - [`Kind::Track`]: follow a smooth curve, sums of one sine an axis.
-//! - [`Kind::Avoid`]: follow the paper's straight run (section V.B) past trunks that stand in the way and are seen late.
+//! - [`CourseKind::Track`]: follow a smooth curve, sums of one sine an axis.
+//! - [`CourseKind::Avoid`]: follow the paper's straight run (section V.B) past trunks that stand in the way and are seen late.
 //!
 //! The reward of a step is its length times how near the vehicle is to where it should be, from 1 to 0, less a little for turning;
 //! an episode of ten seconds is worth ten at most. A vehicle that hits a trunk, overturns or strays is lost, which costs five.
@@ -33,7 +33,7 @@ const TURNING: f32 = 0.005;
 
 /// What to learn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum CourseKind {
     /// Past trunks.
     Avoid,
     /// Along a curve.
@@ -95,9 +95,9 @@ fn between(rng: &mut Pcg64Mcg, low: f32, high: f32) -> f32 {
 }
 
 impl Course {
-    pub(super) fn draw(kind: Kind, rng: &mut Pcg64Mcg) -> Self {
+    pub(super) fn draw(kind: CourseKind, rng: &mut Pcg64Mcg) -> Self {
         match kind {
-            Kind::Avoid => {
+            CourseKind::Avoid => {
                 let speed_m_s = between(rng, 4.0, 8.0);
                 let start = In::new(Vector3::new(0.0, 0.0, -HEIGHT_M));
                 let run = Trajectory::new(start, 0.0, speed_m_s, 2.0);
@@ -110,7 +110,7 @@ impl Course {
                 });
                 Self::Avoid { run, ahead_s, trunks }
             }
-            Kind::Track => {
+            CourseKind::Track => {
                 let mut sines = Sines::default();
                 for axis in 0..3 {
                     let size = if axis == 2 { 0.3 } else { 1.0 };

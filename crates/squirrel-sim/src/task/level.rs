@@ -2,6 +2,7 @@
 //! folded to 1 spread.
 
 use crate::batch::SetPoint;
+use squirrel_core::control::wiic::Envelope;
 use squirrel_core::math::{limit, lower};
 use squirrel_core::policy::{ACTION, Span};
 use squirrel_core::vehicle::{MAX_ROTORS, PerRotor, Vehicle};
@@ -16,14 +17,15 @@ pub enum Level {
     Motor,
     /// Rates of roll, pitch and yaw in [`RATE_MAX_RAD_S`], thrust in weights above hover, and wings.
     BodyRate,
-    /// As [`Span::command`]: roll, pitch, thrust and wings; heading is held north. What [`squirrel_core::policy`] flies.
+    /// As [`Span::command`]: roll, pitch, thrust and wings; heading is held north; limited as the flight code limits commands. What
+    /// [`squirrel_core::policy`] flies.
     AttitudeWing,
 }
 
-/// What an action tells.
+/// What an action commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Told {
-    /// Set point or rotor commands, as many as [`Level::told_numbers`].
+pub(super) struct ActionCommand {
+    /// Set point or rotor commands, as many as [`Level::command_numbers`].
     pub(super) rotors: PerRotor<f32>,
     /// Both wings, 0..1.
     pub(super) wing: f32,
@@ -39,12 +41,12 @@ impl Level {
         }
     }
 
-    /// Numbers that the batch is told.
-    pub(super) fn told_numbers(self, rotors: usize) -> usize {
+    /// Numbers of a set point or of rotor commands.
+    pub(super) fn command_numbers(self, rotors: usize) -> usize {
         if self == Self::Motor { rotors } else { 4 }
     }
 
-    /// What the autopilot is told; none where rotors are.
+    /// What set points are; none where rotors are commanded.
     pub(super) fn set_point(self) -> Option<SetPoint> {
         match self {
             Self::Motor => None,
@@ -54,7 +56,14 @@ impl Level {
     }
 
     /// * `action` - [`Self::numbers`] long
-    pub(super) fn told(self, action: &[f32], span: &Span, vehicle: &Vehicle<f32>) -> Told {
+    /// * `envelope` - to which the flight code limits attitude commands
+    pub(super) fn command(
+        self,
+        action: &[f32],
+        span: &Span,
+        envelope: &Envelope,
+        vehicle: &Vehicle<f32>,
+    ) -> ActionCommand {
         let number = |i: usize| limit(action.get(i).copied().unwrap_or(f32::NAN), -1.0, 1.0);
         let mut rotors = [0.0; MAX_ROTORS];
         let mut wing = 0.5 * (1.0 + number(action.len().wrapping_sub(1)));
@@ -73,13 +82,13 @@ impl Level {
                 rotors[3] = lower((1.0 + number(3)) * span.weight_n, span.thrust_max_n);
             }
             Self::AttitudeWing => {
-                let command = span.command(&[number(0), number(1), number(2), number(3)]);
-                let attitude = command.attitude;
+                let pilot = span.command(&[number(0), number(1), number(2), number(3)]);
+                let attitude = envelope.limit(&pilot.attitude);
                 (rotors[0], rotors[1], rotors[3]) =
                     (attitude.roll_rad, attitude.pitch_rad, attitude.thrust_n);
-                wing = command.wing;
+                wing = pilot.wing;
             }
         }
-        Told { rotors, wing }
+        ActionCommand { rotors, wing }
     }
 }

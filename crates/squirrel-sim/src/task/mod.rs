@@ -18,7 +18,7 @@ use crate::batch::pool::Pool;
 use crate::batch::simd::Path;
 use crate::batch::{BatchError, Scheme};
 use crate::vehicle_file::VehicleFile;
-use course::Kind;
+use course::CourseKind;
 use part::{Candidate, Part};
 use squirrel_core::control::Reference;
 use squirrel_core::dynamics::State;
@@ -31,7 +31,7 @@ pub const STEPS: usize = 10;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TaskSettings {
     /// What to do.
-    pub kind: Kind,
+    pub kind: CourseKind,
     /// What actions are.
     pub level: Level,
     /// Length of an episode, s.

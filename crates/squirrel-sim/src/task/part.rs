@@ -2,13 +2,15 @@
 
 use super::course::{self, Course};
 use super::{STEPS, TaskError, TaskSettings};
-use crate::batch::{Autopilot, Batch, BatchError, Craft, Settings, Tuned};
+use crate::batch::{Autopilot, Batch, BatchError, BatchVehicle, Settings, Tuned};
 use crate::plant::WindParameters;
 use crate::sensors::{SensorParameters, Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use squirrel_core::control::Reference;
+use squirrel_core::control::twcc::OuterAirframe;
+use squirrel_core::control::wiic::Envelope;
 use squirrel_core::dynamics::State;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
@@ -25,10 +27,11 @@ const SENSING: Sensing = Sensing { range_m: 5.0, half_view_rad: 0.261_799_4, spe
 /// A vehicle of which episodes may be flown.
 #[derive(Debug, Clone)]
 pub(super) struct Candidate {
-    craft: Craft,
+    member: BatchVehicle,
     tuned: Tuned,
     sensors: SensorParameters,
     span: Span,
+    envelope: Envelope,
     hover_speed_rad_s: f32,
 }
 
@@ -78,10 +81,19 @@ impl Candidate {
         let fail = |problem| BatchError::Airframe { vehicle: number, problem };
         let vehicle = file.vehicle.cast::<f32>().map_err(fail)?;
         let span = Span::of(&vehicle);
+        let tilt_max_rad = vehicle.parameters().limits.tilt_max_rad;
+        let envelope = OuterAirframe::new(&vehicle, control.twcc.thrust_min_n, tilt_max_rad).envelope;
         let each = span.weight_n / vehicle.rotors().len() as f32;
         let hover_speed_rad_s = (each / vehicle.parameters().propulsion.thrust_coefficient_n_s2).sqrt();
         let tuned = Tuned { vehicle, gains: control.attitude };
-        Ok(Self { craft: Craft::from(file), tuned, sensors: file.sensors, span, hover_speed_rad_s })
+        Ok(Self {
+            member: BatchVehicle::from(file),
+            tuned,
+            sensors: file.sensors,
+            span,
+            envelope,
+            hover_speed_rad_s,
+        })
     }
 }
 
@@ -96,14 +108,14 @@ impl<const ROTORS: usize> Part<ROTORS> {
         settings: TaskSettings,
     ) -> Result<Self, TaskError> {
         let candidates = Arc::clone(candidates);
-        let crafts: Vec<Craft> = candidates.iter().map(|one| one.craft.clone()).collect();
+        let members: Vec<BatchVehicle> = candidates.iter().map(|one| one.member.clone()).collect();
         let batch = Settings {
             dt_s: 1.0 / (RATE_HZ as f64 * STEPS as f64),
             scheme: settings.scheme,
             threads: 1,
             path: settings.path,
         };
-        let mut batch = Batch::with_room(count, &crafts, batch)?;
+        let mut batch = Batch::with_room(count, &members, batch)?;
         let level = settings.level;
         if let Some(set_point) = level.set_point() {
             let tuned: Vec<Tuned> =
@@ -125,7 +137,7 @@ impl<const ROTORS: usize> Part<ROTORS> {
             batch,
             candidates,
             episodes: vec![episode; count],
-            set_points: vec![0.0; count * level.told_numbers(ROTORS)],
+            set_points: vec![0.0; count * level.command_numbers(ROTORS)],
             wings: vec![0.0; count * 2],
             actions: vec![0.0; count * level.numbers(ROTORS)],
             observation: vec![0.0; count * OBSERVATION],
@@ -169,14 +181,15 @@ impl<const ROTORS: usize> Part<ROTORS> {
     /// One action of each.
     pub(super) fn step(&mut self) -> Result<(), TaskError> {
         let level = self.settings.level;
-        let width = level.told_numbers(ROTORS);
+        let width = level.command_numbers(ROTORS);
         for (number, action) in self.actions.chunks_exact(level.numbers(ROTORS)).enumerate() {
             let episode = &mut self.episodes[number];
             let candidate = &self.candidates[episode.candidate];
-            let told = level.told(action, &candidate.span, &candidate.tuned.vehicle);
-            self.set_points[width * number..][..width].copy_from_slice(&told.rotors[..width]);
-            self.wings[2 * number..][..2].fill(told.wing);
-            episode.wing = told.wing;
+            let command =
+                level.command(action, &candidate.span, &candidate.envelope, &candidate.tuned.vehicle);
+            self.set_points[width * number..][..width].copy_from_slice(&command.rotors[..width]);
+            self.wings[2 * number..][..2].fill(command.wing);
+            episode.wing = command.wing;
         }
         if level.set_point().is_some() {
             self.batch.set_points(&self.set_points)?;
@@ -223,7 +236,7 @@ impl<const ROTORS: usize> Part<ROTORS> {
         let candidate = course::draw_below(&mut episode.rng, self.candidates.len());
         let chosen = &self.candidates[candidate];
         if candidate != episode.candidate || episode.steps == 0 {
-            self.batch.refit(number, &chosen.craft)?;
+            self.batch.refit(number, &chosen.member)?;
             if self.settings.level.set_point().is_some() {
                 self.batch.retune(number, &chosen.tuned)?;
             }
@@ -239,8 +252,8 @@ impl<const ROTORS: usize> Part<ROTORS> {
             *speed = chosen.hover_speed_rad_s;
         }
         let seed = course::draw(&mut episode.rng);
-        if chosen.craft.effects.gust().is_some() {
-            self.batch.set_air(number, &chosen.craft, WindParameters::calm(), seed)?;
+        if chosen.member.effects.gust().is_some() {
+            self.batch.set_air(number, &chosen.member, WindParameters::calm(), seed)?;
         } else {
             self.batch.set_wind(number, In::zero())?;
         }

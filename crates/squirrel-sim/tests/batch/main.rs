@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod autopilot;
-mod craft;
 mod errors;
 mod identity;
 mod lanes;
 mod support;
 mod tasks;
+mod vehicle;

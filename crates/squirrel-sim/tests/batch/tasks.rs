@@ -1,13 +1,20 @@
 //! Environments: what happens in one depends on nothing but its seed, and rewards are for what they say.
 
-use squirrel_core::policy::OBSERVATION;
-use squirrel_sim::batch::Scheme;
+use squirrel_core::dynamics::State;
+use squirrel_core::frames::In;
+use squirrel_core::nalgebra::Vector3;
+use squirrel_core::policy::{OBSERVATION, PilotCommand, Span};
+use squirrel_core::stack::{Gnss, Imu, SensorFrame, StackState};
+use squirrel_sim::arm::Arm;
 use squirrel_sim::batch::simd::Path;
-use squirrel_sim::task::course::Kind;
+use squirrel_sim::batch::{Batch, BatchVehicle, Scheme, Settings};
+use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::scenario::Scenario;
+use squirrel_sim::task::course::CourseKind;
 use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-fn settings(kind: Kind, level: Level) -> TaskSettings {
+fn settings(kind: CourseKind, level: Level) -> TaskSettings {
     TaskSettings {
         kind,
         level,
@@ -69,9 +76,62 @@ fn fly(tasks: &mut Tasks, steps: usize, pilot: impl Fn(&[f32]) -> Vec<f32>) -> V
     all
 }
 
+/// The flight code beside a task: the same actions on the same plant, the same bits after each. It gets true attitude and rates at
+/// 500 Hz, as the task's inner loop has them.
+#[test]
+fn an_action_turns_the_rotors_in_a_task_as_in_the_flight_code() {
+    let vehicle = VehicleFile::squirrel();
+    let scenario = Scenario::find("hover").unwrap();
+    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    let stack = setup.stack().unwrap();
+    let span = Span::of(stack.vehicle());
+    let settings = TaskSettings { threads: 1, ..settings(CourseKind::Track, Level::AttitudeWing) };
+    let mut tasks = Tasks::<4>::new(std::slice::from_ref(&vehicle), 1, 5, settings).unwrap();
+    let mut observation = vec![0.0; OBSERVATION];
+    tasks.reset(|_| false, &mut observation).unwrap();
+
+    let batch = Settings { dt_s: 2e-3, scheme: Scheme::Rk4, threads: 1, path: Path::best() };
+    let mut plant: Batch<f32> = Batch::with(&[BatchVehicle::from(&vehicle)], batch).unwrap();
+    plant.reset(0, &tasks.state(0).unwrap().0).unwrap();
+    let mut known = StackState::default();
+    let mut control = |time_us: u64, state: &State<f32>, command: Option<PilotCommand>| {
+        let mut frame = SensorFrame::empty(time_us);
+        frame.imu = Some(Imu { omega: state.omega, specific_force: In::new(Vector3::new(0.0, 0.0, -9.8)) });
+        frame.attitude = Some(state.ned_from_body());
+        frame.gnss = Some(Gnss { position: state.position, velocity: state.velocity });
+        frame.command = command;
+        stack.control(&mut known, &frame)
+    };
+    // A first frame takes no time, and hover takes no rotor to its limit.
+    control(0, &plant.state(0).unwrap(), Some(span.command(&[0.0, 0.0, 0.0, -1.0])));
+    let (mut time_us, mut beyond, mut spread) = (2000, 0, 0.0_f32);
+    for count in 0..300 {
+        // Leans, throws, and cuts thrust below what the flight code allows.
+        let k = count as f32;
+        let throw = [0.9 * (k * 0.5).sin(), 0.9 * (k * 0.3).cos(), 1.2 * (k * 0.11).sin(), (k * 0.05).sin()];
+        let action = if count % 50 < 25 { lean(&observation) } else { throw };
+        let command = span.command(&action);
+        for tick in 0..10 {
+            let output = control(time_us, &plant.state(0).unwrap(), (tick == 0).then_some(command));
+            time_us += 2000;
+            beyond += u32::from(output.inner.unwrap().mixer.saturated);
+            plant.command(&output.rotor_command[..4]).unwrap();
+            plant.command_wings(&output.wing_command).unwrap();
+            plant.step(1);
+        }
+        let seen = step(&mut tasks, &action);
+        assert!(!seen.terminated[0], "action {count}");
+        let (one, other) = (tasks.state(0).unwrap().0, plant.state(0).unwrap());
+        assert_eq!(one, other, "action {count}");
+        spread = spread.max(plant.deployment(0).unwrap()[0]);
+        observation.clone_from(&seen.observation);
+    }
+    assert!(beyond > 100 && spread > 0.9, "{beyond} {spread}");
+}
+
 #[test]
 fn an_environment_is_the_same_among_many_and_on_any_registers() {
-    for (kind, level) in [(Kind::Avoid, Level::AttitudeWing), (Kind::Track, Level::Motor)] {
+    for (kind, level) in [(CourseKind::Avoid, Level::AttitudeWing), (CourseKind::Track, Level::Motor)] {
         for sensors in [false, true] {
             let settings = TaskSettings { sensors, ..settings(kind, level) };
             let pilot = |observation: &[f32]| match level {
@@ -107,12 +167,12 @@ fn an_environment_is_the_same_among_many_and_on_any_registers() {
 #[test]
 fn who_follows_is_paid_and_who_falls_is_lost() {
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 50, 3, settings(CourseKind::Track, Level::AttitudeWing)).unwrap();
     let good = fly(&mut tasks, 499, |observation| lean(observation).to_vec());
     let total: f32 = good.iter().flat_map(|seen| &seen.reward).sum::<f32>() / 50.0;
     assert!(total > 6.0, "{total}");
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 50, 3, settings(Kind::Track, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 50, 3, settings(CourseKind::Track, Level::AttitudeWing)).unwrap();
     let bad = fly(&mut tasks, 200, |_| vec![0.0, 0.0, -1.0, -1.0]);
     let lost = (0..50).filter(|k| bad.iter().any(|seen| seen.terminated[*k])).count();
     assert_eq!(lost, 50);
@@ -121,7 +181,7 @@ fn who_follows_is_paid_and_who_falls_is_lost() {
 /// An episode ends at its time; the step after it starts another one, whatever the action, and pays nothing.
 #[test]
 fn episodes_end_in_time_and_begin_again() {
-    let short = TaskSettings { episode_s: 0.1, ..settings(Kind::Avoid, Level::AttitudeWing) };
+    let short = TaskSettings { episode_s: 0.1, ..settings(CourseKind::Avoid, Level::AttitudeWing) };
     let mut tasks: Tasks = Tasks::new(&vehicles()[..1], 3, 1, short).unwrap();
     let before = tasks.obstacles(1).unwrap();
     let seen = fly(&mut tasks, 7, |observation| lean(observation).to_vec());
@@ -136,7 +196,7 @@ fn episodes_end_in_time_and_begin_again() {
 #[test]
 fn trunks_are_solid_and_seen_before_they_are_hit() {
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 100, 5, settings(Kind::Avoid, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 100, 5, settings(CourseKind::Avoid, Level::AttitudeWing)).unwrap();
     let trunks: Vec<_> = (0..100).map(|k| tasks.obstacles(k).unwrap()).collect();
     let seen = fly(&mut tasks, 450, |observation| lean(observation).to_vec());
     let (mut hits, mut warned) = (0, 0);
@@ -153,7 +213,7 @@ fn trunks_are_solid_and_seen_before_they_are_hit() {
 #[test]
 fn what_cannot_be_learned_is_named() {
     let bad = |vehicles: &[VehicleFile], count, episode_s| {
-        let settings = TaskSettings { episode_s, ..settings(Kind::Avoid, Level::Motor) };
+        let settings = TaskSettings { episode_s, ..settings(CourseKind::Avoid, Level::Motor) };
         Tasks::<4>::new(vehicles, count, 0, settings).unwrap_err().to_string()
     };
     assert_eq!(bad(&vehicles(), 0, 1.0), "num_envs = 0: must be at least 1");
@@ -162,7 +222,7 @@ fn what_cannot_be_learned_is_named() {
     let mut uncontrolled = vehicles();
     uncontrolled[1].control = None;
     assert!(bad(&uncontrolled, 1, 1.0).starts_with("vehicles[1]: [control] is missing"));
-    let mut tasks: Tasks = Tasks::new(&vehicles(), 2, 0, settings(Kind::Avoid, Level::Motor)).unwrap();
+    let mut tasks: Tasks = Tasks::new(&vehicles(), 2, 0, settings(CourseKind::Avoid, Level::Motor)).unwrap();
     let error = tasks.reset(|_| true, &mut [0.0; 3]).unwrap_err().to_string();
     assert_eq!(error, "observation: 3 numbers, must be 50");
 }

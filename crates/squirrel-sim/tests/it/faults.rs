@@ -5,7 +5,7 @@ use squirrel_core::stack::failsafe::{Failsafe, FailsafeReason as Reason, RECOVER
 use squirrel_log::flight_code::frames;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::faults::{Fault, Kind, Sensor};
+use squirrel_sim::faults::{Fault, Sensor, SensorFaultKind};
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -14,7 +14,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 ///
 /// A sensor that hangs in flight contradicts itself only once the flight would have changed it; the core tests say when.
 fn expected(fault: &Fault) -> Option<(Reason, u64)> {
-    let silent = fault.kind != Kind::Stuck;
+    let silent = fault.kind != SensorFaultKind::Stuck;
     match fault.sensor {
         Sensor::Imu if silent => Some((Reason::ImuLost, 100_000)),
         // At 300 Hz, noise and all.
@@ -23,7 +23,7 @@ fn expected(fault: &Fault) -> Option<(Reason, u64)> {
         Sensor::Gnss if silent => Some((Reason::GnssLost, 1_500_000)),
         Sensor::Altitude if silent => Some((Reason::AltitudeLost, 1_000_000)),
         // The first of them that is missed.
-        Sensor::All if matches!(fault.kind, Kind::NotANumber | Kind::Infinite) => {
+        Sensor::All if matches!(fault.kind, SensorFaultKind::NotANumber | SensorFaultKind::Infinite) => {
             Some((Reason::ImuLost, 100_000))
         }
         _ => None,
@@ -77,7 +77,7 @@ fn ten_thousand_faults_are_survived_and_named() {
         }
         acted += u32::from(!reasons.is_empty());
         let window_us = fault.end_us - fault.start_us;
-        let silent_us = if fault.kind == Kind::Late { window_us / 2 } else { window_us };
+        let silent_us = if fault.kind == SensorFaultKind::Late { window_us / 2 } else { window_us };
         if let Some((reason, after_us)) = expected(&fault)
             && silent_us > after_us + 110_000
         {

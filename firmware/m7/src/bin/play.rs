@@ -14,7 +14,7 @@
 
 use core::fmt::Write;
 use cortex_m_rt::entry;
-use squirrel_core::estimate::navigator::Told;
+use squirrel_core::estimate::navigator::Navigated;
 use squirrel_core::stack::wire::{
     HASH_START, Header, RECORD_MAX, Reader, Record, SETUP, Wire, hash, written,
 };
@@ -78,9 +78,9 @@ impl Sequence {
 
     fn parts(&mut self, counter: &mut Counter, frame: &SensorFrame) -> StackOutput {
         let (stack, state) = (&self.stack, &mut self.state_of_parts);
-        let (told, to_navigate) = counter.of(|| navigate(stack, state, frame));
-        let (mut output, to_control) = counter.of(|| control(stack, state, &told.frame));
-        let ((), to_watch) = counter.of(|| watch(stack, state, &told, &mut output));
+        let (navigated, to_navigate) = counter.of(|| navigate(stack, state, frame));
+        let (mut output, to_control) = counter.of(|| control(stack, state, &navigated.frame));
+        let ((), to_watch) = counter.of(|| watch(stack, state, &navigated, &mut output));
         let is_aided = frame.gnss.is_some() || frame.altitude_m.is_some() || frame.magnetic.is_some();
         let estimator = if is_aided { &mut self.aided } else { &mut self.inertial };
         estimator.add(to_navigate + to_watch);
@@ -109,7 +109,7 @@ fn one_step(stack: &Stack, state: &mut StackState, frame: &SensorFrame) -> Stack
 }
 
 #[inline(never)]
-fn navigate(stack: &Stack, state: &mut StackState, frame: &SensorFrame) -> Told {
+fn navigate(stack: &Stack, state: &mut StackState, frame: &SensorFrame) -> Navigated {
     stack.navigate(state, frame)
 }
 
@@ -119,8 +119,8 @@ fn control(stack: &Stack, state: &mut StackState, frame: &SensorFrame) -> StackO
 }
 
 #[inline(never)]
-fn watch(stack: &Stack, state: &mut StackState, told: &Told, output: &mut StackOutput) {
-    stack.watch(state, told, output);
+fn watch(stack: &Stack, state: &mut StackState, navigated: &Navigated, output: &mut StackOutput) {
+    stack.watch(state, navigated, output);
 }
 
 /// Whether every output was the host's; `None` where the file is not what it should be.

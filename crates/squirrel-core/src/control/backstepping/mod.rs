@@ -9,7 +9,8 @@ pub mod quaternion;
 use super::command_filter::EulerReference;
 use crate::frames::{Body, Ned, Rotation};
 use crate::lane::Lane;
-use crate::math::{Real, limit, real, wrap_angle};
+use crate::lane::functions::{limit, wrap};
+use crate::math::{Real, real};
 use crate::vehicle::{ParameterError, each_positive, positive};
 use nalgebra::{Matrix3, Vector3};
 
@@ -36,11 +37,7 @@ impl AttitudeForm {
     pub fn yaw_target_rad(self, measured_rad: f32, commanded_rad: f32) -> f32 {
         match self {
             Self::Euler => commanded_rad,
-            Self::Quaternion => {
-                let lead =
-                    limit(wrap_angle(commanded_rad - measured_rad), -YAW_LEAD_MAX_RAD, YAW_LEAD_MAX_RAD);
-                measured_rad + lead
-            }
+            Self::Quaternion => yaw_target(measured_rad, commanded_rad),
         }
     }
 
@@ -161,33 +158,27 @@ impl AttitudeGains {
             }
             AttitudeForm::Quaternion => {
                 let law = quaternion::Law::from_euler_gains(
-                    &self.c1_per_s,
-                    &self.c2_per_s,
-                    &self.lambda_per_s2,
-                    inertia_kg_m2,
+                    &self.c1_per_s.into(),
+                    &self.c2_per_s.into(),
+                    &self.lambda_per_s2.into(),
+                    &(*inertia_kg_m2).into(),
                 );
                 let target = quaternion::Target::from_euler(
-                    &reference.angle,
-                    &reference.rate,
-                    &reference.acceleration,
+                    &reference.angle.into(),
+                    &reference.rate.into(),
+                    &reference.acceleration.into(),
                 );
                 // The integral of half the error drives the quaternion law; its sign is opposite.
                 let chi = state.integral * -0.5;
-                let out = law.torque(
-                    inertia_kg_m2,
-                    &ned_from_body.quaternion,
-                    omega,
-                    &target,
-                    &chi,
-                    state.negative_sign,
-                );
-                state.negative_sign = out.negative_sign;
-                (out.torque, out.z1 * -2.0, -out.z2)
+                let sign = if state.negative_sign { -1.0 } else { 1.0 };
+                let out = law.torque(&ned_from_body.wxyz(), &(*omega).into(), &target, &chi.into(), sign);
+                state.negative_sign = out.sign < 0.0;
+                (out.torque.into(), Vector3::from(out.z1) * -2.0, -Vector3::from(out.z2))
             }
         };
         if !hold_integral {
-            let next = state.integral + angle_error * dt_s;
-            state.integral = next.map(|x| limit(x, -self.integral_max_rad_s, self.integral_max_rad_s));
+            let (before, error) = (state.integral.into(), angle_error.into());
+            state.integral = integrated(&before, &error, self.integral_max_rad_s, dt_s).into();
         }
         AttitudeTerms {
             angle_error,
@@ -197,6 +188,23 @@ impl AttitudeGains {
             torque_n_m: torque,
         }
     }
+}
+
+/// The yaw to turn to on the way to a commanded one, see [`AttitudeForm::yaw_target_rad`].
+#[inline(always)]
+pub fn yaw_target<L: Lane>(measured_rad: L, commanded_rad: L) -> L {
+    let largest = f64::from(YAW_LEAD_MAX_RAD);
+    measured_rad + limit(wrap(commanded_rad - measured_rad), L::of(-largest), L::of(largest))
+}
+
+/// An integral of an error a step later, within its limit.
+#[inline(always)]
+pub fn integrated<L: Lane>(integral: &[L; 3], error: &[L; 3], largest: L, dt_s: L) -> [L; 3] {
+    let mut next = *integral;
+    for i in 0..3 {
+        next[i] = limit(integral[i] + error[i] * dt_s, L::of(0.0) - largest, largest);
+    }
+    next
 }
 
 /// Sines and cosines of roll and pitch, and with them the kinematics of Euler angles, `omega = E(angle) rate`.

@@ -12,129 +12,12 @@
 
 use super::Tilt;
 use crate::lane::Lane;
-use crate::lane::functions::size;
+use crate::lane::functions::{sine_and_cosine_of_half, size};
 use crate::lane::vector::{cross, minus, scaled, times};
-use crate::math::{Real, real};
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
 
-/// Gains; diagonal matrices as vectors.
+/// Gains, diagonal matrices as vectors, and the inertia that they are for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Law<T: Real> {
-    /// 1/s.
-    pub c1: Vector3<T>,
-    /// N m s.
-    pub c2: Vector3<T>,
-    /// 1/s^2.
-    pub lambda: Vector3<T>,
-    /// N m.
-    pub k: T,
-}
-
-/// Reference attitude with body rate and its derivative, both in the reference's own body frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Target<T: Real> {
-    /// Body to NED.
-    pub attitude: UnitQuaternion<T>,
-    /// rad/s.
-    pub omega: Vector3<T>,
-    /// rad/s^2.
-    pub omega_dot: Vector3<T>,
-}
-
-/// Torque and the errors it answers.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Answer<T: Real> {
-    /// Vector part of the error quaternion, the short way round.
-    pub z1: Vector3<T>,
-    /// Rate error, rad/s.
-    pub z2: Vector3<T>,
-    /// Body torque, N m.
-    pub torque: Vector3<T>,
-    /// The sign used, to be handed in at the next step.
-    pub negative_sign: bool,
-}
-
-impl<T: Real> Target<T> {
-    /// From Euler angles and their derivatives.
-    pub fn from_euler(angle: &Vector3<T>, rate: &Vector3<T>, acceleration: &Vector3<T>) -> Self {
-        let half = |angle: T| (angle * real(0.5)).sin_cos();
-        let (roll, pitch, yaw) = (half(angle.x), half(angle.y), half(angle.z));
-        let tilt = Tilt::of_halves(roll, pitch);
-        let ((sr, cr), (sp, cp), (sy, cy)) = (roll, pitch, yaw);
-        let [w, x, y, z] = attitude_of_halves([(sr, cr), (sp, cp), (sy, cy)]);
-        let attitude = Quaternion::new(w, x, y, z);
-        Self {
-            attitude: UnitQuaternion::new_unchecked(attitude),
-            omega: Vector3::from(tilt.body_rate(&(*rate).into())),
-            omega_dot: Vector3::from(tilt.body_acceleration(&(*rate).into(), &(*acceleration).into())),
-        }
-    }
-}
-
-impl<T: Real> Law<T> {
-    /// The gains that give the same small-angle loop as the Euler law: the vector part is half the angle.
-    pub fn from_euler_gains(
-        c1: &Vector3<T>,
-        c2: &Vector3<T>,
-        lambda: &Vector3<T>,
-        inertia: &Matrix3<T>,
-    ) -> Self {
-        let two: T = real(2.0);
-        let diagonal = inertia.diagonal();
-        Self { c1: c1 * two, c2: diagonal.component_mul(c2), lambda: lambda * two, k: two * diagonal.max() }
-    }
-
-    /// * `inertia` - kg m^2
-    /// * `attitude` - body to NED; `omega` - body rate, rad/s
-    /// * `chi` - integral of `z1`, s
-    /// * `negative_sign` - the sign of the last step
-    pub fn torque(
-        &self,
-        inertia: &Matrix3<T>,
-        attitude: &UnitQuaternion<T>,
-        omega: &Vector3<T>,
-        target: &Target<T>,
-        chi: &Vector3<T>,
-        negative_sign: bool,
-    ) -> Answer<T> {
-        let four = |q: &UnitQuaternion<T>| [q.w, q.i, q.j, q.k];
-        let law = Gains {
-            c1: self.c1.into(),
-            c2: self.c2.into(),
-            lambda: self.lambda.into(),
-            k: self.k,
-            inertia: (*inertia).into(),
-        };
-        let wanted = Wanted {
-            attitude: four(&target.attitude),
-            omega: target.omega.into(),
-            omega_dot: target.omega_dot.into(),
-        };
-        let sign = if negative_sign { -T::one() } else { T::one() };
-        let out = law.torque(&four(attitude), &(*omega).into(), &wanted, &(*chi).into(), sign);
-        Answer {
-            z1: out.z1.into(),
-            z2: out.z2.into(),
-            torque: out.torque.into(),
-            negative_sign: out.sign < T::zero(),
-        }
-    }
-}
-
-/// The attitude of Euler angles, `[w, x, y, z]`, from sine and cosine of half of each.
-#[inline(always)]
-pub fn attitude_of_halves<L: Lane>([(sr, cr), (sp, cp), (sy, cy)]: [(L, L); 3]) -> [L; 4] {
-    [
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    ]
-}
-
-/// [`Law`] on lanes, with the inertia that it is for.
-#[derive(Debug, Clone, Copy)]
-pub struct Gains<L> {
+pub struct Law<L> {
     /// 1/s.
     pub c1: [L; 3],
     /// N m s.
@@ -147,9 +30,9 @@ pub struct Gains<L> {
     pub inertia: [[L; 3]; 3],
 }
 
-/// [`Target`] on lanes.
-#[derive(Debug, Clone, Copy)]
-pub struct Wanted<L> {
+/// Reference attitude with body rate and its derivative, both in the reference's own body frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Target<L> {
     /// Body to NED, `[w, x, y, z]`.
     pub attitude: [L; 4],
     /// rad/s.
@@ -158,9 +41,9 @@ pub struct Wanted<L> {
     pub omega_dot: [L; 3],
 }
 
-/// [`Answer`] on lanes.
-#[derive(Debug, Clone, Copy)]
-pub struct Torque<L> {
+/// Torque and the errors it answers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Answer<L> {
     /// Vector part of the error quaternion, the short way round.
     pub z1: [L; 3],
     /// Rate error, rad/s.
@@ -171,7 +54,44 @@ pub struct Torque<L> {
     pub sign: L,
 }
 
-impl<L: Lane> Gains<L> {
+impl<L: Lane> Target<L> {
+    /// From Euler angles and their derivatives.
+    #[inline(always)]
+    pub fn from_euler(angle: &[L; 3], rate: &[L; 3], acceleration: &[L; 3]) -> Self {
+        let (sr, cr) = sine_and_cosine_of_half(angle[0]);
+        let (sp, cp) = sine_and_cosine_of_half(angle[1]);
+        let (sy, cy) = sine_and_cosine_of_half(angle[2]);
+        let tilt = Tilt::of_halves((sr, cr), (sp, cp));
+        Self {
+            attitude: [
+                cr * cp * cy + sr * sp * sy,
+                sr * cp * cy - cr * sp * sy,
+                cr * sp * cy + sr * cp * sy,
+                cr * cp * sy - sr * sp * cy,
+            ],
+            omega: tilt.body_rate(rate),
+            omega_dot: tilt.body_acceleration(rate, acceleration),
+        }
+    }
+}
+
+impl<L: Lane> Law<L> {
+    /// The gains that give the same small-angle loop as the Euler law: the vector part is half the angle.
+    ///
+    /// * `inertia` - by columns, kg m^2
+    #[inline(always)]
+    pub fn from_euler_gains(c1: &[L; 3], c2: &[L; 3], lambda: &[L; 3], inertia: &[[L; 3]; 3]) -> Self {
+        let two = L::of(2.0);
+        let [[x, ..], [_, y, _], [.., z]] = *inertia;
+        Self {
+            c1: scaled(c1, two),
+            c2: [x * c2[0], y * c2[1], z * c2[2]],
+            lambda: scaled(lambda, two),
+            k: two * x.upper(y).upper(z),
+            inertia: *inertia,
+        }
+    }
+
     /// * `attitude` - body to NED; `omega` - body rate, rad/s
     /// * `chi` - integral of `z1`, s
     /// * `sign` - of the last step
@@ -180,10 +100,10 @@ impl<L: Lane> Gains<L> {
         &self,
         attitude: &[L; 4],
         omega: &[L; 3],
-        target: &Wanted<L>,
+        target: &Target<L>,
         chi: &[L; 3],
         sign: L,
-    ) -> Torque<L> {
+    ) -> Answer<L> {
         let (none, one, half) = (L::of(0.0), L::of(1.0), L::of(0.5));
         // q_e = q_d^-1 q
         let ([w, x, y, z], [qw, qx, qy, qz]) = (target.attitude, *attitude);
@@ -211,7 +131,7 @@ impl<L: Lane> Gains<L> {
         for i in 0..3 {
             torque[i] = gyroscopic[i] + torque[i] - z1[i] * self.k - self.c2[i] * z2[i];
         }
-        Torque { z1, z2, torque, sign }
+        Answer { z1, z2, torque, sign }
     }
 }
 
@@ -232,37 +152,49 @@ mod tests {
     use super::super::fixtures::*;
     use super::*;
 
+    use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+
     fn law() -> Law<f64> {
-        Law::from_euler_gains(
-            &Vector3::new(9.0, 9.0, 4.0),
-            &Vector3::new(14.0, 14.0, 5.0),
-            &Vector3::new(8.0, 8.0, 2.0),
-            &inertia(),
-        )
+        Law::from_euler_gains(&[9.0, 9.0, 4.0], &[14.0, 14.0, 5.0], &[8.0, 8.0, 2.0], &inertia().into())
+    }
+
+    fn four(q: &UnitQuaternion<f64>) -> [f64; 4] {
+        [q.w, q.i, q.j, q.k]
+    }
+
+    fn unit([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+        UnitQuaternion::new_normalize(nalgebra::Quaternion::new(w, x, y, z))
+    }
+
+    fn answer(s: &Turning, t: f64, sign: f64) -> Answer<f64> {
+        law().torque(&four(&s.attitude()), &s.omega.into(), &target(t), &s.chi.into(), sign)
     }
 
     fn target(t: f64) -> Target<f64> {
-        let (a, w) = (Vector3::new(0.4, -0.3, 0.8), Vector3::new(2.0, 3.0, 1.0));
+        let (a, w) = ([0.4, -0.3, 0.8], [2.0, 3.0, 1.0]);
+        let at = |f: fn(f64, f64, f64) -> f64| core::array::from_fn(|i| f(a[i], w[i], w[i] * t));
         Target::from_euler(
-            &Vector3::from_fn(|i, _| a[i] * (w[i] * t).sin()),
-            &Vector3::from_fn(|i, _| a[i] * w[i] * (w[i] * t).cos()),
-            &Vector3::from_fn(|i, _| -a[i] * w[i] * w[i] * (w[i] * t).sin()),
+            &at(|a, _, x| a * x.sin()),
+            &at(|a, w, x| a * w * x.cos()),
+            &at(|a, w, x| -a * w * w * x.sin()),
         )
     }
 
     #[test]
     fn a_target_is_the_attitude_of_its_angles_and_its_rates_are_derivatives() {
-        let h = 1e-6;
+        let h = 1e-5;
         for t in [0.1, 0.7, 1.9] {
             let (a, w) = (Vector3::new(0.4_f64, -0.3, 0.8), Vector3::new(2.0_f64, 3.0, 1.0));
             let angle = Vector3::from_fn(|i, _| a[i] * (w[i] * t).sin());
             let expected = UnitQuaternion::from_euler_angles(angle.x, angle.y, angle.z);
-            assert!(target(t).attitude.angle_to(&expected) < 1e-12);
-            let turned =
-                (target(t - h).attitude.inverse() * target(t + h).attitude).scaled_axis() / (2.0 * h);
-            assert!((turned - target(t).omega).norm() < 1e-8, "{turned}");
-            let slope = (target(t + h).omega - target(t - h).omega) / (2.0 * h);
-            assert!((slope - target(t).omega_dot).norm() < 1e-8, "{slope}");
+            let attitude = |t: f64| unit(target(t).attitude);
+            let omega = |t: f64| Vector3::from(target(t).omega);
+            // Its sines are polynomials.
+            assert!(attitude(t).angle_to(&expected) < 1e-9);
+            let turned = (attitude(t - h).inverse() * attitude(t + h)).scaled_axis() / (2.0 * h);
+            assert!((turned - omega(t)).norm() < 1e-8, "{turned}");
+            let slope = (omega(t + h) - omega(t - h)) / (2.0 * h);
+            assert!((slope - Vector3::from(target(t).omega_dot)).norm() < 1e-8, "{slope}");
         }
     }
 
@@ -271,26 +203,17 @@ mod tests {
     fn the_lyapunov_function_never_rises_for_q_and_its_antipode() {
         for sign in [1.0, -1.0] {
             for start in starts(2.9) {
-                let first = law().torque(
-                    &inertia(),
-                    &start.times(sign).attitude(),
-                    &start.omega,
-                    &target(0.0),
-                    &start.chi,
-                    sign < 0.0,
-                );
-                let answer = |s: &Turning, t: f64| {
-                    law().torque(&inertia(), &s.attitude(), &s.omega, &target(t), &s.chi, first.negative_sign)
-                };
+                let first = answer(&start.times(sign), 0.0, sign).sign;
                 let value = |s: &Turning, t: f64| {
-                    let a = answer(s, t);
-                    let eta = (target(t).attitude.inverse() * s.attitude()).w.abs();
-                    law().k * (2.0 * (1.0 - eta) + 0.5 * law().lambda.component_mul(&s.chi).dot(&s.chi))
-                        + 0.5 * a.z2.dot(&(inertia() * a.z2))
+                    let z2 = Vector3::from(answer(s, t, first).z2);
+                    let eta = (unit(target(t).attitude).inverse() * s.attitude()).w.abs();
+                    let lambda = Vector3::from(law().lambda);
+                    law().k * (2.0 * (1.0 - eta) + 0.5 * lambda.component_mul(&s.chi).dot(&s.chi))
+                        + 0.5 * z2.dot(&(inertia() * z2))
                 };
                 never_rises(start.times(sign), 4.0, value, |s, t| {
-                    let a = answer(s, t);
-                    (a.torque, a.z1)
+                    let a = answer(s, t, first);
+                    (a.torque.into(), a.z1.into())
                 });
             }
         }
@@ -299,17 +222,9 @@ mod tests {
     #[test]
     fn antipodal_attitudes_get_the_same_torque() {
         for start in starts(2.0) {
-            let one =
-                law().torque(&inertia(), &start.attitude(), &start.omega, &target(0.3), &start.chi, false);
-            let other = law().torque(
-                &inertia(),
-                &start.times(-1.0).attitude(),
-                &start.omega,
-                &target(0.3),
-                &start.chi,
-                false,
-            );
-            assert!((one.torque - other.torque).norm() < 1e-12);
+            let [one, other] =
+                [1.0, -1.0].map(|sign| Vector3::from(answer(&start.times(sign), 0.3, 1.0).torque));
+            assert!((one - other).norm() < 1e-12);
         }
     }
 
@@ -323,17 +238,12 @@ mod tests {
         let error = 1e-4;
         let zero = Vector3::zeros();
         let angle = Vector3::new(-error, 0.0, 0.0);
-        let a = euler.torque(&inertia(), &angle, &zero, &zero, &zero, &zero, &zero);
+        let inertia: Matrix3<f64> = inertia();
+        let a = euler.torque(&inertia, &angle, &zero, &zero, &zero, &zero, &zero);
         let attitude = UnitQuaternion::from_euler_angles(-error, 0.0, 0.0);
-        let b = law().torque(
-            &inertia(),
-            &attitude,
-            &zero,
-            &Target::from_euler(&zero, &zero, &zero),
-            &zero,
-            false,
-        );
+        let none = [0.0; 3];
+        let b = law().torque(&four(&attitude), &none, &Target::from_euler(&none, &none, &none), &none, 1.0);
         // k is set by the largest inertia, so the loops agree to within that one term.
-        assert!((a.torque.x / b.torque.x - 1.0).abs() < 0.03, "{} {}", a.torque.x, b.torque.x);
+        assert!((a.torque.x / b.torque[0] - 1.0).abs() < 0.03, "{} {}", a.torque.x, b.torque[0]);
     }
 }

@@ -99,7 +99,7 @@ wire_enum! {
         None, ClockStuck, ImuLost, ImuStuck, AttitudeLost, AttitudeStuck, GnssLost, GnssStuck, AltitudeLost,
         CommandLost,
     }
-    Mode { Primary, Wiic, FullThrust }
+    Mode { Primary, WingsOpen, FullThrust }
     Reason { InsideLimits, WingsWouldNotHelp, RollLimit, PitchLimit, ThrustLimit, Dwell, PolicyFixed, WingsComeCloser }
     Guard { Inside, WindowNotFull, Speed, AngleOfAttack }
 }

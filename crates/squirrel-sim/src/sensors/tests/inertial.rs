@@ -39,9 +39,9 @@ fn bias_and_scale_are_drawn_for_each_flight_axis_and_unit() {
         let p = with(100.0, |imu| {
             (imu.units, imu.gyro_bias_sd_rad_s, imu.accel_scale_sd) = (2, 0.02, 0.01);
         });
-        let told = frames(&p, seed, 100, 1);
-        assert_eq!(told[0].imu, told[99].imu);
-        for (list, imu) in [(&mut first, told[0].imu), (&mut second, told[0].imu_2)] {
+        let sampled = frames(&p, seed, 100, 1);
+        assert_eq!(sampled[0].imu, sampled[99].imu);
+        for (list, imu) in [(&mut first, sampled[0].imu), (&mut second, sampled[0].imu_2)] {
             let error = imu.unwrap().omega.vector.cast() - truth().omega.vector;
             list.extend_from_slice(error.as_slice());
             scales.push(f64::from(imu.unwrap().specific_force.vector.z) / -9.8 - 1.0);
@@ -69,9 +69,9 @@ fn a_unit_that_sits_askew_turns_the_vector_and_keeps_its_length() {
 
 #[test]
 fn two_units_have_noise_of_their_own() {
-    let told = frames(&SensorParameters::suite("nominal").unwrap(), 6, 300, 20);
+    let sampled = frames(&SensorParameters::suite("nominal").unwrap(), 6, 300, 20);
     let of = |unit: fn(&SensorFrame) -> Option<squirrel_core::stack::Imu>| -> Vec<f64> {
-        told.iter().filter_map(unit).map(|i| i.omega.vector.x.into()).collect()
+        sampled.iter().filter_map(unit).map(|i| i.omega.vector.x.into()).collect()
     };
     let (first, second) = (of(|f| f.imu), of(|f| f.imu_2));
     assert_eq!(first.len(), second.len());
@@ -86,9 +86,9 @@ fn readings_end_at_the_range_and_are_whole_steps() {
         (imu.accel_range_m_s2, imu.gyro_range_rad_s) = (5.0, 0.25);
         (imu.gyro_noise_rad_s, imu.gyro_resolution_rad_s) = (0.05, 1.0 / 128.0);
     });
-    let told = frames(&p, 2, 100, 10);
+    let sampled = frames(&p, 2, 100, 10);
     let mut clipped = 0;
-    for imu in told.iter().filter_map(|f| f.imu) {
+    for imu in sampled.iter().filter_map(|f| f.imu) {
         assert_eq!(imu.specific_force.vector.z, -5.0);
         clipped += i32::from(imu.omega.vector.z == 0.25);
         assert!(imu.omega.vector.iter().all(|x| x.abs() <= 0.25 && (x * 128.0).fract() == 0.0));

@@ -91,31 +91,34 @@ fn noise_has_its_size_and_bias_its_place() {
 #[test]
 fn streams_are_independent() {
     let base = || SensorParameters::suite("nominal").unwrap();
-    let told = |p: &SensorParameters| frames(p, 5, 300, 2);
-    let quiet = told(&base());
+    let sampled = |p: &SensorParameters| frames(p, 5, 300, 2);
+    let quiet = sampled(&base());
     let (mut baro, mut all) = (base(), SensorParameters::suite("hobby").unwrap());
     (baro.baro.noise_m, baro.baro.drift_m_root_s, baro.baro.lag_s) = (1.0, 0.1, 0.1);
     (all.attitude, all.battery, all.imu) = (base().attitude, base().battery, base().imu);
     (all.gnss.dropouts_per_s, all.gnss.dropout_s) = (10.0, 0.1);
-    for (a, b) in quiet.iter().zip(told(&baro)) {
+    for (a, b) in quiet.iter().zip(sampled(&baro)) {
         assert_eq!((a.imu, a.imu_2, a.gnss, a.magnetic), (b.imu, b.imu_2, b.gnss, b.magnetic));
     }
-    for (a, b) in quiet.iter().zip(told(&all)) {
+    for (a, b) in quiet.iter().zip(sampled(&all)) {
         assert_eq!((a.imu, a.imu_2, a.attitude), (b.imu, b.imu_2, b.attitude));
     }
     let mut dropping = base();
     (dropping.gnss.dropouts_per_s, dropping.gnss.dropout_s) = (2.0, 0.2);
-    let heard: Vec<_> =
-        told(&dropping).iter().zip(&quiet).filter_map(|(b, a)| b.gnss.map(|b| (Some(b), a.gnss))).collect();
+    let heard: Vec<_> = sampled(&dropping)
+        .iter()
+        .zip(&quiet)
+        .filter_map(|(b, a)| b.gnss.map(|b| (Some(b), a.gnss)))
+        .collect();
     assert!(heard.len() < 20 && heard.iter().all(|(b, a)| a == b), "what is left of the fixes is the same");
 }
 
 #[test]
 fn same_seed_same_bits_and_another_seed_others() {
     for name in SUITES {
-        let told = |seed| frames(&SensorParameters::suite(name).unwrap(), seed, 300, 2);
-        assert_eq!(told(8), told(8), "{name}");
-        assert!(told(8)[0] != told(9)[0], "{name}");
+        let sampled = |seed| frames(&SensorParameters::suite(name).unwrap(), seed, 300, 2);
+        assert_eq!(sampled(8), sampled(8), "{name}");
+        assert!(sampled(8)[0] != sampled(9)[0], "{name}");
     }
 }
 

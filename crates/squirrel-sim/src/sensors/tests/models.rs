@@ -10,12 +10,12 @@ fn the_receiver_wanders() {
     (p.gnss.position_wander_m, p.gnss.wander_time_s) = (1.5, 20.0);
     let [mut start, mut later] = [Vec::new(), Vec::new()];
     for seed in 0..600 {
-        let told = frames(&p, seed, 10, 21);
+        let sampled = frames(&p, seed, 10, 21);
         for (list, k) in [(&mut start, 0), (&mut later, 200)] {
-            let error = told[k].gnss.unwrap().position.vector.cast::<f64>() - truth().position.vector;
+            let error = sampled[k].gnss.unwrap().position.vector.cast::<f64>() - truth().position.vector;
             list.extend_from_slice(error.as_slice());
         }
-        let step = told[1].gnss.unwrap().position.vector - told[0].gnss.unwrap().position.vector;
+        let step = sampled[1].gnss.unwrap().position.vector - sampled[0].gnss.unwrap().position.vector;
         // sd of a step: 1.5 sqrt(2 * 0.1 / 20) = 0.15.
         assert!(step.norm() < 1.0, "it wanders, it does not jump");
     }
@@ -50,9 +50,9 @@ fn outliers_have_their_share_and_size() {
 fn dropouts_have_their_rate_and_length() {
     let mut p = SensorParameters::ideal();
     (p.gnss.dropouts_per_s, p.gnss.dropout_s) = (0.05, 3.0);
-    let told: Vec<bool> = frames(&p, 4, 10, 20_000).iter().map(|f| f.gnss.is_some()).collect();
-    let gaps = told.windows(2).filter(|pair| pair[0] && !pair[1]).count();
-    let missing = told.iter().filter(|heard| !**heard).count();
+    let sampled: Vec<bool> = frames(&p, 4, 10, 20_000).iter().map(|f| f.gnss.is_some()).collect();
+    let gaps = sampled.windows(2).filter(|pair| pair[0] && !pair[1]).count();
+    let missing = sampled.iter().filter(|heard| !**heard).count();
     // One every 20 + 3 s: 870, each 30 fixes long, give or take 1/sqrt(870); those shorter than a fix may go unseen.
     assert!((740..960).contains(&gaps), "{gaps}");
     assert!((missing as f64 / 200_000.0 / (3.0 / 23.0) - 1.0).abs() < 0.15, "{missing}");
@@ -110,10 +110,10 @@ fn a_barometer_drifts_and_has_steps() {
     (p.baro.drift_m_root_s, p.baro.resolution_m) = (0.1, 0.0625);
     let mut ends = Vec::new();
     for seed in 0..500 {
-        let told = frames(&p, seed, 50, 9);
-        assert_eq!(told[0].altitude_m, Some(3.0));
-        assert!(told.iter().filter_map(|f| f.altitude_m).all(|h| (h * 16.0).fract() == 0.0));
-        ends.push(f64::from(told.last().unwrap().altitude_m.unwrap()) - 3.0);
+        let sampled = frames(&p, seed, 50, 9);
+        assert_eq!(sampled[0].altitude_m, Some(3.0));
+        assert!(sampled.iter().filter_map(|f| f.altitude_m).all(|h| (h * 16.0).fract() == 0.0));
+        ends.push(f64::from(sampled.last().unwrap().altitude_m.unwrap()) - 3.0);
     }
     assert!((sd(&ends) / 0.3 - 1.0).abs() < 0.13, "{}", sd(&ends));
 }
@@ -133,8 +133,8 @@ fn a_magnetometer_points_north_and_down_and_sees_the_current() {
         assert!((field.norm() - 48.0).abs() < 1e-4 && ((field.z / 48.0).asin() - 1.13).abs() < 1e-5);
         let heading = (-field.y).atan2(field.x);
         assert!((f64::from(heading) - std::f64::consts::FRAC_PI_2 - bias).abs() < 1e-6);
-        let told = frame.attitude.unwrap().euler().2;
-        assert!((told - heading).abs() < 0.01, "as the attitude is told");
+        let sampled = frame.attitude.unwrap().euler().2;
+        assert!((sampled - heading).abs() < 0.01, "as the attitude is told");
         now.current_a = 20.0;
         let more = sensors.poll(20_000, &now).0.magnetic.unwrap().vector - field;
         assert!((more - Vector3::new(2.0, 0.0, -4.0)).norm() < 1e-4);

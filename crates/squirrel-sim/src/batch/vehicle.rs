@@ -9,7 +9,7 @@ use squirrel_core::vehicle::Vehicle;
 
 /// What flies: airframe, effects, wings, battery, as [`crate::plant::Plant::new`] takes them.
 #[derive(Debug, Clone)]
-pub struct Craft {
+pub struct BatchVehicle {
     /// The airframe without effects.
     pub vehicle: Vehicle<f64>,
     /// Effects, each vehicle with sizes of its own.
@@ -20,7 +20,7 @@ pub struct Craft {
     pub battery: Option<BatteryParameters>,
 }
 
-impl From<&VehicleFile> for Craft {
+impl From<&VehicleFile> for BatchVehicle {
     fn from(file: &VehicleFile) -> Self {
         Self {
             vehicle: file.vehicle,
@@ -41,14 +41,14 @@ pub(super) struct Fitted {
 }
 
 impl Fitted {
-    /// What every craft needs.
+    /// What every member needs.
     ///
     /// # Errors
     /// Something that does not act in a batch, or flat wings beside membranes.
-    pub(super) fn all(crafts: &[Craft]) -> Result<Self, BatchError> {
+    pub(super) fn all(members: &[BatchVehicle]) -> Result<Self, BatchError> {
         let mut fitted = Self { wing: NONE, stretches: 0, present: Present::default() };
-        for (vehicle, craft) in crafts.iter().enumerate() {
-            let needs = Self::one(craft, vehicle)?;
+        for (vehicle, member) in members.iter().enumerate() {
+            let needs = Self::one(member, vehicle)?;
             if fitted.wing != NONE && needs.wing != NONE && fitted.wing != needs.wing {
                 return Err(BatchError::Wings { vehicle });
             }
@@ -59,16 +59,16 @@ impl Fitted {
         Ok(fitted)
     }
 
-    /// What one craft needs.
-    pub(super) fn one(craft: &Craft, vehicle: usize) -> Result<Self, BatchError> {
-        let wing = match craft.wing {
+    /// What one member needs.
+    pub(super) fn one(member: &BatchVehicle, vehicle: usize) -> Result<Self, BatchError> {
+        let wing = match member.wing {
             WingPlant::None => NONE,
             WingPlant::Flat { .. } => FLAT,
             WingPlant::Membrane { .. } => MEMBRANE,
             WingPlant::Parnn { .. } => return Err(BatchError::Network { vehicle }),
         };
-        let stretches = craft.battery.as_ref().map_or(0, |b| b.ocv_v_of_charge.len().saturating_sub(1));
-        let present = Present::of(&craft.effects);
+        let stretches = member.battery.as_ref().map_or(0, |b| b.ocv_v_of_charge.len().saturating_sub(1));
+        let present = Present::of(&member.effects);
         if let Some(effect) = present.of_sensors() {
             return Err(BatchError::Effect { vehicle, effect });
         }
@@ -80,12 +80,12 @@ impl Fitted {
         *self == Self { wing: NONE, stretches: 0, present: Present::default() }
     }
 
-    /// The effects of another craft, if it fits.
+    /// The effects of another member, if it fits.
     ///
     /// # Errors
     /// What there is no place for.
-    pub(super) fn fits(&self, craft: &Craft, vehicle: usize) -> Result<Present, BatchError> {
-        let needs = Self::one(craft, vehicle)?;
+    pub(super) fn fits(&self, member: &BatchVehicle, vehicle: usize) -> Result<Present, BatchError> {
+        let needs = Self::one(member, vehicle)?;
         let what = if needs.wing != NONE && needs.wing != self.wing {
             Some("wing")
         } else if needs.stretches > self.stretches {

@@ -7,7 +7,7 @@ use squirrel_core::effects::{Effects, FORM, Kind, Present, forms};
 use squirrel_core::frames::In;
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_sim::batch::simd::{Path, Paths};
-use squirrel_sim::batch::{Batch, Craft, Scheme, Settings};
+use squirrel_sim::batch::{Batch, BatchVehicle, Scheme, Settings};
 use squirrel_sim::plant::{GustModel, Plant, Wind, WindParameters, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -28,29 +28,29 @@ fn put(effects: &mut Effects<f64>, name: &str, form: usize, share: f64) {
     }
 }
 
-fn craft(wing: &str) -> Craft {
-    let mut craft = Craft::from(&VehicleFile::squirrel());
-    let WingPlant::Membrane { servo, .. } = &craft.wing else { panic!("the squirrel has membranes") };
+fn member(wing: &str) -> BatchVehicle {
+    let mut member = BatchVehicle::from(&VehicleFile::squirrel());
+    let WingPlant::Membrane { servo, .. } = &member.wing else { panic!("the squirrel has membranes") };
     match wing {
-        "none" => craft.wing = WingPlant::None,
+        "none" => member.wing = WingPlant::None,
         "flat" => {
-            craft.wing = WingPlant::Flat { wing: craft.vehicle.parameters().wing.unwrap(), servo: *servo }
+            member.wing = WingPlant::Flat { wing: member.vehicle.parameters().wing.unwrap(), servo: *servo }
         }
         _ => {}
     }
-    craft
+    member
 }
 
 /// Crafts with these wings, each with the airframe of a thrown vehicle and its share of effects, in turn of their forms.
-fn crafts<T: Paths>(thrown: &Thrown<T>, wing: &str, names: &[&str]) -> Vec<Craft> {
+fn members<T: Paths>(thrown: &Thrown<T>, wing: &str, names: &[&str]) -> Vec<BatchVehicle> {
     let mut out = Vec::new();
     for (number, vehicle) in thrown.vehicles.iter().enumerate() {
-        let mut craft = Craft { vehicle: vehicle.cast().unwrap(), ..craft(wing) };
+        let mut member = BatchVehicle { vehicle: vehicle.cast().unwrap(), ..member(wing) };
         for name in names {
             let count = forms(Effects::<f64>::parameters(name).unwrap()).len().max(1);
-            put(&mut craft.effects, name, number % count, (number % 7) as f64 / 7.0);
+            put(&mut member.effects, name, number % count, (number % 7) as f64 / 7.0);
         }
-        out.push(craft);
+        out.push(member);
     }
     out
 }
@@ -61,14 +61,14 @@ const WIND: WindParameters = WindParameters {
     gust: GustModel::Dryden { scale_length_m: 6.0 },
 };
 
-fn batch<T: Paths>(thrown: &Thrown<T>, crafts: &[Craft], settings: Settings) -> Batch<T> {
-    let mut batch = Batch::with(crafts, settings).unwrap();
-    for (number, craft) in crafts.iter().enumerate() {
+fn batch<T: Paths>(thrown: &Thrown<T>, members: &[BatchVehicle], settings: Settings) -> Batch<T> {
+    let mut batch = Batch::with(members, settings).unwrap();
+    for (number, member) in members.iter().enumerate() {
         batch.reset(number, &thrown.states[number]).unwrap();
         batch.set_charge(number, 0.5 + 0.4 * (number % 2) as f64).unwrap();
-        batch.set_air(number, craft, WIND, number as u64).unwrap();
+        batch.set_air(number, member, WIND, number as u64).unwrap();
     }
-    batch.command(&thrown.commands[..4 * crafts.len()]).unwrap();
+    batch.command(&thrown.commands[..4 * members.len()]).unwrap();
     batch
 }
 
@@ -78,10 +78,15 @@ fn wings<T: Paths>(count: usize, step: usize) -> Vec<T> {
 }
 
 /// Flies in calls of `call` steps, wings moving every 100 ms.
-fn flown<T: Paths>(thrown: &Thrown<T>, crafts: &[Craft], settings: Settings, call: usize) -> Vec<Vec<u64>> {
-    let mut batch = batch(thrown, crafts, settings);
+fn flown<T: Paths>(
+    thrown: &Thrown<T>,
+    members: &[BatchVehicle],
+    settings: Settings,
+    call: usize,
+) -> Vec<Vec<u64>> {
+    let mut batch = batch(thrown, members, settings);
     for step in (0..400).step_by(100) {
-        batch.command_wings(&wings::<T>(crafts.len(), step)).unwrap();
+        batch.command_wings(&wings::<T>(members.len(), step)).unwrap();
         for _ in 0..100 / call {
             batch.step(call);
         }
@@ -101,15 +106,15 @@ fn all_effects() -> Vec<&'static str> {
 
 fn neither_registers_nor_threads_nor_calls_matter<T: Paths>(wing: &str) {
     let thrown = Thrown::<T>::new(130);
-    let crafts = crafts(&thrown, wing, &all_effects());
+    let members = members(&thrown, wing, &all_effects());
     for scheme in [Scheme::Rk4, Scheme::Euler] {
         let settings = Settings { scheme, threads: 1, ..Settings::default() };
-        let expected = flown(&thrown, &crafts, settings, 100);
+        let expected = flown(&thrown, &members, settings, 100);
         assert!(expected.iter().flatten().all(|bits| f64::from_bits(*bits).is_finite()));
         for path in Path::available() {
             for (threads, call) in [(2, 100), (1, 1), (5, 20)] {
                 let other = Settings { path, threads, ..settings };
-                let same = flown(&thrown, &crafts, other, call) == expected;
+                let same = flown(&thrown, &members, other, call) == expected;
                 assert!(same, "{wing}, {scheme:?}, {}, {threads} threads, {call} steps a call", path.name());
             }
         }
@@ -133,27 +138,27 @@ fn plates_and_no_wings_have_one_result() {
 }
 
 #[test]
-fn a_craft_alone_is_the_same_among_a_thousand() {
+fn a_vehicle_alone_is_the_same_among_a_thousand() {
     let all = Thrown::<f32>::new(1000);
-    let crafts = crafts(&all, "membrane", &all_effects());
+    let members = members(&all, "membrane", &all_effects());
     let settings = Settings { threads: 1, ..Settings::default() };
-    let thousand = flown(&all, &crafts, settings, 100);
+    let thousand = flown(&all, &members, settings, 100);
     for count in [1, 17] {
-        assert!(flown(&all, &crafts[..count], settings, 100)[..] == thousand[..count], "{count}");
+        assert!(flown(&all, &members[..count], settings, 100)[..] == thousand[..count], "{count}");
     }
 }
 
 /// Largest difference of position (m), velocity (m/s) and voltage (V) between a batch and plants that fly the same.
 fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
     let thrown = Thrown::<T>::new(21);
-    let crafts = crafts(&thrown, wing, names);
-    let mut batch = batch(&thrown, &crafts, Settings { threads: 1, ..Settings::default() });
-    let states: Vec<_> = crafts
+    let members = members(&thrown, wing, names);
+    let mut batch = batch(&thrown, &members, Settings { threads: 1, ..Settings::default() });
+    let states: Vec<_> = members
         .iter()
         .enumerate()
-        .map(|(number, craft)| {
+        .map(|(number, member)| {
             let plant =
-                Plant::new(craft.vehicle, craft.effects, craft.wing.clone(), craft.battery.clone(), 1e-3);
+                Plant::new(member.vehicle, member.effects, member.wing.clone(), member.battery.clone(), 1e-3);
             let plant = plant.unwrap();
             let start = &thrown.states[number];
             let to = |x: T| try_convert::<T, f64>(x).unwrap();
@@ -165,10 +170,7 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
             body.rotor_speed_rad_s = start.rotor_speed_rad_s.map(to);
             let state = plant.initial_state(body, 0.5 + 0.4 * (number % 2) as f64);
             let seed = number as u64;
-            let mut winds = vec![Wind::new(WIND, seed ^ 0x5851_F42D_4C95_7F2D)];
-            if let Some(gusts) = craft.effects.gust() {
-                winds.push(Wind::new(WindParameters::of_gusts(gusts), seed ^ 0x9E6C_63D0_876A_3F1B));
-            }
+            let winds = Wind::of_flight(WIND, &member.effects, seed);
             let mut command = [0.0; MAX_ROTORS];
             for i in 0..4 {
                 command[i] = to(thrown.commands[4 * number + i]);
@@ -177,7 +179,7 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
         })
         .collect();
     for step in (0..steps).step_by(100) {
-        batch.command_wings(&wings::<T>(crafts.len(), step)).unwrap();
+        batch.command_wings(&wings::<T>(members.len(), step)).unwrap();
         batch.step(100.min(steps - step));
     }
     let mut worst = 0.0_f64;
@@ -216,7 +218,7 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
 /// In f64 the operations are the plant's, but for its servo within the step in which a rate limit ends (a polynomial there, relative
 /// error 6e-11) and for factors of rotors; a tumbling vehicle makes these larger.
 #[test]
-fn crafts_in_f64_fly_as_the_plant_does() {
+fn vehicles_in_f64_fly_as_the_plant_does() {
     for wing in ["none", "flat", "membrane"] {
         let worst = off_the_plant::<f64>(wing, &[], 400);
         assert!(worst < 1e-8, "{wing}: {worst:e}");
@@ -234,7 +236,7 @@ fn every_effect_acts_as_in_the_plant() {
 }
 
 #[test]
-fn in_f32_a_craft_stays_near_the_plant() {
+fn in_f32_a_vehicle_stays_near_the_plant() {
     let worst = off_the_plant::<f32>("membrane", &["battery_sag", "ground_effect", "payload_swing"], 200);
     assert!(worst < 5e-3, "{worst:e}");
 }
@@ -243,33 +245,33 @@ fn in_f32_a_craft_stays_near_the_plant() {
 fn effects_make_a_difference() {
     let thrown = Thrown::<f64>::new(21);
     let settings = Settings { threads: 1, ..Settings::default() };
-    let without = flown(&thrown, &crafts(&thrown, "membrane", &[]), settings, 100);
+    let without = flown(&thrown, &members(&thrown, "membrane", &[]), settings, 100);
     for name in all_effects() {
-        let with = flown(&thrown, &crafts(&thrown, "membrane", &[name]), settings, 100);
+        let with = flown(&thrown, &members(&thrown, "membrane", &[name]), settings, 100);
         assert_ne!(with[20], without[20], "{name}");
     }
 }
 
 #[test]
 fn what_does_not_fly_in_a_batch_is_named() {
-    let refused = |change: &dyn Fn(&mut Craft)| {
-        let mut crafts = vec![craft("membrane"), craft("membrane")];
-        change(&mut crafts[1]);
-        Batch::<f32>::with(&crafts, Settings::default()).unwrap_err().to_string()
+    let refused = |change: &dyn Fn(&mut BatchVehicle)| {
+        let mut members = vec![member("membrane"), member("membrane")];
+        change(&mut members[1]);
+        Batch::<f32>::with(&members, Settings::default()).unwrap_err().to_string()
     };
     for name in Effects::<f64>::NAMES.iter().filter(|name| is_of_sensors(name)) {
-        let text = refused(&|craft| put(&mut craft.effects, name, 0, 0.5));
+        let text = refused(&|member| put(&mut member.effects, name, 0, 0.5));
         assert!(text.starts_with(&format!("vehicles[1]: effects.{name}: ")), "{text}");
     }
-    let text = refused(&|c| c.wing = craft("flat").wing);
+    let text = refused(&|c| c.wing = member("flat").wing);
     assert_eq!(text, "vehicles[1]: wing.model: flat and membrane do not fly in one batch");
     let text = refused(&|c| put(&mut c.effects, "mass_error", 0, -20.0));
     assert!(text.starts_with("vehicles[1]: with effects, mass.mass_kg = "), "{text}");
 
-    let mut batch = Batch::<f32>::with(&[craft("none")], Settings::default()).unwrap();
-    let text = batch.refit(0, &craft("membrane")).unwrap_err().to_string();
+    let mut batch = Batch::<f32>::with(&[member("none")], Settings::default()).unwrap();
+    let text = batch.refit(0, &member("membrane")).unwrap_err().to_string();
     assert!(text.starts_with("vehicles[0]: wing: the batch was made without"), "{text}");
-    let mut heavy = craft("none");
+    let mut heavy = member("none");
     put(&mut heavy.effects, "added_mass", 0, 0.5);
     let text = batch.refit(0, &heavy).unwrap_err().to_string();
     assert!(text.starts_with("vehicles[0]: added_mass: the batch was made without"), "{text}");
@@ -277,7 +279,7 @@ fn what_does_not_fly_in_a_batch_is_named() {
     let text = batch.refit(0, &heavy).unwrap_err().to_string();
     assert!(text.starts_with("vehicles[0]: added_mass: the batch was made without"), "steps first: {text}");
     // What changes the airframe once has a place everywhere.
-    let mut other = craft("none");
+    let mut other = member("none");
     put(&mut other.effects, "mass_error", 0, 0.5);
     put(&mut other.effects, "motor_lag", 0, 0.5);
     batch.refit(0, &other).unwrap();
@@ -289,9 +291,9 @@ fn what_does_not_fly_in_a_batch_is_named() {
 #[test]
 fn another_form_may_come_later() {
     let formed = |name: &str, form: usize| {
-        let mut craft = craft("membrane");
-        put(&mut craft.effects, name, form, 0.5);
-        craft
+        let mut member = member("membrane");
+        put(&mut member.effects, name, form, 0.5);
+        member
     };
     let fly = |mut batch: Batch<f64>| {
         for number in 0..2 {

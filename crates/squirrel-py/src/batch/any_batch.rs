@@ -12,7 +12,7 @@ use squirrel_core::effects::GUST_TIME_CONSTANT_S;
 use squirrel_core::frames::In;
 use squirrel_core::vehicle::Vehicle as Airframe;
 use squirrel_sim::batch::simd::Paths;
-use squirrel_sim::batch::{BODY_NUMBERS, Batch, BatchError, Craft, Settings};
+use squirrel_sim::batch::{BODY_NUMBERS, Batch, BatchError, BatchVehicle, Settings};
 use squirrel_sim::plant::{GustModel, WindParameters, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -22,7 +22,7 @@ const STEPS_A_LOOK: usize = 1_000_000;
 const FEW_STEPS: usize = 500;
 
 /// A batch of any scalar and any number of rotors.
-pub(super) trait AnyFlock: Send {
+pub(super) trait AnyBatch: Send {
     fn vehicles(&self) -> usize;
     fn advance(&mut self, steps: usize);
     /// Commands, steps by way of `advance` where they are many, and motions.
@@ -44,12 +44,18 @@ pub(super) trait AnyFlock: Send {
     fn reset(&mut self, states: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()>;
     fn set_charge(&mut self, charge: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()>;
     fn set_wind(&mut self, wind: &Bound<'_, PyAny>) -> PyResult<()>;
-    fn set_air(&mut self, number: usize, craft: &Craft, air: WindParameters, seed: u64) -> PyResult<()>;
+    fn set_air(
+        &mut self,
+        number: usize,
+        member: &BatchVehicle,
+        air: WindParameters,
+        seed: u64,
+    ) -> PyResult<()>;
     fn replace(&mut self, number: usize, airframe: &Airframe<f64>) -> PyResult<()>;
-    fn refit(&mut self, number: usize, craft: &Craft) -> PyResult<()>;
+    fn refit(&mut self, number: usize, member: &BatchVehicle) -> PyResult<()>;
 }
 
-impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
+impl<T: Paths + Float, const ROTORS: usize> AnyBatch for Batch<T, ROTORS> {
     fn vehicles(&self) -> usize {
         self.len()
     }
@@ -136,8 +142,14 @@ impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
         }
         Ok(())
     }
-    fn set_air(&mut self, number: usize, craft: &Craft, air: WindParameters, seed: u64) -> PyResult<()> {
-        Self::set_air(self, number, craft, air, seed).map_err(|error| match error {
+    fn set_air(
+        &mut self,
+        number: usize,
+        member: &BatchVehicle,
+        air: WindParameters,
+        seed: u64,
+    ) -> PyResult<()> {
+        Self::set_air(self, number, member, air, seed).map_err(|error| match error {
             BatchError::NotFitted { .. } => {
                 value("gust_sigma_m_s: the base model has no gusts; set_wind between steps moves its air")
             }
@@ -147,8 +159,8 @@ impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
     fn replace(&mut self, number: usize, airframe: &Airframe<f64>) -> PyResult<()> {
         Self::replace(self, number, &airframe.cast().map_err(value)?).map_err(value)
     }
-    fn refit(&mut self, number: usize, craft: &Craft) -> PyResult<()> {
-        Self::refit(self, number, craft).map_err(refused)
+    fn refit(&mut self, number: usize, member: &BatchVehicle) -> PyResult<()> {
+        Self::refit(self, number, member).map_err(refused)
     }
 }
 
@@ -156,19 +168,19 @@ impl<T: Paths + Float, const ROTORS: usize> AnyFlock for Batch<T, ROTORS> {
 ///
 /// # Errors
 /// Ctrl-C.
-pub(super) fn advance(py: Python<'_>, flock: &mut dyn AnyFlock, steps: usize) -> PyResult<()> {
-    if steps.saturating_mul(flock.vehicles()) < FEW_STEPS {
-        flock.advance(steps);
+pub(super) fn advance(py: Python<'_>, batch: &mut dyn AnyBatch, steps: usize) -> PyResult<()> {
+    if steps.saturating_mul(batch.vehicles()) < FEW_STEPS {
+        batch.advance(steps);
         return Ok(());
     }
-    let at_once = (STEPS_A_LOOK / flock.vehicles()).max(1);
+    let at_once = (STEPS_A_LOOK / batch.vehicles()).max(1);
     let mut left = steps;
     while left > at_once {
-        py.detach(|| flock.advance(at_once));
+        py.detach(|| batch.advance(at_once));
         py.check_signals()?;
         left -= at_once;
     }
-    py.detach(|| flock.advance(left));
+    py.detach(|| batch.advance(left));
     Ok(())
 }
 
@@ -214,12 +226,12 @@ pub(super) fn air(mean_ned_m_s: [f64; 3], gust_sigma_m_s: f64) -> WindParameters
 /// Makes a batch.
 ///
 /// * `whole` - with wings, batteries and effects; otherwise the airframes alone
-pub(super) fn flock(
+pub(super) fn any_batch(
     vehicles: &[Bound<'_, Vehicle>],
     settings: Settings,
     in_32: bool,
     whole: bool,
-) -> PyResult<Box<dyn AnyFlock>> {
+) -> PyResult<Box<dyn AnyBatch>> {
     let files: Vec<&VehicleFile> = vehicles.iter().map(|vehicle| &vehicle.get().file).collect();
     let rotors = files.first().map_or(0, |first| first.vehicle.rotors().len());
     if let Some(at) = files.iter().position(|one| one.vehicle.rotors().len() != rotors) {
@@ -231,8 +243,8 @@ pub(super) fn flock(
     match rotors {
         // An empty list is the batch's to refuse.
         0 | 4 if whole => {
-            let crafts: Vec<Craft> = files.into_iter().map(Craft::from).collect();
-            if in_32 { of_crafts::<f32>(&crafts, settings) } else { of_crafts::<f64>(&crafts, settings) }
+            let members: Vec<BatchVehicle> = files.into_iter().map(BatchVehicle::from).collect();
+            if in_32 { of_members::<f32>(&members, settings) } else { of_members::<f64>(&members, settings) }
         }
         0 | 4 => of_airframes::<4>(&files, settings, in_32),
         6 | 8 if whole && files.iter().any(|file| !is_base(file)) => Err(value(format!(
@@ -249,22 +261,22 @@ fn is_base(file: &VehicleFile) -> bool {
     matches!(file.wing, WingPlant::None) && file.battery.is_none() && !file.effects.any()
 }
 
-fn of_crafts<T: Paths + Float>(crafts: &[Craft], settings: Settings) -> PyResult<Box<dyn AnyFlock>> {
-    Ok(Box::new(Batch::<T, 4>::with(crafts, settings).map_err(refused)?))
+fn of_members<T: Paths + Float>(members: &[BatchVehicle], settings: Settings) -> PyResult<Box<dyn AnyBatch>> {
+    Ok(Box::new(Batch::<T, 4>::with(members, settings).map_err(refused)?))
 }
 
 fn of_airframes<const ROTORS: usize>(
     files: &[&VehicleFile],
     settings: Settings,
     in_32: bool,
-) -> PyResult<Box<dyn AnyFlock>> {
+) -> PyResult<Box<dyn AnyBatch>> {
     if in_32 { of::<f32, ROTORS>(files, settings) } else { of::<f64, ROTORS>(files, settings) }
 }
 
 fn of<T: Paths + Float, const ROTORS: usize>(
     files: &[&VehicleFile],
     settings: Settings,
-) -> PyResult<Box<dyn AnyFlock>> {
+) -> PyResult<Box<dyn AnyBatch>> {
     let airframes =
         files.iter().map(|file| file.vehicle.cast::<T>().map_err(value)).collect::<PyResult<Vec<_>>>()?;
     Ok(Box::new(Batch::<T, ROTORS>::new(&airframes, settings).map_err(value)?))
