@@ -6,14 +6,29 @@
 
 use crate::campaign::Plan;
 use crate::journal::Keep;
+use crate::pages;
+use crate::sheet::{Cell, Sheet};
+use crate::study::{Arms, Found, Study};
 use crate::tracking::{self, Condition, GUST_M_S, Row};
 use serde::Serialize;
+use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Effective thrust-to-weight ratios.
 pub const THRUST_TO_WEIGHT: [f64; 4] = [1.20, 1.25, 1.30, 2.00];
+
+/// On the command line.
+pub const STUDY: Study = Study {
+    arms: Arms::Asked(&Arm::ALONE),
+    ..Study::new(
+        "table3",
+        "The paper's Table III: its real flights, with the error as satellite fix and barometer have it",
+        (12, "Flights per arm and condition, on paired seeds"),
+        fly,
+    )
+};
 
 /// Arms at one ratio.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -39,26 +54,16 @@ pub struct Table3 {
 
 /// Flies the study; `None` where only a part is flown here.
 ///
-/// * `progress` - called once for each flight
-///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Table3>, FlightError> {
-    let rows = tracking::run(plan, "table3", &conditions(&plan.vehicle)?, keep, progress)?;
+pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Table3>, FlightError> {
+    let rows = tracking::run(plan, "table3", &conditions(&plan.vehicle)?, keep)?;
     let points = |rows: Vec<Vec<Row>>| {
         let point = |(thrust_to_weight, rows)| Point { thrust_to_weight, rows };
         THRUST_TO_WEIGHT.into_iter().zip(rows).map(point).collect()
     };
     let vehicle = plan.vehicle.name.clone();
     Ok(rows.map(|rows| Table3 { vehicle, trials: plan.trials, seed: plan.seed, points: points(rows) }))
-}
-
-/// Number of flights that [`run`] flies here.
-///
-/// # Errors
-/// No trials.
-pub fn flights(plan: &Plan, keep: &Keep<'_>) -> Result<u64, FlightError> {
-    tracking::flights(plan, THRUST_TO_WEIGHT.len(), keep)
 }
 
 /// What is flown at each ratio.
@@ -73,4 +78,37 @@ pub fn conditions(vehicle: &VehicleFile) -> Result<Vec<Condition>, FlightError> 
         Ok(Condition { vehicle: vehicle.clone(), scenario })
     };
     THRUST_TO_WEIGHT.iter().map(condition).collect()
+}
+
+fn fly(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightError> {
+    let Some(study) = run(plan, keep)? else { return Ok(None) };
+    let mut found = Found::of(&study)?;
+    found.say(format!(
+        "The paper's real flights, {} trials an arm on paired seeds from {}; measured by satellite fix and barometer.",
+        study.trials, study.seed
+    ));
+    found.say(
+        "Gain is mean error of pc over mean error of the arm, minus 1, with its paired 95 % interval.\n",
+    );
+    let mut sheet = Sheet::default();
+    for point in &study.points {
+        for row in &point.rows {
+            let (gain, columns) = (row.gain_measured, tracking::columns(row));
+            let ratio = ("T/W", "thrust_to_weight", Cell::Number(point.thrust_to_weight, 2));
+            let measured = [
+                ("measured gain %", "gain_measured", Cell::Percent(gain.value, 1)),
+                (
+                    "95 % interval",
+                    "gain_measured_low,gain_measured_high",
+                    Cell::PercentInterval(Some(gain), 1),
+                ),
+            ];
+            sheet.row(&[&[ratio, columns[0]], &measured[..], &columns[1..]].concat());
+        }
+    }
+    found.csv = found.sheet(sheet);
+    if keep.folder.is_some() {
+        found.page = Some(pages::table3(&study, plan)?);
+    }
+    Ok(Some(found))
 }

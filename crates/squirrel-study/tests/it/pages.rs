@@ -24,7 +24,7 @@ fn check(page: &str, figures: usize, arms: &[Arm]) {
 #[test]
 fn the_forest_has_a_map_an_arm() {
     let plan = plan(&[Arm::Pc, Arm::TwccPlus]);
-    let study = forest::run(&plan, 2.0, &Keep::default(), || ()).unwrap().unwrap();
+    let study = forest::run(&plan, 2.0, &Keep::default()).unwrap().unwrap();
     let page = pages::forest(&study, &plan).unwrap();
     // Phantom flies in any case; two charts of success.
     check(&page, 3 + 2, &[Arm::Pc, Arm::Phantom, Arm::TwccPlus]);
@@ -44,7 +44,7 @@ fn the_forest_has_a_map_an_arm() {
 #[test]
 fn steering_has_its_wheels_and_the_tracks_of_one_cell() {
     let plan = plan(&[Arm::TwccParnn, Arm::PcPlus]);
-    let study = steering::run(&plan, &Keep::default(), || ()).unwrap().unwrap();
+    let study = steering::run(&plan, &Keep::default()).unwrap().unwrap();
     let page = pages::steering(&study, &plan).unwrap();
     // Two sections of wheels by plant, ratio, angle and speed; the scene, and a track each of pc and twcc_parnn.
     check(&page, 2 * 8 + 1 + 2, &[Arm::Pc, Arm::TwccParnn, Arm::PcPlus]);
@@ -55,11 +55,11 @@ fn steering_has_its_wheels_and_the_tracks_of_one_cell() {
 fn the_real_flights_and_the_ratios_have_their_figures() {
     let plan = plan(&[Arm::TwccPlus, Arm::PcPlus]);
     let arms = [Arm::Pc, Arm::TwccPlus, Arm::PcPlus];
-    let study = table3::run(&plan, &Keep::default(), || ()).unwrap().unwrap();
+    let study = table3::run(&plan, &Keep::default()).unwrap().unwrap();
     let page = pages::table3(&study, &plan).unwrap();
     check(&page, table3::THRUST_TO_WEIGHT.len() + 1 + 3, &arms);
     assert_eq!(page, pages::table3(&study, &plan).unwrap());
-    let study = thrust::run(&plan, &Keep::default(), || ()).unwrap().unwrap();
+    let study = thrust::run(&plan, &Keep::default()).unwrap().unwrap();
     let page = pages::thrust(&study);
     // Gain over pc, gain over pc_plus and height: by the limit where it is scarce, by the limit, by the battery.
     check(&page, 9, &arms);
