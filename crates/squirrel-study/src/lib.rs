@@ -21,6 +21,7 @@ pub mod table2;
 pub mod table3;
 pub mod thrust;
 pub mod tracking;
+pub mod wind;
 pub mod wing_flights;
 
 /// All studies, by name.
@@ -33,4 +34,5 @@ pub static STUDIES: &[study::Study] = &[
     table2::STUDY,
     table3::STUDY,
     thrust::STUDY,
+    wind::STUDY,
 ];
