@@ -3,8 +3,10 @@
 //! Each is one file, with the keys of its table in `[sensors]`, its devices and what it reads ([`Reads`]), and a line of [`Logged`].
 
 mod battery;
+mod range_finder;
 
 pub use battery::BatterySensor;
+pub use range_finder::RangeFinderSensor;
 
 use super::Truth;
 use super::line::Line;
@@ -62,6 +64,8 @@ macro_rules! logged {
 logged! {
     /// Battery monitor.
     battery: BatterySensor = Some(BatterySensor::default()), stream 5;
+    /// Range finder.
+    range_finder: RangeFinderSensor = None, stream 16;
 }
 
 /// One sensor in one flight.
