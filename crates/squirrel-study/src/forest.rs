@@ -8,8 +8,10 @@
 //!
 //! All of it is flown twice: with the laws as they are, and with the limit of speed that ours has for the paper's too.
 
+mod page;
 mod table;
 
+pub use page::page;
 pub use table::STUDY;
 
 use crate::campaign::{self, Flown, Plan};

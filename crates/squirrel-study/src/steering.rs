@@ -4,8 +4,10 @@
 //! simulations, and on the independent plant, the vehicle's own wing. What differs between them is what the paper's figure owes to a plant
 //! that agrees with the controller.
 
+mod page;
 mod table;
 
+pub use page::page;
 pub use table::STUDY;
 
 use crate::campaign::Plan;

@@ -6,16 +6,21 @@
 
 use crate::campaign::Plan;
 use crate::journal::Keep;
-use crate::pages;
+use crate::pages::{begin, chart_row, facts, figure, numbers, tracks};
 use crate::sheet::{Cell, Sheet};
 use crate::study::{Arms, Found, Study};
+use crate::thrust::PAPER_GAIN;
 use crate::tracking::{self, Condition, GUST_M_S, Row};
 use serde::Serialize;
+use squirrel_report::chart::{Axis, Extent, Ink, RowChart, Svg};
+use squirrel_report::page::{Columns, Figure};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 
+/// Arms whose tracks are shown.
+const SHOWN: [Arm; 4] = [Arm::Pc, Arm::TwccParnn, Arm::TwccPlus, Arm::PcPlus];
 /// Effective thrust-to-weight ratios.
 pub const THRUST_TO_WEIGHT: [f64; 4] = [1.20, 1.25, 1.30, 2.00];
 
@@ -108,7 +113,59 @@ fn fly(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightE
     }
     found.csv = found.sheet(sheet);
     if keep.folder.is_some() {
-        found.page = Some(pages::table3(&study, plan)?);
+        found.page = Some(page(&study, plan)?);
     }
     Ok(Some(found))
+}
+
+/// Table III as a page without network.
+///
+/// # Errors
+/// A flight that fails.
+pub fn page(study: &Table3, plan: &Plan) -> Result<String, FlightError> {
+    let lead = "The paper's real flights, 7.3 m/s, R_d 4 m, a turn of 110 to 130 deg, with the error as its log has it, by satellite \
+                fix and barometer. The paper does not say how much thrust there was. Gain is the mean error of pc over that of \
+                the arm, minus 1.";
+    let facts = facts(&study.vehicle, study.trials, study.seed);
+    let mut page = begin("Table III: the paper's real flights", lead, &facts, &[]);
+    page.section(
+        "Measured gain",
+        "Gain of the measured errors over pc with its paired 95 % interval; the red stroke is the paper's gain of twcc_parnn.",
+    );
+    let of_point =
+        |point: &Point| figure(format!("T/W {:.2}", point.thrust_to_weight), String::new(), measured(point));
+    page.figures(Columns::Two, &study.points.iter().map(of_point).collect::<Vec<Figure>>());
+    if let (Some(point), Some(condition)) = (study.points.first(), conditions(&plan.vehicle)?.first()) {
+        page.section(
+            &format!("The first trial at T/W {:.2}", point.thrust_to_weight),
+            "Tracks are coloured by speed. The paper's drone without wings sank.",
+        );
+        tracks(&mut page, plan, condition, &SHOWN)?;
+    }
+    let rows = study
+        .points
+        .iter()
+        .flat_map(|point| point.rows.iter().map(|row| (vec![format!("{:.2}", point.thrust_to_weight)], row)));
+    numbers(&mut page, &["T/W"], rows);
+    Ok(page.html())
+}
+
+fn measured(point: &Point) -> Svg {
+    let axis = Axis::new("measured gain over pc", "%");
+    let label = format!("measured gain by arm at T/W {:.2}", point.thrust_to_weight);
+    let mut chart = RowChart::new(&label, Columns::Two.width(), axis);
+    let paper = || Extent {
+        from: 100.0 * PAPER_GAIN,
+        to: 100.0 * PAPER_GAIN,
+        ink: Ink::Limit,
+        name: format!("the paper's {:.1} %", 100.0 * PAPER_GAIN),
+    };
+    chart.rows.extend(point.rows.iter().filter(|row| row.arm != Arm::Pc.name()).map(|row| {
+        // Plus zero turns a rounded minus zero round.
+        let note = format!("{:+.1} %", (1e3 * row.gain_measured.value).round() / 10.0 + 0.0);
+        let mut row = chart_row(row.arm, row.gain_measured, note);
+        row.bars.push(paper());
+        row
+    }));
+    chart.svg()
 }

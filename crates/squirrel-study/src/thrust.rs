@@ -9,9 +9,12 @@
 //! which the tilt limit holds height, 1.155 with one angle at 30 deg and 1.33 with both (docs/equations.md E.4); what is gained there is said beside
 //! the fair rival `pc_plus`.
 
+mod page;
+
+pub use page::page;
+
 use crate::campaign::Plan;
 use crate::journal::Keep;
-use crate::pages;
 use crate::sheet::{Cell, Sheet};
 use crate::statistics::{Estimate, FEW};
 use crate::study::{Arms, Found, Study};
@@ -247,6 +250,6 @@ fn fly(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightE
     }
     found.csv = found.sheet(sheet);
     found.words(words(&study));
-    found.page = Some(pages::thrust(&study));
+    found.page = Some(page(&study));
     Ok(Some(found))
 }

@@ -1,9 +1,8 @@
 //! The forest as the command line shows it.
 
-use super::{BAND_M, Row, run, words};
+use super::{BAND_M, Row, page, run, words};
 use crate::campaign::Plan;
 use crate::journal::Keep;
-use crate::pages;
 use crate::sheet::{Cell, Sheet};
 use crate::study::{Arms, Choice, Found, Study};
 use squirrel_sim::arm::Arm;
@@ -47,7 +46,7 @@ fn fly(plan: &Plan, options: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, F
     found.csv = csv;
     found.words(words(&study));
     if keep.folder.is_some() {
-        found.page = Some(pages::forest(&study, plan)?);
+        found.page = Some(page(&study, plan)?);
     }
     Ok(Some(found))
 }

@@ -1,9 +1,8 @@
 //! Steering angles and speeds as the command line shows them.
 
-use super::{ANGLES_DEG, SPEEDS_M_S, Steering, ratio, run, words};
+use super::{ANGLES_DEG, SPEEDS_M_S, Steering, page, ratio, run, words};
 use crate::campaign::Plan;
 use crate::journal::Keep;
-use crate::pages;
 use crate::sheet::{Cell, Sheet};
 use crate::study::{Arms, Found, Shown, Study};
 use squirrel_sim::arm::Arm;
@@ -31,7 +30,7 @@ fn fly(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightE
     found.words(words(&study));
     found.csv = cells(&study).csv;
     if keep.folder.is_some() {
-        found.page = Some(pages::steering(&study, plan)?);
+        found.page = Some(page(&study, plan)?);
     }
     Ok(Some(found))
 }
