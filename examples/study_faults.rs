@@ -12,13 +12,14 @@
 
 use squirrel_examples::Outcome;
 use squirrel_sim::vehicle_file::VehicleFile;
-use squirrel_study::faults::{self, Faults, Plan};
+use squirrel_study::campaign::Plan;
+use squirrel_study::faults::{self, Faults};
 use squirrel_study::journal::Keep;
 use squirrel_study::statistics::Share;
 
 fn study() -> Outcome<Faults> {
-    let plan = Plan { vehicle: VehicleFile::squirrel(), trials: 100, seed: 1 };
-    Ok(faults::run(&plan, &Keep::default(), || ())?.ok_or("a part of a study")?)
+    let plan = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials: 100, seed: 1 };
+    Ok(faults::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 
 /// Of faults that can be survived, those that were.

@@ -12,12 +12,13 @@
 
 use squirrel_examples::Outcome;
 use squirrel_sim::vehicle_file::VehicleFile;
-use squirrel_study::filters::{self, Filters, Plan};
+use squirrel_study::campaign::Plan;
+use squirrel_study::filters::{self, Filters};
 use squirrel_study::journal::Keep;
 
 fn study() -> Outcome<Filters> {
-    let plan = Plan { vehicle: VehicleFile::squirrel(), trials: 3, seed: 1 };
-    Ok(filters::run(&plan, &Keep::default(), || ())?.ok_or("a part of a study")?)
+    let plan = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials: 3, seed: 1 };
+    Ok(filters::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 
 /// Inclination's error of a filter, RMS, deg.

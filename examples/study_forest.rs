@@ -24,7 +24,7 @@ fn study() -> Outcome<Forest> {
     // `phantom` flies in any case.
     let arms = vec![Arm::Pc, Arm::TwccFlat, Arm::PcPlus, Arm::TwccPlus];
     let plan = Plan { vehicle: VehicleFile::squirrel(), arms, trials: 12, seed: 1 };
-    Ok(forest::run(&plan, THRUST_TO_WEIGHT, &Keep::default(), || ())?.ok_or("a part of a study")?)
+    Ok(forest::run(&plan, THRUST_TO_WEIGHT, &Keep::default())?.ok_or("a part of a study")?)
 }
 
 fn main() -> Outcome<()> {

@@ -20,7 +20,7 @@ use squirrel_study::steering::{self, ANGLES_DEG, SPEEDS_M_S, Steering};
 fn study() -> Outcome<Steering> {
     let arms = vec![Arm::TwccFlat, Arm::TwccParnn];
     let plan = Plan { vehicle: VehicleFile::squirrel(), arms, trials: 1, seed: 1 };
-    Ok(steering::run(&plan, &Keep::default(), || ())?.ok_or("a part of a study")?)
+    Ok(steering::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 
 fn main() -> Outcome<()> {

@@ -13,15 +13,16 @@
 
 use squirrel_examples::Outcome;
 use squirrel_sim::vehicle_file::VehicleFile;
+use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
-use squirrel_study::table2::{self, Plan, Row, Table2};
+use squirrel_study::table2::{self, Row, Table2};
 
 /// Of flights learned from, s.
 const TRAINING_S: u32 = 300;
 
 fn study() -> Outcome<Table2> {
-    let plan = Plan { vehicle: VehicleFile::squirrel(), trials: 1, seed: 1, epochs: 5 };
-    Ok(table2::run(&plan, &Keep::default(), |_| ())?.ok_or("a part of a study")?)
+    let plan = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials: 1, seed: 1 };
+    Ok(table2::run(&plan, 5, &Keep::default())?.ok_or("a part of a study")?)
 }
 
 /// Errors to the truth, N, of a model on the sets, training first.

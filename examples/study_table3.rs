@@ -23,7 +23,7 @@ use squirrel_study::tracking::Row;
 fn study() -> Outcome<Table3> {
     let arms = vec![Arm::TwccFlat, Arm::TwccParnn];
     let plan = Plan { vehicle: VehicleFile::squirrel(), arms, trials: 3, seed: 1 };
-    Ok(table3::run(&plan, &Keep::default(), || ())?.ok_or("a part of a study")?)
+    Ok(table3::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 
 fn main() -> Outcome<()> {

@@ -22,7 +22,7 @@ fn study() -> Outcome<Thrust> {
     // `pc` flies in any case: gains are over it.
     let arms = vec![Arm::TwccPlus, Arm::PcPlus];
     let plan = Plan { vehicle: VehicleFile::squirrel(), arms, trials: 3, seed: 1 };
-    Ok(thrust::run(&plan, &Keep::default(), || ())?.ok_or("a part of a study")?)
+    Ok(thrust::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 
 fn main() -> Outcome<()> {

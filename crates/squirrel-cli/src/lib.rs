@@ -34,7 +34,7 @@ enum Command {
     Fly(commands::fly::Fly),
     /// Run an experiment with many flights.
     #[command(subcommand)]
-    Study(commands::study::Study),
+    Study(commands::study::Studies),
     /// Train a model of the wing force on flight logs.
     Train(commands::train::Train),
     /// Run a log's inputs through the flight code again and compare every bit.

@@ -51,7 +51,11 @@ pub(crate) struct Table {
 
 impl Table {
     pub(crate) fn new(header: &[&str]) -> Self {
-        Self { rows: vec![header.iter().map(|&h| h.to_owned()).collect()] }
+        Self::of(vec![header.iter().map(|&h| h.to_owned()).collect()])
+    }
+    /// The first of the rows is the header.
+    pub(crate) fn of(rows: Vec<Vec<String>>) -> Self {
+        Self { rows }
     }
     pub(crate) fn row(&mut self, cells: Vec<String>) {
         self.rows.push(cells);

@@ -33,10 +33,12 @@ pub struct Settings {
     pub seed: u64,
 }
 
+/// Passes over the windows if nobody says; as in the paper.
+pub const EPOCHS: usize = 800;
+
 impl Default for Settings {
-    /// 800 epochs as in the paper.
     fn default() -> Self {
-        Self { epochs: 800, batch: 256, rate: 3e-3, clip: 5.0, patience: 200, seed: 0 }
+        Self { epochs: EPOCHS, batch: 256, rate: 3e-3, clip: 5.0, patience: 200, seed: 0 }
     }
 }
 

@@ -26,13 +26,6 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// All arms that the vehicle can fly alone; without weights nobody believes in the network. Planners fly where they are asked for.
-    pub fn of_all_arms(vehicle: VehicleFile, trials: u32, seed: u64) -> Self {
-        let mut arms = Arm::ALONE.to_vec();
-        arms.retain(|arm| arm.is_known_to(&vehicle));
-        Self { vehicle, arms, trials, seed }
-    }
-
     /// With `arm` among the arms, each of them once and in their order.
     ///
     /// # Errors
@@ -59,11 +52,6 @@ impl Plan {
         let texts = scenarios.into_iter().fold(HASH_START, |h, s| hash(h, s.to_toml().as_bytes()));
         let arms = arms.join(" ");
         format!("{}, arms {arms}, scenarios {texts:016x}", identity(study, &self.vehicle, self.seed))
-    }
-
-    /// Number of flights under so many conditions.
-    pub fn flights(&self, conditions: usize) -> u32 {
-        self.trials * conditions as u32 * self.arms.len() as u32
     }
 
     /// That every arm can fly a scenario: asked before anything is kept.
@@ -96,16 +84,14 @@ pub struct Flown<T> {
 /// Flies what the journal does not hold yet; without a result where it is a part's.
 ///
 /// * `fly` - arm, number of the condition, trial
-/// * `progress` - called once for each flight
 ///
 /// # Errors
 /// A flight that fails, or a journal that cannot be written.
 pub fn run<T: Serialize + DeserializeOwned + Send>(
     plan: &Plan,
     conditions: usize,
-    journal: &Journal,
+    journal: &Journal<'_>,
     fly: impl Fn(Arm, usize, u32) -> Result<T, FlightError> + Sync,
-    progress: impl Fn() + Sync,
 ) -> Result<Option<Flown<T>>, FlightError> {
     let arms = plan.arms.len();
     // Trials are the slowest to change, so that a study may go on to more of them.
@@ -113,7 +99,7 @@ pub fn run<T: Serialize + DeserializeOwned + Send>(
         let (trial, rest) = (k as usize / (conditions * arms), k as usize % (conditions * arms));
         fly(plan.arms[rest % arms], rest / arms, trial as u32)
     };
-    let all = journal.run(plan.flights(conditions), one, progress)?;
+    let all = journal.run(plan.trials * (conditions * arms) as u32, one)?;
     Ok(all.map(|all| Flown { arms: plan.arms.clone(), conditions, all }))
 }
 

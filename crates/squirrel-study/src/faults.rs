@@ -5,14 +5,15 @@
 //! thrust at a ratio below [`HEALTHY_RATIO`], or both inertial units that say nothing that is a number. A fault is *flagged* where the
 //! flight code reports anything from the fault on, be it health or a reason of its failsafe.
 
-use crate::campaign::Draw;
+use crate::campaign::{Draw, Plan};
 use crate::journal::{Journal, Keep, check_trials, identity};
+use crate::sheet::{Cell, Sheet};
+use crate::study::{Found, Study};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Integrator, Metrics, OVER_RAD, Setup};
 use squirrel_sim::scenario::{FaultKind, FaultTable, Scenario};
 use squirrel_sim::sensors::{SUITES, SensorParameters};
-use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Thrust-to-weight ratio from which a weak rotor is survivable.
 pub const HEALTHY_RATIO: f64 = 1.6;
@@ -22,16 +23,13 @@ const ROTOR_LOSS: f64 = 0.3;
 const LANDING_M_S: f64 = 2.0;
 const SCENARIOS: [&str; 3] = ["avoid", "track", "hover"];
 
-/// What to run.
-#[derive(Debug, Clone)]
-pub struct Plan {
-    /// Vehicle; its sensors are drawn.
-    pub vehicle: VehicleFile,
-    /// Flights.
-    pub trials: u32,
-    /// Seed of all trials.
-    pub seed: u64,
-}
+/// On the command line.
+pub const STUDY: Study = Study::new(
+    "faults",
+    "What becomes of flights in which one thing fails",
+    (1000, "Flights, each with one random fault"),
+    study,
+);
 
 /// One flight.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -100,15 +98,15 @@ pub struct Faults {
 
 /// Flies the study; the result depends neither on threads nor on how often it was stopped.
 ///
+/// * `plan` - whose sensors are drawn, and whose arms do not matter: [`Arm::TwccFlat`] flies
 /// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it is a part of one
-/// * `progress` - called once for each flight
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Faults>, FlightError> {
+pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Faults>, FlightError> {
     check_trials(plan.trials)?;
     let journal = Journal::open(keep, "faults", &identity("faults", &plan.vehicle, plan.seed))?;
-    let Some(flights) = journal.run(plan.trials, |trial| fly(plan, trial), progress)? else {
+    let Some(flights) = journal.run(plan.trials, |trial| fly(plan, trial))? else {
         return Ok(None);
     };
     let rows: Vec<Row> =
@@ -150,7 +148,7 @@ pub fn scenario(plan: &Plan, trial: u32) -> Result<(Scenario, &'static str), Fli
     let kind = FaultKind::ALL[trial as usize % FaultKind::ALL.len()];
     let suite = draw.one_of(&SUITES);
     let mut scenario = Scenario::find(draw.one_of(&SCENARIOS)).map_err(FlightError)?;
-    scenario.seed = plan.seed.wrapping_mul(1_000_003).wrapping_add(u64::from(trial));
+    scenario.seed = plan.trial_seed(trial);
     scenario.thrust_to_weight = Some(draw.between(1.2, 2.0));
     scenario.wind.gust_sigma_m_s = draw.between(0.0, 1.0);
     // Also what follows the manoeuvre counts.
@@ -180,6 +178,12 @@ pub fn scenario(plan: &Plan, trial: u32) -> Result<(Scenario, &'static str), Fli
     Ok((scenario, suite))
 }
 
+/// Whether a vehicle turned over, met the ground, or left the numbers.
+pub(crate) fn is_lost(metrics: &Metrics) -> bool {
+    let hit = metrics.contact_speed_m_s.is_some_and(|speed| speed > LANDING_M_S);
+    hit || metrics.tilt_max_rad > OVER_RAD || metrics.not_finite
+}
+
 fn fly(plan: &Plan, trial: u32) -> Result<Trial, FlightError> {
     let (scenario, suite) = scenario(plan, trial)?;
     let mut vehicle = plan.vehicle.clone();
@@ -197,7 +201,6 @@ fn fly(plan: &Plan, trial: u32) -> Result<Trial, FlightError> {
     let name = scenario.name.clone();
     let setup = Setup { vehicle, arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
     let metrics: Metrics = setup.fly(false, |_| {})?.metrics;
-    let hit = metrics.contact_speed_m_s.is_some_and(|speed| speed > LANDING_M_S);
     Ok(Trial {
         fault,
         table,
@@ -205,10 +208,36 @@ fn fly(plan: &Plan, trial: u32) -> Result<Trial, FlightError> {
         scenario: name,
         thrust_to_weight: ratio,
         survivable,
-        survived: !(hit || metrics.tilt_max_rad > OVER_RAD || metrics.not_finite),
+        survived: !is_lost(&metrics),
         flags: metrics.flags.names(),
         not_finite: metrics.not_finite,
         tilt_max_deg: metrics.tilt_max_rad.to_degrees(),
         contact_speed_m_s: metrics.contact_speed_m_s,
     })
+}
+
+fn study(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightError> {
+    let Some(study) = run(plan, keep)? else { return Ok(None) };
+    let mut found = Found::of(&study)?;
+    found.say(format!(
+        "{} single faults in flights of {} from seed {}.\n",
+        study.trials, study.vehicle, study.seed
+    ));
+    let mut sheet = Sheet::default();
+    for row in &study.rows {
+        let count = |n: u32| Cell::Number(f64::from(n), 0);
+        sheet.row(&[
+            ("fault", "fault", Cell::Text(row.fault)),
+            ("flights", "flights", count(row.flights)),
+            ("survivable", "survivable", count(row.survivable)),
+            ("survived", "survived", count(row.survived)),
+            ("flagged", "flagged", count(row.flagged)),
+            ("lost", "lost", count(row.lost)),
+            ("lost unflagged", "lost_unflagged", count(row.lost_unflagged)),
+            ("not finite", "not_finite", count(row.not_finite)),
+        ]);
+    }
+    found.csv = found.sheet(sheet);
+    found.say(format!("\nSurvived {:.1} % of the survivable faults.", 100.0 * study.survived_share));
+    Ok(Some(found))
 }

@@ -5,9 +5,12 @@
 //! estimator; the filters hear the recorded inertial unit, receiver and barometer, and no compass. Errors count
 //! from five seconds on.
 
+use crate::campaign::Plan;
 use crate::in_loop;
 use crate::journal::{self, Journal, Keep, check_trials};
+use crate::sheet::{Cell, Sheet};
 use crate::statistics::{Estimate, mean, paired};
+use crate::study::{Found, Study};
 use crate::wing_flights::Kind;
 use squirrel_core::estimate::eskf::Eskf;
 use squirrel_core::estimate::mahony::Mahony;
@@ -24,7 +27,6 @@ use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{FlightError, Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
-use squirrel_sim::sensors::SUITES;
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Bias that an uncalibrated gyro keeps, deg/s: docs/equations.md C.2.
@@ -60,16 +62,23 @@ fn make(
     }
 }
 
-/// What to run.
-#[derive(Debug, Clone)]
-pub struct Plan {
-    /// Vehicle.
-    pub vehicle: VehicleFile,
-    /// Flights.
-    pub trials: u32,
-    /// Seed of all trials.
-    pub seed: u64,
-}
+/// On the command line.
+pub const STUDY: Study = Study {
+    others: |trials| {
+        let flown = (0..trials).map(|trial| format!("{FLIGHTS}/{}.toml", name(trial)));
+        flown.chain([IN_LOOP, "filters_in_loop.trials.jsonl"].map(str::to_owned)).collect()
+    },
+    ..Study::new(
+        "filters",
+        "How far estimators of attitude are off in flight, with a calibrated gyro and without",
+        (20, "Flights"),
+        study,
+    )
+};
+
+/// What is written beside the files that every study has.
+const FLIGHTS: &str = "flights";
+const IN_LOOP: &str = "filters_in_loop.csv";
 
 /// A filter with one kind of gyro.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -108,12 +117,12 @@ type Errors = [f64; 2];
 
 /// Flies the study on all cores; the result does not depend on how many there are.
 ///
+/// * `plan` - whose arms do not matter: nobody decides
 /// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it is a part of one
-/// * `progress` - called once for each trial: the flights, then a pair for each of them and each suite of sensors
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Filters>, FlightError> {
+pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Filters>, FlightError> {
     check_trials(plan.trials)?;
     let kinds: Vec<(bool, Estimator)> =
         [true, false].into_iter().flat_map(|calibrated| FILTERS.map(|filter| (calibrated, filter))).collect();
@@ -123,9 +132,8 @@ pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<O
         let log = fly(plan, trial)?;
         kinds.iter().map(|(calibrated, filter)| heard(plan, &log, *filter, *calibrated)).collect()
     };
-    let flown = journal("filters")?.run(plan.trials, all, &progress)?;
-    let in_loop =
-        in_loop::run(&plan.vehicle, plan.trials, plan.seed, &journal("filters_in_loop")?, &progress)?;
+    let flown = journal("filters")?.run(plan.trials, all)?;
+    let in_loop = in_loop::run(&plan.vehicle, plan.trials, plan.seed, &journal("filters_in_loop")?)?;
     let (Some(flown), Some(in_loop)) = (flown, in_loop) else { return Ok(None) };
     let rows = kinds.iter().enumerate().map(|(k, (calibrated, filter))| {
         let trials_deg: Vec<f64> = flown.iter().map(|trial| trial[k][0]).collect();
@@ -147,12 +155,6 @@ pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<O
     }))
 }
 
-/// Number of times that [`run`] calls back.
-pub fn steps(plan: &Plan, keep: &Keep<'_>) -> u64 {
-    let trials = u64::from(plan.trials);
-    keep.share(trials) + keep.share(trials * SUITES.len() as u64)
-}
-
 /// The flights, named by their trial.
 ///
 /// # Errors
@@ -162,7 +164,7 @@ pub fn scenarios(plan: &Plan) -> Result<Vec<Scenario>, FlightError> {
 }
 
 fn scenario(plan: &Plan, trial: u32) -> Result<Scenario, FlightError> {
-    let scenario = Kind::T1.scenario(plan.seed.wrapping_mul(1_000_003).wrapping_add(u64::from(trial)))?;
+    let scenario = Kind::T1.scenario(plan.trial_seed(trial))?;
     Ok(Scenario { name: name(trial), ..scenario })
 }
 
@@ -230,4 +232,39 @@ fn heard(plan: &Plan, log: &FlightLog, filter: Estimator, calibrated: bool) -> R
         }
     }
     Ok([f64::sqrt(sum / count), max])
+}
+
+fn study(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightError> {
+    let Some(study) = run(plan, keep)? else { return Ok(None) };
+    let mut found = Found::of(&study)?;
+    found.say(format!(
+        "Random runs of {} with spread wings in gusts, {} flights from seed {}; inclination, deg.\n",
+        study.vehicle, study.trials, study.seed
+    ));
+    let mut sheet = Sheet::default();
+    let [b, c, d] = study.bias_deg_s;
+    let off = format!("off by {b}, {c}, {d} deg/s");
+    for row in &study.rows {
+        let rms = row.inclination_rms_deg;
+        sheet.row(&[
+            ("filter", "filter", Cell::Text(row.filter)),
+            (
+                "gyro",
+                "calibrated",
+                if row.calibrated { Cell::Named("calibrated", "true") } else { Cell::Named(&off, "false") },
+            ),
+            ("RMS", "rms_deg", Cell::Number(rms.value, 2)),
+            ("95 % interval", "rms_low_deg,rms_high_deg", Cell::Interval(Some(rms), 2)),
+            ("largest", "max_deg", Cell::Number(row.inclination_max_deg, 1)),
+        ]);
+    }
+    found.csv = found.sheet(sheet);
+    found.say(
+        "\nThe avoidance manoeuvre on estimates over the same flight on the truth; distance to the reference, m.\n",
+    );
+    let in_loop = found.sheet(in_loop::sheet(&study.in_loop));
+    let named = |s: Scenario| (format!("{FLIGHTS}/{}.toml", s.name), s.to_toml());
+    found.others = vec![(IN_LOOP.to_owned(), in_loop)];
+    found.others.extend(scenarios(plan)?.into_iter().map(named));
+    Ok(Some(found))
 }

@@ -8,6 +8,12 @@
 //!
 //! All of it is flown twice: with the laws as they are, and with the limit of speed that ours has for the paper's too.
 
+mod page;
+mod table;
+
+pub use page::page;
+pub use table::STUDY;
+
 use crate::campaign::{self, Flown, Plan};
 use crate::journal::{Journal, Keep};
 use crate::statistics::{Estimate, FEW, Share, mean, paired_shares};
@@ -103,29 +109,15 @@ pub struct Forest {
     pub limited: Vec<Row>,
 }
 
-/// Number of flights that [`run`] flies here.
-///
-/// # Errors
-/// No trials.
-pub fn flights(plan: &Plan, keep: &Keep<'_>) -> Result<u64, FlightError> {
-    Ok(keep.share(u64::from(plan.beside(Arm::Phantom)?.flights(CONDITIONS))))
-}
-
 /// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped.
 ///
 /// * `thrust_to_weight` - effective ratio
 /// * `plan` - `phantom` is flown in any case
 /// * `keep` - keeps the flights; without a result where it is a part of them
-/// * `progress` - called once for each flight
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(
-    plan: &Plan,
-    thrust_to_weight: f64,
-    keep: &Keep<'_>,
-    progress: impl Fn() + Sync,
-) -> Result<Option<Forest>, FlightError> {
+pub fn run(plan: &Plan, thrust_to_weight: f64, keep: &Keep<'_>) -> Result<Option<Forest>, FlightError> {
     let plan = &plan.beside(Arm::Phantom)?;
     let first = scenario(plan, thrust_to_weight, 0)?;
     plan.check(&plan.vehicle, &first)?;
@@ -134,7 +126,7 @@ pub fn run(
     let fly = |arm, condition, trial| {
         fly(if condition == 0 { plan } else { &limited }, arm, thrust_to_weight, trial)
     };
-    let Some(flown) = campaign::run(plan, CONDITIONS, &journal, fly, progress)? else { return Ok(None) };
+    let Some(flown) = campaign::run(plan, CONDITIONS, &journal, fly)? else { return Ok(None) };
     let rows = |condition| plan.arms.iter().map(|arm| row(&flown, *arm, condition)).collect();
     Ok(Some(Forest {
         vehicle: plan.vehicle.name.clone(),

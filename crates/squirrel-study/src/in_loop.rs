@@ -1,6 +1,7 @@
 //! What estimation costs in the loop: the avoidance manoeuvre on estimates beside the same flight on the truth, over suites of sensors.
 
 use crate::journal::Journal;
+use crate::sheet::{Cell, Sheet};
 use crate::statistics::{self, Estimate, mean, paired};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
@@ -43,23 +44,18 @@ pub struct Row {
 
 /// Flies `trials` pairs for each suite; without a result where the journal is a part's.
 ///
-/// * `progress` - called once for each pair
-///
 /// # Errors
 /// A vehicle that cannot fly, or a journal that cannot be written.
 pub fn run(
     vehicle: &VehicleFile,
     trials: u32,
     seed: u64,
-    journal: &Journal,
-    progress: impl Fn() + Sync,
+    journal: &Journal<'_>,
 ) -> Result<Option<Vec<Row>>, FlightError> {
     let count = SUITES.len() as u32;
-    let pairs = journal.run(
-        trials * count,
-        |k| pair(vehicle, SUITES[(k % count) as usize], seed.wrapping_mul(1_000_003) + u64::from(k / count)),
-        progress,
-    )?;
+    let pairs = journal.run(trials * count, |k| {
+        pair(vehicle, SUITES[(k % count) as usize], seed.wrapping_mul(1_000_003) + u64::from(k / count))
+    })?;
     let Some(pairs) = pairs else { return Ok(None) };
     let row = |(i, suite): (usize, &&'static str)| {
         let of: Vec<&Pair> = pairs.iter().skip(i).step_by(SUITES.len()).collect();
@@ -96,4 +92,22 @@ fn pair(vehicle: &VehicleFile, suite: &str, seed: u64) -> Result<Pair, FlightErr
         lost: ours.contact_s.is_some() || ours.tilt_max_rad > OVER_RAD,
         flags: ours.flags.names(),
     })
+}
+
+/// The rows.
+pub fn sheet(rows: &[Row]) -> Sheet {
+    let mut sheet = Sheet::default();
+    for row in rows {
+        sheet.row(&[
+            ("sensors", "suite", Cell::Text(row.suite)),
+            ("flights", "flights", Cell::Number(f64::from(row.flights), 0)),
+            ("RMSE", "rmse_m", Cell::Number(row.rmse_m, 2)),
+            ("on the truth", "oracle_rmse_m", Cell::Number(row.oracle_rmse_m, 2)),
+            ("ratio", "ratio", Cell::Number(row.ratio.value, 3)),
+            ("95 % interval", "ratio_low,ratio_high", Cell::Interval(Some(row.ratio), 3)),
+            ("lost", "lost", Cell::Number(f64::from(row.lost), 0)),
+            ("flagged", "flagged", Cell::Number(f64::from(row.flagged), 0)),
+        ]);
+    }
+    sheet
 }

@@ -95,24 +95,40 @@ pub struct Keep<'a> {
     pub part: Part,
     /// The arguments that describe the study, for who merges parts of it.
     pub command: &'a [String],
+    /// Who is told how far it is.
+    pub progress: Option<&'a dyn Progress>,
+}
+
+/// Who is told how far a study is.
+pub trait Progress: Sync + std::fmt::Debug {
+    /// So many steps more are to be done.
+    fn ahead(&self, steps: u64);
+    /// So many of them are done.
+    fn done(&self, steps: u64);
 }
 
 impl Keep<'_> {
-    /// How many of so many trials are flown here.
-    pub fn share(&self, trials: u64) -> u64 {
-        match self.part {
-            Part::Shard(shard) => {
-                (trials + u64::from(shard.of) - u64::from(shard.number)) / u64::from(shard.of)
-            }
-            Part::All | Part::Merged => trials,
-        }
+    /// Of so many trials those that are flown here.
+    pub(crate) fn mine(&self, trials: u32) -> Vec<u32> {
+        let is_mine = |trial: &u32| !matches!(self.part, Part::Shard(shard) if !shard.has(*trial));
+        (0..trials).filter(is_mine).collect()
+    }
+
+    /// Tells of steps that are to be done.
+    pub(crate) fn ahead(&self, steps: usize) {
+        self.progress.inspect(|told| told.ahead(steps as u64));
+    }
+
+    /// Tells of steps that are done.
+    pub(crate) fn done(&self, steps: u64) {
+        self.progress.inspect(|told| told.done(steps));
     }
 }
 
 /// A study's trials on disk, or nowhere.
 #[derive(Debug)]
-pub struct Journal {
-    part: Part,
+pub struct Journal<'a> {
+    keep: Keep<'a>,
     file: Option<(PathBuf, Mutex<File>)>,
     head: Head,
     done: Lines,
@@ -168,18 +184,18 @@ pub(crate) fn write(path: &Path, head: &Head, lines: &Lines) -> Result<(), Fligh
     write_whole(path, text.as_bytes()).map_err(|e| at(&e))
 }
 
-impl Journal {
+impl<'a> Journal<'a> {
     /// The trials of a study.
     ///
     /// * `plan` - what a result depends on beside the program itself, in one line
     ///
     /// # Errors
     /// The file cannot be read or written, or is of another plan; a part of a study that nobody keeps.
-    pub fn open(keep: &Keep<'_>, name: &str, plan: &str) -> Result<Self, FlightError> {
+    pub fn open(keep: &Keep<'a>, name: &str, plan: &str) -> Result<Self, FlightError> {
         let head = Head { plan: plan.to_owned(), command: keep.command.to_vec() };
         let Some(folder) = keep.folder else {
             if keep.part == Part::All {
-                return Ok(Self { part: Part::All, file: None, head, done: Lines::new() });
+                return Ok(Self { keep: *keep, file: None, head, done: Lines::new() });
             }
             return Err(FlightError(
                 "shard: needs a folder that keeps what was flown; give --out".to_owned(),
@@ -206,12 +222,10 @@ impl Journal {
             let line = serde_json::to_string(&head).map_err(|e| at(&e))?;
             writeln!(file, "{line}").map_err(|e| at(&e))?;
         }
-        Ok(Self { part: keep.part, file: Some((path, Mutex::new(file))), head, done })
+        Ok(Self { keep: *keep, file: Some((path, Mutex::new(file))), head, done })
     }
 
     /// The results of all trials, from 0; those that are missing are flown on all cores. `None` where only a part of them is flown here.
-    ///
-    /// * `progress` - called once for each trial, also for those that were there
     ///
     /// # Errors
     /// A trial that fails, a result that cannot be read, or one that cannot be written; after a merge, a trial that is missing.
@@ -219,25 +233,24 @@ impl Journal {
         &self,
         trials: u32,
         fly: impl Fn(u32) -> Result<T, FlightError> + Sync,
-        progress: impl Fn() + Sync,
     ) -> Result<Option<Vec<T>>, FlightError> {
         let one = |trial: u32| {
             let result = match self.done.get(&trial) {
                 Some(line) => self.read(line)?,
-                None if self.part == Part::Merged => {
+                None if self.keep.part == Part::Merged => {
                     return Err(self.at(&format!("flight = {trial}: missing, in none of the merged folders")));
                 }
-                None => self.keep(trial, &fly(trial)?)?,
+                None => self.write_down(trial, &fly(trial)?)?,
             };
-            progress();
+            self.keep.done(1);
             Ok(result)
         };
-        if let Part::Shard(shard) = self.part {
-            let mine: Vec<u32> = (0..trials).filter(|trial| shard.has(*trial)).collect();
-            mine.into_par_iter().map(|trial| one(trial).map(drop)).collect::<Result<(), _>>()?;
+        let mine = self.keep.mine(trials);
+        self.keep.ahead(mine.len());
+        let all: Vec<T> = mine.into_par_iter().map(one).collect::<Result<_, _>>()?;
+        if let Part::Shard(_) = self.keep.part {
             return Ok(None);
         }
-        let all: Vec<T> = (0..trials).into_par_iter().map(one).collect::<Result<_, _>>()?;
         if let Some((path, _)) = &self.file {
             let (_, lines, _) = read(path)?;
             write(path, &self.head, &lines)?;
@@ -255,7 +268,7 @@ impl Journal {
     }
 
     /// Writes a result down; what is handed on is what was written, so that it does not matter who asks.
-    fn keep<T: Serialize + DeserializeOwned>(&self, trial: u32, result: &T) -> Result<T, FlightError> {
+    fn write_down<T: Serialize + DeserializeOwned>(&self, trial: u32, result: &T) -> Result<T, FlightError> {
         let line = serde_json::to_string(&Line { trial, result }).map_err(|e| self.at(&e))?;
         // A number that is none cannot be read again, and must not be kept.
         let kept = self.read(&line)?;

@@ -7,6 +7,10 @@
 //!
 //! Both planners have the same numbers; the one without wings is the fair rival (docs/equations.md G.1).
 
+mod table;
+
+pub use table::STUDY;
+
 use crate::campaign::{self, Flown, Plan};
 use crate::journal::{Journal, Keep};
 use crate::statistics::{Estimate, Share, gain, mean, paired};
@@ -113,24 +117,14 @@ fn conditions() -> impl Iterator<Item = (&'static str, f64)> {
     KINDS.into_iter().flat_map(|kind| THRUST_TO_WEIGHT.map(|ratio| (kind, ratio)))
 }
 
-/// Number of flights that [`run`] flies here.
-pub fn flights(plan: &Plan, keep: &Keep<'_>) -> u64 {
-    keep.share(u64::from(plan.flights(conditions().count())))
-}
-
 /// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped. `None` where only a part is flown
 /// here.
 ///
 /// * `plan` - its arms must be [`ARMS`]
-/// * `progress` - called once for each flight
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(
-    plan: &Plan,
-    keep: &Keep<'_>,
-    progress: impl Fn() + Sync,
-) -> Result<Option<Planning>, FlightError> {
+pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Planning>, FlightError> {
     let all: Vec<(&str, f64)> = conditions().collect();
     for (kind, ratio) in &all {
         plan.check(&plan.vehicle, &scenario(plan, kind, *ratio, 0).1)?;
@@ -142,7 +136,7 @@ pub fn run(
         let (kind, ratio) = all[condition];
         fly(plan, arm, kind, ratio, trial)
     };
-    let Some(flown) = campaign::run(plan, all.len(), &journal, fly, progress)? else { return Ok(None) };
+    let Some(flown) = campaign::run(plan, all.len(), &journal, fly)? else { return Ok(None) };
     let rows = all.iter().enumerate().flat_map(|(i, (kind, ratio))| {
         let flown = &flown;
         plan.arms.iter().map(move |arm| row(flown, *arm, i, kind, *ratio))

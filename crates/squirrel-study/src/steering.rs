@@ -4,6 +4,12 @@
 //! simulations, and on the independent plant, the vehicle's own wing. What differs between them is what the paper's figure owes to a plant
 //! that agrees with the controller.
 
+mod page;
+mod table;
+
+pub use page::page;
+pub use table::STUDY;
+
 use crate::campaign::Plan;
 use crate::journal::Keep;
 use crate::statistics::Estimate;
@@ -106,17 +112,11 @@ pub fn ratio(gain: Estimate) -> Estimate {
 
 /// Flies the study; `None` where only a part is flown here.
 ///
-/// * `progress` - called once for each flight
-///
 /// # Errors
 /// A vehicle that cannot fly or has no weights, or a folder that cannot be written.
-pub fn run(
-    plan: &Plan,
-    keep: &Keep<'_>,
-    progress: impl Fn() + Sync,
-) -> Result<Option<Steering>, FlightError> {
+pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Steering>, FlightError> {
     let conditions = conditions(&plan.vehicle)?;
-    let Some(rows) = tracking::run(plan, "steering", &conditions, keep, progress)? else {
+    let Some(rows) = tracking::run(plan, "steering", &conditions, keep)? else {
         return Ok(None);
     };
     let cells: Vec<Cell> = grid()
@@ -132,14 +132,6 @@ pub fn run(
     }
     let vehicle = plan.vehicle.name.clone();
     Ok(Some(Steering { vehicle, trials: plan.trials, seed: plan.seed, cells, means }))
-}
-
-/// Number of flights that [`run`] flies here.
-///
-/// # Errors
-/// No trials.
-pub fn flights(plan: &Plan, keep: &Keep<'_>) -> Result<u64, FlightError> {
-    tracking::flights(plan, grid().count(), keep)
 }
 
 /// A place in the grid.

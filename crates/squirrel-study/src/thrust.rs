@@ -9,11 +9,18 @@
 //! which the tilt limit holds height, 1.155 with one angle at 30 deg and 1.33 with both (docs/equations.md E.4); what is gained there is said beside
 //! the fair rival `pc_plus`.
 
+mod page;
+
+pub use page::page;
+
 use crate::campaign::Plan;
 use crate::journal::Keep;
+use crate::sheet::{Cell, Sheet};
 use crate::statistics::{Estimate, FEW};
+use crate::study::{Arms, Found, Study};
 use crate::tracking::{self, Condition, GUST_M_S, Row};
 use serde::Serialize;
+use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -30,6 +37,17 @@ const FREE_CHARGE: [f64; 2] = [1.0, 0.02];
 const VOLTAGE_EXPONENT: f64 = 0.9;
 /// The paper's tracking gain.
 pub const PAPER_GAIN: f64 = 0.131;
+
+/// On the command line.
+pub const STUDY: Study = Study {
+    arms: Arms::Asked(&Arm::ALONE),
+    ..Study::new(
+        "thrust",
+        "What wings are worth as a function of the thrust-to-weight ratio, with a battery that sags and without",
+        (12, "Flights per arm and condition, on paired seeds"),
+        fly,
+    )
+};
 
 /// Arms at one ratio.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -75,14 +93,12 @@ pub struct Thrust {
 /// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped. `None` where only a part is flown
 /// here.
 ///
-/// * `progress` - called once for each flight
-///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<Option<Thrust>, FlightError> {
+pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Thrust>, FlightError> {
     let planned = planned(&plan.vehicle);
     let conditions = conditions(&plan.vehicle)?;
-    let Some(rows) = tracking::run(plan, "thrust", &conditions, keep, progress)? else {
+    let Some(rows) = tracking::run(plan, "thrust", &conditions, keep)? else {
         return Ok(None);
     };
     let reference_v = plan.vehicle.vehicle.parameters().propulsion.reference_voltage_v;
@@ -116,14 +132,6 @@ pub fn run(plan: &Plan, keep: &Keep<'_>, progress: impl Fn() + Sync) -> Result<O
 }
 
 const SERIES: [&str; 3] = ["limit", "battery", "battery_alone"];
-
-/// Number of flights that [`run`] flies here.
-///
-/// # Errors
-/// No trials.
-pub fn flights(plan: &Plan, keep: &Keep<'_>) -> Result<u64, FlightError> {
-    tracking::flights(plan, planned(&plan.vehicle).len(), keep)
-}
 
 /// Series, charge and limit of each point. Without a battery there is only a limit.
 fn planned(vehicle: &VehicleFile) -> Vec<(&'static str, Option<f64>, f64)> {
@@ -215,4 +223,33 @@ pub fn words(study: &Thrust) -> Vec<String> {
         format!("twcc_plus over pc_plus, where the interval excludes zero, at T/W {}.", gains.join("; "))
     });
     words
+}
+
+fn fly(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightError> {
+    let Some(study) = run(plan, keep)? else { return Ok(None) };
+    let mut found = Found::of(&study)?;
+    found.say(format!(
+        "Avoidance manoeuvre, {} trials an arm on paired seeds from {}.",
+        study.trials, study.seed
+    ));
+    found.say(
+        "Gain is mean error of pc over mean error of the arm, minus 1, with its paired 95 % interval; over phantom and over",
+    );
+    found.say("pc_plus likewise. T/W is what there was: the limit, less what the battery did not give.\n");
+    let mut sheet = Sheet::default();
+    for point in &study.points {
+        let charge = point.charge.map_or_else(|| "-".to_owned(), |charge| format!("{charge:.2}"));
+        let place = [
+            ("series", "series", Cell::Text(point.series)),
+            ("T/W", "thrust_to_weight", Cell::Number(point.thrust_to_weight, 2)),
+            ("charge", "charge", Cell::Text(&charge)),
+        ];
+        for row in &point.rows {
+            sheet.row(&[&place[..], &tracking::columns(row)].concat());
+        }
+    }
+    found.csv = found.sheet(sheet);
+    found.words(words(&study));
+    found.page = Some(page(&study));
+    Ok(Some(found))
 }

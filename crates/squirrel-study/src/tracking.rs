@@ -3,6 +3,7 @@
 
 use crate::campaign::{self, Flown, Plan};
 use crate::journal::{Journal, Keep};
+use crate::sheet::{Cell, Column};
 use crate::statistics::{Estimate, gain, mean, paired};
 use serde::{Deserialize, Serialize};
 use squirrel_plan::pilot;
@@ -84,7 +85,6 @@ pub fn run(
     name: &str,
     conditions: &[Condition],
     keep: &Keep<'_>,
-    progress: impl Fn() + Sync,
 ) -> Result<Option<Vec<Vec<Row>>>, FlightError> {
     let plan = plan.beside(Arm::Pc)?;
     for condition in conditions {
@@ -93,20 +93,12 @@ pub fn run(
     let scenarios = conditions.iter().map(|condition| &condition.scenario);
     let journal = Journal::open(keep, name, &plan.identity(name, scenarios))?;
     let one = |arm, condition: usize, trial| fly(&plan, &conditions[condition], arm, trial);
-    let flown = campaign::run(&plan, conditions.len(), &journal, one, progress)?;
+    let flown = campaign::run(&plan, conditions.len(), &journal, one)?;
     let rows = |flown: Flown<Flight>| {
         let of = |condition| plan.arms.iter().map(|arm| row(&flown, *arm, condition)).collect();
         (0..conditions.len()).map(of).collect()
     };
     Ok(flown.map(rows))
-}
-
-/// Number of flights that [`run`] flies here.
-///
-/// # Errors
-/// No trials.
-pub fn flights(plan: &Plan, conditions: usize, keep: &Keep<'_>) -> Result<u64, FlightError> {
-    Ok(keep.share(u64::from(plan.beside(Arm::Pc)?.flights(conditions))))
 }
 
 /// The flight of a trial.
@@ -151,4 +143,29 @@ fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
         gain_over_phantom: gain_over(Arm::Phantom),
         gain_over_pc_plus: gain_over(Arm::PcPlus),
     }
+}
+
+/// A row of a sheet.
+pub fn columns(row: &Row) -> [Column<'_>; 11] {
+    [
+        ("arm", "arm", Cell::Text(row.arm)),
+        ("RMSE 3-D m", "rmse_m", Cell::Number(row.rmse_m, 2)),
+        ("horiz. m", "rmse_horizontal_m", Cell::Number(row.rmse_horizontal_m, 2)),
+        ("measured m", "rmse_measured_m", Cell::Number(row.rmse_measured_m, 2)),
+        ("gain %", "gain", Cell::Percent(row.gain.value, 1)),
+        ("95 % interval", "gain_low,gain_high", Cell::PercentInterval(Some(row.gain), 1)),
+        (
+            "over phantom",
+            "over_phantom_low,over_phantom_high",
+            Cell::PercentInterval(row.gain_over_phantom, 1),
+        ),
+        (
+            "over pc_plus",
+            "over_pc_plus_low,over_pc_plus_high",
+            Cell::PercentInterval(row.gain_over_pc_plus, 1),
+        ),
+        ("lost m", "height_lost_m", Cell::Number(row.height_lost_m, 2)),
+        ("gained m", "height_gained_m", Cell::Number(row.height_gained_m, 2)),
+        ("wings s", "wings_open_s", Cell::Number(row.wings_open_s, 2)),
+    ]
 }

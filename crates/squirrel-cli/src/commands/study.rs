@@ -1,48 +1,53 @@
-//! `squirrel study`: experiments with many flights.
+//! `squirrel study`: experiments with many flights. What they are is in `squirrel_study::STUDIES`; here they get their options.
 
-mod faults;
-mod filters;
-mod forest;
 mod merge;
-mod planning;
-mod sheet;
-mod steering;
-mod table2;
-mod table3;
-mod thrust;
 
 use super::vehicle;
-use crate::output::{self, talk};
+use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
+use clap::error::ErrorKind;
+use clap::{Arg, ArgMatches, Args as _, Command, FromArgMatches, value_parser};
 use indicatif::ProgressBar;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
+use squirrel_study::STUDIES;
 use squirrel_study::campaign::Plan;
-use squirrel_study::journal::{Keep, Part, Shard, check_trials};
-use std::path::{Path, PathBuf};
+use squirrel_study::journal::{Keep, Part, Progress, Shard, check_trials};
+use squirrel_study::study::{Arms, Found, Shown, Study, Timed, Work};
+use std::path::PathBuf;
+use std::time::Instant;
 
-/// The experiments.
-#[derive(Debug, clap::Subcommand)]
-pub(crate) enum Study {
-    /// What becomes of flights in which one thing fails.
-    Faults(faults::Options),
-    /// How far estimators of attitude are off in flight, with a calibrated gyro and without.
-    Filters(filters::Options),
-    /// Who comes through the paper's forest, in its height band and at all, and who owes it to wings.
-    Forest(forest::Options),
-    /// Put the parts of a study together that were flown with --shard.
+/// An experiment that is asked for, or a merge of parts of one.
+#[derive(Debug)]
+pub(crate) enum Studies {
+    Fly(Flown),
     Merge(merge::Options),
-    /// What wings buy where both plan: avoidance tasks, planned with wings and without, and flown.
-    Planning(planning::Options),
-    /// The paper's figure of steering angles and speeds, in paper mode and on the independent plant.
-    Steering(steering::Options),
-    /// What models of the wing force predict, the paper's Table II: to labels and to truth, 30 to 300 s of training.
-    Table2(table2::Options),
-    /// The paper's Table III: its real flights, with the error as satellite fix and barometer have it.
-    Table3(table3::Options),
-    /// What wings are worth as a function of the thrust-to-weight ratio, with a battery that sags and without.
-    Thrust(thrust::Options),
+}
+
+/// An experiment and its options.
+#[derive(Debug)]
+pub(crate) struct Flown {
+    study: &'static Study,
+    trials: u32,
+    /// Its own options.
+    own: ArgMatches,
+    common: Common,
+    /// Fly nothing: all trials are there.
+    merged: bool,
+}
+
+/// Shows people how far a study is.
+#[derive(Debug)]
+struct Bar(ProgressBar);
+
+impl Progress for Bar {
+    fn ahead(&self, steps: u64) {
+        self.0.inc_length(steps);
+    }
+
+    fn done(&self, steps: u64) {
+        self.0.inc(steps);
+    }
 }
 
 /// What every experiment is told.
@@ -64,157 +69,228 @@ struct Common {
     /// Fly a part of the trials only, K/N, into an --out of its own; `squirrel study merge` puts the parts together.
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
-    /// Fly nothing: all trials are there.
-    #[arg(skip)]
-    merged: bool,
 }
 
-/// Arms and trials of the experiments that compare controllers.
-#[derive(Debug, clap::Args)]
-struct Flown {
-    /// Arms to fly beside the reference, separated by commas; all if left out.
-    #[arg(long, value_delimiter = ',')]
-    arms: Vec<String>,
-    #[command(flatten)]
-    common: Common,
+const MERGE: &str = "merge";
+
+impl clap::Subcommand for Studies {
+    fn augment_subcommands(command: Command) -> Command {
+        let merge = merge::Options::augment_args(Command::new(MERGE))
+            .about("Put the parts of a study together that were flown with --shard");
+        let mut all: Vec<Command> = STUDIES.iter().map(|study| options(study)).chain([merge]).collect();
+        all.sort_by(|a, b| a.get_name().cmp(b.get_name()));
+        command.subcommands(all)
+    }
+
+    fn augment_subcommands_for_update(command: Command) -> Command {
+        Self::augment_subcommands(command)
+    }
+
+    fn has_subcommand(name: &str) -> bool {
+        name == MERGE || STUDIES.iter().any(|study| study.name == name)
+    }
 }
 
-impl Common {
+/// A study as a command.
+fn options(study: &'static Study) -> Command {
+    let value =
+        |name: &'static str| Arg::new(name).long(name).value_name(name.replace('-', "_").to_uppercase());
+    let (trials, what) = study.trials;
+    let trials = value("trials").help(what).default_value(trials.to_string());
+    let mut command = Command::new(study.name).arg(trials.value_parser(value_parser!(u32)));
+    for choice in study.options {
+        let option = value(choice.name).help(choice.help).default_value(choice.default.to_string());
+        command = command.arg(if choice.whole {
+            option.value_parser(value_parser!(usize))
+        } else {
+            option.value_parser(value_parser!(f64))
+        });
+    }
+    if let Arms::Asked(arms) = study.arms {
+        let left_out = if arms == Arm::ALONE { "all".to_owned() } else { names(arms).join(", ") };
+        let help = format!("Arms to fly beside the reference, separated by commas; {left_out} if left out");
+        command = command.arg(value("arms").help(help).value_delimiter(','));
+    }
+    // The arguments bring an `about` of their own.
+    Common::augment_args(command).about(study.about)
+}
+
+fn names(arms: &[Arm]) -> Vec<&'static str> {
+    arms.iter().map(|arm| arm.name()).collect()
+}
+
+impl FromArgMatches for Studies {
+    fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
+        let Some((name, matches)) = matches.subcommand() else {
+            return Err(clap::Error::new(ErrorKind::MissingSubcommand));
+        };
+        let Some(study) = STUDIES.iter().find(|study| study.name == name) else {
+            return merge::Options::from_arg_matches(matches).map(Self::Merge);
+        };
+        Ok(Self::Fly(Flown {
+            study,
+            trials: matches.get_one("trials").copied().unwrap_or(study.trials.0),
+            own: matches.clone(),
+            common: Common::from_arg_matches(matches)?,
+            merged: false,
+        }))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
+        *self = Self::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl Studies {
+    pub(crate) fn run(&self) -> Result<(), String> {
+        match self {
+            Self::Fly(flown) => flown.run(),
+            Self::Merge(merge) => merge.run(),
+        }
+    }
+}
+
+impl Flown {
+    fn run(&self) -> Result<(), String> {
+        let plan = self.plan()?;
+        let own = self.study.options.iter().map(|choice| {
+            let value = || self.own.get_one::<f64>(choice.name).copied();
+            let count = || self.own.get_one(choice.name).map(|n: &usize| *n as f64);
+            if choice.whole { count() } else { value() }.unwrap_or(choice.default)
+        });
+        let own: Vec<f64> = own.collect();
+        let command = self.command(&plan, &own);
+        let part = match self.common.shard {
+            _ if self.merged => Part::Merged,
+            Some(shard) => Part::Shard(shard),
+            None => Part::All,
+        };
+        let bar = Bar(output::progress(0, self.study.unit));
+        let folder = self.common.out.as_deref();
+        let found =
+            (self.study.fly)(&plan, &own, &Keep { folder, part, command: &command, progress: Some(&bar) });
+        bar.0.finish_and_clear();
+        match found.map_err(|e| e.to_string())? {
+            Some(found) => self.end(&found),
+            None => {
+                if let (Some(shard), Some(folder)) = (self.common.shard, &self.common.out) {
+                    talk(&format!(
+                        "part {shard} is in {}; `squirrel study merge` puts the parts together",
+                        folder.display()
+                    ));
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// What is asked of the study.
+    fn plan(&self) -> Result<Plan, String> {
+        let asked = self.own.try_get_many::<String>("arms").ok().flatten().unwrap_or_default();
+        let arms: Vec<Arm> = asked.map(|name| Arm::parse(name)).collect::<Result<_, _>>()?;
+        let vehicle = self.begin()?;
+        let arms = match self.study.arms {
+            Arms::Asked(all) if arms.is_empty() => {
+                let (known, missing): (Vec<Arm>, Vec<Arm>) =
+                    all.iter().partition(|arm| arm.is_known_to(&vehicle));
+                if !missing.is_empty() {
+                    let missing = names(&missing).join(", ");
+                    talk(&format!("{} does not have what they need: {missing} left out", vehicle.name));
+                }
+                known
+            }
+            Arms::Asked(_) => arms,
+            Arms::Fixed(arms) => arms.to_vec(),
+        };
+        Ok(Plan { vehicle, arms, trials: self.trials, seed: self.common.seed })
+    }
+
     /// The vehicle, once it is known that results can be written: nobody wants to learn that afterwards.
-    ///
-    /// * `name` - of the study's files
-    /// * `others` - what it writes beside them
-    fn begin(
-        &self,
-        name: &str,
-        trials: u32,
-        others: impl IntoIterator<Item = String>,
-    ) -> Result<VehicleFile, String> {
-        if self.shard.is_some() && self.json.is_some() {
+    fn begin(&self) -> Result<VehicleFile, String> {
+        let (Common { vehicle: file, out, json, shard, .. }, name) = (&self.common, self.study.name);
+        if shard.is_some() && json.is_some() {
             return Err("--json: a part of a study has no figures; merge the parts first".to_owned());
         }
-        check_trials(trials).map_err(|e| e.to_string())?;
-        let kept = self.out.as_ref().map(|folder| folder.join(format!("{name}.json")));
-        let paths = Paths::default().vehicle("--vehicle", &self.vehicle);
-        let mut paths = paths.writes_json(self.json.as_ref(), kept.as_ref());
-        if let Some(folder) = &self.out {
+        check_trials(self.trials).map_err(|e| e.to_string())?;
+        let kept = out.as_ref().map(|folder| folder.join(format!("{name}.json")));
+        let paths = Paths::default().vehicle("--vehicle", file);
+        let mut paths = paths.writes_json(json.as_ref(), kept.as_ref());
+        if let Some(folder) = out {
             let names = ["csv", "json", "html", "trials.jsonl"].map(|kind| format!("{name}.{kind}"));
-            paths = paths.writes_into(folder, names.into_iter().chain(others));
+            paths = paths.writes_into(folder, names.into_iter().chain((self.study.others)(self.trials)));
         }
         paths.check()?;
-        let vehicle = vehicle(self.vehicle.as_deref())?;
-        if let Some(folder) = &self.out {
+        let vehicle = vehicle(file.as_deref())?;
+        if let Some(folder) = out {
             output::folder(folder)?;
         }
         Ok(vehicle)
     }
 
-    /// Where trials are kept, and which are flown.
-    fn keep<'a>(&'a self, command: &'a [String]) -> Keep<'a> {
-        let part = match self.shard {
-            _ if self.merged => Part::Merged,
-            Some(shard) => Part::Shard(shard),
-            None => Part::All,
-        };
-        Keep { folder: self.out.as_deref(), part, command }
-    }
-
     /// The arguments that describe a study, without those that say where it is flown.
-    fn command(&self, study: &str, own: &[(&str, String)]) -> Vec<String> {
-        let mut words = vec![study.to_owned(), format!("--seed={}", self.seed)];
-        words.extend(own.iter().map(|(name, value)| format!("--{name}={value}")));
+    fn command(&self, plan: &Plan, own: &[f64]) -> Vec<String> {
+        let mut words = vec![
+            self.study.name.to_owned(),
+            format!("--seed={}", plan.seed),
+            format!("--trials={}", plan.trials),
+        ];
+        if let Arms::Asked(_) = self.study.arms {
+            words.push(format!("--arms={}", names(&plan.arms).join(",")));
+        }
+        let own = self.study.options.iter().zip(own);
+        words.extend(own.map(|(choice, value)| format!("--{}={value}", choice.name)));
         words
     }
 
-    /// Ends the progress bar; the study, or `None` where only a part was flown, with a word about it.
-    fn ended<T>(
-        &self,
-        bar: &ProgressBar,
-        study: Result<Option<T>, FlightError>,
-    ) -> Result<Option<T>, String> {
-        bar.finish_and_clear();
-        let study = study.map_err(|e| e.to_string())?;
-        if let (None, Some(shard), Some(folder)) = (&study, self.shard, &self.out) {
-            talk(&format!(
-                "part {shard} is in {}; `squirrel study merge` puts the parts together",
-                folder.display()
-            ));
+    /// Shows and writes what was found.
+    fn end(&self, found: &Found) -> Result<(), String> {
+        for shown in &found.shown {
+            match shown {
+                Shown::Line(line) => say(line),
+                Shown::Table(rows) => Table::of(rows.clone()).print(),
+            }
         }
-        Ok(study)
-    }
-
-    /// Writes the figures; the folder, where there is one.
-    fn end(&self, name: &str, csv: &str, study: &impl serde::Serialize) -> Result<Option<&Path>, String> {
-        if let Some(folder) = &self.out {
-            let file = folder.join(format!("{name}.csv"));
-            output::write_file(&file, csv.as_bytes())?;
-            output::write_json(Some(&folder.join(format!("{name}.json"))), study)?;
-            talk(&format!("wrote {}", file.display()));
+        found.timed.as_ref().map(time);
+        let name = self.study.name;
+        if let Some(folder) = &self.common.out {
+            let kept = |file: &str, text: &str| {
+                let path = folder.join(file);
+                output::folder(path.parent().unwrap_or(folder))?;
+                output::write_file(&path, text.as_bytes())?;
+                Ok::<PathBuf, String>(path)
+            };
+            let csv = kept(&format!("{name}.csv"), &found.csv)?;
+            kept(&format!("{name}.json"), &found.json)?;
+            talk(&format!("wrote {}", csv.display()));
+            for (file, text) in &found.others {
+                kept(file, text)?;
+            }
+            if let Some(page) = &found.page {
+                talk(&format!("wrote {}", kept(&format!("{name}.html"), page)?.display()));
+            }
         }
-        output::write_json(self.json.as_deref(), study)?;
-        Ok(self.out.as_deref())
-    }
-}
-
-/// Writes the study's page beside its figures.
-fn write_page(folder: &Path, name: &str, html: &str) -> Result<(), String> {
-    let file = folder.join(format!("{name}.html"));
-    output::write_file(&file, html.as_bytes())?;
-    talk(&format!("wrote {}", file.display()));
-    Ok(())
-}
-
-impl Flown {
-    /// The plan, and the arguments that describe the study.
-    fn plan(&self, study: &str, trials: u32, own: &[(&str, String)]) -> Result<(Plan, Vec<String>), String> {
-        let arms: Vec<Arm> = self.arms.iter().map(|name| Arm::parse(name)).collect::<Result<_, _>>()?;
-        let vehicle = self.common.begin(study, trials, [])?;
-        let mut plan = Plan::of_all_arms(vehicle, trials, self.common.seed);
-        if !arms.is_empty() {
-            plan.arms = arms;
-        } else if plan.arms.len() < Arm::ALONE.len() {
-            let missing: Vec<&str> =
-                Arm::ALONE.iter().filter(|arm| !plan.arms.contains(arm)).map(|arm| arm.name()).collect();
-            talk(&format!(
-                "{} does not have what they need: {} left out",
-                plan.vehicle.name,
-                missing.join(", ")
-            ));
-        }
-        let arms: Vec<&str> = plan.arms.iter().map(|arm| arm.name()).collect();
-        let mut described = vec![("trials", trials.to_string()), ("arms", arms.join(","))];
-        described.extend(own.iter().cloned());
-        Ok((plan, self.common.command(study, &described)))
+        self.common.json.as_ref().map_or(Ok(()), |path| output::write_file(path, found.json.as_bytes()))
     }
 }
 
-impl Study {
-    pub(crate) fn run(&self) -> Result<(), String> {
-        match self {
-            Self::Faults(options) => options.run(),
-            Self::Filters(options) => options.run(),
-            Self::Forest(options) => options.run(),
-            Self::Merge(options) => options.run(),
-            Self::Planning(options) => options.run(),
-            Self::Steering(options) => options.run(),
-            Self::Table2(options) => options.run(),
-            Self::Table3(options) => options.run(),
-            Self::Thrust(options) => options.run(),
-        }
+/// How long work takes on one core of this machine, ms.
+#[allow(clippy::disallowed_methods, reason = "how long it takes is the question")]
+fn time(timed: &Timed) {
+    say(&format!("\n{}\n", timed.words));
+    let mut table = Table::new(&[&timed.columns[..], &["median", "p90", "longest"]].concat());
+    for (place, work) in &timed.rows {
+        let took = |piece: &Work| {
+            let begin = Instant::now();
+            piece();
+            begin.elapsed().as_secs_f64() * 1e3
+        };
+        let mut took_ms: Vec<f64> = work.iter().map(took).collect();
+        took_ms.sort_by(f64::total_cmp);
+        let at = |share: f64| took_ms[((took_ms.len() - 1) as f64 * share).round() as usize];
+        let mut cells = place.clone();
+        cells.extend([0.5, 0.9, 1.0].map(|share| format!("{:.1}", at(share))));
+        table.row(cells);
     }
-
-    /// What every experiment is told; a merge is none.
-    fn common_mut(&mut self) -> Option<&mut Common> {
-        match self {
-            Self::Faults(options) => Some(&mut options.common),
-            Self::Filters(options) => Some(&mut options.common),
-            Self::Forest(options) => Some(&mut options.flown.common),
-            Self::Planning(options) => Some(&mut options.common),
-            Self::Steering(options) => Some(&mut options.flown.common),
-            Self::Table2(options) => Some(&mut options.common),
-            Self::Table3(options) => Some(&mut options.flown.common),
-            Self::Thrust(options) => Some(&mut options.flown.common),
-            Self::Merge(_) => None,
-        }
-    }
+    table.print();
 }

@@ -18,7 +18,7 @@ pub(super) enum Kind {
 }
 
 /// The fixed names; `truth.*`, `reference.*` and `control.*` are open.
-const FIXED: [(&str, Kind); 19] = [
+const FIXED: [(&str, Kind); 20] = [
     ("imu.omega_body_rad_s", Kind::VectorBody),
     ("imu.specific_force_body_m_s2", Kind::VectorBody),
     ("imu_2.omega_body_rad_s", Kind::VectorBody),
@@ -34,6 +34,7 @@ const FIXED: [(&str, Kind); 19] = [
     ("gnss.velocity_ned_m_s", Kind::VectorNed),
     ("baro.altitude_m", Kind::Numbers(1)),
     ("magnetometer.field_body_ut", Kind::VectorBody),
+    ("range_finder.distance_m", Kind::Numbers(1)),
     ("battery.voltage_v", Kind::Numbers(1)),
     ("battery.current_a", Kind::Numbers(1)),
     ("rotor.command", Kind::PerRotor),

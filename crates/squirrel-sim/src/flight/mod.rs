@@ -285,7 +285,7 @@ impl Setup {
                 if let Some(push) = contact_specific_force {
                     truth.specific_force = state.body.ned_from_body().inverse() * push;
                 }
-                let (mut frame, battery) = sensors.poll(time_us, &truth);
+                let (mut frame, logged) = sensors.poll(time_us, &truth);
                 failing.spoil(&mut frame);
                 frame.set_obstacles(&obstacles.seen(&state.body, believed.as_ref()));
                 if self.arm.is_given_the_force() {
@@ -308,7 +308,7 @@ impl Setup {
                     recorder.followed(time_us, followed.as_ref(), pilot.as_deref());
                     recorder.tick(
                         &frame,
-                        battery,
+                        &logged,
                         &output,
                         &state,
                         total_wind(plant.acting(), &state.body, air),

@@ -2,7 +2,7 @@
 
 use super::{Offboard, Setup};
 use crate::plant::PlantState;
-use crate::sensors::BatteryReading;
+use crate::sensors::logged::Row;
 use squirrel_core::control::Reference;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned};
@@ -60,7 +60,7 @@ impl Recorder {
     pub(super) fn tick(
         &mut self,
         frame: &SensorFrame,
-        battery: Option<BatteryReading>,
+        logged: &[(&str, Row)],
         output: &StackOutput,
         state: &PlantState,
         air: In<Ned, f64>,
@@ -68,9 +68,9 @@ impl Recorder {
     ) {
         let t = frame.time_us as f64 * 1e-6;
         self.inputs.record(&mut self.log, t, frame);
-        if let Some(b) = battery {
-            let rows: &[(&str, &[f64])] = &[("voltage_v", &[b.voltage_v]), ("current_a", &[b.current_a])];
-            self.log.source_mut("battery").push(t, rows);
+        for (source, row) in logged {
+            let row = row.iter().map(|(channel, x)| (*channel, std::slice::from_ref(x)));
+            self.log.source_mut(source).push(t, &row.collect::<Vec<_>>());
         }
         let stamp = self.effects.command_clock().stamp_s(t);
         let moved = Moved {

@@ -14,7 +14,7 @@ pub(super) enum Stream {
     Attitude = 2,
     Gnss = 3,
     Baro = 4,
-    Battery = 5,
+    // 5 and from 16 on: sensors that the flight code does not hear (`logged`).
     Imu2 = 6,
     ImuErrors = 7,
     Imu2Errors = 8,
@@ -30,14 +30,18 @@ pub(super) enum Stream {
 impl Stream {
     /// * `seed` - of the flight; a sensor with its own seed does not look at it
     pub(super) fn start(self, timing: &Timing, seed: u64) -> Pcg64Mcg {
-        // Streams are apart by a large odd number; the seeding itself mixes the bits.
-        let apart = (self as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        let apart = apart(self as u64);
         Pcg64Mcg::seed_from_u64(match (timing.seed, self) {
-            (Some(own), Self::Imu | Self::Attitude | Self::Gnss | Self::Baro | Self::Battery) => own,
+            (Some(own), Self::Imu | Self::Attitude | Self::Gnss | Self::Baro) => own,
             (Some(own), _) => own.wrapping_add(apart),
             (None, _) => seed.wrapping_add(apart),
         })
     }
+}
+
+/// Streams are apart by a large odd number; the seeding itself mixes the bits.
+fn apart(stream: u64) -> u64 {
+    stream.wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
 /// Another stream that begins where this one is, for a copy of the sensors whose noise is to be another.
@@ -84,6 +88,12 @@ pub(super) struct Line<S> {
 impl<S> Line<S> {
     pub(super) fn new(timing: Timing, seed: u64, stream: Stream) -> Self {
         Self { timing, rng: stream.start(&timing, seed), taken: 0, waiting: VecDeque::new() }
+    }
+
+    /// Of a sensor that has one stream, by its number.
+    pub(super) fn numbered(timing: Timing, seed: u64, stream: u64) -> Self {
+        let seed = timing.seed.unwrap_or(seed.wrapping_add(apart(stream)));
+        Self { timing, rng: Pcg64Mcg::seed_from_u64(seed), taken: 0, waiting: VecDeque::new() }
     }
 
     /// Takes a sample if one is due, and returns the newest that has arrived. A sensor may have nothing to say when it is due.

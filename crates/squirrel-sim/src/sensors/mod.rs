@@ -3,13 +3,14 @@
 //! Each sensor has a rate, a latency, its errors and its own random streams, so that switching one sensor's noise on changes
 //! nothing in another's. A sample is taken at the sensor's rate and handed over when its latency has passed, never before.
 //! Effects on sensors (biases that a vehicle file hides from the flight code, more latency) act here. What a sensor reads is
-//! in its file; attitude and battery monitor are as simple as truth, bias and white noise.
+//! in its file; the attitude is as simple as truth, bias and white noise. Those that the flight code does not hear are in `logged`.
 
 mod baro;
 mod devices;
 mod gnss;
 mod imu;
 mod line;
+pub mod logged;
 mod magnetometer;
 mod parameters;
 mod suite;
@@ -17,15 +18,15 @@ mod table;
 #[cfg(test)]
 mod tests;
 
-pub use parameters::{
-    AttitudeSensor, BaroSensor, BatterySensor, GnssSensor, ImuSensor, MagnetometerSensor, Timing,
-};
+pub use logged::BatterySensor;
+pub use parameters::{AttitudeSensor, BaroSensor, GnssSensor, ImuSensor, MagnetometerSensor, Timing};
 pub use suite::{SUITES, SensorParameters};
 
 use baro::Barometer;
 use gnss::Receiver;
 use imu::{Unit, Vibration};
-use line::{Line, Stream, fork, noise, quantised};
+use line::{Line, Stream, fork, noise};
+use logged::{LoggedLine, Row};
 use magnetometer::Compass;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
@@ -88,15 +89,6 @@ impl Truth {
 /// Samples of the inertial units that make a second at rest.
 const SAMPLES_AT_REST: f64 = 300.0;
 
-/// Reading of the battery monitor; for the log, the flight code does not use it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BatteryReading {
-    /// Voltage, V.
-    pub voltage_v: f64,
-    /// Current, A.
-    pub current_a: f64,
-}
-
 /// The sensors of one vehicle in one flight.
 #[derive(Debug, Clone)]
 pub struct Sensors {
@@ -108,8 +100,8 @@ pub struct Sensors {
     attitude: Line<Rotation<Ned, Body, f32>>,
     gnss: Receiver,
     baro: Barometer,
-    battery: Line<BatteryReading>,
     compass: Option<Compass>,
+    logged: Vec<LoggedLine>,
 }
 
 impl Sensors {
@@ -125,14 +117,14 @@ impl Sensors {
             attitude: Line::new(p.attitude.timing, seed, Stream::Attitude),
             gnss: Receiver::new(&p.gnss, seed),
             baro: Barometer::new(&p.baro, seed),
-            battery: Line::new(p.battery.timing, seed, Stream::Battery),
             compass: p.magnetometer.map(|p| Compass::new(&p, seed)),
+            logged: p.logged.lines(seed),
             parameters,
         }
     }
 
-    /// What has arrived at a time, us. Times must not run backwards.
-    pub fn poll(&mut self, time_us: u64, truth: &Truth) -> (SensorFrame, Option<BatteryReading>) {
+    /// What has arrived at a time, us, for the flight code, and for the log by its source. Times must not run backwards.
+    pub fn poll(&mut self, time_us: u64, truth: &Truth) -> (SensorFrame, Vec<(&'static str, Row)>) {
         let p = &self.parameters;
         let time_s = time_us as f64 * 1e-6;
         let force_bias = self.effects.specific_force_bias(time_s).vector;
@@ -164,16 +156,8 @@ impl Sensors {
             let measured = Rotation::new(heading_bias.quaternion * truth.ned_from_body.quaternion);
             frame.magnetic = compass.poll(p, time_us, measured, truth);
         }
-        let battery = self.battery.poll(time_us, |rng| {
-            let p = &p.battery;
-            let voltage_v = truth.voltage_v + p.voltage_bias_v + noise(rng, p.voltage_noise_v).x;
-            let current_a = truth.current_a + p.current_bias_a + noise(rng, p.current_noise_a).x;
-            Some(BatteryReading {
-                voltage_v: quantised(voltage_v, p.voltage_resolution_v),
-                current_a: quantised(current_a, p.current_resolution_a),
-            })
-        });
-        (frame, battery)
+        let logged = self.logged.iter_mut().filter_map(|line| line.poll(time_us, truth)).collect();
+        (frame, logged)
     }
 
     /// What these sensors say in a second at rest before the flight, or longer where inertial units are slow, at their rate: level on the ground, rotors

@@ -4,10 +4,9 @@
 //! its slow position error does not show. No sensor is late by default, and what is drawn for each flight is off.
 
 use super::devices;
-use super::table::{DEVICE, Field, Limit, Slot, Table};
+use super::table::Limit::{AboveZero, Signed, Size, Within};
 use crate::quantity::plain;
 use crate::setting::SettingError;
-use Limit::{AboveZero, Signed, Size, Within};
 use serde::Deserialize;
 
 /// When a sensor speaks.
@@ -26,7 +25,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    const fn every(rate_hz: f64) -> Self {
+    pub(super) const fn every(rate_hz: f64) -> Self {
         Self { rate_hz, latency_s: 0.0, seed: None }
     }
 
@@ -68,22 +67,23 @@ macro_rules! sensor {
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct $name {
             /// When it speaks.
-            pub timing: Timing,
+            pub timing: $crate::sensors::Timing,
             $($(#[$field_doc])* pub $key: $kind,)*
         }
         impl Default for $name {
             fn default() -> Self {
-                Self { timing: Timing::every($rate_hz), $($key: $default,)* }
+                Self { timing: $crate::sensors::Timing::every($rate_hz), $($key: $default,)* }
             }
         }
-        impl Table for $name {
+        impl $crate::sensors::table::Table for $name {
             fn keys(&self) -> &'static [&'static str] {
-                const KEYS: &[&str] = &[$({ let _ = $devices; DEVICE },)? "timing", $(stringify!($key)),*];
+                const KEYS: &[&str] = &[$({ let _ = $devices; $crate::sensors::table::DEVICE },)? "timing", $(stringify!($key)),*];
                 KEYS
             }
-            fn fields(&mut self) -> Vec<Field<'_>> {
+            fn fields(&mut self) -> Vec<$crate::sensors::table::Field<'_>> {
+                use $crate::sensors::table::{Field, Limit, Slot};
                 vec![
-                    Field { key: "timing", slot: Slot::Timing(&mut self.timing), limit: Signed },
+                    Field { key: "timing", slot: Slot::Timing(&mut self.timing), limit: Limit::Signed },
                     $(Field { key: stringify!($key), slot: Slot::from(&mut self.$key), limit: $limit },)*
                 ]
             }
@@ -98,6 +98,7 @@ macro_rules! sensor {
         }
     };
 }
+pub(super) use sensor;
 
 sensor! {
     /// Gyroscopes and accelerometers.
@@ -195,23 +196,6 @@ sensor! {
     pressure_coefficient_wing: f64 = 0.0, Within(-2.0, 2.0);
     /// Step of its converter, m; 0: none.
     resolution_m: f64 = 0.0, Size;
-}
-
-sensor! {
-    /// Battery monitor.
-    BatterySensor at 50.0 Hz;
-    /// White noise of voltage, V.
-    voltage_noise_v: f64 = 0.01, Size;
-    /// Constant error of voltage, V.
-    voltage_bias_v: f64 = 0.0, Signed;
-    /// Step of its converter for the voltage, V; 0: none.
-    voltage_resolution_v: f64 = 0.0, Size;
-    /// White noise of current, A.
-    current_noise_a: f64 = 0.1, Size;
-    /// Constant error of current, A.
-    current_bias_a: f64 = 0.0, Signed;
-    /// Step of its converter for the current, A; 0: none.
-    current_resolution_a: f64 = 0.0, Size;
 }
 
 sensor! {

@@ -4,13 +4,13 @@
 //! flight logs of small multirotors show. A vehicle file may start from a suite, `suite = "hobby"`, and change numbers of it; noise
 //! per sample is for the suite's rates, so a table with another rate names its `device` again.
 
-use super::parameters::{
-    AttitudeSensor, BaroSensor, BatterySensor, GnssSensor, ImuSensor, MagnetometerSensor,
-};
+use super::logged::Logged;
+use super::parameters::{AttitudeSensor, BaroSensor, GnssSensor, ImuSensor, MagnetometerSensor};
 use super::table::{OneOf, Reader, Said, Table};
 use crate::setting::SettingError;
 use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use std::fmt;
+use std::sync::LazyLock;
 
 /// All sensors of a vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -23,10 +23,10 @@ pub struct SensorParameters {
     pub gnss: GnssSensor,
     /// Barometer.
     pub baro: BaroSensor,
-    /// Battery monitor.
-    pub battery: BatterySensor,
     /// Magnetometer, where there is one.
     pub magnetometer: Option<MagnetometerSensor>,
+    /// Those that the flight code does not hear.
+    pub logged: Logged,
 }
 
 /// Names of suites for [`SensorParameters::suite`].
@@ -34,7 +34,8 @@ pub const SUITES: [&str; 4] = ["nominal", "hobby", "research", "rtk"];
 
 const SUITE: &str = "suite";
 /// Keys of `[sensors]`; all but the suite are tables.
-const KEYS: [&str; 7] = ["imu", "attitude", "gnss", "baro", "battery", "magnetometer", SUITE];
+static KEYS: LazyLock<Vec<&'static str>> =
+    LazyLock::new(|| [&["imu", "attitude", "gnss", "baro", "magnetometer", SUITE], Logged::NAMES].concat());
 
 /// What the airframe of a suite does to its devices.
 struct SuiteAirframe {
@@ -69,8 +70,9 @@ impl SensorParameters {
         p.gnss.position_noise_m = 0.0;
         p.gnss.velocity_noise_m_s = 0.0;
         p.baro.noise_m = 0.0;
-        p.battery.voltage_noise_v = 0.0;
-        p.battery.current_noise_a = 0.0;
+        if let Some(battery) = &mut p.logged.battery {
+            (battery.voltage_noise_v, battery.current_noise_a) = (0.0, 0.0);
+        }
         p
     }
 
@@ -156,9 +158,8 @@ impl SensorParameters {
             "attitude" => Some(&mut self.attitude),
             "gnss" => Some(&mut self.gnss),
             "baro" => Some(&mut self.baro),
-            "battery" => Some(&mut self.battery),
             "magnetometer" => Some(self.magnetometer.get_or_insert_default()),
-            _ => None,
+            _ => self.logged.table(name),
         }
     }
 
@@ -166,7 +167,7 @@ impl SensorParameters {
     /// The first number that cannot be, with its field.
     pub(crate) fn check(&self) -> Result<(), SettingError> {
         let mut copy = *self;
-        for name in KEYS {
+        for name in KEYS.iter().copied() {
             if let Some(table) = copy.table(name) {
                 table.fields().iter().try_for_each(|field| field.check(name))?;
             }
@@ -187,7 +188,7 @@ impl<'de> Deserialize<'de> for SensorParameters {
                 let mut like = SensorParameters::default();
                 let mut suite = None;
                 let mut said: Vec<(&str, Said)> = Vec::new();
-                while let Some(key) = map.next_key_seed(OneOf { names: &KEYS, what: None })? {
+                while let Some(key) = map.next_key_seed(OneOf { names: KEYS.as_slice(), what: None })? {
                     if let Some(table) = like.table(key) {
                         said.push((key, map.next_value_seed(Reader::of(table))?));
                     } else {

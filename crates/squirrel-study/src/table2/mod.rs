@@ -6,9 +6,12 @@
 //! epochs are trained and the last weights count.
 
 mod report;
+mod table;
 
 pub use report::render;
+pub use table::STUDY;
 
+use crate::campaign::Plan;
 use crate::journal::{Journal, Keep, check_trials, identity};
 use crate::statistics::mean;
 use crate::wing_flights::{FLIGHT_S, Kind, WingFlightError};
@@ -35,19 +38,6 @@ const TEST_FLIGHTS: u32 = 4;
 const ALPHA_FROM_M_S: f32 = 3.0;
 /// 10 deg.
 const LARGE_ALPHA_RAD: f32 = 0.174_532_93;
-
-/// What to run.
-#[derive(Debug, Clone)]
-pub struct Plan {
-    /// Vehicle.
-    pub vehicle: VehicleFile,
-    /// Trials, each with its own flights and first weights.
-    pub trials: u32,
-    /// Seed of all of them.
-    pub seed: u64,
-    /// Passes over the windows; 800 in the paper.
-    pub epochs: usize,
-}
 
 /// A figure over the trials.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -176,44 +166,39 @@ struct Flown {
     label_noise_n: f64,
 }
 
-/// Number of flights and trainings that [`run`] will do here.
-pub fn steps(plan: &Plan, keep: &Keep<'_>) -> u64 {
-    keep.share(u64::from(plan.trials)) * steps_of_a_trial()
-}
-
-fn steps_of_a_trial() -> u64 {
-    let flights = TRAINING_FLIGHTS[2] + TEST_FLIGHTS * Kind::TESTS.len() as u32;
-    let trainings = TRAINING_FLIGHTS.len() * Model::ALL.len();
-    u64::from(flights) + trainings as u64
+/// Flights and trainings.
+fn steps_of_a_trial() -> usize {
+    let flights = TRAINING_FLIGHTS[2] as usize + TEST_FLIGHTS as usize * Kind::TESTS.len();
+    flights + TRAINING_FLIGHTS.len() * Model::ALL.len()
 }
 
 /// Flies and trains on all cores; the result depends neither on how many there are nor on how often the study was stopped. `None` where
 /// only a part of it is done here.
 ///
+/// * `plan` - whose arms do not matter
+/// * `epochs` - passes over the windows; 800 in the paper
 /// * `keep` - keeps the trials
-/// * `progress` - called with the number of flights and trainings that are done more than before
 ///
 /// # Errors
 /// A vehicle that cannot fly or has no wings, no trials, no epochs, or a folder that cannot be written.
-pub fn run(
-    plan: &Plan,
-    keep: &Keep<'_>,
-    progress: impl Fn(u64) + Sync,
-) -> Result<Option<Table2>, FlightError> {
+pub fn run(plan: &Plan, epochs: usize, keep: &Keep<'_>) -> Result<Option<Table2>, FlightError> {
     check_trials(plan.trials)?;
     let identity = identity("table2", &plan.vehicle, plan.seed);
-    let journal = Journal::open(keep, "table2", &format!("{identity}, {} epochs", plan.epochs))?;
-    let counted = AtomicU64::new(0);
+    // A trial is many steps, which are told of one by one.
+    let silent = Keep { progress: None, ..*keep };
+    let journal = Journal::open(&silent, "table2", &format!("{identity}, {epochs} epochs"))?;
+    let (steps, counted) = (keep.mine(plan.trials).len() * steps_of_a_trial(), AtomicU64::new(0));
+    keep.ahead(steps);
     let one = |trial: u32| {
         let count = || {
             counted.fetch_add(1, Ordering::Relaxed);
-            progress(1);
+            keep.done(1);
         };
-        self::trial(plan, trial as usize, &count).map_err(|e| FlightError(e.to_string()))
+        self::trial(plan, epochs, trial, &count).map_err(|e| FlightError(e.to_string()))
     };
     // What a trial that was kept would have counted is counted in the end.
-    let Some(trials) = journal.run(plan.trials, one, || ())? else { return Ok(None) };
-    progress(steps(plan, keep).saturating_sub(counted.into_inner()));
+    let Some(trials) = journal.run(plan.trials, one)? else { return Ok(None) };
+    keep.done((steps as u64).saturating_sub(counted.into_inner()));
 
     let (mut rows, mut words) = (Vec::new(), Vec::new());
     let models = Model::ALL.len();
@@ -244,7 +229,7 @@ pub fn run(
         vehicle: plan.vehicle.name.clone(),
         trials: plan.trials,
         seed: plan.seed,
-        epochs: plan.epochs,
+        epochs,
         sets: Kind::ALL.into_iter().enumerate().map(|(i, kind)| describe(kind, i, &trials)).collect(),
         rows,
         words,
@@ -281,25 +266,32 @@ pub fn scenarios(plan: &Plan) -> Result<Vec<Scenario>, FlightError> {
 }
 
 /// Of the flights of a kind in a trial, which count up from it: a hundred a kind, a thousand a trial.
-fn first_seed(plan: &Plan, trial: usize, kind: Kind) -> u64 {
+fn first_seed(plan: &Plan, trial: u32, kind: Kind) -> u64 {
     let place = Kind::ALL.iter().position(|other| *other == kind).unwrap_or_default() as u64;
-    trial_seed(plan, trial).wrapping_mul(1000).wrapping_add(100 * place)
-}
-
-fn trial_seed(plan: &Plan, trial: usize) -> u64 {
-    plan.seed.wrapping_mul(1_000_003).wrapping_add(trial as u64)
+    plan.trial_seed(trial).wrapping_mul(1000).wrapping_add(100 * place)
 }
 
 /// Flies one trial, and trains and judges every model on it.
-fn trial(plan: &Plan, number: usize, progress: &(impl Fn() + Sync)) -> Result<Trial, WingFlightError> {
+fn trial(
+    plan: &Plan,
+    epochs: usize,
+    number: u32,
+    progress: &(impl Fn() + Sync),
+) -> Result<Trial, WingFlightError> {
     let flights = fly(plan, number, progress)?;
-    let seed = trial_seed(plan, number);
+    let seed = plan.trial_seed(number);
     let tasks: Vec<(u32, Model)> =
         TRAINING_FLIGHTS.into_iter().flat_map(|flights| Model::ALL.map(|model| (flights, model))).collect();
     let judged = tasks
         .par_iter()
         .map(|(number, model)| {
-            let judged = train(plan, *model, &flights, *number as usize, seed);
+            let judged = train(
+                &plan.vehicle,
+                *model,
+                &flights,
+                *number as usize,
+                Settings { epochs, seed, ..Settings::default() },
+            );
             progress();
             judged
         })
@@ -310,7 +302,7 @@ fn trial(plan: &Plan, number: usize, progress: &(impl Fn() + Sync)) -> Result<Tr
 }
 
 /// All flights of a trial.
-fn fly(plan: &Plan, trial: usize, progress: &(impl Fn() + Sync)) -> Result<Flights, WingFlightError> {
+fn fly(plan: &Plan, trial: u32, progress: &(impl Fn() + Sync)) -> Result<Flights, WingFlightError> {
     let mut tasks = Vec::new();
     for kind in Kind::ALL {
         let flights = if kind == Kind::Training { TRAINING_FLIGHTS[2] } else { TEST_FLIGHTS };
@@ -333,14 +325,19 @@ fn fly(plan: &Plan, trial: usize, progress: &(impl Fn() + Sync)) -> Result<Fligh
     })
 }
 
-fn train(plan: &Plan, model: Model, trial: &Flights, flights: usize, seed: u64) -> Result<Judged, NnError> {
+fn train(
+    vehicle: &VehicleFile,
+    model: Model,
+    trial: &Flights,
+    flights: usize,
+    settings: Settings,
+) -> Result<Judged, NnError> {
     let mut training = Windows::new();
     for (flight, windows) in trial.training[..flights].iter().enumerate() {
         training.push(&format!("training {flight}"), windows)?;
     }
-    let settings = Settings { epochs: plan.epochs, seed, ..Settings::default() };
-    let area_m2 = labels::plate_area_m2(&plan.vehicle);
-    let mut trainer = Trainer::new(model, &plan.vehicle.name, area_m2, &training, &Windows::new(), settings)?;
+    let area_m2 = labels::plate_area_m2(vehicle);
+    let mut trainer = Trainer::new(model, &vehicle.name, area_m2, &training, &Windows::new(), settings)?;
     while trainer.epoch()?.is_some() {}
     let trained = trainer.best();
 

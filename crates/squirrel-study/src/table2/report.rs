@@ -42,7 +42,7 @@ pub fn render(study: &Table2) -> String {
 }
 
 /// `0.0312 ± 0.0008`; the deviation only where there are several trials.
-fn plus_minus(x: Spread, scale: f64, digits: usize) -> String {
+pub(super) fn plus_minus(x: Spread, scale: f64, digits: usize) -> String {
     let mean = format!("{:.digits$}", scale * x.mean);
     x.sd.map_or_else(|| mean.clone(), |sd| format!("{mean} \u{b1} {:.digits$}", scale * sd))
 }
@@ -55,7 +55,7 @@ fn row(cells: Vec<String>) -> page::Row {
     page::Row { ink: None, cells }
 }
 
-fn head(names: &[&str]) -> Vec<String> {
+pub(super) fn head(names: &[&str]) -> Vec<String> {
     names.iter().map(|&name| name.to_owned()).collect()
 }
 

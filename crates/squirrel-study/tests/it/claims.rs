@@ -4,6 +4,8 @@
 //! for percent with one digit or `.2` for a number with two. `SQUIRREL_CLAIMS_WRITE=1` writes the figures anew.
 
 use serde_json::Value;
+use squirrel_nn::train::EPOCHS;
+use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::forest::{self, Forest};
@@ -19,25 +21,24 @@ const IDS: [&str; 21] = [
 ];
 
 fn plan(trials: u32) -> Plan {
-    Plan::of_all_arms(VehicleFile::squirrel(), trials, 1)
+    Plan { vehicle: VehicleFile::squirrel(), arms: Arm::ALONE.to_vec(), trials, seed: 1 }
 }
 
 /// A hundred and five trials of every arm, for both tests.
 static FOREST: LazyLock<Forest> =
-    LazyLock::new(|| forest::run(&plan(105), 2.0, &Keep::default(), || ()).unwrap().unwrap());
+    LazyLock::new(|| forest::run(&plan(105), 2.0, &Keep::default()).unwrap().unwrap());
 
 fn studies() -> BTreeMap<&'static str, Value> {
     let keep = Keep::default();
     let vehicle = VehicleFile::squirrel();
     let json = |study: &dyn Fn() -> serde_json::Result<Value>| study().unwrap();
-    let learned = table2::Plan { vehicle: vehicle.clone(), trials: 5, seed: 1, epochs: 800 };
     BTreeMap::from([
         ("paper", json(&|| serde_json::to_value(paper::facts(&vehicle)))),
         ("forest", json(&|| serde_json::to_value(&*FOREST))),
-        ("thrust", json(&|| serde_json::to_value(thrust::run(&plan(12), &keep, || ()).unwrap()))),
-        ("table3", json(&|| serde_json::to_value(table3::run(&plan(12), &keep, || ()).unwrap()))),
-        ("steering", json(&|| serde_json::to_value(steering::run(&plan(6), &keep, || ()).unwrap()))),
-        ("table2", json(&|| serde_json::to_value(table2::run(&learned, &keep, |_| ()).unwrap()))),
+        ("thrust", json(&|| serde_json::to_value(thrust::run(&plan(12), &keep).unwrap()))),
+        ("table3", json(&|| serde_json::to_value(table3::run(&plan(12), &keep).unwrap()))),
+        ("steering", json(&|| serde_json::to_value(steering::run(&plan(6), &keep).unwrap()))),
+        ("table2", json(&|| serde_json::to_value(table2::run(&plan(5), EPOCHS, &keep).unwrap()))),
     ])
 }
 

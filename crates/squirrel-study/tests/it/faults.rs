@@ -1,13 +1,14 @@
 //! Flights in which one thing fails, and studies that are stopped.
 
 use squirrel_sim::vehicle_file::VehicleFile;
-use squirrel_study::faults::{Faults, Plan, run};
+use squirrel_study::campaign::Plan;
+use squirrel_study::faults::{Faults, run};
 use squirrel_study::journal::Keep;
 use std::path::Path;
 
 fn study(trials: u32, folder: Option<&Path>) -> Faults {
-    let plan = Plan { vehicle: VehicleFile::squirrel(), trials, seed: 3 };
-    run(&plan, &Keep { folder, ..Keep::default() }, || ()).unwrap().unwrap()
+    let plan = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials, seed: 3 };
+    run(&plan, &Keep { folder, ..Keep::default() }).unwrap().unwrap()
 }
 
 #[test]
@@ -56,11 +57,11 @@ fn a_study_that_was_stopped_goes_on_to_the_same_bytes() {
     let changed = std::fs::read_to_string(&file).unwrap().replace("\"survived\":true", "\"survived\":false");
     std::fs::write(&file, changed).unwrap();
     assert_eq!(study(24, Some(&folder)).survived_share, 0.0);
-    let other = Plan { vehicle: VehicleFile::squirrel(), trials: 24, seed: 4 };
+    let other = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials: 24, seed: 4 };
     let there = Keep { folder: Some(&folder), ..Keep::default() };
-    let error = run(&other, &there, || ()).unwrap_err().to_string();
+    let error = run(&other, &there).unwrap_err().to_string();
     assert!(error.contains("faults.trials.jsonl: is of another plan"), "{error}");
     std::fs::write(&file, "not a journal\n").unwrap();
-    assert!(run(&other, &there, || ()).unwrap_err().to_string().contains("faults.trials.jsonl"));
+    assert!(run(&other, &there).unwrap_err().to_string().contains("faults.trials.jsonl"));
     std::fs::remove_dir_all(&folder).unwrap();
 }

@@ -1,12 +1,13 @@
 //! What estimators of attitude are worth in flight.
 
 use squirrel_sim::vehicle_file::VehicleFile;
-use squirrel_study::filters::{Filters, Plan, run};
+use squirrel_study::campaign::Plan;
+use squirrel_study::filters::{Filters, run};
 use squirrel_study::journal::Keep;
 
 fn study(trials: u32) -> Filters {
-    let plan = Plan { vehicle: VehicleFile::squirrel(), trials, seed: 1 };
-    run(&plan, &Keep::default(), || ()).unwrap().unwrap()
+    let plan = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials, seed: 1 };
+    run(&plan, &Keep::default()).unwrap().unwrap()
 }
 
 /// The paper's filter bears accelerations if the gyro is calibrated, the plain one never does, and the default does in any case.
@@ -37,6 +38,6 @@ fn one_thread_and_two_give_the_same_numbers() {
 
 #[test]
 fn no_trials_is_an_error() {
-    let plan = Plan { vehicle: VehicleFile::squirrel(), trials: 0, seed: 1 };
-    assert!(run(&plan, &Keep::default(), || ()).unwrap_err().to_string().starts_with("trials = 0"));
+    let plan = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials: 0, seed: 1 };
+    assert!(run(&plan, &Keep::default()).unwrap_err().to_string().starts_with("trials = 0"));
 }

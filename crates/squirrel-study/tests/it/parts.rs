@@ -1,49 +1,29 @@
 //! Studies that were stopped, flown on other numbers of threads, or in parts that were merged, leave the same bytes.
 
-use serde::Serialize;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::{Keep, Part};
 use squirrel_study::merge::merge;
-use squirrel_study::{faults, filters, forest, planning, steering, table2, table3, thrust};
+use squirrel_study::study::{Arms, Study};
+use squirrel_study::{STUDIES, forest, table3, thrust};
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// The study's result as JSON, where it has one.
-type Study = fn(&Keep<'_>) -> Result<Option<String>, FlightError>;
-
-fn json<T: Serialize>(study: Option<T>) -> Option<String> {
-    study.map(|study| serde_json::to_string(&study).unwrap())
-}
 
 fn plan(trials: u32) -> Plan {
     Plan { vehicle: VehicleFile::squirrel(), arms: vec![Arm::Pc, Arm::TwccPlus], trials, seed: 5 }
 }
 
-const STUDIES: [(&str, Study); 8] = [
-    ("faults", |keep| {
-        let plan = faults::Plan { vehicle: VehicleFile::squirrel(), trials: 9, seed: 5 };
-        faults::run(&plan, keep, || ()).map(json)
-    }),
-    ("filters", |keep| {
-        let plan = filters::Plan { vehicle: VehicleFile::squirrel(), trials: 2, seed: 5 };
-        filters::run(&plan, keep, || ()).map(json)
-    }),
-    ("forest", |keep| forest::run(&plan(3), 2.0, keep, || ()).map(json)),
-    ("planning", |keep| {
-        let plan = Plan { arms: planning::ARMS.to_vec(), ..plan(1) };
-        planning::run(&plan, keep, || ()).map(json)
-    }),
-    ("steering", |keep| steering::run(&plan(1), keep, || ()).map(json)),
-    ("table2", |keep| {
-        let plan = table2::Plan { vehicle: VehicleFile::squirrel(), trials: 2, seed: 5, epochs: 1 };
-        table2::run(&plan, keep, |_| ()).map(json)
-    }),
-    ("table3", |keep| table3::run(&plan(2), keep, || ()).map(json)),
-    ("thrust", |keep| thrust::run(&plan(2), keep, || ()).map(json)),
-];
+/// A study's result as JSON, where it has one: two trials, with as little to do as there can be.
+fn fly(study: &Study, keep: &Keep<'_>) -> Result<Option<String>, FlightError> {
+    let mut plan = plan(2);
+    if let Arms::Fixed(arms) = study.arms {
+        plan.arms = arms.to_vec();
+    }
+    let options: Vec<f64> = study.options.iter().map(|o| if o.whole { 1.0 } else { o.default }).collect();
+    Ok((study.fly)(&plan, &options, keep)?.map(|found| found.json))
+}
 
 /// A folder that is gone afterwards.
 struct Folder(PathBuf);
@@ -84,9 +64,10 @@ fn journals(folder: &Path) -> Vec<(String, Vec<u8>)> {
 fn stopped_threaded_and_merged_studies_leave_the_same_bytes() {
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let command = ["a".to_owned(), "study".to_owned()];
-    for (name, study) in STUDIES {
+    for known in STUDIES {
+        let (name, study) = (known.name, |keep: &Keep<'_>| fly(known, keep));
         let folder = Folder::new(name);
-        let keep = |folder, part| Keep { folder: Some(folder), part, command: &command };
+        let keep = |folder, part| Keep { folder: Some(folder), part, command: &command, ..Keep::default() };
         let whole = folder.below("whole");
         let result = pool(2).install(|| study(&keep(&whole, Part::All))).unwrap();
         assert!(result.is_some(), "{name}");
@@ -130,32 +111,31 @@ fn a_study_that_changes_does_not_go_on_as_it_was() {
                 folder: Some(part),
                 part: Part::Shard(format!("{}/2", k + 1).parse().unwrap()),
                 command: &command,
+                ..Keep::default()
             };
-            thrust::run(&plan(trials), &part, || ()).unwrap();
+            thrust::run(&plan(trials), &part).unwrap();
         }
     }
     let merged = folder.below("merged");
     assert_eq!(merge(&parts, &merged).unwrap(), ["thrust", "--trials=2"]);
     let whole = Keep { folder: Some(&merged), part: Part::Merged, ..Keep::default() };
-    assert_eq!(thrust::run(&plan(2), &whole, || ()).unwrap().unwrap().trials, 2);
+    assert_eq!(thrust::run(&plan(2), &whole).unwrap().unwrap().trials, 2);
 
     let kept = Keep { folder: Some(&merged), ..Keep::default() };
     let other =
         VehicleFile::parse(&plan(1).vehicle.text.replace("parnn_weights", "# parnn_weights"), "v").unwrap();
     let mut changed = plan(2);
     changed.vehicle.weights = other.weights;
-    let error = thrust::run(&changed, &kept, || ()).unwrap_err().to_string();
+    let error = thrust::run(&changed, &kept).unwrap_err().to_string();
     assert!(error.contains("is of another plan"), "{error}");
 
     let empty = folder.below("empty");
     let nothing = Keep { folder: Some(&empty), ..Keep::default() };
-    assert!(forest::run(&plan(1), 0.5, &nothing, || ()).is_err());
+    assert!(forest::run(&plan(1), 0.5, &nothing).is_err());
     let mut bare = plan(1);
     bare.vehicle.control = None;
-    assert!(table3::run(&bare, &nothing, || ()).is_err());
-    assert!(
-        thrust::run(&plan(100_001), &nothing, || ()).unwrap_err().to_string().starts_with("trials = 100001")
-    );
+    assert!(table3::run(&bare, &nothing).is_err());
+    assert!(thrust::run(&plan(100_001), &nothing).unwrap_err().to_string().starts_with("trials = 100001"));
     assert!(journals(&empty).is_empty(), "what cannot be flown is not begun");
 }
 
@@ -163,12 +143,12 @@ fn a_study_that_changes_does_not_go_on_as_it_was() {
 fn a_damaged_line_is_named() {
     let folder = Folder::new("damaged");
     let keep = Keep { folder: Some(&folder.0), ..Keep::default() };
-    table3::run(&plan(1), &keep, || ()).unwrap();
+    table3::run(&plan(1), &keep).unwrap();
     let file = folder.0.join("table3.trials.jsonl");
     let text = fs::read_to_string(&file).unwrap();
     let damage = |from: &str, to: &str| {
         fs::write(&file, text.replacen(from, to, 1)).unwrap();
-        table3::run(&plan(1), &keep, || ()).unwrap_err().to_string()
+        table3::run(&plan(1), &keep).unwrap_err().to_string()
     };
     let error = damage("\"rmse_m\":", "\"rmse_m\":NaN,\"x\":");
     assert!(error.contains("table3.trials.jsonl: line 2, from its begin:"), "{error}");
@@ -182,8 +162,8 @@ fn what_cannot_be_merged_is_named() {
     let (one, other, into) = (folder.below("one"), folder.below("other"), folder.below("into"));
     let command = ["thrust".to_owned()];
     let fly = |folder: &Path, trials| {
-        let keep = Keep { folder: Some(folder), part: Part::All, command: &command };
-        thrust::run(&Plan { seed: u64::from(trials), ..plan(trials) }, &keep, || ()).unwrap();
+        let keep = Keep { folder: Some(folder), part: Part::All, command: &command, ..Keep::default() };
+        thrust::run(&Plan { seed: u64::from(trials), ..plan(trials) }, &keep).unwrap();
     };
     let error = |folders: &[PathBuf]| merge(folders, &into).unwrap_err().to_string();
     assert!(error(std::slice::from_ref(&one)).contains("one: holds no part of a study"));
@@ -202,7 +182,5 @@ fn what_cannot_be_merged_is_named() {
         assert!(bad.parse::<squirrel_study::journal::Shard>().is_err(), "{bad}");
     }
     let keep = Keep { part: Part::Shard("1/2".parse().unwrap()), ..Keep::default() };
-    assert!(
-        thrust::run(&plan(1), &keep, || ()).unwrap_err().to_string().starts_with("shard: needs a folder")
-    );
+    assert!(thrust::run(&plan(1), &keep).unwrap_err().to_string().starts_with("shard: needs a folder"));
 }

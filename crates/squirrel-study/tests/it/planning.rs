@@ -14,7 +14,7 @@ use squirrel_study::planning::{self, ARMS, Row};
 #[test]
 fn plans_are_followed_on_the_full_plant() {
     let plan = Plan { vehicle: VehicleFile::squirrel(), arms: ARMS.to_vec(), trials: 40, seed: 1 };
-    let study = planning::run(&plan, &Keep::default(), || ()).unwrap().unwrap();
+    let study = planning::run(&plan, &Keep::default()).unwrap().unwrap();
     let row = |kind: &str, ratio: f64, arm: Arm| -> &Row {
         let is = |row: &&Row| row.kind == kind && row.thrust_to_weight == ratio && row.arm == arm.name();
         study.rows.iter().find(is).unwrap()

@@ -4,12 +4,29 @@
 
 use squirrel_nn::model::Model;
 use squirrel_sim::vehicle_file::VehicleFile;
-use squirrel_study::journal::Keep;
-use squirrel_study::table2::{Plan, Row, Table2, run, steps};
+use squirrel_study::campaign::Plan;
+use squirrel_study::journal::{Keep, Progress};
+use squirrel_study::table2::{Row, Table2, run};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-fn plan(trials: u32, epochs: usize) -> Plan {
-    Plan { vehicle: VehicleFile::squirrel(), trials, seed: 1, epochs }
+fn plan(trials: u32) -> Plan {
+    Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials, seed: 1 }
+}
+
+#[derive(Debug, Default)]
+struct Told {
+    ahead: AtomicU64,
+    done: AtomicU64,
+}
+
+impl Progress for Told {
+    fn ahead(&self, steps: u64) {
+        self.ahead.fetch_add(steps, Ordering::Relaxed);
+    }
+
+    fn done(&self, steps: u64) {
+        self.done.fetch_add(steps, Ordering::Relaxed);
+    }
 }
 
 fn row<'a>(study: &'a Table2, set: &str, model: Model) -> &'a Row {
@@ -19,7 +36,7 @@ fn row<'a>(study: &'a Table2, set: &str, model: Model) -> &'a Row {
 /// The paper's comparison holds, and its reason is what the rival is told: with the direction of the flow it is as good.
 #[test]
 fn parnn_beats_the_papers_rival_and_not_the_fair_one() {
-    let study = run(&plan(2, 300), &Keep::default(), |_| ()).unwrap().unwrap();
+    let study = run(&plan(2), 300, &Keep::default()).unwrap().unwrap();
     let over = |set: &str, model: Model| row(&study, set, model).to_labels.over_parnn.mean;
     let tests = ["t1", "t2", "t3", "t4"];
     let vanilla = tests.map(|set| over(set, Model::VanillaNed));
@@ -45,24 +62,23 @@ fn parnn_beats_the_papers_rival_and_not_the_fair_one() {
 #[test]
 fn one_thread_and_two_give_the_same_numbers_and_every_step_is_told() {
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let (plan, told) = (plan(1, 2), AtomicU64::new(0));
-    let study = |threads: usize| {
-        let tell = |steps| _ = told.fetch_add(steps, Ordering::Relaxed);
-        pool(threads).install(|| run(&plan, &Keep::default(), tell)).unwrap().unwrap()
-    };
+    let told = Told::default();
+    let keep = Keep { progress: Some(&told), ..Keep::default() };
+    let study = |threads: usize| pool(threads).install(|| run(&plan(1), 2, &keep)).unwrap().unwrap();
     assert_eq!(study(1), study(2));
-    assert_eq!(told.into_inner(), 2 * steps(&plan, &Keep::default()));
+    // 10 and 4 times 4 flights, and 7 models three times.
+    assert_eq!([told.ahead, told.done].map(AtomicU64::into_inner), [2 * (26 + 21); 2]);
 }
 
 #[test]
 fn a_single_trial_has_no_deviation() {
-    let study = run(&plan(1, 1), &Keep::default(), |_| ()).unwrap().unwrap();
+    let study = run(&plan(1), 1, &Keep::default()).unwrap().unwrap();
     assert!(study.rows.iter().all(|r| r.to_labels.rmse_n.sd.is_none() && r.to_truth.over_parnn.sd.is_none()));
     assert!(study.rows.iter().all(|r| r.model != Model::Parnn || r.to_labels.over_parnn.mean == 0.0));
 }
 
 #[test]
 fn what_cannot_be_studied_is_refused() {
-    assert!(run(&plan(0, 1), &Keep::default(), |_| ()).unwrap_err().to_string().starts_with("trials = 0"));
-    assert!(run(&plan(1, 0), &Keep::default(), |_| ()).unwrap_err().to_string().starts_with("epochs = 0"));
+    assert!(run(&plan(0), 1, &Keep::default()).unwrap_err().to_string().starts_with("trials = 0"));
+    assert!(run(&plan(1), 0, &Keep::default()).unwrap_err().to_string().starts_with("epochs = 0"));
 }

@@ -14,7 +14,7 @@ fn plan(arms: &[Arm], trials: u32) -> Plan {
 }
 
 fn study(arms: &[Arm], trials: u32) -> Thrust {
-    run(&plan(arms, trials), &Keep::default(), || ()).unwrap().unwrap()
+    run(&plan(arms, trials), &Keep::default()).unwrap().unwrap()
 }
 
 fn of<'a>(rows: &'a [Row], arm: &str) -> &'a Row {
@@ -64,8 +64,8 @@ fn wings_help_where_thrust_is_scarce() {
 /// By satellite fix and barometer, as in the paper: ours is better than the paper's gain over PC, and better than every arm of the paper.
 #[test]
 fn the_better_controller_gains_more_than_the_paper_at_scarce_thrust() {
-    let plan = Plan::of_all_arms(VehicleFile::squirrel(), 12, 1);
-    let study = table3::run(&plan, &Keep::default(), || ()).unwrap().unwrap();
+    let plan = plan(&Arm::ALONE, 12);
+    let study = table3::run(&plan, &Keep::default()).unwrap().unwrap();
     assert_eq!(study.points.len(), 4);
     for point in &study.points {
         let ours = of(&point.rows, "twcc_plus");
@@ -89,7 +89,7 @@ fn the_better_controller_gains_more_than_the_paper_at_scarce_thrust() {
 #[test]
 fn wings_help_at_every_angle_and_more_at_speed_where_thrust_is_scarce() {
     let plan = plan(&[Arm::TwccFlat, Arm::TwccParnn], 6);
-    let study = steering::run(&plan, &Keep::default(), || ()).unwrap().unwrap();
+    let study = steering::run(&plan, &Keep::default()).unwrap().unwrap();
     let mean = |wings, ratio: f64| {
         let at = |mean: &&steering::Mean| {
             mean.wings == wings && mean.thrust_to_weight == ratio && mean.arm == "twcc_parnn"
@@ -117,6 +117,6 @@ fn one_thread_and_two_give_the_same_numbers() {
 
 #[test]
 fn no_trials_is_an_error() {
-    let error = run(&plan(&[Arm::Pc], 0), &Keep::default(), || ()).unwrap_err();
+    let error = run(&plan(&[Arm::Pc], 0), &Keep::default()).unwrap_err();
     assert!(error.to_string().starts_with("trials = 0"));
 }

@@ -1,6 +1,6 @@
 //! `squirrel study merge`: the parts of a study, put together.
 
-use super::Study;
+use super::Studies;
 use crate::output;
 use crate::paths::Paths;
 use clap::Parser;
@@ -26,11 +26,11 @@ pub(crate) struct Options {
 }
 
 /// The arguments that a part was flown with.
-#[derive(Debug, Parser)]
+#[derive(Parser)]
 #[command(name = "study", no_binary_name = true)]
 struct Again {
     #[command(subcommand)]
-    study: Study,
+    study: Studies,
 }
 
 impl Options {
@@ -61,12 +61,13 @@ impl Options {
     fn merged(&self) -> Result<(), String> {
         let command = merge(&self.folders, &self.out).map_err(|e| e.to_string())?;
         let unknown = |_| format!("{}: is no study of this version", command.join(" "));
-        let mut study = Again::try_parse_from(&command).map_err(unknown)?.study;
-        let common = study.common_mut().ok_or("merge: no study")?;
-        common.out = Some(self.out.clone());
-        common.vehicle.clone_from(&self.vehicle);
-        common.json.clone_from(&self.json);
-        common.merged = true;
-        study.run()
+        let Studies::Fly(mut flown) = Again::try_parse_from(&command).map_err(unknown)?.study else {
+            return Err("merge: no study".to_owned());
+        };
+        flown.common.out = Some(self.out.clone());
+        flown.common.vehicle.clone_from(&self.vehicle);
+        flown.common.json.clone_from(&self.json);
+        flown.merged = true;
+        flown.run()
     }
 }

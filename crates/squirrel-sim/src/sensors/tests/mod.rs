@@ -68,11 +68,11 @@ fn each_sensor_speaks_at_its_rate_and_after_its_latency() {
 
 #[test]
 fn ideal_sensors_tell_the_truth() {
-    let (frame, battery) = sensors(&SensorParameters::ideal(), 1).poll(0, &truth());
+    let (frame, logged) = sensors(&SensorParameters::ideal(), 1).poll(0, &truth());
     assert_eq!(frame.gnss.unwrap().velocity.vector, Vector3::new(4.0, 5.0, 6.0));
     assert_eq!(frame.altitude_m, Some(3.0));
     assert_eq!(frame.imu.unwrap().omega.vector, Vector3::new(0.1, 0.2, 0.3));
-    assert_eq!(battery.unwrap().voltage_v, 15.0);
+    assert_eq!((logged[0].0, logged[0].1[0]), ("battery", ("voltage_v", 15.0)));
     assert_eq!((frame.imu_2, frame.magnetic), (None, None), "not there unless asked for");
 }
 
@@ -95,7 +95,7 @@ fn streams_are_independent() {
     let quiet = sampled(&base());
     let (mut baro, mut all) = (base(), SensorParameters::suite("hobby").unwrap());
     (baro.baro.noise_m, baro.baro.drift_m_root_s, baro.baro.lag_s) = (1.0, 0.1, 0.1);
-    (all.attitude, all.battery, all.imu) = (base().attitude, base().battery, base().imu);
+    (all.attitude, all.logged, all.imu) = (base().attitude, base().logged, base().imu);
     (all.gnss.dropouts_per_s, all.gnss.dropout_s) = (10.0, 0.1);
     for (a, b) in quiet.iter().zip(sampled(&baro)) {
         assert_eq!((a.imu, a.imu_2, a.gnss, a.magnetic), (b.imu, b.imu_2, b.gnss, b.magnetic));
@@ -142,7 +142,7 @@ fn readings_of_old_flights_keep_their_bits() {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut eat = |bits: u64| hash = (hash ^ bits).wrapping_mul(0x0100_0000_01b3);
         for k in 0..900_u64 {
-            let (frame, battery) = sensors.poll(k * 10_000 / 3, &truth());
+            let (frame, logged) = sensors.poll(k * 10_000 / 3, &truth());
             let mut single = Vec::new();
             if let Some(imu) = frame.imu {
                 single.extend(imu.omega.vector.iter().chain(&imu.specific_force.vector));
@@ -157,9 +157,8 @@ fn readings_of_old_flights_keep_their_bits() {
             for x in single {
                 eat(x.to_bits().into());
             }
-            if let Some(b) = battery {
-                eat(b.voltage_v.to_bits());
-                eat(b.current_a.to_bits());
+            for (_, number) in logged.into_iter().flat_map(|(_, row)| row) {
+                eat(number.to_bits());
             }
         }
         assert_eq!(hash, before, "seed {seed}");

@@ -1,8 +1,8 @@
 //! The forest as a page: where every flight ended, who came through, and every number.
 
-use super::{begin, chart_row, figure, head, ink, log, percent, row};
+use super::{BAND_M, Forest, Row, scenario, words};
 use crate::campaign::Plan;
-use crate::forest::{BAND_M, Forest, Row, scenario, words};
+use crate::pages::{begin, chart_row, figure, head, ink, log, percent, row};
 use crate::statistics::Share;
 use squirrel_log::FlightLog;
 use squirrel_report::chart::{Axis, Ink, Range, RowChart, Svg, Track, TrackChart, Values};

@@ -1,89 +1,22 @@
-//! The paper's real flights and what wings are worth as a function of thrust, as pages.
+//! What wings are worth as a function of thrust, as a page.
 
-use super::{begin, chart_row, figure, head, ink, percent, row, tracks};
-use crate::campaign::Plan;
+use super::{PAPER_GAIN, Point, Thrust, words};
+use crate::pages::{begin, facts, figure, ink, numbers};
 use crate::statistics::Estimate;
-use crate::table3::{self, Table3};
-use crate::thrust::{self, PAPER_GAIN, Point, Thrust};
 use crate::tracking::Row;
-use squirrel_report::chart::{Axis, Extent, Ink, Limit, LineChart, Range, RowChart, Series, Svg};
-use squirrel_report::page::{self, Columns, Figure, Page};
+use squirrel_report::chart::{Axis, Limit, LineChart, Range, Series, Svg};
+use squirrel_report::page::{Columns, Figure};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::FlightError;
 
-/// Arms whose tracks are shown.
-const SHOWN: [Arm; 4] = [Arm::Pc, Arm::TwccParnn, Arm::TwccPlus, Arm::PcPlus];
 /// Up to this ratio thrust is scarce, and points lie near one another.
 const SCARCE: f64 = 1.5;
 
-/// Table III as a page without network.
-///
-/// # Errors
-/// A flight that fails.
-pub fn table3(study: &Table3, plan: &Plan) -> Result<String, FlightError> {
-    let lead = "The paper's real flights, 7.3 m/s, R_d 4 m, a turn of 110 to 130 deg, with the error as its log has it, by satellite \
-                fix and barometer. The paper does not say how much thrust there was. Gain is the mean error of pc over that of \
-                the arm, minus 1.";
-    let facts = facts(&study.vehicle, study.trials, study.seed);
-    let mut page = begin("Table III: the paper's real flights", lead, &facts, &[]);
-    page.section(
-        "Measured gain",
-        "Gain of the measured errors over pc with its paired 95 % interval; the red stroke is the paper's gain of twcc_parnn.",
-    );
-    let of_point = |point: &table3::Point| {
-        figure(format!("T/W {:.2}", point.thrust_to_weight), String::new(), measured(point))
-    };
-    page.figures(Columns::Two, &study.points.iter().map(of_point).collect::<Vec<Figure>>());
-    if let (Some(point), Some(condition)) = (study.points.first(), table3::conditions(&plan.vehicle)?.first())
-    {
-        page.section(
-            &format!("The first trial at T/W {:.2}", point.thrust_to_weight),
-            "Tracks are coloured by speed. The paper's drone without wings sank.",
-        );
-        tracks(&mut page, plan, condition, &SHOWN)?;
-    }
-    let rows = study
-        .points
-        .iter()
-        .flat_map(|point| point.rows.iter().map(|row| (vec![format!("{:.2}", point.thrust_to_weight)], row)));
-    numbers(&mut page, &["T/W"], rows);
-    Ok(page.html())
-}
-
-fn facts(vehicle: &str, trials: u32, seed: u64) -> [(&'static str, String); 3] {
-    [
-        ("vehicle", vehicle.to_owned()),
-        ("trials an arm and condition", trials.to_string()),
-        ("seed", seed.to_string()),
-    ]
-}
-
-fn measured(point: &table3::Point) -> Svg {
-    let axis = Axis::new("measured gain over pc", "%");
-    let label = format!("measured gain by arm at T/W {:.2}", point.thrust_to_weight);
-    let mut chart = RowChart::new(&label, Columns::Two.width(), axis);
-    let paper = || Extent {
-        from: 100.0 * PAPER_GAIN,
-        to: 100.0 * PAPER_GAIN,
-        ink: Ink::Limit,
-        name: format!("the paper's {:.1} %", 100.0 * PAPER_GAIN),
-    };
-    chart.rows.extend(point.rows.iter().filter(|row| row.arm != Arm::Pc.name()).map(|row| {
-        // Plus zero turns a rounded minus zero round.
-        let note = format!("{:+.1} %", (1e3 * row.gain_measured.value).round() / 10.0 + 0.0);
-        let mut row = chart_row(row.arm, row.gain_measured, note);
-        row.bars.push(paper());
-        row
-    }));
-    chart.svg()
-}
-
 /// Thrust-to-weight ratios as a page without network.
-pub fn thrust(study: &Thrust) -> String {
+pub fn page(study: &Thrust) -> String {
     let lead = "What wings are worth as a function of the effective thrust-to-weight ratio: the avoidance manoeuvre, 7.3 m/s, R_d 4 m, a \
                 turn of 110 to 130 deg. Gain is the mean error of pc over that of the arm, minus 1.";
     let facts = facts(&study.vehicle, study.trials, study.seed);
-    let mut page = begin("What wings are worth where thrust is scarce", lead, &facts, &thrust::words(study));
+    let mut page = begin("What wings are worth where thrust is scarce", lead, &facts, &words(study));
     let views = views(study);
     let figures = |draw: &dyn Fn(&View<'_>) -> Svg| -> Vec<Figure> {
         views.iter().map(|view| figure(view.title.to_owned(), String::new(), draw(view))).collect()
@@ -195,42 +128,4 @@ impl View<'_> {
         chart.series.iter_mut().for_each(|series| series.name.clear());
         chart.svg()
     }
-}
-
-/// Adds the table of every number.
-///
-/// * `own` - names of the columns that say where a row belongs
-fn numbers<'a>(page: &mut Page, own: &[&str], rows: impl Iterator<Item = (Vec<String>, &'a Row)>) {
-    page.section(
-        "Every number",
-        "Gains with their paired 95 % intervals, in %; heights are means of the largest.",
-    );
-    let names = [
-        "RMSE m",
-        "horizontal m",
-        "measured m",
-        "gain",
-        "gain horizontal",
-        "gain measured",
-        "over phantom",
-        "over pc_plus",
-        "lost m",
-        "gained m",
-        "wings open s",
-    ];
-    let names = head(&[&["arm"][..], own, &names].concat());
-    let cells = |(place, of): (Vec<String>, &Row)| {
-        let metres = [of.rmse_m, of.rmse_horizontal_m, of.rmse_measured_m].map(|x| format!("{x:.2}"));
-        let gains = [
-            Some(of.gain),
-            Some(of.gain_horizontal),
-            Some(of.gain_measured),
-            of.gain_over_phantom,
-            of.gain_over_pc_plus,
-        ];
-        let rest = [of.height_lost_m, of.height_gained_m, of.wings_open_s].map(|x| format!("{x:.2}"));
-        let gains = gains.map(|gain| percent(gain, 1));
-        row(of.arm, place.into_iter().chain(metres).chain(gains).chain(rest))
-    };
-    page.table(&names, &rows.map(cells).collect::<Vec<page::Row>>());
 }

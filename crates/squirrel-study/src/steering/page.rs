@@ -1,10 +1,8 @@
 //! Steering angles and speeds as a page: the paper's wheels (Fig. 9), tracks of one cell, and every number.
 
-use super::{begin, figure, head, ink, row, tracks};
+use super::{ANGLES_DEG, Mean, SPEEDS_M_S, Steering, THRUST_TO_WEIGHT, Wings, conditions, ratio, words};
 use crate::campaign::Plan;
-use crate::steering::{
-    ANGLES_DEG, Mean, SPEEDS_M_S, Steering, THRUST_TO_WEIGHT, Wings, conditions, ratio, words,
-};
+use crate::pages::{begin, figure, head, ink, row, tracks};
 use squirrel_report::chart::{Axis, Limit, Range, Svg, Wheel, WheelLine};
 use squirrel_report::page::{Columns, Figure, Page};
 use squirrel_sim::arm::Arm;
@@ -128,7 +126,7 @@ fn wheel(title: &str, names: &[String], means: &[&Mean], spokes: Spokes, [low, h
 fn flown(page: &mut Page, study: &Steering, plan: &Plan) -> Result<(), FlightError> {
     let is = |x: f64, wanted: f64| (x - wanted).abs() < 1e-9;
     // Cells are in the order of their conditions.
-    let is_shown = |cell: &crate::steering::Cell| {
+    let is_shown = |cell: &super::Cell| {
         cell.wings == Wings::Independent
             && is(cell.thrust_to_weight, THRUST_TO_WEIGHT[0])
             && is(cell.angle_deg, SHOWN_DEG)

@@ -1,60 +1,58 @@
-//! `squirrel study table2`: models of the wing force on flights that they have not seen.
+//! Models of the wing force as the command line shows them.
 
-use super::{Common, write_page};
-use crate::output::{self, Table, say};
+use super::report::{self, head};
+use super::{ERRORS, Error, Row, Spread, Table2, render, run, scenarios};
+use crate::campaign::Plan;
+use crate::journal::Keep;
+use crate::study::{Choice, Found, Shown, Study};
+use crate::wing_flights::Kind;
 use squirrel_nn::model::Model;
-use squirrel_nn::train::Settings;
-use squirrel_study::table2::{self, ERRORS, Error, Plan, Row, Spread, Table2};
-use squirrel_study::wing_flights::Kind;
+use squirrel_nn::train::EPOCHS;
+use squirrel_sim::flight::FlightError;
+use squirrel_sim::scenario::Scenario;
 use std::fmt::Write as _;
 
-/// Options of the study.
-#[derive(Debug, clap::Args)]
-pub(crate) struct Options {
-    /// Trials, each with its own flights and first weights.
-    #[arg(long, default_value_t = 5)]
-    trials: u32,
-    /// Passes over the training windows.
-    #[arg(long, default_value_t = Settings::default().epochs)]
-    epochs: usize,
-    #[command(flatten)]
-    pub(super) common: Common,
+/// On the command line.
+pub const STUDY: Study = Study {
+    options: &[Choice {
+        name: "epochs",
+        help: "Passes over the training windows",
+        default: EPOCHS as f64,
+        whole: true,
+    }],
+    unit: "flights and trainings",
+    others: |_| Kind::ALL.map(|kind| format!("{}.toml", kind.name())).to_vec(),
+    ..Study::new(
+        "table2",
+        "What models of the wing force predict, the paper's Table II: to labels and to truth, 30 to 300 s of training",
+        (5, "Trials, each with its own flights and first weights"),
+        fly,
+    )
+};
+
+fn fly(plan: &Plan, options: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightError> {
+    let epochs = options[0] as usize;
+    let Some(study) = run(plan, epochs, keep)? else { return Ok(None) };
+    let mut found = Found::of(&study)?;
+    show(&mut found, &study);
+    found.csv = csv(&study);
+    let named = |s: Scenario| (format!("{}.toml", s.name), s.to_toml());
+    found.others = scenarios(plan)?.into_iter().map(named).collect();
+    found.page = Some(render(&study));
+    Ok(Some(found))
 }
 
-impl Options {
-    pub(super) fn run(&self) -> Result<(), String> {
-        let (trials, seed) = (self.trials, self.common.seed);
-        let others = Kind::ALL.map(|kind| format!("{}.toml", kind.name()));
-        let plan =
-            Plan { vehicle: self.common.begin("table2", trials, others)?, trials, seed, epochs: self.epochs };
-        let own = [("trials", trials.to_string()), ("epochs", self.epochs.to_string())];
-        let command = self.common.command("table2", &own);
-        let keep = self.common.keep(&command);
-        let bar = output::progress(table2::steps(&plan, &keep), "flights and trainings");
-        let study = table2::run(&plan, &keep, |steps| bar.inc(steps));
-        let Some(study) = self.common.ended(&bar, study)? else { return Ok(()) };
-
-        show(&study);
-        let Some(folder) = self.common.end("table2", &csv(&study), &study)? else { return Ok(()) };
-        for scenario in table2::scenarios(&plan).map_err(|e| e.to_string())? {
-            let file = folder.join(format!("{}.toml", scenario.name));
-            output::write_file(&file, scenario.to_toml().as_bytes())?;
-        }
-        write_page(folder, "table2", &table2::render(&study))
-    }
-}
-
-fn show(study: &Table2) {
-    say(&format!(
+fn show(found: &mut Found, study: &Table2) {
+    found.say(format!(
         "Models of the wing force of {}, {} trials from seed {}, {} epochs; mean and standard deviation over the trials.\n",
         study.vehicle, study.trials, study.seed, study.epochs
     ));
-    sets(study);
+    found.shown.push(Shown::Table(sets(study)));
     let lengths: Vec<u32> = study.rows.chunk_by(|a, b| a.training_s == b.training_s).map(length).collect();
     for rows in study.rows.chunk_by(|a, b| a.training_s == b.training_s && a.set == b.set) {
-        say(&format!("\n{} s of training, {}: RMSE in N, over paRNN in %", length(rows), rows[0].set));
+        found.say(format!("\n{} s of training, {}: RMSE in N, over paRNN in %", length(rows), rows[0].set));
         let columns = ["to labels", "x", "y", "z", "over", "to truth", "x", "y", "z", "over"];
-        let mut table = Table::new(&[&["model"][..], &columns].concat());
+        let mut table = vec![head(&[&["model"][..], &columns].concat())];
         for row in rows {
             let mut cells = vec![row.model.name().to_owned()];
             for error in [&row.to_labels, &row.to_truth] {
@@ -62,28 +60,28 @@ fn show(study: &Table2) {
                 cells.extend(error.axis_rmse_n.map(newtons));
                 cells.push(over(error));
             }
-            table.row(cells);
+            table.push(cells);
         }
-        table.print();
+        found.shown.push(Shown::Table(table));
     }
     for (words, error) in ERRORS {
-        say(&format!("\nRMSE {words} over that of paRNN, minus 1, in %"));
+        found.say(format!("\nRMSE {words} over that of paRNN, minus 1, in %"));
         let names: Vec<&str> = study.sets.iter().map(|set| set.set).collect();
-        let mut table = Table::new(&[&["training s", "model"][..], &names].concat());
+        let mut table = vec![head(&[&["training s", "model"][..], &names].concat())];
         for training_s in &lengths {
             for model in Model::ALL.into_iter().skip(1) {
                 let mut cells = vec![training_s.to_string(), model.name().to_owned()];
                 let of_model = |row: &&Row| row.training_s == *training_s && row.model == model;
                 cells.extend(study.rows.iter().filter(of_model).map(|row| over(error(row))));
-                table.row(cells);
+                table.push(cells);
             }
         }
-        table.print();
+        found.shown.push(Shown::Table(table));
     }
 }
 
-fn sets(study: &Table2) {
-    let mut table = Table::new(&[
+fn sets(study: &Table2) -> Vec<Vec<String>> {
+    let mut table = vec![head(&[
         "set",
         "flown",
         "flights",
@@ -94,12 +92,12 @@ fn sets(study: &Table2) {
         "|alpha_est| > |alpha| %",
         "beyond 10 deg %",
         "median gamma",
-    ]);
+    ])];
     for set in &study.sets {
         // The last of a set is that of the longest training.
         let word = study.words.iter().rfind(|word| word.set == set.set);
         let [slow, fast] = set.speed_m_s.map(|v| format!("{v:.1}"));
-        table.row(vec![
+        table.push(vec![
             set.set.to_owned(),
             set.about.to_owned(),
             set.flights.to_string(),
@@ -112,7 +110,7 @@ fn sets(study: &Table2) {
             word.map(|w| plus_minus(w.gamma_median, 1.0, 2)).unwrap_or_default(),
         ]);
     }
-    table.print();
+    table
 }
 
 fn length(rows: &[Row]) -> u32 {
@@ -120,8 +118,7 @@ fn length(rows: &[Row]) -> u32 {
 }
 
 fn plus_minus(x: Spread, scale: f64, digits: usize) -> String {
-    let mean = format!("{:.digits$}", scale * x.mean);
-    x.sd.map_or_else(|| mean.clone(), |sd| format!("{mean}\u{b1}{:.digits$}", scale * sd))
+    report::plus_minus(x, scale, digits).replace(' ', "")
 }
 
 fn newtons(x: Spread) -> String {
