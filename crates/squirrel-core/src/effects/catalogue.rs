@@ -315,6 +315,11 @@ macro_rules! catalogue {
                 $($(if present.$module.any() { sum = sum + self.$module.added_mass_kg(); })?)+
                 sum
             }
+            /// Whether any effect adds wind.
+            #[inline(always)]
+            pub fn blow(present: Present) -> bool {
+                $($((<super::$module::Numbers<L> as Acts<L>>::BLOWS && present.$module.any()) ||)?)+ false
+            }
             /// Whether the wrench of any effect depends on how fast the rotors spin.
             #[inline(always)]
             pub fn feel_rotor_spin(present: Present) -> bool {

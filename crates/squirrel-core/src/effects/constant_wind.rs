@@ -67,6 +67,8 @@ impl<T: Real> ConstantWind<T> {
 }
 
 impl<L: Lane> Acts<L> for Numbers<L> {
+    const BLOWS: bool = true;
+
     #[inline(always)]
     fn wind(&self, height_m: L, forms: Forms) -> [L; 2] {
         let [mut factor, slope] = self.profile;

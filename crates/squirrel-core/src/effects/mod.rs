@@ -421,6 +421,8 @@ impl Forms {
 pub trait Acts<L: Lane>: Copy {
     /// Whether its wrench depends on how fast the rotors spin, which is dear to sum up.
     const FEELS_ROTOR_SPIN: bool = false;
+    /// Whether it [adds wind](Acts::wind).
+    const BLOWS: bool = false;
 
     /// Wind that the effect adds, north and east, m/s.
     ///

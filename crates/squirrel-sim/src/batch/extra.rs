@@ -148,11 +148,15 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         }
         let Extra { airs, effects, present, clock, .. } = &mut **extra;
         let (motion, wind) = (&self.motion, self.held.wind);
+        let effects_blow = Prepared::<S>::blow(*present);
         let airspeed_m_s = |lane| {
-            let through = through_air(&take(&motion.velocity, lane), &take(&wind, lane));
-            let wind = effects.take(lane).wind(*present, real::<S>(0.0) - motion.position[2][lane]);
-            let [north, east] = wind.map(|x| try_convert::<S, f64>(x).unwrap_or(f64::NAN));
-            (through - Vector3::new(north, east, 0.0)).norm()
+            let mut through = through_air(&take(&motion.velocity, lane), &take(&wind, lane));
+            if effects_blow {
+                let wind = effects.take(lane).wind(*present, real::<S>(0.0) - motion.position[2][lane]);
+                let [north, east] = wind.map(|x| try_convert::<S, f64>(x).unwrap_or(f64::NAN));
+                through -= Vector3::new(north, east, 0.0);
+            }
+            through.norm()
         };
         until = airs.advance(*clock, until, &mut self.held.wind, forecast, airspeed_m_s);
         let steps = until - extra.clock;

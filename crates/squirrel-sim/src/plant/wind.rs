@@ -9,6 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 use squirrel_core::effects::{Effects, GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S, GustSpectrum};
 use squirrel_core::frames::{In, Ned};
+use squirrel_core::lane::functions::exp;
 use squirrel_core::nalgebra::Vector3;
 
 /// Shape of the gusts.
@@ -157,7 +158,7 @@ impl Wind {
                 self.first = self.first * keep + self.noise() * fresh;
             }
             GustModel::Dryden { scale_length_m } => {
-                let keep = (-dt_s * airspeed_m_s().max(1.0) / scale_length_m).exp();
+                let keep = exp(-dt_s * airspeed_m_s().max(1.0) / scale_length_m);
                 // With unit noise the first stage has variance 1/2, so that the shaped output has variance 1.
                 let before = self.first;
                 self.first = self.first * keep + self.noise() * ((1.0 - keep * keep) * 0.5).sqrt();
