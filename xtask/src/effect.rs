@@ -58,13 +58,15 @@ pub(crate) fn step() -> Result<String, String> {
     Ok(format!("{name} in {} lines and {} files", lines.len(), page.files.len()))
 }
 
-/// Runs the tests in the copy, with the features of the simulator that the whole workspace has.
+/// Runs the tests in the copy. The Python package has none of that name, but needs all the others, so that the libraries beside them
+/// are built with the features that the whole workspace has, and are there already.
 fn tested(copy: &Path, name: &str) -> Result<(), String> {
     let mut command = Command::new("cargo");
     command.current_dir(copy).env("CARGO_TARGET_DIR", target_directory()?);
     command.env("SQUIRREL_EFFECT", name).env("SQUIRREL_EFFECTS_WRITE", "1");
-    command.args(["test", "--release", "--locked", "-p", "squirrel-sim", "-p", "hidden-effects"]);
-    command.args(["--features", "squirrel-sim/rapier", "--test", "it", "--test", "batch", "--"]).args(TESTS);
+    command.args(["test", "--release", "--locked"]);
+    command.args(["squirrel-py", "squirrel-sim", "hidden-effects"].iter().flat_map(|name| ["-p", name]));
+    command.args(["--test", "it", "--test", "batch", "--"]).args(TESTS);
     let done = command.stderr(Stdio::inherit()).output().map_err(|error| format!("cargo: {error}"))?;
     let said = String::from_utf8_lossy(&done.stdout);
     eprint!("{said}");
