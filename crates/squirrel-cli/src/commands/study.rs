@@ -77,7 +77,7 @@ impl clap::Subcommand for Studies {
     fn augment_subcommands(command: Command) -> Command {
         let merge = merge::Options::augment_args(Command::new(MERGE))
             .about("Put the parts of a study together that were flown with --shard");
-        let mut all: Vec<Command> = STUDIES.iter().map(|study| options(study)).chain([merge]).collect();
+        let mut all: Vec<Command> = STUDIES.iter().map(options).chain([merge]).collect();
         all.sort_by(|a, b| a.get_name().cmp(b.get_name()));
         command.subcommands(all)
     }
@@ -171,18 +171,16 @@ impl Flown {
         let found =
             (self.study.fly)(&plan, &own, &Keep { folder, part, command: &command, progress: Some(&bar) });
         bar.0.finish_and_clear();
-        match found.map_err(|e| e.to_string())? {
-            Some(found) => self.end(&found),
-            None => {
-                if let (Some(shard), Some(folder)) = (self.common.shard, &self.common.out) {
-                    talk(&format!(
-                        "part {shard} is in {}; `squirrel study merge` puts the parts together",
-                        folder.display()
-                    ));
-                }
-                Ok(())
-            }
+        if let Some(found) = found.map_err(|e| e.to_string())? {
+            return self.end(&found);
         }
+        if let (Some(shard), Some(folder)) = (self.common.shard, &self.common.out) {
+            talk(&format!(
+                "part {shard} is in {}; `squirrel study merge` puts the parts together",
+                folder.display()
+            ));
+        }
+        Ok(())
     }
 
     /// What is asked of the study.
