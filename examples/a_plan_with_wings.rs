@@ -1,11 +1,13 @@
 //! Lesson 14, `squirrel plan`: what wings buy where both with and without them plan ahead.
 //!
-//! A [`Craft`] is what the vehicle can do, a [`Task`] where it is and what it should be near to, and a [`Planner`] makes a plan of both: where
-//! to be, how the rotors shall push, when the wings shall open. Here a run-up of 6 s leads straight on, and then the vehicle shall go off at
-//! 120 deg at once, the paper's manoeuvre, of which the first plan knew nothing. The same planner without wings is the fair rival. Both
-//! plans in a row are flown on the full plant, with sensors, rotors and a membrane for a wing, by a [`Follower`]: look how far beside its plan each
-//! flight is. Wings brake harder, so that the turn comes nearer to what was wanted, by four percent where thrust is scarce and by hardly one where
-//! it is not.
+//! A [`Craft`] is what the vehicle can do, a [`Task`] where it is and what it should be near to,
+//! and a [`Planner`] makes a plan of both: where to be, how the rotors shall push, when the wings
+//! shall open. Here a run-up of 6 s leads straight on, and then the vehicle shall go off at 120 deg
+//! at once, the paper's manoeuvre, of which the first plan knew nothing. The same planner without
+//! wings is the fair rival. Both plans in a row are flown on the full plant, with sensors, rotors
+//! and a membrane for a wing, by a [`Follower`]: look how far beside its plan each flight is. Wings
+//! brake harder, so that the turn comes nearer to what was wanted, by four percent where thrust is
+//! scarce and by hardly one where it is not.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example a_plan_with_wings
@@ -64,16 +66,24 @@ fn fly(thrust_to_weight: f64, wing: Option<WingModel>) -> Outcome<Flown> {
     let vehicle = VehicleFile::squirrel();
     let thrust_max_n = thrust_to_weight * vehicle.vehicle.weight_n();
     let craft = Craft::of(&vehicle, thrust_max_n, wing, RESERVE)?;
-    let mut scenario = Scenario { duration_s: RUN_UP_S + TURN_S, seed: 1, ..Scenario::find("hover")? };
+    let mut scenario =
+        Scenario { duration_s: RUN_UP_S + TURN_S, seed: 1, ..Scenario::find("hover")? };
     scenario.thrust_to_weight = Some(thrust_to_weight);
 
     let start = Vector3::new(0.0, 0.0, -scenario.height_m);
-    let hover = Begin { position: start, velocity: Vector3::zeros(), thrust: -craft.hover(), spread: 0.0 };
-    let straight = Task::new(hover, along(start, 0.0, 5.0, RUN_UP_S), vec![], STEP_S, f64::INFINITY)?;
+    let hover =
+        Begin { position: start, velocity: Vector3::zeros(), thrust: -craft.hover(), spread: 0.0 };
+    let straight =
+        Task::new(hover, along(start, 0.0, 5.0, RUN_UP_S), vec![], STEP_S, f64::INFINITY)?;
     let run_up = Planner::default().plan(&Craft { wing: None, ..craft.clone() }, &straight, None);
     let last = run_up.track.points().last().ok_or("an empty plan")?;
 
-    let begin = Begin { position: last.position, velocity: last.velocity, thrust: last.thrust, spread: 0.0 };
+    let begin = Begin {
+        position: last.position,
+        velocity: last.velocity,
+        thrust: last.thrust,
+        spread: 0.0,
+    };
     let wanted = along(last.position, 120_f32.to_radians(), 2.0, TURN_S);
     let task = Task::new(begin, wanted, vec![], STEP_S, f64::INFINITY)?;
     let turn = Planner::default().plan(&craft, &task, None);
@@ -84,7 +94,8 @@ fn fly(thrust_to_weight: f64, wing: Option<WingModel>) -> Outcome<Flown> {
     let setup = Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
     let mut follower = Follower::new(&setup, FollowGains::default())?;
     follower.follow(track.clone(), 0);
-    let flight = setup.fly_on(&mut InProcess::new(setup.stack()?), Some(&mut follower), true, |_| {})?;
+    let flight =
+        setup.fly_on(&mut InProcess::new(setup.stack()?), Some(&mut follower), true, |_| {})?;
 
     let log = flight.log.ok_or("no log was kept")?;
     let (time_s, truth) = log.channel("truth.position_ned_m").ok_or("the log lacks the truth")?;

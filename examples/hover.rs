@@ -1,8 +1,9 @@
 //! Lesson 1, hover: the simplest flight.
 //!
-//! A [`Setup`] is all that a flight depends on: vehicle, arm (who flies), scenario (what, in which air, from which seed), and what moves
-//! the body. Flying it gives metrics and, where asked for, the log. Look at the two heights: where the vehicle is, which only a simulator
-//! knows, and where the flight code believes it to be. It holds the place that it believes in.
+//! A [`Setup`] is all that a flight depends on: vehicle, arm (who flies), scenario (what, in which
+//! air, from which seed), and what moves the body. Flying it gives metrics and, where asked for,
+//! the log. Look at the two heights: where the vehicle is, which only a simulator knows, and where
+//! the flight code believes it to be. It holds the place that it believes in.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example hover
@@ -26,15 +27,23 @@ fn fly(seed: u64) -> Outcome<Flight> {
 
 /// Times, s, and heights, m, of a channel of positions; NED points down.
 fn heights(log: &FlightLog, channel: &str) -> Outcome<Vec<[f64; 2]>> {
-    let (time_s, positions) = log.channel(channel).ok_or_else(|| format!("the log lacks {channel}"))?;
+    let (time_s, positions) =
+        log.channel(channel).ok_or_else(|| format!("the log lacks {channel}"))?;
     Ok(time_s.iter().enumerate().map(|(i, time_s)| [*time_s, -positions.row(i)[2]]).collect())
 }
 
 fn main() -> Outcome<()> {
     let Flight { metrics, log } = fly(1)?;
     let log = log.ok_or("no log was kept")?;
-    println!("error {:.3} m, tilt at most {:.1} deg", metrics.rmse_m, metrics.tilt_max_rad.to_degrees());
-    println!("sank by {:.3} m, climbed by {:.3} m\n", metrics.height_lost_m, metrics.height_gained_m);
+    println!(
+        "error {:.3} m, tilt at most {:.1} deg",
+        metrics.rmse_m,
+        metrics.tilt_max_rad.to_degrees()
+    );
+    println!(
+        "sank by {:.3} m, climbed by {:.3} m\n",
+        metrics.height_lost_m, metrics.height_gained_m
+    );
 
     println!("time s  height m  believed m");
     let believed = heights(&log, "estimate.position_ned_m")?;
@@ -47,7 +56,11 @@ fn main() -> Outcome<()> {
 
     println!("\nsources of the log:");
     for (name, source) in &log.sources {
-        println!("  {name:<16} {:>5} samples of {} channels", source.time_s.len(), source.channels.len());
+        println!(
+            "  {name:<16} {:>5} samples of {} channels",
+            source.time_s.len(),
+            source.channels.len()
+        );
     }
     Ok(())
 }
@@ -59,7 +72,11 @@ fn it_holds_its_place_and_says_so_in_the_log() -> Outcome<()> {
     assert!(metrics.tilt_max_rad < 0.2 && metrics.contact_s.is_none() && !metrics.not_finite);
     let heights = heights(&log.ok_or("no log was kept")?, "truth.position_ned_m")?;
     let lowest = heights.iter().map(|[_, height_m]| *height_m).fold(f64::INFINITY, f64::min);
-    assert!((30.0 - lowest - metrics.height_lost_m).abs() < 1e-9, "{lowest} m, {}", metrics.height_lost_m);
+    assert!(
+        (30.0 - lowest - metrics.height_lost_m).abs() < 1e-9,
+        "{lowest} m, {}",
+        metrics.height_lost_m
+    );
     Ok(())
 }
 

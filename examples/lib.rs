@@ -18,7 +18,8 @@
 //! | 13 | `what_wings_reach` | which accelerations wings add, and where that is worth something |
 //! | 14 | `a_plan_with_wings` | what wings buy where both plan ahead, planned and flown |
 //!
-//! Lessons 5 to 11 are the studies of `squirrel study` with fewer flights. Here is what lessons share.
+//! Lessons 5 to 11 are the studies of `squirrel study` with fewer flights. Here is what lessons
+//! share.
 
 use squirrel_study::statistics::Estimate;
 

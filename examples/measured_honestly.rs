@@ -1,9 +1,10 @@
 //! Lesson 4, measured honestly: what is a difference between two controllers worth?
 //!
-//! Three habits of every study here. *Paired seeds*: each arm flies the same obstacle, gusts and noise, so that luck cancels in the
-//! difference. *A phantom*: an arm that decides like `twcc_flat` on a plant that has no wings; what it gains, wings do not give.
-//! *An interval*: resampled from the pairs, to see what of a difference may be luck still. Look at the ratio of 2: `twcc_flat` beats
-//! `pc`, and most of that is not the wings'.
+//! Three habits of every study here. *Paired seeds*: each arm flies the same obstacle, gusts and
+//! noise, so that luck cancels in the difference. *A phantom*: an arm that decides like `twcc_flat`
+//! on a plant that has no wings; what it gains, wings do not give. *An interval*: resampled from
+//! the pairs, to see what of a difference may be luck still. Look at the ratio of 2: `twcc_flat`
+//! beats `pc`, and most of that is not the wings'.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example measured_honestly
@@ -37,7 +38,8 @@ fn errors_m(arm: Arm, thrust_to_weight: f64) -> Outcome<Vec<f64>> {
 struct Gains {
     /// `twcc_flat` over `pc`, seed by seed.
     paired: Estimate,
-    /// The same errors with seeds that do not match: what the interval would be on seeds of one's own.
+    /// The same errors with seeds that do not match: what the interval would be on seeds of one's
+    /// own.
     unpaired: Estimate,
     /// `phantom` over `pc`.
     phantom: Estimate,
@@ -77,9 +79,14 @@ fn scarce_thrust_is_where_wings_pay_and_pairs_show_it() -> Outcome<()> {
     assert!(scarce.wings.low > 0.1, "{}", percent(scarce.wings));
     assert!(scarce.phantom.value.abs() < 0.05, "{}", percent(scarce.phantom));
     let width = |gain: Estimate| gain.high - gain.low;
-    assert!(width(scarce.paired) < width(scarce.unpaired), "{} not paired", percent(scarce.unpaired));
+    assert!(
+        width(scarce.paired) < width(scarce.unpaired),
+        "{} not paired",
+        percent(scarce.unpaired)
+    );
 
-    // With thrust to spare the law alone is better than `pc`, and a comparison of two arms would call that the wings.
+    // With thrust to spare the law alone is better than `pc`, and a comparison of two arms would
+    // call that the wings.
     let plenty = gains(2.0)?;
     assert!(plenty.phantom.low > 0.0, "{}", percent(plenty.phantom));
     assert!(plenty.wings.value < 0.5 * plenty.paired.value, "{}", percent(plenty.wings));

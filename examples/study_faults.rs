@@ -1,7 +1,8 @@
 //! Lesson 11, `squirrel study faults`: one thing fails in flight; what becomes of it?
 //!
-//! Each trial draws a fault, its size and time, sensors, scenario and thrust. A flight is lost where it turns over or hits the ground; a fault
-//! is flagged where the flight code reports anything. A loss that nobody was told of is the worst outcome, so it has a column of its own.
+//! Each trial draws a fault, its size and time, sensors, scenario and thrust. A flight is lost
+//! where it turns over or hits the ground; a fault is flagged where the flight code reports
+//! anything. A loss that nobody was told of is the worst outcome, so it has a column of its own.
 //! Look at which fault is survived unnoticed: a wing that is stuck.
 //!
 //! ```sh
@@ -39,7 +40,10 @@ fn main() -> Outcome<()> {
     }
     let share = survived(&study);
     let [low, high] = [share.share.low, share.share.high].map(|share| 100.0 * share);
-    println!("\nsurvived, of those that can be: {} of {} ({low:.1} to {high:.1} %)", share.count, share.of);
+    println!(
+        "\nsurvived, of those that can be: {} of {} ({low:.1} to {high:.1} %)",
+        share.count, share.of
+    );
     Ok(())
 }
 

@@ -1,8 +1,10 @@
 //! Lesson 8, `squirrel study forest`: 400 m through trunks at 7 m/s.
 //!
-//! In the paper's forest 19 of 21 flights came through, and 4 and 2 of 21 with its rivals. Here trunks are solid, and a flight counts
-//! only where it keeps its height too. An arm owes its success to wings where it comes through more often than the same decisions
-//! without: than `phantom`, and `twcc_plus` than `pc_plus`. Look at who comes through: the better law does, with wings or without.
+//! In the paper's forest 19 of 21 flights came through, and 4 and 2 of 21 with its rivals. Here
+//! trunks are solid, and a flight counts only where it keeps its height too. An arm owes its
+//! success to wings where it comes through more often than the same decisions without: than
+//! `phantom`, and `twcc_plus` than `pc_plus`. Look at who comes through: the better law does, with
+//! wings or without.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example study_forest
@@ -29,7 +31,10 @@ fn study() -> Outcome<Forest> {
 
 fn main() -> Outcome<()> {
     let study = study()?;
-    println!("of {} flights      through  at its height  95 % interval  path m  trunks met", study.trials);
+    println!(
+        "of {} flights      through  at its height  95 % interval  path m  trunks met",
+        study.trials
+    );
     for row in &study.rows {
         let (arm, through, in_band) = (row.arm, row.through.count, row.in_band);
         let [low, high] = [in_band.share.low, in_band.share.high].map(|share| 100.0 * share);

@@ -1,8 +1,10 @@
 //! Lesson 6, `squirrel study steering`: the paper's figure of steering angles and speeds.
 //!
-//! Each cell of angle, speed and thrust is flown on two plants: in *paper mode* the plant's wing is the very network that `twcc_parnn`
-//! believes in, as in the paper's simulations; the *independent* plant has the vehicle's own membrane. A controller that is tested on
-//! its own model should do best there. Look at whether it does, and at what the network is worth over the flat plate (`twcc_flat`).
+//! Each cell of angle, speed and thrust is flown on two plants: in *paper mode* the plant's wing is
+//! the very network that `twcc_parnn` believes in, as in the paper's simulations; the *independent*
+//! plant has the vehicle's own membrane. A controller that is tested on its own model should do
+//! best there. Look at whether it does, and at what the network is worth over the flat plate
+//! (`twcc_flat`).
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example study_steering
@@ -30,8 +32,13 @@ fn main() -> Outcome<()> {
     println!("plant        ratio  arm          mean  {}", speeds.join("  "));
     for mean in study.means.iter().filter(|mean| mean.arm != "pc") {
         let (wings, ratio, arm) = (mean.wings.name(), mean.thrust_to_weight, mean.arm);
-        let by_speed: Vec<String> = mean.ratio_by_speed.iter().map(|ratio| format!("{ratio:>7.3}")).collect();
-        println!("{wings:<12} {ratio:>5.1}  {arm:<10} {:>6.3}  {}", mean.ratio, by_speed.join("  "));
+        let by_speed: Vec<String> =
+            mean.ratio_by_speed.iter().map(|ratio| format!("{ratio:>7.3}")).collect();
+        println!(
+            "{wings:<12} {ratio:>5.1}  {arm:<10} {:>6.3}  {}",
+            mean.ratio,
+            by_speed.join("  ")
+        );
     }
     println!();
     for words in steering::words(&study) {
@@ -44,8 +51,9 @@ fn main() -> Outcome<()> {
 fn the_learned_model_is_worth_little_more_than_the_plate() -> Outcome<()> {
     let study = study()?;
     let ratio = |wings, thrust_to_weight: f64, arm: &str| {
-        let is =
-            |m: &&steering::Mean| m.wings == wings && m.thrust_to_weight == thrust_to_weight && m.arm == arm;
+        let is = |m: &&steering::Mean| {
+            m.wings == wings && m.thrust_to_weight == thrust_to_weight && m.arm == arm
+        };
         study.means.iter().find(is).map(|mean| mean.ratio).ok_or("the arm did not fly")
     };
     for wings in steering::Wings::ALL {

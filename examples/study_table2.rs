@@ -1,9 +1,12 @@
-//! Lesson 9, `squirrel study table2`: how well do models of the wing force predict flights that they have not seen?
+//! Lesson 9, `squirrel study table2`: how well do models of the wing force predict flights that
+//! they have not seen?
 //!
-//! Models learn from the specific force in random flights with spread wings and are judged on four other sets: faster and in wind (t1), as in
-//! training (t2), in wind (t3), slowly (t4). Errors are to the true force, which only a simulator knows, and to the labels, which
-//! is all that a flight has. Five passes of one trial show who learns fast: look at the models that correct the flat plate (`parnn`,
-//! `scaled_flat_plate`) beside those that learn a force from nothing. What 800 passes make of them is in docs/guide/learn.md.
+//! Models learn from the specific force in random flights with spread wings and are judged on four
+//! other sets: faster and in wind (t1), as in training (t2), in wind (t3), slowly (t4). Errors are
+//! to the true force, which only a simulator knows, and to the labels, which is all that a flight
+//! has. Five passes of one trial show who learns fast: look at the models that correct the flat
+//! plate (`parnn`, `scaled_flat_plate`) beside those that learn a force from nothing. What 800
+//! passes make of them is in docs/guide/learn.md.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example study_table2
@@ -37,7 +40,10 @@ fn columns(numbers: impl IntoIterator<Item = f64>) -> String {
 
 fn main() -> Outcome<()> {
     let study = study()?;
-    println!("error to the true force after {TRAINING_S} s of flights and {} passes, N", study.epochs);
+    println!(
+        "error to the true force after {TRAINING_S} s of flights and {} passes, N",
+        study.epochs
+    );
     let sets: Vec<String> = study.sets.iter().map(|set| format!("{:>10}", set.set)).collect();
     println!("{:<18}{}", "model", sets.concat());
     let models = study.rows.iter().filter(|row| row.training_s == TRAINING_S && row.set == "t1");

@@ -1,9 +1,10 @@
 //! Lesson 7, `squirrel study table3`: the paper's real flights.
 //!
-//! The paper flew three trials an arm, measured errors by satellite fix and barometer, and found a gain of 13.1 %; it does not say how
-//! much thrust there was. So the study flies several ratios and gives both errors, the true one and the one that such a log has. Look
-//! for the ratio at which `pc` sinks and the gain is the paper's. Three trials are too few: an interval that is resampled from three
-//! pairs holds no more than those three saw.
+//! The paper flew three trials an arm, measured errors by satellite fix and barometer, and found a
+//! gain of 13.1 %; it does not say how much thrust there was. So the study flies several ratios and
+//! gives both errors, the true one and the one that such a log has. Look for the ratio at which
+//! `pc` sinks and the gain is the paper's. Three trials are too few: an interval that is resampled
+//! from three pairs holds no more than those three saw.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example study_table3
@@ -46,10 +47,17 @@ fn the_papers_gain_and_its_sinking_drone_are_those_of_scarce_thrust() -> Outcome
     let study = study()?;
     let row = |ratio: f64, arm: &str| {
         let point = study.points.iter().find(|point| point.thrust_to_weight == ratio);
-        point.and_then(|point| point.rows.iter().find(|row| row.arm == arm)).ok_or("the arm did not fly")
+        point
+            .and_then(|point| point.rows.iter().find(|row| row.arm == arm))
+            .ok_or("the arm did not fly")
     };
     let gain = |ratio| row(ratio, "twcc_flat").map(|row| row.gain.value);
-    assert!(gain(1.2)? > PAPER_GAIN && PAPER_GAIN > gain(1.3)?, "{} and {}", gain(1.2)?, gain(1.3)?);
+    assert!(
+        gain(1.2)? > PAPER_GAIN && PAPER_GAIN > gain(1.3)?,
+        "{} and {}",
+        gain(1.2)?,
+        gain(1.3)?
+    );
     assert!(row(1.2, "pc")?.height_lost_m > 3.0 && row(2.0, "pc")?.height_lost_m < 1.0);
     // A log errs, but not by what is to be shown.
     let pc = row(1.2, "pc")?;

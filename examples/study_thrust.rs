@@ -1,9 +1,10 @@
 //! Lesson 5, `squirrel study thrust`: what wings are worth as thrust gets scarce.
 //!
-//! A study is a [`Plan`] (vehicle, arms, trials, seed) and a [`Keep`] (a folder from which it goes on after a stop, or nothing, as here).
-//! The avoidance manoeuvre is flown at several effective thrust-to-weight ratios, set by a limit or by an emptier battery. The fair
-//! comparison is `twcc_plus`, the best controller here, with `pc_plus`, the same with its wings folded. Look at how the
-//! gain of wings shrinks from a fifth to a fiftieth as thrust grows.
+//! A study is a [`Plan`] (vehicle, arms, trials, seed) and a [`Keep`] (a folder from which it goes
+//! on after a stop, or nothing, as here). The avoidance manoeuvre is flown at several effective
+//! thrust-to-weight ratios, set by a limit or by an emptier battery. The fair comparison is
+//! `twcc_plus`, the best controller here, with `pc_plus`, the same with its wings folded. Look at
+//! how the gain of wings shrinks from a fifth to a fiftieth as thrust grows.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example study_thrust
@@ -49,7 +50,8 @@ fn main() -> Outcome<()> {
 fn wings_are_worth_most_where_thrust_is_scarce() -> Outcome<()> {
     let study = study()?;
     let gain = |ratio: f64| {
-        let point = study.points.iter().find(|p| p.series == "limit" && p.thrust_to_weight == ratio);
+        let point =
+            study.points.iter().find(|p| p.series == "limit" && p.thrust_to_weight == ratio);
         let row = point.and_then(|point| point.rows.iter().find(|row| row.arm == "twcc_plus"));
         row.and_then(|row| row.gain_over_pc_plus).ok_or("the point was not flown")
     };

@@ -1,9 +1,10 @@
 //! Lesson 12, the drone that sank: what a flight log knows that the simulation does not.
 //!
-//! In the paper's flights the drone without wings sinks while it avoids an obstacle, and the authors suspect the battery.
-//! Here that suspicion is the truth, hidden in a "measured" drone whose rotors slow down as its voltage falls. The simulation
-//! does not know. The gap workflow finds what is missing, names it, adds it to the vehicle file, and the simulated drone sinks
-//! like the measured one, in flights that nobody has fitted.
+//! In the paper's flights the drone without wings sinks while it avoids an obstacle, and the
+//! authors suspect the battery. Here that suspicion is the truth, hidden in a "measured" drone
+//! whose rotors slow down as its voltage falls. The simulation does not know. The gap workflow
+//! finds what is missing, names it, adds it to the vehicle file, and the simulated drone sinks like
+//! the measured one, in flights that nobody has fitted.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example the_drone_that_sank
@@ -19,7 +20,8 @@ use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};
 
-/// What only the measured drone has: the hidden effect, and rotors that are off by half of their tolerance.
+/// What only the measured drone has: the hidden effect, and rotors that are off by half of their
+/// tolerance.
 const SECRETS: [(&str, &str); 2] = [
     ("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]"),
     ("value = 6.0e-7", "value = 5.97e-7"),
@@ -49,12 +51,15 @@ struct Sink {
 
 /// The drone that flies in the lesson's reality; its sensors have noise of their own.
 fn measured() -> Outcome<VehicleFile> {
-    let text = SECRETS.iter().fold(SQUIRREL_TOML.to_owned(), |text, (from, to)| text.replacen(from, to, 1));
+    let text = SECRETS
+        .iter()
+        .fold(SQUIRREL_TOML.to_owned(), |text, (from, to)| text.replacen(from, to, 1));
     let mut vehicle = VehicleFile::parse(&text, "measured")?;
     // Attitude comes from another autopilot, as in most logs.
     vehicle.estimator = Estimator::External;
     let sensors = &mut vehicle.sensors;
-    for timing in [&mut sensors.imu.timing, &mut sensors.attitude.timing, &mut sensors.gnss.timing] {
+    for timing in [&mut sensors.imu.timing, &mut sensors.attitude.timing, &mut sensors.gnss.timing]
+    {
         timing.seed = Some(42);
     }
     Ok(vehicle)
@@ -69,7 +74,8 @@ fn fly(vehicle: &VehicleFile, scenario: &str, seed: u64, charge: f64) -> Outcome
         // It sinks: no rung of the ladder near the ground.
         table.heights_m = vec![1.5, 1.2, 0.9];
     }
-    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    let setup =
+        Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
     let flight = setup.fly(true, |_| {})?;
     Ok((flight.log.ok_or("the flight has no log")?, flight.metrics.height_lost_m))
 }
@@ -78,7 +84,12 @@ fn fly(vehicle: &VehicleFile, scenario: &str, seed: u64, charge: f64) -> Outcome
 fn height_error_m(a: &FlightLog, b: &FlightLog) -> Outcome<f64> {
     let heights = |log: &FlightLog| -> Outcome<Vec<f64>> {
         let (_, position) = log.channel("gnss.position_ned_m").ok_or("the log has no position")?;
-        Ok(position.values.chunks_exact(3).map(|p| -p[2]).filter(|height| height.is_finite()).collect())
+        Ok(position
+            .values
+            .chunks_exact(3)
+            .map(|p| -p[2])
+            .filter(|height| height.is_finite())
+            .collect())
     };
     let (a, b) = (heights(a)?, heights(b)?);
     let squares: Vec<f64> = a.iter().zip(&b).map(|(a, b)| (a - b).powi(2)).collect();
@@ -94,12 +105,14 @@ fn story() -> Outcome<Story> {
     for seed in HELD_OUT {
         avoidance.push((format!("avoid-{seed}"), fly(&measured, "avoid", seed, LOW)?));
     }
-    let logs: Vec<_> = avoidance.iter().map(|(name, (log, _))| (name.clone(), log.clone())).collect();
+    let logs: Vec<_> =
+        avoidance.iter().map(|(name, (log, _))| (name.clone(), log.clone())).collect();
 
     // Find: where do these flights disagree with the vehicle file?
     let finding = find(&simulated, &logs)?;
 
-    // Name: two flights that show every effect, on a fuller and an emptier battery; the avoidance flights prove it.
+    // Name: two flights that show every effect, on a fuller and an emptier battery; the avoidance
+    // flights prove it.
     let mut excitation = Vec::new();
     for (seed, charge) in [(1, 0.7), (2, LOW)] {
         excitation.push((format!("excite-{seed}"), fly(&measured, "excite_rich", seed, charge)?.0));
@@ -109,7 +122,8 @@ fn story() -> Outcome<Story> {
     // Add: a new vehicle file.
     let names: Vec<String> = excitation.iter().map(|(name, _)| name.clone()).collect();
     let patch = add(&simulated, &diagnosis, &names)?;
-    let patched = VehicleFile { estimator: Estimator::External, ..VehicleFile::parse(&patch, "patched")? };
+    let patched =
+        VehicleFile { estimator: Estimator::External, ..VehicleFile::parse(&patch, "patched")? };
 
     // Shrink: fly the avoidance again in closed loop, without and with the effect.
     let mut flights = Vec::new();
@@ -131,17 +145,23 @@ fn main() -> Outcome<()> {
     println!("find: residual force of the avoidance flights x {x:.3} N, y {y:.3} N, z {z:.3} N\n");
     println!("name: {}\n", verdict.words);
     println!("add:\n{}", squirrel_gap::difference(SQUIRREL_TOML, &patch));
-    println!("shrink:   sinks by, m                       height error against the measured flight, m");
+    println!(
+        "shrink:   sinks by, m                       height error against the measured flight, m"
+    );
     println!("flight    measured  simulated  with effect  simulated  with effect");
     for Sink { seed, lost_m: [measured, before, after], error_m: [error, left] } in flights {
-        println!("avoid {seed:<3} {measured:>8.2}  {before:>9.2}  {after:>11.2}  {error:>9.3}  {left:>11.3}");
+        println!(
+            "avoid {seed:<3} {measured:>8.2}  {before:>9.2}  {after:>11.2}  {error:>9.3}  {left:>11.3}"
+        );
     }
     Ok(())
 }
 
 #[test]
 fn the_sink_is_found_named_added_and_gone() {
-    let Ok(Story { finding, verdict, patch, flights }) = story() else { panic!("the story cannot be told") };
+    let Ok(Story { finding, verdict, patch, flights }) = story() else {
+        panic!("the story cannot be told")
+    };
     let [x, y, z] = finding.residual.force_body_rms_n;
     assert!(z > 3.0 * x.max(y), "the gap is along z: {:?}", finding.residual.force_body_rms_n);
     let names: Vec<&str> = verdict.effects.iter().map(|effect| effect.name).collect();
@@ -154,9 +174,16 @@ fn the_sink_is_found_named_added_and_gone() {
     assert!(patch.contains("[effects.battery_sag]"));
     // Each flight has noise of its own, so that two flights of one vehicle differ, too.
     for Sink { seed, lost_m: [measured, before, _], error_m: [error, left] } in &flights {
-        assert!(*measured > before + 1.0, "flight {seed} sinks {measured} m, {before} m in simulation");
-        assert!(*left < 0.5 * error, "flight {seed}: height error {error} m, with the effect {left} m");
+        assert!(
+            *measured > before + 1.0,
+            "flight {seed} sinks {measured} m, {before} m in simulation"
+        );
+        assert!(
+            *left < 0.5 * error,
+            "flight {seed}: height error {error} m, with the effect {left} m"
+        );
     }
-    let mean = |which: usize| flights.iter().map(|f| f.lost_m[which]).sum::<f64>() / flights.len() as f64;
+    let mean =
+        |which: usize| flights.iter().map(|f| f.lost_m[which]).sum::<f64>() / flights.len() as f64;
     assert!((mean(2) / mean(0) - 1.0).abs() < 0.15, "sinks {} m, measured {} m", mean(2), mean(0));
 }

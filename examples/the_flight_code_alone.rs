@@ -1,9 +1,10 @@
 //! Lesson 3, the flight code alone: no simulator, no clock, no allocation.
 //!
-//! [`Stack`] is what does not change in flight: vehicle, gains, mission. [`StackState`] is all that does, a plain struct. A step is a
-//! function of state and sensor frame, and gives commands with every term behind them. So an autopilot calls it 300 times a second with
-//! what its sensors said since; so a log is replayed bit for bit; and a state that was copied goes on as the original. Look at what
-//! happens when a sensor speaks nonsense, and when it goes silent.
+//! [`Stack`] is what does not change in flight: vehicle, gains, mission. [`StackState`] is all that
+//! does, a plain struct. A step is a function of state and sensor frame, and gives commands with
+//! every term behind them. So an autopilot calls it 300 times a second with what its sensors said
+//! since; so a log is replayed bit for bit; and a state that was copied goes on as the original.
+//! Look at what happens when a sensor speaks nonsense, and when it goes silent.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example the_flight_code_alone
@@ -14,16 +15,21 @@ use squirrel_core::estimate::navigator::Navigation;
 use squirrel_core::frames::{In, Rotation};
 use squirrel_core::guidance::mission::Mission;
 use squirrel_core::nalgebra::Vector3;
-use squirrel_core::stack::{Gnss, Imu, SensorFrame, Stack, StackOutput, StackParameters, StackState};
+use squirrel_core::stack::{
+    Gnss, Imu, SensorFrame, Stack, StackOutput, StackParameters, StackState,
+};
 use squirrel_examples::Outcome;
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// The flight code of the shipped vehicle. An embedded user has these numbers in flash (docs/embedding.md).
+/// The flight code of the shipped vehicle. An embedded user has these numbers in flash
+/// (docs/embedding.md).
 fn stack() -> Outcome<Stack> {
     let file = VehicleFile::squirrel();
     // Attitude comes with the frame, so that a frame can be made up by hand.
-    let parameters =
-        StackParameters { navigation: Navigation::external(), ..file.control.ok_or("no [control]")? };
+    let parameters = StackParameters {
+        navigation: Navigation::external(),
+        ..file.control.ok_or("no [control]")?
+    };
     let hold = Mission::Hover { position: In::new(Vector3::new(0.0, 0.0, -10.0)) };
     Ok(Stack::new(file.vehicle.cast()?, parameters, hold)?)
 }
@@ -77,7 +83,10 @@ fn main() -> Outcome<()> {
     println!("is every bit the same? {}", on == again && state == thawed);
 
     let output = stack.step(&mut state, &frame_with(600, Some(nonsense())));
-    println!("\na gyro that is no number: {} rejected, {:?}", output.rejected, output.failsafe.mode);
+    println!(
+        "\na gyro that is no number: {} rejected, {:?}",
+        output.rejected, output.failsafe.mode
+    );
     let silent = (601..900).map(|tick| stack.step(&mut state, &frame_with(tick, None)));
     if let Some(output) = silent.last() {
         println!("silent for a second: {:?}, {:?}", output.failsafe.mode, output.failsafe.reason);

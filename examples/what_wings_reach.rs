@@ -1,10 +1,12 @@
 //! Lesson 13, `squirrel reach`: what wings add to the accelerations that a vehicle can reach.
 //!
-//! A [`Question`] is mass, thrust, limits of tilt, a velocity and a model of the wings; [`Reach`] answers with the support function: the
-//! largest acceleration along a direction, with its thrust, attitude and wings, and a bound that nothing exceeds. Spread wings push against the
-//! motion, whatever one wants. In level flight that brakes and hardly lifts; the faster the vehicle sinks, the more they lift, as a
-//! parachute does. Look at the descent that doubles what the rotors can do upwards, and at braking with height held, which wings improve
-//! only where thrust is scarce: at 30 deg of tilt it is `g tan(30 deg)` whatever carries the weight.
+//! A [`Question`] is mass, thrust, limits of tilt, a velocity and a model of the wings; [`Reach`]
+//! answers with the support function: the largest acceleration along a direction, with its thrust,
+//! attitude and wings, and a bound that nothing exceeds. Spread wings push against the motion,
+//! whatever one wants. In level flight that brakes and hardly lifts; the faster the vehicle sinks,
+//! the more they lift, as a parachute does. Look at the descent that doubles what the rotors can do
+//! upwards, and at braking with height held, which wings improve only where thrust is scarce: at 30
+//! deg of tilt it is `g tan(30 deg)` whatever carries the weight.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example what_wings_reach
@@ -63,7 +65,8 @@ fn wings_lift_who_sinks_and_brake_who_lacks_thrust() -> Outcome<()> {
     let [level, sinking] = [gain(0.0)?, gain(37.0)?];
     assert!(level < 1.3 && sinking > 1.9, "{level} {sinking}");
     for (ratio, wings_help) in [(1.1, true), (1.3, false), (2.0, false)] {
-        let braking = reach(0.0, ratio)?.extremes().braking_level_m_s2.ok_or("height cannot be held")?;
+        let braking =
+            reach(0.0, ratio)?.extremes().braking_level_m_s2.ok_or("height cannot be held")?;
         assert_eq!(braking.ratio() > 1.01, wings_help, "{ratio}: {braking:?}");
     }
     // The bound proves it: no attitude does better.

@@ -1,9 +1,10 @@
 //! Lesson 2, wings or not: the avoidance manoeuvre in which a drone without wings sinks.
 //!
-//! The drone flies 7.3 m/s towards an obstacle and turns away from it by 110 to 130 deg, as in the paper's real flights, and its rotors
-//! may push with 1.2 times its weight: at 34 deg of tilt all of that goes into holding height. The conventional controller (`pc`) tilts
-//! on and pays in height; the paper's (`twcc_flat`) opens the wings and lets the air brake. Look at the height lost, at the error, and
-//! at how little is left of either difference where thrust is not scarce.
+//! The drone flies 7.3 m/s towards an obstacle and turns away from it by 110 to 130 deg, as in the
+//! paper's real flights, and its rotors may push with 1.2 times its weight: at 34 deg of tilt all
+//! of that goes into holding height. The conventional controller (`pc`) tilts on and pays in
+//! height; the paper's (`twcc_flat`) opens the wings and lets the air brake. Look at the height
+//! lost, at the error, and at how little is left of either difference where thrust is not scarce.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example wings_or_not
@@ -20,7 +21,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 fn avoid(arm: Arm, thrust_to_weight: f64, seed: u64) -> Outcome<Metrics> {
     let thrust_to_weight = Some(thrust_to_weight);
     let scenario = Scenario { seed, thrust_to_weight, ..Scenario::find("avoid")? };
-    let setup = Setup { vehicle: VehicleFile::squirrel(), arm, scenario, integrator: Integrator::Rk4 };
+    let setup =
+        Setup { vehicle: VehicleFile::squirrel(), arm, scenario, integrator: Integrator::Rk4 };
     Ok(setup.fly(false, |_| {})?.metrics)
 }
 
@@ -30,7 +32,10 @@ fn main() -> Outcome<()> {
         for arm in [Arm::Pc, Arm::TwccFlat] {
             let m = avoid(arm, ratio, 3)?;
             let (name, lost_m) = (arm.name(), m.height_lost_m);
-            println!("{ratio:>13.1}  {name:<9} {:>8.2}  {lost_m:>10.2}  {:>12.2}", m.rmse_m, m.wings_open_s);
+            println!(
+                "{ratio:>13.1}  {name:<9} {:>8.2}  {lost_m:>10.2}  {:>12.2}",
+                m.rmse_m, m.wings_open_s
+            );
         }
     }
     Ok(())

@@ -1,7 +1,8 @@
 //! The lists of steps.
 //!
-//! Everything is built in the release profile: `clippy` and `doc` share the metadata of the dependencies and, with `test`,
-//! the build scripts and procedural macros; `test`, `bench` and the demo share the libraries.
+//! Everything is built in the release profile: `clippy` and `doc` share the metadata of the
+//! dependencies and, with `test`, the build scripts and procedural macros; `test`, `bench` and the
+//! demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
 use crate::{effect, firmware, python, thumb, weights, wheel};
@@ -61,8 +62,9 @@ pub(crate) fn test(_: &[String]) -> Result<(), String> {
     run(&steps)
 }
 
-/// `cargo xtask bench`: whole workspace, so that features and thus the built libraries are those of `test`; benches by
-/// name, because the test harness of the libraries does not know criterion's arguments.
+/// `cargo xtask bench`: whole workspace, so that features and thus the built libraries are those of
+/// `test`; benches by name, because the test harness of the libraries does not know criterion's
+/// arguments.
 pub(crate) fn bench(arguments: &[String]) -> Result<(), String> {
     let mut command = cargo()?;
     command.args(["bench", "--workspace", "--locked"]);
@@ -97,7 +99,15 @@ pub(crate) fn pictures(_: &[String]) -> Result<(), String> {
 
 /// `cargo xtask gap-bench`: the blind bench of the gap workflow on the program as it is built now.
 pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
-    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli", "-p", "hidden-effects"]))?;
+    call(cargo()?.args([
+        "build",
+        "--release",
+        "--locked",
+        "-p",
+        "squirrel-cli",
+        "-p",
+        "hidden-effects",
+    ]))?;
     let built = target_directory()?.join("release");
     let mut command = Command::new(built.join("hidden-effects"));
     call(command.args(["bench", "--squirrel"]).arg(built.join("squirrel")).args(arguments))
@@ -105,7 +115,9 @@ pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
 
 /// The files in the crates' `benches` folders, without extension, in order.
 fn bench_names(root: &Path) -> Result<Vec<String>, String> {
-    let list = |path: &Path| std::fs::read_dir(path).map_err(|error| format!("{}: {error}", path.display()));
+    let list = |path: &Path| {
+        std::fs::read_dir(path).map_err(|error| format!("{}: {error}", path.display()))
+    };
     let mut names = Vec::new();
     for package in list(&root.join("crates"))? {
         let folder = package.map_err(|error| error.to_string())?.path().join("benches");
@@ -114,7 +126,9 @@ fn bench_names(root: &Path) -> Result<Vec<String>, String> {
         }
         for file in list(&folder)? {
             let path = file.map_err(|error| error.to_string())?.path();
-            if let (Some("rs"), Some(stem)) = (path.extension().and_then(|e| e.to_str()), path.file_stem()) {
+            if let (Some("rs"), Some(stem)) =
+                (path.extension().and_then(|e| e.to_str()), path.file_stem())
+            {
                 names.push(stem.to_string_lossy().into_owned());
             }
         }
@@ -123,12 +137,14 @@ fn bench_names(root: &Path) -> Result<Vec<String>, String> {
     Ok(names)
 }
 
-/// What `cargo run` flies, by the program that `test` has built: `cargo run` alone would build it again with the features
-/// of fewer crates.
+/// What `cargo run` flies, by the program that `test` has built: `cargo run` alone would build it
+/// again with the features of fewer crates.
 fn demo() -> Result<String, String> {
     let folder = target_directory()?;
-    let program = folder.join("release").join("squirrel").with_extension(std::env::consts::EXE_EXTENSION);
-    call(Command::new(program).args(["demo", "--out"]).arg(folder.join("demo"))).map(|()| String::new())
+    let program =
+        folder.join("release").join("squirrel").with_extension(std::env::consts::EXE_EXTENSION);
+    call(Command::new(program).args(["demo", "--out"]).arg(folder.join("demo")))
+        .map(|()| String::new())
 }
 
 /// rustfmt and clippy, which rustup's minimal profile leaves out.
@@ -145,8 +161,8 @@ fn tools() -> Result<String, String> {
     Ok(format!("added {}", missing.join(" ")))
 }
 
-/// cargo-deny where it is installed. Building it takes minutes and its advisories come over the network, so a fresh machine
-/// does without: `xtask/tests` checks licences and dependencies there.
+/// cargo-deny where it is installed. Building it takes minutes and its advisories come over the
+/// network, so a fresh machine does without: `xtask/tests` checks licences and dependencies there.
 fn deny() -> Result<String, String> {
     if !succeeds(Command::new("cargo").args(["deny", "--version"])) {
         return Ok(said("skipped: no cargo-deny (cargo install --locked cargo-deny@0.20.2)"));

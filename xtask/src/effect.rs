@@ -1,5 +1,5 @@
-//! One more effect, as `docs/adding-an-effect.md` adds it, in a copy of the repository: that page is true, and an effect is a file
-//! and a line.
+//! One more effect, as `docs/adding-an-effect.md` adds it, in a copy of the repository: that page
+//! is true, and an effect is a file and a line.
 
 use crate::run::{call, output, root, target_directory};
 use std::fs;
@@ -11,7 +11,8 @@ const PAGE: &str = "docs/adding-an-effect.md";
 /// Below it lies the effect, whose file has its name.
 const EFFECTS: &str = "crates/squirrel-core/src/effects/";
 const LIST: &str = "docs/guide/effects.md";
-/// Most lines that the page may add beside its new files: two of the compiler, two of the catalogues.
+/// Most lines that the page may add beside its new files: two of the compiler, two of the
+/// catalogues.
 const LINES_MAX: usize = 4;
 /// What is asked of the copy, by module. The last two ask for one effect by `SQUIRREL_EFFECT`.
 const TESTS: [&str; 4] = ["effects::", "vehicle::", "seen_by_find::", "twins::"];
@@ -49,7 +50,10 @@ pub(crate) fn step() -> Result<String, String> {
     )?;
     let since = modified(&root.join(PAGE))?;
     for path in page.paths() {
-        keep_time(&copy.join(path), modified(&root.join(path)).map_or(since, |time| time.max(since)))?;
+        keep_time(
+            &copy.join(path),
+            modified(&root.join(path)).map_or(since, |time| time.max(since)),
+        )?;
     }
     tested(&copy, name)?;
     if !read(&copy.join(LIST))?.contains(&format!("| `{name}` |")) {
@@ -58,16 +62,20 @@ pub(crate) fn step() -> Result<String, String> {
     Ok(format!("{name} in {} lines and {} files", lines.len(), page.files.len()))
 }
 
-/// Runs the tests in the copy. The Python package has none of that name, but needs all the others, so that the libraries beside them
-/// are built with the features that the whole workspace has, and are there already.
+/// Runs the tests in the copy. The Python package has none of that name, but needs all the others,
+/// so that the libraries beside them are built with the features that the whole workspace has, and
+/// are there already.
 fn tested(copy: &Path, name: &str) -> Result<(), String> {
     let mut command = Command::new("cargo");
     command.current_dir(copy).env("CARGO_TARGET_DIR", target_directory()?);
     command.env("SQUIRREL_EFFECT", name).env("SQUIRREL_EFFECTS_WRITE", "1");
     command.args(["test", "--release", "--locked"]);
-    command.args(["squirrel-py", "squirrel-sim", "hidden-effects"].iter().flat_map(|name| ["-p", name]));
+    command.args(
+        ["squirrel-py", "squirrel-sim", "hidden-effects"].iter().flat_map(|name| ["-p", name]),
+    );
     command.args(["--test", "it", "--test", "batch", "--"]).args(TESTS);
-    let done = command.stderr(Stdio::inherit()).output().map_err(|error| format!("cargo: {error}"))?;
+    let done =
+        command.stderr(Stdio::inherit()).output().map_err(|error| format!("cargo: {error}"))?;
     let said = String::from_utf8_lossy(&done.stdout);
     eprint!("{said}");
     if !done.status.success() {
@@ -91,8 +99,11 @@ impl Page {
         let mut lines = text.lines();
         while let Some(line) = lines.next() {
             let Some(head) = line.strip_prefix("```") else { continue };
-            let block: String =
-                lines.by_ref().take_while(|line| *line != "```").flat_map(|line| [line, "\n"]).collect();
+            let block: String = lines
+                .by_ref()
+                .take_while(|line| *line != "```")
+                .flat_map(|line| [line, "\n"])
+                .collect();
             match head.split_once(' ') {
                 Some((_, path)) => page.files.push((path.to_owned(), block)),
                 None if head == "diff" => page.patch += &block,
@@ -120,14 +131,15 @@ impl Page {
     }
 }
 
-/// Copies what git knows, and what it does not ignore, as it lies there now. Times are kept, so that cargo builds again what the
-/// page changes and no more.
+/// Copies what git knows, and what it does not ignore, as it lies there now. Times are kept, so
+/// that cargo builds again what the page changes and no more.
 fn copied(root: &Path, copy: &Path) -> Result<(), String> {
     if copy.exists() {
         fs::remove_dir_all(copy).map_err(|error| format!("{}: {error}", copy.display()))?;
     }
     let list = ["ls-files", "--cached", "--others", "--exclude-standard"];
-    let names = output(Command::new("git").current_dir(root).args(list)).ok_or("git ls-files: failed")?;
+    let names =
+        output(Command::new("git").current_dir(root).args(list)).ok_or("git ls-files: failed")?;
     for name in names.lines() {
         let (from, to) = (root.join(name), copy.join(name));
         // One that was taken away and is not committed is none.
@@ -140,12 +152,15 @@ fn copied(root: &Path, copy: &Path) -> Result<(), String> {
 }
 
 fn modified(path: &Path) -> Result<SystemTime, String> {
-    path.metadata().and_then(|is| is.modified()).map_err(|error| format!("{}: {error}", path.display()))
+    path.metadata()
+        .and_then(|is| is.modified())
+        .map_err(|error| format!("{}: {error}", path.display()))
 }
 
 fn keep_time(path: &Path, time: SystemTime) -> Result<(), String> {
     let file = fs::File::options().write(true).open(path);
-    file.and_then(|file| file.set_modified(time)).map_err(|error| format!("{}: {error}", path.display()))
+    file.and_then(|file| file.set_modified(time))
+        .map_err(|error| format!("{}: {error}", path.display()))
 }
 
 fn read(path: &Path) -> Result<String, String> {
@@ -172,7 +187,10 @@ mod tests {
         assert_eq!(page.files[0].1, "mod a;\n\n");
         assert_eq!(page.files.len(), 1);
         assert_eq!(page.changed_lines(), ["+z", "-w", "+u"]);
-        assert_eq!(page.paths().collect::<Vec<_>>(), ["crates/squirrel-core/src/effects/tail.rs", "x", "v"]);
+        assert_eq!(
+            page.paths().collect::<Vec<_>>(),
+            ["crates/squirrel-core/src/effects/tail.rs", "x", "v"]
+        );
         assert!(page.patch.starts_with("--- a/x\n") && page.patch.ends_with("+u\n"));
     }
 
@@ -182,7 +200,10 @@ mod tests {
         let page = read(&folder.join(PAGE)).unwrap();
         let page = Page::of(&page);
         let name = page.effect().unwrap();
-        assert!(!folder.join(EFFECTS).join(format!("{name}.rs")).exists(), "{name} is there already");
+        assert!(
+            !folder.join(EFFECTS).join(format!("{name}.rs")).exists(),
+            "{name} is there already"
+        );
         assert_eq!(page.files.len(), 2, "an effect and its twin");
         assert_eq!(page.changed_lines().len(), LINES_MAX);
     }

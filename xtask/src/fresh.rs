@@ -1,4 +1,5 @@
-//! What a newcomer sees: the README's two commands in a clone of HEAD that has nothing built and nothing beside it.
+//! What a newcomer sees: the README's two commands in a clone of HEAD that has nothing built and
+//! nothing beside it.
 
 use crate::run::{call, root};
 use std::process::Command;
@@ -13,7 +14,9 @@ const NOT_HIS: [&str; 5] =
 /// `cargo xtask clean-fresh`; the clone stays where a command fails.
 pub(crate) fn chore(_: &[String]) -> Result<(), String> {
     let clone = std::env::temp_dir().join(format!("squirrel-fresh-{}", std::process::id()));
-    call(Command::new("git").args(["clone", "--quiet", "--no-hardlinks"]).arg(root()?).arg(&clone))?;
+    call(
+        Command::new("git").args(["clone", "--quiet", "--no-hardlinks"]).arg(root()?).arg(&clone),
+    )?;
     for arguments in COMMANDS {
         eprintln!("\n==> cargo {} in {}", arguments.join(" "), clone.display());
         let mut command = Command::new("cargo");

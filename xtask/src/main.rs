@@ -1,6 +1,7 @@
 //! The repository's chores: `cargo xtask CHORE`.
 //!
-//! No dependency, so that the first command on a fresh machine starts within seconds. Talk goes to stderr.
+//! No dependency, so that the first command on a fresh machine starts within seconds. Talk goes to
+//! stderr.
 
 mod chores;
 mod effect;
@@ -21,7 +22,12 @@ type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<
 const CHORES: [Chore; 13] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
-    ("bench", "[ARGUMENT...]", "all criterion benches; arguments go to criterion (--quick)", chores::bench),
+    (
+        "bench",
+        "[ARGUMENT...]",
+        "all criterion benches; arguments go to criterion (--quick)",
+        chores::bench,
+    ),
     (
         "gap-bench",
         "--cases N|--full --seed S [--json FILE]",

@@ -1,5 +1,5 @@
-//! A report as a picture, to look at it where there is no browser window: any report, or that of a hidden effect which is
-//! made, flown and diagnosed for it.
+//! A report as a picture, to look at it where there is no browser window: any report, or that of a
+//! hidden effect which is made, flown and diagnosed for it.
 
 use crate::run::{call, cargo, succeeds, target_directory};
 use std::path::{Path, PathBuf};
@@ -27,7 +27,8 @@ const GAP_CASE: [&str; 7] = ["make", "--set", "single", "--n", "1", "--seed", "5
 /// Panels of a gap report.
 const GAP_PANELS: std::ops::RangeInclusive<char> = 'a'..='h';
 
-/// `cargo xtask report-png [HTML [PNG [WIDTHxHEIGHT]]]`; without a file, the gap report of a hidden effect.
+/// `cargo xtask report-png [HTML [PNG [WIDTHxHEIGHT]]]`; without a file, the gap report of a hidden
+/// effect.
 pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     let (html, png, size) = match arguments {
         [] => return gap_report(),
@@ -39,22 +40,39 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     draw(Path::new(html), &png, size)
 }
 
-/// Makes a case, has the program diagnose it, checks that the report has all panels, and draws it into `target/gap-report`.
+/// Makes a case, has the program diagnose it, checks that the report has all panels, and draws it
+/// into `target/gap-report`.
 fn gap_report() -> Result<(), String> {
-    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli", "-p", "hidden-effects"]))?;
-    let (built, folder) = (target_directory()?.join("release"), target_directory()?.join("gap-report"));
+    call(cargo()?.args([
+        "build",
+        "--release",
+        "--locked",
+        "-p",
+        "squirrel-cli",
+        "-p",
+        "hidden-effects",
+    ]))?;
+    let (built, folder) =
+        (target_directory()?.join("release"), target_directory()?.join("gap-report"));
     if folder.exists() {
-        std::fs::remove_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+        std::fs::remove_dir_all(&folder)
+            .map_err(|error| format!("{}: {error}", folder.display()))?;
     }
     call(Command::new(built.join("hidden-effects")).args(GAP_CASE).arg("--out").arg(&folder))?;
     let cases = folder.join("cases");
     let at = |error: std::io::Error| format!("{}: {error}", cases.display());
-    let case = std::fs::read_dir(&cases).map_err(at)?.next().ok_or("no case was made")?.map_err(at)?.path();
+    let case = std::fs::read_dir(&cases)
+        .map_err(at)?
+        .next()
+        .ok_or("no case was made")?
+        .map_err(at)?
+        .path();
     let mut run = Command::new(built.join("squirrel"));
     run.current_dir(&case).args(["gap", "run", "--vehicle", "vehicle.toml", "--flights", "train"]);
     call(run.args(["--held-out", "held-out", "--out"]).arg(&folder))?;
     let html = folder.join("report.html");
-    let text = std::fs::read_to_string(&html).map_err(|error| format!("{}: {error}", html.display()))?;
+    let text =
+        std::fs::read_to_string(&html).map_err(|error| format!("{}: {error}", html.display()))?;
     if let Some(panel) = GAP_PANELS.into_iter().find(|panel| !holds_data(&text, *panel)) {
         return Err(format!("{}: panel-{panel} is missing or lacks data", html.display()));
     }

@@ -11,7 +11,8 @@ const PACKAGES: &str = "numpy==2.4.6";
 const OLDEST: (u32, u32) = (3, 11);
 
 /// Newest first would pick a pre-release; what the user calls `python3` is what he expects.
-const CANDIDATES: [&str; 6] = ["python3", "python3.14", "python3.13", "python3.12", "python3.11", "python"];
+const CANDIDATES: [&str; 6] =
+    ["python3", "python3.14", "python3.13", "python3.12", "python3.11", "python"];
 
 /// The interpreter of the Rust tests' environment, whether it exists yet or not.
 ///

@@ -169,7 +169,8 @@ mod tests {
 
     #[test]
     fn a_command_that_fails_is_quoted() {
-        let error = call(Command::new("cargo").arg("--no-such-flag").stderr(Stdio::null())).unwrap_err();
+        let error =
+            call(Command::new("cargo").arg("--no-such-flag").stderr(Stdio::null())).unwrap_err();
         assert!(error.starts_with("cargo --no-such-flag: "), "{error}");
         let error = call(&mut Command::new("no-such-program-of-squirrel")).unwrap_err();
         assert!(error.starts_with("no-such-program-of-squirrel: "), "{error}");

@@ -1,7 +1,8 @@
 //! The proof that the flight code needs no std: it is checked for the target of a Cortex-M7.
 //!
-//! The target's core library comes from rustup, or, where rustup cannot download, from the library sources that Debian
-//! packages; Debian's own compiler must then compile them, for sources and compiler have to be of one version.
+//! The target's core library comes from rustup, or, where rustup cannot download, from the library
+//! sources that Debian packages; Debian's own compiler must then compile them, for sources and
+//! compiler have to be of one version.
 
 use crate::run::{call, installed_on_ci, output, root, target_directory};
 use std::path::{Path, PathBuf};
@@ -55,7 +56,8 @@ pub(crate) fn check() -> Result<String, String> {
     }
 }
 
-/// Builds in the firmware's workspace for the target; the child's status, and its errors where they are kept.
+/// Builds in the firmware's workspace for the target; the child's status, and its errors where they
+/// are kept.
 ///
 /// # Errors
 /// No route on this machine.
@@ -79,7 +81,8 @@ pub(crate) fn build(arguments: &[&str], keep_errors: bool) -> Result<std::proces
     command.output().map_err(|error| format!("cargo: {error}"))
 }
 
-/// Another command of cargo in the firmware's workspace, by the toolchain that has the target; `None` where there is none.
+/// Another command of cargo in the firmware's workspace, by the toolchain that has the target;
+/// `None` where there is none.
 ///
 /// # Errors
 /// As [`root`].
@@ -126,7 +129,8 @@ fn choose(
     }
 }
 
-/// A command that starts from the machine's default toolchain, not from what the calling cargo was told.
+/// A command that starts from the machine's default toolchain, not from what the calling cargo was
+/// told.
 fn clean(program: &str) -> Result<Command, String> {
     let mut command = Command::new(program);
     command.current_dir(root()?);
@@ -137,7 +141,8 @@ fn clean(program: &str) -> Result<Command, String> {
 }
 
 fn has_target() -> bool {
-    let sysroot = clean("rustc").ok().and_then(|mut rustc| output(rustc.args(["--print", "sysroot"])));
+    let sysroot =
+        clean("rustc").ok().and_then(|mut rustc| output(rustc.args(["--print", "sysroot"])));
     sysroot.is_some_and(|path| has_libcore(&PathBuf::from(path)))
 }
 
@@ -151,7 +156,8 @@ fn add_target() -> bool {
     clean("rustup").is_ok_and(|mut rustup| call(rustup.args(["target", "add", TARGET])).is_ok())
 }
 
-/// Whether Debian's packages are there. Where nobody can be asked, on CI as root, they are installed.
+/// Whether Debian's packages are there. Where nobody can be asked, on CI as root, they are
+/// installed.
 fn has_debian() -> bool {
     let there = || {
         Path::new(DEBIAN_SOURCES).is_dir()
@@ -193,7 +199,8 @@ mod tests {
 
     #[test]
     fn a_sysroot_without_the_target_has_no_libcore() {
-        let sysroot = std::env::temp_dir().join(format!("squirrel-xtask-sysroot-{}", std::process::id()));
+        let sysroot =
+            std::env::temp_dir().join(format!("squirrel-xtask-sysroot-{}", std::process::id()));
         let folder = sysroot.join("lib/rustlib").join(TARGET).join("lib");
         assert!(!has_libcore(&sysroot));
         std::fs::create_dir_all(&folder).unwrap();

@@ -1,6 +1,8 @@
-//! The shipped weights from nothing: random flights with spread wings, training, and the same bytes as in `vehicles/`.
+//! The shipped weights from nothing: random flights with spread wings, training, and the same bytes
+//! as in `vehicles/`.
 //!
-//! It is what a user would do by hand, with the program as it is built now; CONTRIBUTING.md says when the file changes.
+//! It is what a user would do by hand, with the program as it is built now; CONTRIBUTING.md says
+//! when the file changes.
 
 use crate::run::{call, cargo, root, target_directory};
 use std::ffi::OsStr;
@@ -59,7 +61,12 @@ fn make() -> Result<PathBuf, String> {
         let log = flights.join(format!("wings-{seed:02}.mcap"));
         let mut fly = Command::new(&squirrel);
         fly.args(["fly", "--arm", "pc_wings_open", "--scenario", "random_spread"]);
-        fly.args([OsStr::new("--seed"), OsStr::new(&seed.to_string()), OsStr::new("--out"), log.as_os_str()]);
+        fly.args([
+            OsStr::new("--seed"),
+            OsStr::new(&seed.to_string()),
+            OsStr::new("--out"),
+            log.as_os_str(),
+        ]);
         // Two dozen tables of tracking errors are of no use here.
         call(fly.stdout(Stdio::null()).stderr(Stdio::null()))?;
     }

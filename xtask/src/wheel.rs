@@ -1,15 +1,17 @@
 //! `cargo xtask wheel`: the Python package, built as it is shipped and tested as it is installed.
 //!
-//! The wheel is built in the release profile and the target folder of everything else, and installed into a virtual
-//! environment of its own. The tests then see nothing but that environment: they check arguments, bits, threads, types and
-//! stubs, run the lines of the README, the guide and the examples, and install the wheel once more where nothing is.
+//! The wheel is built in the release profile and the target folder of everything else, and
+//! installed into a virtual environment of its own. The tests then see nothing but that
+//! environment: they check arguments, bits, threads, types and stubs, run the lines of the README,
+//! the guide and the examples, and install the wheel once more where nothing is.
 
 use crate::python;
 use crate::run::{call, cargo, root, target_directory};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What builds and tests the wheel, what it can use where it is there, what runs notebooks, and studies in parts.
+/// What builds and tests the wheel, what it can use where it is there, what runs notebooks, and
+/// studies in parts.
 const PACKAGES: &str = "numpy==2.4.6 maturin==1.16.0 pytest==9.2.0 mypy==2.4.1 matplotlib==3.11.2 pandas==3.1.1 polars==2.1.0 gymnasium==1.4.0 nbclient==0.11.0 ipykernel==7.4.0 distributed==2026.8.0";
 /// Largest wheel.
 const BYTES_MAX: u64 = 8_000_000;
@@ -30,15 +32,28 @@ fn run(arguments: &[String]) -> Result<String, String> {
     python::environment(&venv, PACKAGES)?;
     let package = root()?.join("crates/squirrel-py");
     let wheel = build(&venv, &package, &folder.join("dist"))?;
-    let bytes = std::fs::metadata(&wheel).map_err(|error| format!("{}: {error}", wheel.display()))?.len();
+    let bytes =
+        std::fs::metadata(&wheel).map_err(|error| format!("{}: {error}", wheel.display()))?.len();
     let size = format!("{:.2} MB", bytes as f64 / 1e6);
     if bytes > BYTES_MAX {
-        return Err(format!("{}: {size}, must be at most {} MB", wheel.display(), BYTES_MAX / 1_000_000));
+        return Err(format!(
+            "{}: {size}, must be at most {} MB",
+            wheel.display(),
+            BYTES_MAX / 1_000_000
+        ));
     }
     let python = python::program(&venv, "python");
     let pip = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"];
     call(Command::new(&python).args(pip).arg(&wheel))?;
-    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-py", "--example", "stubs"]))?;
+    call(cargo()?.args([
+        "build",
+        "--release",
+        "--locked",
+        "-p",
+        "squirrel-py",
+        "--example",
+        "stubs",
+    ]))?;
     let stubs = target_directory()?.join("release/examples").join(library("stubs"));
     call(
         Command::new(&python)
@@ -60,7 +75,8 @@ fn build(venv: &Path, package: &Path, dist: &Path) -> Result<PathBuf, String> {
     if dist.exists() {
         std::fs::remove_dir_all(dist).map_err(at)?;
     }
-    // The release profile and the target folder are cargo's own, so that nothing is compiled that is compiled already.
+    // The release profile and the target folder are cargo's own, so that nothing is compiled that
+    // is compiled already.
     let mut maturin = Command::new(python::program(venv, "maturin"));
     maturin.current_dir(root()?).args(["build", "--release", "--locked", "--quiet"]);
     maturin.args(["--compression-level", "9", "--manifest-path"]);
@@ -71,17 +87,20 @@ fn build(venv: &Path, package: &Path, dist: &Path) -> Result<PathBuf, String> {
     }
     call(&mut maturin)?;
     let mut wheels = std::fs::read_dir(dist).map_err(at)?;
-    let wheel = wheels.next().ok_or_else(|| format!("{}: maturin has left no wheel", dist.display()))?;
+    let wheel =
+        wheels.next().ok_or_else(|| format!("{}: maturin has left no wheel", dist.display()))?;
     Ok(wheel.map_err(at)?.path())
 }
 
-/// Whether the compiler links with the linker that it brings along, as it does for this target where there is one.
+/// Whether the compiler links with the linker that it brings along, as it does for this target
+/// where there is one.
 fn has_lld() -> bool {
     let target = "x86_64-unknown-linux-gnu";
     let sysroot = Command::new("rustc").args(["--print", "sysroot"]).output();
     let sysroot = sysroot.ok().and_then(|out| String::from_utf8(out.stdout).ok());
-    let lld =
-        |sysroot: String| Path::new(sysroot.trim()).join(format!("lib/rustlib/{target}/bin/gcc-ld/ld.lld"));
+    let lld = |sysroot: String| {
+        Path::new(sysroot.trim()).join(format!("lib/rustlib/{target}/bin/gcc-ld/ld.lld"))
+    };
     cfg!(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))
         && sysroot.is_some_and(|sysroot| lld(sysroot).exists())
 }

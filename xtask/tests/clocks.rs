@@ -1,4 +1,5 @@
-//! No test asks a clock: on a busy machine it would fail without anything being wrong. Tests count work, benches measure time.
+//! No test asks a clock: on a busy machine it would fail without anything being wrong. Tests count
+//! work, benches measure time.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod repository;
@@ -20,7 +21,8 @@ const CLOCKS: [&str; 7] = [
     "time.time(",
 ];
 
-/// The first line that is a test's: of a file in a folder `tests` of a package the first, of another the one that begins its module of tests.
+/// The first line that is a test's: of a file in a folder `tests` of a package the first, of
+/// another the one that begins its module of tests.
 fn first_line_of_tests(path: &Path, text: &str) -> Option<usize> {
     let inside = path
         .components()
@@ -40,7 +42,8 @@ fn clocks(path: &Path, text: &str) -> Vec<String> {
 #[test]
 fn no_test_asks_a_clock() {
     let root = root();
-    let files: Vec<_> = FOLDERS.iter().flat_map(|folder| files(&root.join(folder), &["rs", "py"])).collect();
+    let files: Vec<_> =
+        FOLDERS.iter().flat_map(|folder| files(&root.join(folder), &["rs", "py"])).collect();
     let own = root.join("xtask/tests/clocks.rs");
     let (mut asked, mut tests) = (Vec::new(), 0);
     for file in files.iter().filter(|file| **file != own) {
@@ -54,8 +57,7 @@ fn no_test_asks_a_clock() {
 
 #[test]
 fn clocks_of_tests_are_told_from_those_of_the_product() {
-    let text =
-        "fn work() { Instant::now(); }\n#[cfg(test)]\nmod tests {\n    fn f() { begin.elapsed(); }\n}\n";
+    let text = "fn work() { Instant::now(); }\n#[cfg(test)]\nmod tests {\n    fn f() { begin.elapsed(); }\n}\n";
     let of = |path: &str| clocks(Path::new(path), text).len();
     assert_eq!(of("tests/hidden-effects/src/ask.rs"), 1);
     assert_eq!(of("crates/a/tests/b.rs"), 2);

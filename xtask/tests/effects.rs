@@ -1,4 +1,5 @@
-//! What is known of an effect stands in its own file: the gap workflow asks for it and names no effect.
+//! What is known of an effect stands in its own file: the gap workflow asks for it and names no
+//! effect.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod repository;
@@ -21,7 +22,8 @@ fn the_gap_workflow_names_no_effect() {
     let mut named = Vec::new();
     for file in products(&root().join("crates/squirrel-gap/src")) {
         let text = fs::read_to_string(&file).unwrap();
-        let lines = product(&text).into_iter().filter(|line| names.iter().any(|name| line.contains(name)));
+        let lines =
+            product(&text).into_iter().filter(|line| names.iter().any(|name| line.contains(name)));
         named.extend(lines.map(|line| format!("{}: {line}", file.display())));
     }
     assert!(named.is_empty(), "{named:#?}");

@@ -1,6 +1,8 @@
-//! One formula, one place: what is written in each of these files is written in no other, and who needs it calls it.
+//! One formula, one place: what is written in each of these files is written in no other, and who
+//! needs it calls it.
 //!
-//! A formula is known by a piece of its text or by a constant that only it has. Comments and tests do not count.
+//! A formula is known by a piece of its text or by a constant that only it has. Comments and tests
+//! do not count.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod repository;
@@ -17,11 +19,23 @@ const FORMULAS: [(&str, &[&str], &str); 33] = [
         &["L::of(-AIR_DENSITY_KG_M3)*", "self.per_square*flow.speed"],
         "core/src/aero/flat_plate.rs",
     ),
-    ("thrust and moment of rotors", &["square*thrust[0]", "square*roll["], "core/src/dynamics/rotors.rs"),
+    (
+        "thrust and moment of rotors",
+        &["square*thrust[0]", "square*roll["],
+        "core/src/dynamics/rotors.rs",
+    ),
     ("rotor lag", &["gap*gap.where_positive"], "core/src/dynamics/rotors.rs"),
-    ("rigid body", &["cross(omega,&times(inertia,omega))", "w*p+j*r-k*q"], "core/src/dynamics/body.rs"),
+    (
+        "rigid body",
+        &["cross(omega,&times(inertia,omega))", "w*p+j*r-k*q"],
+        "core/src/dynamics/body.rs",
+    ),
     ("rotation matrix", &["ww+ii-jj-kk"], "core/src/lane/vector.rs"),
-    ("membrane", &["0.56)+", "steady-state.fast_camber", "c2*(c2+l)+l2"], "core/src/aero/membrane.rs"),
+    (
+        "membrane",
+        &["0.56)+", "steady-state.fast_camber", "c2*(c2+l)+l2"],
+        "core/src/aero/membrane.rs",
+    ),
     (
         "battery",
         &["current*self.r1_ohm", "torque_coefficient*speed*speed*speed"],
@@ -39,8 +53,16 @@ const FORMULAS: [(&str, &[&str], &str); 33] = [
         &["gap*poles.stiffness-self.rate[i]*poles.damping"],
         "core/src/control/command_filter.rs",
     ),
-    ("integral of the error", &["integral[i]+error[i]*dt_s"], "core/src/control/backstepping/mod.rs"),
-    ("yaw to turn to", &["wrap(commanded_rad-measured_rad)"], "core/src/control/backstepping/mod.rs"),
+    (
+        "integral of the error",
+        &["integral[i]+error[i]*dt_s"],
+        "core/src/control/backstepping/mod.rs",
+    ),
+    (
+        "yaw to turn to",
+        &["wrap(commanded_rad-measured_rad)"],
+        "core/src/control/backstepping/mod.rs",
+    ),
     ("Euler kinematics", &["cr*cp*roll-sr*sp*pitch"], "core/src/control/backstepping/mod.rs"),
     ("mixer", &["w_i*a[i]+w_j*a[j]", "s*tilt[i]+u*self.collective[i]"], "core/src/control/mix.rs"),
     ("what effects do to a wrench", &["numbers.thrust_factor("], "core/src/dynamics/mod.rs"),
@@ -50,8 +72,16 @@ const FORMULAS: [(&str, &[&str], &str); 33] = [
     ("battery_sag", &["self.load_gain*(load-"], "core/src/effects/battery_sag.rs"),
     ("cg_offset", &["cross(&self.offset_m,&at.force)"], "core/src/effects/cg_offset.rs"),
     ("constant_wind", &["ln(height_m.upper("], "core/src/effects/constant_wind.rs"),
-    ("flapping_moment", &["(u*u+v*v).root()*self.per_scale"], "core/src/effects/flapping_moment.rs"),
-    ("ground_effect", &["L::of(1.0/16.0)", "self.radius_m/height_m"], "core/src/effects/ground_effect.rs"),
+    (
+        "flapping_moment",
+        &["(u*u+v*v).root()*self.per_scale"],
+        "core/src/effects/flapping_moment.rs",
+    ),
+    (
+        "ground_effect",
+        &["L::of(1.0/16.0)", "self.radius_m/height_m"],
+        "core/src/effects/ground_effect.rs",
+    ),
     ("linear_drag", &["-x*u,"], "core/src/effects/linear_drag.rs"),
     ("payload_swing", &["v*self.decay+x*self.stiffness"], "core/src/effects/payload_swing.rs"),
     ("quadratic_drag", &["self.per_square[i]*at.flow"], "core/src/effects/quadratic_drag.rs"),
@@ -80,13 +110,23 @@ const CALLS: [(&str, &[&str]); 8] = [
     ("sim/src/batch/battery.rs", &["pack.discharge(", "pack.settle("]),
     (
         "sim/src/batch/autopilot.rs",
-        &["filter.step(", "Target::from_euler(", "yaw_target(", "integrated(", ".torque(q,", "mixer.mix("],
+        &[
+            "filter.step(",
+            "Target::from_euler(",
+            "yaw_target(",
+            "integrated(",
+            ".torque(q,",
+            "mixer.mix(",
+        ],
     ),
     (
         "sim/src/plant/mod.rs",
         &["dynamics::derivative(", "membrane.evaluate(", "servo.lead(", "battery.step("],
     ),
-    ("core/src/dynamics/mod.rs", &["aero::drag(", "rotors::wrench(", "body::acceleration(", "with_effects("]),
+    (
+        "core/src/dynamics/mod.rs",
+        &["aero::drag(", "rotors::wrench(", "body::acceleration(", "with_effects("],
+    ),
     (
         "core/src/dynamics/lanes.rs",
         &["drag(&airframe.linear_drag", "thrust_and_moment(", "lag_rate(", "body::acceleration("],
@@ -139,7 +179,8 @@ fn every_effect_with_an_equation_is_on_the_list() {
 fn the_density_of_air_is_asked_where_a_law_of_the_air_stands() {
     let all = code();
     let strangers = holding(&all, "AIR_DENSITY_KG_M3");
-    let strangers: Vec<&str> = strangers.into_iter().filter(|path| !DENSITY.contains(path)).collect();
+    let strangers: Vec<&str> =
+        strangers.into_iter().filter(|path| !DENSITY.contains(path)).collect();
     assert!(strangers.is_empty(), "{strangers:?}");
 }
 

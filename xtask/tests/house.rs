@@ -1,5 +1,5 @@
-//! The house stands as `docs/ARCHITECTURE.md` says: what the page names exists, the crates are all on it, and dependencies
-//! point downwards only.
+//! The house stands as `docs/ARCHITECTURE.md` says: what the page names exists, the crates are all
+//! on it, and dependencies point downwards only.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod repository;
@@ -99,7 +99,8 @@ fn named_paths(page: &str) -> Vec<(String, String)> {
     let mut base = String::new();
     let mut paths = Vec::new();
     for line in page.lines() {
-        let quoted = line.split('`').skip(1).step_by(2).filter(|text| is_path(text)).map(str::to_owned);
+        let quoted =
+            line.split('`').skip(1).step_by(2).filter(|text| is_path(text)).map(str::to_owned);
         if line.starts_with('#') {
             base = quoted.last().unwrap_or_default();
             paths.push((String::new(), base.clone()));
@@ -110,7 +111,8 @@ fn named_paths(page: &str) -> Vec<(String, String)> {
     paths
 }
 
-/// A path has a slash or the ending of a file of ours; commands and code have spaces, brackets or colons.
+/// A path has a slash or the ending of a file of ours; commands and code have spaces, brackets or
+/// colons.
 fn is_path(text: &str) -> bool {
     let ending = [".rs", ".toml", ".md", ".css", ".js"].iter().any(|ending| text.ends_with(ending));
     (ending || text.contains('/')) && !text.contains([' ', '<', '(', '[', ':', '*'])
@@ -120,12 +122,17 @@ fn is_path(text: &str) -> bool {
 fn dependencies(manifest: &str) -> BTreeSet<String> {
     let manifest: toml::Table = manifest.parse().unwrap();
     let platforms = manifest.get("target").and_then(toml::Value::as_table);
-    let platforms = platforms.into_iter().flat_map(|t| t.values()).filter_map(toml::Value::as_table);
+    let platforms =
+        platforms.into_iter().flat_map(|t| t.values()).filter_map(toml::Value::as_table);
     let mut names = BTreeSet::new();
     for table in std::iter::once(&manifest).chain(platforms) {
         for kind in ["dependencies", "build-dependencies"] {
-            for (key, value) in table.get(kind).and_then(toml::Value::as_table).into_iter().flatten() {
-                names.insert(value.get("package").and_then(toml::Value::as_str).unwrap_or(key).to_owned());
+            for (key, value) in
+                table.get(kind).and_then(toml::Value::as_table).into_iter().flatten()
+            {
+                names.insert(
+                    value.get("package").and_then(toml::Value::as_str).unwrap_or(key).to_owned(),
+                );
             }
         }
     }
@@ -142,7 +149,11 @@ fn upward_arrows(package: &str, manifest: &str) -> Vec<String> {
         let foreign = KEPT_IN.iter().any(|(kept, homes)| kept == name && !homes.contains(&package));
         ours || foreign
     };
-    dependencies(manifest).into_iter().filter(wrong).map(|name| format!("{package} -> {name}")).collect()
+    dependencies(manifest)
+        .into_iter()
+        .filter(wrong)
+        .map(|name| format!("{package} -> {name}"))
+        .collect()
 }
 
 #[test]
@@ -150,7 +161,8 @@ fn every_path_on_the_page_exists() {
     let root = root();
     let paths = named_paths(&page());
     assert!(paths.len() > 20, "only {} paths found", paths.len());
-    let gone: Vec<_> = paths.iter().filter(|(base, path)| !root.join(base).join(path).exists()).collect();
+    let gone: Vec<_> =
+        paths.iter().filter(|(base, path)| !root.join(base).join(path).exists()).collect();
     assert!(gone.is_empty(), "named in docs/ARCHITECTURE.md, not in the repository: {gone:?}");
 }
 
@@ -163,11 +175,16 @@ fn every_crate_and_every_room_of_core_and_sim_is_on_the_page() {
         .collect();
     let mut rooms: BTreeSet<String> =
         folders(&root.join("crates")).iter().map(|name| format!("crates/{name}")).collect();
-    for package in
-        ["crates/squirrel-core", "crates/squirrel-log", "crates/squirrel-report", "crates/squirrel-sim"]
-    {
+    for package in [
+        "crates/squirrel-core",
+        "crates/squirrel-log",
+        "crates/squirrel-report",
+        "crates/squirrel-sim",
+    ] {
         rooms.extend(
-            folders(&root.join(package).join("src")).iter().map(|room| format!("{package}/src/{room}/")),
+            folders(&root.join(package).join("src"))
+                .iter()
+                .map(|room| format!("{package}/src/{room}/")),
         );
     }
     let missing: Vec<_> = rooms.difference(&named).collect();
@@ -181,7 +198,9 @@ fn dependencies_point_downwards() {
     let packages = folders(&crates).into_iter().map(|name| (crates.join(&name), name));
     let wrong: Vec<String> = packages
         .chain(others.map(|(path, name)| (root().join(path), name.to_owned())))
-        .flat_map(|(path, name)| upward_arrows(&name, &fs::read_to_string(path.join("Cargo.toml")).unwrap()))
+        .flat_map(|(path, name)| {
+            upward_arrows(&name, &fs::read_to_string(path.join("Cargo.toml")).unwrap())
+        })
         .collect();
     assert!(wrong.is_empty(), "{wrong:?}");
     let own = dependencies(include_str!("../Cargo.toml"));
@@ -214,7 +233,8 @@ fn rapier_stays_in_its_room() {
 fn wrong_arrows_are_seen() {
     let upwards = "[dependencies]\nsquirrel-gap.workspace = true\nnalgebra = \"0.35\"";
     assert_eq!(upward_arrows("squirrel-sim", upwards), ["squirrel-sim -> squirrel-gap"]);
-    let renamed = "[target.'cfg(unix)'.dependencies]\nfast = { package = \"glam\", version = \"0.33\" }";
+    let renamed =
+        "[target.'cfg(unix)'.dependencies]\nfast = { package = \"glam\", version = \"0.33\" }";
     assert_eq!(upward_arrows("squirrel-sim", renamed), ["squirrel-sim -> glam"]);
     let oracle = "[dependencies]\nclap = \"4\"\n[dev-dependencies]\nclarabel = \"0.11\"";
     assert_eq!(upward_arrows("squirrel-core", oracle), ["squirrel-core -> clap"]);
@@ -233,7 +253,11 @@ fn paths_are_told_from_code() {
 fn the_port_that_is_shown_is_the_port_that_is_compiled() {
     let read = |path: &str| fs::read_to_string(root().join(path)).unwrap();
     let (guide, source) = (read("docs/embedding.md"), read("firmware/m7/src/bin/port.rs"));
-    let shown = guide.split("```rust\n").nth(1).and_then(|rest| rest.split("\n```").next()).unwrap();
-    assert!(source.contains(shown), "docs/embedding.md shows another port than firmware/m7/src/bin/port.rs");
+    let shown =
+        guide.split("```rust\n").nth(1).and_then(|rest| rest.split("\n```").next()).unwrap();
+    assert!(
+        source.contains(shown),
+        "docs/embedding.md shows another port than firmware/m7/src/bin/port.rs"
+    );
     assert!(shown.lines().count() <= 32, "{} lines", shown.lines().count());
 }

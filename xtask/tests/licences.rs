@@ -1,11 +1,13 @@
-//! What cargo-deny would say about licences, for machines that do not have it: every package in the lock file must be
-//! usable under the licences that `deny.toml` allows. The firmware is a workspace of its own, with a lock file of its own.
+//! What cargo-deny would say about licences, for machines that do not have it: every package in the
+//! lock file must be usable under the licences that `deny.toml` allows. The firmware is a workspace
+//! of its own, with a lock file of its own.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
 use std::process::Command;
 
-/// Whether an SPDX expression can be satisfied by allowed licences. `/`, the old spelling, is an OR; None: not SPDX.
+/// Whether an SPDX expression can be satisfied by allowed licences. `/`, the old spelling, is an
+/// OR; None: not SPDX.
 fn is_allowed(expression: &str, allowed: &dyn Fn(&str) -> bool) -> Option<bool> {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let mut words = spaced.split_whitespace().collect::<Vec<_>>().into_iter().peekable();
@@ -50,7 +52,8 @@ fn single(words: &mut Words<'_>, allowed: &dyn Fn(&str) -> bool) -> Option<bool>
 #[test]
 fn every_package_has_an_allowed_licence() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
-    let deny: toml::Table = std::fs::read_to_string(root.join("deny.toml")).unwrap().parse().unwrap();
+    let deny: toml::Table =
+        std::fs::read_to_string(root.join("deny.toml")).unwrap().parse().unwrap();
     let allow: Vec<&str> =
         deny["licenses"]["allow"].as_array().unwrap().iter().map(|l| l.as_str().unwrap()).collect();
 

@@ -1,4 +1,5 @@
-//! Modules of a crate know only what lies below them: no two need each other, by whatever way round.
+//! Modules of a crate know only what lies below them: no two need each other, by whatever way
+//! round.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod repository;
@@ -46,8 +47,8 @@ fn arrows(source: &Path) -> Arrows {
     arrows
 }
 
-/// Modules that need themselves by way of others: what is left when those that need nothing left are taken away, and those that
-/// nothing left needs.
+/// Modules that need themselves by way of others: what is left when those that need nothing left
+/// are taken away, and those that nothing left needs.
 fn cycles(mut arrows: Arrows) -> Arrows {
     loop {
         let before = arrows.len();
@@ -76,11 +77,16 @@ fn no_module_needs_itself_by_way_of_another() {
 
 #[test]
 fn a_cycle_is_seen() {
-    let needs = |name: &str, of: &[&str]| (name.to_owned(), of.iter().map(ToString::to_string).collect());
+    let needs =
+        |name: &str, of: &[&str]| (name.to_owned(), of.iter().map(ToString::to_string).collect());
     let tree = Arrows::from([needs("a", &["b", "c"]), needs("b", &["c"]), needs("c", &[])]);
     assert!(cycles(tree).is_empty());
-    let round =
-        Arrows::from([needs("a", &["b"]), needs("b", &["c"]), needs("c", &["b"]), needs("d", &["a"])]);
+    let round = Arrows::from([
+        needs("a", &["b"]),
+        needs("b", &["c"]),
+        needs("c", &["b"]),
+        needs("d", &["a"]),
+    ]);
     assert_eq!(cycles(round).into_keys().collect::<Vec<_>>(), ["b", "c"]);
     assert_eq!(
         named("use crate::{a::X, b};\n// crate::c\nlet y = crate::d::z();"),

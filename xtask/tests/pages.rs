@@ -13,14 +13,18 @@ const README_LINES: usize = 150;
 /// Targets of links and pictures outside of code that are no addresses of the network.
 fn links(page: &str) -> Vec<&str> {
     let prose = page.split("\n```").step_by(2).flat_map(|text| text.split('`').step_by(2));
-    let targets = prose.flat_map(|text| text.split("](").skip(1)).filter_map(|rest| rest.split(')').next());
+    let targets =
+        prose.flat_map(|text| text.split("](").skip(1)).filter_map(|rest| rest.split(')').next());
     targets.filter(|target| !target.contains("://")).collect()
 }
 
 /// What a heading is called in links to it.
 fn anchor(heading: &str) -> String {
-    let kept =
-        heading.trim_start_matches('#').trim().chars().filter(|c| c.is_alphanumeric() || " -_".contains(*c));
+    let kept = heading
+        .trim_start_matches('#')
+        .trim()
+        .chars()
+        .filter(|c| c.is_alphanumeric() || " -_".contains(*c));
     kept.collect::<String>().to_lowercase().replace(' ', "-")
 }
 
@@ -28,7 +32,8 @@ fn anchor(heading: &str) -> String {
 fn leads_somewhere(page: &Path, link: &str) -> bool {
     let (file, heading) = link.split_once('#').unwrap_or((link, ""));
     let target = if file.is_empty() { page.to_owned() } else { page.parent().unwrap().join(file) };
-    let has = |text: String| text.lines().any(|line| line.starts_with('#') && anchor(line) == heading);
+    let has =
+        |text: String| text.lines().any(|line| line.starts_with('#') && anchor(line) == heading);
     target.exists() && (heading.is_empty() || fs::read_to_string(&target).is_ok_and(has))
 }
 
@@ -55,7 +60,8 @@ fn the_readme_is_short() {
 
 #[test]
 fn links_are_told_from_code_and_from_the_network() {
-    let page = "[a](b.md) and ![c](d/e.svg), `[f](g)` and [h](https://i.j)\n```sh\n[k](l)\n```\n[m](#n)";
+    let page =
+        "[a](b.md) and ![c](d/e.svg), `[f](g)` and [h](https://i.j)\n```sh\n[k](l)\n```\n[m](#n)";
     assert_eq!(links(page), ["b.md", "d/e.svg", "#n"]);
     let readme = root().join("README.md");
     assert!(leads_somewhere(&readme, "docs/claims.md#what-we-claim"));

@@ -11,8 +11,12 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 fn commands(c: &mut Criterion) {
     let scenario = Scenario::find("avoid").expect("built in");
-    let setup =
-        Setup { vehicle: VehicleFile::squirrel(), arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
+    let setup = Setup {
+        vehicle: VehicleFile::squirrel(),
+        arm: Arm::TwccFlat,
+        scenario,
+        integrator: Integrator::Rk4,
+    };
     let log = setup.fly(true, |_| {}).expect("flies").log.expect("recorded");
     let path = std::env::temp_dir().join(format!("squirrel-bench-{}.mcap", std::process::id()));
     c.bench_function("write_log", |b| b.iter(|| log.write(&path).expect("writes")));

@@ -1,7 +1,7 @@
 //! The command line of squirrel.
 //!
-//! Results go to stdout, talk and progress bars to stderr, and to `--json FILE` for machines. Exit codes: 0 done, 1 failed
-//! with one line that names file, field and value, 2 wrong usage.
+//! Results go to stdout, talk and progress bars to stderr, and to `--json FILE` for machines. Exit
+//! codes: 0 done, 1 failed with one line that names file, field and value, 2 wrong usage.
 
 mod commands;
 mod output;
@@ -10,7 +10,8 @@ mod paths;
 use clap::{Parser, Subcommand};
 use std::ffi::OsString;
 
-/// A flight stack for multirotors that change shape: fly it, log it, replay it, compare it with measured flights.
+/// A flight stack for multirotors that change shape: fly it, log it, replay it, compare it with
+/// measured flights.
 #[derive(Debug, Parser)]
 #[command(
     name = "squirrel",
@@ -39,7 +40,8 @@ enum Command {
     Train(commands::train::Train),
     /// Run a log's inputs through the flight code again and compare every bit.
     Replay(commands::replay::Replay),
-    /// Write the sensor frames of flights, and the hash of every output, for a target without files.
+    /// Write the sensor frames of flights, and the hash of every output, for a target without
+    /// files.
     ExportVectors(commands::export_vectors::ExportVectors),
     /// Turn a foreign log into a flight log, or recover a truncated one.
     Import(commands::import::Import),
@@ -55,7 +57,8 @@ enum Command {
     Vehicle(commands::vehicle::VehicleCommand),
 }
 
-/// Runs the program on arguments, the first of which is its name, and says its exit code: Python's front end needs the number.
+/// Runs the program on arguments, the first of which is its name, and says its exit code: Python's
+/// front end needs the number.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let cli = match Cli::try_parse_from(arguments) {
         Ok(cli) => cli,

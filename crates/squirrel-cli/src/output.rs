@@ -66,10 +66,12 @@ impl Table {
             self.rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0)
         };
         let widths: Vec<usize> = (0..columns).map(width).collect();
-        let is_number =
-            |cell: &String| cell == "-" || cell.starts_with(|c: char| c.is_ascii_digit() || "+-".contains(c));
-        let numbers: Vec<bool> =
-            (0..columns).map(|c| self.rows[1..].iter().filter_map(|r| r.get(c)).all(is_number)).collect();
+        let is_number = |cell: &String| {
+            cell == "-" || cell.starts_with(|c: char| c.is_ascii_digit() || "+-".contains(c))
+        };
+        let numbers: Vec<bool> = (0..columns)
+            .map(|c| self.rows[1..].iter().filter_map(|r| r.get(c)).all(is_number))
+            .collect();
         for (i, row) in self.rows.iter().enumerate() {
             let mut line = String::new();
             for (c, cell) in row.iter().enumerate() {
@@ -94,9 +96,13 @@ pub(crate) fn write_file(path: &Path, content: &[u8]) -> Result<(), String> {
 }
 
 /// Writes a result as JSON where `--json` asks for it.
-pub(crate) fn write_json(path: Option<&Path>, result: &impl serde::Serialize) -> Result<(), String> {
+pub(crate) fn write_json(
+    path: Option<&Path>,
+    result: &impl serde::Serialize,
+) -> Result<(), String> {
     let Some(path) = path else { return Ok(()) };
-    let mut text = serde_json::to_string_pretty(result).map_err(|e| format!("{}: {e}", path.display()))?;
+    let mut text =
+        serde_json::to_string_pretty(result).map_err(|e| format!("{}: {e}", path.display()))?;
     text.push('\n');
     write_file(path, text.as_bytes())
 }

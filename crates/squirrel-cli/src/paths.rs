@@ -1,5 +1,5 @@
-//! What a command reads and what it writes, compared before it begins: nothing that is read is overwritten, and no two results go into one
-//! file.
+//! What a command reads and what it writes, compared before it begins: nothing that is read is
+//! overwritten, and no two results go into one file.
 
 use squirrel_log::files::{self, FileId};
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -99,7 +99,8 @@ impl Paths {
         self
     }
 
-    /// The figures, which `--out` may have, too: there both are one file with the same bytes, and may be.
+    /// The figures, which `--out` may have, too: there both are one file with the same bytes, and
+    /// may be.
     ///
     /// * `kept` - that file
     pub(crate) fn writes_json(self, json: Option<&PathBuf>, kept: Option<&PathBuf>) -> Self {
@@ -123,7 +124,8 @@ impl Paths {
     /// Whether the command may begin.
     ///
     /// # Errors
-    /// A result that would overwrite what is read, or another result; one that cannot be written, which nobody wants to learn after the work.
+    /// A result that would overwrite what is read, or another result; one that cannot be written,
+    /// which nobody wants to learn after the work.
     pub(crate) fn check(&self) -> Result<(), String> {
         let mut taken: BTreeMap<FileId, (&Given, &str)> = BTreeMap::new();
         for input in &self.reads {
@@ -135,9 +137,13 @@ impl Paths {
             if let Some((other, why)) = ids.iter().find_map(|id| taken.get(id)) {
                 let (path, its) = (result.path.display(), other.path.display());
                 let (argument, other) = (result.argument, other.argument);
-                return Err(format!("{argument} {path}: would be written over {other} {its}; {why}"));
+                return Err(format!(
+                    "{argument} {path}: would be written over {other} {its}; {why}"
+                ));
             }
-            taken.extend(ids.into_iter().map(|id| (id, (result, "each result needs a file of its own"))));
+            taken.extend(
+                ids.into_iter().map(|id| (id, (result, "each result needs a file of its own"))),
+            );
         }
         self.writes
             .iter()
@@ -147,7 +153,9 @@ impl Paths {
 
     /// Whether a result's folder is missing, and the command makes it.
     fn is_yet_to_be(&self, result: &Given) -> bool {
-        let Some(folder) = result.path.parent().filter(|folder| !folder.is_dir()) else { return false };
+        let Some(folder) = result.path.parent().filter(|folder| !folder.is_dir()) else {
+            return false;
+        };
         result.in_folder || FileId::read(folder).is_some_and(|id| self.makes.contains(&id))
     }
 }

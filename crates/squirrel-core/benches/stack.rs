@@ -17,7 +17,9 @@ use squirrel_core::guidance::mission::Mission;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::rnn::elman::Elman;
 use squirrel_core::rnn::parnn::{Domain, Parnn, WINDOW};
-use squirrel_core::stack::{Gnss, Imu, OUTER_PERIOD_US, SensorFrame, Stack, StackParameters, StackState};
+use squirrel_core::stack::{
+    Gnss, Imu, OUTER_PERIOD_US, SensorFrame, Stack, StackParameters, StackState,
+};
 use std::hint::black_box;
 
 fn stack(form: AttitudeForm, force_model: &ForceModel) -> Stack {

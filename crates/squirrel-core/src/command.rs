@@ -1,4 +1,5 @@
-//! What is asked of a vehicle: where to go, how to stand, how hard to push. Guidance and policies say it, control does it.
+//! What is asked of a vehicle: where to go, how to stand, how hard to push. Guidance and policies
+//! say it, control does it.
 
 use crate::frames::{In, Ned};
 use crate::math::wrap_angle;

@@ -60,7 +60,8 @@ pub struct SensorFrame {
     pub gnss: Option<Gnss>,
     /// Barometric altitude above the origin, m, up.
     pub altitude_m: Option<f32>,
-    /// Magnetic field of the earth, and what of the vehicle's own a compass cannot tell from it, uT.
+    /// Magnetic field of the earth, and what of the vehicle's own a compass cannot tell from it,
+    /// uT.
     pub magnetic: Option<In<Body, f32>>,
     /// Wing force as if spread, N, where something outside the flight code knows it.
     pub wing_force: Option<In<Ned, f32>>,
@@ -93,7 +94,8 @@ impl SensorFrame {
         self.obstacles.get(..self.obstacle_count).unwrap_or(&[])
     }
 
-    /// Sets the obstacles; those beyond [`MAX_OBSTACLES`] are left out, so hand in the nearest first.
+    /// Sets the obstacles; those beyond [`MAX_OBSTACLES`] are left out, so hand in the nearest
+    /// first.
     pub fn set_obstacles(&mut self, obstacles: &[Obstacle]) {
         self.obstacle_count = 0;
         for (place, obstacle) in self.obstacles.iter_mut().zip(obstacles) {
@@ -102,7 +104,8 @@ impl SensorFrame {
         }
     }
 
-    /// Takes out what is not finite, or larger than any flight, of what estimators hear; how many readings that were.
+    /// Takes out what is not finite, or larger than any flight, of what estimators hear; how many
+    /// readings that were.
     pub(crate) fn drop_what_is_no_reading(&mut self) -> u32 {
         let mut dropped = 0;
         let mut accept = |valid: bool| {
@@ -112,9 +115,11 @@ impl SensorFrame {
         self.imu = self.imu.filter(|imu| accept(imu.is_reading()));
         self.imu_2 = self.imu_2.filter(|imu| accept(imu.is_reading()));
         self.gnss = self.gnss.filter(|gnss| accept(gnss.is_reading()));
-        self.altitude_m = self.altitude_m.filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
-        self.magnetic =
-            self.magnetic.filter(|field| accept(field.vector.norm_squared() <= FIELD_MAX_UT * FIELD_MAX_UT));
+        self.altitude_m =
+            self.altitude_m.filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
+        self.magnetic = self
+            .magnetic
+            .filter(|field| accept(field.vector.norm_squared() <= FIELD_MAX_UT * FIELD_MAX_UT));
         dropped
     }
 

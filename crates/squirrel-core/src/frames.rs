@@ -1,7 +1,8 @@
 //! Frames: vectors and rotations that know what they are expressed in.
 //!
-//! Typed at module borders, so that a body force cannot be added to a world force by mistake; inside an equation the
-//! plain nalgebra vector is taken out and named with its frame (`velocity_ned`, `force_body`).
+//! Typed at module borders, so that a body force cannot be added to a world force by mistake;
+//! inside an equation the plain nalgebra vector is taken out and named with its frame
+//! (`velocity_ned`, `force_body`).
 //!
 //! ```
 //! use squirrel_core::frames::{Body, In, Ned, Rotation};
@@ -102,7 +103,8 @@ impl<F: Frame, T: Real> Mul<T> for In<F, T> {
     }
 }
 
-/// The rotation that takes components in `From` to components in `To`: `v_ned = ned_from_body * v_body`.
+/// The rotation that takes components in `From` to components in `To`:
+/// `v_ned = ned_from_body * v_body`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(transparent)]
 pub struct Rotation<To, From, T: Real> {
@@ -204,7 +206,10 @@ mod tests {
     fn nose_up_points_the_forward_axis_at_the_sky() {
         let ned_from_body = Rotation::<Ned, Body, f64>::from_euler(0.0, 0.3, 0.0);
         let forward_ned = ned_from_body * In::new(Vector3::x());
-        assert!((forward_ned.vector.z + 0.3f64.sin()).abs() < 1e-12, "down is positive, so up is negative");
+        assert!(
+            (forward_ned.vector.z + 0.3f64.sin()).abs() < 1e-12,
+            "down is positive, so up is negative"
+        );
     }
 
     #[test]
@@ -220,7 +225,8 @@ mod tests {
                 );
             }
         }
-        let up = Rotation::<Ned, Body, f64>::from_wxyz([0.5_f64.sqrt(), 0.0, 0.5_f64.sqrt(), 0.0]).unwrap();
+        let up = Rotation::<Ned, Body, f64>::from_wxyz([0.5_f64.sqrt(), 0.0, 0.5_f64.sqrt(), 0.0])
+            .unwrap();
         assert!(up.heading().is_finite());
     }
 

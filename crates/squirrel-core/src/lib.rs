@@ -1,24 +1,30 @@
-//! The flight code of squirrel: one control stack that flies in simulation, in Python and on a Cortex-M7, bit for bit.
+//! The flight code of squirrel: one control stack that flies in simulation, in Python and on a
+//! Cortex-M7, bit for bit.
 //!
 //! Layers, top down. Each knows only what lies below it:
 //!
-//! - [`stack`]: the whole flight code as one function of (state, sensor frame); 300 Hz inside, 10 Hz outside.
+//! - [`stack`]: the whole flight code as one function of (state, sensor frame); 300 Hz inside, 10
+//!   Hz outside.
 //! - [`estimate`]: where the vehicle is and how it stands, from noisy sensors.
 //! - [`policy`]: what a learned policy sees and what its numbers mean.
 //! - [`frame`]: what the sensors say at one instant.
 //! - [`guidance`]: what to follow: reference trajectories, obstacle sensing.
-//! - [`control`]: how to follow it: position control, wing decisions, thrust-wing coordination, attitude, mixer.
+//! - [`control`]: how to follow it: position control, wing decisions, thrust-wing coordination,
+//!   attitude, mixer.
 //! - [`command`]: what is asked: a reference, an attitude and a thrust.
 //! - [`rnn`]: small networks, and the paper's learned wing force.
 //! - [`dynamics`]: rotors, battery, servo, rigid body, RK4; whole vehicles on lanes.
 //! - [`effects`]: physics that a vehicle may have on top of the base model, one file an effect.
 //! - [`aero`]: drag, flat plate, membrane.
 //! - [`vehicle`]: the numbers of one airframe, checked once.
-//! - [`frames`], [`math`]: vectors that know their frame, and arithmetic whose bits do not depend on the target.
-//! - [`lane`]: the scalar that physics and networks are written over: one number, a register of them, or a dual number.
+//! - [`frames`], [`math`]: vectors that know their frame, and arithmetic whose bits do not depend
+//!   on the target.
+//! - [`lane`]: the scalar that physics and networks are written over: one number, a register of
+//!   them, or a dual number.
 //!
-//! No allocation, no clock, no panic in a step; all memory of a controller is one plain `Copy` struct. SI units and
-//! radians. World frame NED, body frame FRD, quaternions Hamilton, body to world.
+//! No allocation, no clock, no panic in a step; all memory of a controller is one plain `Copy`
+//! struct. SI units and radians. World frame NED, body frame FRD, quaternions Hamilton, body to
+//! world.
 
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 #![deny(unsafe_code)]

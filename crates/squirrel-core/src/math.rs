@@ -1,7 +1,8 @@
 //! Arithmetic whose bits do not depend on the target.
 //!
-//! `f32::min` and `f32::max` differ between x86-64 and Cortex-M7 on NaN and on the sign of zero, and the platform's
-//! `sin` differs in the last bit. Flight code therefore uses the compare-select helpers and the `libm` calls below.
+//! `f32::min` and `f32::max` differ between x86-64 and Cortex-M7 on NaN and on the sign of zero,
+//! and the platform's `sin` differs in the last bit. Flight code therefore uses the compare-select
+//! helpers and the `libm` calls below.
 
 pub use crate::lane::{Real, lower, real, sqrt, upper};
 use nalgebra::Vector3;
@@ -24,13 +25,15 @@ pub fn limit_norm<T: Real>(v: Vector3<T>, max: T) -> Vector3<T> {
     if norm > max { v * (max / norm) } else { v }
 }
 
-/// A count below 2^53 as it is: a processor without 64-bit integers has an f64 that holds both halves.
+/// A count below 2^53 as it is: a processor without 64-bit integers has an f64 that holds both
+/// halves.
 #[inline(always)]
 pub fn whole(count: u64) -> f64 {
     f64::from((count >> 32) as u32) * 4_294_967_296.0 + f64::from(count as u32)
 }
 
-/// Sine and cosine as `libm` gives them together: the same bits, and one function on the target instead of three.
+/// Sine and cosine as `libm` gives them together: the same bits, and one function on the target
+/// instead of three.
 pub fn sin(x: f32) -> f32 {
     libm::sincosf(x).0
 }
@@ -40,7 +43,8 @@ pub fn cos(x: f32) -> f32 {
     libm::sincosf(x).1
 }
 
-/// Angle wrapped into (-pi, pi], rad, to within the rounding of the angle. Total: a non-finite angle gives 0.
+/// Angle wrapped into (-pi, pi], rad, to within the rounding of the angle. Total: a non-finite
+/// angle gives 0.
 pub fn wrap_angle(angle: f32) -> f32 {
     use core::f32::consts::PI;
     if angle > -PI && angle <= PI {

@@ -1,8 +1,10 @@
-//! What a learned policy sees and what its numbers mean: the same in training, in simulation and in flight.
+//! What a learned policy sees and what its numbers mean: the same in training, in simulation and in
+//! flight.
 //!
-//! A policy is a function from [`OBSERVATION`] numbers to [`ACTION`] numbers, for example a [`Policy`] network. It follows a
-//! reference, knows one obstacle at a time, and answers with attitude, thrust and wings, which the inner loop of the stack
-//! flies. All numbers are of order one. Ours; the paper has no learned control.
+//! A policy is a function from [`OBSERVATION`] numbers to [`ACTION`] numbers, for example a
+//! [`Policy`] network. It follows a reference, knows one obstacle at a time, and answers with
+//! attitude, thrust and wings, which the inner loop of the stack flies. All numbers are of order
+//! one. Ours; the paper has no learned control.
 //!
 //! | observation | what | scale |
 //! |---|---|---|
@@ -99,8 +101,9 @@ impl Span {
         Self { weight_n: vehicle.weight_n(), thrust_max_n, tilt_max_rad }
     }
 
-    /// What an action means: roll and pitch as shares of the largest tilt, thrust in weights above hover, wings from -1 folded
-    /// to 1 spread. Each number is limited to [-1, 1]; what is no number counts as -1.
+    /// What an action means: roll and pitch as shares of the largest tilt, thrust in weights above
+    /// hover, wings from -1 folded to 1 spread. Each number is limited to [-1, 1]; what is no
+    /// number counts as -1.
     pub fn command(&self, action: &[f32; ACTION]) -> PilotCommand {
         let [roll, pitch, thrust, wing] = action.map(|x| limit(x, -1.0, 1.0));
         PilotCommand {
@@ -206,14 +209,19 @@ mod tests {
     #[test]
     fn an_obstacle_is_known_from_when_it_is_seen_until_it_is_out_of_range() {
         let sensing = Sensing { range_m: 5.0, half_view_rad: 0.2618, speed_min_m_s: 1.0 };
-        let (mut lookout, trunk) = (Lookout::new(sensing), [Obstacle { id: 3, north_m: 10.0, east_m: 0.0 }]);
+        let (mut lookout, trunk) =
+            (Lookout::new(sensing), [Obstacle { id: 3, north_m: 10.0, east_m: 0.0 }]);
         let north = In::new(Vector3::new(7.0, 0.0, 0.0));
         let east = In::new(Vector3::new(0.0, 7.0, 0.0));
         let at = |n: f32, e: f32| In::new(Vector3::new(n, e, -10.0));
         assert_eq!(lookout.look(at(4.0, 0.0), north, &trunk), None, "too far");
         assert_eq!(lookout.look(at(6.0, 0.0), east, &trunk), None, "not ahead");
         assert_eq!(lookout.look(at(6.0, 0.0), north, &trunk), Some(Vector2::new(0.8, 0.0)));
-        assert_eq!(lookout.look(at(6.0, 2.0), east, &trunk), Some(Vector2::new(0.8, -0.4)), "still known");
+        assert_eq!(
+            lookout.look(at(6.0, 2.0), east, &trunk),
+            Some(Vector2::new(0.8, -0.4)),
+            "still known"
+        );
         assert_eq!(lookout.look(at(6.0, 6.0), east, &trunk), None, "out of range");
     }
 }

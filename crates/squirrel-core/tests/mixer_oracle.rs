@@ -1,7 +1,8 @@
-//! The mixer's answers against an interior-point solver (Clarabel) that solves the stated problem step by step.
+//! The mixer's answers against an interior-point solver (Clarabel) that solves the stated problem
+//! step by step.
 //!
-//! Lexicographic: the largest share of roll and pitch, then the nearest thrust, then the nearest yaw torque, over all
-//! rotor thrusts of a quadrotor within their limits.
+//! Lexicographic: the largest share of roll and pitch, then the nearest thrust, then the nearest
+//! yaw torque, over all rotor thrusts of a quadrotor within their limits.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -17,7 +18,8 @@ use squirrel_core::nalgebra::Vector3;
 struct Draw(u64);
 impl Draw {
     fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
     fn within(&mut self, low: f64, high: f64) -> f64 {
@@ -42,7 +44,8 @@ fn solve(p: &[f64], q: &[f64], a: &[(Vec<f64>, f64)], g: &[(Vec<f64>, f64)]) -> 
         ..Default::default()
     };
     let mut solver =
-        DefaultSolver::new(&CscMatrix::from(&diagonal), q, &matrix, &bounds, &cones, settings).unwrap();
+        DefaultSolver::new(&CscMatrix::from(&diagonal), q, &matrix, &bounds, &cones, settings)
+            .unwrap();
     solver.solve();
     assert!(
         matches!(solver.solution.status, SolverStatus::Solved | SolverStatus::AlmostSolved),
@@ -54,13 +57,15 @@ fn solve(p: &[f64], q: &[f64], a: &[(Vec<f64>, f64)], g: &[(Vec<f64>, f64)]) -> 
 
 /// Rotor thrusts of the lexicographic optimum; variables are four thrusts and the share.
 fn oracle(t: &[[f64; 4]; 4], thrust_max: f64, demand: &ThrustTorque) -> Vec<f64> {
-    let want =
-        [demand.thrust_n, demand.torque_n_m.x, demand.torque_n_m.y, demand.torque_n_m.z].map(f64::from);
+    let want = [demand.thrust_n, demand.torque_n_m.x, demand.torque_n_m.y, demand.torque_n_m.z]
+        .map(f64::from);
     let row = |k: usize, share: f64| t[k].iter().copied().chain([share]).collect::<Vec<f64>>();
-    let unit = |i: usize, sign: f64| (0..5).map(|j| if i == j { sign } else { 0.0 }).collect::<Vec<f64>>();
+    let unit =
+        |i: usize, sign: f64| (0..5).map(|j| if i == j { sign } else { 0.0 }).collect::<Vec<f64>>();
     // Torque rows are scaled to newtons, so that all constraints are of one size.
     let scale = 10.0;
-    let scaled = |k: usize, share: f64| row(k, share).into_iter().map(|x| x * scale).collect::<Vec<f64>>();
+    let scaled =
+        |k: usize, share: f64| row(k, share).into_iter().map(|x| x * scale).collect::<Vec<f64>>();
     let equal = vec![(scaled(1, -want[1]), 0.0), (scaled(2, -want[2]), 0.0)];
     let mut bounds = vec![(unit(4, 1.0), 1.0), (unit(4, -1.0), 0.0)];
     for i in 0..4 {
@@ -109,8 +114,12 @@ fn saturated_answers_match_the_oracle_on_a_thousand_random_demands() {
         let mixer = Mixer::new(&vehicle).unwrap();
         let demand = ThrustTorque {
             thrust_n: draw.within(0.0, 24.0) as f32,
-            torque_n_m: Vector3::new(draw.within(-1.0, 1.0), draw.within(-1.0, 1.0), draw.within(-0.2, 0.2))
-                .map(|x| x as f32),
+            torque_n_m: Vector3::new(
+                draw.within(-1.0, 1.0),
+                draw.within(-1.0, 1.0),
+                draw.within(-0.2, 0.2),
+            )
+            .map(|x| x as f32),
         };
         let answer = mixer.allocate(&demand);
         saturated += usize::from(answer.saturated);
@@ -125,13 +134,17 @@ fn saturated_answers_match_the_oracle_on_a_thousand_random_demands() {
         let expected = oracle(&t, 5.4, &demand);
         for i in 0..4 {
             let gap = (f64::from(answer.rotor_thrust_n[i]) - expected[i]).abs();
-            assert!(gap < 2e-3, "case {n}, rotor {i}: {answer:?} for {expected:?}, demand {demand:?}");
+            assert!(
+                gap < 2e-3,
+                "case {n}, rotor {i}: {answer:?} for {expected:?}, demand {demand:?}"
+            );
         }
     }
     assert!(saturated > 500, "only {saturated} demands saturate");
 }
 
-/// With more rotors than axes the mixer stays on `T^+`: thrusts `s a + u b + y c`. Its share is the largest there.
+/// With more rotors than axes the mixer stays on `T^+`: thrusts `s a + u b + y c`. Its share is the
+/// largest there.
 #[test]
 fn the_share_of_six_and_eight_rotors_is_the_largest() {
     let mut draw = Draw(4);
@@ -140,15 +153,17 @@ fn the_share_of_six_and_eight_rotors_is_the_largest() {
         let count = 6 + 2 * (n % 2);
         let (mut positions, mut signs) = (Vec::new(), Vec::new());
         for i in 0..count {
-            let angle =
-                core::f64::consts::TAU * (f64::from(i) + draw.within(-0.1, 0.1)) / f64::from(count) + 0.3;
+            let angle = core::f64::consts::TAU * (f64::from(i) + draw.within(-0.1, 0.1))
+                / f64::from(count)
+                + 0.3;
             let arm = draw.within(0.12, 0.2);
             positions.push([arm * angle.cos(), arm * angle.sin()]);
             signs.push(if i % 2 == 0 { 1.0 } else { -1.0 });
         }
         let Ok(mixer) = Mixer::new(&vehicle(&positions, &signs)) else { continue };
         let thrusts = |u: f32, torque: [f32; 3]| {
-            let answer = mixer.allocate(&ThrustTorque { thrust_n: u, torque_n_m: Vector3::from(torque) });
+            let answer =
+                mixer.allocate(&ThrustTorque { thrust_n: u, torque_n_m: Vector3::from(torque) });
             assert!(!answer.saturated);
             answer.rotor_thrust_n.map(f64::from)
         };
@@ -163,7 +178,8 @@ fn the_share_of_six_and_eight_rotors_is_the_largest() {
         let torque = [draw.within(-3.0, 3.0), draw.within(-3.0, 3.0), draw.within(-0.1, 0.1)];
         let mut bounds = vec![(vec![1.0, 0.0, 0.0], 1.0), (vec![-1.0, 0.0, 0.0], 0.0)];
         for i in 0..usize::try_from(count).unwrap() {
-            let row = vec![roll[i] * torque[0] + pitch[i] * torque[1], hover[i] / 15.0, 0.1 * yaw[i]];
+            let row =
+                vec![roll[i] * torque[0] + pitch[i] * torque[1], hover[i] / 15.0, 0.1 * yaw[i]];
             bounds.push((row.iter().map(|x| -x).collect(), 0.0));
             bounds.push((row, f64::from(mixer.rotor_thrust_max_n())));
         }
@@ -192,8 +208,9 @@ fn round_trip_for_random_layouts() {
         let mut positions = Vec::new();
         let mut signs = Vec::new();
         for i in 0..count {
-            let angle =
-                core::f64::consts::TAU * (f64::from(i) + draw.within(-0.2, 0.2)) / f64::from(count) + 0.3;
+            let angle = core::f64::consts::TAU * (f64::from(i) + draw.within(-0.2, 0.2))
+                / f64::from(count)
+                + 0.3;
             let arm = draw.within(0.08, 0.2);
             positions.push([arm * angle.cos(), arm * angle.sin()]);
             signs.push(if i % 2 == 0 { 1.0 } else { -1.0 });
@@ -220,18 +237,24 @@ fn round_trip_for_random_layouts() {
     assert!(compared > 300, "only {compared} of 500 layouts can fly this demand unsaturated");
 }
 
-/// docs/equations.md T2 on the printed matrix: rotor 1 front-left, 2 back-left, 3 back-right, 4 front-right.
+/// docs/equations.md T2 on the printed matrix: rotor 1 front-left, 2 back-left, 3 back-right, 4
+/// front-right.
 #[test]
 fn torque_signs_are_the_paper_s() {
     let mixer = Mixer::new(&vehicle(&PAPER_X, &PAPER_SIGNS)).unwrap();
     let rotors = |x: f32, y: f32, z: f32| {
-        let f =
-            mixer.allocate(&ThrustTorque { thrust_n: 6.0, torque_n_m: Vector3::new(x, y, z) }).rotor_thrust_n;
+        let f = mixer
+            .allocate(&ThrustTorque { thrust_n: 6.0, torque_n_m: Vector3::new(x, y, z) })
+            .rotor_thrust_n;
         [f[0] > 1.5, f[1] > 1.5, f[2] > 1.5, f[3] > 1.5]
     };
     assert_eq!(rotors(0.05, 0.0, 0.0), [true, true, false, false], "roll right: left rotors");
     assert_eq!(rotors(0.0, 0.05, 0.0), [true, false, false, true], "pitch up: front rotors");
-    assert_eq!(rotors(0.0, 0.0, 0.005), [false, true, false, true], "yaw right: counter-clockwise rotors");
+    assert_eq!(
+        rotors(0.0, 0.0, 0.005),
+        [false, true, false, true],
+        "yaw right: counter-clockwise rotors"
+    );
 }
 
 #[test]
@@ -252,7 +275,8 @@ fn nothing_comes_in_nothing_bad_goes_out() {
             2 => -f32::MAX,
             _ => draw.within(-50.0, 50.0) as f32,
         };
-        let demand = ThrustTorque { thrust_n: wild(), torque_n_m: Vector3::new(wild(), wild(), wild()) };
+        let demand =
+            ThrustTorque { thrust_n: wild(), torque_n_m: Vector3::new(wild(), wild(), wild()) };
         for f in &mixer.allocate(&demand).rotor_thrust_n[..4] {
             assert!((0.0..=5.4 + 1e-4).contains(f), "{f} for {demand:?}");
         }

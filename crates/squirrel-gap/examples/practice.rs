@@ -1,9 +1,11 @@
-//! Practice cases through the whole workflow, by hand: whether the verdict on each is that of the answers beside them.
+//! Practice cases through the whole workflow, by hand: whether the verdict on each is that of the
+//! answers beside them.
 //!
 //!     cargo run --release -p squirrel-gap --example practice -- DIR
 //!
-//! DIR holds `answers.json` and `cases/ID/{train/flight00,train/flight01,holdout/flight00}/` in the files of `vehicles/maps/practice.toml`. The
-//! tests ask the same of cases that they fly themselves, `tests/it/foreign.rs`.
+//! DIR holds `answers.json` and `cases/ID/{train/flight00,train/flight01,holdout/flight00}/` in the
+//! files of `vehicles/maps/practice.toml`. The tests ask the same of cases that they fly
+//! themselves, `tests/it/foreign.rs`.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is where it speaks")]
 
 use serde_json::Value as Json;
@@ -39,7 +41,8 @@ fn main() -> ExitCode {
 
 /// How many verdicts are wrong.
 fn run(folder: &Path) -> Result<usize, Box<dyn Error>> {
-    let answers: Json = serde_json::from_str(&std::fs::read_to_string(folder.join("answers.json"))?)?;
+    let answers: Json =
+        serde_json::from_str(&std::fs::read_to_string(folder.join("answers.json"))?)?;
     let answers = answers.as_object().ok_or("answers.json: not an object")?;
     let mut wrong = 0;
     for (case, answer) in answers {
@@ -68,7 +71,8 @@ fn verdict(case: &Path) -> Result<Verdict, Box<dyn Error>> {
 fn complaint(answer: &Json, verdict: &Verdict) -> Option<String> {
     let hidden = answer["effects"].as_object();
     // A note says that the effect is there in another form than the standard one.
-    let other_form = hidden.is_some_and(|all| all.values().any(|effect| effect.get("note").is_some()));
+    let other_form =
+        hidden.is_some_and(|all| all.values().any(|effect| effect.get("note").is_some()));
     let right = match answer["verdict"].as_str() {
         Some("none") => &[Kind::None][..],
         Some("outside_catalogue") => &[Kind::OutsideCatalogue],

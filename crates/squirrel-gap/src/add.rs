@@ -1,4 +1,5 @@
-//! The vehicle file with the named effects in it: a patch that keeps every comment and the order of what was there.
+//! The vehicle file with the named effects in it: a patch that keeps every comment and the order of
+//! what was there.
 
 use crate::diagnosis::{Diagnosis, Own};
 use crate::verdict::{Kind, NamedEffect, Value, nothing_to_add};
@@ -7,23 +8,32 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use std::fmt::Write;
 use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, value};
 
-/// The text of the vehicle file with the effects of a diagnosis added, each number with its interval, the flights that it
-/// comes from, and what they covered.
+/// The text of the vehicle file with the effects of a diagnosis added, each number with its
+/// interval, the flights that it comes from, and what they covered.
 ///
 /// * `flights` - names of the flights
 ///
 /// # Errors
 /// One line: the text is not TOML, or the patched file would not be a vehicle.
-pub fn add(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
+pub fn add(
+    vehicle: &VehicleFile,
+    diagnosis: &Diagnosis,
+    flights: &[String],
+) -> Result<String, String> {
     with(vehicle, diagnosis, diagnosis.before.as_ref(), &diagnosis.verdict.effects, flights)
 }
 
-/// As [`add`], and with the file's own numbers where these flights have them, each inside its tolerance; without a name where none
-/// stands. What is proven on held-out flights is this whole explanation.
+/// As [`add`], and with the file's own numbers where these flights have them, each inside its
+/// tolerance; without a name where none stands. What is proven on held-out flights is this whole
+/// explanation.
 ///
 /// # Errors
 /// One line: something is missing that such numbers would take up; or as [`add`].
-pub fn fit(vehicle: &VehicleFile, diagnosis: &Diagnosis, flights: &[String]) -> Result<String, String> {
+pub fn fit(
+    vehicle: &VehicleFile,
+    diagnosis: &Diagnosis,
+    flights: &[String],
+) -> Result<String, String> {
     let verdict = &diagnosis.verdict;
     let own = diagnosis.before.as_ref().or(diagnosis.now.as_ref());
     match (nothing_to_add(verdict), verdict.verdict) {
@@ -54,7 +64,8 @@ pub fn patched(
     }
 }
 
-/// As [`add`], of the explanations that flights do not tell apart the first with an effect: the answer, then its alternatives.
+/// As [`add`], of the explanations that flights do not tell apart the first with an effect: the
+/// answer, then its alternatives.
 ///
 /// # Errors
 /// One line: no explanation has the effect; or as [`add`].
@@ -65,8 +76,9 @@ pub fn add_effect(
     flights: &[String],
 ) -> Result<String, String> {
     let verdict = &diagnosis.verdict;
-    let sets =
-        || std::iter::once(&verdict.effects).chain(verdict.alternatives.iter().map(|set| &set.numbers));
+    let sets = || {
+        std::iter::once(&verdict.effects).chain(verdict.alternatives.iter().map(|set| &set.numbers))
+    };
     let Some(chosen) = sets().find(|set| set.iter().any(|named| named.name == effect)) else {
         let mut names: Vec<&str> = sets().flatten().map(|named| named.name).collect();
         names.sort_unstable();
@@ -87,7 +99,8 @@ fn with(
     chosen: &[NamedEffect],
     flights: &[String],
 ) -> Result<String, String> {
-    let mut document: DocumentMut = vehicle.text.parse().map_err(|e| format!("{}: {e}", vehicle.name))?;
+    let mut document: DocumentMut =
+        vehicle.text.parse().map_err(|e| format!("{}: {e}", vehicle.name))?;
     if let Some(own) = own {
         own_rotors(&mut document, vehicle, own)?;
         own_airframe(&mut document, vehicle, own);
@@ -147,7 +160,8 @@ fn with(
 fn own_rotors(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) -> Result<(), String> {
     let (before, now) = (vehicle.vehicle.rotor_factors(), own.vehicle.vehicle.rotor_factors());
     for rotor in 0..vehicle.vehicle.rotors().len() {
-        let [was, is] = [vehicle, &own.vehicle].map(|file| file.vehicle.rotors()[rotor].position.vector);
+        let [was, is] =
+            [vehicle, &own.vehicle].map(|file| file.vehicle.rotors()[rotor].position.vector);
         if was != is {
             let position = &mut rotor_table(document, vehicle, rotor)?["position_body_m"];
             replace(position, numbers(is.as_slice()), &own.source);
@@ -172,7 +186,8 @@ fn own_airframe(document: &mut DocumentMut, vehicle: &VehicleFile, own: &Own) {
     if was.inertia_kg_m2 != inertia {
         let diagonal = numbers(inertia.diagonal().as_slice());
         let is_full = nalgebra::Matrix3::from_diagonal(&inertia.diagonal()) != inertia;
-        let rows = || (0..3).map(|row| numbers(&[0, 1, 2].map(|column| inertia[(row, column)]))).collect();
+        let rows =
+            || (0..3).map(|row| numbers(&[0, 1, 2].map(|column| inertia[(row, column)]))).collect();
         let now = if is_full { rows() } else { diagonal };
         replace(&mut document["mass"]["inertia_kg_m2"], now, &own.source);
     }
@@ -232,10 +247,13 @@ fn write_form(table: &mut Table, effect: &str, form: &'static str) {
 
 /// The form that an effect has among its numbers.
 fn chosen_form(parameters: &[EffectParameter], values: &[f64]) -> &'static str {
-    let chosen = parameters.iter().zip(values).find_map(|(parameter, number)| match parameter.kind {
-        ParameterKind::OneOf(names) if parameter.key == FORM => names.get(*number as usize).copied(),
-        _ => None,
-    });
+    let chosen =
+        parameters.iter().zip(values).find_map(|(parameter, number)| match parameter.kind {
+            ParameterKind::OneOf(names) if parameter.key == FORM => {
+                names.get(*number as usize).copied()
+            }
+            _ => None,
+        });
     chosen.unwrap_or("standard")
 }
 
@@ -316,7 +334,9 @@ pub fn difference(before: &str, after: &str) -> String {
     while i < old.len() || j < new.len() {
         if i < old.len() && j < new.len() && old[i] == new[j] {
             (i, j) = (i + 1, j + 1);
-        } else if let Some(ahead) = old.get(i).and_then(|line| new[j..].iter().position(|n| n == line)) {
+        } else if let Some(ahead) =
+            old.get(i).and_then(|line| new[j..].iter().position(|n| n == line))
+        {
             // A line that comes again later: everything until then is new.
             for line in &new[j..j + ahead] {
                 let _ = writeln!(text, "+ {line}");

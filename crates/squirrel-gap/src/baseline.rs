@@ -1,12 +1,14 @@
-//! A machine's own numbers: the vehicle file fitted to flights in which it flew well, and by how much they differ from one
-//! such flight to the next. What has changed since is what such differences do not explain.
+//! A machine's own numbers: the vehicle file fitted to flights in which it flew well, and by how
+//! much they differ from one such flight to the next. What has changed since is what such
+//! differences do not explain.
 //!
 //! ```text
 //! theta   the numbers of the file, all flights together, wide priors, a few damped steps of Gauss-Newton
 //! k       maximises  sum_flights ln Z(flight | numbers off theta by sd k s0) - (ln k)^2 / (2 0.35^2)
 //! t       = k s0 sqrt(1 + 1/n)              the tolerance of another flight, n flights in the baseline
 //! ```
-//! `s0` is half of the smallest size worth reporting, of each effect: one factor is all that a few flights tell of scatter.
+//! `s0` is half of the smallest size worth reporting, of each effect: one factor is all that a few
+//! flights tell of scatter.
 
 use crate::GapError;
 use crate::compatibility::{self, Moments, Ready};
@@ -25,9 +27,11 @@ use std::collections::BTreeMap;
 const STEPS: usize = 4;
 /// Part of the smallest size worth reporting below which an effect of a machine is none.
 const NEXT_TO_NOTHING: f64 = 0.1;
-/// Part of the smallest size worth reporting by which a number differs from one flight to the next, where nothing is known.
+/// Part of the smallest size worth reporting by which a number differs from one flight to the next,
+/// where nothing is known.
 const USUAL_SHARE: f64 = 0.5;
-/// How many times that it may be, and how sure that it is about once, as the deviation of its logarithm.
+/// How many times that it may be, and how sure that it is about once, as the deviation of its
+/// logarithm.
 const TIMES: [f64; 7] = [0.35, 0.5, 0.7, 0.85, 1.0, 1.4, 2.0];
 const TIMES_SD: f64 = 0.35;
 
@@ -50,7 +54,8 @@ impl Baseline {
     /// Fits the numbers of a vehicle file to flights in which the machine flew well.
     ///
     /// # Errors
-    /// [`GapError`]: a log or vehicle that nothing can be computed with, or no flight whose data agree with themselves.
+    /// [`GapError`]: a log or vehicle that nothing can be computed with, or no flight whose data
+    /// agree with themselves.
     pub fn fit(
         vehicle: &VehicleFile,
         flights: &[(String, FlightLog)],
@@ -64,7 +69,9 @@ impl Baseline {
                 let moments = if is_known { Moments::IfKnown } else { Moments::Lasting };
                 (compatibility::problems(&ready, flights, &[])?, moments)
             }
-            Err(error) => (compatibility::unreadable(vehicle, flights, &[], error)?, Moments::IfKnown),
+            Err(error) => {
+                (compatibility::unreadable(vehicle, flights, &[], error)?, Moments::IfKnown)
+            }
         };
         let good = compatibility::kept(flights, &set_aside);
         if good.is_empty() {
@@ -100,7 +107,8 @@ fn step(
             parameter.tolerance = parameter.tolerance.max(parameter.largest);
         }
     }
-    let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &|| () };
+    let search =
+        Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &|| () };
     fitted::machine(&search, search.towards()?, is_fitted)
 }
 
@@ -135,14 +143,21 @@ fn scatter(
     for flight in flights {
         let (predictor, mut catalogue) = prepared(vehicle, moments, std::slice::from_ref(flight))?;
         catalogue.take(&Scatter::default());
-        let search =
-            Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &|| () };
+        let search = Search {
+            predictor: &predictor,
+            catalogue: &catalogue,
+            gust_m_s: None,
+            progress: &|| (),
+        };
         let (point, set) = search.afloat()?;
         let left = predictor.residual(&hypothesis(&predictor, &catalogue, &point)?)?;
-        for (most, own) in out.usual.iter_mut().flatten().zip(usual(&predictor, &left).iter().flatten()) {
+        for (most, own) in
+            out.usual.iter_mut().flatten().zip(usual(&predictor, &left).iter().flatten())
+        {
             *most = most.max(*own);
         }
-        let effects = (0..catalogue.columns(&predictor)).map(|column| catalogue.group(column)).collect();
+        let effects =
+            (0..catalogue.columns(&predictor)).map(|column| catalogue.group(column)).collect();
         alone.push(Alone { set, effects });
     }
     out.tolerances = among(&alone);
@@ -164,16 +179,21 @@ impl Alone {
             effect.map_or(*own, |(_, smallest)| times * USUAL_SHARE * smallest)
         };
         let sd: Vec<f64> = self.effects.iter().zip(&self.set.prior).map(of).collect();
-        self.set.gram.posterior(&sd, BETA).map_or(f64::NEG_INFINITY, |posterior| posterior.log_evidence)
+        self.set
+            .gram
+            .posterior(&sd, BETA)
+            .map_or(f64::NEG_INFINITY, |posterior| posterior.log_evidence)
     }
 }
 
 /// How much the numbers of a flight differ from those of others, by effect.
 fn among(alone: &[Alone]) -> BTreeMap<&'static str, f64> {
     let evidence = |times: f64| {
-        alone.iter().map(|flight| flight.evidence(times)).sum::<f64>() - 0.5 * (times.ln() / TIMES_SD).powi(2)
+        alone.iter().map(|flight| flight.evidence(times)).sum::<f64>()
+            - 0.5 * (times.ln() / TIMES_SD).powi(2)
     };
-    let best = TIMES.into_iter().max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).unwrap_or(1.0);
+    let best =
+        TIMES.into_iter().max_by(|a, b| evidence(*a).total_cmp(&evidence(*b))).unwrap_or(1.0);
     // About their mean, which is not known better.
     let times = best * (1.0 + 1.0 / alone.len() as f64).sqrt();
     let effects = alone.iter().flat_map(|flight| flight.effects.iter().flatten());

@@ -1,8 +1,10 @@
-//! Held-out flights of our own flight code flown again in closed loop: as the vehicle file was, and with the effects added.
+//! Held-out flights of our own flight code flown again in closed loop: as the vehicle file was, and
+//! with the effects added.
 //!
-//! The open loop asks whether forces are right for a second. Here the controller answers to the model for the whole flight,
-//! so that what shows is what a user sees: whether the simulated drone goes where the measured one went. Only the scenario,
-//! the arm and the integrator are taken from the log; the vehicle is the one under test.
+//! The open loop asks whether forces are right for a second. Here the controller answers to the
+//! model for the whole flight, so that what shows is what a user sees: whether the simulated drone
+//! goes where the measured one went. Only the scenario, the arm and the integrator are taken from
+//! the log; the vehicle is the one under test.
 
 use crate::GapError;
 use crate::flight::series::Series;
@@ -20,13 +22,15 @@ const CHANNEL: &str = "gnss.position_ned_m";
 pub struct ClosedLoop {
     /// Name of the flight.
     pub flight: String,
-    /// Root mean square of simulated less measured position, north, east, down, m: with the vehicle as it was.
+    /// Root mean square of simulated less measured position, north, east, down, m: with the vehicle
+    /// as it was.
     pub before_ned_m: [f64; 3],
     /// The same with the effects added.
     pub after_ned_m: [f64; 3],
 }
 
-/// Flies held-out flights again under both vehicles; flights that another autopilot flew are left out, and a note says so.
+/// Flies held-out flights again under both vehicles; flights that another autopilot flew are left
+/// out, and a note says so.
 ///
 /// * `before`, `after` - the vehicle as it was, and with the effects added
 ///
@@ -40,7 +44,9 @@ pub fn closed_loop(
     let (mut all, mut notes) = (Vec::new(), Vec::new());
     for (flight, log) in held_out {
         if let Some(policy) = log.metadata.get("policy") {
-            notes.push(format!("{flight}: not flown again in closed loop: commanded by the policy {policy}"));
+            notes.push(format!(
+                "{flight}: not flown again in closed loop: commanded by the policy {policy}"
+            ));
             continue;
         }
         let setup = match replay::setup(log) {
@@ -62,7 +68,11 @@ pub fn closed_loop(
 }
 
 /// Root mean square of simulated less measured position, m, over the time that both flew.
-fn error_ned_m(vehicle: &VehicleFile, setup: &Setup, measured: &Series) -> Result<[f64; 3], GapError> {
+fn error_ned_m(
+    vehicle: &VehicleFile,
+    setup: &Setup,
+    measured: &Series,
+) -> Result<[f64; 3], GapError> {
     let refused = |problem: String| GapError::Vehicle { vehicle: vehicle.name.clone(), problem };
     let setup = Setup { vehicle: vehicle.clone(), ..setup.clone() };
     let log = setup.fly(true, |_| {}).map_err(|e| refused(e.to_string()))?.log;

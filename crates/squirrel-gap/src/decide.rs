@@ -1,4 +1,5 @@
-//! Which answer it is: evidence ranks names, held-out flights say whether one stands, and what is left is told beside it.
+//! Which answer it is: evidence ranks names, held-out flights say whether one stands, and what is
+//! left is told beside it.
 //!
 //! | what is left | names | answer |
 //! |---|---|---|
@@ -15,22 +16,25 @@ use crate::words;
 use squirrel_core::effects::{BatterySag, Effect, Effects, Gust, Kind as ParameterKind, forms};
 use std::collections::BTreeMap;
 
-/// Part of what the nominal model leaves that a form which differs may leave; more is outside the catalogue.
+/// Part of what the nominal model leaves that a form which differs may leave; more is outside the
+/// catalogue.
 const FORM_SHARE: f64 = 0.1;
 /// Part of the held-out gap that a name in another form must remove.
 const FORM_REMOVED: f64 = 0.6;
-/// How much more of the held-out gap another name must leave to be worse by that alone, and how much if the evidence is against
-/// it, too, by so many nats: twenty to one.
+/// How much more of the held-out gap another name must leave to be worse by that alone, and how
+/// much if the evidence is against it, too, by so many nats: twenty to one.
 const RIVAL_GAP: f64 = 3.0;
 const RIVAL_GAP_BEHIND: f64 = 1.5;
-/// Part of an error on held-out flights by which another one may be larger and no worse: the floor takes what noise is beyond it.
+/// Part of an error on held-out flights by which another one may be larger and no worse: the floor
+/// takes what noise is beyond it.
 const HELD_OUT_NOISE: f64 = 0.05;
 /// More alternatives than this within the evidence of a name are no answer.
 const ALTERNATIVES_MAX: usize = 3;
 /// Alternatives that are shown.
 const SHOWN: usize = 5;
 
-/// Other names that are as good: the evidence hardly tells them apart, and held-out flights do not either.
+/// Other names that are as good: the evidence hardly tells them apart, and held-out flights do not
+/// either.
 pub(crate) fn close<'a>(
     naming: &Naming,
     rivals: &'a [Scored],
@@ -38,25 +42,35 @@ pub(crate) fn close<'a>(
     gap: Option<&Gap>,
 ) -> Vec<&'a Scored> {
     let named = naming.found.best.log_evidence;
-    // A set that was not named may have more evidence than what was: too little for each of its names.
+    // A set that was not named may have more evidence than what was: too little for each of its
+    // names.
     let best = rivals.iter().map(|rival| rival.log_evidence).fold(named, f64::max);
     let clearly_worse = |rival: usize| {
         let (Some(proof), Some(gap)) = (proof, gap) else { return false };
-        let left = proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
+        let left =
+            proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
         let is_behind = rivals[rival].log_evidence < named - BEHIND_NATS;
         let times = if is_behind { RIVAL_GAP_BEHIND } else { RIVAL_GAP };
         left.is_some_and(|left| left - 1.0 >= times * (gap.after - 1.0).max(HELD_OUT_NOISE))
     };
-    let is_close = |(i, rival): &(usize, &Scored)| rival.log_evidence > best - NATS_MIN && !clearly_worse(*i);
+    let is_close =
+        |(i, rival): &(usize, &Scored)| rival.log_evidence > best - NATS_MIN && !clearly_worse(*i);
     rivals.iter().enumerate().filter(is_close).map(|(_, rival)| rival).collect()
 }
 
-/// The names that an answer shares with all that are as good, if that is a part of it: they stand whichever is right.
-pub(crate) fn shared(search: &Search<'_>, naming: &Naming, close: &[&Scored]) -> Option<Vec<Member>> {
+/// The names that an answer shares with all that are as good, if that is a part of it: they stand
+/// whichever is right.
+pub(crate) fn shared(
+    search: &Search<'_>,
+    naming: &Naming,
+    close: &[&Scored],
+) -> Option<Vec<Member>> {
     let own = &naming.found.best.members;
-    let has =
-        |set: &Scored, member: &Member| set.members.iter().any(|other| other.candidate == member.candidate);
-    let kept: Vec<usize> = (0..own.len()).filter(|i| close.iter().all(|set| has(set, &own[*i]))).collect();
+    let has = |set: &Scored, member: &Member| {
+        set.members.iter().any(|other| other.candidate == member.candidate)
+    };
+    let kept: Vec<usize> =
+        (0..own.len()).filter(|i| close.iter().all(|set| has(set, &own[*i]))).collect();
     let stands = |i: usize| search.stands_out(&naming.found.best, i, &naming.deviations) >= STANDS;
     let some = !kept.is_empty() && kept.len() < own.len();
     // Which rotors are weak is one answer, and a part of it is another one.
@@ -105,7 +119,10 @@ pub(crate) fn decide(
         let shrinks = gap.as_ref().is_none_or(|gap| gap.removed_fraction > FORM_REMOVED);
         if naming.stands && close.is_empty() {
             Kind::NamedIncomplete
-        } else if share < FORM_SHARE && !leftover.is_foreign() && search.is_plausible(&found.best) && shrinks
+        } else if share < FORM_SHARE
+            && !leftover.is_foreign()
+            && search.is_plausible(&found.best)
+            && shrinks
         {
             Kind::NamedFormDiffers
         } else if naming.stands {
@@ -126,8 +143,10 @@ pub(crate) fn decide(
     let mut alternatives =
         if is_open { open } else { alternatives(search, naming, rivals.iter().take(SHOWN)) };
     if curve_hides_sag && effects.is_empty() {
-        let single =
-            search.single_evidence(found).into_iter().find(|(name, _)| *name == BatterySag::<f64>::NAME);
+        let single = search
+            .single_evidence(found)
+            .into_iter()
+            .find(|(name, _)| *name == BatterySag::<f64>::NAME);
         let evidence_nats = single.map_or(0.0, |(_, nats)| nats);
         alternatives.push(Alternative {
             effects: vec![BatterySag::<f64>::NAME],
@@ -144,7 +163,9 @@ pub(crate) fn decide(
     };
     let goes_with = goes_with.filter(|_| kind != Kind::Named);
     let fly_next = match kind {
-        Kind::NamedIncomplete if is_open => Some(words::fly_for(&names_beside(&effects, &alternatives))),
+        Kind::NamedIncomplete if is_open => {
+            Some(words::fly_for(&names_beside(&effects, &alternatives)))
+        }
         Kind::NotIdentifiable if effects.is_empty() => Some(words::fly_for(&blind)),
         Kind::Ambiguous | Kind::NotIdentifiable => {
             let mut all: Vec<&str> = effects.iter().map(|e| e.name).collect();
@@ -178,8 +199,9 @@ pub(crate) fn decide(
     verdict
 }
 
-/// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too, in the channels that it
-/// explains; 1 where it explains none. What stands out in other channels is another thing.
+/// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too, in the
+/// channels that it explains; 1 where it explains none. What stands out in other channels is
+/// another thing.
 fn left_share(naming: &Naming) -> f64 {
     let excess = |slow: f64, floor: f64| (slow.powi(2) / floor.powi(2) - 1.0).max(0.0);
     let (mut before, mut after) = (0.0, 0.0);
@@ -260,7 +282,8 @@ fn parameters(
 /// The members of another set, as a vehicle file would take them.
 fn numbers(search: &Search<'_>, set: &Scored) -> Vec<NamedEffect> {
     let offset = set.free.len();
-    let deviations: Vec<f64> = (0..offset).map(|column| set.posterior.variance(column).sqrt()).collect();
+    let deviations: Vec<f64> =
+        (0..offset).map(|column| set.posterior.variance(column).sqrt()).collect();
     let members = set.members.iter().enumerate();
     members
         .map(|(index, member)| NamedEffect {

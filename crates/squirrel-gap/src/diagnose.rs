@@ -1,4 +1,5 @@
-//! From flights to a verdict: check that the logs agree with themselves, name what is missing, prove it on other flights.
+//! From flights to a verdict: check that the logs agree with themselves, name what is missing,
+//! prove it on other flights.
 
 use crate::GapError;
 use crate::baseline::Baseline;
@@ -27,8 +28,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 /// * `progress` - called with what is being done
 ///
 /// # Errors
-/// [`GapError`]: a log or vehicle that nothing can be computed with. A log that contradicts itself is no error but the
-/// verdict [`Kind::DataProblem`].
+/// [`GapError`]: a log or vehicle that nothing can be computed with. A log that contradicts itself
+/// is no error but the verdict [`Kind::DataProblem`].
 pub fn diagnose(
     vehicle: &VehicleFile,
     flights: &[(String, FlightLog)],
@@ -57,7 +58,8 @@ pub fn diagnose_since(
     diagnose_against(&baseline.declared, Some(baseline), flights, held_out, progress)
 }
 
-/// What has changed since good flights of the same machine, where there are any; else what the vehicle file lacks.
+/// What has changed since good flights of the same machine, where there are any; else what the
+/// vehicle file lacks.
 ///
 /// * `good` - name and log of each; may be empty
 /// * other arguments as of [`diagnose`]
@@ -116,13 +118,16 @@ fn sorted<'a>(
     };
     let ready = match Ready::new(vehicle, flights, held_out) {
         Ok(ready) => ready,
-        Err(error) => return without(compatibility::unreadable(vehicle, flights, held_out, error)?),
+        Err(error) => {
+            return without(compatibility::unreadable(vehicle, flights, held_out, error)?);
+        }
     };
     progress("checking the data");
     let aside = compatibility::problems(&ready, flights, held_out)?;
     let is_bad = |(name, _): &(String, FlightLog)| aside.iter().any(|a| a.flight == *name);
     if let Some(first) = aside.first().filter(|_| flights.iter().all(is_bad)) {
-        let (goes_with, words) = (format!("{}: {}", first.flight, first.channel), first.words.clone());
+        let (goes_with, words) =
+            (format!("{}: {}", first.flight, first.channel), first.words.clone());
         let places = find::places(&ready.predictor, &ready.nominal)?;
         let verdict = Verdict {
             verdict: Kind::DataProblem,
@@ -195,13 +200,15 @@ fn judged(
     predictor.notes.extend(silent_tolerances(vehicle));
     progress("naming");
     let lengths_m = payload_lengths_m(&predictor, &nominal);
-    let mut catalogue = Catalogue::new(&predictor, &lengths_m, clock_step_s(&predictor, &nominal)?)?;
+    let mut catalogue =
+        Catalogue::new(&predictor, &lengths_m, clock_step_s(&predictor, &nominal)?)?;
     if let Some(baseline) = baseline {
         catalogue.take(&baseline.scatter);
     }
     let tick = || progress("naming");
     let naming = explain_flights(&predictor, &mut catalogue, &tick)?;
-    let search = Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
+    let search =
+        Search { predictor: &predictor, catalogue: &catalogue, gust_m_s: None, progress: &tick };
     let wanted = |naming: &_| hold(unseen.as_ref(), &search, naming);
     let mut naming = standing(&search, naming, wanted)?;
     let rivals = search.rivals(&naming.found)?;
@@ -220,8 +227,11 @@ fn judged(
     let close = close(&naming, &rivals, proof.as_ref(), numbers.as_ref());
     let mut open = Vec::new();
     if let Some(kept) = shared(&search, &naming, &close) {
-        open =
-            alternatives(&search, &naming, std::iter::once(&naming.found.best).chain(close.iter().copied()));
+        open = alternatives(
+            &search,
+            &naming,
+            std::iter::once(&naming.found.best).chain(close.iter().copied()),
+        );
         naming = only(&search, &naming, &kept)?;
         (proof, numbers) = proven(&naming, &[])?;
     }
@@ -231,8 +241,10 @@ fn judged(
     let set = if stands { &naming.found.best } else { naming.found.null.as_ref() };
     let own = fitted::of(&search, set)?;
     let fits_moments = has_other_moments && search.predictor.has_gyroscope() && baseline.is_none();
-    // Under priors as wide as what is plausible, flights may ask for a body that cannot be: then its moments stay the file's.
-    let with_moments = if fits_moments { fitted::with_moments(&search, set, flights).ok() } else { None };
+    // Under priors as wide as what is plausible, flights may ask for a body that cannot be: then
+    // its moments stay the file's.
+    let with_moments =
+        if fits_moments { fitted::with_moments(&search, set, flights).ok() } else { None };
     let tolerance = match with_moments {
         Some(_) => "inside its tolerance, moments beyond it",
         None => "inside its tolerance",
@@ -248,15 +260,16 @@ fn judged(
     Ok(Diagnosis { verdict, domain, before: None, now: Some(now), details: Some(details) })
 }
 
-/// Whether the thrust curve of the vehicle file, moved by its sd, changes the vertical force more than the smallest sag
-/// worth reporting: then nothing tells the two apart.
+/// Whether the thrust curve of the vehicle file, moved by its sd, changes the vertical force more
+/// than the smallest sag worth reporting: then nothing tells the two apart.
 fn curve_hides_sag(predictor: &Predictor, nominal: &[f64]) -> Result<bool, GapError> {
     if !predictor.has_voltage() {
         return Ok(false);
     }
     let vehicle = predictor.vehicle;
     let mut p = *vehicle.vehicle.parameters();
-    let (Some(curve), Some(sd)) = (p.propulsion.thrust_curve, sds(vehicle, "propulsion.pwm_to_thrust_n"))
+    let (Some(curve), Some(sd)) =
+        (p.propulsion.thrust_curve, sds(vehicle, "propulsion.pwm_to_thrust_n"))
     else {
         return Ok(false);
     };
@@ -273,7 +286,9 @@ fn curve_hides_sag(predictor: &Predictor, nominal: &[f64]) -> Result<bool, GapEr
     for (i, sd) in sd.iter().enumerate().take(4).filter(|(_, sd)| **sd > 0.0) {
         let mut coefficients = curve.coefficients();
         coefficients[i] += sd;
-        let Ok(moved) = ThrustCurve::new(coefficients, p.propulsion.reference_voltage_v) else { continue };
+        let Ok(moved) = ThrustCurve::new(coefficients, p.propulsion.reference_voltage_v) else {
+            continue;
+        };
         p.propulsion.thrust_curve = Some(moved);
         let Ok(vehicle) = Vehicle::new(p) else { continue };
         if change(&Hypothesis { vehicle, ..predictor.nominal() })? > sag {
@@ -285,7 +300,8 @@ fn curve_hides_sag(predictor: &Predictor, nominal: &[f64]) -> Result<bool, GapEr
 
 /// What the flights covered.
 fn covered(predictor: &Predictor) -> Vec<Covered> {
-    let (mut speed, mut height, mut tilt, mut voltage) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut speed, mut height, mut tilt, mut voltage) =
+        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (track, motion) in predictor.tracks.iter().zip(predictor.plain()) {
         for (body, volt) in motion.body.iter().zip(&track.voltage_v).step_by(track.every) {
             speed.push(body.velocity.vector.norm());

@@ -12,7 +12,8 @@ pub struct Diagnosis {
     pub verdict: Verdict,
     /// What the flights covered: name, low, high, unit.
     pub domain: Vec<Covered>,
-    /// The vehicle with its numbers where good flights of the machine have them, if flights are compared with such.
+    /// The vehicle with its numbers where good flights of the machine have them, if flights are
+    /// compared with such.
     pub(crate) before: Option<Own>,
     /// The same where these flights have them.
     pub(crate) now: Option<Own>,

@@ -118,7 +118,9 @@ pub enum GapError {
         norm: f64,
     },
     /// A channel that is there and holds nothing.
-    #[error("{flight}: {channel}: none of its {samples} samples has usable numbers, at least 2 are needed")]
+    #[error(
+        "{flight}: {channel}: none of its {samples} samples has usable numbers, at least 2 are needed"
+    )]
     Empty {
         /// Name of the flight.
         flight: String,
@@ -140,7 +142,9 @@ pub enum GapError {
         least_hz: f64,
     },
     /// Less than a second in which all channels exist and the filter has no edge.
-    #[error("{flight}: {channel}: leaves {usable_s:.3} s of usable flight, at least {least_s} s are needed")]
+    #[error(
+        "{flight}: {channel}: leaves {usable_s:.3} s of usable flight, at least {least_s} s are needed"
+    )]
     TooShort {
         /// Name of the flight.
         flight: String,
@@ -175,8 +179,9 @@ pub enum GapError {
 }
 
 impl GapError {
-    /// The channel of one flight whose samples are to blame, so that the others can go on without it. A log that lacks a
-    /// channel, or is of another vehicle, is a mistake of whoever gave it, and stays an error.
+    /// The channel of one flight whose samples are to blame, so that the others can go on without
+    /// it. A log that lacks a channel, or is of another vehicle, is a mistake of whoever gave it,
+    /// and stays an error.
     pub(crate) fn channel(&self) -> Option<&'static str> {
         match self {
             Self::Time { channel, .. }

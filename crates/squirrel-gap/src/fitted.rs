@@ -1,8 +1,9 @@
-//! The vehicle file with its own numbers where flights have them: what floated inside its tolerance, as a point of the search
-//! has it.
+//! The vehicle file with its own numbers where flights have them: what floated inside its
+//! tolerance, as a point of the search has it.
 //!
-//! Where the file explains next to nothing of the moments, nothing is named from them, and no tolerance holds. Its numbers of
-//! moments are then fitted to them afterwards, under wide priors and by themselves: they predict, and are no finding.
+//! Where the file explains next to nothing of the moments, nothing is named from them, and no
+//! tolerance holds. Its numbers of moments are then fitted to them afterwards, under wide priors
+//! and by themselves: they predict, and are no finding.
 
 use crate::GapError;
 use crate::name::{Catalogue, Point, Scored, Search, hypothesis};
@@ -22,7 +23,8 @@ const NEXT_TO_NOTHING: f64 = 0.01;
 /// Steps of their fit, each about what the last has found.
 const STEPS: usize = 3;
 
-/// The vehicle file as an explanation has it, with what it names, and with the moments of the flights.
+/// The vehicle file as an explanation has it, with what it names, and with the moments of the
+/// flights.
 ///
 /// # Errors
 /// Numbers that no vehicle has, or what the predictor says.
@@ -92,11 +94,13 @@ pub(crate) fn machine(
     }
     point.base[catalogue.shared_columns()..].fill(0.0);
     let at = hypothesis(predictor, catalogue, &point)?;
-    let possible = possible(&at.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
+    let possible =
+        possible(&at.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
     Ok((possible, at.effects))
 }
 
-/// A vehicle whose numbers a file may have: a drag or a torque of less than nothing and an inertia of no body are hypotheses at best.
+/// A vehicle whose numbers a file may have: a drag or a torque of less than nothing and an inertia
+/// of no body are hypotheses at best.
 fn possible(fitted: &Vehicle<f64>) -> Result<Vehicle<f64>, ParameterError> {
     let mut p = *fitted.parameters();
     p.drag.linear_n_s_per_m = p.drag.linear_n_s_per_m.map(|x| x.max(0.0));
@@ -127,7 +131,8 @@ pub(crate) fn worth_a_line(own: &VehicleFile, share: f64) -> Effects<f64> {
         let is_worth = |(p, value): (&EffectParameter, &f64)| {
             p.range(&own.vehicle).is_some_and(|range| value.abs() >= share * range.smallest)
         };
-        let declared = own.provenance.iter().any(|(field, _)| field.starts_with(&format!("effects.{name}.")));
+        let declared =
+            own.provenance.iter().any(|(field, _)| field.starts_with(&format!("effects.{name}.")));
         if (declared || found.parameters.iter().zip(found.values.iter()).any(is_worth))
             && let Some(place) = kept.insert(name)
         {

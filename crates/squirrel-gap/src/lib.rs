@@ -1,10 +1,12 @@
-//! The gap workflow: where simulation and measurement disagree, which missing effect explains it, and what adding it is
-//! worth on flights that were not used to find it.
+//! The gap workflow: where simulation and measurement disagree, which missing effect explains it,
+//! and what adding it is worth on flights that were not used to find it.
 //!
 //! - [`check()`] tells which flights contradict themselves, and what to change in their import map.
-//! - [`find`](mod@find) measures the disagreement: residual force and moment of flights against a vehicle.
+//! - [`find`](mod@find) measures the disagreement: residual force and moment of flights against a
+//!   vehicle.
 //! - [`diagnose()`] names what is missing and proves it on held-out flights in open loop.
-//! - [`add()`] writes the vehicle file with it; [`closed_loop()`] flies held-out flights again with both.
+//! - [`add()`] writes the vehicle file with it; [`closed_loop()`] flies held-out flights again with
+//!   both.
 //! - [`Workflow`] is all of that in a row, with a report.
 //!
 //! The physics is that of the simulator; nothing of it is written here again.

@@ -1,6 +1,7 @@
 //! Numbers as people read them.
 
-/// A number with so many significant digits: plain where people read it so, with an exponent where it is tiny or huge.
+/// A number with so many significant digits: plain where people read it so, with an exponent where
+/// it is tiny or huge.
 pub fn significant(value: f64, digits: u8) -> String {
     let size = value.abs();
     if size == 0.0 {

@@ -1,11 +1,13 @@
-//! What an explanation is worth on flights that it never saw: the vehicle as it was, with the names, with other names, and
-//! with each name left out.
+//! What an explanation is worth on flights that it never saw: the vehicle as it was, with the
+//! names, with other names, and with each name left out.
 //!
-//! Every model may put the sensors and the thrust of these flights where it fits them best inside their tolerances, so that
-//! what differs is the effect.
+//! Every model may put the sensors and the thrust of these flights where it fits them best inside
+//! their tolerances, so that what differs is the effect.
 
 use crate::GapError;
-use crate::name::{Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights};
+use crate::name::{
+    Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights,
+};
 use crate::predictor::{CHANNELS, Hypothesis, Predictor, TURNING};
 use crate::shrink::{Errors12, Floor, Flown};
 use crate::verdict::Gap;
@@ -16,7 +18,8 @@ use squirrel_log::FlightLog;
 #[derive(Debug)]
 pub(crate) struct HeldOut {
     pub(crate) nominal: Errors12,
-    /// Of the best other name and of all that the evidence hardly tells from the answer, the best first.
+    /// Of the best other name and of all that the evidence hardly tells from the answer, the best
+    /// first.
     pub(crate) rivals: Vec<Errors12>,
     pub(crate) fitted: Errors12,
     /// What the explanation leaves if it is true, and what is left in air without gusts.
@@ -35,7 +38,8 @@ pub(crate) fn prove(
     let whole = search.whole(&naming.found.best);
     let fitted_at = at(&whole.members, &whole.base)?;
     let flown = Flown::new(unseen, &fitted_at)?;
-    let errors = |hypothesis: Hypothesis| Ok::<_, GapError>(Flown::new(unseen, &hypothesis)?.errors());
+    let errors =
+        |hypothesis: Hypothesis| Ok::<_, GapError>(Flown::new(unseen, &hypothesis)?.errors());
     let Some(fitted) = flown.errors() else { return Ok(None) };
     let Some(nominal) = errors(at(&[], &whole.base)?)? else { return Ok(None) };
     let mut rivals = Vec::with_capacity(others.len());
@@ -49,7 +53,8 @@ pub(crate) fn prove(
 
 /// The proof in numbers.
 pub(crate) fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
-    // Gusts are no force that could be foreseen: with them, errors are as large as expected, and without them larger.
+    // Gusts are no force that could be foreseen: with them, errors are as large as expected, and
+    // without them larger.
     let before = proof.nominal.over(&proof.calm.of(&proof.fitted));
     let floor = proof.floor.of(&proof.fitted);
     let after = proof.fitted.over(&floor);
@@ -65,8 +70,8 @@ pub(crate) fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
     }
 }
 
-/// A hypothesis on flights that were not fitted. What floats inside its tolerance is shared; what the sensors of other flights
-/// did is not, and is found from these.
+/// A hypothesis on flights that were not fitted. What floats inside its tolerance is shared; what
+/// the sensors of other flights did is not, and is found from these.
 fn settled_on(
     unseen: &Predictor,
     search: &Search<'_>,
@@ -83,12 +88,14 @@ fn settled_on(
     hypothesis(unseen, catalogue, &point)
 }
 
-/// By how much residuals must be smaller with a name for it to hold: mean over channels of the logarithm of mean squares.
+/// By how much residuals must be smaller with a name for it to hold: mean over channels of the
+/// logarithm of mean squares.
 const HOLDS: f64 = 1e-3;
 
-/// Of each name, whether the force and moment of held-out flights are predicted better with it, every channel in units of what
-/// the model leaves there: a model that misses a little everywhere is far above the noise of some channels, and a name may act
-/// on others. Not flown for a second: what is missed carries such a flight away from any name. `None` without such flights.
+/// Of each name, whether the force and moment of held-out flights are predicted better with it,
+/// every channel in units of what the model leaves there: a model that misses a little everywhere
+/// is far above the noise of some channels, and a name may act on others. Not flown for a second:
+/// what is missed carries such a flight away from any name. `None` without such flights.
 ///
 /// # Errors
 /// What the predictor says.
@@ -116,7 +123,8 @@ pub(crate) fn hold(
             .enumerate()
             .filter(|(_, (w, _))| **w > 0.0)
             .map(|(channel, (w, without))| (channel, (without / w).ln()))
-            // A gyroscope against the attitude says nothing of most names, and is no vote against them.
+            // A gyroscope against the attitude says nothing of most names, and is no vote against
+            // them.
             .filter(|(channel, gain)| *channel < TURNING || gain.abs() > HOLDS)
             .map(|(_, gain)| gain)
             .collect();

@@ -1,19 +1,22 @@
-//! The gap on flights that the fit never saw: the plant re-simulated in open loop under the logged commands.
+//! The gap on flights that the fit never saw: the plant re-simulated in open loop under the logged
+//! commands.
 //!
-//! Every half second the plant is put where the vehicle was measured to be and flown for a second, and every fourth time for
-//! two, under the logged commands at the measured voltage. What the sensors should then have read, under the hypothesis, is
-//! compared with what they read, in bins of 0.1 s: velocity, attitude, angular rate and specific force, three channels each.
+//! Every half second the plant is put where the vehicle was measured to be and flown for a second,
+//! and every fourth time for two, under the logged commands at the measured voltage. What the
+//! sensors should then have read, under the hypothesis, is compared with what they read, in bins of
+//! 0.1 s: velocity, attitude, angular rate and specific force, three channels each.
 //!
 //! ```text
 //! J = mean over channels of MSE(model) / MSE(floor), over the first second      1: nothing but noise
 //! removed = 1 - (J_after - 1) / (J_before - 1)
 //! ```
-//! The floor is the best model against itself, started and read with the noise of these sensors in turbulent air of the
-//! declared tolerance. One flight's noise is not the mean flight's: where the best model is inside two standard deviations
-//! of what noise leaves from flight to flight, the floor of these flights is taken to be where it is. All models share the
-//! numbers that float inside their tolerances, so that the gap is that of the effect. Where moments are left out of what is
-//! explained, the attitude is the measured one and only velocity and specific force are compared; what a log without an IMU
-//! does not measure is not compared either.
+//! The floor is the best model against itself, started and read with the noise of these sensors in
+//! turbulent air of the declared tolerance. One flight's noise is not the mean flight's: where the
+//! best model is inside two standard deviations of what noise leaves from flight to flight, the
+//! floor of these flights is taken to be where it is. All models share the numbers that float
+//! inside their tolerances, so that the gap is that of the effect. Where moments are left out of
+//! what is explained, the attitude is the measured one and only velocity and specific force are
+//! compared; what a log without an IMU does not measure is not compared either.
 
 use crate::GapError;
 use crate::leftover::floor::TURBULENCE_S;
@@ -50,7 +53,8 @@ const LONG_EVERY: usize = 4;
 /// Length of a bin and distance of segments, s.
 pub(crate) const BIN_S: f64 = 0.1;
 const RESTART_S: f64 = 0.5;
-/// Weights of a parabola through nine samples at its middle (Savitzky and Golay, 1964), and the noise that they pass.
+/// Weights of a parabola through nine samples at its middle (Savitzky and Golay, 1964), and the
+/// noise that they pass.
 const START_WEIGHTS: [f64; 9] = [-21.0, 14.0, 39.0, 54.0, 59.0, 54.0, 39.0, 14.0, -21.0];
 const START_SUM: f64 = 231.0;
 const START_NOISE: f64 = 0.505;
@@ -62,8 +66,8 @@ pub(crate) type Errors = SVector<f64, 12>;
 
 /// Flights of noise that the floor is the mean of.
 const DRAWS: u64 = 3;
-/// Standard deviations of the scatter of a flight's noise that still are noise, and the least part of the mean that a lucky
-/// flight has.
+/// Standard deviations of the scatter of a flight's noise that still are noise, and the least part
+/// of the mean that a lucky flight has.
 const SCATTER: f64 = 2.0;
 const LUCK: f64 = 0.5;
 
@@ -113,15 +117,17 @@ pub(crate) struct Floor {
 }
 
 impl Floor {
-    /// The floor of these very flights, by channel: a flight is lucky or not, and what a model leaves inside the scatter of
-    /// noise is noise.
+    /// The floor of these very flights, by channel: a flight is lucky or not, and what a model
+    /// leaves inside the scatter of noise is noise.
     pub(crate) fn of(&self, model: &Errors12) -> Errors {
         let reach = self.deviation * SCATTER;
         let mean = self.mean.mse();
         let lucky = mean * LUCK;
         model
             .mse()
-            .zip_zip_map(&mean, &reach, |own, mean, reach| own.clamp((mean - reach).max(0.0), mean + reach))
+            .zip_zip_map(&mean, &reach, |own, mean, reach| {
+                own.clamp((mean - reach).max(0.0), mean + reach)
+            })
             .sup(&lucky)
     }
 }
@@ -144,7 +150,10 @@ impl<'a> Flown<'a> {
     ///
     /// # Errors
     /// A hypothesis that the plant cannot be stepped with.
-    pub(crate) fn new(predictor: &'a Predictor<'a>, hypothesis: &'a Hypothesis) -> Result<Self, GapError> {
+    pub(crate) fn new(
+        predictor: &'a Predictor<'a>,
+        hypothesis: &'a Hypothesis,
+    ) -> Result<Self, GapError> {
         let mut pieces = Vec::new();
         for (piece, track) in predictor.tracks.iter().enumerate() {
             if track.attitude().is_none() || track.velocity().is_empty() {
@@ -169,7 +178,8 @@ impl<'a> Flown<'a> {
         (all.count[0] > 0.0).then_some(all)
     }
 
-    /// Errors that the hypothesis would have if it were true: started, read and blown about with noise.
+    /// Errors that the hypothesis would have if it were true: started, read and blown about with
+    /// noise.
     pub(crate) fn floor(&self, turbulence_m_s: f64) -> Floor {
         let mut all = Errors12::new();
         // Mean errors of each segment over the first second.
@@ -183,8 +193,9 @@ impl<'a> Flown<'a> {
             for draw in 0..DRAWS {
                 let mut rng = Pcg64Mcg::seed_from_u64(1000 * draw + piece + 11);
                 let mut noise = Pcg64Mcg::seed_from_u64(1000 * draw + piece + 29);
-                let mut draw =
-                    || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise)) };
+                let mut draw = || -> Vector3<f64> {
+                    Vector3::from_fn(|_, _| StandardNormal.sample(&mut noise))
+                };
                 let noise = Noise {
                     turbulence_m_s,
                     velocity_m_s: velocity_noise * track.velocity_smoothing(),
@@ -195,8 +206,8 @@ impl<'a> Flown<'a> {
                 own.fly(Some(noise), |blown| {
                     let Some(still) = still.next() else { return };
                     let (own, other) = (&still.read, &blown.read);
-                    let velocity =
-                        other.velocity_ned - own.velocity_ned + draw().component_mul(&velocity_noise);
+                    let velocity = other.velocity_ned - own.velocity_ned
+                        + draw().component_mul(&velocity_noise);
                     let rotation = (own.attitude.inverse() * other.attitude).scaled_axis()
                         + draw().component_mul(&attitude_noise);
                     let rate = other.omega - own.omega + draw().component_mul(&rate_noise) / white;
@@ -207,7 +218,9 @@ impl<'a> Flown<'a> {
                         segments.push(Errors::zeros());
                     }
                     if let Some(segment) = segments.last_mut().filter(|_| blown.number < COUNTED) {
-                        let error = Errors::from_iterator(parts.iter().flat_map(|part| part.iter().copied()));
+                        let error = Errors::from_iterator(
+                            parts.iter().flat_map(|part| part.iter().copied()),
+                        );
                         *segment += error.component_mul(&error) / COUNTED as f64;
                     }
                     all.add(blown.number, parts);
@@ -232,8 +245,8 @@ struct Noise<'a> {
     rng: &'a mut Pcg64Mcg,
 }
 
-/// Whether the attitude is the plant's own: it is the measured one where nothing is said of moments, or where no gyroscope
-/// says how fast the vehicle turned at the start.
+/// Whether the attitude is the plant's own: it is the measured one where nothing is said of
+/// moments, or where no gyroscope says how fast the vehicle turned at the start.
 fn flies_freely(predictor: &Predictor) -> bool {
     predictor.has_all_of(3) && predictor.has_gyroscope()
 }
@@ -246,7 +259,12 @@ fn compared(
     // What was differentiated behind a filter is smoother than anything that a plant does.
     let measured = |is_measured: bool, value| if is_measured { value } else { Vector3::zeros() };
     let turns = flies_freely(predictor);
-    [velocity, measured(turns, rotation), measured(turns, rate), measured(predictor.is_felt(), force)]
+    [
+        velocity,
+        measured(turns, rotation),
+        measured(turns, rate),
+        measured(predictor.is_felt(), force),
+    ]
 }
 
 /// One bin of one segment.
@@ -273,7 +291,11 @@ struct Segments<'a> {
 }
 
 impl<'a> Segments<'a> {
-    fn new(predictor: &'a Predictor<'a>, hypothesis: &'a Hypothesis, piece: usize) -> Result<Self, GapError> {
+    fn new(
+        predictor: &'a Predictor<'a>,
+        hypothesis: &'a Hypothesis,
+        piece: usize,
+    ) -> Result<Self, GapError> {
         let track = &predictor.tracks[piece];
         let n = track.time_s.len();
         let motion = predictor.motion(piece, hypothesis);
@@ -281,7 +303,8 @@ impl<'a> Segments<'a> {
         let plant = predictor.plant_in(hypothesis, track.flight, dt_s)?;
         let per_bin = (BIN_S / track.period_s).round().max(1.0) as usize;
         let stride = (RESTART_S / track.period_s).round().max(1.0) as usize;
-        let starts: Vec<usize> = (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();
+        let starts: Vec<usize> =
+            (0..n).step_by(stride).skip(1).filter(|s| s + per_bin < n).collect();
         let states = predictor.led_states(&plant, piece, &motion, &starts);
         let starts = starts.into_iter().zip(states).collect();
         Ok(Self { predictor, hypothesis, piece, motion, plant, starts, per_bin })
@@ -317,12 +340,14 @@ impl<'a> Segments<'a> {
         let n = track.time_s.len();
         if start >= 4 && start + 4 < n {
             let weighted = START_WEIGHTS.iter().zip(&motion.body[start - 4..]);
-            state.body.omega = In::new(weighted.map(|(w, body)| body.omega.vector * (w / START_SUM)).sum());
+            state.body.omega =
+                In::new(weighted.map(|(w, body)| body.omega.vector * (w / START_SUM)).sum());
         }
         let mut wind = Vector3::zeros();
         let mut turbulence = 0.0;
         if let Some(noise) = noise {
-            let mut draw = || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng)) };
+            let mut draw =
+                || -> Vector3<f64> { Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng)) };
             turbulence = noise.turbulence_m_s;
             wind = draw() * turbulence;
             state.body.velocity =
@@ -344,7 +369,8 @@ impl<'a> Segments<'a> {
             if last >= n {
                 break;
             }
-            let (mut velocity, mut rate, mut force) = (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
+            let (mut velocity, mut rate, mut force) =
+                (Vector3::zeros(), Vector3::zeros(), Vector3::zeros());
             let mut middle = state.body.ned_from_body().quaternion;
             let began = state.body.velocity.vector;
             for sample in first..last {
@@ -368,7 +394,8 @@ impl<'a> Segments<'a> {
                 let slope = (state.body.velocity.vector - before.velocity.vector) / track.period_s;
                 force += before.ned_from_body().quaternion.inverse() * (slope - gravity);
                 if let Some(noise) = noise {
-                    let fresh: Vector3<f64> = Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng));
+                    let fresh: Vector3<f64> =
+                        Vector3::from_fn(|_, _| StandardNormal.sample(noise.rng));
                     wind = wind * keep + fresh * (turbulence * (1.0 - keep * keep).sqrt());
                 }
             }
@@ -383,15 +410,22 @@ impl<'a> Segments<'a> {
                 specific_force: force.component_mul(&force_scale) / samples
                     + effects.specific_force_bias(time_s).vector,
             };
-            let acceleration_ned = (state.body.velocity.vector - began) / (samples * track.period_s);
+            let acceleration_ned =
+                (state.body.velocity.vector - began) / (samples * track.period_s);
             each(Bin { number: bin, first, last, read, acceleration_ned });
         }
     }
 
     /// Adds what the sensors read in a bin, minus what they should have read.
-    fn compare(&self, Bin { number, first, last, read, acceleration_ned }: &Bin, all: &mut Errors12) {
+    fn compare(
+        &self,
+        Bin { number, first, last, read, acceleration_ned }: &Bin,
+        all: &mut Errors12,
+    ) {
         let track = self.track();
-        let (Some(measured_attitude), Some(end)) = (track.attitude(), last.checked_sub(1)) else { return };
+        let (Some(measured_attitude), Some(end)) = (track.attitude(), last.checked_sub(1)) else {
+            return;
+        };
         let latency_s = self.hypothesis.effects.gnss_latency_s();
         let (a, b) = (track.time_s[*first], track.time_s[end]);
         // The fix that speaks of this bin has its stamp a latency later.
@@ -406,12 +440,17 @@ impl<'a> Segments<'a> {
         let velocity = fixes[from..until].iter().map(|(_, v)| v).sum::<Vector3<f64>>() / n;
         let at = fixes[from..until].iter().map(|(t, _)| t - latency_s).sum::<f64>() / n;
         let q = UnitQuaternion::new_unchecked(measured_attitude[usize::midpoint(*first, *last)]);
-        let mean = |v: &[Vector3<f64>]| v[*first..*last].iter().sum::<Vector3<f64>>() / (last - first) as f64;
+        let mean = |v: &[Vector3<f64>]| {
+            v[*first..*last].iter().sum::<Vector3<f64>>() / (last - first) as f64
+        };
         let velocity_then = read.velocity_ned + acceleration_ned * (at - 0.5 * (a + b));
         let rotation = (read.attitude.inverse() * q).scaled_axis();
         let rate = mean(track.omega()) - read.omega;
         let force = mean(track.specific_force()) - read.specific_force;
-        all.add(*number, compared(self.predictor, [velocity - velocity_then, rotation, rate, force]));
+        all.add(
+            *number,
+            compared(self.predictor, [velocity - velocity_then, rotation, rate, force]),
+        );
     }
 }
 

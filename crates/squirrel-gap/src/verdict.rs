@@ -66,11 +66,12 @@ pub struct NamedEffect {
     pub parameters: BTreeMap<&'static str, Value>,
 }
 
-/// A number of the vehicle, inside its declared tolerance or near it, that moved with the named effects: theirs hold with it.
+/// A number of the vehicle, inside its declared tolerance or near it, that moved with the named
+/// effects: theirs hold with it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Moved {
-    /// `mass_error.mass_fraction`, `weak_rotor[2].thrust_loss_fraction`, `rotor[0].position_body_m[1]` (rotors of effects count
-    /// from 1, tables of the file from 0).
+    /// `mass_error.mass_fraction`, `weak_rotor[2].thrust_loss_fraction`,
+    /// `rotor[0].position_body_m[1]` (rotors of effects count from 1, tables of the file from 0).
     pub name: String,
     /// By how much, in the unit of the name.
     pub value: f64,
@@ -102,10 +103,11 @@ pub struct Alternative {
 /// What the names leave of the flights that they were fitted to.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Left {
-    /// Part of the mean square above noise, in units of noise, that the names remove, over all channels.
+    /// Part of the mean square above noise, in units of noise, that the names remove, over all
+    /// channels.
     pub share_removed: f64,
-    /// What is left above noise and tolerances, as part of what was measured about its mean, rms, in the channels that stand
-    /// out; 0 where none does.
+    /// What is left above noise and tolerances, as part of what was measured about its mean, rms,
+    /// in the channels that stand out; 0 where none does.
     pub share_left: f64,
     /// The channels that stand out, the worst first.
     pub channels: Vec<&'static str>,
@@ -140,7 +142,8 @@ impl Left {
 pub struct Gap {
     /// Names of the flights.
     pub held_out_flights: Vec<String>,
-    /// Error over that of the noise floor, mean over channels, of the vehicle as it was; 1 is nothing but noise.
+    /// Error over that of the noise floor, mean over channels, of the vehicle as it was; 1 is
+    /// nothing but noise.
     pub before: f64,
     /// The same with the named effects.
     pub after: f64,
@@ -205,7 +208,8 @@ pub struct Verdict {
     pub gap: Option<Gap>,
     /// What the names leave; none where nothing was looked for, or only what lasts.
     pub leftover: Option<Left>,
-    /// Held-out flights of our own flight code, flown again; empty until somebody does, and for those of other autopilots.
+    /// Held-out flights of our own flight code, flown again; empty until somebody does, and for
+    /// those of other autopilots.
     pub closed_loop: Vec<ClosedLoop>,
     /// Path of the vehicle file with the effects added.
     pub model_patch: Option<String>,
@@ -226,7 +230,8 @@ impl Verdict {
     }
 }
 
-/// Why a vehicle file has nothing to take from a verdict, in one line; `None` where the verdict names what the file lacks.
+/// Why a vehicle file has nothing to take from a verdict, in one line; `None` where the verdict
+/// names what the file lacks.
 pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
     Some(match verdict.verdict {
         Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers => return None,
@@ -240,7 +245,9 @@ pub fn nothing_to_add(verdict: &Verdict) -> Option<String> {
                 sets.join(", ")
             )
         }
-        Kind::OutsideCatalogue => "something is missing that the catalogue does not have".to_owned(),
+        Kind::OutsideCatalogue => {
+            "something is missing that the catalogue does not have".to_owned()
+        }
         Kind::NotIdentifiable if verdict.effects.is_empty() => {
             "nothing is above its tolerance, in flights that would not show every effect".to_owned()
         }

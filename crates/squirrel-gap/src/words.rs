@@ -137,10 +137,12 @@ pub(crate) fn paragraph(verdict: &Verdict, blind: &[&str], curve_hides_sag: bool
     text
 }
 
-/// What an incomplete answer leaves: how much, where, and with what it goes; or names that the flights do not tell apart.
+/// What an incomplete answer leaves: how much, where, and with what it goes; or names that the
+/// flights do not tell apart.
 fn remains(verdict: &Verdict) -> String {
     let Some(left) = verdict.leftover.as_ref().filter(|left| !left.channels.is_empty()) else {
-        let sets: Vec<String> = verdict.alternatives.iter().map(|set| set.effects.join(" + ")).collect();
+        let sets: Vec<String> =
+            verdict.alternatives.iter().map(|set| set.effects.join(" + ")).collect();
         return format!(
             "Something else remains, which these flights do not tell apart: {}",
             sets.join("; or ")
@@ -160,7 +162,10 @@ mod tests {
 
     #[test]
     fn channels_are_spoken_wherever_they_stand() {
-        assert_eq!(spoken("velocity (60 % of force_body_z_n)"), "velocity (60 % of the vertical force)");
+        assert_eq!(
+            spoken("velocity (60 % of force_body_z_n)"),
+            "velocity (60 % of the vertical force)"
+        );
     }
 
     #[test]

@@ -1,5 +1,6 @@
-//! The workflow as a whole: flights to a diagnosis, and what follows from it: the vehicle file with what was found, held-out
-//! flights flown again with that, and the report. The command line and Python call it; they differ in where they write.
+//! The workflow as a whole: flights to a diagnosis, and what follows from it: the vehicle file with
+//! what was found, held-out flights flown again with that, and the report. The command line and
+//! Python call it; they differ in where they write.
 
 use crate::GapError;
 use crate::add::{add_effect, patched};
@@ -34,9 +35,11 @@ pub struct Patched {
 }
 
 impl Workflow {
-    /// Finds out what a vehicle lacks, see [`diagnose_with`]. Flights that are set aside take no part in what follows.
+    /// Finds out what a vehicle lacks, see [`diagnose_with`]. Flights that are set aside take no
+    /// part in what follows.
     ///
-    /// * `baseline` - good flights of the same machine; none for a vehicle that is taken as its file has it
+    /// * `baseline` - good flights of the same machine; none for a vehicle that is taken as its
+    ///   file has it
     ///
     /// # Errors
     /// As [`diagnose_with`].
@@ -50,7 +53,8 @@ impl Workflow {
         let diagnosis = diagnose_with(&vehicle, baseline, &flights, &held_out, progress)?;
         let looked_at = |flight: &str| diagnosis.verdict.has_looked_at(flight);
         held_out.retain(|(name, _)| looked_at(name));
-        let flights = flights.into_iter().map(|(name, _)| name).filter(|name| looked_at(name)).collect();
+        let flights =
+            flights.into_iter().map(|(name, _)| name).filter(|name| looked_at(name)).collect();
         Ok(Self { diagnosis, vehicle, flights, held_out })
     }
 
@@ -80,12 +84,13 @@ impl Workflow {
 
     fn read(&self, text: String) -> Result<Patched, String> {
         let weights = self.vehicle.weights.clone();
-        let vehicle =
-            VehicleFile::parse_with(&text, &self.vehicle.name, weights).map_err(|e| e.to_string())?;
+        let vehicle = VehicleFile::parse_with(&text, &self.vehicle.name, weights)
+            .map_err(|e| e.to_string())?;
         Ok(Patched { text, vehicle })
     }
 
-    /// Flies held-out flights again in closed loop, as the vehicle was and with what was found; the verdict then has both.
+    /// Flies held-out flights again in closed loop, as the vehicle was and with what was found; the
+    /// verdict then has both.
     ///
     /// # Errors
     /// As [`closed_loop`].

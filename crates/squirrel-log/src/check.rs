@@ -17,16 +17,29 @@ pub(super) fn check(file: &str, log: &FlightLog) -> Result<(), LogError> {
 }
 
 fn check_names(file: &str, source_name: &str, source: &Source) -> Result<(), LogError> {
-    let refuse = |name: String, kind, why| Err(LogError::Name { file: file.to_owned(), name, kind, why });
+    let refuse =
+        |name: String, kind, why| Err(LogError::Name { file: file.to_owned(), name, kind, why });
     if !source_name.split('.').all(is_identifier) {
-        return refuse(source_name.to_owned(), "source", "need letters, digits and `_`, parts joined by `.`");
+        return refuse(
+            source_name.to_owned(),
+            "source",
+            "need letters, digits and `_`, parts joined by `.`",
+        );
     }
     for name in source.channels.keys() {
         if !is_identifier(name) {
-            return refuse(format!("{source_name}.{name}"), "channel", "need letters, digits and `_`");
+            return refuse(
+                format!("{source_name}.{name}"),
+                "channel",
+                "need letters, digits and `_`",
+            );
         }
         if [schema::TIME.0, schema::CRC.0].contains(&name.as_str()) {
-            return refuse(format!("{source_name}.{name}"), "channel", "the file has a field of that name");
+            return refuse(
+                format!("{source_name}.{name}"),
+                "channel",
+                "the file has a field of that name",
+            );
         }
     }
     if source.channels.len() > schema::CHANNELS_MAX {
@@ -76,7 +89,13 @@ fn check_lengths(file: &str, source_name: &str, source: &Source) -> Result<(), L
         let (width, values) = (channel.width, channel.values.len());
         if width == 0 || samples.checked_mul(width) != Some(values) {
             let channel = format!("{source_name}.{name}");
-            return Err(LogError::Length { file: file.to_owned(), channel, values, samples, width });
+            return Err(LogError::Length {
+                file: file.to_owned(),
+                channel,
+                values,
+                samples,
+                width,
+            });
         }
     }
     Ok(())

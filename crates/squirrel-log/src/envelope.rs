@@ -1,7 +1,8 @@
-//! The frame of an MCAP file around its content: magic bytes, record lengths, the CRCs of data and summary section.
+//! The frame of an MCAP file around its content: magic bytes, record lengths, the CRCs of data and
+//! summary section.
 //!
-//! mcap's readers check these only on request, do not say where a record stands, and do not tell a file that was cut
-//! from one that was changed; it is two loops to do all that on the raw bytes.
+//! mcap's readers check these only on request, do not say where a record stands, and do not tell a
+//! file that was cut from one that was changed; it is two loops to do all that on the raw bytes.
 
 use mcap::MAGIC;
 use mcap::records::op;
@@ -43,12 +44,9 @@ impl<'a> Frame<'a> {
 /// The records of a file, up to the footer or to the first one that is not whole.
 pub(super) fn frames(file: &[u8]) -> impl Iterator<Item = Frame<'_>> {
     let first = (file.len() >= MAGIC.len()).then(|| Frame::at(file, MAGIC.len())).flatten();
-    std::iter::successors(
-        first,
-        |frame| {
-            if frame.opcode == op::FOOTER { None } else { Frame::at(file, frame.end()) }
-        },
-    )
+    std::iter::successors(first, |frame| {
+        if frame.opcode == op::FOOTER { None } else { Frame::at(file, frame.end()) }
+    })
 }
 
 /// What is wrong with the frame of a file.
@@ -88,9 +86,10 @@ pub(super) fn check(file: &[u8]) -> Result<(), Damage> {
     let rest = &file[end..];
     match (footer, rest) {
         (true, rest) if rest == MAGIC => Ok(()),
-        (true, rest) if !MAGIC.starts_with(rest) => {
-            corrupt(format!("{} bytes after the footer are not those that end an MCAP file", rest.len()))
-        }
+        (true, rest) if !MAGIC.starts_with(rest) => corrupt(format!(
+            "{} bytes after the footer are not those that end an MCAP file",
+            rest.len()
+        )),
         (false, rest) if rest.ends_with(MAGIC) => {
             corrupt(format!("the record at byte {end} runs past the end of the file"))
         }

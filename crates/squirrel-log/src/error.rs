@@ -1,4 +1,5 @@
-//! What can be wrong with a flight log: one line each, which starts with the file name as the caller gave it.
+//! What can be wrong with a flight log: one line each, which starts with the file name as the
+//! caller gave it.
 
 use std::io;
 
@@ -52,7 +53,8 @@ pub enum LogError {
         file: String,
         /// Length of the file, bytes.
         bytes_total: u64,
-        /// From the first to the last sample that [`FlightLog::recover`](super::FlightLog::recover) would give, s.
+        /// From the first to the last sample that [`FlightLog::recover`](super::FlightLog::recover)
+        /// would give, s.
         duration_s: f64,
         /// Samples of all sources that it would give.
         messages: u64,

@@ -1,12 +1,16 @@
-//! What Foxglove's 3-D panel shows of a flight: the vehicle as a moving frame, obstacles as cylinders.
+//! What Foxglove's 3-D panel shows of a flight: the vehicle as a moving frame, obstacles as
+//! cylinders.
 //!
 //! The messages are Foxglove's own schemas, field numbers as published at
-//! <https://github.com/foxglove/foxglove-sdk/tree/main/schemas/proto/foxglove>, with only the fields used here.
-//! The panel has z up, so the parent frame `map` is ENU; the child frame `body` stays FRD.
+//! <https://github.com/foxglove/foxglove-sdk/tree/main/schemas/proto/foxglove>, with only the
+//! fields used here. The panel has z up, so the parent frame `map` is ENU; the child frame `body`
+//! stays FRD.
 
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, Timestamp};
+use prost_types::{
+    DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, Timestamp,
+};
 
 pub(super) const TRANSFORM_TOPIC: &str = "/tf";
 pub(super) const TRANSFORM_SCHEMA: &str = "foxglove.FrameTransform";
@@ -104,20 +108,23 @@ struct SceneUpdate {
     entities: Vec<SceneEntity>,
 }
 
-/// The vehicle's frame in ENU from its position (NED, m) and attitude (NED from body, w x y z); `None` if a number is
-/// not finite.
+/// The vehicle's frame in ENU from its position (NED, m) and attitude (NED from body, w x y z);
+/// `None` if a number is not finite.
 pub(super) fn frame_transform(
     time_ns: u64,
     position_ned_m: &[f64],
     q_ned_from_body_wxyz: &[f64],
 ) -> Option<Vec<u8>> {
-    let (&[north, east, down], &[w, x, y, z]) = (position_ned_m, q_ned_from_body_wxyz) else { return None };
+    let (&[north, east, down], &[w, x, y, z]) = (position_ned_m, q_ned_from_body_wxyz) else {
+        return None;
+    };
     if ![north, east, down, w, x, y, z].iter().all(|value| value.is_finite()) {
         return None;
     }
     // q_enu_from_ned = (0, 1, 1, 0) / sqrt(2), times q_ned_from_body.
     let half = std::f64::consts::FRAC_1_SQRT_2;
-    let rotation = Quaternion { w: -half * (x + y), x: half * (w + z), y: half * (w - z), z: half * (y - x) };
+    let rotation =
+        Quaternion { w: -half * (x + y), x: half * (w + z), y: half * (w - z), z: half * (y - x) };
     let transform = FrameTransform {
         timestamp: Some(timestamp(time_ns)),
         parent_frame_id: "map".to_owned(),
@@ -150,7 +157,10 @@ pub(super) fn scene(time_ns: u64, obstacles: &[[f64; 3]]) -> Vec<u8> {
 }
 
 fn timestamp(time_ns: u64) -> Timestamp {
-    Timestamp { seconds: (time_ns / 1_000_000_000).cast_signed(), nanos: (time_ns % 1_000_000_000) as i32 }
+    Timestamp {
+        seconds: (time_ns / 1_000_000_000).cast_signed(),
+        nanos: (time_ns % 1_000_000_000) as i32,
+    }
 }
 
 /// Serialised `FileDescriptorSet` of [`TRANSFORM_SCHEMA`].
@@ -167,7 +177,10 @@ pub(super) fn transform_schema() -> Vec<u8> {
 
 /// Serialised `FileDescriptorSet` of [`SCENE_SCHEMA`].
 pub(super) fn scene_schema() -> Vec<u8> {
-    let pose = [("position", 1, One(".foxglove.Vector3")), ("orientation", 2, One(".foxglove.Quaternion"))];
+    let pose = [
+        ("position", 1, One(".foxglove.Vector3")),
+        ("orientation", 2, One(".foxglove.Quaternion")),
+    ];
     let color = [("r", 1, Double), ("g", 2, Double), ("b", 3, Double), ("a", 4, Double)];
     let cylinder = [
         ("pose", 1, One(".foxglove.Pose")),
@@ -245,14 +258,15 @@ fn message(name: &str, fields: &[(&str, i32, Field)]) -> DescriptorProto {
 fn descriptor_set(messages: Vec<DescriptorProto>) -> Vec<u8> {
     let timestamp_file = "google/protobuf/timestamp.proto";
     let timestamp = message("Timestamp", &[("seconds", 1, Int64), ("nanos", 2, Int32)]);
-    let file = |name: &str, package: &str, dependency: Vec<String>, message_type| FileDescriptorProto {
-        name: Some(name.to_owned()),
-        package: Some(package.to_owned()),
-        dependency,
-        message_type,
-        syntax: Some("proto3".to_owned()),
-        ..FileDescriptorProto::default()
-    };
+    let file =
+        |name: &str, package: &str, dependency: Vec<String>, message_type| FileDescriptorProto {
+            name: Some(name.to_owned()),
+            package: Some(package.to_owned()),
+            dependency,
+            message_type,
+            syntax: Some("proto3".to_owned()),
+            ..FileDescriptorProto::default()
+        };
     let set = FileDescriptorSet {
         file: vec![
             file(timestamp_file, "google.protobuf", Vec::new(), vec![timestamp]),

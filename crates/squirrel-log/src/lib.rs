@@ -1,12 +1,14 @@
 //! Flight logs: what a flight looks like in memory and in an MCAP file.
 //!
-//! A [`FlightLog`] is a set of sources (`imu`, `gnss`, `control.inner`, ...), each with its own time axis, each with
-//! named channels (`imu.omega_body_rad_s`). Sources run at their own rate; a log may lack any of them.
+//! A [`FlightLog`] is a set of sources (`imu`, `gnss`, `control.inner`, ...), each with its own
+//! time axis, each with named channels (`imu.omega_body_rad_s`). Sources run at their own rate; a
+//! log may lack any of them.
 //!
-//! In the file each source is a topic whose messages are described by a protobuf schema in the file, so that Foxglove
-//! and the MCAP libraries of other languages read it without squirrel.
+//! In the file each source is a topic whose messages are described by a protobuf schema in the
+//! file, so that Foxglove and the MCAP libraries of other languages read it without squirrel.
 //!
-//! - [`flight_code`] records what the flight code was given and what it answered, and rebuilds its frames from a log.
+//! - [`flight_code`] records what the flight code was given and what it answered, and rebuilds its
+//!   frames from a log.
 //! - [`import`] makes a log of foreign files by a map.
 //! - [`files`] writes whatever is written, whole or not at all, and tells which paths are one file.
 
@@ -37,7 +39,8 @@ const METADATA_NAME: &str = "squirrel";
 pub struct Channel {
     /// Numbers per sample, at least 1.
     pub width: usize,
-    /// `time_s.len() * width` numbers, sample-major. NaN marks a sample that the source did not give.
+    /// `time_s.len() * width` numbers, sample-major. NaN marks a sample that the source did not
+    /// give.
     pub values: Vec<f64>,
 }
 
@@ -53,8 +56,8 @@ pub struct Source {
 /// A flight in memory.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FlightLog {
-    /// Free text that describes the flight: `vehicle_toml`, `parnn_weights_hex`, `arm`, `scenario_toml`, `seed`,
-    /// `version`, `git`.
+    /// Free text that describes the flight: `vehicle_toml`, `parnn_weights_hex`, `arm`,
+    /// `scenario_toml`, `seed`, `version`, `git`.
     pub metadata: BTreeMap<String, String>,
     /// Sources by name (`imu`, `control.inner`).
     pub sources: BTreeMap<String, Source>,
@@ -71,7 +74,8 @@ impl Channel {
 }
 
 impl FlightLog {
-    /// The time axis and the channel of a full name such as `imu.omega_body_rad_s`; `None` if the log lacks it.
+    /// The time axis and the channel of a full name such as `imu.omega_body_rad_s`; `None` if the
+    /// log lacks it.
     pub fn channel(&self, name: &str) -> Option<(&[f64], &Channel)> {
         let (source, channel) = name.rsplit_once('.')?;
         let source = self.sources.get(source)?;
@@ -85,11 +89,13 @@ impl FlightLog {
 }
 
 impl Source {
-    /// Appends one sample: its time, s, and a row of every channel. The first sample makes the channels.
+    /// Appends one sample: its time, s, and a row of every channel. The first sample makes the
+    /// channels.
     ///
     /// # Panics
-    /// If a later sample has other channels or widths than the first, or a row is empty: the caller builds the rows, so
-    /// that is a mistake in the program. Times are checked when the log is written.
+    /// If a later sample has other channels or widths than the first, or a row is empty: the caller
+    /// builds the rows, so that is a mistake in the program. Times are checked when the log is
+    /// written.
     pub fn push(&mut self, time_s: f64, rows: &[(&str, &[f64])]) {
         if self.time_s.is_empty() {
             let channel = |&(name, row): &(&str, &[f64])| {
@@ -97,7 +103,11 @@ impl Source {
             };
             self.channels = rows.iter().map(channel).collect();
         }
-        assert_eq!(rows.len(), self.channels.len(), "a sample has every channel of its source once");
+        assert_eq!(
+            rows.len(),
+            self.channels.len(),
+            "a sample has every channel of its source once"
+        );
         for &(name, row) in rows {
             let Some(channel) = self.channels.get_mut(name) else {
                 panic!("`{name}` is not in the first sample")

@@ -1,7 +1,7 @@
 //! One sample of one source as a protobuf message, and back.
 //!
-//! Every channel carries a CRC32 over its time and its numbers, so that a value which some tool changed is found and
-//! named even where the tool wrote fresh checksums around it.
+//! Every channel carries a CRC32 over its time and its numbers, so that a value which some tool
+//! changed is found and named even where the tool wrote fresh checksums around it.
 
 use prost::DecodeError;
 use prost::encoding::{DecodeContext, decode_key, double, fixed32, skip_field};
@@ -62,12 +62,15 @@ impl SourceReader {
     pub(super) fn new(name: &str, message_name: &str, set: &[u8]) -> Result<Self, String> {
         let fields = schema::decode(message_name, set)?;
         let number = |wanted: &str, kind: Type| {
-            let field = fields.iter().find(|field| field.name() == wanted && field.r#type() == kind);
-            let field = field.ok_or_else(|| format!("schema `{message_name}` has no field `{wanted}`"))?;
+            let field =
+                fields.iter().find(|field| field.name() == wanted && field.r#type() == kind);
+            let field =
+                field.ok_or_else(|| format!("schema `{message_name}` has no field `{wanted}`"))?;
             Ok::<_, String>(field.number() as u32)
         };
-        let is_channel =
-            |field: &&FieldDescriptorProto| field.r#type() == Type::Double && field.name() != schema::TIME.0;
+        let is_channel = |field: &&FieldDescriptorProto| {
+            field.r#type() == Type::Double && field.name() != schema::TIME.0
+        };
         Ok(Self {
             name: name.to_owned(),
             time_number: number(schema::TIME.0, Type::Double)?,
@@ -95,17 +98,23 @@ impl SourceReader {
         let (time_s, crc32) = self
             .parse(message)
             .map_err(|error| corrupt(format!("{}: message {index}: {error}", self.name)))?;
-        let time_s =
-            time_s.ok_or_else(|| corrupt(format!("{}: message {index} has no time_s", self.name)))?;
+        let time_s = time_s
+            .ok_or_else(|| corrupt(format!("{}: message {index} has no time_s", self.name)))?;
         if crc32.len() != self.columns.len() {
             let (found, need) = (crc32.len(), self.columns.len());
             let name = &self.name;
-            return Err(corrupt(format!("{name} at {time_s:.6} s: {found} CRC32s for {need} channels")));
+            return Err(corrupt(format!(
+                "{name} at {time_s:.6} s: {found} CRC32s for {need} channels"
+            )));
         }
         let full_name = |column: &Column| format!("{}.{}", self.name, column.name);
         for (column, crc32) in self.columns.iter_mut().zip(crc32) {
             if !column.row.is_empty() && row_crc32(time_s, &column.row) != crc32 {
-                return Err(LogError::ValueCrc { file: file.to_owned(), channel: full_name(column), time_s });
+                return Err(LogError::ValueCrc {
+                    file: file.to_owned(),
+                    channel: full_name(column),
+                    time_s,
+                });
             }
             column.push(index).map_err(|width| LogError::RowWidth {
                 file: file.to_owned(),
@@ -134,7 +143,9 @@ impl SourceReader {
                 time_s = Some(value);
             } else if number == self.crc_number {
                 fixed32::merge_repeated(wire_type, &mut crc32, &mut message, context)?;
-            } else if let Some(column) = self.columns.iter_mut().find(|column| column.number == number) {
+            } else if let Some(column) =
+                self.columns.iter_mut().find(|column| column.number == number)
+            {
                 double::merge_repeated(wire_type, &mut column.row, &mut message, context)?;
             } else {
                 skip_field(wire_type, number, &mut message, context)?;
@@ -165,7 +176,8 @@ impl Column {
         }
     }
 
-    /// Appends the row at hand as sample `index`; a missing row becomes NaN, so that no later row shifts.
+    /// Appends the row at hand as sample `index`; a missing row becomes NaN, so that no later row
+    /// shifts.
     ///
     /// # Errors
     /// The width so far, if the row has another one.

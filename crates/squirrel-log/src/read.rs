@@ -1,4 +1,5 @@
-//! Reads a flight from an MCAP file: nothing that has changed since it was written gets through unnoticed.
+//! Reads a flight from an MCAP file: nothing that has changed since it was written gets through
+//! unnoticed.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,8 +13,8 @@ use super::envelope::{self, Damage, Frame};
 use super::message::SourceReader;
 use super::{FlightLog, LogError, METADATA_NAME, check, foxglove, schema};
 
-/// Largest record or unpacked chunk, far above the 1 MiB that is written: a wrong length in a damaged file does not eat
-/// the memory.
+/// Largest record or unpacked chunk, far above the 1 MiB that is written: a wrong length in a
+/// damaged file does not eat the memory.
 const RECORD_MAX_BYTES: usize = 256 << 20;
 
 /// What [`FlightLog::recover`] found.
@@ -32,19 +33,21 @@ pub struct Recovery {
 impl FlightLog {
     /// Reads a flight log; the bits of every value are those that were written.
     ///
-    /// A channel that a message lacks is NaN in that sample. Topics with Foxglove's own schemas are skipped.
+    /// A channel that a message lacks is NaN in that sample. Topics with Foxglove's own schemas are
+    /// skipped.
     ///
     /// # Errors
-    /// [`LogError`]: the file cannot be read, is empty, is no MCAP file, is no log of squirrel, is truncated, or any of
-    /// its bytes or values does not match its checksum.
+    /// [`LogError`]: the file cannot be read, is empty, is no MCAP file, is no log of squirrel, is
+    /// truncated, or any of its bytes or values does not match its checksum.
     pub fn read(path: &Path) -> Result<Self, LogError> {
         Self::read_where(path, |_| true)
     }
 
-    /// As [`FlightLog::read`], of some sources alone: a log holds several times what most of its readers look at.
+    /// As [`FlightLog::read`], of some sources alone: a log holds several times what most of its
+    /// readers look at.
     ///
-    /// * `wanted` - whether a source is asked for, by its name; what is in the others stays packed and unchecked, but for the
-    ///   checksums of the file
+    /// * `wanted` - whether a source is asked for, by its name; what is in the others stays packed
+    ///   and unchecked, but for the checksums of the file
     ///
     /// # Errors
     /// As [`FlightLog::read`], with the sources that are read.
@@ -64,12 +67,13 @@ impl FlightLog {
         })
     }
 
-    /// Reads what is whole of a truncated flight log: every source up to the last whole chunk, which ends at most one
-    /// second before the cut, and the metadata. A file that is whole is read as [`FlightLog::read`] does.
+    /// Reads what is whole of a truncated flight log: every source up to the last whole chunk,
+    /// which ends at most one second before the cut, and the metadata. A file that is whole is read
+    /// as [`FlightLog::read`] does.
     ///
     /// # Errors
-    /// [`LogError`] as [`FlightLog::read`], but for the missing end; [`LogError::NothingWhole`] if the cut is before
-    /// the end of the metadata.
+    /// [`LogError`] as [`FlightLog::read`], but for the missing end; [`LogError::NothingWhole`] if
+    /// the cut is before the end of the metadata.
     pub fn recover(path: &Path) -> Result<(Self, Recovery), LogError> {
         let (log, recovery, _) = load(path, &|_| true)?;
         Ok((log, recovery))
@@ -89,14 +93,21 @@ fn open(path: &Path) -> Result<(String, Vec<u8>), LogError> {
     if bytes.starts_with(MAGIC) || MAGIC.starts_with(&bytes) {
         Ok((file, bytes))
     } else if bytes.ends_with(MAGIC) {
-        Err(LogError::Corrupt { file, what: "the first 8 bytes are not those of an MCAP file".to_owned() })
+        Err(LogError::Corrupt {
+            file,
+            what: "the first 8 bytes are not those of an MCAP file".to_owned(),
+        })
     } else {
         Err(LogError::NotMcap { file })
     }
 }
 
-/// Reads a file that is whole, or else what is whole of a file that was cut; the flag says that it was.
-fn load(path: &Path, wanted: &dyn Fn(&str) -> bool) -> Result<(FlightLog, Recovery, bool), LogError> {
+/// Reads a file that is whole, or else what is whole of a file that was cut; the flag says that it
+/// was.
+fn load(
+    path: &Path,
+    wanted: &dyn Fn(&str) -> bool,
+) -> Result<(FlightLog, Recovery, bool), LogError> {
     let (file, bytes) = open(path)?;
     let cut = match envelope::check(&bytes) {
         Ok(()) => false,
@@ -166,7 +177,8 @@ impl<'a> Reader<'a> {
         if frame.opcode != mcap::records::op::CHUNK {
             return self.record(frame.opcode, frame.body());
         }
-        // MCAP's own reader unpacks the chunk; it gives nothing out before the chunk's CRC is right.
+        // MCAP's own reader unpacks the chunk; it gives nothing out before the chunk's CRC is
+        // right.
         let options = LinearReaderOptions::default()
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
@@ -206,7 +218,8 @@ impl<'a> Reader<'a> {
                 self.metadata.get_or_insert_default().extend(record.metadata);
             }
             Record::Schema { header, data } => {
-                let schema = Schema { name: header.name, encoding: header.encoding, set: data.into_owned() };
+                let schema =
+                    Schema { name: header.name, encoding: header.encoding, set: data.into_owned() };
                 self.schemas.insert(header.id, schema);
             }
             Record::Channel(channel) if !self.topics.contains_key(&channel.id) => {
@@ -216,7 +229,11 @@ impl<'a> Reader<'a> {
             Record::Message { header, data } => match self.topics.get_mut(&header.channel_id) {
                 Some(Topic::Source(source)) => source.push(self.file, &data)?,
                 Some(Topic::Skipped) => {}
-                None => return Err(self.corrupt(format!("message of unknown channel {}", header.channel_id))),
+                None => {
+                    return Err(
+                        self.corrupt(format!("message of unknown channel {}", header.channel_id))
+                    );
+                }
             },
             _ => {}
         }
@@ -230,11 +247,19 @@ impl<'a> Reader<'a> {
         if [foxglove::TRANSFORM_SCHEMA, foxglove::SCENE_SCHEMA].contains(&name) {
             return Ok(Topic::Skipped);
         }
-        if channel.message_encoding != "protobuf" || encoding != "protobuf" || !schema::is_source(name) {
+        if channel.message_encoding != "protobuf"
+            || encoding != "protobuf"
+            || !schema::is_source(name)
+        {
             let encoding = &channel.message_encoding;
-            return Err(self.foreign(format!("topic `{topic}` has {encoding} messages of schema `{name}`")));
+            return Err(
+                self.foreign(format!("topic `{topic}` has {encoding} messages of schema `{name}`"))
+            );
         }
-        if self.topics.values().any(|other| matches!(other, Topic::Source(source) if source.name() == topic))
+        if self
+            .topics
+            .values()
+            .any(|other| matches!(other, Topic::Source(source) if source.name() == topic))
         {
             return Err(self.foreign(format!("topic `{topic}` has two channels")));
         }

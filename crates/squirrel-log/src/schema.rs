@@ -1,8 +1,9 @@
 //! The protobuf schema of a source: made on writing, followed on reading.
 //!
-//! The schema stands in the file, so a log can be read by programs that know nothing of squirrel, and by versions of
-//! squirrel that know other channels. It is proto2, whose fields know whether they are set: in proto3 a program that
-//! re-writes a log would drop every 0.0, and a motor at rest would look like a sample that was not given.
+//! The schema stands in the file, so a log can be read by programs that know nothing of squirrel,
+//! and by versions of squirrel that know other channels. It is proto2, whose fields know whether
+//! they are set: in proto3 a program that re-writes a log would drop every 0.0, and a motor at rest
+//! would look like a sample that was not given.
 
 use prost::Message as _;
 use prost_types::field_descriptor_proto::{Label, Type};
@@ -51,18 +52,22 @@ pub(super) fn encode(source_name: &str, source: &Source) -> Vec<u8> {
     FileDescriptorSet { file: vec![file] }.encode_to_vec()
 }
 
-/// The fields of message `full_name` in a serialised `FileDescriptorSet`, in order of their numbers.
+/// The fields of message `full_name` in a serialised `FileDescriptorSet`, in order of their
+/// numbers.
 ///
 /// # Errors
 /// One line that says what is wrong with the schema.
 pub(super) fn decode(full_name: &str, set: &[u8]) -> Result<Vec<FieldDescriptorProto>, String> {
-    let set = FileDescriptorSet::decode(set).map_err(|error| format!("schema `{full_name}`: {error}"))?;
+    let set =
+        FileDescriptorSet::decode(set).map_err(|error| format!("schema `{full_name}`: {error}"))?;
     let mut fields = set
         .file
         .into_iter()
         .flat_map(|file| {
             let prefix = file.package.map_or_else(String::new, |package| package + ".");
-            file.message_type.into_iter().map(move |message| (prefix.clone() + message.name(), message))
+            file.message_type
+                .into_iter()
+                .map(move |message| (prefix.clone() + message.name(), message))
         })
         .find_map(|(name, message)| (name == full_name).then_some(message.field))
         .ok_or_else(|| format!("schema `{full_name}` does not describe its message"))?;

@@ -9,9 +9,9 @@ use mcap::{McapError, WriteOptions};
 use super::{FlightLog, LogError, METADATA_NAME, Source, check, foxglove, message, schema};
 use crate::files::write_whole;
 
-/// A chunk is what a truncated file loses. It is closed by flight time, because only time bounds the loss for every
-/// mix of sources: 1 s is some 300 kB of a simulated flight and 2 kB of a GNSS receiver alone. Beyond 1 MiB, mcap's
-/// default, it is closed by bytes too.
+/// A chunk is what a truncated file loses. It is closed by flight time, because only time bounds
+/// the loss for every mix of sources: 1 s is some 300 kB of a simulated flight and 2 kB of a GNSS
+/// receiver alone. Beyond 1 MiB, mcap's default, it is closed by bytes too.
 const CHUNK_NS: u64 = 1_000_000_000;
 
 /// Poses for the 3-D panel, at most 50 a second.
@@ -22,16 +22,18 @@ type Writer = mcap::Writer<Cursor<Vec<u8>>>;
 impl FlightLog {
     /// Writes the log as an MCAP file; equal logs give equal bytes.
     ///
-    /// One topic a source, protobuf with the schema inside the file, and [`FlightLog::metadata`] as the metadata record
-    /// `squirrel`. A source without samples is left out. If the log has `truth.position_ned_m` and
-    /// `truth.q_ned_from_body_wxyz`, the vehicle also moves in Foxglove's 3-D panel; metadata `obstacles_json`
-    /// (`[[north_m, east_m, radius_m], ...]`) puts cylinders there.
+    /// One topic a source, protobuf with the schema inside the file, and [`FlightLog::metadata`] as
+    /// the metadata record `squirrel`. A source without samples is left out. If the log has
+    /// `truth.position_ned_m` and `truth.q_ned_from_body_wxyz`, the vehicle also moves in
+    /// Foxglove's 3-D panel; metadata `obstacles_json` (`[[north_m, east_m, radius_m], ...]`) puts
+    /// cylinders there.
     ///
     /// The file appears under its name only when it is whole.
     ///
     /// # Errors
-    /// [`LogError`] that names the source, index and value if a time is not finite, negative or not after the one
-    /// before it, if the number of values does not fit, if a name cannot be a field, or if the disk refuses.
+    /// [`LogError`] that names the source, index and value if a time is not finite, negative or not
+    /// after the one before it, if the number of values does not fit, if a name cannot be a field,
+    /// or if the disk refuses.
     pub fn write(&self, path: &Path) -> Result<(), LogError> {
         let file = path.display().to_string();
         check::check(&file, self)?;
@@ -44,15 +46,18 @@ impl FlightLog {
             self.metadata.get("obstacles_json").map(|json| serde_json::from_str(json)).transpose();
         let obstacles: Option<Vec<[f64; 3]>> =
             obstacles.map_err(|error| LogError::Obstacles { file: file.to_owned(), error })?;
-        self.encode(obstacles.as_deref()).map_err(|error| LogError::Mcap { file: file.to_owned(), error })
+        self.encode(obstacles.as_deref())
+            .map_err(|error| LogError::Mcap { file: file.to_owned(), error })
     }
 
     fn encode(&self, obstacles: Option<&[[f64; 3]]>) -> Result<Vec<u8>, McapError> {
         // The library string and one compression thread keep the bytes the same on every machine.
         let options = WriteOptions::new().library("squirrel").compression_threads(0);
         let mut writer = options.create(Cursor::new(Vec::new()))?;
-        writer
-            .write_metadata(&Metadata { name: METADATA_NAME.to_owned(), metadata: self.metadata.clone() })?;
+        writer.write_metadata(&Metadata {
+            name: METADATA_NAME.to_owned(),
+            metadata: self.metadata.clone(),
+        })?;
         let mut tracks = Vec::new();
         for (name, source) in self.sources.iter().filter(|(_, source)| !source.time_s.is_empty()) {
             let set = schema::encode(name, source);
@@ -112,7 +117,8 @@ impl Pose {
 
     /// `None` unless the source is `truth` and knows place and attitude.
     fn of(name: &str, source: &Source, writer: &mut Writer) -> Result<Option<Self>, McapError> {
-        let has = |name, width| source.channels.get(name).is_some_and(|channel| channel.width == width);
+        let has =
+            |name, width| source.channels.get(name).is_some_and(|channel| channel.width == width);
         if name != "truth" || !has(Self::POSITION, 3) || !has(Self::ATTITUDE, 4) {
             return Ok(None);
         }
@@ -143,7 +149,12 @@ impl Pose {
     }
 }
 
-fn add_topic(writer: &mut Writer, topic: &str, schema_name: &str, set: &[u8]) -> Result<u16, McapError> {
+fn add_topic(
+    writer: &mut Writer,
+    topic: &str,
+    schema_name: &str,
+    set: &[u8],
+) -> Result<u16, McapError> {
     let schema = writer.add_schema(schema_name, "protobuf", set)?;
     writer.add_channel(schema, topic, "protobuf", &std::collections::BTreeMap::new())
 }
@@ -155,8 +166,12 @@ fn put(
     time_ns: u64,
     message: &[u8],
 ) -> Result<(), McapError> {
-    let header =
-        MessageHeader { channel_id, sequence: index as u32, log_time: time_ns, publish_time: time_ns };
+    let header = MessageHeader {
+        channel_id,
+        sequence: index as u32,
+        log_time: time_ns,
+        publish_time: time_ns,
+    };
     writer.write_to_known_channel(&header, message)
 }
 

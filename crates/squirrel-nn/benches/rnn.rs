@@ -1,4 +1,5 @@
-//! The recurrent network 2-8-8-2 over windows of ten: forwards in flight and in bulk, and an epoch of training.
+//! The recurrent network 2-8-8-2 over windows of ten: forwards in flight and in bulk, and an epoch
+//! of training.
 //!
 //! `benches/rnn/compare.py` runs JAX and PyTorch beside these.
 
@@ -34,7 +35,9 @@ fn windows(count: usize) -> Vec<[[f32; 2]; WINDOW]> {
 fn forwards(c: &mut Criterion) {
     let (net, rows) = (network(), windows(1000));
     let mut group = c.benchmark_group("rnn_forward");
-    group.bench_function("1_window", |b| b.iter(|| black_box(&net).window::<f32>(black_box(&rows[0]))));
+    group.bench_function("1_window", |b| {
+        b.iter(|| black_box(&net).window::<f32>(black_box(&rows[0])));
+    });
     for path in Path::available() {
         group.bench_function(format!("1000_windows_{}", path.name()), |b| {
             b.iter(|| forward::<WINDOW, 2, _>(path, black_box(&net), black_box(&rows)));

@@ -16,7 +16,8 @@ pub(crate) struct Adam {
     pub(crate) decay: Decay,
 }
 
-/// How much of the first zeros is left in the means; products of the decays, because powers differ between platforms.
+/// How much of the first zeros is left in the means; products of the decays, because powers differ
+/// between platforms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Decay {
     pub(crate) mean: f64,
@@ -41,7 +42,8 @@ impl Adam {
         let (keep_mean, keep_square) = (MEAN_DECAY as f32, SQUARE_DECAY as f32);
         let (take_mean, take_square) = ((1.0 - MEAN_DECAY) as f32, (1.0 - SQUARE_DECAY) as f32);
         let memory = self.mean.iter_mut().zip(&mut self.square);
-        for ((parameter, slope), (mean, square)) in parameters.iter_mut().zip(gradient).zip(memory) {
+        for ((parameter, slope), (mean, square)) in parameters.iter_mut().zip(gradient).zip(memory)
+        {
             *mean = keep_mean * *mean + take_mean * slope;
             *square = keep_square * *square + take_square * (slope * slope);
             *parameter -= rate * *mean / ((correction * *square).sqrt() + EPSILON);
@@ -74,7 +76,10 @@ mod tests {
     fn the_first_step_has_the_length_of_the_rate() {
         let (mut adam, mut parameters) = (Adam::new(2), [1.0, -2.0]);
         adam.step(&mut parameters, &[0.5, -1e-3], 0.01);
-        assert!((parameters[0] - 0.99).abs() < 1e-6 && (parameters[1] + 1.99).abs() < 1e-6, "{parameters:?}");
+        assert!(
+            (parameters[0] - 0.99).abs() < 1e-6 && (parameters[1] + 1.99).abs() < 1e-6,
+            "{parameters:?}"
+        );
     }
 
     #[test]
@@ -84,7 +89,10 @@ mod tests {
             let slope = [2.0 * (parameters[0] - 0.5), 20.0 * (parameters[1] - 0.25)];
             adam.step(&mut parameters, &slope, cosine(0.05, step, 2000));
         }
-        assert!((parameters[0] - 0.5).abs() < 1e-3 && (parameters[1] - 0.25).abs() < 1e-3, "{parameters:?}");
+        assert!(
+            (parameters[0] - 0.5).abs() < 1e-3 && (parameters[1] - 0.25).abs() < 1e-3,
+            "{parameters:?}"
+        );
     }
 
     #[test]

@@ -40,9 +40,12 @@ impl Trainer {
             validation_hash: hash_text(self.validation_hash),
             history: history.clone(),
         };
-        let parts = [(PARAMETERS, parameters), (BEST, best), (MEAN, &adam.mean), (SQUARE, &adam.square)];
-        let tensors: Vec<_> =
-            parts.into_iter().flat_map(|(prefix, numbers)| named(self.card.model, prefix, numbers)).collect();
+        let parts =
+            [(PARAMETERS, parameters), (BEST, best), (MEAN, &adam.mean), (SQUARE, &adam.square)];
+        let tensors: Vec<_> = parts
+            .into_iter()
+            .flat_map(|(prefix, numbers)| named(self.card.model, prefix, numbers))
+            .collect();
         Ok(weights::write(path, &record, &tensors)?)
     }
 
@@ -60,7 +63,9 @@ impl Trainer {
             ("validation_hash", &validation_hash, hash_text(validation.hash())),
         ] {
             if *then != now {
-                return Err(contents.field(field, then, &format!("the windows at hand have {now}")).into());
+                return Err(contents
+                    .field(field, then, &format!("the windows at hand have {now}"))
+                    .into());
             }
         }
         if best_epoch > history.len() || history.len() > settings.epochs {
@@ -71,7 +76,8 @@ impl Trainer {
         let (parameters, best) = (take(PARAMETERS)?, take(BEST)?);
         let adam = Adam { mean: take(MEAN)?, square: take(SQUARE)?, decay };
         contents.finish()?;
-        let trainer = Self::new(card.model, &card.vehicle, card.area_m2, training, validation, settings);
+        let trainer =
+            Self::new(card.model, &card.vehicle, card.area_m2, training, validation, settings);
         let mut trainer = trainer.map_err(|error| match error {
             NnError::Setting { field, value, reason } => {
                 let (file, reason) = (path.display().to_string(), reason.to_owned());

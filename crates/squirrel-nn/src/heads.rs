@@ -1,7 +1,8 @@
 //! From the outputs of a network to a force, with derivatives: what the models differ in.
 //!
-//! A head is evaluated one window at a time, in the scalar code of `squirrel-core`, so that a force in training has the bits
-//! of the force in flight; against ten steps of two layers this costs little.
+//! A head is evaluated one window at a time, in the scalar code of `squirrel-core`, so that a force
+//! in training has the bits of the force in flight; against ten steps of two layers this costs
+//! little.
 
 use nalgebra::{Vector3, convert};
 use squirrel_core::frames::In;
@@ -28,7 +29,11 @@ impl<S> AsRef<[[S; INPUTS]]> for Sample<S> {
 
 impl<S: Real> Sample<S> {
     /// * `velocity_body_m_s` - relative to the air, at the last row
-    pub(crate) fn new(rows: [[S; INPUTS]; WINDOW], velocity_body_m_s: [S; 3], target: [S; 3]) -> Self {
+    pub(crate) fn new(
+        rows: [[S; INPUTS]; WINDOW],
+        velocity_body_m_s: [S; 3],
+        target: [S; 3],
+    ) -> Self {
         Self { rows, flow: Flow::new(In::new(Vector3::from(velocity_body_m_s))), target }
     }
 }
@@ -62,11 +67,15 @@ impl<S: Real> Head<S, 3> for Direct {
     #[inline]
     fn force(self, outputs: &[S; 3], _: &Flow<S>) -> Force<S, 3> {
         let (one, zero) = (convert(1.0), convert(0.0));
-        Force { force: *outputs, by_output: [[one, zero, zero], [zero, one, zero], [zero, zero, one]] }
+        Force {
+            force: *outputs,
+            by_output: [[one, zero, zero], [zero, one, zero], [zero, zero, one]],
+        }
     }
 }
 
-/// The outputs are coefficients along the wing and along its normal: `f = -rho A |v|^2 (y0 e_t + y1 n)`.
+/// The outputs are coefficients along the wing and along its normal:
+/// `f = -rho A |v|^2 (y0 e_t + y1 n)`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Plane<S> {
     pub(crate) area_m2: S,
@@ -92,7 +101,8 @@ pub(crate) struct Corrected<S> {
 
 impl<S: Real> Head<S, 2> for Corrected<S> {
     /// With `f = -Q |v| sin(alpha_est) gamma n_f`: by `gamma` it is `f / gamma`; by `alpha_w` it is
-    /// `-Q gamma |v| (cos(alpha_est) n_f + sin(alpha_est) (cos(beta) e_t - sin(beta) n))`, and 0 where clipped.
+    /// `-Q gamma |v| (cos(alpha_est) n_f + sin(alpha_est) (cos(beta) e_t - sin(beta) n))`, and 0
+    /// where clipped.
     #[inline]
     fn force(self, outputs: &[S; 2], flow: &Flow<S>) -> Force<S, 2> {
         let (one, zero) = (convert::<f64, S>(1.0), convert(0.0));

@@ -1,12 +1,14 @@
-//! Windows from a flight log: what the air did to the spread wings, by the accelerometer (docs/equations.md T21).
+//! Windows from a flight log: what the air did to the spread wings, by the accelerometer
+//! (docs/equations.md T21).
 //!
 //! ```text
 //! f_a = m f_measured - m f_model      body frame, N; the model is the vehicle without wings
 //! ```
-//! In the body frame the label needs no attitude: an error of the thrust model lies along the normal. The model is the
-//! simulator's plant, led along the measured motion under the logged commands, so that thrust, drag and whatever effects the
-//! vehicle file has are taken off as they would fly. Features come every 0.1 s from measured velocity and attitude; a label is
-//! the mean over the 0.1 s about its time.
+//! In the body frame the label needs no attitude: an error of the thrust model lies along the
+//! normal. The model is the simulator's plant, led along the measured motion under the logged
+//! commands, so that thrust, drag and whatever effects the vehicle file has are taken off as they
+//! would fly. Features come every 0.1 s from measured velocity and attitude; a label is the mean
+//! over the 0.1 s about its time.
 
 use crate::error::NnError;
 use crate::windows::Window;
@@ -33,23 +35,29 @@ const LED_STEP_S: f64 = 1e-9;
 /// * `vehicle` - the one that flew; its wings are what is learned
 ///
 /// # Errors
-/// [`NnError::Channel`] names the channel that the log lacks, [`NnError::Samples`] one that cannot be, [`NnError::Folded`] a
-/// flight with nothing to learn from.
-pub fn windows(vehicle: &VehicleFile, flight: &str, log: &FlightLog) -> Result<Vec<Window>, NnError> {
+/// [`NnError::Channel`] names the channel that the log lacks, [`NnError::Samples`] one that cannot
+/// be, [`NnError::Folded`] a flight with nothing to learn from.
+pub fn windows(
+    vehicle: &VehicleFile,
+    flight: &str,
+    log: &FlightLog,
+) -> Result<Vec<Window>, NnError> {
     let refused = |problem: String| NnError::Vehicle { vehicle: vehicle.name.clone(), problem };
     if vehicle.wing == WingPlant::None {
         return Err(refused("has no wings to learn about".to_owned()));
     }
-    let plant =
-        Plant::new(vehicle.vehicle, vehicle.effects, WingPlant::None, None, LED_STEP_S).map_err(refused)?;
+    let plant = Plant::new(vehicle.vehicle, vehicle.effects, WingPlant::None, None, LED_STEP_S)
+        .map_err(refused)?;
     let rotors = vehicle.vehicle.rotors().len();
     let need = |channel, width, needed_for| Line::need(flight, log, channel, width, needed_for);
     let force = need("imu.specific_force_body_m_s2", 3, "the force is measured by it")?;
     let omega = need("imu.omega_body_rad_s", 3, "rotation is measured by it")?;
-    let attitude = need("attitude.q_ned_from_body_wxyz", 4, "velocity is turned into the body frame by it")?;
+    let attitude =
+        need("attitude.q_ned_from_body_wxyz", 4, "velocity is turned into the body frame by it")?;
     let velocity = need("gnss.velocity_ned_m_s", 3, "the air meets the wings with it")?;
     let rotor = need("rotor.command", rotors, "thrust is taken off by it")?;
-    let wing = need("wing.command", 2, "wings must be spread where something is learned about them")?;
+    let wing =
+        need("wing.command", 2, "wings must be spread where something is learned about them")?;
     let voltage = Line::read(flight, log, "battery.voltage_v", 1)?;
     let truth = Line::read(flight, log, "truth.wing_force_body_n", 3)?;
     let reference_v = vehicle.vehicle.parameters().propulsion.reference_voltage_v;
@@ -61,7 +69,8 @@ pub fn windows(vehicle: &VehicleFile, flight: &str, log: &FlightLog) -> Result<V
         omega: In::new(omega.vector(t)),
         ..State::at_rest()
     };
-    // The plant runs from sample to sample of the accelerometer; what it leaves there is the force of the wings.
+    // The plant runs from sample to sample of the accelerometer; what it leaves there is the force
+    // of the wings.
     let mut wings = Vec::with_capacity(force.time_s.len());
     let mut state = plant.initial_state(body_at(force.time_s[0]), 1.0);
     for (k, &t) in force.time_s.iter().enumerate() {
@@ -80,12 +89,17 @@ pub fn windows(vehicle: &VehicleFile, flight: &str, log: &FlightLog) -> Result<V
     let mean = |line: &dyn Fn(usize) -> Vector3<f64>, time_s: &[f64], t: f64| {
         let from = time_s.partition_point(|s| *s < t - 0.5 * STEP_S);
         let until = time_s.partition_point(|s| *s < t + 0.5 * STEP_S);
-        (until > from).then(|| (from..until).map(line).sum::<Vector3<f64>>() / (until - from) as f64)
+        (until > from)
+            .then(|| (from..until).map(line).sum::<Vector3<f64>>() / (until - from) as f64)
     };
 
     let lines = [&force, &omega, &attitude, &velocity, &rotor, &wing];
-    let start = lines.iter().map(|line| line.time_s[0]).fold(f64::NEG_INFINITY, f64::max) + 0.5 * STEP_S;
-    let end = lines[..4].iter().map(|line| line.time_s[line.time_s.len() - 1]).fold(f64::INFINITY, f64::min);
+    let start =
+        lines.iter().map(|line| line.time_s[0]).fold(f64::NEG_INFINITY, f64::max) + 0.5 * STEP_S;
+    let end = lines[..4]
+        .iter()
+        .map(|line| line.time_s[line.time_s.len() - 1])
+        .fold(f64::INFINITY, f64::min);
     let steps = ((end - 0.5 * STEP_S - start) / STEP_S).floor().max(0.0) as usize;
     let mut rows: Vec<[f32; INPUTS]> = Vec::with_capacity(steps);
     let mut all = Vec::new();
@@ -152,7 +166,8 @@ impl Line {
         width: usize,
     ) -> Result<Option<Self>, NnError> {
         let Some((time_s, values)) = log.channel(channel) else { return Ok(None) };
-        let refuse = |problem: String| Err(NnError::Samples { flight: flight.to_owned(), channel, problem });
+        let refuse =
+            |problem: String| Err(NnError::Samples { flight: flight.to_owned(), channel, problem });
         if values.width != width {
             return refuse(format!("has {} numbers a sample, must have {width}", values.width));
         }
@@ -163,7 +178,11 @@ impl Line {
             return refuse(format!("time {} s after {} s, must rise", time_s[i], time_s[i - 1]));
         }
         if let Some(i) = values.values.iter().position(|x| !x.is_finite()) {
-            return refuse(format!("{} at {} s, must be finite", values.values[i], time_s[i / width]));
+            return refuse(format!(
+                "{} at {} s, must be finite",
+                values.values[i],
+                time_s[i / width]
+            ));
         }
         Ok(Some(Self { time_s: time_s.to_vec(), values: values.clone() }))
     }

@@ -1,4 +1,5 @@
-//! Learned models of the force on spread wings: the paper's network and its rivals, trained by exact gradients.
+//! Learned models of the force on spread wings: the paper's network and its rivals, trained by
+//! exact gradients.
 //!
 //! - [`labels`]: windows from a flight log.
 //! - [`windows`]: what models learn from, split by flight.
@@ -33,8 +34,8 @@
 //! # Ok::<(), squirrel_nn::NnError>(())
 //! ```
 //!
-//! The forward pass is that of `squirrel-core`, run on registers of windows, so weights fly with the bits they were trained
-//! with. SI units and radians; body frame FRD, world NED.
+//! The forward pass is that of `squirrel-core`, run on registers of windows, so weights fly with
+//! the bits they were trained with. SI units and radians; body frame FRD, world NED.
 
 mod adam;
 mod checkpoint;

@@ -1,4 +1,5 @@
-//! The paper's network and its rivals behind one interface: shapes, first weights, forces, gradients.
+//! The paper's network and its rivals behind one interface: shapes, first weights, forces,
+//! gradients.
 
 use crate::error::NnError;
 use crate::heads::{Corrected, Direct, Head, Plane, Sample};
@@ -22,11 +23,13 @@ pub enum Model {
     Parnn,
     /// The same from the last row alone: what recurrence is worth.
     ParnnWindow1,
-    /// The paper's rival: a recurrent network says the force in NED, though it sees speed and angle of attack only.
+    /// The paper's rival: a recurrent network says the force in NED, though it sees speed and angle
+    /// of attack only.
     VanillaNed,
     /// It says the force in the body frame.
     VanillaBody,
-    /// It says coefficients along the flow in the wing and along its normal: told as much about direction as paRNN.
+    /// It says coefficients along the flow in the wing and along its normal: told as much about
+    /// direction as paRNN.
     VanillaPlane,
     /// The paper's flat plate; nothing is learned.
     FlatPlate,
@@ -94,7 +97,8 @@ impl Model {
         matches!(self.kind(), Kind::Network { .. })
     }
 
-    /// Names and shapes of its parameters in their order. Matrices are `[inputs, outputs]`: `y = x W + b`.
+    /// Names and shapes of its parameters in their order. Matrices are `[inputs, outputs]`:
+    /// `y = x W + b`.
     pub fn tensors(self) -> Vec<(&'static str, Vec<usize>)> {
         match self.kind() {
             Kind::Network { outputs } => vec![
@@ -117,8 +121,8 @@ impl Model {
         self.tensors().iter().map(|(_, shape)| shape.iter().product::<usize>()).sum()
     }
 
-    /// Parameters to start from: weights uniform within `1 / sqrt(8)`, those of the output a tenth of it, no bias; the outputs
-    /// of paRNN start at the flat plate.
+    /// Parameters to start from: weights uniform within `1 / sqrt(8)`, those of the output a tenth
+    /// of it, no bias; the outputs of paRNN start at the flat plate.
     pub(crate) fn start(self, seed: u64) -> Vec<f32> {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let bound = 1.0 / (HIDDEN as f32).sqrt();
@@ -144,7 +148,8 @@ impl Model {
 
     /// A window as this model sees it: the force in the frame that it speaks.
     pub(crate) fn sample(self, window: &Window) -> Sample<f32> {
-        let target = if self == Self::VanillaNed { window.label_ned_n() } else { window.label_body_n };
+        let target =
+            if self == Self::VanillaNed { window.label_ned_n() } else { window.label_body_n };
         Sample::new(window.rows, window.velocity_body_m_s, target)
     }
 
@@ -157,21 +162,29 @@ impl Model {
         samples: &[Sample<S>],
     ) -> Vec<[S; 3]> {
         match self {
-            Self::Parnn => forces::<S, _, WINDOW, 2>(path, Corrected { area_m2 }, parameters, samples),
-            Self::ParnnWindow1 => forces::<S, _, 1, 2>(path, Corrected { area_m2 }, parameters, samples),
+            Self::Parnn => {
+                forces::<S, _, WINDOW, 2>(path, Corrected { area_m2 }, parameters, samples)
+            }
+            Self::ParnnWindow1 => {
+                forces::<S, _, 1, 2>(path, Corrected { area_m2 }, parameters, samples)
+            }
             Self::VanillaNed | Self::VanillaBody => {
                 forces::<S, _, WINDOW, 3>(path, Direct, parameters, samples)
             }
-            Self::VanillaPlane => forces::<S, _, WINDOW, 2>(path, Plane { area_m2 }, parameters, samples),
+            Self::VanillaPlane => {
+                forces::<S, _, WINDOW, 2>(path, Plane { area_m2 }, parameters, samples)
+            }
             Self::FlatPlate | Self::ScaledFlatPlate => {
                 let scale = parameters.first().copied().unwrap_or(convert(1.0));
-                let along_normal = |s: &Sample<S>| s.flow.impedance(area_m2) * s.flow.normal * scale;
+                let along_normal =
+                    |s: &Sample<S>| s.flow.impedance(area_m2) * s.flow.normal * scale;
                 samples.iter().map(|s| [convert(0.0), convert(0.0), along_normal(s)]).collect()
             }
         }
     }
 
-    /// Mean squared error over some samples, N^2, with its derivative by the parameters; 0 where the model is no network.
+    /// Mean squared error over some samples, N^2, with its derivative by the parameters; 0 where
+    /// the model is no network.
     ///
     /// * `members` - which samples, not empty
     pub(crate) fn gradient<S: Paths>(
@@ -184,18 +197,33 @@ impl Model {
         gradient: &mut [S],
     ) -> f64 {
         match self {
-            Self::Parnn => {
-                batch::<S, _, WINDOW, 2>(path, Corrected { area_m2 }, parameters, samples, members, gradient)
-            }
-            Self::ParnnWindow1 => {
-                batch::<S, _, 1, 2>(path, Corrected { area_m2 }, parameters, samples, members, gradient)
-            }
+            Self::Parnn => batch::<S, _, WINDOW, 2>(
+                path,
+                Corrected { area_m2 },
+                parameters,
+                samples,
+                members,
+                gradient,
+            ),
+            Self::ParnnWindow1 => batch::<S, _, 1, 2>(
+                path,
+                Corrected { area_m2 },
+                parameters,
+                samples,
+                members,
+                gradient,
+            ),
             Self::VanillaNed | Self::VanillaBody => {
                 batch::<S, _, WINDOW, 3>(path, Direct, parameters, samples, members, gradient)
             }
-            Self::VanillaPlane => {
-                batch::<S, _, WINDOW, 2>(path, Plane { area_m2 }, parameters, samples, members, gradient)
-            }
+            Self::VanillaPlane => batch::<S, _, WINDOW, 2>(
+                path,
+                Plane { area_m2 },
+                parameters,
+                samples,
+                members,
+                gradient,
+            ),
             Self::FlatPlate | Self::ScaledFlatPlate => 0.0,
         }
     }
@@ -238,7 +266,8 @@ impl TryFrom<String> for Model {
     }
 }
 
-/// Uniform in [-1, 1), from the upper 24 bits of a draw; written out so that weights do not depend on a library's version.
+/// Uniform in [-1, 1), from the upper 24 bits of a draw; written out so that weights do not depend
+/// on a library's version.
 fn uniform(rng: &mut Pcg64Mcg) -> f32 {
     use rand::Rng;
     (rng.next_u32() >> 8) as f32 / 8_388_608.0 - 1.0
@@ -264,7 +293,11 @@ fn forces<S: Paths, H: Head<S, OUT>, const STEPS: usize, const OUT: usize>(
 ) -> Vec<[S; 3]> {
     let net = network(parameters);
     let outputs = S::run(path, Forward::<_, _, STEPS, OUT> { net: &net, windows: samples });
-    outputs.iter().zip(samples).map(|(outputs, sample)| head.force(outputs, &sample.flow).force).collect()
+    outputs
+        .iter()
+        .zip(samples)
+        .map(|(outputs, sample)| head.force(outputs, &sample.flow).force)
+        .collect()
 }
 
 fn batch<S: Paths, H: Head<S, OUT>, const STEPS: usize, const OUT: usize>(
@@ -276,7 +309,8 @@ fn batch<S: Paths, H: Head<S, OUT>, const STEPS: usize, const OUT: usize>(
     gradient: &mut [S],
 ) -> f64 {
     let net = network(parameters);
-    let (loss, by_net) = S::run(path, Batch::<_, _, STEPS, OUT> { net: &net, head, samples, members });
+    let (loss, by_net) =
+        S::run(path, Batch::<_, _, STEPS, OUT> { net: &net, head, samples, members });
     for (to, from) in gradient.iter_mut().zip(by_net.tensors().into_iter().flatten()) {
         *to = *from;
     }

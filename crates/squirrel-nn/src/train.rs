@@ -1,8 +1,9 @@
-//! Training: epochs of Adam over shuffled batches, until the rate is down or the validation set gets no better.
+//! Training: epochs of Adam over shuffled batches, until the rate is down or the validation set
+//! gets no better.
 //!
-//! A [`Trainer`] is stepped from outside, an [`Trainer::epoch`] at a time, so that whoever calls can show progress, save a
-//! checkpoint or stop. Same windows, settings and seed give the same weights, on every path and whether or not training
-//! was interrupted.
+//! A [`Trainer`] is stepped from outside, an [`Trainer::epoch`] at a time, so that whoever calls
+//! can show progress, save a checkpoint or stop. Same windows, settings and seed give the same
+//! weights, on every path and whether or not training was interrupted.
 
 use crate::adam::{Adam, clip, cosine};
 use crate::error::NnError;
@@ -27,7 +28,8 @@ pub struct Settings {
     pub rate: f64,
     /// A longer gradient is shortened to this length, N^2.
     pub clip: f64,
-    /// Stop after so many epochs in which the validation set got no better; only where there is one.
+    /// Stop after so many epochs in which the validation set got no better; only where there is
+    /// one.
     pub patience: usize,
     /// Of first weights and order of windows.
     pub seed: u64,
@@ -118,7 +120,8 @@ impl Trainer {
         if training.all().is_empty() {
             return Err(NnError::Empty { set: "training" });
         }
-        let samples = |windows: &Windows| windows.all().iter().map(|w| model.sample(w)).collect::<Vec<_>>();
+        let samples =
+            |windows: &Windows| windows.all().iter().map(|w| model.sample(w)).collect::<Vec<_>>();
         let (training_samples, validation_samples) = (samples(training), samples(validation));
         let mut parameters = model.start(settings.seed);
         if model == Model::ScaledFlatPlate {
@@ -159,11 +162,12 @@ impl Trainer {
         &self.settings
     }
 
-    /// All epochs are done, the validation set got no better for long enough, or there is nothing to train.
+    /// All epochs are done, the validation set got no better for long enough, or there is nothing
+    /// to train.
     pub fn is_done(&self) -> bool {
         let epochs = self.state.history.len();
-        let stuck =
-            !self.validation.is_empty() && epochs - self.state.best_epoch >= self.settings.patience.max(1);
+        let stuck = !self.validation.is_empty()
+            && epochs - self.state.best_epoch >= self.settings.patience.max(1);
         !self.card.model.is_network() || epochs >= self.settings.epochs || stuck
     }
 
@@ -183,7 +187,11 @@ impl Trainer {
         if !(training + loss).is_finite() || self.state.parameters.iter().any(|p| !p.is_finite()) {
             return Err(NnError::Diverged { model: self.card.model.name(), epoch: number, loss });
         }
-        let best = self.state.history.get(self.state.best_epoch.wrapping_sub(1)).and_then(|e| e.validation);
+        let best = self
+            .state
+            .history
+            .get(self.state.best_epoch.wrapping_sub(1))
+            .and_then(|e| e.validation);
         if validation.is_none() || best.is_none_or(|best| loss < best) {
             self.state.best.clone_from(&self.state.parameters);
             self.state.best_epoch = number;
@@ -220,7 +228,8 @@ impl Trainer {
     /// Mean squared error over the validation windows, N^2.
     fn error(&self) -> f64 {
         let State { parameters, .. } = &self.state;
-        let forces = self.card.model.forces(self.path, parameters, self.card.area_m2, &self.validation);
+        let forces =
+            self.card.model.forces(self.path, parameters, self.card.area_m2, &self.validation);
         let squared = forces.iter().zip(&self.validation).flat_map(|(force, sample)| {
             force.iter().zip(sample.target).map(|(f, t)| (f64::from(*f) - f64::from(t)).powi(2))
         });
@@ -228,10 +237,12 @@ impl Trainer {
     }
 }
 
-/// The windows in the order of an epoch, by Fisher and Yates; written out so that weights do not depend on a library's version.
+/// The windows in the order of an epoch, by Fisher and Yates; written out so that weights do not
+/// depend on a library's version.
 fn shuffled(count: usize, seed: u64, epoch: usize) -> Vec<u32> {
     let mut order: Vec<u32> = (0..count as u32).collect();
-    let mut rng = Pcg64Mcg::seed_from_u64(seed ^ (epoch as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mut rng =
+        Pcg64Mcg::seed_from_u64(seed ^ (epoch as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
     for last in (1..count).rev() {
         // The upper bits of a product: uniform to within 2^-32.
         let pick = (u64::from(rng.next_u32()) * (last as u64 + 1)) >> 32;

@@ -51,9 +51,13 @@ impl Trained {
     /// # Errors
     /// Another number of parameters than the model has, or one that is not finite.
     pub fn with_parameters(&self, parameters: Vec<f32>) -> Result<Self, NnError> {
-        let refuse = |value: String, reason| Err(NnError::Setting { field: "parameters", value, reason });
+        let refuse =
+            |value: String, reason| Err(NnError::Setting { field: "parameters", value, reason });
         if parameters.len() != self.parameters.len() {
-            return refuse(format!("{} numbers", parameters.len()), "must be as many as the model has");
+            return refuse(
+                format!("{} numbers", parameters.len()),
+                "must be as many as the model has",
+            );
         }
         if let Some(number) = parameters.iter().find(|number| !number.is_finite()) {
             return refuse(number.to_string(), "must be finite");
@@ -65,7 +69,8 @@ impl Trained {
     pub fn forces_body_n(&self, windows: &[Window]) -> Vec<[f32; 3]> {
         let model = self.card.model;
         let samples: Vec<Sample<f32>> = windows.iter().map(|window| model.sample(window)).collect();
-        let mut forces = model.forces(simd::Path::best(), &self.parameters, self.card.area_m2, &samples);
+        let mut forces =
+            model.forces(simd::Path::best(), &self.parameters, self.card.area_m2, &samples);
         if model == Model::VanillaNed {
             for (force, window) in forces.iter_mut().zip(windows) {
                 *force = (window.ned_from_body().inverse() * Vector3::from(*force)).into();
@@ -84,13 +89,15 @@ impl Trained {
         })
     }
 
-    /// Writes a safetensors file: tensors by [`Model::tensors`], the card as JSON in the metadata record `squirrel`. Equal
-    /// models give equal bytes. The file appears under its name only when it is whole.
+    /// Writes a safetensors file: tensors by [`Model::tensors`], the card as JSON in the metadata
+    /// record `squirrel`. Equal models give equal bytes. The file appears under its name only when
+    /// it is whole.
     ///
     /// # Errors
     /// A parameter or figure is not finite, or the disk refuses.
     pub fn save(&self, path: &Path) -> Result<(), NnError> {
-        if let Some((name, value)) = self.card.figures.iter().find(|(_, value)| !value.is_finite()) {
+        if let Some((name, value)) = self.card.figures.iter().find(|(_, value)| !value.is_finite())
+        {
             let (file, value) = (path.display().to_string(), format!("{name}: {value}"));
             let reason = "must be finite".to_owned();
             return Err(WeightsError::Field { file, field: "figures", value, reason }.into());
@@ -101,7 +108,8 @@ impl Trained {
     /// Reads what [`Trained::save`] wrote.
     ///
     /// # Errors
-    /// Not such a file, a tensor is missing, unknown, of another shape or not finite, or the card does not fit the flight code.
+    /// Not such a file, a tensor is missing, unknown, of another shape or not finite, or the card
+    /// does not fit the flight code.
     pub fn load(path: &Path) -> Result<Self, NnError> {
         let mut contents = Contents::read(path)?;
         let card: Card = contents.record()?;

@@ -1,7 +1,8 @@
-//! What models learn from: windows of what the network sees, with the force that was there at their end, flight by flight.
+//! What models learn from: windows of what the network sees, with the force that was there at their
+//! end, flight by flight.
 //!
-//! Neighbouring windows of a flight share nine of ten rows, so a split by window would let a model look up its test set.
-//! Sets are therefore split by flight only.
+//! Neighbouring windows of a flight share nine of ten rows, so a split by window would let a model
+//! look up its test set. Sets are therefore split by flight only.
 
 use crate::error::NnError;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -33,14 +34,16 @@ impl Window {
             ("label_body_n", &self.label_body_n),
             ("truth_body_n", self.truth_body_n.as_ref().map_or(&[], |truth| truth)),
         ];
-        let not_finite = fields.into_iter().find(|(_, numbers)| numbers.iter().any(|x| !x.is_finite()));
+        let not_finite =
+            fields.into_iter().find(|(_, numbers)| numbers.iter().any(|x| !x.is_finite()));
         if let Some((field, numbers)) = not_finite {
             return Some((field, numbers.to_vec(), "must be finite"));
         }
         let q = self.q_ned_from_body_wxyz;
         let square: f32 = q.iter().map(|x| x * x).sum();
         // 1 % off in length.
-        (!((square - 1.0).abs() < 0.02)).then(|| ("q_ned_from_body_wxyz", q.to_vec(), "must have norm 1"))
+        (!((square - 1.0).abs() < 0.02))
+            .then(|| ("q_ned_from_body_wxyz", q.to_vec(), "must have norm 1"))
     }
 
     pub(crate) fn ned_from_body(&self) -> UnitQuaternion<f32> {
@@ -48,8 +51,9 @@ impl Window {
         UnitQuaternion::new_normalize(Quaternion::new(w, x, y, z))
     }
 
-    /// The label as the paper has it, `m a - m g e3 + U n` in NED, N (docs/equations.md T21): that of the body frame turned by the
-    /// measured attitude, whose error comes with it. The paper's rival of paRNN learns it, nothing else needs it.
+    /// The label as the paper has it, `m a - m g e3 + U n` in NED, N (docs/equations.md T21): that
+    /// of the body frame turned by the measured attitude, whose error comes with it. The paper's
+    /// rival of paRNN learns it, nothing else needs it.
     pub fn label_ned_n(&self) -> [f32; 3] {
         (self.ned_from_body() * Vector3::from(self.label_body_n)).into()
     }
@@ -78,14 +82,21 @@ impl Windows {
     /// Adds a flight's windows in the order of time.
     ///
     /// # Errors
-    /// A flight of this name is there already, or a window has a number that is not finite or an attitude that is no rotation.
+    /// A flight of this name is there already, or a window has a number that is not finite or an
+    /// attitude that is no rotation.
     pub fn push(&mut self, flight: &str, windows: &[Window]) -> Result<(), NnError> {
         if self.flights.iter().any(|known| known.name == flight) {
             return Err(NnError::SameName { flight: flight.to_owned() });
         }
         for (window, w) in windows.iter().enumerate() {
             if let Some((field, value, reason)) = w.problem() {
-                return Err(NnError::Window { flight: flight.to_owned(), window, field, value, reason });
+                return Err(NnError::Window {
+                    flight: flight.to_owned(),
+                    window,
+                    field,
+                    value,
+                    reason,
+                });
             }
         }
         let start = self.windows.len();
@@ -101,7 +112,9 @@ impl Windows {
 
     /// Names of the flights and their windows, as they were added.
     pub fn flights(&self) -> impl Iterator<Item = (&str, &[Window])> {
-        self.flights.iter().map(|flight| (flight.name.as_str(), &self.windows[flight.range.clone()]))
+        self.flights
+            .iter()
+            .map(|flight| (flight.name.as_str(), &self.windows[flight.range.clone()]))
     }
 
     /// The other flights, and those that are held out.
@@ -109,7 +122,9 @@ impl Windows {
     /// # Errors
     /// A name that no flight has.
     pub fn split(&self, held_out: &[&str]) -> Result<(Self, Self), NnError> {
-        if let Some(flight) = held_out.iter().find(|name| self.flights.iter().all(|f| f.name != **name)) {
+        if let Some(flight) =
+            held_out.iter().find(|name| self.flights.iter().all(|f| f.name != **name))
+        {
             return Err(NnError::NoFlight { flight: (*flight).to_owned() });
         }
         let (mut kept, mut out) = (Self::new(), Self::new());
@@ -120,8 +135,8 @@ impl Windows {
         Ok((kept, out))
     }
 
-    /// Of all that a model can learn from, in order, and of the flights' names; tells in a weights file which data it was trained
-    /// on. FNV-1a.
+    /// Of all that a model can learn from, in order, and of the flights' names; tells in a weights
+    /// file which data it was trained on. FNV-1a.
     pub fn hash(&self) -> u64 {
         let mut hash = Fnv::new();
         for (name, windows) in self.flights() {
@@ -138,7 +153,8 @@ impl Windows {
     }
 }
 
-/// Fowler, Noll and Vo's hash: a dozen lines that give the same number everywhere; nobody attacks it here.
+/// Fowler, Noll and Vo's hash: a dozen lines that give the same number everywhere; nobody attacks
+/// it here.
 struct Fnv(u64);
 
 impl Fnv {

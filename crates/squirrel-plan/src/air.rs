@@ -3,11 +3,13 @@
 //! ```text
 //! v+ = v + dt (a(v - wind, T, w) + b)     wind+ = wind exp(-dt / tau_wind)     b+ = b exp(-dt / tau_b)     measured: v
 //! ```
-//! An extended Kalman filter over velocity `v`, wind, and an acceleration `b` that the model has not, such as of rotors that give less than
-//! they are told. Wings that push less than is believed look like a tail wind, and are planned for as well by it. Wings at speed tell wind from
-//! `b`; with folded wings only drag does, and what is thought of each beforehand decides. Both are drawn to zero, so that what is not seen
-//! any more is forgotten. A velocity that jumps, where fixes come back or something is touched, is taken over and says nothing about the air.
-//! That the flight code may not fly what it is told, after a loss of all fixes, is not known here.
+//! An extended Kalman filter over velocity `v`, wind, and an acceleration `b` that the model has
+//! not, such as of rotors that give less than they are told. Wings that push less than is believed
+//! look like a tail wind, and are planned for as well by it. Wings at speed tell wind from `b`;
+//! with folded wings only drag does, and what is thought of each beforehand decides. Both are drawn
+//! to zero, so that what is not seen any more is forgotten. A velocity that jumps, where fixes come
+//! back or something is touched, is taken over and says nothing about the air. That the flight code
+//! may not fly what it is told, after a loss of all fixes, is not known here.
 
 use crate::trajectory::{Air, Craft};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
@@ -16,7 +18,8 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 const WIND: ([f64; 3], f64) = ([3.0, 3.0, 0.5], 30.0);
 /// The same of the acceleration that the model has not, m/s^2 and s.
 const OFFSET: ([f64; 3], f64) = ([0.3; 3], 10.0);
-/// Accelerations that do not last, of gusts, and of rotors and attitude on the way, m/s^2 over a root of 1 Hz.
+/// Accelerations that do not last, of gusts, and of rotors and attitude on the way, m/s^2 over a
+/// root of 1 Hz.
 const UNREST: f64 = 0.4;
 /// Of a measured velocity, m/s.
 const VELOCITY: f64 = 0.05;
@@ -99,7 +102,8 @@ impl AirEstimate {
             return;
         };
         let seen: SMatrix<f64, 9, 3> = self.covariance.fixed_columns::<3>(V).into();
-        let spread = self.covariance.fixed_view::<3, 3>(V, V) + Matrix3::identity() * VELOCITY.powi(2);
+        let spread =
+            self.covariance.fixed_view::<3, 3>(V, V) + Matrix3::identity() * VELOCITY.powi(2);
         let error = measured - *velocity;
         let Some(inverse) = spread.try_inverse() else { return };
         let jump = error.dot(&(inverse * error));
@@ -138,14 +142,16 @@ mod tests {
     /// The shipped squirrel as a plan knows it.
     fn squirrel() -> Craft {
         let vehicle = VehicleFile::squirrel();
-        Craft::of(&vehicle, 1.5 * vehicle.vehicle.weight_n(), Some(WingModel::Flat), RESERVE).unwrap()
+        Craft::of(&vehicle, 1.5 * vehicle.vehicle.weight_n(), Some(WingModel::Flat), RESERVE)
+            .unwrap()
     }
 
     fn believed(air: Air, opens: bool) -> Air {
         flown(&Craft { air, ..squirrel() }, opens, 0.0)
     }
 
-    /// What is believed after twenty seconds of weaving and changes of speed, the wings open for a second of every three if at all.
+    /// What is believed after twenty seconds of weaving and changes of speed, the wings open for a
+    /// second of every three if at all.
     ///
     /// * `noise_m_s` - of each measured velocity, to one side and the other
     fn flown(real: &Craft, opens: bool, noise_m_s: f64) -> Air {
@@ -154,7 +160,9 @@ mod tests {
         for step in 0..1000 {
             let time_s = f64::from(step) * 0.02;
             let sides = Vector3::new(1.0, if step % 2 == 0 { 1.0 } else { -1.0 }, -1.0);
-            estimate.measure(&(velocity + sides * if step % 3 == 0 { noise_m_s } else { -0.5 * noise_m_s }));
+            estimate.measure(
+                &(velocity + sides * if step % 3 == 0 { noise_m_s } else { -0.5 * noise_m_s }),
+            );
             // What keeps height, and about the speed.
             let still = real.acceleration(&velocity, &real.hover(), 0.0);
             let wanted = Vector3::new(
@@ -182,10 +190,14 @@ mod tests {
         }
         let offset = Vector3::new(0.0, 0.0, 0.6);
         let air = believed(Air { offset, ..Air::calm() }, true);
-        assert!((air.offset - offset).norm() < 0.4 * offset.norm() && air.wind.norm() < 0.6, "{air:?}");
+        assert!(
+            (air.offset - offset).norm() < 0.4 * offset.norm() && air.wind.norm() < 0.6,
+            "{air:?}"
+        );
     }
 
-    /// With folded wings a wind is drag and little else: what it does to the motion is found all the same.
+    /// With folded wings a wind is drag and little else: what it does to the motion is found all
+    /// the same.
     #[test]
     fn what_is_believed_explains_the_motion() {
         let wind = Vector3::new(4.0, -1.0, 0.0);
@@ -197,7 +209,8 @@ mod tests {
             craft.acceleration(&Vector3::new(6.0, 0.5, 0.0), &craft.hover(), 0.0)
         };
         let real = pushed(Air { wind, ..Air::calm() });
-        let (missed, unknown) = ((pushed(found) - real).norm(), (pushed(Air::calm()) - real).norm());
+        let (missed, unknown) =
+            ((pushed(found) - real).norm(), (pushed(Air::calm()) - real).norm());
         assert!(missed < 0.4 * unknown, "{missed} of {unknown}, {found:?}");
     }
 
@@ -214,7 +227,9 @@ mod tests {
     fn nonsense_is_no_wind() {
         let air = flown(&squirrel(), true, 0.05);
         assert!(air.wind.norm() < 0.6 && air.offset.norm() < 0.2, "{air:?}");
-        for wild in [Vector3::new(500.0, 0.0, 0.0), Vector3::new(-3.0, 2.0, 1.0), Vector3::repeat(1e200)] {
+        for wild in
+            [Vector3::new(500.0, 0.0, 0.0), Vector3::new(-3.0, 2.0, 1.0), Vector3::repeat(1e200)]
+        {
             let mut estimate = AirEstimate::new(squirrel());
             for step in 0..200 {
                 let velocity = if step == 100 { wild } else { Vector3::zeros() };

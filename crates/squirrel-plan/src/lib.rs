@@ -1,6 +1,7 @@
 //! What wings make reachable, and trajectories that use it.
 //!
-//! World NED, body FRD, SI and radians, f64. Everything here is deterministic, reads no clock and prints nothing.
+//! World NED, body FRD, SI and radians, f64. Everything here is deterministic, reads no clock and
+//! prints nothing.
 #![forbid(unsafe_code)]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "tests"))]
 

@@ -1,9 +1,12 @@
-//! The planner in the loop: ten times a second a new plan from what is believed, followed in between.
+//! The planner in the loop: ten times a second a new plan from what is believed, followed in
+//! between.
 //!
-//! It is told what the other controllers are told: the mission's reference, which turns away where an obstacle comes into view, and of
-//! obstacles those that came into view so far. It looks [`HORIZON_S`] ahead. The time that planning takes is not simulated: a plan acts in
-//! the step in which it is asked for. What the air does, and what its model lacks, it takes from how the vehicle moves ([`AirEstimate`]). The
-//! arms are [`Arm::PlanWings`] and, with the wings folded, [`Arm::PlanNoWings`].
+//! It is told what the other controllers are told: the mission's reference, which turns away where
+//! an obstacle comes into view, and of obstacles those that came into view so far. It looks
+//! [`HORIZON_S`] ahead. The time that planning takes is not simulated: a plan acts in the step in
+//! which it is asked for. What the air does, and what its model lacks, it takes from how the
+//! vehicle moves ([`AirEstimate`]). The arms are [`Arm::PlanWings`] and, with the wings folded,
+//! [`Arm::PlanNoWings`].
 
 use crate::air::AirEstimate;
 use crate::trajectory::{Begin, Craft, KeepOut, Planner, Task, Wanted};
@@ -32,7 +35,8 @@ pub const STEP_S: f64 = 0.1;
 const FEEL_S: f64 = 0.02;
 /// What is kept to spare between vehicle and obstacle, m.
 pub const SPARE_M: f64 = 0.3;
-/// Convex problems a plan, with folded wings and again where they may spread: the next plan goes on from this one.
+/// Convex problems a plan, with folded wings and again where they may spread: the next plan goes on
+/// from this one.
 const ITERATIONS: u32 = 4;
 /// Obstacles further behind than this are forgotten, m.
 const FORGET_M: f64 = 30.0;
@@ -99,7 +103,13 @@ impl Replanner {
 
     fn plan(&mut self, motion: &MeasuredMotion, frame: &SensorFrame) {
         let time_us = frame.time_us;
-        self.mission.sense(&mut self.state, time_us, motion.position, motion.velocity, frame.obstacles());
+        self.mission.sense(
+            &mut self.state,
+            time_us,
+            motion.position,
+            motion.velocity,
+            frame.obstacles(),
+        );
         self.look(motion, frame.obstacles());
         let wide = |v: &Vector3<f32>| v.cast::<f64>();
         let wanted = |k: usize| {
@@ -119,9 +129,11 @@ impl Replanner {
             STEP_S,
             self.speed_max_m_s,
         );
-        // What is believed can be nonsense where sensors fail: then the last plan is flown to its end.
+        // What is believed can be nonsense where sensors fail: then the last plan is flown to its
+        // end.
         let Ok(task) = task else { return };
-        let warm = self.last.as_ref().map(|(track, begin_us)| (track, (time_us - begin_us) as f64 * 1e-6));
+        let warm =
+            self.last.as_ref().map(|(track, begin_us)| (track, (time_us - begin_us) as f64 * 1e-6));
         let plan = self.planner.plan(self.air.craft(), &task, warm);
         self.follower.follow(plan.track.clone(), time_us);
         self.last = Some((plan.track, time_us));
@@ -148,7 +160,8 @@ impl Replanner {
     fn look(&mut self, motion: &MeasuredMotion, obstacles: &[Obstacle]) {
         let Some(sensing) = &self.sensing else { return };
         let far = |o: &Obstacle| {
-            let (north, east) = (o.north_m - motion.position.vector.x, o.east_m - motion.position.vector.y);
+            let (north, east) =
+                (o.north_m - motion.position.vector.x, o.east_m - motion.position.vector.y);
             f64::from(north.hypot(east)) > FORGET_M
         };
         self.seen.retain(|o| !far(o));
@@ -172,8 +185,11 @@ impl Replanner {
 /// * `thrust_n` - asked for last
 /// * `spread` - deployment of the wings
 pub fn begin(motion: &MeasuredMotion, thrust_n: f64, spread: f64) -> Begin {
-    let attitude =
-        Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, motion.heading_rad);
+    let attitude = Rotation::<Ned, Body, f32>::from_euler(
+        motion.roll_rad,
+        motion.pitch_rad,
+        motion.heading_rad,
+    );
     let down = attitude * In::new(Vector3::z());
     Begin {
         position: motion.position.vector.cast(),
@@ -192,7 +208,8 @@ pub fn half_width_m(setup: &Setup) -> f64 {
 impl Offboard for Replanner {
     fn command(&mut self, tick: u64, frame: &SensorFrame) -> Option<PilotCommand> {
         self.follower.look(frame);
-        let every = |step_s: f64| tick.is_multiple_of((CONTROL_RATE_HZ as f64 * step_s).round() as u64);
+        let every =
+            |step_s: f64| tick.is_multiple_of((CONTROL_RATE_HZ as f64 * step_s).round() as u64);
         if every(FEEL_S)
             && let Some(motion) = self.follower.motion()
         {
@@ -227,7 +244,8 @@ impl Offboard for Replanner {
     }
 }
 
-/// Who commands a setup from outside of the flight code, if anybody: a policy, or the planner of its arm.
+/// Who commands a setup from outside of the flight code, if anybody: a policy, or the planner of
+/// its arm.
 ///
 /// # Errors
 /// A mission that cannot be flown so.

@@ -1,8 +1,9 @@
 //! What a plan may believe about spread wings: the steady force at a velocity and an attitude.
 //!
-//! Planning looks seconds ahead, where camber and flow have settled, so the memory of the membrane and of the network is taken at its
-//! end: the force that stays when the air stays. It depends on the velocity through the air and on the wings' normal alone, and is the
-//! physics of the rooms below, called at rest: [`flat_plate`], [`Membrane`], [`Parnn`].
+//! Planning looks seconds ahead, where camber and flow have settled, so the memory of the membrane
+//! and of the network is taken at its end: the force that stays when the air stays. It depends on
+//! the velocity through the air and on the wings' normal alone, and is the physics of the rooms
+//! below, called at rest: [`flat_plate`], [`Membrane`], [`Parnn`].
 
 use nalgebra::Vector3;
 use squirrel_core::aero::{Air, flat_plate};
@@ -15,7 +16,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Longest step in which the membrane is led to its steady state, s.
 const SETTLING_STEP_S: f64 = 0.04;
-/// The same in chords of the air's way: the flow attaches within four, and faster than that a step is longer than what it follows.
+/// The same in chords of the air's way: the flow attaches within four, and faster than that a step
+/// is longer than what it follows.
 const SETTLING_STEP_CHORDS: f64 = 1.6;
 /// Bound on such steps: creep, the slowest, is over by then.
 const SETTLING_STEPS: u32 = 2000;
@@ -172,7 +174,8 @@ mod tests {
         WingForce::of(&VehicleFile::squirrel(), model).unwrap()
     }
 
-    /// Whatever is believed: braking with the nose up, nothing at rest, and the same force in any heading.
+    /// Whatever is believed: braking with the nose up, nothing at rest, and the same force in any
+    /// heading.
     #[test]
     fn every_model_brakes_and_turns_with_the_vehicle() {
         for model in WingModel::ALL {
@@ -183,7 +186,8 @@ mod tests {
             assert!(force.x < -0.4 && force.z < -0.6 && force.y.abs() < 1e-9, "{model:?}: {force}");
             assert_eq!(wing.force(In::zero(), nose_up).vector.norm(), 0.0, "{model:?}");
             let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 1.1);
-            let turned = wing.force(In::new(turn * ahead.vector), In::new(turn * nose_up.vector)).vector;
+            let turned =
+                wing.force(In::new(turn * ahead.vector), In::new(turn * nose_up.vector)).vector;
             assert!((turned - turn * force).norm() < 1e-6, "{model:?}: {turned} for {force}");
         }
     }
@@ -192,8 +196,9 @@ mod tests {
     #[test]
     fn the_membrane_has_settled() {
         let WingForce::Membrane(membrane) = squirrel(WingModel::Membrane) else { unreachable!() };
-        for (pitch_rad, speed) in
-            [0.05, 0.3, 0.6, 1.2].iter().flat_map(|pitch| [2.0, 7.0, 20.0, 50.0, 100.0].map(|v| (*pitch, v)))
+        for (pitch_rad, speed) in [0.05, 0.3, 0.6, 1.2]
+            .iter()
+            .flat_map(|pitch| [2.0, 7.0, 20.0, 50.0, 100.0].map(|v| (*pitch, v)))
         {
             let (s, c) = f64::sin_cos(pitch_rad);
             let air = Air::new(In::new(Vector3::new(speed * c, 0.0, speed * s)), In::zero());
@@ -206,7 +211,11 @@ mod tests {
             let off = (settled(&membrane, &air) - plant).norm();
             // Faster than anything here flies, a step of the plant's own size is not small either.
             let near = if speed > 20.0 { 1e-3 } else { 1e-6 };
-            assert!(off < near * (1.0 + plant.norm()), "{pitch_rad} at {speed}: {off} of {}", plant.norm());
+            assert!(
+                off < near * (1.0 + plant.norm()),
+                "{pitch_rad} at {speed}: {off} of {}",
+                plant.norm()
+            );
         }
     }
 
@@ -215,7 +224,8 @@ mod tests {
         let text = squirrel_sim::vehicle_file::SQUIRREL_TOML;
         let start = text.find("[wing]").unwrap();
         let end = text.find("[battery]").unwrap();
-        let bare = VehicleFile::parse(&format!("{}{}", &text[..start], &text[end..]), "bare.toml").unwrap();
+        let bare = VehicleFile::parse(&format!("{}{}", &text[..start], &text[end..]), "bare.toml")
+            .unwrap();
         assert!(WingForce::of(&bare, WingModel::Flat).unwrap_err().to_string().contains("[wing]"));
         assert!(WingModel::parse("paper").unwrap_err().to_string().contains("membrane"));
     }

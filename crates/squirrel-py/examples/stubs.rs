@@ -1,5 +1,6 @@
-//! A Python module that says what the stubs of squirrel are. An extension module as squirrel itself, because a program would
-//! have to link Python: `tests/test_stubs.py` loads it and compares.
+//! A Python module that says what the stubs of squirrel are. An extension module as squirrel
+//! itself, because a program would have to link Python: `tests/test_stubs.py` loads it and
+//! compares.
 
 use pyo3::prelude::*;
 

@@ -115,7 +115,8 @@ impl<T: Float> Rows<'_, T> {
     }
 }
 
-/// Numbers that are looked at at once: the processor looks at many in one go where it need not stop at the first.
+/// Numbers that are looked at at once: the processor looks at many in one go where it need not stop
+/// at the first.
 const LOOK: usize = 1024;
 
 /// Checks dtype and shape of an array.
@@ -129,7 +130,8 @@ pub(crate) fn array<'a, 'py, T: Float>(
     object: &'a Bound<'py, PyAny>,
     shape: &[Option<usize>],
 ) -> PyResult<&'a Bound<'py, PyArrayDyn<T>>> {
-    let expected = || format!("{name}: expected a {} array of shape {}", T::NAME, shape_text(shape));
+    let expected =
+        || format!("{name}: expected a {} array of shape {}", T::NAME, shape_text(shape));
     let Ok(array) = object.cast::<PyArrayDyn<T>>() else {
         return Err(value(format!("{}, got {}", expected(), kind(object))));
     };
@@ -182,9 +184,10 @@ pub(crate) fn is_32(object: &Bound<'_, PyAny>) -> bool {
 fn kind(object: &Bound<'_, PyAny>) -> String {
     match object.cast::<PyUntypedArray>() {
         Ok(array) => format!("{} of shape {}", array.dtype(), python_shape(array.shape())),
-        Err(_) => {
-            object.get_type().name().map_or_else(|_| "something else".to_owned(), |name| name.to_string())
-        }
+        Err(_) => object
+            .get_type()
+            .name()
+            .map_or_else(|_| "something else".to_owned(), |name| name.to_string()),
     }
 }
 

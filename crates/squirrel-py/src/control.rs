@@ -44,8 +44,9 @@ pub(crate) fn lock<'a, T: Clone>(
 /// Gains of a vehicle that has them.
 fn gains(vehicle: &Bound<'_, Vehicle>) -> PyResult<StackParameters> {
     let file = &vehicle.get().file;
-    file.control
-        .ok_or_else(|| value(format!("vehicle: {}: [control] is missing; control needs gains", file.name)))
+    file.control.ok_or_else(|| {
+        value(format!("vehicle: {}: [control] is missing; control needs gains", file.name))
+    })
 }
 
 /// The vehicle as the flight code knows it.
@@ -68,8 +69,9 @@ fn optional<'py>(
     array: Option<&Array32<'py>>,
     n: usize,
 ) -> PyResult<impl Fn(usize) -> Vector3<f32> + use<'py>> {
-    let rows: Option<Rows<'py, f32>> =
-        array.map(|array| rows(name, &array.0, &[Some(n), Some(3)], Numbers::Finite)).transpose()?;
+    let rows: Option<Rows<'py, f32>> = array
+        .map(|array| rows(name, &array.0, &[Some(n), Some(3)], Numbers::Finite))
+        .transpose()?;
     Ok(move |i| rows.as_ref().map_or_else(Vector3::zeros, |rows| Vector3::from(rows.row::<3>(i))))
 }
 
@@ -100,7 +102,11 @@ impl Backstepping {
     #[new]
     #[pyo3(signature = (vehicle, *, count = 1))]
     fn new(vehicle: &Bound<'_, Vehicle>, count: usize) -> PyResult<Self> {
-        Ok(Self { gains: gains(vehicle)?.attitude, vehicle: single(vehicle)?, memory: memory(count)? })
+        Ok(Self {
+            gains: gains(vehicle)?.attitude,
+            vehicle: single(vehicle)?,
+            memory: memory(count)?,
+        })
     }
 
     /// One step of each vehicle.
@@ -147,8 +153,10 @@ impl Backstepping {
         let n = memory.len();
         let three = [Some(n), Some(3)];
         let name = "q_ned_from_body_wxyz";
-        let attitudes =
-            rotations(name, &rows(name, &q_ned_from_body_wxyz.0, &[Some(n), Some(4)], Numbers::Finite)?)?;
+        let attitudes = rotations(
+            name,
+            &rows(name, &q_ned_from_body_wxyz.0, &[Some(n), Some(4)], Numbers::Finite)?,
+        )?;
         let omega = rows::<f32>("omega_body_rad_s", &omega_body_rad_s.0, &three, Numbers::Finite)?;
         let angle = rows::<f32>("angle_rad", &angle_rad.0, &three, Numbers::Finite)?;
         let rate = optional("rate_rad_s", rate_rad_s.as_ref(), n)?;
@@ -163,7 +171,15 @@ impl Backstepping {
                 acceleration: acceleration(i),
             };
             let omega = Vector3::from(omega.row(i));
-            let out = self.gains.update(state, inertia, &attitudes[i], &omega, &wanted, hold_integral, dt_s);
+            let out = self.gains.update(
+                state,
+                inertia,
+                &attitudes[i],
+                &omega,
+                &wanted,
+                hold_integral,
+                dt_s,
+            );
             terms.push("angle_error_rad", out.angle_error.as_slice());
             terms.push("rate_error_rad_s", out.rate_error.as_slice());
             terms.push("integral_rad_s", out.integral.as_slice());
@@ -180,7 +196,8 @@ impl Backstepping {
     }
 }
 
-/// Thrust-wing coordination: from a reference to angles, thrust and wings, the flight code's own law (float32).
+/// Thrust-wing coordination: from a reference to angles, thrust and wings, the flight code's own
+/// law (float32).
 ///
 /// Parameters
 /// ----------
@@ -230,7 +247,8 @@ impl Twcc {
     ///     Attitude.
     /// reference_position_ned_m : ndarray of float32, shape (count, 3)
     ///     What to follow.
-    /// reference_velocity_ned_m_s, reference_acceleration_ned_m_s2 : ndarray of float32, shape (count, 3), optional
+    /// reference_velocity_ned_m_s, reference_acceleration_ned_m_s2 : ndarray of float32, shape
+    /// (count, 3), optional
     ///     Its derivatives; zero if left out.
     /// reference_yaw_rad : float
     ///     Heading, clockwise from north.
@@ -268,15 +286,26 @@ impl Twcc {
         let n = memory.len();
         let three = [Some(n), Some(3)];
         let position = rows::<f32>("position_ned_m", &position_ned_m.0, &three, Numbers::Finite)?;
-        let velocity = rows::<f32>("velocity_ned_m_s", &velocity_ned_m_s.0, &three, Numbers::Finite)?;
+        let velocity =
+            rows::<f32>("velocity_ned_m_s", &velocity_ned_m_s.0, &three, Numbers::Finite)?;
         let name = "q_ned_from_body_wxyz";
-        let attitudes =
-            rotations(name, &rows(name, &q_ned_from_body_wxyz.0, &[Some(n), Some(4)], Numbers::Finite)?)?;
-        let wanted =
-            rows::<f32>("reference_position_ned_m", &reference_position_ned_m.0, &three, Numbers::Finite)?;
-        let wanted_velocity = optional("reference_velocity_ned_m_s", reference_velocity_ned_m_s.as_ref(), n)?;
-        let wanted_acceleration =
-            optional("reference_acceleration_ned_m_s2", reference_acceleration_ned_m_s2.as_ref(), n)?;
+        let attitudes = rotations(
+            name,
+            &rows(name, &q_ned_from_body_wxyz.0, &[Some(n), Some(4)], Numbers::Finite)?,
+        )?;
+        let wanted = rows::<f32>(
+            "reference_position_ned_m",
+            &reference_position_ned_m.0,
+            &three,
+            Numbers::Finite,
+        )?;
+        let wanted_velocity =
+            optional("reference_velocity_ned_m_s", reference_velocity_ned_m_s.as_ref(), n)?;
+        let wanted_acceleration = optional(
+            "reference_acceleration_ned_m_s2",
+            reference_acceleration_ned_m_s2.as_ref(),
+            n,
+        )?;
         let force = optional("wing_force_ned_n", wing_force_ned_n.as_ref(), n)?;
         if !reference_yaw_rad.is_finite() {
             return Err(value(format!("reference_yaw_rad = {reference_yaw_rad}: must be finite")));

@@ -47,7 +47,8 @@ impl<'py> Model<'py> {
         let winds = wind_ned_m_s
             .map(|wind| rows("wind_ned_m_s", &wind.0, &[n, Some(3)], Numbers::Finite))
             .transpose()?;
-        let voltage_v = voltage_v.unwrap_or(file.vehicle.parameters().propulsion.reference_voltage_v);
+        let voltage_v =
+            voltage_v.unwrap_or(file.vehicle.parameters().propulsion.reference_voltage_v);
         if !voltage_v.is_finite() {
             return Err(value(format!("voltage_v = {voltage_v}: must be finite")));
         }
@@ -58,10 +59,14 @@ impl<'py> Model<'py> {
 
     fn held(&self, i: usize) -> Held<f64> {
         let mut command = [0.0; MAX_ROTORS];
-        command[..self.rotors].copy_from_slice(&self.commands.numbers()[i * self.rotors..][..self.rotors]);
+        command[..self.rotors]
+            .copy_from_slice(&self.commands.numbers()[i * self.rotors..][..self.rotors]);
         Held {
             drive: RotorDrive::new(&self.vehicle, &self.effects, &command, self.voltage_v),
-            wind: self.winds.as_ref().map_or_else(In::zero, |winds| In::new(Vector3::from(winds.row(i)))),
+            wind: self
+                .winds
+                .as_ref()
+                .map_or_else(In::zero, |winds| In::new(Vector3::from(winds.row(i)))),
             deployment: [0.0; 2],
             tether_force: In::zero(),
         }

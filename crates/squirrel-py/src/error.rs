@@ -1,5 +1,5 @@
-//! Errors of the crates below as Python's: what a file or system refused is an `OSError`, everything else a `ValueError`; the
-//! text is squirrel's own line.
+//! Errors of the crates below as Python's: what a file or system refused is an `OSError`,
+//! everything else a `ValueError`; the text is squirrel's own line.
 
 use pyo3::PyErr;
 use pyo3::exceptions::PyValueError;

@@ -46,7 +46,11 @@ fn signalled() -> PyResult<()> {
 }
 
 /// A scenario by name or file, with what the call says of it.
-pub(crate) fn scenario(name: &str, seed: Option<u64>, thrust_to_weight: Option<f64>) -> PyResult<Scenario> {
+pub(crate) fn scenario(
+    name: &str,
+    seed: Option<u64>,
+    thrust_to_weight: Option<f64>,
+) -> PyResult<Scenario> {
     if Path::new(name).extension().is_some_and(|e| e == "toml")
         && let Err(e) = std::fs::metadata(name)
     {
@@ -129,7 +133,8 @@ pub(crate) fn simulate(
     let stack = setup.stack().map_err(error::value)?;
     let policy = policy.map(|policy| policy.get().weights.clone());
     let mut pilot = pilot::offboard(&setup, &stack, policy).map_err(error::value)?;
-    let mut computer = Interruptible { stack, state: StackState::default(), steps: 0, signal: None };
+    let mut computer =
+        Interruptible { stack, state: StackState::default(), steps: 0, signal: None };
     let flown = py.detach(|| {
         let pilot = pilot.as_mut().map(|pilot| &mut **pilot as &mut dyn Offboard);
         setup.fly_on(&mut computer, pilot, true, |_| {})

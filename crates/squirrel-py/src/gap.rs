@@ -1,4 +1,5 @@
-//! The gap workflow: its steps on logs in memory. `squirrel/gap.py` makes dataclasses of what comes back.
+//! The gap workflow: its steps on logs in memory. `squirrel/gap.py` makes dataclasses of what comes
+//! back.
 
 use crate::error::value;
 use crate::interrupt::{Stop, interruptible};
@@ -46,7 +47,8 @@ pub(crate) fn gap_find<'py>(
     #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'py, PyDict>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let (vehicle, flights) = (vehicle.get().file.clone(), logs("flights", flights)?);
-    let finding = interruptible(py, move |_| squirrel_gap::find(&vehicle, &flights))?.map_err(value)?;
+    let finding =
+        interruptible(py, move |_| squirrel_gap::find(&vehicle, &flights))?.map_err(value)?;
     json(py, &finding)
 }
 
@@ -87,7 +89,8 @@ fn diagnose(
     stop: &Stop,
 ) -> PyResult<(Verdict, Option<VehicleFile>)> {
     let tick = |_: &str| stop.check();
-    let mut found = Workflow::diagnose(vehicle, &baseline, flights, held_out, &tick).map_err(value)?;
+    let mut found =
+        Workflow::diagnose(vehicle, &baseline, flights, held_out, &tick).map_err(value)?;
     let patched = found.patched(fit).map_err(value)?.ok();
     if fly_again && let Some(patched) = &patched {
         stop.check();
@@ -95,7 +98,9 @@ fn diagnose(
     }
     stop.check();
     if let Some(folder) = out {
-        let fail = |e: std::io::Error| crate::error::system(e.kind(), format!("{}: {e}", folder.display()));
+        let fail = |e: std::io::Error| {
+            crate::error::system(e.kind(), format!("{}: {e}", folder.display()))
+        };
         std::fs::create_dir_all(folder).map_err(fail)?;
         if let Some(patched) = &patched {
             let path = folder.join("vehicle.toml");

@@ -1,6 +1,7 @@
 //! Calls that take long and that Ctrl-C ends at once.
 //!
-//! Python's handlers run only in the thread that called, when it looks. It therefore waits and looks, while another thread works.
+//! Python's handlers run only in the thread that called, when it looks. It therefore waits and
+//! looks, while another thread works.
 
 use pyo3::prelude::*;
 use std::panic::resume_unwind;
@@ -20,8 +21,8 @@ const STACK_BYTES: usize = 8 << 20;
 pub(crate) struct Stop(Arc<AtomicBool>);
 
 impl Stop {
-    /// Ends this thread if nobody does. To be called where a library tells its progress: it hears no answer, so the thread unwinds,
-    /// which is no panic and prints nothing.
+    /// Ends this thread if nobody does. To be called where a library tells its progress: it hears
+    /// no answer, so the thread unwinds, which is no panic and prints nothing.
     pub(crate) fn check(&self) {
         if self.0.load(Ordering::Relaxed) {
             resume_unwind(Box::new("interrupted"));
@@ -29,7 +30,8 @@ impl Stop {
     }
 }
 
-/// Works on another thread until it is done or a signal's handler raises; the interpreter's lock is free meanwhile.
+/// Works on another thread until it is done or a signal's handler raises; the interpreter's lock is
+/// free meanwhile.
 ///
 /// # Errors
 /// What the handler raised; the system gives no thread.

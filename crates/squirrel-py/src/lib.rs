@@ -1,11 +1,15 @@
 //! Python bindings: `import squirrel`.
 //!
-//! The functions of the crates below as Python sees them, batched over the first axis of NumPy arrays; nothing is computed
-//! here. Arrays are checked where they come in (`arguments`), errors are squirrel's own lines as Python's exceptions
-//! (`error`), and whatever takes long runs without the interpreter's lock.
+//! The functions of the crates below as Python sees them, batched over the first axis of NumPy
+//! arrays; nothing is computed here. Arrays are checked where they come in (`arguments`), errors
+//! are squirrel's own lines as Python's exceptions (`error`), and whatever takes long runs without
+//! the interpreter's lock.
 
 #![allow(clippy::doc_link_with_quotes, reason = "examples in docstrings are Python")]
-#![allow(clippy::needless_pass_by_value, reason = "arguments come from Python, which hands them over")]
+#![allow(
+    clippy::needless_pass_by_value,
+    reason = "arguments come from Python, which hands them over"
+)]
 #![allow(clippy::too_many_arguments, reason = "Python's keyword arguments")]
 
 mod arguments;
@@ -95,7 +99,8 @@ mod _squirrel {
 pyo3_stub_gen::module_variable!("squirrel._squirrel", "__version__", String);
 pyo3_stub_gen::export_verbatim!("squirrel._squirrel", "__version__");
 
-/// What the stubs of this module are made of. Here, because only the crate that declares them finds its own declarations.
+/// What the stubs of this module are made of. Here, because only the crate that declares them finds
+/// its own declarations.
 ///
 /// # Errors
 /// The declarations contradict each other.

@@ -11,10 +11,11 @@ use squirrel_sim::flight::Metrics;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their channels as arrays.
+/// A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their
+/// channels as arrays.
 ///
-/// An array is the caller's own, one copy of a column of the log. Files hold their samples row by row, compressed, so that there is
-/// nothing in them to look at in place.
+/// An array is the caller's own, one copy of a column of the log. Files hold their samples row by
+/// row, compressed, so that there is nothing in them to look at in place.
 ///
 /// Examples
 /// --------
@@ -38,7 +39,10 @@ impl FlightLog {
     fn source(&self, name: &str) -> PyResult<&squirrel_log::Source> {
         self.log.sources.get(name).ok_or_else(|| {
             let names: Vec<&str> = self.log.sources.keys().map(String::as_str).collect();
-            PyKeyError::new_err(format!("source {name}: not in this log, which has {}", names.join(", ")))
+            PyKeyError::new_err(format!(
+                "source {name}: not in this log, which has {}",
+                names.join(", ")
+            ))
         })
     }
 }
@@ -122,7 +126,11 @@ impl FlightLog {
         Ok(PyArray1::from_slice(py, &self.source(source)?.time_s))
     }
 
-    fn __getitem__<'py>(&self, py: Python<'py>, channel: &str) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    fn __getitem__<'py>(
+        &self,
+        py: Python<'py>,
+        channel: &str,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let Some((time_s, found)) = self.log.channel(channel) else {
             return Err(PyKeyError::new_err(format!("{channel}: not in this log")));
         };
@@ -147,7 +155,8 @@ impl FlightLog {
         self.log.metadata.clone()
     }
 
-    /// What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was read.
+    /// What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was
+    /// read.
     #[getter]
     #[gen_stub(override_return_type(type_repr = "dict[str, float | None] | None"))]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
@@ -172,7 +181,8 @@ impl FlightLog {
     ///     The log lacks the source.
     #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
     fn to_pandas<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyAny>> {
-        let frame = py.import("pandas")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))?;
+        let frame =
+            py.import("pandas")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))?;
         frame.call_method1("set_index", ("time_s",))
     }
 
@@ -211,7 +221,8 @@ impl FlightLog {
         columns.set_item("time_s", PyArray1::from_slice(py, &source.time_s))?;
         for (channel, found) in &source.channels {
             for k in 0..found.width {
-                let label = if found.width == 1 { channel.clone() } else { format!("{channel}_{k}") };
+                let label =
+                    if found.width == 1 { channel.clone() } else { format!("{channel}_{k}") };
                 let numbers = found.values.iter().skip(k).step_by(found.width).copied();
                 columns.set_item(label, PyArray1::from_iter(py, numbers))?;
             }

@@ -92,25 +92,30 @@ impl Model {
                 return Err(value(format!("tensors: {name}: missing")));
             };
             let shape: Vec<_> = shape.into_iter().map(Some).collect();
-            parameters.extend_from_slice(rows::<f32>(name, &array.0, &shape, Numbers::Finite)?.numbers());
+            parameters
+                .extend_from_slice(rows::<f32>(name, &array.0, &shape, Numbers::Finite)?.numbers());
         }
         let trained = self.trained.with_parameters(parameters).map_err(|e| error::nn(&e))?;
         Ok(Self { trained, history: Vec::new() })
     }
 
-    /// Where the weights come from: model, vehicle, area, what was flown in training, seed, figures.
+    /// Where the weights come from: model, vehicle, area, what was flown in training, seed,
+    /// figures.
     #[getter]
     #[gen_stub(override_return_type(type_repr = "dict[str, typing.Any]", imports = ("typing")))]
     fn card<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         json(py, &self.trained.card)
     }
 
-    /// Root mean squared errors of each epoch, N, shape (epochs, 2): over the training windows while the weights moved, and over
-    /// the validation windows after it (NaN where there are none). Empty for a model that was loaded.
+    /// Root mean squared errors of each epoch, N, shape (epochs, 2): over the training windows
+    /// while the weights moved, and over the validation windows after it (NaN where there are
+    /// none). Empty for a model that was loaded.
     #[getter]
     fn history<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let numbers =
-            self.history.iter().flat_map(|e| [e.training.sqrt(), e.validation.map_or(f64::NAN, f64::sqrt)]);
+        let numbers = self
+            .history
+            .iter()
+            .flat_map(|e| [e.training.sqrt(), e.validation.map_or(f64::NAN, f64::sqrt)]);
         table(py, numbers.collect(), 2)
     }
 
@@ -181,10 +186,15 @@ pub(crate) fn forward<'py>(
     q_ned_from_body_wxyz: Option<Array32<'py>>,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let trained = &model.get().trained;
-    let seen = self::rows::<f32>("rows", &rows.0, &[None, Some(WINDOW), Some(INPUTS)], Numbers::Finite)?;
+    let seen =
+        self::rows::<f32>("rows", &rows.0, &[None, Some(WINDOW), Some(INPUTS)], Numbers::Finite)?;
     let n = Some(seen.numbers().len() / (WINDOW * INPUTS));
-    let velocity =
-        self::rows::<f32>("velocity_body_m_s", &velocity_body_m_s.0, &[n, Some(3)], Numbers::Finite)?;
+    let velocity = self::rows::<f32>(
+        "velocity_body_m_s",
+        &velocity_body_m_s.0,
+        &[n, Some(3)],
+        Numbers::Finite,
+    )?;
     let name = "q_ned_from_body_wxyz";
     let attitude = q_ned_from_body_wxyz
         .map(|q| self::rows::<f32>(name, &q.0, &[n, Some(4)], Numbers::Finite))
@@ -203,17 +213,23 @@ pub(crate) fn forward<'py>(
         label_body_n: [0.0; 3],
         truth_body_n: None,
     };
-    let windows: Vec<Window> = seen.numbers().chunks_exact(WINDOW * INPUTS).enumerate().map(window).collect();
+    let windows: Vec<Window> =
+        seen.numbers().chunks_exact(WINDOW * INPUTS).enumerate().map(window).collect();
     let forces = py.detach(|| trained.forces_body_n(&windows));
     table(py, forces.into_flattened(), 3)
 }
 
 /// Windows of all flights; Ctrl-C ends it between two of them.
-fn windows_of(py: Python<'_>, vehicle: &VehicleFile, flights: &Bound<'_, PyDict>) -> PyResult<Windows> {
+fn windows_of(
+    py: Python<'_>,
+    vehicle: &VehicleFile,
+    flights: &Bound<'_, PyDict>,
+) -> PyResult<Windows> {
     let mut all = Windows::new();
     for (name, log) in logs("flights", flights)? {
         py.check_signals()?;
-        let found = py.detach(|| labels::windows(vehicle, &name, &log)).map_err(|e| error::nn(&e))?;
+        let found =
+            py.detach(|| labels::windows(vehicle, &name, &log)).map_err(|e| error::nn(&e))?;
         all.push(&name, &found).map_err(|e| error::nn(&e))?;
     }
     Ok(all)
@@ -256,7 +272,10 @@ pub(crate) fn windows<'py>(
     let out = PyDict::new(py);
     out.set_item(
         "rows",
-        array(all.iter().flat_map(|w| w.rows.into_iter().flatten()).collect(), &[n, WINDOW, INPUTS])?,
+        array(
+            all.iter().flat_map(|w| w.rows.into_iter().flatten()).collect(),
+            &[n, WINDOW, INPUTS],
+        )?,
     )?;
     out.set_item(
         "velocity_body_m_s",
@@ -266,7 +285,10 @@ pub(crate) fn windows<'py>(
         "q_ned_from_body_wxyz",
         array(all.iter().flat_map(|w| w.q_ned_from_body_wxyz).collect(), &[n, 4])?,
     )?;
-    out.set_item("label_body_n", array(all.iter().flat_map(|w| w.label_body_n).collect(), &[n, 3])?)?;
+    out.set_item(
+        "label_body_n",
+        array(all.iter().flat_map(|w| w.label_body_n).collect(), &[n, 3])?,
+    )?;
     let truth = all.iter().flat_map(|w| w.truth_body_n.unwrap_or([f32::NAN; 3]));
     out.set_item("truth_body_n", array(truth.collect(), &[n, 3])?)?;
     Ok(out)
@@ -322,8 +344,8 @@ pub(crate) fn train(
     let (training, validation) = split.map_err(|e| value(format!("validation: {e}")))?;
     let settings = Settings { epochs, batch, rate, clip, patience, seed };
     let area_m2 = labels::plate_area_m2(&vehicle);
-    let mut trainer =
-        Trainer::new(kind, &vehicle.name, area_m2, &training, &validation, settings).map_err(fail)?;
+    let mut trainer = Trainer::new(kind, &vehicle.name, area_m2, &training, &validation, settings)
+        .map_err(fail)?;
     while py.detach(|| trainer.epoch()).map_err(fail)?.is_some() {
         py.check_signals()?;
     }

@@ -1,4 +1,5 @@
-//! What wings make reachable, and trajectories. `squirrel/plan.py` makes dataclasses of what comes back.
+//! What wings make reachable, and trajectories. `squirrel/plan.py` makes dataclasses of what comes
+//! back.
 
 use crate::arguments::{Array64, Numbers, rows};
 use crate::error::value;
@@ -17,7 +18,8 @@ use squirrel_plan::trajectory::{Air, Begin, Craft, KeepOut, Planner, Task, Wante
 use squirrel_plan::wing::{WingForce, WingModel};
 use squirrel_sim::track::TrackPoint;
 
-/// What wings make reachable, as a case in the JSON of ``squirrel reach``, and the support function along directions as arrays.
+/// What wings make reachable, as a case in the JSON of ``squirrel reach``, and the support function
+/// along directions as arrays.
 ///
 /// * `yaw_rad` - of the box; the heading of the velocity if left out
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
@@ -73,7 +75,8 @@ pub(crate) fn plan_reach<'py>(
 
 /// A support function along many directions.
 fn arrays<'py>(py: Python<'py>, found: &[(f64, Support)]) -> PyResult<Bound<'py, PyDict>> {
-    let numbers = |number: fn(&(f64, Support)) -> f64| PyArray1::from_iter(py, found.iter().map(number));
+    let numbers =
+        |number: fn(&(f64, Support)) -> f64| PyArray1::from_iter(py, found.iter().map(number));
     let vectors = |vector: fn(&Support) -> Vector3<f64>| {
         table(py, found.iter().flat_map(|(_, s)| <[f64; 3]>::from(vector(s))).collect(), 3)
     };
@@ -123,10 +126,13 @@ pub(crate) fn plan_trajectory<'py>(
     craft.air = Air::windy(wind_ned_m_s.into()).map_err(value)?;
     let three = |name: &str, array: &Array64<'py>, count: Option<usize>| {
         let rows = rows::<f64>(name, &array.0, &[count, Some(3)], Numbers::Any)?;
-        Ok::<_, PyErr>(rows.numbers().chunks_exact(3).map(Vector3::from_column_slice).collect::<Vec<_>>())
+        Ok::<_, PyErr>(
+            rows.numbers().chunks_exact(3).map(Vector3::from_column_slice).collect::<Vec<_>>(),
+        )
     };
     let positions = three("reference_position_ned_m", &reference_position_ned_m, None)?;
-    let velocities = three("reference_velocity_ned_m_s", &reference_velocity_ned_m_s, Some(positions.len()))?;
+    let velocities =
+        three("reference_velocity_ned_m_s", &reference_velocity_ned_m_s, Some(positions.len()))?;
     let keep = |o: Vector3<f64>| KeepOut { centre: Vector2::new(o.x, o.y), radius_m: o.z };
     let obstacles = three("obstacles_m", &obstacles_m, None)?.into_iter().map(keep).collect();
     let begin = Begin {
@@ -135,9 +141,12 @@ pub(crate) fn plan_trajectory<'py>(
         thrust: thrust_ned_n.map_or_else(|| -craft.hover(), Vector3::from),
         spread: deployment,
     };
-    let wanted =
-        positions.into_iter().zip(velocities).map(|(position, velocity)| Wanted { position, velocity });
-    let task = Task::new(begin, wanted.collect(), obstacles, step_s, speed_max_m_s).map_err(value)?;
+    let wanted = positions
+        .into_iter()
+        .zip(velocities)
+        .map(|(position, velocity)| Wanted { position, velocity });
+    let task =
+        Task::new(begin, wanted.collect(), obstacles, step_s, speed_max_m_s).map_err(value)?;
     let plan = py.detach(|| Planner::default().plan(&craft, &task, None));
     let facts = PyDict::new(py);
     facts.set_item("status", plan.status.name())?;

@@ -11,10 +11,11 @@ use squirrel_core::rnn::elman::Dense;
 use squirrel_sim::weights::PolicyWeights;
 use std::path::PathBuf;
 
-/// A policy that flies: two layers of 32 tanh neurons and a linear output, from 25 numbers seen to 4 numbers commanded.
+/// A policy that flies: two layers of 32 tanh neurons and a linear output, from 25 numbers seen to
+/// 4 numbers commanded.
 ///
-/// What the numbers mean is written in `squirrel.policy`. Layers are ``(weight, bias)`` as `torch.nn.Linear` has them:
-/// ``y = weight @ x + bias``.
+/// What the numbers mean is written in `squirrel.policy`. Layers are
+/// ``(weight, bias)`` as `torch.nn.Linear` has them: ``y = weight @ x + bias``.
 ///
 /// Parameters
 /// ----------
@@ -37,7 +38,8 @@ fn dense<const IN: usize, const OUT: usize>(
     name: &str,
     (weight, bias): &(Array32<'_>, Array32<'_>),
 ) -> PyResult<Dense<IN, OUT>> {
-    let weight = rows::<f32>(&format!("{name}[0]"), &weight.0, &[Some(OUT), Some(IN)], Numbers::Finite)?;
+    let weight =
+        rows::<f32>(&format!("{name}[0]"), &weight.0, &[Some(OUT), Some(IN)], Numbers::Finite)?;
     let bias = rows::<f32>(&format!("{name}[1]"), &bias.0, &[Some(OUT)], Numbers::Finite)?;
     let transposed = |i: usize| std::array::from_fn(|o| weight.numbers()[o * IN + i]);
     Ok(Dense { weight: std::array::from_fn(transposed), bias: bias.row(0) })
@@ -84,7 +86,8 @@ impl Policy {
         Ok(Self { weights })
     }
 
-    /// Write a safetensors file for ``squirrel fly --policy``; it appears under its name only when it is whole.
+    /// Write a safetensors file for ``squirrel fly --policy``; it appears under its name only when
+    /// it is whole.
     ///
     /// Parameters
     /// ----------
@@ -120,7 +123,12 @@ impl Policy {
         py: Python<'py>,
         observation: Array32<'py>,
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let seen = rows::<f32>("observation", &observation.0, &[None, Some(OBSERVATION)], Numbers::Finite)?;
+        let seen = rows::<f32>(
+            "observation",
+            &observation.0,
+            &[None, Some(OBSERVATION)],
+            Numbers::Finite,
+        )?;
         let numbers = seen.numbers();
         let actions: Vec<f32> = py.detach(|| {
             let each = numbers.as_chunks::<OBSERVATION>().0.iter();

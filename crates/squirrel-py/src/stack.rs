@@ -68,8 +68,8 @@ impl Stack {
 
     /// One step of each vehicle.
     ///
-    /// A measurement that is left out was not made in this step. One that is not finite is the flight code's to refuse: it
-    /// keeps the last valid one and counts ``rejected``.
+    /// A measurement that is left out was not made in this step. One that is not finite is the
+    /// flight code's to refuse: it keeps the last valid one and counts ``rejected``.
     ///
     /// Parameters
     /// ----------
@@ -143,9 +143,8 @@ impl Stack {
                 let [w, x, y, z] = rows.row(i);
                 Rotation::new(UnitQuaternion::new_unchecked(Quaternion::new(w, x, y, z)))
             });
-            frame.gnss = position.as_ref().zip(velocity.as_ref()).map(|(position, velocity)| Gnss {
-                position: In::new(vector(position)),
-                velocity: In::new(vector(velocity)),
+            frame.gnss = position.as_ref().zip(velocity.as_ref()).map(|(position, velocity)| {
+                Gnss { position: In::new(vector(position)), velocity: In::new(vector(velocity)) }
             });
             frame.altitude_m = altitude.as_ref().map(|rows| rows.row::<1>(i)[0]);
             frame.wing_force = wing_force.as_ref().map(|rows| In::new(vector(rows)));
@@ -154,7 +153,8 @@ impl Stack {
             terms.push("wing_command", &out.wing_command);
             terms.push("reference_position_ned_m", out.reference.position.vector.as_slice());
             terms.push("thrust_n", &[out.inner.map_or(f32::NAN, |inner| inner.demand.thrust_n)]);
-            let torque = out.inner.map_or(Vector3::repeat(f32::NAN), |inner| inner.demand.torque_n_m);
+            let torque =
+                out.inner.map_or(Vector3::repeat(f32::NAN), |inner| inner.demand.torque_n_m);
             terms.push("torque_n_m", torque.as_slice());
             terms.push("failsafe_mode", &[f32::from(out.failsafe.mode as u8)]);
             terms.push("failsafe_reason", &[f32::from(out.failsafe.reason as u8)]);

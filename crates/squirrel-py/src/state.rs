@@ -47,8 +47,10 @@ pub(crate) fn check_attitudes<T: Float + Real>(
     at: usize,
 ) -> PyResult<()> {
     for (i, row) in numbers.chunks_exact(width).enumerate() {
-        let square: f64 =
-            row[at..at + 4].iter().map(|x| nalgebra::try_convert(*x).unwrap_or(f64::NAN).powi(2)).sum();
+        let square: f64 = row[at..at + 4]
+            .iter()
+            .map(|x| nalgebra::try_convert(*x).unwrap_or(f64::NAN).powi(2))
+            .sum();
         if !((square.sqrt() - 1.0).abs() < NORM_SLACK) {
             let norm = square.sqrt();
             return Err(value(format!(
@@ -61,8 +63,12 @@ pub(crate) fn check_attitudes<T: Float + Real>(
 }
 
 /// The rotations in rows of `w x y z`.
-pub(crate) fn rotations(name: &str, rows: &Rows<'_, f32>) -> PyResult<Vec<Rotation<Ned, Body, f32>>> {
+pub(crate) fn rotations(
+    name: &str,
+    rows: &Rows<'_, f32>,
+) -> PyResult<Vec<Rotation<Ned, Body, f32>>> {
     check_attitudes(name, rows.numbers(), 4, 0)?;
-    let rotations = rows.numbers().chunks_exact(4).map(|q| Rotation::from_wxyz([q[0], q[1], q[2], q[3]]));
+    let rotations =
+        rows.numbers().chunks_exact(4).map(|q| Rotation::from_wxyz([q[0], q[1], q[2], q[3]]));
     Ok(rotations.map(|rotation| rotation.unwrap_or_else(Rotation::identity)).collect())
 }

@@ -21,8 +21,9 @@ const ROTORS: usize = 4;
 
 /// Environments to learn in, side by side: what the classes of `squirrel.envs` are made of.
 ///
-/// An action is 20 ms of flight. An episode that has ended is followed by a new one in the next step, whose action is not looked at.
-/// Environment k draws from ``seed + k``: what happens in it does not depend on how many there are, nor on threads.
+/// An action is 20 ms of flight. An episode that has ended is followed by a new one in the next
+/// step, whose action is not looked at. Environment k draws from ``seed + k``: what happens in it
+/// does not depend on how many there are, nor on threads.
 ///
 /// Parameters
 /// ----------
@@ -64,7 +65,8 @@ pub(crate) struct Tasks {
 
 impl Tasks {
     fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Environments<ROTORS>>> {
-        let broken = |_| PyRuntimeError::new_err("a call on these environments has panicked; make new ones");
+        let broken =
+            |_| PyRuntimeError::new_err("a call on these environments has panicked; make new ones");
         self.environments.lock_py_attached(py).map_err(broken)
     }
 
@@ -114,7 +116,9 @@ impl Tasks {
             "body_rate" => Level::BodyRate,
             "attitude_wing" => Level::AttitudeWing,
             other => {
-                return Err(value(format!("action = {other}: must be motor, body_rate or attitude_wing")));
+                return Err(value(format!(
+                    "action = {other}: must be motor, body_rate or attitude_wing"
+                )));
             }
         };
         // The length of a step is the task's.
@@ -161,7 +165,11 @@ impl Tasks {
     ///     A mask of another length.
     #[pyo3(signature = (mask = None))]
     #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[numpy.float32]", imports = ("numpy.typing", "numpy")))]
-    fn reset<'py>(&self, py: Python<'py>, mask: Option<Vec<bool>>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn reset<'py>(
+        &self,
+        py: Python<'py>,
+        mask: Option<Vec<bool>>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         if let Some(mask) = &mask
             && mask.len() != self.count
         {

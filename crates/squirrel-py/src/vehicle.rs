@@ -20,10 +20,11 @@ const BUNDLED: [(&str, &str); 5] = [
     ("crazyflie2_arpl", include_str!("../../../vehicles/crazyflie2_arpl.toml")),
 ];
 
-/// A vehicle: airframe, rotors, wings, battery, gains, sensors and effects, checked when it is made and never changed.
+/// A vehicle: airframe, rotors, wings, battery, gains, sensors and effects, checked when it is made
+/// and never changed.
 ///
-/// Keys are those of vehicle files, with the unit in the name: ``mass.mass_kg``, ``rotor[0].position_body_m``,
-/// ``effects.battery_sag.voltage_exponent``.
+/// Keys are those of vehicle files, with the unit in the name:
+/// ``mass.mass_kg``, ``rotor[0].position_body_m``, ``effects.battery_sag.voltage_exponent``.
 ///
 /// Examples
 /// --------
@@ -157,7 +158,8 @@ impl Vehicle {
         write_file(&path, self.file.text.as_bytes())
     }
 
-    /// What a careful reader still wants to know of a vehicle whose numbers are all sound, as every vehicle's are.
+    /// What a careful reader still wants to know of a vehicle whose numbers are all sound, as every
+    /// vehicle's are.
     ///
     /// Returns
     /// -------
@@ -253,7 +255,8 @@ pub(crate) fn or_squirrel(vehicle: Option<&Bound<'_, Vehicle>>) -> VehicleFile {
 
 /// Writes a file, whole or not at all.
 pub(crate) fn write_file(path: &Path, content: &[u8]) -> PyResult<()> {
-    write_whole(path, content).map_err(|e| error::system(e.kind(), format!("{}: {e}", path.display())))
+    write_whole(path, content)
+        .map_err(|e| error::system(e.kind(), format!("{}: {e}", path.display())))
 }
 
 /// The table that holds a key, and the last part of the key.
@@ -299,8 +302,10 @@ fn set(document: &mut DocumentMut, key: &str, new: Option<Value>) -> Result<(), 
     let Some(new) = new else {
         return table.remove(name).map(|_| ()).ok_or_else(|| "not there".to_owned());
     };
-    let long =
-        table.get_mut(name).and_then(Item::as_table_like_mut).filter(|long| long.contains_key("value"));
+    let long = table
+        .get_mut(name)
+        .and_then(Item::as_table_like_mut)
+        .filter(|long| long.contains_key("value"));
     if let Some(long) = long {
         long.insert("value", Item::Value(new));
         // It told where the old number was from.
@@ -340,10 +345,13 @@ fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>>
         Value::Float(x) => x.value().into_pyobject(py)?.into_any(),
         Value::Boolean(x) => x.value().into_pyobject(py)?.to_owned().into_any(),
         Value::Array(list) => {
-            PyList::new(py, list.iter().map(|x| to_python(py, x)).collect::<PyResult<Vec<_>>>()?)?.into_any()
+            PyList::new(py, list.iter().map(|x| to_python(py, x)).collect::<PyResult<Vec<_>>>()?)?
+                .into_any()
         }
-        other => {
-            other.as_str().map_or_else(|| other.to_string(), str::to_owned).into_pyobject(py)?.into_any()
-        }
+        other => other
+            .as_str()
+            .map_or_else(|| other.to_string(), str::to_owned)
+            .into_pyobject(py)?
+            .into_any(),
     })
 }

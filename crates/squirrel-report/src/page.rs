@@ -133,10 +133,9 @@ impl Page {
             self.add("<tr>");
             for i in 0..head.len() {
                 let text = row.cells.get(i).map_or("\u{2013}", |c| c.as_str());
-                let swatch = row
-                    .ink
-                    .filter(|_| i == 0)
-                    .map_or(String::new(), |ink| format!("<i class=\"swatch {}\"></i>", ink.class()));
+                let swatch = row.ink.filter(|_| i == 0).map_or(String::new(), |ink| {
+                    format!("<i class=\"swatch {}\"></i>", ink.class())
+                });
                 self.add(&format!("<td>{swatch}{}</td>", escape(text)));
             }
             self.add("</tr>\n");
@@ -168,12 +167,18 @@ impl Page {
         self.add("</div>\n");
     }
 
-    /// Adds a section of numbered questions with figures beside them, made to fit the first screen, with remarks below.
+    /// Adds a section of numbered questions with figures beside them, made to fit the first screen,
+    /// with remarks below.
     pub fn cards(&mut self, id: &str, cards: &[Card], figures: &[Figure], remarks: &[String]) {
-        self.add(&format!("<section id=\"{}\">\n<div class=\"screen\">\n<ol class=\"cards\">\n", escape(id)));
+        self.add(&format!(
+            "<section id=\"{}\">\n<div class=\"screen\">\n<ol class=\"cards\">\n",
+            escape(id)
+        ));
         for card in cards {
             let [question, answer] = [&card.question, &card.answer].map(|text| escape(text));
-            self.add(&format!("<li>\n<div>\n<h2>{question}</h2>\n<p class=\"answer\">{answer}</p>\n"));
+            self.add(&format!(
+                "<li>\n<div>\n<h2>{question}</h2>\n<p class=\"answer\">{answer}</p>\n"
+            ));
             for sentence in &card.sentences {
                 self.paragraph("say", sentence);
             }

@@ -3,7 +3,8 @@
 use super::chart::{Svg, escape};
 use std::fmt::Write as _;
 
-/// The colours by day alone: a page in the dark shows a light picture rather than dark lines on a dark ground.
+/// The colours by day alone: a page in the dark shows a light picture rather than dark lines on a
+/// dark ground.
 const STYLE: &str = concat!(
     include_str!("colours.css"),
     include_str!("charts.css"),
@@ -22,7 +23,8 @@ pub fn picture(title: &str, lead: &[&str], drawings: &[Svg]) -> String {
     let top = MARGIN + 24.0 + LINE * lead.len() as f64;
     let width: f64 = drawings.iter().map(|drawing| drawing.size()[0]).sum();
     let width = 2.0 * MARGIN + width + GAP * drawings.len().saturating_sub(1) as f64;
-    let height = top + drawings.iter().map(|drawing| drawing.size()[1]).fold(0.0, f64::max) + MARGIN;
+    let height =
+        top + drawings.iter().map(|drawing| drawing.size()[1]).fold(0.0, f64::max) + MARGIN;
     let mut text = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" role=\"img\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n\
@@ -33,7 +35,8 @@ pub fn picture(title: &str, lead: &[&str], drawings: &[Svg]) -> String {
     );
     for (k, line) in lead.iter().enumerate() {
         let y = MARGIN + 14.0 + LINE * (k + 1) as f64;
-        let _ = writeln!(text, "<text class=\"lead\" x=\"{MARGIN}\" y=\"{y}\">{}</text>", escape(line));
+        let _ =
+            writeln!(text, "<text class=\"lead\" x=\"{MARGIN}\" y=\"{y}\">{}</text>", escape(line));
     }
     let mut left = MARGIN;
     for drawing in drawings {

@@ -1,5 +1,6 @@
-//! Vehicle-steps of batches: 10 000 and 100 vehicles, RK4 and Euler, one step and 100 steps a call, all threads; and what a
-//! reinforcement-learning loop does besides: commands in, motions out. One core and each path: `cargo xtask batch-gate`.
+//! Vehicle-steps of batches: 10 000 and 100 vehicles, RK4 and Euler, one step and 100 steps a call,
+//! all threads; and what a reinforcement-learning loop does besides: commands in, motions out. One
+//! core and each path: `cargo xtask batch-gate`.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use squirrel_sim::batch::simd::{Path, Paths};
@@ -18,10 +19,12 @@ fn steps<T: Paths>(c: &mut Criterion, scalar: &str) {
     for scheme in [Scheme::Rk4, Scheme::Euler] {
         for vehicles in [10_000, 100] {
             for steps in [1, 100] {
-                let mut group = c.benchmark_group(format!("{scalar}_{scheme:?}_{vehicles}x{steps}"));
+                let mut group =
+                    c.benchmark_group(format!("{scalar}_{scheme:?}_{vehicles}x{steps}"));
                 group.throughput(Throughput::Elements((vehicles * steps) as u64));
                 for path in Path::available() {
-                    let mut batch = batch::<T>(vehicles, Settings { scheme, path, ..Settings::default() });
+                    let mut batch =
+                        batch::<T>(vehicles, Settings { scheme, path, ..Settings::default() });
                     group.bench_function(BenchmarkId::from_parameter(path.name()), |b| {
                         b.iter(|| batch.step(black_box(steps)));
                     });
@@ -40,7 +43,8 @@ fn all_steps(c: &mut Criterion) {
 fn commands_and_motions(c: &mut Criterion) {
     let mut group = c.benchmark_group("commands_in_step_motions_out");
     for vehicles in [10_000, 100] {
-        let mut batch = batch::<f32>(vehicles, Settings { scheme: Scheme::Euler, ..Settings::default() });
+        let mut batch =
+            batch::<f32>(vehicles, Settings { scheme: Scheme::Euler, ..Settings::default() });
         let commands = vec![0.5; vehicles * 4];
         let mut rows = vec![0.0; vehicles * (BODY_NUMBERS + 4)];
         group.throughput(Throughput::Elements(vehicles as u64));

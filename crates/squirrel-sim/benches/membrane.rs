@@ -1,6 +1,8 @@
-//! Cost of the membrane wing, both sides: one evaluation, and RK4 steps where each stage waits for the one before.
+//! Cost of the membrane wing, both sides: one evaluation, and RK4 steps where each stage waits for
+//! the one before.
 //!
-//! Read the smallest of several runs on a quiet machine. The target is 60 ns an evaluation in a generic x86-64 build.
+//! Read the smallest of several runs on a quiet machine. The target is 60 ns an evaluation in a
+//! generic x86-64 build.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use squirrel_core::aero::Air;
@@ -35,8 +37,10 @@ fn air(velocity_m_s: Vector3<f64>) -> Air<f64> {
 }
 
 fn bench(c: &mut Criterion) {
-    let wing = Membrane::new(MembraneParameters::new(0.02, 0.09)).expect("the defaults are possible");
-    let start = Falling { velocity_m_s: Vector3::new(6.0, 0.5, 3.0), membrane: MembraneState::at_rest() };
+    let wing =
+        Membrane::new(MembraneParameters::new(0.02, 0.09)).expect("the defaults are possible");
+    let start =
+        Falling { velocity_m_s: Vector3::new(6.0, 0.5, 3.0), membrane: MembraneState::at_rest() };
 
     c.bench_function("membrane: evaluate", |b| {
         let air = air(start.velocity_m_s);
@@ -55,7 +59,8 @@ fn bench(c: &mut Criterion) {
             state = rk4(state, 1e-3, |s| {
                 let (wrench, membrane) =
                     wing.evaluate(&air(s.velocity_m_s), ANGLE_RATE_RAD_S, SPREAD, &s.membrane);
-                // A push to each side keeps every velocity away from 0, where subnormal numbers would be timed.
+                // A push to each side keeps every velocity away from 0, where subnormal numbers
+                // would be timed.
                 let push_m_s2 = Vector3::new(1.0, 0.3, 9.8);
                 Falling { velocity_m_s: push_m_s2 + wrench.force.vector * 2.0, membrane }
             });

@@ -1,8 +1,9 @@
 //! One plant step, one call of the led plant, and one vehicle in complete closed loop.
 //!
-//! `plant_step_without_wing` counts RK4 steps of rigid body, four rotor lags, drag and battery; `closed_loop` counts seconds
-//! of flight (plant at 1 kHz with membrane wing, battery, gusts and noisy sensors; flight code at 300 and 10 Hz; no log), so
-//! its throughput is the ratio to real time.
+//! `plant_step_without_wing` counts RK4 steps of rigid body, four rotor lags, drag and battery;
+//! `closed_loop` counts seconds of flight (plant at 1 kHz with membrane wing, battery, gusts and
+//! noisy sensors; flight code at 300 and 10 Hz; no log), so its throughput is the ratio to real
+//! time.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use squirrel_core::dynamics::State;
@@ -26,7 +27,8 @@ fn plant_steps(c: &mut Criterion) {
     let file = VehicleFile::squirrel();
     let mut group = c.benchmark_group("plant_step");
     for (name, wing) in [("without_wing", WingPlant::None), ("membrane_wing", file.wing.clone())] {
-        let plant = Plant::new(file.vehicle, file.effects, wing, file.battery.clone(), 1e-3).expect("sound");
+        let plant = Plant::new(file.vehicle, file.effects, wing, file.battery.clone(), 1e-3)
+            .expect("sound");
         let command = [0.5, 0.501, 0.5, 0.499, 0.0, 0.0, 0.0, 0.0];
         let steps = 1000;
         group.throughput(Throughput::Elements(steps));
@@ -40,9 +42,11 @@ fn plant_steps(c: &mut Criterion) {
             });
         });
     }
-    // A step that carries derivatives by twelve numbers; beside `membrane_wing`, of which central differences take 24.
+    // A step that carries derivatives by twelve numbers; beside `membrane_wing`, of which central
+    // differences take 24.
     let plant =
-        Plant::new(file.vehicle, file.effects, file.wing.clone(), file.battery.clone(), 1e-3).expect("sound");
+        Plant::new(file.vehicle, file.effects, file.wing.clone(), file.battery.clone(), 1e-3)
+            .expect("sound");
     let command = [0.5, 0.501, 0.5, 0.499, 0.0, 0.0, 0.0, 0.0];
     let state = start(&plant);
     group.throughput(Throughput::Elements(1));
@@ -84,12 +88,17 @@ fn closed_loop(c: &mut Criterion) {
     let mut scenario = Scenario::find("track").expect("built in");
     scenario.duration_s = 10.0;
     scenario.wind.gust_sigma_m_s = 0.5;
-    let setup =
-        Setup { vehicle: VehicleFile::squirrel(), arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
+    let setup = Setup {
+        vehicle: VehicleFile::squirrel(),
+        arm: Arm::TwccFlat,
+        scenario,
+        integrator: Integrator::Rk4,
+    };
     let mut group = c.benchmark_group("closed_loop");
     group.throughput(Throughput::Elements(10));
-    group
-        .bench_function("seconds_of_flight", |b| b.iter(|| setup.fly(false, |_| {}).expect("flies").metrics));
+    group.bench_function("seconds_of_flight", |b| {
+        b.iter(|| setup.fly(false, |_| {}).expect("flies").metrics);
+    });
     group.finish();
 }
 

@@ -1,5 +1,5 @@
-//! Cost of the world: one step in contact and in the air, and the question whether anything is near.
-//! `cargo bench -p squirrel-sim --bench world`
+//! Cost of the world: one step in contact and in the air, and the question whether anything is
+//! near. `cargo bench -p squirrel-sim --bench world`
 #![allow(missing_docs)] // What the macros of criterion make.
 
 use criterion::{Criterion, criterion_group, criterion_main};

@@ -1,8 +1,13 @@
 //! What registers are worth to a batch, on one core: `cargo xtask batch-gate`.
 //!
-//! Prints million vehicle-steps a second of each path for the base model and for whole vehicles (membrane wing, battery, gusts), and
-//! fails where the base model is less than 5 times (AVX2) or 7 times (AVX-512) as fast as the path of one number at a time.
-#![allow(clippy::print_stdout, clippy::disallowed_methods, reason = "prints a table of measured times")]
+//! Prints million vehicle-steps a second of each path for the base model and for whole vehicles
+//! (membrane wing, battery, gusts), and fails where the base model is less than 5 times (AVX2) or 7
+//! times (AVX-512) as fast as the path of one number at a time.
+#![allow(
+    clippy::print_stdout,
+    clippy::disallowed_methods,
+    reason = "prints a table of measured times"
+)]
 
 use squirrel_sim::batch::simd::Path;
 use squirrel_sim::batch::{Batch, BatchVehicle, Scheme, Settings};
@@ -37,8 +42,9 @@ fn whole(settings: Settings) -> Made {
     Ok(batch)
 }
 
-/// Million vehicle-steps a second, the best of rounds in turn: what disturbs a shared machine only ever takes time away. Each
-/// round has batches of its own, since where their memory lies may halve the speed of one.
+/// Million vehicle-steps a second, the best of rounds in turn: what disturbs a shared machine only
+/// ever takes time away. Each round has batches of its own, since where their memory lies may halve
+/// the speed of one.
 fn speeds(make: fn(Settings) -> Made) -> Result<Vec<f64>, Box<dyn Error>> {
     let paths = Path::available();
     let mut best = vec![0.0_f64; paths.len()];
@@ -64,7 +70,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut slow = Vec::new();
     for (i, path) in Path::available().iter().enumerate() {
         let [one, other] = [&base, &whole].map(|speeds| speeds[i] / speeds[0]);
-        println!("{:8} {:7.1}  x{one:5.1}     {:7.1}  x{other:5.1}", path.name(), base[i], whole[i]);
+        println!(
+            "{:8} {:7.1}  x{one:5.1}     {:7.1}  x{other:5.1}",
+            path.name(),
+            base[i],
+            whole[i]
+        );
         let least = match path.name() {
             "avx512" => 7.0,
             "avx2" => 5.0,

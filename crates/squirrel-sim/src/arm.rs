@@ -1,4 +1,5 @@
-//! Arms: who flies. Each pairs a controller with a plant, so that what a gain comes from can be told apart.
+//! Arms: who flies. Each pairs a controller with a plant, so that what a gain comes from can be
+//! told apart.
 
 use crate::plant::WingPlant;
 use crate::vehicle_file::VehicleFile;
@@ -97,15 +98,21 @@ impl Arm {
     ///
     /// # Errors
     /// One line where they are needed and there are none.
-    pub fn configure(self, twcc: &mut TwccParameters, weights: Option<&ParnnWeights>) -> Result<(), String> {
+    pub fn configure(
+        self,
+        twcc: &mut TwccParameters,
+        weights: Option<&ParnnWeights>,
+    ) -> Result<(), String> {
         twcc.policy = match self {
             // Of a planner: what flies before its first command, and where it is lost.
             Self::Pc | Self::PcPlus | Self::PlanWings | Self::PlanNoWings => WingPolicy::Folded,
             Self::PcWingsOpen => WingPolicy::Open,
             Self::WiicNoWings => WingPolicy::CoordinatedWithoutWings,
-            Self::Phantom | Self::TwccFlat | Self::TwccParnn | Self::TwccOracle | Self::TwccPlus => {
-                WingPolicy::Coordinated
-            }
+            Self::Phantom
+            | Self::TwccFlat
+            | Self::TwccParnn
+            | Self::TwccOracle
+            | Self::TwccPlus => WingPolicy::Coordinated,
         };
         twcc.force_model = match (self, weights) {
             (Self::TwccParnn, Some(weights)) => ForceModel::Parnn(*weights.parnn()),

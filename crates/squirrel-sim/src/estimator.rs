@@ -1,7 +1,8 @@
-//! Who tells the flight code how the vehicle stands and where it is: `[estimation]` of a vehicle file.
+//! Who tells the flight code how the vehicle stands and where it is: `[estimation]` of a vehicle
+//! file.
 //!
-//! A filter's numbers are those of the file's `[sensors]`: it expects the noise that their datasheets state. `oracle` is no filter but
-//! the truth, to see what estimation costs.
+//! A filter's numbers are those of the file's `[sensors]`: it expects the noise that their
+//! datasheets state. `oracle` is no filter but the truth, to see what estimation costs.
 
 use crate::sensors::SensorParameters;
 use crate::setting::SettingError;
@@ -75,7 +76,12 @@ impl Estimator {
     pub fn parse(name: &str) -> Result<Self, SettingError> {
         Self::ALL.into_iter().find(|estimator| estimator.name() == name).ok_or_else(|| {
             let known = Self::ALL.map(Self::name).join(", ");
-            SettingError::Name { field: "estimation.filter", name: name.to_owned(), what: "filter", known }
+            SettingError::Name {
+                field: "estimation.filter",
+                name: name.to_owned(),
+                what: "filter",
+                known,
+            }
         })
     }
 
@@ -128,26 +134,31 @@ impl Estimator {
     /// The height filter's numbers.
     pub(crate) fn altitude(sensors: &SensorParameters) -> AltitudeParameters {
         let by_default = AltitudeParameters::default();
-        AltitudeParameters { baro_noise_m: f64::max(sensors.baro.noise_m, 0.02) as f32, ..by_default }
+        AltitudeParameters {
+            baro_noise_m: f64::max(sensors.baro.noise_m, 0.02) as f32,
+            ..by_default
+        }
     }
 }
 
-/// Deviation of a height by the barometer, m: noise, and three times what flow at [`FAST_M_S`] makes of static pressure, which stays
-/// for many samples.
+/// Deviation of a height by the barometer, m: noise, and three times what flow at [`FAST_M_S`]
+/// makes of static pressure, which stays for many samples.
 fn baro_error_m(sensors: &SensorParameters) -> f64 {
     let baro = &sensors.baro;
     let largest = baro.pressure_coefficient.iter().fold(0.0, |most: f64, c| most.max(c.abs()));
     baro.noise_m.hypot(3.0 * largest * FAST_M_S * FAST_M_S / (2.0 * GRAVITY_M_S2))
 }
 
-/// Deviation of a heading by the compass, rad: of its noise, its iron and [`DRAWN_A`] beside the field's horizontal part.
+/// Deviation of a heading by the compass, rad: of its noise, its iron and [`DRAWN_A`] beside the
+/// field's horizontal part.
 fn heading_error_rad(sensors: &SensorParameters) -> f64 {
     let Some(compass) = &sensors.magnetometer else { return 0.0 };
     let current = Vector3::from(compass.current_ut_per_a).norm() * DRAWN_A;
     let error_ut = compass.noise_ut.hypot(compass.hard_iron_sd_ut).hypot(current);
     let horizontal_ut = compass.field_ut * compass.inclination_rad.cos().abs();
     // Soft iron turns the whole field, a deviation of it for one of the field's.
-    (error_ut.hypot(compass.soft_iron_sd * compass.field_ut) / f64::max(horizontal_ut, 1.0)).min(1.0)
+    (error_ut.hypot(compass.soft_iron_sd * compass.field_ut) / f64::max(horizontal_ut, 1.0))
+        .min(1.0)
 }
 
 /// A speed of agile flight, m/s.

@@ -1,7 +1,7 @@
 //! Sensor faults put into recorded frames: to see what the flight code does when a sensor fails.
 //!
-//! A [`Fault`] is one sensor, one kind and a window of time. What it makes of a flight's frames is no closed loop: the vehicle
-//! in the log does not feel what the flight code answers.
+//! A [`Fault`] is one sensor, one kind and a window of time. What it makes of a flight's frames is
+//! no closed loop: the vehicle in the log does not feel what the flight code answers.
 
 use squirrel_core::frames::{In, Rotation};
 use squirrel_core::guidance::mission::scramble;
@@ -51,7 +51,8 @@ pub struct Fault {
     pub end_us: u64,
 }
 
-const SENSORS: [Sensor; 5] = [Sensor::Imu, Sensor::Attitude, Sensor::Gnss, Sensor::Altitude, Sensor::All];
+const SENSORS: [Sensor; 5] =
+    [Sensor::Imu, Sensor::Attitude, Sensor::Gnss, Sensor::Altitude, Sensor::All];
 const KINDS: [SensorFaultKind; 5] = [
     SensorFaultKind::NotANumber,
     SensorFaultKind::Infinite,
@@ -65,14 +66,16 @@ const WELL_US: [u64; 2] = [500_000, 1_000_000];
 const LONGEST_US: u64 = 2_400_000;
 
 impl Fault {
-    /// A piece of a flight with a fault, drawn from a seed: half a second well, up to 2.4 s with the fault, a second well.
+    /// A piece of a flight with a fault, drawn from a seed: half a second well, up to 2.4 s with
+    /// the fault, a second well.
     ///
     /// * `frames` - of a flight of at least 5 s
     ///
     /// # Errors
     /// One line where the flight is shorter.
     pub fn draw(frames: &[SensorFrame], seed: u32) -> Result<(Self, Vec<SensorFrame>), String> {
-        let draw = |k: u32, of: u64| u64::from(scramble(seed.wrapping_mul(5).wrapping_add(k + 1))) % of;
+        let draw =
+            |k: u32, of: u64| u64::from(scramble(seed.wrapping_mul(5).wrapping_add(k + 1))) % of;
         let length_us = WELL_US[0] + LONGEST_US + WELL_US[1];
         let (Some(first), Some(last)) = (frames.first(), frames.last()) else {
             return Err("no frames".to_owned());
@@ -135,7 +138,8 @@ impl Fault {
                         }
                     }
                     if let Some(q) = broken.attitude.as_mut().filter(|_| hit(Sensor::Attitude)) {
-                        *q = Rotation::new(Unit::new_unchecked(Quaternion::new(bad, 0.0, 0.0, 0.0)));
+                        *q =
+                            Rotation::new(Unit::new_unchecked(Quaternion::new(bad, 0.0, 0.0, 0.0)));
                     }
                     if let Some(gnss) = broken.gnss.as_mut().filter(|_| hit(Sensor::Gnss)) {
                         gnss.velocity = In::new(Vector3::new(0.0, bad, 0.0));

@@ -1,7 +1,11 @@
 //! A number in a vehicle file: plain, or `{ value, sd, source }`.
 
-use serde::de::value::{F64Deserializer, I64Deserializer, MapAccessDeserializer, SeqAccessDeserializer};
-use serde::de::{Deserialize, Deserializer, Error, IntoDeserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::value::{
+    F64Deserializer, I64Deserializer, MapAccessDeserializer, SeqAccessDeserializer,
+};
+use serde::de::{
+    Deserialize, Deserializer, Error, IntoDeserializer, MapAccess, SeqAccess, Visitor,
+};
 use std::fmt;
 use std::marker::PhantomData;
 
@@ -9,7 +13,8 @@ use std::marker::PhantomData;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Quantity<V>(pub(crate) V);
 
-/// The long form. `low`, `high` and `domain` are what the gap workflow writes; they do not act here.
+/// The long form. `low`, `high` and `domain` are what the gap workflow writes; they do not act
+/// here.
 #[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Detailed<V> {
@@ -36,7 +41,9 @@ enum Deviation {
 }
 
 /// For fields of other tables that take a quantity: the value alone.
-pub(crate) fn plain<'de, D: Deserializer<'de>, V: Deserialize<'de>>(deserializer: D) -> Result<V, D::Error> {
+pub(crate) fn plain<'de, D: Deserializer<'de>, V: Deserialize<'de>>(
+    deserializer: D,
+) -> Result<V, D::Error> {
     Quantity::deserialize(deserializer).map(|q| q.0)
 }
 
@@ -89,8 +96,9 @@ pub(crate) fn provenance(table: &toml::Table) -> Vec<(String, Provenance)> {
 fn walk(value: &toml::Value, field: String, all: &mut Vec<(String, Provenance)>) {
     match value {
         toml::Value::Table(table) if table.contains_key("value") => {
-            let text =
-                |key: &str| table.get(key).map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned));
+            let text = |key: &str| {
+                table.get(key).map(|v| v.as_str().map_or_else(|| v.to_string(), str::to_owned))
+            };
             let value = text("value").unwrap_or_default();
             all.push((field, Provenance { value, sd: text("sd"), source: text("source") }));
         }

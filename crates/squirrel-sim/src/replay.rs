@@ -1,7 +1,8 @@
 //! Replay: the log's inputs through the flight code again, and every output compared bit for bit.
 //!
-//! The log says which vehicle, arm and scenario flew; the flight code is rebuilt from that (or from another vehicle file, to
-//! see what a changed gain would have done) and stepped with the recorded frames.
+//! The log says which vehicle, arm and scenario flew; the flight code is rebuilt from that (or from
+//! another vehicle file, to see what a changed gain would have done) and stepped with the recorded
+//! frames.
 
 use crate::arm::Arm;
 use crate::estimator::Estimator;
@@ -13,7 +14,8 @@ use squirrel_core::stack::StackState;
 use squirrel_log::FlightLog;
 use squirrel_log::flight_code::{ESTIMATE, frames, record_output};
 
-/// Sources that the flight code writes, causes before consequences: of two that differ at one time, the first is named.
+/// Sources that the flight code writes, causes before consequences: of two that differ at one time,
+/// the first is named.
 pub const OUTPUT_SOURCES: [&str; 10] = [
     "control.status",
     ESTIMATE,
@@ -59,18 +61,24 @@ pub struct Replay {
 /// One line that names the metadata that is missing or cannot be used.
 pub fn setup(log: &FlightLog) -> Result<Setup, String> {
     let text = |key: &str| {
-        log.metadata
-            .get(key)
-            .ok_or_else(|| format!("metadata {key}: missing; the log was not recorded by squirrel fly"))
+        log.metadata.get(key).ok_or_else(|| {
+            format!("metadata {key}: missing; the log was not recorded by squirrel fly")
+        })
     };
     let weights = log.metadata.get(flight::PARNN_WEIGHTS).map(|hex| {
-        ParnnWeights::from_hex(&format!("metadata {}", flight::PARNN_WEIGHTS), hex).map_err(|e| e.to_string())
+        ParnnWeights::from_hex(&format!("metadata {}", flight::PARNN_WEIGHTS), hex)
+            .map_err(|e| e.to_string())
     });
-    let mut vehicle =
-        VehicleFile::parse_with(text("vehicle_toml")?, "metadata vehicle_toml", weights.transpose()?)
-            .map_err(|e| e.to_string())?;
-    vehicle.estimator =
-        log.metadata.get(flight::ESTIMATOR).map_or(Ok(Estimator::External), |n| Estimator::parse(n))?;
+    let mut vehicle = VehicleFile::parse_with(
+        text("vehicle_toml")?,
+        "metadata vehicle_toml",
+        weights.transpose()?,
+    )
+    .map_err(|e| e.to_string())?;
+    vehicle.estimator = log
+        .metadata
+        .get(flight::ESTIMATOR)
+        .map_or(Ok(Estimator::External), |n| Estimator::parse(n))?;
     let scenario = Scenario::parse(text("scenario_toml")?, "metadata scenario_toml")?;
     let integrator = Integrator::parse(text("integrator")?)?;
     Ok(Setup { vehicle, arm: Arm::parse(text("arm")?)?, scenario, integrator })
@@ -98,7 +106,12 @@ pub fn replay(log: &FlightLog, setup: &Setup) -> Result<Replay, String> {
     Ok(replay)
 }
 
-fn compare(log: &FlightLog, again: &FlightLog, name: &str, replay: &mut Replay) -> Result<(), String> {
+fn compare(
+    log: &FlightLog,
+    again: &FlightLog,
+    name: &str,
+    replay: &mut Replay,
+) -> Result<(), String> {
     let (Some(logged), Some(replayed)) = (log.sources.get(name), again.sources.get(name)) else {
         return if log.sources.contains_key(name) == again.sources.contains_key(name) {
             Ok(())
@@ -116,7 +129,10 @@ fn compare(log: &FlightLog, again: &FlightLog, name: &str, replay: &mut Replay) 
             return Err(format!("{full}: missing in the log"));
         };
         if before.width != values.width {
-            return Err(format!("{full}: has {} numbers a sample, must have {}", before.width, values.width));
+            return Err(format!(
+                "{full}: has {} numbers a sample, must have {}",
+                before.width, values.width
+            ));
         }
         replay.values += values.values.len();
         let differs = |(a, b): (&f64, &f64)| a.to_bits() != b.to_bits();

@@ -1,4 +1,5 @@
-//! Scenarios: what to fly, in which air, among which obstacles. A TOML file or one of the built-in ones.
+//! Scenarios: what to fly, in which air, among which obstacles. A TOML file or one of the built-in
+//! ones.
 
 mod excite;
 mod faults;
@@ -35,11 +36,12 @@ pub struct Scenario {
     pub duration_s: f64,
     /// Height of the mission above the ground, m.
     pub height_m: f64,
-    /// Effective thrust-to-weight ratio: what all rotors together may be asked for over the weight. Overrides
-    /// `limits.thrust_max_n` and `limits.rotor_thrust_max_n` of the vehicle.
+    /// Effective thrust-to-weight ratio: what all rotors together may be asked for over the weight.
+    /// Overrides `limits.thrust_max_n` and `limits.rotor_thrust_max_n` of the vehicle.
     #[serde(default)]
     pub thrust_to_weight: Option<f64>,
-    /// Fastest that a controller may fly horizontally to catch up with its reference, for those whose law has a limit: not the paper's.
+    /// Fastest that a controller may fly horizontally to catch up with its reference, for those
+    /// whose law has a limit: not the paper's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speed_max_m_s: Option<f64>,
     /// Charge of the battery at the start, 0..1.
@@ -164,7 +166,8 @@ impl Scenario {
                 "scenario = {name_or_path}: no such scenario; known are {names}, or a .toml file"
             ));
         }
-        let text = std::fs::read_to_string(name_or_path).map_err(|e| format!("{name_or_path}: {e}"))?;
+        let text =
+            std::fs::read_to_string(name_or_path).map_err(|e| format!("{name_or_path}: {e}"))?;
         Self::parse(&text, name_or_path)
     }
 
@@ -212,14 +215,17 @@ impl Scenario {
     fn built_in(name: &str) -> Option<Self> {
         match name {
             "hover" => Some(Self::base("hover", 10.0, MissionTable::Hover {})),
-            "track" => {
-                Some(Self::base("track", 20.0, MissionTable::Circle { radius_m: 6.0, speed_m_s: 4.0 }))
-            }
-            // The paper's real flights: 7.3 m/s, R_d 4 m, 110 to 130 deg. At this thrust-to-weight ratio the paper's
-            // gain and its sinking wingless drone appear together.
-            "avoid" => {
-                Some(Self { thrust_to_weight: Some(1.25), ..Self::turn("avoid", 7.3, 4.0, 110.0, 130.0) })
-            }
+            "track" => Some(Self::base(
+                "track",
+                20.0,
+                MissionTable::Circle { radius_m: 6.0, speed_m_s: 4.0 },
+            )),
+            // The paper's real flights: 7.3 m/s, R_d 4 m, 110 to 130 deg. At this thrust-to-weight
+            // ratio the paper's gain and its sinking wingless drone appear together.
+            "avoid" => Some(Self {
+                thrust_to_weight: Some(1.25),
+                ..Self::turn("avoid", 7.3, 4.0, 110.0, 130.0)
+            }),
             // The paper's simulated study: R_d 5 m, one angle.
             "steer" => Some(Self::turn("steer", 7.0, 5.0, 120.0, 120.0)),
             "forest" => Some(Self::through_forest()),
@@ -234,7 +240,8 @@ impl Scenario {
         }
     }
 
-    /// One obstacle on a straight run, and a turn of `min_deg` to `max_deg` to the right away from it.
+    /// One obstacle on a straight run, and a turn of `min_deg` to `max_deg` to the right away from
+    /// it.
     pub fn turn(name: &str, speed_m_s: f64, range_m: f64, min_deg: f64, max_deg: f64) -> Self {
         let mission = MissionTable::Avoid {
             course_rad: 0.0,
@@ -255,7 +262,8 @@ impl Scenario {
         }
     }
 
-    /// The paper's simulated forest: 7 m/s, `R_d` 5 m, turns of 110 to 130 deg to either side until 400 m are flown.
+    /// The paper's simulated forest: 7 m/s, `R_d` 5 m, turns of 110 to 130 deg to either side until
+    /// 400 m are flown.
     fn through_forest() -> Self {
         let mut scenario = Self::turn("forest", 7.0, 5.0, 110.0, 130.0);
         if let MissionTable::Avoid { both_sides, .. } = &mut scenario.mission {
@@ -303,7 +311,10 @@ impl Scenario {
             return Err(format!("battery_charge = {}: must be 0 to 1", self.battery_charge));
         }
         if !(0.0..=1e5).contains(&self.measured_window_s) {
-            return Err(format!("measured_window_s = {}: must be 0 to 1e5", self.measured_window_s));
+            return Err(format!(
+                "measured_window_s = {}: must be 0 to 1e5",
+                self.measured_window_s
+            ));
         }
         for (i, [north, east, radius]) in self.obstacles.iter().enumerate() {
             if !(north.abs() <= 1e5 && east.abs() <= 1e5 && *radius > 0.0 && *radius <= 100.0) {
@@ -350,7 +361,8 @@ impl Scenario {
         }
     }
 
-    /// The manoeuvres of an excitation flight in plain words, one a line; `None` for other scenarios.
+    /// The manoeuvres of an excitation flight in plain words, one a line; `None` for other
+    /// scenarios.
     ///
     /// # Errors
     /// As [`Self::mission`].
@@ -398,8 +410,12 @@ impl Scenario {
                 radius_m: radius_m as f32,
                 speed_m_s: speed_m_s as f32,
             },
-            MissionTable::Excite(ref table) => Mission::Excite(table.programme(self.height_m, self.seed)?),
-            MissionTable::Runs(ref table) => Mission::Excite(table.programme(self.height_m, self.seed)?),
+            MissionTable::Excite(ref table) => {
+                Mission::Excite(table.programme(self.height_m, self.seed)?)
+            }
+            MissionTable::Runs(ref table) => {
+                Mission::Excite(table.programme(self.height_m, self.seed)?)
+            }
         };
         Ok(mission)
     }
@@ -418,8 +434,8 @@ impl Scenario {
     }
 }
 
-/// The pilot's card of a built-in excitation scenario at seed 0: what to fly, when, how fast and how high, one manoeuvre a
-/// line. `None` for other names.
+/// The pilot's card of a built-in excitation scenario at seed 0: what to fly, when, how fast and
+/// how high, one manoeuvre a line. `None` for other names.
 pub fn pilot_card(name: &str) -> Option<String> {
     Scenario::built_in(name)?.pilot_card().ok()?
 }
@@ -440,12 +456,15 @@ mod tests {
     #[test]
     fn errors_name_file_field_and_value() {
         let text = Scenario::find("avoid").unwrap().to_toml();
-        let error = |from: &str, to: &str| Scenario::parse(&text.replace(from, to), "s.toml").unwrap_err();
+        let error =
+            |from: &str, to: &str| Scenario::parse(&text.replace(from, to), "s.toml").unwrap_err();
         assert_eq!(
             error("speed_m_s = 7.3", "speed_m_s = -1.0"),
             "s.toml: mission.speed_m_s = -1: must be finite and > 0"
         );
-        assert!(error("duration_s = 13.0", "duration_s = nan").starts_with("s.toml: duration_s = NaN"));
+        assert!(
+            error("duration_s = 13.0", "duration_s = nan").starts_with("s.toml: duration_s = NaN")
+        );
         assert!(error("range_m", "rnage_m").contains("s.toml, line"));
         assert!(Scenario::find("loop").unwrap_err().contains("avoid"));
         assert!(Scenario::find("missing.toml").unwrap_err().starts_with("missing.toml"));

@@ -1,7 +1,9 @@
-//! Planned motion in memory and in a log: what to be where, how the rotors shall push, and how far the wings shall be spread.
+//! Planned motion in memory and in a log: what to be where, how the rotors shall push, and how far
+//! the wings shall be spread.
 //!
-//! In a log it is the source `plan`. Any log with `reference.position_ned_m`, `reference.velocity_ned_m_s` and
-//! `reference.acceleration_ned_m_s2` will do too: then the rotors give all of the acceleration, and wings stay folded.
+//! In a log it is the source `plan`. Any log with `reference.position_ned_m`,
+//! `reference.velocity_ned_m_s` and `reference.acceleration_ned_m_s2` will do too: then the rotors
+//! give all of the acceleration, and wings stay folded.
 
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::Vector3;
@@ -108,7 +110,8 @@ impl Track {
         self.time_s.last().copied().unwrap_or(0.0)
     }
 
-    /// The motion at a time; the first point before it begins, the last after its end. `None` without points.
+    /// The motion at a time; the first point before it begins, the last after its end. `None`
+    /// without points.
     pub fn at(&self, time_s: f64) -> Option<TrackPoint> {
         let next = self.time_s.partition_point(|t| *t <= time_s);
         let (Some(k), true) = (next.checked_sub(1), next < self.points.len()) else {
@@ -118,7 +121,10 @@ impl Track {
         let (h, s) = (self.time_s[next] - self.time_s[k], time_s - self.time_s[k]);
         let jerk = (b.acceleration - a.acceleration) / h;
         Some(TrackPoint {
-            position: a.position + a.velocity * s + a.acceleration * (s * s / 2.0) + jerk * (s * s * s / 6.0),
+            position: a.position
+                + a.velocity * s
+                + a.acceleration * (s * s / 2.0)
+                + jerk * (s * s * s / 6.0),
             velocity: a.velocity + a.acceleration * s + jerk * (s * s / 2.0),
             acceleration: a.acceleration + jerk * s,
             thrust: a.thrust + (b.thrust - a.thrust) * (s / h),
@@ -155,7 +161,8 @@ impl Track {
             Some(source) => source.time_s.clone(),
             None => return Err(TrackError::Nothing),
         };
-        let (Some(first), Some(last), true) = (time_s.first(), time_s.last(), time_s.len() > 1) else {
+        let (Some(first), Some(last), true) = (time_s.first(), time_s.last(), time_s.len() > 1)
+        else {
             return Err(TrackError::Samples { from: source, samples: time_s.len() });
         };
         let first = *first;
@@ -189,7 +196,8 @@ impl Track {
         } else {
             acceleration.iter().map(|a| (a - Vector3::z() * GRAVITY_M_S2) * mass_kg).collect()
         };
-        let wing = if is_plan { column("wing", 1, 1.0)?.values.clone() } else { vec![0.0; time_s.len()] };
+        let wing =
+            if is_plan { column("wing", 1, 1.0)?.values.clone() } else { vec![0.0; time_s.len()] };
         let points = (0..time_s.len()).map(|k| TrackPoint {
             position: position[k],
             velocity: velocity[k],
@@ -229,7 +237,10 @@ mod tests {
         for k in 0..200 {
             let t = f64::from(k) * 0.01;
             let at = track.at(t).unwrap();
-            assert!((at.position.x - t * t * t / 3.0).abs() < 1e-12 && (at.velocity.x - t * t).abs() < 1e-12);
+            assert!(
+                (at.position.x - t * t * t / 3.0).abs() < 1e-12
+                    && (at.velocity.x - t * t).abs() < 1e-12
+            );
             assert!((at.thrust.x - t).abs() < 1e-12 && (at.wing - 0.5 * t).abs() < 1e-12);
         }
         assert_eq!(track.at(99.0).unwrap(), *track.points().last().unwrap());

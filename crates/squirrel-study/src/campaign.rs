@@ -1,6 +1,8 @@
-//! Flights of every arm under every condition on paired seeds: what the studies of controllers have in common.
+//! Flights of every arm under every condition on paired seeds: what the studies of controllers have
+//! in common.
 //!
-//! Trial `k` has one seed, whichever arm flies it and under whatever condition, so that differences between arms are of pairs.
+//! Trial `k` has one seed, whichever arm flies it and under whatever condition, so that differences
+//! between arms are of pairs.
 
 use crate::journal::{Journal, check_trials, identity};
 use serde::Serialize;
@@ -47,11 +49,18 @@ impl Plan {
     /// What a result depends on beside its number, in one line.
     ///
     /// * `scenarios` - of all conditions
-    pub fn identity<'a>(&self, study: &str, scenarios: impl IntoIterator<Item = &'a Scenario>) -> String {
+    pub fn identity<'a>(
+        &self,
+        study: &str,
+        scenarios: impl IntoIterator<Item = &'a Scenario>,
+    ) -> String {
         let arms: Vec<&str> = self.arms.iter().map(|arm| arm.name()).collect();
         let texts = scenarios.into_iter().fold(HASH_START, |h, s| hash(h, s.to_toml().as_bytes()));
         let arms = arms.join(" ");
-        format!("{}, arms {arms}, scenarios {texts:016x}", identity(study, &self.vehicle, self.seed))
+        format!(
+            "{}, arms {arms}, scenarios {texts:016x}",
+            identity(study, &self.vehicle, self.seed)
+        )
     }
 
     /// That every arm can fly a scenario: asked before anything is kept.
@@ -106,7 +115,9 @@ pub fn run<T: Serialize + DeserializeOwned + Send>(
 impl<T> Flown<T> {
     /// The flights of an arm under a condition, by trial; none for an arm that did not fly.
     pub fn of(&self, arm: Arm, condition: usize) -> Vec<&T> {
-        let Some(place) = self.arms.iter().position(|other| *other == arm) else { return Vec::new() };
+        let Some(place) = self.arms.iter().position(|other| *other == arm) else {
+            return Vec::new();
+        };
         let first = condition * self.arms.len() + place;
         self.all.iter().skip(first).step_by(self.conditions * self.arms.len()).collect()
     }

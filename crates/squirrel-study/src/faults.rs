@@ -1,9 +1,11 @@
 //! What becomes of flights in which one thing fails: a thousand random single faults, by kind.
 //!
-//! Each trial draws a fault, its size and time, a suite of sensors, a scenario, a thrust-to-weight ratio and gusts. A flight is *lost* where
-//! it turns over, meets the ground faster than a landing, or leaves the numbers. A fault is *survivable* unless it is a rotor that lacks
-//! thrust at a ratio below [`HEALTHY_RATIO`], or both inertial units that say nothing that is a number. A fault is *flagged* where the
-//! flight code reports anything from the fault on, be it health or a reason of its failsafe.
+//! Each trial draws a fault, its size and time, a suite of sensors, a scenario, a thrust-to-weight
+//! ratio and gusts. A flight is *lost* where it turns over, meets the ground faster than a landing,
+//! or leaves the numbers. A fault is *survivable* unless it is a rotor that lacks thrust at a ratio
+//! below [`HEALTHY_RATIO`], or both inertial units that say nothing that is a number. A fault is
+//! *flagged* where the flight code reports anything from the fault on, be it health or a reason of
+//! its failsafe.
 
 use crate::campaign::{Draw, Plan};
 use crate::journal::{Journal, Keep, check_trials, identity};
@@ -99,7 +101,8 @@ pub struct Faults {
 /// Flies the study; the result depends neither on threads nor on how often it was stopped.
 ///
 /// * `plan` - whose sensors are drawn, and whose arms do not matter: [`Arm::TwccFlat`] flies
-/// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it is a part of one
+/// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it
+///   is a part of one
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
@@ -109,8 +112,11 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Faults>, FlightError> 
     let Some(flights) = journal.run(plan.trials, |trial| fly(plan, trial))? else {
         return Ok(None);
     };
-    let rows: Vec<Row> =
-        FaultKind::ALL.iter().map(|kind| row(*kind, &flights)).filter(|row| row.flights > 0).collect();
+    let rows: Vec<Row> = FaultKind::ALL
+        .iter()
+        .map(|kind| row(*kind, &flights))
+        .filter(|row| row.flights > 0)
+        .collect();
     let sum = |of: fn(&Row) -> u32| f64::from(rows.iter().map(of).sum::<u32>());
     Ok(Some(Faults {
         vehicle: plan.vehicle.name.clone(),
@@ -166,7 +172,9 @@ pub fn scenario(plan: &Plan, trial: u32) -> Result<(Scenario, &'static str), Fli
         FaultKind::BatterySag => Some(draw.between(0.05, 0.15)),
     };
     let which = match kind {
-        FaultKind::ImuSpike | FaultKind::ImuStuck | FaultKind::ImuDead => Some(draw.one_of(&[1, 2])),
+        FaultKind::ImuSpike | FaultKind::ImuStuck | FaultKind::ImuDead => {
+            Some(draw.one_of(&[1, 2]))
+        }
         FaultKind::ImuNan | FaultKind::WingStuck => draw.one_of(&[None, Some(1), Some(2)]),
         FaultKind::MotorWeak => {
             Some(1 + draw.between(0.0, plan.vehicle.vehicle.rotors().len() as f64) as u32)
@@ -188,7 +196,8 @@ fn fly(plan: &Plan, trial: u32) -> Result<Trial, FlightError> {
     let (scenario, suite) = scenario(plan, trial)?;
     let mut vehicle = plan.vehicle.clone();
     vehicle.sensors = SensorParameters::suite(suite).unwrap_or(vehicle.sensors);
-    let (Some((fault, table)), Some(ratio)) = (scenario.faults.first_key_value(), scenario.thrust_to_weight)
+    let (Some((fault, table)), Some(ratio)) =
+        (scenario.faults.first_key_value(), scenario.thrust_to_weight)
     else {
         return Err(FlightError("a trial without a fault".to_owned()));
     };
@@ -238,6 +247,7 @@ fn study(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, Fligh
         ]);
     }
     found.csv = found.sheet(sheet);
-    found.say(format!("\nSurvived {:.1} % of the survivable faults.", 100.0 * study.survived_share));
+    found
+        .say(format!("\nSurvived {:.1} % of the survivable faults.", 100.0 * study.survived_share));
     Ok(Some(found))
 }

@@ -1,9 +1,9 @@
-//! How far estimators of attitude are off in flight: each filter on the same agile flights, with a calibrated gyro and with one whose bias
-//! nobody took off.
+//! How far estimators of attitude are off in flight: each filter on the same agile flights, with a
+//! calibrated gyro and with one whose bias nobody took off.
 //!
-//! Flights are random runs at up to 11 m/s with spread wings in gusts ([`crate::wing_flights`], kind `t1`), flown on the vehicle's own
-//! estimator; the filters hear the recorded inertial unit, receiver and barometer, and no compass. Errors count
-//! from five seconds on.
+//! Flights are random runs at up to 11 m/s with spread wings in gusts ([`crate::wing_flights`],
+//! kind `t1`), flown on the vehicle's own estimator; the filters hear the recorded inertial unit,
+//! receiver and barometer, and no compass. Errors count from five seconds on.
 
 use crate::campaign::Plan;
 use crate::in_loop;
@@ -44,7 +44,8 @@ const FILTERS: [Estimator; 6] = [
     Estimator::Eskf,
 ];
 
-/// The filter of a name with what the vehicle's sensors are said to be; one that nobody told a bias.
+/// The filter of a name with what the vehicle's sensors are said to be; one that nobody told a
+/// bias.
 fn make(
     estimator: Estimator,
     vehicle: &VehicleFile,
@@ -118,14 +119,17 @@ type Errors = [f64; 2];
 /// Flies the study on all cores; the result does not depend on how many there are.
 ///
 /// * `plan` - whose arms do not matter: nobody decides
-/// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it is a part of one
+/// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it
+///   is a part of one
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
 pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Filters>, FlightError> {
     check_trials(plan.trials)?;
-    let kinds: Vec<(bool, Estimator)> =
-        [true, false].into_iter().flat_map(|calibrated| FILTERS.map(|filter| (calibrated, filter))).collect();
+    let kinds: Vec<(bool, Estimator)> = [true, false]
+        .into_iter()
+        .flat_map(|calibrated| FILTERS.map(|filter| (calibrated, filter)))
+        .collect();
     let identity = journal::identity("filters", &plan.vehicle, plan.seed);
     let journal = |name| Journal::open(keep, name, &identity);
     let all = |trial| -> Result<Vec<Errors>, FlightError> {
@@ -133,7 +137,8 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Filters>, FlightError>
         kinds.iter().map(|(calibrated, filter)| heard(plan, &log, *filter, *calibrated)).collect()
     };
     let flown = journal("filters")?.run(plan.trials, all)?;
-    let in_loop = in_loop::run(&plan.vehicle, plan.trials, plan.seed, &journal("filters_in_loop")?)?;
+    let in_loop =
+        in_loop::run(&plan.vehicle, plan.trials, plan.seed, &journal("filters_in_loop")?)?;
     let (Some(flown), Some(in_loop)) = (flown, in_loop) else { return Ok(None) };
     let rows = kinds.iter().enumerate().map(|(k, (calibrated, filter))| {
         let trials_deg: Vec<f64> = flown.iter().map(|trial| trial[k][0]).collect();
@@ -175,13 +180,22 @@ pub fn name(trial: u32) -> String {
 
 fn fly(plan: &Plan, trial: u32) -> Result<FlightLog, FlightError> {
     let scenario = scenario(plan, trial)?;
-    let setup =
-        Setup { vehicle: plan.vehicle.clone(), arm: Arm::PcWingsOpen, scenario, integrator: Integrator::Rk4 };
+    let setup = Setup {
+        vehicle: plan.vehicle.clone(),
+        arm: Arm::PcWingsOpen,
+        scenario,
+        integrator: Integrator::Rk4,
+    };
     Ok(setup.fly(true, |_| {})?.log.unwrap_or_default())
 }
 
 /// What a filter makes of a flight.
-fn heard(plan: &Plan, log: &FlightLog, filter: Estimator, calibrated: bool) -> Result<Errors, FlightError> {
+fn heard(
+    plan: &Plan,
+    log: &FlightLog,
+    filter: Estimator,
+    calibrated: bool,
+) -> Result<Errors, FlightError> {
     let frames = frames(log).map_err(|error| FlightError(error.to_string()))?;
     let Some((time_s, truth)) = log.channel("truth.q_ned_from_body_wxyz") else {
         return Err(FlightError("truth.q_ned_from_body_wxyz: missing".to_owned()));
@@ -198,14 +212,16 @@ fn heard(plan: &Plan, log: &FlightLog, filter: Estimator, calibrated: bool) -> R
     };
     // What the file says of the gyro is what was calibrated.
     let known = Vector3::from(plan.vehicle.sensors.imu.gyro_bias_rad_s);
-    let left = if calibrated { Vector3::zeros() } else { Vector3::from(BIAS_DEG_S).map(f64::to_radians) };
+    let left =
+        if calibrated { Vector3::zeros() } else { Vector3::from(BIAS_DEG_S).map(f64::to_radians) };
     let change = (left - known).map(|x| x as f32);
 
     let (mut before_us, mut at) = (None, 0);
     let (mut sum, mut count, mut max) = (0.0, 0.0, 0.0_f64);
     for frame in &frames {
         let Some(imu) = frame.imu else { continue };
-        let dt_s = before_us.map_or(0.0, |before: u64| frame.time_us.saturating_sub(before) as f32 * 1e-6);
+        let dt_s =
+            before_us.map_or(0.0, |before: u64| frame.time_us.saturating_sub(before) as f32 * 1e-6);
         before_us = Some(frame.time_us);
         filter.step(&Sensed {
             dt_s,
@@ -219,7 +235,9 @@ fn heard(plan: &Plan, log: &FlightLog, filter: Estimator, calibrated: bool) -> R
             at += 1;
         }
         if now_s >= SETTLED_S {
-            let down = |r: Rotation<Ned, Body, f64>| (r.inverse() * In::<Ned, f64>::new(Vector3::z())).vector;
+            let down = |r: Rotation<Ned, Body, f64>| {
+                (r.inverse() * In::<Ned, f64>::new(Vector3::z())).vector
+            };
             let believed = filter.estimate().ned_from_body.wxyz().map(f64::from);
             let Some(truth) = attitude(at).map(down) else { continue };
             // What is no attitude errs as much as can be.
@@ -251,7 +269,11 @@ fn study(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, Fligh
             (
                 "gyro",
                 "calibrated",
-                if row.calibrated { Cell::Named("calibrated", "true") } else { Cell::Named(&off, "false") },
+                if row.calibrated {
+                    Cell::Named("calibrated", "true")
+                } else {
+                    Cell::Named(&off, "false")
+                },
             ),
             ("RMS", "rms_deg", Cell::Number(rms.value, 2)),
             ("95 % interval", "rms_low_deg,rms_high_deg", Cell::Interval(Some(rms), 2)),

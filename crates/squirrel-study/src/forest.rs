@@ -1,12 +1,15 @@
 //! The paper's forest (section V.C): who comes 400 m through trunks, and who owes it to wings.
 //!
-//! 7 m/s, `R_d` 5 m, turns of 110 to 130 deg, trunks of 1 m every 10.5 to 13.5 m, solid, the drone with its real size. A flight that is
-//! more than [`BAND_M`] above or below its height at any time has come through the plane, but not through the forest that the paper means:
-//! both counts are given. An arm owes its success to wings where it comes through in the band more often than, on the same trials, the arm
-//! that decides alike and has none: `phantom` for `twcc_flat`, `pc_plus` for `twcc_plus`. What the others have over `phantom`, which believes in
-//! the flat plate, they owe to wings and to what they believe, together.
+//! 7 m/s, `R_d` 5 m, turns of 110 to 130 deg, trunks of 1 m every 10.5 to 13.5 m, solid, the drone
+//! with its real size. A flight that is more than [`BAND_M`] above or below its height at any time
+//! has come through the plane, but not through the forest that the paper means: both counts are
+//! given. An arm owes its success to wings where it comes through in the band more often than, on
+//! the same trials, the arm that decides alike and has none: `phantom` for `twcc_flat`, `pc_plus`
+//! for `twcc_plus`. What the others have over `phantom`, which believes in the flat plate, they owe
+//! to wings and to what they believe, together.
 //!
-//! All of it is flown twice: with the laws as they are, and with the limit of speed that ours has for the paper's too.
+//! All of it is flown twice: with the laws as they are, and with the limit of speed that ours has
+//! for the paper's too.
 
 mod page;
 mod table;
@@ -105,11 +108,13 @@ pub struct Forest {
     pub thrust_to_weight: f64,
     /// By arm, each as its law is.
     pub rows: Vec<Row>,
-    /// By arm, with the scenario's limit of speed for the paper's laws too, which have none: what of the difference is that limit.
+    /// By arm, with the scenario's limit of speed for the paper's laws too, which have none: what
+    /// of the difference is that limit.
     pub limited: Vec<Row>,
 }
 
-/// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped.
+/// Flies the study on all cores; the result depends neither on threads nor on how often it was
+/// stopped.
 ///
 /// * `thrust_to_weight` - effective ratio
 /// * `plan` - `phantom` is flown in any case
@@ -117,7 +122,11 @@ pub struct Forest {
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(plan: &Plan, thrust_to_weight: f64, keep: &Keep<'_>) -> Result<Option<Forest>, FlightError> {
+pub fn run(
+    plan: &Plan,
+    thrust_to_weight: f64,
+    keep: &Keep<'_>,
+) -> Result<Option<Forest>, FlightError> {
     let plan = &plan.beside(Arm::Phantom)?;
     let first = scenario(plan, thrust_to_weight, 0)?;
     plan.check(&plan.vehicle, &first)?;
@@ -178,10 +187,12 @@ fn fly(plan: &Plan, arm: Arm, thrust_to_weight: f64, trial: u32) -> Result<Fligh
 
 fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
     let average = |figure: fn(&Flight) -> f64| mean(&flown.figures(arm, condition, figure));
-    let in_band = |arm| flown.of(arm, condition).into_iter().map(Flight::in_band).collect::<Vec<_>>();
+    let in_band =
+        |arm| flown.of(arm, condition).into_iter().map(Flight::in_band).collect::<Vec<_>>();
     let of = flown.of(arm, condition);
     let over = |rival| {
-        (!flown.of(rival, condition).is_empty()).then(|| paired_shares(&in_band(arm), &in_band(rival)))
+        (!flown.of(rival, condition).is_empty())
+            .then(|| paired_shares(&in_band(arm), &in_band(rival)))
     };
     Row {
         arm: arm.name(),

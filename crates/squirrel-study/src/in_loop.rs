@@ -1,4 +1,5 @@
-//! What estimation costs in the loop: the avoidance manoeuvre on estimates beside the same flight on the truth, over suites of sensors.
+//! What estimation costs in the loop: the avoidance manoeuvre on estimates beside the same flight
+//! on the truth, over suites of sensors.
 
 use crate::journal::Journal;
 use crate::sheet::{Cell, Sheet};
@@ -54,12 +55,17 @@ pub fn run(
 ) -> Result<Option<Vec<Row>>, FlightError> {
     let count = SUITES.len() as u32;
     let pairs = journal.run(trials * count, |k| {
-        pair(vehicle, SUITES[(k % count) as usize], seed.wrapping_mul(1_000_003) + u64::from(k / count))
+        pair(
+            vehicle,
+            SUITES[(k % count) as usize],
+            seed.wrapping_mul(1_000_003) + u64::from(k / count),
+        )
     })?;
     let Some(pairs) = pairs else { return Ok(None) };
     let row = |(i, suite): (usize, &&'static str)| {
         let of: Vec<&Pair> = pairs.iter().skip(i).step_by(SUITES.len()).collect();
-        let [ours, oracle] = [0, 1].map(|k| of.iter().map(|pair| pair.rmse_m[k]).collect::<Vec<_>>());
+        let [ours, oracle] =
+            [0, 1].map(|k| of.iter().map(|pair| pair.rmse_m[k]).collect::<Vec<_>>());
         Row {
             suite,
             flights: trials,

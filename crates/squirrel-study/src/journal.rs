@@ -1,10 +1,12 @@
-//! Studies that can be stopped, and split over machines: each trial's result is a line of a file, and who starts again flies only what is
-//! missing.
+//! Studies that can be stopped, and split over machines: each trial's result is a line of a file,
+//! and who starts again flies only what is missing.
 //!
-//! The file is `NAME.trials.jsonl` in the study's folder. Its first line says what was planned; a study with another plan refuses to go on
-//! from it. A line that was cut off by the stop counts as not flown. Results are handed back in the order of the trials, and the lines of a
-//! study that is done are put in that order, so that a study that was stopped ten times, or flown in parts ([`Shard`]) that were merged
-//! ([`crate::merge`]), leaves the same bytes as one that never was, on any number of threads.
+//! The file is `NAME.trials.jsonl` in the study's folder. Its first line says what was planned; a
+//! study with another plan refuses to go on from it. A line that was cut off by the stop counts as
+//! not flown. Results are handed back in the order of the trials, and the lines of a study that is
+//! done are put in that order, so that a study that was stopped ten times, or flown in parts
+//! ([`Shard`]) that were merged ([`crate::merge`]), leaves the same bytes as one that never was, on
+//! any number of threads.
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -35,9 +37,11 @@ pub fn check_trials(trials: u32) -> Result<(), FlightError> {
 /// What a study's trials depend on beside their number, in one line: for [`Journal::open`].
 pub fn identity(name: &str, vehicle: &VehicleFile, seed: u64) -> String {
     // The file names its network; what that says is not in the text.
-    let weights = vehicle.weights.as_ref().and_then(|weights| written(weights.parnn(), <[u8]>::to_vec));
+    let weights =
+        vehicle.weights.as_ref().and_then(|weights| written(weights.parnn(), <[u8]>::to_vec));
     let hash = hash(hash(HASH_START, vehicle.text.as_bytes()), &weights.unwrap_or_default());
-    let (of, estimator, version) = (&vehicle.name, vehicle.estimator.name(), env!("CARGO_PKG_VERSION"));
+    let (of, estimator, version) =
+        (&vehicle.name, vehicle.estimator.name(), env!("CARGO_PKG_VERSION"));
     format!("{name} of {of} ({hash:016x}) on {estimator}, seed {seed}, version {version}")
 }
 
@@ -60,7 +64,8 @@ impl FromStr for Shard {
 
     /// `K/N`, K from 1.
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers = text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
+        let numbers =
+            text.split_once('/').and_then(|(k, n)| Some((k.parse().ok()?, n.parse().ok()?)));
         match numbers {
             Some((number, of)) if number >= 1 && number <= of => Ok(Self { number, of }),
             _ => Err("must be K/N, with K from 1 to N".to_owned()),
@@ -152,7 +157,8 @@ struct Line<T> {
 /// Lines by their trials.
 pub(crate) type Lines = BTreeMap<u32, String>;
 
-/// A file's head and whole lines, and how long they are; nothing where there is no file or no head yet.
+/// A file's head and whole lines, and how long they are; nothing where there is no file or no head
+/// yet.
 pub(crate) fn read(path: &Path) -> Result<(Option<Head>, Lines, usize), FlightError> {
     let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
     let text = match std::fs::read_to_string(path) {
@@ -190,7 +196,8 @@ impl<'a> Journal<'a> {
     /// * `plan` - what a result depends on beside the program itself, in one line
     ///
     /// # Errors
-    /// The file cannot be read or written, or is of another plan; a part of a study that nobody keeps.
+    /// The file cannot be read or written, or is of another plan; a part of a study that nobody
+    /// keeps.
     pub fn open(keep: &Keep<'a>, name: &str, plan: &str) -> Result<Self, FlightError> {
         let head = Head { plan: plan.to_owned(), command: keep.command.to_vec() };
         let Some(folder) = keep.folder else {
@@ -206,8 +213,10 @@ impl<'a> Journal<'a> {
         let (before, done, mut length) = read(&path)?;
         if let Some(before) = before {
             if before.plan != plan {
-                let problem =
-                    format!("is of another plan ({}); give another --out, or delete it", before.plan);
+                let problem = format!(
+                    "is of another plan ({}); give another --out, or delete it",
+                    before.plan
+                );
                 return Err(at(&problem));
             }
             if before != head {
@@ -216,7 +225,8 @@ impl<'a> Journal<'a> {
                 length = read(&path)?.2;
             }
         }
-        let mut file = OpenOptions::new().create(true).append(true).open(&path).map_err(|e| at(&e))?;
+        let mut file =
+            OpenOptions::new().create(true).append(true).open(&path).map_err(|e| at(&e))?;
         file.set_len(length as u64).map_err(|e| at(&e))?;
         if length == 0 {
             let line = serde_json::to_string(&head).map_err(|e| at(&e))?;
@@ -225,10 +235,12 @@ impl<'a> Journal<'a> {
         Ok(Self { keep: *keep, file: Some((path, Mutex::new(file))), head, done })
     }
 
-    /// The results of all trials, from 0; those that are missing are flown on all cores. `None` where only a part of them is flown here.
+    /// The results of all trials, from 0; those that are missing are flown on all cores. `None`
+    /// where only a part of them is flown here.
     ///
     /// # Errors
-    /// A trial that fails, a result that cannot be read, or one that cannot be written; after a merge, a trial that is missing.
+    /// A trial that fails, a result that cannot be read, or one that cannot be written; after a
+    /// merge, a trial that is missing.
     pub fn run<T: Serialize + DeserializeOwned + Send>(
         &self,
         trials: u32,
@@ -238,7 +250,8 @@ impl<'a> Journal<'a> {
             let result = match self.done.get(&trial) {
                 Some(line) => self.read(line)?,
                 None if self.keep.part == Part::Merged => {
-                    return Err(self.at(&format!("flight = {trial}: missing, in none of the merged folders")));
+                    return Err(self
+                        .at(&format!("flight = {trial}: missing, in none of the merged folders")));
                 }
                 None => self.write_down(trial, &fly(trial)?)?,
             };
@@ -267,8 +280,13 @@ impl<'a> Journal<'a> {
         Ok(line.result)
     }
 
-    /// Writes a result down; what is handed on is what was written, so that it does not matter who asks.
-    fn write_down<T: Serialize + DeserializeOwned>(&self, trial: u32, result: &T) -> Result<T, FlightError> {
+    /// Writes a result down; what is handed on is what was written, so that it does not matter who
+    /// asks.
+    fn write_down<T: Serialize + DeserializeOwned>(
+        &self,
+        trial: u32,
+        result: &T,
+    ) -> Result<T, FlightError> {
         let line = serde_json::to_string(&Line { trial, result }).map_err(|e| self.at(&e))?;
         // A number that is none cannot be read again, and must not be kept.
         let kept = self.read(&line)?;

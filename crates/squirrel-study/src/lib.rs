@@ -1,7 +1,8 @@
 //! The experiments: arms against each other on paired seeds, with intervals.
 //!
-//! [`STUDIES`] are all of them, each a module that says what is asked, how it is flown ([`campaign`], [`journal`]) and what is shown of it
-//! ([`sheet`], [`pages`]); [`study`] is what they have to say.
+//! [`STUDIES`] are all of them, each a module that says what is asked, how it is flown
+//! ([`campaign`], [`journal`]) and what is shown of it ([`sheet`], [`pages`]); [`study`] is what
+//! they have to say.
 
 pub mod campaign;
 pub mod faults;

@@ -8,17 +8,22 @@ use std::path::{Path, PathBuf};
 /// The end of every journal's name.
 const SUFFIX: &str = ".trials.jsonl";
 
-/// Writes the trials of all folders into another, which must exist; the arguments that describe the study.
+/// Writes the trials of all folders into another, which must exist; the arguments that describe the
+/// study.
 ///
 /// # Errors
-/// A folder without trials or that cannot be read, folders of different studies, a trial that has two results.
+/// A folder without trials or that cannot be read, folders of different studies, a trial that has
+/// two results.
 pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightError> {
     let mut all: BTreeMap<String, (Head, Lines)> = BTreeMap::new();
     let mut command: Option<Vec<String>> = None;
     for folder in folders {
         let names = journals(folder)?;
         if names.is_empty() {
-            return Err(FlightError(format!("{}: holds no part of a study (*{SUFFIX})", folder.display())));
+            return Err(FlightError(format!(
+                "{}: holds no part of a study (*{SUFFIX})",
+                folder.display()
+            )));
         }
         for name in names {
             let path = folder.join(&name);
@@ -34,11 +39,16 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
             }
             let command = command.get_or_insert_with(|| head.command.clone());
             if *command != head.command {
-                return Err(at(format!("is of another study ({}) than the first", head.command.join(" "))));
+                return Err(at(format!(
+                    "is of another study ({}) than the first",
+                    head.command.join(" ")
+                )));
             }
             for (trial, line) in lines {
                 if merged.get(&trial).is_some_and(|other| *other != line) {
-                    return Err(at(format!("flight = {trial}: has another result in another folder")));
+                    return Err(at(format!(
+                        "flight = {trial}: has another result in another folder"
+                    )));
                 }
                 merged.insert(trial, line);
             }
@@ -50,7 +60,8 @@ pub fn merge(folders: &[PathBuf], into: &Path) -> Result<Vec<String>, FlightErro
         if let Some(there) = there
             && there != *head
         {
-            let problem = format!("is of another plan ({}); give another --out, or delete it", there.plan);
+            let problem =
+                format!("is of another plan ({}); give another --out, or delete it", there.plan);
             return Err(FlightError(format!("{}: {problem}", path.display())));
         }
         // What an earlier merge brought stays.

@@ -1,6 +1,8 @@
-//! What the pages of studies have in common: the figures that the paper shows, and every number. The same study gives the same bytes.
+//! What the pages of studies have in common: the figures that the paper shows, and every number.
+//! The same study gives the same bytes.
 //!
-//! Tracks are those of the first trial, flown again for the page: a study keeps figures of its flights, not their logs.
+//! Tracks are those of the first trial, flown again for the page: a study keeps figures of its
+//! flights, not their logs.
 
 use crate::campaign::Plan;
 use crate::statistics::Estimate;
@@ -47,7 +49,8 @@ pub(crate) fn row(arm: &str, rest: impl IntoIterator<Item = String>) -> Row {
 pub(crate) fn percent(e: Option<Estimate>, digits: u8) -> String {
     // Plus zero turns a rounded minus zero round.
     let unit = 10f64.powi(i32::from(digits));
-    let signed = |x: f64| format!("{:+.*}", usize::from(digits), (100.0 * x * unit).round() / unit + 0.0);
+    let signed =
+        |x: f64| format!("{:+.*}", usize::from(digits), (100.0 * x * unit).round() / unit + 0.0);
     e.map_or_else(
         || "\u{2013}".to_owned(),
         // The interval is not broken between lines.
@@ -73,7 +76,8 @@ pub(crate) fn log(setup: &Setup) -> Result<FlightLog, FlightError> {
     pilot::fly(setup, true, |_| {})?.log.ok_or_else(missing)
 }
 
-/// Adds the tracks of the first trial under a condition, by those of the arms that are among the plan's.
+/// Adds the tracks of the first trial under a condition, by those of the arms that are among the
+/// plan's.
 pub(crate) fn tracks(
     page: &mut Page,
     plan: &Plan,
@@ -134,7 +138,8 @@ pub(crate) fn numbers<'a>(
     ];
     let names = head(&[&["arm"][..], own, &names].concat());
     let cells = |(place, of): (Vec<String>, &tracking::Row)| {
-        let metres = [of.rmse_m, of.rmse_horizontal_m, of.rmse_measured_m].map(|x| format!("{x:.2}"));
+        let metres =
+            [of.rmse_m, of.rmse_horizontal_m, of.rmse_measured_m].map(|x| format!("{x:.2}"));
         let gains = [
             Some(of.gain),
             Some(of.gain_horizontal),
@@ -142,7 +147,8 @@ pub(crate) fn numbers<'a>(
             of.gain_over_phantom,
             of.gain_over_pc_plus,
         ];
-        let rest = [of.height_lost_m, of.height_gained_m, of.wings_open_s].map(|x| format!("{x:.2}"));
+        let rest =
+            [of.height_lost_m, of.height_gained_m, of.wings_open_s].map(|x| format!("{x:.2}"));
         let gains = gains.map(|gain| percent(gain, 1));
         row(of.arm, place.into_iter().chain(metres).chain(gains).chain(rest))
     };

@@ -1,4 +1,5 @@
-//! What follows from the paper's own numbers without a flight: its figures recomputed, and what its limits allow.
+//! What follows from the paper's own numbers without a flight: its figures recomputed, and what its
+//! limits allow.
 
 use crate::statistics::gain;
 use serde::Serialize;
@@ -64,7 +65,8 @@ pub fn facts(vehicle: &VehicleFile) -> Facts {
     let p = vehicle.vehicle.parameters();
     let level_m_s2 = GRAVITY_M_S2 * p.limits.tilt_max_rad.tan();
     let upward = RATIOS.map(|thrust_to_weight| {
-        let [wingless_m_s2, flat_m_s2] = [0.0, 1.0].map(|wings| upward(vehicle, thrust_to_weight, wings));
+        let [wingless_m_s2, flat_m_s2] =
+            [0.0, 1.0].map(|wings| upward(vehicle, thrust_to_weight, wings));
         Upward { thrust_to_weight, wingless_m_s2, flat_m_s2, ratio: flat_m_s2 / wingless_m_s2 }
     });
     Facts {
@@ -87,9 +89,14 @@ fn upward(vehicle: &VehicleFile, thrust_to_weight: f64, wings: f64) -> f64 {
     let area_m2 = p.wing.map_or(0.0, |wing| wing.area_per_side_m2 * wing.normal_force_slope);
     let thrust_n = thrust_to_weight * vehicle.vehicle.weight_n();
     let at = |share: f64| {
-        let attitude = Rotation::<Ned, Body, f64>::from_euler(0.0, share * p.limits.tilt_max_rad, 0.0);
+        let attitude =
+            Rotation::<Ned, Body, f64>::from_euler(0.0, share * p.limits.tilt_max_rad, 0.0);
         let normal = attitude * In::new(Vector3::z());
-        let air = flat_plate::force(In::<Ned, f64>::new(Vector3::x() * SPEED_M_S), normal, wings * area_m2);
+        let air = flat_plate::force(
+            In::<Ned, f64>::new(Vector3::x() * SPEED_M_S),
+            normal,
+            wings * area_m2,
+        );
         (thrust_n * normal.vector.z - air.vector.z) / p.mass_kg - GRAVITY_M_S2
     };
     (-3000..=3000).map(|k| at(f64::from(k) / 3000.0)).fold(f64::NEG_INFINITY, f64::max)

@@ -1,11 +1,14 @@
-//! What wings buy where both plan: random avoidance tasks, planned with and without, and flown on the full plant.
+//! What wings buy where both plan: random avoidance tasks, planned with and without, and flown on
+//! the full plant.
 //!
-//! Each trial flies straight on for four and a half seconds. Then one plan is made from what the vehicle believes of itself, two seconds long, and
-//! followed to its end without another one. Two kinds of task, each at three thrust-to-weight ratios:
+//! Each trial flies straight on for four and a half seconds. Then one plan is made from what the
+//! vehicle believes of itself, two seconds long, and followed to its end without another one. Two
+//! kinds of task, each at three thrust-to-weight ratios:
 //! - `pass`: on past one to three trunks that stand in the way;
 //! - `turn`: away from a trunk by 110 to 130 deg, the paper's manoeuvre.
 //!
-//! Both planners have the same numbers; the one without wings is the fair rival (docs/equations.md G.1).
+//! Both planners have the same numbers; the one without wings is the fair rival (docs/equations.md
+//! G.1).
 
 mod table;
 
@@ -117,8 +120,8 @@ fn conditions() -> impl Iterator<Item = (&'static str, f64)> {
     KINDS.into_iter().flat_map(|kind| THRUST_TO_WEIGHT.map(|ratio| (kind, ratio)))
 }
 
-/// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped. `None` where only a part is flown
-/// here.
+/// Flies the study on all cores; the result depends neither on threads nor on how often it was
+/// stopped. `None` where only a part is flown here.
 ///
 /// * `plan` - its arms must be [`ARMS`]
 ///
@@ -186,7 +189,13 @@ fn scenario(plan: &Plan, kind: &str, ratio: f64, trial: u32) -> (Drawn, Scenario
     } else {
         let count = draw.one_of(&[1, 2, 3]);
         let trunks = (0..count)
-            .map(|_| [draw.between(0.9, 1.8) * speed_m_s, draw.between(-1.5, 1.5), draw.between(0.3, 0.6)])
+            .map(|_| {
+                [
+                    draw.between(0.9, 1.8) * speed_m_s,
+                    draw.between(-1.5, 1.5),
+                    draw.between(0.3, 0.6),
+                ]
+            })
             .collect();
         Drawn { speed_m_s, turn_rad: None, trunks }
     };
@@ -231,7 +240,9 @@ fn craft(setup: &Setup) -> Result<Craft, FlightError> {
 fn task(drawn: &Drawn, setup: &Setup, begin: Begin, time_s: f64) -> Result<Task, FlightError> {
     let start = Vector3::new(0.0, 0.0, -setup.scenario.height_m as f32);
     let (run, since_s) = match drawn.turn_rad {
-        None => (Trajectory::new(In::new(start), 0.0, drawn.speed_m_s as f32, RAMP_S as f32), time_s),
+        None => {
+            (Trajectory::new(In::new(start), 0.0, drawn.speed_m_s as f32, RAMP_S as f32), time_s)
+        }
         Some(turn_rad) => {
             let here = Vector3::new(begin.position.x as f32, begin.position.y as f32, start.z);
             (Trajectory::new(In::new(here), turn_rad as f32, drawn.speed_m_s as f32, 2.0), 0.0)
@@ -246,7 +257,8 @@ fn task(drawn: &Drawn, setup: &Setup, begin: Begin, time_s: f64) -> Result<Task,
         centre: Vector2::new(*north, *east),
         radius_m: radius + spare_m,
     });
-    Task::new(begin, wanted.collect(), keep_out.collect(), STEP_S, f64::INFINITY).map_err(FlightError)
+    Task::new(begin, wanted.collect(), keep_out.collect(), STEP_S, f64::INFINITY)
+        .map_err(FlightError)
 }
 
 impl Offboard for Once {
@@ -256,8 +268,10 @@ impl Offboard for Once {
         if self.made.is_none() && time_s >= BEGIN_S {
             let motion = self.follower.motion()?;
             // Level flight: thrust carries the weight.
-            let thrust_n = self.craft.hover().z / f64::from(motion.roll_rad.cos() * motion.pitch_rad.cos());
-            let task = task(&self.drawn, &self.setup, begin(&motion, thrust_n, 0.0), time_s).ok()?;
+            let thrust_n =
+                self.craft.hover().z / f64::from(motion.roll_rad.cos() * motion.pitch_rad.cos());
+            let task =
+                task(&self.drawn, &self.setup, begin(&motion, thrust_n, 0.0), time_s).ok()?;
             let plan = Planner::default().plan(&self.craft, &task, None);
             self.follower.follow(plan.track.clone(), frame.time_us);
             self.made = Some((task, plan));
@@ -284,12 +298,17 @@ fn fly(plan: &Plan, arm: Arm, kind: &str, ratio: f64, trial: u32) -> Result<Tria
     let (drawn, scenario) = scenario(plan, kind, ratio, trial);
     let setup = plan.setup(arm, scenario);
     let mut pilot = Once::new(drawn, &setup)?;
-    let flight = setup.fly_on(&mut InProcess::new(setup.stack()?), Some(&mut pilot), false, |_| {})?;
+    let flight =
+        setup.fly_on(&mut InProcess::new(setup.stack()?), Some(&mut pilot), false, |_| {})?;
     let Some((task, plan)) = pilot.made else {
         return Err(FlightError("planning: the vehicle never knew where it was".to_owned()));
     };
-    let off =
-        plan.track.points().iter().zip(task.wanted()).map(|(p, w)| (p.position - w.position).norm_squared());
+    let off = plan
+        .track
+        .points()
+        .iter()
+        .zip(task.wanted())
+        .map(|(p, w)| (p.position - w.position).norm_squared());
     let m = flight.metrics;
     Ok(Trial {
         status: plan.status.name().to_owned(),
@@ -303,11 +322,17 @@ fn fly(plan: &Plan, arm: Arm, kind: &str, ratio: f64, trial: u32) -> Result<Tria
     })
 }
 
-/// The tasks of a kind at a ratio without flying there: as if the run-up had been flown exactly. For who measures how long plans take.
+/// The tasks of a kind at a ratio without flying there: as if the run-up had been flown exactly.
+/// For who measures how long plans take.
 ///
 /// # Errors
 /// A vehicle that cannot be planned for.
-pub fn tasks(plan: &Plan, arm: Arm, kind: &str, ratio: f64) -> Result<Vec<(Craft, Task)>, FlightError> {
+pub fn tasks(
+    plan: &Plan,
+    arm: Arm,
+    kind: &str,
+    ratio: f64,
+) -> Result<Vec<(Craft, Task)>, FlightError> {
     (0..plan.trials)
         .map(|trial| {
             let (drawn, scenario) = scenario(plan, kind, ratio, trial);

@@ -13,7 +13,8 @@ pub struct Sheet {
     pub(crate) csv: String,
 }
 
-/// What is in one cell. An interval is one cell of the table and two columns of the CSV, `low` and `high`.
+/// What is in one cell. An interval is one cell of the table and two columns of the CSV, `low` and
+/// `high`.
 #[derive(Debug, Clone, Copy)]
 pub enum Cell<'a> {
     /// A word.
@@ -35,25 +36,30 @@ impl Sheet {
     pub fn row(&mut self, columns: &[Column<'_>]) {
         if self.rows.is_empty() {
             self.rows.push(columns.iter().map(|(heading, ..)| (*heading).to_owned()).collect());
-            self.csv = columns.iter().map(|(_, name, _)| *name).collect::<Vec<_>>().join(",") + "\n";
+            self.csv =
+                columns.iter().map(|(_, name, _)| *name).collect::<Vec<_>>().join(",") + "\n";
         }
         let mut shown = Vec::new();
         for (i, (_, _, cell)) in columns.iter().enumerate() {
             let gap = if i == 0 { "" } else { "," };
-            let numbers =
-                |e: &Option<Estimate>| e.map_or(",".to_owned(), |e| format!("{},{}", e.low, e.high));
+            let numbers = |e: &Option<Estimate>| {
+                e.map_or(",".to_owned(), |e| format!("{},{}", e.low, e.high))
+            };
             let (text, raw) = match cell {
                 Cell::Text(text) => ((*text).to_owned(), (*text).to_owned()),
                 Cell::Named(text, raw) => ((*text).to_owned(), (*raw).to_owned()),
                 Cell::Number(x, digits) => (format!("{x:.digits$}"), x.to_string()),
                 Cell::Percent(x, digits) => (format!("{:+.digits$}", 100.0 * x), x.to_string()),
                 Cell::Interval(e, digits) => (
-                    e.map_or("-".to_owned(), |e| format!("{:.digits$} to {:.digits$}", e.low, e.high)),
+                    e.map_or("-".to_owned(), |e| {
+                        format!("{:.digits$} to {:.digits$}", e.low, e.high)
+                    }),
                     numbers(e),
                 ),
                 Cell::PercentInterval(e, digits) => {
-                    let percent =
-                        |e: Estimate| format!("{:+.digits$} to {:+.digits$}", 100.0 * e.low, 100.0 * e.high);
+                    let percent = |e: Estimate| {
+                        format!("{:+.digits$} to {:+.digits$}", 100.0 * e.low, 100.0 * e.high)
+                    };
                     (e.map_or("-".to_owned(), percent), numbers(e))
                 }
             };

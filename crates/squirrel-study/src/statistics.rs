@@ -19,8 +19,8 @@ pub fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len() as f64
 }
 
-/// `statistic` of paired samples with a percentile bootstrap over the pairs. The draw is fixed, so that the same data give
-/// the same interval.
+/// `statistic` of paired samples with a percentile bootstrap over the pairs. The draw is fixed, so
+/// that the same data give the same interval.
 ///
 /// * `a`, `b` - paired by index, same length
 pub fn paired(a: &[f64], b: &[f64], statistic: impl Fn(&[f64], &[f64]) -> f64) -> Estimate {
@@ -46,16 +46,19 @@ pub fn paired(a: &[f64], b: &[f64], statistic: impl Fn(&[f64], &[f64]) -> f64) -
     Estimate { value: statistic(&a[..n], &b[..n]), low: at(0.025), high: at(0.975) }
 }
 
-/// With fewer trials than this nothing is concluded: a bootstrap of so few says no more than they do.
+/// With fewer trials than this nothing is concluded: a bootstrap of so few says no more than they
+/// do.
 pub const FEW: u32 = 5;
 
-/// Difference of two shares of the same trials, with an interval from Wilson's intervals of both and their correlation (after Newcombe
-/// 1998): unlike a bootstrap it has a width where no pair differs.
+/// Difference of two shares of the same trials, with an interval from Wilson's intervals of both
+/// and their correlation (after Newcombe 1998): unlike a bootstrap it has a width where no pair
+/// differs.
 ///
 /// * `a`, `b` - outcomes paired by index
 pub fn paired_shares(a: &[bool], b: &[bool]) -> Estimate {
     let [one, other] = [a, b].map(|outcomes| Share::of(outcomes.iter().copied()).share);
-    let count = |x: bool, y: bool| a.iter().zip(b).filter(|(a, b)| **a == x && **b == y).count() as f64;
+    let count =
+        |x: bool, y: bool| a.iter().zip(b).filter(|(a, b)| **a == x && **b == y).count() as f64;
     let [both, first, second, none] =
         [count(true, true), count(true, false), count(false, true), count(false, false)];
     let sides = (both + first) * (second + none) * (both + second) * (first + none);
@@ -69,7 +72,8 @@ pub fn paired_shares(a: &[bool], b: &[bool]) -> Estimate {
     }
 }
 
-/// A share of trials with Wilson's 95 % interval, which holds for few trials and for shares near 0 and 1 too.
+/// A share of trials with Wilson's 95 % interval, which holds for few trials and for shares near 0
+/// and 1 too.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Share {
     /// How many.
@@ -109,7 +113,8 @@ mod tests {
         (x * 1e4).round() / 1e2
     }
 
-    /// Table III of the paper, three trials an arm: what it calls a gain of 13.1 % is a ratio of means minus one (C1, C2).
+    /// Table III of the paper, three trials an arm: what it calls a gain of 13.1 % is a ratio of
+    /// means minus one (C1, C2).
     #[test]
     fn the_papers_tracking_gain() {
         let wingless = [4.7012, 4.4438, 4.8829];
@@ -128,7 +133,13 @@ mod tests {
     /// Table II: the abstract's 24.4 to 70.4 % are ratios minus one too (C3).
     #[test]
     fn the_papers_force_errors() {
-        let rows = [(0.4821, 0.4209), (0.9375, 0.6965), (0.6977, 0.4094), (0.9672, 0.6019), (0.3133, 0.2518)];
+        let rows = [
+            (0.4821, 0.4209),
+            (0.9375, 0.6965),
+            (0.6977, 0.4094),
+            (0.9672, 0.6019),
+            (0.3133, 0.2518),
+        ];
         let ratios = rows.map(|(vanilla, parnn)| (gain(&[vanilla], &[parnn]) * 1e3).round() / 10.0);
         assert_eq!(ratios, [14.5, 34.6, 70.4, 60.7, 24.4]);
     }
@@ -144,7 +155,9 @@ mod tests {
         let mut inside = 0;
         for trial in 0..200u64 {
             // Pairs whose true ratio is 1.25, with noise from a quadratic residue sequence.
-            let noise = |k: u64| (((trial * 97 + k * 31) * (trial + 7 * k + 3)) % 1009) as f64 / 1009.0 - 0.5;
+            let noise = |k: u64| {
+                (((trial * 97 + k * 31) * (trial + 7 * k + 3)) % 1009) as f64 / 1009.0 - 0.5
+            };
             let a: Vec<f64> = (0..24).map(|k| 5.0 + noise(k)).collect();
             let b: Vec<f64> = (0..24).map(|k| 4.0 + noise(k + 500)).collect();
             let e = paired(&a, &b, gain);
@@ -166,7 +179,8 @@ mod tests {
         let (x, y) = (paired_shares(&a, &b), paired_shares(&b, &a));
         assert!((x.value - 15.0 / 105.0).abs() < 1e-12 && x.low > 0.0, "{x:?}");
         assert!((x.low + y.high).abs() < 1e-12, "turned round: {x:?} {y:?}");
-        // Where shares are neither near 0 nor 1 it is about what the normal approximation of pairs says.
+        // Where shares are neither near 0 nor 1 it is about what the normal approximation of pairs
+        // says.
         let deviation = ((25.0 - 15.0 * 15.0 / 105.0_f64) / (105.0 * 105.0)).sqrt();
         assert!((x.high - x.value - 1.96 * deviation).abs() < 0.01, "{x:?}, {deviation}");
         // Trials that go together tell more than trials that do not.

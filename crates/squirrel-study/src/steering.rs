@@ -1,8 +1,10 @@
-//! The paper's figure of steering angles and speeds (Fig. 9): the error of each arm over that of `pc`, `R_d` 5 m.
+//! The paper's figure of steering angles and speeds (Fig. 9): the error of each arm over that of
+//! `pc`, `R_d` 5 m.
 //!
-//! Every cell is flown twice: in *paper mode*, where the plant's wing is the network that `twcc_parnn` believes in, as in the paper's
-//! simulations, and on the independent plant, the vehicle's own wing. What differs between them is what the paper's figure owes to a plant
-//! that agrees with the controller.
+//! Every cell is flown twice: in *paper mode*, where the plant's wing is the network that
+//! `twcc_parnn` believes in, as in the paper's simulations, and on the independent plant, the
+//! vehicle's own wing. What differs between them is what the paper's figure owes to a plant that
+//! agrees with the controller.
 
 mod page;
 mod table;
@@ -25,7 +27,8 @@ pub const ANGLES_DEG: [f64; 5] = [30.0, 60.0, 90.0, 120.0, 150.0];
 pub const SPEEDS_M_S: [f64; 4] = [3.0, 5.0, 7.0, 9.0];
 /// `R_d`, m.
 const RANGE_M: f64 = 5.0;
-/// Effective thrust-to-weight ratios: scarce thrust, where wings matter, and plenty. The paper states none.
+/// Effective thrust-to-weight ratios: scarce thrust, where wings matter, and plenty. The paper
+/// states none.
 pub const THRUST_TO_WEIGHT: [f64; 2] = [1.2, 2.0];
 
 /// Whose wing the plant has.
@@ -144,9 +147,15 @@ struct Place {
 
 fn grid() -> impl Iterator<Item = Place> {
     let ratios = |wings| THRUST_TO_WEIGHT.into_iter().map(move |ratio| (wings, ratio));
-    let angles = |(wings, ratio)| ANGLES_DEG.into_iter().map(move |angle_deg| (wings, ratio, angle_deg));
+    let angles =
+        |(wings, ratio)| ANGLES_DEG.into_iter().map(move |angle_deg| (wings, ratio, angle_deg));
     let speeds = |(wings, thrust_to_weight, angle_deg)| {
-        SPEEDS_M_S.into_iter().map(move |speed_m_s| Place { wings, thrust_to_weight, angle_deg, speed_m_s })
+        SPEEDS_M_S.into_iter().map(move |speed_m_s| Place {
+            wings,
+            thrust_to_weight,
+            angle_deg,
+            speed_m_s,
+        })
     };
     Wings::ALL.into_iter().flat_map(ratios).flat_map(angles).flat_map(speeds)
 }
@@ -190,8 +199,14 @@ fn average(cells: &[Cell], arm: usize) -> Mean {
         better_than_flat: smaller("twcc_flat"),
         ratio: by(&|_| true),
         ratio_horizontal: mean(|row| row.gain_horizontal, &|_| true),
-        ratio_by_angle: ANGLES_DEG.iter().map(|angle| by(&|cell| cell.angle_deg == *angle)).collect(),
-        ratio_by_speed: SPEEDS_M_S.iter().map(|speed| by(&|cell| cell.speed_m_s == *speed)).collect(),
+        ratio_by_angle: ANGLES_DEG
+            .iter()
+            .map(|angle| by(&|cell| cell.angle_deg == *angle))
+            .collect(),
+        ratio_by_speed: SPEEDS_M_S
+            .iter()
+            .map(|speed| by(&|cell| cell.speed_m_s == *speed))
+            .collect(),
     }
 }
 

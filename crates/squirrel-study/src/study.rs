@@ -1,5 +1,6 @@
-//! What a study is to the command line: a study's file says it in one [`Study`], and `squirrel study` makes of it options and help, a progress
-//! bar, the files of `--out`, and the way back from the parts of `--shard`.
+//! What a study is to the command line: a study's file says it in one [`Study`], and
+//! `squirrel study` makes of it options and help, a progress bar, the files of `--out`, and the way
+//! back from the parts of `--shard`.
 
 use crate::campaign::Plan;
 use crate::journal::Keep;
@@ -81,7 +82,8 @@ pub enum Shown {
     Table(Vec<Vec<String>>),
 }
 
-/// Work whose duration is a question of its own. A library has no clock, so that the command line does it and measures.
+/// Work whose duration is a question of its own. A library has no clock, so that the command line
+/// does it and measures.
 #[allow(missing_debug_implementations, reason = "work has none")]
 pub struct Timed {
     /// What is timed, in words.
@@ -96,8 +98,14 @@ pub struct Timed {
 pub type Work = Box<dyn Fn()>;
 
 impl Study {
-    /// A study whose trials are flights, without arms and options of its own; a study that is more says so field by field.
-    pub const fn new(name: &'static str, about: &'static str, trials: (u32, &'static str), fly: Fly) -> Self {
+    /// A study whose trials are flights, without arms and options of its own; a study that is more
+    /// says so field by field.
+    pub const fn new(
+        name: &'static str,
+        about: &'static str,
+        trials: (u32, &'static str),
+        fly: Fly,
+    ) -> Self {
         Self {
             name,
             about,
@@ -117,7 +125,8 @@ impl Found {
     /// # Errors
     /// It cannot be written as JSON.
     pub fn of(study: &impl Serialize) -> Result<Self, FlightError> {
-        let json = serde_json::to_string_pretty(study).map_err(|e| FlightError(e.to_string()))? + "\n";
+        let json =
+            serde_json::to_string_pretty(study).map_err(|e| FlightError(e.to_string()))? + "\n";
         Ok(Self { json, ..Self::default() })
     }
 

@@ -1,8 +1,8 @@
-//! Table III of the paper: its real flights, 7.3 m/s, `R_d` 4 m, a turn of 110 to 130 deg, with the error as its log has it, by
-//! satellite fix and barometer, beside the true one.
+//! Table III of the paper: its real flights, 7.3 m/s, `R_d` 4 m, a turn of 110 to 130 deg, with the
+//! error as its log has it, by satellite fix and barometer, beside the true one.
 //!
-//! The paper does not say how much thrust there was, and the answer depends on little else: its drone without wings sank, which it does
-//! below a ratio of about 1.3.
+//! The paper does not say how much thrust there was, and the answer depends on little else: its
+//! drone without wings sank, which it does below a ratio of about 1.3.
 
 use crate::campaign::Plan;
 use crate::journal::Keep;
@@ -68,7 +68,12 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Table3>, FlightError> 
         THRUST_TO_WEIGHT.into_iter().zip(rows).map(point).collect()
     };
     let vehicle = plan.vehicle.name.clone();
-    Ok(rows.map(|rows| Table3 { vehicle, trials: plan.trials, seed: plan.seed, points: points(rows) }))
+    Ok(rows.map(|rows| Table3 {
+        vehicle,
+        trials: plan.trials,
+        seed: plan.seed,
+        points: points(rows),
+    }))
 }
 
 /// What is flown at each ratio.
@@ -132,20 +137,22 @@ pub fn page(study: &Table3, plan: &Plan) -> Result<String, FlightError> {
         "Measured gain",
         "Gain of the measured errors over pc with its paired 95 % interval; the red stroke is the paper's gain of twcc_parnn.",
     );
-    let of_point =
-        |point: &Point| figure(format!("T/W {:.2}", point.thrust_to_weight), String::new(), measured(point));
+    let of_point = |point: &Point| {
+        figure(format!("T/W {:.2}", point.thrust_to_weight), String::new(), measured(point))
+    };
     page.figures(Columns::Two, &study.points.iter().map(of_point).collect::<Vec<Figure>>());
-    if let (Some(point), Some(condition)) = (study.points.first(), conditions(&plan.vehicle)?.first()) {
+    if let (Some(point), Some(condition)) =
+        (study.points.first(), conditions(&plan.vehicle)?.first())
+    {
         page.section(
             &format!("The first trial at T/W {:.2}", point.thrust_to_weight),
             "Tracks are coloured by speed. The paper's drone without wings sank.",
         );
         tracks(&mut page, plan, condition, &SHOWN)?;
     }
-    let rows = study
-        .points
-        .iter()
-        .flat_map(|point| point.rows.iter().map(|row| (vec![format!("{:.2}", point.thrust_to_weight)], row)));
+    let rows = study.points.iter().flat_map(|point| {
+        point.rows.iter().map(|row| (vec![format!("{:.2}", point.thrust_to_weight)], row))
+    });
     numbers(&mut page, &["T/W"], rows);
     Ok(page.html())
 }

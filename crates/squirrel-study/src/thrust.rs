@@ -1,13 +1,18 @@
-//! What wings are worth as a function of thrust: every arm through the avoidance manoeuvre at several effective thrust-to-weight ratios.
+//! What wings are worth as a function of thrust: every arm through the avoidance manoeuvre at
+//! several effective thrust-to-weight ratios.
 //!
-//! The paper's real flights: 7.3 m/s, `R_d` 4 m, a turn of 110 to 130 deg; error over 6 s from the encounter. Two series:
-//! - `limit`: the collective thrust that the flight code may ask for, at a battery that does not sag;
-//! - `battery`: one such limit, [`BATTERY_RATIO`], and a battery that is emptier from flight to flight. Thrust follows its voltage
-//!   (`battery_sag`), which the flight code does not know, and what is left of the limit is the effective ratio.
+//! The paper's real flights: 7.3 m/s, `R_d` 4 m, a turn of 110 to 130 deg; error over 6 s from the
+//! encounter. Two series:
+//! - `limit`: the collective thrust that the flight code may ask for, at a battery that does not
+//!   sag;
+//! - `battery`: one such limit, [`BATTERY_RATIO`], and a battery that is emptier from flight to
+//!   flight. Thrust follows its voltage (`battery_sag`), which the flight code does not know, and
+//!   what is left of the limit is the effective ratio.
 //!
-//! The last rows of `battery` have the vehicle's own limit, to see where the battery alone brings it. Little is expected of wings from the ratio on at
-//! which the tilt limit holds height, 1.155 with one angle at 30 deg and 1.33 with both (docs/equations.md E.4); what is gained there is said beside
-//! the fair rival `pc_plus`.
+//! The last rows of `battery` have the vehicle's own limit, to see where the battery alone brings
+//! it. Little is expected of wings from the ratio on at which the tilt limit holds height, 1.155
+//! with one angle at 30 deg and 1.33 with both (docs/equations.md E.4); what is gained there is
+//! said beside the fair rival `pc_plus`.
 
 mod page;
 
@@ -69,7 +74,8 @@ pub struct Crossing {
     pub series: &'static str,
     /// Arm.
     pub arm: &'static str,
-    /// Largest effective ratio at which the gain is [`PAPER_GAIN`], between neighbouring points; absent where it is nowhere.
+    /// Largest effective ratio at which the gain is [`PAPER_GAIN`], between neighbouring points;
+    /// absent where it is nowhere.
     pub thrust_to_weight: Option<f64>,
 }
 
@@ -86,12 +92,13 @@ pub struct Thrust {
     pub points: Vec<Point>,
     /// By series and arm.
     pub crossings: Vec<Crossing>,
-    /// Ratios of the series `limit` at which `twcc_plus` is better than `pc_plus` by an interval that excludes zero, with the gain.
+    /// Ratios of the series `limit` at which `twcc_plus` is better than `pc_plus` by an interval
+    /// that excludes zero, with the gain.
     pub headline: Vec<(f64, Estimate)>,
 }
 
-/// Flies the study on all cores; the result depends neither on threads nor on how often it was stopped. `None` where only a part is flown
-/// here.
+/// Flies the study on all cores; the result depends neither on threads nor on how often it was
+/// stopped. `None` where only a part is flown here.
 ///
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
@@ -107,23 +114,29 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Thrust>, FlightError> 
         .zip(rows)
         .map(|((series, charge, ratio), rows)| {
             let voltage_v = rows.iter().map(|row| row.voltage_v).sum::<f64>() / rows.len() as f64;
-            let sag = charge.map_or(1.0, |_| (voltage_v / reference_v).powf(2.0 * VOLTAGE_EXPONENT));
+            let sag =
+                charge.map_or(1.0, |_| (voltage_v / reference_v).powf(2.0 * VOLTAGE_EXPONENT));
             Point { series, charge, thrust_to_weight: ratio * sag, rows }
         })
         .collect();
     let order = |point: &Point| SERIES.iter().position(|series| *series == point.series);
-    points.sort_by(|a, b| order(a).cmp(&order(b)).then(a.thrust_to_weight.total_cmp(&b.thrust_to_weight)));
+    points.sort_by(|a, b| {
+        order(a).cmp(&order(b)).then(a.thrust_to_weight.total_cmp(&b.thrust_to_weight))
+    });
     let mut crossings = Vec::new();
     for series in &SERIES[..2] {
         let of: Vec<&Point> = points.iter().filter(|point| point.series == *series).collect();
         for row in of.first().map_or(&[][..], |point| &point.rows) {
-            let crossing = Crossing { series, arm: row.arm, thrust_to_weight: crossing(&of, row.arm) };
+            let crossing =
+                Crossing { series, arm: row.arm, thrust_to_weight: crossing(&of, row.arm) };
             crossings.push(crossing);
         }
     }
     let excludes_zero = |point: &Point| {
         let plus = point.rows.iter().find(|row| row.arm == "twcc_plus")?;
-        plus.gain_over_pc_plus.filter(|gain| gain.low > 0.0).map(|gain| (point.thrust_to_weight, gain))
+        plus.gain_over_pc_plus
+            .filter(|gain| gain.low > 0.0)
+            .map(|gain| (point.thrust_to_weight, gain))
     };
     let headline =
         points.iter().filter(|point| point.series == SERIES[0]).filter_map(excludes_zero).collect();
@@ -181,7 +194,8 @@ fn crossing(points: &[&Point], arm: &str) -> Option<f64> {
     })
 }
 
-/// What the points say, in words: where the paper's gain lies, and what wings are worth to the best controller.
+/// What the points say, in words: where the paper's gain lies, and what wings are worth to the best
+/// controller.
 pub fn words(study: &Thrust) -> Vec<String> {
     if study.trials < FEW {
         return vec![format!("Fewer than {FEW} trials tell nothing about wings.")];
@@ -193,10 +207,16 @@ pub fn words(study: &Thrust) -> Vec<String> {
             .iter()
             // Of the paper's arms; ours are above it at every ratio.
             .filter(|crossing| crossing.series == series && crossing.arm.starts_with("twcc_"))
-            .filter_map(|crossing| Some(format!("{} {:.2}", crossing.arm, crossing.thrust_to_weight?)))
+            .filter_map(|crossing| {
+                Some(format!("{} {:.2}", crossing.arm, crossing.thrust_to_weight?))
+            })
             .collect();
         let none = || "at none of the ratios for any arm".to_owned();
-        let at = if at.is_empty() { none() } else { format!("at an effective T/W of {}", at.join(", ")) };
+        let at = if at.is_empty() {
+            none()
+        } else {
+            format!("at an effective T/W of {}", at.join(", "))
+        };
         words.push(format!("A gain of {:.1} % lies, {how}, {at}.", 100.0 * PAPER_GAIN));
     }
     let alone = study.points.iter().filter(|point| point.series == SERIES[2]);
@@ -220,7 +240,10 @@ pub fn words(study: &Thrust) -> Vec<String> {
     words.push(if gains.is_empty() {
         "twcc_plus over pc_plus: at no ratio does the interval exclude zero.".to_owned()
     } else {
-        format!("twcc_plus over pc_plus, where the interval excludes zero, at T/W {}.", gains.join("; "))
+        format!(
+            "twcc_plus over pc_plus, where the interval excludes zero, at T/W {}.",
+            gains.join("; ")
+        )
     });
     words
 }
@@ -235,7 +258,9 @@ fn fly(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightE
     found.say(
         "Gain is mean error of pc over mean error of the arm, minus 1, with its paired 95 % interval; over phantom and over",
     );
-    found.say("pc_plus likewise. T/W is what there was: the limit, less what the battery did not give.\n");
+    found.say(
+        "pc_plus likewise. T/W is what there was: the limit, less what the battery did not give.\n",
+    );
     let mut sheet = Sheet::default();
     for point in &study.points {
         let charge = point.charge.map_or_else(|| "-".to_owned(), |charge| format!("{charge:.2}"));

@@ -1,5 +1,6 @@
-//! The paper's avoidance manoeuvre, flown by every arm under every condition, and what became of the tracking error: what the studies
-//! [`crate::thrust`], [`crate::table3`] and [`crate::steering`] have in common.
+//! The paper's avoidance manoeuvre, flown by every arm under every condition, and what became of
+//! the tracking error: what the studies [`crate::thrust`], [`crate::table3`] and
+//! [`crate::steering`] have in common.
 
 use crate::campaign::{self, Flown, Plan};
 use crate::journal::{Journal, Keep};
@@ -68,13 +69,16 @@ pub struct Row {
     pub gain_horizontal: Estimate,
     /// The same of the measured errors.
     pub gain_measured: Estimate,
-    /// The gain over `phantom`, which decides like `twcc_flat` and has no wings; absent where it did not fly.
+    /// The gain over `phantom`, which decides like `twcc_flat` and has no wings; absent where it
+    /// did not fly.
     pub gain_over_phantom: Option<Estimate>,
-    /// The gain over `pc_plus`, which is `twcc_plus` with the wings folded; absent where it did not fly.
+    /// The gain over `pc_plus`, which is `twcc_plus` with the wings folded; absent where it did not
+    /// fly.
     pub gain_over_pc_plus: Option<Estimate>,
 }
 
-/// Flies conditions with the arms of a plan and [`Arm::Pc`]; rows by condition. `None` where only a part is flown here.
+/// Flies conditions with the arms of a plan and [`Arm::Pc`]; rows by condition. `None` where only a
+/// part is flown here.
 ///
 /// * `name` - of the journal
 ///
@@ -124,9 +128,11 @@ fn fly(plan: &Plan, condition: &Condition, arm: Arm, trial: u32) -> Result<Fligh
 fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
     let of = |arm, figure: fn(&Flight) -> f64| flown.figures(arm, condition, figure);
     let average = |figure| mean(&of(arm, figure));
-    let over = |rival, figure: fn(&Flight) -> f64| paired(&of(rival, figure), &of(arm, figure), gain);
+    let over =
+        |rival, figure: fn(&Flight) -> f64| paired(&of(rival, figure), &of(arm, figure), gain);
     let gain_over = |rival| {
-        (!flown.of(rival, condition).is_empty()).then(|| over(rival, |flight: &Flight| flight.rmse_m))
+        (!flown.of(rival, condition).is_empty())
+            .then(|| over(rival, |flight: &Flight| flight.rmse_m))
     };
     Row {
         arm: arm.name(),

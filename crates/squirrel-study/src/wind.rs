@@ -1,10 +1,11 @@
-//! How each controller holds in wind: a circle of 6 m at 4 m/s (the scenario `track`) and the paper's avoidance manoeuvre (`avoid`) in a steady
-//! wind with light gusts.
+//! How each controller holds in wind: a circle of 6 m at 4 m/s (the scenario `track`) and the
+//! paper's avoidance manoeuvre (`avoid`) in a steady wind with light gusts.
 //!
-//! Wind comes from ahead, from behind or from the left of a vehicle that heads north: on the circle it does so all along, in the manoeuvre up
-//! to the turn. The vehicle does not know the wind. On the circle, wings stay folded, so that arms which differ only in wings fly alike; in the turn
-//! they open. A flight is *lost* where the vehicle turns over, meets the ground or leaves the numbers, and *flagged* where the flight code
-//! reports anything.
+//! Wind comes from ahead, from behind or from the left of a vehicle that heads north: on the circle
+//! it does so all along, in the manoeuvre up to the turn. The vehicle does not know the wind. On
+//! the circle, wings stay folded, so that arms which differ only in wings fly alike; in the turn
+//! they open. A flight is *lost* where the vehicle turns over, meets the ground or leaves the
+//! numbers, and *flagged* where the flight code reports anything.
 
 use crate::campaign::{self, Flown, Plan};
 use crate::faults::is_lost;
@@ -33,7 +34,8 @@ pub const STUDY: Study = Study {
 /// Scenarios.
 const MISSIONS: [&str; 2] = ["track", "avoid"];
 /// Where the wind comes from, and where it blows to, north and east.
-const FROM: [(&str, [f64; 2]); 3] = [("head", [-1.0, 0.0]), ("tail", [1.0, 0.0]), ("side", [0.0, 1.0])];
+const FROM: [(&str, [f64; 2]); 3] =
+    [("head", [-1.0, 0.0]), ("tail", [1.0, 0.0]), ("side", [0.0, 1.0])];
 /// Speeds of the wind beside calm air, m/s.
 const SPEEDS_M_S: [f64; 3] = [3.0, 5.0, 8.0];
 /// Effective thrust-to-weight ratios.
@@ -92,8 +94,11 @@ type Condition = (&'static str, f64, &'static str, f64, Scenario);
 
 fn conditions() -> Result<Vec<Condition>, FlightError> {
     let mut all = Vec::new();
-    for (mission, ratio) in MISSIONS.into_iter().flat_map(|m| THRUST_TO_WEIGHT.map(|ratio| (m, ratio))) {
-        let blown = FROM.into_iter().flat_map(|(from, to)| SPEEDS_M_S.map(|speed| (from, to, speed)));
+    for (mission, ratio) in
+        MISSIONS.into_iter().flat_map(|m| THRUST_TO_WEIGHT.map(|ratio| (m, ratio)))
+    {
+        let blown =
+            FROM.into_iter().flat_map(|(from, to)| SPEEDS_M_S.map(|speed| (from, to, speed)));
         for (from, to, speed) in std::iter::once(("calm", [0.0; 2], 0.0)).chain(blown) {
             let mut scenario = Scenario::find(mission).map_err(FlightError)?;
             scenario.thrust_to_weight = Some(ratio);

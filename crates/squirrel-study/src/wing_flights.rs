@@ -1,4 +1,5 @@
-//! Random flights with spread wings: what networks learn from, and the four sets of Table II that they are judged by.
+//! Random flights with spread wings: what networks learn from, and the four sets of Table II that
+//! they are judged by.
 //!
 //! | kind | flown as in training, but |
 //! |---|---|
@@ -8,8 +9,9 @@
 //! | `t3` | in wind |
 //! | `t4` | slowly |
 //!
-//! Networks see ground speed, as in the paper (docs/equations.md T6), so that wind is an error of what they see. All of it is what
-//! `squirrel fly --arm pc_wings_open --scenario random_spread` flies, with the scenario's numbers changed.
+//! Networks see ground speed, as in the paper (docs/equations.md T6), so that wind is an error of
+//! what they see. All of it is what `squirrel fly --arm pc_wings_open --scenario random_spread`
+//! flies, with the scenario's numbers changed.
 
 use squirrel_core::frames::{In, Ned, Rotation};
 use squirrel_core::nalgebra::Vector3;
@@ -107,8 +109,11 @@ impl Kind {
         }
         if matches!(self, Self::T1 | Self::T3) {
             // Of flights one after the other the wind comes from all sides.
-            let side =
-                Rotation::<Ned, Ned, f64>::from_euler(0.0, 0.0, GOLDEN_ANGLE_RAD * (seed % 1024) as f64);
+            let side = Rotation::<Ned, Ned, f64>::from_euler(
+                0.0,
+                0.0,
+                GOLDEN_ANGLE_RAD * (seed % 1024) as f64,
+            );
             scenario.wind.mean_ned_m_s = (side * In::new(Vector3::x() * WIND_M_S)).vector.into();
             scenario.wind.gust_sigma_m_s = GUST_M_S;
         }
@@ -121,8 +126,12 @@ impl Kind {
     /// A vehicle that cannot fly or has no wings.
     pub fn fly(self, vehicle: &VehicleFile, seed: u64) -> Result<Vec<Window>, WingFlightError> {
         let scenario = self.scenario(seed)?;
-        let setup =
-            Setup { vehicle: vehicle.clone(), arm: Arm::PcWingsOpen, scenario, integrator: Integrator::Rk4 };
+        let setup = Setup {
+            vehicle: vehicle.clone(),
+            arm: Arm::PcWingsOpen,
+            scenario,
+            integrator: Integrator::Rk4,
+        };
         let name = format!("{} {seed}", self.name());
         let log = setup.fly(true, |_| {})?.log.unwrap_or_default();
         Ok(labels::windows(vehicle, &name, &log)?)

@@ -4,8 +4,9 @@
 //! Disarmed --switch turned on, and nothing against it--> Armed --switch off--> Disarmed
 //!                                                          |--the failsafe cuts for CUT_MAX_US--> Ended --switch off--> Disarmed
 //! ```
-//! The switch must be seen off before it can arm, so that a board that starts with the switch on does not fly. While armed, core's
-//! failsafe decides what flies; one that cut for long ends the flight, because a vehicle on the ground must not start again by itself.
+//! The switch must be seen off before it can arm, so that a board that starts with the switch on
+//! does not fly. While armed, core's failsafe decides what flies; one that cut for long ends the
+//! flight, because a vehicle on the ground must not start again by itself.
 
 use squirrel_core::stack::failsafe::FailsafeMode;
 
@@ -58,7 +59,9 @@ impl Arming {
     /// Looks at the inputs; what holds from now on.
     pub fn update(&mut self, now: &Inputs) -> State {
         let since = |start: Option<u64>, holds: bool| holds.then(|| start.unwrap_or(now.time_us));
-        let lasts = |start: Option<u64>, us: u64| start.is_some_and(|t| now.time_us.saturating_sub(t) >= us);
+        let lasts = |start: Option<u64>, us: u64| {
+            start.is_some_and(|t| now.time_us.saturating_sub(t) >= us)
+        };
         self.well_since_us = since(self.well_since_us, now.ready);
         let armed = matches!(self.state, State::Armed { .. });
         self.cut_since_us = since(self.cut_since_us, armed && now.failsafe == FailsafeMode::Cut);
@@ -81,7 +84,12 @@ mod tests {
     use super::*;
 
     /// Ticks of 0.1 s with these inputs; the state after the last.
-    fn run(arming: &mut Arming, time_us: &mut u64, ticks: u64, inputs: (bool, bool, FailsafeMode)) -> State {
+    fn run(
+        arming: &mut Arming,
+        time_us: &mut u64,
+        ticks: u64,
+        inputs: (bool, bool, FailsafeMode),
+    ) -> State {
         let (switch_on, ready, failsafe) = inputs;
         let mut state = arming.state;
         for _ in 0..ticks {
@@ -107,7 +115,11 @@ mod tests {
         run(&mut arming, &mut t, 20, (false, true, OFF));
         run(&mut arming, &mut t, 1, (false, false, OFF));
         run(&mut arming, &mut t, 5, (false, true, OFF));
-        assert_eq!(run(&mut arming, &mut t, 100, (true, true, OFF)), State::Disarmed, "turned on too early");
+        assert_eq!(
+            run(&mut arming, &mut t, 100, (true, true, OFF)),
+            State::Disarmed,
+            "turned on too early"
+        );
     }
 
     #[test]
@@ -117,7 +129,10 @@ mod tests {
         assert!(matches!(run(&mut arming, &mut t, 1, (true, true, OFF)), State::Armed { .. }));
         let begin = t;
         // In flight nobody lies still.
-        assert_eq!(run(&mut arming, &mut t, 50, (true, false, OFF)), State::Armed { since_us: begin });
+        assert_eq!(
+            run(&mut arming, &mut t, 50, (true, false, OFF)),
+            State::Armed { since_us: begin }
+        );
         assert_eq!(run(&mut arming, &mut t, 1, (false, false, OFF)), State::Disarmed);
     }
 
@@ -135,7 +150,11 @@ mod tests {
             State::Armed { .. }
         ));
         assert_eq!(run(&mut arming, &mut t, 21, (true, false, FailsafeMode::Cut)), State::Ended);
-        assert_eq!(run(&mut arming, &mut t, 50, (true, true, OFF)), State::Ended, "well again is not enough");
+        assert_eq!(
+            run(&mut arming, &mut t, 50, (true, true, OFF)),
+            State::Ended,
+            "well again is not enough"
+        );
         assert_eq!(run(&mut arming, &mut t, 1, (false, true, OFF)), State::Disarmed);
     }
 }

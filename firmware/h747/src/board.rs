@@ -12,8 +12,9 @@
 //! | lamp, low is on | PI12 |
 //! | time of the executor | TIM5 |
 //!
-//! The IMU lies with its x axis forward and its z axis up. The vehicle's setup is in the last sector of flash. 400 MHz: with its
-//! own step-down converter as supply the part does not reach 480.
+//! The IMU lies with its x axis forward and its z axis up. The vehicle's setup is in the last
+//! sector of flash. 400 MHz: with its own step-down converter as supply the part does not reach
+//! 480.
 
 use core::mem::MaybeUninit;
 use embassy_stm32::bind_interrupts;
@@ -37,7 +38,8 @@ use squirrel_core::nalgebra::Vector3;
 use squirrel_h747::flight::Outputs;
 use squirrel_h747::outputs::{DSHOT_BIT_HZ, dshot_waveform};
 
-/// How the vehicle must stand at arming, rad clockwise from north: nothing on this board measures a heading.
+/// How the vehicle must stand at arming, rad clockwise from north: nothing on this board measures a
+/// heading.
 pub(crate) const HEADING_AT_ARMING_RAD: f32 = 0.0;
 /// Setup of the flight code: the last sector of the second bank.
 const SETUP_ADDRESS: usize = 0x081E_0000;
@@ -114,7 +116,15 @@ pub(crate) fn start() -> Option<Board> {
         imu: Spi::new(p.SPI1, p.PA5, p.PA7, p.PA6, p.DMA1_CH1, p.DMA1_CH2, Irqs, bus),
         imu_select: Output::new(p.PA4, Level::High, Speed::VeryHigh),
         gnss,
-        barometer: I2c::new(p.I2C1, p.PB8, p.PB9, p.DMA1_CH4, p.DMA1_CH5, Irqs, i2c::Config::default()),
+        barometer: I2c::new(
+            p.I2C1,
+            p.PB8,
+            p.PB9,
+            p.DMA1_CH4,
+            p.DMA1_CH5,
+            Irqs,
+            i2c::Config::default(),
+        ),
         log,
         switch: Switch(Input::new(p.PE2, Pull::Up)),
         lamp: Lamp(Output::new(p.PI12, Level::High, Speed::Low)),
@@ -147,8 +157,8 @@ fn clocks() -> Config {
 
 /// The sector of the setup, whatever is in it.
 pub(crate) fn setup() -> &'static [u8] {
-    // SAFETY: this flash is there on every part of the type, nothing writes it while the program runs, and bytes have no
-    // invalid values.
+    // SAFETY: this flash is there on every part of the type, nothing writes it while the program
+    // runs, and bytes have no invalid values.
     unsafe { core::slice::from_raw_parts(SETUP_ADDRESS as *const u8, SETUP_LENGTH) }
 }
 
@@ -174,7 +184,9 @@ impl Actuators {
             self.servos.channel(channel).set_duty_cycle_fraction(pulse_us, period_us);
         }
         let burst = self.burst.reborrow();
-        self.rotors.waveform_up_multi_channel(burst, Irqs, Channel::Ch1, Channel::Ch4, &waveform).await;
+        self.rotors
+            .waveform_up_multi_channel(burst, Irqs, Channel::Ch1, Channel::Ch4, &waveform)
+            .await;
     }
 }
 

@@ -38,7 +38,8 @@ pub struct Flight {
 }
 
 impl Flight {
-    /// `None` where this board cannot fly the vehicle: not four rotors, commands in newtons, or an estimate from elsewhere.
+    /// `None` where this board cannot fly the vehicle: not four rotors, commands in newtons, or an
+    /// estimate from elsewhere.
     #[must_use]
     pub fn new(stack: Stack) -> Option<Self> {
         let propulsion = stack.vehicle().parameters().propulsion;
@@ -58,7 +59,8 @@ impl Flight {
 
     /// One step.
     ///
-    /// * `arming` - whether the rotors may turn; a new flight starts from a new state, where the ground has told
+    /// * `arming` - whether the rotors may turn; a new flight starts from a new state, where the
+    ///   ground has told
     /// * `now_us` - since the board started, never backwards
     /// * `log` - is given each record: a setup where a flight begins, then a frame a step
     pub fn step(
@@ -76,7 +78,8 @@ impl Flight {
             return Outputs::safe();
         };
         if self.since_us != Some(since_us) {
-            (self.state, self.hash, self.since_us) = (StackState::default(), HASH_START, Some(since_us));
+            (self.state, self.hash, self.since_us) =
+                (StackState::default(), HASH_START, Some(since_us));
             let stack = sensors.start().and_then(|start| self.stack.starting(start).ok());
             self.begun = stack.is_some();
             if let Some(stack) = stack {
@@ -195,7 +198,11 @@ mod tests {
         assert_eq!(bench.flight.failsafe(), FailsafeMode::Cut);
         bench.steps(330, State::Disarmed, true);
         let again = State::Armed { since_us: bench.now_us };
-        assert_ne!(bench.steps(100, again, true), Outputs::safe(), "a new flight remembers nothing");
+        assert_ne!(
+            bench.steps(100, again, true),
+            Outputs::safe(),
+            "a new flight remembers nothing"
+        );
     }
 
     /// What the host does with the line: the flight again, with the same outputs to the bit.

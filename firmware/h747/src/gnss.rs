@@ -37,7 +37,8 @@ impl Place {
         let sine = libm::sin(origin.latitude_rad);
         let w = 1.0 - ECCENTRICITY_SQUARED * sine * sine;
         let east_radius_m = RADIUS_M / libm::sqrt(w) + origin.height_m;
-        let north_radius_m = RADIUS_M * (1.0 - ECCENTRICITY_SQUARED) / (w * libm::sqrt(w)) + origin.height_m;
+        let north_radius_m =
+            RADIUS_M * (1.0 - ECCENTRICITY_SQUARED) / (w * libm::sqrt(w)) + origin.height_m;
         let mut east_rad = self.longitude_rad - origin.longitude_rad;
         // Across the date line.
         if east_rad.abs() > core::f64::consts::PI {
@@ -69,7 +70,8 @@ impl Receiver {
         let mut fix = None;
         while let Some(packet) = packets.next() {
             let Ok(UbxPacket::Proto23(PacketRef::NavPvt(pvt))) = packet else { continue };
-            let in_space = matches!(pvt.fix_type(), GnssFixType::Fix3D | GnssFixType::GPSPlusDeadReckoning);
+            let in_space =
+                matches!(pvt.fix_type(), GnssFixType::Fix3D | GnssFixType::GPSPlusDeadReckoning);
             if in_space && pvt.flags().contains(NavPvtFlags::GPS_FIX_OK) {
                 let place = Place {
                     latitude_rad: pvt.latitude().to_radians(),
@@ -100,7 +102,8 @@ pub(crate) mod tests {
         let mut payload = [0u8; 92];
         payload[20] = fix;
         payload[21] = ok;
-        let mut put = |at: usize, value: i32| payload[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        let mut put =
+            |at: usize, value: i32| payload[at..at + 4].copy_from_slice(&value.to_le_bytes());
         put(24, lon);
         put(28, lat);
         put(36, height_mm);
@@ -133,7 +136,11 @@ pub(crate) mod tests {
     #[test]
     fn no_fix_and_broken_bytes_are_none() {
         for (fix, ok) in [(0, 1), (2, 1), (5, 1), (3, 0)] {
-            assert_eq!(Receiver::default().read(&message(1, 1, 1, [0; 3], fix, ok)), None, "{fix} {ok}");
+            assert_eq!(
+                Receiver::default().read(&message(1, 1, 1, [0; 3], fix, ok)),
+                None,
+                "{fix} {ok}"
+            );
         }
         let mut bytes = message(1, 1, 1, [0; 3], 3, 1);
         bytes[40] ^= 1;

@@ -5,8 +5,9 @@
 //!                                  arming, 10 Hz -> which of the outputs are let through
 //!                                  log <- setup, frames, hash of the outputs
 //! ```
-//! What needs hardware is in the image (`main.rs`, `board.rs`), and thin. **Nobody has flown it**: it is built and sized, these
-//! modules are tested on the host, and that is all that is known of it.
+//! What needs hardware is in the image (`main.rs`, `board.rs`), and thin. **Nobody has flown it**:
+//! it is built and sized, these modules are tested on the host, and that is all that is known of
+//! it.
 
 #![cfg_attr(not(test), no_std)]
 #![forbid(unsafe_code)]

@@ -1,10 +1,12 @@
 //! The image for an STM32H747: tasks around the flight code. Built and sized, never flown.
 //!
-//! `fly` runs 300 times a second: IMU, step, motor controllers, servos, log; core's outer loop is every thirtieth step, so that the bits
-//! are those of the simulator. `arm` runs ten times a second. The others wait for their sensor, or for something to log. All of them
-//! share one executor, without priorities: none computes for longer than some tens of microseconds at a time.
+//! `fly` runs 300 times a second: IMU, step, motor controllers, servos, log; core's outer loop is
+//! every thirtieth step, so that the bits are those of the simulator. `arm` runs ten times a
+//! second. The others wait for their sensor, or for something to log. All of them share one
+//! executor, without priorities: none computes for longer than some tens of microseconds at a time.
 //!
-//! The lamp: off is disarmed, slow blinking ready, lit armed, fast blinking a board that cannot fly (no setup, or no IMU).
+//! The lamp: off is disarmed, slow blinking ready, lit armed, fast blinking a board that cannot fly
+//! (no setup, or no IMU).
 
 #![no_std]
 #![no_main]
@@ -52,7 +54,8 @@ const PRESSURE_STEP: Duration = Duration::from_hz(50);
 const SAMPLES_MAX: u16 = 8;
 
 /// What the arming task decided, and what it decides by.
-static ARMED: Shared<CriticalSectionRawMutex, Cell<State>> = Shared::new(Cell::new(State::Disarmed));
+static ARMED: Shared<CriticalSectionRawMutex, Cell<State>> =
+    Shared::new(Cell::new(State::Disarmed));
 static STATUS: Shared<CriticalSectionRawMutex, Cell<(bool, FailsafeMode)>> =
     Shared::new(Cell::new((false, FailsafeMode::Off)));
 static FIX: Signal<CriticalSectionRawMutex, (Fix, u64)> = Signal::new();
@@ -61,7 +64,8 @@ static PRESSURE_PA: Signal<CriticalSectionRawMutex, (f32, u64)> = Signal::new();
 static LOG: Pipe<CriticalSectionRawMutex, 8192> = Pipe::new();
 
 /// The bus of the IMU, which tasks borrow for as long as the program runs.
-static BUS: StaticCell<Mutex<NoopRawMutex, Spi<'static, Async, spi::mode::Master>>> = StaticCell::new();
+static BUS: StaticCell<Mutex<NoopRawMutex, Spi<'static, Async, spi::mode::Master>>> =
+    StaticCell::new();
 
 type Imu = ICM42688<
     SpiDevice<'static, NoopRawMutex, Spi<'static, Async, spi::mode::Master>, Output<'static>>,
@@ -133,7 +137,8 @@ async fn fly(
     }
 }
 
-/// Mean of the samples since the last step, in the body frame: rad/s, m/s^2. `None` where there is none.
+/// Mean of the samples since the last step, in the body frame: rad/s, m/s^2. `None` where there is
+/// none.
 async fn samples(imu: &mut Imu) -> Option<(In<Body, f32>, In<Body, f32>)> {
     let (mut omega, mut force, mut count) = (In::zero(), In::zero(), 0u16);
     while count < SAMPLES_MAX {
@@ -149,7 +154,8 @@ async fn samples(imu: &mut Imu) -> Option<(In<Body, f32>, In<Body, f32>)> {
             }
             Ok(None) => break,
             Err(_) => {
-                // What overflowed is old. Where that fails too, the sensor is silent, and the failsafe counts.
+                // What overflowed is old. Where that fails too, the sensor is silent, and the
+                // failsafe counts.
                 let _ = imu.reset_fifo().await;
                 return None;
             }
@@ -159,7 +165,8 @@ async fn samples(imu: &mut Imu) -> Option<(In<Body, f32>, In<Body, f32>)> {
     (count > 0).then(|| (omega * share, force * share))
 }
 
-/// Puts a record on the line, whole or not at all: where the line cannot follow, the host misses records and sees it.
+/// Puts a record on the line, whole or not at all: where the line cannot follow, the host misses
+/// records and sees it.
 fn keep(record: &[u8]) {
     let mut line = [0; LINE_MAX];
     if let Some(bytes) = framed(record, &mut line)
@@ -183,8 +190,12 @@ async fn arm(switch: Switch, mut lamp: Lamp) {
     for tick in (0..10u8).cycle() {
         ticker.next().await;
         let (ready, failsafe) = STATUS.lock(Cell::get);
-        let inputs =
-            Inputs { time_us: Instant::now().as_micros(), switch_on: switch.is_on(), ready, failsafe };
+        let inputs = Inputs {
+            time_us: Instant::now().as_micros(),
+            switch_on: switch.is_on(),
+            ready,
+            failsafe,
+        };
         let state = arming.update(&inputs);
         ARMED.lock(|armed| armed.set(state));
         lamp.set(match state {
@@ -225,7 +236,9 @@ async fn weigh_air(mut bus: I2c<'static, Async, i2c::Master>) {
             .power_mode(PowerMode::Normal)
             .output_data_rate(OutputDataRate::R50Hz)
             .pressure_oversampling(Oversampling::X8);
-        let sensor = Bmp390::new_i2c(&mut bus, SdoPinState::Low, config, ResetPolicy::Soft, &mut Delay).await;
+        let sensor =
+            Bmp390::new_i2c(&mut bus, SdoPinState::Low, config, ResetPolicy::Soft, &mut Delay)
+                .await;
         if let Ok(mut sensor) = sensor {
             let mut ticker = Ticker::every(PRESSURE_STEP);
             while let Ok(measured) = sensor.read_sensor_data().await {

@@ -1,8 +1,9 @@
 //! From the flight code's commands to what motor controllers and servos read.
 //!
-//! DShot: sixteen bits a frame, most significant first: eleven of value, one that asks for telemetry, four of checksum (the
-//! exclusive or of the three nibbles before it). A bit takes one period of a timer; a one is high for three quarters of it,
-//! a zero for three eighths. Value 0 stops the motor, 1 to 47 are commands, 48 to 2047 are throttle.
+//! DShot: sixteen bits a frame, most significant first: eleven of value, one that asks for
+//! telemetry, four of checksum (the exclusive or of the three nibbles before it). A bit takes one
+//! period of a timer; a one is high for three quarters of it, a zero for three eighths. Value 0
+//! stops the motor, 1 to 47 are commands, 48 to 2047 are throttle.
 
 use squirrel_core::vehicle::CommandKind;
 
@@ -12,7 +13,8 @@ pub const ROTORS: usize = 4;
 pub const DSHOT_BIT_HZ: u32 = 300_000;
 /// Bits of a frame, and one period of silence so that the line rests low.
 const PERIODS: usize = 17;
-/// Compare values of one frame to all rotors, bit by bit, rotor by rotor within a bit: what the timer's DMA burst takes.
+/// Compare values of one frame to all rotors, bit by bit, rotor by rotor within a bit: what the
+/// timer's DMA burst takes.
 pub type Waveform = [u16; PERIODS * ROTORS];
 
 const STOP: u16 = 0;
@@ -21,7 +23,8 @@ const THROTTLE_MAX: u16 = 2047;
 
 /// DShot value of a rotor command; stop where the command is 0 or less, or no number.
 ///
-/// * `kind` - unit of the command; `None` comes back for newtons, which no motor controller understands
+/// * `kind` - unit of the command; `None` comes back for newtons, which no motor controller
+///   understands
 pub fn dshot_value(kind: CommandKind, command: f32) -> Option<u16> {
     let fraction = match kind {
         CommandKind::SpeedFraction | CommandKind::Duty => command,
@@ -64,7 +67,8 @@ pub fn dshot_waveform(values: [u16; ROTORS], period: u16) -> Waveform {
     waveform
 }
 
-/// Pulse of the left and the right wing's servo, us: folded to spread. The servos are mounted as mirror images.
+/// Pulse of the left and the right wing's servo, us: folded to spread. The servos are mounted as
+/// mirror images.
 ///
 /// * `wings` - left, right; 0 folded to 1 spread; what is no number counts as folded
 #[must_use]

@@ -1,8 +1,10 @@
-//! What the sensors said since the last step, as the frame that the flight code takes: raw, for that estimates by itself.
+//! What the sensors said since the last step, as the frame that the flight code takes: raw, for
+//! that estimates by itself.
 //!
-//! A reading goes into one frame; a sensor that is silent is absent from the next, and core's failsafe counts how long. On the ground
-//! frames go to core's [`Preflight`], which finds attitude, gyro bias and what fix and barometer are off by; they are relative to the
-//! first fix and pressure since the vehicle was set down. What moves it begins that anew.
+//! A reading goes into one frame; a sensor that is silent is absent from the next, and core's
+//! failsafe counts how long. On the ground frames go to core's [`Preflight`], which finds attitude,
+//! gyro bias and what fix and barometer are off by; they are relative to the first fix and pressure
+//! since the vehicle was set down. What moves it begins that anew.
 
 use crate::gnss::{Fix, Place};
 use squirrel_core::estimate::navigator::Start;
@@ -106,8 +108,8 @@ impl Sensors {
         (self.place, self.ground_pa, self.preflight) = (None, None, Preflight::default());
     }
 
-    /// Where a flight would begin now: here, in the middle of the mission's frame. `None` before a second at rest, in which fix
-    /// and barometer have spoken, too.
+    /// Where a flight would begin now: here, in the middle of the mission's frame. `None` before a
+    /// second at rest, in which fix and barometer have spoken, too.
     #[must_use]
     pub fn start(&self) -> Option<Start> {
         let (Some(_), Some(_)) = (self.place, self.ground_pa) else { return None };
@@ -118,7 +120,8 @@ impl Sensors {
         Some(Start { ned_from_body, ..start })
     }
 
-    /// All sensors speak, it is known where a flight would begin, and the vehicle stands level and still.
+    /// All sensors speak, it is known where a flight would begin, and the vehicle stands level and
+    /// still.
     #[must_use]
     pub fn are_ready(&self, now_us: u64) -> bool {
         let speak = Reading::is_fresh(self.imu.as_ref(), now_us, IMU_AGE_US)
@@ -252,8 +255,8 @@ pub(crate) mod tests {
         let (mut sensors, mut now) = standing();
         for _ in 0..2000 {
             now += 3333;
-            let tilted =
-                Rotation::<Ned, Body, f32>::from_euler(0.25, 0.0, 0.0).inverse() * In::new(rest().1.vector);
+            let tilted = Rotation::<Ned, Body, f32>::from_euler(0.25, 0.0, 0.0).inverse()
+                * In::new(rest().1.vector);
             sensors.imu(In::zero(), tilted, now);
             sensors.fix(fix(), now);
             sensors.pressure(97_000.0, now);

@@ -1,12 +1,14 @@
 //! The flight code's setup (vehicle, gains, mission, weights), kept apart from the image.
 //!
-//! `squirrel export-vectors flight.mcap --out DIR` writes `DIR/setup-0.bin`, a file of vectors without frames: a header with magic
-//! and version, then one setup behind its length. It is flashed to a sector of its own, so that another vehicle is no other image.
+//! `squirrel export-vectors flight.mcap --out DIR` writes `DIR/setup-0.bin`, a file of vectors
+//! without frames: a header with magic and version, then one setup behind its length. It is flashed
+//! to a sector of its own, so that another vehicle is no other image.
 
 use squirrel_core::stack::Stack;
 use squirrel_core::stack::wire::{Header, Reader, Record, Wire};
 
-/// The setup at the start of these bytes; what follows it, as erased flash, is not looked at. `None` where it is none of this version.
+/// The setup at the start of these bytes; what follows it, as erased flash, is not looked at.
+/// `None` where it is none of this version.
 #[must_use]
 pub fn read(bytes: &[u8]) -> Option<Stack> {
     let (header, rest) = bytes.split_at_checked(Header::LENGTH)?;
@@ -50,6 +52,10 @@ pub(crate) mod tests {
         assert_eq!(read(&other), None);
         let mut header = [0; Header::LENGTH];
         Header { sequences: 1, frames: 1 }.put(&mut Writer::new(&mut header));
-        assert_eq!(read(&[&header[..], &SETUP[Header::LENGTH..]].concat()), None, "a flight is no setup");
+        assert_eq!(
+            read(&[&header[..], &SETUP[Header::LENGTH..]].concat()),
+            None,
+            "a flight is no setup"
+        );
     }
 }

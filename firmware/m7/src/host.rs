@@ -1,7 +1,7 @@
 //! Files of the host, and records in them, by semihosting.
 //!
-//! The debugger, here QEMU, opens and reads files for the program. Standard input and output of QEMU are files too
-//! (`/dev/stdin`), so that one program reads from a file or from a pipe alike.
+//! The debugger, here QEMU, opens and reads files for the program. Standard input and output of
+//! QEMU are files too (`/dev/stdin`), so that one program reads from a file or from a pipe alike.
 
 use core::fmt;
 use cortex_m_semihosting::{debug, nr, syscall};
@@ -31,7 +31,8 @@ impl File {
 
     fn with_mode(path: &[u8], mode: usize) -> Option<Self> {
         let length = path.len().checked_sub(1)?;
-        // SAFETY: the host reads `length` bytes and the zero behind them, all of which are in `path`.
+        // SAFETY: the host reads `length` bytes and the zero behind them, all of which are in
+        // `path`.
         let handle = unsafe { syscall!(OPEN, path.as_ptr(), mode, length) };
         (handle != usize::MAX).then_some(Self { handle })
     }
@@ -82,11 +83,14 @@ impl fmt::Write for File {
     }
 }
 
-/// The first argument after the program's name, with a zero behind it; `None` where there is none or it is too long.
+/// The first argument after the program's name, with a zero behind it; `None` where there is none
+/// or it is too long.
 pub fn argument(buffer: &mut [u8; 256]) -> Option<&[u8]> {
     let mut block = [buffer.as_mut_ptr() as usize, buffer.len()];
-    // SAFETY: the host writes at most as many bytes as the block says, into `buffer`, and the length into the block.
-    let failed = unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, block.as_mut_ptr() as usize) };
+    // SAFETY: the host writes at most as many bytes as the block says, into `buffer`, and the
+    // length into the block.
+    let failed =
+        unsafe { cortex_m_semihosting::syscall1(nr::GET_CMDLINE, block.as_mut_ptr() as usize) };
     let length = block[1];
     let line = buffer.get_mut(..length.checked_add(1)?).filter(|_| failed == 0)?;
     *line.last_mut()? = 0;

@@ -1,8 +1,9 @@
 //! Instructions by SysTick.
 //!
-//! Under QEMU's `-icount shift=6` an instruction takes 64 ns of virtual time, and SysTick on the core clock of the mps2-an500
-//! counts 40 ns each. So a difference of ticks is a count of instructions, exact and the same in every run, up to 10 million.
-//! They are instructions, not cycles: a real M7 issues up to two at once and waits for memory.
+//! Under QEMU's `-icount shift=6` an instruction takes 64 ns of virtual time, and SysTick on the
+//! core clock of the mps2-an500 counts 40 ns each. So a difference of ticks is a count of
+//! instructions, exact and the same in every run, up to 10 million. They are instructions, not
+//! cycles: a real M7 issues up to two at once and waits for memory.
 
 use cortex_m::peripheral::{SYST, syst::SystClkSource};
 

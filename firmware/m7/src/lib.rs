@@ -1,4 +1,5 @@
-//! What an emulated Cortex-M7 needs around the flight code: files of the host over semihosting, and a count of instructions.
+//! What an emulated Cortex-M7 needs around the flight code: files of the host over semihosting, and
+//! a count of instructions.
 
 #![no_std]
 

@@ -1,4 +1,5 @@
-//! The vehicles of the cases: drawn layouts, their numbers with tolerances, and the vehicle file that states them.
+//! The vehicles of the cases: drawn layouts, their numbers with tolerances, and the vehicle file
+//! that states them.
 
 use crate::catalogue::CLASS_MASS_KG;
 use crate::draw::Draw;
@@ -96,13 +97,23 @@ fn layout(draw: &mut Draw) -> Vec<([f64; 2], f64)> {
     match draw.index(5) {
         // Long X; diagonal pairs one after the other.
         0 => {
-            vec![([0.12, 0.085], 1.0), ([-0.12, -0.085], 1.0), ([0.12, -0.085], -1.0), ([-0.12, 0.085], -1.0)]
+            vec![
+                ([0.12, 0.085], 1.0),
+                ([-0.12, -0.085], 1.0),
+                ([0.12, -0.085], -1.0),
+                ([-0.12, 0.085], -1.0),
+            ]
         }
         // Square X numbered clockwise from the front left, as in the hobby's older tables.
         1 => vec![([0.1, -0.1], -1.0), ([0.1, 0.1], 1.0), ([-0.1, 0.1], -1.0), ([-0.1, -0.1], 1.0)],
         // Wide: arms longer to the sides.
         2 => {
-            vec![([0.08, 0.135], -1.0), ([-0.08, -0.135], -1.0), ([0.08, -0.135], 1.0), ([-0.08, 0.135], 1.0)]
+            vec![
+                ([0.08, 0.135], -1.0),
+                ([-0.08, -0.135], -1.0),
+                ([0.08, -0.135], 1.0),
+                ([-0.08, 0.135], 1.0),
+            ]
         }
         // Square X numbered from the back right.
         3 => vec![([-0.1, 0.1], 1.0), ([0.1, 0.1], -1.0), ([-0.1, -0.1], -1.0), ([0.1, -0.1], 1.0)],
@@ -120,12 +131,16 @@ impl Airframe {
     /// A vehicle: mostly of 0.45 to 0.8 kg, at times of 0.4 to 1.6 kg, everything scaled with it.
     pub fn draw(draw: &mut Draw) -> Self {
         let layout = layout(draw);
-        let mass_kg =
-            if draw.uniform(0.0, 1.0) < 0.85 { draw.uniform(0.45, 0.8) } else { draw.uniform(0.4, 1.6) };
+        let mass_kg = if draw.uniform(0.0, 1.0) < 0.85 {
+            draw.uniform(0.45, 0.8)
+        } else {
+            draw.uniform(0.4, 1.6)
+        };
         let mass_kg = round(mass_kg);
         let scale = mass_kg / CLASS_MASS_KG;
         let length = scale.cbrt();
-        let about = |draw: &mut Draw, x: f64, share: f64| round(x * draw.uniform(1.0 - share, 1.0 + share));
+        let about =
+            |draw: &mut Draw, x: f64, share: f64| round(x * draw.uniform(1.0 - share, 1.0 + share));
         let speed_max_rad_s = about(draw, 2200.0 / length, 0.15);
         let hover_share = draw.uniform(0.5, 0.58);
         let hover_speed = hover_share * speed_max_rad_s;
@@ -176,7 +191,8 @@ impl Airframe {
         }
         real.rotor_time_constant_s = off(draw, self.rotor_time_constant_s, t::ROTOR_LAG);
         // No airframe is driven by its drag.
-        real.drag_n_s_per_m = self.drag_n_s_per_m.map(|d| (d + draw.normal(t::DRAG_N_S_PER_M)).max(0.0));
+        real.drag_n_s_per_m =
+            self.drag_n_s_per_m.map(|d| (d + draw.normal(t::DRAG_N_S_PER_M)).max(0.0));
         real.drag_area_m2 = off(draw, self.drag_area_m2, t::DRAG_AREA);
         real.wing_area_m2 = off(draw, self.wing_area_m2, t::WING);
         real.wing_slope = off(draw, self.wing_slope, t::WING);
@@ -190,8 +206,8 @@ impl Airframe {
         (real, errors)
     }
 
-    /// A machine of a fleet that one file stands for: mass, thrust, inertia, drag and the place of the centre of mass are
-    /// each off by up to a tenth (the place: of the longest arm), evenly.
+    /// A machine of a fleet that one file stands for: mass, thrust, inertia, drag and the place of
+    /// the centre of mass are each off by up to a tenth (the place: of the longest arm), evenly.
     #[must_use]
     pub fn of_a_fleet(&self, draw: &mut Draw) -> Self {
         let mut off = |x: f64| x * (1.0 + draw.uniform(-FLEET, FLEET));
@@ -213,7 +229,8 @@ impl Airframe {
         other
     }
 
-    /// Thrust of a rotor at the speed at which all together carry the weight, over that at top speed.
+    /// Thrust of a rotor at the speed at which all together carry the weight, over that at top
+    /// speed.
     pub fn hover_command(&self) -> f64 {
         let squared: f64 = self.rotors.iter().map(|r| r.thrust_coefficient_n_s2).sum();
         (self.mass_kg * GRAVITY_M_S2 / squared).sqrt() / self.speed_max_rad_s
@@ -226,11 +243,18 @@ impl Airframe {
             "# Numbers and tolerances (1 sd) of a vehicle as its maker states them.\nname = \"bench\"\n",
         );
         let number = |text: &mut String, key: &str, value: f64, sd: f64| {
-            let _ = writeln!(text, "{key} = {{ value = {value:e}, sd = {:e}, {SOURCE} }}", round(sd));
+            let _ =
+                writeln!(text, "{key} = {{ value = {value:e}, sd = {:e}, {SOURCE} }}", round(sd));
         };
         let triple = |text: &mut String, key: &str, value: Vector3<f64>, sd: Vector3<f64>| {
-            let list = |v: Vector3<f64>| format!("[{:e}, {:e}, {:e}]", round(v.x), round(v.y), round(v.z));
-            let _ = writeln!(text, "{key} = {{ value = {}, sd = {}, {SOURCE} }}", list(value), list(sd));
+            let list =
+                |v: Vector3<f64>| format!("[{:e}, {:e}, {:e}]", round(v.x), round(v.y), round(v.z));
+            let _ = writeln!(
+                text,
+                "{key} = {{ value = {}, sd = {}, {SOURCE} }}",
+                list(value),
+                list(sd)
+            );
         };
         text += "\n[mass]\n";
         number(&mut text, "mass_kg", self.mass_kg, t::MASS * self.mass_kg);
@@ -243,17 +267,26 @@ impl Airframe {
             let _ = writeln!(text, "yaw_sign = {}", rotor.yaw_sign);
         }
         text += "\n[propulsion]\ncommand = \"speed_fraction\"\n";
-        let _ = writeln!(text, "speed_max_rad_s = {{ value = {:e}, {SOURCE} }}", self.speed_max_rad_s);
+        let _ =
+            writeln!(text, "speed_max_rad_s = {{ value = {:e}, {SOURCE} }}", self.speed_max_rad_s);
         let rotor = &self.rotors[0];
         let (thrust, torque) = (rotor.thrust_coefficient_n_s2, rotor.torque_coefficient_n_m_s2);
         number(&mut text, "thrust_coefficient_n_s2", thrust, t::THRUST * thrust);
         number(&mut text, "torque_coefficient_n_m_s2", torque, t::TORQUE * torque);
         let lag = self.rotor_time_constant_s;
         number(&mut text, "time_constant_s", lag, t::ROTOR_LAG * lag);
-        let _ =
-            writeln!(text, "reference_voltage_v = {{ value = {:e}, {SOURCE} }}", self.reference_voltage_v);
+        let _ = writeln!(
+            text,
+            "reference_voltage_v = {{ value = {:e}, {SOURCE} }}",
+            self.reference_voltage_v
+        );
         text += "\n[drag]\n";
-        triple(&mut text, "linear_n_s_per_m", self.drag_n_s_per_m, Vector3::repeat(t::DRAG_N_S_PER_M));
+        triple(
+            &mut text,
+            "linear_n_s_per_m",
+            self.drag_n_s_per_m,
+            Vector3::repeat(t::DRAG_N_S_PER_M),
+        );
         number(&mut text, "area_m2", self.drag_area_m2, t::DRAG_AREA * self.drag_area_m2);
         text += "\n[wing]\nmodel = \"flat\"\n";
         number(&mut text, "area_per_side_m2", self.wing_area_m2, t::WING * self.wing_area_m2);
@@ -304,7 +337,10 @@ mod tests {
             }
             assert_eq!(p.inertia_kg_m2.diagonal(), airframe.inertia_kg_m2);
             assert_eq!(p.drag.linear_n_s_per_m, airframe.drag_n_s_per_m);
-            assert_eq!(p.propulsion.thrust_coefficient_n_s2, airframe.rotors[0].thrust_coefficient_n_s2);
+            assert_eq!(
+                p.propulsion.thrust_coefficient_n_s2,
+                airframe.rotors[0].thrust_coefficient_n_s2
+            );
             hexas += usize::from(airframe.rotors.len() == 6);
         }
         assert!((5..25).contains(&hexas), "{hexas} of 60 are hexas");
@@ -331,7 +367,8 @@ mod tests {
             let (real, _) = airframe.individual(&mut Draw::new(seed));
             mass.push(real.mass_kg / airframe.mass_kg - 1.0);
             thrust.push(
-                real.rotors[0].thrust_coefficient_n_s2 / airframe.rotors[0].thrust_coefficient_n_s2 - 1.0,
+                real.rotors[0].thrust_coefficient_n_s2 / airframe.rotors[0].thrust_coefficient_n_s2
+                    - 1.0,
             );
         }
         let sd = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();

@@ -1,4 +1,5 @@
-//! Cases: what is drawn, what is hidden, and the files that go to the program and those that do not.
+//! Cases: what is drawn, what is hidden, and the files that go to the program and those that do
+//! not.
 
 use crate::airframe::{Airframe, SensorErrors};
 use crate::catalogue::{CATALOGUE, CLASS_MASS_KG, Entry, HiddenEffect};
@@ -97,7 +98,8 @@ impl CaseError {
 
 const STANDARD: &str = "standard";
 
-/// A case whose vehicle does not stay up is drawn anew so often: an effect near its largest can make a low hover impossible.
+/// A case whose vehicle does not stay up is drawn anew so often: an effect near its largest can
+/// make a low hover impossible.
 const REDRAWS: u64 = 12;
 
 /// Seeds of a case: its own, and those that are tried where the vehicle fell.
@@ -136,9 +138,11 @@ impl Case {
             Set::Outside => answer.outside = Some(Outside::draw(index, &mut draw, mass_kg, rotors)),
             Set::Sensors => answer.recorder = Recorder::Faulty(SensorFault::draw(index, &mut draw)),
             Set::Two => {
-                let partners: Vec<_> = CATALOGUE.iter().filter(|other| first.goes_with(other)).collect();
+                let partners: Vec<_> =
+                    CATALOGUE.iter().filter(|other| first.goes_with(other)).collect();
                 let second = partners[draw.index(partners.len())];
-                answer.effects = vec![one(&mut draw, first, STANDARD), one(&mut draw, second, STANDARD)];
+                answer.effects =
+                    vec![one(&mut draw, first, STANDARD), one(&mut draw, second, STANDARD)];
             }
             Set::OtherForm => {
                 let forms = forms();
@@ -146,7 +150,8 @@ impl Case {
                 answer.effects = vec![one(&mut draw, entry, form)];
             }
             Set::Overstated => {
-                // Few cases see all four kinds of overstatement, and four rounds see each with each effect.
+                // Few cases see all four kinds of overstatement, and four rounds see each with each
+                // effect.
                 let round = index / effects.len() + index / 2;
                 let drawn = Overstatement::draw(first, round, &mut draw, mass_kg, rotors);
                 if drawn.is_of_the_other_side() {
@@ -167,7 +172,8 @@ impl Case {
         Self { answer, nominal, seed }
     }
 
-    /// Draws a case and makes it in a folder, as [`Self::make`]; one that cannot be flown is drawn again.
+    /// Draws a case and makes it in a folder, as [`Self::make`]; one that cannot be flown is drawn
+    /// again.
     ///
     /// # Errors
     /// [`CaseError`]
@@ -199,9 +205,10 @@ impl Case {
         other
     }
 
-    /// Flies the case and writes `FOLDER/cases/ID/` (`vehicle.toml`, `train/`, `held-out/`, and `baseline/` where good
-    /// flights are given) and `FOLDER/answers/ID.json`, beside it the true vehicle as `ID.toml` where a patch is compared
-    /// with it. Returns the case's folder, which appears only when it is whole.
+    /// Flies the case and writes `FOLDER/cases/ID/` (`vehicle.toml`, `train/`, `held-out/`, and
+    /// `baseline/` where good flights are given) and `FOLDER/answers/ID.json`, beside it the true
+    /// vehicle as `ID.toml` where a patch is compared with it. Returns the case's folder, which
+    /// appears only when it is whole.
     ///
     /// # Errors
     /// [`CaseError`]
@@ -209,7 +216,8 @@ impl Case {
         let id = &self.answer.case;
         let (cases, answers) = (folder.join("cases"), folder.join("answers"));
         let names = self.flight_names();
-        let flights = (0..names.len()).map(|number| self.flight(number)).collect::<Result<Vec<_>, _>>()?;
+        let flights =
+            (0..names.len()).map(|number| self.flight(number)).collect::<Result<Vec<_>, _>>()?;
         let partial = cases.join(format!("{id}.partial"));
         let write = |path: &Path, text: &str| fs::write(path, text).map_err(CaseError::io(path));
         for (flight, name) in flights.iter().zip(names) {
@@ -228,7 +236,8 @@ impl Case {
         let answer = answers.join(format!("{id}.json"));
         write_json(&answer, &self.answer)?;
         if self.answer.misfit.is_some() {
-            let tables: String = self.answer.effects.iter().map(squirrel_made::effect_table).collect();
+            let tables: String =
+                self.answer.effects.iter().map(squirrel_made::effect_table).collect();
             write(&answer.with_extension("toml"), &(self.vehicle_toml() + &tables))?;
         }
         Ok(whole)
@@ -254,7 +263,8 @@ impl Case {
         self.nominal.individual(draw)
     }
 
-    /// Flight 0 and 1 of the training, 2 held out, 3 and 4 before anything was hidden, as its recorder writes it down.
+    /// Flight 0 and 1 of the training, 2 held out, 3 and 4 before anything was hidden, as its
+    /// recorder writes it down.
     ///
     /// # Errors
     /// [`CaseError::Flight`] if the vehicle does not stay up.
@@ -331,7 +341,8 @@ impl Case {
             hidden: format!("{:?} {:?}", self.answer.effects, self.answer.outside),
             reason,
         };
-        // What is unmodelled belongs to the vehicle: its size comes from the first flight, whichever is flown.
+        // What is unmodelled belongs to the vehicle: its size comes from the first flight,
+        // whichever is flown.
         let unmodelled = match self.answer.misfit {
             Some(misfit) => {
                 let first = Order { charge: charges[0], seed: mix(self.seed, 10), ..order.clone() };
@@ -346,7 +357,8 @@ impl Case {
         attempt(0).or_else(|_| attempt(1)).or_else(|_| attempt(2)).map_err(refused)
     }
 
-    /// The vehicle that everybody believes: what its file states, unless that says too much of something.
+    /// The vehicle that everybody believes: what its file states, unless that says too much of
+    /// something.
     pub fn nominal(&self) -> &Airframe {
         &self.nominal
     }
@@ -368,8 +380,10 @@ pub(crate) const GOOD_FROM: usize = 3;
 /// # Errors
 /// [`CaseError::Io`] if the disk refuses.
 pub fn write_json(path: &Path, value: &impl Serialize) -> Result<(), CaseError> {
-    let mut text = serde_json::to_string_pretty(value)
-        .map_err(|error| CaseError::Io { file: path.display().to_string(), source: error.into() })?;
+    let mut text = serde_json::to_string_pretty(value).map_err(|error| CaseError::Io {
+        file: path.display().to_string(),
+        source: error.into(),
+    })?;
     text.push('\n');
     let partial = path.with_extension("partial");
     fs::write(&partial, text).map_err(CaseError::io(&partial))?;
@@ -389,7 +403,9 @@ mod tests {
             assert!(hidden(Set::None).effects.is_empty() && hidden(Set::None).outside.is_none());
             assert_eq!(hidden(Set::Two).effects.len(), 2);
             assert_ne!(hidden(Set::OtherForm).effects[0].form, STANDARD);
-            assert!(hidden(Set::Outside).outside.is_some() && hidden(Set::Outside).effects.is_empty());
+            assert!(
+                hidden(Set::Outside).outside.is_some() && hidden(Set::Outside).effects.is_empty()
+            );
             assert_eq!(hidden(Set::NoiseX3).noise, 3.0);
         }
         let names: BTreeSet<_> = (0..CATALOGUE.len())
@@ -398,7 +414,8 @@ mod tests {
         assert_eq!(names.len(), CATALOGUE.len());
     }
 
-    /// Half of the cases of a half set hide one effect, half of them nothing; the other new sets hide what they say.
+    /// Half of the cases of a half set hide one effect, half of them nothing; the other new sets
+    /// hide what they say.
     #[test]
     fn new_sets_hide_what_they_say() {
         for index in 0..60 {
@@ -415,8 +432,8 @@ mod tests {
             let share = misfit.misfit.unwrap().share;
             assert!((0.1..0.25).contains(&share) && misfit.effects.len() == 1);
         }
-        let stated =
-            (0..28).map(|index| Case::draw(Set::Overstated, index, 1).answer.stated.unwrap().effect.name);
+        let stated = (0..28)
+            .map(|index| Case::draw(Set::Overstated, index, 1).answer.stated.unwrap().effect.name);
         let names: BTreeSet<_> = stated.collect();
         assert!(names.len() == 28 && !names.contains("gust"));
     }

@@ -1,7 +1,7 @@
 //! The effects that a case may hide, their sizes, and which two go together.
 //!
-//! Names, keys and ranges are the vehicle file's. Sizes with a unit of force, moment or mass are drawn above the lower end
-//! for vehicles heavier than the class that the ranges were made for.
+//! Names, keys and ranges are the vehicle file's. Sizes with a unit of force, moment or mass are
+//! drawn above the lower end for vehicles heavier than the class that the ranges were made for.
 
 use crate::draw::Draw;
 use crate::independent::twins::{Equation, angular_damping, flapping_moment};
@@ -66,10 +66,12 @@ impl HiddenEffect {
         let quantities = entry.map_or(&[][..], |entry| entry.quantities);
         let sizes = quantities.iter().filter_map(|quantity| match *quantity {
             // The length of a load's line says how it swings, not how much of it there is.
-            Quantity::Size { key: "length_m", .. } | Quantity::Rotor { .. } | Quantity::OneOf { .. } => None,
-            Quantity::Size { key, .. } | Quantity::Extensive { key, .. } | Quantity::Signed { key, .. } => {
-                Some(vec![key])
-            }
+            Quantity::Size { key: "length_m", .. }
+            | Quantity::Rotor { .. }
+            | Quantity::OneOf { .. } => None,
+            Quantity::Size { key, .. }
+            | Quantity::Extensive { key, .. }
+            | Quantity::Signed { key, .. } => Some(vec![key]),
             Quantity::Plane { keys, .. } => Some(keys.to_vec()),
             Quantity::Space { keys, .. } => Some(keys.to_vec()),
         });
@@ -118,7 +120,8 @@ pub struct Entry {
     pub name: &'static str,
     /// Other published forms that the independent generator can fly.
     pub forms: &'static [&'static str],
-    /// Channels of the residual that it must show in, where its equation has a file of its own: force x, y, z, moment x, y, z.
+    /// Channels of the residual that it must show in, where its equation has a file of its own:
+    /// force x, y, z, moment x, y, z.
     pub shows: &'static [usize],
     /// That equation.
     pub(crate) equation: Option<Equation>,
@@ -160,28 +163,62 @@ const AXIS: Quantity = Quantity::OneOf { key: "axis", names: &["x", "y", "z"] };
 const SIDE: Quantity = Quantity::OneOf { key: "side", names: &["left", "right"] };
 const WIND: Quantity =
     Quantity::Plane { keys: ["wind_north_m_s", "wind_east_m_s"], smallest: 1.5, largest: 6.0 };
-const CG: Quantity = Quantity::Plane { keys: ["cg_x_m", "cg_y_m"], smallest: 0.003, largest: 0.012 };
+const CG: Quantity =
+    Quantity::Plane { keys: ["cg_x_m", "cg_y_m"], smallest: 0.003, largest: 0.012 };
 const TILT: Quantity =
     Quantity::Plane { keys: ["tilt_x_rad", "tilt_y_rad"], smallest: DEGREE, largest: 4.0 * DEGREE };
-const BIAS: Quantity =
-    Quantity::Space { keys: ["bias_x_m_s2", "bias_y_m_s2", "bias_z_m_s2"], smallest: 0.15, largest: 0.6 };
+const BIAS: Quantity = Quantity::Space {
+    keys: ["bias_x_m_s2", "bias_y_m_s2", "bias_z_m_s2"],
+    smallest: 0.15,
+    largest: 0.6,
+};
 
 /// The whole catalogue.
 pub const CATALOGUE: &[Entry] = &[
-    entry("linear_drag", Kind::Drag, &["anisotropic"], &[extensive("extra_drag_n_s_per_m", 0.04, 0.25)]),
-    entry("quadratic_drag", Kind::Drag, &["anisotropic"], &[extensive("extra_drag_area_m2", 0.008, 0.05)]),
+    entry(
+        "linear_drag",
+        Kind::Drag,
+        &["anisotropic"],
+        &[extensive("extra_drag_n_s_per_m", 0.04, 0.25)],
+    ),
+    entry(
+        "quadratic_drag",
+        Kind::Drag,
+        &["anisotropic"],
+        &[extensive("extra_drag_area_m2", 0.008, 0.05)],
+    ),
     entry("constant_wind", Kind::SlowForce, &["log_profile"], &[WIND]),
     entry("gust", Kind::SlowForce, &["dryden"], &[size("sigma_m_s", 0.8, 2.5)]),
-    entry("ground_effect", Kind::Ground, &["exponential"], &[size("effective_radius_m", 0.25, 0.55)]),
-    entry("battery_sag", Kind::Thrust, &["linear", "load_dependent"], &[size("voltage_exponent", 0.4, 1.0)]),
+    entry(
+        "ground_effect",
+        Kind::Ground,
+        &["exponential"],
+        &[size("effective_radius_m", 0.25, 0.55)],
+    ),
+    entry(
+        "battery_sag",
+        Kind::Thrust,
+        &["linear", "load_dependent"],
+        &[size("voltage_exponent", 0.4, 1.0)],
+    ),
     entry("thrust_coefficient", Kind::Thrust, &[], &[signed("thrust_fraction", 0.04, 0.15)]),
-    entry("motor_lag", Kind::Actuation, &["asymmetric"], &[size("extra_time_constant_s", 0.015, 0.06)]),
+    entry(
+        "motor_lag",
+        Kind::Actuation,
+        &["asymmetric"],
+        &[size("extra_time_constant_s", 0.015, 0.06)],
+    ),
     entry("weak_rotor", Kind::Thrust, &[], &[ROTOR, size("thrust_loss_fraction", 0.05, 0.2)]),
     entry("mass_error", Kind::Thrust, &[], &[signed("mass_fraction", 0.04, 0.2)]),
     entry("inertia_error", Kind::Moment, &[], &[AXIS, signed("inertia_fraction", 0.12, 0.4)]),
     entry("cg_offset", Kind::Moment, &[], &[CG]),
     entry("thrust_misalignment", Kind::SlowForce, &[], &[TILT]),
-    entry("translational_lift", Kind::Lift, &["linear", "quadratic"], &[size("gain_s2_per_m2", 6e-4, 3e-3)]),
+    entry(
+        "translational_lift",
+        Kind::Lift,
+        &["linear", "quadratic"],
+        &[size("gain_s2_per_m2", 6e-4, 3e-3)],
+    ),
     entry("axial_inflow", Kind::Lift, &[], &[size("gain_s_per_m", 0.012, 0.06)]),
     flapping_moment::ENTRY,
     entry("rotor_gyro_torque", Kind::Yaw, &[], &[extensive("rotor_inertia_kg_m2", 4e-6, 2e-5)]),
@@ -192,7 +229,10 @@ pub const CATALOGUE: &[Entry] = &[
         "wing_membrane",
         Kind::Wing,
         &["speed_dependent"],
-        &[signed("gain", 0.12, 0.45), signed("angle_of_attack_offset_rad", 1.5 * DEGREE, 6.0 * DEGREE)],
+        &[
+            signed("gain", 0.12, 0.45),
+            signed("angle_of_attack_offset_rad", 1.5 * DEGREE, 6.0 * DEGREE),
+        ],
     ),
     entry("wing_asymmetry", Kind::Wing, &[], &[SIDE, size("loss_fraction", 0.12, 0.5)]),
     entry("wing_servo_lag", Kind::Wing, &[], &[size("extra_time_constant_s", 0.12, 0.5)]),
@@ -209,7 +249,8 @@ pub const CATALOGUE: &[Entry] = &[
     ),
 ];
 
-/// Pairs of different kinds that flights tell apart only by the tolerances, or where one hides the other's only sign.
+/// Pairs of different kinds that flights tell apart only by the tolerances, or where one hides the
+/// other's only sign.
 const CONFOUNDED: [[&str; 2]; 8] = [
     ["weak_rotor", "cg_offset"],
     ["inertia_error", "yaw_torque_coeff"],
@@ -239,7 +280,11 @@ impl Entry {
         rotors: usize,
     ) -> HiddenEffect {
         let raised = |smallest: f64, largest: f64| {
-            if factor > 1.0 { (factor * smallest).min(0.7 * largest).max(smallest) } else { smallest }
+            if factor > 1.0 {
+                (factor * smallest).min(0.7 * largest).max(smallest)
+            } else {
+                smallest
+            }
         };
         let mut parameters = BTreeMap::new();
         let mut put = |key: &str, value: Value| parameters.insert(key.to_owned(), value);
@@ -254,15 +299,22 @@ impl Entry {
                     put(key, Value::Number(draw.uniform(least, largest)));
                 }
                 Quantity::Signed { key, smallest, largest } => {
-                    put(key, Value::Number(draw.sign() * draw.uniform(raised(smallest, largest), largest)));
+                    put(
+                        key,
+                        Value::Number(
+                            draw.sign() * draw.uniform(raised(smallest, largest), largest),
+                        ),
+                    );
                 }
                 Quantity::Plane { keys, smallest, largest } => {
-                    let (length, angle) = (draw.uniform(raised(smallest, largest), largest), draw.angle());
+                    let (length, angle) =
+                        (draw.uniform(raised(smallest, largest), largest), draw.angle());
                     put(keys[0], Value::Number(length * angle.cos()));
                     put(keys[1], Value::Number(length * angle.sin()));
                 }
                 Quantity::Space { keys, smallest, largest } => {
-                    let (length, angle) = (draw.uniform(raised(smallest, largest), largest), draw.angle());
+                    let (length, angle) =
+                        (draw.uniform(raised(smallest, largest), largest), draw.angle());
                     let up = draw.uniform(-1.0, 1.0);
                     let flat = (1.0 - up * up).sqrt();
                     for (key, x) in keys.iter().zip([flat * angle.cos(), flat * angle.sin(), up]) {
@@ -283,7 +335,10 @@ impl Entry {
     /// Whether its sizes have both signs in the catalogue.
     pub fn is_signed(&self) -> bool {
         let signed = |quantity: &Quantity| {
-            matches!(quantity, Quantity::Signed { .. } | Quantity::Plane { .. } | Quantity::Space { .. })
+            matches!(
+                quantity,
+                Quantity::Signed { .. } | Quantity::Plane { .. } | Quantity::Space { .. }
+            )
         };
         self.quantities.iter().any(signed)
     }
@@ -326,7 +381,10 @@ mod tests {
             let rotor = entry("weak_rotor").draw(&mut draw, "standard", 0.5, 6).number("rotor");
             assert!((1.0..=6.0).contains(&rotor) && rotor.fract() == 0.0);
             let heavy = entry("added_mass").draw(&mut draw, "standard", 1.6, 4).number("mass_kg");
-            assert!((0.0876..0.15).contains(&heavy), "a heavy vehicle shows only much of it: {heavy}");
+            assert!(
+                (0.0876..0.15).contains(&heavy),
+                "a heavy vehicle shows only much of it: {heavy}"
+            );
         }
         assert!((60..140).contains(&positive));
     }

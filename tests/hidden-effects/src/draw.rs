@@ -1,4 +1,5 @@
-//! Everything that is drawn at random comes from here: one generator a purpose, each from its own seed.
+//! Everything that is drawn at random comes from here: one generator a purpose, each from its own
+//! seed.
 
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};

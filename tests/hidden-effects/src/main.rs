@@ -1,4 +1,5 @@
-//! `hidden-effects make`: cases and their answers in a folder. `hidden-effects bench`: the program's score on them.
+//! `hidden-effects make`: cases and their answers in a folder. `hidden-effects bench`: the
+//! program's score on them.
 #![allow(clippy::print_stderr, clippy::print_stdout, reason = "this is where the program speaks")]
 
 use hidden_effects::bench::{self, Plan};
@@ -68,12 +69,14 @@ fn score(options: &Options) -> Result<(), String> {
     let run = if options.get("score-again").is_some() { bench::score_again } else { bench::run };
     let outcomes = run(&plan).map_err(|error| error.to_string());
     if temporary.exists() {
-        std::fs::remove_dir_all(&temporary).map_err(|error| format!("{}: {error}", temporary.display()))?;
+        std::fs::remove_dir_all(&temporary)
+            .map_err(|error| format!("{}: {error}", temporary.display()))?;
     }
     let summary = bench::summarise(seed, outcomes?);
     print!("{}", summary.table());
     if let Some(json) = options.get("json") {
-        hidden_effects::case::write_json(Path::new(json), &summary).map_err(|error| error.to_string())?;
+        hidden_effects::case::write_json(Path::new(json), &summary)
+            .map_err(|error| error.to_string())?;
     }
     Ok(())
 }

@@ -9,7 +9,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 #[allow(clippy::large_enum_variant, reason = "there is one in a flight")]
-#[allow(missing_docs, reason = "keys say quantity and unit; the equations are the independent generator's")]
+#[allow(
+    missing_docs,
+    reason = "keys say quantity and unit; the equations are the independent generator's"
+)]
 pub enum Outside {
     /// Something falls off.
     MassLost { mass_fraction: f64, at_s: f64 },
@@ -72,8 +75,8 @@ pub enum Makes {
     ThrustFactor,
 }
 
-/// `size * axis * shape(first . x, second . x)`, `x` motion and commands over what is usual; late by a lag, and there only
-/// where another sum is positive.
+/// `size * axis * shape(first . x, second . x)`, `x` motion and commands over what is usual; late
+/// by a lag, and there only where another sum is positive.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "the equation above says what each is")]
 pub struct Formula {
@@ -90,7 +93,8 @@ pub struct Formula {
 
 impl Formula {
     const SHAPES: [Shape; 5] = [Shape::Sin, Shape::Tanh, Shape::Square, Shape::Abs, Shape::Product];
-    const MAKES: [Makes; 4] = [Makes::BodyForce, Makes::Moment, Makes::NedForce, Makes::ThrustFactor];
+    const MAKES: [Makes; 4] =
+        [Makes::BodyForce, Makes::Moment, Makes::NedForce, Makes::ThrustFactor];
 
     /// Shape and what it makes go by the number, everything else is drawn.
     fn draw(number: usize, draw: &mut Draw, heavy: f64) -> Self {
@@ -118,7 +122,8 @@ impl Formula {
         }
     }
 
-    /// The function of the two sums; of usual motion it is about 1 in size, and about 0 in the mean.
+    /// The function of the two sums; of usual motion it is about 1 in size, and about 0 in the
+    /// mean.
     pub fn of(&self, a: f64, b: f64) -> f64 {
         match self.shape {
             Shape::Sin => (2.0 * a).sin(),
@@ -156,8 +161,9 @@ impl Outside {
     /// A kind by its number, 0 to [`Self::KINDS`], in sizes that matter for such a vehicle.
     pub fn draw(kind: usize, draw: &mut Draw, mass_kg: f64, rotors: usize) -> Self {
         let heavy = mass_kg / CLASS_MASS_KG;
-        let place =
-            |draw: &mut Draw, radius: f64| (draw.uniform(-radius, radius), draw.uniform(-radius, radius));
+        let place = |draw: &mut Draw, radius: f64| {
+            (draw.uniform(-radius, radius), draw.uniform(-radius, radius))
+        };
         let half_time_s = draw.uniform(14.0, 24.0);
         if kind % 2 == 1 {
             return Self::Formula(Formula::draw(kind / 2 % Self::BY_HAND, draw, heavy));
@@ -167,7 +173,12 @@ impl Outside {
             1 => {
                 let (north_m, east_m) = place(draw, 3.0);
                 let stiffness_n_per_m = heavy * draw.uniform(0.08, 0.16);
-                Self::Tether { stiffness_n_per_m, length_m: draw.uniform(2.0, 4.0), north_m, east_m }
+                Self::Tether {
+                    stiffness_n_per_m,
+                    length_m: draw.uniform(2.0, 4.0),
+                    north_m,
+                    east_m,
+                }
             }
             2 => {
                 let (north_m, east_m) = place(draw, 2.0);
@@ -202,7 +213,10 @@ impl Outside {
                 slope: draw.uniform(1.2, 2.2),
                 above_hover: draw.uniform(0.005, 0.02),
             },
-            10 => Self::HeadingSideForce { force_n: heavy * draw.uniform(0.4, 0.8), phase_rad: draw.angle() },
+            10 => Self::HeadingSideForce {
+                force_n: heavy * draw.uniform(0.4, 0.8),
+                phase_rad: draw.angle(),
+            },
             11 => Self::Slosh {
                 frequency_hz: draw.uniform(0.7, 1.5),
                 mass_kg: heavy * draw.uniform(0.03, 0.06),
@@ -223,7 +237,9 @@ impl Outside {
                 distance_m: draw.uniform(0.5, 1.5),
                 direction_rad: draw.angle(),
             },
-            _ => Self::WingJam { deployment: draw.uniform(0.3, 0.6), from_s: draw.uniform(4.0, 8.0) },
+            _ => {
+                Self::WingJam { deployment: draw.uniform(0.3, 0.6), from_s: draw.uniform(4.0, 8.0) }
+            }
         }
     }
 }
@@ -234,8 +250,9 @@ mod tests {
 
     #[test]
     fn every_number_is_another_kind() {
-        let mut names: Vec<_> =
-            (0..Outside::KINDS).map(|kind| Outside::draw(kind, &mut Draw::new(1), 0.5, 4).name()).collect();
+        let mut names: Vec<_> = (0..Outside::KINDS)
+            .map(|kind| Outside::draw(kind, &mut Draw::new(1), 0.5, 4).name())
+            .collect();
         let formulas = names.iter().filter(|name| name.starts_with("formula_")).count();
         assert_eq!(2 * formulas, Outside::KINDS);
         names.sort();

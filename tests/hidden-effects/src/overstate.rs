@@ -1,4 +1,5 @@
-//! Vehicle files that say more of an effect than there is: in `[effects.NAME]`, or in a number of the vehicle itself.
+//! Vehicle files that say more of an effect than there is: in `[effects.NAME]`, or in a number of
+//! the vehicle itself.
 
 use crate::airframe::Airframe;
 use crate::catalogue::{Entry, HiddenEffect, Value};
@@ -26,12 +27,14 @@ pub struct Overstatement {
 /// Part of what the file says that is there.
 const PART: [f64; 2] = [0.3, 0.6];
 
-/// Effects whose size is positive in the catalogue and has another side in the world: a rotor that is stronger than its
-/// neighbours, lift, inflow and flapping against the usual sign. Only the independent generator flies them.
-const OTHER_SIDE: [&str; 4] = ["weak_rotor", "translational_lift", "axial_inflow", "flapping_moment"];
+/// Effects whose size is positive in the catalogue and has another side in the world: a rotor that
+/// is stronger than its neighbours, lift, inflow and flapping against the usual sign. Only the
+/// independent generator flies them.
+const OTHER_SIDE: [&str; 4] =
+    ["weak_rotor", "translational_lift", "axial_inflow", "flapping_moment"];
 
-/// Effects that a number of the vehicle has too. A moment of inertia is not among them: too high by much, it is that of no
-/// body, and no file may have it.
+/// Effects that a number of the vehicle has too. A moment of inertia is not among them: too high by
+/// much, it is that of no body, and no file may have it.
 const IN_BASE: [&str; 7] = [
     "linear_drag",
     "quadratic_drag",
@@ -43,8 +46,9 @@ const IN_BASE: [&str; 7] = [
 ];
 
 impl Overstatement {
-    /// The case of a number in the set, whose effects come in rounds: in four rounds each effect is there in part, not at
-    /// all, in part with the file's own number too high, and with the opposite sign, as far as that exists.
+    /// The case of a number in the set, whose effects come in rounds: in four rounds each effect is
+    /// there in part, not at all, in part with the file's own number too high, and with the
+    /// opposite sign, as far as that exists.
     pub fn draw(entry: &Entry, round: usize, draw: &mut Draw, mass_kg: f64, rotors: usize) -> Self {
         let part = draw.uniform(PART[0], PART[1]);
         let in_base = round % 4 == 2 && IN_BASE.contains(&entry.name);
@@ -54,8 +58,10 @@ impl Overstatement {
             1 | 3 => 0.0,
             _ => part,
         };
-        // What is to be found is the difference: it must not be below the smallest that is worth reporting.
-        let effect = entry.draw_above(1.0 / (1.0 - share.max(0.0)), draw, "standard", mass_kg, rotors);
+        // What is to be found is the difference: it must not be below the smallest that is worth
+        // reporting.
+        let effect =
+            entry.draw_above(1.0 / (1.0 - share.max(0.0)), draw, "standard", mass_kg, rotors);
         let real = (share != 0.0).then(|| effect.scaled(share));
         Self { stated: Stated { effect, in_base }, real }
     }
@@ -63,7 +69,8 @@ impl Overstatement {
     /// Whether squirrel's own vehicle files refuse what flies.
     pub fn is_of_the_other_side(&self) -> bool {
         let negative = |real: &HiddenEffect| real.parameters.values().any(is_negative);
-        OTHER_SIDE.contains(&self.stated.effect.name.as_str()) && self.real.as_ref().is_some_and(negative)
+        OTHER_SIDE.contains(&self.stated.effect.name.as_str())
+            && self.real.as_ref().is_some_and(negative)
     }
 }
 
@@ -101,8 +108,9 @@ impl Stated {
         file
     }
 
-    /// What the patched file says in all of a parameter, given the number of a verdict. That of an effect whose table is
-    /// there is the table's new number; where the vehicle's own number has it, it adds to that.
+    /// What the patched file says in all of a parameter, given the number of a verdict. That of an
+    /// effect whose table is there is the table's new number; where the vehicle's own number has
+    /// it, it adds to that.
     fn total(&self, key: &str, said: f64) -> f64 {
         let file = self.effect.number(key);
         if !self.in_base {
@@ -114,10 +122,15 @@ impl Stated {
         }
     }
 
-    /// Whether the patched file is near what flies: every size of the effect has lost most of what it was off by.
+    /// Whether the patched file is near what flies: every size of the effect has lost most of what
+    /// it was off by.
     ///
     /// * `said` - numbers of the verdict by key
-    pub fn is_mended(&self, real: Option<&HiddenEffect>, said: impl Fn(&str) -> Option<f64>) -> bool {
+    pub fn is_mended(
+        &self,
+        real: Option<&HiddenEffect>,
+        said: impl Fn(&str) -> Option<f64>,
+    ) -> bool {
         let sizes = self.effect.sizes();
         !sizes.is_empty()
             && sizes.iter().all(|keys| {
@@ -125,7 +138,8 @@ impl Stated {
                 for key in keys {
                     let truth = real.map_or(0.0, |real| real.number(key));
                     // A key that the verdict lacks stays as the file has it.
-                    let total = said(key).map_or(self.effect.number(key), |said| self.total(key, said));
+                    let total =
+                        said(key).map_or(self.effect.number(key), |said| self.total(key, said));
                     off = off.hypot(self.effect.number(key) - truth);
                     left = left.hypot(total - truth);
                 }
@@ -157,13 +171,18 @@ mod tests {
         let (mut negative, mut based) = (0, 0);
         for (entry, round, drawn) in each() {
             for keys in drawn.stated.effect.sizes() {
-                let norm =
-                    |of: &dyn Fn(&str) -> f64| keys.iter().map(|key| of(key).powi(2)).sum::<f64>().sqrt();
+                let norm = |of: &dyn Fn(&str) -> f64| {
+                    keys.iter().map(|key| of(key).powi(2)).sum::<f64>().sqrt()
+                };
                 let file = norm(&|key| drawn.stated.effect.number(key));
                 let real = norm(&|key| drawn.real.as_ref().map_or(0.0, |real| real.number(key)));
                 let part = real / file;
                 // The length of a load's line is right in the file.
-                assert!(part == 0.0 || (0.3..=0.6).contains(&part), "{} {round}: {part}", entry.name);
+                assert!(
+                    part == 0.0 || (0.3..=0.6).contains(&part),
+                    "{} {round}: {part}",
+                    entry.name
+                );
             }
             negative += usize::from(drawn.is_of_the_other_side());
             based += usize::from(drawn.stated.in_base);

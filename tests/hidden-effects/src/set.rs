@@ -36,7 +36,8 @@ pub enum Set {
     Overstated,
     /// One effect beside unmodelled, coloured forces and moments.
     Misfit,
-    /// A vehicle that is off its file, with good flights of its own; then one effect more, or nothing.
+    /// A vehicle that is off its file, with good flights of its own; then one effect more, or
+    /// nothing.
     Baseline,
 }
 
@@ -126,18 +127,21 @@ impl Set {
         match self {
             Self::Capture => of(&CAPTURED),
             Self::Misfit => of(&BESIDE_MISFIT),
-            // Gusts have no size that a file could state too large: what blows on one day is not what blows on another.
+            // Gusts have no size that a file could state too large: what blows on one day is not
+            // what blows on another.
             Self::Overstated => CATALOGUE.iter().filter(|entry| entry.name != "gust").collect(),
             _ => CATALOGUE.iter().collect(),
         }
     }
 }
 
-/// What position and attitude from outside, commands and voltage can show. Slow forces: drag, wind, lift over speed and
-/// climb, the wings' and the ground's, thrust that follows the voltage or is off, weight, a load that swings below 1 Hz, a
-/// thrust axis that leans. Trim, that is the moment that is commanded all the time: a weak rotor, a centre of mass beside
-/// the rotors' middle, one wing weaker than the other. Not on it: what shows above 3 Hz only, where attitude that is
-/// differentiated twice is noise (lags, latencies, gyroscopic torque, damping, inertia), and the sensors that are not there.
+/// What position and attitude from outside, commands and voltage can show. Slow forces: drag, wind,
+/// lift over speed and climb, the wings' and the ground's, thrust that follows the voltage or is
+/// off, weight, a load that swings below 1 Hz, a thrust axis that leans. Trim, that is the moment
+/// that is commanded all the time: a weak rotor, a centre of mass beside the rotors' middle, one
+/// wing weaker than the other. Not on it: what shows above 3 Hz only, where attitude that is
+/// differentiated twice is noise (lags, latencies, gyroscopic torque, damping, inertia), and the
+/// sensors that are not there.
 pub const CAPTURED: [&str; 15] = [
     "linear_drag",
     "quadratic_drag",
@@ -156,8 +160,8 @@ pub const CAPTURED: [&str; 15] = [
     "payload_swing",
 ];
 
-/// Forces and moments that follow from motion and commands. Not on it: gusts, which are an unmodelled force themselves, and
-/// errors of sensors and clocks, which are no force.
+/// Forces and moments that follow from motion and commands. Not on it: gusts, which are an
+/// unmodelled force themselves, and errors of sensors and clocks, which are no force.
 pub const BESIDE_MISFIT: [&str; 21] = [
     "linear_drag",
     "quadratic_drag",
@@ -193,9 +197,11 @@ pub enum Generator {
 }
 
 impl Generator {
-    /// Each flies every other case of a set, and so every effect and form. What no catalogue has, only one can fly.
+    /// Each flies every other case of a set, and so every effect and form. What no catalogue has,
+    /// only one can fly.
     pub(crate) fn of(set: Set, index: usize) -> Self {
-        // Of an even number of forms or effects: the generators change places from one round to the next.
+        // Of an even number of forms or effects: the generators change places from one round to the
+        // next.
         let turn = match set {
             Set::Outside | Set::Misfit => return Self::Independent,
             Set::OtherForm => index + index / forms().len(),

@@ -1,4 +1,5 @@
-//! The image for the real part: linted, what needs no hardware tested here, built, sized. Nothing runs it.
+//! The image for the real part: linted, what needs no hardware tested here, built, sized. Nothing
+//! runs it.
 
 use super::elf::Elf;
 use super::{Figures, build};
@@ -8,12 +9,17 @@ use std::process::Command;
 
 const PACKAGE: &str = "--package=squirrel-h747";
 
-/// Checks format and lints of the firmware's workspace, and tests the parts of the image that need no hardware.
+/// Checks format and lints of the firmware's workspace, and tests the parts of the image that need
+/// no hardware.
 ///
 /// # Errors
 /// What clippy or a test says.
 pub(super) fn check() -> Result<(), String> {
-    call(Command::new("cargo").args(["fmt", "--all", "--check"]).current_dir(root()?.join("firmware")))?;
+    call(
+        Command::new("cargo")
+            .args(["fmt", "--all", "--check"])
+            .current_dir(root()?.join("firmware")),
+    )?;
     let host = output(Command::new("rustc").arg("-vV"));
     let host = host.as_deref().and_then(host_of).ok_or("rustc -vV: names no host")?;
     for arguments in [
@@ -23,7 +29,9 @@ pub(super) fn check() -> Result<(), String> {
     ] {
         let Some(mut command) = thumb::plain(arguments)? else {
             // Its compiler has no clippy, and no libraries of the host.
-            eprintln!("firmware: lints and tests on the host left out: core is built from Debian's sources");
+            eprintln!(
+                "firmware: lints and tests on the host left out: core is built from Debian's sources"
+            );
             return Ok(());
         };
         if arguments[0] == "clippy" {

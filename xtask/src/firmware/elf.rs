@@ -42,11 +42,16 @@ impl Elf {
     fn read(bytes: &[u8]) -> Option<Self> {
         let table = word(bytes, 32)? as usize;
         let (entry, count, names) = (half(bytes, 46)?, half(bytes, 48)?, half(bytes, 50)?);
-        let header =
-            |i: u16, field: usize| word(bytes, table + usize::from(i) * usize::from(entry) + 4 * field);
+        let header = |i: u16, field: usize| {
+            word(bytes, table + usize::from(i) * usize::from(entry) + 4 * field)
+        };
         let content = |i: u16| {
             let (from, size) = (header(i, 4)? as usize, header(i, 5)? as usize);
-            if header(i, 1)? == NO_BITS { Some(&[][..]) } else { bytes.get(from..from.checked_add(size)?) }
+            if header(i, 1)? == NO_BITS {
+                Some(&[][..])
+            } else {
+                bytes.get(from..from.checked_add(size)?)
+            }
         };
         let (mut sections, mut symbols) = (Vec::new(), Vec::new());
         for i in 0..count {

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 
 /// Where they are recorded.
 pub(super) const FIGURES: &str = "firmware/figures.txt";
-/// A figure that grows by more than this is an error: compilers differ a little, careless code more.
+/// A figure that grows by more than this is an error: compilers differ a little, careless code
+/// more.
 const GROWTH_ALLOWED: f64 = 0.05;
 /// Clock of the real part, and rate of the step, Hz.
 const CLOCK_HZ: f64 = 480e6;
@@ -22,7 +23,8 @@ const WHOLE_WORST: &str = "whole step, worst, instructions";
 const CONTROL_TEXT: &str = "control image: text, B";
 const STATE: &str = "state, B";
 
-/// Largest of all flights, and where a line of the image `play` has it. Inner and outer are control without the estimator.
+/// Largest of all flights, and where a line of the image `play` has it. Inner and outer are control
+/// without the estimator.
 pub(super) const OF_ANY_FLIGHT: [(&str, usize); 8] = [
     ("inner step, mean of the worst arm, instructions", 6),
     (INNER, 7),
@@ -67,7 +69,10 @@ pub(super) fn check_budget(measured: &Figures) -> Result<(), String> {
 }
 
 /// Name, budget, recorded and measured figure a line, and what grew.
-pub(super) fn compare(measured: &Figures, recorded: &BTreeMap<String, u64>) -> (String, Vec<&'static str>) {
+pub(super) fn compare(
+    measured: &Figures,
+    recorded: &BTreeMap<String, u64>,
+) -> (String, Vec<&'static str>) {
     let mut text = format!("{:<62} {:>7} {:>9} {:>9}\n", "figure", "budget", "recorded", "now");
     let mut grown = Vec::new();
     for (name, now) in measured {
@@ -106,8 +111,11 @@ pub(super) fn parse(text: &str) -> Result<BTreeMap<String, u64>, String> {
     let lines = text.lines().filter(|line| !line.starts_with('#'));
     lines
         .map(|line| {
-            let entry = line.rsplit_once(": ").and_then(|(name, n)| Some((name.to_owned(), n.parse().ok()?)));
-            entry.ok_or_else(|| format!("{FIGURES}: `{line}`: must be a name, a colon and a number"))
+            let entry = line
+                .rsplit_once(": ")
+                .and_then(|(name, n)| Some((name.to_owned(), n.parse().ok()?)));
+            entry
+                .ok_or_else(|| format!("{FIGURES}: `{line}`: must be a name, a colon and a number"))
         })
         .collect()
 }

@@ -1,12 +1,17 @@
-//! The flight code on a Cortex-M7: built, played against the host bit for bit, measured, compared with recorded figures.
+//! The flight code on a Cortex-M7: built, played against the host bit for bit, measured, compared
+//! with recorded figures.
 //!
-//! 1. Every arm flies the avoidance manoeuvre here, and a policy commands one; QEMU plays the recorded frames and must say the
-//!    same hashes. So it must for a hundred pieces of flight in which a sensor fails.
+//! 1. Every arm flies the avoidance manoeuvre here, and a policy commands one; QEMU plays the
+//!    recorded frames and must say the same hashes. So it must for a hundred pieces of flight in
+//!    which a sensor fails.
 //! 2. A flight with the flight code in QEMU must leave the same log, byte for byte, as one without.
-//! 3. Negative controls: another mass by one bit must change the hashes, a step that may panic must not link.
-//! 4. The workspace is linted; the image for the real part is built and sized, and what of it needs no hardware is tested.
-//! 5. Instructions of control and of the estimator, size of the images that hold nothing but one of them or the whole
-//!    step, worst-case stack, against `firmware/figures.txt` and the budget; `--write` takes the new ones.
+//! 3. Negative controls: another mass by one bit must change the hashes, a step that may panic must
+//!    not link.
+//! 4. The workspace is linted; the image for the real part is built and sized, and what of it needs
+//!    no hardware is tested.
+//! 5. Instructions of control and of the estimator, size of the images that hold nothing but one of
+//!    them or the whole step, worst-case stack, against `firmware/figures.txt` and the budget;
+//!    `--write` takes the new ones.
 
 mod board;
 mod elf;
@@ -56,7 +61,8 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     }
 }
 
-/// [`check`] as a step of `cargo xtask test`: without an emulator it is left out and says so, but never on CI.
+/// [`check`] as a step of `cargo xtask test`: without an emulator it is left out and says so, but
+/// never on CI.
 ///
 /// # Errors
 /// As [`check`].
@@ -78,7 +84,8 @@ pub(crate) fn step() -> Result<String, String> {
 pub(crate) fn check() -> Result<String, String> {
     let figures = measure()?;
     let path = root()?.join(FIGURES);
-    let text = std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+    let text =
+        std::fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
     let (table, grown) = compare(&figures, &parse(&text)?);
     eprint!("{table}");
     check_budget(&figures)?;
@@ -108,8 +115,11 @@ fn measure() -> Result<Figures, String> {
         return Err("another mass by one bit: the emulated outputs did not change".to_owned());
     }
     eprintln!("negative control: another mass by one bit changes the hash of every flight");
-    let wrong = thumb::build(&["--package=squirrel-m7", "--bin", "step", "--features", "may-panic"], true)?;
-    if wrong.status.success() || !String::from_utf8_lossy(&wrong.stderr).contains("a_panic_can_be_reached") {
+    let wrong =
+        thumb::build(&["--package=squirrel-m7", "--bin", "step", "--features", "may-panic"], true)?;
+    if wrong.status.success()
+        || !String::from_utf8_lossy(&wrong.stderr).contains("a_panic_can_be_reached")
+    {
         return Err("a step that may panic: linked, or failed for another reason".to_owned());
     }
     eprintln!("negative control: a step that may panic does not link");
@@ -117,13 +127,15 @@ fn measure() -> Result<Figures, String> {
     let images = build(&["--package=squirrel-m7"])?;
     eprintln!("no panic can be reached from control nor the whole step: their images link");
     let mut flights = squirrel.play("flights")?;
-    // The mass is nothing to a flight that is commanded, so that it is no part of the negative control.
+    // The mass is nothing to a flight that is commanded, so that it is no part of the negative
+    // control.
     let commanded = squirrel.play("commanded")?;
     flights.lines.extend(commanded.lines.into_iter().skip(1));
     let faults = squirrel.play("faults")?;
     if !(flights.well && commanded.well && faults.well) {
         let lines = flights.lines.iter().chain(&faults.lines);
-        let differs: Vec<&str> = lines.filter(|l| !l.contains(" same ")).map(String::as_str).collect();
+        let differs: Vec<&str> =
+            lines.filter(|l| !l.contains(" same ")).map(String::as_str).collect();
         return Err(format!("outputs on the M7 are not the host's: {}", differs.join("; ")));
     }
     let flown = flights.lines.len() - 1;
@@ -132,9 +144,10 @@ fn measure() -> Result<Figures, String> {
     eprintln!("fly --hil qemu: the same log, byte for byte");
 
     let mut figures = flights.figures()?;
-    for (image, function, names) in
-        [("control", "squirrel_control", figures::OF_CONTROL), ("step", "squirrel_step", figures::OF_STEP)]
-    {
+    for (image, function, names) in [
+        ("control", "squirrel_control", figures::OF_CONTROL),
+        ("step", "squirrel_step", figures::OF_STEP),
+    ] {
         let path = images.join(image);
         let bytes = std::fs::read(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let elf = Elf::parse(&bytes).map_err(|error| format!("{}: {error}", path.display()))?;
@@ -159,7 +172,11 @@ fn emulator() -> Result<(), String> {
 /// Builds the images; their folder.
 fn build(arguments: &[&str]) -> Result<PathBuf, String> {
     let done = thumb::build(arguments, false)?;
-    if done.status.success() { thumb::images() } else { Err("the firmware does not build".to_owned()) }
+    if done.status.success() {
+        thumb::images()
+    } else {
+        Err("the firmware does not build".to_owned())
+    }
 }
 
 /// Runs an image that says at least two lines.
@@ -169,7 +186,8 @@ fn emulate(image: &str, argument: Option<&str>, folder: &Path) -> Result<Played,
     command.args(["-serial", "none", "-icount", "shift=6", "-semihosting-config"]);
     let argument = argument.map_or(String::new(), |argument| format!(",arg={argument}"));
     command.arg(format!("enable=on,target=native,arg={image}{argument}"));
-    let done = command.arg("-kernel").arg(thumb::images()?.join(image)).current_dir(folder).output();
+    let done =
+        command.arg("-kernel").arg(thumb::images()?.join(image)).current_dir(folder).output();
     let done = done.map_err(|error| format!("{QEMU}: {error}"))?;
     let text = String::from_utf8_lossy(&done.stdout);
     let lines: Vec<String> = text.lines().map(str::to_owned).collect();
@@ -191,19 +209,33 @@ impl Squirrel {
         let done = command.args(arguments).current_dir(&self.folder).output();
         let done = done.map_err(|error| format!("{}: {error}", self.program.display()))?;
         let said = String::from_utf8_lossy(&done.stderr);
-        if done.status.success() { Ok(()) } else { Err(format!("{}: {}", arguments.join(" "), said.trim())) }
+        if done.status.success() {
+            Ok(())
+        } else {
+            Err(format!("{}: {}", arguments.join(" "), said.trim()))
+        }
     }
 
-    /// Flies all arms, and one by commands of a policy; vectors of the flights, and of faults in one of them.
+    /// Flies all arms, and one by commands of a policy; vectors of the flights, and of faults in
+    /// one of them.
     fn record(&self) -> Result<(), String> {
         let logs = ARMS.map(|arm| format!("{arm}.mcap"));
         for (arm, log) in ARMS.iter().zip(&logs) {
             self.run(&["fly", "--arm", arm, "--scenario", "avoid", "--out", log])?;
         }
         let path = self.folder.join("policy.safetensors");
-        std::fs::write(&path, policy::file()).map_err(|error| format!("{}: {error}", path.display()))?;
+        std::fs::write(&path, policy::file())
+            .map_err(|error| format!("{}: {error}", path.display()))?;
         let commanded = "policy.mcap";
-        self.run(&["fly", "--policy", "policy.safetensors", "--scenario", "track", "--out", commanded])?;
+        self.run(&[
+            "fly",
+            "--policy",
+            "policy.safetensors",
+            "--scenario",
+            "track",
+            "--out",
+            commanded,
+        ])?;
         let mut export = vec!["export-vectors", "--out", "flights"];
         export.extend(logs.iter().map(String::as_str));
         self.run(&export)?;
@@ -251,8 +283,9 @@ impl Played {
     /// Means and worst cases over all sequences.
     fn figures(&self) -> Result<Figures, String> {
         let wrong = || format!("{QEMU}: said {:?}", self.lines);
-        let number =
-            |words: &[&str], i: usize| words.get(i).and_then(|word| word.parse().ok()).ok_or_else(wrong);
+        let number = |words: &[&str], i: usize| {
+            words.get(i).and_then(|word| word.parse().ok()).ok_or_else(wrong)
+        };
         let memory: Vec<&str> = self.lines[0].split(' ').collect();
         let mut figures = Figures::new();
         figures.insert("constants of a flight, B", number(&memory, 2)?);

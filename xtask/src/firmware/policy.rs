@@ -1,7 +1,8 @@
 //! A policy for the flight code to be commanded by: its file, made from nothing.
 //!
-//! A controller that anybody would write, as the network that flies: acceleration from the errors of position and velocity, on the
-//! part of tanh that is nearly linear, wings half open. That it flies well is no matter here, that commands differ all the time is.
+//! A controller that anybody would write, as the network that flies: acceleration from the errors
+//! of position and velocity, on the part of tanh that is nearly linear, wings half open. That it
+//! flies well is no matter here, that commands differ all the time is.
 
 use std::fmt::Write as _;
 
@@ -16,7 +17,8 @@ const TENSORS: [(&str, &[usize]); 6] = [
     ("second.bias", &[HIDDEN]),
     ("second.weight", &[HIDDEN, HIDDEN]),
 ];
-const RECORD: &str = r#"{\"kind\":\"policy\",\"format\":1,\"observation\":25,\"hidden\":32,\"action\":4}"#;
+const RECORD: &str =
+    r#"{\"kind\":\"policy\",\"format\":1,\"observation\":25,\"hidden\":32,\"action\":4}"#;
 
 /// The bytes of the file: length of a header, the header, numbers.
 pub(super) fn file() -> Vec<u8> {
@@ -38,7 +40,8 @@ pub(super) fn file() -> Vec<u8> {
     [&(header.len() as u64).to_le_bytes()[..], header.as_bytes(), &numbers].concat()
 }
 
-/// North by pitching down, east by rolling right, down by less thrust: neuron 0, 1, 2 of each layer.
+/// North by pitching down, east by rolling right, down by less thrust: neuron 0, 1, 2 of each
+/// layer.
 fn number(tensor: &str, row: usize, column: usize) -> f32 {
     const GAIN: [f32; 3] = [-0.2, 0.2, -0.1];
     match (tensor, row, column) {

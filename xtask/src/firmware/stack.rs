@@ -1,7 +1,8 @@
 //! The static worst case of a function's stack, from its machine code.
 //!
-//! Every instruction that moves the stack pointer down counts once, whether or not it is on the way, and every callee on top:
-//! an upper bound. A call through a register, a frame of variable size and recursion have none, and are errors.
+//! Every instruction that moves the stack pointer down counts once, whether or not it is on the
+//! way, and every callee on top: an upper bound. A call through a register, a frame of variable
+//! size and recursion have none, and are errors.
 
 use super::elf::Elf;
 use std::collections::BTreeMap;
@@ -32,7 +33,9 @@ fn deepest(
     known: &mut Known,
 ) -> Result<(u32, Vec<String>), String> {
     let inside = |s: &&super::elf::Symbol| {
-        s.is_function && s.address <= address && (address < s.address + s.size || address == s.address)
+        s.is_function
+            && s.address <= address
+            && (address < s.address + s.size || address == s.address)
     };
     let symbol = elf.symbols.iter().filter(inside).max_by_key(|s| s.size);
     let symbol = symbol.ok_or_else(|| format!("0x{address:x}: no function there"))?;
@@ -84,7 +87,8 @@ fn code(elf: &Elf, start: u32, size: u32) -> Vec<(u32, u16)> {
         .map(|s| (s.address, s.name.starts_with("$t")))
         .collect();
     marks.sort_unstable();
-    let is_code = |at: u32| marks.iter().rev().find(|(mark, _)| *mark <= at).is_none_or(|(_, code)| *code);
+    let is_code =
+        |at: u32| marks.iter().rev().find(|(mark, _)| *mark <= at).is_none_or(|(_, code)| *code);
     let mut found = Vec::new();
     for section in &elf.sections {
         for at in (start..start + size).step_by(2) {

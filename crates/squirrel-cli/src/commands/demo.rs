@@ -1,4 +1,5 @@
-//! `squirrel demo`: the paper's avoidance manoeuvre with three controllers, on numbers that are part of the program.
+//! `squirrel demo`: the paper's avoidance manoeuvre with three controllers, on numbers that are
+//! part of the program.
 
 use super::{facts, figures, view, write_log};
 use crate::output::{self, Table, say, talk};
@@ -114,7 +115,10 @@ impl Demo {
             arms: rows,
         };
         output::write_json(self.json.as_deref(), &result)?;
-        talk(&format!("\nwrote {} and flight-*.mcap (open in Foxglove) beside it", report.display()));
+        talk(&format!(
+            "\nwrote {} and flight-*.mcap (open in Foxglove) beside it",
+            report.display()
+        ));
         Ok(())
     }
 }

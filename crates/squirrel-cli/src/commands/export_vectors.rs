@@ -1,8 +1,10 @@
-//! `squirrel export-vectors`: the sensor frames of flights for a target without files, with the hash of every output.
+//! `squirrel export-vectors`: the sensor frames of flights for a target without files, with the
+//! hash of every output.
 //!
-//! The bytes are those of [`squirrel_core::stack::wire`]: `vectors.bin` is a header, then for each flight its setup and its frames;
-//! `setup-K.bin` is the setup of flight K alone, a file of vectors without frames, for a board to fly with. Before anything
-//! is written the host flies all of them again: vectors whose outputs are not the log's would test nothing.
+//! The bytes are those of [`squirrel_core::stack::wire`]: `vectors.bin` is a header, then for each
+//! flight its setup and its frames; `setup-K.bin` is the setup of flight K alone, a file of vectors
+//! without frames, for a board to fly with. Before anything is written the host flies all of them
+//! again: vectors whose outputs are not the log's would test nothing.
 
 use crate::output::{self, Table, talk};
 use crate::paths::Paths;
@@ -30,7 +32,8 @@ pub(crate) struct ExportVectors {
     /// Seed of the faults.
     #[arg(long, default_value_t = 0)]
     seed: u32,
-    /// Folder for `vectors.bin` and, of each flight, `setup-0.bin` and so on; made where it is missing.
+    /// Folder for `vectors.bin` and, of each flight, `setup-0.bin` and so on; made where it is
+    /// missing.
     #[arg(long)]
     out: PathBuf,
     /// Write the result here as JSON.
@@ -89,7 +92,8 @@ impl ExportVectors {
                 add("whole".to_owned(), &frames).map_err(at)?;
             }
             for k in 0..self.faults {
-                let (fault, broken) = Fault::draw(&frames, self.seed.wrapping_add(k)).map_err(at)?;
+                let (fault, broken) =
+                    Fault::draw(&frames, self.seed.wrapping_add(k)).map_err(at)?;
                 let Fault { sensor, kind, start_us, end_us } = fault;
                 let length_s = (end_us - start_us) as f64 * 1e-6;
                 add(format!("{sensor:?} {kind:?} {length_s:.2} s"), &broken).map_err(at)?;
@@ -105,7 +109,8 @@ impl ExportVectors {
         }
         let vectors = self.out.join(VECTORS);
         output::write_file(&vectors, &bytes)?;
-        let mut table = Table::new(&["flight", "setup", "arm", "what", "steps", "hash of the outputs"]);
+        let mut table =
+            Table::new(&["flight", "setup", "arm", "what", "steps", "hash of the outputs"]);
         for s in &sequences {
             let steps = s.steps.to_string();
             let (flight, setup, arm) = (s.flight.clone(), s.setup.clone(), s.arm.to_owned());
@@ -124,13 +129,15 @@ fn setup_file(flight: usize) -> String {
 
 /// What a value is on the wire.
 pub(crate) fn wire(value: &impl Wire) -> Result<Vec<u8>, String> {
-    written(value, <[u8]>::to_vec).ok_or_else(|| format!("a record is longer than {RECORD_MAX} bytes"))
+    written(value, <[u8]>::to_vec)
+        .ok_or_else(|| format!("a record is longer than {RECORD_MAX} bytes"))
 }
 
 /// A record behind its length.
 pub(crate) fn record(record: &Record) -> Result<Vec<u8>, String> {
     let bytes = wire(record)?;
-    let length = u16::try_from(bytes.len()).map_err(|e| format!("a record of {} bytes: {e}", bytes.len()))?;
+    let length = u16::try_from(bytes.len())
+        .map_err(|e| format!("a record of {} bytes: {e}", bytes.len()))?;
     Ok([&length.to_le_bytes()[..], &bytes].concat())
 }
 

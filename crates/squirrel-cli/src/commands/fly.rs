@@ -13,7 +13,9 @@ use squirrel_plan::pilot::offboard;
 use squirrel_report::flight::{Heading, render};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Setup};
+use squirrel_sim::flight::{
+    FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Setup,
+};
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::track::Track;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -26,18 +28,21 @@ pub(crate) struct Fly {
     /// Vehicle file; the shipped squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat, twcc_parnn, twcc_oracle, twcc_plus, pc_plus,
-    /// plan_wings, plan_no_wings; if left out, twcc_flat, or pc with a policy or a reference.
+    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat,
+    /// twcc_parnn, twcc_oracle, twcc_plus, pc_plus, plan_wings, plan_no_wings; if left out,
+    /// twcc_flat, or pc with a policy or a reference.
     #[arg(long)]
     arm: Option<String>,
-    /// Policy that flies instead of the arm's outer loop (.safetensors); the mission goes straight on, to avoid is its own
-    /// business.
+    /// Policy that flies instead of the arm's outer loop (.safetensors); the mission goes straight
+    /// on, to avoid is its own business.
     #[arg(long)]
     policy: Option<PathBuf>,
-    /// Plan to fly along instead of the mission (.mcap, as `squirrel plan` writes it, or any log with a reference), to its end.
+    /// Plan to fly along instead of the mission (.mcap, as `squirrel plan` writes it, or any log
+    /// with a reference), to its end.
     #[arg(long, conflicts_with = "policy")]
     reference: Option<PathBuf>,
-    /// hover, avoid, steer, track, excite_calm, excite_normal, excite_rich, or a scenario file (.toml).
+    /// hover, avoid, steer, track, excite_calm, excite_normal, excite_rich, or a scenario file
+    /// (.toml).
     #[arg(long, default_value = "avoid")]
     scenario: String,
     /// Seed of everything random; overrides the scenario's.
@@ -46,8 +51,8 @@ pub(crate) struct Fly {
     /// Largest collective thrust over weight; overrides vehicle and scenario.
     #[arg(long)]
     thrust_to_weight: Option<f64>,
-    /// Who estimates attitude, velocity and position: eskf, mekf, mahony, rkf_mtf, rkf_stf, kalman, external (what [sensors.attitude]
-    /// says), oracle (the truth); if left out, the vehicle's.
+    /// Who estimates attitude, velocity and position: eskf, mekf, mahony, rkf_mtf, rkf_stf, kalman,
+    /// external (what [sensors.attitude] says), oracle (the truth); if left out, the vehicle's.
     #[arg(long)]
     estimator: Option<String>,
     /// rk4 (rapier near contact), or rapier throughout (first order).
@@ -114,7 +119,8 @@ impl Fly {
         let Some(path) = &self.reference else { return Ok(None) };
         let log = FlightLog::read(path).map_err(|e| e.to_string())?;
         let mass_kg = vehicle.vehicle.parameters().mass_kg;
-        let track = Track::of(&log, mass_kg).map_err(|problem| format!("{}: {problem}", path.display()))?;
+        let track =
+            Track::of(&log, mass_kg).map_err(|problem| format!("{}: {problem}", path.display()))?;
         if matches!(scenario.mission, MissionTable::Excite(_) | MissionTable::Runs(_)) {
             return Err(format!(
                 "scenario = {}: has manoeuvres of its own, nothing else is followed",
@@ -134,7 +140,11 @@ impl Fly {
             ));
         }
         if let Some(name) = log.metadata.get("vehicle").filter(|name| **name != vehicle.name) {
-            talk(&format!("{}: was made for {name}, and {} flies it", path.display(), vehicle.name));
+            talk(&format!(
+                "{}: was made for {name}, and {} flies it",
+                path.display(),
+                vehicle.name
+            ));
         }
         Ok(Some(track))
     }
@@ -163,7 +173,8 @@ impl Fly {
         }
         let offboard = self.policy.is_some() || self.reference.is_some();
         let by_default = if offboard { Arm::Pc } else { Arm::TwccFlat };
-        // What the options changed is the scenario's, and so are errors in it; the rest is the vehicle's.
+        // What the options changed is the scenario's, and so are errors in it; the rest is the
+        // vehicle's.
         scenario.check().map_err(|e| format!("scenario {}: {e}", self.scenario))?;
         let mut vehicle = vehicle(self.vehicle.as_deref())?;
         if let Some(name) = &self.estimator {
@@ -184,12 +195,18 @@ impl Fly {
             Some(file) => format!("{}: {e}", file.display()),
             None => e.to_string(),
         })?;
-        let weights =
-            self.policy.as_deref().map(PolicyWeights::load).transpose().map_err(|e| e.to_string())?;
+        let weights = self
+            .policy
+            .as_deref()
+            .map(PolicyWeights::load)
+            .transpose()
+            .map_err(|e| e.to_string())?;
         // What flies, in words.
         let who = match (&weights, &self.reference) {
             (Some(weights), _) => format!("policy {} over {}", weights.name, setup.arm.name()),
-            (None, Some(file)) => format!("the plan of {} over {}", file.display(), setup.arm.name()),
+            (None, Some(file)) => {
+                format!("the plan of {} over {}", file.display(), setup.arm.name())
+            }
             (None, None) => setup.arm.name().to_owned(),
         };
         let policy = weights.as_ref().map(PolicyWeights::hash);
@@ -200,9 +217,12 @@ impl Fly {
         let pilot = pilot.as_mut().map(|pilot| &mut **pilot as &mut dyn Offboard);
         let flown = match self.hil {
             None => setup.fly_on(&mut InProcess::new(stack), pilot, record, progress),
-            Some(Hil::Qemu) => {
-                setup.fly_on(&mut EmulatedM7::start(&self.hil_image, &stack)?, pilot, record, progress)
-            }
+            Some(Hil::Qemu) => setup.fly_on(
+                &mut EmulatedM7::start(&self.hil_image, &stack)?,
+                pilot,
+                record,
+                progress,
+            ),
         };
         bar.finish_and_clear();
         let mut flight = flown.map_err(|e| e.to_string())?;
@@ -225,7 +245,11 @@ impl Fly {
                     title: format!("{}: {who}", setup.scenario.name),
                     lead: String::new(),
                     facts: facts(&setup),
-                    card: setup.scenario.pilot_card().map_err(|e| e.to_string())?.unwrap_or_default(),
+                    card: setup
+                        .scenario
+                        .pilot_card()
+                        .map_err(|e| e.to_string())?
+                        .unwrap_or_default(),
                 };
                 output::write_file(path, render(&heading, &[view(&setup, log, cells)]).as_bytes())?;
                 talk(&format!("wrote {}", path.display()));

@@ -1,4 +1,5 @@
-//! `squirrel gap`: where simulation and measurement disagree, what is missing, and what adding it is worth.
+//! `squirrel gap`: where simulation and measurement disagree, what is missing, and what adding it
+//! is worth.
 
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
@@ -21,7 +22,8 @@ const REPORT: &str = "report.html";
 /// Steps of the gap workflow.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Gap {
-    /// Residual force and moment of measured flights against a vehicle, per channel and window, ranked.
+    /// Residual force and moment of measured flights against a vehicle, per channel and window,
+    /// ranked.
     Find(Given),
     /// Which effect the vehicle file lacks.
     Name(Given),
@@ -29,11 +31,12 @@ pub(crate) enum Gap {
     Add {
         #[command(flatten)]
         flights: Given,
-        /// Add this effect, of an answer that is a set of them or not sure enough to be added by itself.
+        /// Add this effect, of an answer that is a set of them or not sure enough to be added by
+        /// itself.
         #[arg(long, value_name = "NAME")]
         effect: Option<String>,
-        /// Write the file's own numbers, too, where these flights have them, inside their tolerances; also where no effect is
-        /// missing.
+        /// Write the file's own numbers, too, where these flights have them, inside their
+        /// tolerances; also where no effect is missing.
         #[arg(long, conflicts_with = "effect")]
         fit: bool,
         /// Print the patch and write nothing.
@@ -46,8 +49,8 @@ pub(crate) enum Gap {
     Run {
         #[command(flatten)]
         flights: Given,
-        /// Write the file's own numbers, too, where these flights have them, inside their tolerances; also where no effect is
-        /// missing.
+        /// Write the file's own numbers, too, where these flights have them, inside their
+        /// tolerances; also where no effect is missing.
         #[arg(long)]
         fit: bool,
     },
@@ -65,8 +68,8 @@ pub(crate) struct Given {
     /// Flight logs, or folders of them, that it never sees.
     #[arg(long, num_args = 1..)]
     held_out: Vec<PathBuf>,
-    /// Good flights of the same machine, or folders of them: the vehicle's numbers become theirs, and what is named is what has
-    /// changed since.
+    /// Good flights of the same machine, or folders of them: the vehicle's numbers become theirs,
+    /// and what is named is what has changed since.
     #[arg(long, num_args = 1..)]
     baseline: Vec<PathBuf>,
     /// Folder for what is written.
@@ -82,7 +85,9 @@ impl Gap {
         match self {
             Self::Find(flights) => flights.find(),
             Self::Name(flights) => flights.name(),
-            Self::Add { flights, effect, fit, dry_run } => flights.add(effect.as_deref(), *fit, *dry_run),
+            Self::Add { flights, effect, fit, dry_run } => {
+                flights.add(effect.as_deref(), *fit, *dry_run)
+            }
             Self::Shrink(flights) => flights.shrink(),
             Self::Run { flights, fit } => flights.everything(*fit),
         }
@@ -90,10 +95,12 @@ impl Gap {
 }
 
 impl Given {
-    /// Whether a step may begin that writes these files into the folder, the last of them what `--json` has, too.
+    /// Whether a step may begin that writes these files into the folder, the last of them what
+    /// `--json` has, too.
     fn check(&self, names: &[&OsStr]) -> Result<(), String> {
-        let reads =
-            Paths::default().vehicle("--vehicle", [&self.vehicle]).flights("--flights", &self.flights)?;
+        let reads = Paths::default()
+            .vehicle("--vehicle", [&self.vehicle])
+            .flights("--flights", &self.flights)?;
         let kept = self.out.as_ref().zip(names.last()).map(|(folder, name)| folder.join(name));
         let mut paths = reads
             .flights("--held-out", &self.held_out)?
@@ -130,13 +137,17 @@ impl Given {
         let own = match &self.baseline[..] {
             [] => None,
             good => Some(
-                squirrel_gap::Baseline::fit(&declared, &logs(good)?, &|_| ()).map_err(|e| e.to_string())?,
+                squirrel_gap::Baseline::fit(&declared, &logs(good)?, &|_| ())
+                    .map_err(|e| e.to_string())?,
             ),
         };
         let vehicle = own.as_ref().map_or(&declared, |own| &own.vehicle);
         let finding = squirrel_gap::find(vehicle, &all).map_err(|e| e.to_string())?;
         let triple = |x: &[f64; 3]| x.map(|v| format!("{v:.4e}")).join("  ");
-        say(&format!("residual force, body x y z:   {}  N rms", triple(&finding.residual.force_body_rms_n)));
+        say(&format!(
+            "residual force, body x y z:   {}  N rms",
+            triple(&finding.residual.force_body_rms_n)
+        ));
         say(&format!(
             "residual moment, body x y z:  {}  N m rms\n",
             triple(&finding.residual.moment_body_rms_n_m)
@@ -159,7 +170,9 @@ impl Given {
 
     fn shrink(&self) -> Result<(), String> {
         if self.held_out.is_empty() {
-            return Err("--held-out: none given; shrink needs flights that the fit never sees".to_owned());
+            return Err(
+                "--held-out: none given; shrink needs flights that the fit never sees".to_owned()
+            );
         }
         self.check(&[REPORT.as_ref(), VERDICT.as_ref()])?;
         let mut found = self.diagnose()?;
@@ -226,10 +239,13 @@ impl Given {
         Ok(())
     }
 
-    /// Where the patched vehicle file goes; asked for before the work, which it would be a pity to lose.
+    /// Where the patched vehicle file goes; asked for before the work, which it would be a pity to
+    /// lose.
     fn patch_path(&self) -> Result<PathBuf, String> {
-        let folder =
-            self.out.as_deref().ok_or("--out: none given; a folder is needed for what is written")?;
+        let folder = self
+            .out
+            .as_deref()
+            .ok_or("--out: none given; a folder is needed for what is written")?;
         Ok(folder.join(self.patch_name()))
     }
 
@@ -285,7 +301,8 @@ fn logs(paths: &[PathBuf]) -> Result<Flights, String> {
 }
 
 fn places(places: &[squirrel_gap::find::Place]) {
-    let mut table = Table::new(&["flight", "from s", "to s", "channel", "x noise", "share %", "condition"]);
+    let mut table =
+        Table::new(&["flight", "from s", "to s", "channel", "x noise", "share %", "condition"]);
     for w in places.iter().take(10) {
         table.row(vec![
             w.flight.clone(),
@@ -370,7 +387,9 @@ fn closed_loop(flights: &[ClosedLoop]) {
     let head = ["flown again", "model", "north m", "east m", "down m"];
     let mut table = Table::new(&head);
     for flight in flights {
-        for (model, error) in [("nominal", flight.before_ned_m), ("with the effects", flight.after_ned_m)] {
+        for (model, error) in
+            [("nominal", flight.before_ned_m), ("with the effects", flight.after_ned_m)]
+        {
             let mut row = vec![flight.flight.clone(), model.to_owned()];
             row.extend(error.map(|x| significant(x, 3)));
             table.row(row);
@@ -384,8 +403,12 @@ fn effects(effects: &[NamedEffect]) {
     for effect in effects {
         for (key, value) in &effect.parameters {
             let numbers = match value {
-                Value::Choice { value, .. } => [(*value).to_owned(), "-".to_owned(), "-".to_owned()],
-                Value::Number { value, low, high } => [value, low, high].map(|x| significant(*x, 4)),
+                Value::Choice { value, .. } => {
+                    [(*value).to_owned(), "-".to_owned(), "-".to_owned()]
+                }
+                Value::Number { value, low, high } => {
+                    [value, low, high].map(|x| significant(*x, 4))
+                }
             };
             let mut row = vec![
                 effect.name.to_owned(),

@@ -1,7 +1,8 @@
 //! The flight code on an emulated Cortex-M7, the plant here: `squirrel fly --hil qemu`.
 //!
-//! QEMU runs the image `link` of `firmware/m7`. Records of [`squirrel_core::stack::wire`] go to its standard input, outputs
-//! come from its standard output; the two wait for each other, so that wall time means nothing.
+//! QEMU runs the image `link` of `firmware/m7`. Records of [`squirrel_core::stack::wire`] go to its
+//! standard input, outputs come from its standard output; the two wait for each other, so that wall
+//! time means nothing.
 
 use super::export_vectors::record;
 use squirrel_core::stack::wire::{Reader, Record, Wire};
@@ -27,7 +28,10 @@ impl EmulatedM7 {
     /// One line where image or emulator are missing, or it does not listen.
     pub(crate) fn start(image: &Path, stack: &Stack) -> Result<Self, String> {
         if !image.is_file() {
-            return Err(format!("{}: no such image; `cargo xtask firmware` builds it", image.display()));
+            return Err(format!(
+                "{}: no such image; `cargo xtask firmware` builds it",
+                image.display()
+            ));
         }
         let mut emulator = Command::new(QEMU)
             .args(["-machine", "mps2-an500", "-cpu", "cortex-m7", "-nographic", "-monitor", "none"])
@@ -66,7 +70,8 @@ impl EmulatedM7 {
 
 impl FlightComputer for EmulatedM7 {
     fn step(&mut self, frame: &SensorFrame) -> Result<(StackOutput, u32), FlightError> {
-        self.ask(frame).map_err(|e| FlightError(format!("at {:.3} s: {e}", frame.time_us as f64 * 1e-6)))
+        self.ask(frame)
+            .map_err(|e| FlightError(format!("at {:.3} s: {e}", frame.time_us as f64 * 1e-6)))
     }
 }
 

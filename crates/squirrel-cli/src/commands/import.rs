@@ -21,8 +21,8 @@ pub(crate) struct Import {
     /// Fly what a board wrote down its serial line again: inputs and outputs of its flight code.
     #[arg(long, conflicts_with_all = ["map", "recover"])]
     board: bool,
-    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages, Crazyflie micro-SD; with --board what the
-    /// board wrote.
+    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages, Crazyflie
+    /// micro-SD; with --board what the board wrote.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.
@@ -36,7 +36,10 @@ pub(crate) struct Import {
 impl Import {
     /// What is read, and where it goes.
     fn paths(&self, read: &[PathBuf]) -> Paths {
-        Paths::default().reads("PATHS", read).writes("--out", [&self.out]).writes("--json", &self.json)
+        Paths::default()
+            .reads("PATHS", read)
+            .writes("--out", [&self.out])
+            .writes("--json", &self.json)
     }
 
     pub(crate) fn run(&self) -> Result<(), String> {

@@ -29,7 +29,8 @@ fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
 
 /// Writes a log that says which commit of the program flew.
 fn write_log(log: &mut FlightLog, path: &Path) -> Result<(), String> {
-    log.metadata.insert("git".to_owned(), option_env!("SQUIRREL_COMMIT").unwrap_or("unknown").to_owned());
+    log.metadata
+        .insert("git".to_owned(), option_env!("SQUIRREL_COMMIT").unwrap_or("unknown").to_owned());
     log.write(path).map_err(|e| e.to_string())
 }
 
@@ -42,13 +43,20 @@ fn figures(metrics: &Metrics) -> Vec<(String, String)> {
         cell("height lost m", format!("{:.2}", metrics.height_lost_m)),
         cell("height gained m", format!("{:.2}", metrics.height_gained_m)),
         cell("wings open s", format!("{:.2}", metrics.wings_open_s)),
-        cell("clearance m", metrics.clearance_m.map_or_else(|| "-".to_owned(), |c| format!("{c:.2}"))),
+        cell(
+            "clearance m",
+            metrics.clearance_m.map_or_else(|| "-".to_owned(), |c| format!("{c:.2}")),
+        ),
         cell("contact s", metrics.contact_s.map_or_else(|| "-".to_owned(), |t| format!("{t:.2}"))),
     ]
 }
 
 /// How the report sees one flight.
-fn view<'a>(setup: &'a Setup, log: &'a FlightLog, summary: Vec<(String, String)>) -> FlightView<'a> {
+fn view<'a>(
+    setup: &'a Setup,
+    log: &'a FlightLog,
+    summary: Vec<(String, String)>,
+) -> FlightView<'a> {
     // The limit holds for roll and for pitch; both at once tilt the thrust further.
     let one_axis = setup.vehicle.vehicle.parameters().limits.tilt_max_rad.cos();
     FlightView {
@@ -67,7 +75,8 @@ fn passed(setup: &Setup, log: &FlightLog) -> Vec<[f64; 3]> {
     const NEAR_M: f64 = 8.0;
     let mut obstacles = setup.scenario.all_obstacles();
     if let Some((time_s, path)) = log.channel("truth.position_ned_m") {
-        let near = |[north, east, _]: &[f64; 3], at: &[f64]| (north - at[0]).hypot(east - at[1]) < NEAR_M;
+        let near =
+            |[north, east, _]: &[f64; 3], at: &[f64]| (north - at[0]).hypot(east - at[1]) < NEAR_M;
         obstacles.retain(|trunk| (0..time_s.len()).step_by(10).any(|i| near(trunk, path.row(i))));
     }
     obstacles

@@ -29,7 +29,8 @@ pub(crate) struct PlanCommand {
     /// Largest collective thrust over weight; overrides vehicle and scenario.
     #[arg(long)]
     thrust_to_weight: Option<f64>,
-    /// What is believed of the wings: flat, membrane, parnn, or none to plan without; if left out, flat where there are wings.
+    /// What is believed of the wings: flat, membrane, parnn, or none to plan without; if left out,
+    /// flat where there are wings.
     #[arg(long)]
     wing: Option<String>,
     /// How much of the scenario, s; at most its duration.
@@ -87,7 +88,9 @@ struct Outcome {
 impl Outcome {
     fn of(wing: Option<WingModel>, task: &Task, plan: &Plan) -> Self {
         let points = plan.track.points();
-        let off = || points.iter().zip(task.wanted()).map(|(point, wanted)| point.position - wanted.position);
+        let off = || {
+            points.iter().zip(task.wanted()).map(|(point, wanted)| point.position - wanted.position)
+        };
         let open = points.iter().filter(|point| point.wing > 0.5).count();
         Self {
             wing: wing.map_or("none", WingModel::name),
@@ -135,7 +138,10 @@ impl PlanCommand {
         let models = if wing.is_some() { vec![wing, None] } else { vec![None] };
         let bar = output::spinner();
         for model in models {
-            bar.set_message(format!("planning with wings: {}", model.map_or("none", WingModel::name)));
+            bar.set_message(format!(
+                "planning with wings: {}",
+                model.map_or("none", WingModel::name)
+            ));
             let mut craft = Craft::of(&setup.vehicle, thrust_max_n, model, RESERVE)?;
             craft.air = Air::windy(setup.scenario.wind.mean_ned_m_s.into())?;
             let task = Task::of(&setup.scenario, &craft, spare_m, self.horizon_s, self.step_s)?;
@@ -160,7 +166,10 @@ impl PlanCommand {
             thrust_to_weight: setup.thrust_to_weight(),
             wind_ned_m_s: setup.scenario.wind.mean_ned_m_s,
             step_s: self.step_s,
-            plans: plans.iter().map(|(model, task, plan)| Outcome::of(*model, task, plan)).collect(),
+            plans: plans
+                .iter()
+                .map(|(model, task, plan)| Outcome::of(*model, task, plan))
+                .collect(),
         };
         output::write_json(self.json.as_deref(), &result)
     }
@@ -225,8 +234,11 @@ fn page(setup: &Setup, plans: &[Made]) -> String {
         }
     };
     let views: Vec<FlightView<'_>> = plans.iter().zip(&logs).map(view).collect();
-    let shown: Vec<Shown<'_>> =
-        plans.iter().zip(&views).map(|((_, task, plan), view)| Shown { view, task, plan }).collect();
+    let shown: Vec<Shown<'_>> = plans
+        .iter()
+        .zip(&views)
+        .map(|((_, task, plan), view)| Shown { view, task, plan })
+        .collect();
     trajectory::page(&format!("{}: planned", setup.scenario.name), &super::facts(setup), &shown)
 }
 
@@ -255,12 +267,15 @@ fn log(setup: &Setup, wing: Option<WingModel>, task: &Task, plan: &Plan) -> Flig
     log
 }
 
-/// The same for the page, which draws flights: planned motion stands where a flight has the truth. No such log is written, for nothing flew.
+/// The same for the page, which draws flights: planned motion stands where a flight has the truth.
+/// No such log is written, for nothing flew.
 fn drawn(setup: &Setup, (model, task, plan): &Made) -> FlightLog {
     let mut log = log(setup, *model, task, plan);
     for (time_s, point) in plan.track.time_s().iter().zip(plan.track.points()) {
-        let rows: [(&str, &[f64]); 2] =
-            [("position_ned_m", point.position.as_slice()), ("velocity_ned_m_s", point.velocity.as_slice())];
+        let rows: [(&str, &[f64]); 2] = [
+            ("position_ned_m", point.position.as_slice()),
+            ("velocity_ned_m_s", point.velocity.as_slice()),
+        ];
         log.source_mut("truth").push(*time_s, &rows);
     }
     log

@@ -1,4 +1,5 @@
-//! `squirrel reach`: the controllable accelerations with folded wings and with a choice of folded or spread.
+//! `squirrel reach`: the controllable accelerations with folded wings and with a choice of folded
+//! or spread.
 
 use super::vehicle;
 use crate::output::{self, Table, say};
@@ -17,8 +18,8 @@ pub(crate) struct Reach {
     /// Vehicle file; the shipped squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// What spread wings do: flat, membrane, parnn. The paper's flat plate is the default, for which the set is known exactly; the others
-    /// come from the vehicle file.
+    /// What spread wings do: flat, membrane, parnn. The paper's flat plate is the default, for
+    /// which the set is known exactly; the others come from the vehicle file.
     #[arg(long, default_value = "flat")]
     wing: String,
     /// Velocity relative to the air: north, east, down, m/s.
@@ -27,7 +28,8 @@ pub(crate) struct Reach {
     /// Largest collective thrust over weight; the vehicle's limit if left out.
     #[arg(long)]
     thrust_to_weight: Option<f64>,
-    /// How attitude is limited, at the vehicle's largest tilt: box (roll and pitch, as in flight), cone (angle to the vertical).
+    /// How attitude is limited, at the vehicle's largest tilt: box (roll and pitch, as in flight),
+    /// cone (angle to the vertical).
     #[arg(long, default_value = "box")]
     tilt: String,
     /// Heading of the box, rad; that of the velocity if left out.
@@ -94,7 +96,9 @@ impl Reach {
             vehicle.name,
             model.name()
         ));
-        say("Accelerations in m/s^2; braking is against the horizontal motion, volumes are ratios alone.\n");
+        say(
+            "Accelerations in m/s^2; braking is against the horizontal motion, volumes are ratios alone.\n",
+        );
         table(&cases);
         if let Some(path) = &self.html {
             let fact = |name: &str, value: String| (name.to_owned(), value);
@@ -113,7 +117,8 @@ impl Reach {
         let mass_kg = vehicle.vehicle.parameters().mass_kg;
         let wing = model.name();
         let vehicle = &vehicle.name;
-        let reached = Reached { vehicle, mass_kg, wing, tilt, tilt_max_rad, yaw_rad, cases: &cases };
+        let reached =
+            Reached { vehicle, mass_kg, wing, tilt, tilt_max_rad, yaw_rad, cases: &cases };
         output::write_json(self.json.as_deref(), &reached)
     }
 
@@ -121,7 +126,10 @@ impl Reach {
     fn questions(&self, vehicle: &VehicleFile, wing: &WingForce) -> Result<Vec<Question>, String> {
         let (p, weight_n) = (vehicle.vehicle.parameters(), vehicle.vehicle.weight_n());
         let &[north, east, down] = self.velocity.as_slice() else {
-            return Err(format!("--velocity: {} numbers; must be north,east,down", self.velocity.len()));
+            return Err(format!(
+                "--velocity: {} numbers; must be north,east,down",
+                self.velocity.len()
+            ));
         };
         finite("--velocity", &self.velocity)?;
         let level = north.hypot(east);
@@ -129,11 +137,14 @@ impl Reach {
         let heading_rad = if level > 0.0 { east.atan2(north) } else { 0.0 };
         let yaw_rad = self.yaw_rad.unwrap_or(heading_rad);
         finite("--yaw-rad", &[yaw_rad])?;
-        let tilt = Tilt::named(&self.tilt, p.limits.tilt_max_rad, yaw_rad).map_err(|e| format!("--{e}"))?;
-        let or = |given: &[f64], own: f64| if given.is_empty() { vec![own] } else { given.to_vec() };
+        let tilt = Tilt::named(&self.tilt, p.limits.tilt_max_rad, yaw_rad)
+            .map_err(|e| format!("--{e}"))?;
+        let or =
+            |given: &[f64], own: f64| if given.is_empty() { vec![own] } else { given.to_vec() };
         let speeds = or(&self.speeds, level.hypot(down));
         let descents_deg = or(&self.descent_deg, down.atan2(level).to_degrees());
-        let ratios = or(&self.ratios, self.thrust_to_weight.unwrap_or(p.limits.thrust_max_n / weight_n));
+        let ratios =
+            or(&self.ratios, self.thrust_to_weight.unwrap_or(p.limits.thrust_max_n / weight_n));
         finite("--descent-deg", &descents_deg)?;
         if let Some(wrong) = speeds.iter().find(|x| !(**x >= 0.0 && x.is_finite())) {
             return Err(format!("--speeds = {wrong}: must be finite and >= 0"));
@@ -145,7 +156,8 @@ impl Reach {
         let mut questions = Vec::new();
         for speed in &speeds {
             for descent_deg in &descents_deg {
-                let ((sin, cos), (s, c)) = (descent_deg.to_radians().sin_cos(), heading_rad.sin_cos());
+                let ((sin, cos), (s, c)) =
+                    (descent_deg.to_radians().sin_cos(), heading_rad.sin_cos());
                 let velocity = In::new(Vector3::new(cos * c, cos * s, sin) * *speed);
                 let question = |ratio: &f64| Question {
                     mass_kg: p.mass_kg,
@@ -170,8 +182,8 @@ fn finite(option: &str, numbers: &[f64]) -> Result<(), String> {
 
 fn table(cases: &[Case]) {
     let head = [
-        "m/s", "down deg", "T/W", "up", "wings", "ratio", "brake", "wings", "ratio", "at a_z=0", "wings",
-        "ratio", "set", "hull",
+        "m/s", "down deg", "T/W", "up", "wings", "ratio", "brake", "wings", "ratio", "at a_z=0",
+        "wings", "ratio", "set", "hull",
     ];
     let mut table = Table::new(&head);
     for case in cases {

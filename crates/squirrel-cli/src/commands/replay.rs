@@ -32,7 +32,8 @@ struct Replayed<'a> {
 
 impl Replay {
     pub(crate) fn run(&self) -> Result<(), String> {
-        let paths = Paths::default().reads("FLIGHT", [&self.flight]).vehicle("--vehicle", &self.vehicle);
+        let paths =
+            Paths::default().reads("FLIGHT", [&self.flight]).vehicle("--vehicle", &self.vehicle);
         paths.writes("--json", &self.json).check()?;
         let file = self.flight.display();
         let log = FlightLog::read(&self.flight).map_err(|e| e.to_string())?;

@@ -1,4 +1,5 @@
-//! `squirrel study`: experiments with many flights. What they are is in `squirrel_study::STUDIES`; here they get their options.
+//! `squirrel study`: experiments with many flights. What they are is in `squirrel_study::STUDIES`;
+//! here they get their options.
 
 mod merge;
 
@@ -59,14 +60,15 @@ struct Common {
     /// Vehicle file; the shipped squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// Folder for the figures as CSV and JSON, and for what else there is to look at; it keeps the trials, so that a study that was
-    /// stopped goes on.
+    /// Folder for the figures as CSV and JSON, and for what else there is to look at; it keeps the
+    /// trials, so that a study that was stopped goes on.
     #[arg(long)]
     out: Option<PathBuf>,
     /// Write the figures here as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
-    /// Fly a part of the trials only, K/N, into an --out of its own; `squirrel study merge` puts the parts together.
+    /// Fly a part of the trials only, K/N, into an --out of its own; `squirrel study merge` puts
+    /// the parts together.
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
 }
@@ -93,8 +95,9 @@ impl clap::Subcommand for Studies {
 
 /// A study as a command.
 fn options(study: &'static Study) -> Command {
-    let value =
-        |name: &'static str| Arg::new(name).long(name).value_name(name.replace('-', "_").to_uppercase());
+    let value = |name: &'static str| {
+        Arg::new(name).long(name).value_name(name.replace('-', "_").to_uppercase())
+    };
     let (trials, what) = study.trials;
     let trials = value("trials").help(what).default_value(trials.to_string());
     let mut command = Command::new(study.name).arg(trials.value_parser(value_parser!(u32)));
@@ -108,7 +111,9 @@ fn options(study: &'static Study) -> Command {
     }
     if let Arms::Asked(arms) = study.arms {
         let left_out = if arms == Arm::ALONE { "all".to_owned() } else { names(arms).join(", ") };
-        let help = format!("Arms to fly beside the reference, separated by commas; {left_out} if left out");
+        let help = format!(
+            "Arms to fly beside the reference, separated by commas; {left_out} if left out"
+        );
         command = command.arg(value("arms").help(help).value_delimiter(','));
     }
     // The arguments bring an `about` of their own.
@@ -168,8 +173,11 @@ impl Flown {
         };
         let bar = Bar(output::progress(0, self.study.unit));
         let folder = self.common.out.as_deref();
-        let found =
-            (self.study.fly)(&plan, &own, &Keep { folder, part, command: &command, progress: Some(&bar) });
+        let found = (self.study.fly)(
+            &plan,
+            &own,
+            &Keep { folder, part, command: &command, progress: Some(&bar) },
+        );
         bar.0.finish_and_clear();
         if let Some(found) = found.map_err(|e| e.to_string())? {
             return self.end(&found);
@@ -194,7 +202,10 @@ impl Flown {
                     all.iter().partition(|arm| arm.is_known_to(&vehicle));
                 if !missing.is_empty() {
                     let missing = names(&missing).join(", ");
-                    talk(&format!("{} does not have what they need: {missing} left out", vehicle.name));
+                    talk(&format!(
+                        "{} does not have what they need: {missing} left out",
+                        vehicle.name
+                    ));
                 }
                 known
             }
@@ -204,19 +215,25 @@ impl Flown {
         Ok(Plan { vehicle, arms, trials: self.trials, seed: self.common.seed })
     }
 
-    /// The vehicle, once it is known that results can be written: nobody wants to learn that afterwards.
+    /// The vehicle, once it is known that results can be written: nobody wants to learn that
+    /// afterwards.
     fn begin(&self) -> Result<VehicleFile, String> {
-        let (Common { vehicle: file, out, json, shard, .. }, name) = (&self.common, self.study.name);
+        let (Common { vehicle: file, out, json, shard, .. }, name) =
+            (&self.common, self.study.name);
         if shard.is_some() && json.is_some() {
-            return Err("--json: a part of a study has no figures; merge the parts first".to_owned());
+            return Err(
+                "--json: a part of a study has no figures; merge the parts first".to_owned()
+            );
         }
         check_trials(self.trials).map_err(|e| e.to_string())?;
         let kept = out.as_ref().map(|folder| folder.join(format!("{name}.json")));
         let paths = Paths::default().vehicle("--vehicle", file);
         let mut paths = paths.writes_json(json.as_ref(), kept.as_ref());
         if let Some(folder) = out {
-            let names = ["csv", "json", "html", "trials.jsonl"].map(|kind| format!("{name}.{kind}"));
-            paths = paths.writes_into(folder, names.into_iter().chain((self.study.others)(self.trials)));
+            let names =
+                ["csv", "json", "html", "trials.jsonl"].map(|kind| format!("{name}.{kind}"));
+            paths = paths
+                .writes_into(folder, names.into_iter().chain((self.study.others)(self.trials)));
         }
         paths.check()?;
         let vehicle = vehicle(file.as_deref())?;
@@ -268,7 +285,10 @@ impl Flown {
                 talk(&format!("wrote {}", kept(&format!("{name}.html"), page)?.display()));
             }
         }
-        self.common.json.as_ref().map_or(Ok(()), |path| output::write_file(path, found.json.as_bytes()))
+        self.common
+            .json
+            .as_ref()
+            .map_or(Ok(()), |path| output::write_file(path, found.json.as_bytes()))
     }
 }
 

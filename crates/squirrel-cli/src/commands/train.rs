@@ -44,8 +44,8 @@ pub(crate) struct Train {
     /// Passes over the windows at most.
     #[arg(long, default_value_t = Settings::default().epochs)]
     epochs: usize,
-    /// Flights to validate on, by name, separated by commas: the weights of the epoch that is best on them are kept, and
-    /// training stops when they get no better.
+    /// Flights to validate on, by name, separated by commas: the weights of the epoch that is best
+    /// on them are kept, and training stops when they get no better.
     #[arg(long, value_delimiter = ',')]
     validation: Vec<String>,
     /// Go on from the checkpoint that a training which was broken off has left beside the weights.
@@ -89,16 +89,26 @@ impl Train {
         let vehicle = vehicle(self.vehicle.as_deref())?;
         let windows = self.windows(&vehicle)?;
         let held_out: Vec<&str> = self.validation.iter().map(String::as_str).collect();
-        let (training, validation) = windows.split(&held_out).map_err(|e| format!("--validation: {e}"))?;
+        let (training, validation) =
+            windows.split(&held_out).map_err(|e| format!("--validation: {e}"))?;
         if training.all().is_empty() {
-            return Err(format!("--validation: {}: none is left to train on", self.validation.join(",")));
+            return Err(format!(
+                "--validation: {}: none is left to train on",
+                self.validation.join(",")
+            ));
         }
         let settings = Settings { epochs: self.epochs, seed: self.seed, ..Settings::default() };
         let area_m2 = labels::plate_area_m2(&vehicle);
-        let new = |model| Trainer::new(model, &vehicle.name, area_m2, &training, &validation, settings);
+        let new =
+            |model| Trainer::new(model, &vehicle.name, area_m2, &training, &validation, settings);
         let mut trainer = if self.resume {
             let nothing = || format!("--resume: {} keeps no checkpoint", self.out.display());
-            self.resumed(checkpoint.as_ref().ok_or_else(nothing)?, settings, &training, &validation)?
+            self.resumed(
+                checkpoint.as_ref().ok_or_else(nothing)?,
+                settings,
+                &training,
+                &validation,
+            )?
         } else {
             new(self.model).map_err(fail)?
         };
@@ -147,12 +157,15 @@ impl Train {
 
     /// What is read and what is written.
     fn paths(&self, checkpoint: Option<&PathBuf>) -> Result<Paths, String> {
-        let reads = Paths::default().flights("--flights", &self.flights)?.vehicle("--vehicle", &self.vehicle);
+        let reads = Paths::default()
+            .flights("--flights", &self.flights)?
+            .vehicle("--vehicle", &self.vehicle);
         let writes = reads.writes("--out", [&self.out]).writes("checkpoint of --out", checkpoint);
         Ok(writes.writes("--report", &self.report).writes("--json", &self.json))
     }
 
-    /// Windows of all flights in the order of their files; a flight whose wings stay folded is left out and said.
+    /// Windows of all flights in the order of their files; a flight whose wings stay folded is left
+    /// out and said.
     fn windows(&self, vehicle: &VehicleFile) -> Result<Windows, String> {
         let files = log_files(&self.flights)?;
         let bar = output::progress(files.len() as u64, "flights");
@@ -189,7 +202,8 @@ impl Train {
         training: &Windows,
         validation: &Windows,
     ) -> Result<Trainer, String> {
-        let trainer = Trainer::resume(checkpoint, training, validation).map_err(|e| e.to_string())?;
+        let trainer =
+            Trainer::resume(checkpoint, training, validation).map_err(|e| e.to_string())?;
         let then = (trainer.best().card.model, *trainer.settings());
         if then != (self.model, settings) {
             let (model, Settings { seed, epochs, .. }) = then;
@@ -235,7 +249,8 @@ fn judge(set: &'static str, trained: &Trained, plate: &Trained, windows: &Window
         rmse_to_labels_n: to_labels.rms_n,
         axis_rmse_to_labels_n: to_labels.axis_rms_n,
         // Only a simulator knows it.
-        rmse_to_truth_n: (truths.len() == all.len()).then(|| ForceError::of(&forces, &truths).rms_n),
+        rmse_to_truth_n: (truths.len() == all.len())
+            .then(|| ForceError::of(&forces, &truths).rms_n),
         flat_plate_rmse_to_labels_n: ForceError::of(&plate.forces_body_n(all), &labels).rms_n,
     }
 }
@@ -258,11 +273,24 @@ fn figures(sets: &[Judged]) -> BTreeMap<String, f64> {
 type Rows = Vec<Vec<String>>;
 
 fn table(sets: &[Judged]) -> Rows {
-    let head = ["set", "flights", "windows", "RMSE to labels N", "x", "y", "z", "to truth N", "flat plate N"];
+    let head = [
+        "set",
+        "flights",
+        "windows",
+        "RMSE to labels N",
+        "x",
+        "y",
+        "z",
+        "to truth N",
+        "flat plate N",
+    ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for judged in sets {
-        let mut row =
-            vec![judged.set.to_owned(), judged.flights.len().to_string(), judged.windows.to_string()];
+        let mut row = vec![
+            judged.set.to_owned(),
+            judged.flights.len().to_string(),
+            judged.windows.to_string(),
+        ];
         let [x, y, z] = judged.axis_rmse_to_labels_n;
         row.extend([judged.rmse_to_labels_n, x, y, z].map(|n| format!("{n:.4}")));
         row.push(judged.rmse_to_truth_n.map_or_else(|| "-".to_owned(), |n| format!("{n:.4}")));
@@ -310,7 +338,8 @@ fn page(best: &Trained, history: &[Epoch], table: &Rows) -> String {
     ]);
     page.section("Errors of the force", "Root mean square over the windows of a set, N.");
     if let Some((head, rows)) = table.split_first() {
-        let rows: Vec<Row> = rows.iter().map(|cells| Row { ink: None, cells: cells.clone() }).collect();
+        let rows: Vec<Row> =
+            rows.iter().map(|cells| Row { ink: None, cells: cells.clone() }).collect();
         page.table(head, &rows);
     }
     page.section("Loss", "");
@@ -325,13 +354,19 @@ fn page(best: &Trained, history: &[Epoch], table: &Rows) -> String {
     let training = history.iter().map(|epoch| epoch.training.sqrt()).collect();
     chart.series.push(Series::line("training", Ink::Series(0), epochs.clone(), training));
     if history.iter().any(|epoch| epoch.validation.is_some()) {
-        let validation = history.iter().map(|epoch| epoch.validation.map_or(f64::NAN, f64::sqrt)).collect();
+        let validation =
+            history.iter().map(|epoch| epoch.validation.map_or(f64::NAN, f64::sqrt)).collect();
         chart.series.push(Series::line("validation", Ink::Series(1), epochs, validation));
     }
     let caption =
-        "Training is the mean over an epoch while the weights moved, validation is after it.".to_owned();
-    let figure =
-        Figure { title: "Over epochs".to_owned(), caption, drawings: vec![chart.svg()], notes: Vec::new() };
+        "Training is the mean over an epoch while the weights moved, validation is after it."
+            .to_owned();
+    let figure = Figure {
+        title: "Over epochs".to_owned(),
+        caption,
+        drawings: vec![chart.svg()],
+        notes: Vec::new(),
+    };
     page.figures(Columns::One, &[figure]);
     page.html()
 }

@@ -1,5 +1,5 @@
-//! `squirrel export-vectors`: the same bytes again, and only from logs that fly again bit for bit; `fly --hil` without its image.
-//! With it: `cargo xtask firmware`.
+//! `squirrel export-vectors`: the same bytes again, and only from logs that fly again bit for bit;
+//! `fly --hil` without its image. With it: `cargo xtask firmware`.
 
 use super::support::{Folder, json};
 use squirrel_core::stack::StackState;
@@ -21,7 +21,10 @@ fn the_file_plays_as_a_target_would_play_it() {
     assert_eq!(setup, fs::read(folder.0.join("a/setup-0.bin")).unwrap());
     let alone = Header::take(&mut Reader::new(&setup)).unwrap();
     assert_eq!(alone, Header { sequences: 1, frames: 0 });
-    assert!(bytes[Header::LENGTH..].starts_with(&setup[Header::LENGTH..]), "the setup is the first record");
+    assert!(
+        bytes[Header::LENGTH..].starts_with(&setup[Header::LENGTH..]),
+        "the setup is the first record"
+    );
     let said = json(&folder, "v.json");
     let mut reader = Reader::new(&bytes);
     let header = Header::take(&mut reader).unwrap();
@@ -36,7 +39,8 @@ fn the_file_plays_as_a_target_would_play_it() {
             }
             Record::Frame(frame, expected) => {
                 let (stack, state) = flight.as_mut().unwrap();
-                outputs = written(&stack.step(state, &frame), |bytes| hash(outputs, bytes)).unwrap();
+                outputs =
+                    written(&stack.step(state, &frame), |bytes| hash(outputs, bytes)).unwrap();
                 assert_eq!(outputs, expected, "step {frames}");
                 frames += 1;
             }

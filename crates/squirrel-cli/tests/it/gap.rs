@@ -1,5 +1,6 @@
-//! The gap workflow as a user runs it: what goes wrong is one line and leaves nothing behind, what is added leaves the rest
-//! of the vehicle file as it was, and the same flights give the same bytes.
+//! The gap workflow as a user runs it: what goes wrong is one line and leaves nothing behind, what
+//! is added leaves the rest of the vehicle file as it was, and the same flights give the same
+//! bytes.
 
 use super::support::{Folder, SQUIRREL, json};
 use squirrel_log::FlightLog;
@@ -23,20 +24,32 @@ fn with_flights(name: &str) -> Folder {
         fs::create_dir(folder.0.join(out)).unwrap();
     }
     for (out, seed) in [("train/a.mcap", "1"), ("train/b.mcap", "2"), ("held-out/c.mcap", "3")] {
-        let flight = ["fly", "--vehicle", "individual.toml", "--arm", "pc", "--scenario", "excite_rich"];
+        let flight =
+            ["fly", "--vehicle", "individual.toml", "--arm", "pc", "--scenario", "excite_rich"];
         folder.succeeds(&[&flight[..], &["--seed", seed, "--out", out]].concat());
     }
     folder
 }
 
-const FLIGHTS: [&str; 6] = ["--vehicle", "squirrel.toml", "--flights", "train", "--held-out", "held-out"];
+const FLIGHTS: [&str; 6] =
+    ["--vehicle", "squirrel.toml", "--flights", "train", "--held-out", "held-out"];
 
 #[test]
 fn what_cannot_be_read_is_one_line_and_leaves_nothing() {
     let folder = Folder::new("gap-unreadable");
     write_vehicles(&folder);
     folder.succeeds(&["fly", "--arm", "pc", "--scenario", "hover", "--out", "f.mcap"]);
-    folder.succeeds(&["fly", "--arm", "pc", "--scenario", "hover", "--seed", "2", "--out", "g.mcap"]);
+    folder.succeeds(&[
+        "fly",
+        "--arm",
+        "pc",
+        "--scenario",
+        "hover",
+        "--seed",
+        "2",
+        "--out",
+        "g.mcap",
+    ]);
     let bytes = fs::read(folder.0.join("f.mcap")).unwrap();
     fs::write(folder.0.join("cut.mcap"), &bytes[..bytes.len() / 2]).unwrap();
     folder.write("empty.mcap", "");
@@ -45,7 +58,10 @@ fn what_cannot_be_read_is_one_line_and_leaves_nothing() {
 
     let whole = FlightLog::read(&folder.0.join("f.mcap")).unwrap();
     let mut nan = whole.clone();
-    nan.sources.values_mut().flat_map(|s| s.channels.values_mut()).for_each(|c| c.values.fill(f64::NAN));
+    nan.sources
+        .values_mut()
+        .flat_map(|s| s.channels.values_mut())
+        .for_each(|c| c.values.fill(f64::NAN));
     nan.write(&folder.0.join("nan.mcap")).unwrap();
     let mut six = whole.clone();
     let command = six.source_mut("rotor").channels.get_mut("command").unwrap();
@@ -71,10 +87,13 @@ fn what_cannot_be_read_is_one_line_and_leaves_nothing() {
     for step in STEPS {
         for (flight, words) in cases {
             let words = [&[flight][..], words].concat();
-            let arguments = ["gap", step, "--vehicle", "squirrel.toml", "--out", "out", "--json", "v.json"];
-            let fit = [&arguments[..], &["--flights", flight, "f.mcap", "--held-out", "g.mcap"]].concat();
+            let arguments =
+                ["gap", step, "--vehicle", "squirrel.toml", "--out", "out", "--json", "v.json"];
+            let fit =
+                [&arguments[..], &["--flights", flight, "f.mcap", "--held-out", "g.mcap"]].concat();
             folder.fails(&fit, &words);
-            let unseen = [&arguments[..], &["--flights", "g.mcap", "f.mcap", "--held-out", flight]].concat();
+            let unseen =
+                [&arguments[..], &["--flights", "g.mcap", "f.mcap", "--held-out", flight]].concat();
             folder.fails(&unseen, &words);
         }
         let twice = ["gap", step, "--vehicle", "squirrel.toml", "--flights", "f.mcap", "f.mcap"];
@@ -92,7 +111,8 @@ fn a_vehicle_file_that_will_not_do_is_one_line() {
     assert_ne!(without, SQUIRREL);
     folder.write("without.toml", &without);
     for step in ["name", "add", "run"] {
-        let arguments = |vehicle| ["gap", step, "--vehicle", vehicle, "--flights", "f.mcap", "--out", "out"];
+        let arguments =
+            |vehicle| ["gap", step, "--vehicle", vehicle, "--flights", "f.mcap", "--out", "out"];
         folder.fails(&arguments("without.toml"), &["mass.mass_kg = 0.548", "no sd"]);
         folder.fails(&arguments("nowhere.toml"), &["nowhere.toml"]);
     }
@@ -112,7 +132,8 @@ fn holds_in_order(text: &str, lines: &str) -> bool {
 fn what_is_added_leaves_the_file_as_it_was() {
     let folder = with_flights("gap-add");
     let before = folder.files();
-    let patch = folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--dry-run"]].concat());
+    let patch =
+        folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--dry-run"]].concat());
     assert!(!patch.contains("vehicle with"), "{patch}");
     for line in ["+ [effects.motor_lag]", "+ extra_time_constant_s = { value = "] {
         assert!(patch.contains(line), "`{line}` is not in:\n{patch}");
@@ -120,8 +141,8 @@ fn what_is_added_leaves_the_file_as_it_was() {
     assert!(!patch.lines().any(|line| line.starts_with("- ")), "{patch}");
     assert_eq!(folder.files(), before, "a dry run writes nothing");
 
-    let said =
-        folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--json", "v.json"]].concat());
+    let said = folder
+        .succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "out", "--json", "v.json"]].concat());
     assert!(said.contains("vehicle with motor_lag: out/squirrel.toml"), "{said}");
     let patched = fs::read_to_string(folder.0.join("out/squirrel.toml")).unwrap();
     assert!(holds_in_order(&patched, SQUIRREL), "every line and comment stays in its place");
@@ -132,14 +153,17 @@ fn what_is_added_leaves_the_file_as_it_was() {
     assert_eq!(json(&folder, "v.json")["model_patch"], "out/squirrel.toml");
     folder.succeeds(&["vehicle", "check", "out/squirrel.toml"]);
 
-    // Another explanation is added by its name; one that none has is an error which says what there is, and writes nothing.
+    // Another explanation is added by its name; one that none has is an error which says what there
+    // is, and writes nothing.
     let verdict = json(&folder, "v.json");
     let other = verdict["alternatives"][0]["effects"][0].as_str().unwrap();
-    folder.succeeds(&[&["gap", "add"], &FLIGHTS[..], &["--out", "other", "--effect", other]].concat());
+    folder.succeeds(
+        &[&["gap", "add"], &FLIGHTS[..], &["--out", "other", "--effect", other]].concat(),
+    );
     let chosen = fs::read_to_string(folder.0.join("other/squirrel.toml")).unwrap();
     assert!(chosen.contains(&format!("[effects.{other}]")), "{chosen}");
-    let output =
-        folder.run(&[&["gap", "add"], &FLIGHTS[..], &["--out", "never", "--effect", "gust"]].concat());
+    let output = folder
+        .run(&[&["gap", "add"], &FLIGHTS[..], &["--out", "never", "--effect", "gust"]].concat());
     let stderr = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(1), "{stderr}");
     let last = stderr.lines().last().unwrap();
@@ -154,7 +178,16 @@ fn what_is_added_leaves_the_file_as_it_was() {
     assert_eq!(json(&folder, "w.json")["verdict"], "none");
 
     // A verdict without a name is an answer, but no patch: `add` fails with why, `run` says it.
-    let none = ["--vehicle", "out/squirrel.toml", "--flights", "train", "--out", "more", "--json", "w.json"];
+    let none = [
+        "--vehicle",
+        "out/squirrel.toml",
+        "--flights",
+        "train",
+        "--out",
+        "more",
+        "--json",
+        "w.json",
+    ];
     let why = "squirrel: nothing to add: no effect is above its tolerance";
     for dry_run in [&["--dry-run"][..], &[]] {
         let output = folder.run(&[&["gap", "add"], &none[..], dry_run].concat());
@@ -168,7 +201,8 @@ fn what_is_added_leaves_the_file_as_it_was() {
     assert!(!folder.0.join("more/squirrel.toml").exists(), "no patch");
 }
 
-/// An answer that does not account for all of it still has effects in it, whose numbers hold with those that floated beside them.
+/// An answer that does not account for all of it still has effects in it, whose numbers hold with
+/// those that floated beside them.
 #[test]
 fn effects_are_shown_with_what_moved_beside_them() {
     let folder = Folder::new("gap-moved");
@@ -196,7 +230,8 @@ fn effects_are_shown_with_what_moved_beside_them() {
     let moved = verdict["moved"].as_array().unwrap();
     assert!(moved.iter().any(|m| m["name"] == "inertia_error[x].inertia_fraction"), "{moved:?}");
     for number in moved {
-        let [value, sd, tolerance] = ["value", "sd", "tolerance"].map(|key| number[key].as_f64().unwrap());
+        let [value, sd, tolerance] =
+            ["value", "sd", "tolerance"].map(|key| number[key].as_f64().unwrap());
         assert!(value != 0.0 && sd > 0.0 && tolerance > 0.0, "{number}");
         assert!(shown.contains(number["name"].as_str().unwrap()), "{number} is not in:\n{shown}");
     }
@@ -206,8 +241,10 @@ fn effects_are_shown_with_what_moved_beside_them() {
 #[test]
 fn the_vehicle_file_is_never_overwritten() {
     let folder = with_flights("gap-overwrite");
-    folder
-        .fails(&[&["gap", "add"], &FLIGHTS[..], &["--out", "."]].concat(), &["squirrel.toml", "overwritten"]);
+    folder.fails(
+        &[&["gap", "add"], &FLIGHTS[..], &["--out", "."]].concat(),
+        &["squirrel.toml", "overwritten"],
+    );
     assert_eq!(fs::read_to_string(folder.0.join("squirrel.toml")).unwrap(), SQUIRREL);
 }
 
@@ -215,12 +252,18 @@ fn the_vehicle_file_is_never_overwritten() {
 fn the_same_flights_give_the_same_bytes() {
     let made = |name| {
         let folder = with_flights(name);
-        folder.succeeds(&[&["gap", "run"], &FLIGHTS[..], &["--out", "out", "--json", "v.json"]].concat());
+        folder.succeeds(
+            &[&["gap", "run"], &FLIGHTS[..], &["--out", "out", "--json", "v.json"]].concat(),
+        );
         let files: Vec<String> = fs::read_dir(folder.0.join("out"))
             .unwrap()
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())
             .collect();
-        assert!(["squirrel.toml", "verdict.json"].iter().all(|file| files.contains(&(*file).to_owned())));
+        assert!(
+            ["squirrel.toml", "verdict.json"]
+                .iter()
+                .all(|file| files.contains(&(*file).to_owned()))
+        );
         let mut all: Vec<_> = files
             .iter()
             .map(|file| (file.clone(), fs::read(folder.0.join("out").join(file)).unwrap()))
@@ -242,12 +285,13 @@ fn the_same_flights_give_the_same_bytes() {
     assert_eq!(first.len(), second.len());
 }
 
-/// Under the controller that flew it, the simulated drone goes where the measured one went once the name is in the file; a
-/// flight of another autopilot cannot be flown again, and a note says so.
+/// Under the controller that flew it, the simulated drone goes where the measured one went once the
+/// name is in the file; a flight of another autopilot cannot be flown again, and a note says so.
 #[test]
 fn held_out_flights_are_flown_again_in_closed_loop() {
     let folder = with_flights("gap-closed-loop");
-    let flight = ["fly", "--vehicle", "individual.toml", "--arm", "pc", "--scenario", "excite_rich"];
+    let flight =
+        ["fly", "--vehicle", "individual.toml", "--arm", "pc", "--scenario", "excite_rich"];
     folder.succeeds(&[&flight[..], &["--seed", "4", "--out", "d.mcap"]].concat());
     let mut foreign = FlightLog::read(&folder.0.join("d.mcap")).unwrap();
     foreign.metadata.clear();
@@ -263,7 +307,8 @@ fn held_out_flights_are_flown_again_in_closed_loop() {
     };
     assert!(norm("after_ned_m") < 0.2 * norm("before_ned_m"), "{flown:?}");
     let notes = verdict["notes"].as_array().unwrap();
-    let said =
-        |note: &serde_json::Value| note.as_str().unwrap().starts_with("held-out/d.mcap: not flown again");
+    let said = |note: &serde_json::Value| {
+        note.as_str().unwrap().starts_with("held-out/d.mcap: not flown again")
+    };
     assert!(notes.iter().any(said), "{notes:?}");
 }

@@ -1,4 +1,5 @@
-//! What is read is never overwritten, no two results go into one file, and what is no file is written to.
+//! What is read is never overwritten, no two results go into one file, and what is no file is
+//! written to.
 
 #![cfg(unix)]
 
@@ -35,18 +36,25 @@ fn with_inputs(name: &str) -> Folder {
     for table in ["f.csv", "csv/f.csv"] {
         folder.write(table, "t,gx,gy,gz\n0,1,2,3\n0.1,1,2,3\n");
     }
-    for log in
-        ["x.mcap.partial", "vectors/vectors.bin", "vectors/setup-0.bin", "d/find.json", "d/report.html"]
-    {
+    for log in [
+        "x.mcap.partial",
+        "vectors/vectors.bin",
+        "vectors/setup-0.bin",
+        "d/find.json",
+        "d/report.html",
+    ] {
         fs::copy(folder.0.join("f/a.mcap"), folder.0.join(log)).unwrap();
     }
     for vehicle in STUDIES.map(|study| format!("d/{study}.csv")) {
         folder.write(&vehicle, SQUIRREL);
     }
-    for vehicle in ["d/flights/trial-001.toml", "d/t1.toml", "d/filters_in_loop.csv", "d/verdict.json"] {
+    for vehicle in
+        ["d/flights/trial-001.toml", "d/t1.toml", "d/filters_in_loop.csv", "d/verdict.json"]
+    {
         folder.write(vehicle, SQUIRREL);
     }
-    for more in ["image.elf", "board.bin", "part1/thrust.trials.jsonl", "part2/thrust.trials.jsonl"] {
+    for more in ["image.elf", "board.bin", "part1/thrust.trials.jsonl", "part2/thrust.trials.jsonl"]
+    {
         folder.write(more, "{}\n");
     }
     symlink(".", folder.0.join("here")).unwrap();
@@ -64,13 +72,17 @@ fn paths_of(folder: &Folder, file: &str) -> Vec<String> {
     vec![file.to_owned(), format!("./{file}"), format!("here/{file}"), link, hard]
 }
 
-/// Runs a command with every path of a file in the place of `@`: it is refused in a line that names both arguments, and changes nothing.
+/// Runs a command with every path of a file in the place of `@`: it is refused in a line that names
+/// both arguments, and changes nothing.
 fn is_refused(folder: &Folder, command: &str, file: &str, arguments: [&str; 2]) {
     let before = fs::read(folder.0.join(file)).unwrap();
     for path in paths_of(folder, file) {
         let command = command.replace('@', &path);
         let words: Vec<&str> = command.split_whitespace().collect();
-        folder.fails(&words, &[arguments[0], arguments[1], file, "what is read is never overwritten"]);
+        folder.fails(
+            &words,
+            &[arguments[0], arguments[1], file, "what is read is never overwritten"],
+        );
         assert!(fs::read(folder.0.join(file)).unwrap() == before, "{command}: {file} is another");
     }
 }
@@ -89,7 +101,11 @@ fn no_command_overwrites_what_it_reads() {
         ("fly --scenario s.toml --json @", "s.toml", ["--scenario", "--json"]),
         ("fly --policy p.safetensors --out @", "p.safetensors", ["--policy", "--out"]),
         ("fly --policy p.safetensors --json @", "p.safetensors", ["--policy", "--json"]),
-        ("fly --scenario hover --reference plan.mcap --out @", "plan.mcap", ["--reference", "--out"]),
+        (
+            "fly --scenario hover --reference plan.mcap --out @",
+            "plan.mcap",
+            ["--reference", "--out"],
+        ),
         ("fly --hil qemu --hil-image image.elf --json @", "image.elf", ["--hil-image", "--json"]),
         ("plan --vehicle v.toml --out @", "v.toml", ["--vehicle", "--out"]),
         ("plan --vehicle v.toml --report @", "v.toml", ["--vehicle", "--report"]),
@@ -105,7 +121,11 @@ fn no_command_overwrites_what_it_reads() {
         ("train flat_plate --flights f --out w --report @", "f/a.mcap", ["--flights", "--report"]),
         ("train flat_plate --flights f --out w --json @", "f/a.mcap", ["--flights", "--json"]),
         ("train flat_plate --flights f --vehicle v.toml --out @", "v.toml", ["--vehicle", "--out"]),
-        ("train flat_plate --flights f --vehicle w.toml --out @", "w.safetensors", ["weights", "--out"]),
+        (
+            "train flat_plate --flights f --vehicle w.toml --out @",
+            "w.safetensors",
+            ["weights", "--out"],
+        ),
         ("import --map map.toml f.csv --out @", "f.csv", ["PATHS", "--out"]),
         ("import --map map.toml f.csv --out x --json @", "f.csv", ["PATHS", "--json"]),
         ("import --map map.toml f.csv --out @", "map.toml", ["--map", "--out"]),
@@ -121,7 +141,11 @@ fn no_command_overwrites_what_it_reads() {
         ("study filters --vehicle @ --out d", "d/filters_in_loop.csv", ["--vehicle", "--out"]),
         ("study table2 --vehicle @ --out d", "d/t1.toml", ["--vehicle", "--out"]),
         ("study merge part1 --out m --json @", "part1/thrust.trials.jsonl", ["FOLDERS", "--json"]),
-        ("study merge part1 part2 --out here/part2", "part2/thrust.trials.jsonl", ["FOLDERS", "--out"]),
+        (
+            "study merge part1 part2 --out here/part2",
+            "part2/thrust.trials.jsonl",
+            ["FOLDERS", "--out"],
+        ),
         ("study merge part1 --out m --vehicle v.toml --json @", "v.toml", ["--vehicle", "--json"]),
         ("gap find --vehicle v.toml --flights @ --out d", "d/find.json", ["--flights", "--out"]),
         (
@@ -129,17 +153,26 @@ fn no_command_overwrites_what_it_reads() {
             "d/report.html",
             ["held-out", "--out"],
         ),
-        ("gap run --vehicle v.toml --flights f --held-out @ --out d", "d/report.html", ["held-out", "--out"]),
+        (
+            "gap run --vehicle v.toml --flights f --held-out @ --out d",
+            "d/report.html",
+            ["held-out", "--out"],
+        ),
         ("gap name --vehicle @ --flights f --out d", "d/verdict.json", ["--vehicle", "--out"]),
         ("gap add --vehicle @ --flights f --out .", "v.toml", ["--vehicle", "--out"]),
         ("gap run --vehicle @ --flights f --out .", "v.toml", ["--vehicle", "--out"]),
-        ("gap add --dry-run --vehicle v.toml --flights f --json @", "v.toml", ["--vehicle", "--json"]),
+        (
+            "gap add --dry-run --vehicle v.toml --flights f --json @",
+            "v.toml",
+            ["--vehicle", "--json"],
+        ),
     ];
     for (command, file, arguments) in cases {
         is_refused(&folder, command, file, arguments);
     }
     for step in ["find", "name", "add", "shrink", "run"] {
-        let command = format!("gap {step} --vehicle v.toml --flights f --held-out h --out d --json @");
+        let command =
+            format!("gap {step} --vehicle v.toml --flights f --held-out h --out d --json @");
         for (file, argument) in
             [("v.toml", "--vehicle"), ("f/a.mcap", "--flights"), ("h/b.mcap", "--held-out")]
         {
@@ -149,7 +182,8 @@ fn no_command_overwrites_what_it_reads() {
     for study in STUDIES {
         let command = format!("study {study} --vehicle v.toml --json @");
         is_refused(&folder, &command, "v.toml", ["--vehicle", "--json"]);
-        let (command, file) = (format!("study {study} --vehicle @ --out d"), format!("d/{study}.csv"));
+        let (command, file) =
+            (format!("study {study} --vehicle @ --out d"), format!("d/{study}.csv"));
         is_refused(&folder, &command, &file, ["--vehicle", "--out"]);
     }
 }
@@ -200,7 +234,8 @@ fn no_two_results_go_into_one_file() {
     ]);
 }
 
-/// A folder that holds an input may also hold results, of an earlier run, too: nothing of it is read.
+/// A folder that holds an input may also hold results, of an earlier run, too: nothing of it is
+/// read.
 #[test]
 fn what_is_not_read_may_be_written_again() {
     let folder = with_inputs("again");
@@ -222,12 +257,15 @@ fn what_is_not_read_may_be_written_again() {
 #[test]
 fn json_may_go_into_the_folder_that_is_yet_to_be_made_and_into_no_other() {
     let folder = with_inputs("new-folder");
-    for (command, out) in [("demo", "a"), ("export-vectors f", "b"), ("study faults --trials 1", "c")] {
+    for (command, out) in
+        [("demo", "a"), ("export-vectors f", "b"), ("study faults --trials 1", "c")]
+    {
         let command = format!("{command} --out {out} --json ./{out}/j.json");
         folder.succeeds(&command.split(' ').collect::<Vec<_>>());
         assert!(folder.0.join(out).join("j.json").is_file(), "{command}");
     }
-    folder.fails(&["study", "faults", "--out", "e", "--json", "nowhere/j.json"], &["nowhere/j.json"]);
+    folder
+        .fails(&["study", "faults", "--out", "e", "--json", "nowhere/j.json"], &["nowhere/j.json"]);
 }
 
 /// `--json` may name the file in which the folder has the same bytes.
@@ -246,9 +284,15 @@ fn the_figures_that_the_folder_has_too_may_be_asked_for_there() {
 fn a_vehicle_may_come_through_a_pipe() {
     let folder = with_inputs("vehicle-pipe");
     let mut check = Command::new(env!("CARGO_BIN_EXE_squirrel"));
-    let check = check.args(["vehicle", "check", "/dev/stdin", "--json", "v.json"]).current_dir(&folder.0);
+    let check =
+        check.args(["vehicle", "check", "/dev/stdin", "--json", "v.json"]).current_dir(&folder.0);
     let mut check = check.stdin(Stdio::piped()).stdout(Stdio::null()).spawn().unwrap();
-    check.stdin.take().unwrap().write_all(SQUIRREL.replacen("parnn_weights", "# ", 1).as_bytes()).unwrap();
+    check
+        .stdin
+        .take()
+        .unwrap()
+        .write_all(SQUIRREL.replacen("parnn_weights", "# ", 1).as_bytes())
+        .unwrap();
     assert!(check.wait().unwrap().success());
 }
 
@@ -256,7 +300,8 @@ fn a_vehicle_may_come_through_a_pipe() {
 fn printed(folder: &Folder, arguments: &[&str], json: &str, into: &OpenOptions) -> String {
     let stdout = into.open(folder.0.join("o.txt")).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_squirrel"));
-    let command = command.args(arguments).args(["--json", json]).current_dir(&folder.0).stdout(stdout);
+    let command =
+        command.args(arguments).args(["--json", json]).current_dir(&folder.0).stdout(stdout);
     assert!(command.status().unwrap().success(), "{arguments:?} --json {json}");
     fs::read_to_string(folder.0.join("o.txt")).unwrap()
 }
@@ -271,7 +316,8 @@ fn json_into_stdout_stands_where_it_was_written_and_nothing_is_lost() {
     for arguments in [["vehicle", "check", "v.toml"].as_slice(), &["replay", "f/a.mcap"]] {
         let said = folder.succeeds(&[arguments, &["--json", "j.json"]].concat());
         let json = fs::read_to_string(folder.0.join("j.json")).unwrap();
-        let whole = if arguments[0] == "replay" { json.clone() + &said } else { said.clone() + &json };
+        let whole =
+            if arguments[0] == "replay" { json.clone() + &said } else { said.clone() + &json };
         for path in ["to-stdout", "/dev/fd/1", "/proc/self/fd/1"] {
             // Into a pipe, `> o.txt`, `>> o.txt`.
             assert_eq!(folder.succeeds(&[arguments, &["--json", path]].concat()), whole, "{path}");
@@ -306,7 +352,15 @@ fn weights_into_a_device_have_no_checkpoint() {
     symlink("/dev/null", folder.0.join("null")).unwrap();
     let scenario = Scenario { duration_s: 8.0, ..Scenario::find("random_spread").unwrap() };
     folder.write("spread.toml", &scenario.to_toml());
-    folder.succeeds(&["fly", "--arm", "pc_wings_open", "--scenario", "spread.toml", "--out", "g.mcap"]);
+    folder.succeeds(&[
+        "fly",
+        "--arm",
+        "pc_wings_open",
+        "--scenario",
+        "spread.toml",
+        "--out",
+        "g.mcap",
+    ]);
     let before = folder.files();
     let train = ["train", "vanilla", "--flights", "g.mcap", "--epochs", "60", "--out", "null"];
     folder.succeeds(&train);

@@ -6,10 +6,22 @@ use std::fs;
 #[test]
 fn a_plan_is_made_and_flown() {
     let folder = Folder::new("plan");
-    let arguments =
-        ["plan", "--scenario", "avoid", "--out", "p.mcap", "--json", "p.json", "--report", "p.html"];
+    let arguments = [
+        "plan",
+        "--scenario",
+        "avoid",
+        "--out",
+        "p.mcap",
+        "--json",
+        "p.json",
+        "--report",
+        "p.html",
+    ];
     let table = folder.succeeds(&arguments);
-    assert!(table.contains("solved") && table.contains("flat") && table.contains("none"), "{table}");
+    assert!(
+        table.contains("solved") && table.contains("flat") && table.contains("none"),
+        "{table}"
+    );
     let plan = || ["p.mcap", "p.json", "p.html"].map(|name| fs::read(folder.0.join(name)).unwrap());
     let first = plan();
     folder.succeeds(&arguments);
@@ -33,7 +45,17 @@ fn a_plan_is_made_and_flown() {
     assert_eq!(with["time_s"].as_array().unwrap().len(), 101);
     assert!(fs::read_to_string(folder.0.join("p.html")).unwrap().contains("<svg"));
 
-    let fly = ["fly", "--scenario", "avoid", "--reference", "p.mcap", "--json", "f.json", "--out", "f.mcap"];
+    let fly = [
+        "fly",
+        "--scenario",
+        "avoid",
+        "--reference",
+        "p.mcap",
+        "--json",
+        "f.json",
+        "--out",
+        "f.mcap",
+    ];
     folder.succeeds(&fly);
     let flown = json(&folder, "f.json");
     let number = |key: &str| flown[key].as_f64().unwrap();
@@ -49,7 +71,14 @@ fn a_planner_is_an_arm() {
     let folder = Folder::new("planner");
     let text = folder.succeeds(&["fly", "--scenario", "hover", "--arm", "plan_wings"]);
     assert!(text.contains("plan_wings"), "{text}");
-    let table = folder.succeeds(&["study", "table3", "--trials", "1", "--arms", "plan_wings,plan_no_wings"]);
+    let table = folder.succeeds(&[
+        "study",
+        "table3",
+        "--trials",
+        "1",
+        "--arms",
+        "plan_wings,plan_no_wings",
+    ]);
     assert!(table.contains("plan_wings") && table.contains("plan_no_wings"), "{table}");
 }
 
@@ -76,7 +105,10 @@ fn what_cannot_be_planned_or_followed_is_one_line() {
         (vec!["plan", "--step-s", "0.001"], "steps, must make 2 to 400"),
         (vec!["plan", "--wing", "paper"], "known are flat, membrane, parnn, none"),
         (vec!["fly", "--reference", "no-such.mcap"], "no-such.mcap"),
-        (vec!["fly", "--reference", "p.mcap", "--scenario", "excite_calm"], "manoeuvres of its own"),
+        (
+            vec!["fly", "--reference", "p.mcap", "--scenario", "excite_calm"],
+            "manoeuvres of its own",
+        ),
         (vec!["fly", "--reference", "p.mcap", "--scenario", "low.toml"], "begins 5.0 m from"),
         (vec!["fly", "--reference", "p.mcap", "--arm", "plan_wings"], "plans by itself"),
         (vec!["fly", "--reference", "broken.mcap"], "broken.mcap"),

@@ -10,9 +10,15 @@ use std::fs;
 fn without_arguments_it_flies_the_demo() {
     let folder = Folder::new("demo");
     let table = folder.succeeds(&[]);
-    for word in
-        ["thrust-to-weight 1.25", "pc", "twcc_flat", "twcc_oracle", "RMSE 3-D", "gain %", "height lost"]
-    {
+    for word in [
+        "thrust-to-weight 1.25",
+        "pc",
+        "twcc_flat",
+        "twcc_oracle",
+        "RMSE 3-D",
+        "gain %",
+        "height lost",
+    ] {
         assert!(table.contains(word), "`{word}` is not in:\n{table}");
     }
     let mut files: Vec<String> = fs::read_dir(folder.0.join("squirrel-demo"))
@@ -20,7 +26,10 @@ fn without_arguments_it_flies_the_demo() {
         .map(|e| e.unwrap().file_name().into_string().unwrap())
         .collect();
     files.sort();
-    assert_eq!(files, ["flight-pc.mcap", "flight-twcc_flat.mcap", "flight-twcc_oracle.mcap", "report.html"]);
+    assert_eq!(
+        files,
+        ["flight-pc.mcap", "flight-twcc_flat.mcap", "flight-twcc_oracle.mcap", "report.html"]
+    );
     let report = fs::read_to_string(folder.0.join("squirrel-demo/report.html")).unwrap();
     assert!(report.contains("<svg") && report.contains("twcc_oracle"));
     for outside in ["src=\"http", "href=\"http", "url(http", "@import", "<link"] {
@@ -28,7 +37,8 @@ fn without_arguments_it_flies_the_demo() {
     }
 }
 
-/// No command is the demo, with all of its options; an option before another command belongs to nobody.
+/// No command is the demo, with all of its options; an option before another command belongs to
+/// nobody.
 #[test]
 fn the_options_of_the_demo_are_those_of_the_program() {
     let folder = Folder::new("options");
@@ -44,7 +54,9 @@ fn the_options_of_the_demo_are_those_of_the_program() {
     }
     assert_eq!(json(&folder, "b.json")["seed"], 3);
     let help = folder.succeeds(&["--help"]);
-    for words in ["squirrel [OPTIONS]", "squirrel <COMMAND>", "Options of the demo", "--json <JSON>"] {
+    for words in
+        ["squirrel [OPTIONS]", "squirrel <COMMAND>", "Options of the demo", "--json <JSON>"]
+    {
         assert!(help.contains(words), "`{words}` is not in:\n{help}");
     }
     assert_eq!(folder.run(&["--json", "c.json", "fly"]).status.code(), Some(2));
@@ -70,7 +82,10 @@ fn the_demo_is_the_same_bytes_twice_and_replays() {
 fn replay_names_the_first_output_of_a_changed_gain_and_a_flipped_byte() {
     let folder = Folder::new("replay");
     folder.succeeds(&["fly", "--arm", "pc", "--scenario", "hover", "--out", "f.mcap"]);
-    folder.write("v.toml", &SQUIRREL.replace("c2_per_s = { value = [14.0", "c2_per_s = { value = [14.5"));
+    folder.write(
+        "v.toml",
+        &SQUIRREL.replace("c2_per_s = { value = [14.0", "c2_per_s = { value = [14.5"),
+    );
     folder.fails(
         &["replay", "f.mcap", "--vehicle", "v.toml"],
         &["f.mcap", "control.inner.", "is the first output"],
@@ -97,8 +112,17 @@ fn a_truncated_log_says_what_is_whole_and_can_be_recovered() {
 #[test]
 fn fly_writes_log_report_and_figures() {
     let folder = Folder::new("fly");
-    let arguments =
-        ["fly", "--arm", "twcc_flat", "--scenario", "avoid", "--seed", "2", "--thrust-to-weight", "1.3"];
+    let arguments = [
+        "fly",
+        "--arm",
+        "twcc_flat",
+        "--scenario",
+        "avoid",
+        "--seed",
+        "2",
+        "--thrust-to-weight",
+        "1.3",
+    ];
     let outputs = ["--out", "f.mcap", "--report", "r.html", "--json", "f.json"];
     let table = folder.succeeds(&[&arguments[..], &outputs[..]].concat());
     assert!(table.contains("1.30") && table.contains("RMSE"), "{table}");
@@ -169,14 +193,16 @@ fn the_study_writes_its_table_for_machines() {
 #[test]
 fn parts_of_a_study_are_merged_into_the_whole() {
     let folder = Folder::new("parts");
-    let study = ["study", "table3", "--arms", "pc,twcc_plus", "--trials", "2", "--seed", "7", "--out"];
+    let study =
+        ["study", "table3", "--arms", "pc,twcc_plus", "--trials", "2", "--seed", "7", "--out"];
     let whole = folder.succeeds(&[&study[..], &["whole"]].concat());
     for k in 1..=4 {
         let (out, shard) = (format!("part{k}"), format!("{k}/4"));
         let said = folder.succeeds(&[&study[..], &[&out, "--shard", &shard]].concat());
         assert!(said.is_empty(), "a part has nothing to say: {said}");
     }
-    let merged = folder.succeeds(&["study", "merge", "part1", "part2", "part3", "part4", "--out", "merged"]);
+    let merged =
+        folder.succeeds(&["study", "merge", "part1", "part2", "part3", "part4", "--out", "merged"]);
     assert_eq!(merged, whole);
     let files = |name: &str| {
         let mut files: Vec<_> = fs::read_dir(folder.0.join(name))
@@ -215,7 +241,9 @@ fn the_study_of_filters_writes_its_table_and_its_flights() {
 #[test]
 fn wrong_usage_is_exit_code_two() {
     let folder = Folder::new("usage");
-    for arguments in [&["flie"][..], &["fly", "--speed", "3"], &["replay"], &["fly", "--seed", "one"]] {
+    for arguments in
+        [&["flie"][..], &["fly", "--speed", "3"], &["replay"], &["fly", "--seed", "one"]]
+    {
         assert_eq!(folder.run(arguments).status.code(), Some(2), "{arguments:?}");
     }
     assert_eq!(folder.run(&["--help"]).status.code(), Some(0));
@@ -265,8 +293,18 @@ fn bad_vehicles_get_one_line_with_file_field_and_value() {
         ("unknown key", "[mass]\n", "[mass]\nmas_kg = 1.0\n", &["line", "mas_kg"]),
         ("negative mass", "value = 0.548,", "value = -0.548,", &["mass.mass_kg = -0.548"]),
         ("NaN", "value = 0.548,", "value = nan,", &["mass.mass_kg = NaN"]),
-        ("impossible inertia", "4.68e-3, 7.72e-3]", "4.68e-3, 9.72e-3]", &["mass.inertia_kg_m2 = 0.00972"]),
-        ("indefinite inertia", "[3.22e-3, 4.68e-3", "[-3.22e-3, 4.68e-3", &["mass.inertia_kg_m2 = -0.00322"]),
+        (
+            "impossible inertia",
+            "4.68e-3, 7.72e-3]",
+            "4.68e-3, 9.72e-3]",
+            &["mass.inertia_kg_m2 = 0.00972"],
+        ),
+        (
+            "indefinite inertia",
+            "[3.22e-3, 4.68e-3",
+            "[-3.22e-3, 4.68e-3",
+            &["mass.inertia_kg_m2 = -0.00322"],
+        ),
         ("wing area without wing", "model = \"membrane\"\n", "", &["wing.area_per_side_m2 = 0.02"]),
         ("unknown effect", "[limits]", "[effects.magic]\nx = 1.0\n[limits]", &["effects.magic"]),
         (
@@ -334,7 +372,8 @@ fn bad_tables_get_one_line_with_file_field_and_value() {
         folder.fails(&["import", "--map", "map.toml", "f.csv", "--out", "f.mcap"], &words);
     }
     folder.write("f.csv", "t,gx,gy,gz\n0,1,2,3\n0.1,1,2,3\n");
-    folder.succeeds(&["import", "--map", "map.toml", "f.csv", "--out", "f.mcap", "--json", "f.json"]);
+    folder
+        .succeeds(&["import", "--map", "map.toml", "f.csv", "--out", "f.mcap", "--json", "f.json"]);
     assert_eq!(json(&folder, "f.json")["channels"][0]["samples"], 2);
     folder.fails(&["replay", "f.mcap"], &["f.mcap", "metadata"]);
 }

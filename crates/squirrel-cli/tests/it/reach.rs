@@ -7,12 +7,16 @@ use std::fs;
 fn a_sweep_is_a_table_a_json_and_a_page() {
     let folder = Folder::new("reach");
     let arguments = ["reach", "--speeds", "5,7", "--descent-deg", "0,90", "--ratios", "1.1,2"];
-    let table = folder.succeeds(&[&arguments[..], &["--json", "r.json", "--html", "r.html"]].concat());
+    let table =
+        folder.succeeds(&[&arguments[..], &["--json", "r.json", "--html", "r.html"]].concat());
     // Head, rule and a row for each of eight cases, all of them aligned.
     let rows: Vec<&str> = table.lines().skip_while(|line| !line.contains("T/W")).take(10).collect();
     assert!(rows[1..].iter().all(|row| row.len() == rows[0].len()), "{table}");
     let reached = json(&folder, "r.json");
-    assert_eq!((reached["vehicle"].as_str(), reached["wing"].as_str()), (Some("squirrel"), Some("flat")));
+    assert_eq!(
+        (reached["vehicle"].as_str(), reached["wing"].as_str()),
+        (Some("squirrel"), Some("flat"))
+    );
     assert_eq!((reached["tilt"].as_str(), reached["yaw_rad"].as_f64()), (Some("box"), Some(0.0)));
     let cases = reached["cases"].as_array().unwrap();
     assert_eq!(cases.len(), 8);
@@ -26,7 +30,10 @@ fn a_sweep_is_a_table_a_json_and_a_page() {
         let both = &cases[4][key];
         let [folded, with_wings, ratio] =
             ["folded", "with_wings", "ratio"].map(|name| both[name].as_f64().unwrap());
-        assert!(with_wings >= folded && (ratio - with_wings / folded).abs() < 1e-12, "{key}: {both}");
+        assert!(
+            with_wings >= folded && (ratio - with_wings / folded).abs() < 1e-12,
+            "{key}: {both}"
+        );
     }
     // At 7 m/s, level, T/W 1.1, as in docs/equations.md F; straight down there is nothing to brake.
     assert_eq!(

@@ -19,8 +19,17 @@ fn with_flights(name: &str, flights: &[&str]) -> Folder {
     fs::create_dir(folder.0.join("f")).unwrap();
     for (seed, flight) in flights.iter().enumerate() {
         let (seed, out) = (seed.to_string(), format!("f/{flight}.mcap"));
-        let fly =
-            ["fly", "--arm", "pc_wings_open", "--scenario", "short.toml", "--seed", &seed, "--out", &out];
+        let fly = [
+            "fly",
+            "--arm",
+            "pc_wings_open",
+            "--scenario",
+            "short.toml",
+            "--seed",
+            &seed,
+            "--out",
+            &out,
+        ];
         folder.succeeds(&fly);
     }
     folder
@@ -32,7 +41,18 @@ fn flights_become_weights_with_figures_and_a_loss_curve_the_same_bytes_twice() {
     let train = |out: &str| {
         let paths = [format!("{out}.safetensors"), format!("{out}.html"), format!("{out}.json")];
         let [weights, report, figures] = paths.each_ref().map(String::as_str);
-        let what = ["train", "parnn", "--flights", "f", "--seed", "3", "--epochs", "60", "--validation", "c"];
+        let what = [
+            "train",
+            "parnn",
+            "--flights",
+            "f",
+            "--seed",
+            "3",
+            "--epochs",
+            "60",
+            "--validation",
+            "c",
+        ];
         let where_to = ["--out", weights, "--report", report, "--json", figures];
         let table = folder.succeeds(&[&what[..], &where_to[..]].concat());
         (table, [weights, report, figures].map(|file| fs::read(folder.0.join(file)).unwrap()))
@@ -52,7 +72,10 @@ fn flights_become_weights_with_figures_and_a_loss_curve_the_same_bytes_twice() {
     assert!(history[59]["training"].as_f64() < history[0]["training"].as_f64());
     let trained = Trained::load(&folder.0.join("one.safetensors")).unwrap();
     assert_eq!(trained.card.vehicle, "squirrel");
-    assert_eq!(trained.card.figures["validation_rmse_to_labels_n"], figures["sets"][1]["rmse_to_labels_n"]);
+    assert_eq!(
+        trained.card.figures["validation_rmse_to_labels_n"],
+        figures["sets"][1]["rmse_to_labels_n"]
+    );
     assert!(trained.parnn().is_some() && trained.card.domain.speed_m_s[1] > 4.0);
     assert!(String::from_utf8_lossy(&files[1]).contains("<svg"));
 }
@@ -60,7 +83,8 @@ fn flights_become_weights_with_figures_and_a_loss_curve_the_same_bytes_twice() {
 #[test]
 fn every_model_can_be_trained() {
     let folder = with_flights("models", &["a"]);
-    let names = "parnn parnn_window_1 vanilla vanilla_body vanilla_plane flat_plate scaled_flat_plate";
+    let names =
+        "parnn parnn_window_1 vanilla vanilla_body vanilla_plane flat_plate scaled_flat_plate";
     for model in names.split(' ') {
         folder.succeeds(&[
             "train",
@@ -72,7 +96,10 @@ fn every_model_can_be_trained() {
             "--epochs",
             "2",
         ]);
-        assert_eq!(Trained::load(&folder.0.join("w.safetensors")).unwrap().card.model.name(), model);
+        assert_eq!(
+            Trained::load(&folder.0.join("w.safetensors")).unwrap().card.model.name(),
+            model
+        );
     }
 }
 
@@ -146,7 +173,10 @@ fn what_cannot_be_trained_on_gets_one_line() {
     let bytes = fs::read(folder.0.join("f/a.mcap")).unwrap();
     fs::write(folder.0.join("cut.mcap"), &bytes[..bytes.len() / 2]).unwrap();
     fails(&["--flights", "cut.mcap"], &["cut.mcap", "truncated"]);
-    assert_eq!(folder.run(&["train", "oracle", "--flights", "f", "--out", "w"]).status.code(), Some(2));
+    assert_eq!(
+        folder.run(&["train", "oracle", "--flights", "f", "--out", "w"]).status.code(),
+        Some(2)
+    );
 }
 
 /// One CSV file a source, axes and quaternion as another autopilot would have them.
@@ -178,7 +208,8 @@ time = { column = "t", unit = "s" }
 /// Columns of channels that share a time axis; `flu` turns the y and z of a vector round.
 fn csv(log: &FlightLog, channels: &[&str], flu: bool) -> String {
     let columns: usize = channels.iter().map(|name| log.channel(name).unwrap().1.width).sum();
-    let mut text = format!("t,{}\n", (0..columns).map(|c| c.to_string()).collect::<Vec<_>>().join(","));
+    let mut text =
+        format!("t,{}\n", (0..columns).map(|c| c.to_string()).collect::<Vec<_>>().join(","));
     let time_s = log.channel(channels[0]).unwrap().0;
     for (i, t) in time_s.iter().enumerate() {
         let _ = write!(text, "{t}");
@@ -197,7 +228,10 @@ fn an_imported_flight_gives_what_the_flight_itself_gives() {
     let folder = with_flights("imported", &["a"]);
     let log = FlightLog::read(&folder.0.join("f/a.mcap")).unwrap();
     fs::create_dir(folder.0.join("csv")).unwrap();
-    folder.write("csv/imu.csv", &csv(&log, &["imu.omega_body_rad_s", "imu.specific_force_body_m_s2"], true));
+    folder.write(
+        "csv/imu.csv",
+        &csv(&log, &["imu.omega_body_rad_s", "imu.specific_force_body_m_s2"], true),
+    );
     folder.write("csv/gnss.csv", &csv(&log, &["gnss.velocity_ned_m_s"], true));
     folder.write("csv/attitude.csv", &csv(&log, &["attitude.q_ned_from_body_wxyz"], false));
     folder.write("csv/commands.csv", &csv(&log, &["rotor.command", "wing.command"], false));
@@ -209,10 +243,15 @@ fn an_imported_flight_gives_what_the_flight_itself_gives() {
         let judged = json(&folder, "t.json")["sets"][0].clone();
         (judged["rmse_to_labels_n"].as_f64().unwrap(), judged["rmse_to_truth_n"].is_null())
     };
-    let ((native, knows_no_truth), (imported, has_none)) = (error("f/a.mcap"), error("imported.mcap"));
+    let ((native, knows_no_truth), (imported, has_none)) =
+        (error("f/a.mcap"), error("imported.mcap"));
     assert!(!knows_no_truth && has_none);
-    // The import has no battery, whose voltage thrust does not feel, and numbers of another rounding.
-    assert!((imported - native).abs() < 1e-3 * native, "{imported} N, from the flight itself {native} N");
+    // The import has no battery, whose voltage thrust does not feel, and numbers of another
+    // rounding.
+    assert!(
+        (imported - native).abs() < 1e-3 * native,
+        "{imported} N, from the flight itself {native} N"
+    );
 }
 
 #[test]
@@ -226,21 +265,27 @@ fn a_measured_flight_without_wings_says_what_it_lacks() {
     let train = ["train", "parnn", "--flights", "b3.mcap", "--out", "w.safetensors"];
     folder.fails(&train, &["b3.mcap: wing.command: missing; wings must be spread"]);
     let crazyflie = text(root.join("vehicles/crazyflie21_brushed.toml"));
-    folder.fails(&[&train[..], &["--vehicle", &crazyflie]].concat(), &["has no wings to learn about"]);
+    folder.fails(
+        &[&train[..], &["--vehicle", &crazyflie]].concat(),
+        &["has no wings to learn about"],
+    );
 }
 
 #[test]
 fn table_two_writes_the_same_bytes_twice_and_holds_every_model() {
     let folder = Folder::new("table2");
     let run = |out: &str| {
-        let study = ["study", "table2", "--trials", "2", "--seed", "1", "--epochs", "5", "--out", out];
+        let study =
+            ["study", "table2", "--trials", "2", "--seed", "1", "--epochs", "5", "--out", out];
         let table = folder.succeeds(&study);
         let files = ["table2.csv", "table2.json", "table2.html"];
         (table, files.map(|file| fs::read(folder.0.join(out).join(file)).unwrap()))
     };
     let (table, files) = run("one");
     assert!((table.clone(), files.clone()) == run("two"), "two runs differ");
-    for word in ["30 s of training, t1", "300 s of training, t4", "vanilla_plane", "label noise N", "over"] {
+    for word in
+        ["30 s of training, t1", "300 s of training, t4", "vanilla_plane", "label noise N", "over"]
+    {
         assert!(table.contains(word), "`{word}` is not in:\n{table}");
     }
     let study = json(&folder, "one/table2.json");
@@ -251,7 +296,15 @@ fn table_two_writes_the_same_bytes_twice_and_holds_every_model() {
     assert!(csv.lines().all(|line| line.split(',').count() == width));
     for set in ["training", "t1", "t2", "t3", "t4"] {
         let scenario = format!("one/{set}.toml");
-        folder.succeeds(&["fly", "--arm", "pc_wings_open", "--scenario", &scenario, "--json", "f.json"]);
+        folder.succeeds(&[
+            "fly",
+            "--arm",
+            "pc_wings_open",
+            "--scenario",
+            &scenario,
+            "--json",
+            "f.json",
+        ]);
         assert_eq!(json(&folder, "f.json")["scenario"], set);
     }
     folder.fails(&["study", "table2", "--trials", "0"], &["trials = 0"]);

@@ -1,7 +1,8 @@
-//! The paper's flat wing: `f = -rho sin(alpha) A |v|^2 n = -rho A |v| (n . v) n` (paper, eq. 4 and 5).
+//! The paper's flat wing: `f = -rho sin(alpha) A |v|^2 n = -rho A |v| (n . v) n` (paper, eq. 4 and
+//! 5).
 //!
-//! A normal-force coefficient of `2 sin(alpha)` on `1/2 rho |v|^2 A`; no tangential part. `v` is relative to the air here
-//! (the paper takes the ground velocity; docs/equations.md T6).
+//! A normal-force coefficient of `2 sin(alpha)` on `1/2 rho |v|^2 A`; no tangential part. `v` is
+//! relative to the air here (the paper takes the ground velocity; docs/equations.md T6).
 
 use crate::aero::{Air, Airflow, BodyWrench};
 use crate::frames::{Body, Frame, In, Wrench};
@@ -58,14 +59,15 @@ impl<T: Real> Pair<T> {
     /// Of a vehicle's wings.
     #[inline(always)]
     pub fn new(wing: &Wing<T>) -> Self {
-        let per_square = real::<T>(0.5 * AIR_DENSITY_KG_M3) * wing.area_per_side_m2 * wing.normal_force_slope;
+        let per_square =
+            real::<T>(0.5 * AIR_DENSITY_KG_M3) * wing.area_per_side_m2 * wing.normal_force_slope;
         Self { per_square, arm_m: wing.lateral_arm_m }
     }
 }
 
 impl<L: Lane> Pair<L> {
-    /// Forces along -z of a left and a right plate, N: `N = 1/2 rho S c_N |v| w`, with `w` the z component of the air's velocity
-    /// at that side, so that roll is damped.
+    /// Forces along -z of a left and a right plate, N: `N = 1/2 rho S c_N |v| w`, with `w` the z
+    /// component of the air's velocity at that side, so that roll is damped.
     ///
     /// * `deployment` - left, right, 0..1
     #[inline(always)]
@@ -113,7 +115,8 @@ mod tests {
 
     #[test]
     fn a_dropped_plate_is_pushed_up() {
-        let f = force(In::<Ned, f64>::new(Vector3::new(0.0, 0.0, 7.0)), In::new(Vector3::z()), AREA_M2);
+        let f =
+            force(In::<Ned, f64>::new(Vector3::new(0.0, 0.0, 7.0)), In::new(Vector3::z()), AREA_M2);
         assert!((f.vector.z + 1.225 * 0.04 * 49.0).abs() < 1e-12);
     }
 
@@ -127,7 +130,11 @@ mod tests {
 
     #[test]
     fn edge_on_air_does_nothing() {
-        let f = force(In::<Body, f64>::new(Vector3::new(9.0, -3.0, 0.0)), In::new(Vector3::z()), AREA_M2);
+        let f = force(
+            In::<Body, f64>::new(Vector3::new(9.0, -3.0, 0.0)),
+            In::new(Vector3::z()),
+            AREA_M2,
+        );
         assert_eq!(f.vector.norm(), 0.0);
     }
 
@@ -142,7 +149,9 @@ mod tests {
         let velocity = In::<Body, f64>::new(Vector3::new(6.0, 1.0, 3.0));
         let mut air = Air { velocity, speed: velocity.vector.norm(), omega: In::zero() };
         let still = wing_pair(&wing, &air, [1.0; 2]);
-        assert!((still.force - force(velocity, In::new(Vector3::z()), AREA_M2)).vector.norm() < 1e-12);
+        assert!(
+            (still.force - force(velocity, In::new(Vector3::z()), AREA_M2)).vector.norm() < 1e-12
+        );
         assert_eq!(still.moment.vector.norm(), 0.0);
         air.omega = In::new(Vector3::new(2.0, 0.0, 0.0));
         assert!(wing_pair(&wing, &air, [1.0; 2]).moment.vector.x < 0.0);

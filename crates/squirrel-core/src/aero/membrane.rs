@@ -1,8 +1,8 @@
 //! Reduced-order membrane wing (docs/equations.md D.3).
 //!
-//! It shares nothing with what a controller may believe: neither the flat plate nor a network. Each side feels its own
-//! air, which damps roll, and carries three states: the elastic camber, its creep and the attached fraction of the flow
-//! (Goman-Khrabrov).
+//! It shares nothing with what a controller may believe: neither the flat plate nor a network. Each
+//! side feels its own air, which damps roll, and carries three states: the elastic camber, its
+//! creep and the attached fraction of the flow (Goman-Khrabrov).
 //!
 //! ```text
 //! a = |alpha|, s = sign alpha, k = s (kappa_1 + kappa_2)
@@ -14,12 +14,14 @@
 //! kappa_1' = (kappa - kappa_1) / tau           kappa_2' = (creep kappa - kappa_2) / tau_creep
 //! 8 kappa lambda_0 + (64 / 3) kappa^3 = q s C_N c / (E t)
 //! ```
-//! Cambers are signed along the load, not along the angle of attack: a membrane takes time to snap through when alpha
-//! changes sign. Where `2 (1 + creep) K_p q c > 8 lambda_0 E t` (8.5 m/s with the defaults) a flat membrane is unstable
-//! edge on and bulges to either side: that follows from the equations, and slack sails do it. The code carries `s` inside
-//! `sin alpha` and `C_N`, which saves most of the sign changes.
+//! Cambers are signed along the load, not along the angle of attack: a membrane takes time to snap
+//! through when alpha changes sign. Where `2 (1 + creep) K_p q c > 8 lambda_0 E t` (8.5 m/s with
+//! the defaults) a flat membrane is unstable edge on and bulges to either side: that follows from
+//! the equations, and slack sails do it. The code carries `s` inside `sin alpha` and `C_N`, which
+//! saves most of the sign changes.
 //!
-//! One side is evaluated at a time, on lanes: a plant takes its two sides as one register, a batch both sides of many vehicles.
+//! One side is evaluated at a time, on lanes: a plant takes its two sides as one register, a batch
+//! both sides of many vehicles.
 
 use super::Airflow;
 use crate::lane::Lane;
@@ -42,7 +44,8 @@ numbers! {
     Membrane {
         /// `1/2 rho A g`, force over squared airspeed and coefficient, kg/m.
         force_scale,
-        /// `3/128 * 1/2 rho c / (E t)`: argument of the camber's cubic over squared airspeed and coefficient, s^2/m^2.
+        /// `3/128 * 1/2 rho c / (E t)`: argument of the camber's cubic over squared airspeed and
+        /// coefficient, s^2/m^2.
         load_scale,
         /// `lambda_0 / 8` and its powers, of Cardano's formula.
         prestrain_powers [3],
@@ -115,7 +118,8 @@ fn flow<L: Lane>(air: &Airflow<L>, y: L) -> Flow<L> {
     Flow { velocity, in_plane_speed, speed, speed_squared, per_speed, sine, cosine }
 }
 
-/// Angle of attack of the side at `y`, m, in rad, in [-pi/2, pi/2], positive where the air hits the belly; 0 below 0.3 m/s.
+/// Angle of attack of the side at `y`, m, in rad, in [-pi/2, pi/2], positive where the air hits the
+/// belly; 0 below 0.3 m/s.
 #[inline(always)]
 pub fn angle_of_attack<L: Lane>(air: &Airflow<L>, y: L) -> L {
     let flow = flow(air, y);
@@ -126,8 +130,8 @@ pub fn angle_of_attack<L: Lane>(air: &Airflow<L>, y: L) -> L {
 impl<L: Lane> Membrane<L> {
     /// Force and moment about the centre of mass of the side at `y`, m, and the rates of its state.
     ///
-    /// Force and moment scale with deployment; the state evolves as if spread. Finite for any finite state and airspeeds up to
-    /// 1e6 m/s; exactly no force without airspeed.
+    /// Force and moment scale with deployment; the state evolves as if spread. Finite for any
+    /// finite state and airspeeds up to 1e6 m/s; exactly no force without airspeed.
     ///
     /// * `angle_rate` - of the angle of attack, rad/s, held over a step; limited to 20
     /// * `deployment` - 0 folded to 1 spread
@@ -150,17 +154,22 @@ impl<L: Lane> Membrane<L> {
         let normal_separated = self.normal_drag * flow.sine / (L::of(0.56) + L::of(0.44) * sine)
             * (one + L::of(1.5) * (camber * sign).upper(none));
         let normal = normal_separated + state.attached * (normal_attached - normal_separated);
-        let tangential = self.tangential_zero * flow.cosine + self.tangential_camber * size(camber * normal);
+        let tangential =
+            self.tangential_zero * flow.cosine + self.tangential_camber * size(camber * normal);
 
         // Minus, because the force opposes the motion through the air.
         let pressure = (none - self.force_scale) * flow.speed_squared * deployment;
         let per_slip = one / flow.in_plane_speed.upper(L::of(SLIP_SPEED_M_S));
         let along = [flow.velocity[0] * per_slip, flow.velocity[1] * per_slip];
-        let force = [pressure * tangential * along[0], pressure * tangential * along[1], pressure * normal];
+        let force =
+            [pressure * tangential * along[0], pressure * tangential * along[1], pressure * normal];
         let ahead_m = self.ahead_m * (one - sine);
         let point = [ahead_m * along[0], ahead_m * along[1] + y];
-        let moment =
-            [point[1] * force[2], none - point[0] * force[2], point[0] * force[1] - point[1] * force[0]];
+        let moment = [
+            point[1] * force[2],
+            none - point[0] * force[2],
+            point[0] * force[1] - point[1] * force[0],
+        ];
 
         let steady = self.steady_camber(self.load_scale * flow.speed_squared * normal);
         let attach_rate = flow.speed.upper(L::of(SPEED_FLOOR_M_S)) * self.attach_per_m;
@@ -185,8 +194,9 @@ impl<L: Lane> Membrane<L> {
 
     /// The root of `8 k lambda_0 + (64 / 3) k^3 = (128 / 3) s`.
     ///
-    /// Cardano: `k = C - L / C` with `L = lambda_0 / 8`, `C = cbrt(s + sqrt(s^2 + L^3))`. Written as
-    /// `k = 2 s / (C^2 + L + (L / C)^2)`, which is exactly 0 at 0, odd, and free of the difference of near equals.
+    /// Cardano: `k = C - L / C` with `L = lambda_0 / 8`, `C = cbrt(s + sqrt(s^2 + L^3))`. Written
+    /// as `k = 2 s / (C^2 + L + (L / C)^2)`, which is exactly 0 at 0, odd, and free of the
+    /// difference of near equals.
     #[inline(always)]
     pub fn steady_camber(&self, s: L) -> L {
         let [l, l2, l3] = self.prestrain_powers;

@@ -42,7 +42,11 @@ pub struct Airflow<L> {
 impl<T: Real> From<&Air<T>> for Airflow<T> {
     #[inline(always)]
     fn from(air: &Air<T>) -> Self {
-        Self { velocity: air.velocity.vector.into(), speed: air.speed, omega: air.omega.vector.into() }
+        Self {
+            velocity: air.velocity.vector.into(),
+            speed: air.speed,
+            omega: air.omega.vector.into(),
+        }
     }
 }
 
@@ -82,7 +86,10 @@ impl<L: Lane> BodyWrench<L> {
 impl<T: Real> From<BodyWrench<T>> for Wrench<Body, T> {
     #[inline(always)]
     fn from(wrench: BodyWrench<T>) -> Self {
-        Self { force: In::new(Vector3::from(wrench.force)), moment: In::new(Vector3::from(wrench.moment)) }
+        Self {
+            force: In::new(Vector3::from(wrench.force)),
+            moment: In::new(Vector3::from(wrench.moment)),
+        }
     }
 }
 
@@ -107,8 +114,9 @@ pub fn drag<L: Lane>(linear: &[L; 3], per_square: L, flow: &Airflow<L>) -> [L; 3
     drag
 }
 
-/// Angle of attack of the wing plane, rad, in [-pi/2, pi/2]: `sin(alpha) = n . v / |v|`, positive where the air hits the
-/// belly. 0 below 0.3 m/s, where the direction of the air means nothing (docs/equations.md T5).
+/// Angle of attack of the wing plane, rad, in [-pi/2, pi/2]: `sin(alpha) = n . v / |v|`, positive
+/// where the air hits the belly. 0 below 0.3 m/s, where the direction of the air means nothing
+/// (docs/equations.md T5).
 ///
 /// * `velocity` - velocity relative to the air, m/s
 pub fn angle_of_attack(velocity: In<Body, f32>) -> f32 {

@@ -1,7 +1,7 @@
 //! Command filter: smooths the 10 Hz steps of the outer loop and supplies their derivatives.
 //!
-//! `x'' = w^2 (u - x) - 2 zeta w x'` per axis (docs/equations.md B.2): steps must not be differentiated, and the backstepping law
-//! wants the first and second derivative of its reference.
+//! `x'' = w^2 (u - x) - 2 zeta w x'` per axis (docs/equations.md B.2): steps must not be
+//! differentiated, and the backstepping law wants the first and second derivative of its reference.
 
 use crate::lane::Lane;
 use crate::lane::functions::wrap;
@@ -81,7 +81,8 @@ mod tests {
 
     #[test]
     fn settles_without_overshoot_and_the_short_way_round() {
-        let mut filter = EulerReference { angle: Vector3::new(0.0, 0.0, 3.0), ..EulerReference::default() };
+        let mut filter =
+            EulerReference { angle: Vector3::new(0.0, 0.0, 3.0), ..EulerReference::default() };
         let target = Vector3::new(0.5, -0.3, -3.0);
         let mut highest = 0.0_f32;
         for _ in 0..300 {

@@ -1,10 +1,12 @@
-//! Following a plan: the thrust vector that was planned, with the errors of position and velocity on top.
+//! Following a plan: the thrust vector that was planned, with the errors of position and velocity
+//! on top.
 //!
 //! ```text
 //! -U n = F(t + delay) + m (k_p (p(t) - p_measured) + k_v (v(t) - v_measured))        F: what the rotors push
 //! ```
-//! The plan's thrust already holds the air's part (docs/equations.md G.1), so no wing model is asked here; wings are told what the plan
-//! has for them when their servo will have moved. Where the thrust does not suffice, height goes first.
+//! The plan's thrust already holds the air's part (docs/equations.md G.1), so no wing model is
+//! asked here; wings are told what the plan has for them when their servo will have moved. Where
+//! the thrust does not suffice, height goes first.
 
 use super::AttitudeThrust;
 use super::position::{MeasuredMotion, heading_frame};
@@ -43,8 +45,8 @@ pub struct FollowGains {
     pub wing_delay_s: f32,
 }
 
-/// Most of the thrust that goes into height: at all of it, a little more or less would be all or nothing sideways, and turning back and
-/// forth takes more of the thrust than there is.
+/// Most of the thrust that goes into height: at all of it, a little more or less would be all or
+/// nothing sideways, and turning back and forth takes more of the thrust than there is.
 const HEIGHT_SHARE: f32 = 0.95;
 
 /// What height has in any case, over the weight.
@@ -70,7 +72,9 @@ impl FollowGains {
         positive("follow.position_per_s2", self.position_per_s2)?;
         positive("follow.velocity_per_s", self.velocity_per_s)?;
         positive("follow.acceleration_max_m_s2", self.acceleration_max_m_s2)?;
-        for (field, x) in [("follow.delay_s", self.delay_s), ("follow.wing_delay_s", self.wing_delay_s)] {
+        for (field, x) in
+            [("follow.delay_s", self.delay_s), ("follow.wing_delay_s", self.wing_delay_s)]
+        {
             if !(0.0..=1.0).contains(&x) {
                 return Err(ParameterError::of(field, x, "must be 0 to 1"));
             }
@@ -94,21 +98,25 @@ impl FollowGains {
         let error = (now.position.vector - motion.position.vector) * self.position_per_s2
             + (now.velocity.vector - motion.velocity.vector) * self.velocity_per_s;
         // Along body z.
-        let wanted = -ahead.vector - limit_norm(error, self.acceleration_max_m_s2) * airframe.mass_kg;
+        let wanted =
+            -ahead.vector - limit_norm(error, self.acceleration_max_m_s2) * airframe.mass_kg;
         let most = airframe.envelope.thrust_max_n;
-        // Height first: what is left of the thrust goes sideways. A thrust that would have to pull downwards is none.
+        // Height first: what is left of the thrust goes sideways. A thrust that would have to pull
+        // downwards is none.
         let hover_n = airframe.mass_kg * GRAVITY_M_S2 as f32;
         let most_down = lower(upper(HEIGHT_SHARE * most, WEIGHT_SHARE * hover_n), most);
         let down = limit(wanted.z, airframe.envelope.thrust_min_n, most_down);
         let level = heading_frame(&wanted, motion.heading_rad);
-        let sideways = limit_norm(Vector3::new(level.x, level.y, 0.0), sqrt(most * most - down * down));
+        let sideways =
+            limit_norm(Vector3::new(level.x, level.y, 0.0), sqrt(most * most - down * down));
         let level = sideways.xy();
         let pitch_rad = libm::atan2f(level.x, down);
         let roll_rad = -libm::atan2f(level.y, libm::hypotf(level.x, down));
         let max = airframe.envelope.tilt_max_rad;
         let (roll_rad, pitch_rad) = (limit(roll_rad, -max, max), limit(pitch_rad, -max, max));
         let ((sr, cr), (sp, cp)) = (libm::sincosf(roll_rad), libm::sincosf(pitch_rad));
-        let thrust_n = Vector3::new(sp * cr, -sr, cp * cr).dot(&Vector3::new(level.x, level.y, down));
+        let thrust_n =
+            Vector3::new(sp * cr, -sr, cp * cr).dot(&Vector3::new(level.x, level.y, down));
         let command = AttitudeThrust { roll_rad, pitch_rad, thrust_n };
         PilotCommand { attitude: airframe.envelope.limit(&command), wing: limit(wing, 0.0, 1.0) }
     }
@@ -135,7 +143,8 @@ mod tests {
             let gains = FollowGains::default();
             let command = gains.command(&airframe(), &motion, &hovering(), In::new(thrust), 1.0);
             let a = command.attitude;
-            let ned_from_body = Rotation::<Ned, Body, f32>::from_euler(a.roll_rad, a.pitch_rad, heading_rad);
+            let ned_from_body =
+                Rotation::<Ned, Body, f32>::from_euler(a.roll_rad, a.pitch_rad, heading_rad);
             let got = ned_from_body * In::new(Vector3::new(0.0, 0.0, -a.thrust_n));
             assert!((got.vector - thrust).norm() < 1e-4, "{heading_rad}: {}", got.vector);
             assert_eq!(command.wing, 1.0);
@@ -146,8 +155,9 @@ mod tests {
     #[test]
     fn errors_are_flown_out() {
         let ahead = PlanPoint { position: In::new(Vector3::new(0.3, 0.2, -0.2)), ..hovering() };
-        let command =
-            FollowGains::default().command(&airframe(), &still(), &ahead, hovering().thrust, 0.0).attitude;
+        let command = FollowGains::default()
+            .command(&airframe(), &still(), &ahead, hovering().thrust, 0.0)
+            .attitude;
         assert!(
             command.pitch_rad < -0.05 && command.roll_rad > 0.03 && command.thrust_n > 5.4,
             "{command:?}"
@@ -165,7 +175,9 @@ mod tests {
                 let a = FollowGains::default().command(&airframe, &still(), &far, thrust, 7.0);
                 let e = airframe.envelope;
                 let a = (a.attitude, a.wing);
-                assert!(a.0.roll_rad.abs() <= e.tilt_max_rad && a.0.pitch_rad.abs() <= e.tilt_max_rad);
+                assert!(
+                    a.0.roll_rad.abs() <= e.tilt_max_rad && a.0.pitch_rad.abs() <= e.tilt_max_rad
+                );
                 assert!((e.thrust_min_n..=e.thrust_max_n).contains(&a.0.thrust_n), "{a:?}");
                 assert_eq!(a.1, 1.0);
             }

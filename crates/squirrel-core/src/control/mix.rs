@@ -1,13 +1,16 @@
 //! The mixer's rule on lanes: what each rotor gives for a thrust and a torque, within its limits.
 //!
-//! Priority is roll and pitch over thrust over yaw, exactly; [`mixer`](super::mixer) derives it. Along `T^+` the rotor thrusts are
-//! `f_i = s a_i + u b_i + y c_i`, with `b_i > 0`; the code works with `f_i / b_i`. A weighted sum of them lies between what the
-//! negative weights take at the thrust limit and what the positive ones give. Weights that take `u` and `y` out of the sum bound
-//! `s`, and weights that take `y` out bound `u`. The shortest such sums are enough, because all others are sums of these with
-//! positive factors: for `s` three rotors, or two with the same `c_i / b_i`; for `u` two, or one without yaw. No iteration; for
-//! four rotors at most six sums each.
+//! Priority is roll and pitch over thrust over yaw, exactly; [`mixer`](super::mixer) derives it.
+//! Along `T^+` the rotor thrusts are `f_i = s a_i + u b_i + y c_i`, with `b_i > 0`; the code works
+//! with `f_i / b_i`. A weighted sum of them lies between what the negative weights take at the
+//! thrust limit and what the positive ones give. Weights that take `u` and `y` out of the sum bound
+//! `s`, and weights that take `y` out bound `u`. The shortest such sums are enough, because all
+//! others are sums of these with positive factors: for `s` three rotors, or two with the same
+//! `c_i / b_i`; for `u` two, or one without yaw. No iteration; for four rotors at most six sums
+//! each.
 //!
-//! Elements of a register select; work that none of them needs is left out, which changes no element.
+//! Elements of a register select; work that none of them needs is left out, which changes no
+//! element.
 
 use crate::lane::Lane;
 use crate::lane::functions::{limit, size};
@@ -26,7 +29,8 @@ numbers! {
     Table<ROTORS> {
         /// 1, or 0 for a place without a rotor; there all other numbers are 0.
         is_there [ROTORS],
-        /// Columns of `T^+`: thrust per newton of collective, per newton metre of roll, pitch, and of scaled yaw.
+        /// Columns of `T^+`: thrust per newton of collective, per newton metre of roll, pitch, and
+        /// of scaled yaw.
         collective [ROTORS],
         /// See `collective`.
         roll [ROTORS],
@@ -40,9 +44,11 @@ numbers! {
         full_share_n [ROTORS],
         /// Limit of each rotor, N.
         thrust_max_n,
-        /// Newton metres of yaw torque per unit of the scaled yaw variable; 0 for a layout without yaw.
+        /// Newton metres of yaw torque per unit of the scaled yaw variable; 0 for a layout without
+        /// yaw.
         yaw_unit_n_m,
-        /// 1 where three rotors differ in `yaw_share`: not where all turn one way or the other with equal strength.
+        /// 1 where three rotors differ in `yaw_share`: not where all turn one way or the other with
+        /// equal strength.
         three_kinds,
     }
 }
@@ -124,7 +130,8 @@ impl<L: Lane, const ROTORS: usize> Table<L, ROTORS> {
     pub fn mix(&self, count: usize, thrust_n: L, torque_n_m: [L; 3]) -> Mixed<L, ROTORS> {
         let (none, one, count) = (L::of(0.0), L::of(1.0), count.min(ROTORS));
         let thrust = finite(thrust_n).upper(none);
-        let [roll, pitch, yaw] = [finite(torque_n_m[0]), finite(torque_n_m[1]), finite(torque_n_m[2])];
+        let [roll, pitch, yaw] =
+            [finite(torque_n_m[0]), finite(torque_n_m[1]), finite(torque_n_m[2])];
         let yaw = self.yaw_unit_n_m.where_positive(yaw / self.yaw_unit_n_m, none);
         let mut tilt = [none; ROTORS];
         let mut beyond = none - one;
@@ -148,7 +155,8 @@ impl<L: Lane, const ROTORS: usize> Table<L, ROTORS> {
         }
         let mut rotor_thrust_n = [none; ROTORS];
         for i in 0..count {
-            rotor_thrust_n[i] = limit(self.rotor_thrust(&tilt, i, s, u, y), none, self.thrust_max_n);
+            rotor_thrust_n[i] =
+                limit(self.rotor_thrust(&tilt, i, s, u, y), none, self.thrust_max_n);
         }
         Mixed { rotor_thrust_n, roll_pitch_share: s, saturated: beyond.where_positive(one, none) }
     }
@@ -183,14 +191,16 @@ impl<L: Lane, const ROTORS: usize> Table<L, ROTORS> {
     fn share_and_thrust(&self, count: usize, tilt: &[L; ROTORS], thrust: L) -> (L, L) {
         let mut tilt_share = [L::of(0.0); ROTORS];
         for i in 0..count {
-            tilt_share[i] = self.is_there[i].where_positive(tilt[i] / self.collective[i], L::of(0.0));
+            tilt_share[i] =
+                self.is_there[i].where_positive(tilt[i] / self.collective[i], L::of(0.0));
         }
         let share = self.largest_share(count, &tilt_share);
         let range = self.thrust_interval(count, &tilt_share, share);
         (share, limit(thrust, range.low, range.low.upper(range.high)))
     }
 
-    /// The largest `s` in [0, 1] that some thrust and yaw allow: sums of rotors that neither of them changes limit it.
+    /// The largest `s` in [0, 1] that some thrust and yaw allow: sums of rotors that neither of
+    /// them changes limit it.
     #[inline(always)]
     fn largest_share(&self, count: usize, a: &[L; ROTORS]) -> L {
         let (c, max, there) = (&self.yaw_share, &self.full_share_n, &self.is_there);
@@ -211,14 +221,16 @@ impl<L: Lane, const ROTORS: usize> Table<L, ROTORS> {
                     let differ = steep(w_i).lower(steep(w_j)).lower(steep(w_k));
                     let counts = differ.where_positive(both * there[k] * self.three_kinds, none);
                     let [above, below] = sums([w_i * max[i], w_j * max[j], w_k * max[k]]);
-                    share = cut(share, (w_i * a[i] + w_j * a[j] + w_k * a[k]) * counts, above, below);
+                    share =
+                        cut(share, (w_i * a[i] + w_j * a[j] + w_k * a[k]) * counts, above, below);
                 }
             }
         }
         share
     }
 
-    /// Thrusts that some yaw allows at a given share: single rotors without yaw, and pairs whose sum yaw does not change.
+    /// Thrusts that some yaw allows at a given share: single rotors without yaw, and pairs whose
+    /// sum yaw does not change.
     #[inline(always)]
     fn thrust_interval(&self, count: usize, a: &[L; ROTORS], s: L) -> Interval<L> {
         let (c, max, there) = (&self.yaw_share, &self.full_share_n, &self.is_there);

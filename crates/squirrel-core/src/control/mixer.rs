@@ -1,16 +1,20 @@
 //! Mixer: collective thrust and torque to rotor thrusts, within what each rotor can give.
 //!
-//! Paper, eq. 1 and 2: `F = T^-1 U` with the rows of `T` the thrust, roll, pitch and yaw that one newton of each rotor
-//! gives. Here `T` comes from the vehicle's geometry, for any layout: rotor i gives `(1, -y_i, x_i, s_i k_m / k_f)`, and
-//! `F = T^+ U` has the smallest norm where there are more than four rotors. (The printed `T` has `d_fr` in the pitch row;
-//! it must be `d_fp`: docs/equations.md T2.)
+//! Paper, eq. 1 and 2: `F = T^-1 U` with the rows of `T` the thrust, roll, pitch and yaw that one
+//! newton of each rotor gives. Here `T` comes from the vehicle's geometry, for any layout: rotor i
+//! gives `(1, -y_i, x_i, s_i k_m / k_f)`, and `F = T^+ U` has the smallest norm where there are
+//! more than four rotors. (The printed `T` has `d_fr` in the pitch row; it must be `d_fp`:
+//! docs/equations.md T2.)
 //!
-//! Where a rotor would leave `[0, F_max]`, priority is roll and pitch over thrust over yaw, exactly, in this order:
-//! 1. the largest share `s <= 1` of the roll and pitch torque, direction kept, that some thrust and yaw allow;
+//! Where a rotor would leave `[0, F_max]`, priority is roll and pitch over thrust over yaw,
+//! exactly, in this order:
+//! 1. the largest share `s <= 1` of the roll and pitch torque, direction kept, that some thrust and
+//!    yaw allow;
 //! 2. the thrust nearest to the demand that some yaw allows at that `s`;
 //! 3. the yaw torque nearest to the demand at both.
 //!
-//! `F_max` is the vehicle's limit at the reference voltage; it does not follow the measured battery voltage.
+//! `F_max` is the vehicle's limit at the reference voltage; it does not follow the measured battery
+//! voltage.
 //!
 //! The rule itself is [`mix`](super::mix), on lanes: flight and batches have the same.
 
@@ -56,11 +60,15 @@ impl Mixer {
     pub fn new(vehicle: &Vehicle<f32>) -> Result<Self, ParameterError> {
         let count = vehicle.rotors().len();
         let propulsion = &vehicle.parameters().propulsion;
-        let torque_per_thrust = propulsion.torque_coefficient_n_m_s2 / propulsion.thrust_coefficient_n_s2;
+        let torque_per_thrust =
+            propulsion.torque_coefficient_n_m_s2 / propulsion.thrust_coefficient_n_s2;
         let mut t = SMatrix::<f32, 4, MAX_ROTORS>::zeros();
         for (i, rotor) in vehicle.rotors().iter().enumerate() {
             let r = rotor.position.vector;
-            t.set_column(i, &nalgebra::Vector4::new(1.0, -r.y, r.x, rotor.yaw_sign * torque_per_thrust));
+            t.set_column(
+                i,
+                &nalgebra::Vector4::new(1.0, -r.y, r.x, rotor.yaw_sign * torque_per_thrust),
+            );
         }
         let inverse = pseudo_inverse(&t)?;
         let reached = t * inverse;
@@ -92,7 +100,8 @@ impl Mixer {
                 ));
             }
         }
-        // The yaw column is scaled to the size of the thrust column, so that all slopes below are of order one.
+        // The yaw column is scaled to the size of the thrust column, so that all slopes below are
+        // of order one.
         let yaw_raw = column(3);
         let largest = |c: &PerRotor<f32>| c.iter().fold(0.0, |m, x| upper(m, x.abs()));
         let (yaw_size, collective_size) = (largest(&yaw_raw), largest(&collective));
@@ -111,8 +120,8 @@ impl Mixer {
             (is_there[i], yaw_share[i], full_share_n[i]) = (1.0, yaw[i] / b, thrust_max_n / b);
         }
         let differ = |i: usize, j: usize| (yaw_share[i] - yaw_share[j]).abs() > FLAT;
-        let has_three_kinds =
-            (0..count).any(|i| (0..i).any(|j| differ(i, j) && (0..j).any(|k| differ(i, k) && differ(j, k))));
+        let has_three_kinds = (0..count)
+            .any(|i| (0..i).any(|j| differ(i, j) && (0..j).any(|k| differ(i, k) && differ(j, k))));
         let table = Table {
             is_there,
             collective,
@@ -149,20 +158,26 @@ impl Mixer {
         }
         MixerTerms {
             rotor_thrust_n: mixed.rotor_thrust_n,
-            achieved: ThrustTorque { thrust_n: sum[0], torque_n_m: Vector3::new(sum[1], sum[2], sum[3]) },
+            achieved: ThrustTorque {
+                thrust_n: sum[0],
+                torque_n_m: Vector3::new(sum[1], sum[2], sum[3]),
+            },
             roll_pitch_share: mixed.roll_pitch_share,
             saturated: mixed.saturated > 0.0,
         }
     }
 
-    /// Number of rotors, with the bound that [`Vehicle`] keeps: here the compiler sees that no loop leaves an array.
+    /// Number of rotors, with the bound that [`Vehicle`] keeps: here the compiler sees that no loop
+    /// leaves an array.
     fn rotors(&self) -> usize {
         self.count.min(MAX_ROTORS)
     }
 }
 
 /// `T^T (T T^T)^-1`; a yaw row of zeros is left out.
-fn pseudo_inverse(t: &SMatrix<f32, 4, MAX_ROTORS>) -> Result<SMatrix<f32, MAX_ROTORS, 4>, ParameterError> {
+fn pseudo_inverse(
+    t: &SMatrix<f32, 4, MAX_ROTORS>,
+) -> Result<SMatrix<f32, MAX_ROTORS, 4>, ParameterError> {
     let mut scaled = *t;
     let mut scale = [1.0; 4];
     for (k, s) in scale.iter_mut().enumerate() {

@@ -1,26 +1,33 @@
 //! The better wing controller: attitude, thrust and wings chosen together, ten times a second.
 //!
-//! The paper's WIIC holds an angle at its limit and leaves height to itself; its PC saturates each angle and the thrust on their own. Here
-//! one weighted least-squares problem decides (docs/equations.md E.5):
+//! The paper's WIIC holds an angle at its limit and leaves height to itself; its PC saturates each
+//! angle and the thrust on their own. Here one weighted least-squares problem decides
+//! (docs/equations.md E.5):
 //!
 //! ```text
 //! min over roll, pitch, U, w of  | W (g e3 - U n/m + w f(n)/m - a_cmd) |^2      n = R e3, W = diag(1, 1, W_z)
 //! |roll|, |pitch| <= tilt_max        U_min <= U <= U_max        w = 0 or 1
 //! ```
 //!
-//! For an attitude and a wing, U is a formula; the attitude is found by a pattern search of seven rounds that starts from PC's request,
-//! so that work is bounded. What else is different from the paper's laws:
-//! - `f` is the flat plate at the *commanded* attitude: the present one is level when a turn begins, and says that wings do not help;
-//! - motion and reference are those of [`Plus::delay_s`] ahead, when what is commanded now acts: attitude bandwidth is compensated, and a
-//!   servo has travelled by the time that the attitude it was opened for is there;
-//! - thrust is for the attitude on the way there, not for its end, so that it does not lift before it brakes;
-//! - height is part of the residual with the weight `W_z`, so that it is held unless the horizontal gains more; a sink weighs the more the less
-//!   thrust there is to end it;
-//! - the way to the reference is flown no faster than rotors alone can brake it beside what the reference itself asks for;
-//! - velocity and acceleration of the reference are fed forward by the position loop ([`super::position::PositionGains`]).
+//! For an attitude and a wing, U is a formula; the attitude is found by a pattern search of seven
+//! rounds that starts from PC's request, so that work is bounded. What else is different from the
+//! paper's laws:
+//! - `f` is the flat plate at the *commanded* attitude: the present one is level when a turn
+//!   begins, and says that wings do not help;
+//! - motion and reference are those of [`Plus::delay_s`] ahead, when what is commanded now acts:
+//!   attitude bandwidth is compensated, and a servo has travelled by the time that the attitude it
+//!   was opened for is there;
+//! - thrust is for the attitude on the way there, not for its end, so that it does not lift before
+//!   it brakes;
+//! - height is part of the residual with the weight `W_z`, so that it is held unless the horizontal
+//!   gains more; a sink weighs the more the less thrust there is to end it;
+//! - the way to the reference is flown no faster than rotors alone can brake it beside what the
+//!   reference itself asks for;
+//! - velocity and acceleration of the reference are fed forward by the position loop
+//!   ([`super::position::PositionGains`]).
 //!
-//! Wings open where they make the residual smaller by [`Plus::open_above_m_s2`], and fold where they no longer make it smaller. Without
-//! wings it is the same controller: the fair rival.
+//! Wings open where they make the residual smaller by [`Plus::open_above_m_s2`], and fold where
+//! they no longer make it smaller. Without wings it is the same controller: the fair rival.
 
 use super::position::PositionGains;
 use super::twcc::OuterAirframe;
@@ -48,13 +55,16 @@ pub struct Plus {
     pub position: PositionGains,
     /// From a command to the attitude that it asks for, s.
     pub delay_s: f32,
-    /// `W_z`: what a vertical acceleration counts that differs from the command, over a horizontal one.
+    /// `W_z`: what a vertical acceleration counts that differs from the command, over a horizontal
+    /// one.
     pub vertical_weight: f32,
-    /// Height that may be lost or gained before it counts: where that much is foreseen, `W_z` is twice as large, m.
+    /// Height that may be lost or gained before it counts: where that much is foreseen, `W_z` is
+    /// twice as large, m.
     pub height_band_m: f32,
     /// Share of the way from the present to the commanded attitude for which thrust is chosen.
     pub thrust_share: f32,
-    /// Share of the acceleration that rotors have to spare in level flight with which an approach to the reference is braked.
+    /// Share of the acceleration that rotors have to spare in level flight with which an approach
+    /// to the reference is braked.
     pub approach_share: f32,
     /// Wings open where they bring the acceleration closer to the command by this much, m/s^2.
     pub open_above_m_s2: f32,
@@ -87,9 +97,10 @@ impl Plus {
     /// The first number out of range, by its name in `[control.plus]`.
     pub fn check(&self) -> Result<(), ParameterError> {
         self.position.check()?;
-        for (field, x) in
-            [("control.plus.delay_s", self.delay_s), ("control.plus.thrust_share", self.thrust_share)]
-        {
+        for (field, x) in [
+            ("control.plus.delay_s", self.delay_s),
+            ("control.plus.thrust_share", self.thrust_share),
+        ] {
             if !(0.0..=1.0).contains(&x) {
                 return Err(ParameterError::of(field, x, "must be 0 to 1"));
             }
@@ -106,16 +117,19 @@ impl Plus {
         positive("control.plus.open_above_m_s2", self.open_above_m_s2)
     }
 
-    /// With what the way to the reference can be braked without wings while height is held and the reference's own acceleration is flown, m/s^2.
+    /// With what the way to the reference can be braked without wings while height is held and the
+    /// reference's own acceleration is flown, m/s^2.
     pub(super) fn approach_m_s2(&self, airframe: &OuterAirframe, reference: &Reference) -> f32 {
         let Envelope { tilt_max_rad, thrust_max_n, .. } = airframe.envelope;
         let weight_n = airframe.mass_kg * GRAVITY_M_S2 as f32;
-        let spare = sqrt(upper(thrust_max_n * thrust_max_n - weight_n * weight_n, 0.0)) / airframe.mass_kg;
+        let spare =
+            sqrt(upper(thrust_max_n * thrust_max_n - weight_n * weight_n, 0.0)) / airframe.mass_kg;
         let level = lower(spare, GRAVITY_M_S2 as f32 * libm::tanf(tilt_max_rad));
         self.approach_share * upper(level - reference.acceleration.vector.xy().norm(), 0.1 * level)
     }
 
-    /// `W_z^2` for a height error and its rate: it grows with the error that is foreseen at the turn of a climb or sink.
+    /// `W_z^2` for a height error and its rate: it grows with the error that is foreseen at the
+    /// turn of a climb or sink.
     ///
     /// * `down_m`, `down_m_s` - position and velocity less those of the reference
     pub(super) fn weight(&self, airframe: &OuterAirframe, down_m: f32, down_m_s: f32) -> f32 {
@@ -181,7 +195,11 @@ fn free_of_thrust(
     n: &Vector3<f32>,
     wings: f32,
 ) -> Vector3<f32> {
-    let force = flat_plate::force::<Ned, f32>(In::new(*velocity), In::new(*n), wings * airframe.wing_area_m2);
+    let force = flat_plate::force::<Ned, f32>(
+        In::new(*velocity),
+        In::new(*n),
+        wings * airframe.wing_area_m2,
+    );
     force.vector / airframe.mass_kg + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32)
 }
 
@@ -212,8 +230,11 @@ impl Demand<'_> {
         for _ in 0..ROUNDS {
             for (roll, pitch) in [(step, 0.0), (-step, 0.0), (0.0, step), (0.0, -step)] {
                 let AttitudeThrust { roll_rad, pitch_rad, .. } = best.command;
-                let next =
-                    self.at(limit(roll_rad + roll, -max, max), limit(pitch_rad + pitch, -max, max), wings);
+                let next = self.at(
+                    limit(roll_rad + roll, -max, max),
+                    limit(pitch_rad + pitch, -max, max),
+                    wings,
+                );
                 if next.cost < best.cost {
                     best = next;
                 }
@@ -254,7 +275,12 @@ mod tests {
     }
 
     fn demand(airframe: &OuterAirframe, acceleration: [f32; 3], velocity: [f32; 3]) -> Demand<'_> {
-        Demand { airframe, acceleration: acceleration.into(), velocity: velocity.into(), weight: 0.25 }
+        Demand {
+            airframe,
+            acceleration: acceleration.into(),
+            velocity: velocity.into(),
+            weight: 0.25,
+        }
     }
 
     /// Braking from 7 m/s, level, the goal here.
@@ -314,7 +340,8 @@ mod tests {
         }
     }
 
-    /// Level at the start of a turn the flat plate says that wings do not help; at the commanded attitude it says that they do.
+    /// Level at the start of a turn the flat plate says that wings do not help; at the commanded
+    /// attitude it says that they do.
     #[test]
     fn wings_open_before_the_nose_is_up() {
         let p = TwccParameters { plus: Some(plus()), ..parameters() };
@@ -338,9 +365,13 @@ mod tests {
         assert_eq!(weight(-1.5, 0.0), 1.0, "twice the weight at the band's edge");
         let rising = weight(-1.0, -5.0);
         assert!(rising > weight(-1.0, 0.0) && weight(-1.0, 3.0) < rising);
-        let brake = |weight| Demand { weight, ..demand(&airframe, [-20.0, 0.0, 5.0], [7.0, 0.0, -5.0]) };
+        let brake =
+            |weight| Demand { weight, ..demand(&airframe, [-20.0, 0.0, 5.0], [7.0, 0.0, -5.0]) };
         let thrust = |weight| {
-            brake(weight).best(&AttitudeThrust { pitch_rad: 0.5, ..Default::default() }, 0.0).command.thrust_n
+            brake(weight)
+                .best(&AttitudeThrust { pitch_rad: 0.5, ..Default::default() }, 0.0)
+                .command
+                .thrust_n
         };
         assert!(thrust(rising) < 0.6 * thrust(0.25), "{} {}", thrust(rising), thrust(0.25));
     }
@@ -348,11 +379,17 @@ mod tests {
     #[test]
     fn a_bad_parameter_is_named() {
         let error = |plus: Plus| plus.check().unwrap_err().to_string();
-        assert!(error(Plus { delay_s: f32::NAN, ..plus() }).starts_with("control.plus.delay_s = NaN"));
-        assert!(error(Plus { thrust_share: 1.5, ..plus() }).starts_with("control.plus.thrust_share = 1.5"));
+        assert!(
+            error(Plus { delay_s: f32::NAN, ..plus() }).starts_with("control.plus.delay_s = NaN")
+        );
+        assert!(
+            error(Plus { thrust_share: 1.5, ..plus() })
+                .starts_with("control.plus.thrust_share = 1.5")
+        );
         let exact = PositionGains { angle_law: AngleLaw::Exact, integral_max_m: -1.0, ..gains() };
         assert!(
-            error(Plus { position: exact, ..plus() }).starts_with("control.position.integral_max_m = -1")
+            error(Plus { position: exact, ..plus() })
+                .starts_with("control.position.integral_max_m = -1")
         );
         plus().check().unwrap();
     }

@@ -5,9 +5,10 @@
 //! v_jd = k_p^p (j_d - j)      e_j = v_jd - v_j      a_cmd,j = k_p^v e_j + k_i^v int(e_j) + k_d^v e_j'
 //! U = m (g - a_cmd,z) / (cos(roll) cos(pitch))      pitch_d = -(m/U) a_cmd,x      roll_d = (m/U) a_cmd,y
 //! ```
-//! Differs: accelerations are turned into the heading frame first (the paper's law holds at zero yaw only, docs/equations.md T7),
-//! limited, and the integral is frozen while anything is saturated. `U` uses the measured tilt with the product of cosines
-//! kept above 0.5 (T8). [`AngleLaw::Exact`] inverts the thrust direction instead of taking sines as angles.
+//! Differs: accelerations are turned into the heading frame first (the paper's law holds at zero
+//! yaw only, docs/equations.md T7), limited, and the integral is frozen while anything is
+//! saturated. `U` uses the measured tilt with the product of cosines kept above 0.5 (T8).
+//! [`AngleLaw::Exact`] inverts the thrust direction instead of taking sines as angles.
 
 use super::{AttitudeThrust, Reference};
 use crate::frames::{Body, In, Ned, Rotation};
@@ -39,10 +40,12 @@ pub struct PositionGains {
     pub velocity_feed_forward: f32,
     /// Share of the reference acceleration that is fed forward, 0 in the paper.
     pub acceleration_feed_forward: f32,
-    /// With what the way to the reference can be braked, m/s^2; infinite in the paper. The position loop asks for no more horizontal speed
-    /// towards it than that: it is proportional to the error nearby, and to its square root far away.
+    /// With what the way to the reference can be braked, m/s^2; infinite in the paper. The position
+    /// loop asks for no more horizontal speed towards it than that: it is proportional to the error
+    /// nearby, and to its square root far away.
     pub approach_max_m_s2: f32,
-    /// Limit of the horizontal velocity that the position loop asks for, m/s; infinite in the paper.
+    /// Limit of the horizontal velocity that the position loop asks for, m/s; infinite in the
+    /// paper.
     pub speed_max_m_s: f32,
     /// Limit of the horizontal acceleration command, m/s^2.
     pub acceleration_max_horizontal_m_s2: f32,
@@ -101,7 +104,8 @@ pub struct MeasuredMotion {
 }
 
 impl MeasuredMotion {
-    /// With the thrust axis of an attitude, as roll and pitch at a heading that need not be the measured one.
+    /// With the thrust axis of an attitude, as roll and pitch at a heading that need not be the
+    /// measured one.
     pub fn new(
         position: In<Ned, f32>,
         velocity: In<Ned, f32>,
@@ -125,7 +129,10 @@ impl PositionGains {
         each_not_negative("control.position.derivative", self.derivative.as_slice())?;
         let horizontal = self.acceleration_max_horizontal_m_s2;
         positive("control.position.acceleration_max_horizontal_m_s2", horizontal)?;
-        positive("control.position.acceleration_max_vertical_m_s2", self.acceleration_max_vertical_m_s2)?;
+        positive(
+            "control.position.acceleration_max_vertical_m_s2",
+            self.acceleration_max_vertical_m_s2,
+        )?;
         positive("control.position.integral_max_m", self.integral_max_m)?;
         for (field, share) in [
             ("control.position.velocity_feed_forward", self.velocity_feed_forward),
@@ -163,8 +170,10 @@ impl PositionGains {
         let position_error = reference.position.vector - motion.position.vector;
         let mut velocity_desired =
             self.approach(&position_error) + reference.velocity.vector * self.velocity_feed_forward;
-        let horizontal =
-            limit_norm(Vector3::new(velocity_desired.x, velocity_desired.y, 0.0), self.speed_max_m_s);
+        let horizontal = limit_norm(
+            Vector3::new(velocity_desired.x, velocity_desired.y, 0.0),
+            self.speed_max_m_s,
+        );
         (velocity_desired.x, velocity_desired.y) = (horizontal.x, horizontal.y);
         let error = velocity_desired - motion.velocity.vector;
         let slope = match state.last_error {
@@ -180,8 +189,10 @@ impl PositionGains {
             + self.integral_per_s2.component_mul(&state.integral)
             + self.derivative.component_mul(&slope)
             + reference.acceleration.vector * self.acceleration_feed_forward;
-        let horizontal =
-            limit_norm(Vector3::new(demand.x, demand.y, 0.0), self.acceleration_max_horizontal_m_s2);
+        let horizontal = limit_norm(
+            Vector3::new(demand.x, demand.y, 0.0),
+            self.acceleration_max_horizontal_m_s2,
+        );
         let max = self.acceleration_max_vertical_m_s2;
         let acceleration = Vector3::new(horizontal.x, horizontal.y, limit(demand.z, -max, max));
         PositionTerms {
@@ -196,8 +207,9 @@ impl PositionGains {
         }
     }
 
-    /// Velocity towards the reference, m/s. Far away it is that from which [`Self::approach_max_m_s2`] stops at the reference, with the
-    /// proportional law's lag: `v^2 = a (2 e - a / k^2)` joins `v = k e` smoothly at `e = a / k^2`.
+    /// Velocity towards the reference, m/s. Far away it is that from which
+    /// [`Self::approach_max_m_s2`] stops at the reference, with the proportional law's lag:
+    /// `v^2 = a (2 e - a / k^2)` joins `v = k e` smoothly at `e = a / k^2`.
     fn approach(&self, position_error: &Vector3<f32>) -> Vector3<f32> {
         let mut velocity = self.position_per_s.component_mul(position_error);
         let (error, speed) = (position_error.xy().norm(), velocity.xy().norm());
@@ -224,7 +236,8 @@ fn request(
     motion: &MeasuredMotion,
 ) -> AttitudeThrust {
     let a = heading_frame(acceleration_ned, motion.heading_rad);
-    // Thrust never asks for free fall or less: a downward command stronger than that keeps a tenth of g.
+    // Thrust never asks for free fall or less: a downward command stronger than that keeps a tenth
+    // of g.
     let lift = upper(GRAVITY_M_S2 as f32 - acceleration_ned.z, 0.1 * GRAVITY_M_S2 as f32);
     let cosines = cos(motion.roll_rad) * cos(motion.pitch_rad);
     let thrust_n = mass_kg * lift / upper(cosines, 0.5);
@@ -282,7 +295,11 @@ mod tests {
     use super::fixtures::*;
     use super::*;
 
-    fn tick(gains: &PositionGains, motion: &MeasuredMotion, reference: &Reference) -> PositionTerms {
+    fn tick(
+        gains: &PositionGains,
+        motion: &MeasuredMotion,
+        reference: &Reference,
+    ) -> PositionTerms {
         gains.update(&mut PositionState::default(), 0.548, motion, reference, false, 0.1)
     }
 
@@ -301,14 +318,16 @@ mod tests {
         assert!(above.request.thrust_n > 0.548 * 9.80665, "a goal above asks for more thrust");
     }
 
-    /// Thrust along the requested attitude must be the requested acceleration, whatever the heading.
+    /// Thrust along the requested attitude must be the requested acceleration, whatever the
+    /// heading.
     #[test]
     fn the_exact_law_inverts_the_dynamics_at_any_yaw() {
         for yaw in [-3.0, -1.0, 0.0, 0.7, 2.5] {
             let motion = MeasuredMotion { heading_rad: yaw, ..still() };
             let terms = tick(&gains(), &motion, &at(1.0, -0.7, -0.3));
             let r = terms.request;
-            let ned_from_body = Rotation::<Ned, Body, f32>::from_euler(r.roll_rad, r.pitch_rad, yaw);
+            let ned_from_body =
+                Rotation::<Ned, Body, f32>::from_euler(r.roll_rad, r.pitch_rad, yaw);
             let a = terms.acceleration.vector;
             let lift = GRAVITY_M_S2 as f32 - a.z;
             // Thrust that holds the vertical at the requested tilt.
@@ -319,17 +338,24 @@ mod tests {
         }
     }
 
-    /// Roll and pitch say where the thrust axis is, whatever heading they are of and whatever the yaw is.
+    /// Roll and pitch say where the thrust axis is, whatever heading they are of and whatever the
+    /// yaw is.
     #[test]
     fn roll_and_pitch_at_any_heading_have_the_thrust_axis_of_the_attitude() {
         for (yaw, heading) in [(0.0, 0.0), (0.3, 0.3), (0.0, 0.5), (1.5, 0.0), (-3.0, 2.0)] {
             let attitude = Rotation::<Ned, Body, f32>::from_euler(0.4, -0.3, yaw);
             let motion = MeasuredMotion::new(In::zero(), In::zero(), &attitude, heading);
-            let same = Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, heading);
+            let same =
+                Rotation::<Ned, Body, f32>::from_euler(motion.roll_rad, motion.pitch_rad, heading);
             let axis = |of: Rotation<Ned, Body, f32>| (of * In::new(Vector3::z())).vector;
-            assert!((axis(attitude) - axis(same)).norm() < 1e-5, "yaw {yaw}, heading {heading}: {motion:?}");
+            assert!(
+                (axis(attitude) - axis(same)).norm() < 1e-5,
+                "yaw {yaw}, heading {heading}: {motion:?}"
+            );
             if yaw == heading {
-                assert!((motion.roll_rad - 0.4).abs() < 1e-5 && (motion.pitch_rad + 0.3).abs() < 1e-5);
+                assert!(
+                    (motion.roll_rad - 0.4).abs() < 1e-5 && (motion.pitch_rad + 0.3).abs() < 1e-5
+                );
             }
         }
     }
@@ -341,8 +367,8 @@ mod tests {
         for size in [0.02_f32, 0.04] {
             let exact = tick(&gains(), &still(), &at(size, -size, 0.0)).request;
             let printed = tick(&paper, &still(), &at(size, -size, 0.0)).request;
-            let difference =
-                (exact.pitch_rad - printed.pitch_rad).abs() + (exact.roll_rad - printed.roll_rad).abs();
+            let difference = (exact.pitch_rad - printed.pitch_rad).abs()
+                + (exact.roll_rad - printed.roll_rad).abs();
             assert!(difference < 20.0 * size.powi(3), "{difference}");
         }
     }
@@ -382,15 +408,19 @@ mod tests {
         assert!((far - Vector3::new(1.2, 1.6, 4.0)).norm() < 1e-5, "{far}");
     }
 
-    /// Braked with the given acceleration from the speed that is asked for, the vehicle comes to rest at the reference but for the lag of the
-    /// proportional law, `v / k`; nearby, and without a limit, nothing changes.
+    /// Braked with the given acceleration from the speed that is asked for, the vehicle comes to
+    /// rest at the reference but for the lag of the proportional law, `v / k`; nearby, and without
+    /// a limit, nothing changes.
     #[test]
     fn an_approach_is_no_faster_than_can_be_braked() {
         let slow = PositionGains { approach_max_m_s2: 2.0, ..gains() };
         for distance in [0.5_f32, 0.78, 0.79, 3.0, 30.0] {
             let speed = |gains: &PositionGains| {
                 let terms = tick(gains, &still(), &at(0.6 * distance, -0.8 * distance, -1.0));
-                assert!((terms.velocity_desired.vector.z + 0.8).abs() < 1e-6, "height has a loop of its own");
+                assert!(
+                    (terms.velocity_desired.vector.z + 0.8).abs() < 1e-6,
+                    "height has a loop of its own"
+                );
                 terms.velocity_desired.vector.xy().norm()
             };
             let (v, proportional) = (speed(&slow), speed(&gains()));
@@ -410,7 +440,12 @@ mod tests {
     fn a_bad_gain_is_named() {
         let mut bad = gains();
         bad.velocity_per_s.y = f32::NAN;
-        assert!(bad.check().unwrap_err().to_string().starts_with("control.position.velocity_per_s[1] = NaN"));
+        assert!(
+            bad.check()
+                .unwrap_err()
+                .to_string()
+                .starts_with("control.position.velocity_per_s[1] = NaN")
+        );
         gains().check().unwrap();
     }
 }

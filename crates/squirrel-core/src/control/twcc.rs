@@ -1,11 +1,13 @@
 //! Thrust-wing coordination control (TWCC): PC, WOEG and WIIC put together, 10 Hz.
 //!
-//! Paper, section III.B. PC always runs. While its request stays inside the angle limit it flies, wings folded. Where the
-//! request leaves the limit and WOEG's flag is up, WIIC flies with wings spread. Differs from the paper:
-//! - the request must come back below 0.9 of the limit before WIIC lets go, and a decision about the wings is kept for a dwell
-//!   time, so that they do not chatter at 10 Hz (the paper switches at once); while only the dwell time holds, PC flies;
-//! - the trigger may include thrust (docs/equations.md T22, [`Trigger::AngleOrThrust`]): on thrust alone PC's angles stay,
-//!   thrust is at its limit and the wings open where they help;
+//! Paper, section III.B. PC always runs. While its request stays inside the angle limit it flies,
+//! wings folded. Where the request leaves the limit and WOEG's flag is up, WIIC flies with wings
+//! spread. Differs from the paper:
+//! - the request must come back below 0.9 of the limit before WIIC lets go, and a decision about
+//!   the wings is kept for a dwell time, so that they do not chatter at 10 Hz (the paper switches
+//!   at once); while only the dwell time holds, PC flies;
+//! - the trigger may include thrust (docs/equations.md T22, [`Trigger::AngleOrThrust`]): on thrust
+//!   alone PC's angles stay, thrust is at its limit and the wings open where they help;
 //! - PC's integral is frozen while WIIC flies or anything is clamped;
 //! - every decision has a [`Reason`].
 
@@ -52,7 +54,8 @@ pub enum Mode {
     /// PC.
     #[default]
     Primary = 0,
-    /// Wings open: WIIC, or the answer of [`plus`](super::plus) with wings. Files and logs call it `wiic`.
+    /// Wings open: WIIC, or the answer of [`plus`](super::plus) with wings. Files and logs call it
+    /// `wiic`.
     WingsOpen = 1,
     /// PC's angles at full thrust.
     FullThrust = 2,
@@ -179,12 +182,19 @@ impl TwccParameters {
     pub fn check(&self, thrust_max_n: f32) -> Result<(), ParameterError> {
         self.position.check()?;
         let e = &self.wing_events;
-        if !(e.close_below_n.is_finite() && e.open_above_n.is_finite() && e.close_below_n <= e.open_above_n) {
+        if !(e.close_below_n.is_finite()
+            && e.open_above_n.is_finite()
+            && e.close_below_n <= e.open_above_n)
+        {
             let reason = "must be finite and <= control.wing.open_above_n";
             return Err(ParameterError::of("control.wing.close_below_n", e.close_below_n, reason));
         }
         if !(0.0..=10.0).contains(&self.dwell_s) {
-            return Err(ParameterError::of("control.wing.dwell_s", self.dwell_s, "must be 0 to 10"));
+            return Err(ParameterError::of(
+                "control.wing.dwell_s",
+                self.dwell_s,
+                "must be 0 to 10",
+            ));
         }
         if !(self.thrust_min_n > 0.0 && self.thrust_min_n < thrust_max_n) {
             let reason = "must be > 0 and below limits.thrust_max_n";
@@ -219,8 +229,14 @@ impl TwccParameters {
             return self.update_plus(plus, state, airframe, motion, ned_from_body, reference, dt_s);
         }
         let hold = state.clamped || state.mode == Mode::WingsOpen;
-        let position =
-            self.position.update(&mut state.position, airframe.mass_kg, motion, reference, hold, dt_s);
+        let position = self.position.update(
+            &mut state.position,
+            airframe.mass_kg,
+            motion,
+            reference,
+            hold,
+            dt_s,
+        );
         let normal = *ned_from_body * In::new(Vector3::z());
         let velocity_body = ned_from_body.inverse() * motion.velocity;
         let (wing_force, parnn) = if self.policy == WingPolicy::CoordinatedWithoutWings {
@@ -228,18 +244,27 @@ impl TwccParameters {
         } else {
             let area_m2 = airframe.wing_area_m2;
             let history = &mut state.history;
-            self.force_model.estimate(history, ned_from_body, velocity_body, given_force, area_m2, dt_s)
+            self.force_model.estimate(
+                history,
+                ned_from_body,
+                velocity_body,
+                given_force,
+                area_m2,
+                dt_s,
+            )
         };
-        let mut wing = self.wing_events.evaluate(wing_force, normal, position.acceleration, state.flag);
+        let mut wing =
+            self.wing_events.evaluate(wing_force, normal, position.acceleration, state.flag);
         wing.flag |= self.policy == WingPolicy::CoordinatedWithoutWings;
         state.flag = wing.flag;
 
-        let (mode, reason) = self.decide(state, &airframe.envelope, &position.request, wing.flag, dt_s);
+        let (mode, reason) =
+            self.decide(state, &airframe.envelope, &position.request, wing.flag, dt_s);
         let request = &position.request;
         let envelope = &airframe.envelope;
         let primary = envelope.limit(request);
-        // WIIC's law belongs to a request beyond the limits. While only the dwell time keeps the wings open, PC flies; and on
-        // thrust alone PC's thrust is at its limit already.
+        // WIIC's law belongs to a request beyond the limits. While only the dwell time keeps the
+        // wings open, PC flies; and on thrust alone PC's thrust is at its limit already.
         let command = if mode == Mode::WingsOpen && reason != Reason::Dwell {
             wiic::command(
                 self.thrust_law,
@@ -292,7 +317,11 @@ impl TwccParameters {
             Vector3::new(forward_right.x, forward_right.y, v.z)
         };
         // Until what is commanded now acts, the last command does.
-        let now = AttitudeThrust { roll_rad: motion.roll_rad, pitch_rad: motion.pitch_rad, thrust_n: 0.0 };
+        let now = AttitudeThrust {
+            roll_rad: motion.roll_rad,
+            pitch_rad: motion.pitch_rad,
+            thrust_n: 0.0,
+        };
         let velocity = heading(&motion.velocity.vector);
         let (mut ahead, mut goal) = (*motion, *reference);
         if let Some(last) = state.last {
@@ -308,8 +337,10 @@ impl TwccParameters {
                 * plus.delay_s;
             goal.velocity.vector += reference.acceleration.vector * plus.delay_s;
         }
-        let gains =
-            PositionGains { approach_max_m_s2: plus.approach_m_s2(airframe, reference), ..plus.position };
+        let gains = PositionGains {
+            approach_max_m_s2: plus.approach_m_s2(airframe, reference),
+            ..plus.position
+        };
         let position =
             gains.update(&mut state.position, airframe.mass_kg, &ahead, &goal, state.clamped, dt_s);
         let request = &position.request;
@@ -388,8 +419,8 @@ impl TwccParameters {
         let pitch_beyond = request.pitch_rad.abs() > held * envelope.tilt_max_rad;
         let roll_beyond = request.roll_rad.abs() > held * envelope.tilt_max_rad;
         let held_thrust = if state.mode == Mode::FullThrust { RELEASE } else { 1.0 };
-        let thrust_beyond =
-            self.trigger == Trigger::AngleOrThrust && request.thrust_n > held_thrust * envelope.thrust_max_n;
+        let thrust_beyond = self.trigger == Trigger::AngleOrThrust
+            && request.thrust_n > held_thrust * envelope.thrust_max_n;
         let (wanted, reason) = match (pitch_beyond || roll_beyond, thrust_beyond, flag) {
             (false, false, _) => (Mode::Primary, Reason::InsideLimits),
             (_, _, false) => (Mode::Primary, Reason::WingsWouldNotHelp),
@@ -421,7 +452,11 @@ pub(crate) mod fixtures {
     pub(crate) fn parameters() -> TwccParameters {
         TwccParameters {
             position: gains(),
-            wing_events: WingEvents { test: WingTest::Normal, open_above_n: 0.1, close_below_n: 0.05 },
+            wing_events: WingEvents {
+                test: WingTest::Normal,
+                open_above_n: 0.1,
+                close_below_n: 0.05,
+            },
             thrust_law: ThrustLaw::Exact,
             trigger: Trigger::Angle,
             force_model: ForceModel::FlatPlate,
@@ -432,8 +467,11 @@ pub(crate) mod fixtures {
         }
     }
     pub(crate) fn airframe() -> OuterAirframe {
-        let envelope =
-            Envelope { tilt_max_rad: core::f32::consts::FRAC_PI_6, thrust_min_n: 0.5, thrust_max_n: 10.0 };
+        let envelope = Envelope {
+            tilt_max_rad: core::f32::consts::FRAC_PI_6,
+            thrust_min_n: 0.5,
+            thrust_max_n: 10.0,
+        };
         OuterAirframe { mass_kg: 0.548, wing_area_m2: 0.04, envelope }
     }
 }
@@ -446,7 +484,8 @@ mod tests {
 
     /// Fast northward flight with the goal behind: PC wants to brake harder than 30 deg of pitch.
     fn braking(pitch_rad: f32) -> (MeasuredMotion, Rotation<Ned, Body, f32>) {
-        let motion = MeasuredMotion { velocity: In::new(Vector3::new(7.0, 0.0, 0.0)), pitch_rad, ..still() };
+        let motion =
+            MeasuredMotion { velocity: In::new(Vector3::new(7.0, 0.0, 0.0)), pitch_rad, ..still() };
         (motion, Rotation::from_euler(0.0, pitch_rad, 0.0))
     }
 
@@ -523,7 +562,9 @@ mod tests {
         let mut weak = airframe();
         weak.envelope.thrust_max_n = 6.0;
         let attitude = Rotation::identity();
-        for (trigger, mode) in [(Trigger::Angle, Mode::Primary), (Trigger::AngleOrThrust, Mode::FullThrust)] {
+        for (trigger, mode) in
+            [(Trigger::Angle, Mode::Primary), (Trigger::AngleOrThrust, Mode::FullThrust)]
+        {
             let p = TwccParameters { trigger, ..parameters() };
             let terms = p.update(
                 &mut TwccState::default(),

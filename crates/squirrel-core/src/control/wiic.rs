@@ -1,15 +1,18 @@
-//! Wing-informed integration controller (WIIC): the angle stays at its limit, thrust makes the motion.
+//! Wing-informed integration controller (WIIC): the angle stays at its limit, thrust makes the
+//! motion.
 //!
 //! Paper, eq. 8, pitch at its limit: `pitch_d = pitch_max`, `U = -(m / pitch_max)(a_x - f_x / m)`,
-//! `roll_d = (m / U)(a_y - f_y / m)`. Printed for one sign and zero yaw only. Here, in the heading frame (docs/equations.md T9):
+//! `roll_d = (m / U)(a_y - f_y / m)`. Printed for one sign and zero yaw only. Here, in the heading
+//! frame (docs/equations.md T9):
 //!
 //! - [`ThrustLaw::Literal`]: the printed law with the sign of the request, and its twin for roll.
-//! - [`ThrustLaw::Exact`]: pitch case `A = -m(a_x - f_x/m) / (s sin(pitch_max))`, `B = m(a_y - f_y/m)`,
-//!   `U = sqrt(A^2 + B^2)`, `roll = atan2(B, A)`; roll case `U = B / (s sin(roll_max))`,
-//!   `sin(pitch) = -m(a_x - f_x/m) / (U cos(roll_max))`.
+//! - [`ThrustLaw::Exact`]: pitch case `A = -m(a_x - f_x/m) / (s sin(pitch_max))`,
+//!   `B = m(a_y - f_y/m)`, `U = sqrt(A^2 + B^2)`, `roll = atan2(B, A)`; roll case
+//!   `U = B / (s sin(roll_max))`, `sin(pitch) = -m(a_x - f_x/m) / (U cos(roll_max))`.
 //!
-//! Both leave height to itself, as the paper does. Where both angles are beyond their limit, the one further beyond is held
-//! and the other clamped. Thrust ends in `[U_min, U_max]`; a demand that the wings already exceed asks for `U_min`.
+//! Both leave height to itself, as the paper does. Where both angles are beyond their limit, the
+//! one further beyond is held and the other clamped. Thrust ends in `[U_min, U_max]`; a demand that
+//! the wings already exceed asks for `U_min`.
 
 use super::AttitudeThrust;
 use crate::math::{cos, limit, sin, upper};
@@ -51,7 +54,8 @@ impl Envelope {
 ///
 /// * `acceleration` - command, forward and right in the heading frame, m/s^2
 /// * `force` - aerodynamic force as if spread, same frame, N
-/// * `request` - what the position loop asks for; says which angle is beyond its limit and on which side
+/// * `request` - what the position loop asks for; says which angle is beyond its limit and on which
+///   side
 pub fn command(
     law: ThrustLaw,
     mass_kg: f32,
@@ -74,8 +78,19 @@ pub fn command(
             }
             ThrustLaw::Exact => {
                 let a = -need.x / (sign * sin(max));
-                let u = if a > 0.0 { thrust_range(libm::hypotf(a, need.y)) } else { envelope.thrust_min_n };
-                (u, if a > 0.0 { libm::atan2f(need.y, a) } else { libm::asinf(limit(need.y / u, -1.0, 1.0)) })
+                let u = if a > 0.0 {
+                    thrust_range(libm::hypotf(a, need.y))
+                } else {
+                    envelope.thrust_min_n
+                };
+                (
+                    u,
+                    if a > 0.0 {
+                        libm::atan2f(need.y, a)
+                    } else {
+                        libm::asinf(limit(need.y / u, -1.0, 1.0))
+                    },
+                )
             }
         };
         AttitudeThrust { roll_rad: angle_range(roll_rad), pitch_rad: sign * max, thrust_n }
@@ -116,7 +131,8 @@ mod tests {
     }
 
     proptest! {
-        /// Thrust and wings together give the commanded horizontal acceleration, wherever nothing is clamped.
+        /// Thrust and wings together give the commanded horizontal acceleration, wherever nothing
+        /// is clamped.
         #[test]
         fn the_exact_law_gives_the_commanded_motion(
             ax in 2.0..8.0f32, ay in -3.0..3.0f32, fx in -0.5..0.5f32, fy in -0.5..0.5f32,
@@ -150,7 +166,8 @@ mod tests {
         }
     }
 
-    /// The printed law is the exact one to first order: halving every angle quarters the relative difference in thrust.
+    /// The printed law is the exact one to first order: halving every angle quarters the relative
+    /// difference in thrust.
     #[test]
     fn literal_and_exact_agree_to_first_order() {
         let difference = |scale: f32| {

@@ -1,13 +1,17 @@
-//! What the air would do to the wings if they were spread: the force behind WOEG's flag and WIIC's law.
+//! What the air would do to the wings if they were spread: the force behind WOEG's flag and WIIC's
+//! law.
 //!
-//! Every model sees the velocity over ground in the body frame, because there is no airspeed sensor (docs/equations.md T6),
-//! and speaks whether the wings are spread or not. The network saw speeds and angles of attack up to some size in training,
-//! always ten rows a tenth of a second apart; asked about anything else it would guess. Then the flat plate, which needs no
-//! training, stands in, and [`Guard`] says why.
+//! Every model sees the velocity over ground in the body frame, because there is no airspeed sensor
+//! (docs/equations.md T6), and speaks whether the wings are spread or not. The network saw speeds
+//! and angles of attack up to some size in training, always ten rows a tenth of a second apart;
+//! asked about anything else it would guess. Then the flat plate, which needs no training, stands
+//! in, and [`Guard`] says why.
 
 use crate::aero::flat_plate;
 use crate::frames::{Body, In, Ned, Rotation};
-use crate::rnn::parnn::{Domain, Estimate, History, INPUTS, Parnn, SPEED_SCALE_M_S, STEP_S, features};
+use crate::rnn::parnn::{
+    Domain, Estimate, History, INPUTS, Parnn, SPEED_SCALE_M_S, STEP_S, features,
+};
 use nalgebra::Vector3;
 
 /// Where the estimate of the wing force comes from.
@@ -62,7 +66,8 @@ fn guard(domain: &Domain, window: &[[f32; INPUTS]]) -> Guard {
 }
 
 impl ForceModel {
-    /// Force of the air on the wings as if they were spread, N, and the terms behind it where the network was asked.
+    /// Force of the air on the wings as if they were spread, N, and the terms behind it where the
+    /// network was asked.
     ///
     /// * `history` - what the network saw before; moves on by one row
     /// * `velocity_body` - over ground, m/s
@@ -78,7 +83,8 @@ impl ForceModel {
         area_m2: f32,
         dt_s: f32,
     ) -> (In<Ned, f32>, Option<ParnnTerms>) {
-        let plate = || *ned_from_body * flat_plate::force(velocity_body, In::new(Vector3::z()), area_m2);
+        let plate =
+            || *ned_from_body * flat_plate::force(velocity_body, In::new(Vector3::z()), area_m2);
         match self {
             Self::FlatPlate => (plate(), None),
             Self::Given => (given.unwrap_or_else(plate), None),
@@ -97,7 +103,8 @@ impl ForceModel {
 }
 
 fn ask(parnn: &Parnn, history: &mut History, velocity: In<Body, f32>, dt_s: f32) -> ParnnTerms {
-    // Rows of a window are equally far apart; after a missed tick, or time that stood still, they would not be.
+    // Rows of a window are equally far apart; after a missed tick, or time that stood still, they
+    // would not be.
     if !((dt_s - STEP_S).abs() < 0.5 * STEP_S) {
         *history = History::new();
     }
@@ -172,12 +179,16 @@ mod tests {
         let all = estimates(&loud(), &[NOSE_UP; WINDOW + 1]);
         for (k, (force, terms)) in all.iter().enumerate() {
             if k + 1 < WINDOW {
-                assert_eq!(*terms, ParnnTerms { guard: Guard::WindowNotFull, estimate: None }, "{k}");
+                assert_eq!(
+                    *terms,
+                    ParnnTerms { guard: Guard::WindowNotFull, estimate: None },
+                    "{k}"
+                );
                 assert_eq!(*force, plate(NOSE_UP));
             } else {
                 assert_eq!(terms.guard, Guard::Inside, "{k}");
-                let network =
-                    Rotation::<Ned, Body, f32>::from_euler(0.2, 0.4, 1.0) * terms.estimate.unwrap().force;
+                let network = Rotation::<Ned, Body, f32>::from_euler(0.2, 0.4, 1.0)
+                    * terms.estimate.unwrap().force;
                 assert_eq!(*force, network);
                 assert_ne!(*force, plate(NOSE_UP), "the network has something to say");
             }
@@ -201,7 +212,10 @@ mod tests {
             for k in WINDOW..2 * WINDOW {
                 assert_eq!(all[k].1.guard, reason, "{k}: {outside:?}");
                 let said = all[k].1.estimate.unwrap();
-                assert!(said.force.vector.iter().all(|f| f.is_finite()), "{k}: {outside:?}: {said:?}");
+                assert!(
+                    said.force.vector.iter().all(|f| f.is_finite()),
+                    "{k}: {outside:?}: {said:?}"
+                );
                 if k > WINDOW {
                     assert_eq!(all[k].0, plate(NOSE_UP), "{k}: {outside:?}");
                 }

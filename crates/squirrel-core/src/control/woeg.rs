@@ -1,9 +1,10 @@
 //! Wing operation event generator (WOEG): would spread wings help?
 //!
 //! Paper, section III.B, gives two definitions (docs/equations.md T11); both are here:
-//! - [`WingTest::Normal`]: the force estimate pushes against the body's down axis, `-n . f > e`. For a flat plate this is
-//!   "the air hits the belly".
-//! - [`WingTest::Acceleration`]: the force estimate points where the position loop wants to go, `f_xy . a_cmd,xy > e |a_cmd|`.
+//! - [`WingTest::Normal`]: the force estimate pushes against the body's down axis, `-n . f > e`.
+//!   For a flat plate this is "the air hits the belly".
+//! - [`WingTest::Acceleration`]: the force estimate points where the position loop wants to go,
+//!   `f_xy . a_cmd,xy > e |a_cmd|`.
 //!
 //! Differs from the paper: a threshold for opening and a lower one for closing.
 
@@ -33,7 +34,8 @@ pub struct WingEvents {
 /// Helpful part of the force and the flag.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WingFlag {
-    /// Part of the force that helps, N; of [`super::plus`], mass times how much closer wings bring the acceleration to the command.
+    /// Part of the force that helps, N; of [`super::plus`], mass times how much closer wings bring
+    /// the acceleration to the command.
     pub helpful_n: f32,
     /// The paper's Flag.
     pub flag: bool,
@@ -74,8 +76,14 @@ mod tests {
         WingEvents { test, open_above_n: 0.1, close_below_n: 0.05 }
     }
 
-    fn flag(test: WingTest, pitch: f32, velocity: Vector3<f32>, acceleration: Vector3<f32>) -> WingFlag {
-        let normal = Rotation::<Ned, Body, f32>::from_euler(0.0, pitch, 0.0) * In::new(Vector3::z());
+    fn flag(
+        test: WingTest,
+        pitch: f32,
+        velocity: Vector3<f32>,
+        acceleration: Vector3<f32>,
+    ) -> WingFlag {
+        let normal =
+            Rotation::<Ned, Body, f32>::from_euler(0.0, pitch, 0.0) * In::new(Vector3::z());
         let force = flat_plate::force(In::new(velocity), normal, 0.04);
         events(test).evaluate(force, normal, In::new(acceleration), false)
     }

@@ -1,8 +1,10 @@
-//! Battery: open-circuit voltage over charge, inner resistance, one RC pair (docs/equations.md D.5).
+//! Battery: open-circuit voltage over charge, inner resistance, one RC pair (docs/equations.md
+//! D.5).
 //!
-//! `V = OCV(charge) - I R0 - V1`, `V1' = (I R1 - V1) / tau1`, `charge' = -I / capacity`. The current carries the rotors'
-//! shaft power: `I = sum(Q_i Omega_i) / (efficiency V) + idle`. The open-circuit voltage is a table, one [`Stretch`] after the
-//! other; the caller walks along it with [`Stretch::or_next`].
+//! `V = OCV(charge) - I R0 - V1`, `V1' = (I R1 - V1) / tau1`, `charge' = -I / capacity`. The
+//! current carries the rotors' shaft power: `I = sum(Q_i Omega_i) / (efficiency V) + idle`. The
+//! open-circuit voltage is a table, one [`Stretch`] after the other; the caller walks along it with
+//! [`Stretch::or_next`].
 
 use crate::lane::Lane;
 use crate::lane::functions::limit;
@@ -45,7 +47,8 @@ numbers! {
 }
 
 numbers! {
-    /// A stretch of the table of a cell's open-circuit voltage: it begins at a charge, and what voltage does on it.
+    /// A stretch of the table of a cell's open-circuit voltage: it begins at a charge, and what
+    /// voltage does on it.
     Stretch {
         /// Charge at which it begins; infinite for one that is not there.
         from,
@@ -71,8 +74,10 @@ impl<L: Lane> Pack<L> {
     /// * `dt` - s
     #[inline(always)]
     pub fn discharge(&self, state: &mut Charge<L>, power_w: L, dt: L) {
-        let current = power_w / (self.efficiency * state.voltage_v.upper(self.floor_v)) + self.idle_a;
-        state.rc_voltage_v = state.rc_voltage_v + (current * self.r1_ohm - state.rc_voltage_v) * self.decay;
+        let current =
+            power_w / (self.efficiency * state.voltage_v.upper(self.floor_v)) + self.idle_a;
+        state.rc_voltage_v =
+            state.rc_voltage_v + (current * self.r1_ohm - state.rc_voltage_v) * self.decay;
         state.charge = (state.charge - current * dt / self.capacity_as).upper(L::of(0.0));
         state.current_a = current;
     }
@@ -81,7 +86,8 @@ impl<L: Lane> Pack<L> {
     #[inline(always)]
     pub fn settle(&self, state: &mut Charge<L>, on: &Stretch<L>) {
         let open = self.cells * on.volt_at(state.charge);
-        state.voltage_v = (open - state.current_a * self.r0_ohm - state.rc_voltage_v).upper(L::of(0.0));
+        state.voltage_v =
+            (open - state.current_a * self.r0_ohm - state.rc_voltage_v).upper(L::of(0.0));
     }
 }
 

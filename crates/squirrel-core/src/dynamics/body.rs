@@ -1,6 +1,7 @@
 //! The rigid body: what force and moment make of its motion.
 //!
-//! `r'' = g e3 + R f / m`, `w' = J^-1 (M - w x J w)`, `q' = 1/2 q (0, w)`; matrices by columns, quaternions `[w, x, y, z]`.
+//! `r'' = g e3 + R f / m`, `w' = J^-1 (M - w x J w)`, `q' = 1/2 q (0, w)`; matrices by columns,
+//! quaternions `[w, x, y, z]`.
 
 use crate::lane::Lane;
 use crate::lane::vector::{cross, minus, scaled, times};
@@ -11,7 +12,11 @@ use crate::math::GRAVITY_M_S2;
 /// * `ned_from_body` - by columns
 /// * `force` - body frame, without gravity, N
 #[inline(always)]
-pub fn acceleration<L: Lane>(ned_from_body: &[[L; 3]; 3], force: &[L; 3], inverse_mass: L) -> [L; 3] {
+pub fn acceleration<L: Lane>(
+    ned_from_body: &[[L; 3]; 3],
+    force: &[L; 3],
+    inverse_mass: L,
+) -> [L; 3] {
     let mut acceleration = times(ned_from_body, &scaled(force, inverse_mass));
     acceleration[2] = L::of(GRAVITY_M_S2) + acceleration[2];
     acceleration
@@ -40,5 +45,10 @@ pub fn attitude_rate<L: Lane>(attitude: &[L; 4], omega: &[L; 3]) -> [L; 4] {
     let half = L::of(0.5);
     let [w, i, j, k] = *attitude;
     let (p, q, r) = (omega[0] * half, omega[1] * half, omega[2] * half);
-    [L::of(0.0) - i * p - j * q - k * r, w * p + j * r - k * q, w * q - i * r + k * p, w * r + i * q - j * p]
+    [
+        L::of(0.0) - i * p - j * q - k * r,
+        w * p + j * r - k * q,
+        w * q - i * r + k * p,
+        w * r + i * q - j * p,
+    ]
 }

@@ -1,7 +1,8 @@
 //! The base model on lanes: what moves, what does not change, what is held, and the derivative.
 //!
-//! The same equations as [`derivative`](super::derivative), for vehicles side by side ([`Row`](crate::lane::Row)) and for derivatives by the state.
-//! No closures and no iterators in what runs in steps: code must end up in the function that was compiled for the registers.
+//! The same equations as [`derivative`](super::derivative), for vehicles side by side
+//! ([`Row`](crate::lane::Row)) and for derivatives by the state. No closures and no iterators in
+//! what runs in steps: code must end up in the function that was compiled for the registers.
 
 use super::State;
 use super::body;
@@ -14,7 +15,8 @@ use crate::numbers;
 use crate::vehicle::{MAX_ROTORS, Vehicle};
 
 numbers! {
-    /// Rigid body and rotor speeds, in the units and frames of [`State`]; as a rate, the derivative of each.
+    /// Rigid body and rotor speeds, in the units and frames of [`State`]; as a rate, the derivative
+    /// of each.
     Motion<ROTORS> {
         /// NED, m.
         position [3],
@@ -123,7 +125,8 @@ pub fn settle<L: Lane, const ROTORS: usize>(
     state: &mut Motion<L, ROTORS>,
 ) {
     for i in 0..ROTORS {
-        state.rotor_speed[i] = lag_start(held.target_speed[i], state.rotor_speed[i], airframe.inverse_lag);
+        state.rotor_speed[i] =
+            lag_start(held.target_speed[i], state.rotor_speed[i], airframe.inverse_lag);
     }
 }
 

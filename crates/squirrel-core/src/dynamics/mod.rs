@@ -4,8 +4,9 @@
 //! r'' = g e3 + R f / m            f = rotors + drag + surfaces + effects, body frame
 //! w'  = J^-1 (M - w x J w)        q' = 1/2 q (0, w)        Omega_i' = (Omega_target,i - Omega_i) / tau
 //! ```
-//! Air enters only through the air-relative velocity `R^T (v - wind)` (the paper writes the ground velocity; docs/equations.md
-//! T6). Wings are a caller's closure, because their own states belong to the plant.
+//! Air enters only through the air-relative velocity `R^T (v - wind)` (the paper writes the ground
+//! velocity; docs/equations.md T6). Wings are a caller's closure, because their own states belong
+//! to the plant.
 
 pub mod battery;
 pub mod body;
@@ -40,7 +41,8 @@ pub fn air<T: Real>(state: &State<T>, wind: In<Ned, T>) -> Air<T> {
 #[inline(always)]
 fn air_in<T: Real>(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T>) -> Air<T> {
     let relative_ned = (state.velocity - wind).vector;
-    // The norm is that of the body velocity too; taken before the rotation, its root does not wait for it.
+    // The norm is that of the body velocity too; taken before the rotation, its root does not wait
+    // for it.
     Air {
         velocity: In::new(ned_from_body.tr_mul(&relative_ned)),
         speed: relative_ned.norm(),
@@ -48,7 +50,8 @@ fn air_in<T: Real>(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T
     }
 }
 
-/// The attitude as a matrix: two products with it cost less, and wait less, than two with the quaternion.
+/// The attitude as a matrix: two products with it cost less, and wait less, than two with the
+/// quaternion.
 #[inline(always)]
 fn rotation_matrix<T: Real>(state: &State<T>) -> Matrix3<T> {
     Matrix3::from(rotation(&state.attitude_wxyz()))
@@ -77,7 +80,8 @@ pub struct Held<T: Real> {
 
 /// Force and moment on the airframe without gravity, body frame.
 ///
-/// * `vehicle` - with what effects change once, see [`Effects::alter`](crate::effects::Effects::alter)
+/// * `vehicle` - with what effects change once, see
+///   [`Effects::alter`](crate::effects::Effects::alter)
 /// * `effects` - of this vehicle
 /// * `surfaces` - wrench of the wings for a given motion through the air
 #[inline(always)]
@@ -108,7 +112,8 @@ fn wrench_in<T: Real>(
     if !effects.any() {
         return rotors + rest;
     }
-    // Copies, so that without effects nothing here needs an address and all of it stays in registers.
+    // Copies, so that without effects nothing here needs an address and all of it stays in
+    // registers.
     let (state, air, ned_from_body) = (*state, *air, *ned_from_body);
     affected(vehicle, effects, &state, held, &air, &ned_from_body, [rotors, rest])
 }
@@ -128,7 +133,8 @@ fn affected<T: Real>(
     let speed = &state.rotor_speed_rad_s;
     let rotor_spin = if Prepared::<T>::feel_rotor_spin(present) {
         let signs = rotors::spin_signs(vehicle);
-        [*speed, held.drive.rates(vehicle.rotor_blocks(), speed)].map(|all| rotors::spin(&signs, &all))
+        [*speed, held.drive.rates(vehicle.rotor_blocks(), speed)]
+            .map(|all| rotors::spin(&signs, &all))
     } else {
         [T::zero(); 2]
     };
@@ -220,7 +226,8 @@ fn wind_of<T: Real>(effects: &Acting<T>, height_m: T) -> In<Ned, T> {
     In::new(Vector3::new(north, east, T::zero()))
 }
 
-/// Time derivative of the state: each field of the result is the rate of the field of the same name.
+/// Time derivative of the state: each field of the result is the rate of the field of the same
+/// name.
 ///
 /// * arguments as in [`wrench`]
 #[inline(always)]
@@ -235,7 +242,8 @@ pub fn derivative<T: Real>(
     let air = air_in(state, total_wind(effects, state, held.wind), &ned_from_body);
     let wrench = wrench_in(vehicle, effects, state, held, &air, &ned_from_body, surfaces);
     let columns = ned_from_body.into();
-    let acceleration = body::acceleration(&columns, &wrench.force.vector.into(), vehicle.inverse_mass());
+    let acceleration =
+        body::acceleration(&columns, &wrench.force.vector.into(), vehicle.inverse_mass());
     State {
         position: state.velocity,
         velocity: In::new(Vector3::from(acceleration)),
@@ -257,12 +265,13 @@ pub fn angular_acceleration<T: Real>(
     let columns: [[[T; 3]; 3]; 2] =
         [vehicle.parameters().inertia_kg_m2.into(), (*vehicle.inertia_inverse()).into()];
     let moment = wrench.moment.vector.into();
-    let rate = body::angular_acceleration([&columns[0], &columns[1]], &omega.vector.into(), &moment);
+    let rate =
+        body::angular_acceleration([&columns[0], &columns[1]], &omega.vector.into(), &moment);
     In::new(Vector3::from(rate))
 }
 
-/// What an accelerometer reads without noise, m/s^2: `f / m + w' x r + w x (w x r)`, with `r` from the centre of mass, on
-/// which the state and the wrench are, to the accelerometer.
+/// What an accelerometer reads without noise, m/s^2: `f / m + w' x r + w x (w x r)`, with `r` from
+/// the centre of mass, on which the state and the wrench are, to the accelerometer.
 ///
 /// * `omega` - angular rate, rad/s
 #[inline(always)]
@@ -336,7 +345,11 @@ mod tests {
             .normalised();
         }
         let (energy_end, momentum_end) = invariants(&state);
-        assert!((energy_end / energy - 1.0).abs() < 1e-9, "energy drifted by {}", energy_end / energy - 1.0);
+        assert!(
+            (energy_end / energy - 1.0).abs() < 1e-9,
+            "energy drifted by {}",
+            energy_end / energy - 1.0
+        );
         assert!((momentum_end - momentum_ned).norm() / momentum_ned.norm() < 1e-9);
     }
 
@@ -350,7 +363,8 @@ mod tests {
             14.8,
         );
         let fly = |steps: usize| {
-            let mut state = State { velocity: In::new(Vector3::new(3.0, -1.0, 0.5)), ..State::at_rest() };
+            let mut state =
+                State { velocity: In::new(Vector3::new(3.0, -1.0, 0.5)), ..State::at_rest() };
             for _ in 0..steps {
                 state = rk4(state, 0.4 / steps as f64, |s| {
                     derivative(&vehicle, &acting(&Effects::none()), s, &still(drive), no_surfaces)
@@ -375,7 +389,8 @@ mod tests {
         assert!((read.vector - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).norm() < 1e-9);
     }
 
-    /// The centre of mass is 10 mm ahead of the accelerometer: yawing pulls it inwards, pitching up pushes it down.
+    /// The centre of mass is 10 mm ahead of the accelerometer: yawing pulls it inwards, pitching up
+    /// pushes it down.
     #[test]
     fn an_accelerometer_off_the_centre_of_mass_feels_the_rotation() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
@@ -383,18 +398,26 @@ mod tests {
         effects.insert("cg_offset").unwrap().values[0] = 0.01;
         let moment = In::new(Vector3::new(0.0, 4.68e-3 * 5.0, 0.0));
         let wrench = Wrench { force: In::zero(), moment };
-        let read = specific_force(&vehicle, &effects, In::new(Vector3::new(0.0, 0.0, 3.0)), &wrench).vector;
+        let read =
+            specific_force(&vehicle, &effects, In::new(Vector3::new(0.0, 0.0, 3.0)), &wrench)
+                .vector;
         assert!((read - Vector3::new(0.09, 0.0, 0.05)).norm() < 1e-12, "{read}");
     }
 
-    fn affected_by(name: &str, values: &[f64], state: &State<f64>, held: &Held<f64>) -> Wrench<Body, f64> {
+    fn affected_by(
+        name: &str,
+        values: &[f64],
+        state: &State<f64>,
+        held: &Held<f64>,
+    ) -> Wrench<Body, f64> {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
         let mut effects = Effects::none();
         effects.insert(name).unwrap().values[..values.len()].copy_from_slice(values);
         wrench(&vehicle, &Acting::new(&effects, &vehicle), state, held, no_surfaces)
     }
 
-    /// Dropped, all of `m + m_a` accelerates, but only `m` has weight: `w' = m g / (m + m_a)`, so `F_z = -m_a w'`.
+    /// Dropped, all of `m + m_a` accelerates, but only `m` has weight: `w' = m g / (m + m_a)`, so
+    /// `F_z = -m_a w'`.
     #[test]
     fn added_mass_is_carried_along_but_not_attracted() {
         let mut state = State::at_rest();
@@ -402,7 +425,8 @@ mod tests {
         let fall = 0.548 * GRAVITY_M_S2 / (0.548 + 0.1);
         let force = affected_by("added_mass", &[0.1], &state, &held).force.vector.z;
         assert!((force + 0.1 * fall).abs() < 1e-12, "{force}");
-        // Rolling at 2 rad/s while slipping to the right at 3 m/s: the velocity along z grows by g - w_x v.
+        // Rolling at 2 rad/s while slipping to the right at 3 m/s: the velocity along z grows by g
+        // - w_x v.
         (state.omega.vector.x, state.velocity.vector.y) = (2.0, 3.0);
         let drag = wrench(
             &Vehicle::new(squirrel::<f64>()).unwrap(),
@@ -421,7 +445,8 @@ mod tests {
         assert!((hover + 0.548 * GRAVITY_M_S2).abs() < 1e-9);
     }
 
-    /// Rotor 1 turns clockwise seen from above, positive about +z, so speeding it up turns the airframe to the left.
+    /// Rotor 1 turns clockwise seen from above, positive about +z, so speeding it up turns the
+    /// airframe to the left.
     #[test]
     fn rotors_that_speed_up_push_the_airframe_back() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
@@ -434,7 +459,8 @@ mod tests {
         let mut state = State { omega: In::new(Vector3::new(0.5, -0.2, 0.0)), ..State::at_rest() };
         state.rotor_speed_rad_s[0] = 900.0;
         let base = wrench(&vehicle, &acting(&Effects::none()), &state, &still(drive), no_surfaces);
-        let more = affected_by("rotor_gyro_torque", &[1e-5], &state, &still(drive)).moment - base.moment;
+        let more =
+            affected_by("rotor_gyro_torque", &[1e-5], &state, &still(drive)).moment - base.moment;
         let by_hand = Vector3::new(0.2 * 900.0, 0.5 * 900.0, -600.0 / 0.03) * 1e-5;
         assert!((more.vector - by_hand).norm() < 1e-12, "{more:?}");
     }
@@ -442,11 +468,15 @@ mod tests {
     #[test]
     fn a_tether_pulls_in_the_world() {
         let mut state = State::at_rest();
-        state.attitude = *nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, core::f64::consts::FRAC_PI_2);
+        state.attitude =
+            *nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, core::f64::consts::FRAC_PI_2);
         let mut held = still(RotorDrive::holding([0.0; MAX_ROTORS]));
         held.tether_force = In::new(Vector3::new(1.0, 0.0, 2.0));
         let pull = affected_by("payload_swing", &[0.1, 0.5], &state, &held).force.vector;
-        assert!((pull - Vector3::new(0.0, -1.0, 2.0)).norm() < 1e-12, "north is to the left: {pull}");
+        assert!(
+            (pull - Vector3::new(0.0, -1.0, 2.0)).norm() < 1e-12,
+            "north is to the left: {pull}"
+        );
     }
 
     #[test]

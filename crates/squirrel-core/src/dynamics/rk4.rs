@@ -25,7 +25,8 @@ pub fn runge_kutta<L: Lane>(dt: L) -> Stages<L, 4> {
 pub fn rk4<T: Real, S: VectorSpace<T>>(state: S, dt_s: T, rate: impl Fn(&S) -> S) -> S {
     let mut stage = state;
     let mut next = state;
-    // A loop, so that `rate` has one call and is inlined into it: a fifth faster than four calls in a row.
+    // A loop, so that `rate` has one call and is inlined into it: a fifth faster than four calls in
+    // a row.
     for [ahead, weight] in runge_kutta(dt_s) {
         let k = rate(&stage);
         stage = state.plus_scaled(ahead, &k);

@@ -1,7 +1,8 @@
 //! Rotors: from command to speed, from speed to force and moment.
 //!
-//! `T_i = k_f Omega_i^2` along -z, `Q_i = yaw_sign_i k_m Omega_i^2` about +z, `Omega_i' = (target_i - Omega_i) / tau`
-//! with its own `tau` for speeding up and slowing down (docs/equations.md D.5).
+//! `T_i = k_f Omega_i^2` along -z, `Q_i = yaw_sign_i k_m Omega_i^2` about +z,
+//! `Omega_i' = (target_i - Omega_i) / tau` with its own `tau` for speeding up and slowing down
+//! (docs/equations.md D.5).
 
 use crate::effects::Acting;
 use crate::frames::{Body, In, Wrench};
@@ -32,11 +33,17 @@ impl<T: Real> RotorDrive<T> {
     ) -> Self {
         let propulsion = &vehicle.parameters().propulsion;
         let mut target_rad_s = [T::zero(); MAX_ROTORS];
-        for (target, u) in target_rad_s.iter_mut().zip(command).take(vehicle.parameters().rotor_count) {
+        for (target, u) in
+            target_rad_s.iter_mut().zip(command).take(vehicle.parameters().rotor_count)
+        {
             *target = propulsion.target_speed_rad_s(*u);
         }
         if effects.any() {
-            effects.numbers().rotor_targets(effects.present(), &mut target_rad_s, battery_voltage_v);
+            effects.numbers().rotor_targets(
+                effects.present(),
+                &mut target_rad_s,
+                battery_voltage_v,
+            );
         }
         let extra_s = effects.rotor_extra_time_constant_s();
         let [up, down] = inverse_lag(propulsion, extra_s);
@@ -63,10 +70,12 @@ impl<T: Real> RotorDrive<T> {
         rate
     }
 
-    /// Moves rotor speeds exactly over a time of any length: `target + (speed - target) exp(-dt / tau)`.
+    /// Moves rotor speeds exactly over a time of any length:
+    /// `target + (speed - target) exp(-dt / tau)`.
     #[inline]
     pub fn lead(&self, speed: &mut PerRotor<T>, dt_s: T) {
-        let keep = |inverse: T| if inverse > T::zero() { (-dt_s * inverse).exp() } else { T::zero() };
+        let keep =
+            |inverse: T| if inverse > T::zero() { (-dt_s * inverse).exp() } else { T::zero() };
         let up = keep(self.inverse_time_constant_up);
         let down = if self.inverse_time_constant_down == self.inverse_time_constant_up {
             up
@@ -193,8 +202,8 @@ mod tests {
         Acting::new(effects, &Vehicle::new(squirrel::<f64>()).unwrap())
     }
 
-    /// Which rotor does what follows from geometry alone: left pair rolls right, front pair pitches up, the rotors whose
-    /// reaction is positive yaw right (clockwise from above).
+    /// Which rotor does what follows from geometry alone: left pair rolls right, front pair pitches
+    /// up, the rotors whose reaction is positive yaw right (clockwise from above).
     #[test]
     fn rotors_turn_the_airframe_the_right_way() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();

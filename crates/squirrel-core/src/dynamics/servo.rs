@@ -1,4 +1,5 @@
-//! Wing servo: dead time, rate limit, first-order lag (docs/equations.md D.4), exact over steps of any length.
+//! Wing servo: dead time, rate limit, first-order lag (docs/equations.md D.4), exact over steps of
+//! any length.
 
 use crate::lane::Lane;
 use crate::lane::functions::{exp, sign, size};
@@ -54,7 +55,8 @@ impl<L: Lane> Servo<L> {
         L::of(0.5) * (start + state.deployment)
     }
 
-    /// Towards the target for a part of a step: at the largest rate while further than `rate tau`, then by the lag.
+    /// Towards the target for a part of a step: at the largest rate while further than `rate tau`,
+    /// then by the lag.
     #[inline(always)]
     fn follow(&self, now: L, target: L, time: L, dt: L) -> L {
         let gap = target - now;
@@ -79,7 +81,8 @@ impl<L: Lane> ServoState<L> {
 }
 
 impl<T: crate::math::Real> ServoState<T> {
-    /// Tells it where to go; a command that changes again within the dead time replaces the one that waits.
+    /// Tells it where to go; a command that changes again within the dead time replaces the one
+    /// that waits.
     pub fn ask(&mut self, command: T, dead_time_s: T) {
         if command != self.waiting {
             self.waiting = command;

@@ -14,7 +14,8 @@ pub struct State<T: Real> {
     pub position: In<Ned, T>,
     /// Velocity over ground, m/s.
     pub velocity: In<Ned, T>,
-    /// Hamilton quaternion, body to NED; unit up to integration error, which [`Self::normalised`] removes.
+    /// Hamilton quaternion, body to NED; unit up to integration error, which [`Self::normalised`]
+    /// removes.
     pub attitude: Quaternion<T>,
     /// Angular rate, rad/s.
     pub omega: In<Body, T>,

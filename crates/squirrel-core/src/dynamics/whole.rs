@@ -1,6 +1,8 @@
-//! Whole vehicles on lanes: wings and effects on top of the base model of [`lanes`](super::lanes), and a step of all.
+//! Whole vehicles on lanes: wings and effects on top of the base model of [`lanes`](super::lanes),
+//! and a step of all.
 //!
-//! Wings and effects that a batch does not have are constants of the code, so that they cost nothing.
+//! Wings and effects that a batch does not have are constants of the code, so that they cost
+//! nothing.
 
 use super::lanes::{Airframe, Held, Motion, airflow, body_rate, plus_scaled, rotor_rates, rotors};
 use super::rotors::spin;
@@ -45,9 +47,16 @@ pub struct Whole<L: Lane, const ROTORS: usize> {
     pub angle_rate: [L; 2],
 }
 
-/// One step: the motion and the membranes at its end. Servos, battery, load and air are stepped beside it.
+/// One step: the motion and the membranes at its end. Servos, battery, load and air are stepped
+/// beside it.
 #[inline(always)]
-pub fn step<L: Lane, const ROTORS: usize, const STAGES: usize, const WING: u8, const EFFECTS: bool>(
+pub fn step<
+    L: Lane,
+    const ROTORS: usize,
+    const STAGES: usize,
+    const WING: u8,
+    const EFFECTS: bool,
+>(
     whole: &Whole<L, ROTORS>,
     stages: &Stages<L, STAGES>,
     state: &Motion<L, ROTORS>,
@@ -55,7 +64,8 @@ pub fn step<L: Lane, const ROTORS: usize, const STAGES: usize, const WING: u8, c
 ) -> (Motion<L, ROTORS>, [Side<L>; 2]) {
     let (mut stage, mut next, mut sides_stage, mut sides_next) = (*state, *state, *sides, *sides);
     for k in 0..STAGES {
-        let (rate, sides_rate) = derivative::<L, ROTORS, WING, EFFECTS>(whole, &stage, &sides_stage);
+        let (rate, sides_rate) =
+            derivative::<L, ROTORS, WING, EFFECTS>(whole, &stage, &sides_stage);
         let [ahead, weight] = stages[k];
         if k + 1 < STAGES {
             stage = plus_scaled(state, ahead, &rate);
@@ -139,7 +149,11 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
             rotor_spin,
             wings: &whole.plate,
             deployment: whole.deployment,
-            tether_force: if whole.present.has_load() { Some(whole.swing.force(&whole.load)) } else { None },
+            tether_force: if whole.present.has_load() {
+                Some(whole.swing.force(&whole.load))
+            } else {
+                None
+            },
         };
         with_effects(&whole.effects, whole.present, [&rotors, &rest], &at)
     } else {

@@ -1,4 +1,5 @@
-//! Scale of the accelerometer: along each axis of the body it reads `f_measured = (1 + s) f`, before its bias.
+//! Scale of the accelerometer: along each axis of the body it reads `f_measured = (1 + s) f`,
+//! before its bias.
 
 use super::{Declared, Effect, EffectParameter, Fitted, Mimic, Shown, Words};
 use crate::frames::{Body, In};

@@ -1,6 +1,7 @@
 //! Commands of rotors and wings act late: `u(t - d)`.
 //!
-//! Whoever hands commands to the plant holds them back; a lag (`motor_lag`) also smooths, a latency only shifts.
+//! Whoever hands commands to the plant holds them back; a lag (`motor_lag`) also smooths, a latency
+//! only shifts.
 
 use super::{Effect, EffectParameter, Response, Shown, Timing, Words};
 use crate::math::Real;
@@ -12,7 +13,8 @@ pub struct ActuationLatency<T>(pub(super) [T; 1]);
 impl<T: Real> Effect<T> for ActuationLatency<T> {
     const NAME: &'static str = "actuation_latency";
     const ACTS_BETWEEN_STEPS: bool = true;
-    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::size("latency_s", 0.015, 0.06)];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::size("latency_s", 0.015, 0.06)];
     const WORDS: Words = Words {
         what: "late commands",
         more: "Commands act late",

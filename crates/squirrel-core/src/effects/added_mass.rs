@@ -1,5 +1,5 @@
-//! Air that moves with the vehicle along body z: `F_z -= m_a w'`, with `w'` the rate of the body z component of the velocity
-//! through the air.
+//! Air that moves with the vehicle along body z: `F_z -= m_a w'`, with `w'` the rate of the body z
+//! component of the velocity through the air.
 //!
 //! `w'` depends on the force, so the dynamics solve for both: with all other forces `F_z`,
 //! `w' = (F_z / m + g_z - (w x V)_z) / (1 + m_a / m)`. Unlike `mass_error` it has no weight.

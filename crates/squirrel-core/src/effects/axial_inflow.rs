@@ -1,4 +1,5 @@
-//! Axial inflow: `T <- T (1 + k w)`, `w` the airspeed along body z: air from below lifts, climbing costs thrust.
+//! Axial inflow: `T <- T (1 + k w)`, `w` the airspeed along body z: air from below lifts, climbing
+//! costs thrust.
 //!
 //! Form `quadratic`: `T (1 + k w + k_2 w |w|)`.
 

@@ -1,8 +1,9 @@
 //! Battery sag: steady rotor speed follows the voltage, `Omega = u Omega_max (V / V_ref)^kappa`.
 //!
-//! The simulator always computes the voltage; thrust feels it only through this effect. Form `linear`: the factor is
-//! `1 + kappa (V / V_ref - 1)`. Form `load_dependent`: the exponent of each rotor is `kappa (1 + g (x - 0.5))`, with `x` its
-//! target over the top speed: a loaded motor loses more.
+//! The simulator always computes the voltage; thrust feels it only through this effect. Form
+//! `linear`: the factor is `1 + kappa (V / V_ref - 1)`. Form `load_dependent`: the exponent of each
+//! rotor is `kappa (1 + g (x - 0.5))`, with `x` its target over the top speed: a loaded motor loses
+//! more.
 
 use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
 use crate::lane::Lane;
@@ -67,7 +68,12 @@ impl<T: Real> BatterySag<T> {
 
 impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
-    fn rotor_targets<const ROTORS: usize>(&self, targets: &mut [L; ROTORS], voltage_v: L, forms: Forms) {
+    fn rotor_targets<const ROTORS: usize>(
+        &self,
+        targets: &mut [L; ROTORS],
+        voltage_v: L,
+        forms: Forms,
+    ) {
         let one = L::of(1.0);
         let ratio = (voltage_v / self.reference_voltage_v).upper(L::of(0.0));
         let logarithm = ln(ratio);

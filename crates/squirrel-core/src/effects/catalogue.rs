@@ -1,11 +1,11 @@
 //! The effects of a vehicle: which are present, and what they do together.
 //!
-//! The one list of all effects is at the end of this file. Sums are kept out of line: the hot loops ask [`Effects::any`] once
-//! and leave them alone where there is no effect.
+//! The one list of all effects is at the end of this file. Sums are kept out of line: the hot loops
+//! ask [`Effects::any`] once and leave them alone where there is no effect.
 
 use super::{
-    Acts, Alteration, CommandClock, Effect, EffectParameter, FORM, Forms, GustSpectrum, Pendulum, Profile,
-    Situation, is,
+    Acts, Alteration, CommandClock, Effect, EffectParameter, FORM, Forms, GustSpectrum, Pendulum,
+    Profile, Situation, is,
 };
 use crate::aero::{Airflow, BodyWrench};
 use crate::frames::{Body, In};
@@ -39,13 +39,14 @@ macro_rules! catalogue {
             pub fn none() -> Self {
                 Self { any: false, $($field: None,)+ }
             }
-            /// Whether any effect is present. The hot loops ask this once and leave the sums below, which are kept out of line,
-            /// alone where there is none.
+            /// Whether any effect is present. The hot loops ask this once and leave the sums below,
+            /// which are kept out of line, alone where there is none.
             #[inline(always)]
             pub fn any(&self) -> bool {
                 self.any
             }
-            /// The parameters of the effect of a name, present or not; `None` for an unknown name. See [`forms`](super::forms).
+            /// The parameters of the effect of a name, present or not; `None` for an unknown name.
+            /// See [`forms`](super::forms).
             pub fn parameters(name: &str) -> Option<&'static [EffectParameter]> {
                 $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
                     return Some(<super::$field::$effect<T> as Effect<T>>::PARAMETERS);
@@ -71,7 +72,8 @@ macro_rules! catalogue {
                 })+
                 None
             }
-            /// The parameters of an effect by name, which is added with zeros (in its standard form) if absent; `None` for an unknown name.
+            /// The parameters of an effect by name, which is added with zeros (in its standard
+            /// form) if absent; `None` for an unknown name.
             pub fn insert(&mut self, name: &str) -> Option<Found<'_, T>> {
                 $(if name == <super::$field::$effect<T> as Effect<T>>::NAME {
                     self.any = true;
@@ -197,7 +199,8 @@ macro_rules! catalogue {
             pub fn or(self, other: Self) -> Self {
                 Self { $($field: self.$field.or(other.$field),)+ }
             }
-            /// Those that act in flight, in steps and between them; not those that change the airframe once.
+            /// Those that act in flight, in steps and between them; not those that change the
+            /// airframe once.
             #[must_use]
             pub fn in_flight(self) -> Self {
                 let mut out = Self { payload_swing: self.payload_swing, ..Self::default() };
@@ -205,7 +208,8 @@ macro_rules! catalogue {
                 $(if <super::$field::$effect<f64> as Effect<f64>>::ACTS_BETWEEN_STEPS { out.$field = self.$field; })+
                 out
             }
-            /// The name of an effect that a batch with the others has no place for; first of those that act in steps.
+            /// The name of an effect that a batch with the others has no place for; first of those
+            /// that act in steps.
             pub fn beyond(self, other: Self) -> Option<&'static str> {
                 for between in [false, true] {
                     $(if <super::$field::$effect<f64> as Effect<f64>>::ACTS_BETWEEN_STEPS == between
@@ -223,7 +227,8 @@ macro_rules! catalogue {
                 })+
                 None
             }
-            /// Whether any acts in steps: has an equation in every one, see [`Acts`], or pulls as a load.
+            /// Whether any acts in steps: has an equation in every one, see [`Acts`], or pulls as a
+            /// load.
             pub fn act_in_steps(self) -> bool {
                 $($(self.$module.any() ||)?)+ self.has_load()
             }
@@ -239,8 +244,8 @@ macro_rules! catalogue {
             }
         }
 
-        /// What the equations of all effects that [act](Acts) need, made of parameters once; of effects that are absent, what makes no
-        /// difference.
+        /// What the equations of all effects that [act](Acts) need, made of parameters once; of
+        /// effects that are absent, what makes no difference.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub struct Prepared<X: Copy> {
             $($($module: super::$module::Numbers<X>,)?)+
@@ -387,7 +392,8 @@ impl<T: Real> Acting<T> {
     }
 }
 
-// Module and type of each effect; `=> module` behind one that has an equation in every step, its `Numbers` there.
+// Module and type of each effect; `=> module` behind one that has an equation in every step, its
+// `Numbers` there.
 catalogue! {
     accel_bias: AccelBias,
     accel_scale: AccelScale,

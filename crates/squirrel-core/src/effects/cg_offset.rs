@@ -1,9 +1,12 @@
-//! Centre of mass off the geometric centre: `M -= r x F`, with all forces of rotors, drag and wings, and `r = (x, y, 0)`, in
-//! the form `spatial` `(x, y, z)`.
+//! Centre of mass off the geometric centre: `M -= r x F`, with all forces of rotors, drag and
+//! wings, and `r = (x, y, 0)`, in the form `spatial` `(x, y, z)`.
 //!
-//! The accelerometer stays at the geometric centre, at `-r` from the centre of mass, and feels the rotation there.
+//! The accelerometer stays at the geometric centre, at `-r` from the centre of mass, and feels the
+//! rotation there.
 
-use super::{Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
+use super::{
+    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is,
+};
 use crate::aero::BodyWrench;
 use crate::frames::{Body, In};
 use crate::lane::Lane;

@@ -28,10 +28,11 @@ impl<T: Real> CommandClock<T> {
         let shown_s = time_s * self.rate;
         if shown_s >= self.at_s { shown_s + self.step_s } else { shown_s }
     }
-    /// When it showed a stamp, s since the flight began. Of what it showed twice, the later one; what it never showed was when
-    /// it jumped.
+    /// When it showed a stamp, s since the flight began. Of what it showed twice, the later one;
+    /// what it never showed was when it jumped.
     pub fn time_s(&self, stamp_s: T) -> T {
-        let shown_s = if stamp_s >= self.at_s { (stamp_s - self.step_s).max(self.at_s) } else { stamp_s };
+        let shown_s =
+            if stamp_s >= self.at_s { (stamp_s - self.step_s).max(self.at_s) } else { stamp_s };
         shown_s / self.rate
     }
 }
@@ -48,10 +49,14 @@ mod tests {
         for step_s in [0.05, -0.05] {
             let clock = jumps(step_s);
             for time_s in [0.0, 3.0, 9.98, 10.2, 30.0] {
-                assert!((clock.time_s(clock.stamp_s(time_s)) - time_s).abs() < 1e-12, "{step_s}, {time_s}");
+                assert!(
+                    (clock.time_s(clock.stamp_s(time_s)) - time_s).abs() < 1e-12,
+                    "{step_s}, {time_s}"
+                );
             }
         }
-        // Forward: nothing has stamps from 10 to 10.05 s. Back: what is stamped 9.95 to 10 s again is taken for the first.
+        // Forward: nothing has stamps from 10 to 10.05 s. Back: what is stamped 9.95 to 10 s again
+        // is taken for the first.
         assert_eq!(jumps(0.05).time_s(10.03), 10.0 / 1.001);
         assert_eq!(jumps(-0.05).time_s(9.97), 9.97 / 1.001);
     }

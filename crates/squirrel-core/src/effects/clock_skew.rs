@@ -10,7 +10,8 @@ pub(super) struct ClockSkew<T>(pub(super) [T; 1]);
 impl<T: Real> Effect<T> for ClockSkew<T> {
     const NAME: &'static str = "clock_skew";
     const IS_OF_SENSORS: bool = true;
-    const PARAMETERS: &'static [EffectParameter] = &[EffectParameter::signed("skew_ppm", 400.0, 1500.0)];
+    const PARAMETERS: &'static [EffectParameter] =
+        &[EffectParameter::signed("skew_ppm", 400.0, 1500.0)];
     const WORDS: Words = Words {
         what: "clock of the commands",
         more: "The clock of commands runs fast",

@@ -1,8 +1,11 @@
-//! The clock that stamps commands jumps: from the time `t_s` on, what is stamped is `dt` later (or earlier) than it was.
+//! The clock that stamps commands jumps: from the time `t_s` on, what is stamped is `dt` later (or
+//! earlier) than it was.
 //!
 //! See [`CommandClock`] for what a log then says.
 
-use super::{CommandClock, Effect, EffectParameter, Fitted, Response, Shown, Timing, Tolerance, Words};
+use super::{
+    CommandClock, Effect, EffectParameter, Fitted, Response, Shown, Timing, Tolerance, Words,
+};
 use crate::math::Real;
 
 /// Size and time of the jump.

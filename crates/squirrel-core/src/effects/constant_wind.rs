@@ -1,7 +1,8 @@
 //! Steady horizontal wind: the air-relative velocity becomes `v - (w_N, w_E, 0)`.
 //!
-//! Form `log_profile`: the wind is that at 10 m, times `ln(h / z0) / ln(10 / z0)` at the height `h` (logarithmic law of the
-//! surface layer, Stull 1988), with `h` not below `2 z0`. Roughness acts up to 4 m, beyond which the law means nothing.
+//! Form `log_profile`: the wind is that at 10 m, times `ln(h / z0) / ln(10 / z0)` at the height `h`
+//! (logarithmic law of the surface layer, Stull 1988), with `h` not below `2 z0`. Roughness acts up
+//! to 4 m, beyond which the law means nothing.
 
 use super::{Acts, Effect, EffectParameter, Fitted, Forms, Mimic, Shown, Tolerance, Words, is};
 use crate::lane::Lane;

@@ -1,6 +1,7 @@
 //! Blade flapping: `M_x -= k v`, `M_y += k u`: the rotor disc tilts back in forward flight.
 //!
-//! Form `saturating`: the velocity is divided by `1 + V_h / scale`, `V_h` the airspeed in the rotor plane.
+//! Form `saturating`: the velocity is divided by `1 + V_h / scale`, `V_h` the airspeed in the rotor
+//! plane.
 
 use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;

@@ -1,4 +1,5 @@
-//! The satellite receiver speaks late: what arrives at `t` was true at `t - d`. The log stamps the arrival.
+//! The satellite receiver speaks late: what arrives at `t` was true at `t - d`. The log stamps the
+//! arrival.
 
 use super::{Effect, EffectParameter, Fitted, Response, Shown, Timing, Tolerance, Words};
 use crate::math::Real;

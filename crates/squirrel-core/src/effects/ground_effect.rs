@@ -1,9 +1,12 @@
-//! Ground effect (Cheeseman and Bennett 1955, with an effective radius): `T <- T / (1 - R^2 / (16 h^2))`.
+//! Ground effect (Cheeseman and Bennett 1955, with an effective radius):
+//! `T <- T / (1 - R^2 / (16 h^2))`.
 //!
-//! `h` is the height above the origin's level, not below `R / 2`. Form `exponential`: `T <- T (1 + g exp(-h / R))`, as fitted
-//! to multirotors, with `h` not below 0.
+//! `h` is the height above the origin's level, not below `R / 2`. Form `exponential`:
+//! `T <- T (1 + g exp(-h / R))`, as fitted to multirotors, with `h` not below 0.
 
-use super::{Acts, Effect, EffectParameter, Fitted, Forms, Response, Scale, Shown, Tolerance, Words, is};
+use super::{
+    Acts, Effect, EffectParameter, Fitted, Forms, Response, Scale, Shown, Tolerance, Words, is,
+};
 use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::lane::functions::exp;

@@ -1,7 +1,8 @@
 //! Gusts: the air also moves at random, with the standard deviation `sigma` along each axis.
 //!
-//! Form `gauss_markov`: correlation time 1.5 s. Form `dryden`: Dryden spectra (MIL-F-8785C) with a scale length of 6 m, which
-//! are that long at 4 m/s. The random process itself is the simulator's; a model cannot predict it.
+//! Form `gauss_markov`: correlation time 1.5 s. Form `dryden`: Dryden spectra (MIL-F-8785C) with a
+//! scale length of 6 m, which are that long at 4 m/s. The random process itself is the simulator's;
+//! a model cannot predict it.
 
 use super::{Effect, EffectParameter, Fitted, Response, Shown, Words, is};
 use crate::math::Real;
@@ -34,10 +35,16 @@ pub struct Gust<T>(pub(super) [T; 2]);
 impl<T: Real> Effect<T> for Gust<T> {
     const NAME: &'static str = "gust";
     const ACTS_BETWEEN_STEPS: bool = true;
-    const PARAMETERS: &'static [EffectParameter] =
-        &[EffectParameter::size("sigma_m_s", 0.8, 2.5), EffectParameter::form(&["gauss_markov", "dryden"])];
-    const WORDS: Words =
-        Words { what: "gusts", more: "Gusts", less: "Gusts", fly: "the same flight again on another day" };
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::size("sigma_m_s", 0.8, 2.5),
+        EffectParameter::form(&["gauss_markov", "dryden"]),
+    ];
+    const WORDS: Words = Words {
+        what: "gusts",
+        more: "Gusts",
+        less: "Gusts",
+        fly: "the same flight again on another day",
+    };
     const SHOWN: Shown = Shown::NOTHING;
     const RESPONSE: Response = Response::Random;
     const FITTED: Fitted = Fitted::Never;

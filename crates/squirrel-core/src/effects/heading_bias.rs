@@ -1,4 +1,5 @@
-//! Bias of the heading: the attitude is measured turned by `+b` about down, `psi_measured = psi + b`.
+//! Bias of the heading: the attitude is measured turned by `+b` about down,
+//! `psi_measured = psi + b`.
 //!
 //! Form `drifting`: `b + drift t`, `t` the time since the flight began.
 

@@ -24,7 +24,8 @@ impl<T: Real> Effect<T> for InertiaError<T> {
     };
     const SHOWN: Shown = Shown::MOMENTS;
     const IS_OF_MOMENTS: bool = true;
-    const SIDE_OF: Option<SideOf> = Some(SideOf { ratio: Ratio::TorqueOverInertia, choice: Some(Z) });
+    const SIDE_OF: Option<SideOf> =
+        Some(SideOf { ratio: Ratio::TorqueOverInertia, choice: Some(Z) });
 
     fn alter(&self, airframe: &mut Alteration<T>) {
         let [axis, fraction] = self.0;

@@ -1,9 +1,11 @@
 //! Rotor (induced, H-force) drag: `F_xy -= D (u, v)`, proportional to airspeed in the rotor plane.
 //!
-//! Form `anisotropic`: `F -= (D (1 + e) u, D (1 - e) v, D_z w)`, for rotors or an airframe longer than wide (Svacha et al.
-//! 2017 identify such a drag matrix).
+//! Form `anisotropic`: `F -= (D (1 + e) u, D (1 - e) v, D_z w)`, for rotors or an airframe longer
+//! than wide (Svacha et al. 2017 identify such a drag matrix).
 
-use super::{Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
+use super::{
+    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is,
+};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -63,6 +65,10 @@ impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
     fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
         let ([x, y, z], [u, v, w]) = (self.slope, at.flow.velocity);
-        BodyWrench::from_force([absent::<L>() - x * u, absent::<L>() - y * v, absent::<L>() - z * w])
+        BodyWrench::from_force([
+            absent::<L>() - x * u,
+            absent::<L>() - y * v,
+            absent::<L>() - z * w,
+        ])
     }
 }

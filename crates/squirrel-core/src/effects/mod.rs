@@ -1,19 +1,19 @@
 //! The catalogue of physical effects that a vehicle may have on top of the base model.
 //!
-//! One effect, one file: equation, parameters with unit and plausible range, name. The name is the table
-//! `[effects.<name>]` of a vehicle file. Every effect is an increment on the base model; zero means absent. Where an
-//! effect acts is a method that it overrides: of [`Effect`] what it does once, on sensors, commands and servos; of [`Acts`] its
-//! equation in every step, written on lanes once for flight alone and in batches. How it is spoken of and what it is known by
-//! stand with it. The dynamics call [`Acting`] and [`Prepared`],
-//! which sum over those present. A new effect is a file, its `mod` below and a line in
-//! the `catalogue!` of `catalogue.rs`.
+//! One effect, one file: equation, parameters with unit and plausible range, name. The name is the
+//! table `[effects.<name>]` of a vehicle file. Every effect is an increment on the base model; zero
+//! means absent. Where an effect acts is a method that it overrides: of [`Effect`] what it does
+//! once, on sensors, commands and servos; of [`Acts`] its equation in every step, written on lanes
+//! once for flight alone and in batches. How it is spoken of and what it is known by stand with it.
+//! The dynamics call [`Acting`] and [`Prepared`], which sum over those present. A new effect is a
+//! file, its `mod` below and a line in the `catalogue!` of `catalogue.rs`.
 //!
-//! An effect may have several published forms: then its last parameter is `form`, and a parameter may exist in some forms only.
-//! Without `form` in a file it is the first, the standard form.
+//! An effect may have several published forms: then its last parameter is `form`, and a parameter
+//! may exist in some forms only. Without `form` in a file it is the first, the standard form.
 //!
-//! Effects that only change numbers of the airframe (mass, inertia, what a rotor gives) do so once, through
-//! [`Effects::alter`]; those on sensors, commands and servos act where these are simulated; the others act in every
-//! derivative.
+//! Effects that only change numbers of the airframe (mass, inertia, what a rotor gives) do so once,
+//! through [`Effects::alter`]; those on sensors, commands and servos act where these are simulated;
+//! the others act in every derivative.
 
 mod accel_bias;
 mod accel_scale;
@@ -96,8 +96,9 @@ pub enum Kind {
     OneOf(&'static [&'static str]),
 }
 
-/// What the plausible sizes of a parameter grow with: the same part of a vehicle's own numbers is as much on a nano
-/// quadrotor as on a large one. Lengths, times and speeds of the catalogue are those of the air, and stay.
+/// What the plausible sizes of a parameter grow with: the same part of a vehicle's own numbers is
+/// as much on a nano quadrotor as on a large one. Lengths, times and speeds of the catalogue are
+/// those of the air, and stay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scale {
     /// A fraction, an angle, a time or a speed.
@@ -112,8 +113,8 @@ pub enum Scale {
     MassTimesArm,
 }
 
-/// Mass, kg, mean inertia about roll and pitch, kg m^2, and mean arm, m, of the vehicle that sizes are written for: the
-/// paper's (Table I).
+/// Mass, kg, mean inertia about roll and pitch, kg m^2, and mean arm, m, of the vehicle that sizes
+/// are written for: the paper's (Table I).
 const REFERENCE: [f64; 3] = [0.548, 3.95e-3, 0.1202];
 
 impl Scale {
@@ -128,7 +129,9 @@ impl Scale {
         match self {
             Self::Fixed => 1.0,
             Self::Mass => mass,
-            Self::Inertia => 0.5 * (p.inertia_kg_m2[(0, 0)] + p.inertia_kg_m2[(1, 1)]) / inertia_kg_m2,
+            Self::Inertia => {
+                0.5 * (p.inertia_kg_m2[(0, 0)] + p.inertia_kg_m2[(1, 1)]) / inertia_kg_m2
+            }
             Self::Arm => arm,
             Self::MassTimesArm => mass * arm,
         }
@@ -213,8 +216,8 @@ impl EffectParameter {
         let times = scale.of(vehicle);
         Some(SizeRange { smallest: smallest * times, largest: largest * times, signed, scale })
     }
-    /// The number of the base model that it adds to, with its field in vehicle files, where the sum cannot be less than nothing:
-    /// a drag, an area, a lag.
+    /// The number of the base model that it adds to, with its field in vehicle files, where the sum
+    /// cannot be less than nothing: a drag, an area, a lag.
     pub fn base_number(&self, vehicle: &Vehicle<f64>) -> Option<(&'static str, f64)> {
         let p = vehicle.parameters();
         let Tolerance::Declared(number) = self.tolerance else { return None };
@@ -224,7 +227,9 @@ impl EffectParameter {
             Declared::LinearDrag(_) => ("drag.linear_n_s_per_m[2]", p.drag.linear_n_s_per_m.z),
             Declared::DragArea => ("drag.area_m2", p.drag.area_m2),
             Declared::RotorLag => ("propulsion.time_constant_s", p.propulsion.time_constant_up_s),
-            Declared::WingLag => ("wing.time_constant_s", p.wing.map_or(0.0, |wing| wing.time_constant_s)),
+            Declared::WingLag => {
+                ("wing.time_constant_s", p.wing.map_or(0.0, |wing| wing.time_constant_s))
+            }
             _ => return None,
         })
     }
@@ -234,7 +239,8 @@ impl EffectParameter {
     }
 }
 
-/// The forms that a list of parameters offers, the standard one first; empty for an effect with one form.
+/// The forms that a list of parameters offers, the standard one first; empty for an effect with one
+/// form.
 pub fn forms(parameters: &[EffectParameter]) -> &'static [&'static str] {
     match parameters.iter().find(|p| p.key == FORM).map(|p| p.kind) {
         Some(Kind::OneOf(names)) => names,
@@ -248,8 +254,8 @@ fn is<T: Real>(value: T, number: usize) -> bool {
     value == real(number as f64)
 }
 
-/// A lag, s, that is shorter upwards by a fraction and longer downwards. A negative one shortens the base model's own: what
-/// the two leave below 0 is no lag.
+/// A lag, s, that is shorter upwards by a fraction and longer downwards. A negative one shortens
+/// the base model's own: what the two leave below 0 is no lag.
 #[inline(always)]
 fn up_and_down<T: Real>(lag_s: T, asymmetry: T) -> [T; 2] {
     [lag_s * (T::one() - asymmetry), lag_s * (T::one() + asymmetry)]
@@ -264,8 +270,8 @@ pub struct Situation<'a, L> {
     pub thrust_n: L,
     /// Force of rotors, drag and wings, body frame, N, before effects that add to it.
     pub force: [L; 3],
-    /// Sum of the rotor speeds about +z, each with the sign of its spin, rad/s, and its rate, rad/s^2; 0 where no effect
-    /// [feels it](Acts::FEELS_ROTOR_SPIN).
+    /// Sum of the rotor speeds about +z, each with the sign of its spin, rad/s, and its rate,
+    /// rad/s^2; 0 where no effect [feels it](Acts::FEELS_ROTOR_SPIN).
     pub rotor_spin: [L; 2],
     /// The vehicle's wings; without area where it has none.
     pub wings: &'a flat_plate::Pair<L>,
@@ -303,7 +309,8 @@ pub trait Effect<T: Real>: Copy {
     const IS_OF_SENSORS: bool = false;
     /// Whether it acts between steps, on commands or on the air.
     const ACTS_BETWEEN_STEPS: bool = false;
-    /// Whether each form beyond the standard one is an equation of its own, that a batch has a place for or not.
+    /// Whether each form beyond the standard one is an equation of its own, that a batch has a
+    /// place for or not.
     const FORMS_APART: bool = false;
 
     /// Gusts that the effect adds to the air.
@@ -353,8 +360,8 @@ pub trait Effect<T: Real>: Copy {
     fn heading_bias_rad(&self, _time_s: T) -> T {
         T::zero()
     }
-    /// Error of the measured heading while the rotors take the power of hover, rad; in proportion to
-    /// [`rotor_load`](crate::vehicle::Vehicle::rotor_load).
+    /// Error of the measured heading while the rotors take the power of hover, rad; in proportion
+    /// to [`rotor_load`](crate::vehicle::Vehicle::rotor_load).
     #[inline(always)]
     fn heading_per_load_rad(&self) -> T {
         T::zero()
@@ -414,10 +421,11 @@ impl Forms {
     }
 }
 
-/// What an effect does in every step: its equation, over the numbers that its `prepare` makes of its parameters once.
+/// What an effect does in every step: its equation, over the numbers that its `prepare` makes of
+/// its parameters once.
 ///
-/// On registers the vehicles of a batch may have it in several forms: `forms` are those that any of them has, and the numbers of
-/// a form that a vehicle does not have make no difference to it.
+/// On registers the vehicles of a batch may have it in several forms: `forms` are those that any of
+/// them has, and the numbers of a form that a vehicle does not have make no difference to it.
 pub trait Acts<L: Lane>: Copy {
     /// Whether its wrench depends on how fast the rotors spin, which is dear to sum up.
     const FEELS_ROTOR_SPIN: bool = false;
@@ -433,7 +441,13 @@ pub trait Acts<L: Lane>: Copy {
     }
     /// Changes the steady rotor speeds, rad/s.
     #[inline(always)]
-    fn rotor_targets<const ROTORS: usize>(&self, _targets: &mut [L; ROTORS], _voltage_v: L, _forms: Forms) {}
+    fn rotor_targets<const ROTORS: usize>(
+        &self,
+        _targets: &mut [L; ROTORS],
+        _voltage_v: L,
+        _forms: Forms,
+    ) {
+    }
     /// Factor on the thrust of all rotors, and so on their roll and pitch moments.
     ///
     /// * `height_m` - above the origin's level
@@ -453,8 +467,8 @@ pub trait Acts<L: Lane>: Copy {
     }
 }
 
-/// Zero with the sign that changes no sum: the compiler drops `x + -0.0`, but not `x + 0.0`, which turns -0 into 0. So an effect
-/// that does not act somewhere costs nothing there.
+/// Zero with the sign that changes no sum: the compiler drops `x + -0.0`, but not `x + 0.0`, which
+/// turns -0 into 0. So an effect that does not act somewhere costs nothing there.
 #[inline(always)]
 fn nothing<F: Frame, T: Real>() -> In<F, T> {
     In::new(Vector3::repeat(-T::zero()))

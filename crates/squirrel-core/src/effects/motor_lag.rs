@@ -1,7 +1,7 @@
 //! Motor lag on top of the vehicle's own: `Omega' = (Omega_target - Omega) / (tau + extra)`.
 //!
-//! Form `asymmetric`: `extra (1 - e)` when speeding up and `extra (1 + e)` when slowing down: a rotor is braked by its drag
-//! alone.
+//! Form `asymmetric`: `extra (1 - e)` when speeding up and `extra (1 + e)` when slowing down: a
+//! rotor is braked by its drag alone.
 
 use super::{Declared, Effect, EffectParameter, Response, Shown, Words, is, up_and_down};
 use crate::math::Real;

@@ -1,7 +1,9 @@
-//! A load on a tether under the vehicle: `F_NED += m_l g / l (s_N, s_E, 0) + m_l g e3`, `s'' = -(g / l) s - c s' - a`.
+//! A load on a tether under the vehicle: `F_NED += m_l g / l (s_N, s_E, 0) + m_l g e3`,
+//! `s'' = -(g / l) s - c s' - a`.
 //!
-//! `s` is the load's horizontal offset from the vehicle, whose horizontal acceleration is `a`; small angles, damping
-//! `c = 0.1 1/s`, in the form `damped` a parameter. The tether is fixed at the centre of mass. A length of 0 is no load.
+//! `s` is the load's horizontal offset from the vehicle, whose horizontal acceleration is `a`;
+//! small angles, damping `c = 0.1 1/s`, in the form `damped` a parameter. The tether is fixed at
+//! the centre of mass. A length of 0 is no load.
 
 use super::{Effect, EffectParameter, Fitted, Response, Scale, Shown, Tolerance, Words, is};
 use crate::lane::Lane;
@@ -17,7 +19,9 @@ pub(super) struct PayloadSwing<T>(pub(super) [T; 4]);
 impl<T: Real> Effect<T> for PayloadSwing<T> {
     const NAME: &'static str = "payload_swing";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::size("mass_kg", 0.03, 0.12).growing_with(Scale::Mass).within(Tolerance::Nothing),
+        EffectParameter::size("mass_kg", 0.03, 0.12)
+            .growing_with(Scale::Mass)
+            .within(Tolerance::Nothing),
         EffectParameter::size("length_m", 0.3, 0.9),
         EffectParameter::size("damping_per_s", 0.2, 2.0).only_in(&["damped"]),
         EffectParameter::form(&["light", "damped"]),
@@ -94,14 +98,16 @@ impl<T: Real> Pendulum<T> {
         let decay = self.damping_per_s * real(0.5);
         let squared = stiffness - decay * decay;
         let root = squared.abs().sqrt();
-        // Cosine and sine over frequency times the decay; their hyperbolic twins where damping wins, written without growth.
+        // Cosine and sine over frequency times the decay; their hyperbolic twins where damping
+        // wins, written without growth.
         let (cosine, sine) = if squared > T::zero() {
             let (sine, cosine) = (root * dt_s).sin_cos();
             let left = (-decay * dt_s).exp();
             (left * cosine, left * sine / root)
         } else {
             let (slow, fast) = (((root - decay) * dt_s).exp(), (-(root + decay) * dt_s).exp());
-            let sine = if root > T::zero() { (slow - fast) / (root * real(2.0)) } else { slow * dt_s };
+            let sine =
+                if root > T::zero() { (slow - fast) / (root * real(2.0)) } else { slow * dt_s };
             ((slow + fast) * real(0.5), sine)
         };
         let weight_n = self.mass_kg * real(GRAVITY_M_S2);
@@ -128,7 +134,8 @@ impl<L: Lane> Swing<L> {
             let trail = acceleration[i] * self.trail;
             let (x, v) = (state.offset_m[i] - trail, state.velocity_m_s[i]);
             state.offset_m[i] = trail + x * self.cosine + (v + x * self.decay) * self.sine;
-            state.velocity_m_s[i] = v * self.cosine - (v * self.decay + x * self.stiffness) * self.sine;
+            state.velocity_m_s[i] =
+                v * self.cosine - (v * self.decay + x * self.stiffness) * self.sine;
         }
     }
 }
@@ -153,8 +160,14 @@ mod tests {
                 velocity_m_s += (pull - acceleration) * h;
                 offset_m += velocity_m_s * h;
             }
-            assert!((Vector2::from(long.offset_m) - offset_m).norm() < 1e-5, "{damping_per_s}: {long:?}");
-            assert!((Vector2::from(long.velocity_m_s) - velocity_m_s).norm() < 1e-4, "{damping_per_s}");
+            assert!(
+                (Vector2::from(long.offset_m) - offset_m).norm() < 1e-5,
+                "{damping_per_s}: {long:?}"
+            );
+            assert!(
+                (Vector2::from(long.velocity_m_s) - velocity_m_s).norm() < 1e-4,
+                "{damping_per_s}"
+            );
             load.over(1e6).lead(&mut long, acceleration.into());
             let trails = acceleration * (-0.5 / GRAVITY_M_S2);
             assert!((Vector2::from(long.offset_m) - trails).norm() < 1e-9);

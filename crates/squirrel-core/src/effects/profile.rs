@@ -1,7 +1,9 @@
-//! What an effect is known by in flights: how it is spoken of, what shows it, and what makes the same.
+//! What an effect is known by in flights: how it is spoken of, what shows it, and what makes the
+//! same.
 //!
-//! Each constant of [`Effect`] that is of one of these types has a default that suits most effects. The gap workflow reads them
-//! through [`Effects::profile`](super::Effects::profile) and knows no effect by its name.
+//! Each constant of [`Effect`] that is of one of these types has a default that suits most effects.
+//! The gap workflow reads them through [`Effects::profile`](super::Effects::profile) and knows no
+//! effect by its name.
 
 use super::Effect;
 use crate::math::Real;
@@ -57,14 +59,16 @@ pub enum Response {
     Linear,
     /// With another slope after a few tolerances: lags and delays.
     Bends,
-    /// As [`Self::Bends`], from the time on that the parameter `at` says. The gap workflow looks for that time first.
+    /// As [`Self::Bends`], from the time on that the parameter `at` says. The gap workflow looks
+    /// for that time first.
     Jumps {
         /// Key of the parameter, s.
         at: &'static str,
     },
     /// With no slope at zero: no linear fit near zero sees it.
     StartsFlat,
-    /// In proportion at one length of a pendulum. The gap workflow looks for the length first, at lines of the spectrum.
+    /// In proportion at one length of a pendulum. The gap workflow looks for the length first, at
+    /// lines of the spectrum.
     Swings {
         /// Key of the length, m.
         length: &'static str,
@@ -78,7 +82,8 @@ pub enum Response {
 pub enum Fitted {
     /// All: the numbers belong to the vehicle and last.
     Always,
-    /// Not that to flights in which a machine flew well: the numbers are of the day, are known better, or are there or not.
+    /// Not that to flights in which a machine flew well: the numbers are of the day, are known
+    /// better, or are there or not.
     ExceptToBaselines,
     /// None: they belong to a sensor, a clock or the air, or have no slope at zero.
     Never,
@@ -95,7 +100,8 @@ pub enum Mimic {
     LeaningAttitude,
 }
 
-/// A ratio that flights show, where they do not show its two sides: of two effects on it one is named.
+/// A ratio that flights show, where they do not show its two sides: of two effects on it one is
+/// named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Ratio {
     /// Thrust over mass.
@@ -135,8 +141,8 @@ pub enum Tolerance {
     Usual(f64),
     /// What the vehicle file declares of one of its own numbers.
     Declared(Declared),
-    /// An angle against the rotors' axes: as [`Self::PartOfSmallest`] beside an accelerometer, which shows these; else as well as
-    /// markers are stuck on.
+    /// An angle against the rotors' axes: as [`Self::PartOfSmallest`] beside an accelerometer,
+    /// which shows these; else as well as markers are stuck on.
     RotorAxes,
 }
 
@@ -161,7 +167,8 @@ pub enum Declared {
     RotorLag,
     /// Time constant of the wings; added to.
     WingLag,
-    /// Places of the rotors, whose middle the parameter is beside, along the axis of its place among the parameters.
+    /// Places of the rotors, whose middle the parameter is beside, along the axis of its place
+    /// among the parameters.
     RotorPlaces,
     /// Bias of the accelerometer, along the axis of the parameter's place.
     AccelBias,

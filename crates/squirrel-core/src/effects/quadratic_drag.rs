@@ -2,7 +2,9 @@
 //!
 //! Form `anisotropic`: its own drag area along each body axis, `A (1 + e)`, `A (1 - e)`, `A_z`.
 
-use super::{Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
+use super::{
+    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is,
+};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};

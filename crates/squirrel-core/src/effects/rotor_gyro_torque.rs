@@ -1,7 +1,9 @@
-//! Gyroscopic and reaction torque of spinning rotors: `M -= I_r (H (w x e3) + H' e3)`, `H = -sum(s_i Omega_i)`.
+//! Gyroscopic and reaction torque of spinning rotors: `M -= I_r (H (w x e3) + H' e3)`,
+//! `H = -sum(s_i Omega_i)`.
 //!
-//! `s_i` is the rotor's `yaw_sign`, the sign of its reaction torque about +z, so it spins the other way: `I_r H e3` is the
-//! angular momentum of all rotors in the body frame, and its rate there is taken from the airframe.
+//! `s_i` is the rotor's `yaw_sign`, the sign of its reaction torque about +z, so it spins the other
+//! way: `I_r H e3` is the angular momentum of all rotors in the body frame, and its rate there is
+//! taken from the airframe.
 
 use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent};
 use crate::aero::BodyWrench;

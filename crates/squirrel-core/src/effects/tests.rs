@@ -13,8 +13,12 @@ const TIME_S: f64 = 10.0;
 fn air() -> Air<f64> {
     Air::new(In::new(Vector3::new(3.0, -2.0, 1.0)), In::new(Vector3::new(0.4, -0.3, 0.2)))
 }
-const WING: Wing<f64> =
-    Wing { area_per_side_m2: 0.02, normal_force_slope: 2.0, lateral_arm_m: 0.1, time_constant_s: 0.1 };
+const WING: Wing<f64> = Wing {
+    area_per_side_m2: 0.02,
+    normal_force_slope: 2.0,
+    lateral_arm_m: 0.1,
+    time_constant_s: 0.1,
+};
 fn vehicle() -> Vehicle<f64> {
     Vehicle::new(squirrel()).unwrap()
 }
@@ -141,7 +145,11 @@ fn close_exp(a: f64, b: f64, what: &str) {
 #[test]
 fn an_effect_of_size_zero_changes_nothing() {
     for (name, form) in names_and_forms() {
-        assert_eq!(actions(&sized(name, form, |_, _| 0.0)), actions(&Effects::none()), "{name}, {form}");
+        assert_eq!(
+            actions(&sized(name, form, |_, _| 0.0)),
+            actions(&Effects::none()),
+            "{name}, {form}"
+        );
     }
 }
 
@@ -175,7 +183,8 @@ fn ranges_are_ranges_and_the_largest_sizes_are_flyable() {
     }
 }
 
-/// One number for each effect that makes a force or changes the airframe, worked out by hand from its equation.
+/// One number for each effect that makes a force or changes the airframe, worked out by hand from
+/// its equation.
 #[test]
 fn sizes_and_signs_by_hand() {
     let wrench = |name: &str, values: &[f64]| wrench_of(&with(name, values));
@@ -191,7 +200,8 @@ fn sizes_and_signs_by_hand() {
     );
     // R = 0.4 m at 0.3 m: 1 / (1 - 0.16 / 1.44).
     close(factor("ground_effect", &[0.4]), 1.125, "ground effect");
-    // At 0.25 m, still above the floor: 1 / (1 - 0.16 / 1). From R / 2 = 0.2 m down, what it is there: 1 / (1 - 0.16 / 0.64).
+    // At 0.25 m, still above the floor: 1 / (1 - 0.16 / 1). From R / 2 = 0.2 m down, what it is
+    // there: 1 / (1 - 0.16 / 0.64).
     close(thrust_factor(&with("ground_effect", &[0.4]), 0.25), 1.0 / 0.84, "above the floor");
     for height_m in [0.2, 0.16, 0.05, 0.0, -1.0] {
         let factor = thrust_factor(&with("ground_effect", &[0.4]), height_m);
@@ -219,11 +229,19 @@ fn sizes_and_signs_by_hand() {
     close(wing.force.vector.z, -0.2 * slope * (0.96 + 0.52), "wing gain");
     close(wing.moment.vector.x, 0.2 * slope * (0.96 - 0.52) * 0.1, "and its roll");
     let wing = wrench("wing_membrane", &[0.2, 0.05]);
-    close(wing.force.vector.z, -slope * (0.2 * 1.48 + 1.2 * 0.05 * 3.0 * 1.5), "gain and angle of attack");
+    close(
+        wing.force.vector.z,
+        -slope * (0.2 * 1.48 + 1.2 * 0.05 * 3.0 * 1.5),
+        "gain and angle of attack",
+    );
     let weak = wrench("wing_asymmetry", &[0.0, 0.3]);
     close(weak.force.vector.z, 0.3 * slope * 0.96, "the left wing lifts less");
     close(weak.moment.vector.x, -0.3 * slope * 0.96 * 0.1, "so the vehicle rolls left");
-    close(wrench("wing_asymmetry", &[1.0, 0.3]).moment.vector.x, 0.3 * slope * 0.52 * 0.1, "or right");
+    close(
+        wrench("wing_asymmetry", &[1.0, 0.3]).moment.vector.x,
+        0.3 * slope * 0.52 * 0.1,
+        "or right",
+    );
     let gyro = wrench("rotor_gyro_torque", &[1e-5]).moment.vector;
     assert!((gyro - Vector3::new(0.3 * 1e-3, 0.4 * 1e-3, 0.04)).norm() < 1e-12, "{gyro}");
 
@@ -255,8 +273,9 @@ fn an_impossible_alteration_is_refused() {
 /// What acts on sensors, commands and servos, and the other forms, worked out by hand.
 #[test]
 fn the_other_forms_by_hand() {
-    let factor =
-        |name: &str, form: &str, values: &[f64]| thrust_factor(&formed(name, form, values), HEIGHT_M);
+    let factor = |name: &str, form: &str, values: &[f64]| {
+        thrust_factor(&formed(name, form, values), HEIGHT_M)
+    };
     let wrench = |name: &str, form: &str, values: &[f64]| wrench_of(&formed(name, form, values));
 
     let drag = wrench("linear_drag", "anisotropic", &[0.1, 0.2, 0.05]).force.vector;
@@ -264,8 +283,16 @@ fn the_other_forms_by_hand() {
     let drag = wrench("quadratic_drag", "anisotropic", &[0.02, -0.5, 0.03]).force.vector;
     let pressure = 0.5 * 1.225 * 14.0_f64.sqrt();
     assert!((drag - Vector3::new(-0.01 * 3.0, 0.03 * 2.0, -0.03) * pressure).norm() < 1e-12);
-    close_exp(factor("ground_effect", "exponential", &[0.3, 0.2]), 1.0 + 0.2 * (-1.0_f64).exp(), "ground");
-    close(factor("translational_lift", "linear", &[0.0, 0.01]), 1.0 + 0.01 * 13.0_f64.sqrt(), "linear lift");
+    close_exp(
+        factor("ground_effect", "exponential", &[0.3, 0.2]),
+        1.0 + 0.2 * (-1.0_f64).exp(),
+        "ground",
+    );
+    close(
+        factor("translational_lift", "linear", &[0.0, 0.01]),
+        1.0 + 0.01 * 13.0_f64.sqrt(),
+        "linear lift",
+    );
     close(factor("translational_lift", "quadratic", &[1e-3]), 1.013, "quadratic lift");
     close(factor("axial_inflow", "quadratic", &[0.03, -0.01]), 1.02, "inflow");
     let damped = wrench("angular_damping", "quadratic", &[0.0, 0.01]).moment.vector;
@@ -280,7 +307,11 @@ fn the_other_forms_by_hand() {
     let wind = formed("constant_wind", "log_profile", &[4.0, -2.0, 0.1]);
     close(wind_at(&wind, 10.0)[0], 4.0, "the wind at 10 m");
     close(wind_at(&wind, 1.0)[1], -1.0, "half of it at 1 m over 0.1 m");
-    close(wind_at(&wind, -5.0)[0], 4.0 * 2.0_f64.ln() / 100.0_f64.ln(), "floored at twice the roughness");
+    close(
+        wind_at(&wind, -5.0)[0],
+        4.0 * 2.0_f64.ln() / 100.0_f64.ln(),
+        "floored at twice the roughness",
+    );
     let ratio = 13.0_f64 / 14.8;
     let [slow, fast] = targets(&with("battery_sag", &[0.8]));
     close_exp(slow, 1500.0 * ratio.powf(0.8), "power law");
@@ -299,16 +330,29 @@ fn the_other_forms_by_hand() {
     };
     assert_eq!(lag(&with("motor_lag", &[0.04])), [[0.04, 0.04], [0.0, 0.0]]);
     assert_eq!(lag(&formed("motor_lag", "asymmetric", &[0.04, 0.5])), [[0.02, 0.06], [0.0, 0.0]]);
-    assert_eq!(lag(&formed("motor_lag", "asymmetric", &[0.04, 2.0]))[0], [-0.04, 0.12], "may shorten");
-    assert_eq!(lag(&formed("wing_servo_lag", "asymmetric", &[0.25, -0.5])), [[0.0, 0.0], [0.375, 0.125]]);
+    assert_eq!(
+        lag(&formed("motor_lag", "asymmetric", &[0.04, 2.0]))[0],
+        [-0.04, 0.12],
+        "may shorten"
+    );
+    assert_eq!(
+        lag(&formed("wing_servo_lag", "asymmetric", &[0.25, -0.5])),
+        [[0.0, 0.0], [0.375, 0.125]]
+    );
 
     assert_eq!(with("actuation_latency", &[0.03]).command_latency_s(), 0.03);
     assert_eq!(with("gnss_latency", &[0.2]).gnss_latency_s(), 0.2);
     close(with("clock_skew", &[1000.0]).command_clock().stamp_s(40.0), 40.04, "a fast clock");
     let steps = with("clock_step", &[0.05, 20.0]).command_clock();
     assert_eq!([19.9, 20.1].map(|t| steps.stamp_s(t)), [19.9, 20.1 + 0.05]);
-    assert_eq!(with("gyro_scale", &[0.05, 0.0, -0.02]).gyro_scale().vector, Vector3::new(0.05, 0.0, -0.02));
-    assert_eq!(with("accel_scale", &[0.0, 0.01, 0.03]).accel_scale().vector, Vector3::new(0.0, 0.01, 0.03));
+    assert_eq!(
+        with("gyro_scale", &[0.05, 0.0, -0.02]).gyro_scale().vector,
+        Vector3::new(0.05, 0.0, -0.02)
+    );
+    assert_eq!(
+        with("accel_scale", &[0.0, 0.01, 0.03]).accel_scale().vector,
+        Vector3::new(0.0, 0.01, 0.03)
+    );
     assert_eq!(
         [0.0, 1.0, 2.5].map(|load| with("compass_current", &[0.2]).heading_bias_rad(TIME_S, load)),
         [0.0, 0.2, 0.5]
@@ -316,14 +360,24 @@ fn the_other_forms_by_hand() {
     let added = Acting::new(&with("added_mass", &[0.1]), &vehicle());
     assert_eq!(added.numbers().added_mass_kg(added.present()), 0.1);
     assert_eq!(with("heading_bias", &[0.2, 0.01]).heading_bias_rad(TIME_S, 1.0), 0.2);
-    close(formed("heading_bias", "drifting", &[0.2, 0.01]).heading_bias_rad(TIME_S, 1.0), 0.3, "drifting");
+    close(
+        formed("heading_bias", "drifting", &[0.2, 0.01]).heading_bias_rad(TIME_S, 1.0),
+        0.3,
+        "drifting",
+    );
     let bias = formed("accel_bias", "drifting", &[0.2, 0.3, 0.4, 0.01, 0.0, -0.02]);
     assert!((bias.specific_force_bias(TIME_S).vector - Vector3::new(0.3, 0.3, 0.2)).norm() < 1e-12);
     assert_eq!(with("gust", &[1.0]).gust(), Some(GustSpectrum::GaussMarkov { sigma_m_s: 1.0 }));
-    assert_eq!(formed("gust", "dryden", &[1.0]).gust(), Some(GustSpectrum::Dryden { sigma_m_s: 1.0 }));
+    assert_eq!(
+        formed("gust", "dryden", &[1.0]).gust(),
+        Some(GustSpectrum::Dryden { sigma_m_s: 1.0 })
+    );
     let load = with("payload_swing", &[0.1, 0.5]).pendulum().unwrap();
     assert_eq!(load, Pendulum { mass_kg: 0.1, length_m: 0.5, damping_per_s: 0.1 });
-    assert_eq!(formed("payload_swing", "damped", &[0.1, 0.5, 0.7]).pendulum().unwrap().damping_per_s, 0.7);
+    assert_eq!(
+        formed("payload_swing", "damped", &[0.1, 0.5, 0.7]).pendulum().unwrap().damping_per_s,
+        0.7
+    );
 }
 
 /// The standard form is the first and has the keys that vehicle files without `form` use.
@@ -343,7 +397,10 @@ fn forms_choose_among_parameters() {
     for name in Effects::<f64>::NAMES {
         let parameters = Effects::<f64>::parameters(name).unwrap();
         let names = forms(parameters);
-        assert!(names.is_empty() || parameters.last().unwrap().key == FORM, "{name}: form comes last");
+        assert!(
+            names.is_empty() || parameters.last().unwrap().key == FORM,
+            "{name}: form comes last"
+        );
         for parameter in parameters {
             assert!(
                 parameter.forms.unwrap_or(&[]).iter().all(|f| names.contains(f)),

@@ -44,6 +44,10 @@ impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
     fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
         let [x, y] = self.tilt;
-        BodyWrench::from_force([absent::<L>() - at.thrust_n * x, absent::<L>() - at.thrust_n * y, absent()])
+        BodyWrench::from_force([
+            absent::<L>() - at.thrust_n * x,
+            absent::<L>() - at.thrust_n * y,
+            absent(),
+        ])
     }
 }

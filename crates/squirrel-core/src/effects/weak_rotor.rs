@@ -23,7 +23,9 @@ impl<T: Real> Effect<T> for WeakRotor<T> {
 
     fn alter(&self, airframe: &mut Alteration<T>) {
         let [rotor, loss] = self.0;
-        for (i, (thrust, torque)) in airframe.thrust.iter_mut().zip(&mut airframe.torque).enumerate() {
+        for (i, (thrust, torque)) in
+            airframe.thrust.iter_mut().zip(&mut airframe.torque).enumerate()
+        {
             if is(rotor, i + 1) {
                 *thrust *= T::one() - loss;
                 *torque *= T::one() - loss;

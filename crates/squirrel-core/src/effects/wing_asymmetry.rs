@@ -1,7 +1,8 @@
 //! One wing gives less: `N (1 - e)` on its side, taken from the flat plate's force.
 
 use super::{
-    Acts, Declared, Effect, EffectParameter, Fitted, Forms, Kind, Mimic, Shown, Situation, Words, absent, is,
+    Acts, Declared, Effect, EffectParameter, Fitted, Forms, Kind, Mimic, Shown, Situation, Words,
+    absent, is,
 };
 use crate::aero::BodyWrench;
 use crate::lane::Lane;

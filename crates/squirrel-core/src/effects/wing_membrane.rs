@@ -1,8 +1,9 @@
-//! What a soft wing does beyond the flat plate: `N <- 1/2 rho S c_N (1 + g) V (w + a0 u) dep` on each side.
+//! What a soft wing does beyond the flat plate: `N <- 1/2 rho S c_N (1 + g) V (w + a0 u) dep` on
+//! each side.
 //!
-//! A gain and an offset of the angle of attack, the correction that the paper's network learns, in two numbers; added to
-//! whatever wing the vehicle flies, as a difference to the flat plate. Form `speed_dependent`: the gain grows with airspeed,
-//! `g min(V / V_full, 1)`, as the membrane fills.
+//! A gain and an offset of the angle of attack, the correction that the paper's network learns, in
+//! two numbers; added to whatever wing the vehicle flies, as a difference to the flat plate. Form
+//! `speed_dependent`: the gain grows with airspeed, `g min(V / V_full, 1)`, as the membrane fills.
 
 use super::{Acts, Declared, Effect, EffectParameter, Forms, Mimic, Shown, Situation, Words, is};
 use crate::aero::BodyWrench;
@@ -67,7 +68,14 @@ impl<L: Lane> Acts<L> for Numbers<L> {
         let [empty, per_speed] = self.filled;
         let gain = self.gain * (empty + flow.speed * per_speed).lower(L::of(1.0));
         let [left, right] = wings.normal_forces(flow, &at.deployment);
-        let turned = wings.per_square * flow.speed * flow.velocity[0] * self.offset_rad * (L::of(1.0) + gain);
-        wings.wrench([left * gain + turned * at.deployment[0], right * gain + turned * at.deployment[1]])
+        let turned = wings.per_square
+            * flow.speed
+            * flow.velocity[0]
+            * self.offset_rad
+            * (L::of(1.0) + gain);
+        wings.wrench([
+            left * gain + turned * at.deployment[0],
+            right * gain + turned * at.deployment[1],
+        ])
     }
 }

@@ -1,6 +1,7 @@
 //! Height and climb from the barometer and the accelerometer: the paper's altitude filter.
 //!
-//! Source: the paper, section II.C; docs/equations.md C.3. State: depth `z`, its rate `v`, and the bias `b` of the vertical acceleration,
+//! Source: the paper, section II.C; docs/equations.md C.3. State: depth `z`, its rate `v`, and the
+//! bias `b` of the vertical acceleration,
 //!
 //! ```text
 //! z += v dt + (a - b) dt^2 / 2,   v += (a - b) dt,   a = (R f)_z + g

@@ -1,10 +1,13 @@
-//! Arithmetic of the error-state filter's covariance, in place and without a product of large matrices.
+//! Arithmetic of the error-state filter's covariance, in place and without a product of large
+//! matrices.
 //!
-//! Sums are in the order in which such products have them, so that the bits are theirs. No index here can leave a panic in the code.
+//! Sums are in the order in which such products have them, so that the bits are theirs. No index
+//! here can leave a panic in the code.
 
 use nalgebra::{Matrix3, SMatrix, SVector};
 
-/// Numbers of the error's state: position, velocity, turn, bias of the accelerometer, bias of the gyro.
+/// Numbers of the error's state: position, velocity, turn, bias of the accelerometer, bias of the
+/// gyro.
 pub const STATES: usize = 15;
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
@@ -66,10 +69,15 @@ impl Carry {
 /// A product that is spelled out: a loop over nine numbers is most of its own work.
 #[inline(always)]
 fn times(m: &Matrix3<f32>, [x, y, z]: [f32; 3]) -> [f32; 3] {
-    [m.m11 * x + m.m12 * y + m.m13 * z, m.m21 * x + m.m22 * y + m.m23 * z, m.m31 * x + m.m32 * y + m.m33 * z]
+    [
+        m.m11 * x + m.m12 * y + m.m13 * z,
+        m.m21 * x + m.m22 * y + m.m23 * z,
+        m.m31 * x + m.m32 * y + m.m33 * z,
+    ]
 }
 
-/// `P H'`: the covariance of the state and a measured number, whose Jacobian is zero for most of the state.
+/// `P H'`: the covariance of the state and a measured number, whose Jacobian is zero for most of
+/// the state.
 pub(super) fn cross_covariance(covariance: &Covariance, row: &StateVector) -> StateVector {
     let mut cross_covariance = StateVector::zeros();
     for (column, share) in covariance.column_iter().zip(row.iter()) {
@@ -100,7 +108,8 @@ pub(super) fn set(row: &mut StateVector, at: usize, value: f32) {
     }
 }
 
-/// Changes three numbers of the diagonal. An index that is only a loop's would leave a panic in the code.
+/// Changes three numbers of the diagonal. An index that is only a loop's would leave a panic in the
+/// code.
 pub(super) fn on_diagonal(covariance: &mut Covariance, part: usize, change: impl Fn(f32) -> f32) {
     for i in part..part + 3 {
         if let Some(x) = covariance.get_mut((i, i)) {
@@ -120,7 +129,8 @@ mod tests {
 
     #[test]
     fn carrying_on_is_the_product_with_the_transition() {
-        let [of_turn, of_bias, turning] = [1, 2, 3].map(|k| Matrix3::from_fn(|i, j| number(i + k, j)));
+        let [of_turn, of_bias, turning] =
+            [1, 2, 3].map(|k| Matrix3::from_fn(|i, j| number(i + k, j)));
         let carry = Carry { of_turn, of_bias, turning, dt_s: 0.25 };
         let mut f = Covariance::identity();
         f.fixed_view_mut::<3, 3>(POSITION, VELOCITY).fill_diagonal(0.25);

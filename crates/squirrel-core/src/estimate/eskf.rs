@@ -1,22 +1,28 @@
-//! Position, velocity, attitude and the inertial unit's biases by an error-state Kalman filter of fifteen states: the default.
+//! Position, velocity, attitude and the inertial unit's biases by an error-state Kalman filter of
+//! fifteen states: the default.
 //!
-//! Source: Sola, "Quaternion kinematics for the error-state Kalman filter", 2017, with the attitude's error about body axes; docs/equations.md
-//! C.2. The inertial unit moves the state, everything else corrects it:
+//! Source: Sola, "Quaternion kinematics for the error-state Kalman filter", 2017, with the
+//! attitude's error about body axes; docs/equations.md C.2. The inertial unit moves the state,
+//! everything else corrects it:
 //!
 //! ```text
 //! p' = v,  v' = R (f - b_a) + g e3,  q' = q (w - b_g) / 2
 //! d_p' = d_v,  d_v' = -R [f - b_a]x d - R d_ba,  d' = -[w - b_g]x d - d_bg
 //! ```
-//! A satellite fix is late: it is compared with where the filter was then, which it remembers (`Past`), and errors of velocity,
-//! turn and bias have carried the state along since. Measurements are fused number by number, each with an innovation gate, so
-//! that an outlier costs nothing. Fixes that are rejected for long are fused after all. A barometer that is rejected for long has
-//! jumped: its zero is moved to where the filter is. A compass is never fused against the rest. Where all fixes contradict the
-//! filter for seconds, the filter is wrong: it starts anew from the accelerometer and the next fix.
+//! A satellite fix is late: it is compared with where the filter was then, which it remembers
+//! (`Past`), and errors of velocity, turn and bias have carried the state along since. Measurements
+//! are fused number by number, each with an innovation gate, so that an outlier costs nothing.
+//! Fixes that are rejected for long are fused after all. A barometer that is rejected for long has
+//! jumped: its zero is moved to where the filter is. A compass is never fused against the rest.
+//! Where all fixes contradict the filter for seconds, the filter is wrong: it starts anew from the
+//! accelerometer and the next fix.
 
 use super::covariance::{ACCEL_BIAS, GYRO_BIAS, POSITION, StateVector, TURN, VELOCITY};
 use super::covariance::{Carry, cross_covariance, on_diagonal, set, symmetrise};
 pub use super::covariance::{Covariance, STATES};
-use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, heading_error, levelled, turned};
+use super::{
+    Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, heading_error, levelled, turned,
+};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{GRAVITY_M_S2, limit, lower, upper};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
@@ -28,9 +34,11 @@ const MOMENT_S: f32 = 0.01;
 const NO_FIX_S: f32 = 0.5;
 /// Variance beyond which nothing is known, SI.
 const VARIANCE_MAX: f32 = 1e8;
-/// A compass errs by its vehicle's iron: so many times the deviation of a reading stands for many that err alike.
+/// A compass errs by its vehicle's iron: so many times the deviation of a reading stands for many
+/// that err alike.
 const COMPASS_MEMORY: f32 = 10.0;
-/// A fix's normalised innovation squared, over its numbers, counts for so much at most in the mean: a few outliers are no fault of the filter.
+/// A fix's normalised innovation squared, over its numbers, counts for so much at most in the mean:
+/// a few outliers are no fault of the filter.
 const NIS_MAX: f32 = 30.0;
 /// Share of a fix's normalised innovation squared (NIS) in the filtered one.
 const NIS_FILTER_GAIN: f32 = 0.05;
@@ -117,7 +125,8 @@ impl Past {
     fn remember(&mut self, now: [Vector3<f32>; 2], dt_s: f32) {
         self.age_s += dt_s;
         if self.age_s >= MOMENT_S {
-            // Steps longer than a moment are moments: ages are then too small by what they are longer, which no flight code's are.
+            // Steps longer than a moment are moments: ages are then too small by what they are
+            // longer, which no flight code's are.
             self.age_s = limit(self.age_s - MOMENT_S, 0.0, MOMENT_S);
             self.newest = (self.newest + MOMENTS - 1) % MOMENTS;
             self.moments[self.newest % MOMENTS] = now;
@@ -143,7 +152,12 @@ impl Past {
     /// An error that is put right now was another one then.
     ///
     /// * `acceleration` - that the rest of the error makes
-    fn correct(&mut self, position: &Vector3<f32>, velocity: &Vector3<f32>, acceleration: &Vector3<f32>) {
+    fn correct(
+        &mut self,
+        position: &Vector3<f32>,
+        velocity: &Vector3<f32>,
+        acceleration: &Vector3<f32>,
+    ) {
         for back in 0..MOMENTS {
             let ago_s = self.age_s + back as f32 * MOMENT_S;
             let moment = &mut self.moments[(self.newest + back) % MOMENTS];
@@ -409,10 +423,14 @@ impl Estimator for Eskf {
         if let Some(gnss) = &sensed.gnss {
             let late_s = p.gnss_latency_s;
             if !self.placed {
-                self.place(gnss.position.vector + gnss.velocity.vector * late_s, gnss.velocity.vector);
+                self.place(
+                    gnss.position.vector + gnss.velocity.vector * late_s,
+                    gnss.velocity.vector,
+                );
             }
             let then = self.past.at([self.position, self.velocity], late_s);
-            let (position, velocity) = (gnss.position.vector - then[0], gnss.velocity.vector - then[1]);
+            let (position, velocity) =
+                (gnss.position.vector - then[0], gnss.velocity.vector - then[1]);
             let is_gated = self.rejected.fixes < REJECTIONS_BEFORE_RESET;
             let mut fused = true;
             // The error was smaller then by what an acceleration makes that errs by turn and bias.
@@ -445,20 +463,28 @@ impl Estimator for Eskf {
         }
         if let Some(altitude_m) = sensed.altitude_m {
             let residual = self.baro_offset_m - altitude_m - self.position.z;
-            let fused = self.update(&mut correction, &unit(POSITION + 2), residual, p.baro_noise_m, true);
+            let fused =
+                self.update(&mut correction, &unit(POSITION + 2), residual, p.baro_noise_m, true);
             self.rejected.altitudes = self.count(self.rejected.altitudes, fused);
             if self.rejected.altitudes >= REJECTIONS_BEFORE_RESET && residual.is_finite() {
                 self.baro_offset_m -= residual;
                 self.rejected.altitudes = 0;
             }
         }
-        if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
+        if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector))
+        {
             let mut row = StateVector::zeros();
             row.fixed_rows_mut::<3>(TURN).copy_from(&down(&self.attitude));
             let innovation_variance =
                 row.dot(&cross_covariance(&self.covariance, &row)) + square(p.heading_noise_rad);
             let fused = square(error) <= square(p.gate) * innovation_variance
-                && self.update(&mut correction, &row, -error, COMPASS_MEMORY * p.heading_noise_rad, true);
+                && self.update(
+                    &mut correction,
+                    &row,
+                    -error,
+                    COMPASS_MEMORY * p.heading_noise_rad,
+                    true,
+                );
             self.rejected.fields = self.count(self.rejected.fields, fused);
         }
         if self.time_since_fix_s > NO_FIX_S {
@@ -467,7 +493,13 @@ impl Estimator for Eskf {
             for i in 0..3 {
                 let mut row = StateVector::zeros();
                 row.fixed_rows_mut::<3>(TURN).copy_from(&slope.row(i).transpose());
-                self.update(&mut correction, &row, -force[i] - expected[i], p.alone_noise_m_s2, true);
+                self.update(
+                    &mut correction,
+                    &row,
+                    -force[i] - expected[i],
+                    p.alone_noise_m_s2,
+                    true,
+                );
             }
         }
         if self.nis.1 > 0 {
@@ -476,10 +508,13 @@ impl Estimator for Eskf {
         symmetrise(&mut self.covariance);
         let specific_force = sensed.imu.specific_force.vector;
         // After what no vehicle does, the covariance may have lost its meaning.
-        let is_covariance =
-            self.covariance.diagonal().iter().all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX);
-        // Nor does any unit have such biases; at rest, one of the accelerometer hides a tilt from every fix. (Alone the filter cannot tell,
-        // and nothing would lead it back.)
+        let is_covariance = self
+            .covariance
+            .diagonal()
+            .iter()
+            .all(|variance| *variance > 0.0 && *variance < VARIANCE_MAX);
+        // Nor does any unit have such biases; at rest, one of the accelerometer hides a tilt from
+        // every fix. (Alone the filter cannot tell, and nothing would lead it back.)
         let is_far = self.accel_bias.norm_squared() > square(ACCEL_BIAS_MAX_M_S2)
             || self.gyro_bias.norm_squared() > square(GYRO_BIAS_MAX_RAD_S);
         let is_biased = is_far && self.time_since_fix_s <= NO_FIX_S;

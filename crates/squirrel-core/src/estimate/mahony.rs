@@ -1,12 +1,13 @@
 //! Inclination by Mahony's complementary filter, heard only where the accelerometer weighs one g.
 //!
-//! Source: Mahony, Hamel and Pflimlin, IEEE TAC 2008 (explicit complementary filter); docs/equations.md C.2. With `y` the measured and `x` the
-//! believed direction of down,
+//! Source: Mahony, Hamel and Pflimlin, IEEE TAC 2008 (explicit complementary filter);
+//! docs/equations.md C.2. With `y` the measured and `x` the believed direction of down,
 //!
 //! ```text
 //! w = gyro - bias + k_p y x x,   bias' = -k_i y x x
 //! ```
-//! Differs: the gate. A multirotor that accelerates for seconds while it weighs one g still misleads it.
+//! Differs: the gate. A multirotor that accelerates for seconds while it weighs one g still
+//! misleads it.
 
 use super::{Estimate, Estimator, STEP_MAX_S, Sensed, down, turned};
 use crate::frames::{Body, In, Ned, Rotation};

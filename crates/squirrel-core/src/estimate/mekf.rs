@@ -1,7 +1,8 @@
 //! Attitude and gyro bias by a multiplicative extended Kalman filter of six states.
 //!
-//! Source: Markley, JGCD 2003; docs/equations.md C.2. The error is a small turn `d` about body axes, `q_true = q exp(d)`, and the bias's error.
-//! From one satellite fix to the next, the mean specific force, turned into NED, is what the velocities have changed by, less gravity; without
+//! Source: Markley, JGCD 2003; docs/equations.md C.2. The error is a small turn `d` about body
+//! axes, `q_true = q exp(d)`, and the bias's error. From one satellite fix to the next, the mean
+//! specific force, turned into NED, is what the velocities have changed by, less gravity; without
 //! fixes the accelerometer counts where it weighs one g:
 //!
 //! ```text
@@ -79,7 +80,8 @@ impl Mekf {
         start: Rotation<Ned, Body, f32>,
         gyro_bias: In<Body, f32>,
     ) -> Self {
-        let (turn, bias) = (2.5e-3, parameters.bias_deviation_rad_s * parameters.bias_deviation_rad_s);
+        let (turn, bias) =
+            (2.5e-3, parameters.bias_deviation_rad_s * parameters.bias_deviation_rad_s);
         Self {
             parameters,
             attitude: start.quaternion,
@@ -94,7 +96,8 @@ impl Mekf {
         let cross_covariance = self.covariance * row.transpose();
         let gain = cross_covariance / ((row * cross_covariance).x + variance);
         let keep = Matrix6::identity() - gain * row;
-        self.covariance = keep * self.covariance * keep.transpose() + gain * gain.transpose() * variance;
+        self.covariance =
+            keep * self.covariance * keep.transpose() + gain * gain.transpose() * variance;
         gain * residual
     }
 }
@@ -132,12 +135,14 @@ impl Estimator for Mekf {
             && fix.ago_s > 0.0
         {
             let felt = fix.felt / fix.ago_s;
-            let pulled = (gnss.velocity.vector - fix.velocity) / fix.ago_s - Vector3::new(0.0, 0.0, g);
+            let pulled =
+                (gnss.velocity.vector - fix.velocity) / fix.ago_s - Vector3::new(0.0, 0.0, g);
             let slope = -cross(&felt) * self.attitude.to_rotation_matrix().into_inner();
             measured = Some((slope, pulled - felt, p.fix_noise_m_s2));
         }
         if let Some(gnss) = &sensed.gnss {
-            self.fix = Some(Fix { velocity: gnss.velocity.vector, ago_s: 0.0, felt: Vector3::zeros() });
+            self.fix =
+                Some(Fix { velocity: gnss.velocity.vector, ago_s: 0.0, felt: Vector3::zeros() });
         }
         if self.fix.is_none() && (force.norm() - g).abs() < p.gate_m_s2 {
             let expected = super::down(&self.attitude) * g;
@@ -145,19 +150,22 @@ impl Estimator for Mekf {
         }
         if let Some((slope, residual, noise)) = measured {
             for i in 0..3 {
-                let row = RowVector6::new(slope[(i, 0)], slope[(i, 1)], slope[(i, 2)], 0.0, 0.0, 0.0);
+                let row =
+                    RowVector6::new(slope[(i, 0)], slope[(i, 1)], slope[(i, 2)], 0.0, 0.0, 0.0);
                 let innovation = residual[i] - (row * correction).x;
                 correction += self.update(&row, innovation, noise * noise);
             }
         }
-        if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector)) {
+        if let Some(error) = sensed.magnetic.and_then(|m| heading_error(&self.attitude, &m.vector))
+        {
             let axis = super::down(&self.attitude);
             let row = RowVector6::new(axis.x, axis.y, axis.z, 0.0, 0.0, 0.0);
             let innovation = -error - (row * correction).x;
             correction += self.update(&row, innovation, p.heading_noise_rad * p.heading_noise_rad);
         }
         self.covariance = (self.covariance + self.covariance.transpose()) * 0.5;
-        self.attitude = turned(&self.attitude, &Vector3::new(correction.x, correction.y, correction.z));
+        self.attitude =
+            turned(&self.attitude, &Vector3::new(correction.x, correction.y, correction.z));
         self.gyro_bias += Vector3::new(correction.w, correction.a, correction.b);
     }
 

@@ -9,11 +9,11 @@
 //! | [`mekf`] | attitude, gyro bias | accelerometer less the acceleration of satellite fixes, compass |
 //! | [`eskf`] | position, velocity, attitude, both biases | satellite fixes that are late, barometer, compass; the default |
 //!
-//! [`altitude`] is the paper's height filter, for those that have none of their own; [`rest`] finds the gyro's bias before take-off.
-//! [`voting`] makes one inertial measurement of two units', [`navigator`] runs what was chosen and tells
-//! control, [`monitor`] sees whether rotors push as told.
-//! All are fixed in size, take bounded work a step, and stay finite for whatever is finite. Which of them errs how much:
-//! docs/equations.md C.
+//! [`altitude`] is the paper's height filter, for those that have none of their own; [`rest`] finds
+//! the gyro's bias before take-off. [`voting`] makes one inertial measurement of two units',
+//! [`navigator`] runs what was chosen and tells control, [`monitor`] sees whether rotors push as
+//! told. All are fixed in size, take bounded work a step, and stay finite for whatever is finite.
+//! Which of them errs how much: docs/equations.md C.
 
 pub mod altitude;
 mod covariance;
@@ -74,9 +74,11 @@ fn cross(v: &Vector3<f32>) -> Matrix3<f32> {
     Matrix3::new(0.0, -v.z, v.y, v.z, 0.0, -v.x, -v.y, v.x, 0.0)
 }
 
-/// An attitude turned about body axes by an angle, rad; by a radian if that is more, which no step of a flight is.
+/// An attitude turned about body axes by an angle, rad; by a radian if that is more, which no step
+/// of a flight is.
 ///
-/// Sine and cosine of half the angle by their series, which f32 cannot tell from the functions below 1 rad.
+/// Sine and cosine of half the angle by their series, which f32 cannot tell from the functions
+/// below 1 rad.
 fn turned(attitude: &UnitQuaternion<f32>, angle: &Vector3<f32>) -> UnitQuaternion<f32> {
     let angle = limit_norm(*angle, 1.0);
     let square = 0.25 * angle.norm_squared();
@@ -96,7 +98,8 @@ fn down(attitude: &UnitQuaternion<f32>) -> Vector3<f32> {
     attitude.inverse_transform_vector(&Vector3::z())
 }
 
-/// An attitude with its inclination replaced and its heading kept as far as may be: the shortest turn to another down.
+/// An attitude with its inclination replaced and its heading kept as far as may be: the shortest
+/// turn to another down.
 ///
 /// * `target` - down in the body frame, a unit vector
 fn levelled(attitude: &UnitQuaternion<f32>, target: &Vector3<f32>) -> UnitQuaternion<f32> {

@@ -1,10 +1,12 @@
-//! Whether rotors push as they were commanded to: what the inertial unit feels against what the mixer promised.
+//! Whether rotors push as they were commanded to: what the inertial unit feels against what the
+//! mixer promised.
 //!
 //! ```text
 //! thrust:  -m f_z - T           torque:  J w' + w x J w - tau
 //! ```
-//! `T` and `tau` follow the mixer's answer with the rotors' time constant. Both differences are means over [`MEAN_S`], for a weak rotor, a
-//! sagging battery or a stuck wing stays, and noise and gusts do not. While wings are spread on purpose they push too, and nothing is learnt.
+//! `T` and `tau` follow the mixer's answer with the rotors' time constant. Both differences are
+//! means over [`MEAN_S`], for a weak rotor, a sagging battery or a stuck wing stays, and noise and
+//! gusts do not. While wings are spread on purpose they push too, and nothing is learnt.
 
 use super::navigator::Health;
 use crate::control::mixer::ThrustTorque;
@@ -76,7 +78,8 @@ impl Monitor {
         let p = vehicle.parameters();
         let omega = imu.omega.vector;
         let before = self.omega.replace(omega);
-        self.spread_ago_s = if wings > 0.0 { 0.0 } else { lower(self.spread_ago_s + dt_s, FOLDED_S) };
+        self.spread_ago_s =
+            if wings > 0.0 { 0.0 } else { lower(self.spread_ago_s + dt_s, FOLDED_S) };
         let (Some(before), true) = (before, dt_s > 0.0) else {
             self.commanded = *achieved;
             return;
@@ -86,13 +89,17 @@ impl Monitor {
         self.commanded.torque_n_m += (achieved.torque_n_m - self.commanded.torque_n_m) * follow;
         let learn = dt_s / (dt_s + MEAN_S);
         let is_folded = self.spread_ago_s >= FOLDED_S;
-        let missing_n =
-            if is_folded { self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z } else { 0.0 };
+        let missing_n = if is_folded {
+            self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z
+        } else {
+            0.0
+        };
         let spin = p.inertia_kg_m2 * omega;
-        let turned =
-            p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin) - self.commanded.torque_n_m;
+        let turned = p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin)
+            - self.commanded.torque_n_m;
         self.missing_n += (missing_n - self.missing_n) * learn;
-        self.torque_n_m += (if is_folded { turned } else { Vector3::zeros() } - self.torque_n_m) * learn;
+        self.torque_n_m +=
+            (if is_folded { turned } else { Vector3::zeros() } - self.torque_n_m) * learn;
         if !(self.missing_n.is_finite() && all_finite(&self.torque_n_m)) {
             *self = Self::default();
         }
@@ -111,8 +118,14 @@ impl Monitor {
         let arm_m = vehicle.rotors().first().map_or(0.0, |rotor| rotor.position.vector.xy().norm());
         let torque_max_n_m = OFF_SHARE * weight_n * arm_m;
         health
-            .with(Health::UPSET, attitude.is_some_and(|a| super::down(&a.quaternion).z < UPSET_COSINE))
+            .with(
+                Health::UPSET,
+                attitude.is_some_and(|a| super::down(&a.quaternion).z < UPSET_COSINE),
+            )
             .with(Health::THRUST_SHORT, self.missing_n > SHORT_SHARE * weight_n)
-            .with(Health::TORQUE_OFF, self.torque_n_m.norm_squared() > torque_max_n_m * torque_max_n_m)
+            .with(
+                Health::TORQUE_OFF,
+                self.torque_n_m.norm_squared() > torque_max_n_m * torque_max_n_m,
+            )
     }
 }

@@ -1,10 +1,12 @@
-//! From raw sensors to what control is told: the units vote, the filter that the vehicle file chose listens, and what is doubted is said.
+//! From raw sensors to what control is told: the units vote, the filter that the vehicle file chose
+//! listens, and what is doubted is said.
 //!
 //! ```text
 //! frame -> voter -> filter -> frame with attitude, rate without bias, position and velocity
 //! ```
-//! Filters without a motion of their own leave position and velocity to the receiver and height to [`super::altitude`]. With
-//! [`Filter::External`] somebody else estimates, and frames pass as they are but for the vote.
+//! Filters without a motion of their own leave position and velocity to the receiver and height to
+//! [`super::altitude`]. With [`Filter::External`] somebody else estimates, and frames pass as they
+//! are but for the vote.
 
 use super::altitude::{AltitudeFilter, AltitudeParameters};
 use super::eskf::{AidFaults, Eskf, EskfParameters};
@@ -107,7 +109,8 @@ impl Health {
     /// It hangs further over than any command asks for.
     pub const UPSET: Self = Self(1 << 9);
 
-    /// The filter started anew at some time in this flight: fixes contradicted it for long, or its biases or its covariance were impossible.
+    /// The filter started anew at some time in this flight: fixes contradicted it for long, or its
+    /// biases or its covariance were impossible.
     pub const RESTARTED: Self = Self(1 << 10);
 
     /// Name of each bit, from the lowest.
@@ -171,11 +174,14 @@ impl Running {
             Filter::Rkf(p) => Self::Rkf(Rkf::new(p, ned_from_body, gyro_bias)),
             Filter::Mahony(p) => Self::Mahony(Mahony::new(p, ned_from_body, gyro_bias)),
             Filter::Mekf(p) => Self::Mekf(Mekf::new(p, ned_from_body, gyro_bias)),
-            Filter::Eskf(p) => Self::Eskf(Eskf::new(p, ned_from_body, gyro_bias).placed_at(position)),
+            Filter::Eskf(p) => {
+                Self::Eskf(Eskf::new(p, ned_from_body, gyro_bias).placed_at(position))
+            }
         }
     }
 
-    /// A step of the filter that listens, and what it believes then. Calls by name, for one through a pointer has no known stack.
+    /// A step of the filter that listens, and what it believes then. Calls by name, for one through
+    /// a pointer has no known stack.
     fn step(&mut self, sensed: &Sensed) -> Option<Estimate> {
         // Apart, so that the stack of one is not also that of the others.
         #[inline(never)]
@@ -245,7 +251,11 @@ pub struct Navigated {
 impl Navigation {
     /// Somebody outside estimates.
     pub fn external() -> Self {
-        Self { filter: Filter::External, altitude: AltitudeParameters::default(), start: Start::at_origin() }
+        Self {
+            filter: Filter::External,
+            altitude: AltitudeParameters::default(),
+            start: Start::at_origin(),
+        }
     }
 
     /// # Errors
@@ -253,7 +263,11 @@ impl Navigation {
     pub fn check(&self) -> Result<(), ParameterError> {
         if !(self.start.gyro_bias.vector.norm() <= 1.0) {
             let size = self.start.gyro_bias.vector.norm();
-            return Err(ParameterError::of("estimation.start.gyro_bias_rad_s", size, "must be at most 1"));
+            return Err(ParameterError::of(
+                "estimation.start.gyro_bias_rad_s",
+                size,
+                "must be at most 1",
+            ));
         }
         let far = self.start.position.vector + self.start.fix_offset.vector;
         if !(far.norm() + self.start.altitude_offset_m.abs() <= 1e5) {
@@ -265,11 +279,18 @@ impl Navigation {
         }
         let turn = self.start.ned_from_body.quaternion.norm_squared();
         if !((turn - 1.0).abs() < 1e-3) {
-            return Err(ParameterError::of("estimation.start.ned_from_body", turn, "must be of length 1"));
+            return Err(ParameterError::of(
+                "estimation.start.ned_from_body",
+                turn,
+                "must be of length 1",
+            ));
         }
         positive("estimation.altitude.accel_noise_m_s2", self.altitude.accel_noise_m_s2)?;
         positive("estimation.altitude.baro_noise_m", self.altitude.baro_noise_m)?;
-        not_negative("estimation.altitude.bias_walk_m_s2_root_s", self.altitude.bias_walk_m_s2_root_s)?;
+        not_negative(
+            "estimation.altitude.bias_walk_m_s2_root_s",
+            self.altitude.bias_walk_m_s2_root_s,
+        )?;
         match self.filter {
             Filter::External => Ok(()),
             Filter::Rkf(p) => {
@@ -360,7 +381,8 @@ impl Navigation {
             let again = state.fix.as_ref() == Some(fix);
             state.fix_repeats = if again { state.fix_repeats.saturating_add(1) } else { 0 };
             // A receiver that hangs would be believed in the end, were it heard.
-            let is_faulty = matches!(&state.running, Running::Eskf(filter) if filter.aid_faults().gnss);
+            let is_faulty =
+                matches!(&state.running, Running::Eskf(filter) if filter.aid_faults().gnss);
             if state.fix_repeats >= HANGS && is_faulty {
                 for_control.gnss = None;
             }
@@ -374,14 +396,25 @@ impl Navigation {
         waiting.gnss = for_control.gnss.or(waiting.gnss);
         waiting.altitude_m = for_control.altitude_m.or(waiting.altitude_m);
         waiting.magnetic = for_control.magnetic.or(waiting.magnetic);
-        state.fix_age_s = if for_control.gnss.is_some() { 0.0 } else { lower(state.fix_age_s + dt_s, 1e6) };
+        state.fix_age_s =
+            if for_control.gnss.is_some() { 0.0 } else { lower(state.fix_age_s + dt_s, 1e6) };
         state.fix = for_control.gnss.or(state.fix);
         for_control.attitude = None;
         let Some(imu) = for_control.imu else {
-            return Navigated { frame: for_control.without_motion(), terms: None, rejected, elapsed_us };
+            return Navigated {
+                frame: for_control.without_motion(),
+                terms: None,
+                rejected,
+                elapsed_us,
+            };
         };
         let Some(terms) = self.hear(state, &imu) else {
-            return Navigated { frame: for_control.without_motion(), terms: None, rejected, elapsed_us };
+            return Navigated {
+                frame: for_control.without_motion(),
+                terms: None,
+                rejected,
+                elapsed_us,
+            };
         };
         for_control.imu = Some(Imu { omega: imu.omega - terms.gyro_bias, ..imu });
         for_control.attitude = Some(terms.ned_from_body);
@@ -402,15 +435,18 @@ impl Navigation {
     /// Runs the filter on an inertial measurement and what waited for it.
     fn hear(&self, state: &mut NavigationState, imu: &Imu) -> Option<NavigationTerms> {
         let Waiting { dt_s, gnss, altitude_m, magnetic } = core::mem::take(&mut state.waiting);
-        let estimate = state.running.step(&Sensed { dt_s, imu: *imu, gnss, altitude_m, magnetic })?;
+        let estimate =
+            state.running.step(&Sensed { dt_s, imu: *imu, gnss, altitude_m, magnetic })?;
         let (position, velocity, aid_faults, time_since_fix_s) =
-            if let (Some((position, velocity)), Running::Eskf(filter)) = (estimate.motion, &state.running) {
+            if let (Some((position, velocity)), Running::Eskf(filter)) =
+                (estimate.motion, &state.running)
+            {
                 (position, velocity, filter.aid_faults(), filter.time_since_fix_s())
             } else {
                 let force = estimate.ned_from_body * imu.specific_force;
-                let height = state
-                    .altitude
-                    .get_or_insert_with(|| AltitudeFilter::new(self.altitude, -self.start.position.vector.z));
+                let height = state.altitude.get_or_insert_with(|| {
+                    AltitudeFilter::new(self.altitude, -self.start.position.vector.z)
+                });
                 height.step(force.vector.z + GRAVITY_M_S2 as f32, altitude_m, dt_s);
                 let fix = state.fix.unwrap_or(Gnss { position: In::zero(), velocity: In::zero() });
                 let (mut position, mut velocity) = (fix.position, fix.velocity);
@@ -420,7 +456,9 @@ impl Navigation {
             };
         // Where the filter leaves the numbers, control is told nothing.
         let all: Vector3<f32> = position.vector + velocity.vector + estimate.gyro_bias.vector;
-        if !(crate::math::all_finite(&all) && estimate.ned_from_body.quaternion.norm_squared().is_finite()) {
+        if !(crate::math::all_finite(&all)
+            && estimate.ned_from_body.quaternion.norm_squared().is_finite())
+        {
             state.running = Running::None;
             state.altitude = None;
             return None;
@@ -432,7 +470,10 @@ impl Navigation {
         state.health = state
             .health
             .with(Health::GNSS_OUT, aid_faults.gnss || is_silent)
-            .with(Health::RESTARTED, matches!(&state.running, Running::Eskf(filter) if filter.restarts() > 0))
+            .with(
+                Health::RESTARTED,
+                matches!(&state.running, Running::Eskf(filter) if filter.restarts() > 0),
+            )
             .with(Health::BARO_OUT, aid_faults.baro || baro_is_silent)
             .with(Health::COMPASS_OUT, aid_faults.compass || compass_is_silent)
             .with(Health::POSITION_LOST, time_since_fix_s > LOST_S);

@@ -1,6 +1,7 @@
 //! What a vehicle finds out while it stands still before take-off: bias of the gyro, attitude.
 //!
-//! A mean over a window in which neither the rate nor the specific force moves by more than noise does; what moves starts the window anew.
+//! A mean over a window in which neither the rate nor the specific force moves by more than noise
+//! does; what moves starts the window anew.
 
 use super::navigator::Start;
 use super::voting::Voter;
@@ -72,7 +73,8 @@ impl RestCalibration {
     }
 }
 
-/// Listens to all sensors before take-off: units vote, and what moves starts the second at rest anew.
+/// Listens to all sensors before take-off: units vote, and what moves starts the second at rest
+/// anew.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Preflight {
     voter: Voter,
@@ -127,7 +129,8 @@ impl Preflight {
     pub fn hear(&mut self, frame: &SensorFrame) {
         let mut frame = *frame;
         frame.drop_what_is_no_reading();
-        let elapsed_us = self.last_us.map_or(0, |last| frame.time_us.saturating_sub(last).min(100_000));
+        let elapsed_us =
+            self.last_us.map_or(0, |last| frame.time_us.saturating_sub(last).min(100_000));
         self.last_us = Some(frame.time_us);
         if let Some(imu) = self.voter.vote([frame.imu, frame.imu_2], elapsed_us as u32) {
             self.gyro_bias = self.calibration.hear(&imu).or(self.gyro_bias);
@@ -155,15 +158,23 @@ impl Preflight {
     pub fn start(&self, position: In<Ned, f32>) -> Option<Start> {
         let down = (-self.force.value?).try_normalize(1e-3)?;
         let level = levelled(&UnitQuaternion::identity(), &down);
-        let yaw_rad =
-            self.field.value.and_then(|field| heading_error(&level, &field)).map_or(0.0, |error| -error);
+        let yaw_rad = self
+            .field
+            .value
+            .and_then(|field| heading_error(&level, &field))
+            .map_or(0.0, |error| -error);
         let heading = Rotation::<Ned, Ned, f32>::from_euler(0.0, 0.0, yaw_rad).quaternion;
         Some(Start {
             ned_from_body: Rotation::new(heading * level),
             gyro_bias: self.gyro_bias?,
             position,
-            fix_offset: In::new(self.fix.value.map_or(Vector3::zeros(), |fix| fix - position.vector)),
-            altitude_offset_m: self.altitude.value.map_or(0.0, |altitude| altitude.z + position.vector.z),
+            fix_offset: In::new(
+                self.fix.value.map_or(Vector3::zeros(), |fix| fix - position.vector),
+            ),
+            altitude_offset_m: self
+                .altitude
+                .value
+                .map_or(0.0, |altitude| altitude.z + position.vector.z),
         })
     }
 }

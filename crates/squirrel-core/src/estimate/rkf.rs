@@ -1,24 +1,28 @@
-//! Inclination by the robust Kalman filter with multiple tuning factors (RKF-MTF), the paper's attitude estimator.
+//! Inclination by the robust Kalman filter with multiple tuning factors (RKF-MTF), the paper's
+//! attitude estimator.
 //!
-//! Source: the paper, section II.C, after Candan and Soken, IEEE TIM 2021; docs/equations.md C.1. The state is down in the body frame, `x`;
-//! what the accelerometer feels beside gravity is an acceleration `a` that fades by `c` a step and whose innovation, per axis, is added to
-//! the measurement's variance:
+//! Source: the paper, section II.C, after Candan and Soken, IEEE TIM 2021; docs/equations.md C.1.
+//! The state is down in the body frame, `x`; what the accelerometer feels beside gravity is an
+//! acceleration `a` that fades by `c` a step and whose innovation, per axis, is added to the
+//! measurement's variance:
 //!
 //! ```text
 //! x- = (I - dt [w]x) x,   P- = F P F' + sigma_g^2 dt^2 [x]x [x]x'
 //! e = -f - c a - g x-,    S = diag(max(0, e_i^2 - g^2 P-_ii - sigma_a^2))
 //! K = g P- (g^2 P- + S + sigma_a^2)^-1,   x = unit(x- + K e),   a = -f - g x
 //! ```
-//! It has no bias of its own and trusts the gyro wherever innovations of the accelerometer are large, so an uncalibrated gyro drags it off: give it the
-//! bias that [`super::rest`] finds. Differs from the source: specific force in FRD, Joseph's form, and heading is carried by the gyro.
+//! It has no bias of its own and trusts the gyro wherever innovations of the accelerometer are
+//! large, so an uncalibrated gyro drags it off: give it the bias that [`super::rest`] finds.
+//! Differs from the source: specific force in FRD, Joseph's form, and heading is carried by the
+//! gyro.
 
 use super::{Estimate, Estimator, STEP_MAX_S, Sensed, cross, down, levelled, turned};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{GRAVITY_M_S2, lower, upper};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
-/// Samples of the accelerometer that the attitude at the start is the mean of. A filter that starts wider lets the first manoeuvre pull
-/// it level.
+/// Samples of the accelerometer that the attitude at the start is the mean of. A filter that starts
+/// wider lets the first manoeuvre pull it level.
 const SAMPLES_AT_REST: f32 = 300.0;
 
 /// How much a surprising acceleration is distrusted.
@@ -70,7 +74,11 @@ pub struct Rkf {
 impl Rkf {
     /// * `start` - as a second at rest left it
     /// * `gyro_bias` - as it was calibrated, rad/s
-    pub fn new(parameters: RkfParameters, start: Rotation<Ned, Body, f32>, gyro_bias: In<Body, f32>) -> Self {
+    pub fn new(
+        parameters: RkfParameters,
+        start: Rotation<Ned, Body, f32>,
+        gyro_bias: In<Body, f32>,
+    ) -> Self {
         let sample = parameters.accel_noise_m_s2 / GRAVITY_M_S2 as f32;
         let start_variance = sample * sample / SAMPLES_AT_REST;
         Self {
@@ -105,7 +113,8 @@ impl Estimator for Rkf {
         let omega = sensed.imu.omega.vector - self.gyro_bias;
         let transition = Matrix3::identity() - cross(&omega) * dt_s;
         let skew = cross(&self.down) * (p.gyro_noise_rad_s * dt_s);
-        let mut covariance = transition * self.covariance * transition.transpose() + skew * skew.transpose();
+        let mut covariance =
+            transition * self.covariance * transition.transpose() + skew * skew.transpose();
         let predicted = transition * self.down;
 
         let felt = -sensed.imu.specific_force.vector;

@@ -1,4 +1,5 @@
-//! Filters on flights of which everything is known: positions that are sums of sines, thrust along what they accelerate by.
+//! Filters on flights of which everything is known: positions that are sums of sines, thrust along
+//! what they accelerate by.
 #![allow(
     clippy::unwrap_used,
     clippy::disallowed_methods,
@@ -21,7 +22,8 @@ struct Noise(u64);
 
 impl Noise {
     fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
     fn normal(&mut self) -> f64 {
@@ -62,7 +64,11 @@ impl Flight {
     }
 
     fn hover() -> Self {
-        Self { amplitude_m: Vector3::zeros(), rate_rad_s: Vector3::repeat(1.0), phase_rad: Vector3::zeros() }
+        Self {
+            amplitude_m: Vector3::zeros(),
+            rate_rad_s: Vector3::repeat(1.0),
+            phase_rad: Vector3::zeros(),
+        }
     }
 
     fn at(&self, time_s: f64) -> Moment {
@@ -85,7 +91,12 @@ impl Flight {
         let y = z.cross(&Vector3::new(yaw.cos(), yaw.sin(), 0.0)).normalize();
         let rotation = nalgebra::Rotation3::from_basis_unchecked(&[y.cross(&z), y, z]);
         let attitude = UnitQuaternion::from_rotation_matrix(&rotation);
-        Moment { position, velocity, attitude, force_body: attitude.inverse_transform_vector(&force) }
+        Moment {
+            position,
+            velocity,
+            attitude,
+            force_body: attitude.inverse_transform_vector(&force),
+        }
     }
 }
 
@@ -132,8 +143,8 @@ fn fly(
             position: In::new(narrow(then.position + noise.vector(0.05))),
             velocity: In::new(narrow(then.velocity + noise.vector(0.05))),
         };
-        let north =
-            moment.attitude.inverse_transform_vector(&Vector3::new(0.5, 0.0, 0.8)) + noise.vector(0.02);
+        let north = moment.attitude.inverse_transform_vector(&Vector3::new(0.5, 0.0, 0.8))
+            + noise.vector(0.02);
         let altitude = -moment.position.z + 0.1 * noise.normal();
         let sensed = Sensed {
             dt_s: dt as f32,
@@ -183,8 +194,8 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     all.iter().sum::<f64>() / all.len() as f64
 }
 
-/// The paper's claim: with a calibrated gyro, accelerations of a flight do not mislead the filter with multiple factors, and they
-/// do mislead the plain one.
+/// The paper's claim: with a calibrated gyro, accelerations of a flight do not mislead the filter
+/// with multiple factors, and they do mislead the plain one.
 #[test]
 fn multiple_factors_bear_accelerations_where_the_gyro_is_calibrated() {
     let rms = |fading| {
@@ -204,7 +215,8 @@ fn a_gyro_that_nobody_calibrated_drags_the_factors_off_and_rest_cures_it() {
     let wrong = Wrong::uncalibrated(3);
     let dragged = inclination_rms_deg(&flight, wrong, rkf(&flight, Fading::Multiple));
 
-    let (mut rest, mut noise, mut bias) = (RestCalibration::new(RestParameters::default()), Noise(9), None);
+    let (mut rest, mut noise, mut bias) =
+        (RestCalibration::new(RestParameters::default()), Noise(9), None);
     for _ in 0..3 * RATE_HZ {
         let omega = wrong.gyro_bias + noise.vector(0.0045);
         let force = Vector3::new(0.0, 0.0, -GRAVITY_M_S2) + noise.vector(0.25);
@@ -262,7 +274,8 @@ fn the_default_needs_no_calibration() {
     for latency_s in [0.0, 0.15] {
         let rms = mean((0..10).map(|seed| {
             let flight = Flight::agile(seed);
-            let parameters = EskfParameters { gnss_latency_s: latency_s as f32, ..EskfParameters::default() };
+            let parameters =
+                EskfParameters { gnss_latency_s: latency_s as f32, ..EskfParameters::default() };
             inclination_rms_deg(
                 &flight,
                 Wrong { latency_s, ..Wrong::uncalibrated(seed) },
@@ -273,7 +286,8 @@ fn the_default_needs_no_calibration() {
     }
 }
 
-/// Position, velocity and bias are found, and latency that is not corrected shows as an error of position.
+/// Position, velocity and bias are found, and latency that is not corrected shows as an error of
+/// position.
 #[test]
 fn late_fixes_are_compared_with_where_the_filter_was() {
     let flight = Flight::agile(4);
@@ -293,11 +307,15 @@ fn late_fixes_are_compared_with_where_the_filter_was() {
         (f64::sqrt(sum / count), off.norm())
     };
     let ((corrected, bias_off), (uncorrected, _)) = (error(0.15), error(0.0));
-    assert!(corrected < 0.15 && uncorrected > 4.0 * corrected, "{corrected:.3} and {uncorrected:.3} m");
+    assert!(
+        corrected < 0.15 && uncorrected > 4.0 * corrected,
+        "{corrected:.3} and {uncorrected:.3} m"
+    );
     assert!(bias_off < 0.002, "bias off by {bias_off} rad/s");
 }
 
-/// Normalised estimation error squared of position, velocity and turn over 50 seeds, against chi-squared of 9 numbers.
+/// Normalised estimation error squared of position, velocity and turn over 50 seeds, against
+/// chi-squared of 9 numbers.
 #[test]
 fn the_default_errs_as_much_as_it_says() {
     let runs = 50;
@@ -311,9 +329,12 @@ fn the_default_errs_as_much_as_it_says() {
         let mut error = nalgebra::SVector::<f64, 9>::zeros();
         error.fixed_rows_mut::<3>(0).copy_from(&(moment.position - position.vector.map(f64::from)));
         error.fixed_rows_mut::<3>(3).copy_from(&(moment.velocity - velocity.vector.map(f64::from)));
-        let believed =
-            UnitQuaternion::new_normalize(estimate.ned_from_body.quaternion.into_inner().cast::<f64>());
-        error.fixed_rows_mut::<3>(6).copy_from(&(believed.inverse() * moment.attitude).scaled_axis());
+        let believed = UnitQuaternion::new_normalize(
+            estimate.ned_from_body.quaternion.into_inner().cast::<f64>(),
+        );
+        error
+            .fixed_rows_mut::<3>(6)
+            .copy_from(&(believed.inverse() * moment.attitude).scaled_axis());
         let covariance = filter.covariance().fixed_view::<9, 9>(0, 0).map(f64::from);
         sum += error.dot(&(covariance.try_inverse().unwrap() * error));
     }
@@ -322,7 +343,8 @@ fn the_default_errs_as_much_as_it_says() {
     assert!((7.82..10.18).contains(&nees), "{nees:.2}");
 }
 
-/// Normalised innovation squared of a fix and an altitude over 50 seeds, against chi-squared of 7 numbers.
+/// Normalised innovation squared of a fix and an altitude over 50 seeds, against chi-squared of 7
+/// numbers.
 #[test]
 fn innovations_of_the_default_are_as_large_as_it_says() {
     struct Deaf(Eskf);
@@ -382,8 +404,8 @@ fn outliers_cost_nothing() {
     assert_eq!(liar.0.rejections(), 20, "of 400 fixes");
 }
 
-/// A barometer of 0.2 m and an accelerometer that is 0.3 m/s^2 off, on a flight that climbs and sinks; and the deviation that it
-/// states is that of its errors.
+/// A barometer of 0.2 m and an accelerometer that is 0.3 m/s^2 off, on a flight that climbs and
+/// sinks; and the deviation that it states is that of its errors.
 #[test]
 fn height_and_climb_are_better_than_the_barometer() {
     let (flight, mut noise) = (Flight::agile(2), Noise(2));
@@ -445,9 +467,15 @@ fn estimates_stay_numbers() {
             let estimate = filter.estimate();
             let q = estimate.ned_from_body.quaternion;
             assert!((q.into_inner().norm() - 1.0).abs() < 1e-3, "filter {which}, step {k}");
-            assert!(estimate.gyro_bias.vector.iter().all(|x| x.is_finite()), "filter {which}, step {k}");
+            assert!(
+                estimate.gyro_bias.vector.iter().all(|x| x.is_finite()),
+                "filter {which}, step {k}"
+            );
             let motion = estimate.motion.unwrap_or_default();
-            assert!(motion.0.vector.iter().chain(motion.1.vector.iter()).all(|x| x.is_finite()), "step {k}");
+            assert!(
+                motion.0.vector.iter().chain(motion.1.vector.iter()).all(|x| x.is_finite()),
+                "step {k}"
+            );
         }
     }
 }

@@ -1,9 +1,11 @@
 //! One inertial measurement out of one unit or two.
 //!
-//! Two units that agree are averaged. Where they differ by more than noise, the one that left what both said before is doubted until they
-//! have agreed again for 0.3 s; with two units nothing else can tell who is wrong. A unit that is silent, or that hangs while the
-//! other moves, does not count. What the units constantly differ by is learnt and halved between them, so that nothing jumps when one of
-//! them goes. A unit that is alone may spike: what no vehicle turns or feels from one sample to the next is replaced by the sample before.
+//! Two units that agree are averaged. Where they differ by more than noise, the one that left what
+//! both said before is doubted until they have agreed again for 0.3 s; with two units nothing else
+//! can tell who is wrong. A unit that is silent, or that hangs while the other moves, does not
+//! count. What the units constantly differ by is learnt and halved between them, so that nothing
+//! jumps when one of them goes. A unit that is alone may spike: what no vehicle turns or feels from
+//! one sample to the next is replaced by the sample before.
 
 use crate::frame::Imu;
 use crate::frames::{Body, In};
@@ -132,14 +134,19 @@ impl Voter {
         [out(0), out(1)]
     }
 
-    /// Whether every unit that ever spoke repeats itself bit for bit although it says that the vehicle turns, or weighs nothing.
+    /// Whether every unit that ever spoke repeats itself bit for bit although it says that the
+    /// vehicle turns, or weighs nothing.
     pub fn hangs(&self) -> bool {
-        let mut spoken =
-            self.units.iter().filter_map(|unit| unit.last.map(|imu| (unit.repeats, imu))).peekable();
+        let mut spoken = self
+            .units
+            .iter()
+            .filter_map(|unit| unit.last.map(|imu| (unit.repeats, imu)))
+            .peekable();
         spoken.peek().is_some()
             && spoken.all(|(repeats, imu)| {
                 let is_turning = imu.omega.vector.norm_squared() > TURNING_RAD_S * TURNING_RAD_S;
-                repeats >= HANGS_ALONE && (is_turning || imu.specific_force.vector == Vector3::zeros())
+                repeats >= HANGS_ALONE
+                    && (is_turning || imu.specific_force.vector == Vector3::zeros())
             })
     }
 

@@ -1,10 +1,11 @@
 //! Excitation: manoeuvres flown so that a log can tell effects apart.
 //!
-//! A [`Programme`] is a list of [`Leg`]s from rest to rest, with headings and forced wings, and a [`Multisine`] on top.
-//! A leg's speed is a trapezoid: constant acceleration, constant speed, constant deceleration. The multisine is added behind
-//! the command filter, whose 3 Hz would swallow it, and brings its own derivatives: the attitude law turns those into moments
-//! at once. Each axis has its own harmonics of one base frequency, so that over the base period no axis hides behind another
-//! (orthogonal multisines: Klein and Morelli, Aircraft System Identification).
+//! A [`Programme`] is a list of [`Leg`]s from rest to rest, with headings and forced wings, and a
+//! [`Multisine`] on top. A leg's speed is a trapezoid: constant acceleration, constant speed,
+//! constant deceleration. The multisine is added behind the command filter, whose 3 Hz would
+//! swallow it, and brings its own derivatives: the attitude law turns those into moments at once.
+//! Each axis has its own harmonics of one base frequency, so that over the base period no axis
+//! hides behind another (orthogonal multisines: Klein and Morelli, Aircraft System Identification).
 
 use super::mission::scramble;
 use crate::command::EulerReference;
@@ -27,7 +28,8 @@ const BASE_HZ: f32 = 0.025;
 const CORNER_HZ: f32 = 3.0;
 /// The multisine fades in over this time, s.
 const FADE_S: f32 = 1.0;
-/// A change of heading takes this long, s: a quarter turn stays within the yaw torque of small rotors.
+/// A change of heading takes this long, s: a quarter turn stays within the yaw torque of small
+/// rotors.
 const YAW_S: f32 = 1.5;
 
 /// One leg: a straight move from where the last one ended, then a hover.
@@ -61,10 +63,18 @@ impl Leg {
     fn check(&self) -> Result<(), ParameterError> {
         positive("leg.duration_s", self.duration_s)?;
         if !(self.move_s > 0.0 && self.move_s <= self.duration_s) {
-            return Err(ParameterError::of("leg.move_s", self.move_s, "must be > 0 and <= leg.duration_s"));
+            return Err(ParameterError::of(
+                "leg.move_s",
+                self.move_s,
+                "must be > 0 and <= leg.duration_s",
+            ));
         }
         if !(self.ramp_s > 0.0 && 2.0 * self.ramp_s <= self.move_s) {
-            return Err(ParameterError::of("leg.ramp_s", self.ramp_s, "must be > 0 and <= leg.move_s / 2"));
+            return Err(ParameterError::of(
+                "leg.ramp_s",
+                self.ramp_s,
+                "must be > 0 and <= leg.move_s / 2",
+            ));
         }
         let numbers = [self.to.vector.x, self.to.vector.y, self.to.vector.z, self.yaw_rad];
         match numbers.iter().chain(&self.wings_s).find(|x| !x.is_finite()) {
@@ -128,15 +138,21 @@ impl Multisine {
             }
         }
         if !(0.0..=0.05).contains(&thrust_share) {
-            return Err(ParameterError::of("multisine_thrust_share", thrust_share, "must be 0 to 0.05"));
+            return Err(ParameterError::of(
+                "multisine_thrust_share",
+                thrust_share,
+                "must be 0 to 0.05",
+            ));
         }
         let mut lines = [[Line::default(); LINES]; 4];
         let ratio = BAND_HZ[1] / BAND_HZ[0];
         for (axis, lines) in lines.iter_mut().enumerate() {
             for (i, line) in lines.iter_mut().enumerate() {
                 let wanted = BAND_HZ[0] * libm::powf(ratio, i as f32 / (LINES - 1) as f32);
-                // Up to a multiple of four base frequencies, then this axis' own place below it; never below the band.
-                let top = upper(4.0 * libm::ceilf(wanted / BASE_HZ / 4.0), BAND_HZ[0] / BASE_HZ + 3.0);
+                // Up to a multiple of four base frequencies, then this axis' own place below it;
+                // never below the band.
+                let top =
+                    upper(4.0 * libm::ceilf(wanted / BASE_HZ / 4.0), BAND_HZ[0] / BASE_HZ + 3.0);
                 let harmonic = lower(top, BAND_HZ[1] / BASE_HZ) - axis as f32;
                 line.frequency_hz = harmonic * BASE_HZ;
                 line.amplitude = match angle_rad.get(axis) {
@@ -209,7 +225,11 @@ impl Programme {
     ///
     /// # Errors
     /// No leg or more than [`MAX_LEGS`], or the first number of a leg that is out of range.
-    pub fn new(start: In<Ned, f32>, legs: &[Leg], multisine: Multisine) -> Result<Self, ParameterError> {
+    pub fn new(
+        start: In<Ned, f32>,
+        legs: &[Leg],
+        multisine: Multisine,
+    ) -> Result<Self, ParameterError> {
         let mut all = [Leg::UNUSED; MAX_LEGS];
         if legs.is_empty() || legs.len() > MAX_LEGS {
             return Err(ParameterError::of("legs", legs.len() as f32, "must be 1 to 16"));
@@ -231,7 +251,8 @@ impl Programme {
         &self.multisine
     }
 
-    /// The leg at a time, the time since its start, and where and with which heading it began. The last leg does not end.
+    /// The leg at a time, the time since its start, and where and with which heading it began. The
+    /// last leg does not end.
     fn leg(&self, time_us: u64) -> (Leg, f32, In<Ned, f32>, f32) {
         let mut since = time_us as f32 * 1e-6;
         let (mut from, mut yaw, mut leg) = (self.start, 0.0, Leg::UNUSED);
@@ -298,7 +319,8 @@ mod tests {
 
     fn programme() -> Programme {
         let multisine = Multisine::new([0.02, 0.02, 0.01], 0.01, 7).unwrap();
-        Programme::new(In::new(Vector3::new(0.0, 0.0, -2.0)), &[leg(9.0), leg(0.0)], multisine).unwrap()
+        Programme::new(In::new(Vector3::new(0.0, 0.0, -2.0)), &[leg(9.0), leg(0.0)], multisine)
+            .unwrap()
     }
 
     #[test]
@@ -309,7 +331,10 @@ mod tests {
         assert_eq!(p.reference(4_500_000).velocity.vector.norm(), 0.0);
         assert!((p.reference(7_000_000).velocity.vector.x + 3.0).abs() < 1e-5, "and back");
         assert_eq!(p.reference(60_000_000).position.vector.x, 0.0, "the last leg does not end");
-        assert_eq!([0.9, 1.0, 1.9, 2.0].map(|t| p.wing_command((t * 1e6) as u64)), [0.0, 1.0, 1.0, 0.0]);
+        assert_eq!(
+            [0.9, 1.0, 1.9, 2.0].map(|t| p.wing_command((t * 1e6) as u64)),
+            [0.0, 1.0, 1.0, 0.0]
+        );
     }
 
     #[test]
@@ -319,7 +344,11 @@ mod tests {
             let (before, now, after) = (k * 41_000 - 500, k * 41_000, k * 41_000 + 500);
             let (a, b, c) = (p.reference(before), p.reference(now), p.reference(after));
             let slope = (c.position - a.position).vector * 1e3;
-            assert!((slope - b.velocity.vector).norm() < 0.02, "{now}: {slope} {}", b.velocity.vector);
+            assert!(
+                (slope - b.velocity.vector).norm() < 0.02,
+                "{now}: {slope} {}",
+                b.velocity.vector
+            );
             let at = |t| p.excitation(t).unwrap().attitude;
             let (a, b, c) = (at(before), at(now), at(after));
             assert!(((c.angle - a.angle) * 1e3 - b.rate).norm() < 2e-3, "{now}");
@@ -330,13 +359,15 @@ mod tests {
     #[test]
     fn every_axis_has_its_own_frequencies_in_the_band_and_keeps_to_its_bound() {
         let p = programme();
-        let mut all: Vec<f32> = (0..4).flat_map(|axis| p.multisine().frequencies_hz(axis)).collect();
+        let mut all: Vec<f32> =
+            (0..4).flat_map(|axis| p.multisine().frequencies_hz(axis)).collect();
         assert!(all.iter().all(|f| (0.299..=6.001).contains(f)), "{all:?}");
         all.sort_by(f32::total_cmp);
         assert!(all.windows(2).all(|w| w[1] - w[0] > 0.9 * BASE_HZ), "{all:?}");
         assert!(all.first().is_some_and(|f| *f < 0.31) && all.last().is_some_and(|f| *f > 5.99));
         let bound = p.multisine().tilt_max_rad();
-        let largest = (0..4000u64).map(|k| p.excitation(k * 10_000).unwrap().attitude.angle.xy().amax());
+        let largest =
+            (0..4000u64).map(|k| p.excitation(k * 10_000).unwrap().attitude.angle.xy().amax());
         let largest = largest.fold(0.0, f32::max);
         assert!(largest <= bound && largest > 0.5 * bound, "{largest} of {bound}");
         assert_eq!(p.excitation(0).unwrap().attitude.angle.norm(), 0.0, "it fades in");
@@ -346,7 +377,9 @@ mod tests {
     fn numbers_that_cannot_be_flown_are_refused_by_name() {
         let start = In::zero();
         let silent = Multisine::new([0.0; 3], 0.0, 0).unwrap();
-        assert!(Programme::new(start, &[], silent).unwrap_err().to_string().starts_with("legs = 0"));
+        assert!(
+            Programme::new(start, &[], silent).unwrap_err().to_string().starts_with("legs = 0")
+        );
         assert!(Programme::new(start, &[Leg::UNUSED; 17], silent).is_err());
         for (broken, field) in [
             (Leg { duration_s: f32::NAN, ..Leg::UNUSED }, "leg.duration_s"),

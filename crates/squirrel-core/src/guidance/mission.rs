@@ -1,8 +1,9 @@
 //! Missions: which reference to follow, and what to do about an obstacle.
 //!
-//! An avoidance mission flies straight at a target speed. When [`super::sensing`] reports an obstacle, a new
-//! [`Trajectory`] starts at the measured position, at rest, turned by a steering angle (paper, section V.B and V.C;
-//! docs/equations.md T20). Its height stays the mission's height, so that lost height counts as error.
+//! An avoidance mission flies straight at a target speed. When [`super::sensing`] reports an
+//! obstacle, a new [`Trajectory`] starts at the measured position, at rest, turned by a steering
+//! angle (paper, section V.B and V.C; docs/equations.md T20). Its height stays the mission's
+//! height, so that lost height counts as error.
 
 use super::excite::{Excitation, Programme};
 use super::sensing::{Obstacle, Sensing, offset};
@@ -15,7 +16,10 @@ use nalgebra::Vector3;
 
 /// What to do.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[allow(clippy::large_enum_variant, reason = "flight code has no heap, and there is one mission a flight")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "flight code has no heap, and there is one mission a flight"
+)]
 pub enum Mission {
     /// Hold a position, m.
     Hover {
@@ -78,10 +82,11 @@ impl Mission {
     /// A number out of range, by its name in a scenario.
     pub fn check(&self) -> Result<(), ParameterError> {
         use crate::vehicle::positive;
-        let finite = |field, place: &In<Ned, f32>| match place.vector.iter().find(|x| !x.is_finite()) {
-            Some(x) => Err(ParameterError::of(field, *x, "must be finite")),
-            None => Ok(()),
-        };
+        let finite =
+            |field, place: &In<Ned, f32>| match place.vector.iter().find(|x| !x.is_finite()) {
+                Some(x) => Err(ParameterError::of(field, *x, "must be finite")),
+                None => Ok(()),
+            };
         match self {
             Self::Hover { position } => finite("position", position),
             Self::Avoid { run, sensing, steering } => {
@@ -216,7 +221,8 @@ impl Steering {
     }
 }
 
-/// A well mixed 32-bit function (the finaliser of MurmurHash3): flight code needs a draw, not a generator with state.
+/// A well mixed 32-bit function (the finaliser of MurmurHash3): flight code needs a draw, not a
+/// generator with state.
 pub fn scramble(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x85EB_CA6B);
@@ -233,7 +239,13 @@ mod tests {
         Mission::Avoid {
             run: Trajectory::new(In::new(Vector3::new(0.0, 0.0, -10.0)), 0.0, 7.0, 2.0),
             sensing: Sensing { range_m: 5.0, half_view_rad: 0.2618, speed_min_m_s: 1.0 },
-            steering: Steering { min_rad: 1.92, max_rad: 2.27, ramp_s: 2.0, both_sides: false, seed: 3 },
+            steering: Steering {
+                min_rad: 1.92,
+                max_rad: 2.27,
+                ramp_s: 2.0,
+                both_sides: false,
+                seed: 3,
+            },
         }
     }
 
@@ -274,8 +286,11 @@ mod tests {
     #[test]
     fn numbers_that_are_none_are_refused_by_name() {
         let Mission::Avoid { run, sensing, steering } = avoid() else { unreachable!() };
-        let broken =
-            Mission::Avoid { run: Trajectory::new(run.start, f32::NAN, 7.0, 2.0), sensing, steering };
+        let broken = Mission::Avoid {
+            run: Trajectory::new(run.start, f32::NAN, 7.0, 2.0),
+            sensing,
+            steering,
+        };
         assert!(broken.check().unwrap_err().to_string().starts_with("course_rad = NaN"));
         let hover = Mission::Hover { position: In::new(Vector3::new(0.0, f32::INFINITY, 0.0)) };
         assert!(hover.check().is_err());
@@ -283,7 +298,8 @@ mod tests {
 
     #[test]
     fn steering_angles_fill_their_range_and_both_sides() {
-        let steering = Steering { min_rad: 1.0, max_rad: 2.0, ramp_s: 2.0, both_sides: true, seed: 1 };
+        let steering =
+            Steering { min_rad: 1.0, max_rad: 2.0, ramp_s: 2.0, both_sides: true, seed: 1 };
         let angles: Vec<f32> = (0..1000).map(|n| steering.angle(n)).collect();
         assert!(angles.iter().all(|a| (1.0..=2.0).contains(&a.abs())));
         let right = angles.iter().filter(|a| **a > 0.0).count();

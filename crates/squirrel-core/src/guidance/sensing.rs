@@ -1,8 +1,9 @@
 //! Obstacle sensing: an obstacle counts when it is near and ahead.
 //!
-//! Paper, section V.B: within `R_d`, inside a field of view of +-15 deg about the direction of movement. Distance is
-//! horizontal, to the obstacle's axis. Differs: an obstacle that the vehicle is already avoiding is not seen again until
-//! it has left the range (the paper does not say how it avoids re-triggering).
+//! Paper, section V.B: within `R_d`, inside a field of view of +-15 deg about the direction of
+//! movement. Distance is horizontal, to the obstacle's axis. Differs: an obstacle that the vehicle
+//! is already avoiding is not seen again until it has left the range (the paper does not say how it
+//! avoids re-triggering).
 
 use crate::frames::{In, Ned};
 use crate::vehicle::ParameterError;
@@ -85,12 +86,15 @@ mod tests {
     use super::*;
     use nalgebra::Vector3;
 
-    const SENSING: Sensing = Sensing { range_m: 5.0, half_view_rad: 0.261_799_4, speed_min_m_s: 1.0 };
+    const SENSING: Sensing =
+        Sensing { range_m: 5.0, half_view_rad: 0.261_799_4, speed_min_m_s: 1.0 };
 
     fn see(north_m: f32, east_m: f32, handled: Option<u32>) -> bool {
         let velocity = In::new(Vector3::new(7.0, 0.0, 0.0));
         SENSING
-            .nearest(In::zero(), velocity, &[Obstacle { id: 7, north_m, east_m }], |id| Some(id) == handled)
+            .nearest(In::zero(), velocity, &[Obstacle { id: 7, north_m, east_m }], |id| {
+                Some(id) == handled
+            })
             .is_some()
     }
 
@@ -106,8 +110,10 @@ mod tests {
 
     #[test]
     fn of_two_takes_the_nearer_and_sees_nothing_at_rest() {
-        let two =
-            [Obstacle { id: 1, north_m: 4.0, east_m: 0.0 }, Obstacle { id: 2, north_m: 3.0, east_m: 0.2 }];
+        let two = [
+            Obstacle { id: 1, north_m: 4.0, east_m: 0.0 },
+            Obstacle { id: 2, north_m: 3.0, east_m: 0.2 },
+        ];
         let velocity = In::new(Vector3::new(7.0, 0.0, 0.0));
         assert_eq!(SENSING.nearest(In::zero(), velocity, &two, |_| false).map(|o| o.id), Some(2));
         assert!(SENSING.nearest(In::zero(), In::zero(), &two, |_| false).is_none());

@@ -1,7 +1,9 @@
-//! The paper's reference: a cubic until the target speed is reached, then a straight line at that speed.
+//! The paper's reference: a cubic until the target speed is reached, then a straight line at that
+//! speed.
 //!
-//! Paper, section V.B; the coefficients are not printed. docs/equations.md T20: `s(t) = V (t^2 / T - t^3 / (3 T^2))` for `t < T`,
-//! then `s = V (t - T/3)`: starts at rest, reaches `V` at `T` without a step in acceleration, peak acceleration `2 V / T`.
+//! Paper, section V.B; the coefficients are not printed. docs/equations.md T20:
+//! `s(t) = V (t^2 / T - t^3 / (3 T^2))` for `t < T`, then `s = V (t - T/3)`: starts at rest,
+//! reaches `V` at `T` without a step in acceleration, peak acceleration `2 V / T`.
 
 use crate::command::Reference;
 use crate::frames::{In, Ned};
@@ -75,10 +77,14 @@ mod tests {
     fn starts_at_rest_and_reaches_the_speed_smoothly() {
         let (start, before, after) = (run().at(0.0), run().at(1.9999), run().at(2.0001));
         assert_eq!(start.velocity.vector.norm(), 0.0);
-        assert!((start.acceleration.vector.norm() - 7.0).abs() < 1e-4, "peak acceleration is 2 V / T");
+        assert!(
+            (start.acceleration.vector.norm() - 7.0).abs() < 1e-4,
+            "peak acceleration is 2 V / T"
+        );
         assert!((before.position - after.position).vector.norm() < 2e-3);
         assert!(
-            (after.velocity.vector.norm() - 7.0).abs() < 1e-4 && before.acceleration.vector.norm() < 1e-2
+            (after.velocity.vector.norm() - 7.0).abs() < 1e-4
+                && before.acceleration.vector.norm() < 1e-2
         );
     }
 

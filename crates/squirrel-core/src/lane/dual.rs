@@ -1,7 +1,7 @@
 //! Dual numbers: a value and its derivatives by `N` variables, carried through every operation.
 //!
-//! `(a + a' e) (b + b' e) = a b + (a' b + a b') e`, because `e^2 = 0`. Where a formula selects, the derivative is that of the side
-//! it takes; on a kink it is the derivative from one side.
+//! `(a + a' e) (b + b' e) = a b + (a' b + a b') e`, because `e^2 = 0`. Where a formula selects, the
+//! derivative is that of the side it takes; on a kink it is the derivative from one side.
 
 use super::Lane;
 use core::ops::{Add, Div, Mul, Sub};
@@ -104,7 +104,8 @@ impl<const N: usize> Lane for Dual<N> {
     fn upper(self, bound: Self) -> Self {
         if self.value > bound.value { self } else { bound }
     }
-    /// At zero the slope is infinite and is taken as none: what grows with the root of a square has a kink there.
+    /// At zero the slope is infinite and is taken as none: what grows with the root of a square has
+    /// a kink there.
     #[inline(always)]
     fn root(self) -> Self {
         let root = self.value.root();
@@ -168,8 +169,12 @@ mod tests {
                 ("activation", x.activation(), 1.0 - at.tanh().powi(2)),
             ];
             for (name, dual, slope) in cases {
-                // What an error of 2e-9, that oscillates, has as its slope; the largest at the end of a polynomial's range.
-                assert!((dual.by[0] - slope).abs() < 1e-6 * slope.abs().max(1.0), "{name} at {at}: {dual:?}");
+                // What an error of 2e-9, that oscillates, has as its slope; the largest at the end
+                // of a polynomial's range.
+                assert!(
+                    (dual.by[0] - slope).abs() < 1e-6 * slope.abs().max(1.0),
+                    "{name} at {at}: {dual:?}"
+                );
             }
         }
     }

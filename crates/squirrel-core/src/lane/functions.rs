@@ -1,8 +1,9 @@
-//! Elementary functions as straight lines of basic operations: the same on one number and on registers.
+//! Elementary functions as straight lines of basic operations: the same on one number and on
+//! registers.
 //!
-//! Polynomials are minimax in relative error where no series is named; the tests sweep each function against the standard
-//! library. A [`Dual`](super::Dual) goes through the same lines, which differentiates the polynomial: its derivatives are as exact
-//! as the values, or nearly.
+//! Polynomials are minimax in relative error where no series is named; the tests sweep each
+//! function against the standard library. A [`Dual`](super::Dual) goes through the same lines,
+//! which differentiates the polynomial: its derivatives are as exact as the values, or nearly.
 
 use super::Lane;
 use core::f64::consts::{FRAC_PI_2, LN_2, LOG2_E, SQRT_2, TAU};
@@ -25,7 +26,8 @@ pub fn limit<L: Lane>(x: L, low: L, high: L) -> L {
     x.upper(low).lower(high)
 }
 
-/// `e^x`, relative error below 6e-11 or, in f32, a few units of the last place; of -80 or 80 for what is beyond.
+/// `e^x`, relative error below 6e-11 or, in f32, a few units of the last place; of -80 or 80 for
+/// what is beyond.
 #[inline(always)]
 pub fn exp<L: Lane>(x: L) -> L {
     let x = limit(x, L::of(-80.0), L::of(80.0));
@@ -58,14 +60,16 @@ pub fn ln<L: Lane>(x: L) -> L {
     exponent * L::of(LN_2) + z * sum * L::of(2.0)
 }
 
-/// Hyperbolic tangent, absolute error below 4e-11 or, in f32, 2e-7; exactly 0 at 0, exactly -1 or 1 beyond 20; -1 for NaN.
+/// Hyperbolic tangent, absolute error below 4e-11 or, in f32, 2e-7; exactly 0 at 0, exactly -1 or 1
+/// beyond 20; -1 for NaN.
 #[inline(always)]
 pub fn tanh<L: Lane>(x: L) -> L {
     let limited = limit(x, L::of(-20.0), L::of(20.0));
     L::of(1.0) - L::of(2.0) / (L::of(1.0) + exp(L::of(2.0) * limited))
 }
 
-/// The angle in [0, pi/2] that has this sine and cosine, rad, absolute error below 2e-9 or, in f32, 2e-7; 0 for (0, 0).
+/// The angle in [0, pi/2] that has this sine and cosine, rad, absolute error below 2e-9 or, in f32,
+/// 2e-7; 0 for (0, 0).
 ///
 /// Takes both, because the caller has both: the arc sine alone loses its digits towards 90 deg.
 #[inline(always)]
@@ -87,7 +91,8 @@ pub fn angle<L: Lane>(sine: L, cosine: L) -> L {
 pub fn cbrt<L: Lane>(x: L) -> L {
     let one = L::of(1.0);
     let r = x.inverse_cube_root_guess();
-    // With e = 1 - x r^3, r (1 - e)^(-1/3) would be exact; its series leaves 2e-5, then 4e-14. No division.
+    // With e = 1 - x r^3, r (1 - e)^(-1/3) would be exact; its series leaves 2e-5, then 4e-14. No
+    // division.
     let e = one - x * r * (r * r);
     let r = r + r * e * (L::of(1.0 / 3.0) + e * (L::of(2.0 / 9.0) + e * L::of(14.0 / 81.0)));
     let e = one - x * r * (r * r);
@@ -95,8 +100,8 @@ pub fn cbrt<L: Lane>(x: L) -> L {
     x * r * r
 }
 
-/// An angle in [-pi, pi], rad, as [`wrap_angle`](crate::math::wrap_angle) but for the sign of half a turn; 0 for what is beyond a million
-/// or no number.
+/// An angle in [-pi, pi], rad, as [`wrap_angle`](crate::math::wrap_angle) but for the sign of half
+/// a turn; 0 for what is beyond a million or no number.
 #[inline(always)]
 pub fn wrap<L: Lane>(x: L) -> L {
     let (turns, _) = (x * L::of(1.0 / TAU)).nearest_and_power_of_two();
@@ -113,7 +118,8 @@ pub fn sine_and_cosine_of_half<L: Lane>(angle: L) -> (L, L) {
 #[inline(always)]
 pub fn half_turn_sine_and_cosine<L: Lane>(x: L) -> (L, L) {
     let (t, one) = (x * x, L::of(1.0));
-    // Taylor's series from its far end, to the powers 15 and 14. No loop: what does not unroll it would divide in flight.
+    // Taylor's series from its far end, to the powers 15 and 14. No loop: what does not unroll it
+    // would divide in flight.
     let sine = series(series(series(series(one, t, 210.0), t, 156.0), t, 110.0), t, 72.0);
     let sine = series(series(series(sine, t, 42.0), t, 20.0), t, 6.0);
     let cosine = series(series(series(series(one, t, 182.0), t, 132.0), t, 90.0), t, 56.0);
@@ -129,13 +135,16 @@ fn series<L: Lane>(sum: L, t: L, over: f64) -> L {
 
 /// Where [`net_tanh`] is held constant: the true value is within 5 ulp of 1 from here on.
 const SATURATION: f32 = 7.9;
-/// Numerator over x, powers of x^2 upwards; minimax in relative error on [0, 7.9], last bits chosen by the error in `f32`.
+/// Numerator over x, powers of x^2 upwards; minimax in relative error on [0, 7.9], last bits chosen
+/// by the error in `f32`.
 const NUMERATOR: [f32; 5] = [1.966_426, 0.264_496_68, 7.037_843e-3, 4.330_742e-5, 3.033_843_4e-8];
 /// Denominator, powers of x^2 upwards. All coefficients are positive: no cancellation.
-const DENOMINATOR: [f32; 5] = [1.966_426, 0.919_971_9, 5.150_518_2e-2, 6.732_387_7e-4, 1.690_905_6e-6];
+const DENOMINATOR: [f32; 5] =
+    [1.966_426, 0.919_971_9, 5.150_518_2e-2, 6.732_387_7e-4, 1.690_905_6e-6];
 
-/// The hyperbolic tangent of the networks, a quotient of polynomials: within 6 ulp of the true value for every `f32`, odd, never
-/// beyond 1. -tanh(7.9) for NaN, so that nothing that comes in can make a hidden state NaN.
+/// The hyperbolic tangent of the networks, a quotient of polynomials: within 6 ulp of the true
+/// value for every `f32`, odd, never beyond 1. -tanh(7.9) for NaN, so that nothing that comes in
+/// can make a hidden state NaN.
 #[inline(always)]
 #[must_use]
 pub fn net_tanh<L: Lane<Element = f32>>(x: L) -> L {
@@ -210,7 +219,10 @@ mod tests {
         let pair = |a: Pair| angle(Portable(a.0.map(f64::sin)), Portable(a.0.map(f64::cos)));
         let e = worst(2_000_000, |u| u * FRAC_PI_2, (one, pair), |a, y| (y - a).abs());
         assert!(e < 2e-9, "{e:e}");
-        assert_eq!([angle(0.0, 0.0), angle(1.0, 0.0), angle(1e-200, 1.0)], [0.0, FRAC_PI_2, 1e-200]);
+        assert_eq!(
+            [angle(0.0, 0.0), angle(1.0, 0.0), angle(1e-200, 1.0)],
+            [0.0, FRAC_PI_2, 1e-200]
+        );
     }
 
     #[test]
@@ -226,8 +238,10 @@ mod tests {
         let sine = |x: f64, y: f64| (y - x.sin()).abs();
         let cosine = |x: f64, y: f64| (y - x.cos()).abs();
         let by = |u: f64| (u - 0.5) * core::f64::consts::PI;
-        let first = (|x: f64| half_turn_sine_and_cosine(x).0, |x: Pair| half_turn_sine_and_cosine(x).0);
-        let second = (|x: f64| half_turn_sine_and_cosine(x).1, |x: Pair| half_turn_sine_and_cosine(x).1);
+        let first =
+            (|x: f64| half_turn_sine_and_cosine(x).0, |x: Pair| half_turn_sine_and_cosine(x).0);
+        let second =
+            (|x: f64| half_turn_sine_and_cosine(x).1, |x: Pair| half_turn_sine_and_cosine(x).1);
         assert!(worst(1_000_000, by, first, sine) < 7e-11);
         assert!(worst(1_000_000, by, second, cosine) < 7e-11);
     }

@@ -1,11 +1,13 @@
 //! The one scalar of the physics and of the networks.
 //!
-//! A formula is written once over [`Lane`]. In flight code and in the simulator a lane is one `f32` or `f64`; in a batch and in
-//! training it is a register ([`Register`]) that holds one number of each of several vehicles, or of several windows; in a
-//! sensitivity it is a [`Dual`]. Only basic operations are used, which IEEE 754 rounds in one way, and no fused multiply-add, so
-//! that every element of a register has the bits that one number has.
+//! A formula is written once over [`Lane`]. In flight code and in the simulator a lane is one `f32`
+//! or `f64`; in a batch and in training it is a register ([`Register`]) that holds one number of
+//! each of several vehicles, or of several windows; in a sensitivity it is a [`Dual`]. Only basic
+//! operations are used, which IEEE 754 rounds in one way, and no fused multiply-add, so that every
+//! element of a register has the bits that one number has.
 //!
-//! There is no comparison, because elements of a register may differ in it: [`Lane::where_positive`] selects.
+//! There is no comparison, because elements of a register may differ in it:
+//! [`Lane::where_positive`] selects.
 //!
 //! - [`functions`]: `exp`, `ln`, `tanh`, `cbrt` and others as straight lines of these operations
 //! - [`vector`]: vectors and matrices of lanes as plain arrays
@@ -27,7 +29,8 @@ pub use real::{Real, lower, real, sqrt, upper};
 
 use core::ops::{Add, Div, Mul, Sub};
 
-/// Numbers that lie side by side in memory. Fixed, because the order of a sum over them decides its bits.
+/// Numbers that lie side by side in memory. Fixed, because the order of a sum over them decides its
+/// bits.
 pub const BLOCK: usize = 16;
 
 /// One number of each of a block.
@@ -55,8 +58,8 @@ pub trait Lane:
     /// `then` where a number is above zero, `otherwise` where it is not or is NaN.
     #[must_use]
     fn where_positive(self, then: Self, otherwise: Self) -> Self;
-    /// Whether any number in it is above zero. For work that can be left out where none is; what is left out must be selected by
-    /// the same numbers, so that no number depends on those beside it.
+    /// Whether any number in it is above zero. For work that can be left out where none is; what is
+    /// left out must be selected by the same numbers, so that no number depends on those beside it.
     fn any_positive(self) -> bool;
     /// The nearest whole number `n`, and `2^n`; for sizes up to 120.
     #[must_use]
@@ -64,7 +67,8 @@ pub trait Lane:
     /// Of a positive normal number `m 2^e` with `m` in `[1, 2)`: `m` and `e`.
     #[must_use]
     fn mantissa_and_exponent(self) -> (Self, Self);
-    /// A third of the exponent and the leading bits of a positive normal number: its power -1/3 to 4 %.
+    /// A third of the exponent and the leading bits of a positive normal number: its power -1/3 to
+    /// 4 %.
     #[must_use]
     fn inverse_cube_root_guess(self) -> Self;
     /// What a neuron makes of its sum: [`net_tanh`], and in `f64` the exact one.
@@ -119,7 +123,8 @@ macro_rules! one_number {
             }
             #[inline(always)]
             fn root(self) -> Self {
-                // The instruction, that registers have too; `libm`'s, which nalgebra takes, is a call.
+                // The instruction, that registers have too; `libm`'s, which nalgebra takes, is a
+                // call.
                 #[cfg(any(test, feature = "std"))]
                 {
                     $scalar::sqrt(self)
@@ -138,8 +143,10 @@ macro_rules! one_number {
             #[inline(always)]
             fn nearest_and_power_of_two(self) -> (Self, Self) {
                 let rounded = self + $round;
-                // The whole number is in the low bits; shifted into the exponent, it is a power of two.
-                let power = (rounded.to_bits() << $mantissa).wrapping_add((1.0 as $scalar).to_bits());
+                // The whole number is in the low bits; shifted into the exponent, it is a power of
+                // two.
+                let power =
+                    (rounded.to_bits() << $mantissa).wrapping_add((1.0 as $scalar).to_bits());
                 (rounded - $round, Self::from_bits(power))
             }
             #[inline(always)]
@@ -176,7 +183,8 @@ macro_rules! one_number {
     };
 }
 one_number!(f32, ROUND_F32, 23, 127.0, net_tanh, |x: f32| {
-    // By numbers instead of integers: registers have no product of 32 bits by 32 bits to shift down.
+    // By numbers instead of integers: registers have no product of 32 bits by 32 bits to shift
+    // down.
     f32::from_bits((THIRDS_F32 - x.to_bits().cast_signed() as f32 * THIRD_F32) as i32 as u32)
 });
 one_number!(f64, ROUND_F64, 52, 1023.0, libm::tanh, |x: f64| {

@@ -2,10 +2,11 @@
 
 use super::{Register, Row};
 
-/// A structure of numbers of a vehicle: once as they are, once as [rows](Row) of a block, once as registers.
+/// A structure of numbers of a vehicle: once as they are, once as [rows](Row) of a block, once as
+/// registers.
 ///
-/// `[n]` behind a name makes it an array of `n` numbers, `[n] [m]` one of `n` arrays of `m`. `<ROTORS>` behind the structure's name is a
-/// length that its user chooses.
+/// `[n]` behind a name makes it an array of `n` numbers, `[n] [m]` one of `n` arrays of `m`.
+/// `<ROTORS>` behind the structure's name is a length that its user chooses.
 #[macro_export]
 macro_rules! numbers {
     ($(#[$about:meta])* $name:ident $(<$rotors:ident>)? {
@@ -130,7 +131,11 @@ pub fn load<L: Register, const N: usize>(rows: &[Row<L::Element>; N], start: usi
 
 /// Registers to columns `start` and on of rows.
 #[inline(always)]
-pub fn store<L: Register, const N: usize>(registers: &[L; N], rows: &mut [Row<L::Element>; N], start: usize) {
+pub fn store<L: Register, const N: usize>(
+    registers: &[L; N],
+    rows: &mut [Row<L::Element>; N],
+    start: usize,
+) {
     for n in 0..N {
         registers[n].store(&mut rows[n][start..]);
     }

@@ -3,8 +3,8 @@
 use super::{Lane, Register, net_tanh};
 use core::ops::{Add, Div, Mul, Sub};
 
-/// 128 bits of numbers: four `f32` or two `f64`. Also the left and the right wing of one vehicle, which then share each
-/// instruction.
+/// 128 bits of numbers: four `f32` or two `f64`. Also the left and the right wing of one vehicle,
+/// which then share each instruction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Portable<S, const N: usize>(pub [S; N]);
 

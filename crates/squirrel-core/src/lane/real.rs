@@ -3,7 +3,8 @@
 use super::Lane;
 use nalgebra::RealField;
 
-/// One number: `f32` on the target, `f64` in the simulator. What formulas are written over is [`Lane`].
+/// One number: `f32` on the target, `f64` in the simulator. What formulas are written over is
+/// [`Lane`].
 pub trait Real: RealField + Copy + Lane<Element = Self> {}
 impl<T: RealField + Copy + Lane<Element = T>> Real for T {}
 
@@ -25,8 +26,8 @@ pub fn upper<T: PartialOrd>(a: T, b: T) -> T {
     if a > b { a } else { b }
 }
 
-/// The square root as IEEE 754 rounds it, as `libm` gives it too. Where an f32 has an instruction for it that the standard library
-/// keeps for itself, that instruction.
+/// The square root as IEEE 754 rounds it, as `libm` gives it too. Where an f32 has an instruction
+/// for it that the standard library keeps for itself, that instruction.
 #[inline(always)]
 pub fn sqrt<T: Real>(x: T) -> T {
     #[cfg(all(target_arch = "arm", feature = "vfp"))]

@@ -1,7 +1,8 @@
 //! Vectors of three lanes, matrices by columns and quaternions `[w, x, y, z]`, as plain arrays.
 //!
-//! The same sums in the same order as nalgebra's, which would not be compiled for the registers that it is called on: code must
-//! end up in the function that was compiled for them, so there are no closures and no iterators in here.
+//! The same sums in the same order as nalgebra's, which would not be compiled for the registers
+//! that it is called on: code must end up in the function that was compiled for them, so there are
+//! no closures and no iterators in here.
 
 use super::Lane;
 use super::functions::{angle, sign, size};

@@ -1,11 +1,13 @@
-//! The recurrent network of the paper: two layers of tanh neurons that see their own last state, and a linear output.
+//! The recurrent network of the paper: two layers of tanh neurons that see their own last state,
+//! and a linear output.
 //!
-//! `h1[t] = tanh(W1x x[t] + W1h h1[t-1] + b1)`, `h2[t] = tanh(W2x h1[t] + W2h h2[t-1] + b2)`, `y = Wo h2[t] + bo`, `h[-1] = 0`
-//! (docs/equations.md E.2).
+//! `h1[t] = tanh(W1x x[t] + W1h h1[t-1] + b1)`, `h2[t] = tanh(W2x h1[t] + W2h h2[t-1] + b2)`,
+//! `y = Wo h2[t] + bo`, `h[-1] = 0` (docs/equations.md E.2).
 //!
-//! Weights are stored by input: `weight[i][o]` leads from input `i` to output `o`. So the eight sums of a layer grow side by
-//! side, which is what a compiler puts into vector registers. A sum starts at the bias and takes inputs in order, then
-//! hidden states in order; this order is part of the meaning, because the bits depend on it.
+//! Weights are stored by input: `weight[i][o]` leads from input `i` to output `o`. So the eight
+//! sums of a layer grow side by side, which is what a compiler puts into vector registers. A sum
+//! starts at the bias and takes inputs in order, then hidden states in order; this order is part of
+//! the meaning, because the bits depend on it.
 
 use crate::lane::Lane;
 
@@ -31,7 +33,8 @@ pub struct Recurrent<const IN: usize, const OUT: usize, T = f32> {
 
 /// Two recurrent layers and a linear output.
 ///
-/// `T` is `f32` for weights that fly. Training also keeps gradients in this shape, in other scalars and in registers.
+/// `T` is `f32` for weights that fly. Training also keeps gradients in this shape, in other scalars
+/// and in registers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Elman<const IN: usize, const HIDDEN: usize, const OUT: usize, T = f32> {
     /// The layer that sees the input.
@@ -88,7 +91,8 @@ fn start<const OUT: usize, L: Lane>(bias: &[L::Element; OUT]) -> [L; OUT] {
     sums
 }
 
-/// The activation of every element. A loop, because the closure of `map` is not inlined into vector code.
+/// The activation of every element. A loop, because the closure of `map` is not inlined into vector
+/// code.
 #[inline(always)]
 fn activate<const N: usize, L: Lane>(mut sums: [L; N]) -> [L; N] {
     for o in 0..N {
@@ -142,8 +146,8 @@ impl<const IN: usize, const HIDDEN: usize, const OUT: usize, T: Copy> Elman<IN, 
         }
     }
 
-    /// The parameters tensor by tensor: input, hidden, bias of the first layer, of the second, weight and bias of the output.
-    /// Matrices row by row, a row an input.
+    /// The parameters tensor by tensor: input, hidden, bias of the first layer, of the second,
+    /// weight and bias of the output. Matrices row by row, a row an input.
     pub const fn tensors(&self) -> [&[T]; 8] {
         let Self { first, second, output } = self;
         [
@@ -225,7 +229,9 @@ mod tests {
         for x in INPUTS {
             let old = (h1, h2);
             for o in 0..3 {
-                let sum = |bias: f32, terms: &[(f32, f32)]| terms.iter().fold(bias, |s, (w, v)| s + w * v);
+                let sum = |bias: f32, terms: &[(f32, f32)]| {
+                    terms.iter().fold(bias, |s, (w, v)| s + w * v)
+                };
                 let layer = &NET.first;
                 let mut terms = vec![(layer.input[0][o], x[0]), (layer.input[1][o], x[1])];
                 terms.extend((0..3).map(|i| (layer.hidden[i][o], old.0[i])));

@@ -1,14 +1,17 @@
 //! From the two outputs of the paper's network to a force on the wing.
 //!
-//! The network says by how much the wing's angle of attack seems larger than it is (`alpha_w`) and how much stronger the
-//! flow acts (`gamma`). The paper turns the normal `n` by `alpha_w` towards the motion, `n_f = cos(alpha_w) n + sin(alpha_w) e_t`, and
-//! takes the flat plate's force along it: `f = -rho A |v|^2 sin(alpha_est) gamma n_f`, `alpha_est = clip(alpha + alpha_w, -90..90 deg)`.
-//! Differs from print (docs/equations.md T4, T5): the force opposes the motion; where `alpha_est` is clipped the normal
-//! is turned by what is left of `alpha_w`, so that it stays a unit vector; `e_t` fades where there is no flow along the wing.
+//! The network says by how much the wing's angle of attack seems larger than it is (`alpha_w`) and
+//! how much stronger the flow acts (`gamma`). The paper turns the normal `n` by `alpha_w` towards
+//! the motion, `n_f = cos(alpha_w) n + sin(alpha_w) e_t`, and takes the flat plate's force along
+//! it: `f = -rho A |v|^2 sin(alpha_est) gamma n_f`,
+//! `alpha_est = clip(alpha + alpha_w, -90..90 deg)`. Differs from print (docs/equations.md T4, T5):
+//! the force opposes the motion; where `alpha_est` is clipped the normal is turned by what is left
+//! of `alpha_w`, so that it stays a unit vector; `e_t` fades where there is no flow along the wing.
 //!
-//! `sin(alpha)` and `cos(alpha)` are ratios of velocities, so neither an arc sine nor the printed inverse of a matrix is
-//! needed: clipped means `cos(alpha + alpha_w) < 0`, and then `n_f` lies along the motion. Where `alpha_w = 0` and
-//! `gamma = 1` what remains is, bit for bit, [`flat_plate::force`].
+//! `sin(alpha)` and `cos(alpha)` are ratios of velocities, so neither an arc sine nor the printed
+//! inverse of a matrix is needed: clipped means `cos(alpha + alpha_w) < 0`, and then `n_f` lies
+//! along the motion. Where `alpha_w = 0` and `gamma = 1` what remains is, bit for bit,
+//! [`flat_plate::force`].
 
 use crate::aero::flat_plate;
 use crate::frames::{Body, In};
@@ -22,8 +25,8 @@ const SPEED_HIGHEST_M_S: f64 = 1e6;
 /// Below this speed along the wing, m/s, its direction fades.
 pub const IN_PLANE_LOWEST_M_S: f64 = 0.05;
 
-/// Motion through the air as the wing sees it: along its normal, and along itself. All zero outside of 0.3 m/s to 1e6 m/s and
-/// for what is not a number.
+/// Motion through the air as the wing sees it: along its normal, and along itself. All zero outside
+/// of 0.3 m/s to 1e6 m/s and for what is not a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flow<T> {
     /// `|v|`, m/s.
@@ -32,8 +35,8 @@ pub struct Flow<T> {
     pub normal: T,
     /// Along the wing, m/s, not negative.
     pub in_plane: T,
-    /// Body x and y components of `e_t`, the direction of motion along the wing: a unit vector where `in_plane` is at least
-    /// 0.05 m/s, shorter below.
+    /// Body x and y components of `e_t`, the direction of motion along the wing: a unit vector
+    /// where `in_plane` is at least 0.05 m/s, shorter below.
     pub direction: [T; 2],
 }
 
@@ -76,7 +79,8 @@ pub struct Correction<T> {
 }
 
 impl<T: Real> Correction<T> {
-    /// `alpha_w = pi/2 tanh(y0)`, `gamma = softplus(y1)`, so that both stay in their range whatever the network says.
+    /// `alpha_w = pi/2 tanh(y0)`, `gamma = softplus(y1)`, so that both stay in their range whatever
+    /// the network says.
     pub fn from_outputs([y0, y1]: [T; 2]) -> Self {
         let softplus = upper(y1, real(0.0)) + (-y1.abs()).exp().ln_1p();
         Self { alpha_w_rad: T::frac_pi_2() * y0.activation(), gamma: softplus }
@@ -148,7 +152,8 @@ mod tests {
         speeds.into_iter().flat_map(|speed| {
             (-12..=12).flat_map(move |elevation| {
                 (0..7).map(move |heading| {
-                    let (elevation, heading) = (f64::from(elevation) * PI / 24.0, f64::from(heading));
+                    let (elevation, heading) =
+                        (f64::from(elevation) * PI / 24.0, f64::from(heading));
                     let along = elevation.cos() * speed;
                     In::new(Vector3::new(
                         along * heading.cos(),
@@ -190,7 +195,10 @@ mod tests {
                 let length = turned.body(&flow).vector.norm();
                 assert!(length <= 1.0 + 1e-14, "{length} for {velocity:?}, {alpha_w_rad}");
                 if flow.in_plane >= IN_PLANE_LOWEST_M_S {
-                    assert!((length - 1.0).abs() < 1e-14, "{length} for {velocity:?}, {alpha_w_rad}");
+                    assert!(
+                        (length - 1.0).abs() < 1e-14,
+                        "{length} for {velocity:?}, {alpha_w_rad}"
+                    );
                     if turned.clipped { clipped += 1 } else { free += 1 }
                 }
             }
@@ -198,7 +206,8 @@ mod tests {
         assert!(clipped > 1000 && free > 1000, "{clipped} {free}");
     }
 
-    /// The printed `n_f = M^-1 b`: `n_f . v = |v| sin(alpha_est)` and `n_f . n = cos(alpha_w)`, in the plane of both.
+    /// The printed `n_f = M^-1 b`: `n_f . v = |v| sin(alpha_est)` and `n_f . n = cos(alpha_w)`, in
+    /// the plane of both.
     #[test]
     fn unclipped_it_solves_the_printed_equations() {
         for velocity in velocities().filter(|v| v.vector.xy().norm() > 0.3) {

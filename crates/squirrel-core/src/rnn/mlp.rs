@@ -24,8 +24,8 @@ impl<const IN: usize, const HIDDEN: usize, const OUT: usize, T: Copy> Mlp<IN, HI
         }
     }
 
-    /// The parameters tensor by tensor: weight and bias of the first layer, of the second, of the output. Matrices row by row,
-    /// a row an input.
+    /// The parameters tensor by tensor: weight and bias of the first layer, of the second, of the
+    /// output. Matrices row by row, a row an input.
     pub const fn tensors(&self) -> [&[T]; 6] {
         let Self { first, second, output } = self;
         [
@@ -71,9 +71,16 @@ mod tests {
             second: Dense { weight: [[-0.6, 0.4], [0.9, 0.8]], bias: [0.2, 0.05] },
             output: Dense { weight: [[2.0, -1.0], [0.5, 1.5]], bias: [-0.1, 0.6] },
         };
-        let recurrent =
-            |layer: Dense<2, 2>| Recurrent { input: layer.weight, hidden: [[5.0; 2]; 2], bias: layer.bias };
-        let elman = Elman { first: recurrent(MLP.first), second: recurrent(MLP.second), output: MLP.output };
+        let recurrent = |layer: Dense<2, 2>| Recurrent {
+            input: layer.weight,
+            hidden: [[5.0; 2]; 2],
+            bias: layer.bias,
+        };
+        let elman = Elman {
+            first: recurrent(MLP.first),
+            second: recurrent(MLP.second),
+            output: MLP.output,
+        };
         let inputs = [0.4_f32, -1.3];
         assert_eq!(MLP.evaluate(&inputs), elman.window(&[inputs]));
         assert_ne!(MLP.evaluate(&inputs), MLP.evaluate(&[0.5, -1.3]));

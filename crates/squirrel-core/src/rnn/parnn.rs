@@ -1,4 +1,5 @@
-//! The paper's force model: a recurrent network that sees speed and angle of attack corrects the flat plate.
+//! The paper's force model: a recurrent network that sees speed and angle of attack corrects the
+//! flat plate.
 
 use super::elman::Elman;
 use super::head::{Correction, Flow, TurnedNormal, force};
@@ -20,7 +21,8 @@ pub const SPEED_SCALE_M_S: f32 = 10.0;
 
 /// What the network sees of a moment: `|v| / 10 m/s` and the angle of attack in rad.
 ///
-/// * `velocity` - velocity relative to the air, m/s; on a vehicle without airspeed sensor that over ground
+/// * `velocity` - velocity relative to the air, m/s; on a vehicle without airspeed sensor that over
+///   ground
 pub fn features(velocity: In<Body, f32>) -> [f32; INPUTS] {
     [velocity.vector.norm() / SPEED_SCALE_M_S, angle_of_attack(velocity)]
 }
@@ -98,12 +100,17 @@ impl Parnn {
             return Err(ParameterError::of("parnn.net", *weight, "every weight must be finite"));
         }
         positive("parnn.area_m2", self.area_m2)?;
-        for (field, [low, high]) in
-            [("domain.speed_m_s", self.domain.speed_m_s), ("domain.alpha_rad", self.domain.alpha_rad)]
-        {
+        for (field, [low, high]) in [
+            ("domain.speed_m_s", self.domain.speed_m_s),
+            ("domain.alpha_rad", self.domain.alpha_rad),
+        ] {
             if !(low.is_finite() && high.is_finite() && low <= high) {
                 let wrong = if low.is_finite() { high } else { low };
-                return Err(ParameterError::of(field, wrong, "must be two finite numbers, the lower first"));
+                return Err(ParameterError::of(
+                    field,
+                    wrong,
+                    "must be two finite numbers, the lower first",
+                ));
             }
         }
         Ok(())
@@ -111,13 +118,15 @@ impl Parnn {
 
     /// The force at the last row of a window.
     ///
-    /// * `rows` - [`features`], oldest first: [`WINDOW`] of them, or as many as the network was trained on
+    /// * `rows` - [`features`], oldest first: [`WINDOW`] of them, or as many as the network was
+    ///   trained on
     /// * `velocity` - at the last row, as for [`features`]
     pub fn estimate(&self, rows: &[[f32; INPUTS]], velocity: In<Body, f32>) -> Estimate {
         let correction = Correction::from_outputs(self.net.window(rows));
         let flow = Flow::new(velocity);
         let force = force(&flow, correction, self.area_m2);
-        // Only weights of absurd size come here; the caller must get a force that can be subtracted all the same.
+        // Only weights of absurd size come here; the caller must get a force that can be subtracted
+        // all the same.
         let force = if all_finite(&force.vector) { force } else { In::zero() };
         Estimate {
             force,
@@ -156,7 +165,9 @@ mod tests {
 
     #[test]
     fn a_standing_vehicle_has_no_wing_force() {
-        for velocity in [[0.0; 3], [0.1, 0.2, -0.1], [f32::NAN, 1.0, 1.0], [f32::INFINITY, 0.0, 0.0]] {
+        for velocity in
+            [[0.0; 3], [0.1, 0.2, -0.1], [f32::NAN, 1.0, 1.0], [f32::INFINITY, 0.0, 0.0]]
+        {
             let velocity = In::new(Vector3::from(velocity));
             let estimate = silent().estimate(&[features(velocity); WINDOW], velocity);
             assert_eq!(estimate.force.vector.norm(), 0.0, "{velocity:?}");
@@ -184,7 +195,9 @@ mod tests {
         assert_eq!(error, "parnn.net = NaN: every weight must be finite");
         assert!(says(&|p| p.area_m2 = 0.0).starts_with("parnn.area_m2 = 0: "));
         assert!(says(&|p| p.domain.speed_m_s = [2.0, 1.0]).starts_with("domain.speed_m_s = 1: "));
-        assert!(says(&|p| p.domain.alpha_rad[0] = f32::NAN).starts_with("domain.alpha_rad = NaN: "));
+        assert!(
+            says(&|p| p.domain.alpha_rad[0] = f32::NAN).starts_with("domain.alpha_rad = NaN: ")
+        );
     }
 
     #[test]

@@ -1,9 +1,10 @@
 //! Failsafe: what flies when a sensor can no longer be believed.
 //!
-//! A sensor is *lost* when nothing valid came from it for longer than its limit; what is not finite counts as nothing. It is
-//! *stuck* when it repeats itself bit for bit although it would have had to change: a gyroscope that turns, an attitude while the
-//! gyroscope turns, a position with a speed, an altitude with a vertical speed. (A sensor that hangs on a reading of perfect
-//! rest is not noticed.) A sensor that never spoke is not lost: the vehicle has not taken off with it.
+//! A sensor is *lost* when nothing valid came from it for longer than its limit; what is not finite
+//! counts as nothing. It is *stuck* when it repeats itself bit for bit although it would have had
+//! to change: a gyroscope that turns, an attitude while the gyroscope turns, a position with a
+//! speed, an altitude with a vertical speed. (A sensor that hangs on a reading of perfect rest is
+//! not noticed.) A sensor that never spoke is not lost: the vehicle has not taken off with it.
 //!
 //! | what is gone | reaction |
 //! |---|---|
@@ -12,10 +13,12 @@
 //! | altitude | none; the height is that of the satellite fix, and the reason is reported |
 //! | commands from outside | the outer loop flies again, without any memory; the reason is reported |
 //!
-//! Where the flight code estimates, position and velocity are gone once no fix was believed for `LOST_S` of
-//! [`crate::estimate::navigator`], and the inertial units repeat themselves where all of them do.
+//! Where the flight code estimates, position and velocity are gone once no fix was believed for
+//! `LOST_S` of [`crate::estimate::navigator`], and the inertial units repeat themselves where all
+//! of them do.
 //!
-//! When all is well again for [`RECOVERY_US`], control resumes without any memory of the time before.
+//! When all is well again for [`RECOVERY_US`], control resumes without any memory of the time
+//! before.
 
 use super::Known;
 use super::merge::{Heard, Merged};
@@ -26,7 +29,8 @@ use nalgebra::Vector3;
 pub const IMU_LIMIT_US: u32 = 100_000;
 /// The attitude is lost after this time, us.
 pub const ATTITUDE_LIMIT_US: u32 = 250_000;
-/// Position and velocity are lost after this time, us: a receiver at 1 Hz may be late by half a second.
+/// Position and velocity are lost after this time, us: a receiver at 1 Hz may be late by half a
+/// second.
 pub const GNSS_LIMIT_US: u32 = 1_500_000;
 /// The altitude is lost after this time, us.
 pub const ALTITUDE_LIMIT_US: u32 = 1_000_000;
@@ -34,7 +38,8 @@ pub const ALTITUDE_LIMIT_US: u32 = 1_000_000;
 pub const COMMAND_LIMIT_US: u32 = 500_000;
 /// A sensor must be well for this time before it is believed again, us.
 pub const RECOVERY_US: u32 = 200_000;
-/// Thrust over weight of [`FailsafeMode::Level`] where nobody knows how fast it sinks: slowly at first.
+/// Thrust over weight of [`FailsafeMode::Level`] where nobody knows how fast it sinks: slowly at
+/// first.
 pub const LEVEL_THRUST_SHARE: f32 = 0.95;
 /// How fast it comes down where somebody does, m/s.
 pub const DESCENT_M_S: f32 = 1.0;
@@ -48,7 +53,8 @@ pub(super) fn descending(descent_m_s: f32) -> f32 {
     limit(share, DESCENT_SHARES[0], DESCENT_SHARES[1])
 }
 
-/// Repeated readings of the inertial unit, where it says that the vehicle turns faster than [`TURNING_RAD_S`].
+/// Repeated readings of the inertial unit, where it says that the vehicle turns faster than
+/// [`TURNING_RAD_S`].
 const IMU_REPEATS: u16 = 100;
 const TURNING_RAD_S: f32 = 1e-3;
 /// Repeated attitudes, where the gyroscope turned further than [`TURNED_RAD`] meanwhile.
@@ -164,7 +170,8 @@ impl Watch {
     }
 }
 
-/// What the flight code's own estimate says, where it has one: the sensors behind it can no longer be seen from here.
+/// What the flight code's own estimate says, where it has one: the sensors behind it can no longer
+/// be seen from here.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Estimated {
     /// Nobody knows any more where the vehicle is.
@@ -223,17 +230,24 @@ impl FailsafeState {
         let dt_s = elapsed_us.min(IMU_LIMIT_US) as f32 * 1e-6;
         let omega = known.imu.map_or(Vector3::zeros(), |imu| imu.omega.vector);
         let climb_m_s = known.gnss.map_or(0.0, |gnss| -gnss.velocity.vector.z);
-        self.turned_rad =
-            if self.attitude.repeats == 0 { Vector3::zeros() } else { self.turned_rad + omega * dt_s };
-        self.climbed_m = if self.altitude.repeats == 0 { 0.0 } else { self.climbed_m + climb_m_s * dt_s };
+        self.turned_rad = if self.attitude.repeats == 0 {
+            Vector3::zeros()
+        } else {
+            self.turned_rad + omega * dt_s
+        };
+        self.climbed_m =
+            if self.altitude.repeats == 0 { 0.0 } else { self.climbed_m + climb_m_s * dt_s };
         self.attitude_hangs = self.attitude.repeats >= ATTITUDE_REPEATS
             && (self.attitude_hangs || self.turned_rad.norm_squared() > TURNED_RAD * TURNED_RAD);
         self.altitude_hangs = self.altitude.repeats >= ALTITUDE_REPEATS
             && (self.altitude_hangs || self.climbed_m.abs() > CLIMBED_M);
 
         let judged = self.judge(known, estimate);
-        self.better_us =
-            if judged.mode < self.active.mode { self.better_us.saturating_add(elapsed_us) } else { 0 };
+        self.better_us = if judged.mode < self.active.mode {
+            self.better_us.saturating_add(elapsed_us)
+        } else {
+            0
+        };
         if judged.mode >= self.active.mode || self.better_us >= RECOVERY_US {
             self.active = judged;
         }
@@ -254,7 +268,9 @@ impl FailsafeState {
                 turning(&imu.omega.vector) || imu.specific_force.vector == Vector3::zeros()
             });
         let gnss_stuck = self.gnss.repeats >= GNSS_REPEATS
-            && known.gnss.is_some_and(|g| g.velocity.vector.norm_squared() > MOVING_M_S * MOVING_M_S);
+            && known
+                .gnss
+                .is_some_and(|g| g.velocity.vector.norm_squared() > MOVING_M_S * MOVING_M_S);
         let (mode, reason) = if self.standing >= CLOCK_REPEATS {
             (M::Cut, R::ClockStuck)
         } else if self.imu.is_lost(IMU_LIMIT_US) {
@@ -326,17 +342,28 @@ mod tests {
     }
 
     /// Reached after `delay` steps, and not before; kept to the end of the fault; gone at the end.
-    fn expect(fault: impl Fn(&mut SensorFrame), mode: FailsafeMode, reason: FailsafeReason, delay: u64) {
+    fn expect(
+        fault: impl Fn(&mut SensorFrame),
+        mode: FailsafeMode,
+        reason: FailsafeReason,
+        delay: u64,
+    ) {
         let all = flown(fault);
         let first = all.iter().position(|(_, f)| *f != Failsafe::default()).unwrap() as u64;
-        assert!((600 + delay - 35..=600 + delay + 35).contains(&first), "{reason:?} after {}", first - 600);
+        assert!(
+            (600 + delay - 35..=600 + delay + 35).contains(&first),
+            "{reason:?} after {}",
+            first - 600
+        );
         for (output, failsafe) in &all[first as usize..1500] {
             assert_eq!((failsafe.mode, failsafe.reason), (mode, reason));
             match mode {
                 FailsafeMode::Off => assert!(output.inner.is_some()),
                 FailsafeMode::Level => {
                     let thrust = output.inner.unwrap().demand.thrust_n;
-                    assert!((thrust / stack().vehicle().weight_n() - LEVEL_THRUST_SHARE).abs() < 1e-6);
+                    assert!(
+                        (thrust / stack().vehicle().weight_n() - LEVEL_THRUST_SHARE).abs() < 1e-6
+                    );
                     assert!(output.outer.is_none() && output.wing_command == [0.0; 2]);
                 }
                 FailsafeMode::Cut => {
@@ -377,7 +404,12 @@ mod tests {
         expect(|f| f.attitude = last.attitude, M::Cut, R::AttitudeStuck, 60);
         let fix = moving(570).gnss;
         expect(|f| f.gnss = f.gnss.and(fix), M::Level, R::GnssStuck, 150);
-        expect(|f| f.altitude_m = f.altitude_m.and(moving(594).altitude_m), M::Off, R::AltitudeLost, 156);
+        expect(
+            |f| f.altitude_m = f.altitude_m.and(moving(594).altitude_m),
+            M::Off,
+            R::AltitudeLost,
+            156,
+        );
         expect(|f| f.time_us = 599 * STEP_US, M::Cut, R::ClockStuck, 15);
     }
 

@@ -1,4 +1,5 @@
-//! Sensors that say anything: every filter in the stack, frames that are noise, nonsense, late, repeated or missing.
+//! Sensors that say anything: every filter in the stack, frames that are noise, nonsense, late,
+//! repeated or missing.
 //!
 //! Ten million frames in a release build, two hundred thousand in another; `FUZZ_FRAMES=n` flies n.
 
@@ -15,7 +16,8 @@ struct Draw(u64);
 
 impl Draw {
     fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         self.0 ^ (self.0 >> 29)
     }
 
@@ -68,7 +70,8 @@ impl Draw {
             Gnss { position, velocity }
         });
         frame.altitude_m = self.one_in(6).then(|| self.number(far));
-        frame.magnetic = self.one_in(6).then(|| In::new(self.vector(if far > 10.0 { far } else { 50.0 })));
+        frame.magnetic =
+            self.one_in(6).then(|| In::new(self.vector(if far > 10.0 { far } else { 50.0 })));
         if self.one_in(40) {
             (frame.imu, frame.imu_2) = (None, None);
         }
@@ -104,15 +107,24 @@ fn fuzzed_sensors_never_reach_the_rotors() {
             let frame = draw.frame(time_us, &last);
             let output = stack.step(&mut state, &frame);
             for command in &output.rotor_command[..4] {
-                assert!((0.0..=1.0).contains(command), "filter {which}, frame {k}: {frame:?}: {output:?}");
+                assert!(
+                    (0.0..=1.0).contains(command),
+                    "filter {which}, frame {k}: {frame:?}: {output:?}"
+                );
             }
-            assert!(output.wing_command.iter().all(|w| (0.0..=1.0).contains(w)), "{which}, {k}: {output:?}");
+            assert!(
+                output.wing_command.iter().all(|w| (0.0..=1.0).contains(w)),
+                "{which}, {k}: {output:?}"
+            );
             if let Some(terms) = &output.navigation {
                 let length = terms.ned_from_body.quaternion.into_inner().norm();
                 let numbers = [terms.position, terms.velocity].map(|v| v.vector);
                 assert!((length - 1.0).abs() < 1e-3, "{which}, {k}: {terms:?}");
                 assert!(numbers.iter().all(crate::math::all_finite), "{which}, {k}: {terms:?}");
-                assert!(crate::math::all_finite(&terms.gyro_bias.vector), "{which}, {k}: {terms:?}");
+                assert!(
+                    crate::math::all_finite(&terms.gyro_bias.vector),
+                    "{which}, {k}: {terms:?}"
+                );
                 believed += 1;
             }
             last = frame;
@@ -122,22 +134,28 @@ fn fuzzed_sensors_never_reach_the_rotors() {
             // The others have no gates, and no way back from every nonsense.
             continue;
         }
-        // Sensors that are well again are heard: a minute later it stands level where the fixes say.
+        // Sensors that are well again are heard: a minute later it stands level where the fixes
+        // say.
         for k in 0..18_000u64 {
             time_us += 3333;
             let mut frame = level(time_us);
             let wobble = 0.01 * ((k % 7) as f32 - 3.0);
             for imu in [&mut frame.imu, &mut frame.imu_2] {
                 let omega = In::new(Vector3::new(wobble, -wobble, 0.5 * wobble));
-                *imu = Some(Imu { omega, specific_force: In::new(Vector3::new(wobble, wobble, -9.806_65)) });
+                *imu = Some(Imu {
+                    omega,
+                    specific_force: In::new(Vector3::new(wobble, wobble, -9.806_65)),
+                });
             }
-            let fix = Gnss { position: In::new(Vector3::new(wobble, 0.0, 0.0)), velocity: In::zero() };
+            let fix =
+                Gnss { position: In::new(Vector3::new(wobble, 0.0, 0.0)), velocity: In::zero() };
             frame.gnss = k.is_multiple_of(30).then_some(fix);
             frame.altitude_m = k.is_multiple_of(6).then_some(wobble);
             frame.magnetic = k.is_multiple_of(6).then(|| In::new(Vector3::new(20.0, wobble, 43.0)));
             let output = stack.step(&mut state, &frame);
             if k == 17_999 {
-                let terms = output.navigation.unwrap_or_else(|| panic!("filter {which} never came back"));
+                let terms =
+                    output.navigation.unwrap_or_else(|| panic!("filter {which} never came back"));
                 let down = terms.ned_from_body.quaternion.inverse_transform_vector(&Vector3::z());
                 assert!(down.z > 0.99, "filter {which}: {terms:?}");
                 assert!(terms.velocity.vector.norm() < 0.5, "filter {which}: {terms:?}");

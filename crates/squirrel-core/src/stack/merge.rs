@@ -15,10 +15,12 @@ impl SensorFrame {
             valid
         };
         let imu = self.imu.as_ref().filter(|imu| accept(imu.is_reading()));
-        let is_turn = |q: &Rotation<Ned, Body, f32>| (q.quaternion.norm_squared() - 1.0).abs() < 1e-3;
+        let is_turn =
+            |q: &Rotation<Ned, Body, f32>| (q.quaternion.norm_squared() - 1.0).abs() < 1e-3;
         let attitude = self.attitude.as_ref().filter(|q| accept(is_turn(q)));
         let gnss = self.gnss.as_ref().filter(|gnss| accept(gnss.is_reading()));
-        let altitude_m = self.altitude_m.as_ref().filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
+        let altitude_m =
+            self.altitude_m.as_ref().filter(|altitude| accept(altitude.abs() <= POSITION_MAX_M));
         if let Some(force) = self.wing_force
             && accept(all_finite(&force.vector))
         {

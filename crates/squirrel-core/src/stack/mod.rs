@@ -5,8 +5,10 @@
 //!   10 Hz:  guidance -> TWCC (PC, WOEG, WIIC) -> roll, pitch, thrust, wings; or a command from outside
 //!   300 Hz: command filter (+ excitation) -> integral backstepping -> mixer -> rotor commands
 //! ```
-//! [`Stack::control`] is the part below the first line, for who estimates by himself. When a sensor is gone or hangs, [`failsafe`] levels or cuts. [`Stack`] is constant in flight; [`StackState`] is everything that changes, one plain struct that can be frozen, logged
-//! and thawed. Time comes in with the frame. A step never panics, allocates or loops without bound; a measurement that is
+//! [`Stack::control`] is the part below the first line, for who estimates by himself. When a sensor
+//! is gone or hangs, [`failsafe`] levels or cuts. [`Stack`] is constant in flight; [`StackState`]
+//! is everything that changes, one plain struct that can be frozen, logged and thawed. Time comes
+//! in with the frame. A step never panics, allocates or loops without bound; a measurement that is
 //! not finite is rejected and the last valid one kept.
 
 pub mod failsafe;
@@ -22,14 +24,18 @@ use crate::control::position::MeasuredMotion;
 use crate::control::twcc::{OuterAirframe, TwccParameters, TwccState, TwccTerms};
 use crate::control::{AttitudeThrust, Reference};
 use crate::estimate::monitor::Monitor;
-use crate::estimate::navigator::{Health, Navigated, Navigation, NavigationState, NavigationTerms, Start};
+use crate::estimate::navigator::{
+    Health, Navigated, Navigation, NavigationState, NavigationTerms, Start,
+};
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
 use crate::math::{limit, lower, whole};
 use crate::policy::PilotCommand;
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
-use failsafe::{Estimated, Failsafe, FailsafeMode, FailsafeReason, FailsafeState, LEVEL_THRUST_SHARE};
+use failsafe::{
+    Estimated, Failsafe, FailsafeMode, FailsafeReason, FailsafeState, LEVEL_THRUST_SHARE,
+};
 use nalgebra::Vector3;
 
 /// Period of the outer loop, us.
@@ -132,8 +138,9 @@ pub struct StackOutput {
     pub navigation: Option<NavigationTerms>,
     /// The outer loop, where it ran in this step; it does not while commands come from outside.
     pub outer: Option<TwccTerms>,
-    /// The inner loop, once attitude and rate are known; rotors stand still before that and while the failsafe cuts. Until the first fix or command it
-    /// asks for no thrust, and rotors only turn as far as levelling takes.
+    /// The inner loop, once attitude and rate are known; rotors stand still before that and while
+    /// the failsafe cuts. Until the first fix or command it asks for no thrust, and rotors only
+    /// turn as far as levelling takes.
     pub inner: Option<InnerTerms>,
 }
 
@@ -202,7 +209,8 @@ impl Stack {
         Ok(stack)
     }
 
-    /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any frame.
+    /// One inner step. Total: bounded work, no panic, outputs finite and within limits for any
+    /// frame.
     ///
     /// It is [`Self::navigate`], [`Self::control`] on what that believes, and [`Self::watch`].
     pub fn step(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
@@ -222,17 +230,28 @@ impl Stack {
         navigated
     }
 
-    /// The last part of a step: whether the rotors push as control told them, and what is to be logged of the estimate.
+    /// The last part of a step: whether the rotors push as control told them, and what is to be
+    /// logged of the estimate.
     pub fn watch(&self, state: &mut StackState, navigated: &Navigated, output: &mut StackOutput) {
         let achieved = output.inner.as_ref().map(|inner| &inner.mixer.achieved);
         let dt_s = lower(navigated.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
-        state.monitor.look(&self.vehicle, achieved, navigated.frame.imu.as_ref(), state.wing_command, dt_s);
-        output.health =
-            state.monitor.judge(&self.vehicle, navigated.frame.attitude.as_ref(), state.navigation.health);
+        state.monitor.look(
+            &self.vehicle,
+            achieved,
+            navigated.frame.imu.as_ref(),
+            state.wing_command,
+            dt_s,
+        );
+        output.health = state.monitor.judge(
+            &self.vehicle,
+            navigated.frame.attitude.as_ref(),
+            state.navigation.health,
+        );
         output.navigation = navigated.terms;
     }
 
-    /// One inner step on the attitude, position and velocity that the frame brings; as total as [`Self::step`].
+    /// One inner step on the attitude, position and velocity that the frame brings; as total as
+    /// [`Self::step`].
     pub fn control(&self, state: &mut StackState, frame: &SensorFrame) -> StackOutput {
         let elapsed_us = elapsed_us(state, frame);
         state.time_us = Some(frame.time_us);
@@ -261,11 +280,16 @@ impl Stack {
             None
         } else {
             let period = outer_period(frame.time_us);
-            let periods =
-                state.outer_begin_us.map_or(1, |begin_us| period.saturating_sub(outer_period(begin_us)));
+            let periods = state
+                .outer_begin_us
+                .map_or(1, |begin_us| period.saturating_sub(outer_period(begin_us)));
             state.outer_begin_us = Some(period.wrapping_mul(OUTER_PERIOD_US));
             let dt_s = lower(periods as f32, 10.0) * OUTER_PERIOD_US as f32 * 1e-6;
-            if is_well && state.known.command.is_none() { self.outer(state, frame, dt_s) } else { None }
+            if is_well && state.known.command.is_none() {
+                self.outer(state, frame, dt_s)
+            } else {
+                None
+            }
         };
         let reference = self.mission.reference(&state.mission, frame.time_us);
         let dt_s = lower(elapsed_us.unwrap_or(0) as f32 * 1e-6, INNER_STEP_MAX_S);
@@ -293,7 +317,8 @@ impl Stack {
         }
     }
 
-    /// What flies while the failsafe acts or until the outer loop's next tick, and what control resumes from afterwards.
+    /// What flies while the failsafe acts or until the outer loop's next tick, and what control
+    /// resumes from afterwards.
     // Apart, so that a step in which nothing is lost stays short.
     #[inline(never)]
     fn forget(&self, state: &mut StackState, was: FailsafeMode) {
@@ -305,21 +330,31 @@ impl Stack {
         if was == FailsafeMode::Cut {
             // It may have turned over meanwhile; the filter leads back from there.
             let (roll, pitch, yaw) = state.known.attitude.map_or((0.0, 0.0, 0.0), |a| a.euler());
-            state.filter =
-                EulerReference { angle: Vector3::new(roll, pitch, yaw), ..EulerReference::default() };
+            state.filter = EulerReference {
+                angle: Vector3::new(roll, pitch, yaw),
+                ..EulerReference::default()
+            };
             state.attitude = AttitudeState::default();
         }
     }
 
     fn outer(&self, state: &mut StackState, frame: &SensorFrame, dt_s: f32) -> Option<TwccTerms> {
-        let (Some(gnss), Some(ned_from_body)) = (state.known.gnss, state.known.attitude) else { return None };
+        let (Some(gnss), Some(ned_from_body)) = (state.known.gnss, state.known.attitude) else {
+            return None;
+        };
         let mut position = gnss.position;
         if let Some(altitude) = state.known.altitude_m
             && state.failsafe.active.reason != FailsafeReason::AltitudeLost
         {
             position.vector.z = -altitude;
         }
-        self.mission.sense(&mut state.mission, frame.time_us, position, gnss.velocity, frame.obstacles());
+        self.mission.sense(
+            &mut state.mission,
+            frame.time_us,
+            position,
+            gnss.velocity,
+            frame.obstacles(),
+        );
         let reference = self.mission.reference(&state.mission, frame.time_us);
         let heading_rad = self.heading_rad(frame.time_us, &ned_from_body);
         let motion = MeasuredMotion::new(position, gnss.velocity, &ned_from_body, heading_rad);
@@ -344,7 +379,9 @@ impl Stack {
         commanded_rad: f32,
         dt_s: f32,
     ) -> Option<InnerTerms> {
-        let (Some(imu), Some(ned_from_body)) = (state.known.imu, state.known.attitude) else { return None };
+        let (Some(imu), Some(ned_from_body)) = (state.known.imu, state.known.attitude) else {
+            return None;
+        };
         let gains = &self.parameters.attitude;
         let yaw_rad = gains.form.yaw_target_rad(ned_from_body.heading(), commanded_rad);
         let target = Vector3::new(state.command.roll_rad, state.command.pitch_rad, yaw_rad);
@@ -377,8 +414,9 @@ impl Stack {
     }
 }
 
-/// Number of the outer period that a time is in; of times after 13 years the last. The quotient is rounded by less than a hundred
-/// thousandth, which is as near as it comes to the next number from below.
+/// Number of the outer period that a time is in; of times after 13 years the last. The quotient is
+/// rounded by less than a hundred thousandth, which is as near as it comes to the next number from
+/// below.
 fn outer_period(time_us: u64) -> u64 {
     u64::from((whole(time_us) / OUTER_PERIOD_US as f64) as u32)
 }

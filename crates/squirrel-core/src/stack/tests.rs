@@ -49,7 +49,8 @@ fn flying(force_model: &ForceModel, form: AttitudeForm, mission: &Mission) -> St
 
 pub(crate) fn level(time_us: u64) -> SensorFrame {
     let mut frame = SensorFrame::empty(time_us);
-    frame.imu = Some(Imu { omega: In::zero(), specific_force: In::new(Vector3::new(0.0, 0.0, -9.80665)) });
+    frame.imu =
+        Some(Imu { omega: In::zero(), specific_force: In::new(Vector3::new(0.0, 0.0, -9.80665)) });
     frame.attitude = Some(Rotation::identity());
     frame.gnss = Some(Gnss { position: In::zero(), velocity: In::zero() });
     frame
@@ -70,8 +71,9 @@ fn level_on_the_spot_it_commands_hover() {
     }
 }
 
-/// A body that turns as the rotors make it, on the spot, yawed away from the reference, which asks it to tilt: degrees between the thrust axis and the one that
-/// was asked for, worst after `settled_s`, and of yaw in the end.
+/// A body that turns as the rotors make it, on the spot, yawed away from the reference, which asks
+/// it to tilt: degrees between the thrust axis and the one that was asked for, worst after
+/// `settled_s`, and of yaw in the end.
 fn beside_what_was_asked_deg(form: AttitudeForm, yaw_rad: f32, settled_s: f32) -> (f32, f32) {
     let goal = Mission::Hover { position: In::new(Vector3::new(0.9, -0.5, 0.0)) };
     let (stack, mut state) = (flying(&ForceModel::FlatPlate, form, &goal), StackState::default());
@@ -83,16 +85,20 @@ fn beside_what_was_asked_deg(form: AttitudeForm, yaw_rad: f32, settled_s: f32) -
     for k in 0..1200u64 {
         let mut frame = level(k * 1_000_000 / 300);
         frame.attitude = Some(attitude);
-        frame.imu =
-            Some(Imu { omega: In::new(omega), specific_force: In::new(Vector3::new(0.0, 0.0, -9.8)) });
+        frame.imu = Some(Imu {
+            omega: In::new(omega),
+            specific_force: In::new(Vector3::new(0.0, 0.0, -9.8)),
+        });
         let output = stack.step(&mut state, &frame);
         if let Some(outer) = output.outer {
-            let pull = Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32) - outer.position.acceleration.vector;
+            let pull =
+                Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32) - outer.position.acceleration.vector;
             asked = pull / pull.norm();
         }
         let torque = output.inner.unwrap().mixer.achieved.torque_n_m;
         omega += inertia.try_inverse().unwrap() * (torque - omega.cross(&(inertia * omega))) * dt_s;
-        attitude = Rotation::new(attitude.quaternion * UnitQuaternion::from_scaled_axis(omega * dt_s));
+        attitude =
+            Rotation::new(attitude.quaternion * UnitQuaternion::from_scaled_axis(omega * dt_s));
         let beside = (attitude * In::new(Vector3::z())).vector.angle(&asked).to_degrees();
         if k as f32 * dt_s > settled_s {
             worst = worst.max(beside);
@@ -101,7 +107,8 @@ fn beside_what_was_asked_deg(form: AttitudeForm, yaw_rad: f32, settled_s: f32) -
     (worst, attitude.euler().2.to_degrees().abs())
 }
 
-/// Where the vehicle points and where it should point are two things: thrust goes where the outer loop wants it all the while that yaw is on its way.
+/// Where the vehicle points and where it should point are two things: thrust goes where the outer
+/// loop wants it all the while that yaw is on its way.
 #[test]
 fn thrust_points_where_it_was_asked_to_whatever_the_yaw_error() {
     for form in [AttitudeForm::Euler, AttitudeForm::Quaternion] {
@@ -150,8 +157,10 @@ fn another_start_is_taken_or_refused() {
 /// A thawed copy continues as the original: the state hides nothing, not even what the network saw.
 #[test]
 fn a_frozen_state_continues_bit_for_bit() {
-    let (stack, mut state) =
-        (stack_that_believes(&ForceModel::Parnn(loud()), AttitudeForm::Euler), StackState::default());
+    let (stack, mut state) = (
+        stack_that_believes(&ForceModel::Parnn(loud()), AttitudeForm::Euler),
+        StackState::default(),
+    );
     let frame = |k: u64| {
         let mut f = level(k * 3333);
         f.attitude = Some(Rotation::from_euler(0.01 * (k as f32).sin(), 0.02, 0.0));
@@ -229,21 +238,25 @@ fn frame() -> impl Strategy<Value = SensorFrame> {
         number(100.0),
         command,
     )
-        .prop_map(|(time_us, omega, force, attitude, position, velocity, altitude, command)| {
-            let mut frame = SensorFrame::empty(time_us);
-            frame.imu = Some(Imu { omega: In::new(omega), specific_force: In::new(force) });
-            frame.attitude = attitude;
-            frame.gnss = Some(Gnss { position: In::new(position), velocity: In::new(velocity) });
-            frame.altitude_m = Some(altitude);
-            frame.wing_force = Some(In::new(force));
-            frame.command = command.map(commanded);
-            frame.set_obstacles(&[Obstacle { id: 1, north_m: omega.x, east_m: omega.y }]);
-            frame
-        })
+        .prop_map(
+            |(time_us, omega, force, attitude, position, velocity, altitude, command)| {
+                let mut frame = SensorFrame::empty(time_us);
+                frame.imu = Some(Imu { omega: In::new(omega), specific_force: In::new(force) });
+                frame.attitude = attitude;
+                frame.gnss =
+                    Some(Gnss { position: In::new(position), velocity: In::new(velocity) });
+                frame.altitude_m = Some(altitude);
+                frame.wing_force = Some(In::new(force));
+                frame.command = command.map(commanded);
+                frame.set_obstacles(&[Obstacle { id: 1, north_m: omega.x, east_m: omega.y }]);
+                frame
+            },
+        )
 }
 
 proptest! {
-    /// State and outputs stay finite, outputs inside limits, for any sensor values and times, also backwards.
+    /// State and outputs stay finite, outputs inside limits, for any sensor values and times, also
+    /// backwards.
     #[test]
     fn state_and_outputs_stay_finite_and_inside_limits(
         frames in proptest::collection::vec(frame(), 60),
@@ -312,10 +325,12 @@ fn when_commands_cease_the_outer_loop_flies_again_as_if_new() {
     let (stack, mut state) = (stack(AttitudeForm::Quaternion), StackState::default());
     let frame = |time_us: u64| {
         let mut frame = level(time_us);
-        frame.gnss = Some(Gnss { position: In::new(Vector3::new(3.0, 0.0, 0.0)), velocity: In::zero() });
+        frame.gnss =
+            Some(Gnss { position: In::new(Vector3::new(3.0, 0.0, 0.0)), velocity: In::zero() });
         frame
     };
-    // A second of its own, so that the outer loop has something to forget; then commands up to 1.48 s.
+    // A second of its own, so that the outer loop has something to forget; then commands up to 1.48
+    // s.
     let mut resumed = None;
     for k in 0..700u64 {
         let time_us = k * 10_000 / 3;
@@ -328,7 +343,11 @@ fn when_commands_cease_the_outer_loop_flies_again_as_if_new() {
         if lost && output.outer.is_some() {
             resumed = resumed.or(output.outer.map(|terms| (time_us, terms)));
         } else if lost && resumed.is_none() {
-            assert_eq!((state.command.roll_rad, state.wing_command), (0.0, 0.0), "level until then");
+            assert_eq!(
+                (state.command.roll_rad, state.wing_command),
+                (0.0, 0.0),
+                "level until then"
+            );
         } else if (1_000_000..=1_980_000).contains(&time_us) {
             assert_eq!((state.command.roll_rad, output.outer), (0.2, None), "{time_us}");
         }
@@ -349,7 +368,11 @@ fn the_failsafe_acts_whatever_is_commanded() {
         let output = stack.step(&mut state, &frame);
         let cut = output.failsafe.mode == FailsafeMode::Cut;
         assert_eq!(cut, k >= 330, "{k}");
-        assert_eq!((output.rotor_command == [0.0; 8], output.wing_command == [0.0; 2]), (cut, cut), "{k}");
+        assert_eq!(
+            (output.rotor_command == [0.0; 8], output.wing_command == [0.0; 2]),
+            (cut, cut),
+            "{k}"
+        );
     }
 }
 
@@ -369,7 +392,8 @@ fn a_filter_that_would_run_away_is_refused() {
     assert!((filter.angle - Vector3::repeat(0.5)).norm() < 1e-3, "{filter:?}");
 }
 
-/// An inertial unit that hangs is found though the filter takes another bias off it in each step; and it stays with what it knew.
+/// An inertial unit that hangs is found though the filter takes another bias off it in each step;
+/// and it stays with what it knew.
 #[test]
 fn a_single_unit_that_hangs_in_flight_is_found_behind_the_filter() {
     let eskf = Filter::Eskf(EskfParameters::default());

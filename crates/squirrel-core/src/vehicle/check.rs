@@ -40,7 +40,12 @@ impl ParameterError {
     pub(crate) fn of<T: Real>(field: &'static str, value: T, reason: &'static str) -> Self {
         Self { field, index: None, value: plain(value), reason }
     }
-    pub(crate) fn at<T: Real>(field: &'static str, index: usize, value: T, reason: &'static str) -> Self {
+    pub(crate) fn at<T: Real>(
+        field: &'static str,
+        index: usize,
+        value: T,
+        reason: &'static str,
+    ) -> Self {
         Self { field, index: Some(index), value: plain(value), reason }
     }
     pub(crate) fn inertia(reason: &'static str) -> Self {
@@ -65,12 +70,18 @@ pub(crate) fn not_negative<T: Real>(field: &'static str, value: T) -> Result<(),
 }
 
 /// Every number of a list must be finite and > 0.
-pub(crate) fn each_positive<T: Real>(field: &'static str, list: &[T]) -> Result<(), ParameterError> {
+pub(crate) fn each_positive<T: Real>(
+    field: &'static str,
+    list: &[T],
+) -> Result<(), ParameterError> {
     each(field, list, positive)
 }
 
 /// Every number of a list must be finite and >= 0.
-pub(crate) fn each_not_negative<T: Real>(field: &'static str, list: &[T]) -> Result<(), ParameterError> {
+pub(crate) fn each_not_negative<T: Real>(
+    field: &'static str,
+    list: &[T],
+) -> Result<(), ParameterError> {
     each(field, list, not_negative)
 }
 
@@ -137,14 +148,19 @@ fn rotors<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {
             }
         }
         if rotor.yaw_sign != T::one() && rotor.yaw_sign != -T::one() {
-            return Err(ParameterError::at("rotor[].yaw_sign", i, rotor.yaw_sign, "must be 1 or -1"));
+            return Err(ParameterError::at(
+                "rotor[].yaw_sign",
+                i,
+                rotor.yaw_sign,
+                "must be 1 or -1",
+            ));
         }
     }
     Ok(())
 }
 
-/// Symmetric, positive definite, and each principal moment at most the sum of the other two: no mass distribution has
-/// other inertia.
+/// Symmetric, positive definite, and each principal moment at most the sum of the other two: no
+/// mass distribution has other inertia.
 fn inertia<T: Real>(j: &Matrix3<T>) -> Result<(), ParameterError> {
     let field = "mass.inertia_kg_m2";
     for (i, x) in j.iter().enumerate() {
@@ -211,7 +227,8 @@ mod tests {
                 .starts_with("rotor[1].position_body_m = inf")
         );
         assert!(
-            error_of(|p| p.drag.linear_n_s_per_m.y = -0.1).starts_with("drag.linear_n_s_per_m[1] = -0.1")
+            error_of(|p| p.drag.linear_n_s_per_m.y = -0.1)
+                .starts_with("drag.linear_n_s_per_m[1] = -0.1")
         );
         assert!(error_of(|p| p.limits.tilt_max_rad = 30.0).starts_with("limits.tilt_max_rad = 30"));
         assert!(error_of(|p| p.rotor_count = 9).contains("= 9"));
@@ -221,7 +238,8 @@ mod tests {
     fn inertia_that_no_body_has_is_refused() {
         // The third is the Crazyflie inertia of a published simulator, off by less than a percent.
         for moments in [[1.0, 1.0, 2.1], [1.0, -1.0, 1.0], [1.43e-5, 1.43e-5, 2.89e-5]] {
-            let text = error_of(|p| p.inertia_kg_m2 = Matrix3::from_diagonal(&Vector3::from(moments)));
+            let text =
+                error_of(|p| p.inertia_kg_m2 = Matrix3::from_diagonal(&Vector3::from(moments)));
             assert!(text.starts_with("mass.inertia_kg_m2"), "{text}");
         }
         let skew = error_of(|p| p.inertia_kg_m2[(0, 1)] = 1e-3);

@@ -1,7 +1,9 @@
-//! The numbers of one airframe: mass, rotors, propulsion, drag, wing, limits. Checked once, constant in flight.
+//! The numbers of one airframe: mass, rotors, propulsion, drag, wing, limits. Checked once,
+//! constant in flight.
 //!
-//! [`Parameters`] is plain data, as a file or a program writes it. [`Vehicle::new`] checks every number and derives
-//! what the hot loops need; an error names the field as the vehicle file spells it, and the value.
+//! [`Parameters`] is plain data, as a file or a program writes it. [`Vehicle::new`] checks every
+//! number and derives what the hot loops need; an error names the field as the vehicle file spells
+//! it, and the value.
 
 mod check;
 mod thrust_curve;
@@ -14,7 +16,8 @@ use crate::frames::{Body, In};
 use crate::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2, Real, real};
 use nalgebra::{Matrix3, Vector3};
 
-/// Most rotors a vehicle may have. Rotor loops run over blocks of [`ROTOR_BLOCK`]; unused places are zero.
+/// Most rotors a vehicle may have. Rotor loops run over blocks of [`ROTOR_BLOCK`]; unused places
+/// are zero.
 pub const MAX_ROTORS: usize = 8;
 /// Rotors per block: a fixed inner length lets the compiler unroll.
 pub const ROTOR_BLOCK: usize = 4;
@@ -27,7 +30,8 @@ pub type PerRotor<T> = [T; MAX_ROTORS];
 pub struct Rotor<T: Real> {
     /// Hub position in the body frame, m. Thrust acts along -z.
     pub position: In<Body, T>,
-    /// Sign of the reaction torque about +z (down): -1 for a rotor that turns clockwise seen from above.
+    /// Sign of the reaction torque about +z (down): -1 for a rotor that turns clockwise seen from
+    /// above.
     pub yaw_sign: T,
 }
 
@@ -61,7 +65,8 @@ pub struct Propulsion<T> {
     pub time_constant_down_s: T,
     /// Battery voltage at which the numbers above hold, V.
     pub reference_voltage_v: T,
-    /// The paper's cubic from the voltage that a duty cycle applies to thrust; replaces the square law of the command.
+    /// The paper's cubic from the voltage that a duty cycle applies to thrust; replaces the square
+    /// law of the command.
     pub thrust_curve: Option<ThrustCurve<T>>,
 }
 
@@ -149,7 +154,8 @@ pub struct Vehicle<T: Real> {
     per_speed_squared: RotorWrench<T>,
 }
 
-/// Thrust (along -z) and moments that each rotor gives per speed squared; zero where there is no rotor.
+/// Thrust (along -z) and moments that each rotor gives per speed squared; zero where there is no
+/// rotor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RotorWrench<T> {
     pub(crate) thrust: PerRotor<T>,
@@ -181,7 +187,10 @@ impl<T: Real> Rotor<T> {
     }
     /// A rotor in the plane of the centre of mass, m.
     pub fn planar(x_m: f64, y_m: f64, yaw_sign: f64) -> Self {
-        Self { position: In::new(Vector3::new(real(x_m), real(y_m), T::zero())), yaw_sign: real(yaw_sign) }
+        Self {
+            position: In::new(Vector3::new(real(x_m), real(y_m), T::zero())),
+            yaw_sign: real(yaw_sign),
+        }
     }
 }
 
@@ -189,11 +198,14 @@ impl<T: Real> Vehicle<T> {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// [`ParameterError`] names the first field that is not finite, out of range or physically impossible.
+    /// [`ParameterError`] names the first field that is not finite, out of range or physically
+    /// impossible.
     pub fn new(parameters: Parameters<T>) -> Result<Self, ParameterError> {
         check::check(&parameters)?;
-        let inertia_inverse =
-            parameters.inertia_kg_m2.try_inverse().ok_or(ParameterError::inertia("inertia is singular"))?;
+        let inertia_inverse = parameters
+            .inertia_kg_m2
+            .try_inverse()
+            .ok_or(ParameterError::inertia("inertia is singular"))?;
         let inverse_mass = T::one() / parameters.mass_kg;
         Ok(Self {
             parameters,
@@ -209,8 +221,8 @@ impl<T: Real> Vehicle<T> {
     /// The vehicle with numbers that effects changed; its geometry and propulsion stay as declared.
     ///
     /// # Errors
-    /// A mass or inertia that is not positive. The triangle inequality is not asked for: an error of one moment is a
-    /// hypothesis about numbers, not a body.
+    /// A mass or inertia that is not positive. The triangle inequality is not asked for: an error
+    /// of one moment is a hypothesis about numbers, not a body.
     pub(crate) fn altered(&self, change: &Alteration<T>) -> Result<Self, ParameterError> {
         check::positive("mass.mass_kg", change.mass_kg)?;
         let mut out = *self;
@@ -220,8 +232,10 @@ impl<T: Real> Vehicle<T> {
         for moment in change.inertia_kg_m2.diagonal().iter() {
             check::positive("mass.inertia_kg_m2", *moment)?;
         }
-        out.inertia_inverse =
-            change.inertia_kg_m2.try_inverse().ok_or(ParameterError::inertia("inertia is singular"))?;
+        out.inertia_inverse = change
+            .inertia_kg_m2
+            .try_inverse()
+            .ok_or(ParameterError::inertia("inertia is singular"))?;
         let rotors = &mut out.per_speed_squared;
         for i in 0..MAX_ROTORS {
             rotors.thrust[i] *= change.thrust[i];
@@ -231,7 +245,8 @@ impl<T: Real> Vehicle<T> {
         }
         Ok(out)
     }
-    /// Thrust and reaction torque of each rotor over what the propulsion numbers give: rotors of one make scatter.
+    /// Thrust and reaction torque of each rotor over what the propulsion numbers give: rotors of
+    /// one make scatter.
     pub fn rotor_factors(&self) -> [PerRotor<T>; 2] {
         let (own, alike) = (&self.per_speed_squared, RotorWrench::new(&self.parameters));
         let over = |own: &PerRotor<T>, alike: &PerRotor<T>| {
@@ -245,22 +260,32 @@ impl<T: Real> Vehicle<T> {
         };
         [over(&own.thrust, &alike.thrust), over(&own.yaw, &alike.yaw)]
     }
-    /// The vehicle with rotors that give more or less than the propulsion numbers say. What is cast from it, as flight code is,
-    /// takes its rotors for alike.
+    /// The vehicle with rotors that give more or less than the propulsion numbers say. What is cast
+    /// from it, as flight code is, takes its rotors for alike.
     ///
     /// * `thrust`, `torque` - over what each rotor had
     ///
     /// # Errors
     /// A factor that is not positive, by its field in vehicle files.
-    pub fn with_rotor_factors(&self, [thrust, torque]: [PerRotor<T>; 2]) -> Result<Self, ParameterError> {
-        for (field, factors) in [("rotor[].thrust_fraction", &thrust), ("rotor[].torque_fraction", &torque)] {
+    pub fn with_rotor_factors(
+        &self,
+        [thrust, torque]: [PerRotor<T>; 2],
+    ) -> Result<Self, ParameterError> {
+        for (field, factors) in
+            [("rotor[].thrust_fraction", &thrust), ("rotor[].torque_fraction", &torque)]
+        {
             check::each_positive(field, factors)?;
         }
         let p = &self.parameters;
-        self.altered(&Alteration { mass_kg: p.mass_kg, inertia_kg_m2: p.inertia_kg_m2, thrust, torque })
+        self.altered(&Alteration {
+            mass_kg: p.mass_kg,
+            inertia_kg_m2: p.inertia_kg_m2,
+            thrust,
+            torque,
+        })
     }
-    /// The vehicle with one rotor beside its place and with another reaction torque: rotors of one make scatter. Out of the
-    /// range of [`Self::rotors`], the vehicle itself.
+    /// The vehicle with one rotor beside its place and with another reaction torque: rotors of one
+    /// make scatter. Out of the range of [`Self::rotors`], the vehicle itself.
     ///
     /// * `moved` - of the hub, m
     /// * `torque_factor` - over what the rotor had
@@ -276,7 +301,8 @@ impl<T: Real> Vehicle<T> {
         }
         out
     }
-    /// The vehicle with more linear drag along its axes, N s/m: the declared number holds to its tolerance along each.
+    /// The vehicle with more linear drag along its axes, N s/m: the declared number holds to its
+    /// tolerance along each.
     #[must_use]
     pub fn with_more_drag(&self, linear_n_s_per_m: Vector3<T>) -> Self {
         let mut out = *self;
@@ -298,7 +324,8 @@ impl<T: Real> Vehicle<T> {
     pub fn inertia_inverse(&self) -> &Matrix3<T> {
         &self.inertia_inverse
     }
-    /// Power of the rotors over that in hover, as their torque has it: the mean cube of their speeds, 1 in hover.
+    /// Power of the rotors over that in hover, as their torque has it: the mean cube of their
+    /// speeds, 1 in hover.
     pub fn rotor_load(&self, speed_rad_s: &PerRotor<T>) -> T {
         let (mut thrust, mut cubes) = (T::zero(), T::zero());
         for (per_square, speed) in
@@ -323,16 +350,21 @@ impl<T: Real> Vehicle<T> {
     pub fn weight_n(&self) -> T {
         self.parameters.mass_kg * real(crate::math::GRAVITY_M_S2)
     }
-    /// Most thrust that one rotor may be asked for, N: its top thrust at the reference voltage, or its limit if lower.
+    /// Most thrust that one rotor may be asked for, N: its top thrust at the reference voltage, or
+    /// its limit if lower.
     pub fn rotor_thrust_max_n(&self) -> T {
         let p = &self.parameters.propulsion;
         let top = match p.thrust_curve {
             Some(curve) => curve.thrust_n(p.reference_voltage_v),
             None => p.thrust_coefficient_n_s2 * p.speed_max_rad_s * p.speed_max_rad_s,
         };
-        self.parameters.limits.rotor_thrust_max_n.map_or(top, |limit| crate::math::lower(limit, top))
+        self.parameters
+            .limits
+            .rotor_thrust_max_n
+            .map_or(top, |limit| crate::math::lower(limit, top))
     }
-    /// The same vehicle in another scalar, checked again: what is sound in `f64` may degenerate in `f32`.
+    /// The same vehicle in another scalar, checked again: what is sound in `f64` may degenerate in
+    /// `f32`.
     ///
     /// # Errors
     /// As [`Vehicle::new`].
@@ -360,12 +392,16 @@ impl<T: Real> Vehicle<T> {
         Vehicle::new(Parameters {
             mass_kg: to(p.mass_kg),
             inertia_kg_m2: p.inertia_kg_m2.map(to),
-            rotors: p
-                .rotors
-                .map(|r| Rotor { position: In::new(r.position.vector.map(to)), yaw_sign: to(r.yaw_sign) }),
+            rotors: p.rotors.map(|r| Rotor {
+                position: In::new(r.position.vector.map(to)),
+                yaw_sign: to(r.yaw_sign),
+            }),
             rotor_count: p.rotor_count,
             propulsion,
-            drag: Drag { linear_n_s_per_m: p.drag.linear_n_s_per_m.map(to), area_m2: to(p.drag.area_m2) },
+            drag: Drag {
+                linear_n_s_per_m: p.drag.linear_n_s_per_m.map(to),
+                area_m2: to(p.drag.area_m2),
+            },
             wing: p.wing.map(|w| Wing {
                 area_per_side_m2: to(w.area_per_side_m2),
                 normal_force_slope: to(w.normal_force_slope),
@@ -382,7 +418,8 @@ impl<T: Real> Vehicle<T> {
 }
 
 impl<T: Real> Propulsion<T> {
-    /// Steady rotor speed at the reference voltage for a command, rad/s. Commands outside their range are limited.
+    /// Steady rotor speed at the reference voltage for a command, rad/s. Commands outside their
+    /// range are limited.
     #[inline]
     pub fn target_speed_rad_s(&self, command: T) -> T {
         let fraction = match self.command {
@@ -393,12 +430,16 @@ impl<T: Real> Propulsion<T> {
         let fraction = crate::math::limit(fraction, T::zero(), T::one());
         match &self.thrust_curve {
             None => fraction * self.speed_max_rad_s,
-            Some(curve) => self.speed_for_thrust(curve.thrust_n(fraction * self.reference_voltage_v)),
+            Some(curve) => {
+                self.speed_for_thrust(curve.thrust_n(fraction * self.reference_voltage_v))
+            }
         }
     }
-    /// The command that gives a thrust, at the reference voltage. Inverse of [`Self::target_speed_rad_s`].
+    /// The command that gives a thrust, at the reference voltage. Inverse of
+    /// [`Self::target_speed_rad_s`].
     ///
-    /// * `thrust_n` - thrust of one rotor, N, not below 0; commands that are fractions or pulses are limited to their range
+    /// * `thrust_n` - thrust of one rotor, N, not below 0; commands that are fractions or pulses
+    ///   are limited to their range
     #[inline]
     pub fn command_for_thrust(&self, thrust_n: T) -> T {
         let fraction = match (self.command, &self.thrust_curve) {
@@ -433,7 +474,11 @@ pub(crate) mod fixtures {
         }
         Parameters {
             mass_kg: real(0.548),
-            inertia_kg_m2: Matrix3::from_diagonal(&Vector3::new(real(3.22e-3), real(4.68e-3), real(7.72e-3))),
+            inertia_kg_m2: Matrix3::from_diagonal(&Vector3::new(
+                real(3.22e-3),
+                real(4.68e-3),
+                real(7.72e-3),
+            )),
             rotors,
             rotor_count: 4,
             propulsion: Propulsion {
@@ -475,9 +520,12 @@ mod tests {
         let mut p = squirrel();
         p.rotors[1].position = p.rotors[1].position + In::new(moved);
         let declared = Vehicle::new(p).unwrap();
-        let (a, b) = (off.rotor_wrench_per_speed_squared(), declared.rotor_wrench_per_speed_squared());
+        let (a, b) =
+            (off.rotor_wrench_per_speed_squared(), declared.rotor_wrench_per_speed_squared());
         for i in 0..4 {
-            assert!((a.roll[i] - b.roll[i]).abs() < 1e-20 && (a.pitch[i] - b.pitch[i]).abs() < 1e-20);
+            assert!(
+                (a.roll[i] - b.roll[i]).abs() < 1e-20 && (a.pitch[i] - b.pitch[i]).abs() < 1e-20
+            );
             let factor = if i == 1 { 1.1 } else { 1.0 };
             assert!((a.yaw[i] - factor * b.yaw[i]).abs() < 1e-20);
         }
@@ -501,7 +549,10 @@ mod tests {
             p.command = kind;
             for thrust in [0.0, 0.3, 1.3435, 4.0] {
                 let speed = p.target_speed_rad_s(p.command_for_thrust(thrust));
-                assert!((p.thrust_coefficient_n_s2 * speed * speed - thrust).abs() < 1e-12, "{kind:?}");
+                assert!(
+                    (p.thrust_coefficient_n_s2 * speed * speed - thrust).abs() < 1e-12,
+                    "{kind:?}"
+                );
             }
         }
     }

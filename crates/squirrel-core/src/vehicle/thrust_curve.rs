@@ -1,8 +1,10 @@
-//! The paper's propulsion fit: rotor thrust as a cubic of the voltage that a duty cycle applies, and its inverse.
+//! The paper's propulsion fit: rotor thrust as a cubic of the voltage that a duty cycle applies,
+//! and its inverse.
 //!
-//! `F = a0 + a1 V + a2 V^2 + a3 V^3`, `V = duty * V_battery` (paper, section II.B). The paper gives no
-//! coefficients. A cubic has no inverse unless it rises, so construction proves that it does on `[0, V_ref]`; the
-//! inverse is then a bisection to a bracket and Newton steps inside it, with a fixed count.
+//! `F = a0 + a1 V + a2 V^2 + a3 V^3`, `V = duty * V_battery` (paper, section II.B). The paper gives
+//! no coefficients. A cubic has no inverse unless it rises, so construction proves that it does on
+//! `[0, V_ref]`; the inverse is then a bisection to a bracket and Newton steps inside it, with a
+//! fixed count.
 
 use super::ParameterError;
 use crate::math::{Real, limit, real};
@@ -32,7 +34,9 @@ impl<T: Real> ThrustCurve<T> {
         // The slope is a parabola: its smallest value lies at an end or at the vertex.
         let [_, _, a2, a3] = coefficients;
         let vertex = if a3 == T::zero() { T::zero() } else { -a2 / (real::<T>(3.0) * a3) };
-        for v in [voltage_max_v * real(1e-3), limit(vertex, T::zero(), voltage_max_v), voltage_max_v] {
+        for v in
+            [voltage_max_v * real(1e-3), limit(vertex, T::zero(), voltage_max_v), voltage_max_v]
+        {
             let slope = curve.slope(v);
             if v > T::zero() && (slope.is_nan_or_negative() || slope == T::zero()) {
                 return Err(ParameterError::of(

@@ -1,8 +1,10 @@
-//! Gyroscope against attitude, and attitude against gravity: whose axes, frame, order or direction is wrong.
+//! Gyroscope against attitude, and attitude against gravity: whose axes, frame, order or direction
+//! is wrong.
 //!
-//! Each way in which a map can misread a quaternion is taken back and held against three things at once: the gyroscope, the
-//! weight, which the specific force turned into the world must cancel, and the fixes. A mistake of the attitude mends all
-//! three; one of the gyroscope leaves the other two as they are.
+//! Each way in which a map can misread a quaternion is taken back and held against three things at
+//! once: the gyroscope, the weight, which the specific force turned into the world must cancel, and
+//! the fixes. A mistake of the attitude mends all three; one of the gyroscope leaves the other two
+//! as they are.
 
 use super::Found;
 use super::fixes::match_of;
@@ -48,17 +50,22 @@ pub(super) fn rates(flight: &Flight) -> Found {
             }
         }
         let least = of_gyro + if is_odd { -MARGIN } else { MARGIN };
-        if let Some((_, words)) = best.filter(|(worth, _)| *worth > least && *worth > now + 2.0 * MARGIN) {
+        if let Some((_, words)) =
+            best.filter(|(worth, _)| *worth > least && *worth > now + 2.0 * MARGIN)
+        {
             return Some((ATTITUDE, words));
         }
         if let Some((_, naming)) = misnamed {
             let remedy = if axes(naming) == "(x, -y, -z)" {
-                "give its body frame: `body = \"flu\"`, or `\"frd\"` where the map has that".to_owned()
+                "give its body frame: `body = \"flu\"`, or `\"frd\"` where the map has that"
+                    .to_owned()
             } else {
                 "put `columns = [...]` into that order".to_owned()
             };
-            let words =
-                format!("fits the attitude's rate better with its axes as {}; {remedy}", axes(naming));
+            let words = format!(
+                "fits the attitude's rate better with its axes as {}; {remedy}",
+                axes(naming)
+            );
             return Some((OMEGA, words));
         }
         return Some((
@@ -113,7 +120,9 @@ fn mistakes() -> Vec<Mistake> {
     };
     for (has, w) in worlds {
         for (is, v) in worlds.iter().copied().filter(|(is, _)| *is != has) {
-            let words = format!("is in another world frame: `world = \"{is}\"` where the map has \"{has}\"");
+            let words = format!(
+                "is in another world frame: `world = \"{is}\"` where the map has \"{has}\""
+            );
             push(words, Box::new(move |q| v * w.conjugate() * q));
         }
     }
@@ -128,10 +137,12 @@ fn mistakes() -> Vec<Mistake> {
             push(words, Box::new(move |q| v * w.conjugate() * q * flu));
         }
     }
-    let in_file = |change: fn(Quaternion<f64>) -> Quaternion<f64>, w: Quaternion<f64>, b: Quaternion<f64>| {
-        Box::new(move |q: Quaternion<f64>| w * change(w.conjugate() * q * b.conjugate()) * b)
-    };
-    let direction = "turns the other way: change `direction` (`world_from_body` or `body_from_world`)";
+    let in_file =
+        |change: fn(Quaternion<f64>) -> Quaternion<f64>, w: Quaternion<f64>, b: Quaternion<f64>| {
+            Box::new(move |q: Quaternion<f64>| w * change(w.conjugate() * q * b.conjugate()) * b)
+        };
+    let direction =
+        "turns the other way: change `direction` (`world_from_body` or `body_from_world`)";
     let order = "has its numbers in another order: change `order` (`wxyz` or `xyzw`)";
     // What the file had is not known any more, so the frames of the map are tried, too.
     for (_, w) in worlds {

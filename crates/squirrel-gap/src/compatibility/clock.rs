@@ -1,4 +1,5 @@
-//! A clock that jumps within a flight: one shift in time explains what two sources say before, another one after.
+//! A clock that jumps within a flight: one shift in time explains what two sources say before,
+//! another one after.
 //!
 //! ```text
 //! R^2(d) = (sum_k x(t_k) y(t_k - d(t_k)))^2 / (sum x^2 sum y^2)      d(t): a line, or a step between two constants
@@ -20,8 +21,9 @@ const SIDE_MIN: usize = 2;
 /// Clocks that run off, ppm: up to, and apart.
 const SKEW_MAX_PPM: i32 = 2000;
 const SKEW_STEP_PPM: i32 = 250;
-/// What a step must show to be believed: F, the correlation on each side, its size, s, and either the most that it may leave
-/// of what the line leaves, or how many times what the line explains it must explain.
+/// What a step must show to be believed: F, the correlation on each side, its size, s, and either
+/// the most that it may leave of what the line leaves, or how many times what the line explains it
+/// must explain.
 struct Bar {
     f: f64,
     fit: f64,
@@ -78,7 +80,8 @@ pub(super) fn steps(flight: &Flight, residual: &[f64]) -> Found {
         .collect();
     let is_unit = matches!(others[..], [a, b] if (a - b).abs() < ALIKE_S);
     let (channel, step) = found.first()?;
-    let (channel, by_s) = if is_unit { ("imu.omega_body_rad_s", -step.by_s) } else { (*channel, step.by_s) };
+    let (channel, by_s) =
+        if is_unit { ("imu.omega_body_rad_s", -step.by_s) } else { (*channel, step.by_s) };
     let words = format!(
         "its clock steps by {by_s:+.2} s against the other sources at about {:.0} s; mend `time` of its source, or cut the flight there",
         step.at_s
@@ -86,7 +89,8 @@ pub(super) fn steps(flight: &Flight, residual: &[f64]) -> Found {
     Some((channel, words))
 }
 
-/// The step of the first against the second, if there is one: how much later the first comes after it.
+/// The step of the first against the second, if there is one: how much later the first comes after
+/// it.
 fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar) -> Option<Step> {
     let (own, other) = (centred(own), centred(other));
     // Where a model has no finite answer, times are not known.
@@ -131,11 +135,16 @@ fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar)
         let mut total = [0.0; 3];
         for block in blocks {
             let place = (slot(block) + most).clamp(0, 2 * most) as usize;
-            total.iter_mut().zip(sums[block * shifts + place]).for_each(|(total, sum)| *total += sum);
+            total
+                .iter_mut()
+                .zip(sums[block * shifts + place])
+                .for_each(|(total, sum)| *total += sum);
         }
         total
     };
-    let fit = |s: [f64; 3]| if s[2] > 0.0 { s[2] * s[2] / (s[0] * s[1]).max(f64::MIN_POSITIVE) } else { 0.0 };
+    let fit = |s: [f64; 3]| {
+        if s[2] > 0.0 { s[2] * s[2] / (s[0] * s[1]).max(f64::MIN_POSITIVE) } else { 0.0 }
+    };
     let mut line = 0.0_f64;
     for ppm in (-SKEW_MAX_PPM..=SKEW_MAX_PPM).step_by(SKEW_STEP_PPM as usize) {
         let slope = f64::from(ppm) * 1e-6 * block_s / SHIFT_STEP_S;
@@ -155,9 +164,11 @@ fn step(time_s: &[f64], own: &[Vector3<f64>], other: &[Vector3<f64>], bar: &Bar)
         if both > stepped {
             stepped = both;
             let sides = before.min(after);
-            let is_right = |shift: i32| (RIGHT_S.0..=RIGHT_S.1).contains(&(f64::from(shift) * SHIFT_STEP_S));
+            let is_right =
+                |shift: i32| (RIGHT_S.0..=RIGHT_S.1).contains(&(f64::from(shift) * SHIFT_STEP_S));
             let sides = if is_right(s0) || is_right(s1) { sides } else { 0.0 };
-            found = Some((sides, f64::from(s1 - s0) * SHIFT_STEP_S, start_s + cut as f64 * block_s));
+            found =
+                Some((sides, f64::from(s1 - s0) * SHIFT_STEP_S, start_s + cut as f64 * block_s));
         }
     }
     let (sides, by_s, at_s) = found?;
@@ -175,10 +186,12 @@ fn centred(values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     values.iter().map(|v| v - mean).collect()
 }
 
-/// Each axis about its mean and in its standard deviations, so that axes count alike whatever their units.
+/// Each axis about its mean and in its standard deviations, so that axes count alike whatever their
+/// units.
 fn in_deviations(values: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let values = centred(values);
-    let square = values.iter().map(|v| v.component_mul(v)).sum::<Vector3<f64>>() / values.len().max(1) as f64;
+    let square = values.iter().map(|v| v.component_mul(v)).sum::<Vector3<f64>>()
+        / values.len().max(1) as f64;
     let scale = square.map(|s| if s > 0.0 { s.sqrt().recip() } else { 0.0 });
     values.iter().map(|v| v.component_mul(&scale)).collect()
 }

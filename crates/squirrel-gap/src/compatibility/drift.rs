@@ -1,7 +1,8 @@
-//! A gyroscope whose bias runs off within a flight: what it says beyond the attitude's rate grows or falls along a line.
+//! A gyroscope whose bias runs off within a flight: what it says beyond the attitude's rate grows
+//! or falls along a line.
 //!
-//! Means over blocks keep single attitudes and what goes with the rates out of it; how they scatter about the line says how
-//! well it is known.
+//! Means over blocks keep single attitudes and what goes with the rates out of it; how they scatter
+//! about the line says how well it is known.
 
 use super::Found;
 use super::flight::Flight;
@@ -27,8 +28,9 @@ pub(super) fn bias(flight: &Flight) -> Found {
         return None;
     }
     let runs = |axis: usize| runs_off(&time_s, &beyond.iter().map(|b| b[axis]).collect::<Vec<_>>());
-    let (by_rad_s, axis) =
-        (0..3).filter_map(|axis| Some((runs(axis)?, axis))).max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
+    let (by_rad_s, axis) = (0..3)
+        .filter_map(|axis| Some((runs(axis)?, axis)))
+        .max_by(|a, b| a.0.abs().total_cmp(&b.0.abs()))?;
     let axis = ["x", "y", "z"][axis];
     let words = format!(
         "runs off by {by_rad_s:+.3} rad/s about {axis} against the attitude within the flight; let the unit warm up, or subtract the bias that a filter estimates"
@@ -44,7 +46,8 @@ fn runs_off(time_s: &[f64], values: &[f64]) -> Option<f64> {
         let (n, time, sum) = blocks.entry(((t - start_s) / BLOCK_S) as i64).or_default();
         (*n, *time, *sum) = (*n + 1.0, *time + t, *sum + x);
     }
-    let points: Vec<(f64, f64)> = blocks.values().map(|(n, time, sum)| (time / n, sum / n)).collect();
+    let points: Vec<(f64, f64)> =
+        blocks.values().map(|(n, time, sum)| (time / n, sum / n)).collect();
     let n = points.len() as f64;
     if points.len() < BLOCKS_MIN {
         return None;
@@ -63,7 +66,8 @@ fn runs_off(time_s: &[f64], values: &[f64]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// A bias with a drift, noise of attitudes that comes and goes, and what a scale of 5 % makes of the rates.
+    /// A bias with a drift, noise of attitudes that comes and goes, and what a scale of 5 % makes
+    /// of the rates.
     fn series(drift_rad_s2: f64) -> (Vec<f64>, Vec<f64>) {
         (0..400)
             .map(|k| {
@@ -83,7 +87,11 @@ mod tests {
         assert_eq!(by(0.0), None);
         assert_eq!(by(3e-4), None, "as much as a warm unit may");
         for drift in [1e-3, -3e-3] {
-            assert!((by(drift).unwrap() / (38.0 * drift) - 1.0).abs() < 0.1, "{drift}: {:?}", by(drift));
+            assert!(
+                (by(drift).unwrap() / (38.0 * drift) - 1.0).abs() < 0.1,
+                "{drift}: {:?}",
+                by(drift)
+            );
         }
         assert_eq!(runs_off(&[0.0, 0.1], &[0.0, 1.0]), None, "too short");
     }

@@ -19,17 +19,19 @@ const MOVES_M_S2: f64 = 0.1;
 const MOVES_M_S: f64 = 0.5;
 /// Correlation from which on a time shift is believed.
 const MATCH: f64 = 0.6;
-/// How much better the accelerometer must go with axes by position for the velocity to be wrong, in correlations.
+/// How much better the accelerometer must go with axes by position for the velocity to be wrong, in
+/// correlations.
 const POSITION_RIGHT: f64 = 0.3;
 /// What one source may be of the other.
 const SCALE: (f64, f64) = (0.5, 2.0);
-/// Part of the misfit in the body frame that the world frame must leave at most, and how well its axes must fit.
+/// Part of the misfit in the body frame that the world frame must leave at most, and how well its
+/// axes must fit.
 const WORLD_MOVES_M_S2: f64 = 0.2;
 const WORLD_MISFIT: f64 = 0.25;
 const WORLD_MATCH: f64 = 0.7;
 
-/// How well fixes go with a strapdown, by the names of their axes and however late up to what effects explain: the sum of
-/// correlations, and the shift, s.
+/// How well fixes go with a strapdown, by the names of their axes and however late up to what
+/// effects explain: the sum of correlations, and the shift, s.
 pub(super) fn match_of(flight: &Flight, strapdown: &[Strapdown]) -> (f64, f64) {
     best(flight, strapdown, SHIFT_S, |pairs| pairs.own_match(MOVES_M_S2))
 }
@@ -60,12 +62,15 @@ pub(super) fn frames(flight: &Flight) -> Found {
     if let Some(found) = world_frame(flight, &pairs, shift_s) {
         return Some(found);
     }
-    // A quarter of a period of a circle looks like other axes: each naming has the shift that is best for it.
+    // A quarter of a period of a circle looks like other axes: each naming has the shift that is
+    // best for it.
     let named = |pairs: &Pairs| pairs.misnamed_beside(MOVES_M_S2, own).map_or(0.0, |(fit, _)| fit);
     let (_, shift_s) = best(flight, &strapdown, SHIFT_S, named);
-    let (_, naming) = flight.accelerations(&strapdown, shift_s).1.misnamed_beside(MOVES_M_S2, own)?;
+    let (_, naming) =
+        flight.accelerations(&strapdown, shift_s).1.misnamed_beside(MOVES_M_S2, own)?;
     let remedy = remedy_of(naming.map(|(axis, sign)| (axis, sign > 0.0)));
-    let words = format!("fits the accelerometer better with its axes as {}; {remedy}", axes(naming));
+    let words =
+        format!("fits the accelerometer better with its axes as {}; {remedy}", axes(naming));
     Some((VELOCITY, words))
 }
 
@@ -101,10 +106,12 @@ pub(super) fn positions(flight: &Flight) -> Found {
         let strapdown = flight.strapdown(&|q| q);
         let fits = |turned: bool| {
             let turn = |own: &Vector3<f64>| if turned { by_position(own) } else { *own };
-            let fit = |pairs: &Pairs| pairs.map(|own, other| (turn(own), *other)).own_match(MOVES_M_S2);
+            let fit =
+                |pairs: &Pairs| pairs.map(|own, other| (turn(own), *other)).own_match(MOVES_M_S2);
             best(flight, &strapdown, SHIFT_S, fit).0
         };
-        let (channel, other) = if flight.has_attitude() && fits(true) > fits(false) + POSITION_RIGHT {
+        let (channel, other) = if flight.has_attitude() && fits(true) > fits(false) + POSITION_RIGHT
+        {
             (VELOCITY, "position")
         } else {
             (POSITION, "velocity")
@@ -120,11 +127,15 @@ pub(super) fn positions(flight: &Flight) -> Found {
     let (low, high) = moved.slope()?;
     (low > SCALE.1 || high < SCALE.0).then(|| {
         let remedy = scale_remedy(low, "m");
-        (POSITION, format!("moves {low:.3} to {high:.3} times as fast as the velocity says; {remedy}"))
+        (
+            POSITION,
+            format!("moves {low:.3} to {high:.3} times as fast as the velocity says; {remedy}"),
+        )
     })
 }
 
-/// Accelerations that are given in the world frame although they should be in the body's: they fit without the attitude.
+/// Accelerations that are given in the world frame although they should be in the body's: they fit
+/// without the attitude.
 fn world_frame(flight: &Flight, body: &Pairs, shift_s: f64) -> Found {
     // Without an attitude the strapdown is the sum of the logged numbers themselves.
     let level = flight.strapdown(&|_| Quaternion::identity());
@@ -157,8 +168,12 @@ fn world_frame(flight: &Flight, body: &Pairs, shift_s: f64) -> Found {
 
 fn remedy_of(naming: [(usize, bool); 3]) -> String {
     let frame = match naming {
-        [(1, true), (0, true), (2, false)] => "`world = \"enu\"`, or \"ned\" where the map has that",
-        [(0, true), (1, false), (2, false)] => "`world = \"nwu\"`, or \"ned\" where the map has that",
+        [(1, true), (0, true), (2, false)] => {
+            "`world = \"enu\"`, or \"ned\" where the map has that"
+        }
+        [(0, true), (1, false), (2, false)] => {
+            "`world = \"nwu\"`, or \"ned\" where the map has that"
+        }
         [(1, _), (0, _), (2, true)] => {
             "`world = \"enu\"` for \"nwu\" or the other way round, here or of the attitude, or the order of `columns = [...]`"
         }

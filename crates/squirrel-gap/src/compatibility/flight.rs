@@ -1,4 +1,5 @@
-//! One flight of a predictor: its long pieces, and what its sources say of one motion at the same times.
+//! One flight of a predictor: its long pieces, and what its sources say of one motion at the same
+//! times.
 
 use super::pairs::Pairs;
 use crate::flight::series::Span;
@@ -10,7 +11,8 @@ use squirrel_core::vehicle::{PerRotor, Vehicle};
 /// Windows over which rates of attitude and of GNSS velocity are taken, s.
 const ATTITUDE_WINDOW_S: f64 = 0.1;
 const GNSS_WINDOW_S: f64 = 0.3;
-/// Shorter pieces of a flight than this are not checked, unless all are, s: a dash between two gaps is no mean of anything.
+/// Shorter pieces of a flight than this are not checked, unless all are, s: a dash between two gaps
+/// is no mean of anything.
 const PIECE_S: f64 = 5.0;
 
 /// What an attitude of the log would be without a mistake.
@@ -28,10 +30,12 @@ impl<'p> Flight<'p> {
             let track = &predictor.tracks[piece];
             track.period_s * track.time_s.len() as f64
         };
-        let own: Vec<usize> =
-            (0..predictor.tracks.len()).filter(|piece| predictor.tracks[*piece].flight == index).collect();
+        let own: Vec<usize> = (0..predictor.tracks.len())
+            .filter(|piece| predictor.tracks[*piece].flight == index)
+            .collect();
         let longest_s = own.iter().map(|piece| duration_s(*piece)).fold(0.0, f64::max);
-        let pieces = own.into_iter().filter(|piece| duration_s(*piece) >= PIECE_S.min(longest_s)).collect();
+        let pieces =
+            own.into_iter().filter(|piece| duration_s(*piece) >= PIECE_S.min(longest_s)).collect();
         Self { predictor, index, pieces }
     }
 
@@ -48,7 +52,8 @@ impl<'p> Flight<'p> {
         &self.predictor.vehicle.vehicle
     }
 
-    /// By how much the effects of the vehicle file make rotors late, s: lag and latency beside those of its propulsion.
+    /// By how much the effects of the vehicle file make rotors late, s: lag and latency beside
+    /// those of its propulsion.
     pub(super) fn stated_delay_s(&self) -> f64 {
         let effects = &self.predictor.vehicle.effects;
         let [up, down] = effects.rotor_extra_time_constant_s();
@@ -83,9 +88,11 @@ impl<'p> Flight<'p> {
             let Some(attitude) = track.attitude() else { continue };
             let step = (ATTITUDE_WINDOW_S / track.period_s).round().max(1.0) as usize;
             for start in (0..attitude.len().saturating_sub(step)).step_by(step) {
-                let [a, b] = [start, start + step].map(|k| UnitQuaternion::new_normalize(turn(attitude[k])));
+                let [a, b] =
+                    [start, start + step].map(|k| UnitQuaternion::new_normalize(turn(attitude[k])));
                 let turned = (a.inverse() * b).scaled_axis() / (step as f64 * track.period_s);
-                let gyro = track.omega()[start..start + step].iter().sum::<Vector3<f64>>() / step as f64;
+                let gyro =
+                    track.omega()[start..start + step].iter().sum::<Vector3<f64>>() / step as f64;
                 time_s.push(track.time_s[start] + 0.5 * step as f64 * track.period_s);
                 pairs.push(gyro, turned);
             }
@@ -100,8 +107,9 @@ impl<'p> Flight<'p> {
             let attitude = track.attitude()?;
             let mut velocity = vec![Vector3::zeros()];
             for k in 1..attitude.len() {
-                let a =
-                    UnitQuaternion::new_normalize(turn(attitude[k])) * track.specific_force()[k] + gravity;
+                let a = UnitQuaternion::new_normalize(turn(attitude[k]))
+                    * track.specific_force()[k]
+                    + gravity;
                 velocity.push(velocity[k - 1] + a * track.period_s);
             }
             Some(Strapdown { start_s: track.time_s[0], period_s: track.period_s, velocity })
@@ -109,7 +117,8 @@ impl<'p> Flight<'p> {
         all.collect()
     }
 
-    /// Changes of velocity of fixes and of strapdown so much earlier, m/s^2, with the times of the middle, s.
+    /// Changes of velocity of fixes and of strapdown so much earlier, m/s^2, with the times of the
+    /// middle, s.
     pub(super) fn accelerations(&self, strapdown: &[Strapdown], shift_s: f64) -> (Vec<f64>, Pairs) {
         let (mut time_s, mut pairs) = (Vec::new(), Pairs::default());
         for (track, own) in self.tracks().filter(|t| t.attitude().is_some()).zip(strapdown) {
@@ -137,7 +146,8 @@ impl<'p> Flight<'p> {
     /// Mean acceleration that specific force and attitude give, m/s^2.
     pub(super) fn mean_acceleration(strapdown: &[Strapdown]) -> Vector3<f64> {
         let duration_s: f64 = strapdown.iter().map(|s| s.period_s * s.velocity.len() as f64).sum();
-        strapdown.iter().map(|s| s.velocity[s.velocity.len() - 1]).sum::<Vector3<f64>>() / duration_s
+        strapdown.iter().map(|s| s.velocity[s.velocity.len() - 1]).sum::<Vector3<f64>>()
+            / duration_s
     }
 
     /// Speed by positions and velocity, m/s.

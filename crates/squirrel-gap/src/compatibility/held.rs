@@ -1,7 +1,8 @@
-//! Channels that repeat old values: forward-filled to a higher rate than they were measured at, or stuck for a while.
+//! Channels that repeat old values: forward-filled to a higher rate than they were measured at, or
+//! stuck for a while.
 //!
-//! Noise changes the last digit of every sample of an inertial unit, an attitude or a fix; what repeats to the bit was not
-//! measured again.
+//! Noise changes the last digit of every sample of an inertial unit, an attitude or a fix; what
+//! repeats to the bit was not measured again.
 
 use super::Found;
 use crate::flight::series::Span;
@@ -11,11 +12,13 @@ use squirrel_log::FlightLog;
 const FRESH_MIN: f64 = 0.5;
 /// Samples that say something about a rate.
 const SAMPLES_MIN: usize = 40;
-/// Commands are held by what they drive: slow is what misses the motion itself, Hz, and the rate is not the stamps'.
+/// Commands are held by what they drive: slow is what misses the motion itself, Hz, and the rate is
+/// not the stamps'.
 const COMMAND_HZ: f64 = 25.0;
 const COMMAND_FRESH: f64 = 0.25;
 
-/// Channels with the longest time, s, and the number of samples for which one may repeat a value in flight.
+/// Channels with the longest time, s, and the number of samples for which one may repeat a value in
+/// flight.
 const CHANNELS: [(&str, f64, usize); 5] = [
     ("imu.specific_force_body_m_s2", 0.4, 20),
     ("imu.omega_body_rad_s", 0.4, 20),

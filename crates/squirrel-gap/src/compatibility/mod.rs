@@ -1,9 +1,10 @@
 //! Whether the logs agree with themselves, before anything is said about forces.
 //!
-//! Each pair of sources that measure one motion is compared: gyroscope and attitude, accelerometer and fixes, velocity and
-//! position, commands and what the vehicle did. An axis that fits better under another name, a slope that no noise of
-//! either source explains, a time shift that no latency explains, a clock that jumps, values that are held, or a flight
-//! given twice is a problem of the data; its words say what to change in the import map. Bounds lie far outside what any
+//! Each pair of sources that measure one motion is compared: gyroscope and attitude, accelerometer
+//! and fixes, velocity and position, commands and what the vehicle did. An axis that fits better
+//! under another name, a slope that no noise of either source explains, a time shift that no
+//! latency explains, a clock that jumps, values that are held, or a flight given twice is a problem
+//! of the data; its words say what to change in the import map. Bounds lie far outside what any
 //! effect of the catalogue does. A flight with a problem is set aside, and the others go on.
 
 mod attitude;
@@ -45,7 +46,8 @@ impl<'a> Ready<'a> {
         held_out: &'a [(String, FlightLog)],
     ) -> Result<Self, GapError> {
         let predictor = Predictor::new(vehicle, flights)?;
-        let unseen = if held_out.is_empty() { None } else { Some(Predictor::new(vehicle, held_out)?) };
+        let unseen =
+            if held_out.is_empty() { None } else { Some(Predictor::new(vehicle, held_out)?) };
         let nominal = predictor.residual(&predictor.nominal())?;
         Ok(Self { predictor, nominal, unseen })
     }
@@ -55,7 +57,10 @@ impl<'a> Ready<'a> {
 ///
 /// # Errors
 /// [`GapError`]: a flight that cannot be read.
-pub fn check(vehicle: &VehicleFile, flights: &[(String, FlightLog)]) -> Result<Vec<SetAside>, GapError> {
+pub fn check(
+    vehicle: &VehicleFile,
+    flights: &[(String, FlightLog)],
+) -> Result<Vec<SetAside>, GapError> {
     problems(&Ready::new(vehicle, flights, &[])?, flights, &[])
 }
 
@@ -83,7 +88,11 @@ pub(crate) fn problems(
     Ok(told)
 }
 
-fn problems_of(predictor: &Predictor<'_>, residual: &[f64], logs: &[(String, FlightLog)]) -> Vec<SetAside> {
+fn problems_of(
+    predictor: &Predictor<'_>,
+    residual: &[f64],
+    logs: &[(String, FlightLog)],
+) -> Vec<SetAside> {
     let first = |(index, (_, log)): (usize, &(String, FlightLog))| {
         let flight = Flight::new(predictor, index);
         // Without an accelerometer forces come from the fixes themselves, and agree with them.
@@ -148,7 +157,8 @@ pub(crate) fn tell(verdict: &mut Verdict, given: usize) {
     let lines: Vec<&str> = aside.iter().take(told).map(|a| a.words.as_str()).collect();
     let more = aside.len() - lines.len();
     let and = if more > 0 { format!("; {more} more: see the notes") } else { String::new() };
-    let words = format!("{} of {given} flights were set aside: {}{and}.", aside.len(), lines.join("; "));
+    let words =
+        format!("{} of {given} flights were set aside: {}{and}.", aside.len(), lines.join("; "));
     verdict.words = match verdict.verdict {
         Kind::DataProblem if given == 1 => return,
         Kind::DataProblem => words,
@@ -159,10 +169,11 @@ pub(crate) fn tell(verdict: &mut Verdict, given: usize) {
 /// Flights set aside that a verdict tells by themselves.
 const TOLD: usize = 3;
 
-/// Correlation of roll and pitch with their commands, however late, below which the model says nothing about moments.
+/// Correlation of roll and pitch with their commands, however late, below which the model says
+/// nothing about moments.
 const MOMENT_FIT: f64 = 0.75;
-/// The same of their changes from row to row: 0.95 to 0.98 where a large moment is missing, 0.7 to 0.9 in measured flights of brushed
-/// motors whose moments the file does not know.
+/// The same of their changes from row to row: 0.95 to 0.98 where a large moment is missing, 0.7 to
+/// 0.9 in measured flights of brushed motors whose moments the file does not know.
 const QUICK_FIT: f64 = 0.93;
 
 /// What takes part of the moments of some flights.
@@ -174,11 +185,12 @@ pub(crate) enum Moments {
     Lasting,
 }
 
-/// Leaves out what is not known of some flights: drag without the motion through the air, and moments that have nothing to do
-/// with those of the vehicle file.
+/// Leaves out what is not known of some flights: drag without the motion through the air, and
+/// moments that have nothing to do with those of the vehicle file.
 pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments: Moments) {
     // A heading that is taken as held does for what lasts.
-    let has_motion = predictor.has_motion() && (predictor.has_heading() || moments == Moments::Lasting);
+    let has_motion =
+        predictor.has_motion() && (predictor.has_heading() || moments == Moments::Lasting);
     if !has_motion {
         predictor.leave_out_drag();
         predictor.leave_out_moments();
@@ -189,8 +201,9 @@ pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments
     }
 }
 
-/// Whether the vehicle file's moments have to do with the measured ones; where they do not, nothing is named from them. A large
-/// moment that the file lacks is slow, as velocity is, and what is quick still follows the commands.
+/// Whether the vehicle file's moments have to do with the measured ones; where they do not, nothing
+/// is named from them. A large moment that the file lacks is slow, as velocity is, and what is
+/// quick still follows the commands.
 pub(crate) fn moments_fit(predictor: &Predictor<'_>, residual: &[f64]) -> bool {
     let fits: Vec<[f64; 2]> = (0..predictor.tracks.len())
         .filter(|piece| predictor.tracks[*piece].measured.len() > 100)

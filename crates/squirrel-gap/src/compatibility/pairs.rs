@@ -4,9 +4,10 @@
 //! own = s other      S_oo / S_xo >= s >= S_xo / S_xx     x: other, o: own; sums about the means, over a block
 //! n_eff = n / (1 + 2 sum_k r_own(k) r_other(k))          Bartlett (1935)
 //! ```
-//! Noise of either source takes one of the two regressions below the true slope and the other above it, so the slope lies
-//! between them whatever the noise is (Frisch, Statistical Confluence Analysis, 1934). The medians over blocks keep a
-//! burst of bad samples out. A correlation counts only where it is beyond what as many independent samples show by chance.
+//! Noise of either source takes one of the two regressions below the true slope and the other above
+//! it, so the slope lies between them whatever the noise is (Frisch, Statistical Confluence
+//! Analysis, 1934). The medians over blocks keep a burst of bad samples out. A correlation counts
+//! only where it is beyond what as many independent samples show by chance.
 
 use nalgebra::Vector3;
 
@@ -74,7 +75,9 @@ impl Pairs {
             damping[axis] = (lost / square).max(0.0);
         }
         let pairs = self.0.iter().zip(rates);
-        Self(pairs.map(|((own, other), rate)| (own + damping.component_mul(rate), *other)).collect())
+        Self(
+            pairs.map(|((own, other), rate)| (own + damping.component_mul(rate), *other)).collect(),
+        )
     }
 
     /// What changes from one row to the next: what is quick.
@@ -84,10 +87,13 @@ impl Pairs {
 
     fn means(&self) -> (Vector3<f64>, Vector3<f64>) {
         let n = self.0.len().max(1) as f64;
-        self.0.iter().fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (x, y)| (a + x / n, b + y / n))
+        self.0
+            .iter()
+            .fold((Vector3::zeros(), Vector3::zeros()), |(a, b), (x, y)| (a + x / n, b + y / n))
     }
 
-    /// Sum over all axes of the squares of the first and the second and of their products, about the means.
+    /// Sum over all axes of the squares of the first and the second and of their products, about
+    /// the means.
     fn sums(&self) -> (f64, f64, f64) {
         let (a, b) = self.means();
         self.0.iter().fold((0.0, 0.0, 0.0), |(aa, bb, ab), (x, y)| {
@@ -105,15 +111,19 @@ impl Pairs {
     /// Autocorrelations of an axis of the first or second up to [`LAGS`].
     fn memory(&self, of_own: bool, axis: usize) -> Vec<f64> {
         let (a, b) = self.means();
-        let x: Vec<f64> =
-            self.0.iter().map(|p| if of_own { p.0[axis] - a[axis] } else { p.1[axis] - b[axis] }).collect();
+        let x: Vec<f64> = self
+            .0
+            .iter()
+            .map(|p| if of_own { p.0[axis] - a[axis] } else { p.1[axis] - b[axis] })
+            .collect();
         let square: f64 = x.iter().map(|x| x * x).sum::<f64>().max(f64::MIN_POSITIVE);
         (1..=LAGS.min(x.len() / 4))
             .map(|lag| x.iter().zip(&x[lag..]).map(|(a, b)| a * b).sum::<f64>() / square)
             .collect()
     }
 
-    /// Correlations of axis `i` of the first with axis `j` of the second; 0 for an axis that moves less than `least`.
+    /// Correlations of axis `i` of the first with axis `j` of the second; 0 for an axis that moves
+    /// less than `least`.
     pub(super) fn correlations(&self, least: f64) -> [[f64; 3]; 3] {
         let (a, b) = self.means();
         let (mut aa, mut bb, mut ab) = ([0.0; 3], [0.0; 3], [[0.0; 3]; 3]);
@@ -140,7 +150,8 @@ impl Pairs {
     pub(super) fn significant(&self, least: f64) -> [[f64; 3]; 3] {
         let r = self.correlations(least);
         let n = self.0.len().max(1) as f64;
-        let [own, other] = [true, false].map(|of_own| [0, 1, 2].map(|axis| self.memory(of_own, axis)));
+        let [own, other] =
+            [true, false].map(|of_own| [0, 1, 2].map(|axis| self.memory(of_own, axis)));
         std::array::from_fn(|i| {
             std::array::from_fn(|j| {
                 let common: f64 = own[i].iter().zip(&other[j]).map(|(a, b)| a * b).sum();
@@ -162,8 +173,8 @@ impl Pairs {
         (0..3).filter(|i| r[*i][*i] != 0.0).count()
     }
 
-    /// The axes of the first as the second would call them and how well they then fit, if that is much better than by
-    /// their names.
+    /// The axes of the first as the second would call them and how well they then fit, if that is
+    /// much better than by their names.
     pub(super) fn misnamed_axes(&self, least: f64) -> Option<(f64, Naming)> {
         self.misnamed_beside(least, self.own_match(least))
     }
@@ -174,7 +185,8 @@ impl Pairs {
         (best - own > MARGIN && best > MATCH).then_some((best, naming))
     }
 
-    /// Bounds of what the first is times the second, from all axes together, whatever noise either has.
+    /// Bounds of what the first is times the second, from all axes together, whatever noise either
+    /// has.
     pub(super) fn slope(&self) -> Option<(f64, f64)> {
         let blocks = (self.0.len() / BLOCK_MIN).clamp(1, BLOCKS);
         let length = self.0.len() / blocks;
@@ -201,7 +213,8 @@ impl Pairs {
         a.z / b.z
     }
 
-    /// By how much the first is later than the second, s, and how well they then correlate; pairs are `step_s` apart.
+    /// By how much the first is later than the second, s, and how well they then correlate; pairs
+    /// are `step_s` apart.
     pub(super) fn best_shift(&self, step_s: f64, most_s: f64) -> (f64, f64) {
         let (a, b) = self.means();
         let most = (most_s / step_s) as i64;
@@ -216,7 +229,8 @@ impl Pairs {
                 let (x, y) = (self.0[i as usize].0 - a, self.0[(i - shift) as usize].1 - b);
                 sum += x.component_mul(&y);
             }
-            (0..2).map(|i| sum[i] / (own[i] * other[i]).sqrt().max(f64::MIN_POSITIVE)).sum::<f64>() / 2.0
+            (0..2).map(|i| sum[i] / (own[i] * other[i]).sqrt().max(f64::MIN_POSITIVE)).sum::<f64>()
+                / 2.0
         };
         if n < 4 * most {
             return (0.0, 0.0);
@@ -234,8 +248,9 @@ impl Pairs {
 
 /// A naming of axes in words: `(-y, x, z)`.
 pub(super) fn axes(naming: Naming) -> String {
-    let names =
-        naming.map(|(axis, sign)| format!("{}{}", if sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][axis]));
+    let names = naming.map(|(axis, sign)| {
+        format!("{}{}", if sign < 0.0 { "-" } else { "" }, ["x", "y", "z"][axis])
+    });
     format!("({})", names.join(", "))
 }
 
@@ -251,7 +266,8 @@ fn best_naming(r: &[[f64; 3]; 3]) -> (f64, Naming) {
     for order in orders {
         let sum: f64 = (0..3).map(|i| r[i][order[i]].abs()).sum();
         if sum > best.0 {
-            best = (sum, [0, 1, 2].map(|i| (order[i], if r[i][order[i]] < 0.0 { -1.0 } else { 1.0 })));
+            best =
+                (sum, [0, 1, 2].map(|i| (order[i], if r[i][order[i]] < 0.0 { -1.0 } else { 1.0 })));
         }
     }
     best
@@ -265,12 +281,15 @@ mod tests {
     fn noise(seed: u64) -> impl FnMut() -> f64 {
         let mut state = seed;
         move || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
         }
     }
 
-    /// A motion of size 1 along each axis seen by two sources, the first of a scale, with noise of a size on each.
+    /// A motion of size 1 along each axis seen by two sources, the first of a scale, with noise of
+    /// a size on each.
     fn seen(scale: f64, own_noise: f64, other_noise: f64) -> Pairs {
         let mut next = noise(7);
         let mut pairs = Pairs::default();

@@ -6,8 +6,11 @@ use std::collections::HashMap;
 
 const CHANNEL: &str = "imu.specific_force_body_m_s2";
 
-/// The flights of the second list that repeat one of the first, or an earlier one of their own list.
-pub(super) fn repeated<'a>(flights: impl Iterator<Item = &'a (String, FlightLog)>) -> Vec<SetAside> {
+/// The flights of the second list that repeat one of the first, or an earlier one of their own
+/// list.
+pub(super) fn repeated<'a>(
+    flights: impl Iterator<Item = &'a (String, FlightLog)>,
+) -> Vec<SetAside> {
     let all: Vec<(&String, Vec<[u64; 6]>)> = flights.map(|(name, log)| (name, rows(log))).collect();
     // The flights in which a row was until now.
     let mut holders: HashMap<&[u64; 6], Vec<usize>> = HashMap::new();

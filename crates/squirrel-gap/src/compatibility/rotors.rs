@@ -3,7 +3,8 @@
 //! ```text
 //! a_axis = sum_i B_axis,i T_i      B = J^-1 [-y_i, x_i, s_i k_m / k_f],  T_i: thrust of a command behind the rotor's lag
 //! ```
-//! An order of rotors only permutes the columns of `B`, so all orders follow from one set of covariances.
+//! An order of rotors only permutes the columns of `B`, so all orders follow from one set of
+//! covariances.
 
 use super::Found;
 use super::flight::Flight;
@@ -13,7 +14,8 @@ use squirrel_core::vehicle::MAX_ROTORS;
 
 const COMMAND: &str = "rotor.command";
 const FORCE: &str = "imu.specific_force_body_m_s2";
-/// Thrust that was felt over thrust that was asked for: a data sheet and an empty battery make 2 of 1.
+/// Thrust that was felt over thrust that was asked for: a data sheet and an empty battery make 2 of
+/// 1.
 const THRUST: (f64, f64) = (0.33, 3.0);
 /// The same of their changes.
 const THRUST_CHANGE: (f64, f64) = (0.2, 5.0);
@@ -24,8 +26,8 @@ const SHIFT_MAX_S: f64 = 1.0;
 const MATCH: f64 = 0.4;
 /// Smallest changes of specific force that say something about axes, m/s^2.
 const MOVES_M_S2: f64 = 0.15;
-/// An order of rotors is wrong where another one fits better by so many standard deviations of what chance does, and where
-/// its own fits at most by this part as well.
+/// An order of rotors is wrong where another one fits better by so many standard deviations of what
+/// chance does, and where its own fits at most by this part as well.
 const ORDER_SD: f64 = 4.0;
 const ORDER_SHARE: f64 = 0.75;
 
@@ -46,15 +48,20 @@ pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
         ));
     }
     let step_s = flight.step_s();
-    // A file may say more of a lag than there is: what acts before its model does may still act after it is given.
+    // A file may say more of a lag than there is: what acts before its model does may still act
+    // after it is given.
     let earliest_s = SHIFT_S.0 - flight.stated_delay_s();
-    // A clock that runs off is late by more and more; what is late from the start is something else.
-    let outside = |(shift_s, fit): (f64, f64)| fit > MATCH && !(earliest_s..=SHIFT_S.1).contains(&shift_s);
+    // A clock that runs off is late by more and more; what is late from the start is something
+    // else.
+    let outside =
+        |(shift_s, fit): (f64, f64)| fit > MATCH && !(earliest_s..=SHIFT_S.1).contains(&shift_s);
     let (shift_s, fit) = moments.best_shift(step_s, SHIFT_MAX_S);
     // Air that damps the rates makes moments look early; rates alone never make them look so.
     let undamped = moments.with_damping(&flight.omega());
     if outside((shift_s, fit))
-        && outside(moments.first((n / 4).max((10.0 / step_s) as usize)).best_shift(step_s, SHIFT_MAX_S))
+        && outside(
+            moments.first((n / 4).max((10.0 / step_s) as usize)).best_shift(step_s, SHIFT_MAX_S),
+        )
         && (shift_s > 0.0 || outside(undamped.best_shift(step_s, SHIFT_MAX_S)))
     {
         let words = if shift_s < 0.0 {
@@ -74,11 +81,14 @@ pub(super) fn model(flight: &Flight, residual: &[f64]) -> Found {
         return Some(found);
     }
     if let Some((_, naming)) = forces.misnamed_axes(MOVES_M_S2) {
-        let words =
-            format!("fits the model better with its axes as {}; see `columns` and `body`", axes(naming));
+        let words = format!(
+            "fits the model better with its axes as {}; see `columns` and `body`",
+            axes(naming)
+        );
         return Some((FORCE, words));
     }
-    let along_z = forces.map(|own, other| (Vector3::new(0.0, 0.0, own.z), Vector3::new(0.0, 0.0, other.z)));
+    let along_z =
+        forces.map(|own, other| (Vector3::new(0.0, 0.0, own.z), Vector3::new(0.0, 0.0, other.z)));
     let (low, high) = along_z.slope()?;
     (low > THRUST_CHANGE.1 || high < THRUST_CHANGE.0).then(|| {
         let words = format!(
@@ -101,8 +111,10 @@ fn order(flight: &Flight) -> Found {
     };
     let as_given: Vec<usize> = (0..count).collect();
     let own = score(&as_given);
-    let (best, order) =
-        orders(count).into_iter().map(|order| (score(&order), order)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (best, order) = orders(count)
+        .into_iter()
+        .map(|order| (score(&order), order))
+        .max_by(|a, b| a.0.total_cmp(&b.0))?;
     if best - own < ORDER_SD * sums.chance || own > ORDER_SHARE * best {
         return None;
     }
@@ -143,7 +155,8 @@ fn orders(count: usize) -> Vec<Vec<usize>> {
         let mut all = vec![Vec::new()];
         for _ in 0..count {
             let longer = |order: &Vec<usize>| {
-                let left: Vec<usize> = given.iter().copied().filter(|i| !order.contains(i)).collect();
+                let left: Vec<usize> =
+                    given.iter().copied().filter(|i| !order.contains(i)).collect();
                 left.into_iter().map(|i| [order.clone(), vec![i]].concat()).collect::<Vec<_>>()
             };
             all = all.iter().flat_map(longer).collect();
@@ -250,11 +263,13 @@ impl Sums {
     }
 }
 
-/// Thrust of each rotor at the rows of the residual, N: behind its lag, through the filter that the residual came through.
+/// Thrust of each rotor at the rows of the residual, N: behind its lag, through the filter that the
+/// residual came through.
 fn thrusts(flight: &Flight, track: &crate::predictor::Track) -> Vec<[f64; MAX_ROTORS]> {
     let p = flight.vehicle().parameters();
     let keeps = |tau_s: f64| if tau_s > 0.0 { (-track.period_s / tau_s).exp() } else { 0.0 };
-    let (up, down) = (keeps(p.propulsion.time_constant_up_s), keeps(p.propulsion.time_constant_down_s));
+    let (up, down) =
+        (keeps(p.propulsion.time_constant_up_s), keeps(p.propulsion.time_constant_down_s));
     let commands = flight.commands();
     let mut next = commands.partition_point(|(t, _)| *t <= track.time_s[0]);
     let mut speed: Option<[f64; MAX_ROTORS]> = None;
@@ -277,7 +292,8 @@ fn thrusts(flight: &Flight, track: &crate::predictor::Track) -> Vec<[f64; MAX_RO
         first.push(Vector6::from_fn(|i, _| thrust[i]));
         second.push(Vector6::new(thrust[6], thrust[7], 0.0, 0.0, 0.0, 0.0));
     }
-    let [first, second] = [first, second].map(|raw| track.filter.apply(&raw, track.edge(), track.every));
+    let [first, second] =
+        [first, second].map(|raw| track.filter.apply(&raw, track.edge(), track.every));
     let all = first.iter().zip(&second);
     all.map(|(a, b)| std::array::from_fn(|i| if i < 6 { a[i] } else { b[i - 6] })).collect()
 }

@@ -26,13 +26,16 @@ pub(super) fn voltage(flight: &Flight) -> Found {
         r if (VOLTAGE.0 * 1e2..VOLTAGE.1 * 1e2).contains(&r) => {
             "it is in hundredths of a volt: `scale = 0.01`"
         }
-        r if (VOLTAGE.0 * 10.0..VOLTAGE.1 * 10.0).contains(&r) => "it is in tenths of a volt: `scale = 0.1`",
+        r if (VOLTAGE.0 * 10.0..VOLTAGE.1 * 10.0).contains(&r) => {
+            "it is in tenths of a volt: `scale = 0.1`"
+        }
         _ => "is it in volts, and of all cells together? see `scale`",
     };
     (!(VOLTAGE.0..VOLTAGE.1).contains(&ratio)).then(|| {
         let mean = ratio * reference;
-        let words =
-            format!("its mean is {mean:.3} V where the vehicle's reference is {reference} V; {remedy}");
+        let words = format!(
+            "its mean is {mean:.3} V where the vehicle's reference is {reference} V; {remedy}"
+        );
         ("battery.voltage_v", words)
     })
 }
@@ -97,7 +100,9 @@ pub(super) fn commands(flight: &Flight) -> Found {
     let of = format!("its middle is {middle:.4} and it goes up to {high:.4}");
     let remedy = match p.propulsion.command {
         CommandKind::SpeedFraction | CommandKind::Duty if high > FRACTION_MAX => match high {
-            _ if low > 800.0 && high < 2300.0 => "pulses of 1000 to 2000 us: `scale = 0.001, offset = -1.0`",
+            _ if low > 800.0 && high < 2300.0 => {
+                "pulses of 1000 to 2000 us: `scale = 0.001, offset = -1.0`"
+            }
             h if h <= 110.0 => "percent: `scale = 0.01`",
             h if h <= 260.0 => "0 to 255: `scale = 0.00392156862745098`",
             h if h <= 1100.0 => "0 to 1000: `scale = 0.001`",
@@ -122,5 +127,8 @@ pub(super) fn commands(flight: &Flight) -> Found {
         CommandKind::PwmMicroseconds => "pulses of 1000 to 2000 us",
         _ => "fractions of 0 to 1",
     };
-    Some(("rotor.command", format!("{of} where the vehicle takes {wanted}; it looks like {remedy}")))
+    Some((
+        "rotor.command",
+        format!("{of} where the vehicle takes {wanted}; it looks like {remedy}"),
+    ))
 }

@@ -1,4 +1,5 @@
-//! Where and by how much flights disagree with a vehicle: the residual of force and moment, in the body frame.
+//! Where and by how much flights disagree with a vehicle: the residual of force and moment, in the
+//! body frame.
 //!
 //! ```text
 //! r_F = LP[ m a - F ]                               a      imu.specific_force_body_m_s2
@@ -7,25 +8,31 @@
 //!                                                   h      baro.altitude_m, or else gnss.position_ned_m
 //! Omega, deployment: the plant under u, c           u, c   rotor.command, wing.command;  V  battery.voltage_v
 //! ```
-//! `m` and `J` are the vehicle's. `F` and `M` are force without gravity and moment of the simulator's own plant: rotors
-//! behind their lag, drag, wings behind their servos, and the effects of the vehicle file, at the measured motion, height and
-//! voltage in still air; the height is smoothed as `name` does it. `LP` is a zero-phase low-pass at 12 Hz (lower without an IMU) and `D` a derivative, whose taps stand in `filter`;
-//! both sides pass the same `LP`, which is linear, so that it is applied once, to their difference.
+//! `m` and `J` are the vehicle's. `F` and `M` are force without gravity and moment of the
+//! simulator's own plant: rotors behind their lag, drag, wings behind their servos, and the effects
+//! of the vehicle file, at the measured motion, height and voltage in still air; the height is
+//! smoothed as `name` does it. `LP` is a zero-phase low-pass at 12 Hz (lower without an IMU) and
+//! `D` a derivative, whose taps stand in `filter`; both sides pass the same `LP`, which is linear,
+//! so that it is applied once, to their difference.
 //!
-//! **Time.** Each flight has a uniform grid with the median period `T` of the IMU. IMU, attitude (normalised), velocity and
-//! voltage are on lines between their samples. Where a channel has no sample for more than five of its median periods, the
-//! flight is cut; each piece starts a grid of its own at its first time and is filtered on its own. The filter's edges
-//! have no residual: 0.2 s and two samples at each end of a piece. The voltage is held beyond its ends.
+//! **Time.** Each flight has a uniform grid with the median period `T` of the IMU. IMU, attitude
+//! (normalised), velocity and voltage are on lines between their samples. Where a channel has no
+//! sample for more than five of its median periods, the flight is cut; each piece starts a grid of
+//! its own at its first time and is filtered on its own. The filter's edges have no residual: 0.2 s
+//! and two samples at each end of a piece. The voltage is held beyond its ends.
 //!
-//! **Commands** are held until the next one. The plant runs in `ceil(T / 1 ms)` steps a sample by the simulator's RK4; a
-//! command acts from the step nearest to its time, and the motion between two samples lies on a line. Before a piece its
-//! first sample is held for 1 s, so that rotors, servos and membranes start settled.
+//! **Commands** are held until the next one. The plant runs in `ceil(T / 1 ms)` steps a sample by
+//! the simulator's RK4; a command acts from the step nearest to its time, and the motion between
+//! two samples lies on a line. Before a piece its first sample is held for 1 s, so that rotors,
+//! servos and membranes start settled.
 //!
-//! **Numbers.** RMS values are over samples, over all flights together or for each. A place is a window of one second and a
-//! channel, taken from the residual that `name` works with; places rank by their rms over that of the noise which the log
-//! itself shows. A share is a place's part of the sum of the squared residual of its channel over all flights.
+//! **Numbers.** RMS values are over samples, over all flights together or for each. A place is a
+//! window of one second and a channel, taken from the residual that `name` works with; places rank
+//! by their rms over that of the noise which the log itself shows. A share is a place's part of the
+//! sum of the squared residual of its channel over all flights.
 //!
-//! `tests/residual_numpy.py` computes the force again, from a CSV file and without any code of this workspace.
+//! `tests/residual_numpy.py` computes the force again, from a CSV file and without any code of this
+//! workspace.
 
 mod places;
 mod residual;
@@ -98,7 +105,8 @@ pub struct Place {
     pub t1_s: f64,
     /// One of [`CHANNELS`].
     pub channel: &'static str,
-    /// How the vehicle flew there: means of what is logged. Throttle is commanded rotor speed over top speed.
+    /// How the vehicle flew there: means of what is logged. Throttle is commanded rotor speed over
+    /// top speed.
     pub condition: String,
     /// Part of the channel's squared residual over all flights that lies here, 0 to 1.
     pub share: f64,
@@ -127,12 +135,12 @@ impl Sum {
 
 /// Residual force and moment of flights against a vehicle; the equations are in the [module](self).
 ///
-/// * `flights` - name and log of each; needs `imu.*` (or position or velocity, and attitude) and `rotor.command`,
-///   uses attitude, velocity, voltage and wing command
+/// * `flights` - name and log of each; needs `imu.*` (or position or velocity, and attitude) and
+///   `rotor.command`, uses attitude, velocity, voltage and wing command
 ///
 /// # Errors
-/// [`GapError`]: a channel is missing, cannot be, or leaves less than a second of a flight; the log is of a vehicle with
-/// another number of rotors; the vehicle cannot be stepped.
+/// [`GapError`]: a channel is missing, cannot be, or leaves less than a second of a flight; the log
+/// is of a vehicle with another number of rotors; the vehicle cannot be stepped.
 pub fn find(vehicle: &VehicleFile, flights: &[(String, FlightLog)]) -> Result<Finding, GapError> {
     if flights.is_empty() {
         return Err(GapError::NoFlights);

@@ -1,4 +1,5 @@
-//! Where the residual is: windows of one second, channel by channel, in units of what noise alone would leave there.
+//! Where the residual is: windows of one second, channel by channel, in units of what noise alone
+//! would leave there.
 
 use super::Place;
 use crate::GapError;
@@ -24,7 +25,8 @@ pub(crate) fn places(predictor: &Predictor, rows: &[f64]) -> Result<Vec<Place>, 
     let mut all: Vec<(f64, Place)> = Vec::new();
     for segment in predictor.segments.iter().filter(|s| s.channel < DYNAMIC) {
         let x = &rows[segment.rows.clone()];
-        let noise = draws.iter().map(|d| square(&d[segment.rows.clone()])).sum::<f64>() / draws.len() as f64;
+        let noise = draws.iter().map(|d| square(&d[segment.rows.clone()])).sum::<f64>()
+            / draws.len() as f64;
         let noise = noise / x.len().max(1) as f64;
         let track = &predictor.tracks[segment.piece];
         let motion = &predictor.plain()[segment.piece];
@@ -70,7 +72,8 @@ fn condition(predictor: &Predictor, at: &Moment) -> String {
     let mut part = |is_logged: bool, name: &str, value: f64, digits: usize, unit: &str| {
         if is_logged {
             let scale = 10_f64.powf(digits as f64);
-            let _ = write!(text, ", {name}{:.digits$}{unit}", (value * scale).round() / scale + 0.0);
+            let _ =
+                write!(text, ", {name}{:.digits$}{unit}", (value * scale).round() / scale + 0.0);
         }
     };
     let moves = predictor.has_motion();

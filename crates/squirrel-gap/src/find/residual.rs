@@ -1,7 +1,8 @@
 //! The residual of one piece of a flight: measured minus model, sample by sample.
 //!
-//! The model is the simulator's own plant, led along the measured motion: it propagates rotors, servos and membranes under
-//! the logged commands and gives force and moment, while velocity, attitude and rates are what was measured.
+//! The model is the simulator's own plant, led along the measured motion: it propagates rotors,
+//! servos and membranes under the logged commands and gives force and moment, while velocity,
+//! attitude and rates are what was measured.
 
 use super::{CHANNELS, GapError};
 use crate::flight::filter::{DERIVATIVE_REACH, derivative};
@@ -16,7 +17,8 @@ use squirrel_sim::plant::{Plant, PlantState};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::convert::Infallible;
 
-/// How long the first sample of a piece is held before it, so that rotors, servos and membranes start settled, s.
+/// How long the first sample of a piece is held before it, so that rotors, servos and membranes
+/// start settled, s.
 const SETTLE_S: f64 = 1.0;
 /// Far beyond any vehicle, and its square still sums up, N or N m.
 const RESIDUAL_MAX: f64 = 1e100;
@@ -33,13 +35,13 @@ pub(super) fn residuals(
     let samples = samples(vehicle, recording, piece);
     let model = model(vehicle, recording, &samples)?;
     // Effects on mass and inertia change what the measured motion is worth in newtons.
-    let airframe = vehicle.effects.alter(&vehicle.vehicle).map_err(|problem| GapError::Vehicle {
-        vehicle: vehicle.name.clone(),
-        problem: problem.to_string(),
+    let airframe = vehicle.effects.alter(&vehicle.vehicle).map_err(|problem| {
+        GapError::Vehicle { vehicle: vehicle.name.clone(), problem: problem.to_string() }
     })?;
     let parameters = airframe.parameters();
     let is_felt = recording.derived.force.is_none();
-    let lever = if is_felt { vehicle.effects.accelerometer_position().vector } else { Vector3::zeros() };
+    let lever =
+        if is_felt { vehicle.effects.accelerometer_position().vector } else { Vector3::zeros() };
     let (measured, predicted): (Vec<Vector6<f64>>, Vec<Vector6<f64>>) = (DERIVATIVE_REACH
         ..samples.len() - DERIVATIVE_REACH)
         .map(|k| {
@@ -48,8 +50,8 @@ pub(super) fn residuals(
             // An accelerometer beside the centre of mass feels the vehicle turn about it.
             let turning = omega_dot.cross(&lever) + omega.cross(&omega.cross(&lever));
             let force = (samples[k].specific_force - turning) * parameters.mass_kg;
-            let moment =
-                parameters.inertia_kg_m2 * omega_dot + omega.cross(&(parameters.inertia_kg_m2 * omega));
+            let moment = parameters.inertia_kg_m2 * omega_dot
+                + omega.cross(&(parameters.inertia_kg_m2 * omega));
             let wrench = &model[k];
             (stack(force, moment), stack(wrench.force.vector, wrench.moment.vector))
         })
@@ -73,15 +75,21 @@ pub(super) fn residuals(
             if let Some(i) = value.iter().position(|x| x.is_nan() || x.abs() >= RESIDUAL_MAX) {
                 let (flight, time_s) = (recording.flight.to_owned(), sample.time_s);
                 let (channel, value) = (CHANNELS[i], value[i]);
-                return Err(GapError::TooLarge { flight, channel, time_s, value, most: RESIDUAL_MAX });
+                return Err(GapError::TooLarge {
+                    flight,
+                    channel,
+                    time_s,
+                    value,
+                    most: RESIDUAL_MAX,
+                });
             }
             Ok(value)
         })
         .collect()
 }
 
-/// The measured samples of a piece with what the vehicle file says of the sensors taken off, at the heights that `name` has:
-/// strapdown, held by barometer or GNSS.
+/// The measured samples of a piece with what the vehicle file says of the sensors taken off, at the
+/// heights that `name` has: strapdown, held by barometer or GNSS.
 fn samples(vehicle: &VehicleFile, recording: &Recording, piece: Span) -> Vec<Sample> {
     let effects = &vehicle.effects;
     let mut samples = recording.grid(piece);

@@ -1,4 +1,5 @@
-//! The low-pass that measurement and model share: a zero-phase FIR, and the derivative that goes with it.
+//! The low-pass that measurement and model share: a zero-phase FIR, and the derivative that goes
+//! with it.
 //!
 //! ```text
 //! h = floor(2.4 rate / f_c + 1/2)                                      half length: 2 h + 1 taps
@@ -6,10 +7,11 @@
 //! y_k = sum_i b_i x_(k+i) / sum_i b_i                                  f_c = 12 Hz, lower where a log has no IMU
 //! x'_k = (x_(k-2) - 8 x_(k-1) + 8 x_(k+1) - x_(k+2)) / (12 T)          T = 1 / rate
 //! ```
-//! 12 Hz keeps what rotors and wings can do and drops what propellers shake. A Hamming window of 0.4 s passes 8 Hz whole
-//! and nothing above 16 Hz. The five-point difference reads 1 % low at 12 Hz on a 100 Hz log; three points would read 9 %
-//! low and favour the model of a sluggish vehicle. Both are linear and the same at all times, so that their order, and
-//! whether measurement and model pass apart or as their difference, does not matter.
+//! 12 Hz keeps what rotors and wings can do and drops what propellers shake. A Hamming window of
+//! 0.4 s passes 8 Hz whole and nothing above 16 Hz. The five-point difference reads 1 % low at 12
+//! Hz on a 100 Hz log; three points would read 9 % low and favour the model of a sluggish vehicle.
+//! Both are linear and the same at all times, so that their order, and whether measurement and
+//! model pass apart or as their difference, does not matter.
 
 use nalgebra::SVector;
 use std::f64::consts::{PI, TAU};
@@ -22,7 +24,8 @@ const HALF_LENGTH_PERIODS: f64 = 2.4;
 /// Samples on each side of a derivative that it looks at.
 pub(crate) const DERIVATIVE_REACH: usize = 2;
 
-/// Lowest rate at which a model is asked: what aliases from above it has come through a lag of rotors and this filter.
+/// Lowest rate at which a model is asked: what aliases from above it has come through a lag of
+/// rotors and this filter.
 const MODEL_RATE_HZ: f64 = 140.0;
 
 /// The filter of a signal of which every sample, or one of `stride`, is known.
@@ -30,7 +33,8 @@ const MODEL_RATE_HZ: f64 = 140.0;
 pub(crate) struct LowPass {
     /// The taps at the full rate, from the middle outwards.
     taps: Vec<f64>,
-    /// By how far an answer lies behind a known sample: how many known samples before that one count, and all their weights.
+    /// By how far an answer lies behind a known sample: how many known samples before that one
+    /// count, and all their weights.
     phases: Vec<(usize, Vec<f64>)>,
 }
 
@@ -69,8 +73,8 @@ impl LowPass {
         self.taps.len() - 1
     }
 
-    /// One filtered sample of `every`, both at the full rate, the first at sample `first`, which must be [`Self::reach`] from
-    /// the beginning.
+    /// One filtered sample of `every`, both at the full rate, the first at sample `first`, which
+    /// must be [`Self::reach`] from the beginning.
     pub(crate) fn apply<const N: usize>(
         &self,
         known: &[SVector<f64, N>],
@@ -84,7 +88,11 @@ impl LowPass {
                 let (before, weights) = &self.phases[k % stride];
                 let start = k / stride - before;
                 let near = known.get(start..start + weights.len())?;
-                Some(near.iter().zip(weights).fold(SVector::zeros(), |sum, (x, weight)| sum + x * *weight))
+                Some(
+                    near.iter()
+                        .zip(weights)
+                        .fold(SVector::zeros(), |sum, (x, weight)| sum + x * *weight),
+                )
             })
             .collect()
     }
@@ -96,7 +104,8 @@ pub(crate) fn model_stride(period_s: f64) -> usize {
     ((1.0 / (period_s * MODEL_RATE_HZ) + 1e-6) as usize).max(1)
 }
 
-/// Five-point derivative of `x` at sample `k`, per second; `k` must be [`DERIVATIVE_REACH`] away from the ends.
+/// Five-point derivative of `x` at sample `k`, per second; `k` must be [`DERIVATIVE_REACH`] away
+/// from the ends.
 pub(crate) fn derivative<V>(x: impl Fn(usize) -> V, k: usize, period_s: f64) -> V
 where
     V: std::ops::Sub<Output = V> + std::ops::Add<Output = V> + std::ops::Mul<f64, Output = V>,
@@ -166,7 +175,12 @@ mod tests {
                 let all = filter.apply(&full, reach + 1, every);
                 assert!(few.len() >= 2 * reach / every - 1, "{rate_hz} Hz: {}", few.len());
                 for (a, b) in all.iter().zip(&few) {
-                    assert!((a - b).amax() < off, "{frequency_hz} of {rate_hz} Hz: {} and {}", a[0], b[0]);
+                    assert!(
+                        (a - b).amax() < off,
+                        "{frequency_hz} of {rate_hz} Hz: {} and {}",
+                        a[0],
+                        b[0]
+                    );
                 }
             }
         }
@@ -190,7 +204,9 @@ mod tests {
             [(0.0, 1.0, 1e-12), (2.0, 1.0, 0.01), (4.0, 0.5, 0.01), (6.0, 0.0, 0.01)]
         {
             let x: Vec<_> = (0..=120)
-                .map(|k| Vector6::repeat((TAU * frequency_hz * (f64::from(k) - 60.0) / 100.0).cos()))
+                .map(|k| {
+                    Vector6::repeat((TAU * frequency_hz * (f64::from(k) - 60.0) / 100.0).cos())
+                })
                 .collect();
             let y = filter.apply(&x, 60, 1)[0][0];
             assert!((y - gain).abs() < off, "{frequency_hz} Hz: {y}");

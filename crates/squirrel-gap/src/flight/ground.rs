@@ -1,16 +1,19 @@
-//! When a flight touches the ground: forces of the ground are nothing that a model of the air could explain.
+//! When a flight touches the ground: forces of the ground are nothing that a model of the air could
+//! explain.
 //!
-//! No log says it. A touch is a jolt, a step from one IMU sample to the next, that is larger than any of the same flight well
-//! above the ground, at a time when the lowest corner of the vehicle's box could be at the ground. What slides or rolls on the
-//! ground before and after need not jolt, so the whole approach with a jolt in it is left out. Without height or attitude
-//! nothing is found.
+//! No log says it. A touch is a jolt, a step from one IMU sample to the next, that is larger than
+//! any of the same flight well above the ground, at a time when the lowest corner of the vehicle's
+//! box could be at the ground. What slides or rolls on the ground before and after need not jolt,
+//! so the whole approach with a jolt in it is left out. Without height or attitude nothing is
+//! found.
 
 use super::recording::Recording;
 use super::series::Span;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::fmt::Write as _;
 
-/// Below this clearance the vehicle may touch, m: a barometer's drift, and its lag in a fast descent.
+/// Below this clearance the vehicle may touch, m: a barometer's drift, and its lag in a fast
+/// descent.
 const NEAR_M: f64 = 0.4;
 /// A touch is this many times the largest jolt away from the ground.
 const JOLT_RATIO: f64 = 1.5;

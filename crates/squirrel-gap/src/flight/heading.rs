@@ -1,10 +1,12 @@
-//! The heading of a log that has roll and velocity and no yaw, for a vehicle that held one heading all along.
+//! The heading of a log that has roll and velocity and no yaw, for a vehicle that held one heading
+//! all along.
 //!
 //! ```text
 //! g tan(roll) = c + a_E cos(heading) - a_N sin(heading)      a  horizontal acceleration; least squares over the flight
 //! ```
-//! A vehicle that rolls is pulled to its right. Of one that turned, this is the heading that fits best, and nobody can tell:
-//! it does for means over seconds of a flight about one heading, and for nothing quicker.
+//! A vehicle that rolls is pulled to its right. Of one that turned, this is the heading that fits
+//! best, and nobody can tell: it does for means over seconds of a flight about one heading, and for
+//! nothing quicker.
 
 use super::series::Series;
 use nalgebra::{Matrix3, Vector3};
@@ -94,9 +96,11 @@ mod tests {
         let time_s: Vec<f64> = (0..2000).map(|k| 0.01 * f64::from(k)).collect();
         let sway = |t: f64| 0.5 * (2.1 * t).sin() + 0.2 * (5.3 * t).cos();
         let along = |t: f64| 2.0 * (1.3 * t).sin();
-        let roll: Vec<f64> = time_s.iter().map(|t| (sway(*t) / GRAVITY_M_S2).atan() + 0.01).collect();
+        let roll: Vec<f64> =
+            time_s.iter().map(|t| (sway(*t) / GRAVITY_M_S2).atan() + 0.01).collect();
         let (sin, cos) = heading.sin_cos();
-        let ned = |t: &f64| [along(*t) * cos - sway(*t) * sin, along(*t) * sin + sway(*t) * cos, 0.0];
+        let ned =
+            |t: &f64| [along(*t) * cos - sway(*t) * sin, along(*t) * sin + sway(*t) * cos, 0.0];
         let accelerations = (time_s.clone(), time_s.iter().flat_map(ned).collect());
         let series = |values: Vec<f64>| Series::computed("roll", 1, (time_s.clone(), values));
         let found = series(roll).and_then(|roll| held(&roll, &accelerations));

@@ -6,13 +6,16 @@
 //! | `imu.acceleration_ned_m_s2`, attitude | `R^T (a - g)`: an accelerometer that a flight controller has turned into the world |
 //! | position or velocity, attitude | differences behind a low-pass ([`smoother`](super::smoother)) |
 //!
-//! Where roll and yaw are logged and pitch is not, pitch is where thrust must point for the vehicle to move as it did, which
-//! is what estimators that know no drag believe: `tan(pitch) = a_x / a_z` of `a = v' - g`, along the heading.
+//! Where roll and yaw are logged and pitch is not, pitch is where thrust must point for the vehicle
+//! to move as it did, which is what estimators that know no drag believe: `tan(pitch) = a_x / a_z`
+//! of `a = v' - g`, along the heading.
 //!
-//! Where yaw is missing, too, the vehicle is taken to have held one heading ([`heading`]), and only what lasts is looked at.
+//! Where yaw is missing, too, the vehicle is taken to have held one heading ([`heading`]), and only
+//! what lasts is looked at.
 //!
-//! Rates are the gyroscope's, or differences of the attitude. One corner serves forces and moments of all flights that are
-//! looked at together, the lowest that one of them needs, so that their residuals are alike.
+//! Rates are the gyroscope's, or differences of the attitude. One corner serves forces and moments
+//! of all flights that are looked at together, the lowest that one of them needs, so that their
+//! residuals are alike.
 
 use super::filter::CUTOFF_HZ;
 use super::heading::{self, Held};
@@ -61,7 +64,8 @@ pub(crate) struct Derived {
     pub(crate) heading: Option<Held>,
     /// The accelerometer was turned into the world by an estimate that used it.
     pub(crate) turned: bool,
-    /// What the noise of attitudes makes of gravity, m/s^2, one standard deviation of a sample of the force.
+    /// What the noise of attitudes makes of gravity, m/s^2, one standard deviation of a sample of
+    /// the force.
     pub(crate) lean: Vector3<f64>,
 }
 
@@ -79,7 +83,8 @@ impl Sources {
     pub(crate) fn read(flight: &str, log: &FlightLog) -> Result<Self, GapError> {
         let optional = |channel, width| Series::read(flight, log, channel, width);
         let (velocity, position) = (optional(VELOCITY, 3)?, optional(POSITION, 3)?);
-        let neither = |channel, instead| GapError::Neither { flight: flight.to_owned(), channel, instead };
+        let neither =
+            |channel, instead| GapError::Neither { flight: flight.to_owned(), channel, instead };
         let mut differences = Derived::default();
         let mut attitude = optional(ATTITUDE, 4)?;
         if let Some(attitude) = &attitude {
@@ -105,8 +110,9 @@ impl Sources {
                     differences.pitch = from;
                     accelerations.and_then(|accelerations| pitch_of_thrust(&accelerations, &yaw))
                 });
-                let pitch =
-                    pitch.ok_or_else(|| neither(ATTITUDE, "attitude.pitch_rad or gnss.velocity_ned_m_s"))?;
+                let pitch = pitch.ok_or_else(|| {
+                    neither(ATTITUDE, "attitude.pitch_rad or gnss.velocity_ned_m_s")
+                })?;
                 attitude = of_angles(&roll, &pitch, &yaw);
             }
         }
@@ -150,11 +156,16 @@ impl Sources {
     /// Forces and rates behind a corner.
     pub(super) fn inertial(&mut self, flight: &str, cutoff_hz: f64) -> Result<Inertial, GapError> {
         let corner = significant(cutoff_hz, 2);
-        let short =
-            |channel| GapError::TooShort { flight: flight.to_owned(), channel, usable_s: 0.0, least_s: 1.0 };
+        let short = |channel| GapError::TooShort {
+            flight: flight.to_owned(),
+            channel,
+            usable_s: 0.0,
+            least_s: 1.0,
+        };
         let (mut notes, mut velocity) = (Vec::new(), None);
         if let Some(held) = self.differences.heading {
-            let [heading, sd] = [held.heading_rad, held.sd_rad].map(|x| significant(x.to_degrees(), 2));
+            let [heading, sd] =
+                [held.heading_rad, held.sd_rad].map(|x| significant(x.to_degrees(), 2));
             notes.push(format!(
                 "{flight}: {YAW}: missing; the vehicle is taken to have held one heading, {heading} deg (sd {sd}), at which its roll makes its acceleration; what is quick about z cannot be judged"
             ));
@@ -180,7 +191,9 @@ impl Sources {
                 ));
                 if self.velocity.is_none() {
                     velocity = Series::computed(VELOCITY, 3, smoother::velocity(source, cutoff_hz));
-                    notes.push(format!("{flight}: {VELOCITY}: missing; that of {POSITION} is taken"));
+                    notes.push(format!(
+                        "{flight}: {VELOCITY}: missing; that of {POSITION} is taken"
+                    ));
                 }
                 let rows = smoother::specific_force(from, source, attitude, cutoff_hz);
                 Series::computed(FORCE, 3, rows).ok_or_else(|| short(from.channel))?
@@ -202,8 +215,13 @@ impl Sources {
     }
 }
 
-/// Measured rotor speeds. A flight of the simulator has those of its plant: they are truth, and no sensor gave them.
-pub(super) fn rotor_speed(flight: &str, log: &FlightLog, rotors: usize) -> Result<Option<Series>, GapError> {
+/// Measured rotor speeds. A flight of the simulator has those of its plant: they are truth, and no
+/// sensor gave them.
+pub(super) fn rotor_speed(
+    flight: &str,
+    log: &FlightLog,
+    rotors: usize,
+) -> Result<Option<Series>, GapError> {
     if log.metadata.contains_key(SIMULATED) {
         return Ok(None);
     }
@@ -229,8 +247,9 @@ impl Common {
         }
         for (flight, log) in flights {
             let speeds = rotor_speed(flight, log, rotors)?;
-            let is_fast =
-                |speeds: &Series| 1.0 / speeds.median_period_s() >= SPEEDS_OF_CUTOFF * own.cutoff_hz;
+            let is_fast = |speeds: &Series| {
+                1.0 / speeds.median_period_s() >= SPEEDS_OF_CUTOFF * own.cutoff_hz
+            };
             own.rotor_speeds &= speeds.as_ref().is_some_and(is_fast);
         }
         Ok(own)

@@ -1,4 +1,5 @@
-//! A logged flight as the gap workflow sees it: channels as series, a uniform grid, and what was flown where.
+//! A logged flight as the gap workflow sees it: channels as series, a uniform grid, and what was
+//! flown where.
 
 pub(crate) mod filter;
 mod ground;

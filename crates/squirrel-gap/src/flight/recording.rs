@@ -1,4 +1,5 @@
-//! What the residual needs of one flight: its channels, a uniform time grid, and the pieces of it without gaps.
+//! What the residual needs of one flight: its channels, a uniform time grid, and the pieces of it
+//! without gaps.
 
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass};
 use super::ground;
@@ -30,7 +31,8 @@ pub(crate) struct Recording<'a> {
     pub(crate) period_s: f64,
     /// Corner of the filter, Hz.
     pub(crate) cutoff_hz: f64,
-    /// What forces and rates come from where the log has no IMU: they have passed the filter already.
+    /// What forces and rates come from where the log has no IMU: they have passed the filter
+    /// already.
     pub(crate) derived: Derived,
     pub(crate) filter: LowPass,
     /// Where every channel exists for longer than the filter has edges.
@@ -64,7 +66,8 @@ pub(crate) struct Sample {
     pub(crate) voltage_v: f64,
 }
 
-/// What is said where rotors turn as they were measured: effects that only commands show cannot be seen.
+/// What is said where rotors turn as they were measured: effects that only commands show cannot be
+/// seen.
 fn taken_as_measured(flight: &str) -> String {
     let is_one = |name: &&&str| {
         Effects::<f64>::profile(name).is_some_and(|profile| profile.shown.has(Shown::COMMANDS))
@@ -83,7 +86,8 @@ impl<'a> Recording<'a> {
     /// * `common` - what the flight shares with those that are looked at together with it
     ///
     /// # Errors
-    /// [`GapError`] with the first channel that is missing, cannot be, or leaves less than a second.
+    /// [`GapError`] with the first channel that is missing, cannot be, or leaves less than a
+    /// second.
     pub(crate) fn new(
         vehicle: &VehicleFile,
         flight: &'a str,
@@ -93,13 +97,17 @@ impl<'a> Recording<'a> {
         let Common { cutoff_hz, rotor_speeds } = common;
         let parameters = vehicle.vehicle.parameters();
         let mut sources = Sources::read(flight, log)?;
-        let rotor =
-            Series::need(flight, log, "rotor.command", parameters.rotor_count).map_err(|e| match e {
-                GapError::Width { flight, found, needed, .. } => {
-                    GapError::Rotors { flight, log: found, vehicle: vehicle.name.clone(), rotors: needed }
-                }
+        let rotor = Series::need(flight, log, "rotor.command", parameters.rotor_count).map_err(
+            |e| match e {
+                GapError::Width { flight, found, needed, .. } => GapError::Rotors {
+                    flight,
+                    log: found,
+                    vehicle: vehicle.name.clone(),
+                    rotors: needed,
+                },
                 other => other,
-            })?;
+            },
+        )?;
         let optional = |channel, width| Series::read(flight, log, channel, width);
         let logged_speed = inertial::rotor_speed(flight, log, parameters.rotor_count)?;
         let is_slow = logged_speed.is_some() && !rotor_speeds;
@@ -187,7 +195,8 @@ impl<'a> Recording<'a> {
         let touches = ground::touches(&recording, Vector3::from(vehicle.size_body_m));
         if !touches.is_empty() {
             let free = ground::outside(&touches);
-            recording.pieces = recording.usable_with(&recording.pieces, "time off the ground", &free)?;
+            recording.pieces =
+                recording.usable_with(&recording.pieces, "time off the ground", &free)?;
             recording.notes.push(ground::note(flight, &touches));
         }
         Ok(recording)
@@ -217,7 +226,8 @@ impl<'a> Recording<'a> {
     ) -> Result<Vec<Span>, GapError> {
         let mut left = common(spans, exists);
         left.retain(|span| self.samples_usable(*span) > 0);
-        let usable_s = left.iter().map(|span| self.samples_usable(*span) as f64 * self.period_s).sum::<f64>();
+        let usable_s =
+            left.iter().map(|span| self.samples_usable(*span) as f64 * self.period_s).sum::<f64>();
         if usable_s < USABLE_MIN_S {
             let flight = self.flight.to_owned();
             return Err(GapError::TooShort { flight, channel, usable_s, least_s: USABLE_MIN_S });
@@ -225,7 +235,8 @@ impl<'a> Recording<'a> {
         Ok(left)
     }
 
-    /// Height over ground at a time, m, by barometer or else by position; `None` if the log has neither.
+    /// Height over ground at a time, m, by barometer or else by position; `None` if the log has
+    /// neither.
     pub(super) fn height_m(&self, time_s: f64) -> Option<f64> {
         match (&self.baro, &self.position) {
             (Some(baro), _) => Some(baro.number(time_s)),
@@ -257,18 +268,21 @@ impl<'a> Recording<'a> {
     pub(crate) fn sample(&self, time_s: f64) -> Sample {
         let attitude = self.attitude.as_ref().map(|q| q.rotation(time_s));
         // Without both, the velocity through the air in the body frame is not known.
-        let velocity = attitude.and(self.velocity.as_ref()).map_or(Vector3::zeros(), |v| v.vector(time_s));
+        let velocity =
+            attitude.and(self.velocity.as_ref()).map_or(Vector3::zeros(), |v| v.vector(time_s));
         let body = State {
             velocity: In::new(velocity),
             attitude: attitude.unwrap_or(Quaternion::identity()),
             omega: In::new(self.omega.vector(time_s)),
             ..State::at_rest()
         };
-        let voltage_v = self.voltage.as_ref().map_or(self.reference_voltage_v, |v| v.number(time_s));
+        let voltage_v =
+            self.voltage.as_ref().map_or(self.reference_voltage_v, |v| v.number(time_s));
         Sample { time_s, specific_force: self.specific_force.vector(time_s), body, voltage_v }
     }
 
-    /// The rotor command in force at a time, in the vehicle's unit; measured speeds, rad/s, where they are taken.
+    /// The rotor command in force at a time, in the vehicle's unit; measured speeds, rad/s, where
+    /// they are taken.
     pub(crate) fn rotor_command(&self, time_s: f64) -> PerRotor<f64> {
         let mut command = [0.0; MAX_ROTORS];
         let held = match &self.speed {
@@ -282,7 +296,8 @@ impl<'a> Recording<'a> {
         command
     }
 
-    /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard deviation.
+    /// White noise of the accelerometer, m/s^2, and of the gyroscope, rad/s, one standard
+    /// deviation.
     pub(crate) fn imu_noise(&self) -> [Vector3<f64>; 2] {
         // Behind the filter nothing is white; what is left of the noise is as large.
         let alike = |noise| Vector3::repeat(noise);

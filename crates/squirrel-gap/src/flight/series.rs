@@ -1,7 +1,9 @@
-//! One channel of a log as a series that can be asked at any time, and the time spans in which it can.
+//! One channel of a log as a series that can be asked at any time, and the time spans in which it
+//! can.
 //!
-//! Samples with a number that is not finite are left out. A channel exists between two of its samples that are at most
-//! five of its median periods apart; beyond, a line between them would be invention.
+//! Samples with a number that is not finite are left out. A channel exists between two of its
+//! samples that are at most five of its median periods apart; beyond, a line between them would be
+//! invention.
 
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
@@ -34,13 +36,19 @@ impl Series {
         let Some((time_s, found)) = log.channel(channel) else { return Ok(None) };
         let flight = || flight.to_owned();
         if found.width != width {
-            return Err(GapError::Width { flight: flight(), channel, found: found.width, needed: width });
+            return Err(GapError::Width {
+                flight: flight(),
+                channel,
+                found: found.width,
+                needed: width,
+            });
         }
         if found.values.len() != time_s.len() * width {
             let (found, needed) = (found.values.len(), time_s.len() * width);
             return Err(GapError::Length { flight: flight(), channel, found, needed });
         }
-        let runs_forward = |i: usize| time_s[i].is_finite() && (i == 0 || time_s[i] > time_s[i - 1]);
+        let runs_forward =
+            |i: usize| time_s[i].is_finite() && (i == 0 || time_s[i] > time_s[i - 1]);
         if let Some(index) = (0..time_s.len()).find(|&i| !runs_forward(i)) {
             return Err(GapError::Time { flight: flight(), channel, index, time_s: time_s[index] });
         }
@@ -57,7 +65,8 @@ impl Series {
         Ok(Some(series))
     }
 
-    /// A channel that is computed from others, at times in order; `None` with fewer than two samples.
+    /// A channel that is computed from others, at times in order; `None` with fewer than two
+    /// samples.
     pub(crate) fn computed(
         channel: &'static str,
         width: usize,
@@ -121,7 +130,8 @@ impl Series {
         self.time_s.iter().copied().zip(self.values.chunks_exact(self.width))
     }
 
-    /// Deviation of the white part of three numbers a sample: that of the third difference, which motion hardly enters.
+    /// Deviation of the white part of three numbers a sample: that of the third difference, which
+    /// motion hardly enters.
     pub(crate) fn white_deviation(&self) -> Vector3<f64> {
         let at = |i| Vector3::from_column_slice(self.row(i));
         let n = self.time_s.len().saturating_sub(3);
@@ -149,7 +159,8 @@ impl Series {
         self.time_s[0]
     }
 
-    /// The samples about `t`, and how far `t` is from the first to the second, 0 to 1; the end sample twice beyond the ends.
+    /// The samples about `t`, and how far `t` is from the first to the second, 0 to 1; the end
+    /// sample twice beyond the ends.
     fn about(&self, t: f64) -> (&[f64], &[f64], f64) {
         let after = self.time_s.partition_point(|&x| x <= t);
         let (i, j) = (after.saturating_sub(1), after.min(self.time_s.len() - 1));
@@ -187,12 +198,14 @@ impl Series {
         a + (b - a) * share
     }
 
-    /// A vector on the cubic through the four samples about `t` (Lagrange), for what is differentiated.
+    /// A vector on the cubic through the four samples about `t` (Lagrange), for what is
+    /// differentiated.
     pub(crate) fn cubic<const N: usize>(&self, t: f64) -> [f64; N] {
         self.through_four(t, |_, _| 1.0)
     }
 
-    /// As [`Self::cubic`] for rotations, each with the sign that is nearer to the first; not of unit length.
+    /// As [`Self::cubic`] for rotations, each with the sign that is nearer to the first; not of
+    /// unit length.
     pub(crate) fn cubic_turned(&self, t: f64) -> [f64; 4] {
         self.through_four(t, |first, row| {
             let dot: f64 = first.iter().zip(row).map(|(a, b)| a * b).sum();
@@ -200,9 +213,14 @@ impl Series {
         })
     }
 
-    fn through_four<const N: usize>(&self, t: f64, sign: impl Fn(&[f64], &[f64]) -> f64) -> [f64; N] {
+    fn through_four<const N: usize>(
+        &self,
+        t: f64,
+        sign: impl Fn(&[f64], &[f64]) -> f64,
+    ) -> [f64; N] {
         let n = self.time_s.len();
-        let first = self.time_s.partition_point(|&x| x <= t).saturating_sub(2).min(n.saturating_sub(4));
+        let first =
+            self.time_s.partition_point(|&x| x <= t).saturating_sub(2).min(n.saturating_sub(4));
         let four = first..(first + 4).min(n);
         let mut sum = [0.0; N];
         for i in four.clone() {
@@ -284,7 +302,11 @@ mod tests {
         let mut values = vec![1.0; 20];
         assert_eq!(series(&time_s, &values).spans(), [(0.0, 19.0)]);
         values[5..9].fill(f64::NAN);
-        assert_eq!(series(&time_s, &values).spans(), [(0.0, 19.0)], "five periods from sample to sample");
+        assert_eq!(
+            series(&time_s, &values).spans(),
+            [(0.0, 19.0)],
+            "five periods from sample to sample"
+        );
         values[9] = f64::NAN;
         assert_eq!(series(&time_s, &values).spans(), [(0.0, 4.0), (10.0, 19.0)]);
         for t in &mut time_s[15..] {
@@ -296,7 +318,10 @@ mod tests {
     #[test]
     fn common_spans_are_the_intersection() {
         let a = [(0.0, 10.0), (20.0, 30.0)];
-        assert_eq!(common(&a, &[(5.0, 22.0), (23.0, 24.0)]), [(5.0, 10.0), (20.0, 22.0), (23.0, 24.0)]);
+        assert_eq!(
+            common(&a, &[(5.0, 22.0), (23.0, 24.0)]),
+            [(5.0, 10.0), (20.0, 22.0), (23.0, 24.0)]
+        );
         assert_eq!(common(&a, &[(10.0, 20.0)]), []);
     }
 

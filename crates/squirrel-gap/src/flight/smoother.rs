@@ -1,14 +1,16 @@
-//! Specific force and angular rates of a log that has no IMU: position or velocity, and attitude, differentiated.
+//! Specific force and angular rates of a log that has no IMU: position or velocity, and attitude,
+//! differentiated.
 //!
 //! ```text
 //! f = LP[R^T (p'' - g)]      or R^T (v' - g)        w = LP[2 q* q']        primes are five-point differences
 //! f_c: least over F of  sum_(f <= F) N(f) + sum_(f > F) (P(f) - N(f))     P  spectrum of p'', measured (Welch, 1967)
 //! N(f) = 2 T s^2 (2 pi f)^(2 n)                                           n  derivatives, s  white noise of a sample
 //! ```
-//! A smoother is a low-pass, and one that is not told of to the model makes each quick motion a force that the model lacks.
-//! So the low-pass is the workflow's own, with a lower corner, and what the model predicts passes the same one. The corner
-//! has the least mean square error: below it a spectrum holds more motion than noise, above it more noise. The noise is that
-//! of the log's third differences, and it goes with the answer: drawn anew, it passes the same differences and filter.
+//! A smoother is a low-pass, and one that is not told of to the model makes each quick motion a
+//! force that the model lacks. So the low-pass is the workflow's own, with a lower corner, and what
+//! the model predicts passes the same one. The corner has the least mean square error: below it a
+//! spectrum holds more motion than noise, above it more noise. The noise is that of the log's third
+//! differences, and it goes with the answer: drawn anew, it passes the same differences and filter.
 
 use super::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass, derivative, second_derivative};
 use super::series::{Series, Span, common};
@@ -28,7 +30,8 @@ const CUTOFF_MIN_HZ: f64 = 1.0;
 /// Steps in which a corner is looked for, Hz, and length of a window, s.
 const STEP_HZ: f64 = 0.5;
 const WINDOW_S: f64 = 4.0;
-/// A position that carries this part of the band that a velocity carries is preferred: velocities are smoothed positions.
+/// A position that carries this part of the band that a velocity carries is preferred: velocities
+/// are smoothed positions.
 const POSITION_SHARE: f64 = 0.5;
 
 /// What accelerations, linear or angular, come from when nothing measures them.
@@ -54,7 +57,8 @@ impl Differences {
         white: Vector3<f64>,
         runs: &[Vec<Vector3<f64>>],
     ) -> Self {
-        let mut own = Self { channel: series.channel, order, period_s, white, cutoff_hz: CUTOFF_HZ };
+        let mut own =
+            Self { channel: series.channel, order, period_s, white, cutoff_hz: CUTOFF_HZ };
         let highest_hz = CUTOFF_HZ.min(1.0 / (SAMPLES_PER_PERIOD * period_s));
         let accelerations: Vec<Vec<Vector3<f64>>> = runs.iter().map(|run| own.raw(run)).collect();
         own.cutoff_hz = corner_hz(&accelerations, period_s, highest_hz, |f| own.noise_power(f));
@@ -66,8 +70,8 @@ impl Differences {
         self.period_s
     }
 
-    /// White noise of attitudes about the pitch axis, rad, that at the corner is as large as that of an acceleration over
-    /// gravity.
+    /// White noise of attitudes about the pitch axis, rad, that at the corner is as large as that
+    /// of an acceleration over gravity.
     ///
     /// * `period_s` - of the attitudes
     pub(crate) fn leaning(&self, period_s: f64) -> Vector3<f64> {
@@ -92,7 +96,8 @@ impl Differences {
         (self.noise_power(1.0) * cutoff_hz.powi(n) / f64::from(n) / 3.0).sqrt()
     }
 
-    /// Deviation of the noise that a low-pass leaves of the sum over accelerations: of rates, from attitudes.
+    /// Deviation of the noise that a low-pass leaves of the sum over accelerations: of rates, from
+    /// attitudes.
     pub(crate) fn passed_rate(&self, cutoff_hz: f64) -> f64 {
         let n = 2 * self.order - 1;
         (self.noise_power(1.0) / TAU.powi(2) * cutoff_hz.powi(n) / f64::from(n) / 3.0).sqrt()
@@ -110,7 +115,8 @@ impl Differences {
 
     /// What noise leaves of accelerations behind the low-pass, at even times.
     ///
-    /// * `lean` - noise of a vector that joins behind the differences, one standard deviation of a sample
+    /// * `lean` - noise of a vector that joins behind the differences, one standard deviation of a
+    ///   sample
     pub(crate) fn noise(
         &self,
         cutoff_hz: f64,
@@ -126,9 +132,11 @@ impl Differences {
             sd.component_mul(&Vector3::from_fn(|_, _| StandardNormal.sample(rng)))
         };
         let white: Vec<Vector3<f64>> = (0..n).map(|_| draw(&self.white)).collect();
-        let raw: Vec<Vector3<f64>> = self.raw(&white).into_iter().map(|a| a + draw(&lean)).collect();
+        let raw: Vec<Vector3<f64>> =
+            self.raw(&white).into_iter().map(|a| a + draw(&lean)).collect();
         let smooth = filter.apply(&raw, filter.reach(), 1);
-        let at = |i: usize| smooth[((i as f64 * step_s / self.period_s) as usize).min(smooth.len() - 1)];
+        let at =
+            |i: usize| smooth[((i as f64 * step_s / self.period_s) as usize).min(smooth.len() - 1)];
         (0..count).map(at).collect()
     }
 }
@@ -180,7 +188,9 @@ fn corner_hz(
 
 /// The noise of attitudes, rad, one standard deviation of a sample about the body's axes.
 pub(crate) fn attitude_white(attitude: &Series) -> Vector3<f64> {
-    let at = |row: &[f64]| UnitQuaternion::new_normalize(Quaternion::new(row[0], row[1], row[2], row[3]));
+    let at = |row: &[f64]| {
+        UnitQuaternion::new_normalize(Quaternion::new(row[0], row[1], row[2], row[3]))
+    };
     let rows: Vec<UnitQuaternion<f64>> = attitude.samples().map(|(_, row)| at(row)).collect();
     // Third differences of small turns: about the second of four samples they add.
     let (mut square, mut n) = (Vector3::zeros(), 0.0_f64);
@@ -204,11 +214,13 @@ pub(crate) fn force_source(
 ) -> Result<Option<Differences>, GapError> {
     let of = |series: &Series, order| {
         let period_s = series.median_period_s();
-        let runs: Vec<_> = series.spans().iter().map(|span| evenly(series, *span, period_s)).collect();
+        let runs: Vec<_> =
+            series.spans().iter().map(|span| evenly(series, *span, period_s)).collect();
         Differences::new(series, order, period_s, series.white_deviation(), &runs)
     };
     let fast = |series: &&Series| 1.0 / series.median_period_s() >= RATE_MIN_HZ;
-    let sources = (position.filter(fast).map(|p| of(p, 2)), velocity.filter(fast).map(|v| of(v, 1)));
+    let sources =
+        (position.filter(fast).map(|p| of(p, 2)), velocity.filter(fast).map(|v| of(v, 1)));
     Ok(match sources {
         (Some(position), Some(velocity)) => {
             let enough = position.cutoff_hz >= POSITION_SHARE * velocity.cutoff_hz;
@@ -236,7 +248,8 @@ pub(crate) fn rate_source(flight: &str, attitude: &Series) -> Result<Differences
         let (flight, channel, rate_hz) = (flight.to_owned(), attitude.channel, 1.0 / period_s);
         return Err(GapError::Rate { flight, channel, rate_hz, least_hz: RATE_MIN_HZ });
     }
-    // The turn since the first sample, summed up: its second difference is the angular acceleration but for how axes turn.
+    // The turn since the first sample, summed up: its second difference is the angular acceleration
+    // but for how axes turn.
     let turned: Vec<Vec<Vector3<f64>>> = attitude
         .spans()
         .iter()
@@ -272,7 +285,11 @@ pub(crate) fn specific_force(
 }
 
 /// Accelerations in the world, m/s^2, behind a low-pass.
-pub(crate) fn accelerations(from: &Differences, series: &Series, cutoff_hz: f64) -> (Vec<f64>, Vec<f64>) {
+pub(crate) fn accelerations(
+    from: &Differences,
+    series: &Series,
+    cutoff_hz: f64,
+) -> (Vec<f64>, Vec<f64>) {
     let raw = |span| from.raw(&evenly(series, span, from.period_s));
     smoothed(from.period_s, cutoff_hz, &series.spans(), raw)
 }

@@ -1,4 +1,5 @@
-//! What a leftover may go with: families of features of the flight, and how well each predicts it where it was not fitted.
+//! What a leftover may go with: families of features of the flight, and how well each predicts it
+//! where it was not fitted.
 
 use crate::predictor::{Motion, Predictor, Track};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
@@ -47,7 +48,9 @@ pub(crate) fn moment(
     let last_s = track.time_s[track.time_s.len() - 1];
     let horizontal = horizontal_position(track, time_s);
     let velocity = body.velocity.vector;
-    let mean = |v: &[Vector3<f64>]| v[start..end].iter().sum::<Vector3<f64>>() / (end - start).max(1) as f64;
+    let mean = |v: &[Vector3<f64>]| {
+        v[start..end].iter().sum::<Vector3<f64>>() / (end - start).max(1) as f64
+    };
     Moment {
         flight: track.flight,
         time_s: time_s - track.began_s,
@@ -76,8 +79,10 @@ fn horizontal_position(track: &Track, time_s: f64) -> Vector3<f64> {
 
 /// Every family at the moments of the leftover.
 pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
-    let family =
-        |name, row: &dyn Fn(&Moment) -> Vec<f64>| Family { name, rows: moments.iter().map(row).collect() };
+    let family = |name, row: &dyn Fn(&Moment) -> Vec<f64>| Family {
+        name,
+        rows: moments.iter().map(row).collect(),
+    };
     let flights = moments.iter().map(|m| m.flight).max().map_or(0, |f| f + 1);
     let down = |m: &Moment, v: Vector3<f64>| m.ned_from_body.tr_mul(&v);
     vec![
@@ -85,7 +90,8 @@ pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
             // Steps at eighths of the flight, and a line, for each flight by itself.
             let mut row = vec![0.0; flights * 8];
             for step in 0..7 {
-                row[m.flight * 8 + step] = f64::from(m.time_s > m.duration_s * (step + 1) as f64 / 8.0);
+                row[m.flight * 8 + step] =
+                    f64::from(m.time_s > m.duration_s * (step + 1) as f64 / 8.0);
             }
             row[m.flight * 8 + 7] = m.time_s / m.duration_s;
             row
@@ -142,14 +148,15 @@ pub(super) fn families(moments: &[Moment]) -> Vec<Family> {
     ]
 }
 
-/// Distance over which a place has one force, m, and time after which one comes back to it and does not linger, s.
+/// Distance over which a place has one force, m, and time after which one comes back to it and does
+/// not linger, s.
 const PLACE_M: f64 = 1.5;
 const AWAY_S: f64 = 5.0;
 /// Moments of all flights that are compared with each other.
 const MOMENTS_MAX: usize = 1500;
 
-/// Part of the variance of a horizontal force in the world that the force at the same place at other times predicts, 0 to 1:
-/// moving air forgets a place, and what is fixed to one does not.
+/// Part of the variance of a horizontal force in the world that the force at the same place at
+/// other times predicts, 0 to 1: moving air forgets a place, and what is fixed to one does not.
 ///
 /// * `force` - body x and y, a number a moment
 pub(super) fn place_share(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
@@ -168,7 +175,9 @@ pub(super) fn place_share(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
         let (mut sum, mut weight) = (Vector3::zeros(), 1.0);
         for (other, theirs) in moments.iter().zip(&ned).step_by(every) {
             if own.flight != other.flight || (own.time_s - other.time_s).abs() > AWAY_S {
-                let w = (-0.5 * (own.position - other.position).norm_squared() / (PLACE_M * PLACE_M)).exp();
+                let w = (-0.5 * (own.position - other.position).norm_squared()
+                    / (PLACE_M * PLACE_M))
+                    .exp();
                 sum += theirs * w;
                 weight += w;
             }
@@ -179,7 +188,8 @@ pub(super) fn place_share(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
     if total > 0.0 { (1.0 - error / total).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Part of the power of a horizontal force along the axis on which most of it lies, of the body or of the world, 0.5 to 1.
+/// Part of the power of a horizontal force along the axis on which most of it lies, of the body or
+/// of the world, 0.5 to 1.
 ///
 /// * `force` - body x and y, a number a moment
 pub(super) fn one_way(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
@@ -197,7 +207,8 @@ pub(super) fn one_way(moments: &[Moment], force: [&[f64]; 2]) -> f64 {
     largest(body).max(largest(world))
 }
 
-/// Part of the variance of `y` that a family predicts in blocks that were left out, 0 to 1: what lasts goes with nothing.
+/// Part of the variance of `y` that a family predicts in blocks that were left out, 0 to 1: what
+/// lasts goes with nothing.
 pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
     let n = y.len();
     let k = family.rows.first().map_or(0, Vec::len) + 1;
@@ -232,13 +243,15 @@ pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
         let mut gram = DMatrix::identity(k, k) * (0.01 * n as f64);
         gram[(0, 0)] = 1e-6;
         let mut right = DVector::zeros(k);
-        for (_, (others, theirs)) in products.iter().enumerate().filter(|(other, _)| *other != fold) {
+        for (_, (others, theirs)) in products.iter().enumerate().filter(|(other, _)| *other != fold)
+        {
             gram += others;
             right += theirs;
         }
         let Some(factor) = gram.cholesky() else { return 0.0 };
         let theta = factor.solve(&right);
-        let mean = (y.iter().sum::<f64>() - y[held.clone()].iter().sum::<f64>()) / (n - held.len()) as f64;
+        let mean =
+            (y.iter().sum::<f64>() - y[held.clone()].iter().sum::<f64>()) / (n - held.len()) as f64;
         for row in held {
             let predicted: f64 = x.column(row).dot(&theta);
             error += (y[row] - predicted).powi(2);
@@ -252,19 +265,23 @@ pub(super) fn predicted_share(family: &Family, y: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// A vehicle that turns once while a force comes from one side of it, or of the world, or from all.
+    /// A vehicle that turns once while a force comes from one side of it, or of the world, or from
+    /// all.
     #[test]
     fn a_force_along_one_axis_of_body_or_world_is_told_from_gusts() {
         let moments: Vec<Moment> =
             (0..400).map(|i| turned(f64::from(i) * std::f64::consts::TAU / 400.0)).collect();
         let blow = |i: usize| (0.7 * i as f64).sin();
         let along = |force: &dyn Fn(usize, &Moment) -> Vector3<f64>| {
-            let body: Vec<Vector3<f64>> = moments.iter().enumerate().map(|(i, m)| force(i, m)).collect();
+            let body: Vec<Vector3<f64>> =
+                moments.iter().enumerate().map(|(i, m)| force(i, m)).collect();
             let [x, y] = [0, 1].map(|axis| body.iter().map(|f| f[axis]).collect::<Vec<_>>());
             one_way(&moments, [&x, &y])
         };
         assert!(along(&|i, _| Vector3::new(0.6, 0.8, 0.0) * blow(i)) > 0.99);
-        assert!(along(&|i, m| m.ned_from_body.tr_mul(&Vector3::new(0.6, 0.8, 0.0)) * blow(i)) > 0.99);
+        assert!(
+            along(&|i, m| m.ned_from_body.tr_mul(&Vector3::new(0.6, 0.8, 0.0)) * blow(i)) > 0.99
+        );
         assert!(along(&|i, _| Vector3::new(blow(i), blow(3 * i + 1), 0.0)) < 0.6);
     }
 
@@ -275,7 +292,8 @@ mod tests {
         let family = Family { name: "wave", rows: (0..400).map(|i| vec![wave(i)]).collect() };
         let share = |of: f64| {
             // Without a rhythm, so that no block knows of another.
-            let y: Vec<f64> = (0..400).map(|i| 5.0 + (37.7 * (i * i) as f64).sin() + of * wave(i)).collect();
+            let y: Vec<f64> =
+                (0..400).map(|i| 5.0 + (37.7 * (i * i) as f64).sin() + of * wave(i)).collect();
             predicted_share(&family, &y)
         };
         assert!(share(0.0) < 0.02 && share(10.0) > 0.95, "{} {}", share(0.0), share(10.0));

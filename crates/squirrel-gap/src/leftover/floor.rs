@@ -1,8 +1,9 @@
-//! What sensor noise and turbulence leave of a residual, by simulation through the predictor's own filters.
+//! What sensor noise and turbulence leave of a residual, by simulation through the predictor's own
+//! filters.
 //!
-//! Noise is what this log shows: the deviation of the third difference of a raw channel, which motion hardly enters. It is
-//! drawn anew, filtered and decimated as the measurement was; turbulence of the tolerance of the wind acts through the
-//! predictor's own model.
+//! Noise is what this log shows: the deviation of the third difference of a raw channel, which
+//! motion hardly enters. It is drawn anew, filtered and decimated as the measurement was;
+//! turbulence of the tolerance of the wind acts through the predictor's own model.
 
 use crate::predictor::{DYNAMIC, Predictor};
 use rand::SeedableRng;
@@ -28,7 +29,8 @@ pub(crate) fn draws(
             let mut rows = vec![0.0; predictor.rows()];
             for (piece, track) in predictor.tracks.iter().enumerate() {
                 let white = track.drawn_noise(&mut rng);
-                let mut winds = [Drift::new(TURBULENCE_S, &mut rng), Drift::new(VELOCITY_ERROR_S, &mut rng)];
+                let mut winds =
+                    [Drift::new(TURBULENCE_S, &mut rng), Drift::new(VELOCITY_ERROR_S, &mut rng)];
                 let step_s = track.every as f64 * track.period_s;
                 let air: Vec<[f64; 3]> = (0..white.len())
                     .map(|_| {
@@ -36,12 +38,17 @@ pub(crate) fn draws(
                             wind.advance(step_s, &mut rng);
                         }
                         [0, 1, 2].map(|axis| {
-                            winds[0].value[axis] * turbulence_m_s + winds[1].value[axis] * VELOCITY_ERROR_M_S
+                            winds[0].value[axis] * turbulence_m_s
+                                + winds[1].value[axis] * VELOCITY_ERROR_M_S
                         })
                     })
                     .collect();
-                for segment in predictor.segments.iter().filter(|s| s.piece == piece && s.channel < DYNAMIC) {
-                    for (i, (row, noise)) in segment.rows.clone().zip(segment.rows_of(&white)).enumerate() {
+                for segment in
+                    predictor.segments.iter().filter(|s| s.piece == piece && s.channel < DYNAMIC)
+                {
+                    for (i, (row, noise)) in
+                        segment.rows.clone().zip(segment.rows_of(&white)).enumerate()
+                    {
                         let air = air[i * segment.mean_of];
                         rows[row] = noise
                             + wind_columns[0][row] * air[0]

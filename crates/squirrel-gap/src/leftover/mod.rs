@@ -1,9 +1,12 @@
-//! What the best explanation leaves, against what noise alone would leave: is there something that no name accounts for?
+//! What the best explanation leaves, against what noise alone would leave: is there something that
+//! no name accounts for?
 //!
-//! The leftover is looked at in blocks of about 0.27 s, which hold what is slower than 2 Hz, and as a whole. Noise is drawn
-//! from what the log itself shows and goes through the same filters; a leftover is real where it is well above their mean,
-//! by more than a model can be wrong in its last percent and than what floats may be off. What it goes with is the family of features that predicts it best
-//! where it was not fitted. A horizontal force that nothing predicts, without a moment, is a gust.
+//! The leftover is looked at in blocks of about 0.27 s, which hold what is slower than 2 Hz, and as
+//! a whole. Noise is drawn from what the log itself shows and goes through the same filters; a
+//! leftover is real where it is well above their mean, by more than a model can be wrong in its
+//! last percent and than what floats may be off. What it goes with is the family of features that
+//! predicts it best where it was not fitted. A horizontal force that nothing predicts, without a
+//! moment, is a gust.
 
 mod features;
 pub(crate) mod floor;
@@ -68,15 +71,17 @@ pub(crate) struct Leftover {
     pub(crate) families: Vec<(&'static str, f64)>,
     /// Part of the variance of the horizontal force that its place predicts.
     pub(crate) place_share: f64,
-    /// Part of the horizontal force along one axis of the body or of the world, 0.5 to 1: gusts blow along both.
+    /// Part of the horizontal force along one axis of the body or of the world, 0.5 to 1: gusts
+    /// blow along both.
     pub(crate) one_way: f64,
-    /// Fourth moment of the slow part of the horizontal force, in units of its size by noise, over the square of its second: 3
-    /// for a normal distribution.
+    /// Fourth moment of the slow part of the horizontal force, in units of its size by noise, over
+    /// the square of its second: 3 for a normal distribution.
     pub(crate) kurtosis: f64,
-    /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above 0.5 Hz.
+    /// A line in the spectrum of the worst channel: frequency, Hz, and its part of the power above
+    /// 0.5 Hz.
     pub(crate) line: Option<(f64, f64)>,
-    /// Whether the model misses a little everywhere, as models of real vehicles do, and not one thing: in force, or where most
-    /// is left. It may, inside its tolerances.
+    /// Whether the model misses a little everywhere, as models of real vehicles do, and not one
+    /// thing: in force, or where most is left. It may, inside its tolerances.
     pub(crate) is_everywhere: bool,
     /// Whether it does so in every channel of force and moment that is looked at.
     pub(crate) is_in_all: bool,
@@ -108,7 +113,8 @@ impl Leftover {
         }
     }
 
-    /// Whether a family predicts so much of it, or it comes in such bursts, that it cannot be gusts.
+    /// Whether a family predicts so much of it, or it comes in such bursts, that it cannot be
+    /// gusts.
     pub(crate) fn is_predicted(&self) -> bool {
         self.families.first().is_some_and(|(_, share)| *share > GUST_SHARE_MAX)
             || self.place_share > PLACE_SHARE_MAX
@@ -116,11 +122,14 @@ impl Leftover {
             || self.kurtosis > GUST_KURTOSIS_MAX
     }
 
-    /// Whether it goes with something that no form of any effect goes with: time, a place, a line in the spectrum.
+    /// Whether it goes with something that no form of any effect goes with: time, a place, a line
+    /// in the spectrum.
     pub(crate) fn is_foreign(&self) -> bool {
-        let strange =
-            |(name, share): &(&str, f64)| ["time in flight", "position"].contains(name) && *share > 0.5;
-        self.families.first().is_some_and(strange) || self.line.is_some_and(|(_, share)| share > LINE_SHARE)
+        let strange = |(name, share): &(&str, f64)| {
+            ["time in flight", "position"].contains(name) && *share > 0.5
+        };
+        self.families.first().is_some_and(strange)
+            || self.line.is_some_and(|(_, share)| share > LINE_SHARE)
     }
 
     /// The channels that stand out, in words.
@@ -142,7 +151,11 @@ pub(crate) fn noise(
 /// What gusts leave, often enough for their size at each moment.
 ///
 /// * arguments as of [`noise`]
-pub(crate) fn gusts(predictor: &Predictor, wind_columns: &[Vec<f64>; 3], sigma_m_s: f64) -> Vec<Vec<f64>> {
+pub(crate) fn gusts(
+    predictor: &Predictor,
+    wind_columns: &[Vec<f64>; 3],
+    sigma_m_s: f64,
+) -> Vec<Vec<f64>> {
     floor::draws(predictor, wind_columns, sigma_m_s, GUST_DRAWS)
 }
 
@@ -151,8 +164,9 @@ pub(crate) fn gusts(predictor: &Predictor, wind_columns: &[Vec<f64>; 3], sigma_m
 /// * `left`, `nominal` - rows of the residual of the best explanation, and of the vehicle as it is
 /// * `motions` - of each piece, under the best explanation
 /// * `draws` - what noise alone leaves, of [`noise`]
-/// * `gusts` - what gusts would leave, of [`gusts`], where they are in question: bursts and places are looked for in
-///   units of their size at each moment, as spread wings feel many times the gust that folded ones do
+/// * `gusts` - what gusts would leave, of [`gusts`], where they are in question: bursts and places
+///   are looked for in units of their size at each moment, as spread wings feel many times the gust
+///   that folded ones do
 /// * `slack` - tolerances that no column of the model stands for
 pub(crate) fn leftover(
     predictor: &Predictor,
@@ -168,7 +182,8 @@ pub(crate) fn leftover(
     for segment in predictor.segments.iter().filter(|s| is_judged(s)) {
         let rows = |all: &[f64]| all[segment.rows.clone()].to_vec();
         let own = rows(left);
-        // What the model says in all: the measurement about its mean, and what the named effects add.
+        // What the model says in all: the measurement about its mean, and what the named effects
+        // add.
         let track = &predictor.tracks[segment.piece];
         let measured = track.measured.iter().map(|m| m[segment.channel]);
         let mean = measured.clone().sum::<f64>() / own.len() as f64;
@@ -218,11 +233,16 @@ pub(crate) fn leftover(
     if let Some(&(channel, _)) = out.excess.first() {
         let y = means(predictor, left, channel);
         let moments = moments_of(predictor, motions, channel);
-        out.families = families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
+        out.families =
+            families(&moments).iter().map(|f| (f.name, predicted_share(f, &y))).collect();
         let gusts = gusts.unwrap_or(draws);
         let [x, y] = [0, 1].map(|channel| -> Vec<f64> {
             let sizes = sizes(predictor, gusts, channel);
-            means(predictor, left, channel).iter().zip(sizes).map(|(force, size)| force / size).collect()
+            means(predictor, left, channel)
+                .iter()
+                .zip(sizes)
+                .map(|(force, size)| force / size)
+                .collect()
         });
         let horizontal = moments_of(predictor, motions, 0);
         out.place_share = place_share(&horizontal, [&x, &y]);
@@ -254,11 +274,13 @@ pub(crate) struct Slack {
     pub(crate) thrust_fraction: f64,
     /// When commands act, s.
     pub(crate) timing_s: f64,
-    /// What the model usually leaves of this machine's flights, slow and as a whole, by channel and in its unit.
+    /// What the model usually leaves of this machine's flights, slow and as a whole, by channel and
+    /// in its unit.
     pub(crate) usual: Usual,
 }
 
-/// Rms of what a model leaves of a flight, by channel of the dynamics: of its slow part and of the whole.
+/// Rms of what a model leaves of a flight, by channel of the dynamics: of its slow part and of the
+/// whole.
 pub(crate) type Usual = [[f64; 2]; DYNAMIC];
 
 /// The largest of what is left of any flight.
@@ -277,9 +299,14 @@ fn is_judged(segment: &Segment) -> bool {
     segment.channel < DYNAMIC && !segment.is_trim() && segment.rows.len() >= 4 * BLOCK
 }
 
-/// What such tolerances leave in a channel, in its unit: forces that act a little beside their place are moments, and no drag
-/// is a straight line.
-fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, slack: Slack) -> f64 {
+/// What such tolerances leave in a channel, in its unit: forces that act a little beside their
+/// place are moments, and no drag is a straight line.
+fn within_tolerance(
+    predictor: &Predictor,
+    motion: &Motion,
+    segment: &Segment,
+    slack: Slack,
+) -> f64 {
     let p = predictor.vehicle.vehicle.parameters();
     let slow = |channel: usize| {
         let measured = &predictor.tracks[segment.piece].measured;
@@ -290,14 +317,17 @@ fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, s
     match segment.channel {
         0..=2 => {
             let n = motion.body.len().max(1) as f64;
-            let speed = motion.body.iter().map(|b| b.velocity.vector.norm_squared()).sum::<f64>() / n;
-            let thrust = if segment.channel == 2 { slack.thrust_fraction * GRAVITY_M_S2 } else { 0.0 };
+            let speed =
+                motion.body.iter().map(|b| b.velocity.vector.norm_squared()).sum::<f64>() / n;
+            let thrust =
+                if segment.channel == 2 { slack.thrust_fraction * GRAVITY_M_S2 } else { 0.0 };
             thrust.hypot(slack.drag_n_s_per_m * speed.sqrt() / p.mass_kg)
         }
         axis @ (3 | 4) => {
             // Commands that were logged on another clock are off by up to a sample.
             let measured = &predictor.tracks[segment.piece].measured;
-            let change = measured.windows(2).map(|w| (w[1][axis] - w[0][axis]).powi(2)).sum::<f64>();
+            let change =
+                measured.windows(2).map(|w| (w[1][axis] - w[0][axis]).powi(2)).sum::<f64>();
             let rate = (change / measured.len().max(1) as f64).sqrt() / segment.step_s;
             let beside = slack.lever_m * slow(2) / p.inertia_kg_m2[(axis - 3, axis - 3)];
             beside.hypot(slack.timing_s * rate)
@@ -308,7 +338,8 @@ fn within_tolerance(predictor: &Predictor, motion: &Motion, segment: &Segment, s
 
 /// How far above noise an axis is that a model misses something on.
 const MISSED: f64 = 2.0;
-/// Part of the variance of three axes, each in units of its own size, that one cause behind all has at least.
+/// Part of the variance of three axes, each in units of its own size, that one cause behind all has
+/// at least.
 const ONE_CAUSE: f64 = 0.8;
 
 fn centred(x: &[f64]) -> Vec<f64> {
@@ -328,8 +359,8 @@ fn misses_in(found: &Leftover, channel: usize) -> bool {
     stands_out || (floor > 0.0 && rms_of(|b| b.slow) > MISSED * floor)
 }
 
-/// Whether all three axes of force or moment are left with something, and not the same thing: one missing effect leaves the
-/// others at their noise, or moves all as one.
+/// Whether all three axes of force or moment are left with something, and not the same thing: one
+/// missing effect leaves the others at their noise, or moves all as one.
 fn is_everywhere(predictor: &Predictor, left: &[f64], found: &Leftover, group: usize) -> bool {
     let axes = [0, 1, 2].map(|axis| 3 * group + axis);
     if !axes.iter().all(|channel| misses_in(found, *channel)) {
@@ -365,7 +396,8 @@ fn means(predictor: &Predictor, rows: &[f64], channel: usize) -> Vec<f64> {
         .collect()
 }
 
-/// How large draws are at each block of one channel: the rms of a block and its neighbours over all of them.
+/// How large draws are at each block of one channel: the rms of a block and its neighbours over all
+/// of them.
 fn sizes(predictor: &Predictor, draws: &[Vec<f64>], channel: usize) -> Vec<f64> {
     let all: Vec<Vec<f64>> = draws.iter().map(|draw| means(predictor, draw, channel)).collect();
     let n = all.first().map_or(0, Vec::len);
@@ -390,23 +422,27 @@ fn rms(x: &[f64]) -> f64 {
 }
 
 fn rms_of_means(x: &[f64]) -> f64 {
-    let means: Vec<f64> = x.chunks_exact(BLOCK).map(|b| b.iter().sum::<f64>() / BLOCK as f64).collect();
+    let means: Vec<f64> =
+        x.chunks_exact(BLOCK).map(|b| b.iter().sum::<f64>() / BLOCK as f64).collect();
     rms(&means)
 }
 
 /// Bins on each side of a line that it stands above.
 const SIDES: usize = 8;
 
-/// The strongest line between 0.5 and 12 Hz, and its part of the power there, in the longest segment of a channel.
+/// The strongest line between 0.5 and 12 Hz, and its part of the power there, in the longest
+/// segment of a channel.
 fn line(predictor: &Predictor, left: &[f64], channel: usize) -> Option<(f64, f64)> {
-    let segment = predictor.segments.iter().filter(|s| s.channel == channel).max_by_key(|s| s.rows.len())?;
+    let segment =
+        predictor.segments.iter().filter(|s| s.channel == channel).max_by_key(|s| s.rows.len())?;
     let x = &left[segment.rows.clone()];
     let n = x.len();
     let duration_s = n as f64 * segment.step_s;
-    // Where slow noise begins to fall is no line: what is below the band is looked at as its neighbour.
+    // Where slow noise begins to fall is no line: what is below the band is looked at as its
+    // neighbour.
     let below = SIDES.min((0.5 * duration_s) as usize);
-    let bins =
-        (0.5 * duration_s) as usize - below..(12.0_f64.min(0.45 / segment.step_s) * duration_s) as usize;
+    let bins = (0.5 * duration_s) as usize - below
+        ..(12.0_f64.min(0.45 / segment.step_s) * duration_s) as usize;
     let power: Vec<f64> = bins
         .clone()
         .map(|bin| {
@@ -421,7 +457,8 @@ fn line(predictor: &Predictor, left: &[f64], channel: usize) -> Option<(f64, f64
         .collect();
     let total: f64 = power.iter().skip(below).sum();
     let (at, _) = power.iter().enumerate().skip(below).max_by(|a, b| a.1.total_cmp(b.1))?;
-    // A line that wanders a little spreads over neighbours, and stands above those further off: slow noise does not.
+    // A line that wanders a little spreads over neighbours, and stands above those further off:
+    // slow noise does not.
     let around = |reach: usize| at.saturating_sub(reach)..(at + reach + 1).min(power.len());
     let own: f64 = power[around(2)].iter().sum();
     let sides: f64 = power[around(SIDES)].iter().sum::<f64>() - own;

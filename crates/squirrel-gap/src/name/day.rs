@@ -1,5 +1,6 @@
-//! Thrust that differs from one flight to the next: usually by next to nothing, and with brushed motors, worn cells or a new
-//! propeller by per cents. One number for all flights then leaves a force along z that is each flight's own.
+//! Thrust that differs from one flight to the next: usually by next to nothing, and with brushed
+//! motors, worn cells or a new propeller by per cents. One number for all flights then leaves a
+//! force along z that is each flight's own.
 
 use super::{Catalogue, Naming, Search, explain};
 use crate::GapError;
@@ -11,10 +12,12 @@ const FORCE_Z: usize = 2;
 /// Part of the tolerance of thrust by which it may differ among flights of one machine.
 const SHARE_OF_TOLERANCE: f64 = 1.0;
 
-/// How much less of the force must be left with a thrust for each flight, as a part of what one thrust leaves.
+/// How much less of the force must be left with a thrust for each flight, as a part of what one
+/// thrust leaves.
 const MUCH_LESS: f64 = 0.6;
 
-/// The best explanation, of several flights with a thrust of their own if one thrust leaves a force along z and theirs leave much less.
+/// The best explanation, of several flights with a thrust of their own if one thrust leaves a force
+/// along z and theirs leave much less.
 ///
 /// * `progress` - called after each piece of work
 ///

@@ -4,8 +4,8 @@
 //! y = X theta + e,  e ~ N(0, 1/beta),  theta_k ~ N(0, s_k^2),  D = diag(s),  A = 1 + beta D G D,  G = X'X,  b = X'y
 //! ln Z = -beta/2 y'y - 1/2 ln det A + 1/2 beta^2 b'D A^-1 D b + const        E[theta] = beta D A^-1 D b
 //! ```
-//! `beta < 1` tempers the likelihood: a model of a flight is never right to the last bit, and the error of a wrong one does
-//! not average away like noise.
+//! `beta < 1` tempers the likelihood: a model of a flight is never right to the last bit, and the
+//! error of a wrong one does not average away like noise.
 
 use super::factor::Factor;
 use nalgebra::{DMatrix, DVector};
@@ -45,7 +45,8 @@ pub(crate) fn products(columns: &[&[f64]], others: &[&[f64]]) -> DMatrix<f64> {
     f64::run(Path::best(), Products { columns, others, lower: false, out })
 }
 
-/// Inner products on the registers of the processor. The order of the sums is that of [`BLOCK`] on all of them.
+/// Inner products on the registers of the processor. The order of the sums is that of [`BLOCK`] on
+/// all of them.
 struct Products<'a> {
     columns: &'a [&'a [f64]],
     others: &'a [&'a [f64]],
@@ -62,7 +63,8 @@ impl Kernel<f64> for Products<'_> {
         let Self { columns, others, lower, mut out } = self;
         let rows = columns.iter().map(|column| column.len()).max().unwrap_or_default();
         // A column of one flight is zero in all others, and zeros add nothing.
-        let spans = |columns: &[&[f64]]| columns.iter().map(|column| span(column)).collect::<Vec<_>>();
+        let spans =
+            |columns: &[&[f64]]| columns.iter().map(|column| span(column)).collect::<Vec<_>>();
         let (own, theirs) = (spans(columns), spans(others));
         for start in (0..rows).step_by(PIECE) {
             let piece = start..(start + PIECE).min(rows);
@@ -72,8 +74,10 @@ impl Kernel<f64> for Products<'_> {
                 let a = &column[piece.clone()];
                 let end = if lower { acting.partition_point(|j| *j <= i) } else { acting.len() };
                 for some in acting[..end].chunks(WIDE) {
-                    // What is missing of the last few is multiplied by its own column and forgotten.
-                    let b = [0, 1, 2, 3].map(|j| some.get(j).map_or(a, |j| &others[*j][piece.clone()]));
+                    // What is missing of the last few is multiplied by its own column and
+                    // forgotten.
+                    let b =
+                        [0, 1, 2, 3].map(|j| some.get(j).map_or(a, |j| &others[*j][piece.clone()]));
                     for (j, sum) in some.iter().zip(side_by_side::<L>(a, b)) {
                         out[(i, *j)] += sum;
                     }
@@ -113,8 +117,8 @@ fn side_by_side<L: Register<Element = f64>>(a: &[f64], b: [&[f64]; WIDE]) -> [f6
         for (lanes, sum) in lanes.chunks_exact_mut(L::WIDTH).zip(sums) {
             sum.store(lanes);
         }
-        *out =
-            lanes.iter().sum::<f64>() + a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum::<f64>();
+        *out = lanes.iter().sum::<f64>()
+            + a[whole..].iter().zip(&b[whole..]).map(|(a, b)| a * b).sum::<f64>();
     }
     out
 }
@@ -139,7 +143,8 @@ impl Gram {
     /// The posterior under prior deviations; a deviation of 0 leaves a parameter out.
     pub(crate) fn posterior(&self, sd: &[f64], beta: f64) -> Option<Posterior> {
         let sd = DVector::from_column_slice(sd);
-        // The last first: what is of one flight alone begins a block of the factor, and what all share stands below the blocks.
+        // The last first: what is of one flight alone begins a block of the factor, and what all
+        // share stands below the blocks.
         let order: Vec<usize> = (0..sd.len()).rev().filter(|i| sd[*i] != 0.0).collect();
         let mut places = vec![None; sd.len()];
         for (place, i) in order.iter().enumerate() {
@@ -149,14 +154,16 @@ impl Gram {
             let (i, j) = (order[row], order[column]);
             f64::from(u8::from(i == j)) + beta * sd[i] * self.g[(i, j)] * sd[j]
         })?;
-        let scaled = DVector::from_iterator(order.len(), order.iter().map(|i| sd[*i] * self.b[*i] * beta));
+        let scaled =
+            DVector::from_iterator(order.len(), order.iter().map(|i| sd[*i] * self.b[*i] * beta));
         let solved = factor.solve(&scaled);
         let mut mean = DVector::zeros(sd.len());
         for (i, x) in order.iter().zip(solved.iter()) {
             mean[*i] = sd[*i] * x;
         }
         Some(Posterior {
-            log_evidence: -0.5 * beta * self.yy - 0.5 * factor.log_determinant() + 0.5 * scaled.dot(&solved),
+            log_evidence: -0.5 * beta * self.yy - 0.5 * factor.log_determinant()
+                + 0.5 * scaled.dot(&solved),
             mean,
             factor,
             sd,
@@ -168,6 +175,7 @@ impl Gram {
 impl Posterior {
     /// Posterior variance of one parameter: `s_i^2 |L^-1 e_i|^2` where `A = L L'`.
     pub(crate) fn variance(&self, i: usize) -> f64 {
-        self.places[i].map_or(0.0, |place| self.sd[i] * self.sd[i] * self.factor.inverse_diagonal(place))
+        self.places[i]
+            .map_or(0.0, |place| self.sd[i] * self.sd[i] * self.factor.inverse_diagonal(place))
     }
 }

@@ -1,7 +1,9 @@
-//! Cholesky factor of a matrix of blocks: the numbers of one flight are coupled with its own and with what all flights share.
+//! Cholesky factor of a matrix of blocks: the numbers of one flight are coupled with its own and
+//! with what all flights share.
 //!
-//! `A = L L'`. A row of `L` is zero until the first number that is not zero in the same row of `A`, so that with the flights' numbers
-//! first only their blocks and what is shared are computed: time goes with the number of flights, not with its cube.
+//! `A = L L'`. A row of `L` is zero until the first number that is not zero in the same row of `A`,
+//! so that with the flights' numbers first only their blocks and what is shared are computed: time
+//! goes with the number of flights, not with its cube.
 
 use nalgebra::DVector;
 
@@ -17,7 +19,8 @@ pub(crate) struct Factor {
 }
 
 impl Factor {
-    /// Factor of a matrix of which `a(row, column)` is below or on the diagonal; `None` where it is not positive definite.
+    /// Factor of a matrix of which `a(row, column)` is below or on the diagonal; `None` where it is
+    /// not positive definite.
     pub(crate) fn new(n: usize, a: impl Fn(usize, usize) -> f64) -> Option<Self> {
         let mut rows = vec![0.0; n * n];
         let mut first = Vec::with_capacity(n);
@@ -77,7 +80,8 @@ impl Factor {
     fn forward(&self, from: usize, x: &mut [f64]) {
         for i in from..x.len() {
             let (row, start) = (self.row(i), self.first[i].max(from));
-            x[i] = (x[i] - if start < i { dot(&row[start..i], &x[start..i]) } else { 0.0 }) / row[i];
+            x[i] =
+                (x[i] - if start < i { dot(&row[start..i], &x[start..i]) } else { 0.0 }) / row[i];
         }
     }
 }
@@ -100,7 +104,8 @@ mod tests {
     use super::*;
     use nalgebra::DMatrix;
 
-    /// Three blocks of two and two shared numbers: as a dense factor has it, and zero where no block is.
+    /// Three blocks of two and two shared numbers: as a dense factor has it, and zero where no
+    /// block is.
     #[test]
     fn blocks_are_factored_as_the_whole() {
         let n = 8;

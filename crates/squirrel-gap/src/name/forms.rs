@@ -45,7 +45,9 @@ impl Search<'_> {
         let list = Effects::<f64>::parameters(self.effect(member)).unwrap_or_default();
         let form = self.form(member);
         (0..list.len())
-            .filter(|slot| matches!(list[*slot].kind, Kind::Size { .. }) && list[*slot].exists_in(form))
+            .filter(|slot| {
+                matches!(list[*slot].kind, Kind::Size { .. }) && list[*slot].exists_in(form)
+            })
             .collect()
     }
 
@@ -61,7 +63,9 @@ impl Search<'_> {
                 let mut other = member.clone();
                 other.values[slot] = form as f64;
                 for (value, parameter) in other.values.iter_mut().zip(list) {
-                    let Some(range) = parameter.range(&self.predictor.vehicle.vehicle) else { continue };
+                    let Some(range) = parameter.range(&self.predictor.vehicle.vehicle) else {
+                        continue;
+                    };
                     let SizeRange { smallest, largest, signed, .. } = range;
                     match (parameter.exists_in(now), parameter.exists_in(names[form])) {
                         (false, true) if signed => *value = 0.0,

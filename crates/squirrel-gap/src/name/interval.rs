@@ -3,9 +3,9 @@
 //! ```text
 //! A = beta G + D^-2     Var(theta) = A^-1 (beta^2 M + D^-2) A^-1     M = sum_blocks g g'     g = X_block' e_block
 //! ```
-//! Where few blocks show a number, the fit has made their sums small, and `M = G`, that of white noise, is the larger one:
-//! the wider of the two is taken. To it comes what no flight tells: how far the number that an effect adds to is off by
-//! itself, and how true the model is.
+//! Where few blocks show a number, the fit has made their sums small, and `M = G`, that of white
+//! noise, is the larger one: the wider of the two is taken. To it comes what no flight tells: how
+//! far the number that an effect adds to is off by itself, and how true the model is.
 
 use super::evidence::BETA;
 use super::linear::Linear;
@@ -43,7 +43,9 @@ fn of_flights(predictor: &Predictor, linear: &Linear, set: &Scored) -> Vec<f64> 
         }
     }
     let mut blocks: BTreeMap<(usize, i64), DVector<f64>> = BTreeMap::new();
-    for (row, (flight, time_s, _)) in linear.whitener.places(&predictor.segments).into_iter().enumerate() {
+    for (row, (flight, time_s, _)) in
+        linear.whitener.places(&predictor.segments).into_iter().enumerate()
+    {
         let block = (flight, (time_s / BLOCK_S).floor() as i64);
         let sum = blocks.entry(block).or_insert_with(|| DVector::zeros(live.len()));
         for (slot, &i) in live.iter().enumerate() {
@@ -52,11 +54,15 @@ fn of_flights(predictor: &Predictor, linear: &Linear, set: &Scored) -> Vec<f64> 
     }
     let n = live.len();
     let gram = DMatrix::from_fn(n, n, |a, b| set.gram.g[(live[a], live[b])]);
-    let precision = DMatrix::from_diagonal(&DVector::from_fn(n, |a, _| set.prior[live[a]].powi(-2)));
+    let precision =
+        DMatrix::from_diagonal(&DVector::from_fn(n, |a, _| set.prior[live[a]].powi(-2)));
     let sums = blocks.values().fold(DMatrix::zeros(n, n), |sums, g| sums + g * g.transpose());
     let bread = BETA * &gram + &precision;
-    let Some(inverse) = bread.cholesky().map(|c| c.inverse()) else { return vec![f64::INFINITY; k] };
-    let [blocks, white] = [sums, gram].map(|meat| &inverse * (BETA * BETA * meat + &precision) * &inverse);
+    let Some(inverse) = bread.cholesky().map(|c| c.inverse()) else {
+        return vec![f64::INFINITY; k];
+    };
+    let [blocks, white] =
+        [sums, gram].map(|meat| &inverse * (BETA * BETA * meat + &precision) * &inverse);
     let wider = |at: usize| blocks[(at, at)].max(white[(at, at)]).sqrt();
     (0..k).map(|i| live.iter().position(|j| *j == i).map_or(f64::INFINITY, wider)).collect()
 }

@@ -1,4 +1,5 @@
-//! The predictor linearised about a set of effects: one column a number, by difference of two predictions.
+//! The predictor linearised about a set of effects: one column a number, by difference of two
+//! predictions.
 //!
 //! A column without rows is one of zeros: heights, where no effect of height acts.
 
@@ -16,7 +17,8 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) struct Linear {
     pub(crate) point: Point,
     pub(crate) whitener: Whitener,
-    /// Columns as they are, in the units of the rows: as in [`Point::base`], and then what no hypothesis has ([`super::slow`]).
+    /// Columns as they are, in the units of the rows: as in [`Point::base`], and then what no
+    /// hypothesis has ([`super::slow`]).
     pub(crate) raw: Vec<Vec<f64>>,
     /// The same, whitened.
     pub(crate) columns: Vec<Vec<f64>>,
@@ -29,10 +31,11 @@ pub(crate) struct Linear {
 }
 
 impl Linear {
-    /// Predicts every number once about a point, fits the whitening to what the fullest model leaves, and whitens.
+    /// Predicts every number once about a point, fits the whitening to what the fullest model
+    /// leaves, and whitens.
     ///
-    /// * `before` - the same predictor about another point: what floats beside the catalogue is its, and with the same members
-    ///   columns that hardly bend
+    /// * `before` - the same predictor about another point: what floats beside the catalogue is
+    ///   its, and with the same members columns that hardly bend
     /// * `gust_m_s` - deviation of gusts that blow: the noise is then theirs, by simulation
     ///
     /// # Errors
@@ -58,11 +61,13 @@ impl Linear {
             let mut moved = point.clone();
             let member = moved.members.iter_mut().find(|m| m.candidate == parameter.candidate);
             let is_named = member.is_some();
-            // At first anything may be large; about a point that explains the flights, only what has a name.
+            // At first anything may be large; about a point that explains the flights, only what
+            // has a name.
             widest.push(if first || is_named { parameter.slab } else { 3.0 * parameter.tolerance });
             tolerance.push(parameter.tolerance);
-            // From nothing, a secant to a typical size: it ranks large effects well, and some have no slope there. Once what
-            // is large has a name, a step of the tolerance: what is left stays inside it.
+            // From nothing, a secant to a typical size: it ranks large effects well, and some have
+            // no slope there. Once what is large has a name, a step of the tolerance: what is left
+            // stays inside it.
             let step = if let Some(member) = member {
                 member.values[parameter.slot] += 0.1 * parameter.smallest;
                 0.1 * parameter.smallest
@@ -79,7 +84,8 @@ impl Linear {
                 _ => {
                     let ahead = difference(&moved, step, None)?;
                     if first && parameter.signed && catalogue.bends(parameter.candidate) {
-                        // Far from nothing, the two sides are not alike: the one that explains more.
+                        // Far from nothing, the two sides are not alike: the one that explains
+                        // more.
                         moved.base[column] -= 2.0 * step;
                         let back = difference(&moved, -step, None)?;
                         let left = |c: &[f64], x: f64| -> f64 {
@@ -104,7 +110,8 @@ impl Linear {
                 (other, None) => {
                     let mut moved = point.clone();
                     moved.base[column] += sd;
-                    let flight = if let Other::Flight { flight, .. } = other { Some(flight) } else { None };
+                    let flight =
+                        if let Other::Flight { flight, .. } = other { Some(flight) } else { None };
                     difference(&moved, sd, flight)?
                 }
             });
@@ -117,7 +124,8 @@ impl Linear {
             let draws = noise(predictor, &predictor.wind_columns(&about)?, sigma);
             whitener.refit(&predictor.segments, &draws, DYNAMIC);
         }
-        let columns: Vec<Vec<f64>> = raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
+        let columns: Vec<Vec<f64>> =
+            raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = inner(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
         Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram, near: !first })
     }
@@ -153,15 +161,20 @@ pub(super) fn height_columns(
             .collect();
         let [lowest, ..] = heights[..] else { continue };
         first = lowest + HEIGHT_KNOTS;
-        // The force feels the height of its own time alone: one change of the whole flight's height is shared out by time.
-        // Upwards: a vehicle that a barometer has near or below the ground feels no slope there.
+        // The force feels the height of its own time alone: one change of the whole flight's height
+        // is shared out by time. Upwards: a vehicle that a barometer has near or below the ground
+        // feels no slope there.
         let step = -0.5 * catalogue.other(lowest).1;
         let mut moved = point.clone();
         for column in &heights {
             moved.base[*column] += step;
         }
-        let change =
-            predictor.slope(residual, &hypothesis(predictor, catalogue, &moved)?, 1.0, Some(flight))?;
+        let change = predictor.slope(
+            residual,
+            &hypothesis(predictor, catalogue, &moved)?,
+            1.0,
+            Some(flight),
+        )?;
         for (knot, column) in heights.into_iter().enumerate() {
             let mut slope = vec![0.0; residual.len()];
             for segment in predictor.segments.iter().filter(|s| s.flight == flight) {
@@ -182,8 +195,8 @@ const INSIDE: f64 = 3.0;
 /// Steps towards the heights of flights.
 const HEIGHT_STEPS: usize = 5;
 
-/// Puts what the sensors and the thrust of flights were off by where it fits best inside its tolerance: of flights that
-/// nothing was fitted to, this is not known from others.
+/// Puts what the sensors and the thrust of flights were off by where it fits best inside its
+/// tolerance: of flights that nothing was fitted to, this is not known from others.
 ///
 /// * `thrust_fraction` - by how much thrust may differ from that of the flights that were fitted
 ///
@@ -204,8 +217,12 @@ pub(crate) fn settle_flights(
         let sd = if is_thrust { thrust_fraction.max(sd) } else { sd };
         let mut moved = point.clone();
         moved.base[column] += sd;
-        let slope =
-            predictor.slope(&residual, &hypothesis(predictor, catalogue, &moved)?, sd, Some(flight))?;
+        let slope = predictor.slope(
+            &residual,
+            &hypothesis(predictor, catalogue, &moved)?,
+            sd,
+            Some(flight),
+        )?;
         of_flights.push((column, sd, whitener.apply(segments, &slope)));
     }
     for _ in 0..HEIGHT_STEPS {
@@ -240,14 +257,21 @@ pub(crate) fn settle_flights(
     Ok(())
 }
 
-/// The whitening of what the fullest model leaves: each pass fits every column, then the autoregression to the rest.
-fn whitener(predictor: &Predictor, columns: &[Vec<f64>], widest: &[f64], residual: &[f64]) -> Whitener {
-    // A first whitening by what changes from row to row: one fitted to the whole residual would take whatever is slow in it
-    // for noise and never give it back.
+/// The whitening of what the fullest model leaves: each pass fits every column, then the
+/// autoregression to the rest.
+fn whitener(
+    predictor: &Predictor,
+    columns: &[Vec<f64>],
+    widest: &[f64],
+    residual: &[f64],
+) -> Whitener {
+    // A first whitening by what changes from row to row: one fitted to the whole residual would
+    // take whatever is slow in it for noise and never give it back.
     let doubt = predictor.doubt();
     let mut whitener = Whitener::white(&predictor.segments, residual);
     for _ in 0..3 {
-        let white: Vec<Vec<f64>> = columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
+        let white: Vec<Vec<f64>> =
+            columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
         let gram = Gram::new(&white, &whitener.apply(&predictor.segments, residual));
         let Some(posterior) = gram.posterior(widest, 1.0) else { break };
         let left = subtract(residual, columns, &posterior.mean);

@@ -1,10 +1,12 @@
-//! What was taped to a machine or hung from it: one thing with two names, its mass and where it pulls the centre of mass.
+//! What was taped to a machine or hung from it: one thing with two names, its mass and where it
+//! pulls the centre of mass.
 //!
 //! ```text
 //! r = d (1 + f) / f      f  added mass over the vehicle's, d  shift of the centre of mass, r  where the load is
 //! ```
-//! A rotor that lost thrust and a load near it ask the same of roll and pitch; the load lets yaw be and adds weight. Each of
-//! its two numbers may be too small for a name by itself, so that no search by single effects meets it.
+//! A rotor that lost thrust and a load near it ask the same of roll and pitch; the load lets yaw be
+//! and adds weight. Each of its two numbers may be too small for a name by itself, so that no
+//! search by single effects meets it.
 
 use super::INTERVAL;
 use super::evidence::BETA;
@@ -18,14 +20,17 @@ const MASS: &str = MassError::<f64>::NAME;
 const CENTRE: &str = CgOffset::<f64>::NAME;
 
 impl Search<'_> {
-    /// A load in place of what was found, if these flights allow one that is within the vehicle's outline.
+    /// A load in place of what was found, if these flights allow one that is within the vehicle's
+    /// outline.
     ///
     /// # Errors
     /// What the predictor says.
     pub(super) fn load(&self, found: &Found) -> Result<Option<Scored>, GapError> {
         let catalogue = self.catalogue;
         let one = |effect: &str| catalogue.candidates.iter().position(|c| c.effect == effect);
-        let (true, Some(mass), Some(centre)) = (catalogue.is_of_one_machine, one(MASS), one(CENTRE)) else {
+        let (true, Some(mass), Some(centre)) =
+            (catalogue.is_of_one_machine, one(MASS), one(CENTRE))
+        else {
             return Ok(None);
         };
         let offset = found.null.free.len();
@@ -52,7 +57,8 @@ impl Search<'_> {
     fn is_a_load(&self, set: &Scored) -> bool {
         let (mut most, mut square) = (0.0, 0.0);
         for (column, (member, slot)) in set.free.iter().enumerate() {
-            let before = self.catalogue.absent(self.predictor, set.members[*member].candidate).values[*slot];
+            let before =
+                self.catalogue.absent(self.predictor, set.members[*member].candidate).values[*slot];
             let change = set.members[*member].values[*slot] - before;
             if self.effect(&set.members[*member]) == MASS {
                 most = change + INTERVAL * set.posterior.variance(column).sqrt();

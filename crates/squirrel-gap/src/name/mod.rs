@@ -1,10 +1,13 @@
-//! Which effect is missing: evidence under declared tolerances, every hypothesis flown by the simulator's own model.
+//! Which effect is missing: evidence under declared tolerances, every hypothesis flown by the
+//! simulator's own model.
 //!
-//! 1. The predictor is linearised in every number of the catalogue ([`linear`]), whitened ([`whiten`]), and everything
-//!    floats inside its tolerance ([`parameters`], [`tolerance`], [`point`], [`evidence`]).
-//! 2. Sets of effects grow, shrink and swap by evidence ([`search`]); each is refined through the simulator ([`refine`]), in
-//!    each of its published forms ([`forms`]).
-//! 3. What is left is held against what noise leaves ([`crate::leftover`]); intervals come from blocks ([`interval`]).
+//! 1. The predictor is linearised in every number of the catalogue ([`linear`]), whitened
+//!    ([`whiten`]), and everything floats inside its tolerance ([`parameters`], [`tolerance`],
+//!    [`point`], [`evidence`]).
+//! 2. Sets of effects grow, shrink and swap by evidence ([`search`]); each is refined through the
+//!    simulator ([`refine`]), in each of its published forms ([`forms`]).
+//! 3. What is left is held against what noise leaves ([`crate::leftover`]); intervals come from
+//!    blocks ([`interval`]).
 
 mod day;
 mod evidence;
@@ -55,7 +58,8 @@ pub(crate) struct Naming {
     pub(crate) found: Found,
     /// The hypothesis at which the explanation is best, everything else inside its tolerance.
     pub(crate) hypothesis: Hypothesis,
-    /// Rows of the residual: of the vehicle as it is with everything else where it most likely is, and of the explanation.
+    /// Rows of the residual: of the vehicle as it is with everything else where it most likely is,
+    /// and of the explanation.
     pub(crate) nominal: Vec<f64>,
     pub(crate) left: Vec<f64>,
     pub(crate) leftover: Leftover,
@@ -65,7 +69,8 @@ pub(crate) struct Naming {
     pub(crate) gust_m_s: Option<f64>,
     /// What they are worth, nats.
     pub(crate) gust_nats: f64,
-    /// Whether its names stand although something is left: each leads by far, and held-out flights want it.
+    /// Whether its names stand although something is left: each leads by far, and held-out flights
+    /// want it.
     pub(crate) stands: bool,
 }
 
@@ -79,16 +84,20 @@ fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
         return Ok(naming);
     }
     let (least, most) = GUST_M_S;
-    // What is named in calm air takes a part of the gusts, or makes more of them: the first guess may be out by twice.
-    let Some(guess) = gust_of(search, &naming)?.filter(|sigma| (0.5 * least..=2.0 * most).contains(sigma))
+    // What is named in calm air takes a part of the gusts, or makes more of them: the first guess
+    // may be out by twice.
+    let Some(guess) =
+        gust_of(search, &naming)?.filter(|sigma| (0.5 * least..=2.0 * most).contains(sigma))
     else {
         return Ok(naming);
     };
     let sigma = guess.clamp(least, most);
-    // Gusts look like drag or wind for a while: what is named beside them must be worth it in their noise.
+    // Gusts look like drag or wind for a while: what is named beside them must be worth it in their
+    // noise.
     let windy = Search { gust_m_s: Some(sigma), ..*search };
     let mut again = judge(&windy, windy.run()?)?;
-    let Some(sigma) = gust_of(&windy, &again)?.filter(|sigma| (least..=most).contains(sigma)) else {
+    let Some(sigma) = gust_of(&windy, &again)?.filter(|sigma| (least..=most).contains(sigma))
+    else {
         return Ok(naming);
     };
     let calm = blown(search, &again, TURBULENCE_M_S, sigma)?;
@@ -113,14 +122,17 @@ fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
     Ok(again)
 }
 
-/// Standard deviations, from blocks of the flights, by which a number stands out from a model that misses a little everywhere.
+/// Standard deviations, from blocks of the flights, by which a number stands out from a model that
+/// misses a little everywhere.
 pub(crate) const STANDS: f64 = 5.0;
 
-/// Part of what is above noise that names explain which leave something in forces alone, or in moments.
+/// Part of what is above noise that names explain which leave something in forces alone, or in
+/// moments.
 const MOST: f64 = 0.5;
 
-/// The explanation with those names alone that stand beside what the model misses everywhere, or with all of them where they
-/// stand beside what is slow in each flight; as it was where what is left is another thing, or nothing.
+/// The explanation with those names alone that stand beside what the model misses everywhere, or
+/// with all of them where they stand beside what is slow in each flight; as it was where what is
+/// left is another thing, or nothing.
 ///
 /// * `hold` - of each name, whether held-out flights want it; `None` where there are none
 ///
@@ -131,7 +143,8 @@ pub(crate) fn standing(
     naming: Naming,
     hold: impl Fn(&Naming) -> Result<Option<Vec<bool>>, GapError>,
 ) -> Result<Naming, GapError> {
-    // What is left of forces alone, or of moments, may be one missing effect: names must explain most of what is there.
+    // What is left of forces alone, or of moments, may be one missing effect: names must explain
+    // most of what is there.
     let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
     let is_candidate = |naming: &Naming| {
         naming.leftover.is_everywhere
@@ -145,7 +158,8 @@ pub(crate) fn standing(
         if !is_refused || naming.found.best.members.is_empty() {
             return Ok(naming);
         }
-        let clear = |index| search.stands_out(&naming.found.best, index, &naming.deviations) >= STANDS;
+        let clear =
+            |index| search.stands_out(&naming.found.best, index, &naming.deviations) >= STANDS;
         let stands = (0..naming.found.best.members.len()).all(clear)
             && slow::leaves_nothing_else(search, &naming)?
             && hold(&naming)?.is_none_or(|holds| holds.iter().all(|holds| *holds));
@@ -157,8 +171,9 @@ pub(crate) fn standing(
         let at = now.as_ref().unwrap_or(&naming);
         let holds = hold(at)?;
         let clear = |index: usize| search.stands_out(&at.found.best, index, &at.deviations);
-        let falls =
-            |index: &usize| holds.as_ref().is_some_and(|holds| !holds[*index]) || clear(*index) < STANDS;
+        let falls = |index: &usize| {
+            holds.as_ref().is_some_and(|holds| !holds[*index]) || clear(*index) < STANDS
+        };
         // One at a time, the least clear first: what falls may have stood in for what stands.
         let weakest = (0..kept.len()).filter(falls).min_by(|a, b| clear(*a).total_cmp(&clear(*b)));
         let Some(weakest) = weakest else { break };
@@ -180,7 +195,11 @@ pub(crate) fn standing(
 ///
 /// # Errors
 /// What the predictor says.
-pub(crate) fn only(search: &Search<'_>, naming: &Naming, members: &[Member]) -> Result<Naming, GapError> {
+pub(crate) fn only(
+    search: &Search<'_>,
+    naming: &Naming,
+    members: &[Member],
+) -> Result<Naming, GapError> {
     judge(search, search.with(&naming.found, members)?)
 }
 
@@ -234,7 +253,8 @@ struct Surroundings {
 impl Surroundings {
     fn of(search: &Search<'_>, about: &Hypothesis) -> Result<Self, GapError> {
         let predictor = search.predictor;
-        let motions = (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, about)).collect();
+        let motions =
+            (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, about)).collect();
         let wind = predictor.wind_columns(about)?;
         let draws = noise(predictor, &wind, search.gust_m_s.unwrap_or(TURBULENCE_M_S));
         Ok(Self { motions, draws })
@@ -252,24 +272,30 @@ fn left_over(
     leftover(search.predictor, motions, left, nominal, draws, None, slack(search, found))
 }
 
-/// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample more or less.
+/// Tolerances beside the catalogue's; a named clock means that commands were logged on it, a sample
+/// more or less.
 fn slack(search: &Search<'_>, found: &Found) -> Slack {
-    let is_of_clock =
-        |m: &Member| matches!(search.profile(m).timing, Some(Timing::ClockRate | Timing::ClockJump));
+    let is_of_clock = |m: &Member| {
+        matches!(search.profile(m).timing, Some(Timing::ClockRate | Timing::ClockJump))
+    };
     let skewed = found.best.members.iter().any(is_of_clock);
     let period_s = search.predictor.tracks.first().map_or(0.0, |t| t.period_s);
     search.catalogue.slack(if skewed { period_s } else { 0.0 }, unlogged_sag(search.predictor))
 }
 
-/// The leftover with everything that floats where it fits best inside twice its tolerance: the tempered fit that names
-/// holds back, and what it holds back is no missing effect.
+/// The leftover with everything that floats where it fits best inside twice its tolerance: the
+/// tempered fit that names holds back, and what it holds back is no missing effect.
 fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
     let best = &found.best;
     let k = best.free.len();
     // A leftover that asks for more than that stays one; the tighter fit then says what is left.
     let loose = [LEFTOVER_TOLERANCES, 1.0].into_iter().find_map(|times| {
-        let wide: Vec<f64> =
-            best.prior.iter().enumerate().map(|(i, sd)| if i < k { *sd } else { times * sd }).collect();
+        let wide: Vec<f64> = best
+            .prior
+            .iter()
+            .enumerate()
+            .map(|(i, sd)| if i < k { *sd } else { times * sd })
+            .collect();
         let loose = best.gram.posterior(&wide, 1.0)?;
         let inside = (k..wide.len()).all(|i| loose.mean[i].abs() <= LEFTOVER_MOST * best.prior[i]);
         (inside || times == 1.0).then_some(loose)
@@ -303,17 +329,24 @@ const GUST_SHARE: f64 = 2.0;
 /// What an explanation leaves if gusts of a deviation blow.
 ///
 /// * `sizes` - deviation of the gusts in whose units it is looked at, m/s
-fn blown(search: &Search<'_>, naming: &Naming, sigma: f64, sizes: f64) -> Result<Leftover, GapError> {
+fn blown(
+    search: &Search<'_>,
+    naming: &Naming,
+    sigma: f64,
+    sizes: f64,
+) -> Result<Leftover, GapError> {
     let predictor = search.predictor;
     let wind = predictor.wind_columns(&naming.hypothesis)?;
-    let motions: Vec<_> =
-        (0..predictor.tracks.len()).map(|piece| predictor.motion(piece, &naming.hypothesis)).collect();
+    let motions: Vec<_> = (0..predictor.tracks.len())
+        .map(|piece| predictor.motion(piece, &naming.hypothesis))
+        .collect();
     let (draws, gusts) = (noise(predictor, &wind, sigma), gusts(predictor, &wind, sizes));
     let slack = slack(search, &naming.found);
     Ok(leftover(predictor, &motions, &naming.left, &naming.nominal, &draws, Some(&gusts), slack))
 }
 
-/// The deviation of gusts that would make the leftover of the horizontal force, m/s; `None` where wind makes none.
+/// The deviation of gusts that would make the leftover of the horizontal force, m/s; `None` where
+/// wind makes none.
 fn gust_of(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError> {
     // The floor is noise and wind, squared; two floors tell them apart.
     let assumed = search.gust_m_s.unwrap_or(TURBULENCE_M_S);
@@ -328,10 +361,12 @@ fn gust_of(search: &Search<'_>, naming: &Naming) -> Result<Option<f64>, GapError
     Ok(sigma.is_finite().then_some(sigma))
 }
 
-/// Independent blocks that a flight counts for in the evidence of gusts: they last longer than a block.
+/// Independent blocks that a flight counts for in the evidence of gusts: they last longer than a
+/// block.
 const SLOW_BLOCKS: f64 = 20.0;
 
-/// What gusts are worth: evidence of the slow horizontal force having the deviation that it has, over the noise's, nats.
+/// What gusts are worth: evidence of the slow horizontal force having the deviation that it has,
+/// over the noise's, nats.
 fn gust_nats(calm: &Leftover) -> f64 {
     calm.bands
         .iter()

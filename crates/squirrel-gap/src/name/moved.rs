@@ -1,4 +1,5 @@
-//! What floats beside the named effects and moved with them: numbers of effects hold together with these alone.
+//! What floats beside the named effects and moved with them: numbers of effects hold together with
+//! these alone.
 
 use super::point::Airframe;
 use super::refine::Scored;
@@ -7,7 +8,8 @@ use crate::verdict::Moved;
 use squirrel_core::effects::{Effects, Kind};
 
 impl Search<'_> {
-    /// Numbers of the vehicle that an explanation has moved by most of their tolerance, the farthest first.
+    /// Numbers of the vehicle that an explanation has moved by most of their tolerance, the
+    /// farthest first.
     pub(crate) fn moved(&self, set: &Scored) -> Vec<Moved> {
         let (catalogue, point) = (self.catalogue, self.settled(set));
         let mut all: Vec<Moved> = point.base[..catalogue.shared_columns()]
@@ -28,7 +30,8 @@ impl Search<'_> {
         all
     }
 
-    /// The name of a number that floats: `weak_rotor[2].thrust_loss_fraction`, `rotor[0].position_body_m[1]`.
+    /// The name of a number that floats: `weak_rotor[2].thrust_loss_fraction`,
+    /// `rotor[0].position_body_m[1]`.
     fn floating(&self, column: usize) -> String {
         let Some(parameter) = self.catalogue.parameters.get(column) else {
             return match self.catalogue.airframe[column - self.catalogue.parameters.len()].0 {

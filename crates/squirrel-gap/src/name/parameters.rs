@@ -1,8 +1,10 @@
-//! What can be named: every effect of the catalogue with its choices, and how far each parameter may be off without a name.
+//! What can be named: every effect of the catalogue with its choices, and how far each parameter
+//! may be off without a name.
 //!
-//! A parameter has two priors, both Gaussian about what the vehicle file says: its **tolerance**, the declared standard
-//! deviation of the nominal number that the effect would change, and, where the effect is hypothesised, its **slab**, as wide
-//! as the effect is plausible. An effect is only worth a name when the flights ask for more than the tolerance.
+//! A parameter has two priors, both Gaussian about what the vehicle file says: its **tolerance**,
+//! the declared standard deviation of the nominal number that the effect would change, and, where
+//! the effect is hypothesised, its **slab**, as wide as the effect is plausible. An effect is only
+//! worth a name when the flights ask for more than the tolerance.
 
 use super::point::{Airframe, DAY_FRACTION, Member};
 use super::tolerance::{SHARE_OF_SMALLEST, airframe, middle_m, slip_ppm, spread_s, tolerance};
@@ -10,8 +12,8 @@ use crate::GapError;
 use crate::leftover::{Slack, Usual};
 use crate::predictor::{Predictor, TURNING};
 use squirrel_core::effects::{
-    Declared, EffectParameter, Effects, FORM, Kind, Profile, Response, Scale, Shown, SizeRange, Timing,
-    Tolerance,
+    Declared, EffectParameter, Effects, FORM, Kind, Profile, Response, Scale, Shown, SizeRange,
+    Timing, Tolerance,
 };
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::plant::WingPlant;
@@ -19,11 +21,13 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Width of the slab over the largest plausible size.
 pub(crate) const SLAB_OF_LARGEST: f64 = 0.6;
-/// How many times the largest plausible size a fraction, a time or a length may have: farther off nothing linear holds, and a
-/// mass or an inertia would be below zero. Forces differ more from one design to another.
+/// How many times the largest plausible size a fraction, a time or a length may have: farther off
+/// nothing linear holds, and a mass or an inertia would be below zero. Forces differ more from one
+/// design to another.
 const LARGEST_TIMES: f64 = 2.0;
 const GROWING_TIMES: f64 = 8.0;
-/// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows the rotors' own.
+/// How well the axes of markers lie along those of the rotors, rad: by eye. An accelerometer shows
+/// the rotors' own.
 const MARKERS_RAD: f64 = 0.03;
 
 /// One number of one effect.
@@ -44,7 +48,8 @@ pub(crate) struct Parameter {
     pub(crate) tolerance: f64,
     /// Standard deviation of the slab.
     pub(crate) slab: f64,
-    /// By how much the number that the effect adds to is off by itself, one standard deviation: flights show only the sum.
+    /// By how much the number that the effect adds to is off by itself, one standard deviation:
+    /// flights show only the sum.
     pub(crate) spread: f64,
 }
 
@@ -54,12 +59,14 @@ impl Parameter {
         self.within == Tolerance::Declared(number)
     }
 
-    /// What it may be off by without anybody noticing: its tolerance, or of what is there or not, a part of the smallest size.
+    /// What it may be off by without anybody noticing: its tolerance, or of what is there or not, a
+    /// part of the smallest size.
     pub(super) fn least(&self) -> f64 {
         if self.tolerance > 0.0 { self.tolerance } else { SHARE_OF_SMALLEST * self.smallest }
     }
 
-    /// A change of the number, no farther from nothing than a vehicle can be, or than its file has it already.
+    /// A change of the number, no farther from nothing than a vehicle can be, or than its file has
+    /// it already.
     ///
     /// * `own` - what the vehicle file has
     pub(super) fn bounded(&self, own: f64, change: f64) -> f64 {
@@ -98,7 +105,8 @@ pub(crate) struct Catalogue {
 }
 
 impl Catalogue {
-    /// * `payload_lengths_m` - at which a slung load is looked for: its frequency is not linear in anything
+    /// * `payload_lengths_m` - at which a slung load is looked for: its frequency is not linear in
+    ///   anything
     /// * `clock_step_s` - when a clock may have jumped, since the beginning of a flight
     ///
     /// # Errors
@@ -142,7 +150,9 @@ impl Catalogue {
             for fixed in choices(list, vehicle.vehicle.rotors().len()) {
                 // What nothing linear finds starts at each of these.
                 let starts: Vec<(&str, f64)> = match profile.response {
-                    Response::Swings { length } => payload_lengths_m.iter().map(|m| (length, *m)).collect(),
+                    Response::Swings { length } => {
+                        payload_lengths_m.iter().map(|m| (length, *m)).collect()
+                    }
                     Response::Jumps { at } => clock_step_s.iter().map(|s| (at, *s)).collect(),
                     _ => {
                         all.add(vehicle, (name, profile), list, fixed, &[])?;
@@ -164,7 +174,9 @@ impl Catalogue {
             }
             parameter.spread = match spread_s(predictor, timing) {
                 Some(spread) => spread,
-                None if parameter.is_behind(Declared::RotorPlaces) => middle_m(vehicle, parameter.slot),
+                None if parameter.is_behind(Declared::RotorPlaces) => {
+                    middle_m(vehicle, parameter.slot)
+                }
                 // What has no declared number has none to be off.
                 None if parameter.tolerance == SHARE_OF_SMALLEST * parameter.smallest => 0.0,
                 None => parameter.tolerance,
@@ -173,7 +185,8 @@ impl Catalogue {
         Ok(all)
     }
 
-    /// By how much the number that a member's slot adds to is off by itself, one standard deviation.
+    /// By how much the number that a member's slot adds to is off by itself, one standard
+    /// deviation.
     pub(crate) fn spread(&self, member: &Member, slot: usize) -> f64 {
         self.own(member).find(|p| p.slot == slot).map_or(0.0, |p| p.spread)
     }
@@ -244,8 +257,13 @@ impl Catalogue {
 /// Part of a lag of the vehicle's own that may be taken away: a motor has some.
 const LAG_MOST: f64 = 0.95;
 
-/// How far a number may go: what takes away from one of the vehicle's own leaves it at nothing, and no less.
-pub(super) fn bounds(vehicle: &Vehicle<f64>, parameter: &EffectParameter, range: &SizeRange) -> (f64, f64) {
+/// How far a number may go: what takes away from one of the vehicle's own leaves it at nothing, and
+/// no less.
+pub(super) fn bounds(
+    vehicle: &Vehicle<f64>,
+    parameter: &EffectParameter,
+    range: &SizeRange,
+) -> (f64, f64) {
     if parameter.is_capped {
         return (if range.signed { -range.largest } else { 0.0 }, range.largest);
     }

@@ -1,7 +1,8 @@
-//! At which lengths a slung load is worth looking for: where the horizontal force residual has lines.
+//! At which lengths a slung load is worth looking for: where the horizontal force residual has
+//! lines.
 //!
-//! `f = sqrt(g / l) / 2 pi`. Over a flight of 40 s two frequencies 0.03 Hz apart have nothing in common, so that a hypothesis
-//! must start near the right one.
+//! `f = sqrt(g / l) / 2 pi`. Over a flight of 40 s two frequencies 0.03 Hz apart have nothing in
+//! common, so that a hypothesis must start near the right one.
 
 use crate::predictor::{DYNAMIC, Predictor};
 use nalgebra::Vector3;
@@ -16,8 +17,8 @@ const APART_HZ: f64 = 0.03;
 /// Lines to look at.
 const LINES: usize = 3;
 
-/// Lengths, m, of loads that swing at the strongest lines of the horizontal force, the strongest first; of a vehicle file that
-/// has a load, its length alone.
+/// Lengths, m, of loads that swing at the strongest lines of the horizontal force, the strongest
+/// first; of a vehicle file that has a load, its length alone.
 ///
 /// * `rows` - residual of the vehicle as it is
 pub(crate) fn payload_lengths_m(predictor: &Predictor, rows: &[f64]) -> Vec<f64> {
@@ -28,8 +29,11 @@ pub(crate) fn payload_lengths_m(predictor: &Predictor, rows: &[f64]) -> Vec<f64>
     let frequency_hz = |i: usize| BAND_HZ.0 + i as f64 * STEP_HZ;
     let mut power = vec![0.0; count];
     for (piece, track) in predictor.tracks.iter().enumerate() {
-        let segments: Vec<_> =
-            predictor.segments.iter().filter(|s| s.piece == piece && s.channel < DYNAMIC.min(3)).collect();
+        let segments: Vec<_> = predictor
+            .segments
+            .iter()
+            .filter(|s| s.piece == piece && s.channel < DYNAMIC.min(3))
+            .collect();
         let [x, y, z] = segments[..] else { continue };
         // A load swings along directions of the world, whatever the vehicle's heading.
         let ned: Vec<Vector3<f64>> = (0..x.rows.len())

@@ -1,8 +1,10 @@
-//! Where the predictor is asked: effects with a name, and everything else that may be off by its tolerance.
+//! Where the predictor is asked: effects with a name, and everything else that may be off by its
+//! tolerance.
 //!
-//! What may be off beside the catalogue: where each rotor sits and what torque it has, since rotors of one make scatter; drag
-//! along y and z beside that along x; and in each flight the tilt of the attitude estimate, how it leans into an acceleration,
-//! a little thrust, and the zero of the barometer, which wanders.
+//! What may be off beside the catalogue: where each rotor sits and what torque it has, since rotors
+//! of one make scatter; drag along y and z beside that along x; and in each flight the tilt of the
+//! attitude estimate, how it leans into an acceleration, a little thrust, and the zero of the
+//! barometer, which wanders.
 
 use super::parameters::{Candidate, Catalogue};
 use crate::GapError;
@@ -19,7 +21,8 @@ use std::collections::BTreeMap;
 /// How flights of one machine differ.
 #[derive(Debug, Default)]
 pub(crate) struct Scatter {
-    /// By effect, in the unit of its number: how much another flight may differ, one standard deviation.
+    /// By effect, in the unit of its number: how much another flight may differ, one standard
+    /// deviation.
     pub(crate) tolerances: BTreeMap<&'static str, f64>,
     /// What the model leaves of one.
     pub(crate) usual: Usual,
@@ -27,11 +30,13 @@ pub(crate) struct Scatter {
 
 /// Tolerance of the tilt of an attitude estimate, rad.
 const TILT_RAD: f64 = 0.006;
-/// By how much an attitude estimate may lean into an acceleration that lasts, rad per m/s^2: a degree at two of them.
+/// By how much an attitude estimate may lean into an acceleration that lasts, rad per m/s^2: a
+/// degree at two of them.
 const LEVELLING_RAD_S2_PER_M: f64 = 0.01;
 /// By how much thrust differs from one flight to the next, as a fraction.
 pub(super) const DAY_FRACTION: f64 = 0.0015;
-/// Smallest change of one rotor's torque that is worth reporting, as a fraction: its thrust shows less.
+/// Smallest change of one rotor's torque that is worth reporting, as a fraction: its thrust shows
+/// less.
 const TORQUE_FRACTION: f64 = 0.03;
 /// By how much torques of rotors may differ where nothing is known of them, as a fraction.
 const FREE_TORQUE_FRACTION: f64 = 0.2;
@@ -55,7 +60,8 @@ pub(crate) struct Member {
 #[derive(Debug, Clone)]
 pub(crate) struct Point {
     pub(crate) members: Vec<Member>,
-    /// One number a column: the catalogue's parameters, those of its airframe, then the sensors of each flight.
+    /// One number a column: the catalogue's parameters, those of its airframe, then the sensors of
+    /// each flight.
     pub(crate) base: Vec<f64>,
 }
 
@@ -111,14 +117,16 @@ pub(crate) fn hypothesis(
     let mut all = predictor.nominal();
     for member in &point.members {
         let candidate = &catalogue.candidates[member.candidate];
-        // The catalogue has one of each effect: a second weak rotor changes the vehicle's own numbers.
+        // The catalogue has one of each effect: a second weak rotor changes the vehicle's own
+        // numbers.
         if all.effects.has(candidate.effect) && !is_same(&mut all.effects, candidate) {
             let mut one = Effects::none();
             if let Some(found) = one.insert(candidate.effect) {
                 found.values.copy_from_slice(&member.values);
             }
-            let altered =
-                one.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
+            let altered = one
+                .alter(&all.vehicle)
+                .map_err(|problem| predictor.refused(problem.to_string()))?;
             if altered != all.vehicle {
                 all.vehicle = altered;
                 continue;
@@ -138,16 +146,17 @@ pub(crate) fn hypothesis(
             sides[candidate.fixed[0].1 as usize] = x;
             continue;
         }
-        // What changes the airframe's numbers does so in a row, so that two rotors can be weak; the rest adds up, and so does
-        // what acts already.
+        // What changes the airframe's numbers does so in a row, so that two rotors can be weak; the
+        // rest adds up, and so does what acts already.
         if all.effects.has(candidate.effect) && is_same(&mut all.effects, candidate) {
             add(&mut all.effects, candidate, parameter.slot, x);
             continue;
         }
         let mut effects = Effects::none();
         add(&mut effects, candidate, parameter.slot, x);
-        let altered =
-            effects.alter(&all.vehicle).map_err(|problem| predictor.refused(problem.to_string()))?;
+        let altered = effects
+            .alter(&all.vehicle)
+            .map_err(|problem| predictor.refused(problem.to_string()))?;
         if altered == all.vehicle {
             add(&mut all.effects, candidate, parameter.slot, x);
         } else {
@@ -187,15 +196,16 @@ pub(crate) fn hypothesis(
 /// The effect that changes a number of the vehicle file.
 fn behind(number: Declared) -> Option<&'static str> {
     let is_it = |p: &EffectParameter| p.tolerance == Tolerance::Declared(number);
-    let has = |name: &&&str| Effects::<f64>::parameters(name).is_some_and(|list| list.iter().any(is_it));
+    let has =
+        |name: &&&str| Effects::<f64>::parameters(name).is_some_and(|list| list.iter().any(is_it));
     Effects::<f64>::NAMES.iter().find(has).copied()
 }
 
 /// Whether an effect that acts makes the choices of a candidate.
 fn is_same(effects: &mut Effects<f64>, candidate: &Candidate) -> bool {
-    effects
-        .insert(candidate.effect)
-        .is_some_and(|found| candidate.fixed.iter().all(|(slot, value)| found.values[*slot] == *value))
+    effects.insert(candidate.effect).is_some_and(|found| {
+        candidate.fixed.iter().all(|(slot, value)| found.values[*slot] == *value)
+    })
 }
 
 fn add(effects: &mut Effects<f64>, candidate: &Candidate, slot: usize, x: f64) {
@@ -237,13 +247,14 @@ impl Catalogue {
         }
     }
 
-    /// The effect that a column changes a number of, with the smallest size of it that is worth reporting; `None` for what
-    /// belongs to a flight, to the place of a rotor, or to no effect.
+    /// The effect that a column changes a number of, with the smallest size of it that is worth
+    /// reporting; `None` for what belongs to a flight, to the place of a rotor, or to no effect.
     pub(crate) fn group(&self, column: usize) -> Option<(&'static str, f64)> {
         if let Some(parameter) = self.parameters.get(column) {
             // What is there or not scatters by nothing.
             let scatters = parameter.tolerance > 0.0;
-            return scatters.then_some((self.candidates[parameter.candidate].effect, parameter.smallest));
+            return scatters
+                .then_some((self.candidates[parameter.candidate].effect, parameter.smallest));
         }
         match self.airframe.get(column - self.parameters.len())?.0 {
             Airframe::Arm { .. } => None,
@@ -255,15 +266,16 @@ impl Catalogue {
         }
     }
 
-    /// Lets numbers that make moments and next to no force be as large as is plausible, and those of rotors' torques with them,
-    /// and nothing else be off.
+    /// Lets numbers that make moments and next to no force be as large as is plausible, and those
+    /// of rotors' torques with them, and nothing else be off.
     pub(crate) fn free_moments_alone(&mut self) {
         for parameter in &mut self.parameters {
             let is_free = self.candidates[parameter.candidate].profile.is_of_moments;
             parameter.tolerance = if is_free { parameter.largest } else { 0.0 };
         }
         for (number, tolerance) in &mut self.airframe {
-            *tolerance = if matches!(number, Airframe::Torque { .. }) { FREE_TORQUE_FRACTION } else { 0.0 };
+            *tolerance =
+                if matches!(number, Airframe::Torque { .. }) { FREE_TORQUE_FRACTION } else { 0.0 };
         }
     }
 
@@ -278,7 +290,9 @@ impl Catalogue {
         }
         for column in 0..self.shared_columns() {
             let group = self.group(column);
-            let Some(sd) = group.and_then(|(effect, _)| scatter.tolerances.get(effect)) else { continue };
+            let Some(sd) = group.and_then(|(effect, _)| scatter.tolerances.get(effect)) else {
+                continue;
+            };
             match self.parameters.get_mut(column) {
                 Some(parameter) => (parameter.tolerance, parameter.spread) = (*sd, *sd),
                 None => self.airframe[column - self.parameters.len()].1 = *sd,
@@ -301,12 +315,14 @@ impl Catalogue {
         members.iter().any(|member| self.candidates[member.candidate].profile.feels_height)
     }
 
-    /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the same choices.
+    /// A candidate as the vehicle file has it: zero, or the file's own numbers where it makes the
+    /// same choices.
     pub(crate) fn absent(&self, predictor: &Predictor, candidate: usize) -> Member {
         let own = &self.candidates[candidate];
         let mut effects = predictor.vehicle.effects;
         let present = effects.has(own.effect);
-        let mut values = effects.insert(own.effect).map_or_else(Vec::new, |found| found.values.to_vec());
+        let mut values =
+            effects.insert(own.effect).map_or_else(Vec::new, |found| found.values.to_vec());
         let same = own.fixed.iter().all(|(slot, value)| values[*slot] == *value);
         if !(present && same) {
             values.fill(0.0);

@@ -1,4 +1,5 @@
-//! The numbers of one set of effects: Gauss-Newton through the simulator, everything else floating with its tolerance.
+//! The numbers of one set of effects: Gauss-Newton through the simulator, everything else floating
+//! with its tolerance.
 
 use super::evidence::{BETA, Gram, Posterior, products};
 use super::linear::{Linear, height_columns};
@@ -17,8 +18,8 @@ const STEPS_MAX: usize = 10;
 const STEP_NATS: f64 = 1.0;
 /// Part of the smallest size worth reporting below which a step is the last.
 const CONVERGED: f64 = 0.01;
-/// The same for a step after which columns are what they were, unless they grow from nothing: that of the difference that
-/// makes them.
+/// The same for a step after which columns are what they were, unless they grow from nothing: that
+/// of the difference that makes them.
 const CLOSE: f64 = 0.1;
 
 /// A set of effects with its best numbers and its evidence.
@@ -36,7 +37,8 @@ pub(crate) struct Scored {
     /// Columns of the free numbers, as they are and whitened.
     pub(crate) own_raw: Vec<Rc<Vec<f64>>>,
     pub(crate) own: Vec<Rc<Vec<f64>>>,
-    /// Where everything else is held, as in [`Point::base`], and whitened columns of heights, by index, if they matter there.
+    /// Where everything else is held, as in [`Point::base`], and whitened columns of heights, by
+    /// index, if they matter there.
     base: Vec<f64>,
     heights: BTreeMap<usize, Rc<Vec<f64>>>,
     /// Whitened measurement, with the free numbers' part in it.
@@ -44,16 +46,19 @@ pub(crate) struct Scored {
 }
 
 impl Scored {
-    /// Whitened columns in the order of the posterior: of the free numbers, then of everything else, heights as they act here.
+    /// Whitened columns in the order of the posterior: of the free numbers, then of everything
+    /// else, heights as they act here.
     pub(super) fn columns<'a>(&'a self, linear: &'a Linear) -> Vec<&'a Vec<f64>> {
         let others = linear.columns.iter().enumerate();
-        let here = others.map(|(index, column)| self.heights.get(&index).map_or(column, |here| &**here));
+        let here =
+            others.map(|(index, column)| self.heights.get(&index).map_or(column, |here| &**here));
         self.own.iter().map(|column| &**column).chain(here).collect()
     }
 }
 
 impl Search<'_> {
-    /// Refines the numbers of a set by Gauss-Newton through the simulator, everything else floating with its tolerance.
+    /// Refines the numbers of a set by Gauss-Newton through the simulator, everything else floating
+    /// with its tolerance.
     ///
     /// # Errors
     /// What the predictor says.
@@ -61,9 +66,11 @@ impl Search<'_> {
         self.score_towards(linear, members, None, f64::NEG_INFINITY)
     }
 
-    /// As [`Self::score`], given up after the first step that does not come near what the set must reach.
+    /// As [`Self::score`], given up after the first step that does not come near what the set must
+    /// reach.
     ///
-    /// * `from` - the set that the last member was added to: everything else starts where it is there
+    /// * `from` - the set that the last member was added to: everything else starts where it is
+    ///   there
     /// * `near` - evidence that each step must lead to, nats
     ///
     /// # Errors
@@ -77,10 +84,13 @@ impl Search<'_> {
     ) -> Result<Scored, GapError> {
         let mut base = from.map_or(&linear.point.base, |from| &from.base).clone();
         let along = self.moving_along(linear, members);
-        let moved_already = from.map_or(Vec::new(), |from| self.moving_along(linear, &from.members));
+        let moved_already =
+            from.map_or(Vec::new(), |from| self.moving_along(linear, &from.members));
         // A lag that is new explains what others were taken to be off for: they start at nothing.
         let mut moved = false;
-        for (column, _) in along.iter().filter(|(column, _)| *column < self.catalogue.parameters.len()) {
+        for (column, _) in
+            along.iter().filter(|(column, _)| *column < self.catalogue.parameters.len())
+        {
             if moved_already.iter().all(|(other, _)| other != column) {
                 moved |= base[*column] != 0.0;
                 base[*column] = 0.0;
@@ -105,7 +115,8 @@ impl Search<'_> {
             }
             let before = base.clone();
             for (column, sd) in &along {
-                let target = best.posterior.mean[best.free.len() + column].clamp(-3.0 * sd, 3.0 * sd);
+                let target =
+                    best.posterior.mean[best.free.len() + column].clamp(-3.0 * sd, 3.0 * sd);
                 let step = share * (target - base[*column]);
                 moved = moved.max(0.1 * step.abs() / sd);
                 base[*column] += step;
@@ -113,8 +124,10 @@ impl Search<'_> {
             if moved < CONVERGED {
                 break;
             }
-            let scored = self.evaluate(linear, &next, &base, Some(&best), moved < CLOSE && !flat)?;
-            // Where the model is linear, every point of it has the same evidence: the mode is where steps end.
+            let scored =
+                self.evaluate(linear, &next, &base, Some(&best), moved < CLOSE && !flat)?;
+            // Where the model is linear, every point of it has the same evidence: the mode is where
+            // steps end.
             if scored.log_evidence > best.log_evidence - STEP_NATS {
                 best = scored;
             } else {
@@ -132,18 +145,21 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Columns that bend so much beside some members that they are refined with them, with their tolerances: heights where
-    /// thrust feels them, and lags and delays beside one of them that is new.
+    /// Columns that bend so much beside some members that they are refined with them, with their
+    /// tolerances: heights where thrust feels them, and lags and delays beside one of them that is
+    /// new.
     fn moving_along(&self, linear: &Linear, members: &[Member]) -> Vec<(usize, f64)> {
         let catalogue = self.catalogue;
         let bends = |m: &Member| catalogue.bends(m.candidate);
-        let is_new = |m: &Member| !linear.point.members.iter().any(|other| other.candidate == m.candidate);
+        let is_new =
+            |m: &Member| !linear.point.members.iter().any(|other| other.candidate == m.candidate);
         let mut all = Vec::new();
         if members.iter().any(|m| bends(m) && is_new(m)) {
             let own = |p: usize| members.iter().any(|m| m.candidate == p);
             let free = catalogue.parameters.iter().enumerate();
-            let bending =
-                free.filter(|(_, p)| catalogue.bends(p.candidate) && !own(p.candidate) && p.tolerance > 0.0);
+            let bending = free.filter(|(_, p)| {
+                catalogue.bends(p.candidate) && !own(p.candidate) && p.tolerance > 0.0
+            });
             all.extend(bending.map(|(column, p)| (column, p.tolerance)));
         }
         if catalogue.feels_height(members) {
@@ -156,7 +172,8 @@ impl Search<'_> {
         all
     }
 
-    /// Whether a number of a member has one slope all along: it is in the catalogue's linear part and no lag.
+    /// Whether a number of a member has one slope all along: it is in the catalogue's linear part
+    /// and no lag.
     fn keeps_slope(&self, member: &Member, slot: usize) -> bool {
         let own = &self.catalogue.candidates[member.candidate].parameters;
         own.iter().map(|p| &self.catalogue.parameters[*p]).any(|p| p.slot == slot)
@@ -179,7 +196,8 @@ impl Search<'_> {
 
     /// Evidence of a set, linearised in its free numbers where they are.
     ///
-    /// * `before` - the same set with other numbers, or without its last member: columns that hardly bend are its
+    /// * `before` - the same set with other numbers, or without its last member: columns that
+    ///   hardly bend are its
     /// * `close` - it is so close that all of its columns hold here
     fn evaluate(
         &self,
@@ -196,7 +214,8 @@ impl Search<'_> {
             let candidate = &self.catalogue.candidates[member.candidate];
             for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
                 let other = &self.catalogue.candidates[parameter.candidate];
-                // Another rotor may still be off by its tolerance; the payload is one thing at several lengths.
+                // Another rotor may still be off by its tolerance; the payload is one thing at
+                // several lengths.
                 let same = parameter.candidate == member.candidate
                     || (other.effect == candidate.effect && other.fixed == candidate.fixed);
                 if same {
@@ -209,7 +228,8 @@ impl Search<'_> {
         let mut y = linear.whitener.apply(segments, &residual);
         // Height matters where an effect of it acts, and as much as it acts.
         if !self.catalogue.feels_height(members) {
-            let of_flights = self.catalogue.shared_columns()..self.catalogue.columns(self.predictor);
+            let of_flights =
+                self.catalogue.shared_columns()..self.catalogue.columns(self.predictor);
             for column in of_flights {
                 if matches!(self.catalogue.other(column).0, Other::Height { .. }) {
                     spikes[column] = 0.0;
@@ -220,7 +240,9 @@ impl Search<'_> {
             before.filter(|_| close).map_or_else(BTreeMap::new, |before| before.heights.clone());
         let heights_hold = !heights.is_empty();
         if !heights_hold {
-            for (index, column) in height_columns(self.predictor, self.catalogue, &point, &residual)? {
+            for (index, column) in
+                height_columns(self.predictor, self.catalogue, &point, &residual)?
+            {
                 heights.insert(index, Rc::new(linear.whitener.apply(segments, &column)));
             }
         }
@@ -230,7 +252,8 @@ impl Search<'_> {
                 add_scaled(&mut y, column(j), *x);
             }
         }
-        let (mut own, mut own_raw, mut free, mut prior) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (mut own, mut own_raw, mut free, mut prior) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         // Where a column is among those of before, if it holds here.
         let mut places = Vec::new();
         for (index, member) in members.iter().enumerate() {
@@ -245,7 +268,8 @@ impl Search<'_> {
                     let step = 0.1 * smallest;
                     let mut moved = point.clone();
                     moved.members[index].values[slot] += step;
-                    let column = self.predictor.slope(&residual, &self.hypothesis(&moved)?, step, None)?;
+                    let column =
+                        self.predictor.slope(&residual, &self.hypothesis(&moved)?, step, None)?;
                     let white = linear.whitener.apply(segments, &column);
                     (Rc::new(column), Rc::new(white))
                 };
@@ -259,7 +283,8 @@ impl Search<'_> {
         }
         let n = linear.columns.len();
         // Products of columns that are not new are known.
-        let (known, offset) = before.map_or((&linear.gram, 0), |before| (&before.gram.g, before.free.len()));
+        let (known, offset) =
+            before.map_or((&linear.gram, 0), |before| (&before.gram.g, before.free.len()));
         let is_new = |j: usize| heights.contains_key(&j) && !heights_hold;
         places.extend((0..n).map(|j| (!is_new(j)).then_some(offset + j)));
         let all: Vec<&[f64]> =
@@ -282,9 +307,11 @@ impl Search<'_> {
         })
     }
 
-    /// Where the column of a number of a member is among those of another set that has the same member at the same place.
+    /// Where the column of a number of a member is among those of another set that has the same
+    /// member at the same place.
     fn place(&self, other: &Scored, index: usize, member: &Member, slot: usize) -> Option<usize> {
-        let same = |m: &Member| m.candidate == member.candidate && self.form(m) == self.form(member);
+        let same =
+            |m: &Member| m.candidate == member.candidate && self.form(m) == self.form(member);
         other.members.get(index).filter(|m| same(m))?;
         other.free.iter().position(|free| *free == (index, slot))
     }

@@ -29,7 +29,12 @@ impl Search<'_> {
                 }
                 names.push(self.effect(&member));
                 let members = [without.members.as_slice(), &[member]].concat();
-                all.push(self.score_towards(&found.linear, &members, Some(without), f64::NEG_INFINITY)?);
+                all.push(self.score_towards(
+                    &found.linear,
+                    &members,
+                    Some(without),
+                    f64::NEG_INFINITY,
+                )?);
                 (self.progress)();
                 if names.len() == RIVALS {
                     break;
@@ -40,7 +45,8 @@ impl Search<'_> {
         if let Some(beaten) = &found.beaten {
             all.push(self.score(&found.linear, beaten)?);
         }
-        let candidates = |members: &[Member]| members.iter().map(|m| m.candidate).collect::<BTreeSet<_>>();
+        let candidates =
+            |members: &[Member]| members.iter().map(|m| m.candidate).collect::<BTreeSet<_>>();
         let own = candidates(&found.best.members);
         all.retain(|rival| self.is_off(rival) && candidates(&rival.members) != own);
         if !own.is_empty()
@@ -71,7 +77,8 @@ impl Search<'_> {
         all
     }
 
-    /// Effects that these flights do not show even at their largest plausible size, everything else floating.
+    /// Effects that these flights do not show even at their largest plausible size, everything else
+    /// floating.
     pub(crate) fn blind(&self, set: &Scored) -> Vec<&'static str> {
         let offset = set.free.len();
         let mut all = self.catalogue.unseen.clone();
@@ -97,7 +104,8 @@ impl Search<'_> {
         all
     }
 
-    /// How far the smallest size of one effect stands out while another floats freely: chi squared by row and column.
+    /// How far the smallest size of one effect stands out while another floats freely: chi squared
+    /// by row and column.
     pub(crate) fn confusability(&self, set: &Scored) -> (Vec<&'static str>, Vec<Vec<f64>>) {
         let offset = set.free.len();
         let mut names: Vec<&'static str> = Vec::new();

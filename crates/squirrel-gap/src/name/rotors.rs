@@ -11,8 +11,8 @@ use crate::GapError;
 use crate::verdict::{RotorHealth, Value};
 
 impl Search<'_> {
-    /// Tries two and more weak rotors at once: one after the other, each alone is less than what looks like all of them. What
-    /// they were better than, if it was a set.
+    /// Tries two and more weak rotors at once: one after the other, each alone is less than what
+    /// looks like all of them. What they were better than, if it was a set.
     pub(super) fn several_rotors(
         &self,
         linear: &Linear,
@@ -20,8 +20,8 @@ impl Search<'_> {
     ) -> Result<Option<Vec<Member>>, GapError> {
         let Some(scored) = self.best_rotors(linear)? else { return Ok(None) };
         (self.progress)();
-        let better =
-            scored.log_evidence - self.needs(&scored.members) > best.log_evidence - self.needs(&best.members);
+        let better = scored.log_evidence - self.needs(&scored.members)
+            > best.log_evidence - self.needs(&best.members);
         if !(better && self.is_off(&scored)) {
             return Ok(None);
         }
@@ -30,28 +30,32 @@ impl Search<'_> {
         Ok((!beaten.is_empty()).then_some(beaten))
     }
 
-    /// A set with more weak rotors than were named, each of the others too little for a name and all of them twenty to one in the
-    /// evidence: the flights leave open how many are weak.
+    /// A set with more weak rotors than were named, each of the others too little for a name and
+    /// all of them twenty to one in the evidence: the flights leave open how many are weak.
     pub(super) fn more_rotors(&self, found: &Found) -> Result<Option<Scored>, GapError> {
         let own = &found.best.members;
         if own.is_empty() || own.iter().any(|member| self.effect(member) != WEAK_ROTOR) {
             return Ok(None);
         }
         let Some(scored) = self.best_rotors(&found.linear)? else { return Ok(None) };
-        let has = |member: &Member| scored.members.iter().any(|other| other.candidate == member.candidate);
+        let has = |member: &Member| {
+            scored.members.iter().any(|other| other.candidate == member.candidate)
+        };
         let is_more = scored.members.len() > own.len() && own.iter().all(has);
         let is_better = scored.log_evidence >= found.best.log_evidence + BEHIND_NATS;
         Ok((is_more && is_better && self.is_off(&scored)).then_some(scored))
     }
 
-    /// What a set must be worth, nats. What happened to the rotors is one thing: how many of them are weak says the evidence.
+    /// What a set must be worth, nats. What happened to the rotors is one thing: how many of them
+    /// are weak says the evidence.
     fn needs(&self, members: &[Member]) -> f64 {
         let others = members.iter().filter(|m| self.effect(m) != WEAK_ROTOR).count();
         let things = others + usize::from(others < members.len());
         NATS_MIN + FURTHER_NATS * (things.max(1) - 1) as f64
     }
 
-    /// The best set of several weak rotors and nothing else; `None` where the vehicle is no machine with good flights.
+    /// The best set of several weak rotors and nothing else; `None` where the vehicle is no machine
+    /// with good flights.
     fn best_rotors(&self, linear: &Linear) -> Result<Option<Scored>, GapError> {
         if !self.catalogue.is_of_one_machine {
             return Ok(None);
@@ -66,7 +70,8 @@ impl Search<'_> {
             if !(2..=MEMBERS_MAX.min(weak.len().saturating_sub(1))).contains(&count) {
                 continue;
             }
-            let own = || weak.iter().enumerate().filter(|(i, _)| chosen >> i & 1 == 1).map(|(_, c)| *c);
+            let own =
+                || weak.iter().enumerate().filter(|(i, _)| chosen >> i & 1 == 1).map(|(_, c)| *c);
             let mut prior = none.prior.clone();
             let parameters = || own().flat_map(|c| &self.catalogue.candidates[c].parameters);
             for p in parameters() {
@@ -91,7 +96,8 @@ impl Search<'_> {
         self.score(linear, &members).map(Some)
     }
 
-    /// How each rotor is against what the vehicle file has, if every one may be off; none where the flights do not show it.
+    /// How each rotor is against what the vehicle file has, if every one may be off; none where the
+    /// flights do not show it.
     pub(crate) fn rotors(&self, null: &Scored) -> Vec<RotorHealth> {
         let catalogue = self.catalogue;
         let effect = |p: &Parameter| catalogue.candidates[p.candidate].effect;
@@ -107,7 +113,11 @@ impl Search<'_> {
             let (value, sd) = (posterior.mean[column], posterior.variance(column).sqrt());
             let (low, high) = (value - INTERVAL * sd, value + INTERVAL * sd);
             let usual = catalogue.parameters[column].tolerance;
-            RotorHealth { rotor: i + 1, thrust_loss_fraction: Value::Number { value, low, high }, usual }
+            RotorHealth {
+                rotor: i + 1,
+                thrust_loss_fraction: Value::Number { value, low, high },
+                usual,
+            }
         };
         own.into_iter().enumerate().map(health).collect()
     }

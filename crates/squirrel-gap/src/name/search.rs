@@ -1,4 +1,5 @@
-//! The search for the set of effects with the most evidence: forward, drop, swap, each step refined through the simulator.
+//! The search for the set of effects with the most evidence: forward, drop, swap, each step refined
+//! through the simulator.
 
 use super::evidence::BETA;
 use super::linear::Linear;
@@ -14,16 +15,17 @@ use std::rc::Rc;
 pub(crate) const NATS_MIN: f64 = 6.0;
 /// What each further effect must be worth: a wrong first number leaves a little to explain.
 pub(super) const FURTHER_NATS: f64 = 10.0;
-/// What an effect must be worth beside gusts, which blow harder at times than at others; and per squared m/s of their
-/// deviation, if it acts through moving air, as gusts on average do.
+/// What an effect must be worth beside gusts, which blow harder at times than at others; and per
+/// squared m/s of their deviation, if it acts through moving air, as gusts on average do.
 const BESIDE_GUSTS_NATS: f64 = 12.0;
 const BLOWN_NATS: f64 = 40.0;
 /// The effect of which a vehicle may have several.
 pub(super) const WEAK_ROTOR: &str = WeakRotor::<f64>::NAME;
-/// What a clock that jumps must be worth for each flight that it jumps in, which are all: by chance something changes at one of
-/// the hundreds of times at which it may.
+/// What a clock that jumps must be worth for each flight that it jumps in, which are all: by chance
+/// something changes at one of the hundreds of times at which it may.
 const JUMP_NATS: f64 = 40.0;
-/// What a scale of the accelerometer must be worth: an attitude that leans into accelerations makes one, too.
+/// What a scale of the accelerometer must be worth: an attitude that leans into accelerations makes
+/// one, too.
 const LEANS_NATS: f64 = 12.0;
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
 const TOLERANCES_MIN: f64 = 3.0;
@@ -37,7 +39,8 @@ const PLAUSIBLE: f64 = 1.3;
 const FIRST_STEP: f64 = 1.5;
 /// Candidates that are refined after each linear ranking.
 const REFINED: usize = 4;
-/// A candidate is given up if its first step leaves more than this part of what must be explained, and this much, nats.
+/// A candidate is given up if its first step leaves more than this part of what must be explained,
+/// and this much, nats.
 const GIVEN_UP: f64 = 0.5;
 const GIVEN_UP_NATS: f64 = 30.0;
 /// Part of its tolerance by which a number must be off to act in the simulator's own model.
@@ -85,7 +88,8 @@ impl Search<'_> {
         loop {
             let mut best = self.score(&linear, &point.members)?;
             if !self.has_settled(&best, &point.members) {
-                // Numbers first: about others, columns are others, and all that is asked now would be asked again.
+                // Numbers first: about others, columns are others, and all that is asked now would
+                // be asked again.
                 point = self.settled(&best);
                 linear = self.linear(&point, Some(linear))?;
                 best = self.score(&linear, &point.members)?;
@@ -100,7 +104,13 @@ impl Search<'_> {
                 }
                 self.finish(&mut best);
                 let null = self.score(&linear, &[])?;
-                return Ok(Found { linear: Rc::new(linear), null: Rc::new(null), best, without, beaten });
+                return Ok(Found {
+                    linear: Rc::new(linear),
+                    null: Rc::new(null),
+                    best,
+                    without,
+                    beaten,
+                });
             }
             point = self.settled(&best);
             linear = self.linear(&point, Some(linear))?;
@@ -143,8 +153,10 @@ impl Search<'_> {
             Ok(BETA * white.iter().map(|x| x * x).sum::<f64>()
                 + far.map(|(x, sd)| (x / sd).powi(2)).sum::<f64>())
         };
-        let part =
-            |share: f64| Point { base: whole.base.iter().map(|x| share * x).collect(), ..whole.clone() };
+        let part = |share: f64| Point {
+            base: whole.base.iter().map(|x| share * x).collect(),
+            ..whole.clone()
+        };
         let mut best = (cost(&part(0.0))?, part(0.0));
         for share in [1.0, 0.5, 0.25, 0.1] {
             let point = part(share);
@@ -163,19 +175,22 @@ impl Search<'_> {
         Ok(linear)
     }
 
-    /// The point at which a set explains most: its members, and everything else where it most likely is, as far as a vehicle
-    /// can be there. What is linear knows no end: where something else is wrong, it asks for a mass below zero.
+    /// The point at which a set explains most: its members, and everything else where it most
+    /// likely is, as far as a vehicle can be there. What is linear knows no end: where something
+    /// else is wrong, it asks for a mass below zero.
     pub(crate) fn whole(&self, set: &Scored) -> Point {
         let mut base: Vec<f64> = set.posterior.mean.iter().skip(set.free.len()).copied().collect();
         for (x, parameter) in base.iter_mut().zip(&self.catalogue.parameters) {
-            let own = self.catalogue.absent(self.predictor, parameter.candidate).values[parameter.slot];
+            let own =
+                self.catalogue.absent(self.predictor, parameter.candidate).values[parameter.slot];
             let flat = self.catalogue.starts_flat(parameter.candidate);
             *x = if flat { 0.0 } else { parameter.bounded(own, *x) };
         }
         Point { members: set.members.clone(), base }
     }
 
-    /// The same without what is hardly off, which is left to the linear part: every effect that acts costs time.
+    /// The same without what is hardly off, which is left to the linear part: every effect that
+    /// acts costs time.
     pub(crate) fn settled(&self, set: &Scored) -> Point {
         let mut point = self.whole(set);
         for (x, parameter) in point.base.iter_mut().zip(&self.catalogue.parameters) {
@@ -211,7 +226,8 @@ impl Search<'_> {
             .collect()
     }
 
-    /// Whether a set is the one that the predictor was linearised about, with numbers within a tenth of what they are.
+    /// Whether a set is the one that the predictor was linearised about, with numbers within a
+    /// tenth of what they are.
     fn has_settled(&self, set: &Scored, about: &[Member]) -> bool {
         set.members.len() == about.len()
             && set.members.iter().all(|member| {
@@ -232,14 +248,17 @@ impl Search<'_> {
     /// Adds effects as long as the evidence asks for them.
     pub(super) fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
         while best.members.len() < MEMBERS_MAX {
-            let Some(next) = self.best_addition(linear, best, &[], f64::NEG_INFINITY)? else { break };
+            let Some(next) = self.best_addition(linear, best, &[], f64::NEG_INFINITY)? else {
+                break;
+            };
             let kept = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
             let needed = next.members.last().map_or(kept, |member| self.needed(member).max(kept));
             if next.log_evidence < best.log_evidence + needed {
                 break;
             }
             *best = next;
-            // Before a second effect explains what the first leaves, the first may have another form.
+            // Before a second effect explains what the first leaves, the first may have another
+            // form.
             self.choose_forms(linear, best)?;
         }
         Ok(())
@@ -257,7 +276,8 @@ impl Search<'_> {
     ) -> Result<Option<Scored>, GapError> {
         let mut best: Option<Scored> = None;
         for (log_evidence, member) in self.ranked(set, except).into_iter().take(REFINED) {
-            // What explains nothing along its slope is worth a flight only where the slope may be another one.
+            // What explains nothing along its slope is worth a flight only where the slope may be
+            // another one.
             let profile = self.profile(&member);
             let straight = !profile.bends() && profile.response != Response::StartsFlat;
             if log_evidence <= set.log_evidence && (straight || linear.knows(&set.members)) {
@@ -267,7 +287,9 @@ impl Search<'_> {
             let near = beats - GIVEN_UP * (beats - set.log_evidence).max(0.0) - GIVEN_UP_NATS;
             let scored = self.score_towards(linear, &members, Some(set), near)?;
             (self.progress)();
-            if self.is_off(&scored) && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence) {
+            if self.is_off(&scored)
+                && best.as_ref().is_none_or(|b| scored.log_evidence > b.log_evidence)
+            {
                 beats = beats.max(scored.log_evidence);
                 best = Some(scored);
             }
@@ -275,10 +297,13 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Whether each member is beyond what the vehicle file allows it, and none at the end of what is plausible: what is forced
-    /// into a name goes there.
+    /// Whether each member is beyond what the vehicle file allows it, and none at the end of what
+    /// is plausible: what is forced into a name goes there.
     pub(crate) fn is_off(&self, scored: &Scored) -> bool {
-        scored.members.iter().all(|member| self.is_beyond_tolerance(member) && !self.is_at_its_end(member))
+        scored
+            .members
+            .iter()
+            .all(|member| self.is_beyond_tolerance(member) && !self.is_at_its_end(member))
     }
 
     fn is_at_its_end(&self, member: &Member) -> bool {
@@ -301,13 +326,17 @@ impl Search<'_> {
         let free = self.free_slots(member);
         let mut standard = self.catalogue.own(member).filter(|p| free.contains(&p.slot)).peekable();
         standard.peek().is_none()
-            || standard.any(|p| (member.values[p.slot] - before[p.slot]).abs() >= TOLERANCES_MIN * p.least())
+            || standard.any(|p| {
+                (member.values[p.slot] - before[p.slot]).abs() >= TOLERANCES_MIN * p.least()
+            })
     }
 
     /// Drops members that refinement has made too small to be off; whether there were any.
     fn prune(&self, linear: &Linear, best: &mut Scored) -> Result<bool, GapError> {
         let before = best.members.len();
-        while let Some(small) = best.members.iter().position(|member| !self.is_beyond_tolerance(member)) {
+        while let Some(small) =
+            best.members.iter().position(|member| !self.is_beyond_tolerance(member))
+        {
             let mut rest = best.members.clone();
             rest.remove(small);
             *best = self.score(linear, &rest)?;
@@ -327,7 +356,8 @@ impl Search<'_> {
         Ok(Found { linear, null: Rc::clone(&found.null), best, without, beaten: None })
     }
 
-    /// By how many standard deviations a member's number differs from what the vehicle file has, the clearest of them.
+    /// By how many standard deviations a member's number differs from what the vehicle file has,
+    /// the clearest of them.
     ///
     /// * `deviations` - of the free numbers
     pub(crate) fn stands_out(&self, set: &Scored, index: usize, deviations: &[f64]) -> f64 {
@@ -337,22 +367,26 @@ impl Search<'_> {
             .fold(0.0, f64::max)
     }
 
-    /// Whether no member is larger than anything plausible: what is forced into a name goes to its limit.
+    /// Whether no member is larger than anything plausible: what is forced into a name goes to its
+    /// limit.
     pub(crate) fn is_plausible(&self, scored: &Scored) -> bool {
         scored.members.iter().all(|member| {
-            self.free_slots(member)
-                .into_iter()
-                .all(|slot| member.values[slot].abs() <= PLAUSIBLE * self.range(member, slot).largest)
+            self.free_slots(member).into_iter().all(|slot| {
+                member.values[slot].abs() <= PLAUSIBLE * self.range(member, slot).largest
+            })
         })
     }
 
-    /// Candidates by the evidence that a linear model gives them beside a set, best first, with their linear numbers.
+    /// Candidates by the evidence that a linear model gives them beside a set, best first, with
+    /// their linear numbers.
     pub(crate) fn ranked(&self, set: &Scored, except: &[&str]) -> Vec<(f64, Member)> {
         let offset = set.free.len();
         let mut all = Vec::new();
         for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
-            let in_set =
-                set.members.iter().any(|m| excludes(&self.catalogue.candidates[m.candidate], candidate));
+            let in_set = set
+                .members
+                .iter()
+                .any(|m| excludes(&self.catalogue.candidates[m.candidate], candidate));
             if in_set || except.contains(&candidate.effect) {
                 continue;
             }
@@ -375,7 +409,8 @@ impl Search<'_> {
                 let value = &mut member.values[parameter.slot];
                 let own = *value;
                 *value += posterior.mean[offset + p];
-                // Less than a file has may be as little as nothing; what it has not is not there by less than nothing.
+                // Less than a file has may be as little as nothing; what it has not is not there by
+                // less than nothing.
                 if !parameter.signed && own > 0.0 {
                     *value = value.max(LEAST * parameter.smallest);
                 }
@@ -407,7 +442,8 @@ impl Search<'_> {
         all
     }
 
-    /// A lag or delay of the vehicle file started from nothing: far off, what is quick has no slope that leads there.
+    /// A lag or delay of the vehicle file started from nothing: far off, what is quick has no slope
+    /// that leads there.
     fn without_delay(&self, member: &Member) -> Option<Member> {
         let stated = self.catalogue.absent(self.predictor, member.candidate);
         let own = self.catalogue.own(member).next()?;
@@ -431,8 +467,8 @@ impl Search<'_> {
         hypothesis(self.predictor, self.catalogue, point)
     }
 
-    /// Drops and replaces members as long as the evidence asks for it; the set without each of its members, unless it was
-    /// changed to the last.
+    /// Drops and replaces members as long as the evidence asks for it; the set without each of its
+    /// members, unless it was changed to the last.
     fn drop_and_swap(&self, linear: &Linear, best: &mut Scored) -> Result<Vec<Scored>, GapError> {
         // Later members may have taken over what an early one was named for.
         let mut all = Vec::new();
@@ -452,8 +488,12 @@ impl Search<'_> {
                     break;
                 }
                 if best.members.len() > 1
-                    && let Some(other) =
-                        self.best_addition(linear, &without, &[self.effect(&out)], best.log_evidence)?
+                    && let Some(other) = self.best_addition(
+                        linear,
+                        &without,
+                        &[self.effect(&out)],
+                        best.log_evidence,
+                    )?
                     && other.log_evidence > best.log_evidence
                 {
                     *best = other;
@@ -468,7 +508,8 @@ impl Search<'_> {
     }
 }
 
-/// Whether an effect leaves no room for another: itself, and where flights show a ratio alone, what stands on its other side.
+/// Whether an effect leaves no room for another: itself, and where flights show a ratio alone, what
+/// stands on its other side.
 fn excludes(named: &Candidate, other: &Candidate) -> bool {
     let on_one_ratio = ratio(named).is_some() && ratio(named) == ratio(other);
     // Two rotors may be weak.

@@ -1,11 +1,11 @@
-//! Names beside a force or moment that each flight has for itself and that changes slowly, as of a pack that warms up: not
-//! whatever is left of a channel is another effect.
+//! Names beside a force or moment that each flight has for itself and that changes slowly, as of a
+//! pack that warms up: not whatever is left of a channel is another effect.
 //!
 //! ```text
 //! y = X theta + Z zeta + e      Z: 1, s, (3 s^2 - 1) / 2 along each flight, s = -1 .. 1, of each channel that is left with something
 //! ```
-//! A name stands if the flights ask for it beside `Z`, which takes from it whatever is as slow, and if the two together leave
-//! nothing.
+//! A name stands if the flights ask for it beside `Z`, which takes from it whatever is as slow, and
+//! if the two together leave nothing.
 
 use super::evidence::inner;
 use super::linear::Linear;
@@ -22,7 +22,8 @@ const TERMS: usize = 3;
 /// How much larger than the rms of what is left each may be, one standard deviation.
 const SIZE_TIMES: f64 = 2.0;
 
-/// Whether flights ask for every name of an explanation beside what is slow, and nothing else is left.
+/// Whether flights ask for every name of an explanation beside what is slow, and nothing else is
+/// left.
 ///
 /// # Errors
 /// What the predictor says.
@@ -30,8 +31,9 @@ pub(super) fn leaves_nothing_else(search: &Search<'_>, naming: &Naming) -> Resul
     let linear = Rc::new(with_slow(search.predictor, naming));
     let best = search.score(&linear, &naming.found.best.members)?;
     let without = search.without(&linear, &best)?;
-    let is_asked_for =
-        |(member, rest): (&Member, &Scored)| best.log_evidence >= rest.log_evidence + search.needed(member);
+    let is_asked_for = |(member, rest): (&Member, &Scored)| {
+        best.log_evidence >= rest.log_evidence + search.needed(member)
+    };
     if !(best.members.iter().zip(&without).all(is_asked_for) && search.is_off(&best)) {
         return Ok(false);
     }
@@ -40,7 +42,8 @@ pub(super) fn leaves_nothing_else(search: &Search<'_>, naming: &Naming) -> Resul
     Ok(!beside.leftover.is_real())
 }
 
-/// The linear model of an explanation with what is slow in the channels that are left with something.
+/// The linear model of an explanation with what is slow in the channels that are left with
+/// something.
 fn with_slow(predictor: &Predictor<'_>, naming: &Naming) -> Linear {
     let mut linear = (*naming.found.linear).clone();
     for (channel, _) in naming.leftover.excess.iter().filter(|(channel, _)| *channel < DYNAMIC) {

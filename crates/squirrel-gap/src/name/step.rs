@@ -1,10 +1,12 @@
-//! When a clock of commands may have jumped: where what the model misses wants another delay before than after.
+//! When a clock of commands may have jumped: where what the model misses wants another delay before
+//! than after.
 //!
 //! ```text
 //! c: change of the residual for a delay       gain(t) = (c'r)^2 / c'c before t + the same after t - that of both together
 //! ```
-//! About the best of them, the time is that at which the residual with the delay becomes the smaller one. A jump is found from
-//! nearby alone, so that a hypothesis must start near the right time, as a slung load at its length.
+//! About the best of them, the time is that at which the residual with the delay becomes the
+//! smaller one. A jump is found from nearby alone, so that a hypothesis must start near the right
+//! time, as a slung load at its length.
 
 use super::whiten::Whitener;
 use crate::GapError;
@@ -20,8 +22,8 @@ const EDGE_S: f64 = 2.0;
 const FINE_S: f64 = 0.02;
 const NEAR_S: f64 = 1.0;
 
-/// The time since the beginning of a flight, s, at which a step explains most; `None` where flights are too short, or rotors
-/// turn as they were measured.
+/// The time since the beginning of a flight, s, at which a step explains most; `None` where flights
+/// are too short, or rotors turn as they were measured.
 ///
 /// * `rows` - residual of the vehicle as it is
 ///
@@ -44,7 +46,9 @@ pub(crate) fn clock_step_s(predictor: &Predictor, rows: &[f64]) -> Result<Option
     let (now, after) = (white(rows), late(DELAY_S)?);
     // By time since the beginning of each flight.
     let began_s: Vec<f64> = (0..predictor.names.len())
-        .map(|flight| predictor.tracks.iter().find(|t| t.flight == flight).map_or(0.0, |t| t.began_s))
+        .map(|flight| {
+            predictor.tracks.iter().find(|t| t.flight == flight).map_or(0.0, |t| t.began_s)
+        })
         .collect();
     let binned = |bin_s: f64, of: &dyn Fn(usize) -> [f64; 2]| -> Vec<[f64; 2]> {
         let mut bins: Vec<[f64; 2]> = Vec::new();
@@ -61,7 +65,8 @@ pub(crate) fn clock_step_s(predictor: &Predictor, rows: &[f64]) -> Result<Option
         [change * change, change * now[row]]
     });
     let total = bins.iter().fold([0.0; 2], |sum, bin| add(sum, *bin));
-    let worth = |[square, product]: [f64; 2]| if square > 0.0 { product * product / square } else { 0.0 };
+    let worth =
+        |[square, product]: [f64; 2]| if square > 0.0 { product * product / square } else { 0.0 };
     let edge = (EDGE_S / BIN_S) as usize;
     let (mut before, mut best): (_, Option<(f64, f64, f64)>) = ([0.0; 2], None);
     for (i, bin) in bins.iter().enumerate().take(bins.len().saturating_sub(edge)) {

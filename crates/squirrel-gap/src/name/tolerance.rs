@@ -1,4 +1,5 @@
-//! How far each number may be off without a name: what the vehicle file declares, and what is known of sensors and batteries.
+//! How far each number may be off without a name: what the vehicle file declares, and what is known
+//! of sensors and batteries.
 
 use super::point::Airframe;
 use crate::GapError;
@@ -7,14 +8,16 @@ use crate::predictor::Predictor;
 use squirrel_core::effects::{Declared, Timing, Tolerance};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has no number for.
+/// Part of the smallest size worth reporting by which a thing may be off that the vehicle file has
+/// no number for.
 pub(super) const SHARE_OF_SMALLEST: f64 = 1.0 / 6.0;
 /// Part of a sample to which times are known, one standard deviation.
 const SAMPLE_SHARE: f64 = 0.1;
 /// Voltage of a full cell, of one at rest, and of an empty one under load, V.
 const CELL_V: [f64; 3] = [4.2, 3.8, 3.2];
 
-/// What sensors may be off by where the vehicle file does not say: m/s^2, and a degree and a quarter in rad.
+/// What sensors may be off by where the vehicle file does not say: m/s^2, and a degree and a
+/// quarter in rad.
 const ACCEL_BIAS: (&str, f64, &str) = ("sensors.imu.accel_bias_m_s2", 0.03, "m/s^2");
 /// Of scales, as fractions, what a file says is the scatter from one switching on to the next.
 const GYRO_SCALE: (&str, f64) = ("sensors.imu.gyro_scale_sd", 0.01);
@@ -27,20 +30,24 @@ pub(crate) fn notes(vehicle: &VehicleFile) -> Vec<String> {
     let mut notes: Vec<String> = [ACCEL_BIAS, HEADING]
         .iter()
         .filter(|(field, ..)| silent(field))
-        .map(|(field, sd, unit)| format!("{field}: has no sd; {} {unit} is taken", significant(*sd, 2)))
+        .map(|(field, sd, unit)| {
+            format!("{field}: has no sd; {} {unit} is taken", significant(*sd, 2))
+        })
         .collect();
     let imu = &vehicle.sensors.imu;
     let scales = [(GYRO_SCALE, imu.gyro_scale_sd), (ACCEL_SCALE, imu.accel_scale_sd)];
     let silent_scales = scales.iter().filter(|(_, sd)| *sd == 0.0);
     notes.extend(silent_scales.map(|((field, sd), _)| format!("{field}: is 0; {sd} is taken")));
-    let mut rotors = (0..vehicle.vehicle.rotors().len()).map(|i| format!("rotor[{i}].position_body_m"));
+    let mut rotors =
+        (0..vehicle.vehicle.rotors().len()).map(|i| format!("rotor[{i}].position_body_m"));
     if let Some(field) = rotors.find(|field| silent(field)) {
         notes.push(format!("{field}: has no sd; the rotor is taken to be where the file says"));
     }
     notes
 }
 
-/// How far the number that an effect changes may be off, one standard deviation, in the unit of the effect's parameter.
+/// How far the number that an effect changes may be off, one standard deviation, in the unit of the
+/// effect's parameter.
 pub(super) fn tolerance(
     vehicle: &VehicleFile,
     within: Tolerance,
@@ -76,16 +83,21 @@ pub(super) fn tolerance(
         Declared::Thrust => {
             fraction("propulsion.thrust_coefficient_n_s2", 0, propulsion.thrust_coefficient_n_s2)
         }
-        Declared::Torque => {
-            fraction("propulsion.torque_coefficient_n_m_s2", 0, propulsion.torque_coefficient_n_m_s2)
-        }
+        Declared::Torque => fraction(
+            "propulsion.torque_coefficient_n_m_s2",
+            0,
+            propulsion.torque_coefficient_n_m_s2,
+        ),
         Declared::RotorLag => {
             if let Some(single) = sds(vehicle, "propulsion.time_constant_s") {
                 return Ok(single[0]);
             }
             let up = "propulsion.time_constant_up_s";
             let has_two = vehicle.provenance.iter().any(|(field, _)| field == up);
-            number(if has_two { up } else { "propulsion.time_constant_s" }, propulsion.time_constant_up_s)
+            number(
+                if has_two { up } else { "propulsion.time_constant_s" },
+                propulsion.time_constant_up_s,
+            )
         }
         Declared::LinearDrag(axis) => {
             let drag = "drag.linear_n_s_per_m";
@@ -119,18 +131,28 @@ fn arms_m(vehicle: &VehicleFile, axis: usize) -> Vec<f64> {
     declared.map(|sd| sd[axis.min(sd.len() - 1)]).collect()
 }
 
-/// By how much the middle of the rotors, which a centre of mass is beside, is off by itself: each by its own.
+/// By how much the middle of the rotors, which a centre of mass is beside, is off by itself: each
+/// by its own.
 pub(super) fn middle_m(vehicle: &VehicleFile, axis: usize) -> f64 {
     let all = arms_m(vehicle, axis);
     all.iter().map(|sd| sd * sd).sum::<f64>().sqrt() / all.len().max(1) as f64
 }
 
 /// The declared sd of a number; `None` where the number is zero and the file declares none.
-fn deviation(vehicle: &VehicleFile, field: &str, index: usize, value: f64) -> Result<Option<f64>, GapError> {
+fn deviation(
+    vehicle: &VehicleFile,
+    field: &str,
+    index: usize,
+    value: f64,
+) -> Result<Option<f64>, GapError> {
     match sds(vehicle, field) {
         Some(sd) => Ok(Some(sd[index.min(sd.len() - 1)])),
         None if value == 0.0 => Ok(None),
-        None => Err(GapError::Tolerance { vehicle: vehicle.name.clone(), field: field.to_owned(), value }),
+        None => Err(GapError::Tolerance {
+            vehicle: vehicle.name.clone(),
+            field: field.to_owned(),
+            value,
+        }),
     }
 }
 
@@ -144,12 +166,13 @@ pub(crate) fn sds(vehicle: &VehicleFile, field: &str) -> Option<Vec<f64>> {
         .filter_map(|part| part.parse().ok())
         .collect();
     // Of a full inertia matrix, the diagonal.
-    let numbers = if numbers.len() == 9 { vec![numbers[0], numbers[4], numbers[8]] } else { numbers };
+    let numbers =
+        if numbers.len() == 9 { vec![numbers[0], numbers[4], numbers[8]] } else { numbers };
     (!numbers.is_empty()).then_some(numbers)
 }
 
-/// How well a log tells when things happen, in the unit of an effect that is about time: a part of a sample, a clock's over
-/// its flight.
+/// How well a log tells when things happen, in the unit of an effect that is about time: a part of
+/// a sample, a clock's over its flight.
 pub(super) fn spread_s(predictor: &Predictor, timing: Option<Timing>) -> Option<f64> {
     let period_s = predictor.tracks.iter().map(|track| track.period_s).fold(0.0, f64::max);
     match timing? {
@@ -162,13 +185,17 @@ pub(super) fn spread_s(predictor: &Predictor, timing: Option<Timing>) -> Option<
 /// The skew, in millionths, at which a clock slips by one sample in the longest flight.
 pub(super) fn slip_ppm(predictor: &Predictor) -> f64 {
     let period_s = predictor.tracks.iter().map(|track| track.period_s).fold(0.0, f64::max);
-    let span_s =
-        predictor.tracks.iter().map(|t| t.time_s[t.time_s.len() - 1] - t.began_s).fold(0.0, f64::max);
+    let span_s = predictor
+        .tracks
+        .iter()
+        .map(|t| t.time_s[t.time_s.len() - 1] - t.began_s)
+        .fold(0.0, f64::max);
     1e6 * period_s / span_s
 }
 
-/// By how much thrust may be off, as a fraction, where the battery's voltage is not logged: it is anywhere between full and
-/// empty, the voltage at which the vehicle's numbers hold may be two of its sd off, and thrust goes with the square of both.
+/// By how much thrust may be off, as a fraction, where the battery's voltage is not logged: it is
+/// anywhere between full and empty, the voltage at which the vehicle's numbers hold may be two of
+/// its sd off, and thrust goes with the square of both.
 pub(super) fn unlogged_sag(predictor: &Predictor) -> f64 {
     if predictor.has_voltage() || predictor.has_rotor_speeds() {
         return 0.0;
@@ -179,7 +206,10 @@ pub(super) fn unlogged_sag(predictor: &Predictor) -> f64 {
     let cells = (reference_v / rest).round().max(1.0);
     let thrust = |cell_v: f64| (cell_v * cells / reference_v).powi(2);
     let sd_v = sds(vehicle, "propulsion.reference_voltage_v").map_or(0.0, |sd| sd[0]);
-    (1.0 - thrust(empty)).abs().max((thrust(full) - 1.0).abs()).hypot(2.0 * 2.0 * sd_v / reference_v)
+    (1.0 - thrust(empty))
+        .abs()
+        .max((thrust(full) - 1.0).abs())
+        .hypot(2.0 * 2.0 * sd_v / reference_v)
 }
 
 /// Numbers of the airframe that have a declared tolerance, where flights show them.
@@ -193,17 +223,22 @@ pub(super) fn airframe(predictor: &Predictor) -> Vec<(Airframe, f64)> {
             let arm = sds(vehicle, &format!("rotor[{rotor}].position_body_m"));
             for axis in 0..2 {
                 all.extend(
-                    arm.as_ref().map(|sd| (Airframe::Arm { rotor, axis }, sd[axis.min(sd.len() - 1)])),
+                    arm.as_ref()
+                        .map(|sd| (Airframe::Arm { rotor, axis }, sd[axis.min(sd.len() - 1)])),
                 );
             }
             let sd = sds(vehicle, "propulsion.torque_coefficient_n_m_s2");
-            all.extend(sd.filter(|_| torque > 0.0).map(|sd| (Airframe::Torque { rotor }, sd[0] / torque)));
+            all.extend(
+                sd.filter(|_| torque > 0.0).map(|sd| (Airframe::Torque { rotor }, sd[0] / torque)),
+            );
         }
     }
     if predictor.has_channel(0) {
         let drag = sds(vehicle, "drag.linear_n_s_per_m");
         for axis in 1..3 {
-            all.extend(drag.as_ref().map(|sd| (Airframe::Drag { axis }, sd[axis.min(sd.len() - 1)])));
+            all.extend(
+                drag.as_ref().map(|sd| (Airframe::Drag { axis }, sd[axis.min(sd.len() - 1)])),
+            );
         }
     }
     all

@@ -1,16 +1,16 @@
 //! Whitening: an autoregression of order 8 per channel, fitted to what the fullest model leaves.
 //!
-//! Residuals of flights are coloured by filters, turbulence and attitude errors. Seen through the same autoregression, the
-//! measurement and every column are as if the noise were white with variance 1, and sums of squares count evidence. Means
-//! over seconds are taken as white.
+//! Residuals of flights are coloured by filters, turbulence and attitude errors. Seen through the
+//! same autoregression, the measurement and every column are as if the noise were white with
+//! variance 1, and sums of squares count evidence. Means over seconds are taken as white.
 
 use crate::predictor::{CHANNELS, Segment};
 use nalgebra::{DMatrix, DVector};
 
 /// Order of the autoregression.
 const ORDER: usize = 8;
-/// Rows of a block that is looked at as a whole, and how many robust deviations of all blocks its mean may be off: a burst
-/// that no column explains is no noise.
+/// Rows of a block that is looked at as a whole, and how many robust deviations of all blocks its
+/// mean may be off: a burst that no column explains is no noise.
 const BLOCK: usize = 8;
 const BURST: f64 = 4.0;
 
@@ -50,9 +50,11 @@ impl Whitener {
             .map(|channel| {
                 let all = segments.iter().filter(|s| s.channel == channel);
                 let is_trim = all.clone().any(Segment::is_trim);
-                let own: Vec<&Segment> = all.filter(|s| is_trim || s.rows.len() > 3 * ORDER).collect();
-                let of =
-                    |rows: &'_ [f64]| own.iter().map(|s| rows[s.rows.clone()].to_vec()).collect::<Vec<_>>();
+                let own: Vec<&Segment> =
+                    all.filter(|s| is_trim || s.rows.len() > 3 * ORDER).collect();
+                let of = |rows: &'_ [f64]| {
+                    own.iter().map(|s| rows[s.rows.clone()].to_vec()).collect::<Vec<_>>()
+                };
                 if is_trim {
                     white(&[of(noise), of(doubt)].concat(), own.iter().map(|s| s.rows.len()).sum())
                 } else {
@@ -85,8 +87,10 @@ impl Whitener {
         }
         let mut out = Self::fit(segments, &changes, &vec![0.0; rows.len()]);
         for (channel, filter) in out.filters.iter_mut().enumerate() {
-            let own =
-                segments.iter().filter(|s| s.channel == channel).flat_map(|s| changes[s.rows.clone()].iter());
+            let own = segments
+                .iter()
+                .filter(|s| s.channel == channel)
+                .flat_map(|s| changes[s.rows.clone()].iter());
             let (sum, n) = own.fold((0.0, 0.0), |(sum, n), x| (sum + x * x, n + 1.0));
             if let Some(filter) = filter {
                 *filter = Filter::white(f64::sqrt(sum / n));
@@ -136,10 +140,9 @@ impl Whitener {
         for segment in segments {
             let filter = self.filters[segment.channel].as_ref();
             if let Some(order) = filter.and_then(|filter| filter.order_in(segment)) {
-                out.extend(
-                    (order..segment.rows.len())
-                        .map(|i| (segment.flight, segment.t0_s + i as f64 * segment.step_s, segment.channel)),
-                );
+                out.extend((order..segment.rows.len()).map(|i| {
+                    (segment.flight, segment.t0_s + i as f64 * segment.step_s, segment.channel)
+                }));
             }
         }
         out
@@ -186,7 +189,8 @@ fn calm(series: &[Vec<f64>]) -> Vec<Vec<f64>> {
     out
 }
 
-/// Least squares over several series, with the power of others added; `None` where there is nothing to fit.
+/// Least squares over several series, with the power of others added; `None` where there is nothing
+/// to fit.
 fn autoregression(series: &[Vec<f64>], doubt: &[Vec<f64>]) -> Option<Filter> {
     let mut gram = DMatrix::zeros(ORDER, ORDER);
     let mut right = DVector::zeros(ORDER);
@@ -226,13 +230,23 @@ mod tests {
 
     /// A segment of one channel with `n` rows.
     fn segment(n: usize) -> Segment {
-        Segment { flight: 0, channel: 2, rows: 0..n, piece: 0, t0_s: 0.0, step_s: 1.0 / 30.0, mean_of: 1 }
+        Segment {
+            flight: 0,
+            channel: 2,
+            rows: 0..n,
+            piece: 0,
+            t0_s: 0.0,
+            step_s: 1.0 / 30.0,
+            mean_of: 1,
+        }
     }
     /// Noise of unit size without memory, the same on every run.
     fn noise(n: usize) -> Vec<f64> {
         let mut state = 1_u64;
         let mut uniform = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         (0..n).map(|_| (0..12).map(|_| uniform()).sum()).collect()
@@ -254,7 +268,8 @@ mod tests {
         assert!(neighbours.abs() < 0.03, "{neighbours}");
     }
 
-    /// A force of a few seconds that no column explains must not count as noise: it is what is to be found.
+    /// A force of a few seconds that no column explains must not count as noise: it is what is to
+    /// be found.
     #[test]
     fn a_burst_does_not_make_the_noise_larger() {
         let quiet = noise(2400);

@@ -1,4 +1,5 @@
-//! Whether what is left is noise: correlation of the whitened leftover with itself and with the inputs of the flight.
+//! Whether what is left is noise: correlation of the whitened leftover with itself and with the
+//! inputs of the flight.
 //!
 //! ```text
 //! r_k = sum e_t e_{t+k} / sum e_t^2      c_k = sum e_t u_{t-k} / sqrt(sum e_t^2 sum u_t^2)      99 %: 2.576 / sqrt(n)
@@ -59,8 +60,10 @@ fn of_channel(
     let terms = autocorrelation.iter().enumerate().map(|(k, r)| r * r / (n - (k + 1) as f64));
     let ljung_box = n * (n + 2.0) * terms.sum::<f64>();
     // An input that does not vary correlates with nothing.
-    let correlation = |sum: &f64, input: f64| if input > 0.0 { sum / (square * input).sqrt() } else { 0.0 };
-    let values = |(sums, input): &(Vec<f64>, f64)| sums.iter().map(|sum| correlation(sum, *input)).collect();
+    let correlation =
+        |sum: &f64, input: f64| if input > 0.0 { sum / (square * input).sqrt() } else { 0.0 };
+    let values =
+        |(sums, input): &(Vec<f64>, f64)| sums.iter().map(|sum| correlation(sum, *input)).collect();
     Some(Whiteness {
         channel: CHANNELS[channel].0.to_owned(),
         lag_s,
@@ -68,7 +71,10 @@ fn of_channel(
         inputs: names
             .iter()
             .zip(&with)
-            .map(|(name, sums)| InputCorrelation { input: (*name).to_owned(), values: values(sums) })
+            .map(|(name, sums)| InputCorrelation {
+                input: (*name).to_owned(),
+                values: values(sums),
+            })
             .collect(),
         band_99: BAND / n.sqrt(),
         ljung_box,
@@ -106,7 +112,8 @@ fn product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Probability that chi-square of `2 half` degrees of freedom is larger: a sum, because their number is even.
+/// Probability that chi-square of `2 half` degrees of freedom is larger: a sum, because their
+/// number is even.
 fn chi_square_tail(x: f64, half: usize) -> f64 {
     let mut term = 1.0;
     let mut sum = 0.0;
@@ -128,9 +135,13 @@ mod tests {
     #[test]
     fn tails_of_chi_square_are_those_of_tables() {
         // 95 % and 99 % points of 2, 10 and 32 degrees of freedom.
-        for (x, half, p) in
-            [(5.991, 1, 0.05), (9.210, 1, 0.01), (18.307, 5, 0.05), (46.194, 16, 0.05), (53.486, 16, 0.01)]
-        {
+        for (x, half, p) in [
+            (5.991, 1, 0.05),
+            (9.210, 1, 0.01),
+            (18.307, 5, 0.05),
+            (46.194, 16, 0.05),
+            (53.486, 16, 0.01),
+        ] {
             let got = chi_square_tail(x, half);
             assert!((got - p).abs() < 2e-5, "{x}: {got}");
         }

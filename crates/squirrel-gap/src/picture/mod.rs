@@ -1,8 +1,9 @@
 //! From a diagnosis to the data of its report, panel by panel.
 //!
-//! The predictor borrows the logs and is gone when a diagnosis is there, so that what only it knows is kept beforehand
-//! ([`seen`]): windows of the residual, what the residual follows, and how white the rest is. Numbers of the verdict are taken
-//! from the verdict, so that the page cannot say anything else.
+//! The predictor borrows the logs and is gone when a diagnosis is there, so that what only it knows
+//! is kept beforehand ([`seen`]): windows of the residual, what the residual follows, and how white
+//! the rest is. Numbers of the verdict are taken from the verdict, so that the page cannot say
+//! anything else.
 
 mod left;
 mod outlook;
@@ -49,14 +50,17 @@ const RICH: &str = "excite_rich";
 const SEPARATED: f64 = 9.0;
 
 /// Why the panels of a data problem are empty.
-const CONTRADICTION: &str =
-    "Empty: the logs contradict themselves, and nothing is computed from such logs. The verdict says where.";
+const CONTRADICTION: &str = "Empty: the logs contradict themselves, and nothing is computed from such logs. The verdict says where.";
 
 /// Keeps what the report needs of the predictor.
 ///
 /// # Errors
 /// What the predictor says.
-pub(crate) fn seen(search: &Search<'_>, naming: &Naming, rivals: &[Scored]) -> Result<Seen, GapError> {
+pub(crate) fn seen(
+    search: &Search<'_>,
+    naming: &Naming,
+    rivals: &[Scored],
+) -> Result<Seen, GapError> {
     let found = &naming.found;
     let name = |set: &Scored| {
         let names: Vec<&str> = set.members.iter().map(|m| search.effect(m)).collect();
@@ -99,8 +103,9 @@ pub(crate) fn seen(search: &Search<'_>, naming: &Naming, rivals: &[Scored]) -> R
 /// The data of the report of a diagnosis; the same for the same logs, and without absolute paths.
 ///
 /// * `vehicle` - what was diagnosed
-/// * `flights`, `held_out` - names of the logs as they were given to [`diagnose`](crate::diagnose()); of an absolute path, the
-///   report says the names of the file and its folder
+/// * `flights`, `held_out` - names of the logs as they were given to
+///   [`diagnose`](crate::diagnose()); of an absolute path, the report says the names of the file
+///   and its folder
 /// * `patched` - text of the vehicle file with the effects in it, where there is one
 pub fn picture(
     vehicle: &VehicleFile,
@@ -126,7 +131,8 @@ pub fn picture(
         verdict: said(&verdict.words),
         domain: domain.collect(),
         rotors: verdict.baseline.iter().flat_map(|since| &since.rotors).filter_map(rotor).collect(),
-        patch_diff: patched.map_or_else(String::new, |text| said(&crate::difference(&vehicle.text, text))),
+        patch_diff: patched
+            .map_or_else(String::new, |text| said(&crate::difference(&vehicle.text, text))),
         channels: CHANNELS.iter().map(|(name, _)| (*name).to_owned()).collect(),
         ..ReportData::default()
     };
@@ -157,12 +163,15 @@ pub fn picture(
         data.held_out = Some(proof(details.held_out.as_ref(), flights, &seen.rival));
     }
     let again = verdict.closed_loop.iter().cloned();
-    data.closed_loop = again.map(|flight| ClosedLoop { flight: short(&flight.flight), ..flight }).collect();
+    data.closed_loop =
+        again.map(|flight| ClosedLoop { flight: short(&flight.flight), ..flight }).collect();
     data.whiteness.clone_from(&seen.whiteness);
-    data.parameters = verdict.effects.iter().flat_map(|e| parameters(vehicle, e, &seen.tolerances)).collect();
+    data.parameters =
+        verdict.effects.iter().flat_map(|e| parameters(vehicle, e, &seen.tolerances)).collect();
     let (names, chi_square) = &details.confusability;
     data.confusability = Some(confusability(names, chi_square));
-    data.fly_next = fly_next(verdict.verdict, verdict.fly_next.as_deref(), data.confusability.as_ref());
+    data.fly_next =
+        fly_next(verdict.verdict, verdict.fly_next.as_deref(), data.confusability.as_ref());
     data.screen = screen(&data);
     data
 }
@@ -183,7 +192,8 @@ fn short(name: &str) -> String {
     parts[parts.len().saturating_sub(2)..].join("/")
 }
 
-/// Single effects as the linear search ranks them, in the place of those that were refined their refined evidence.
+/// Single effects as the linear search ranks them, in the place of those that were refined their
+/// refined evidence.
 fn evidence(details: &Details) -> Vec<Evidence> {
     let sets = &details.seen.sets;
     let refined = sets.iter().enumerate().map(|(i, (name, nats))| Evidence {
@@ -191,15 +201,24 @@ fn evidence(details: &Details) -> Vec<Evidence> {
         nats: *nats,
         is_answer: i == 0 && details.seen.has_answer,
     });
-    let alone = details.evidence.iter().filter(|(name, _)| sets.iter().all(|(other, _)| other != name));
     let alone =
-        alone.map(|(name, nats)| Evidence { name: (*name).to_owned(), nats: *nats, is_answer: false });
+        details.evidence.iter().filter(|(name, _)| sets.iter().all(|(other, _)| other != name));
+    let alone = alone.map(|(name, nats)| Evidence {
+        name: (*name).to_owned(),
+        nats: *nats,
+        is_answer: false,
+    });
     refined.chain(alone).collect()
 }
 
 fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
     let Some(flown) = flown else {
-        return HeldOut { flights, rival: String::new(), channels: Vec::new(), horizons: Vec::new() };
+        return HeldOut {
+            flights,
+            rival: String::new(),
+            channels: Vec::new(),
+            horizons: Vec::new(),
+        };
     };
     let at = |channel: usize, bin: usize| Errors {
         nominal: flown.nominal.rms(channel, bin),
@@ -208,15 +227,20 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
         floor: flown.floor.mean.rms(channel, bin),
     };
     // A short flight has no segment of the full length, and rare fixes may leave a horizon out.
-    let flown_at = |bin: &usize| flown.fitted.count[*bin] > 0.0 && flown.floor.mean.count[*bin] > 0.0;
+    let flown_at =
+        |bin: &usize| flown.fitted.count[*bin] > 0.0 && flown.floor.mean.count[*bin] > 0.0;
     let bins: Vec<usize> = (0..BINS).filter(flown_at).collect();
     let horizon_s = |bin: usize| (bin + 1) as f64 * BIN_S;
     let last = bins.last().copied().unwrap_or(0);
     let channels = FLOWN_CHANNELS.iter().enumerate().map(|(channel, key)| {
         let unit = unit(key);
-        let name = without_unit(key).replace("omega", "angular rate").replace("_body", "").replace('_', " ");
-        let horizons =
-            bins.iter().map(|bin| Horizon { horizon_s: horizon_s(*bin), errors: at(channel, *bin) });
+        let name = without_unit(key)
+            .replace("omega", "angular rate")
+            .replace("_body", "")
+            .replace('_', " ");
+        let horizons = bins
+            .iter()
+            .map(|bin| Horizon { horizon_s: horizon_s(*bin), errors: at(channel, *bin) });
         HeldOutChannel {
             name,
             unit: unit.to_owned(),
@@ -232,7 +256,9 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
     });
     let horizons = bins.iter().map(|bin| {
         let over = |of: fn(&Errors) -> f64| {
-            let all = (0..FLOWN_CHANNELS.len()).map(|channel| at(channel, *bin)).filter(|e| e.floor > 0.0);
+            let all = (0..FLOWN_CHANNELS.len())
+                .map(|channel| at(channel, *bin))
+                .filter(|e| e.floor > 0.0);
             let ratios: Vec<f64> = all.map(|e| of(&e) / e.floor).collect();
             ratios.iter().sum::<f64>() / ratios.len() as f64
         };
@@ -260,16 +286,31 @@ fn parameters(
     for parameter in list {
         match (parameter.kind, effect.parameters.get(parameter.key)) {
             (_, Some(Value::Choice { value, .. })) => name = format!("{name} {value}"),
-            (ParameterKind::Rotor, Some(Value::Number { value, .. })) => name = format!("{name} {value}"),
+            (ParameterKind::Rotor, Some(Value::Number { value, .. })) => {
+                name = format!("{name} {value}");
+            }
             (ParameterKind::Size { .. }, Some(&Value::Number { value, low, high })) => {
-                let Some(SizeRange { smallest, largest, .. }) = parameter.range(&vehicle.vehicle) else {
+                let Some(SizeRange { smallest, largest, .. }) = parameter.range(&vehicle.vehicle)
+                else {
                     continue;
                 };
-                let own = tolerances.iter().find(|(e, key, _)| *e == effect.name && *key == parameter.key);
+                let own = tolerances
+                    .iter()
+                    .find(|(e, key, _)| *e == effect.name && *key == parameter.key);
                 let tolerance = own.map_or(f64::NAN, |(.., tolerance)| *tolerance);
                 let (effect, key, unit) =
                     (String::new(), parameter.key.to_owned(), unit(parameter.key).to_owned());
-                rows.push(ParameterRow { effect, key, unit, value, low, high, smallest, largest, tolerance });
+                rows.push(ParameterRow {
+                    effect,
+                    key,
+                    unit,
+                    value,
+                    low,
+                    high,
+                    smallest,
+                    largest,
+                    tolerance,
+                });
             }
             _ => {}
         }
@@ -289,9 +330,14 @@ fn confusability(names: &[&str], chi_square: &[Vec<f64>]) -> Confusability {
 }
 
 /// What the verdict asks for; without that, a flight that separates what these flights do not.
-fn fly_next(verdict: Kind, asked: Option<&str>, confusability: Option<&Confusability>) -> Vec<FlyNext> {
+fn fly_next(
+    verdict: Kind,
+    asked: Option<&str>,
+    confusability: Option<&Confusability>,
+) -> Vec<FlyNext> {
     let next = |why: String| vec![FlyNext { why, what: RICH.to_owned() }];
-    let marked = confusability.is_some_and(|c| c.chi_square.iter().flatten().any(|x| *x < SEPARATED));
+    let marked =
+        confusability.is_some_and(|c| c.chi_square.iter().flatten().any(|x| *x < SEPARATED));
     match asked {
         Some(asked) => next(format!("To decide: {asked}")),
         None if marked && verdict != Kind::OutsideCatalogue => {

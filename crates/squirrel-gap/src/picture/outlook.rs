@@ -1,4 +1,5 @@
-//! The second half of the first screen: how much better the answer predicts, what remains, what to fly next.
+//! The second half of the first screen: how much better the answer predicts, what remains, what to
+//! fly next.
 
 use super::plain::{TOLD, capital, full_stop, noun, nouns, said, sizes};
 use super::units::{three, with_unit};
@@ -28,7 +29,10 @@ pub(super) fn grows(verdict: &Verdict) -> bool {
 pub(super) fn prediction(verdict: &Verdict, held_out: Option<&HeldOut>, mass_kg: f64) -> Answer {
     let Some(gap) = &verdict.gap else {
         return if verdict.verdict == Kind::DataProblem {
-            said("Not tested", vec!["Nothing is predicted from logs that contradict themselves.".to_owned()])
+            said(
+                "Not tested",
+                vec!["Nothing is predicted from logs that contradict themselves.".to_owned()],
+            )
         } else {
             let why = if held_out.is_some() {
                 "The held-out flights cannot be re-simulated: that needs attitude and velocity throughout."
@@ -64,7 +68,8 @@ pub(super) fn prediction(verdict: &Verdict, held_out: Option<&HeldOut>, mass_kg:
         "It predicts worse".to_owned()
     } else {
         lines.push(format!("Counted above noise, on {flights} that the fit never saw."));
-        let whose = if verdict.verdict == Kind::OutsideCatalogue { "With the nearest name, " } else { "" };
+        let whose =
+            if verdict.verdict == Kind::OutsideCatalogue { "With the nearest name, " } else { "" };
         format!("{whose}{} less error", removed(gap.removed_fraction))
     };
     if let Some(rival) = gap.best_rival {
@@ -82,14 +87,16 @@ pub(super) fn prediction(verdict: &Verdict, held_out: Option<&HeldOut>, mass_kg:
     Answer { figure, figure_note: note, ..said(answer, lines) }
 }
 
-/// The channel that gains most, in its own unit: a force where one falls, or else what falls most over its noise.
+/// The channel that gains most, in its own unit: a force where one falls, or else what falls most
+/// over its noise.
 fn largest_gain(channels: &[HeldOutChannel], mass_kg: f64) -> Option<String> {
     let gain = |c: &HeldOutChannel| {
         let e = &c.second;
         (e.nominal.powi(2) - e.fitted.powi(2)) / e.floor.powi(2)
     };
-    let falls =
-        |c: &&HeldOutChannel, by: f64| gain(c).is_finite() && c.second.fitted < (1.0 - by) * c.second.nominal;
+    let falls = |c: &&HeldOutChannel, by: f64| {
+        gain(c).is_finite() && c.second.fitted < (1.0 - by) * c.second.nominal
+    };
     let most = |force: bool, by: f64| {
         let own = channels.iter().filter(|c| !force || c.name.starts_with("specific force"));
         own.filter(|c| falls(c, by)).max_by(|a, b| gain(a).total_cmp(&gain(b)))
@@ -114,12 +121,17 @@ pub(super) fn remains(verdict: &Verdict) -> Answer {
         return said("Not known", vec![why.to_owned()]);
     };
     let mut lines = Vec::new();
-    let held_out = verdict.gap.as_ref().filter(|gap| gap.after > ABOVE_NOISE && !verdict.effects.is_empty());
+    let held_out =
+        verdict.gap.as_ref().filter(|gap| gap.after > ABOVE_NOISE && !verdict.effects.is_empty());
     if !verdict.effects.is_empty() {
-        let what = if verdict.verdict == Kind::OutsideCatalogue { "nearest name" } else { "answer" };
+        let what =
+            if verdict.verdict == Kind::OutsideCatalogue { "nearest name" } else { "answer" };
         let (share, than) = (100.0 * left.share_removed, "what these flights differed by");
         lines.push(if share < 0.0 {
-            format!("The {what} adds {:.1} % to {than}, inside what the file's tolerances allow.", -share)
+            format!(
+                "The {what} adds {:.1} % to {than}, inside what the file's tolerances allow.",
+                -share
+            )
         } else {
             format!("The {what} takes away {share:.1} % of {than}.")
         });
@@ -139,9 +151,10 @@ pub(super) fn remains(verdict: &Verdict) -> Answer {
                 figure_note: "squared error over that of noise, on held-out flights".to_owned(),
                 ..said(format!("{nothing} here, more on held-out flights"), lines)
             },
-            None if lines.is_empty() => {
-                said(nothing, vec!["What these flights show, the vehicle file accounts for.".to_owned()])
-            }
+            None if lines.is_empty() => said(
+                nothing,
+                vec!["What these flights show, the vehicle file accounts for.".to_owned()],
+            ),
             None => said(nothing, lines),
         };
     }
@@ -154,7 +167,10 @@ pub(super) fn remains(verdict: &Verdict) -> Answer {
         ),
     );
     lines.extend(held_out.map(|gap| {
-        format!("On the held-out flights, {} times the squared error of noise remains.", three(gap.after))
+        format!(
+            "On the held-out flights, {} times the squared error of noise remains.",
+            three(gap.after)
+        )
     }));
     Answer {
         figure: format!("{:.0} %", 100.0 * left.share_left),
@@ -174,16 +190,18 @@ fn beside(verdict: &Verdict, other: &Alternative) -> Alternative {
 pub(super) fn next(verdict: &Verdict, vehicle: &VehicleFile, held_out: bool) -> Answer {
     if let Some(asked) = &verdict.fly_next {
         // The last part names the scenario that flies most of it.
-        let (flights, rest) = asked.rsplit_once("; `").map_or((asked.as_str(), None), |(f, r)| (f, Some(r)));
-        let mut lines: Vec<String> = flights.split("); ").map(|part| capital(&closed(part))).collect();
+        let (flights, rest) =
+            asked.rsplit_once("; `").map_or((asked.as_str(), None), |(f, r)| (f, Some(r)));
+        let mut lines: Vec<String> =
+            flights.split("); ").map(|part| capital(&closed(part))).collect();
         let more = lines.len().saturating_sub(TOLD);
         lines.truncate(TOLD);
         if more > 0 {
             lines.push(format!("And {more} more, see below."));
         }
-        lines.extend(
-            rest.map(|rest| format!("\u{201c}{}; its card is below.", rest.replacen('`', "\u{201d}", 1))),
-        );
+        lines.extend(rest.map(|rest| {
+            format!("\u{201c}{}; its card is below.", rest.replacen('`', "\u{201d}", 1))
+        }));
         return said("One more flight, with this in it", lines);
     }
     let sharpen = || {
@@ -193,7 +211,12 @@ pub(super) fn next(verdict: &Verdict, vehicle: &VehicleFile, held_out: bool) -> 
         let widest = verdict.effects.iter().max_by(|a, b| wide(a).total_cmp(&wide(b)))?;
         let width = wide(&widest);
         (width > 0.0).then(|| {
-            format!("To narrow {} (\u{b1}{:.0} %): {}.", noun(widest), 100.0 * width, manoeuvre(widest.name))
+            format!(
+                "To narrow {} (\u{b1}{:.0} %): {}.",
+                noun(widest),
+                100.0 * width,
+                manoeuvre(widest.name)
+            )
         })
     };
     let unproven = || {
@@ -211,12 +234,16 @@ pub(super) fn next(verdict: &Verdict, vehicle: &VehicleFile, held_out: bool) -> 
     match verdict.verdict {
         Kind::DataProblem => said(
             "Nothing new: mend the import first",
-            vec!["Change what stands above in the import map, import again, and run again.".to_owned()],
+            vec![
+                "Change what stands above in the import map, import again, and run again."
+                    .to_owned(),
+            ],
         ),
         Kind::OutsideCatalogue if grows(verdict) => said(
             "The same flights again",
             vec![
-                "Fly those to fit and those to hold out with the vehicle unchanged between them.".to_owned(),
+                "Fly those to fit and those to hold out with the vehicle unchanged between them."
+                    .to_owned(),
             ],
         ),
         Kind::OutsideCatalogue => said(
@@ -227,7 +254,8 @@ pub(super) fn next(verdict: &Verdict, vehicle: &VehicleFile, held_out: bool) -> 
             ],
         ),
         Kind::NamedIncomplete | Kind::NamedFormDiffers => {
-            let line = "No flight can name what remains; the answer may be used where it holds.".to_owned();
+            let line = "No flight can name what remains; the answer may be used where it holds."
+                .to_owned();
             let lines = [Some(line), sharpen(), unproven()].into_iter().flatten();
             said("Nothing more for this answer", lines.collect())
         }

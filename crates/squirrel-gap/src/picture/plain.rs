@@ -6,7 +6,8 @@ use crate::verdict::{Alternative, NamedEffect, Value};
 use squirrel_core::effects::{Effects, Kind as ParameterKind};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Other explanations and flights set aside that are told on the first screen; the panels below have all.
+/// Other explanations and flights set aside that are told on the first screen; the panels below
+/// have all.
 pub(super) const TOLD: usize = 3;
 
 fn words(effect: &NamedEffect) -> [String; 3] {
@@ -36,8 +37,9 @@ pub(super) fn nouns(other: &Alternative) -> String {
     } else {
         let words = |name: &str| Effects::<f64>::profile(name).map(|profile| profile.words);
         let find = |name: &str| words(name).filter(|words| !words.what.contains('@'));
-        let noun =
-            |name: &&str| find(name).map_or((*name).to_owned(), |words| format!("{} ({name})", words.what));
+        let noun = |name: &&str| {
+            find(name).map_or((*name).to_owned(), |words| format!("{} ({name})", words.what))
+        };
         other.effects.iter().map(noun).collect::<Vec<_>>()
     };
     nouns.join(" with ")
@@ -53,17 +55,20 @@ pub(super) struct Size {
     pub(super) declared: String,
     /// By how many standard deviations it is above the vehicle file; NaN where it has none.
     pub(super) far: f64,
-    /// Half width of the interval over the size, or over that of the file where it is larger; NaN where both are zero.
+    /// Half width of the interval over the size, or over that of the file where it is larger; NaN
+    /// where both are zero.
     pub(super) width: f64,
 }
 
 /// An interval of 95 % is so many standard deviations wide.
 const WIDTH: f64 = 2.0 * 1.96;
 
-/// The sizes of an effect, the farthest from the vehicle file first; an effect that the file lacks is zero there.
+/// The sizes of an effect, the farthest from the vehicle file first; an effect that the file lacks
+/// is zero there.
 pub(super) fn sizes(effect: &NamedEffect, vehicle: &VehicleFile) -> Vec<Size> {
     let mut declared = vehicle.effects;
-    let declared = declared.get_mut(effect.name).map_or_else(Vec::new, |found| found.values.to_vec());
+    let declared =
+        declared.get_mut(effect.name).map_or_else(Vec::new, |found| found.values.to_vec());
     let list = Effects::<f64>::parameters(effect.name).unwrap_or_default();
     let slot = |key: &str| list.iter().position(|p| p.key == key);
     // The file's own number is that of the same rotor, axis or side.
@@ -122,7 +127,8 @@ pub(super) fn statement(effect: &NamedEffect, vehicle: &VehicleFile) -> String {
 /// More than this many times is not counted.
 const COUNTLESS: f64 = 1e6;
 
-/// How many times likelier something is than what is so many nats behind: `400`, or `more than a million`.
+/// How many times likelier something is than what is so many nats behind: `400`, or
+/// `more than a million`.
 pub(super) fn times(nats: f64) -> String {
     let times = nats.exp();
     if times >= COUNTLESS {
@@ -138,7 +144,11 @@ pub(super) fn times(nats: f64) -> String {
 
 /// The same as odds: `400 : 1`.
 pub(super) fn odds(nats: f64) -> String {
-    if nats.exp() >= COUNTLESS { "> 1 million : 1".to_owned() } else { format!("{} : 1", times(nats)) }
+    if nats.exp() >= COUNTLESS {
+        "> 1 million : 1".to_owned()
+    } else {
+        format!("{} : 1", times(nats))
+    }
 }
 
 /// An answer without a number.

@@ -1,7 +1,8 @@
-//! What the residual follows: what a unit of a named effect would do to a channel, or, where no name accounts for it, the
-//! quantity of the flight that it goes with.
+//! What the residual follows: what a unit of a named effect would do to a channel, or, where no
+//! name accounts for it, the quantity of the flight that it goes with.
 //!
-//! Against its own effect a residual lies on a line whose slope is the effect's size; under the answer on a flat one.
+//! Against its own effect a residual lies on a line whose slope is the effect's size; under the
+//! answer on a flat one.
 
 use super::{CHANNELS, unit};
 use crate::leftover::{Moment, moment};
@@ -52,7 +53,9 @@ pub(super) fn conditional(search: &Search<'_>, naming: &Naming) -> Vec<Condition
     let best = &naming.found.best;
     let mut all = Vec::new();
     for (index, member) in best.members.iter().enumerate() {
-        let Some(column) = best.free.iter().position(|(member, _)| *member == index) else { continue };
+        let Some(column) = best.free.iter().position(|(member, _)| *member == index) else {
+            continue;
+        };
         let candidate = &search.catalogue.candidates[member.candidate];
         let slot = best.free[column].1;
         let key = squirrel_core::effects::Effects::<f64>::parameters(candidate.effect)
@@ -90,9 +93,13 @@ fn of_effect(
         .filter(|(_, weight)| *weight > 0.0)
         .take(CHANNELS_EACH)
         .map(|(channel, _)| {
-            let rows =
-                predictor.segments.iter().filter(|s| s.channel == channel).flat_map(|s| s.rows.clone());
-            let sample = |i: usize| Sample { at: raw[i], before: naming.nominal[i], after: naming.left[i] };
+            let rows = predictor
+                .segments
+                .iter()
+                .filter(|s| s.channel == channel)
+                .flat_map(|s| s.rows.clone());
+            let sample =
+                |i: usize| Sample { at: raw[i], before: naming.nominal[i], after: naming.left[i] };
             let (name, unit) = CHANNELS[channel];
             Conditional {
                 channel: name.to_owned(),
@@ -105,7 +112,8 @@ fn of_effect(
         .collect()
 }
 
-/// The quantities that the leftover follows best, in the channels where it stands out; in all where it does nowhere.
+/// The quantities that the leftover follows best, in the channels where it stands out; in all where
+/// it does nowhere.
 fn of_leftover(predictor: &Predictor, naming: &Naming) -> Vec<Conditional> {
     let leftover = &naming.leftover;
     let mut channels: Vec<usize> = leftover.excess.iter().map(|(channel, _)| *channel).collect();
@@ -120,8 +128,10 @@ fn of_leftover(predictor: &Predictor, naming: &Naming) -> Vec<Conditional> {
             if family.is_some_and(|family| family != of) {
                 continue;
             }
-            let samples: Vec<Sample> =
-                blocks.iter().map(|(moment, sample)| Sample { at: value(moment), ..*sample }).collect();
+            let samples: Vec<Sample> = blocks
+                .iter()
+                .map(|(moment, sample)| Sample { at: value(moment), ..*sample })
+                .collect();
             let bins = bins(&samples);
             let (channel, unit) = CHANNELS[channel];
             all.push((
@@ -138,7 +148,11 @@ fn of_leftover(predictor: &Predictor, naming: &Naming) -> Vec<Conditional> {
     }
     // Stable: equals keep the order of channels and quantities.
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    all.into_iter().filter(|(_, c)| !c.bins.is_empty()).take(CHANNELS_EACH).map(|(_, c)| c).collect()
+    all.into_iter()
+        .filter(|(_, c)| !c.bins.is_empty())
+        .take(CHANNELS_EACH)
+        .map(|(_, c)| c)
+        .collect()
 }
 
 /// Means of one channel over blocks, and where the vehicle was in them.
@@ -178,7 +192,8 @@ fn bins(samples: &[Sample]) -> Vec<Bin> {
             let mean = |of: fn(&Sample) -> f64| bin.iter().map(of).sum::<f64>() / bin.len() as f64;
             let sd = |of: fn(&Sample) -> f64| {
                 let middle = mean(of);
-                (bin.iter().map(|s| (of(s) - middle).powi(2)).sum::<f64>() / bin.len() as f64).sqrt()
+                (bin.iter().map(|s| (of(s) - middle).powi(2)).sum::<f64>() / bin.len() as f64)
+                    .sqrt()
             };
             Bin {
                 at: mean(|s| s.at),
@@ -207,13 +222,16 @@ mod tests {
 
     #[test]
     fn a_line_is_seen_and_a_constant_regressor_has_no_bins() {
-        let sample = |i: usize, at: f64| Sample { at, before: 0.5 * at, after: f64::from(i as u32 % 2) };
+        let sample =
+            |i: usize, at: f64| Sample { at, before: 0.5 * at, after: f64::from(i as u32 % 2) };
         let line: Vec<Sample> = (0..1000).map(|i| sample(i, i as f64)).collect();
         let seen = bins(&line);
         assert_eq!(seen.len(), BINS);
         assert_eq!(seen.iter().map(|b| b.count).sum::<usize>(), 1000);
         assert!(
-            seen.iter().all(|b| (b.before_mean - 0.5 * b.at).abs() < 1e-9 && (b.after_sd - 0.5).abs() < 0.02)
+            seen.iter()
+                .all(|b| (b.before_mean - 0.5 * b.at).abs() < 1e-9
+                    && (b.after_sd - 0.5).abs() < 0.02)
         );
         assert!(explained(&line, &seen) > 0.99);
         let still: Vec<Sample> = (0..1000).map(|i| sample(i, 3.0)).collect();

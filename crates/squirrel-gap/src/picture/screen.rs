@@ -1,12 +1,14 @@
-//! The first screen of the report: five questions of a pilot, and what the verdict says to each in plain sentences.
+//! The first screen of the report: five questions of a pilot, and what the verdict says to each in
+//! plain sentences.
 //!
-//! All numbers are the verdict's. Beside it are needed: the evidence of the answer as a whole, which the verdict has by
-//! effect only, the channels of the held-out flights, and what the vehicle file has where the answer differs. A difference
-//! of `n` nats in evidence is one of `e^n` in odds.
+//! All numbers are the verdict's. Beside it are needed: the evidence of the answer as a whole,
+//! which the verdict has by effect only, the channels of the held-out flights, and what the vehicle
+//! file has where the answer differs. A difference of `n` nats in evidence is one of `e^n` in odds.
 
 use super::outlook::{grows, next, prediction, remains};
 use super::plain::{
-    Size, TOLD, capital, full_stop, noun, nouns, odds as odds_of, said, sizes, small, statement, times,
+    Size, TOLD, capital, full_stop, noun, nouns, odds as odds_of, said, sizes, small, statement,
+    times,
 };
 use super::units::three;
 use crate::name::NATS_MIN;
@@ -16,8 +18,8 @@ use crate::words::spoken;
 use squirrel_core::effects::{Effect, Gust};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Evidence from which on the next explanation is out of the question, nats. Below [`NATS_MIN`], held-out flights have
-/// decided.
+/// Evidence from which on the next explanation is out of the question, nats. Below [`NATS_MIN`],
+/// held-out flights have decided.
 const VERY_SURE_NATS: f64 = 10.0;
 
 /// What the first screen says.
@@ -38,12 +40,16 @@ pub fn first_screen(verdict: &Verdict, vehicle: &VehicleFile, data: &ReportData)
 /// Another explanation, and by how many nats it is behind the answer.
 type Behind<'a> = Option<(&'a Alternative, f64)>;
 
-/// The best explanation that does without a part of the answer. Gusts are weighed against calm air alone, so that other
-/// explanations stand beside the answer without them.
+/// The best explanation that does without a part of the answer. Gusts are weighed against calm air
+/// alone, so that other explanations stand beside the answer without them.
 fn behind<'a>(verdict: &'a Verdict, data: &ReportData) -> Behind<'a> {
     let whole = data.evidence.iter().find(|e| e.is_answer)?.nats;
-    let gusts: f64 =
-        verdict.effects.iter().filter(|e| e.name == Gust::<f64>::NAME).map(|e| e.evidence_nats).sum();
+    let gusts: f64 = verdict
+        .effects
+        .iter()
+        .filter(|e| e.name == Gust::<f64>::NAME)
+        .map(|e| e.evidence_nats)
+        .sum();
     let has = |other: &Alternative, effect: &NamedEffect| {
         let same = |own: &NamedEffect| own.name == effect.name && noun(own) == noun(effect);
         if other.numbers.is_empty() {
@@ -53,7 +59,8 @@ fn behind<'a>(verdict: &'a Verdict, data: &ReportData) -> Behind<'a> {
         }
     };
     let calm = || verdict.effects.iter().filter(|e| e.name != Gust::<f64>::NAME);
-    let rival = verdict.alternatives.iter().find(|other| !calm().all(|effect| has(other, effect)))?;
+    let rival =
+        verdict.alternatives.iter().find(|other| !calm().all(|effect| has(other, effect)))?;
     let nats = whole - gusts - rival.evidence_nats;
     nats.is_finite().then_some((rival, nats))
 }
@@ -62,15 +69,21 @@ fn missing(verdict: &Verdict, vehicle: &VehicleFile) -> Answer {
     let effects = &verdict.effects;
     let first = effects.first().and_then(|effect| sizes(effect, vehicle).into_iter().next());
     let number = |own: Answer| match &first {
-        Some(Size { name, value, interval, .. }) => {
-            Answer { figure: value.clone(), figure_note: format!("{name}, 95 %: {interval}"), ..own }
-        }
+        Some(Size { name, value, interval, .. }) => Answer {
+            figure: value.clone(),
+            figure_note: format!("{name}, 95 %: {interval}"),
+            ..own
+        },
         None => own,
     };
     let all: Vec<String> = effects.iter().map(|e| statement(e, vehicle)).collect();
-    let all = all.into_iter().reduce(|all, next| format!("{all}, and {}", small(&next))).unwrap_or_default();
+    let all = all
+        .into_iter()
+        .reduce(|all, next| format!("{all}, and {}", small(&next)))
+        .unwrap_or_default();
     let mut lines: Vec<String> = effects.iter().map(|e| with_sizes(e, vehicle)).collect();
-    let others = verdict.alternatives.iter().take(TOLD).map(|other| format!("Or: {}.", nouns(other)));
+    let others =
+        verdict.alternatives.iter().take(TOLD).map(|other| format!("Or: {}.", nouns(other)));
     let goes_with = verdict.goes_with.as_deref().map_or_else(
         || "It goes with nothing that was tried.".to_owned(),
         |what| format!("It goes with {}.", spoken(what)),
@@ -85,7 +98,9 @@ fn missing(verdict: &Verdict, vehicle: &VehicleFile) -> Answer {
         ),
         Kind::Named | Kind::NamedIncomplete => number(said(all, lines)),
         Kind::NamedFormDiffers => {
-            lines.push("It is this, but it follows none of the published formulas exactly.".to_owned());
+            lines.push(
+                "It is this, but it follows none of the published formulas exactly.".to_owned(),
+            );
             number(said(all, lines))
         }
         Kind::Ambiguous => {
@@ -109,7 +124,8 @@ fn missing(verdict: &Verdict, vehicle: &VehicleFile) -> Answer {
             said("Something that is not in the catalogue", lines)
         }
         Kind::NotIdentifiable if effects.is_empty() => {
-            let what = verdict.words.split_once(". ").map_or(verdict.words.as_str(), |(first, _)| first);
+            let what =
+                verdict.words.split_once(". ").map_or(verdict.words.as_str(), |(first, _)| first);
             said("Nothing seen, but these flights could not show everything", vec![full_stop(what)])
         }
         Kind::NotIdentifiable => {
@@ -137,9 +153,12 @@ fn with_sizes(effect: &NamedEffect, vehicle: &VehicleFile) -> String {
 }
 
 fn how_sure(verdict: &Verdict, vehicle: &VehicleFile, behind: Behind<'_>) -> Answer {
-    // Where nothing does without the answer, its own worth: that of the name that is worth the least.
+    // Where nothing does without the answer, its own worth: that of the name that is worth the
+    // least.
     let least = verdict.effects.iter().min_by(|a, b| a.evidence_nats.total_cmp(&b.evidence_nats));
-    let worth = least.map(|e| (e.name, e.evidence_nats)).filter(|(_, nats)| nats.is_finite() && *nats > 0.0);
+    let worth = least
+        .map(|e| (e.name, e.evidence_nats))
+        .filter(|(_, nats)| nats.is_finite() && *nats > 0.0);
     let odds = |own: Answer| {
         let (nats, note) = match (behind, worth) {
             (Some((_, nats)), _) => (nats, "odds against the next explanation"),
@@ -186,7 +205,10 @@ fn how_sure(verdict: &Verdict, vehicle: &VehicleFile, behind: Behind<'_>) -> Ans
         // It is this answer only where the flights would show everything.
         Kind::None => said(
             "Sure: these flights would have shown it",
-            vec!["Every effect that the vehicle can have would stand out at a plausible size.".to_owned()],
+            vec![
+                "Every effect that the vehicle can have would stand out at a plausible size."
+                    .to_owned(),
+            ],
         ),
         Kind::DataProblem => said(
             "Nothing is said about forces",
@@ -198,15 +220,17 @@ fn how_sure(verdict: &Verdict, vehicle: &VehicleFile, behind: Behind<'_>) -> Ans
             let lines = std::iter::once(line.to_owned()).chain(without);
             said("Sure that something is missing, not what", lines.collect())
         }
-        Kind::NotIdentifiable if verdict.effects.is_empty() => {
-            said("Not sure", vec!["An effect that these flights cannot show may still be there.".to_owned()])
-        }
+        Kind::NotIdentifiable if verdict.effects.is_empty() => said(
+            "Not sure",
+            vec!["An effect that these flights cannot show may still be there.".to_owned()],
+        ),
         Kind::Ambiguous | Kind::NotIdentifiable => {
             let few = format!("Odds below {} do not decide.", odds_of(NATS_MIN));
             odds(said("Not decided between these", lines(next).into_iter().chain([few]).collect()))
         }
         Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers => {
-            let nats = behind.map(|(_, nats)| nats).or(worth.map(|(_, nats)| nats)).unwrap_or_default();
+            let nats =
+                behind.map(|(_, nats)| nats).or(worth.map(|(_, nats)| nats)).unwrap_or_default();
             let words = if nats >= VERY_SURE_NATS {
                 "Very sure"
             } else if nats >= NATS_MIN {

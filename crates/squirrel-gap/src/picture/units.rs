@@ -39,7 +39,8 @@ pub(super) fn without_unit(key: &str) -> &str {
 /// Below this, seconds, metres and kilograms are read in thousandths.
 const THOUSANDTHS: f64 = 0.1;
 
-/// How a number of the vehicle file is read: its name, its unit, and by how much the number is multiplied for that unit.
+/// How a number of the vehicle file is read: its name, its unit, and by how much the number is
+/// multiplied for that unit.
 ///
 /// * `key` - in the vehicle file
 /// * `size` - about as large as the number is, in the unit of the key

@@ -1,8 +1,9 @@
 //! The residual in windows of one second, in units of its noise, with what the vehicle did there.
 //!
-//! Noise of the dynamics is what sensors and the air's own motion leave behind the filters, drawn as for the leftover; where
-//! gusts are the answer, theirs belongs to it after. Velocity drifts from strapdown by what sensors add up to, so that its
-//! unit is the innovation of the autoregression that the evidence whitens with.
+//! Noise of the dynamics is what sensors and the air's own motion leave behind the filters, drawn
+//! as for the leftover; where gusts are the answer, theirs belongs to it after. Velocity drifts
+//! from strapdown by what sensors add up to, so that its unit is the innovation of the
+//! autoregression that the evidence whitens with.
 
 use crate::GapError;
 use crate::leftover::floor;
@@ -33,7 +34,8 @@ impl Windows {
     fn means(&self, values: impl Iterator<Item = (f64, f64)>) -> Vec<f64> {
         let mut all = vec![Mean::default(); self.count];
         for (time_s, value) in values {
-            let window = (((time_s - self.start_s) / WINDOW_S).max(0.0) as usize).min(self.count - 1);
+            let window =
+                (((time_s - self.start_s) / WINDOW_S).max(0.0) as usize).min(self.count - 1);
             all[window].sum += value;
             all[window].count += 1.0;
         }
@@ -73,7 +75,8 @@ pub(super) fn panels(search: &Search<'_>, naming: &Naming) -> Result<Vec<FlightP
                 if !is_logged {
                     return Vec::new();
                 }
-                let tracks = predictor.tracks.iter().enumerate().filter(|(_, t)| t.flight == flight);
+                let tracks =
+                    predictor.tracks.iter().enumerate().filter(|(_, t)| t.flight == flight);
                 windows.means(tracks.flat_map(|(piece, track)| {
                     let at = move |i| track.edge() + i * track.every;
                     (0..track.measured.len()).map(move |i| (track.time_s[at(i)], of(piece, at(i))))
@@ -89,7 +92,9 @@ pub(super) fn panels(search: &Search<'_>, naming: &Naming) -> Result<Vec<FlightP
                 after: if has_answer { rows(&after) } else { Vec::new() },
                 speed_m_s: strip(predictor.has_motion(), &|p, k| body(p, k).velocity.vector.norm()),
                 height_m: strip(predictor.has_height(), &|p, k| -body(p, k).position.vector.z),
-                wings: strip(predictor.has_wings(), &|p, k| predictor.commanded(flight, time_s(p, k)).1),
+                wings: strip(predictor.has_wings(), &|p, k| {
+                    predictor.commanded(flight, time_s(p, k)).1
+                }),
             })
         })
         .collect())
@@ -107,12 +112,18 @@ fn windows(predictor: &Predictor, flight: usize) -> Option<Windows> {
 fn noise(predictor: &Predictor, wind: &[Vec<f64>; 3], turbulence_m_s: f64) -> Vec<f64> {
     let draws = floor::draws(predictor, wind, turbulence_m_s, DRAWS);
     let square = |rows: &[f64]| rows.iter().map(|x| x * x).sum::<f64>() / rows.len() as f64;
-    let mean = |rows: &std::ops::Range<usize>| draws.iter().map(|d| square(&d[rows.clone()])).sum::<f64>();
+    let mean =
+        |rows: &std::ops::Range<usize>| draws.iter().map(|d| square(&d[rows.clone()])).sum::<f64>();
     predictor.segments.iter().map(|s| mean(&s.rows) / DRAWS as f64).collect()
 }
 
 /// By segment: time, s, and squared residual over that of its noise.
-fn by_noise(predictor: &Predictor, naming: &Naming, rows: &[f64], noise: &[f64]) -> Vec<Vec<(f64, f64)>> {
+fn by_noise(
+    predictor: &Predictor,
+    naming: &Naming,
+    rows: &[f64],
+    noise: &[f64],
+) -> Vec<Vec<(f64, f64)>> {
     let segments = predictor.segments.iter().zip(noise);
     segments
         .map(|(segment, noise)| {

@@ -1,5 +1,5 @@
-//! Rotors and wing servos along the flights, under the logged commands: the same for every hypothesis that does not touch
-//! them, which most do not, so they are kept.
+//! Rotors and wing servos along the flights, under the logged commands: the same for every
+//! hypothesis that does not touch them, which most do not, so they are kept.
 
 use super::commands::Commands;
 use super::kept::Kept;
@@ -23,14 +23,16 @@ pub(crate) struct Path {
     pub(crate) stride: usize,
     pub(crate) first: usize,
     pub(crate) moments: Vec<Moment>,
-    /// The actuators just before the command that came at a moment, by its index, where that matters.
+    /// The actuators just before the command that came at a moment, by its index, where that
+    /// matters.
     pub(crate) before: Vec<(usize, Actuators)>,
 }
 
 /// Samples of a piece at which two plants are asked whether their rotors would do the same.
 const PROBES: usize = 7;
 
-/// Everything that paths depend on: what rotors are told at some samples, how commands arrive, how servos lag.
+/// Everything that paths depend on: what rotors are told at some samples, how commands arrive, how
+/// servos lag.
 #[derive(Debug, Clone, PartialEq)]
 struct Key {
     stride: Vec<usize>,
@@ -77,7 +79,8 @@ impl Key {
         });
         let [opening, closing] = effects.wing_extra_time_constant_s();
         let runs = effects.command_clock();
-        let clock = [effects.command_latency_s(), runs.rate, runs.step_s, runs.at_s, opening, closing];
+        let clock =
+            [effects.command_latency_s(), runs.rate, runs.step_s, runs.at_s, opening, closing];
         Self {
             stride: tracks.iter().map(stride).collect(),
             jumps: jumps(effects),

@@ -1,5 +1,6 @@
-//! The logged commands as the vehicle got them: held until the next one, late or on another clock where a hypothesis says so.
-//! Measured rotor speeds stand in for commands where there are any, and are neither late nor on another clock.
+//! The logged commands as the vehicle got them: held until the next one, late or on another clock
+//! where a hypothesis says so. Measured rotor speeds stand in for commands where there are any, and
+//! are neither late nor on another clock.
 
 use crate::flight::recording::Recording;
 use crate::flight::series::Series;
@@ -92,14 +93,24 @@ impl Clock<'_> {
         {
             self.rotor += 1;
         }
-        while self.commands.wing.get(self.wing + 1).is_some_and(|(stamp, _)| self.acts_s(*stamp) <= until_s) {
+        while self
+            .commands
+            .wing
+            .get(self.wing + 1)
+            .is_some_and(|(stamp, _)| self.acts_s(*stamp) <= until_s)
+        {
             self.wing += 1;
         }
     }
     /// Time of the next change, s; infinite after the last.
     pub(crate) fn next_change_s(&self) -> f64 {
-        let rotor = self.commands.rotor.get(self.rotor + 1).map_or(f64::INFINITY, |(s, _)| self.turns_s(*s));
-        let wing = self.commands.wing.get(self.wing + 1).map_or(f64::INFINITY, |(s, _)| self.acts_s(*s));
+        let rotor = self
+            .commands
+            .rotor
+            .get(self.rotor + 1)
+            .map_or(f64::INFINITY, |(s, _)| self.turns_s(*s));
+        let wing =
+            self.commands.wing.get(self.wing + 1).map_or(f64::INFINITY, |(s, _)| self.acts_s(*s));
         rotor.min(wing)
     }
     /// Rotor command in the vehicle's unit, and wing command, left and right, 0 to 1.

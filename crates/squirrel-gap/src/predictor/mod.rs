@@ -1,16 +1,18 @@
-//! What the simulator's own model predicts of the measurements of a set of flights, for any hypothesis about the vehicle.
+//! What the simulator's own model predicts of the measurements of a set of flights, for any
+//! hypothesis about the vehicle.
 //!
 //! ```text
 //! dynamics     LP[f - f(plant)]  m/s^2      LP[D[w] - w'(plant)]  rad/s^2     12 Hz zero phase, every 1/30 s
 //! kinematics   v_GNSS - v_strapdown  m/s                                      every 0.1 s, mean of a piece removed
 //!              w(attitude) - w(gyroscope)  rad/s                              every 0.2 s, likewise
 //! ```
-//! The plant is led along the measured motion: rotors, servos and payload run under the logged commands at the measured
-//! voltage, while velocity, attitude and rates are what was measured. A hypothesis changes nothing but the vehicle's effects
-//! and what its sensors do, so that every effect that the simulator can fly can be tested against a log; no regressor is
-//! written twice. Forces show in the first family, sensors that lie in the second. Without an IMU the corner is lower, as
-//! [`smoother`](crate::flight::smoother) has it, and there is no second family; with measured rotor speeds these stand in for
-//! commands, lag and sag.
+//! The plant is led along the measured motion: rotors, servos and payload run under the logged
+//! commands at the measured voltage, while velocity, attitude and rates are what was measured. A
+//! hypothesis changes nothing but the vehicle's effects and what its sensors do, so that every
+//! effect that the simulator can fly can be tested against a log; no regressor is written twice.
+//! Forces show in the first family, sensors that lie in the second. Without an IMU the corner is
+//! lower, as [`smoother`](crate::flight::smoother) has it, and there is no second family; with
+//! measured rotor speeds these stand in for commands, lag and sag.
 
 mod actuators;
 mod commands;
@@ -80,7 +82,8 @@ pub(crate) struct Hypothesis {
     pub(crate) vehicle: Vehicle<f64>,
     pub(crate) effects: Effects<f64>,
     pub(crate) errors: Vec<SensorErrors>,
-    /// By what fraction the thrust of each flight is more than the vehicle's: propellers wear, and packs differ.
+    /// By what fraction the thrust of each flight is more than the vehicle's: propellers wear, and
+    /// packs differ.
     pub(crate) thrust: Vec<f64>,
 }
 
@@ -104,7 +107,8 @@ pub(crate) struct Predictor<'a> {
     /// Rotors turn as fast as was measured.
     rotor_speeds: bool,
     commands: Vec<Commands>,
-    /// The motion of each track for the effects of the vehicle file and errorless sensors, which most hypotheses share.
+    /// The motion of each track for the effects of the vehicle file and errorless sensors, which
+    /// most hypotheses share.
     plain: Vec<Rc<Motion>>,
     /// Of each track, the last motions under other errors.
     motions: Vec<Kept<(SensorPath, SensorErrors), Motion>>,
@@ -125,7 +129,10 @@ impl<'a> Predictor<'a> {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub(crate) fn in_parts(&self, flights: &'a [(String, FlightLog)]) -> Result<Option<Self>, GapError> {
+    pub(crate) fn in_parts(
+        &self,
+        flights: &'a [(String, FlightLog)],
+    ) -> Result<Option<Self>, GapError> {
         let mut duration_s = vec![0.0; flights.len()];
         for track in &self.tracks {
             duration_s[track.flight] += track.time_s.len() as f64 * track.period_s;
@@ -134,8 +141,9 @@ impl<'a> Predictor<'a> {
         if total_s <= LOOKED_AT_S {
             return Ok(None);
         }
-        let mut parts =
-            Self::build(self.vehicle, flights, |flight| LOOKED_AT_S * duration_s[flight] / total_s)?;
+        let mut parts = Self::build(self.vehicle, flights, |flight| {
+            LOOKED_AT_S * duration_s[flight] / total_s
+        })?;
         parts.notes.push(format!(
             "of {total_s:.0} s of flight, names come from {LOOKED_AT_S:.0} s: parts spread evenly, and parts with much movement"
         ));
@@ -160,7 +168,8 @@ impl<'a> Predictor<'a> {
             }
             let recording = Recording::new(vehicle, flight, log, common)?;
             let spans = spread::spread(&recording, limit_s(index));
-            tracks.extend(spans.into_iter().map(|span| Track::new(index, vehicle, &recording, span)));
+            tracks
+                .extend(spans.into_iter().map(|span| Track::new(index, vehicle, &recording, span)));
             commands.push(Commands::new(&recording));
             notes.extend(recording.notes);
             names.push(flight.as_str());
@@ -200,7 +209,18 @@ impl<'a> Predictor<'a> {
         let motions = tracks.iter().map(|_| Kept::default()).collect();
         let paths = Paths::default();
         let rotor_speeds = common.rotor_speeds;
-        Ok(Self { vehicle, names, tracks, segments, notes, rotor_speeds, commands, plain, motions, paths })
+        Ok(Self {
+            vehicle,
+            names,
+            tracks,
+            segments,
+            notes,
+            rotor_speeds,
+            commands,
+            plain,
+            motions,
+            paths,
+        })
     }
 
     /// Number of rows of a residual.
@@ -222,11 +242,13 @@ impl<'a> Predictor<'a> {
         self.segments.retain(|s| (3..DYNAMIC).contains(&s.channel));
     }
 
-    /// Leaves the horizontal force out of everything that follows: without velocity and attitude nothing is known of drag.
+    /// Leaves the horizontal force out of everything that follows: without velocity and attitude
+    /// nothing is known of drag.
     pub(crate) fn leave_out_drag(&mut self) {
         self.segments.retain(|s| !(0..2).contains(&s.channel));
-        self.notes
-            .push("force_body_x_n, force_body_y_n: left out; drag needs velocity and attitude".to_owned());
+        self.notes.push(
+            "force_body_x_n, force_body_y_n: left out; drag needs velocity and attitude".to_owned(),
+        );
     }
     /// Whether a channel takes part.
     pub(crate) fn has_channel(&self, channel: usize) -> bool {
@@ -242,7 +264,8 @@ impl<'a> Predictor<'a> {
         let mut rows = vec![0.0; self.rows()];
         for segment in self.segments.iter().filter(|s| s.channel < DYNAMIC) {
             let measured = &self.tracks[segment.piece].measured;
-            let mean = measured.iter().map(|m| m[segment.channel]).sum::<f64>() / measured.len() as f64;
+            let mean =
+                measured.iter().map(|m| m[segment.channel]).sum::<f64>() / measured.len() as f64;
             for (row, m) in rows[segment.rows.clone()].iter_mut().zip(segment.rows_of(measured)) {
                 *row = m - mean;
             }
@@ -281,7 +304,8 @@ impl<'a> Predictor<'a> {
         Ok(rows)
     }
 
-    /// As [`Self::residual`] for the pieces of one flight alone; the rows of the others stay as they are.
+    /// As [`Self::residual`] for the pieces of one flight alone; the rows of the others stay as
+    /// they are.
     pub(crate) fn residual_of(
         &self,
         hypothesis: &Hypothesis,
@@ -294,7 +318,8 @@ impl<'a> Predictor<'a> {
             .map(|flight| hypothesis.in_flight(flight).filter(|_| is_asked(flight)))
             .map(|own| own.map(|own| self.plant_at(&own, LED_STEP_S)).transpose())
             .collect::<Result<_, _>>()?;
-        let paths = self.paths.of(&plant, &self.tracks, &self.commands, |t| stride(plant.effects(), t));
+        let paths =
+            self.paths.of(&plant, &self.tracks, &self.commands, |t| stride(plant.effects(), t));
         let mut segments = self.segments.iter().peekable();
         for (piece, track) in self.tracks.iter().enumerate() {
             if !is_asked(track.flight) {
@@ -325,11 +350,13 @@ impl<'a> Predictor<'a> {
         Ok(())
     }
 
-    /// Mean commanded rotor speed over top speed, and mean wing command, 0 to 1, at a time of a flight.
+    /// Mean commanded rotor speed over top speed, and mean wing command, 0 to 1, at a time of a
+    /// flight.
     pub(crate) fn commanded(&self, flight: usize, time_s: f64) -> (f64, f64) {
         let p = self.vehicle.vehicle.parameters();
         let (rotor, wing) = self.commands[flight].at(time_s);
-        let turns = |u: &f64| if self.rotor_speeds { *u } else { p.propulsion.target_speed_rad_s(*u) };
+        let turns =
+            |u: &f64| if self.rotor_speeds { *u } else { p.propulsion.target_speed_rad_s(*u) };
         let speed: f64 = rotor[..p.rotor_count].iter().map(turns).sum();
         (speed / (p.rotor_count as f64 * p.propulsion.speed_max_rad_s), 0.5 * (wing[0] + wing[1]))
     }
@@ -385,7 +412,8 @@ impl<'a> Predictor<'a> {
         self.commands.iter().all(Commands::has_wing)
     }
 
-    /// What a metre per second of wind towards north, east and down changes in the rows, under a hypothesis.
+    /// What a metre per second of wind towards north, east and down changes in the rows, under a
+    /// hypothesis.
     ///
     /// # Errors
     /// As [`Self::residual`].
@@ -456,7 +484,8 @@ impl<'a> Predictor<'a> {
 /// What effects do to the path of the sensors.
 type SensorPath = ([Vector3<f64>; 4], [f64; 4]);
 
-/// What effects do to the sensors, in numbers; each is a line in time, the heading's in the rotors' load, too.
+/// What effects do to the sensors, in numbers; each is a line in time, the heading's in the rotors'
+/// load, too.
 fn sensors(effects: &Effects<f64>) -> SensorPath {
     let bias = |t| effects.specific_force_bias(t).vector;
     let heading = |t, load| effects.heading_bias_rad(t, load);
@@ -470,10 +499,12 @@ fn sensors(effects: &Effects<f64>) -> SensorPath {
 const LOOKED_AT_S: f64 = 480.0;
 /// The step of a plant that is only led matters to nothing; it is shorter than any lag.
 const LED_STEP_S: f64 = 1e-9;
-/// How long the first sample of a piece is held before it, so that rotors and servos start settled, s.
+/// How long the first sample of a piece is held before it, so that rotors and servos start settled,
+/// s.
 const SETTLE_S: f64 = 1.0;
 
-/// Leads the plant along a piece and shows its state at each moment of the path, with the sample of the grid.
+/// Leads the plant along a piece and shows its state at each moment of the path, with the sample of
+/// the grid.
 fn lead(
     plant: &Plant,
     track: &Track,
@@ -508,7 +539,8 @@ fn dynamics(plant: &Plant, track: &Track, motion: &Motion, path: &Path) -> Vec<V
     lead(plant, track, motion, path, |k, state| {
         let led = plant.led(state);
         let mut a = led.angular_acceleration;
-        // A rotor's acceleration jumps with its command: what a sample stands for lies half before and half after the jump.
+        // A rotor's acceleration jumps with its command: what a sample stands for lies half before
+        // and half after the jump.
         if let Some((_, before)) = jumps.next_if(|(moment, _)| *moment == predicted.len()) {
             let mut earlier = *state;
             plant.meet(&mut earlier, &motion.body[k], before);

@@ -10,12 +10,15 @@ use rand_distr::{Distribution, StandardNormal};
 pub(crate) const TURBULENCE_M_S: f64 = 0.12;
 
 impl Track {
-    /// Noise behind the filters, a row each: white in accelerometer and gyroscope, or in what stands in for them.
+    /// Noise behind the filters, a row each: white in accelerometer and gyroscope, or in what
+    /// stands in for them.
     pub(crate) fn drawn_noise(&self, rng: &mut impl Rng) -> Vec<Vector6<f64>> {
         let [accelerometer, gyroscope] = self.imu_noise;
         let mut draw = |sd: Vector3<f64>| -> Vec<Vector3<f64>> {
             let mut one = || -> f64 { StandardNormal.sample(rng) };
-            (0..self.time_s.len()).map(|_| Vector3::new(sd.x * one(), sd.y * one(), sd.z * one())).collect()
+            (0..self.time_s.len())
+                .map(|_| Vector3::new(sd.x * one(), sd.y * one(), sd.z * one()))
+                .collect()
         };
         let (force, rate) = (draw(accelerometer), draw(gyroscope));
         let raw: Vec<Vector6<f64>> = (DERIVATIVE_REACH..force.len() - DERIVATIVE_REACH)

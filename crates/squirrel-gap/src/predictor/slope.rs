@@ -4,8 +4,8 @@ use super::{Hypothesis, Predictor};
 use crate::GapError;
 
 impl Predictor<'_> {
-    /// What a step of a hypothesis takes from the rows of a residual, over the step; zero in the rows of other flights than
-    /// the one that it belongs to.
+    /// What a step of a hypothesis takes from the rows of a residual, over the step; zero in the
+    /// rows of other flights than the one that it belongs to.
     ///
     /// # Errors
     /// As [`Self::residual`].
@@ -16,7 +16,8 @@ impl Predictor<'_> {
         step: f64,
         flight: Option<usize>,
     ) -> Result<Vec<f64>, GapError> {
-        let own = || self.segments.iter().filter(|s| flight.is_none_or(|flight| flight == s.flight));
+        let own =
+            || self.segments.iter().filter(|s| flight.is_none_or(|flight| flight == s.flight));
         // Zeros that nothing writes cost no memory: with many flights, most of such a column.
         let mut rows = vec![0.0; residual.len()];
         for segment in own() {

@@ -1,7 +1,8 @@
-//! Which parts of long flights are looked at: a model that is wrong by a hundredth is not known better from an hour than from
-//! some minutes, but an hour costs an hour's time.
+//! Which parts of long flights are looked at: a model that is wrong by a hundredth is not known
+//! better from an hour than from some minutes, but an hour costs an hour's time.
 //!
-//! Half of the time is spread evenly, so that slow things show, half goes to where the vehicle moves most, where most shows.
+//! Half of the time is spread evenly, so that slow things show, half goes to where the vehicle
+//! moves most, where most shows.
 
 use crate::flight::recording::Recording;
 use crate::flight::series::Span;
@@ -42,15 +43,19 @@ pub(super) fn spread(recording: &Recording<'_>, limit_s: f64) -> Vec<Span> {
 /// A piece in windows of about one length.
 fn cut((start_s, end_s): Span) -> impl Iterator<Item = Span> {
     let n = ((end_s - start_s) / WINDOW_S).round().max(1.0);
-    let at = move |i: usize| if i as f64 == n { end_s } else { start_s + (end_s - start_s) * i as f64 / n };
+    let at = move |i: usize| {
+        if i as f64 == n { end_s } else { start_s + (end_s - start_s) * i as f64 / n }
+    };
     (0..n as usize).map(move |i| (at(i), at(i + 1)))
 }
 
-/// How much the vehicle moves in a window: variances of specific force and angular rate, each over its noise's.
+/// How much the vehicle moves in a window: variances of specific force and angular rate, each over
+/// its noise's.
 fn movement(recording: &Recording<'_>, (start_s, end_s): Span) -> f64 {
     /// Often enough for how much, s.
     const STEP_S: f64 = 0.05;
-    let [force_noise, rate_noise] = recording.imu_noise().map(|noise| noise.norm_squared().max(1e-12));
+    let [force_noise, rate_noise] =
+        recording.imu_noise().map(|noise| noise.norm_squared().max(1e-12));
     let n = ((end_s - start_s) / STEP_S).max(1.0) as usize;
     let samples = (0..n).map(|i| recording.sample(start_s + i as f64 * STEP_S));
     let (force, rate): (Vec<_>, Vec<_>) =

@@ -1,12 +1,14 @@
-//! The motion of one piece of a flight from its sensors: strapdown integration, held by GNSS and barometer.
+//! The motion of one piece of a flight from its sensors: strapdown integration, held by GNSS and
+//! barometer.
 //!
 //! ```text
 //! v_s' = R (f - b) / (1 + s) + g   b, s, heading, GNSS latency, tilt: what a hypothesis says of the path of the sensors
 //! v    = v_s + S[v_GNSS - v_s]  S  local linear smoother, Gaussian weights of 0.5 s
 //! h    = h_s + S[h_baro - h_s]  h_s' = -v_z
 //! ```
-//! What the smoother takes away is the second family of residuals, `v_GNSS - v_s`: sensors that lie show there, forces that
-//! the model lacks do not. The third is what a gyroscope says of turns against the attitude ([`turning`](super::turning)).
+//! What the smoother takes away is the second family of residuals, `v_GNSS - v_s`: sensors that lie
+//! show there, forces that the model lacks do not. The third is what a gyroscope says of turns
+//! against the attitude ([`turning`](super::turning)).
 
 use super::turning::Turning;
 use crate::flight::filter::{CUTOFF_HZ, DERIVATIVE_REACH, LowPass, derivative, model_stride};
@@ -40,12 +42,13 @@ const LOW_M: f64 = 2.0;
 pub(crate) struct SensorErrors {
     /// Tilt of the attitude estimate about north and east, rad.
     pub(crate) tilt_rad: [f64; 2],
-    /// By how much an attitude estimate leans into an acceleration that lasts, rad per m/s^2: a filter that takes the
-    /// accelerometer for the vertical.
+    /// By how much an attitude estimate leans into an acceleration that lasts, rad per m/s^2: a
+    /// filter that takes the accelerometer for the vertical.
     pub(crate) levelling_rad_s2_per_m: f64,
     /// What the barometer reads too high, m, on lines between the knots of the flight.
     pub(crate) height_m: [f64; HEIGHT_KNOTS],
-    /// By how much the velocity through the air is less than that over ground, m/s: moving air, or an error of velocity.
+    /// By how much the velocity through the air is less than that over ground, m/s: moving air, or
+    /// an error of velocity.
     pub(crate) air_ned_m_s: [f64; 3],
 }
 
@@ -90,14 +93,20 @@ pub(crate) struct Track {
 pub(crate) struct Motion {
     /// On the grid; rotors are not measured.
     pub(crate) body: Vec<State<f64>>,
-    /// Time, s, and GNSS velocity minus strapdown velocity, m/s, whose mean over the piece is removed.
+    /// Time, s, and GNSS velocity minus strapdown velocity, m/s, whose mean over the piece is
+    /// removed.
     pub(crate) kinematic: Vec<(f64, Vector3<f64>)>,
     /// Rate by the attitude minus rate by the gyroscope, rad/s, about its mean.
     pub(crate) turning: Vec<Vector3<f64>>,
 }
 
 impl Track {
-    pub(crate) fn new(flight: usize, vehicle: &VehicleFile, recording: &Recording, piece: Span) -> Self {
+    pub(crate) fn new(
+        flight: usize,
+        vehicle: &VehicleFile,
+        recording: &Recording,
+        piece: Span,
+    ) -> Self {
         let samples = recording.grid(piece);
         let period_s = recording.period_s;
         let cutoff_hz = recording.cutoff_hz;
@@ -129,18 +138,27 @@ impl Track {
         let inside = |t: &f64| (piece.0..=piece.1).contains(t);
         let vectors = |series: Option<&Series>| {
             let all = series.into_iter().flat_map(Series::samples);
-            all.filter(|(t, _)| inside(t)).map(|(t, v)| (t, Vector3::from_column_slice(v))).collect()
+            all.filter(|(t, _)| inside(t))
+                .map(|(t, v)| (t, Vector3::from_column_slice(v)))
+                .collect()
         };
         let position: Vec<(f64, Vector3<f64>)> = vectors(recording.position.as_ref());
         let altitude_m = match &recording.baro {
-            Some(baro) => baro.samples().filter(|(t, _)| inside(t)).map(|(t, h)| (t, h[0])).collect(),
+            Some(baro) => {
+                baro.samples().filter(|(t, _)| inside(t)).map(|(t, h)| (t, h[0])).collect()
+            }
             None => position.iter().map(|(t, p)| (*t, -p.z)).collect(),
         };
         let omega: Vec<_> = samples.iter().map(|s| s.body.omega.vector).collect();
         let turns = recording.has_attitude() && derived.rates.is_none();
         Self {
             turning: turns.then(|| Turning::new(&omega, period_s)),
-            rotor_load: rotor_load(vehicle, recording, piece.0, samples.iter().map(|s| s.voltage_v)),
+            rotor_load: rotor_load(
+                vehicle,
+                recording,
+                piece.0,
+                samples.iter().map(|s| s.voltage_v),
+            ),
             flight,
             period_s,
             began_s: recording.pieces[0].0,
@@ -157,7 +175,9 @@ impl Track {
             voltage_v: samples.iter().map(|s| s.voltage_v).collect(),
             specific_force: samples.iter().map(|s| s.specific_force).collect(),
             omega,
-            attitude: recording.has_attitude().then(|| samples.iter().map(|s| s.body.attitude).collect()),
+            attitude: recording
+                .has_attitude()
+                .then(|| samples.iter().map(|s| s.body.attitude).collect()),
             velocity: vectors(recording.velocity.as_ref()),
             position,
             altitude_m,
@@ -165,7 +185,8 @@ impl Track {
         }
     }
 
-    /// The part of a height knot at a time: 1 at its own, 0 at its neighbours, constant beyond the ends.
+    /// The part of a height knot at a time: 1 at its own, 0 at its neighbours, constant beyond the
+    /// ends.
     pub(crate) fn height_share(&self, knot: usize, time_s: f64) -> f64 {
         let at = |i: usize| self.knots_s[i];
         let line = |from: f64, to: f64| ((time_s - from) / (to - from)).clamp(0.0, 1.0);
@@ -175,7 +196,12 @@ impl Track {
     }
 
     fn height_error_m(&self, errors: &SensorErrors, time_s: f64) -> f64 {
-        errors.height_m.iter().enumerate().map(|(knot, x)| x * self.height_share(knot, time_s)).sum()
+        errors
+            .height_m
+            .iter()
+            .enumerate()
+            .map(|(knot, x)| x * self.height_share(knot, time_s))
+            .sum()
     }
 
     /// First sample of the grid that has a residual.
@@ -198,7 +224,8 @@ impl Track {
     pub(crate) fn velocity(&self) -> &[(f64, Vector3<f64>)] {
         &self.velocity
     }
-    /// White noise of the GNSS velocity, m/s, one standard deviation, from differences of strapdown and fixes.
+    /// White noise of the GNSS velocity, m/s, one standard deviation, from differences of strapdown
+    /// and fixes.
     pub(crate) fn velocity_noise(&self) -> Vector3<f64> {
         if let Some(from) = &self.derived.force {
             return Vector3::repeat(from.passed_rate(self.cutoff_hz));
@@ -212,24 +239,28 @@ impl Track {
             .sum();
         (sum / (20.0 * n)).map(f64::sqrt)
     }
-    /// What smoothing leaves of it: a local linear fit with Gaussian weights, over fixes at their rate.
+    /// What smoothing leaves of it: a local linear fit with Gaussian weights, over fixes at their
+    /// rate.
     pub(crate) fn velocity_smoothing(&self) -> f64 {
         if !self.is_felt() {
             return 1.0;
         }
         let n = self.velocity.len();
-        let (Some(first), Some(last)) = (self.velocity.first(), self.velocity.last()) else { return 1.0 };
+        let (Some(first), Some(last)) = (self.velocity.first(), self.velocity.last()) else {
+            return 1.0;
+        };
         let step_s = ((last.0 - first.0) / (n - 1).max(1) as f64).max(BIN_S);
         (step_s / (2.0 * PI.sqrt() * SMOOTHER_S)).sqrt().min(1.0)
     }
-    /// By how much attitudes are off against each other over half a second, rad, one standard deviation of each: what the
-    /// gyroscope does not say of their change.
+    /// By how much attitudes are off against each other over half a second, rad, one standard
+    /// deviation of each: what the gyroscope does not say of their change.
     pub(crate) fn attitude_noise(&self) -> Vector3<f64> {
         let Some(attitude) = &self.attitude else { return Vector3::zeros() };
         let lag = (ATTITUDE_LAG_S / self.period_s).round().max(1.0) as usize;
         let (mut square, mut n) = (Vector3::zeros(), 0.0);
         for start in (0..attitude.len().saturating_sub(lag)).step_by(lag) {
-            let [from, to] = [start, start + lag].map(|k| UnitQuaternion::new_unchecked(attitude[k]));
+            let [from, to] =
+                [start, start + lag].map(|k| UnitQuaternion::new_unchecked(attitude[k]));
             let turned = (start..start + lag).fold(UnitQuaternion::identity(), |q, k| {
                 // The mean of two samples is the rate between them.
                 q * UnitQuaternion::from_scaled_axis(
@@ -270,7 +301,11 @@ impl Track {
         };
         let Some(attitude) = &self.attitude else {
             let still = |k| at(k, Vector3::zeros(), Vector3::zeros(), Quaternion::identity());
-            return Motion { body: (0..n).map(still).collect(), kinematic: Vec::new(), turning: Vec::new() };
+            return Motion {
+                body: (0..n).map(still).collect(),
+                kinematic: Vec::new(),
+                turning: Vec::new(),
+            };
         };
         let [north, east] = errors.tilt_rad;
         let tilt = UnitQuaternion::from_scaled_axis(Vector3::new(-north, -east, 0.0));
@@ -285,7 +320,9 @@ impl Track {
                 if heading == 0.0 && errors.tilt_rad == [0.0; 2] {
                     turned
                 } else {
-                    UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, -heading)) * tilt * turned
+                    UnitQuaternion::from_scaled_axis(Vector3::new(0.0, 0.0, -heading))
+                        * tilt
+                        * turned
                 }
             })
             .collect();
@@ -329,14 +366,18 @@ impl Track {
             self.add(&mut height_m, &smoothed(&correction));
         }
         let air = Vector3::from(errors.air_ned_m_s);
-        let body =
-            (0..n).map(|k| at(k, strapdown[k] - air, -height_m[k], attitude[k].into_inner())).collect();
-        let mean = kinematic.iter().map(|(_, e)| e).sum::<Vector3<f64>>() / kinematic.len().max(1) as f64;
+        let body = (0..n)
+            .map(|k| at(k, strapdown[k] - air, -height_m[k], attitude[k].into_inner()))
+            .collect();
+        let mean =
+            kinematic.iter().map(|(_, e)| e).sum::<Vector3<f64>>() / kinematic.len().max(1) as f64;
         for (_, e) in &mut kinematic {
             *e -= mean;
         }
-        let turning =
-            self.turning.as_ref().map_or_else(Vec::new, |turning| turning.rows(&attitude, &rate_scale));
+        let turning = self
+            .turning
+            .as_ref()
+            .map_or_else(Vec::new, |turning| turning.rows(&attitude, &rate_scale));
         Motion { body, kinematic, turning }
     }
 
@@ -357,11 +398,16 @@ impl Track {
 
     /// What the accelerometer is off by, m/s^2; nothing where there is none.
     pub(crate) fn bias(&self, effects: &Effects<f64>, time_s: f64) -> Vector3<f64> {
-        if self.has_accelerometer() { effects.specific_force_bias(time_s).vector } else { Vector3::zeros() }
+        if self.has_accelerometer() {
+            effects.specific_force_bias(time_s).vector
+        } else {
+            Vector3::zeros()
+        }
     }
 
-    /// A force that the model predicts, as this flight shows it: where it comes from what the vehicle did in the world, the
-    /// axes are those of the measured attitude, whatever a hypothesis says of it, and no accelerometer adds its scale and bias.
+    /// A force that the model predicts, as this flight shows it: where it comes from what the
+    /// vehicle did in the world, the axes are those of the measured attitude, whatever a hypothesis
+    /// says of it, and no accelerometer adds its scale and bias.
     pub(super) fn as_shown(
         &self,
         k: usize,
@@ -390,7 +436,8 @@ impl Track {
         self.derived.force.is_none()
     }
 
-    /// The sample of the grid at or before a time, and the share of the way to the next; the ends beyond them.
+    /// The sample of the grid at or before a time, and the share of the way to the next; the ends
+    /// beyond them.
     fn place(&self, time_s: f64) -> (usize, f64) {
         let last = self.time_s.len() - 2;
         let steps = ((time_s - self.time_s[0]) / self.period_s).max(0.0);
@@ -413,7 +460,8 @@ impl Track {
     }
 }
 
-/// Power of the rotors over that in hover along a piece, by commands and their lag, or as fast as they turned.
+/// Power of the rotors over that in hover along a piece, by commands and their lag, or as fast as
+/// they turned.
 fn rotor_load(
     vehicle: &VehicleFile,
     recording: &Recording,
@@ -451,18 +499,24 @@ impl Leaning {
     }
 
     /// The attitude without its lean: one sample on.
-    fn upright(&mut self, attitude: UnitQuaternion<f64>, force: &Vector3<f64>) -> UnitQuaternion<f64> {
+    fn upright(
+        &mut self,
+        attitude: UnitQuaternion<f64>,
+        force: &Vector3<f64>,
+    ) -> UnitQuaternion<f64> {
         if self.gain == 0.0 {
             return attitude;
         }
         let now = attitude * force;
-        self.acceleration += (Vector3::new(now.x, now.y, 0.0) - self.acceleration) * (1.0 - self.keep);
+        self.acceleration +=
+            (Vector3::new(now.x, now.y, 0.0) - self.acceleration) * (1.0 - self.keep);
         let a = self.acceleration;
         UnitQuaternion::from_scaled_axis(Vector3::new(-a.y, a.x, 0.0) * self.gain) * attitude
     }
 }
 
-/// Where the barometer's error is asked for: spread over the time that a flight is low, or over all of it.
+/// Where the barometer's error is asked for: spread over the time that a flight is low, or over all
+/// of it.
 fn knots_s(recording: &Recording) -> [f64; HEIGHT_KNOTS] {
     let (start_s, end_s) = (recording.pieces[0].0, recording.pieces[recording.pieces.len() - 1].1);
     let heights: Vec<(f64, f64)> = match (&recording.baro, &recording.position) {
@@ -527,7 +581,8 @@ fn smoothed(points: &[(f64, Vector3<f64>)]) -> Vec<(f64, Vector3<f64>)> {
                 wty += y * (weight * d);
             }
             let determinant = w * wtt - wt * wt;
-            let value = if determinant > 1e-12 { (wy * wtt - wty * wt) / determinant } else { *own };
+            let value =
+                if determinant > 1e-12 { (wy * wtt - wty * wt) / determinant } else { *own };
             (*t, value)
         })
         .collect()

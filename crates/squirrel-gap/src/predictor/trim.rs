@@ -1,7 +1,8 @@
 //! What lasts of forces and moments: means over seconds instead of all that passes the filter.
 //!
-//! A log without a gyroscope has quick motion from estimates, which a model of the vehicle has little to do with. What is
-//! commanded all the time still balances: weight, which rotor gives less, where the centre of mass is.
+//! A log without a gyroscope has quick motion from estimates, which a model of the vehicle has
+//! little to do with. What is commanded all the time still balances: weight, which rotor gives
+//! less, where the centre of mass is.
 
 use super::{DYNAMIC, Predictor, Segment};
 use nalgebra::Vector6;
@@ -28,8 +29,9 @@ impl Segment {
 }
 
 impl Predictor<'_> {
-    /// Keeps what lasts of forces and moments: their means over [`TRIM_S`]. Where a model knows little of what is quick, a
-    /// moment that is commanded all the time still says which rotor gives less, or that the centre of mass is beside its place.
+    /// Keeps what lasts of forces and moments: their means over [`TRIM_S`]. Where a model knows
+    /// little of what is quick, a moment that is commanded all the time still says which rotor
+    /// gives less, or that the centre of mass is beside its place.
     pub(crate) fn keep_trim(&mut self) {
         self.segments.retain(|s| s.channel < DYNAMIC);
         for segment in &mut self.segments {
@@ -45,13 +47,18 @@ impl Predictor<'_> {
         ));
     }
 
-    /// What no model of this vehicle is trusted with, row by row: a part of what was measured about its mean, and of what lasts,
-    /// of the forces and moments of hover.
+    /// What no model of this vehicle is trusted with, row by row: a part of what was measured about
+    /// its mean, and of what lasts, of the forces and moments of hover.
     pub(crate) fn doubt(&self) -> Vec<f64> {
         let mut rows: Vec<f64> = self.measured().iter().map(|x| x * DOUBT).collect();
         let p = self.vehicle.vehicle.parameters();
-        let arm =
-            self.vehicle.vehicle.rotors().iter().map(|r| r.position.vector.xy().norm()).fold(0.0, f64::max);
+        let arm = self
+            .vehicle
+            .vehicle
+            .rotors()
+            .iter()
+            .map(|r| r.position.vector.xy().norm())
+            .fold(0.0, f64::max);
         let torque = p.propulsion.torque_coefficient_n_m_s2 / p.propulsion.thrust_coefficient_n_s2;
         let weight_n = p.mass_kg * GRAVITY_M_S2;
         for segment in self.segments.iter().filter(|s| s.is_trim()) {

@@ -4,8 +4,9 @@
 //! e_i = log(B_i^-1 A_i)     A_i: turn of the attitude from one knot to the next, B_i: of the gyroscope     every 20 ms
 //! C_i = sum e_j, j < i      row: (mean of C over a window - mean over the window before) / T                T = 0.2 s
 //! ```
-//! Rows are rates about the axes of the body, so that a gyroscope's scale makes them proportional to its rates. Means over
-//! windows keep the noise of single attitudes out of them. Small angles add up.
+//! Rows are rates about the axes of the body, so that a gyroscope's scale makes them proportional
+//! to its rates. Means over windows keep the noise of single attitudes out of them. Small angles
+//! add up.
 
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -31,7 +32,8 @@ impl Turning {
         let turn = |k: usize| {
             let between = omega[k..=k + every].windows(2);
             // The mean of two samples is the rate between them.
-            let steps = between.map(|w| UnitQuaternion::from_scaled_axis((w[0] + w[1]) * (0.5 * period_s)));
+            let steps =
+                between.map(|w| UnitQuaternion::from_scaled_axis((w[0] + w[1]) * (0.5 * period_s)));
             steps.fold(UnitQuaternion::identity(), |q, step| q * step).scaled_axis()
         };
         let knots = (0..omega.len().saturating_sub(every)).step_by(every);
@@ -43,15 +45,23 @@ impl Turning {
         (self.window * self.every) as f64 * self.period_s
     }
 
-    /// The rows of a hypothesis about both, rad/s; the mean of the piece, which is the gyroscope's bias, is removed.
+    /// The rows of a hypothesis about both, rad/s; the mean of the piece, which is the gyroscope's
+    /// bias, is removed.
     ///
     /// * `attitude` - on the grid
     /// * `scale` - what the gyroscope reads of a rate, by axis
-    pub(super) fn rows(&self, attitude: &[UnitQuaternion<f64>], scale: &Vector3<f64>) -> Vec<Vector3<f64>> {
+    pub(super) fn rows(
+        &self,
+        attitude: &[UnitQuaternion<f64>],
+        scale: &Vector3<f64>,
+    ) -> Vec<Vector3<f64>> {
         let mut sum = Vector3::zeros();
         let mut means = Vec::with_capacity(self.turns.len() / self.window);
-        for window in
-            self.turns.chunks_exact(self.window).enumerate().map(|(w, turns)| (w * self.window, turns))
+        for window in self
+            .turns
+            .chunks_exact(self.window)
+            .enumerate()
+            .map(|(w, turns)| (w * self.window, turns))
         {
             let (first, turns) = window;
             let mut mean = Vector3::zeros();
@@ -59,7 +69,8 @@ impl Turning {
                 mean += sum;
                 let from = (first + i) * self.every;
                 let gyroscope = UnitQuaternion::from_scaled_axis(turn.component_div(scale));
-                let error = gyroscope.inverse() * (attitude[from].inverse() * attitude[from + self.every]);
+                let error =
+                    gyroscope.inverse() * (attitude[from].inverse() * attitude[from + self.every]);
                 // Of a small rotation, twice the vector part is the angle.
                 sum += error.imag() * (2.0 * error.w.signum());
             }
@@ -83,7 +94,8 @@ mod tests {
 
     /// A vehicle that turns about all axes, and what a gyroscope with a scale and a bias says.
     fn flown(scale: Vector3<f64>) -> (Vec<UnitQuaternion<f64>>, Vec<Vector3<f64>>) {
-        let rate = |t: f64| Vector3::new((5.0 * t).sin(), 0.7 * (3.0 * t).cos(), 0.5 * (1.1 * t).sin());
+        let rate =
+            |t: f64| Vector3::new((5.0 * t).sin(), 0.7 * (3.0 * t).cos(), 0.5 * (1.1 * t).sin());
         let mut q = UnitQuaternion::from_euler_angles(0.1, -0.2, 2.0);
         let (mut attitude, mut omega) = (Vec::new(), Vec::new());
         for k in 0..5000 {

@@ -2,13 +2,16 @@
 
 use super::{DomainRow, Evidence, ReportData, RotorRow, WIDTH, figure, lacking, quantity};
 use squirrel_core::effects::Effects;
-use squirrel_report::chart::{Axis, ChartRow, Dot, Extent, Ink, Level, Matrix, Range, RowChart, drawable};
+use squirrel_report::chart::{
+    Axis, ChartRow, Dot, Extent, Ink, Level, Matrix, Range, RowChart, drawable,
+};
 use squirrel_report::page::{Columns, Figure, Page, Row};
 use squirrel_sim::scenario::pilot_card;
 
 /// Hypotheses this close to the best one are not decided.
 const RIVAL_NATS: f64 = 5.0;
-/// Chi-square below which a pair is not separated (3 standard deviations), and below which it is only weakly.
+/// Chi-square below which a pair is not separated (3 standard deviations), and below which it is
+/// only weakly.
 const SEPARATED_CHI_SQUARE: [f64; 2] = [9.0, 25.0];
 
 pub(super) fn verdict(page: &mut Page, data: &ReportData) {
@@ -58,7 +61,8 @@ pub(super) fn evidence(page: &mut Page, data: &ReportData) {
         let best = answer.unwrap_or(first).nats;
         let mut chart =
             RowChart::new("evidence of each hypothesis", WIDTH, Axis::new("log evidence", "nats"));
-        // Ends where the data ends: the next tick below a small negative would squeeze what matters.
+        // Ends where the data ends: the next tick below a small negative would squeeze what
+        // matters.
         let lowest = known.last().map_or(0.0, |e| e.nats.min(0.0));
         chart.x.range = Range::Exact(lowest, first.nats.max(1.0));
         for e in &known {
@@ -74,7 +78,9 @@ pub(super) fn evidence(page: &mut Page, data: &ReportData) {
                 ..ChartRow::default()
             });
         }
-        for name in Effects::<f64>::NAMES.iter().filter(|name| known.iter().all(|e| e.name != **name)) {
+        for name in
+            Effects::<f64>::NAMES.iter().filter(|name| known.iter().all(|e| e.name != **name))
+        {
             chart.rows.push(ChartRow {
                 label: (*name).to_owned(),
                 note: "\u{2013}".to_owned(),
@@ -93,7 +99,8 @@ pub(super) fn parameters(page: &mut Page, data: &ReportData) {
             lacking(page, data, "No parameters: no effect was named.");
             return;
         }
-        let axis = Axis::new("size over largest plausible size", "").with_range(Range::Including(-0.2, 1.0));
+        let axis = Axis::new("size over largest plausible size", "")
+            .with_range(Range::Including(-0.2, 1.0));
         let mut chart = RowChart::new("parameters with intervals", WIDTH, axis);
         for p in &data.parameters {
             let share = |x: f64| x / p.largest;
@@ -106,7 +113,13 @@ pub(super) fn parameters(page: &mut Page, data: &ReportData) {
             let sign = if p.value < 0.0 { -1.0 } else { 1.0 };
             chart.rows.push(ChartRow {
                 label: format!("{}.{}", p.effect, p.key),
-                note: format!("{} [{}, {}] {}", figure(p.value), figure(p.low), figure(p.high), p.unit),
+                note: format!(
+                    "{} [{}, {}] {}",
+                    figure(p.value),
+                    figure(p.low),
+                    figure(p.high),
+                    p.unit
+                ),
                 bands: vec![
                     band(sign * p.smallest, sign * p.largest, Ink::Series(2), "plausible"),
                     band(-p.tolerance, p.tolerance, Ink::Limit, "tolerance of the vehicle"),
@@ -121,8 +134,8 @@ pub(super) fn parameters(page: &mut Page, data: &ReportData) {
             });
         }
         page.figures(Columns::One, &[Figure { drawings: vec![chart.svg()], ..Figure::default() }]);
-        let head =
-            ["parameter", "estimate", "95 % interval", "plausible size", "tolerance"].map(str::to_owned);
+        let head = ["parameter", "estimate", "95 % interval", "plausible size", "tolerance"]
+            .map(str::to_owned);
         let range = |low: f64, high: f64| format!("{} to {}", figure(low), figure(high));
         let rows = data.parameters.iter().map(|p| Row {
             ink: None,

@@ -1,6 +1,8 @@
-//! What the report shows, as plain data: whoever found it fills this in, and the same struct serialises beside the page.
+//! What the report shows, as plain data: whoever found it fills this in, and the same struct
+//! serialises beside the page.
 //!
-//! Numbers that are unknown are NaN; they are drawn as gaps and written as null. Lists that are empty say so on the page.
+//! Numbers that are unknown are NaN; they are drawn as gaps and written as null. Lists that are
+//! empty say so on the page.
 
 use crate::ClosedLoop;
 use serde::Serialize;
@@ -10,7 +12,8 @@ use serde::Serialize;
 pub struct ReportData {
     /// Title of the page.
     pub title: String,
-    /// The first screen: what is missing, how sure, how much better it predicts, what remains, what to fly next.
+    /// The first screen: what is missing, how sure, how much better it predicts, what remains, what
+    /// to fly next.
     pub screen: Vec<Answer>,
     /// Flights that were set aside, each with what to change; a line each.
     pub set_aside: Vec<String>,
@@ -98,7 +101,8 @@ pub struct FlightPanel {
     pub start_s: f64,
     /// Length of a window, s, > 0.
     pub window_s: f64,
-    /// Root mean square of each channel in units of its predicted noise, under the vehicle as declared: `[channel][window]`.
+    /// Root mean square of each channel in units of its predicted noise, under the vehicle as
+    /// declared: `[channel][window]`.
     pub before: Vec<Vec<f64>>,
     /// The same under the vehicle with the answer; empty where there is none.
     pub after: Vec<Vec<f64>>,
@@ -162,7 +166,8 @@ pub struct HeldOut {
     pub rival: String,
     /// One row a channel; empty where the flights cannot be re-simulated.
     pub channels: Vec<HeldOutChannel>,
-    /// All channels together, over the length of the re-simulation: each over its noise floor, mean over channels.
+    /// All channels together, over the length of the re-simulation: each over its noise floor, mean
+    /// over channels.
     pub horizons: Vec<Horizon>,
 }
 
@@ -256,7 +261,8 @@ pub struct ParameterRow {
     pub tolerance: f64,
 }
 
-/// Chi-square by which the smallest reportable size of one effect stands out while another floats freely.
+/// Chi-square by which the smallest reportable size of one effect stands out while another floats
+/// freely.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Confusability {
     /// Effects.

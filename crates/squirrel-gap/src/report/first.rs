@@ -1,4 +1,5 @@
-//! The first screen: five answers that a pilot can act on, and a picture of the worst channel before and after.
+//! The first screen: five answers that a pilot can act on, and a picture of the worst channel
+//! before and after.
 
 use super::{FlightPanel, ReportData};
 use crate::words::spoken;
@@ -33,8 +34,9 @@ pub(super) fn screen(page: &mut Page, data: &ReportData) {
     page.cards("answers", &cards.collect::<Vec<_>>(), picture.as_slice(), &remarks);
 }
 
-/// The flight and channel that the answer helps most, in units of its noise, of the channels that it acts on; where it helps
-/// none, the worst. What floats inside tolerances helps other channels, too.
+/// The flight and channel that the answer helps most, in units of its noise, of the channels that
+/// it acts on; where it helps none, the worst. What floats inside tolerances helps other channels,
+/// too.
 fn shown(data: &ReportData) -> Option<(&FlightPanel, usize, &'static str)> {
     let acts = |channel: &usize| {
         let name = data.channels.get(*channel);
@@ -57,9 +59,8 @@ fn shown(data: &ReportData) -> Option<(&FlightPanel, usize, &'static str)> {
     let helped = largest(&gain, &|channel| !known || acts(channel));
     match helped.filter(|at| after(at) < HELPED * before(at)) {
         Some((flight, channel)) => Some((flight, channel, "Where the answer acts")),
-        None => {
-            largest(&before, &|_| true).map(|(flight, channel)| (flight, channel, "Where they differ most"))
-        }
+        None => largest(&before, &|_| true)
+            .map(|(flight, channel)| (flight, channel, "Where they differ most")),
     }
 }
 
@@ -70,7 +71,8 @@ fn mean(row: &[f64]) -> f64 {
 }
 
 fn picture(data: &ReportData, flight: &FlightPanel, channel: usize, why: &str) -> Figure {
-    let name = data.channels.get(channel).map_or_else(|| "a channel".to_owned(), |name| spoken(name));
+    let name =
+        data.channels.get(channel).map_or_else(|| "a channel".to_owned(), |name| spoken(name));
     let axis = Axis::new("error over noise", "").with_range(Range::Including(0.0, 2.0));
     let mut chart = LineChart::new(
         &format!("{name} of {} over time, before and after", flight.name),
@@ -79,8 +81,10 @@ fn picture(data: &ReportData, flight: &FlightPanel, channel: usize, why: &str) -
     );
     (chart.width, chart.plot_height) = (WIDTH, PLOT_HEIGHT);
     chart.limits.push(Limit { y: 1.0, label: "noise".to_owned() });
-    let rows =
-        [("before", Ink::Series(1), Some(&flight.before)), ("after", Ink::Series(0), Some(&flight.after))];
+    let rows = [
+        ("before", Ink::Series(1), Some(&flight.before)),
+        ("after", Ink::Series(0), Some(&flight.after)),
+    ];
     for (name, ink, rows) in rows {
         if let Some(row) = rows.and_then(|rows| rows.get(channel)) {
             let at = (0..row.len()).map(|k| flight.start_s + (k as f64 + 0.5) * flight.window_s);

@@ -1,7 +1,9 @@
-//! The gap report: where simulation and flights disagree, what explains it, and how far that can be trusted.
+//! The gap report: where simulation and flights disagree, what explains it, and how far that can be
+//! trusted.
 //!
-//! One HTML file without network, the same bytes for the same data. The answers come first; each panel below answers one
-//! question and says in words when nothing was given for it. [`ReportData`] is everything that the page shows.
+//! One HTML file without network, the same bytes for the same data. The answers come first; each
+//! panel below answers one question and says in words when nothing was given for it. [`ReportData`]
+//! is everything that the page shows.
 //!
 //! | panel | question |
 //! |---|---|
@@ -22,8 +24,9 @@ mod proof;
 mod residual;
 
 pub use data::{
-    Answer, Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
-    HeldOutChannel, Horizon, InputCorrelation, ParameterRow, ReportData, RotorRow, Whiteness,
+    Answer, Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext,
+    HeldOut, HeldOutChannel, Horizon, InputCorrelation, ParameterRow, ReportData, RotorRow,
+    Whiteness,
 };
 
 use crate::number::significant;
@@ -31,10 +34,13 @@ use squirrel_report::chart::drawable;
 use squirrel_report::page::Page;
 
 /// Identifiers of the panels in the order of the page.
-pub const PANELS: [&str; 9] =
-    ["answers", "panel-h", "panel-a", "panel-b", "panel-c", "panel-d", "panel-e", "panel-f", "panel-g"];
+pub const PANELS: [&str; 9] = [
+    "answers", "panel-h", "panel-a", "panel-b", "panel-c", "panel-d", "panel-e", "panel-f",
+    "panel-g",
+];
 
-/// Width of drawings that span the page, px: narrower than the page, so that their text can still be read on a small screen.
+/// Width of drawings that span the page, px: narrower than the page, so that their text can still
+/// be read on a small screen.
 const WIDTH: f64 = 900.0;
 
 /// The report as one HTML file.

@@ -85,7 +85,8 @@ fn closed_loop(page: &mut Page, data: &ReportData) {
          measured position over the whole flight.",
     );
     let axes = ["north", "east", "down"];
-    let columns = axes.iter().flat_map(|axis| ["nominal", "fitted"].map(|model| format!("{axis}, {model}")));
+    let columns =
+        axes.iter().flat_map(|axis| ["nominal", "fitted"].map(|model| format!("{axis}, {model}")));
     let head: Vec<String> = std::iter::once("flight".to_owned()).chain(columns).collect();
     let rows = data.closed_loop.iter().map(|again| {
         let pairs = again.before_ned_m.iter().zip(&again.after_ned_m);
@@ -124,8 +125,10 @@ fn by_channel(held_out: &HeldOut) -> Figure {
 }
 
 fn by_horizon(held_out: &HeldOut) -> Figure {
-    let mut figure =
-        Figure { title: "Error over the length of the re-simulation".to_owned(), ..Figure::default() };
+    let mut figure = Figure {
+        title: "Error over the length of the re-simulation".to_owned(),
+        ..Figure::default()
+    };
     if held_out.horizons.is_empty() {
         figure.notes.push("No horizons were given.".to_owned());
         return figure;
@@ -136,7 +139,13 @@ fn by_horizon(held_out: &HeldOut) -> Figure {
     figure
 }
 
-fn over_horizon(label: &str, names: [String; 4], horizons: &[Horizon], y: Axis, columns: Columns) -> Svg {
+fn over_horizon(
+    label: &str,
+    names: [String; 4],
+    horizons: &[Horizon],
+    y: Axis,
+    columns: Columns,
+) -> Svg {
     let mut chart = LineChart::new(label, Axis::new("horizon", "s"), y);
     chart.width = columns.width();
     chart.x.range = Range::Including(0.0, 0.0);
@@ -181,7 +190,8 @@ fn lags(w: &Whiteness, first: usize, count: usize) -> Vec<f64> {
 }
 
 fn own(w: &Whiteness) -> Figure {
-    let mut figure_of = Figure { title: format!("{}: autocorrelation", w.channel), ..Figure::default() };
+    let mut figure_of =
+        Figure { title: format!("{}: autocorrelation", w.channel), ..Figure::default() };
     if w.autocorrelation.is_empty() {
         figure_of.notes.push("No autocorrelation was given.".to_owned());
     } else {
@@ -220,7 +230,8 @@ fn with_inputs(w: &Whiteness) -> Figure {
     for (i, input) in w.inputs.iter().enumerate() {
         let at = lags(w, 0, input.values.len());
         chart.series.push(Series::line(&input.input, Ink::Series(i), at, input.values.clone()));
-        let size = input.values.iter().filter(|x| drawable(**x)).fold(0.0_f64, |a, x| a.max(x.abs()));
+        let size =
+            input.values.iter().filter(|x| drawable(**x)).fold(0.0_f64, |a, x| a.max(x.abs()));
         largest.push(format!("{} {}", input.input, figure(size)));
     }
     band(&mut chart, w);

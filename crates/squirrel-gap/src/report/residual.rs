@@ -35,8 +35,10 @@ fn flight(flight: &FlightPanel, channels: &[String]) -> Figure {
     }
     let each = windows.div_ceil(CELLS);
     let group = |title: &str, rows: &[Vec<f64>]| {
-        let name = |i: usize| channels.get(i).cloned().unwrap_or_else(|| format!("channel {}", i + 1));
-        let rows = rows.iter().enumerate().map(|(i, v)| (name(i), merged(v, each, |x| x * x, f64::sqrt)));
+        let name =
+            |i: usize| channels.get(i).cloned().unwrap_or_else(|| format!("channel {}", i + 1));
+        let rows =
+            rows.iter().enumerate().map(|(i, v)| (name(i), merged(v, each, |x| x * x, f64::sqrt)));
         HeatGroup { title: title.to_owned(), rows: rows.collect() }
     };
     let mut groups = Vec::new();
@@ -55,11 +57,12 @@ fn flight(flight: &FlightPanel, channels: &[String]) -> Figure {
         ("height", "m", &flight.height_m),
         ("wings", "", &flight.wings),
     ];
-    let strips = strips.into_iter().filter(|(.., v)| !v.is_empty()).map(|(label, unit, values)| Strip {
-        label: label.to_owned(),
-        unit: unit.to_owned(),
-        values: merged(values, each, |x| x, |x| x),
-    });
+    let strips =
+        strips.into_iter().filter(|(.., v)| !v.is_empty()).map(|(label, unit, values)| Strip {
+            label: label.to_owned(),
+            unit: unit.to_owned(),
+            values: merged(values, each, |x| x, |x| x),
+        });
     let scale = Axis::new("residual over noise", "").with_range(Range::Exact(0.0, FULL));
     let map = HeatMap {
         label: format!("residual of {} over time", flight.name),
@@ -76,10 +79,19 @@ fn flight(flight: &FlightPanel, channels: &[String]) -> Figure {
 }
 
 /// Means of groups of `each` numbers; numbers that cannot be drawn are left out.
-fn merged(values: &[f64], each: usize, into: impl Fn(f64) -> f64, back: impl Fn(f64) -> f64) -> Vec<f64> {
+fn merged(
+    values: &[f64],
+    each: usize,
+    into: impl Fn(f64) -> f64,
+    back: impl Fn(f64) -> f64,
+) -> Vec<f64> {
     let mean = |group: &[f64]| {
         let known: Vec<f64> = group.iter().filter(|x| drawable(**x)).map(|x| into(*x)).collect();
-        if known.is_empty() { f64::NAN } else { back(known.iter().sum::<f64>() / known.len() as f64) }
+        if known.is_empty() {
+            f64::NAN
+        } else {
+            back(known.iter().sum::<f64>() / known.len() as f64)
+        }
     };
     values.chunks(each.max(1)).map(mean).collect()
 }
@@ -89,9 +101,14 @@ pub(super) fn against_regressors(page: &mut Page, data: &ReportData) {
                 follows; strokes are one standard deviation. Look for a slope before that is flat after: it is the size of the \
                 effect.";
     page.panel("panel-c", "Against what explains it", text, |page| {
-        let (drawn, empty): (Vec<_>, Vec<_>) = data.conditional.iter().partition(|c| !c.bins.is_empty());
+        let (drawn, empty): (Vec<_>, Vec<_>) =
+            data.conditional.iter().partition(|c| !c.bins.is_empty());
         if drawn.is_empty() {
-            lacking(page, data, "No regressor was given: nothing was named that could explain the residual.");
+            lacking(
+                page,
+                data,
+                "No regressor was given: nothing was named that could explain the residual.",
+            );
         } else {
             page.figures(Columns::Two, &drawn.into_iter().map(conditional).collect::<Vec<_>>());
         }
@@ -111,12 +128,15 @@ fn conditional(c: &Conditional) -> Figure {
     let before: Vec<[f64; 2]> = c.bins.iter().map(|b| [b.before_mean, b.before_sd]).collect();
     let after: Vec<[f64; 2]> = c.bins.iter().map(|b| [b.after_mean, b.after_sd]).collect();
     let mut notes = Vec::new();
-    for (name, ink, points) in [("before", Ink::Series(1), before), ("after", Ink::Series(0), after)] {
+    for (name, ink, points) in
+        [("before", Ink::Series(1), before), ("after", Ink::Series(0), after)]
+    {
         if points.iter().all(|[mean, _]| !drawable(*mean)) {
             notes.push(format!("No residual {name}."));
             continue;
         }
-        let column = |sign: f64| points.iter().map(|[mean, sd]| mean + sign * sd).collect::<Vec<_>>();
+        let column =
+            |sign: f64| points.iter().map(|[mean, sd]| mean + sign * sd).collect::<Vec<_>>();
         let strokes = Series::strokes("", ink, &at, &column(-1.0), &column(1.0));
         chart.series.push(Series { pale: true, ..strokes });
         let mean = points.iter().map(|[mean, _]| *mean).collect();

@@ -1,5 +1,5 @@
-//! What has changed on a machine since it flew well: on measured flights with cut propellers, and on simulated ones whose truth
-//! is known.
+//! What has changed on a machine since it flew well: on measured flights with cut propellers, and
+//! on simulated ones whose truth is known.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{flights, fly_rich, imported, vehicle};
@@ -34,8 +34,9 @@ fn weak(diagnosis: &Diagnosis) -> Vec<(usize, f64)> {
 /// Flights of `CrazyPAD` by their names.
 fn crazypad(names: &[&str]) -> Flights {
     let folder = flights("crazypad-dev");
-    let read =
-        |name: &&str| ((*name).to_owned(), imported("crazypad.toml", &folder.join(format!("{name}.bin"))));
+    let read = |name: &&str| {
+        ((*name).to_owned(), imported("crazypad.toml", &folder.join(format!("{name}.bin"))))
+    };
     names.iter().map(read).collect()
 }
 
@@ -55,7 +56,8 @@ fn a_cut_propeller_is_its_rotor() {
     let found = since(&vehicle("crazyflie21_brushed.toml"), &good, &now);
     let [(3, loss)] = weak(&found)[..] else { panic!("{:?}", found.verdict.effects) };
     assert_eq!((found.verdict.verdict, found.verdict.effects.len()), (Kind::Named, 1));
-    // Its motor is asked for 54 g where the good flights ask for 41.5 g, in the firmware's own measure.
+    // Its motor is asked for 54 g where the good flights ask for 41.5 g, in the firmware's own
+    // measure.
     assert!((loss - (1.0 - 41.5 / 54.0)).abs() < 0.04, "{loss}");
     let health = &found.verdict.baseline.as_ref().unwrap().rotors;
     assert_eq!(health.iter().map(|r| r.rotor).collect::<Vec<_>>(), [1, 2, 3, 4]);
@@ -107,22 +109,24 @@ fn has_alternative(diagnosis: &Diagnosis, effects: &[&str]) -> bool {
     diagnosis.verdict.alternatives.iter().any(|set| set.effects == effects)
 }
 
-/// A weight between motors 3 and 4 makes both work harder, as two weak rotors would; neither its mass nor its place stands out
-/// by itself.
+/// A weight between motors 3 and 4 makes both work harder, as two weak rotors would; neither its
+/// mass nor its place stands out by itself.
 #[test]
 fn a_load_is_one_of_the_answers() {
     let names = ["add_weight_W1_at_M3_M4__E8_log02", "cut_M3_3.5mm_3.5mm_40mm__E8_log02"];
     let (good, flights) = (crazypad(&NORMAL_E8), crazypad(&names));
     let file = vehicle("crazyflie21_brushed.toml");
     let own = Baseline::fit(&file, &good, &|_| ()).unwrap();
-    let [loaded, cut] = [0, 1].map(|i| diagnose_since(&own, &flights[i..=i], &[], &|_| ()).unwrap());
+    let [loaded, cut] =
+        [0, 1].map(|i| diagnose_since(&own, &flights[i..=i], &[], &|_| ()).unwrap());
     assert_eq!(loaded.verdict.verdict, Kind::Ambiguous, "{}", loaded.verdict.words);
     assert!(has_alternative(&loaded, &["mass_error", "cg_offset"]), "{}", loaded.verdict.words);
     // What yaw shows to be no load is none.
     assert_eq!(cut.verdict.verdict, Kind::Named, "{}", cut.verdict.words);
 }
 
-/// Motor 3 was asked for 9 % more than in the good flights and motor 1 for 5 % more: one weak rotor is sure, a single one is not.
+/// Motor 3 was asked for 9 % more than in the good flights and motor 1 for 5 % more: one weak rotor
+/// is sure, a single one is not.
 #[test]
 fn how_many_rotors_are_weak_may_be_open() {
     let name = "pair_cut_M2_0.5mm_46.5mm_M1_0.5mm_46.5mm__E9_log02";
@@ -133,15 +137,19 @@ fn how_many_rotors_are_weak_may_be_open() {
     assert!(has_alternative(&found, &["weak_rotor"; 3]), "{}", found.verdict.words);
 }
 
-/// The file says too much thrust, too little drag and another centre of mass; then a rotor becomes weak. Against the file
-/// that is one thing among others; against the machine's good flights it is the only one.
+/// The file says too much thrust, too little drag and another centre of mass; then a rotor becomes
+/// weak. Against the file that is one thing among others; against the machine's good flights it is
+/// the only one.
 #[test]
 fn what_the_file_has_wrong_has_not_changed() {
     let file = VehicleFile::squirrel();
-    let text = |effects: &str| VehicleFile::parse(&format!("{}\n{effects}", file.text), "machine").unwrap();
+    let text = |effects: &str| {
+        VehicleFile::parse(&format!("{}\n{effects}", file.text), "machine").unwrap()
+    };
     let machine = "[effects.thrust_coefficient]\nthrust_fraction = -0.08\n[effects.cg_offset]\ncg_x_m = 0.004\ncg_y_m = -0.003\n[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n";
     let well = text(machine);
-    let weak_now = text(&format!("{machine}[effects.weak_rotor]\nrotor = 2\nthrust_loss_fraction = 0.12\n"));
+    let weak_now =
+        text(&format!("{machine}[effects.weak_rotor]\nrotor = 2\nthrust_loss_fraction = 0.12\n"));
     let good = vec![fly_rich(&well, 1), fly_rich(&well, 2)];
     let now = vec![fly_rich(&weak_now, 3)];
     let against_file = diagnose(&file, &now, &[], &|_| ()).unwrap();
@@ -162,18 +170,29 @@ fn a_good_flight_is_no_flight_to_judge() {
     assert_eq!(error.to_string(), "flight 1: two flights have this name");
 }
 
-/// A baseline that contradicts itself is one error with what is wrong, and a bad flight beside good ones is left out.
+/// A baseline that contradicts itself is one error with what is wrong, and a bad flight beside good
+/// ones is left out.
 #[test]
 fn bad_good_flights_are_said() {
     let file = VehicleFile::squirrel();
     let (name, mut log) = fly_rich(&file, 1);
-    for value in &mut log.sources.get_mut("imu").unwrap().channels.get_mut("omega_body_rad_s").unwrap().values
+    for value in &mut log
+        .sources
+        .get_mut("imu")
+        .unwrap()
+        .channels
+        .get_mut("omega_body_rad_s")
+        .unwrap()
+        .values
     {
         *value = value.to_degrees();
     }
     let bad = (name, log);
     let error = Baseline::fit(&file, std::slice::from_ref(&bad), &|_| ()).unwrap_err().to_string();
-    assert!(error.starts_with("baseline: no flight is left: flight 1: imu.omega_body_rad_s"), "{error}");
+    assert!(
+        error.starts_with("baseline: no flight is left: flight 1: imu.omega_body_rad_s"),
+        "{error}"
+    );
     let own = Baseline::fit(&file, &[bad, fly_rich(&file, 2)], &|_| ()).unwrap();
     assert_eq!((own.flights.len(), own.set_aside.len()), (1, 1));
 }

@@ -73,8 +73,10 @@ fn of_files(vehicle: &VehicleFile, map: &str, files: Vec<PathBuf>) -> (usize, Ve
 fn measured_flights_and_windows_raise_no_alarm() {
     let files = nanobench();
     let flights = files.len();
-    let (nanobench, mut said) = of_files(&vehicle("crazyflie21_brushed.toml"), "nanobench.toml", files);
-    let (arpl, of_arpl) = of_files(&vehicle("crazyflie2_arpl.toml"), "arpl.toml", csv_files("arpl-motorlag"));
+    let (nanobench, mut said) =
+        of_files(&vehicle("crazyflie21_brushed.toml"), "nanobench.toml", files);
+    let (arpl, of_arpl) =
+        of_files(&vehicle("crazyflie2_arpl.toml"), "arpl.toml", csv_files("arpl-motorlag"));
     said.extend(of_arpl);
     println!("{nanobench} and {arpl} flights and windows, {} alarms", said.len());
     assert!(said.is_empty(), "{said:#?}");
@@ -110,7 +112,8 @@ fn of_case(case: &Case) -> Vec<String> {
     let vehicle = VehicleFile::parse(&case.nominal().to_toml(), "nominal").unwrap();
     // A few cannot be flown.
     let Ok(log) = case.flight(0) else { return Vec::new() };
-    let hidden = format!("{:?} {:?} {:?}", case.answer.set, case.answer.effects, case.answer.outside);
+    let hidden =
+        format!("{:?} {:?} {:?}", case.answer.set, case.answer.effects, case.answer.outside);
     check(&vehicle, &[("flight".to_owned(), log)])
         .unwrap()
         .into_iter()

@@ -1,5 +1,6 @@
-//! Logs that contradict themselves: an axis, a frame, a unit, a clock or a rotor is not what the log says. The answer is
-//! that, with the channel, and never the name of an effect. Commands that are late as a link can be late are an effect.
+//! Logs that contradict themselves: an axis, a frame, a unit, a clock or a rotor is not what the
+//! log says. The answer is that, with the channel, and never the name of an effect. Commands that
+//! are late as a link can be late are an effect.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::foreign;
@@ -98,7 +99,8 @@ fn late(log: &mut FlightLog, late_s: f64) {
 /// Gives specific force in the world frame.
 fn to_world(log: &mut FlightLog) {
     let attitude = log.channel(ATTITUDE).unwrap().1.clone();
-    let force = log.sources.get_mut("imu").unwrap().channels.get_mut("specific_force_body_m_s2").unwrap();
+    let force =
+        log.sources.get_mut("imu").unwrap().channels.get_mut("specific_force_body_m_s2").unwrap();
     for (k, f) in force.values.chunks_exact_mut(3).enumerate() {
         let q = attitude.row(k);
         let q = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]));
@@ -112,24 +114,34 @@ const MISTAKES: [Mistake; 32] = [
     ("gyroscope x and y swapped", OMEGA, |log| each(log, OMEGA, |w| w.swap(0, 1))),
     ("gyroscope y and z swapped", OMEGA, |log| each(log, OMEGA, |w| w.swap(1, 2))),
     ("gyroscope forward-left-up", OMEGA, |log| each(log, OMEGA, |w| (w[1], w[2]) = (-w[1], -w[2]))),
-    ("gyroscope in deg/s", OMEGA, |log| each(log, OMEGA, |w| w.iter_mut().for_each(|x| *x = x.to_degrees()))),
+    ("gyroscope in deg/s", OMEGA, |log| {
+        each(log, OMEGA, |w| w.iter_mut().for_each(|x| *x = x.to_degrees()));
+    }),
     ("accelerometer x and y swapped", FORCE, |log| each(log, FORCE, |f| f.swap(0, 1))),
     ("accelerometer x and z swapped", FORCE, |log| each(log, FORCE, |f| f.swap(0, 2))),
     ("accelerometer y reversed", FORCE, |log| each(log, FORCE, |f| f[1] = -f[1])),
     ("accelerometer forward-left-up", FORCE, |log| {
         each(log, FORCE, |f| (f[1], f[2]) = (-f[1], -f[2]));
     }),
-    ("accelerometer in g", FORCE, |log| each(log, FORCE, |f| f.iter_mut().for_each(|x| *x /= 9.80665))),
+    ("accelerometer in g", FORCE, |log| {
+        each(log, FORCE, |f| f.iter_mut().for_each(|x| *x /= 9.80665));
+    }),
     ("velocity east-north-up", VELOCITY, |log| {
         each(log, VELOCITY, |v| (v[0], v[1], v[2]) = (v[1], v[0], -v[2]));
     }),
     ("velocity up for down", VELOCITY, |log| each(log, VELOCITY, |v| v[2] = -v[2])),
-    ("velocity in cm/s", VELOCITY, |log| each(log, VELOCITY, |v| v.iter_mut().for_each(|x| *x *= 100.0))),
+    ("velocity in cm/s", VELOCITY, |log| {
+        each(log, VELOCITY, |v| v.iter_mut().for_each(|x| *x *= 100.0));
+    }),
     ("velocity north and east swapped", VELOCITY, |log| each(log, VELOCITY, |v| v.swap(0, 1))),
     ("position north and east swapped", POSITION, |log| each(log, POSITION, |p| p.swap(0, 1))),
     ("voltage in mV", VOLTAGE, |log| each(log, VOLTAGE, |v| v[0] *= 1e3)),
-    ("commands in percent", COMMAND, |log| each(log, COMMAND, |u| u.iter_mut().for_each(|x| *x *= 100.0))),
-    ("commands 0 to 65535", COMMAND, |log| each(log, COMMAND, |u| u.iter_mut().for_each(|x| *x *= 65535.0))),
+    ("commands in percent", COMMAND, |log| {
+        each(log, COMMAND, |u| u.iter_mut().for_each(|x| *x *= 100.0));
+    }),
+    ("commands 0 to 65535", COMMAND, |log| {
+        each(log, COMMAND, |u| u.iter_mut().for_each(|x| *x *= 65535.0));
+    }),
     ("commands as pulses", COMMAND, |log| {
         each(log, COMMAND, |u| u.iter_mut().for_each(|x| *x = 1000.0 + 1000.0 * *x));
     }),
@@ -163,11 +175,15 @@ fn complaint(what: &str, channel: &str, verdict: &Verdict) -> Option<String> {
         && goes_with.contains(channel)
         && verdict.words.contains(channel);
     println!("{what}: {:?}: {}", verdict.verdict, verdict.words);
-    (!right).then(|| format!("{what}: {:?}, goes with {goes_with:?}: {}", verdict.verdict, verdict.words))
+    (!right).then(|| {
+        format!("{what}: {:?}, goes with {goes_with:?}: {}", verdict.verdict, verdict.words)
+    })
 }
 
 fn complaints(case: &Case) -> Vec<String> {
-    let ask = |(what, channel, mistake): &Mistake| complaint(what, channel, &case.with(mistake).verdict());
+    let ask = |(what, channel, mistake): &Mistake| {
+        complaint(what, channel, &case.with(mistake).verdict())
+    };
     let mut wrong: Vec<String> = MISTAKES.iter().filter_map(ask).collect();
     // Rotors turn in pairs: some other orders are only a vehicle that is turned by half a turn.
     for order in [[1, 0, 2, 3], [1, 2, 3, 0], [3, 2, 1, 0]] {
@@ -177,7 +193,11 @@ fn complaints(case: &Case) -> Vec<String> {
                 order.iter().zip(u).for_each(|(from, to): (&usize, &mut f64)| *to = old[*from]);
             });
         });
-        wrong.extend(complaint(&format!("rotors in the order {order:?}"), COMMAND, &permuted.verdict()));
+        wrong.extend(complaint(
+            &format!("rotors in the order {order:?}"),
+            COMMAND,
+            &permuted.verdict(),
+        ));
     }
     wrong
 }
@@ -199,7 +219,10 @@ fn assert_aside(verdict: &Verdict, flight: &str, channel: &str) {
     println!("{:?}: {}", verdict.verdict, verdict.words);
     let [aside] = &verdict.set_aside[..] else { panic!("{:?}", verdict.set_aside) };
     assert_eq!((aside.flight.as_str(), aside.channel), (flight, channel));
-    assert!(verdict.words.contains("1 of 3 flights were set aside") && verdict.words.contains(&aside.words));
+    assert!(
+        verdict.words.contains("1 of 3 flights were set aside")
+            && verdict.words.contains(&aside.words)
+    );
     assert!(verdict.notes.iter().any(|note| note.contains(&aside.words)), "{:?}", verdict.notes);
     assert_ne!(verdict.verdict, Kind::DataProblem);
 }
@@ -233,7 +256,8 @@ fn a_log_whose_clock_runs_backwards_is_set_aside() {
     step(&mut back.flights[0].1, "rotor", -1.0);
     assert_aside(&back.verdict(), "first", COMMAND);
     step(&mut back.flights[1].1, "rotor", -1.0);
-    let error = diagnose(&case.vehicle, &back.flights, &case.held_out, &|_| {}).unwrap_err().to_string();
+    let error =
+        diagnose(&case.vehicle, &back.flights, &case.held_out, &|_| {}).unwrap_err().to_string();
     assert!(error.starts_with("first: rotor.command: time_s["), "{error}");
 }
 
@@ -246,7 +270,10 @@ fn a_training_flight_is_no_proof() {
     for source in half.sources.values_mut() {
         let from = source.time_s.partition_point(|t| *t < 20.0);
         source.time_s.drain(..from);
-        source.channels.values_mut().for_each(|channel| drop(channel.values.drain(..from * channel.width)));
+        source
+            .channels
+            .values_mut()
+            .for_each(|channel| drop(channel.values.drain(..from * channel.width)));
     }
     for log in [whole, half] {
         let repeated = Case { held_out: vec![("another-name".to_owned(), log)], ..case.clone() };
@@ -307,7 +334,8 @@ fn noise_makes_no_other_name() {
     }
 }
 
-/// The battery falls and takes the thrust with it, and the log says that it stays: what thrust lacks is no sag by that voltage.
+/// The battery falls and takes the thrust with it, and the log says that it stays: what thrust
+/// lacks is no sag by that voltage.
 #[test]
 fn a_battery_monitor_that_is_stuck_is_said_and_names_no_sag() {
     let sagging = vehicle_with(
@@ -322,6 +350,7 @@ fn a_battery_monitor_that_is_stuck_is_said_and_names_no_sag() {
     let said = "first: battery.voltage_v: 15.6 V in every sample, a monitor that is stuck; thrust may be that of any charge";
     assert!(verdict.notes.iter().any(|note| note == said), "{:?}", verdict.notes);
     let named = verdict.effects.iter().map(|e| e.name);
-    let names: Vec<&str> = named.chain(verdict.alternatives.iter().flat_map(|a| a.effects.clone())).collect();
+    let names: Vec<&str> =
+        named.chain(verdict.alternatives.iter().flat_map(|a| a.effects.clone())).collect();
     assert!(!names.contains(&"battery_sag"), "{names:?}");
 }

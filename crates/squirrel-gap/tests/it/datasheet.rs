@@ -1,4 +1,5 @@
-//! Measured flights of a Crazyflie with a vehicle file from data sheets and one hover: what a user has before the first fit.
+//! Measured flights of a Crazyflie with a vehicle file from data sheets and one hover: what a user
+//! has before the first fit.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{flights, imported, vehicle};
@@ -26,7 +27,8 @@ fn names(verdict: &Verdict) -> Vec<&'static str> {
     verdict.effects.iter().map(|effect| effect.name).collect()
 }
 
-/// Numbers as far off as data sheets are do not keep each flight alone from showing the sag, and nothing else.
+/// Numbers as far off as data sheets are do not keep each flight alone from showing the sag, and
+/// nothing else.
 #[test]
 fn a_file_from_data_sheets_lacks_the_sag_alone() {
     let vehicle = vehicle("crazyflie21_datasheet.toml");

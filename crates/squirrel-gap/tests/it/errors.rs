@@ -1,4 +1,5 @@
-//! Logs that lack something, or hold what cannot be: an error names flight, channel and value, a note what was taken instead.
+//! Logs that lack something, or hold what cannot be: an error names flight, channel and value, a
+//! note what was taken instead.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{vehicle, vehicle_with};
@@ -6,9 +7,11 @@ use squirrel_gap::{Finding, GapError, find};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
-const SAGGING: (&str, &str) = ("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]");
+const SAGGING: (&str, &str) =
+    ("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]");
 
-/// A hover of the squirrel at 100 Hz with every channel: level, still, all rotors at the hover command.
+/// A hover of the squirrel at 100 Hz with every channel: level, still, all rotors at the hover
+/// command.
 fn hover(seconds: f64) -> FlightLog {
     let mut log = FlightLog::default();
     let p = *VehicleFile::squirrel().vehicle.parameters();
@@ -60,7 +63,8 @@ fn turning_without_a_cause_is_a_moment() {
     let j = squirrel.vehicle.parameters().inertia_kg_m2.diagonal();
     let turning = |omega: &dyn Fn(f64) -> [f64; 3]| {
         let mut log = hover(3.0);
-        for (k, row) in values(&mut log, "imu", "omega_body_rad_s").chunks_exact_mut(3).enumerate() {
+        for (k, row) in values(&mut log, "imu", "omega_body_rad_s").chunks_exact_mut(3).enumerate()
+        {
             row.copy_from_slice(&omega(k as f64 * 0.01));
         }
         run(&squirrel, &log).unwrap().residual.moment_body_rms_n_m
@@ -69,7 +73,10 @@ fn turning_without_a_cause_is_a_moment() {
         let error = found.iter().zip(wanted).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         assert!(error < 1e-9, "{found:?} N m, must be {wanted:?}");
     };
-    near(turning(&|_| [2.0, 3.0, 5.0]), [15.0 * (j.z - j.y), 10.0 * (j.z - j.x), 6.0 * (j.y - j.x)]);
+    near(
+        turning(&|_| [2.0, 3.0, 5.0]),
+        [15.0 * (j.z - j.y), 10.0 * (j.z - j.x), 6.0 * (j.y - j.x)],
+    );
     near(turning(&|t| [0.0, 4.0 * t, 0.0]), [0.0, 4.0 * j.y, 0.0]);
 }
 
@@ -118,7 +125,10 @@ fn what_the_log_lacks_is_noted() {
         note("attitude", "q_ned_from_body_wxyz"),
         format!("f: attitude.q_ned_from_body_wxyz: {still}")
     );
-    assert!(note("battery", "voltage_v").ends_with("battery_sag is that of the reference voltage, 14.8 V"));
+    assert!(
+        note("battery", "voltage_v")
+            .ends_with("battery_sag is that of the reference voltage, 14.8 V")
+    );
     assert_eq!(note("wing", "command"), "f: wing.command: missing; the wings are taken as folded");
 
     assert!(note("baro", "altitude_m").ends_with("missing; what depends on height cannot be seen"));
@@ -128,7 +138,11 @@ fn what_the_log_lacks_is_noted() {
     log.sources.remove("battery");
     let finding = run(&VehicleFile::squirrel(), &log).unwrap();
     assert_eq!(finding.notes, ["f: battery.voltage_v: missing; thrust may be that of any charge"]);
-    assert!(finding.places.iter().all(|place| !place.condition.contains(" V")), "{:?}", finding.places);
+    assert!(
+        finding.places.iter().all(|place| !place.condition.contains(" V")),
+        "{:?}",
+        finding.places
+    );
 }
 
 #[test]
@@ -192,10 +206,14 @@ fn a_flight_must_last_a_second_in_every_channel() {
             *t *= 3.0;
         }
     });
-    assert_eq!(slow, "f: imu.specific_force_body_m_s2: its rate is 33.333 Hz, must be at least 48 Hz");
+    assert_eq!(
+        slow,
+        "f: imu.specific_force_body_m_s2: its rate is 33.333 Hz, must be at least 48 Hz"
+    );
 }
 
-/// A gap cuts the flight: both pieces lose their edges, and the jump between them leaves no residual.
+/// A gap cuts the flight: both pieces lose their edges, and the jump between them leaves no
+/// residual.
 #[test]
 fn a_gap_cuts_the_flight() {
     let squirrel = VehicleFile::squirrel();
@@ -215,7 +233,8 @@ fn a_gap_cuts_the_flight() {
     assert!(r.force_body_rms_n[2] < 1e-6, "{}", r.force_body_rms_n[2]);
 }
 
-/// A log may hold only the edges of the wing command, and commands that change between samples of a slow IMU.
+/// A log may hold only the edges of the wing command, and commands that change between samples of a
+/// slow IMU.
 #[test]
 fn wing_commands_may_come_as_edges() {
     let squirrel = vehicle_with("squirrel.toml", &[("\"membrane\"", "\"flat\"")]);
@@ -240,8 +259,10 @@ fn wing_commands_may_come_as_edges() {
 
 #[test]
 fn a_vehicle_that_the_plant_cannot_step_is_refused() {
-    let stiff =
-        vehicle_with("squirrel.toml", &[("value = 0.04, sd = 0.004", "value = 0.0004, sd = 0.00004")]);
+    let stiff = vehicle_with(
+        "squirrel.toml",
+        &[("value = 0.04, sd = 0.004", "value = 0.0004, sd = 0.00004")],
+    );
     let message = run(&stiff, &hover(3.0)).unwrap_err().to_string();
     assert!(
         message.starts_with("squirrel: dt_s = 0.001") && message.contains("time_constant_up_s"),
@@ -249,7 +270,8 @@ fn a_vehicle_that_the_plant_cannot_step_is_refused() {
     );
 }
 
-/// Other vehicles and scales: a flight of a Crazyflie without attitude, velocity, height and battery, each of which is said.
+/// Other vehicles and scales: a flight of a Crazyflie without attitude, velocity, height and
+/// battery, each of which is said.
 #[test]
 fn a_log_of_motors_and_imu_alone_is_enough() {
     let flight = crate::support::flights("arpl-motorlag").join("log10.csv");
@@ -257,5 +279,9 @@ fn a_log_of_motors_and_imu_alone_is_enough() {
     let finding = run(&vehicle("crazyflie21_brushed.toml"), &log).unwrap();
     println!("{:?}\n{:?}\n{:?}", finding.residual, finding.notes, finding.places[0]);
     assert_eq!(finding.notes.len(), 4);
-    assert!(finding.places[0].condition.starts_with("throttle 0."), "{}", finding.places[0].condition);
+    assert!(
+        finding.places[0].condition.starts_with("throttle 0."),
+        "{}",
+        finding.places[0].condition
+    );
 }

@@ -1,4 +1,5 @@
-//! A vehicle file that is nothing like what flew: the search looks at no vehicle that cannot be, and gives an answer.
+//! A vehicle file that is nothing like what flew: the search looks at no vehicle that cannot be,
+//! and gives an answer.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use crate::support::vehicle_with;
@@ -12,11 +13,17 @@ use squirrel_sim::vehicle_file::VehicleFile;
 #[test]
 fn numbers_far_off_end_in_an_answer_and_not_in_an_error() {
     let scenario = Scenario::find("track").unwrap();
-    let setup =
-        Setup { vehicle: VehicleFile::squirrel(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    let setup = Setup {
+        vehicle: VehicleFile::squirrel(),
+        arm: Arm::Pc,
+        scenario,
+        integrator: Integrator::Rk4,
+    };
     let log = setup.fly(true, |_| {}).unwrap().log.unwrap();
     let mut light = log.clone();
-    for f in &mut light.source_mut("imu").channels.get_mut("specific_force_body_m_s2").unwrap().values {
+    for f in
+        &mut light.source_mut("imu").channels.get_mut("specific_force_body_m_s2").unwrap().values
+    {
         *f *= 0.7;
     }
     let inertia = (

@@ -1,4 +1,5 @@
-//! The first screen of the report: each kind of verdict has its five answers, and their numbers are those of the verdict.
+//! The first screen of the report: each kind of verdict has its five answers, and their numbers are
+//! those of the verdict.
 //!
 //! The pages are written to `target/tmp/first-screen-*.html`.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -12,8 +13,13 @@ use squirrel_gap::{
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 
-const QUESTIONS: [&str; 5] =
-    ["What is missing", "How sure", "How much better it predicts", "What remains", "What to fly next"];
+const QUESTIONS: [&str; 5] = [
+    "What is missing",
+    "How sure",
+    "How much better it predicts",
+    "What remains",
+    "What to fly next",
+];
 
 fn size(value: f64, half: f64) -> Value {
     Value::Number { value, low: value - half, high: value + half }
@@ -21,7 +27,8 @@ fn size(value: f64, half: f64) -> Value {
 
 fn weak_rotor(rotor: f64, evidence_nats: f64) -> NamedEffect {
     let rotor = Value::Number { value: rotor, low: rotor, high: rotor };
-    let parameters = BTreeMap::from([("rotor", rotor), ("thrust_loss_fraction", size(0.243, 0.0196))]);
+    let parameters =
+        BTreeMap::from([("rotor", rotor), ("thrust_loss_fraction", size(0.243, 0.0196))]);
     NamedEffect { name: "weak_rotor", form: "standard", evidence_nats, parameters }
 }
 
@@ -77,7 +84,8 @@ fn verdict(kind: Kind) -> Verdict {
         Kind::Named => {}
         Kind::None => (verdict.effects, verdict.alternatives) = (Vec::new(), Vec::new()),
         Kind::NamedIncomplete => {
-            verdict.leftover = Some(left(vec!["force_body_z_n", "moment_body_x_n_m"], Some(family)));
+            verdict.leftover =
+                Some(left(vec!["force_body_z_n", "moment_body_x_n_m"], Some(family)));
         }
         Kind::NamedFormDiffers => {
             (verdict.effects, verdict.goes_with) = (vec![sag()], Some(family.to_owned()));
@@ -122,7 +130,8 @@ const KINDS: [(Kind, &str); 8] = [
     (Kind::DataProblem, "data_problem"),
 ];
 
-/// The report of a verdict: evidence, one held-out channel that gains, and one flight, as far as the kind has them.
+/// The report of a verdict: evidence, one held-out channel that gains, and one flight, as far as
+/// the kind has them.
 fn report(verdict: &Verdict, vehicle: &VehicleFile) -> ReportData {
     let mut data = ReportData {
         title: "Gap report: squirrel".to_owned(),
@@ -132,8 +141,10 @@ fn report(verdict: &Verdict, vehicle: &VehicleFile) -> ReportData {
     };
     if verdict.verdict != Kind::DataProblem {
         data.set_aside = verdict.set_aside.iter().map(|aside| aside.words.clone()).collect();
-        let wave = |gain: f64| (0..40).map(|k| 1.0 + gain * (1.0 + (0.4 * f64::from(k)).sin())).collect();
-        let after = if verdict.effects.is_empty() { Vec::new() } else { vec![wave(0.01), wave(0.1)] };
+        let wave =
+            |gain: f64| (0..40).map(|k| 1.0 + gain * (1.0 + (0.4 * f64::from(k)).sin())).collect();
+        let after =
+            if verdict.effects.is_empty() { Vec::new() } else { vec![wave(0.01), wave(0.1)] };
         data.flights = vec![FlightPanel {
             name: "day 1/a.mcap".to_owned(),
             window_s: 1.0,
@@ -152,12 +163,18 @@ fn report(verdict: &Verdict, vehicle: &VehicleFile) -> ReportData {
         data.held_out = Some(HeldOut {
             flights: vec!["day 2/held.mcap".to_owned()],
             rival: String::new(),
-            channels: vec![channel("velocity down", "m/s"), channel("specific force z", "m/s\u{b2}")],
+            channels: vec![
+                channel("velocity down", "m/s"),
+                channel("specific force z", "m/s\u{b2}"),
+            ],
             horizons: Vec::new(),
         });
         let whole: f64 = verdict.effects.iter().map(|e| e.evidence_nats).sum();
-        data.evidence =
-            vec![Evidence { name: "all".to_owned(), nats: whole, is_answer: !verdict.effects.is_empty() }];
+        data.evidence = vec![Evidence {
+            name: "all".to_owned(),
+            nats: whole,
+            is_answer: !verdict.effects.is_empty(),
+        }];
     }
     data.screen = first_screen(verdict, vehicle, &data);
     data
@@ -184,14 +201,20 @@ fn every_kind_of_verdict_answers_five_questions() {
         let verdict = verdict(kind);
         let data = report(&verdict, &VehicleFile::squirrel());
         let html = render(&data);
-        let out = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("first-screen-{name}.html"));
+        let out = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"))
+            .join(format!("first-screen-{name}.html"));
         std::fs::write(&out, &html).unwrap();
         let begun = html.split_once("<section id=\"answers\">").unwrap().1;
         let shown = begun.split_once("</section>").unwrap().0;
-        assert_eq!(data.screen.iter().map(|a| a.question.as_str()).collect::<Vec<_>>(), QUESTIONS, "{name}");
+        assert_eq!(
+            data.screen.iter().map(|a| a.question.as_str()).collect::<Vec<_>>(),
+            QUESTIONS,
+            "{name}"
+        );
         for answer in &data.screen {
             assert!(
-                !answer.answer.is_empty() && !answer.sentences.is_empty() | !answer.figure.is_empty(),
+                !answer.answer.is_empty()
+                    && !answer.sentences.is_empty() | !answer.figure.is_empty(),
                 "{name}: {answer:?}"
             );
             assert!(shown.contains(&format!("<h2>{}</h2>", answer.question)), "{name}");
@@ -228,13 +251,19 @@ fn each_kind_says_what_is_missing_in_its_own_words() {
     assert!(missing.contains("Or: thrust of rotor 2 (weak_rotor)."), "{missing}");
     assert!(sure.contains("Not decided") && sure.contains("20 : 1"), "{sure}");
     assert!(sure.contains("Odds below 400 : 1 do not decide."), "{sure}");
-    assert!(next.contains("Yaw steps (yaw_torque_coeff).\nHovers; and weigh it (weak_rotor).\n"), "{next}");
     assert!(
-        next.contains("\u{201c}squirrel fly --scenario excite_rich\u{201d} flies most of it; its card"),
+        next.contains("Yaw steps (yaw_torque_coeff).\nHovers; and weigh it (weak_rotor).\n"),
+        "{next}"
+    );
+    assert!(
+        next.contains(
+            "\u{201c}squirrel fly --scenario excite_rich\u{201d} flies most of it; its card"
+        ),
         "{next}"
     );
     let [.., remains, _] = of(Kind::NamedIncomplete);
-    for words in ["the vertical force and the roll moment", "velocity (60 % of the vertical force)"] {
+    for words in ["the vertical force and the roll moment", "velocity (60 % of the vertical force)"]
+    {
         assert!(remains.contains(words), "{remains}");
     }
     let [missing, _, better, ..] = of(Kind::OutsideCatalogue);
@@ -244,7 +273,10 @@ fn each_kind_says_what_is_missing_in_its_own_words() {
     );
     assert!(better.contains("With the nearest name"), "{better}");
     let [missing, ..] = of(Kind::NotIdentifiable);
-    assert!(missing.contains("Words of the verdict.\n") && !missing.contains("More words"), "{missing}");
+    assert!(
+        missing.contains("Words of the verdict.\n") && !missing.contains("More words"),
+        "{missing}"
+    );
     let [missing, .., next] = of(Kind::DataProblem);
     assert!(missing.contains("is it in mV?") && next.contains("import map"), "{missing}{next}");
 }
@@ -262,7 +294,8 @@ fn numbers_are_those_of_the_verdict() {
         missing.figure_note,
         format!("thrust loss, 95 %: {} to {} %", three(100.0 * low), three(100.0 * high))
     );
-    // 43.2 nats of the answer, 37.2 of the same effect at another rotor: e^6 is 400; 0.243 over its deviation of 0.01.
+    // 43.2 nats of the answer, 37.2 of the same effect at another rotor: e^6 is 400; 0.243 over its
+    // deviation of 0.01.
     assert_eq!(sure.figure, "400 : 1");
     assert!(
         all(&sure).contains("thrust of rotor 2 (weak_rotor), is 400 times less likely (6.00 nats)"),
@@ -301,14 +334,19 @@ fn what_speaks_against_an_answer_is_said() {
     assert!(next.contains("put one like them among those to fit"), "{next}");
     assert!(remains.contains("more on held-out flights\n3.50"), "{remains}");
     let [_, sure, ..] = with(&|v| v.alternatives[0].evidence_nats = 41.9);
-    assert!(sure.contains("Fairly sure") && sure.contains("3.7 times less likely (1.30 nats)"), "{sure}");
+    assert!(
+        sure.contains("Fairly sure") && sure.contains("3.7 times less likely (1.30 nats)"),
+        "{sure}"
+    );
     let [_, sure, ..] = with(&|v| v.alternatives[0].evidence_nats = 50.0);
     assert!(sure.contains("fits these flights as well") && !sure.contains(" : 1"), "{sure}");
     let [_, sure, ..] = with(&|v| v.alternatives.clear());
     assert!(sure.contains("> 1 million : 1") && sure.contains("Leaving out weak_rotor"), "{sure}");
     let [.., next] = with(&|v| {
-        v.effects[0] =
-            NamedEffect { parameters: BTreeMap::from([("voltage_exponent", size(0.9, 0.5))]), ..sag() }
+        v.effects[0] = NamedEffect {
+            parameters: BTreeMap::from([("voltage_exponent", size(0.9, 0.5))]),
+            ..sag()
+        }
     });
     assert!(next.contains("(\u{b1}56 %): climbs at full thrust"), "{next}");
     let [missing, _, _, _, next] = with(&|v| {
@@ -329,26 +367,40 @@ fn without_a_held_out_flight_the_screen_asks_for_one() {
     let vehicle = VehicleFile::squirrel();
     let mut data = report(&verdict, &vehicle);
     assert!(all(&data.screen[2]).contains("cannot be re-simulated"), "{:?}", data.screen[2]);
-    assert!(all(&data.screen[4]).contains("attitude and velocity throughout"), "{:?}", data.screen[4]);
+    assert!(
+        all(&data.screen[4]).contains("attitude and velocity throughout"),
+        "{:?}",
+        data.screen[4]
+    );
     data.held_out = None;
     let screen = first_screen(&verdict, &vehicle, &data);
-    assert!(all(&screen[2]).contains("--held-out") && all(&screen[4]).contains("held out"), "{screen:?}");
+    assert!(
+        all(&screen[2]).contains("--held-out") && all(&screen[4]).contains("held out"),
+        "{screen:?}"
+    );
 }
 
-/// Names that all explanations share are the answer; what each has beside them is told as what remains.
+/// Names that all explanations share are the answer; what each has beside them is told as what
+/// remains.
 #[test]
 fn what_explanations_share_is_sure_and_the_rest_remains() {
     let mut verdict = verdict(Kind::NamedIncomplete);
     verdict.leftover = Some(left(Vec::new(), None));
-    verdict.alternatives =
-        vec![other(&[weak_rotor(3.0, f64::NAN), sag()], 50.0), other(&[weak_rotor(3.0, f64::NAN)], 44.0)];
+    verdict.alternatives = vec![
+        other(&[weak_rotor(3.0, f64::NAN), sag()], 50.0),
+        other(&[weak_rotor(3.0, f64::NAN)], 44.0),
+    ];
     let [_, sure, _, remains, _] = screen(&verdict).map(|answer| all(&answer));
     assert!(sure.contains("Very sure") && sure.contains("Leaving out weak_rotor"), "{sure}");
     assert_eq!(remains.matches("Perhaps").count(), 1, "{remains}");
-    assert!(remains.contains("Perhaps thrust that sags with the battery (battery_sag)."), "{remains}");
+    assert!(
+        remains.contains("Perhaps thrust that sags with the battery (battery_sag)."),
+        "{remains}"
+    );
 }
 
-/// The picture is of the channel that the answer acts on, also where tolerances help another one more.
+/// The picture is of the channel that the answer acts on, also where tolerances help another one
+/// more.
 #[test]
 fn the_picture_is_of_the_channel_that_the_answer_acts_on() {
     let mut data = report(&verdict(Kind::Named), &VehicleFile::squirrel());
@@ -366,7 +418,8 @@ fn the_picture_is_of_the_channel_that_the_answer_acts_on() {
     assert!(render(&data).contains("Where they differ most: the forward force"));
 }
 
-/// A file that has an effect already: what it overstates is less, and the distance is from the file's own number.
+/// A file that has an effect already: what it overstates is less, and the distance is from the
+/// file's own number.
 #[test]
 fn what_the_file_has_is_what_an_effect_is_told_against() {
     let text = VehicleFile::squirrel().text + "\n[effects.battery_sag]\nvoltage_exponent = 1.0\n";
@@ -387,6 +440,9 @@ fn flights_set_aside_stand_beside_the_answers() {
     let mut verdict = verdict(Kind::Named);
     verdict.set_aside = vec![aside(); 4];
     let html = render(&report(&verdict, &VehicleFile::squirrel()));
-    assert_eq!(html.matches("Set aside: day 1/&lt;b&gt;.mcap: battery.voltage_v: its mean").count(), 2);
+    assert_eq!(
+        html.matches("Set aside: day 1/&lt;b&gt;.mcap: battery.voltage_v: its mean").count(),
+        2
+    );
     assert!(html.contains("Set aside: 2 more flights."));
 }

@@ -1,5 +1,5 @@
-//! A file that is fitted has its own numbers where the flights have them: what is proven is the whole explanation, and not its
-//! names alone.
+//! A file that is fitted has its own numbers where the flights have them: what is proven is the
+//! whole explanation, and not its names alone.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{flights, fly_rich, imported, vehicle, vehicle_with};
@@ -27,14 +27,16 @@ fn parse(text: &str) -> VehicleFile {
 
 #[test]
 fn a_fitted_file_predicts_held_out_flights_better_than_its_names_alone() {
-    let (file, drag) = (VehicleFile::squirrel(), "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n");
+    let (file, drag) =
+        (VehicleFile::squirrel(), "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n");
     let flown = flown(drag);
     let diagnosis = diagnose(&file, &[fly_rich(&flown, 1)], &[], &|_| {}).unwrap();
     assert_eq!(diagnosis.verdict.verdict, Kind::Named, "{}", diagnosis.verdict.words);
     let [fitted, names_alone] =
         [fit, add].map(|patch| parse(&patch(&file, &diagnosis, &["flight 1".to_owned()]).unwrap()));
     let unseen = [fly_rich(&flown, 2)];
-    let roll = |vehicle: &VehicleFile| find(vehicle, &unseen).unwrap().residual.moment_body_rms_n_m[0];
+    let roll =
+        |vehicle: &VehicleFile| find(vehicle, &unseen).unwrap().residual.moment_body_rms_n_m[0];
     let (with_numbers, without) = (roll(&fitted), roll(&names_alone));
     println!("{with_numbers:.2e} N m with the file's numbers, {without:.2e} without");
     assert!(with_numbers < 0.7 * without, "{with_numbers:.2e} {without:.2e}");
@@ -44,13 +46,15 @@ fn a_fitted_file_predicts_held_out_flights_better_than_its_names_alone() {
 fn numbers_are_fitted_inside_their_tolerance_where_nothing_is_missing() {
     let file = VehicleFile::squirrel();
     let flown = flown("");
-    let diagnosis = diagnose(&file, &[fly_rich(&flown, 1), fly_rich(&flown, 2)], &[], &|_| {}).unwrap();
+    let diagnosis =
+        diagnose(&file, &[fly_rich(&flown, 1), fly_rich(&flown, 2)], &[], &|_| {}).unwrap();
     assert_eq!(diagnosis.verdict.verdict, Kind::None, "{}", diagnosis.verdict.words);
     assert!(nothing_to_add(&diagnosis.verdict).is_some());
     let text = fit(&file, &diagnosis, &["flight 1".to_owned(), "flight 2".to_owned()]).unwrap();
     assert!(!text.contains("[effects.weak_rotor]"), "{text}");
     let [thrust, _] = parse(&text).vehicle.rotor_factors();
-    let about_mean = |all: &[f64]| all.iter().map(|x| x - all.iter().sum::<f64>() / 4.0).collect::<Vec<_>>();
+    let about_mean =
+        |all: &[f64]| all.iter().map(|x| x - all.iter().sum::<f64>() / 4.0).collect::<Vec<_>>();
     let own = about_mean(&thrust.iter().copied().take(4).collect::<Vec<_>>());
     for (rotor, (fitted, true_fraction)) in own.iter().zip(about_mean(&ROTORS)).enumerate() {
         println!("rotor {}: {fitted:.4}, {true_fraction:.4} in truth", rotor + 1);
@@ -83,8 +87,8 @@ fn numbers_do_not_take_up_what_no_name_fits() {
     assert!(error.contains("nothing to fit: something is missing"), "{error}");
 }
 
-/// Of a Crazyflie's moments its file explains next to nothing, and nothing is named from them. Fitted to three flights, it predicts
-/// those of a fourth.
+/// Of a Crazyflie's moments its file explains next to nothing, and nothing is named from them.
+/// Fitted to three flights, it predicts those of a fourth.
 #[test]
 fn moments_that_a_file_knows_nothing_of_are_fitted_and_predict() {
     let file = vehicle("crazyflie21_brushed.toml");

@@ -1,5 +1,5 @@
-//! Flights of the simulator in `tests/hidden-effects`, which shares no dynamics with ours, each with something hidden in it: what
-//! `find` shows of it, and the verdict of the whole workflow.
+//! Flights of the simulator in `tests/hidden-effects`, which shares no dynamics with ours, each
+//! with something hidden in it: what `find` shows of it, and the verdict of the whole workflow.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use hidden_effects::case::{Answer, Case, Generator, Set};
@@ -29,7 +29,8 @@ pub(crate) fn nothing() -> Case {
 
 /// The vehicle as its file has it, two flights to fit and one held out.
 pub(crate) fn flown(case: &Case) -> (VehicleFile, Flights, Flights) {
-    let flight = |number: usize| (case.flight_names()[number].to_owned(), case.flight(number).unwrap());
+    let flight =
+        |number: usize| (case.flight_names()[number].to_owned(), case.flight(number).unwrap());
     let vehicle = VehicleFile::parse(&case.vehicle_toml(), "vehicle").unwrap();
     (vehicle, vec![flight(0), flight(1)], vec![flight(2)])
 }
@@ -51,15 +52,22 @@ fn excited(mut case: Case, excitation: Excitation) -> Case {
     case
 }
 
-/// Effects of the rotors, the air, the wings and the sensors, alone and in a pair, in other forms, excited more and less.
+/// Effects of the rotors, the air, the wings and the sensors, alone and in a pair, in other forms,
+/// excited more and less.
 fn cases() -> Vec<Case> {
     let lost = Outside::MassLost { mass_fraction: 0.19, at_s: 19.0 };
     vec![
         nothing(),
         nothing().hiding(vec![], Some(lost)),
-        excited(hiding(&[("ground_effect", "standard", &[("effective_radius_m", 0.4)])]), Excitation::Calm),
+        excited(
+            hiding(&[("ground_effect", "standard", &[("effective_radius_m", 0.4)])]),
+            Excitation::Calm,
+        ),
         hiding(&[("motor_lag", "standard", &[("extra_time_constant_s", 0.053)])]),
-        excited(hiding(&[("gnss_latency", "standard", &[("latency_s", 0.31)])]), Excitation::Normal),
+        excited(
+            hiding(&[("gnss_latency", "standard", &[("latency_s", 0.31)])]),
+            Excitation::Normal,
+        ),
         hiding(&[("battery_sag", "standard", &[("voltage_exponent", 0.91)])]),
         hiding(&[
             ("weak_rotor", "standard", &[("rotor", 3.0), ("thrust_loss_fraction", 0.052)]),
@@ -103,9 +111,12 @@ fn what_is_hidden_shows_in_its_channel() {
     let mut seen = 0;
     for case in cases() {
         let Answer { effects, excitation, .. } = &case.answer;
-        let Some(channels) = effects.iter().find_map(|effect| channels_of(&effect.name)) else { continue };
+        let Some(channels) = effects.iter().find_map(|effect| channels_of(&effect.name)) else {
+            continue;
+        };
         assert_ne!(*excitation, Excitation::Calm);
-        let ratio: Vec<f64> = residual(&case).iter().zip(nothing).map(|(r, floor)| r / floor).collect();
+        let ratio: Vec<f64> =
+            residual(&case).iter().zip(nothing).map(|(r, floor)| r / floor).collect();
         let worst = (0..6).max_by(|a, b| ratio[*a].total_cmp(&ratio[*b])).unwrap();
         println!("over nothing hidden {ratio:.2?}: {effects:?}");
         assert!(channels.contains(&CHANNELS[worst]), "{ratio:.2?}: {effects:?}");

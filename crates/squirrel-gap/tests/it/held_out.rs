@@ -5,7 +5,8 @@ use crate::support::{fly_rich, vehicle_with};
 use squirrel_gap::{Kind, diagnose};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Two flights of a vehicle with an effect, and one of a vehicle without it, which the file describes well.
+/// Two flights of a vehicle with an effect, and one of a vehicle without it, which the file
+/// describes well.
 #[test]
 fn what_makes_held_out_flights_worse_than_the_file_is_no_name() {
     let file = VehicleFile::squirrel();

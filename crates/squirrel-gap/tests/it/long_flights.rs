@@ -7,7 +7,8 @@ use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Ten minutes of circling: the drag is found, and the verdict says that it has not looked at everything.
+/// Ten minutes of circling: the drag is found, and the verdict says that it has not looked at
+/// everything.
 #[test]
 fn a_long_flight_is_looked_at_in_parts() {
     let plain = VehicleFile::squirrel();
@@ -17,11 +18,16 @@ fn a_long_flight_is_looked_at_in_parts() {
     let scenario = Scenario { duration_s: 300.0, mission, ..Scenario::find("track").unwrap() };
     let fly = |seed: u64| {
         let scenario = Scenario { seed, ..scenario.clone() };
-        let setup = Setup { vehicle: flown.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+        let setup =
+            Setup { vehicle: flown.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
         (format!("flight {seed}"), setup.fly(true, |_| {}).unwrap().log.unwrap())
     };
     let verdict = diagnose(&plain, &[fly(1), fly(2)], &[], &|_| {}).unwrap().verdict;
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     assert_eq!(verdict.effects[0].name, "linear_drag");
-    assert!(verdict.notes.iter().any(|note| note.contains("of 600 s of flight")), "{:?}", verdict.notes);
+    assert!(
+        verdict.notes.iter().any(|note| note.contains("of 600 s of flight")),
+        "{:?}",
+        verdict.notes
+    );
 }

@@ -6,7 +6,8 @@ use squirrel_gap::{diagnose, find};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A Python with NumPy: `SQUIRREL_PYTHON`, or else `python3`, or else an environment of its own under `target`.
+/// A Python with NumPy: `SQUIRREL_PYTHON`, or else `python3`, or else an environment of its own
+/// under `target`.
 fn python() -> PathBuf {
     let python: PathBuf =
         std::env::var_os("SQUIRREL_PYTHON").map_or_else(|| PathBuf::from("python3"), PathBuf::from);
@@ -24,7 +25,10 @@ fn python() -> PathBuf {
             "{} -m venv failed",
             python.display()
         );
-        assert!(run(&own, &["-m", "pip", "install", "--quiet", "numpy>=2.3.5"]), "NumPy cannot be installed");
+        assert!(
+            run(&own, &["-m", "pip", "install", "--quiet", "numpy>=2.3.5"]),
+            "NumPy cannot be installed"
+        );
     }
     own
 }
@@ -66,15 +70,19 @@ fn numpy_finds_the_same_residual_force() {
     }
 }
 
-/// What is known of these flights: k was fitted at 3.42 to 3.78 V, and thrust sags with the battery, so that the two
-/// flights at 3.17 to 3.54 V disagree more along z.
+/// What is known of these flights: k was fitted at 3.42 to 3.78 V, and thrust sags with the
+/// battery, so that the two flights at 3.17 to 3.54 V disagree more along z.
 #[test]
 fn thrust_disagrees_more_on_an_emptier_battery() {
     let folder = flights("nanobench");
-    let flights: Vec<_> =
-        ["B8_star_slow_rep1", "B3_figure8_fast_rep1", "B9_trefoil_slow_rep1", "B2_circle_medium_rep1"]
-            .map(|name| (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv")))))
-            .into();
+    let flights: Vec<_> = [
+        "B8_star_slow_rep1",
+        "B3_figure8_fast_rep1",
+        "B9_trefoil_slow_rep1",
+        "B2_circle_medium_rep1",
+    ]
+    .map(|name| (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv")))))
+    .into();
     let finding = find(&vehicle("crazyflie21_brushed.toml"), &flights).unwrap();
     println!("{}", serde_json::to_string_pretty(&finding).unwrap());
     let z = |name: &str| finding.residual.per_flight[name].force_body_rms_n[2];
@@ -86,7 +94,8 @@ fn thrust_disagrees_more_on_an_emptier_battery() {
     assert!(finding.notes.is_empty(), "{:?}", finding.notes);
 }
 
-/// Motion capture alone names what the IMU names: the sag that the file lacks, in flights that it was not fitted to.
+/// Motion capture alone names what the IMU names: the sag that the file lacks, in flights that it
+/// was not fitted to.
 #[test]
 fn without_their_imu_flights_still_name_the_sag() {
     let folder = flights("nanobench");
@@ -94,9 +103,16 @@ fn without_their_imu_flights_still_name_the_sag() {
         let mut log = imported("nanobench.toml", &folder.join(format!("{name}.csv")));
         log.sources.remove("imu");
         let flights = [(name.to_owned(), log)];
-        let verdict = diagnose(&vehicle("crazyflie21_brushed.toml"), &flights, &[], &|_| {}).unwrap().verdict;
+        let verdict =
+            diagnose(&vehicle("crazyflie21_brushed.toml"), &flights, &[], &|_| {}).unwrap().verdict;
         println!("{name}: {}", verdict.words);
-        assert_eq!(verdict.effects.iter().map(|e| e.name).collect::<Vec<_>>(), ["battery_sag"], "{name}");
-        assert!(verdict.notes.iter().any(|n| n.contains("forces are those of gnss.position_ned_m")));
+        assert_eq!(
+            verdict.effects.iter().map(|e| e.name).collect::<Vec<_>>(),
+            ["battery_sag"],
+            "{name}"
+        );
+        assert!(
+            verdict.notes.iter().any(|n| n.contains("forces are those of gnss.position_ned_m"))
+        );
     }
 }

@@ -1,5 +1,5 @@
-//! Flights under motion capture: no accelerometer, no gyroscope, position and attitude at 100 Hz. What is named is what the
-//! same flights with their IMU name.
+//! Flights under motion capture: no accelerometer, no gyroscope, position and attitude at 100 Hz.
+//! What is named is what the same flights with their IMU name.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{vehicle, vehicle_with};
@@ -74,8 +74,13 @@ fn captured(log: &FlightLog, seed: u64) -> FlightLog {
 
 /// Three flights of an individual, with their IMU and without.
 fn flights(individual: &VehicleFile) -> [Flights; 2] {
-    let own: Flights = (1..=3).map(|seed| (format!("flight {seed}"), fly(individual, seed))).collect();
-    let seen = own.iter().zip(11..).map(|((name, log), seed)| (name.clone(), captured(log, seed))).collect();
+    let own: Flights =
+        (1..=3).map(|seed| (format!("flight {seed}"), fly(individual, seed))).collect();
+    let seen = own
+        .iter()
+        .zip(11..)
+        .map(|((name, log), seed)| (name.clone(), captured(log, seed)))
+        .collect();
     [own, seen]
 }
 
@@ -89,9 +94,14 @@ fn verdict(vehicle: &VehicleFile, flights: &Flights) -> Verdict {
 }
 
 fn size(verdict: &Verdict, effect: &str, key: &str) -> [f64; 3] {
-    let found =
-        verdict.effects.iter().find(|e| e.name == effect).unwrap_or_else(|| panic!("{effect}: not named"));
-    let Value::Number { value, low, high } = found.parameters[key] else { panic!("{key}: no number") };
+    let found = verdict
+        .effects
+        .iter()
+        .find(|e| e.name == effect)
+        .unwrap_or_else(|| panic!("{effect}: not named"));
+    let Value::Number { value, low, high } = found.parameters[key] else {
+        panic!("{key}: no number")
+    };
     [value, low, high]
 }
 
@@ -105,7 +115,8 @@ fn said(notes: &[String]) -> [f64; 2] {
     [after("below"), after("with noise of")]
 }
 
-/// A right model leaves what the noise of positions is worth behind two differences and the filter, and nothing is named.
+/// A right model leaves what the noise of positions is worth behind two differences and the filter,
+/// and nothing is named.
 #[test]
 fn the_own_vehicle_leaves_the_noise_of_positions() {
     let own = vehicle("squirrel.toml");
@@ -114,14 +125,20 @@ fn the_own_vehicle_leaves_the_noise_of_positions() {
     let [cutoff_hz, noise_m_s2] = said(&finding.notes);
     let tau_f = std::f64::consts::TAU * cutoff_hz;
     let formula = POSITION_NOISE_M * tau_f * tau_f * (2.0 * cutoff_hz / RATE_HZ / 5.0).sqrt();
-    println!("{cutoff_hz} Hz, {noise_m_s2} m/s^2, {formula} m/s^2, {:?}", finding.residual.force_body_rms_n);
+    println!(
+        "{cutoff_hz} Hz, {noise_m_s2} m/s^2, {formula} m/s^2, {:?}",
+        finding.residual.force_body_rms_n
+    );
     assert!((noise_m_s2 / formula - 1.0).abs() < 0.1, "said {noise_m_s2}, is {formula}");
     for force_n in finding.residual.force_body_rms_n {
         let over = force_n / (own.vehicle.parameters().mass_kg * formula);
         assert!((0.8..1.2).contains(&over), "{over} times the noise");
     }
     let notes = finding.notes.join("\n");
-    assert!(notes.contains("imu.omega_body_rad_s: missing; rates are those of attitude"), "{notes}");
+    assert!(
+        notes.contains("imu.omega_body_rad_s: missing; rates are those of attitude"),
+        "{notes}"
+    );
     assert_eq!(verdict(&own, &flights).verdict, Kind::None);
 }
 
@@ -145,7 +162,8 @@ fn names_are_those_of_the_same_flights_with_an_imu() {
     }
 }
 
-/// What an autopilot writes to a card: acceleration in the world less gravity, roll and yaw, velocity; no pitch, no gyroscope.
+/// What an autopilot writes to a card: acceleration in the world less gravity, roll and yaw,
+/// velocity; no pitch, no gyroscope.
 fn carded(log: &FlightLog) -> FlightLog {
     let (time_s, force) = log.channel("imu.specific_force_body_m_s2").unwrap();
     let (true_s, attitude) = log.channel("truth.q_ned_from_body_wxyz").unwrap();
@@ -167,8 +185,8 @@ fn carded(log: &FlightLog) -> FlightLog {
     out
 }
 
-/// Pitch is that of the thrust, so that drag along the nose is lost in it; in slow flight thrust is as well known as with an
-/// IMU.
+/// Pitch is that of the thrust, so that drag along the nose is lost in it; in slow flight thrust is
+/// as well known as with an IMU.
 #[test]
 fn an_acceleration_in_the_world_and_two_angles_are_enough_for_thrust() {
     let own = vehicle("squirrel.toml");
@@ -208,7 +226,9 @@ fn neither_imu_nor_position_is_one_error() {
     for missing in [&["gnss"][..], &["attitude"]] {
         assert_eq!(
             without(missing),
-            format!("f: imu.specific_force_body_m_s2: missing; the residual needs it, or {instead}")
+            format!(
+                "f: imu.specific_force_body_m_s2: missing; the residual needs it, or {instead}"
+            )
         );
     }
 }

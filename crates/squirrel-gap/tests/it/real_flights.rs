@@ -11,8 +11,9 @@ type Flights = Vec<(String, FlightLog)>;
 /// Flights that train on a full battery and are held out on an emptier one.
 fn nanobench() -> (Flights, Flights) {
     let folder = flights("nanobench");
-    let read =
-        |name: &str| (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv"))));
+    let read = |name: &str| {
+        (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv"))))
+    };
     let train = ["B8_star_slow_rep1", "B3_figure8_fast_rep1"].map(read);
     let held_out = ["B9_trefoil_slow_rep1", "B2_circle_medium_rep1"].map(read);
     (train.into(), held_out.into())
@@ -30,7 +31,8 @@ fn names(verdict: &Verdict) -> Vec<&'static str> {
     verdict.effects.iter().map(|effect| effect.name).chain(others).collect()
 }
 
-/// Thrust is a constant times the sum of squares there, fitted at 3.42 to 3.78 V; the held-out flights are at 3.17 to 3.54 V.
+/// Thrust is a constant times the sum of squares there, fitted at 3.42 to 3.78 V; the held-out
+/// flights are at 3.17 to 3.54 V.
 #[test]
 fn thrust_sags_with_the_battery_of_a_crazyflie() {
     let (flights, held_out) = nanobench();
@@ -41,7 +43,8 @@ fn thrust_sags_with_the_battery_of_a_crazyflie() {
     let names: Vec<String> = flights.iter().map(|(name, _)| name.clone()).collect();
     let text = add(&nominal, &diagnosis, &names).unwrap();
     let patched = VehicleFile::parse(&text, "patched").unwrap();
-    let vertical = |vehicle: &VehicleFile| find(vehicle, &held_out).unwrap().residual.force_body_rms_n[2];
+    let vertical =
+        |vehicle: &VehicleFile| find(vehicle, &held_out).unwrap().residual.force_body_rms_n[2];
     let (before, after) = (vertical(&nominal), vertical(&patched));
     println!("vertical force on the held-out flights: {before:.5} N, patched {after:.5} N");
     assert!(after <= 0.5 * before, "{after} N, without sag {before} N");
@@ -51,8 +54,13 @@ fn thrust_sags_with_the_battery_of_a_crazyflie() {
 #[test]
 fn sag_and_a_free_thrust_curve_are_confounded() {
     let (flights, held_out) = nanobench();
-    let verdict = diagnosed(&vehicle("crazyflie21_brushed_curve.toml"), &flights, &held_out).verdict;
-    assert!(matches!(verdict.verdict, Kind::Ambiguous | Kind::NotIdentifiable), "{:?}", verdict.verdict);
+    let verdict =
+        diagnosed(&vehicle("crazyflie21_brushed_curve.toml"), &flights, &held_out).verdict;
+    assert!(
+        matches!(verdict.verdict, Kind::Ambiguous | Kind::NotIdentifiable),
+        "{:?}",
+        verdict.verdict
+    );
     assert!(names(&verdict).contains(&"battery_sag"), "{:?}", names(&verdict));
     assert!(verdict.words.contains("curve"), "{}", verdict.words);
     assert!(verdict.fly_next.is_some());
@@ -62,9 +70,11 @@ fn sag_and_a_free_thrust_curve_are_confounded() {
 #[test]
 fn rotors_lag_in_logs_that_hold_nothing_but_the_inertial_unit() {
     let folder = flights("arpl-motorlag");
-    let read = |name: &str| (name.to_owned(), imported("arpl.toml", &folder.join(format!("{name}.csv"))));
+    let read =
+        |name: &str| (name.to_owned(), imported("arpl.toml", &folder.join(format!("{name}.csv"))));
     let verdict =
-        diagnosed(&vehicle("crazyflie2_arpl.toml"), &vec![read("log10")], &vec![read("log16")]).verdict;
+        diagnosed(&vehicle("crazyflie2_arpl.toml"), &vec![read("log10")], &vec![read("log16")])
+            .verdict;
     // The battery is not logged: its slow drift of thrust stays, and is no other effect.
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     let names: Vec<_> = verdict.effects.iter().map(|e| e.name).collect();

@@ -1,5 +1,5 @@
-//! Models of real vehicles miss a little everywhere, and logs hold what a filter believed: names that stand in spite of it, and
-//! names that are not to be had.
+//! Models of real vehicles miss a little everywhere, and logs hold what a filter believed: names
+//! that stand in spite of it, and names that are not to be had.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{fly, fly_rich, vehicle_with};
@@ -11,24 +11,28 @@ use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
 
 fn logs(folder: &Path) -> Vec<(String, FlightLog)> {
-    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let mut files: Vec<_> =
+        std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
     files.iter().map(|file| (file.display().to_string(), FlightLog::read(file).unwrap())).collect()
 }
 
 /// A blind case with its vehicle file.
 fn blind(set: Set, index: usize) -> (Case, VehicleFile, Diagnosis) {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("real-models-{set:?}-{index}"));
+    let folder =
+        Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("real-models-{set:?}-{index}"));
     let (case, path) = Case::draw_and_make(set, index, 11, &folder).unwrap();
     let vehicle = VehicleFile::load(&path.join("vehicle.toml")).unwrap();
     let diagnosis =
-        diagnose(&vehicle, &logs(&path.join("train")), &logs(&path.join("held-out")), &|_| {}).unwrap();
+        diagnose(&vehicle, &logs(&path.join("train")), &logs(&path.join("held-out")), &|_| {})
+            .unwrap();
     std::fs::remove_dir_all(&folder).unwrap();
     println!("{}", diagnosis.verdict.words);
     (case, vehicle, diagnosis)
 }
 
-/// A coloured force and moment of 10 to 25 % of what was measured lies on every axis beside the effect.
+/// A coloured force and moment of 10 to 25 % of what was measured lies on every axis beside the
+/// effect.
 #[test]
 fn a_name_stands_beside_what_a_model_misses_everywhere() {
     let (case, vehicle, diagnosis) = blind(Set::Misfit, 0);
@@ -43,12 +47,13 @@ fn a_name_stands_beside_what_a_model_misses_everywhere() {
     assert!(patched.contains(&format!("[effects.{}]", verdict.effects[0].name)), "{patched}");
 }
 
-/// A moment that no effect of the catalogue makes, so large that the file explains little of all: quick moments still follow the
-/// commands, so that they take part and it is seen.
+/// A moment that no effect of the catalogue makes, so large that the file explains little of all:
+/// quick moments still follow the commands, so that they take part and it is seen.
 #[test]
 fn a_large_moment_that_no_name_fits_is_seen() {
-    let is_one =
-        |index: &usize| outside(*index).is_some_and(|outside| outside.name() == "formula_product_moment");
+    let is_one = |index: &usize| {
+        outside(*index).is_some_and(|outside| outside.name() == "formula_product_moment")
+    };
     let (_, _, diagnosis) = blind(Set::Outside, (0..40).find(is_one).unwrap());
     assert_eq!(diagnosis.verdict.verdict, Kind::OutsideCatalogue, "{}", diagnosis.verdict.words);
     let channels = diagnosis.verdict.leftover.unwrap().channels;
@@ -59,12 +64,15 @@ fn outside(index: usize) -> Option<hidden_effects::outside::Outside> {
     Case::draw(Set::Outside, index, 11).answer.outside
 }
 
-/// The thrust of each flight drifts by itself, as with a pack that warms up: a drag that the file lacks is named beside it, and the
-/// force that is left is told. A thrust that drifts by itself has no name.
+/// The thrust of each flight drifts by itself, as with a pack that warms up: a drag that the file
+/// lacks is named beside it, and the force that is left is told. A thrust that drifts by itself has
+/// no name.
 #[test]
 fn a_name_stands_beside_a_slow_force_of_each_flight() {
-    let drag =
-        ("linear_n_s_per_m = { value = [0.0, 0.0, 0.0]", "linear_n_s_per_m = { value = [0.2, 0.2, 0.0]");
+    let drag = (
+        "linear_n_s_per_m = { value = [0.0, 0.0, 0.0]",
+        "linear_n_s_per_m = { value = [0.2, 0.2, 0.0]",
+    );
     let (file, flown) = (VehicleFile::squirrel(), vehicle_with("squirrel.toml", &[drag]));
     let answer = |vehicle: &VehicleFile| {
         let drifts = [(1, 0.004), (2, -0.004), (3, 0.003)];
@@ -100,25 +108,30 @@ fn drifting((name, mut log): (String, FlightLog), drift: f64) -> (String, Flight
     (name, log)
 }
 
-/// Where the file overstates what there is, that is found, and what it takes away leaves no less than nothing.
+/// Where the file overstates what there is, that is found, and what it takes away leaves no less
+/// than nothing.
 #[test]
 fn a_drag_that_the_file_overstates_is_found() {
-    let drag =
-        ("linear_n_s_per_m = { value = [0.0, 0.0, 0.0]", "linear_n_s_per_m = { value = [0.1, 0.1, 0.1]");
+    let drag = (
+        "linear_n_s_per_m = { value = [0.0, 0.0, 0.0]",
+        "linear_n_s_per_m = { value = [0.1, 0.1, 0.1]",
+    );
     let file = vehicle_with("squirrel.toml", &[drag]);
     let flown = VehicleFile::squirrel();
-    let verdict = diagnose(&file, &[fly_rich(&flown, 1)], &[fly_rich(&flown, 2)], &|_| {}).unwrap().verdict;
+    let verdict =
+        diagnose(&file, &[fly_rich(&flown, 1)], &[fly_rich(&flown, 2)], &|_| {}).unwrap().verdict;
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     assert_eq!(verdict.effects[0].name, "linear_drag", "{}", verdict.words);
-    let squirrel_gap::Value::Number { value, .. } = verdict.effects[0].parameters["extra_drag_n_s_per_m"]
+    let squirrel_gap::Value::Number { value, .. } =
+        verdict.effects[0].parameters["extra_drag_n_s_per_m"]
     else {
         panic!("{}", verdict.words);
     };
     assert!((-0.1..-0.09).contains(&value), "{value}");
 }
 
-/// A lag or delay that the file has and the vehicle has not looks like commands that act before they are given, and a load that
-/// is not there like one that weighs less than nothing.
+/// A lag or delay that the file has and the vehicle has not looks like commands that act before
+/// they are given, and a load that is not there like one that weighs less than nothing.
 #[test]
 fn a_lag_a_latency_or_a_load_that_is_not_there_is_found() {
     let flown = VehicleFile::squirrel();
@@ -140,13 +153,15 @@ fn a_lag_a_latency_or_a_load_that_is_not_there_is_found() {
     }
 }
 
-/// Three flights on motors and propellers that give 2.5 % more or less: that is no reason to doubt what holds in each of them.
+/// Three flights on motors and propellers that give 2.5 % more or less: that is no reason to doubt
+/// what holds in each of them.
 #[test]
 fn flights_that_differ_in_thrust_lack_the_same_effect() {
     let sd = |text: &str| {
         let line = text.lines().find(|line| line.starts_with("thrust_coefficient_n_s2")).unwrap();
         let value: f64 = line.split(&['=', ','][..]).nth(2).unwrap().trim().parse().unwrap();
-        let tolerant = format!("thrust_coefficient_n_s2 = {{ value = {value:e}, sd = {:e} }}", 0.05 * value);
+        let tolerant =
+            format!("thrust_coefficient_n_s2 = {{ value = {value:e}, sd = {:e} }}", 0.05 * value);
         (line.to_owned(), tolerant)
     };
     let (line, tolerant) = sd(&VehicleFile::squirrel().text);
@@ -157,8 +172,9 @@ fn flights_that_differ_in_thrust_lack_the_same_effect() {
         );
         fly_rich(&vehicle_with("squirrel.toml", &[("[limits]", &effects)]), seed)
     };
-    let verdict =
-        diagnose(&file, &[day(1, -0.025), day(2, 0.0), day(3, 0.025)], &[], &|_| {}).unwrap().verdict;
+    let verdict = diagnose(&file, &[day(1, -0.025), day(2, 0.0), day(3, 0.025)], &[], &|_| {})
+        .unwrap()
+        .verdict;
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     assert_eq!(
         verdict.effects.iter().map(|e| e.name).collect::<Vec<_>>(),
@@ -168,7 +184,8 @@ fn flights_that_differ_in_thrust_lack_the_same_effect() {
     );
 }
 
-/// The attitude as a filter has it that takes a lasting acceleration for the vertical: 0.6 deg at a metre per second squared.
+/// The attitude as a filter has it that takes a lasting acceleration for the vertical: 0.6 deg at a
+/// metre per second squared.
 fn levelled(mut log: FlightLog) -> FlightLog {
     let (times, forces) = {
         let (times, forces) = log.channel("imu.specific_force_body_m_s2").unwrap();
@@ -203,7 +220,8 @@ fn an_attitude_that_leans_into_accelerations_is_no_effect() {
     assert_eq!(verdict.verdict, Kind::None, "{}", verdict.words);
 }
 
-/// A held-out flight on propellers that give 0.8 % less thrust: a name that is right is not worse for that.
+/// A held-out flight on propellers that give 0.8 % less thrust: a name that is right is not worse
+/// for that.
 #[test]
 fn a_held_out_flight_of_another_day_does_not_take_a_name_away() {
     let file = VehicleFile::squirrel();
@@ -211,7 +229,8 @@ fn a_held_out_flight_of_another_day_does_not_take_a_name_away() {
     let worn = "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.08\n\n[effects.thrust_coefficient]\nthrust_fraction = -0.008\n\n[limits]";
     let flown = vehicle_with("squirrel.toml", &[("[limits]", effect)]);
     let later = vehicle_with("squirrel.toml", &[("[limits]", worn)]);
-    let verdict = diagnose(&file, &[fly_rich(&flown, 1)], &[fly_rich(&later, 2)], &|_| {}).unwrap().verdict;
+    let verdict =
+        diagnose(&file, &[fly_rich(&flown, 1)], &[fly_rich(&later, 2)], &|_| {}).unwrap().verdict;
     assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
     let gap = verdict.gap.as_ref().unwrap();
     assert!(gap.removed_fraction > 0.98, "{gap:?}");

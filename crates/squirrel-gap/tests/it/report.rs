@@ -7,8 +7,9 @@
 use squirrel_core::effects::Effects;
 use squirrel_gap::ClosedLoop;
 use squirrel_gap::report::{
-    Answer, Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext, HeldOut,
-    HeldOutChannel, Horizon, InputCorrelation, PANELS, ParameterRow, ReportData, RotorRow, Whiteness, render,
+    Answer, Bin, Conditional, Confusability, DomainRow, Errors, Evidence, FlightPanel, FlyNext,
+    HeldOut, HeldOutChannel, Horizon, InputCorrelation, PANELS, ParameterRow, ReportData, RotorRow,
+    Whiteness, render,
 };
 
 /// Reproducible, between -1 and 1.
@@ -76,7 +77,9 @@ fn example() -> ReportData {
     let whiteness = |channel: &str, seed: usize| Whiteness {
         channel: channel.to_owned(),
         lag_s: 1.0 / 30.0,
-        autocorrelation: (0..40).map(|k| 0.5 * f64::exp(-0.5 * k as f64) + 0.04 * noise(seed + k)).collect(),
+        autocorrelation: (0..40)
+            .map(|k| 0.5 * f64::exp(-0.5 * k as f64) + 0.04 * noise(seed + k))
+            .collect(),
         inputs: ["thrust", "roll command", "pitch command"]
             .iter()
             .enumerate()
@@ -233,17 +236,41 @@ fn every_panel_holds_its_data() {
         ),
         (
             "panel-h",
-            vec!["lacks linear_drag", "0 to 9.20 m/s", "0.180 to 10.9 m", "+extra_drag_n_s_per_m = 0.0851"],
+            vec![
+                "lacks linear_drag",
+                "0 to 9.20 m/s",
+                "0.180 to 10.9 m",
+                "+extra_drag_n_s_per_m = 0.0851",
+            ],
         ),
         (
             "panel-a",
-            vec!["rich 0", "rich 1", "before", "after", "fx m/s", "Mz N m", "max 9.0 m/s", "wings", "height"],
+            vec![
+                "rich 0",
+                "rich 1",
+                "before",
+                "after",
+                "fx m/s",
+                "Mz N m",
+                "max 9.0 m/s",
+                "wings",
+                "height",
+            ],
         ),
         ("panel-b", vec!["1234", "1231", "rival within 5 nats", "payload_swing"]),
-        ("panel-c", vec!["fx against forward airspeed", "6800 samples in 17 bins", "before", "after"]),
+        (
+            "panel-c",
+            vec!["fx against forward airspeed", "6800 samples in 17 bins", "before", "after"],
+        ),
         (
             "panel-d",
-            vec!["normal 4", "best rival (quadratic_drag)", "0.0930 m/s", "0.0107 m/s", "noise floor"],
+            vec![
+                "normal 4",
+                "best rival (quadratic_drag)",
+                "0.0930 m/s",
+                "0.0107 m/s",
+                "noise floor",
+            ],
         ),
         (
             "panel-e",
@@ -256,11 +283,22 @@ fn every_panel_holds_its_data() {
         ),
         (
             "panel-f",
-            vec!["0.0851 [0.0823, 0.0879] N s/m", "thrust_coefficient.thrust_fraction", "\u{2212}0.0610"],
+            vec![
+                "0.0851 [0.0823, 0.0879] N s/m",
+                "thrust_coefficient.thrust_fraction",
+                "\u{2212}0.0610",
+            ],
         ),
         (
             "panel-g",
-            vec!["6.9", "17", "not separated", "fly excite_rich", "wings open at", "weigh the vehicle"],
+            vec![
+                "6.9",
+                "17",
+                "not separated",
+                "fly excite_rich",
+                "wings open at",
+                "weigh the vehicle",
+            ],
         ),
     ] {
         let text = panel(&html, id);
@@ -303,7 +341,10 @@ fn what_is_missing_is_said_in_words() {
     let html = render(&partial);
     check(&html);
     let first = panel(&html, "answers");
-    assert!(first.contains("Where they differ most: fx") && first.contains("nothing was added to the model"));
+    assert!(
+        first.contains("Where they differ most: fx")
+            && first.contains("nothing was added to the model")
+    );
     assert!(!first.contains("Set aside"));
     assert!(panel(&html, "panel-a").contains("nothing was added to the model"));
     assert!(panel(&html, "panel-b").contains(untried), "at its place without a bar");
@@ -367,11 +408,13 @@ fn ten_flights_of_five_minutes_stay_below_a_megabyte_and_a_half() {
     assert!(html.len() < 1_500_000, "{} bytes", html.len());
 }
 
-/// `SQUIRREL_GAP_REPORT=report.html cargo test -p squirrel-gap --test report` checks a report that something else wrote.
+/// `SQUIRREL_GAP_REPORT=report.html cargo test -p squirrel-gap --test report` checks a report that
+/// something else wrote.
 #[test]
 fn a_report_file_has_all_panels() {
     let file = std::env::var_os("SQUIRREL_GAP_REPORT");
-    let html = file.map_or_else(|| render(&example()), |path| std::fs::read_to_string(path).unwrap());
+    let html =
+        file.map_or_else(|| render(&example()), |path| std::fs::read_to_string(path).unwrap());
     check(&html);
     for id in PANELS {
         let text = panel(&html, id);

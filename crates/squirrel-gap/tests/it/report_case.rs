@@ -1,4 +1,5 @@
-//! The report of a hidden effect, from flight to page: every panel holds data, and the data is that of the verdict.
+//! The report of a hidden effect, from flight to page: every panel holds data, and the data is that
+//! of the verdict.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use hidden_effects::case::{Case, Set};
@@ -22,7 +23,8 @@ impl Found {
     fn new(name: &str) -> Self {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
         let (_, case) = Case::draw_and_make(Set::Single, 0, 5, &folder).unwrap();
-        let log = |file: &str| (format!("{FOLDER}/{file}"), FlightLog::read(&case.join(file)).unwrap());
+        let log =
+            |file: &str| (format!("{FOLDER}/{file}"), FlightLog::read(&case.join(file)).unwrap());
         Self {
             vehicle: VehicleFile::load(&case.join("vehicle.toml")).unwrap(),
             flights: vec![log("train/flight00.mcap"), log("train/flight01.mcap")],
@@ -66,7 +68,10 @@ fn every_panel_of_a_hidden_effect_holds_data() {
         assert!(text.contains("<svg") || id == "panel-h", "{id} has no picture");
         assert!(!text.contains("class=\"missing\""), "{id} lacks something");
     }
-    assert!(!html.contains(FOLDER) && !html.contains(env!("CARGO_TARGET_TMPDIR")), "an absolute path");
+    assert!(
+        !html.contains(FOLDER) && !html.contains(env!("CARGO_TARGET_TMPDIR")),
+        "an absolute path"
+    );
     assert_eq!(
         render(&found.picture(&found.diagnosis(), Some(&text))),
         html,
@@ -74,29 +79,44 @@ fn every_panel_of_a_hidden_effect_holds_data() {
     );
 
     let effect = &diagnosis.verdict.effects[0];
-    let (_, Value::Number { value, low, high }) = effect.parameters.first_key_value().unwrap() else {
+    let (_, Value::Number { value, low, high }) = effect.parameters.first_key_value().unwrap()
+    else {
         panic!("{effect:?}")
     };
     let row = &data.parameters[0];
     assert_eq!((row.value, row.low, row.high), (*value, *low, *high));
     for flight in &data.flights {
         assert!(mean(&flight.before) > 1.5, "{}: {}", flight.name, mean(&flight.before));
-        assert!((0.6..1.3).contains(&mean(&flight.after)), "{}: {}", flight.name, mean(&flight.after));
+        assert!(
+            (0.6..1.3).contains(&mean(&flight.after)),
+            "{}: {}",
+            flight.name,
+            mean(&flight.after)
+        );
         assert_eq!(flight.speed_m_s.len(), flight.before[0].len());
     }
     // Against a unit of the effect, the slope is the size of the effect; what is left is flat.
     let bins = &data.conditional[0].bins;
     let (first, last) = (bins.first().unwrap(), bins.last().unwrap());
-    let slope = |of: fn(&squirrel_gap::report::Bin) -> f64| (of(last) - of(first)) / (last.at - first.at);
+    let slope =
+        |of: fn(&squirrel_gap::report::Bin) -> f64| (of(last) - of(first)) / (last.at - first.at);
     let (before, after) = (slope(|b| b.before_mean), slope(|b| b.after_mean));
-    assert!((before / value - 1.0).abs() < 0.15 && (after / value).abs() < 0.15, "{before} {after} {value}");
+    assert!(
+        (before / value - 1.0).abs() < 0.15 && (after / value).abs() < 0.15,
+        "{before} {after} {value}"
+    );
     let held_out = data.held_out.as_ref().unwrap();
     assert_eq!(held_out.channels.len(), 12);
     let second = held_out.horizons.iter().find(|h| h.horizon_s > 0.95).unwrap().errors;
     assert!(second.nominal > 2.0 * second.fitted && second.floor == 1.0, "{second:?}");
     assert_eq!(data.whiteness.len(), 6);
     for w in &data.whiteness {
-        assert!(w.autocorrelation.iter().all(|r| r.abs() < 0.4), "{}: {:?}", w.channel, w.autocorrelation);
+        assert!(
+            w.autocorrelation.iter().all(|r| r.abs() < 0.4),
+            "{}: {:?}",
+            w.channel,
+            w.autocorrelation
+        );
     }
     assert_eq!(data.evidence.iter().filter(|e| e.is_answer).count(), 1);
 }
@@ -120,7 +140,8 @@ fn logs_that_contradict_themselves_leave_the_reason_in_every_panel() {
     }
 }
 
-/// A flight given twice is told in the verdict's words, by a name without its folder; the others fill the panels.
+/// A flight given twice is told in the verdict's words, by a name without its folder; the others
+/// fill the panels.
 #[test]
 fn a_flight_that_is_set_aside_is_told_in_the_report() {
     let mut found = Found::new("report_aside");

@@ -1,4 +1,5 @@
-//! Flights with measured rotor speeds: thrust is judged by the speeds that the rotors had, whatever they were told.
+//! Flights with measured rotor speeds: thrust is judged by the speeds that the rotors had, whatever
+//! they were told.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{vehicle, vehicle_with};
@@ -11,7 +12,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 type Flights = Vec<(String, FlightLog)>;
 
-/// Three flights of an individual as another vehicle's log would have them, where what is known of rotors was measured.
+/// Three flights of an individual as another vehicle's log would have them, where what is known of
+/// rotors was measured.
 fn flights(individual: &VehicleFile) -> Flights {
     let fly = |seed: u64| {
         let mut scenario = Scenario::find("excite_rich").unwrap();
@@ -19,8 +21,12 @@ fn flights(individual: &VehicleFile) -> Flights {
         if let MissionTable::Excite(table) = &mut scenario.mission {
             table.heights_m = vec![1.5, 1.0, 0.7];
         }
-        let setup =
-            Setup { vehicle: individual.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+        let setup = Setup {
+            vehicle: individual.clone(),
+            arm: Arm::Pc,
+            scenario,
+            integrator: Integrator::Rk4,
+        };
         let mut log = setup.fly(true, |_| {}).unwrap().log.unwrap();
         log.metadata.clear();
         log
@@ -44,7 +50,8 @@ fn moments(finding: &Finding) -> [f64; 3] {
     finding.residual.moment_body_rms_n_m
 }
 
-/// Rotors that lag and sag: the commands are wrong about the speeds, the speeds are right about the forces.
+/// Rotors that lag and sag: the commands are wrong about the speeds, the speeds are right about the
+/// forces.
 #[test]
 fn lag_and_sag_do_not_leak_into_thrust() {
     let model = vehicle("squirrel.toml");
@@ -63,7 +70,8 @@ fn lag_and_sag_do_not_leak_into_thrust() {
         moments(&told)
     );
     for axis in 0..3 {
-        let over = |f: &Finding| f.residual.force_body_rms_n[axis] / clean.residual.force_body_rms_n[axis];
+        let over =
+            |f: &Finding| f.residual.force_body_rms_n[axis] / clean.residual.force_body_rms_n[axis];
         assert!((0.95..1.05).contains(&over(&measured)), "force, axis {axis}: {}", over(&measured));
         let over = |f: &Finding| moments(f)[axis] / moments(&clean)[axis];
         // Rotors that lag turn the vehicle less.
@@ -85,12 +93,17 @@ fn a_hidden_thrust_coefficient_is_found_beside_a_lag() {
         "[effects.motor_lag]\nextra_time_constant_s = 0.05\n[effects.thrust_coefficient]\nthrust_fraction = -0.12",
     );
     let flights = flights(&hidden);
-    let verdict = diagnose(&vehicle("squirrel.toml"), &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
-    println!("{:?} {}\n{:#?}\n{:?}", verdict.verdict, verdict.words, verdict.effects, verdict.notes);
+    let verdict =
+        diagnose(&vehicle("squirrel.toml"), &flights[..2], &flights[2..], &|_| {}).unwrap().verdict;
+    println!(
+        "{:?} {}\n{:#?}\n{:?}",
+        verdict.verdict, verdict.words, verdict.effects, verdict.notes
+    );
     // Whether the form is said to fit all of it depends on the noise of the flights.
     assert!(nothing_to_add(&verdict).is_none(), "{}", verdict.words);
     assert_eq!(verdict.effects.iter().map(|e| e.name).collect::<Vec<_>>(), ["thrust_coefficient"]);
-    let Value::Number { value, low, high } = verdict.effects[0].parameters["thrust_fraction"] else {
+    let Value::Number { value, low, high } = verdict.effects[0].parameters["thrust_fraction"]
+    else {
         panic!("no number")
     };
     assert!((low..high).contains(&-0.12), "{value}, {low} to {high}");

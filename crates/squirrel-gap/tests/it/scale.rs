@@ -1,4 +1,5 @@
-//! The same logs explained for a vehicle of an eighth or eight times the mass: no size of the workflow is one of 0.5 kg.
+//! The same logs explained for a vehicle of an eighth or eight times the mass: no size of the
+//! workflow is one of 0.5 kg.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::fly_rich;
@@ -8,7 +9,8 @@ use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use toml_edit::{DocumentMut, Item, Table};
 
-/// Fields that carry mass: with all of them times a factor, and lengths and times as they are, a vehicle flies the same.
+/// Fields that carry mass: with all of them times a factor, and lengths and times as they are, a
+/// vehicle flies the same.
 const HEAVY: [(&str, &[&str]); 4] = [
     ("mass", &["mass_kg", "inertia_kg_m2"]),
     ("propulsion", &["thrust_coefficient_n_s2", "torque_coefficient_n_m_s2"]),
@@ -82,7 +84,8 @@ fn same_answer(hidden: &str) {
     };
     let own = verdict(1.0);
     println!("{}", own.words);
-    // Whether a form is said to fit all of it depends on the noise of the flight; what is scaled here is the answer.
+    // Whether a form is said to fit all of it depends on the noise of the flight; what is scaled
+    // here is the answer.
     let patches = [Kind::Named, Kind::NamedFormDiffers, Kind::NamedIncomplete];
     assert!(patches.contains(&own.verdict), "{hidden}: {}", own.words);
     for factor in [0.125, 8.0] {
@@ -95,7 +98,10 @@ fn same_answer(hidden: &str) {
             for (own, other) in own.into_iter().zip(other) {
                 let expected = own * factor.powi(power(name, key));
                 let off = (other - expected).abs();
-                assert!(off <= 1e-6 * expected.abs(), "{name}.{key} x {factor}: {other}, not {expected}");
+                assert!(
+                    off <= 1e-6 * expected.abs(),
+                    "{name}.{key} x {factor}: {other}, not {expected}"
+                );
             }
         }
     }

@@ -6,8 +6,8 @@ use squirrel_gap::{Kind, Value, Verdict, diagnose};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Two flights of a squirrel with an effect, against its file without. The attitude is measured from outside: one that a
-/// filter has made from the same gyroscope has its errors, too.
+/// Two flights of a squirrel with an effect, against its file without. The attitude is measured
+/// from outside: one that a filter has made from the same gyroscope has its errors, too.
 fn flown(effects: &str) -> [(String, FlightLog); 2] {
     let file = VehicleFile::squirrel().text.replace("filter = \"eskf\"", "filter = \"external\"");
     let vehicle = VehicleFile::parse(&format!("{file}\n{effects}"), "vehicle").unwrap();
@@ -29,7 +29,8 @@ fn number(verdict: &Verdict, key: &str) -> f64 {
     }
 }
 
-/// About each axis a scale is an alias of the inertia's, as far as angular accelerations go; the attitude tells.
+/// About each axis a scale is an alias of the inertia's, as far as angular accelerations go; the
+/// attitude tells.
 #[test]
 fn a_scale_of_the_gyroscope_is_no_inertia() {
     let flights = flown(
@@ -67,7 +68,8 @@ fn a_compass_that_follows_the_current_is_no_heading_bias() {
 #[test]
 fn a_step_of_the_clock_is_no_skew() {
     for step_s in [0.05, -0.04] {
-        let verdict = verdict(&flown(&format!("[effects.clock_step]\nstep_s = {step_s}\nat_s = 17.0\n")));
+        let verdict =
+            verdict(&flown(&format!("[effects.clock_step]\nstep_s = {step_s}\nat_s = 17.0\n")));
         names(&verdict, "clock_step");
         let (by_s, at_s) = (number(&verdict, "step_s"), number(&verdict, "at_s"));
         assert!((by_s - step_s).abs() < 0.01 && (at_s - 17.0).abs() < 1.0, "{by_s} s at {at_s} s");
@@ -80,7 +82,8 @@ fn a_skew_of_the_clock_is_no_step() {
     names(&verdict(&flown("[effects.clock_skew]\nskew_ppm = 1000.0\n")), "clock_skew");
 }
 
-/// A bias that runs off has no name: the flights contradict themselves. A scale of a tenth is no contradiction.
+/// A bias that runs off has no name: the flights contradict themselves. A scale of a tenth is no
+/// contradiction.
 #[test]
 fn a_gyroscope_that_drifts_is_set_aside_and_one_with_a_scale_is_not() {
     let scale = flown(

@@ -1,5 +1,5 @@
-//! Flights of the simulator, where the truth is known: against its own vehicle nothing but noise is left, against another
-//! one what was changed.
+//! Flights of the simulator, where the truth is known: against its own vehicle nothing but noise is
+//! left, against another one what was changed.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::vehicle_with;
@@ -26,9 +26,10 @@ fn squirrel_with(changes: &[(&str, &str)]) -> VehicleFile {
 
 /// Residual that white noise of the IMU leaves: force, N, per axis and moment, N m.
 ///
-/// A filter of 12 Hz passes `12 / 150` of the power of noise at 300 Hz. Of a derivative it passes what lies below about
-/// 12 Hz: `(2 pi)^2 12^3 / (3 * 150)` of the power of the rate's noise. The bar is 1.3 times that, because the edge
-/// of the filter is not sharp and the attitude and velocity have noise of their own.
+/// A filter of 12 Hz passes `12 / 150` of the power of noise at 300 Hz. Of a derivative it passes
+/// what lies below about 12 Hz: `(2 pi)^2 12^3 / (3 * 150)` of the power of the rate's noise. The
+/// bar is 1.3 times that, because the edge of the filter is not sharp and the attitude and velocity
+/// have noise of their own.
 fn noise_bar(vehicle: &VehicleFile) -> ([f64; 3], [f64; 3]) {
     let (imu, p) = (&vehicle.sensors.imu, vehicle.vehicle.parameters());
     let force = p.mass_kg * imu.accel_noise_m_s2 * (12.0_f64 / 150.0).sqrt();
@@ -62,9 +63,12 @@ fn the_own_vehicle_leaves_noise() {
 #[test]
 fn wings_and_effects_of_the_own_vehicle_leave_noise() {
     let flat = squirrel_with(&[("\"membrane\"", "\"flat\"")]);
-    let sagging = squirrel_with(&[("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]")]);
-    let draggy =
-        squirrel_with(&[("[limits]", "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.2\n\n[limits]")]);
+    let sagging =
+        squirrel_with(&[("[limits]", "[effects.battery_sag]\nvoltage_exponent = 0.9\n\n[limits]")]);
+    let draggy = squirrel_with(&[(
+        "[limits]",
+        "[effects.linear_drag]\nextra_drag_n_s_per_m = 0.2\n\n[limits]",
+    )]);
     for vehicle in [&VehicleFile::squirrel(), &flat, &sagging, &draggy] {
         let log = fly(vehicle, "avoid", Arm::TwccFlat);
         let (_, wing) = log.channel("wing.command").unwrap();
@@ -76,8 +80,10 @@ fn wings_and_effects_of_the_own_vehicle_leave_noise() {
 /// Thrust near the ground depends on the height: at the ground's it would be a third more, 1.8 N.
 #[test]
 fn an_effect_of_height_in_the_file_acts_at_the_height_of_the_flight() {
-    let near =
-        squirrel_with(&[("[limits]", "[effects.ground_effect]\neffective_radius_m = 0.5\n\n[limits]")]);
+    let near = squirrel_with(&[(
+        "[limits]",
+        "[effects.ground_effect]\neffective_radius_m = 0.5\n\n[limits]",
+    )]);
     let log = fly(&near, "hover", Arm::Pc);
     let (_, altitude) = log.channel("baro.altitude_m").unwrap();
     assert!(altitude.values.iter().all(|h| *h > 1.0), "far from the ground");
@@ -112,14 +118,19 @@ fn sag_that_the_model_lacks_grows_as_the_voltage_falls() {
 
     assert_noise(&sagging, &found(&sagging, log.clone()));
     let finding = found(&model, log);
-    let z: Vec<_> = finding.places.iter().filter(|place| place.channel == "force_body_z_n").collect();
+    let z: Vec<_> =
+        finding.places.iter().filter(|place| place.channel == "force_body_z_n").collect();
     println!("{z:#?}");
     assert!(z.len() >= 5 && z[0].share > 0.1, "{}", z.len());
-    assert!(z[..3].iter().all(|place| place.t0_s >= 12.0), "the worst windows are the last ones: {z:#?}");
+    assert!(
+        z[..3].iter().all(|place| place.t0_s >= 12.0),
+        "the worst windows are the last ones: {z:#?}"
+    );
     assert!(z[0].condition.ends_with(" V"), "{}", z[0].condition);
 }
 
-/// The wing of the model, not the log's truth, decides: a model with another wing disagrees where the wings are open.
+/// The wing of the model, not the log's truth, decides: a model with another wing disagrees where
+/// the wings are open.
 #[test]
 fn a_wrong_wing_shows_where_it_is_open() {
     let vehicle = VehicleFile::squirrel();
@@ -134,7 +145,10 @@ fn a_wrong_wing_shows_where_it_is_open() {
     let finding = found(&model, log.clone());
     println!("{:#?}", &finding.places[..3]);
     assert!(finding.residual.force_body_rms_n[2] > 2.0 * noise_bar(&vehicle).0[2]);
-    assert!(finding.places[0].t1_s > opens && finding.places[0].t0_s < opens + 4.0, "opens at {opens} s");
+    assert!(
+        finding.places[0].t1_s > opens && finding.places[0].t0_s < opens + 4.0,
+        "opens at {opens} s"
+    );
 }
 
 /// Two runs give the same bytes, and the fields have their order.

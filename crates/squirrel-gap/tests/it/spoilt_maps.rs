@@ -14,7 +14,8 @@ const VELOCITY: &str = "gnss.velocity_ned_m_s";
 const VOLTAGE: &str = "battery.voltage_v";
 const COMMAND: &str = "rotor.command";
 
-/// A mistake: what it is, what the map has, what stands there instead, the channels that may be named, and a word of the remedy.
+/// A mistake: what it is, what the map has, what stands there instead, the channels that may be
+/// named, and a word of the remedy.
 type Mistake = (&'static str, &'static str, &'static str, &'static [&'static str], &'static str);
 
 const MISTAKES: [Mistake; 17] = [
@@ -32,8 +33,20 @@ const MISTAKES: [Mistake; 17] = [
         &[FORCE],
         "columns",
     ),
-    ("velocity axes swapped", "[\"vx\", \"vy\", \"vz\"]", "[\"vy\", \"vx\", \"vz\"]", &[VELOCITY], "columns"),
-    ("specific force in g", "body = \"flu\", scale = 9.80665", "body = \"flu\"", &[FORCE], "scale = 9.80665"),
+    (
+        "velocity axes swapped",
+        "[\"vx\", \"vy\", \"vz\"]",
+        "[\"vy\", \"vx\", \"vz\"]",
+        &[VELOCITY],
+        "columns",
+    ),
+    (
+        "specific force in g",
+        "body = \"flu\", scale = 9.80665",
+        "body = \"flu\"",
+        &[FORCE],
+        "scale = 9.80665",
+    ),
     (
         "rates in deg/s",
         "body = \"flu\" }\n\"imu.spec",
@@ -41,7 +54,13 @@ const MISTAKES: [Mistake; 17] = [
         &[OMEGA],
         "scale = 0.0174",
     ),
-    ("voltage in mV", "[\"pwr_pm_vbat\"]", "[\"pwr_pm_vbat\"], scale = 1000.0", &[VOLTAGE], "scale = 0.001"),
+    (
+        "voltage in mV",
+        "[\"pwr_pm_vbat\"]",
+        "[\"pwr_pm_vbat\"], scale = 1000.0",
+        &[VOLTAGE],
+        "scale = 0.001",
+    ),
     ("quaternion order", "order = \"xyzw\"", "order = \"wxyz\"", &[ATTITUDE], "order"),
     ("quaternion direction", "world_from_body", "body_from_world", &[ATTITUDE], "direction"),
     (
@@ -65,8 +84,20 @@ const MISTAKES: [Mistake; 17] = [
         &[ATTITUDE, VELOCITY],
         "world",
     ),
-    ("velocity world", "\"vz\"], world = \"nwu\"", "\"vz\"], world = \"ned\"", &[VELOCITY], "world"),
-    ("gyro body", "\"imu_gyro_z\"], body = \"flu\"", "\"imu_gyro_z\"], body = \"frd\"", &[OMEGA], "body"),
+    (
+        "velocity world",
+        "\"vz\"], world = \"nwu\"",
+        "\"vz\"], world = \"ned\"",
+        &[VELOCITY],
+        "world",
+    ),
+    (
+        "gyro body",
+        "\"imu_gyro_z\"], body = \"flu\"",
+        "\"imu_gyro_z\"], body = \"frd\"",
+        &[OMEGA],
+        "body",
+    ),
     (
         "accelerometer body",
         "\"imu_acc_z\"], body = \"flu\"",
@@ -79,12 +110,15 @@ const MISTAKES: [Mistake; 17] = [
     ("motors 2 and 4 swapped", "[1, 2, 3, 4]", "[1, 4, 3, 2]", &[COMMAND], "rotors = [1, 4, 3, 2]"),
 ];
 
-/// A mistake that no line of the map makes: what it is, channels that may be named, a word of the remedy, and how it is made.
+/// A mistake that no line of the map makes: what it is, channels that may be named, a word of the
+/// remedy, and how it is made.
 type Spoil = (&'static str, &'static [&'static str], &'static str, fn(&mut FlightLog));
 
 const SPOILS: [Spoil; 12] = [
     ("world acceleration", &[FORCE], "world", |log| to_world(log, [0.0, 0.0, 0.0])),
-    ("world acceleration less gravity", &[FORCE], "gravity", |log| to_world(log, [0.0, 0.0, 9.80665])),
+    ("world acceleration less gravity", &[FORCE], "gravity", |log| {
+        to_world(log, [0.0, 0.0, 9.80665]);
+    }),
     ("fixes step 0.3 s", &[VELOCITY], "clock steps by +0.", |log| step(log, "gnss", 0.3)),
     ("fixes step 0.8 s", &[VELOCITY], "clock steps by +0.", |log| step(log, "gnss", 0.8)),
     ("attitude steps 0.2 s", &[ATTITUDE], "clock steps by +0.", |log| step(log, "attitude", 0.2)),
@@ -100,8 +134,14 @@ const SPOILS: [Spoil; 12] = [
 /// Gives specific force in the world frame, NED, plus something.
 fn to_world(log: &mut FlightLog, plus: [f64; 3]) {
     let attitude = log.sources["attitude"].channels["q_ned_from_body_wxyz"].values.clone();
-    let force =
-        &mut log.sources.get_mut("imu").unwrap().channels.get_mut("specific_force_body_m_s2").unwrap().values;
+    let force = &mut log
+        .sources
+        .get_mut("imu")
+        .unwrap()
+        .channels
+        .get_mut("specific_force_body_m_s2")
+        .unwrap()
+        .values;
     for (f, q) in force.chunks_exact_mut(3).zip(attitude.chunks_exact(4)) {
         let (w, v) = (q[0], [q[1], q[2], q[3]]);
         let cross = |a: [f64; 3], b: [f64; 3]| {
@@ -152,7 +192,8 @@ fn name_of(file: &Path) -> String {
     file.file_stem().unwrap().to_string_lossy().into_owned()
 }
 
-/// One flight of twenty hovers almost still, and some move along one axis alone: what nothing shows is not named.
+/// One flight of twenty hovers almost still, and some move along one axis alone: what nothing shows
+/// is not named.
 #[test]
 fn a_spoilt_map_is_named_in_measured_flights() {
     let mut missed = Vec::new();

@@ -1,4 +1,5 @@
-//! The inputs of the flight code: recorded, and read back. A frame is rebuilt from the samples that carry its time.
+//! The inputs of the flight code: recorded, and read back. A frame is rebuilt from the samples that
+//! carry its time.
 
 use super::{ESTIMATE, wide};
 use crate::FlightLog;
@@ -51,12 +52,14 @@ impl Inputs {
                 .push(t, &[("omega_body_rad_s", &omega), ("specific_force_body_m_s2", &force)]);
         }
         if let Some(attitude) = frame.attitude.filter(|_| !self.estimates) {
-            log.source_mut("attitude").push(t, &[("q_ned_from_body_wxyz", &attitude.wxyz().map(f64::from))]);
+            log.source_mut("attitude")
+                .push(t, &[("q_ned_from_body_wxyz", &attitude.wxyz().map(f64::from))]);
         }
         if let Some(gnss) = frame.gnss {
             let position = wide(&gnss.position.vector);
             let velocity = wide(&gnss.velocity.vector);
-            log.source_mut("gnss").push(t, &[("position_ned_m", &position), ("velocity_ned_m_s", &velocity)]);
+            log.source_mut("gnss")
+                .push(t, &[("position_ned_m", &position), ("velocity_ned_m_s", &velocity)]);
         }
         if let Some(altitude) = frame.altitude_m {
             log.source_mut("baro").push(t, &[("altitude_m", &[f64::from(altitude)])]);
@@ -165,8 +168,11 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
     let mut imu_2 = channel("imu_2.omega_body_rad_s", 3)?;
     let force_2 = channel("imu_2.specific_force_body_m_s2", 3)?;
     // Where the flight code estimates, an attitude in the log is its own.
-    let attitude_name =
-        if log.sources.contains_key(ESTIMATE) { None } else { Some("attitude.q_ned_from_body_wxyz") };
+    let attitude_name = if log.sources.contains_key(ESTIMATE) {
+        None
+    } else {
+        Some("attitude.q_ned_from_body_wxyz")
+    };
     let mut attitude = attitude_name.map_or(Ok(None), |name| channel(name, 4))?;
     let mut gnss = channel("gnss.position_ned_m", 3)?;
     let velocity = channel("gnss.velocity_ned_m_s", 3)?;
@@ -187,7 +193,8 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
             let Some((cursor, omega)) = imu else { continue };
             let Some(i) = cursor.at(*t) else { continue };
             let force = force.as_ref().map_or(Vector3::zeros(), |(_, c)| narrow(c.row(i)));
-            *place = Some(Imu { omega: In::new(narrow(omega.row(i))), specific_force: In::new(force) });
+            *place =
+                Some(Imu { omega: In::new(narrow(omega.row(i))), specific_force: In::new(force) });
         }
         if let Some((cursor, q)) = &mut attitude
             && let Some(i) = cursor.at(*t)
@@ -198,8 +205,10 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
             && let Some(i) = cursor.at(*t)
         {
             let velocity = velocity.as_ref().map_or(Vector3::zeros(), |(_, c)| narrow(c.row(i)));
-            frame.gnss =
-                Some(Gnss { position: In::new(narrow(position.row(i))), velocity: In::new(velocity) });
+            frame.gnss = Some(Gnss {
+                position: In::new(narrow(position.row(i))),
+                velocity: In::new(velocity),
+            });
         }
         if let Some((cursor, altitude)) = &mut baro
             && let Some(i) = cursor.at(*t)
@@ -235,7 +244,8 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
         }
         all.push(frame);
     }
-    let cursors = [&imu, &imu_2, &attitude, &gnss, &baro, &magnetic, &obstacle, &wing_force, &command];
+    let cursors =
+        [&imu, &imu_2, &attitude, &gnss, &baro, &magnetic, &obstacle, &wing_force, &command];
     for (cursor, _) in cursors.into_iter().flatten() {
         if let Some(t) = cursor.time_s.get(cursor.next) {
             return Err(InputError::NoStep { time_s: *t });

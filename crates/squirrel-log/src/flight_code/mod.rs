@@ -1,6 +1,8 @@
-//! What the flight code was given and what it answered, as channels of a log; and the way back to its sensor frames.
+//! What the flight code was given and what it answered, as channels of a log; and the way back to
+//! its sensor frames.
 //!
-//! Inputs are `f32` and stored as `f64`, so that a log holds their exact bits: the flight code flies the same again on them.
+//! Inputs are `f32` and stored as `f64`, so that a log holds their exact bits: the flight code
+//! flies the same again on them.
 
 mod inputs;
 mod outputs;

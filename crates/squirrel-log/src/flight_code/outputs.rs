@@ -77,7 +77,10 @@ pub fn record_output(
                 ("flag", &[f64::from(u8::from(outer.wing.flag))]),
                 ("mode", &[f64::from(outer.mode as u8)]),
                 ("reason", &[f64::from(outer.reason as u8)]),
-                ("roll_pitch_command_rad", &angles(outer.command.roll_rad, outer.command.pitch_rad)),
+                (
+                    "roll_pitch_command_rad",
+                    &angles(outer.command.roll_rad, outer.command.pitch_rad),
+                ),
                 ("thrust_command_n", &[f64::from(outer.command.thrust_n)]),
                 ("clamped", &[f64::from(u8::from(outer.clamped))]),
             ],
@@ -133,8 +136,10 @@ pub fn record_reference(log: &mut FlightLog, source: &str, t: f64, r: &Reference
 
 /// What is believed, and what is not as it should be.
 fn record_estimate(log: &mut FlightLog, t: f64, output: &StackOutput) {
-    log.source_mut("control.status")
-        .push(t, &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])]);
+    log.source_mut("control.status").push(
+        t,
+        &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])],
+    );
     if let Some(terms) = &output.navigation {
         let attitude = terms.ned_from_body.wxyz().map(f64::from);
         log.source_mut(ESTIMATE).push(
@@ -151,10 +156,13 @@ fn record_estimate(log: &mut FlightLog, t: f64, output: &StackOutput) {
     }
 }
 
-/// What the network said, also where the flat plate stood in for it; NaN before its window was full.
+/// What the network said, also where the flat plate stood in for it; NaN before its window was
+/// full.
 fn record_parnn(log: &mut FlightLog, t: f64, terms: &ParnnTerms) {
-    let said = |of: fn(&Estimate) -> f32| terms.estimate.as_ref().map_or(f64::NAN, |e| f64::from(of(e)));
-    let force = [said(|e| e.force.vector.x), said(|e| e.force.vector.y), said(|e| e.force.vector.z)];
+    let said =
+        |of: fn(&Estimate) -> f32| terms.estimate.as_ref().map_or(f64::NAN, |e| f64::from(of(e)));
+    let force =
+        [said(|e| e.force.vector.x), said(|e| e.force.vector.y), said(|e| e.force.vector.z)];
     log.source_mut("control.parnn").push(
         t,
         &[

@@ -1,8 +1,10 @@
-//! What a board wrote down its serial line: the setup and the frames of its flight code, flown again by the host.
+//! What a board wrote down its serial line: the setup and the frames of its flight code, flown
+//! again by the host.
 //!
-//! A board sends its inputs alone, each frame with the hash of all outputs so far (`docs/embedding.md`). The flight code is a
-//! function of them, so the host computes every term of every step, and the hash proves that it is what flew. From the first
-//! frame that was lost on the line this no longer holds: from there on the log has inputs alone.
+//! A board sends its inputs alone, each frame with the hash of all outputs so far
+//! (`docs/embedding.md`). The flight code is a function of them, so the host computes every term of
+//! every step, and the hash proves that it is what flew. From the first frame that was lost on the
+//! line this no longer holds: from there on the log has inputs alone.
 
 use super::ImportError;
 use crate::FlightLog;
@@ -22,7 +24,8 @@ pub struct BoardReport {
     pub frames: usize,
     /// First and last time of the board's clock, s.
     pub time_s: [f64; 2],
-    /// Time up to which the outputs are the board's to the bit, s; `None` where not even the first is.
+    /// Time up to which the outputs are the board's to the bit, s; `None` where not even the first
+    /// is.
     pub outputs_until_s: Option<f64>,
     /// Records of the file that are damaged or belong to no setup.
     pub lost_records: usize,
@@ -34,13 +37,15 @@ struct Recorded {
     frames: Vec<(squirrel_core::stack::SensorFrame, u64)>,
 }
 
-/// Flies what a board recorded again, as a flight log with inputs and, as far as they are proved, outputs.
+/// Flies what a board recorded again, as a flight log with inputs and, as far as they are proved,
+/// outputs.
 ///
 /// # Errors
 /// The file cannot be read, has no flight, or more than one.
 pub fn import_board(path: &Path) -> Result<(FlightLog, BoardReport), ImportError> {
     let file = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
+    let bytes =
+        std::fs::read(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
     let (flights, lost_records) = flights(&bytes);
     let board = |problem: String| ImportError::Board { file: file.clone(), problem };
     let [flight] = flights.as_slice() else {
@@ -49,7 +54,9 @@ pub fn import_board(path: &Path) -> Result<(FlightLog, BoardReport), ImportError
                 "no frame behind a setup in {} bytes; {lost_records} records are damaged or belong to no setup",
                 bytes.len()
             ),
-            n => format!("{n} flights; a log has one, so cut the file where the board was armed again"),
+            n => format!(
+                "{n} flights; a log has one, so cut the file where the board was armed again"
+            ),
         }));
     };
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -64,7 +71,10 @@ pub fn import_board(path: &Path) -> Result<(FlightLog, BoardReport), ImportError
     let mut last_us = None;
     for (frame, expected) in &flight.frames {
         if last_us.is_some_and(|last| frame.time_us <= last) {
-            return Err(board(format!("time_us = {}: not after the frame before it", frame.time_us)));
+            return Err(board(format!(
+                "time_us = {}: not after the frame before it",
+                frame.time_us
+            )));
         }
         last_us = Some(frame.time_us);
         let t = frame.time_us as f64 * 1e-6;
@@ -81,15 +91,21 @@ pub fn import_board(path: &Path) -> Result<(FlightLog, BoardReport), ImportError
     }
     let time_s = [flight.frames.first(), flight.frames.last()]
         .map(|frame| frame.map_or(f64::NAN, |(frame, _)| frame.time_us as f64 * 1e-6));
-    let report =
-        BoardReport { file: name, frames: flight.frames.len(), time_s, outputs_until_s, lost_records };
+    let report = BoardReport {
+        file: name,
+        frames: flight.frames.len(),
+        time_s,
+        outputs_until_s,
+        lost_records,
+    };
     Ok((log, report))
 }
 
 /// Flights that have frames, and the number of records that are damaged or belong to no setup.
 fn flights(bytes: &[u8]) -> (Vec<Recorded>, usize) {
     let (mut all, mut lost): (Vec<Recorded>, usize) = (Vec::new(), 0);
-    // Zeros end records and are nowhere else; behind the last there is the begin of one that was cut off, or nothing.
+    // Zeros end records and are nowhere else; behind the last there is the begin of one that was
+    // cut off, or nothing.
     for framed in bytes.split(|byte| *byte == 0).filter(|framed| !framed.is_empty()) {
         let record = cobs::decode_vec(framed).ok().and_then(|record| {
             let mut reader = Reader::new(&record);
@@ -97,7 +113,9 @@ fn flights(bytes: &[u8]) -> (Vec<Recorded>, usize) {
         });
         match (record, all.last_mut()) {
             (Some(Record::Setup(stack)), _) => all.push(Recorded { stack, frames: Vec::new() }),
-            (Some(Record::Frame(frame, outputs)), Some(flight)) => flight.frames.push((frame, outputs)),
+            (Some(Record::Frame(frame, outputs)), Some(flight)) => {
+                flight.frames.push((frame, outputs));
+            }
             (Some(Record::Frame(..)) | None, _) => lost += 1,
         }
     }
@@ -111,7 +129,9 @@ impl std::fmt::Display for BoardReport {
         write!(f, "{}: {} frames, {from_s:.3} to {to_s:.3} s; ", self.file, self.frames)?;
         f.write_str(&match self.outputs_until_s {
             Some(t) if t == to_s => "every output is the board's to the bit".to_owned(),
-            Some(t) => format!("outputs are the board's to the bit up to {t:.3} s and left out from there"),
+            Some(t) => {
+                format!("outputs are the board's to the bit up to {t:.3} s and left out from there")
+            }
             None => "no output is the board's; they are left out".to_owned(),
         })?;
         if self.lost_records > 0 {

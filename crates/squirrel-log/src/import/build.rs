@@ -12,10 +12,12 @@ use crate::{Channel, FlightLog, Source};
 /// How far the norm of a quaternion may be from 1 before it is no rotation.
 const QUATERNION_NORM_TOLERANCE: f64 = 0.05;
 
-/// Adds the channels of one `[[source]]`; `rows` are the kept ones, `time_s` is the time of all rows in the log.
+/// Adds the channels of one `[[source]]`; `rows` are the kept ones, `time_s` is the time of all
+/// rows in the log.
 ///
 /// # Errors
-/// Time axes that differ within one source of the log, a quaternion that is no rotation, a channel without numbers.
+/// Time axes that differ within one source of the log, a quaternion that is no rotation, a channel
+/// without numbers.
 pub(super) fn add_source(
     log: &mut FlightLog,
     report: &mut ImportReport,
@@ -40,7 +42,8 @@ pub(super) fn add_source(
             remedy,
         };
         let forward_filled = channels[0].1.forward_filled;
-        if let Some((_, other)) = channels.iter().find(|(_, c)| c.forward_filled != forward_filled) {
+        if let Some((_, other)) = channels.iter().find(|(_, c)| c.forward_filled != forward_filled)
+        {
             return Err(axes_error(
                 other,
                 "some are forward_filled and some are not",
@@ -84,10 +87,14 @@ pub(super) fn add_source(
     Ok(())
 }
 
-/// Rows at which any column of the channels has another number than before. An empty cell is not a change.
+/// Rows at which any column of the channels has another number than before. An empty cell is not a
+/// change.
 fn changes(channels: &[(&str, &ChannelMap)], table: &Table, rows: &[usize]) -> Vec<usize> {
-    let columns: Vec<&[f64]> =
-        channels.iter().flat_map(|(_, channel)| &channel.columns).map(|name| table.column(name)).collect();
+    let columns: Vec<&[f64]> = channels
+        .iter()
+        .flat_map(|(_, channel)| &channel.columns)
+        .map(|name| table.column(name))
+        .collect();
     let mut last = vec![f64::NAN; columns.len()];
     let mut changed = Vec::new();
     for &row in rows {
@@ -128,11 +135,13 @@ fn channel(map: &ChannelMap, table: &Table, rows: &[usize]) -> Result<Channel, I
             (Conversion::Ned(world), &[x, y, z]) => values.extend(world.to_ned([x, y, z])),
             (Conversion::Frd(body), &[x, y, z]) => values.extend(body.to_frd([x, y, z])),
             (Conversion::Attitude(frame), &[a, b, c, d]) => {
-                let q = attitude.next(*frame, [a, b, c, d]).map_err(|norm| ImportError::QuaternionNorm {
-                    file: table.name.clone(),
-                    columns: map.columns.join(", "),
-                    row: table.rows[row],
-                    norm,
+                let q = attitude.next(*frame, [a, b, c, d]).map_err(|norm| {
+                    ImportError::QuaternionNorm {
+                        file: table.name.clone(),
+                        columns: map.columns.join(", "),
+                        row: table.rows[row],
+                        norm,
+                    }
                 })?;
                 values.extend(q);
             }
@@ -161,7 +170,8 @@ fn all_missing(map: &ChannelMap, table: &Table) -> ImportError {
     }
 }
 
-/// Normalises attitudes and picks of `q` and `-q` the one nearer to the last; the first has `w >= 0`.
+/// Normalises attitudes and picks of `q` and `-q` the one nearer to the last; the first has
+/// `w >= 0`.
 struct Continuous {
     last: Option<[f64; 4]>,
 }

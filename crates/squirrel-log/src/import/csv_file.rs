@@ -29,8 +29,9 @@ impl<'a> CsvFile<'a> {
         let name = path.display().to_string();
         let read_error = |source| ImportError::Read { file: path.display().to_string(), source };
         let file = Metered::new(File::open(path).map_err(read_error)?, meter);
-        // A newline at the very end, whether or not the file has one: the line of a row is then always the reader's
-        // line less one. Empty lines are skipped, a carriage return is trimmed as white space.
+        // A newline at the very end, whether or not the file has one: the line of a row is then
+        // always the reader's line less one. Empty lines are skipped, a carriage return is trimmed
+        // as white space.
         let mut reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -41,7 +42,8 @@ impl<'a> CsvFile<'a> {
         let mut record = ByteRecord::new();
         while next_record(&mut reader, &mut record).map_err(read_error)? {
             if !is_blank(&record) {
-                let header = record.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect();
+                let header =
+                    record.iter().map(|cell| String::from_utf8_lossy(cell).into_owned()).collect();
                 return Ok(Self { name, header, reader });
             }
         }

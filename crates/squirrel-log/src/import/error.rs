@@ -1,6 +1,8 @@
-//! What can be wrong with an import map or a foreign log: one line each, naming file, field, row and value.
+//! What can be wrong with an import map or a foreign log: one line each, naming file, field, row
+//! and value.
 //!
-//! Rows are line numbers of a CSV file as an editor shows them (the header is row 1); in other files they are counted from
+//! Rows are line numbers of a CSV file as an editor shows them (the header is row 1); in other
+//! files they are counted from
 //! 1. The file of a topic is named with it: ``log.ulg, topic `sensor_gyro` ``.
 
 use std::io;
@@ -58,7 +60,9 @@ pub enum ImportError {
         given: String,
     },
     /// Two PATHs offer the same file.
-    #[error("{map}: file `{file}` is given twice: {first} and {second}; import one flight at a time")]
+    #[error(
+        "{map}: file `{file}` is given twice: {first} and {second}; import one flight at a time"
+    )]
     AmbiguousFile {
         /// Name of the map.
         map: String,
@@ -193,7 +197,9 @@ pub enum ImportError {
         previous_row: u64,
     },
     /// A quaternion is too long or too short to be a rotation.
-    #[error("{file}, columns {columns}, row {row}: quaternion norm {norm:.4} is more than 5 % away from 1")]
+    #[error(
+        "{file}, columns {columns}, row {row}: quaternion norm {norm:.4} is more than 5 % away from 1"
+    )]
     QuaternionNorm {
         /// Path as given, and topic.
         file: String,
@@ -223,7 +229,9 @@ pub enum ImportError {
         rows: usize,
     },
     /// Channels that share a source of the log do not share a time axis.
-    #[error("{map}: `{channel}` has other times than the rest of `{log_source}` ({problem}): {remedy}")]
+    #[error(
+        "{map}: `{channel}` has other times than the rest of `{log_source}` ({problem}): {remedy}"
+    )]
     TimeAxes {
         /// Name of the map.
         map: String,

@@ -23,9 +23,10 @@ pub(super) fn find(map: &ImportMap, paths: &[PathBuf]) -> Result<Vec<PathBuf>, I
         .collect::<Result<Vec<_>, _>>()?;
     match paths.iter().find(|path| found.iter().all(|file| !file.starts_with(path))) {
         None => Ok(found),
-        Some(unused) => {
-            Err(ImportError::UnusedPath { map: map.name.clone(), path: unused.display().to_string() })
-        }
+        Some(unused) => Err(ImportError::UnusedPath {
+            map: map.name.clone(),
+            path: unused.display().to_string(),
+        }),
     }
 }
 
@@ -69,7 +70,11 @@ fn find_one(
         .collect();
     match offered.as_slice() {
         [one] => Ok(one.clone()),
-        [] => Err(ImportError::MissingFile { map: map.name.clone(), file: file.clone(), given: given() }),
+        [] => Err(ImportError::MissingFile {
+            map: map.name.clone(),
+            file: file.clone(),
+            given: given(),
+        }),
         [first, second, ..] => Err(ImportError::AmbiguousFile {
             map: map.name.clone(),
             file: file.clone(),

@@ -1,8 +1,8 @@
 //! Turns vectors and attitudes of foreign frames into NED and FRD.
 //!
-//! World frames: `ned` (north, east, down), `enu` (east, north, up), `nwu` (north, west, up). Body frames: `frd`
-//! (forward, right, down), `flu` (forward, left, up). Each pair differs by half a turn, so vectors only swap and flip
-//! their numbers.
+//! World frames: `ned` (north, east, down), `enu` (east, north, up), `nwu` (north, west, up). Body
+//! frames: `frd` (forward, right, down), `flu` (forward, left, up). Each pair differs by half a
+//! turn, so vectors only swap and flip their numbers.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -120,7 +120,11 @@ mod tests {
                 for (file, order, direction) in [
                     ([c.w, c.i, c.j, c.k], Order::Wxyz, Direction::WorldFromBody),
                     ([c.i, c.j, c.k, c.w], Order::Xyzw, Direction::WorldFromBody),
-                    ([inverse.w, inverse.i, inverse.j, inverse.k], Order::Wxyz, Direction::BodyFromWorld),
+                    (
+                        [inverse.w, inverse.i, inverse.j, inverse.k],
+                        Order::Wxyz,
+                        Direction::BodyFromWorld,
+                    ),
                 ] {
                     let frame = AttitudeFrame { order, direction, world, body };
                     let ned_from_frd = UnitQuaternion::from_quaternion(frame.q_ned_from_body(file));

@@ -1,6 +1,7 @@
 //! The import map: a TOML file that says what the columns of a foreign log mean.
 //!
-//! All that can be checked without data is checked here, once: channel names, widths, frames, permutations, the mask.
+//! All that can be checked without data is checked here, once: channel names, widths, frames,
+//! permutations, the mask.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -136,38 +137,45 @@ impl ImportMap {
     /// [`ImportError::Read`] if the file cannot be read, else as [`ImportMap::parse`].
     pub fn load(path: &Path) -> Result<Self, ImportError> {
         let name = path.display().to_string();
-        let text =
-            fs::read_to_string(path).map_err(|source| ImportError::Read { file: name.clone(), source })?;
+        let text = fs::read_to_string(path)
+            .map_err(|source| ImportError::Read { file: name.clone(), source })?;
         Self::parse(&text, &name)
     }
 
     /// Checks the text of a map; `name` is how error messages call it.
     ///
     /// # Errors
-    /// [`ImportError::MapSyntax`] with the line for what TOML itself can tell (unknown keys, units and frames),
-    /// [`ImportError::MapField`] for the rest.
+    /// [`ImportError::MapSyntax`] with the line for what TOML itself can tell (unknown keys, units
+    /// and frames), [`ImportError::MapField`] for the rest.
     pub fn parse(text: &str, name: &str) -> Result<Self, ImportError> {
-        let toml: MapToml = toml::from_str(text).map_err(|error| syntax_error(text, name, &error))?;
+        let toml: MapToml =
+            toml::from_str(text).map_err(|error| syntax_error(text, name, &error))?;
         let field_error =
             |field: String, problem| ImportError::MapField { map: name.to_owned(), field, problem };
         let keep = toml.keep.as_deref().map(Condition::parse).transpose();
         let keep = keep.map_err(|problem| field_error("keep".to_owned(), problem))?;
         if toml.source.is_empty() {
-            return Err(field_error("source".to_owned(), "no [[source]]: nothing to import".to_owned()));
+            return Err(field_error(
+                "source".to_owned(),
+                "no [[source]]: nothing to import".to_owned(),
+            ));
         }
         let mut seen = BTreeSet::new();
         let mut sources = Vec::new();
         for (index, mut source) in toml.source.into_iter().enumerate() {
             let number = index + 1;
-            check_source(&source)
-                .map_err(|(field, problem)| field_error(format!("source {number}, {field}"), problem))?;
+            check_source(&source).map_err(|(field, problem)| {
+                field_error(format!("source {number}, {field}"), problem)
+            })?;
             let mut channels = Vec::new();
             for (channel, toml) in std::mem::take(&mut source.channels) {
                 let field = format!("source {number}, `{channel}`");
                 if !seen.insert(channel.clone()) {
                     return Err(field_error(field, "is in another source already".to_owned()));
                 }
-                channels.push(channel_map(channel, toml).map_err(|problem| field_error(field, problem))?);
+                channels.push(
+                    channel_map(channel, toml).map_err(|problem| field_error(field, problem))?,
+                );
             }
             let SourceToml { file, topic, instance, time, .. } = source;
             sources.push(SourceMap { file, topic, instance, time, channels });
@@ -270,7 +278,8 @@ fn channel_map(name: String, toml: ChannelToml) -> Result<ChannelMap, String> {
     };
     let missing: Vec<&str> = keys.iter().copied().filter(|key| !given[key]).collect();
     let (Some(conversion), true) = (conversion, missing.is_empty()) else {
-        let hints: Vec<String> = missing.iter().map(|key| format!("`{key}` ({})", choices(key))).collect();
+        let hints: Vec<String> =
+            missing.iter().map(|key| format!("`{key}` ({})", choices(key))).collect();
         return Err(format!("add {}", hints.join(", ")));
     };
     if let Some((key, _)) = given.iter().find(|(key, is_given)| **is_given && !keys.contains(key)) {
@@ -290,7 +299,12 @@ fn choices(key: &str) -> &'static str {
     }
 }
 
-fn per_column(key: &str, given: Option<PerColumn>, default: f64, count: usize) -> Result<Vec<f64>, String> {
+fn per_column(
+    key: &str,
+    given: Option<PerColumn>,
+    default: f64,
+    count: usize,
+) -> Result<Vec<f64>, String> {
     let numbers = match given {
         None => vec![default; count],
         Some(PerColumn::All(x)) => vec![x; count],

@@ -4,8 +4,9 @@
 //! keep  = any   any = all ("or" all)*   all = term ("and" term)*   term = "(" any ")" | value compare number
 //! value = column | "abs(" column ")" | "mean(" column ("," column)* ")"      compare = < <= > >= == !=
 //! ```
-//! A column is compared as the file has it, before scale and offset. Names with other characters than letters, digits
-//! and `_ . [ ] : /` go in single quotes. A comparison with an empty cell is false.
+//! A column is compared as the file has it, before scale and offset. Names with other characters
+//! than letters, digits and `_ . [ ] : /` go in single quotes. A comparison with an empty cell is
+//! false.
 
 use super::table::Table;
 
@@ -61,7 +62,9 @@ impl Condition {
     /// Columns that the condition looks at.
     pub(super) fn columns(&self) -> Vec<&str> {
         match self {
-            Condition::Compare { value: Value::Column(column) | Value::Abs(column), .. } => vec![column],
+            Condition::Compare { value: Value::Column(column) | Value::Abs(column), .. } => {
+                vec![column]
+            }
             Condition::Compare { value: Value::Mean(columns), .. } => {
                 columns.iter().map(String::as_str).collect()
             }
@@ -169,8 +172,14 @@ fn tokens(text: &str) -> Result<Vec<Token>, String> {
                         !(c.is_ascii_alphanumeric() || c == '.' || c == '_' || sign_of_exponent)
                     })
                     .map_or(rest.len(), |(i, _)| i);
-                let number = rest[..len].replace('_', "").parse::<f64>().ok().filter(|x| x.is_finite());
-                (Token::Number(number.ok_or_else(|| format!("`{}` is no number", &rest[..len]))?), len)
+                let number =
+                    rest[..len].replace('_', "").parse::<f64>().ok().filter(|x| x.is_finite());
+                (
+                    Token::Number(
+                        number.ok_or_else(|| format!("`{}` is no number", &rest[..len]))?,
+                    ),
+                    len,
+                )
             }
             c if word_character(c) => {
                 let len = rest.find(|c| !word_character(c)).unwrap_or(rest.len());
@@ -344,8 +353,9 @@ mod tests {
 
     #[test]
     fn terms_split_at_the_outer_and_only() {
-        let terms =
-            Condition::parse("a > 1 and (b > 2 and c > 3) and (d > 4 or e > 5)").unwrap().into_terms();
+        let terms = Condition::parse("a > 1 and (b > 2 and c > 3) and (d > 4 or e > 5)")
+            .unwrap()
+            .into_terms();
         let columns: Vec<_> = terms.iter().map(Condition::columns).collect();
         assert_eq!(columns, [vec!["a"], vec!["b"], vec!["c"], vec!["d", "e"]]);
     }
@@ -369,6 +379,9 @@ mod tests {
             assert_eq!(Condition::parse(mask).unwrap_err(), message, "{mask}");
         }
         let deep = "(".repeat(100_000);
-        assert_eq!(Condition::parse(&deep).unwrap_err(), "more than 32 parentheses inside each other");
+        assert_eq!(
+            Condition::parse(&deep).unwrap_err(),
+            "more than 32 parentheses inside each other"
+        );
     }
 }

@@ -1,8 +1,9 @@
 //! MCAP files with JSON messages: the messages of one topic as rows.
 //!
-//! A column is a path into the message: `gyro.x`, `u[0]`. The columns `log_time` and `publish_time` are MCAP's own
-//! times, ns; a field of that name hides them. A field that a message lacks, or null, is NaN; true is 1. Text that reads
-//! as a number is one, since JSON writes 64-bit integers and NaN as text.
+//! A column is a path into the message: `gyro.x`, `u[0]`. The columns `log_time` and `publish_time`
+//! are MCAP's own times, ns; a field of that name hides them. A field that a message lacks, or
+//! null, is NaN; true is 1. Text that reads as a number is one, since JSON writes 64-bit integers
+//! and NaN as text.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -64,7 +65,8 @@ impl<'a> McapFile<'a> {
         }
         let clocks: Vec<_> =
             [LOG_TIME, PUBLISH_TIME].into_iter().filter(|&clock| !paths.contains(clock)).collect();
-        let columns = paths.into_iter().chain(clocks.iter().map(|&clock| clock.to_owned())).collect();
+        let columns =
+            paths.into_iter().chain(clocks.iter().map(|&clock| clock.to_owned())).collect();
         Ok(Self { name, columns, clocks, messages, share, meter })
     }
 }
@@ -111,18 +113,21 @@ fn messages(file: &str, bytes: &[u8], topic: &str) -> Result<Vec<Message>, Impor
         return Err(damaged("the first 8 bytes are not those of an MCAP file".to_owned()));
     }
     let broken = |error: mcap::McapError| damaged(format!("damaged or cut off: {error}"));
-    let mut stream =
-        RawMessageStream::new_with_options(bytes, Options::ValidateChunkCrcs.into()).map_err(broken)?;
+    let mut stream = RawMessageStream::new_with_options(bytes, Options::ValidateChunkCrcs.into())
+        .map_err(broken)?;
     let (mut topics, mut messages) = (BTreeSet::new(), Vec::new());
     while let Some(message) = stream.next() {
         let message = message.map_err(broken)?;
         let id = message.header.channel_id;
-        let channel =
-            stream.get_channel(id).ok_or_else(|| damaged(format!("a message of unknown channel {id}")))?;
+        let channel = stream
+            .get_channel(id)
+            .ok_or_else(|| damaged(format!("a message of unknown channel {id}")))?;
         if channel.topic == topic {
             let encoding = &channel.message_encoding;
             if encoding != "json" {
-                return Err(damaged(format!("topic `{topic}` has {encoding} messages, import reads json")));
+                return Err(damaged(format!(
+                    "topic `{topic}` has {encoding} messages, import reads json"
+                )));
             }
             messages.push(Message {
                 log_time_ns: message.header.log_time,
@@ -135,7 +140,11 @@ fn messages(file: &str, bytes: &[u8], topic: &str) -> Result<Vec<Message>, Impor
     }
     if messages.is_empty() {
         let nearest = nearest(topic, topics.iter().map(String::as_str));
-        return Err(ImportError::MissingTopic { file: file.to_owned(), topic: topic.to_owned(), nearest });
+        return Err(ImportError::MissingTopic {
+            file: file.to_owned(),
+            topic: topic.to_owned(),
+            nearest,
+        });
     }
     Ok(messages)
 }

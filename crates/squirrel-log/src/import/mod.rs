@@ -1,8 +1,9 @@
-//! Import of foreign flight logs: CSV, Parquet, ULog, MCAP and Crazyflie micro-SD files become a [`FlightLog`] in NED, FRD, SI
-//! and radians by a TOML map. The extension of a file says its format; a Crazyflie's log, which has none of its own, is known
-//! by its first byte.
+//! Import of foreign flight logs: CSV, Parquet, ULog, MCAP and Crazyflie micro-SD files become a
+//! [`FlightLog`] in NED, FRD, SI and radians by a TOML map. The extension of a file says its
+//! format; a Crazyflie's log, which has none of its own, is known by its first byte.
 //!
-//! The map names, for each canonical channel, the columns, their scale and offset, their frame, and how time is written:
+//! The map names, for each canonical channel, the columns, their scale and offset, their frame, and
+//! how time is written:
 //!
 //! ```toml
 //! keep = "pz > 0.4"                     # rows worth importing, as a condition on source columns
@@ -17,8 +18,9 @@
 //! "attitude.yaw_rad"              = { columns = ["yaw"], optional = true }
 //! ```
 //!
-//! ULog files of PX4 (`.ulg`), MCAP files with JSON messages (`.mcap`) and the micro-SD logs of a Crazyflie have topics: a
-//! source reads one, its fields are the columns. `instance` counts the publishers of a ULog topic from 0.
+//! ULog files of PX4 (`.ulg`), MCAP files with JSON messages (`.mcap`) and the micro-SD logs of a
+//! Crazyflie have topics: a source reads one, its fields are the columns. `instance` counts the
+//! publishers of a ULog topic from 0.
 //!
 //! ```toml
 //! [[source]]
@@ -39,20 +41,28 @@
 //! channels = { "battery.voltage_v" = { columns = ["pm.vbatMV"], scale = 0.001 } }
 //! ```
 //!
-//! - A number becomes `value * scale + offset` (each one number, or one a column) before frames are turned.
-//! - `world` (`ned`, `enu`, `nwu`) belongs to channels with `_ned_` in their name, `body` (`frd`, `flu`) to those with
-//!   `_body_`; an attitude needs both, and `order` and `direction`. `baro.altitude_m` is up.
-//! - `imu.acceleration_ned_m_s2` is what an autopilot logs as acceleration in the world: the accelerometer turned there, less
-//!   gravity. `attitude.yaw_rad`, `attitude.pitch_rad` and `attitude.roll_rad` are for logs that lack one of the angles.
-//! - `rotors[i]` is the number, from 1, of the vehicle's rotor in column `i`; without it columns are in vehicle order.
-//! - `forward_filled` drops rows that only repeat the last sample: a slow sensor written at a fast rate gets its own slow
-//!   time axis. Channels of one log source (`battery.*`) share the axis; a row stays when any of them changes.
-//! - `optional = true` imports a file that lacks a column of the channel without it; the report says so.
-//! - `keep` may join parts with `and` that look at different files. A part drops rows of each file or topic that has its
-//!   columns, and of all others, by time: their rows outside the spans in which it keeps consecutive rows of the first. One
-//!   that has the columns itself, as topics have an `x` each, is no exception: its rows must hold by themselves, too.
+//! - A number becomes `value * scale + offset` (each one number, or one a column) before frames are
+//!   turned.
+//! - `world` (`ned`, `enu`, `nwu`) belongs to channels with `_ned_` in their name, `body` (`frd`,
+//!   `flu`) to those with `_body_`; an attitude needs both, and `order` and `direction`.
+//!   `baro.altitude_m` is up.
+//! - `imu.acceleration_ned_m_s2` is what an autopilot logs as acceleration in the world: the
+//!   accelerometer turned there, less gravity. `attitude.yaw_rad`, `attitude.pitch_rad` and
+//!   `attitude.roll_rad` are for logs that lack one of the angles.
+//! - `rotors[i]` is the number, from 1, of the vehicle's rotor in column `i`; without it columns
+//!   are in vehicle order.
+//! - `forward_filled` drops rows that only repeat the last sample: a slow sensor written at a fast
+//!   rate gets its own slow time axis. Channels of one log source (`battery.*`) share the axis; a
+//!   row stays when any of them changes.
+//! - `optional = true` imports a file that lacks a column of the channel without it; the report
+//!   says so.
+//! - `keep` may join parts with `and` that look at different files. A part drops rows of each file
+//!   or topic that has its columns, and of all others, by time: their rows outside the spans in
+//!   which it keeps consecutive rows of the first. One that has the columns itself, as topics have
+//!   an `x` each, is no exception: its rows must hold by themselves, too.
 //! - Empty cells, nulls and `nan` are NaN in the log and counted in the report.
-//! - The earliest kept time over all files is time zero; metadata `time_zero_s` has it in the foreign clock.
+//! - The earliest kept time over all files is time zero; metadata `time_zero_s` has it in the
+//!   foreign clock.
 
 mod board;
 mod build;
@@ -91,12 +101,16 @@ use table::{Table, TableFile};
 
 /// Imports one flight.
 ///
-/// `paths` is the flight's folder, or its file, or all of its files (matched to the map by file name). The log has
-/// metadata `imported_from` (file names), `map` (the map's text) and `time_zero_s`.
+/// `paths` is the flight's folder, or its file, or all of its files (matched to the map by file
+/// name). The log has metadata `imported_from` (file names), `map` (the map's text) and
+/// `time_zero_s`.
 ///
 /// # Errors
 /// The first thing wrong with the files, naming file, column, row and value; see [`ImportError`].
-pub fn import(map: &ImportMap, paths: &[PathBuf]) -> Result<(FlightLog, ImportReport), ImportError> {
+pub fn import(
+    map: &ImportMap,
+    paths: &[PathBuf],
+) -> Result<(FlightLog, ImportReport), ImportError> {
     import_watched(map, paths, &|_, _| {})
 }
 
@@ -127,21 +141,28 @@ pub fn import_watched(
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
     check_mask_columns(map, &opened)?;
     let mut report = ImportReport::default();
-    let present = map.sources.iter().zip(&opened).map(|(source, file)| present(source, &**file, &mut report));
+    let present =
+        map.sources.iter().zip(&opened).map(|(source, file)| present(source, &**file, &mut report));
     let sources: Vec<SourceMap> = present.collect();
     let tables = sources
         .iter()
         .zip(opened)
         .map(|(source, file)| read(source, &map.keep, file))
         .collect::<Result<Vec<_>, _>>()?;
-    let times: Vec<Vec<f64>> =
-        sources.iter().zip(&tables).map(|(s, table)| seconds(s, table)).collect::<Result<_, _>>()?;
+    let times: Vec<Vec<f64>> = sources
+        .iter()
+        .zip(&tables)
+        .map(|(s, table)| seconds(s, table))
+        .collect::<Result<_, _>>()?;
     let kept = kept_rows(&map.keep, &tables, &times);
-    for ((source, table), (rows, time_s)) in sources.iter().zip(&tables).zip(kept.iter().zip(&times)) {
+    for ((source, table), (rows, time_s)) in
+        sources.iter().zip(&tables).zip(kept.iter().zip(&times))
+    {
         check_order(source, table, rows, time_s)?;
     }
     // Times increase, so each file's first kept row is its earliest.
-    let zero_s = kept.iter().zip(&times).map(|(rows, time_s)| time_s[rows[0]]).fold(f64::INFINITY, f64::min);
+    let zero_s =
+        kept.iter().zip(&times).map(|(rows, time_s)| time_s[rows[0]]).fold(f64::INFINITY, f64::min);
 
     let names = files::names(&found);
     let mut log = FlightLog::default();
@@ -175,7 +196,10 @@ fn present(source: &SourceMap, file: &dyn TableFile, report: &mut ImportReport) 
         let lacks = |column: &&String| !has_all(file, &[column.as_str()]);
         let absent = channel.columns.iter().find(lacks).filter(|_| channel.optional);
         report.absent.extend(
-            absent.map(|column| AbsentChannel { channel: channel.name.clone(), column: column.clone() }),
+            absent.map(|column| AbsentChannel {
+                channel: channel.name.clone(),
+                column: column.clone(),
+            }),
         );
         absent.is_none()
     });
@@ -183,24 +207,35 @@ fn present(source: &SourceMap, file: &dyn TableFile, report: &mut ImportReport) 
 }
 
 /// Every part of the mask needs one file that has all of its columns.
-fn check_mask_columns(map: &ImportMap, files: &[Box<dyn TableFile + '_>]) -> Result<(), ImportError> {
+fn check_mask_columns(
+    map: &ImportMap,
+    files: &[Box<dyn TableFile + '_>],
+) -> Result<(), ImportError> {
     for term in &map.keep {
         let columns = term.columns();
         if files.iter().any(|file| has_all(file.as_ref(), &columns)) {
             continue;
         }
-        let nowhere =
-            columns.iter().find(|column| files.iter().all(|file| !has_all(file.as_ref(), &[column])));
+        let nowhere = columns
+            .iter()
+            .find(|column| files.iter().all(|file| !has_all(file.as_ref(), &[column])));
         let problem = match nowhere {
             Some(column) => {
                 let all = files.iter().flat_map(|file| file.columns()).map(String::as_str);
                 format!("no file has a column `{column}`; nearest: {}", nearest(column, all))
             }
             None => {
-                format!("no single file has all of {}: split the condition with `and`", columns.join(", "))
+                format!(
+                    "no single file has all of {}: split the condition with `and`",
+                    columns.join(", ")
+                )
             }
         };
-        return Err(ImportError::MapField { map: map.name.clone(), field: "keep".to_owned(), problem });
+        return Err(ImportError::MapField {
+            map: map.name.clone(),
+            field: "keep".to_owned(),
+            problem,
+        });
     }
     Ok(())
 }
@@ -210,10 +245,18 @@ fn has_all(file: &dyn TableFile, columns: &[&str]) -> bool {
 }
 
 /// Reads the columns of a source and those that the mask looks at.
-fn read(source: &SourceMap, keep: &[Condition], file: Box<dyn TableFile + '_>) -> Result<Table, ImportError> {
-    let of_channels = source.channels.iter().flat_map(|channel| &channel.columns).map(String::as_str);
-    let of_mask =
-        keep.iter().map(Condition::columns).filter(|columns| has_all(file.as_ref(), columns)).flatten();
+fn read(
+    source: &SourceMap,
+    keep: &[Condition],
+    file: Box<dyn TableFile + '_>,
+) -> Result<Table, ImportError> {
+    let of_channels =
+        source.channels.iter().flat_map(|channel| &channel.columns).map(String::as_str);
+    let of_mask = keep
+        .iter()
+        .map(Condition::columns)
+        .filter(|columns| has_all(file.as_ref(), columns))
+        .flatten();
     let mut wanted = vec![source.time.column.as_str()];
     for column in of_channels.chain(of_mask) {
         if !wanted.contains(&column) {
@@ -248,7 +291,9 @@ fn kept_rows(keep: &[Condition], tables: &[Table], times: &[Vec<f64>]) -> Vec<Ve
             .iter()
             .zip(&by_rows)
             .zip(times)
-            .filter_map(|((table, rows), time_s)| Some((table.name.as_str(), spans(rows.as_ref()?, time_s))))
+            .filter_map(|((table, rows), time_s)| {
+                Some((table.name.as_str(), spans(rows.as_ref()?, time_s)))
+            })
             .collect();
         for (((kept, rows), table), time_s) in kept.iter_mut().zip(by_rows).zip(tables).zip(times) {
             // Two sources may read one file: its rows are the same.
@@ -279,7 +324,12 @@ fn inside(spans: &[(f64, f64)], t: f64) -> bool {
 }
 
 /// The kept rows must exist and their time must increase.
-fn check_order(source: &SourceMap, table: &Table, rows: &[usize], time_s: &[f64]) -> Result<(), ImportError> {
+fn check_order(
+    source: &SourceMap,
+    table: &Table,
+    rows: &[usize],
+    time_s: &[f64],
+) -> Result<(), ImportError> {
     if rows.is_empty() {
         return Err(ImportError::NothingKept { file: table.name.clone(), rows: table.len() });
     }

@@ -23,10 +23,12 @@ const FIXED: [(&str, Kind); 20] = [
     ("imu.specific_force_body_m_s2", Kind::VectorBody),
     ("imu_2.omega_body_rad_s", Kind::VectorBody),
     ("imu_2.specific_force_body_m_s2", Kind::VectorBody),
-    // The accelerometer turned into the world by the logged attitude, less gravity: what autopilots log as acceleration.
+    // The accelerometer turned into the world by the logged attitude, less gravity: what autopilots
+    // log as acceleration.
     ("imu.acceleration_ned_m_s2", Kind::VectorNed),
     ("attitude.q_ned_from_body_wxyz", Kind::Attitude),
-    // Angles of logs that lack one of them: nose right, nose up, right side down, in this order from the world.
+    // Angles of logs that lack one of them: nose right, nose up, right side down, in this order
+    // from the world.
     ("attitude.yaw_rad", Kind::Numbers(1)),
     ("attitude.pitch_rad", Kind::Numbers(1)),
     ("attitude.roll_rad", Kind::Numbers(1)),
@@ -51,7 +53,8 @@ pub(super) fn kind(name: &str) -> Option<Kind> {
     }
     let rest = OPEN.iter().find_map(|prefix| name.strip_prefix(prefix))?;
     let word = |part: &str| {
-        !part.is_empty() && part.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')
+        !part.is_empty()
+            && part.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')
     };
     if !rest.split('.').all(word) {
         return None;
@@ -73,10 +76,12 @@ pub(super) fn kind(name: &str) -> Option<Kind> {
 
 /// The canonical names nearest to a wrong one, for an error message.
 pub(super) fn nearest_canonical(name: &str) -> String {
-    nearest(name, FIXED.iter().map(|(fixed, _)| *fixed)) + "; truth.*, reference.* and control.* are open"
+    nearest(name, FIXED.iter().map(|(fixed, _)| *fixed))
+        + "; truth.*, reference.* and control.* are open"
 }
 
-/// Up to three candidates by edit distance; those with the same first part (before a dot) alone, if there are any.
+/// Up to three candidates by edit distance; those with the same first part (before a dot) alone, if
+/// there are any.
 pub(super) fn nearest<'a>(name: &str, candidates: impl Iterator<Item = &'a str>) -> String {
     let first = |s: &str| s.split('.').next().map(str::to_owned);
     let mut ranked: Vec<_> =
@@ -124,7 +129,9 @@ mod tests {
 
     #[test]
     fn names_outside_the_list_are_unknown() {
-        for name in ["imu.omega", "time_s", "truth", "truth.", "truth..x", "truth.Ä", "control.a b", ""] {
+        for name in
+            ["imu.omega", "time_s", "truth", "truth.", "truth..x", "truth.Ä", "control.a b", ""]
+        {
             assert_eq!(kind(name), None, "{name}");
         }
     }

@@ -1,7 +1,7 @@
 //! Parquet files: flat numeric columns, nullable or not; a null is NaN.
 //!
-//! A column inside structs has its path as its name, `gyro.x`. Times are the integers that the file stores: the map
-//! says their unit.
+//! A column inside structs has its path as its name, `gyro.x`. Times are the integers that the file
+//! stores: the map says their unit.
 
 use std::fs::File;
 use std::path::Path;
@@ -58,9 +58,11 @@ impl<'a> ParquetFile<'a> {
         let mut values = Vec::new();
         for group in 0..self.reader.num_row_groups() {
             let before = values.len();
-            let group = self.reader.get_row_group(group).map_err(|error| damaged(&self.name, &error))?;
+            let group =
+                self.reader.get_row_group(group).map_err(|error| damaged(&self.name, &error))?;
             self.check_place(group.metadata().column(place))?;
-            let pages = group.get_column_page_reader(place).map_err(|error| damaged(&self.name, &error))?;
+            let pages =
+                group.get_column_page_reader(place).map_err(|error| damaged(&self.name, &error))?;
             let pages = Box::new(Pages { inner: pages, has_dictionary: false });
             match numbers(get_column_reader(descriptor.clone(), pages), &descriptor, &mut values) {
                 Ok(true) => {}
@@ -77,10 +79,13 @@ impl<'a> ParquetFile<'a> {
             if i64::try_from(values.len() - before) != Ok(rows) {
                 let found = values.len() - before;
                 let column = &self.columns[place];
-                let problem = format!("column `{column}` has {found} values where the file has {rows} rows");
+                let problem =
+                    format!("column `{column}` has {found} values where the file has {rows} rows");
                 return Err(ImportError::Damaged { file: self.name.clone(), problem });
             }
-            self.meter.add(usize::try_from(group.metadata().column(place).compressed_size()).unwrap_or(0));
+            self.meter.add(
+                usize::try_from(group.metadata().column(place).compressed_size()).unwrap_or(0),
+            );
         }
         for (row, value) in values.iter_mut().enumerate() {
             *value = checked(*value).map_err(|problem| ImportError::Cell {
@@ -103,7 +108,8 @@ impl<'a> ParquetFile<'a> {
             return Ok(());
         }
         let column = chunk.column_path();
-        let problem = format!("column `{column}` claims {size} bytes at byte {start} of {}", self.bytes);
+        let problem =
+            format!("column `{column}` claims {size} bytes at byte {start} of {}", self.bytes);
         Err(ImportError::Damaged { file: self.name.clone(), problem })
     }
 }
@@ -194,7 +200,8 @@ fn append<T: DataType>(
     }
 }
 
-/// The pages of a column chunk; a page that needs a dictionary comes only after one, which the decoder takes for granted.
+/// The pages of a column chunk; a page that needs a dictionary comes only after one, which the
+/// decoder takes for granted.
 struct Pages {
     inner: Box<dyn PageReader>,
     has_dictionary: bool,

@@ -68,7 +68,10 @@ impl fmt::Display for ImportReport {
             }
             write!(f, ": {rows} rows, {rows_masked} dropped by `keep`")?;
             if *bytes_cut > 0 {
-                write!(f, "; the file ends inside a record, its last {bytes_cut} bytes are left out")?;
+                write!(
+                    f,
+                    "; the file ends inside a record, its last {bytes_cut} bytes are left out"
+                )?;
             }
             writeln!(f)?;
         }

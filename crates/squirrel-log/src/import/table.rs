@@ -1,4 +1,5 @@
-//! What every reader gives: the columns that a map asks for, as numbers, with the row of the file each came from.
+//! What every reader gives: the columns that a map asks for, as numbers, with the row of the file
+//! each came from.
 
 use std::fs;
 use std::io::{self, Read};
@@ -24,7 +25,8 @@ pub(super) trait TableFile {
     /// Reads some columns to the end of the file; `wanted` has no name twice.
     ///
     /// # Errors
-    /// A missing or repeated column, a value that is no number or infinite, a damaged file, no rows.
+    /// A missing or repeated column, a value that is no number or infinite, a damaged file, no
+    /// rows.
     fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError>;
 }
 
@@ -51,7 +53,8 @@ enum Format {
     Usd,
 }
 
-/// The format of a file: by its extension, or by its first byte, for the logs of a Crazyflie are called `log00`.
+/// The format of a file: by its extension, or by its first byte, for the logs of a Crazyflie are
+/// called `log00`.
 ///
 /// # Errors
 /// Neither says it, or the file cannot be read or is empty.
@@ -82,8 +85,8 @@ fn first_byte(path: &Path) -> io::Result<Option<u8>> {
 /// Opens the file of one `[[source]]`.
 ///
 /// # Errors
-/// An unknown format, `topic` or `instance` where the format has none or missing where it has, an unreadable or
-/// empty file, a damaged header, a missing topic.
+/// An unknown format, `topic` or `instance` where the format has none or missing where it has, an
+/// unreadable or empty file, a damaged header, a missing topic.
 pub(super) fn open<'a>(
     map: &ImportMap,
     index: usize,
@@ -130,7 +133,12 @@ pub(super) fn open<'a>(
 impl Table {
     /// * `rows` - number of each row in the file
     /// * `values` - one list a wanted column, as long as `rows`
-    pub(super) fn new(name: String, wanted: &[&str], values: Vec<Vec<f64>>, rows: Vec<u64>) -> Self {
+    pub(super) fn new(
+        name: String,
+        wanted: &[&str],
+        values: Vec<Vec<f64>>,
+        rows: Vec<u64>,
+    ) -> Self {
         let columns = wanted.iter().map(|&column| column.to_owned()).zip(values).collect();
         Self { name, columns, rows, bytes_cut: 0 }
     }
@@ -195,7 +203,11 @@ impl Table {
 ///
 /// # Errors
 /// [`ImportError::MissingColumn`], [`ImportError::RepeatedColumn`].
-pub(super) fn places(file: &str, columns: &[String], wanted: &[&str]) -> Result<Vec<usize>, ImportError> {
+pub(super) fn places(
+    file: &str,
+    columns: &[String],
+    wanted: &[&str],
+) -> Result<Vec<usize>, ImportError> {
     let place = |column: &&str| {
         let mut found = columns.iter().enumerate().filter(|(_, name)| name == column);
         match (found.next(), found.count()) {

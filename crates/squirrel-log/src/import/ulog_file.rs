@@ -1,8 +1,9 @@
 //! ULog files of PX4: the messages of one topic as rows.
 //!
-//! The format is that of docs.px4.io, "ULog File Format", version 1 with appended data: a header, then records of size,
-//! type and payload. A log that ends inside a record, as one does after a loss of power, is read up to there, and the
-//! table says how many bytes are left out; any other damage is an error.
+//! The format is that of docs.px4.io, "ULog File Format", version 1 with appended data: a header,
+//! then records of size, type and payload. A log that ends inside a record, as one does after a
+//! loss of power, is read up to there, and the table says how many bytes are left out; any other
+//! damage is an error.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
@@ -55,16 +56,22 @@ impl<'a> UlogFile<'a> {
         if log.messages.is_empty() {
             if log.bytes_cut > 0 {
                 let end = bytes.len() - log.bytes_cut;
-                let problem =
-                    format!("ends inside the record at byte {end}, before any message of `{wanted}`");
+                let problem = format!(
+                    "ends inside the record at byte {end}, before any message of `{wanted}`"
+                );
                 return Err(damaged(problem));
             }
             let nearest = nearest(&wanted, log.topics.iter().map(String::as_str));
-            return Err(ImportError::MissingTopic { file: file.to_owned(), topic: wanted, nearest });
+            return Err(ImportError::MissingTopic {
+                file: file.to_owned(),
+                topic: wanted,
+                nearest,
+            });
         }
         let layout = Layout::new(topic, &log.definitions).map_err(damaged)?;
         let length = layout.size_logged..=layout.size;
-        if let Some(message) = log.messages.iter().find(|message| !length.contains(&message.len())) {
+        if let Some(message) = log.messages.iter().find(|message| !length.contains(&message.len()))
+        {
             return Err(damaged(format!(
                 "the message of `{wanted}` at byte {} has {} bytes, its format {}",
                 message.start,
@@ -86,14 +93,16 @@ impl TableFile for UlogFile<'_> {
 
     fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
         let records = self.messages.iter().map(|message| &self.bytes[message.clone()]);
-        let mut table = Table::of_records(self.name, &self.layout.columns, &self.columns, wanted, &records)?;
+        let mut table =
+            Table::of_records(self.name, &self.layout.columns, &self.columns, wanted, &records)?;
         self.meter.add(self.bytes.len());
         table.bytes_cut = self.bytes_cut as u64;
         Ok(table)
     }
 }
 
-/// A topic as messages name it: `sensor_gyro`, and `sensor_gyro instance 1` for the second of a kind.
+/// A topic as messages name it: `sensor_gyro`, and `sensor_gyro instance 1` for the second of a
+/// kind.
 fn label(topic: &str, instance: u8) -> String {
     if instance == 0 { topic.to_owned() } else { format!("{topic} instance {instance}") }
 }
@@ -126,8 +135,10 @@ impl Records {
         self.bytes_total = bytes.len();
         let mut start = HEADER_BYTES;
         loop {
-            // Appended data start where they say, and what stands before them may end inside a record.
-            let section_end = self.appended.iter().copied().find(|&at| at > start).unwrap_or(bytes.len());
+            // Appended data start where they say, and what stands before them may end inside a
+            // record.
+            let section_end =
+                self.appended.iter().copied().find(|&at| at > start).unwrap_or(bytes.len());
             let rest = &bytes[start..section_end];
             match record(rest) {
                 Some((kind, payload)) => {
@@ -146,7 +157,8 @@ impl Records {
     }
 
     fn record(&mut self, kind: u8, payload: &[u8], at: usize, wanted: &str) -> Result<(), String> {
-        let text = |bytes| str::from_utf8(bytes).map_err(|_| "has a name that is no text".to_owned());
+        let text =
+            |bytes| str::from_utf8(bytes).map_err(|_| "has a name that is no text".to_owned());
         match kind {
             b'B' => {
                 let flags = payload.get(8..16).ok_or("is too short for flags")?;
@@ -158,19 +170,24 @@ impl Records {
                 }
             }
             b'F' => {
-                let (name, fields) = text(payload)?.split_once(':').ok_or("is no format: no `:`")?;
+                let (name, fields) =
+                    text(payload)?.split_once(':').ok_or("is no format: no `:`")?;
                 self.definitions.insert(name.to_owned(), fields.to_owned());
             }
             b'A' => {
                 let (&[instance, low, high], name) =
                     payload.split_first_chunk().ok_or("is too short for a topic")?;
-                self.subscriptions.insert(u16::from_le_bytes([low, high]), label(text(name)?, instance));
+                self.subscriptions
+                    .insert(u16::from_le_bytes([low, high]), label(text(name)?, instance));
             }
             b'D' => {
-                let (&id, data) = payload.split_first_chunk().ok_or("is too short for a message")?;
+                let (&id, data) =
+                    payload.split_first_chunk().ok_or("is too short for a message")?;
                 let id = u16::from_le_bytes(id);
-                let topic =
-                    self.subscriptions.get(&id).ok_or_else(|| format!("is a message of unknown id {id}"))?;
+                let topic = self
+                    .subscriptions
+                    .get(&id)
+                    .ok_or_else(|| format!("is a message of unknown id {id}"))?;
                 if topic == wanted {
                     self.messages.push(at + payload.len() - data.len()..at + payload.len());
                 }
@@ -178,7 +195,8 @@ impl Records {
                     self.topics.insert(topic.clone());
                 }
             }
-            // Parameters, texts, drop-outs and the like are no numbers over time; later types are to be skipped.
+            // Parameters, texts, drop-outs and the like are no numbers over time; later types are
+            // to be skipped.
             _ => {}
         }
         Ok(())
@@ -189,7 +207,10 @@ impl Records {
         for offset in offsets.chunks_exact(8).take(3).filter_map(|offset| offset.first_chunk()) {
             let at = u64::from_le_bytes(*offset);
             if at > self.bytes_total as u64 {
-                return Err(format!("says that data are appended at byte {at} of {}", self.bytes_total));
+                return Err(format!(
+                    "says that data are appended at byte {at} of {}",
+                    self.bytes_total
+                ));
             }
             if at > 0 {
                 self.appended.push(at as usize);

@@ -1,6 +1,8 @@
-//! ULog's message formats: from `name:type field;type field;` to columns with a type and a place in the message.
+//! ULog's message formats: from `name:type field;type field;` to columns with a type and a place in
+//! the message.
 //!
-//! Fields may be arrays and other formats, so a column's name is a path: `position[0]`, `esc[1].esc_rpm`.
+//! Fields may be arrays and other formats, so a column's name is a path: `position[0]`,
+//! `esc[1].esc_rpm`.
 
 use std::collections::BTreeMap;
 
@@ -40,7 +42,8 @@ impl Layout {
         definitions: &BTreeMap<String, String>,
         depth: usize,
     ) -> Result<(), String> {
-        let fields = definitions.get(format).ok_or_else(|| format!("format `{format}` is not defined"))?;
+        let fields =
+            definitions.get(format).ok_or_else(|| format!("format `{format}` is not defined"))?;
         if depth == DEPTH_MAX {
             return Err(format!("format `{format}` is nested more than {DEPTH_MAX} deep"));
         }
@@ -73,7 +76,9 @@ impl Layout {
                     self.size_logged = self.size;
                 }
                 if self.size > MESSAGE_MAX_BYTES {
-                    return Err(format!("format `{format}` is longer than {MESSAGE_MAX_BYTES} bytes"));
+                    return Err(format!(
+                        "format `{format}` is longer than {MESSAGE_MAX_BYTES} bytes"
+                    ));
                 }
             }
         }
@@ -102,7 +107,8 @@ mod tests {
     use super::*;
 
     fn layout(definitions: &[(&str, &str)]) -> Result<Layout, String> {
-        let definitions = definitions.iter().map(|(name, fields)| ((*name).to_owned(), (*fields).to_owned()));
+        let definitions =
+            definitions.iter().map(|(name, fields)| ((*name).to_owned(), (*fields).to_owned()));
         Layout::new("top", &definitions.collect())
     }
 
@@ -134,7 +140,10 @@ mod tests {
             (&[("other", "")][..], "format `top` is not defined"),
             (&[("top", "inner x;")], "format `inner` is not defined"),
             (&[("top", "float")], "format `top` has the field `float`: not `type name`"),
-            (&[("top", "float[-1] x")], "format `top` has the field `float[-1] x`: not `type name`"),
+            (
+                &[("top", "float[-1] x")],
+                "format `top` has the field `float[-1] x`: not `type name`",
+            ),
             (&[("top", "float[2 x")], "format `top` has the field `float[2 x`: not `type name`"),
             (&[("top", "top x")], "format `top` is nested more than 16 deep"),
             (&[("top", "double[65535] x")], "format `top` is longer than 65535 bytes"),

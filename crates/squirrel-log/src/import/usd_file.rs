@@ -1,9 +1,10 @@
 //! Micro-SD logs of a Crazyflie: the records of one event type as rows.
 //!
-//! `usd_format.rs` describes the format. The columns are the event's variables, and `timestamp`, in us whichever version the
-//! file has. The last four bytes are the CRC-32 of all before them. A file that contradicts it, or ends inside a record, is
-//! refused: the firmware writes the CRC when it is told to stop and when it is turned off, so this is a bad copy, and which of
-//! its bytes are good nobody knows.
+//! `usd_format.rs` describes the format. The columns are the event's variables, and `timestamp`, in
+//! us whichever version the file has. The last four bytes are the CRC-32 of all before them. A file
+//! that contradicts it, or ends inside a record, is refused: the firmware writes the CRC when it is
+//! told to stop and when it is turned off, so this is a bad copy, and which of its bytes are good
+//! nobody knows.
 
 use std::collections::BTreeSet;
 
@@ -82,7 +83,10 @@ fn records<'h>(
 ) -> Result<Vec<usize>, String> {
     let end = bytes.len().saturating_sub(CRC_BYTES);
     if end < header.size {
-        return Err(format!("ends after {} bytes, before the CRC-32 behind the header", bytes.len()));
+        return Err(format!(
+            "ends after {} bytes, before the CRC-32 behind the header",
+            bytes.len()
+        ));
     }
     let (mut at, mut records) = (header.size, Vec::new());
     while at < end {
@@ -116,5 +120,7 @@ fn check_crc(bytes: &[u8]) -> Result<(), String> {
         return Ok(());
     }
     let at = before.len();
-    Err(format!("the CRC-32 at byte {at} is {stored:08x}, that of the bytes before it is {computed:08x}"))
+    Err(format!(
+        "the CRC-32 at byte {at} is {stored:08x}, that of the bytes before it is {computed:08x}"
+    ))
 }

@@ -1,9 +1,11 @@
-//! The header of a Crazyflie's micro-SD log: which kinds of records there are, and which numbers each holds.
+//! The header of a Crazyflie's micro-SD log: which kinds of records there are, and which numbers
+//! each holds.
 //!
-//! After the firmware's `usddeck.c` and Bitcraze's `cfusdlog.py`, all little endian: the byte 0xBC, the version (u16, 1 or
-//! 2), the number of event types (u16); then of each its id (u16), its name, the number of its variables (u16), and these as
-//! `name(type)`. Texts end with a zero; a type is a letter of Python's `struct`. A record is the id of its event (u16),
-//! the time (version 1: u32, ms; version 2: u64, us) and the variables without padding.
+//! After the firmware's `usddeck.c` and Bitcraze's `cfusdlog.py`, all little endian: the byte 0xBC,
+//! the version (u16, 1 or 2), the number of event types (u16); then of each its id (u16), its name,
+//! the number of its variables (u16), and these as `name(type)`. Texts end with a zero; a type is a
+//! letter of Python's `struct`. A record is the id of its event (u16), the time (version 1: u32,
+//! ms; version 2: u64, us) and the variables without padding.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -42,7 +44,8 @@ pub(super) struct EventType {
 impl Header {
     /// Reads the header of a file.
     ///
-    /// * `wanted` - the event whose columns are kept: those of all would need many times the memory of the file
+    /// * `wanted` - the event whose columns are kept: those of all would need many times the memory
+    ///   of the file
     ///
     /// # Errors
     /// Says where it is cut off or contradicts the format.
@@ -50,7 +53,9 @@ impl Header {
         let mut text = Text { bytes, at: 0 };
         let [magic] = text.take()?;
         if !is_usd(magic) {
-            return Err(format!("byte 0 is {magic:#04x}, not {MAGIC:#04x} as in a Crazyflie's micro-SD log"));
+            return Err(format!(
+                "byte 0 is {magic:#04x}, not {MAGIC:#04x} as in a Crazyflie's micro-SD log"
+            ));
         }
         // Its type, and the microseconds of a step.
         let clock = match text.count()? {
@@ -69,7 +74,9 @@ impl Header {
             let new = names.insert(name);
             let old = header.events.insert(id, EventType { name: name.to_owned(), size });
             if !new || old.is_some() {
-                return Err(format!("the event type at byte {at} repeats the name `{name}` or the id {id}"));
+                return Err(format!(
+                    "the event type at byte {at} repeats the name `{name}` or the id {id}"
+                ));
             }
         }
         header.size = text.at;
@@ -77,7 +84,8 @@ impl Header {
     }
 }
 
-/// Reads the variables of an event, and adds the columns of its records; returns the bytes of a record.
+/// Reads the variables of an event, and adds the columns of its records; returns the bytes of a
+/// record.
 fn event(
     text: &mut Text,
     clock: (Kind, f64),
@@ -107,7 +115,8 @@ fn event(
     Ok(size)
 }
 
-/// The type that a letter stands for. The firmware writes b B h H i I e f; the others mean the same to Bitcraze's reader.
+/// The type that a letter stands for. The firmware writes b B h H i I e f; the others mean the same
+/// to Bitcraze's reader.
 fn kind(letter: &str) -> Option<Kind> {
     Some(match letter {
         "b" => Kind::I8,

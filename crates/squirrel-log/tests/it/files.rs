@@ -22,8 +22,10 @@ fn is_link(path: &Path) -> bool {
 }
 
 fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -60,7 +62,9 @@ fn links_in_a_circle_and_into_missing_folders_are_errors_and_stay() {
     symlink("a", folder.join("b")).unwrap();
     symlink("nowhere/file", folder.join("astray")).unwrap();
     for name in ["a", "astray"] {
-        assert!(writable(&folder.join(name)).is_err() && write_whole(&folder.join(name), b"x").is_err());
+        assert!(
+            writable(&folder.join(name)).is_err() && write_whole(&folder.join(name), b"x").is_err()
+        );
         assert!(is_link(&folder.join(name)));
     }
     assert_eq!(names(&folder), ["a", "astray", "b"]);
@@ -127,9 +131,12 @@ fn a_device_is_nobodys_own_file() {
     let folder = folder("device");
     symlink("/dev/null", folder.join("null")).unwrap();
     symlink("/proc/self/fd/1", folder.join("stdout")).unwrap();
-    for path in
-        [PathBuf::from("/dev/null"), folder.join("null"), PathBuf::from("/dev/fd/1"), folder.join("stdout")]
-    {
+    for path in [
+        PathBuf::from("/dev/null"),
+        folder.join("null"),
+        PathBuf::from("/dev/fd/1"),
+        folder.join("stdout"),
+    ] {
         assert_eq!(FileId::written(&path), [], "{}", path.display());
     }
     assert_eq!(FileId::read(&folder.join("null")), None);

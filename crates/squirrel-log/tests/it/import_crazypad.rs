@@ -1,5 +1,6 @@
-//! The map of CrazyPAD: a piece of one flight by hand, and all flights that are at hand against physics in NED and FRD. At hand are
-//! the cut-outs in `tests/data/flights`, or the whole flights in the folder `SQUIRREL_FLIGHTS`.
+//! The map of CrazyPAD: a piece of one flight by hand, and all flights that are at hand against
+//! physics in NED and FRD. At hand are the cut-outs in `tests/data/flights`, or the whole flights
+//! in the folder `SQUIRREL_FLIGHTS`.
 #![allow(clippy::print_stdout, reason = "tests")]
 #![allow(clippy::unreadable_literal, reason = "numbers as another decoder prints them")]
 
@@ -24,7 +25,8 @@ fn map(text: &str) -> ImportMap {
 
 #[test]
 fn the_map_turns_a_piece_of_a_flight_into_our_frames() {
-    let (log, report) = import(&map(&map_text()), &[root("tests/data/crazypad/E8_log00.bin")]).unwrap();
+    let (log, report) =
+        import(&map(&map_text()), &[root("tests/data/crazypad/E8_log00.bin")]).unwrap();
     assert_eq!((report.files[0].rows, report.files[0].rows_masked), (200, 108));
     let close = |channel: &str, expected: &[f64]| {
         let last = log.channel(channel).unwrap().1.row(91);
@@ -38,8 +40,14 @@ fn the_map_turns_a_piece_of_a_flight_into_our_frames() {
     close("control.rotor_thrust_request", &counts([42_979.0, 37_829.0, 45_865.0, 35_343.0]));
     close("battery.voltage_v", &[3.536]);
     // North, west and up in the file.
-    close("gnss.position_ned_m", &[5.896473885513842e-05, 0.011082288809120655, -0.5031231641769409]);
-    close("gnss.velocity_ned_m_s", &[0.028661735355854034, -0.030340489000082016, -0.07731214165687561]);
+    close(
+        "gnss.position_ned_m",
+        &[5.896473885513842e-05, 0.011082288809120655, -0.5031231641769409],
+    );
+    close(
+        "gnss.velocity_ned_m_s",
+        &[0.028661735355854034, -0.030340489000082016, -0.07731214165687561],
+    );
     let acceleration_g = [-0.00902516022324562, 0.007438897155225277, 0.021492421627044678];
     close("imu.acceleration_ned_m_s2", &acceleration_g.map(|g| g * GRAVITY_M_S2));
     close("attitude.roll_rad", &[-0.06214368715882301_f64.to_radians()]);
@@ -60,7 +68,8 @@ fn flights() -> Vec<(String, FlightLog)> {
         let name = path.file_stem().unwrap().display().to_string();
         let (log, report) = import(&map, &[path]).unwrap();
         let without_yaw = ["cut_M3_2mm__E8_log02", "cut_M3_3mm__E8_log02"].contains(&name.as_str());
-        let absent: Vec<&str> = report.absent.iter().map(|absent| absent.channel.as_str()).collect();
+        let absent: Vec<&str> =
+            report.absent.iter().map(|absent| absent.channel.as_str()).collect();
         assert_eq!(absent, if without_yaw { vec!["attitude.yaw_rad"] } else { vec![] }, "{name}");
         (name, log)
     };
@@ -77,14 +86,16 @@ fn column(log: &FlightLog, channel: &str, place: usize) -> Vec<f64> {
 fn correlation(x: &[f64], y: &[f64]) -> (f64, f64) {
     let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
     let (mean_x, mean_y) = (mean(x), mean(y));
-    let sum =
-        |f: &dyn Fn(f64, f64) -> f64| x.iter().zip(y).map(|(x, y)| f(x - mean_x, y - mean_y)).sum::<f64>();
+    let sum = |f: &dyn Fn(f64, f64) -> f64| {
+        x.iter().zip(y).map(|(x, y)| f(x - mean_x, y - mean_y)).sum::<f64>()
+    };
     let (xx, yy, xy) = (sum(&|x, _| x * x), sum(&|_, y| y * y), sum(&|x, y| x * y));
     (xy / (xx * yy).sqrt(), xy / xx)
 }
 
-/// Correlation of an angle's acceleration with a sum of the rotors' thrusts `LAG` rows before: rotors, filter and estimate
-/// are late by about 40 ms. Both are means over the same triangle of `2 WIDTH` rows.
+/// Correlation of an angle's acceleration with a sum of the rotors' thrusts `LAG` rows before:
+/// rotors, filter and estimate are late by about 40 ms. Both are means over the same triangle of
+/// `2 WIDTH` rows.
 fn follows(log: &FlightLog, angle: &[f64], signs: [f64; 4]) -> f64 {
     const LAG: usize = 4;
     const WIDTH: usize = 10;
@@ -117,7 +128,11 @@ fn every_flight_obeys_physics() {
         let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
         steps.sort_unstable_by(f64::total_cmp);
         let step_s = if name.contains("__E8_") { 9.886e-3 } else { 9.9125e-3 };
-        assert!((steps[steps.len() / 2] - step_s).abs() < 3e-6, "{name}: {}", steps[steps.len() / 2]);
+        assert!(
+            (steps[steps.len() / 2] - step_s).abs() < 3e-6,
+            "{name}: {}",
+            steps[steps.len() / 2]
+        );
 
         // Half a metre up is minus half a metre down, and the way is the velocity's.
         let down = column(&log, "gnss.position_ned_m", 2);
@@ -135,14 +150,16 @@ fn every_flight_obeys_physics() {
         // Fixes of the position make steps, up to 0.76 of correlation; the slope is 0.96 to 1.005.
         assert!(r > 0.7 && (slope - 1.0).abs() < 0.05, "{name}: {r} {slope}");
 
-        // Right side down pulls east, by g times the angle: 0.84 to 1.10 times that in these flights.
+        // Right side down pulls east, by g times the angle: 0.84 to 1.10 times that in these
+        // flights.
         let roll = column(&log, "attitude.roll_rad", 0);
         let east = column(&log, "imu.acceleration_ned_m_s2", 1);
         let (r, slope) = correlation(&roll, &east);
         assert!(r > 0.2 && (0.75..1.25).contains(&(slope / GRAVITY_M_S2)), "{name}: {r} {slope}");
 
-        // Rotors 1 to 4 front right, back right, back left, front left; 1 and 3 turn the nose right. The acceleration is
-        // noisy as a pitch, but its correlation has the right sign in every flight, 0.016 to 0.5.
+        // Rotors 1 to 4 front right, back right, back left, front left; 1 and 3 turn the nose
+        // right. The acceleration is noisy as a pitch, but its correlation has the right sign in
+        // every flight, 0.016 to 0.5.
         let nose_down = column(&log, "imu.acceleration_ned_m_s2", 0);
         let nose_up: Vec<f64> = nose_down.iter().map(|north| -north / GRAVITY_M_S2).collect();
         let by_roll = follows(&log, &roll, [-1.0, -1.0, 1.0, 1.0]);
@@ -156,7 +173,8 @@ fn every_flight_obeys_physics() {
     }
 }
 
-/// The rotors get what Bitcraze's firmware makes of the request and the voltage; the request is not what they get.
+/// The rotors get what Bitcraze's firmware makes of the request and the voltage; the request is not
+/// what they get.
 #[test]
 fn the_command_is_the_request_after_the_compensation_of_the_battery() {
     for (name, log) in flights() {
@@ -164,12 +182,13 @@ fn the_command_is_the_request_after_the_compensation_of_the_battery() {
         for rotor in 0..4 {
             let request = column(&log, "control.rotor_thrust_request", rotor);
             let command = column(&log, "rotor.command", rotor);
-            let off = request.iter().zip(&command).zip(&volts).filter(|((request, command), volts)| {
-                let g = 60.0 * **request * 65535.0 / 65536.0;
-                let motor_v = 0.088 * g - 0.0006239 * g * g;
-                // The voltage is cut to millivolts, the command to 1/65535.
-                !(-0.0002..0.0013).contains(&(motor_v / **command - **volts))
-            });
+            let off =
+                request.iter().zip(&command).zip(&volts).filter(|((request, command), volts)| {
+                    let g = 60.0 * **request * 65535.0 / 65536.0;
+                    let motor_v = 0.088 * g - 0.0006239 * g * g;
+                    // The voltage is cut to millivolts, the command to 1/65535.
+                    !(-0.0002..0.0013).contains(&(motor_v / **command - **volts))
+                });
             // At full request the two may be of different steps.
             assert!(off.count() <= 2, "{name}, rotor {}", rotor + 1);
         }

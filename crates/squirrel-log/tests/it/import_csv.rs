@@ -8,15 +8,16 @@ use nalgebra::{UnitQuaternion, Vector3};
 
 #[test]
 fn an_enu_flu_attitude_comes_out_as_ned_from_frd() {
-    // Nose up 30 deg, heading east: in ENU the nose points along (cos 30, 0, sin 30) and FLU's left points north, so
-    // world_from_body is a turn by -30 deg about y (north in ENU).
+    // Nose up 30 deg, heading east: in ENU the nose points along (cos 30, 0, sin 30) and FLU's left
+    // points north, so world_from_body is a turn by -30 deg about y (north in ENU).
     let q_enu_from_flu = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -FRAC_PI_6);
     let nose_enu = q_enu_from_flu * Vector3::x();
     assert!((nose_enu - Vector3::new(0.75_f64.sqrt(), 0.0, 0.5)).norm() < 1e-12, "{nose_enu}");
 
     let q = q_enu_from_flu.inverse();
     let row = format!("{},{},{},{}", q.i, q.j, q.k, q.w);
-    let flight = Flight::new("attitude", &[("f.csv", &format!("t,qx,qy,qz,qw\n0,{row}\n1,{row}\n"))]);
+    let flight =
+        Flight::new("attitude", &[("f.csv", &format!("t,qx,qy,qz,qw\n0,{row}\n1,{row}\n"))]);
     let map = one_source(
         r#""attitude.q_ned_from_body_wxyz" = { columns = ["qx", "qy", "qz", "qw"], order = "xyzw", world = "enu", body = "flu", direction = "body_from_world" }"#,
     );
@@ -50,9 +51,15 @@ fn attitudes_are_normalised_and_their_sign_is_continuous() {
         let half = 0.05 * f64::from(step);
         let row = channel.row(step.into());
         if step == 50 {
-            assert!(row.iter().all(|x| x.is_nan()), "a rotation without one of its numbers is none");
+            assert!(
+                row.iter().all(|x| x.is_nan()),
+                "a rotation without one of its numbers is none"
+            );
         } else {
-            assert!((row[0] - half.cos()).abs() < 1e-12 && (row[3] - half.sin()).abs() < 1e-12, "{row:?}");
+            assert!(
+                (row[0] - half.cos()).abs() < 1e-12 && (row[3] - half.sin()).abs() < 1e-12,
+                "{row:?}"
+            );
         }
     }
     assert_eq!(report.channels[0].samples_missing, 1);
@@ -112,7 +119,10 @@ fn a_held_sensor_gets_its_own_slow_time_axis() {
 fn channels_of_one_source_share_their_time_axis_or_the_import_fails() {
     let flight = Flight::new(
         "axes",
-        &[("f.csv", "t,x,y,z\n0,1,1,1\n1,1,1,1\n2,2,2,2\n"), ("g.csv", "t,x,y,z\n0,1,1,1\n5,1,1,1\n")],
+        &[
+            ("f.csv", "t,x,y,z\n0,1,1,1\n1,1,1,1\n2,2,2,2\n"),
+            ("g.csv", "t,x,y,z\n0,1,1,1\n5,1,1,1\n"),
+        ],
     );
     let map = one_source(&format!(
         "{OMEGA}\n\"imu.specific_force_body_m_s2\" = \
@@ -204,8 +214,9 @@ fn a_mask_drops_rows_of_its_file_and_time_spans_of_the_others() {
         channels = { "gnss.position_ned_m" = { columns = ["n", "e", "d"], world = "ned" } }
     "#;
     let (log, report) = flight.import_folder(map).unwrap();
-    // d < -0.5 keeps GNSS rows at 1, 2, 4, 5 s, so IMU rows in [1, 2] and [4, 5] s; z != 5 drops the IMU row at 1.25 s,
-    // and of the other files what lies strictly between its neighbours: here nothing.
+    // d < -0.5 keeps GNSS rows at 1, 2, 4, 5 s, so IMU rows in [1, 2] and [4, 5] s; z != 5 drops
+    // the IMU row at 1.25 s, and of the other files what lies strictly between its neighbours: here
+    // nothing.
     assert_eq!(log.metadata["time_zero_s"], "1");
     assert_eq!(log.channel("gnss.position_ned_m").unwrap().0, [0.0, 1.0, 3.0, 4.0]);
     let imu_s = log.channel("imu.omega_body_rad_s").unwrap().0;
@@ -218,8 +229,8 @@ fn a_mask_drops_rows_of_its_file_and_time_spans_of_the_others() {
     );
 }
 
-/// Files and topics often call their columns alike: that a row of one holds by itself does not bring back a time that the
-/// other has dropped.
+/// Files and topics often call their columns alike: that a row of one holds by itself does not
+/// bring back a time that the other has dropped.
 #[test]
 fn a_mask_drops_time_spans_of_files_that_have_its_column_too() {
     let mut imu = "t,x,y,z\n".to_owned();
@@ -247,7 +258,8 @@ fn a_mask_drops_time_spans_of_files_that_have_its_column_too() {
 
 #[test]
 fn masked_rows_may_have_a_broken_clock() {
-    let flight = Flight::new("clock", &[("f.csv", "t,x,y,z\n900,0,0,0\n901,0,0,0\n1,1,0,0\n2,1,0,0\n")]);
+    let flight =
+        Flight::new("clock", &[("f.csv", "t,x,y,z\n900,0,0,0\n901,0,0,0\n1,1,0,0\n2,1,0,0\n")]);
     let (log, _) = flight.import_file(&format!("keep = \"x > 0\"\n{}", one_source(OMEGA))).unwrap();
     assert_eq!(log.channel("imu.omega_body_rad_s").unwrap().0, [0.0, 1.0]);
 }

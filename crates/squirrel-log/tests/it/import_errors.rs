@@ -13,7 +13,10 @@ fn a_bad_file_names_file_column_row_and_value() {
         ("t,x,yy,z\n0,1,2,3\n", "f.csv: no column `y`; nearest: t, x, yy"),
         ("t,x,y,y,z\n0,1,2,2,3\n", "f.csv: column `y` is in the header 2 times"),
         ("t,x,y,z\n0,1,2,3\n1,4,oops,6\n", "f.csv, column `y`, row 3: `oops` is no number"),
-        ("t,x,y,z\r\n0,1,2,3\r\n\r\n1,4,0x1F,6\r\n", "f.csv, column `y`, row 4: `0x1F` is no number"),
+        (
+            "t,x,y,z\r\n0,1,2,3\r\n\r\n1,4,0x1F,6\r\n",
+            "f.csv, column `y`, row 4: `0x1F` is no number",
+        ),
         ("\n\nt,x,y,z\n\n0,1,2,3\n1,4,\"1,5\",6", "f.csv, column `y`, row 6: `1,5` is no number"),
         ("t,x,y,z\n0,1,2,-inf\n", "f.csv, column `z`, row 2: `-inf` is infinite"),
         ("t,x,y,z\n0,1,2,1e999\n", "f.csv, column `z`, row 2: `1e999` is infinite"),
@@ -25,7 +28,10 @@ fn a_bad_file_names_file_column_row_and_value() {
             "t,x,y,z\n0.5,1,2,3\n0.25,1,2,3\n",
             "f.csv, column `t`, row 3: time runs backwards: 0.25 after 0.5 in row 2",
         ),
-        ("t,x,y,z\n0.5,1,2,3\n0.5,1,2,3\n", "f.csv, column `t`, row 3: time repeats: 0.5 after 0.5 in row 2"),
+        (
+            "t,x,y,z\n0.5,1,2,3\n0.5,1,2,3\n",
+            "f.csv, column `t`, row 3: time repeats: 0.5 after 0.5 in row 2",
+        ),
         (
             "t,x,y,z\n0,,nan,\n1,,NaN,\n",
             "f.csv, columns x, y, z: `imu.omega_body_rad_s` has no number in any kept row",
@@ -79,10 +85,18 @@ fn a_bad_channel_says_what_to_write() {
              imu.specific_force_body_m_s2; truth.*, \
              reference.* and control.* are open",
         ),
-        ("time_s", r#"columns = ["t"]"#.into(), "time is not a channel: write `time = { column, unit }`"),
+        (
+            "time_s",
+            r#"columns = ["t"]"#.into(),
+            "time is not a channel: write `time = { column, unit }`",
+        ),
         ("imu.omega_body_rad_s", XYZ.into(), "add `body` (frd or flu)"),
         ("gnss.position_ned_m", XYZ.into(), "add `world` (ned, enu or nwu)"),
-        ("gnss.position_ned_m", r#"columns = ["x"], world = "ned""#.into(), "columns: wants 3, got 1"),
+        (
+            "gnss.position_ned_m",
+            r#"columns = ["x"], world = "ned""#.into(),
+            "columns: wants 3, got 1",
+        ),
         (
             "attitude.q_ned_from_body_wxyz",
             r#"columns = ["t", "x", "y", "z"], world = "ned""#.into(),
@@ -109,7 +123,11 @@ fn a_bad_channel_says_what_to_write() {
             format!("{XYZ}, rotors = [1, 2, 2]"),
             "rotors: wants each of 1 to 3 once, got [1, 2, 2]",
         ),
-        ("rotor.command", format!("{XYZ}, rotors = [1, 2]"), "rotors: wants each of 1 to 3 once, got [1, 2]"),
+        (
+            "rotor.command",
+            format!("{XYZ}, rotors = [1, 2]"),
+            "rotors: wants each of 1 to 3 once, got [1, 2]",
+        ),
         ("rotor.command", format!("{XYZ}, scale = [1, 2]"), "scale: 2 numbers for 3 columns"),
         ("rotor.command", format!("{XYZ}, scale = 0"), "scale: must not be 0"),
         ("rotor.command", format!("{XYZ}, offset = nan"), "offset: must be finite, got NaN"),
@@ -125,7 +143,12 @@ fn a_bad_channel_says_what_to_write() {
 fn a_map_that_toml_refuses_gives_line_and_text() {
     let good = one_source(OMEGA);
     for (from, to, line, problem) in [
-        ("unit = \"s\"", "unit = \"min\"", 2, "unknown variant `min`, expected one of `s`, `ms`, `us`, `ns`"),
+        (
+            "unit = \"s\"",
+            "unit = \"min\"",
+            2,
+            "unknown variant `min`, expected one of `s`, `ms`, `us`, `ns`",
+        ),
         ("unit = \"s\"", "units = \"s\"", 2, "unknown field `units`"),
         ("\"frd\"", "\"fru\"", 4, "unknown variant `fru`, expected `frd` or `flu`"),
         ("body =", "frame =", 4, "unknown field `frame`"),
@@ -159,7 +182,10 @@ fn a_map_that_contradicts_itself_names_the_field() {
     for (map, message) in [
         ("source = []".to_owned(), "source: no [[source]]: nothing to import"),
         (one_source(""), "source 1, channels: no channel: nothing to import"),
-        (good.replace("\"s\"", "\"s\", offset_s = inf"), "source 1, time.offset_s: must be finite, got inf"),
+        (
+            good.replace("\"s\"", "\"s\", offset_s = inf"),
+            "source 1, time.offset_s: must be finite, got inf",
+        ),
         (
             good.replace("time =", "file = \"../f.csv\"\ntime ="),
             "source 1, file: `../f.csv` is not a file inside the flight folder",
@@ -168,7 +194,10 @@ fn a_map_that_contradicts_itself_names_the_field() {
         (format!("keep = \"x >\"\n{good}"), "keep: expected a number, found the end"),
         (format!("keep = \"xx > 1\"\n{good}"), "keep: no file has a column `xx`; nearest: x, t, y"),
     ] {
-        assert_eq!(flight.import_file(&map).unwrap_err().to_string(), format!("map.toml: {message}"));
+        assert_eq!(
+            flight.import_file(&map).unwrap_err().to_string(),
+            format!("map.toml: {message}")
+        );
     }
     let error = flight.import_file(&format!("keep = \"x > 9\"\n{good}")).unwrap_err();
     assert_eq!(flight.message(&error), "f.csv: `keep` drops all 2 rows");
@@ -176,7 +205,8 @@ fn a_map_that_contradicts_itself_names_the_field() {
 
 #[test]
 fn a_condition_over_two_files_asks_to_be_split() {
-    let flight = Flight::new("split", &[("a.csv", "t,x\n0,1\n1,2\n"), ("b.csv", "t,y\n0,1\n1,2\n")]);
+    let flight =
+        Flight::new("split", &[("a.csv", "t,x\n0,1\n1,2\n"), ("b.csv", "t,y\n0,1\n1,2\n")]);
     let map = |keep: &str| {
         format!(
             r#"
@@ -201,14 +231,19 @@ fn a_condition_over_two_files_asks_to_be_split() {
 
 #[test]
 fn paths_that_do_not_fit_the_map_are_named() {
-    let flight = Flight::new("paths", &[("a.csv", GOOD_CSV), ("b.csv", GOOD_CSV), ("sub/a.csv", GOOD_CSV)]);
+    let flight =
+        Flight::new("paths", &[("a.csv", GOOD_CSV), ("b.csv", GOOD_CSV), ("sub/a.csv", GOOD_CSV)]);
     let without_file = one_source(OMEGA);
     let with_file = without_file.replace("time =", "file = \"a.csv\"\ntime =");
     let missing = without_file.replace("time =", "file = \"c.csv\"\ntime =");
     for (map, paths, message) in [
         (&with_file, &["nowhere"][..], "nowhere: No such file or directory (os error 2)"),
         (&missing, &["sub"], "map.toml: file `c.csv` is in none of the given paths: sub"),
-        (&missing, &["a.csv", "b.csv"], "map.toml: file `c.csv` is in none of the given paths: a.csv, b.csv"),
+        (
+            &missing,
+            &["a.csv", "b.csv"],
+            "map.toml: file `c.csv` is in none of the given paths: a.csv, b.csv",
+        ),
         (&missing, &[], "map.toml: file `c.csv` is in none of the given paths: none"),
         (
             &with_file,
@@ -216,7 +251,11 @@ fn paths_that_do_not_fit_the_map_are_named() {
             "map.toml: file `a.csv` is given twice: a.csv and sub/a.csv; import one flight at a time",
         ),
         (&with_file, &["a.csv", "b.csv"], "b.csv: no source of map.toml reads this"),
-        (&without_file, &["sub"], "map.toml: source 1, file: without it PATH must be one file, given: sub"),
+        (
+            &without_file,
+            &["sub"],
+            "map.toml: source 1, file: without it PATH must be one file, given: sub",
+        ),
         (
             &without_file,
             &["a.csv", "b.csv"],

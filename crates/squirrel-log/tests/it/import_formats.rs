@@ -1,5 +1,5 @@
-//! One flight written as CSV, Parquet, ULog, MCAP and a Crazyflie's micro-SD log: it must come out the same, and damage must
-//! come out as an error.
+//! One flight written as CSV, Parquet, ULog, MCAP and a Crazyflie's micro-SD log: it must come out
+//! the same, and damage must come out as an error.
 
 use std::fmt::Write;
 
@@ -26,7 +26,8 @@ fn csv() -> String {
 }
 
 fn parquet(compression: Compression) -> Vec<u8> {
-    let axis = |i: usize| (0..ROWS).map(|r| Some(row(r).1[i]).filter(|x| !x.is_nan())).collect::<Vec<_>>();
+    let axis =
+        |i: usize| (0..ROWS).map(|r| Some(row(r).1[i]).filter(|x| !x.is_nan())).collect::<Vec<_>>();
     let doubles = axis(2).iter().map(|z| z.map(f64::from)).collect();
     parquet_bytes(
         "required int64 t; required float x; optional float y; optional double z;",
@@ -67,8 +68,10 @@ fn mcap() -> Vec<u8> {
 }
 
 fn usd() -> Vec<u8> {
-    let mut log =
-        Usd::new(2, &[(0xffff, "gyro", &["x(f)", "y(f)", "z(f)"]), (0, "battery", &["pm.vbatMV(H)"])]);
+    let mut log = Usd::new(
+        2,
+        &[(0xffff, "gyro", &["x(f)", "y(f)", "z(f)"]), (0, "battery", &["pm.vbatMV(H)"])],
+    );
     for (t, rates) in (0..ROWS).map(row) {
         log = log.record(0xffff, t.cast_unsigned(), &rates.map(f32::to_le_bytes).concat());
         log = log.record(0, t.cast_unsigned(), &3700_u16.to_le_bytes());
@@ -112,10 +115,16 @@ fn every_format_gives_the_flight_of_the_csv() {
         assert_eq!(report.files[0].rows, counted.files[0].rows, "{file}");
         assert_eq!(report.channels[0].samples_missing, 1, "{file}");
     }
-    for compression in [Compression::SNAPPY, Compression::ZSTD(parquet::basic::ZstdLevel::default())] {
+    for compression in
+        [Compression::SNAPPY, Compression::ZSTD(parquet::basic::ZstdLevel::default())]
+    {
         flight.write("f.parquet", &parquet(compression));
         let (log, _) = flight.import(&map("f.parquet"), &["f.parquet"]).unwrap();
-        assert_eq!(format!("{:?}", log.sources), format!("{:?}", expected.sources), "{compression}");
+        assert_eq!(
+            format!("{:?}", log.sources),
+            format!("{:?}", expected.sources),
+            "{compression}"
+        );
     }
 }
 
@@ -132,12 +141,18 @@ fn a_prefix_of_a_file_is_an_error_or_a_shorter_flight() {
             match flight.import(&map(file), &[file]) {
                 Err(error) => {
                     let message = flight.message(&error);
-                    assert!(message.starts_with(file) && !message.contains('\n'), "{length}: {message}");
+                    assert!(
+                        message.starts_with(file) && !message.contains('\n'),
+                        "{length}: {message}"
+                    );
                     errors += 1;
                 }
                 Ok((log, report)) => {
                     let times = format!("{:?}", log.channel("imu.omega_body_rad_s").unwrap().0);
-                    assert!(whole.starts_with(times.trim_end_matches(']')), "{file}, {length}: {times}");
+                    assert!(
+                        whole.starts_with(times.trim_end_matches(']')),
+                        "{file}, {length}: {times}"
+                    );
                     let said = report.to_string().contains("ends inside a record");
                     assert_eq!(said, report.files[0].bytes_cut > 0, "{report}");
                     shorter += 1;
@@ -145,7 +160,8 @@ fn a_prefix_of_a_file_is_an_error_or_a_shorter_flight() {
             }
         }
         assert!(errors > 0, "{file}");
-        // Only a ULog is read up to where it was cut: the others have their index or a checksum at the end.
+        // Only a ULog is read up to where it was cut: the others have their index or a checksum at
+        // the end.
         assert_eq!(shorter > 0, file == "f.ulg", "{file}: {shorter}");
     }
 }
@@ -180,7 +196,11 @@ fn a_bad_file_is_one_line_that_says_what_is_wrong() {
         ("log00", b"", "log00: empty file"),
         ("f.parquet", b"t,x,y,z\n0,1,2,3\n", "f.parquet: "),
         ("f.ulg", b"t,x,y,z\n0,1,2,3\n", "f.ulg: the first 7 bytes are not those of a ULog file"),
-        ("f.mcap", b"t,x,y,z\n0,1,2,3\n", "f.mcap: the first 8 bytes are not those of an MCAP file"),
+        (
+            "f.mcap",
+            b"t,x,y,z\n0,1,2,3\n",
+            "f.mcap: the first 8 bytes are not those of an MCAP file",
+        ),
         ("f.ulg", b"ULog\x01", "f.ulg: ends inside the header, after 5 bytes"),
     ] {
         flight.write(file, bytes);
@@ -222,8 +242,14 @@ fn a_map_that_asks_for_what_is_not_there_is_refused() {
         "f.ulg: no message of topic `sensor_baro`; nearest: sensor_gyro, battery"
     );
     assert_eq!(gone("f.mcap", "/imu", "/gps"), "f.mcap: no message of topic `/gps`; nearest: /imu");
-    assert_eq!(gone("log00", "gyro", "gyr"), "log00: no message of topic `gyr`; nearest: gyro, battery");
-    assert_eq!(gone("log00", "\"x\"", "\"t\""), "log00, topic `gyro`: no column `t`; nearest: x, y, z");
+    assert_eq!(
+        gone("log00", "gyro", "gyr"),
+        "log00: no message of topic `gyr`; nearest: gyro, battery"
+    );
+    assert_eq!(
+        gone("log00", "\"x\"", "\"t\""),
+        "log00, topic `gyro`: no column `t`; nearest: x, y, z"
+    );
     assert_eq!(
         gone("f.ulg", "topic = \"sensor_gyro\"", ""),
         "map.toml: source 1, topic: missing: say which topic of `f.ulg`"

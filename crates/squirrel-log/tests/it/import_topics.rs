@@ -53,8 +53,21 @@ fn typed_ulog() -> Ulog {
         .data(700, &fields(21, 0.4))
 }
 
-const ALL: [&str; 13] =
-    ["a", "b", "c", "d", "e", "f", "g", "h", "i", "esc[0].rpm", "esc[0].volts", "esc[1].rpm", "esc[1].volts"];
+const ALL: [&str; 13] = [
+    "a",
+    "b",
+    "c",
+    "d",
+    "e",
+    "f",
+    "g",
+    "h",
+    "i",
+    "esc[0].rpm",
+    "esc[0].volts",
+    "esc[1].rpm",
+    "esc[1].volts",
+];
 
 #[test]
 fn ulog_types_arrays_and_nested_formats_are_read() {
@@ -102,7 +115,11 @@ fn the_reader_of_px4_agrees() {
                 SomeVec::Bool(x) => x.iter().map(|&x| f64::from(u8::from(x))).collect(),
                 SomeVec::Char(_) => panic!("no text here"),
             };
-            assert_eq!(format!("{:?}", values(&flight, &map, "f.ulg")), format!("{expected:?}"), "{column}");
+            assert_eq!(
+                format!("{:?}", values(&flight, &map, "f.ulg")),
+                format!("{expected:?}"),
+                "{column}"
+            );
         }
     }
 }
@@ -114,7 +131,10 @@ fn ulog_records_that_contradict_the_format_are_refused() {
     let message = [0; 12];
     let cases = [
         (start().data(5, &message), "f.ulg: the record at byte 91 is a message of unknown id 5"),
-        (start().subscribe(5, "b", 0).data(5, &message), "f.ulg: no message of topic `a`; nearest: b"),
+        (
+            start().subscribe(5, "b", 0).data(5, &message),
+            "f.ulg: no message of topic `a`; nearest: b",
+        ),
         (Ulog::new().subscribe(5, "a", 0).data(5, &message), "f.ulg: format `a` is not defined"),
         (start().record(b'A', b"\0\0"), "f.ulg: the record at byte 91 is too short for a topic"),
         (start().record(b'D', b"\0"), "f.ulg: the record at byte 91 is too short for a message"),
@@ -161,7 +181,11 @@ fn appended_ulog_data_follow_a_cut_record() {
     flight.write("f.ulg", &bytes);
     let (_, report) = flight.import(&map("a", "timestamp", &["x"]), &["f.ulg"]).unwrap();
     assert_eq!(report.files[0].bytes_cut, 13);
-    assert!(report.to_string().contains("the file ends inside a record, its last 13 bytes are left out"));
+    assert!(
+        report
+            .to_string()
+            .contains("the file ends inside a record, its last 13 bytes are left out")
+    );
     // What a card was filled with in advance and never written.
     flight.write("f.ulg", &[&log(None).0[..], &[0; 4096]].concat());
     let (_, report) = flight.import(&map("a", "timestamp", &["x"]), &["f.ulg"]).unwrap();
@@ -201,7 +225,11 @@ fn mcap_messages_that_are_no_numbers_are_refused() {
     let flight = Flight::new("json", &[]);
     let good = r#"{"t":1,"x":1}"#;
     for (encoding, second, problem) in [
-        ("json", r#"{"t":2,"x":"high"}"#, "f.mcap, topic `a`, column `x`, row 2: `\"high\"` is no number"),
+        (
+            "json",
+            r#"{"t":2,"x":"high"}"#,
+            "f.mcap, topic `a`, column `x`, row 2: `\"high\"` is no number",
+        ),
         (
             "json",
             r#"{"t":2,"x":"Infinity"}"#,
@@ -279,5 +307,8 @@ fn parquet_types_are_numbers_or_refused() {
         Compression::UNCOMPRESSED,
     );
     flight.write("f.parquet", &empty);
-    assert_eq!(error(&flight, &map("", "t", &["x"]), "f.parquet"), "f.parquet: a header and no rows");
+    assert_eq!(
+        error(&flight, &map("", "t", &["x"]), "f.parquet"),
+        "f.parquet: a header and no rows"
+    );
 }

@@ -1,5 +1,5 @@
-//! Micro-SD logs of a Crazyflie: a piece of a real one against other decoders' numbers, every type and version, every
-//! damage.
+//! Micro-SD logs of a Crazyflie: a piece of a real one against other decoders' numbers, every type
+//! and version, every damage.
 #![allow(clippy::unreadable_literal, reason = "numbers as another decoder prints them")]
 
 use super::import_support::Flight;
@@ -22,7 +22,8 @@ fn error(flight: &Flight, event: &str, columns: &[&str]) -> String {
     flight.message(&flight.import(&map(event, columns), &["log00"]).unwrap_err())
 }
 
-/// Two seconds of a CrazyPAD flight; the numbers are those of Python's `struct.unpack` on the same bytes.
+/// Two seconds of a CrazyPAD flight; the numbers are those of Python's `struct.unpack` on the same
+/// bytes.
 #[test]
 fn a_piece_of_a_real_flight_has_the_numbers_of_another_decoder() {
     let flight = Flight::new("piece", &[]);
@@ -55,7 +56,19 @@ fn a_piece_of_a_real_flight_has_the_numbers_of_another_decoder() {
 /// Every type, its events mixed; the same in both versions.
 #[test]
 fn types_events_and_versions_are_read() {
-    let all = ["a(b)", "b(B)", "c(h)", "d(H)", "e(i)", "f(I)", "g(q)", "h(Q)", "i(e)", "j(f)", "k.k(k)(d)"];
+    let all = [
+        "a(b)",
+        "b(B)",
+        "c(h)",
+        "d(H)",
+        "e(i)",
+        "f(I)",
+        "g(q)",
+        "h(Q)",
+        "i(e)",
+        "j(f)",
+        "k.k(k)(d)",
+    ];
     let names = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k.k(k)"];
     let mut bytes = vec![0x80, 0xff];
     bytes.extend((-300_i16).to_le_bytes());
@@ -69,16 +82,23 @@ fn types_events_and_versions_are_read() {
     bytes.extend(0.1_f64.to_le_bytes());
     let numbers = [-128.0, 255.0, -300.0, 6e4, -7e4, 4e9, -5e9, 6e9, -2.5, 1.5, 0.1];
     for (version, step) in [(1, 1), (2, 1000)] {
-        let log = Usd::new(version, &[(7, "all", &all), (0, "bare", &[]), (0xffff, "one", &["group.x(B)"])])
-            .record(7, 10 * step, &bytes)
-            .record(0, 11 * step, &[])
-            .record(0xffff, 12 * step, &[1])
-            .record(0, 4_000_000_000 * step, &[])
-            .record(7, 4_000_000_001 * step, &bytes);
+        let log = Usd::new(
+            version,
+            &[(7, "all", &all), (0, "bare", &[]), (0xffff, "one", &["group.x(B)"])],
+        )
+        .record(7, 10 * step, &bytes)
+        .record(0, 11 * step, &[])
+        .record(0xffff, 12 * step, &[1])
+        .record(0, 4_000_000_000 * step, &[])
+        .record(7, 4_000_000_001 * step, &bytes);
         let flight = Flight::new("types", &[]);
         flight.write("log00", &log.finish());
         assert_eq!(values(&flight, "all", &names), [numbers, numbers].concat());
-        assert_eq!(values(&flight, "all", &["timestamp"]), [10e3, 4_000_000_001e3], "version {version}");
+        assert_eq!(
+            values(&flight, "all", &["timestamp"]),
+            [10e3, 4_000_000_001e3],
+            "version {version}"
+        );
         assert_eq!(values(&flight, "bare", &["timestamp"]), [11e3, 4_000_000_000e3]);
         assert_eq!(values(&flight, "one", &["group.x"]), [1.0]);
         assert_eq!(
@@ -94,7 +114,8 @@ fn what_contradicts_the_format_is_one_line_with_its_place() {
     let flight = Flight::new("contradiction", &[]);
     let one = |version, variables| Usd::new(version, &[(1, "one", variables)]);
     let good = || one(2, &["x(f)"]).record(1, 5, &[0; 4]);
-    // Header: 5 bytes, id, `one`, count: 13, `x(f)`: 18; the record has 14, and the CRC is at byte 32.
+    // Header: 5 bytes, id, `one`, count: 13, `x(f)`: 18; the record has 14, and the CRC is at byte
+    // 32.
     let whole = good().finish();
     assert_eq!(whole.len(), 36);
     let changed = |at: usize, byte: u8| {
@@ -117,16 +138,28 @@ fn what_contradicts_the_format_is_one_line_with_its_place() {
         (changed(15, b'L'), "the variable `x(L)` at byte 13 has the unknown type `L`"),
         (changed(16, b']'), "the variable `x(f]` at byte 13 is not `name(type)`"),
         (changed(18, 9), "the record at byte 18 is of the unknown event id 9"),
-        (changed(29, 9), "the CRC-32 at byte 32 is 26090841, that of the bytes before it is 29d833ce"),
-        (changed(32, 0), "the CRC-32 at byte 32 is 26090800, that of the bytes before it is 26090841"),
+        (
+            changed(29, 9),
+            "the CRC-32 at byte 32 is 26090841, that of the bytes before it is 29d833ce",
+        ),
+        (
+            changed(32, 0),
+            "the CRC-32 at byte 32 is 26090800, that of the bytes before it is 26090841",
+        ),
         (good().record(1, 6, &f32::INFINITY.to_le_bytes()).finish(), "`inf` is infinite"),
-        (Usd::new(2, &[(1, "a", &[]), (1, "one", &["x(f)"])]).finish(), "the event type at byte 11 repeats"),
+        (
+            Usd::new(2, &[(1, "a", &[]), (1, "one", &["x(f)"])]).finish(),
+            "the event type at byte 11 repeats",
+        ),
         (
             Usd::new(2, &[(1, "one", &["x(f)"]), (2, "one", &[])]).finish(),
             "the event type at byte 18 repeats",
         ),
         (Usd::new(2, &[]).finish(), "no message of topic `one`; nearest: "),
-        (one(2, &["x(f)", "x(f)"]).record(1, 5, &[0; 8]).finish(), "column `x` is in the header 2 times"),
+        (
+            one(2, &["x(f)", "x(f)"]).record(1, 5, &[0; 8]).finish(),
+            "column `x` is in the header 2 times",
+        ),
     ] {
         flight.write("log00", &bytes);
         let message = error(&flight, "one", &["x"]);
@@ -135,7 +168,8 @@ fn what_contradicts_the_format_is_one_line_with_its_place() {
     }
 }
 
-/// The CRC finds every single bit; before it is asked, and where it was made anew, nothing may panic.
+/// The CRC finds every single bit; before it is asked, and where it was made anew, nothing may
+/// panic.
 #[test]
 fn no_flipped_bit_and_no_prefix_is_read() {
     let mut log = Usd::new(2, &[(0xffff, "fast", &["a.x(f)", "a.y(H)"]), (3, "slow", &["b(B)"])]);
@@ -146,7 +180,8 @@ fn no_flipped_bit_and_no_prefix_is_read() {
     let flight = Flight::new("bits", &[]);
     let read = |bytes: &[u8]| {
         flight.write("log00", bytes);
-        let imported = flight.import(&map("fast", &["a.x"]), &["log00"]).map_err(|e| flight.message(&e));
+        let imported =
+            flight.import(&map("fast", &["a.x"]), &["log00"]).map_err(|e| flight.message(&e));
         if let Err(message) = &imported {
             assert!(message.starts_with("log00") && !message.contains('\n'), "{message}");
         }

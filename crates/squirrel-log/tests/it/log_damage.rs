@@ -1,4 +1,5 @@
-//! Damaged, cut, re-written and foreign files: each is found, named in one line, and as much as is whole is recovered.
+//! Damaged, cut, re-written and foreign files: each is found, named in one line, and as much as is
+//! whole is recovered.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,8 +23,10 @@ fn flight(seconds: u32) -> FlightLog {
     for i in 0..=50 * seconds {
         let time_s = f64::from(i) / 50.0;
         let (sin, cos) = time_s.sin_cos();
-        log.source_mut("imu")
-            .push(time_s, &[("omega_body_rad_s", &[sin, cos, 0.0]), ("temperature_k", &[293.0 + sin])]);
+        log.source_mut("imu").push(
+            time_s,
+            &[("omega_body_rad_s", &[sin, cos, 0.0]), ("temperature_k", &[293.0 + sin])],
+        );
         if i % 10 == 0 {
             log.source_mut("battery").push(time_s, &[("voltage_v", &[16.0 - time_s])]);
             let attitude: &[f64] = &[cos, 0.0, 0.0, sin];
@@ -40,7 +43,9 @@ fn flight(seconds: u32) -> FlightLog {
 fn line(file: &Path, error: &LogError) -> String {
     let text = error.to_string();
     assert!(!text.contains('\n'), "{text}");
-    text.strip_prefix(&format!("{}: ", file.display())).expect("starts with the file name").to_owned()
+    text.strip_prefix(&format!("{}: ", file.display()))
+        .expect("starts with the file name")
+        .to_owned()
 }
 
 fn read_error(file: &Path) -> String {
@@ -75,7 +80,10 @@ fn bytes_after_the_end_are_found() {
     let mut bytes = fs::read(&file).unwrap();
     bytes.extend_from_slice(b"more");
     fs::write(&file, &bytes).unwrap();
-    assert_eq!(read_error(&file), "corrupt: 12 bytes after the footer are not those that end an MCAP file");
+    assert_eq!(
+        read_error(&file),
+        "corrupt: 12 bytes after the footer are not those that end an MCAP file"
+    );
 }
 
 #[test]
@@ -111,7 +119,10 @@ fn of_a_truncated_file_every_whole_second_is_recovered() {
                  recover them with `squirrel import --recover`"
             )
         );
-        assert!(end_s >= last_s && end_s - last_s < 1.5, "one more second a chunk: {last_s} then {end_s}");
+        assert!(
+            end_s >= last_s && end_s - last_s < 1.5,
+            "one more second a chunk: {last_s} then {end_s}"
+        );
         last_s = end_s;
     }
     assert_eq!(last_s, 10.0, "the cut before the end is in the summary");
@@ -153,7 +164,10 @@ fn recover_does_not_vouch_for_a_changed_file() {
     let mut bytes = fs::read(&file).unwrap();
     bytes[60] ^= 1;
     fs::write(&file, &bytes).unwrap();
-    assert!(line(&file, &FlightLog::recover(&file).unwrap_err()).starts_with("corrupt: the data section"));
+    assert!(
+        line(&file, &FlightLog::recover(&file).unwrap_err())
+            .starts_with("corrupt: the data section")
+    );
 }
 
 /// Writes a file anew as another tool would, with fresh checksums, its messages changed.
@@ -173,7 +187,10 @@ fn rewrite(file: &Path, change: impl Fn(&str, f64, &mut Vec<u8>)) {
 
 /// Place of a number in a message.
 fn find(message: &[u8], value: f64) -> usize {
-    message.windows(8).position(|bytes| bytes == value.to_le_bytes()).expect("the message has the value")
+    message
+        .windows(8)
+        .position(|bytes| bytes == value.to_le_bytes())
+        .expect("the message has the value")
 }
 
 #[test]
@@ -194,7 +211,10 @@ fn a_changed_value_is_named() {
             message[at] ^= 1;
         }
     });
-    assert_eq!(read_error(&file), "imu.omega_body_rad_s at 3.220000 s: value does not match its CRC32");
+    assert_eq!(
+        read_error(&file),
+        "imu.omega_body_rad_s at 3.220000 s: value does not match its CRC32"
+    );
 }
 
 #[test]
@@ -207,7 +227,10 @@ fn a_changed_time_is_named() {
             message[at..at + 8].copy_from_slice(&3.201_f64.to_le_bytes());
         }
     });
-    assert_eq!(read_error(&file), "battery.voltage_v at 3.201000 s: value does not match its CRC32");
+    assert_eq!(
+        read_error(&file),
+        "battery.voltage_v at 3.201000 s: value does not match its CRC32"
+    );
 }
 
 #[test]
@@ -215,7 +238,8 @@ fn a_channel_that_a_message_lacks_is_nan_and_shifts_nothing() {
     let file = path("lacks.mcap");
     let mut expected = flight(1);
     expected.write(&file).unwrap();
-    // The list is field 2: key, length 24, three numbers. The first message lacks it, so its width is not known yet.
+    // The list is field 2: key, length 24, three numbers. The first message lacks it, so its width
+    // is not known yet.
     let lacks = |time_s: f64| time_s < 1e-6 || (time_s - 0.5).abs() < 1e-6;
     rewrite(&file, |topic, time_s, message| {
         if topic == "imu" && lacks(time_s) {
@@ -243,7 +267,8 @@ fn a_row_of_another_width_is_named() {
     rewrite(&file, |topic, time_s, message| {
         if topic == "imu" && (time_s - 0.5).abs() < 1e-6 {
             let at = message.windows(2).position(|bytes| bytes == [2 << 3 | 2, 24]).unwrap();
-            let two: Vec<u8> = [1.0_f64, 2.0].iter().flat_map(|value| value.to_le_bytes()).collect();
+            let two: Vec<u8> =
+                [1.0_f64, 2.0].iter().flat_map(|value| value.to_le_bytes()).collect();
             let mut crc = crc32fast::Hasher::new();
             crc.update(&0.5_f64.to_le_bytes());
             crc.update(&two);
@@ -252,7 +277,10 @@ fn a_row_of_another_width_is_named() {
             message[at..at + 4].copy_from_slice(&crc.finalize().to_le_bytes());
         }
     });
-    assert_eq!(read_error(&file), "imu.omega_body_rad_s at 0.500000 s: 2 numbers, before it 3 a sample");
+    assert_eq!(
+        read_error(&file),
+        "imu.omega_body_rad_s at 0.500000 s: 2 numbers, before it 3 a sample"
+    );
 }
 
 #[test]
@@ -296,7 +324,9 @@ fn numbers_and_names_of_fields_are_those_of_the_schema_in_the_file() {
     let channel_id = writer.add_channel(schema, "later", "protobuf", &BTreeMap::new()).unwrap();
     let header = MessageHeader { channel_id, sequence: 0, log_time: 500_000_000, publish_time: 0 };
     writer.write_to_known_channel(&header, &message).unwrap();
-    writer.write_metadata(&Metadata { name: "squirrel".to_owned(), metadata: BTreeMap::new() }).unwrap();
+    writer
+        .write_metadata(&Metadata { name: "squirrel".to_owned(), metadata: BTreeMap::new() })
+        .unwrap();
     writer.finish().unwrap();
 
     let mut expected = FlightLog::default();
@@ -309,7 +339,9 @@ fn a_message_without_its_checksums_is_found() {
     let file = path("no_crc.mcap");
     flight(1).write(&file).unwrap();
     // The last field of the message: key of two bytes, length, two checksums.
-    rewrite(&file, |topic, _, message| message.truncate(message.len() - if topic == "imu" { 11 } else { 0 }));
+    rewrite(&file, |topic, _, message| {
+        message.truncate(message.len() - if topic == "imu" { 11 } else { 0 });
+    });
     assert_eq!(read_error(&file), "corrupt: imu at 0.000000 s: 0 CRC32s for 2 channels");
 }
 

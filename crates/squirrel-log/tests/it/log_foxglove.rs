@@ -1,4 +1,5 @@
-//! A flight with a true pose opens in Foxglove's 3-D panel: frames in ENU, at most 50 a second, obstacles as cylinders.
+//! A flight with a true pose opens in Foxglove's 3-D panel: frames in ENU, at most 50 a second,
+//! obstacles as cylinders.
 
 use std::fs;
 use std::path::PathBuf;
@@ -58,7 +59,8 @@ impl Fields {
 /// 2 s at 300 Hz of a climb to the north-east, nose to the east.
 fn flight() -> FlightLog {
     let mut log = FlightLog::default();
-    let nose_east = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
+    let nose_east =
+        UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::FRAC_PI_2);
     let attitude: &[f64] = &[nose_east.w, nose_east.i, nose_east.j, nose_east.k];
     for i in 0..600 {
         let time_s = f64::from(i) / 300.0;
@@ -72,7 +74,11 @@ fn flight() -> FlightLog {
 fn messages(log: &FlightLog, name: &str, topic: &str) -> Vec<(f64, Vec<u8>)> {
     let file = path(name);
     log.write(&file).unwrap();
-    assert_eq!(FlightLog::read(&file).unwrap(), *log, "the reader skips what it did not write as a source");
+    assert_eq!(
+        FlightLog::read(&file).unwrap(),
+        *log,
+        "the reader skips what it did not write as a source"
+    );
     let bytes = fs::read(&file).unwrap();
     let messages = mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap);
     let messages = messages.filter(|message| message.channel.topic == topic);
@@ -92,9 +98,18 @@ fn the_vehicle_moves_in_enu_at_50_hz() {
         let q = Quaternion::new(q.double(4), q.double(1), q.double(2), q.double(3));
         assert!((q.norm() - 1.0).abs() < 1e-12);
         let enu_from_body = UnitQuaternion::from_quaternion(q);
-        assert!((enu_from_body * Vector3::x() - Vector3::x()).norm() < 1e-12, "the nose points east");
-        assert!((enu_from_body * Vector3::y() + Vector3::y()).norm() < 1e-12, "the right wing points south");
-        assert!((enu_from_body * Vector3::z() + Vector3::z()).norm() < 1e-12, "the belly points down");
+        assert!(
+            (enu_from_body * Vector3::x() - Vector3::x()).norm() < 1e-12,
+            "the nose points east"
+        );
+        assert!(
+            (enu_from_body * Vector3::y() + Vector3::y()).norm() < 1e-12,
+            "the right wing points south"
+        );
+        assert!(
+            (enu_from_body * Vector3::z() + Vector3::z()).norm() < 1e-12,
+            "the belly points down"
+        );
     }
 }
 
@@ -133,5 +148,8 @@ fn obstacles_that_are_no_list_are_refused() {
     let (file, mut log) = (path("bad_scene.mcap"), flight());
     log.metadata.insert("obstacles_json".to_owned(), "[[8, 1]]".to_owned());
     let text = log.write(&file).unwrap_err().to_string();
-    assert!(text.starts_with(&format!("{}: metadata `obstacles_json`: ", file.display())), "{text}");
+    assert!(
+        text.starts_with(&format!("{}: metadata `obstacles_json`: ", file.display())),
+        "{text}"
+    );
 }

@@ -1,4 +1,5 @@
-//! A flight log comes back from its file with the same bits, and the file is what MCAP tools expect.
+//! A flight log comes back from its file with the same bits, and the file is what MCAP tools
+//! expect.
 
 use std::fs;
 use std::path::PathBuf;
@@ -34,13 +35,15 @@ fn source() -> impl Strategy<Value = Source> {
     let channels = prop::collection::btree_map("[a-z_][a-z0-9_]{0,9}", 1_usize..6, 0..4);
     (vec(1e-6..0.7_f64, 1..12), channels).prop_flat_map(move |(steps_s, widths)| {
         let samples = steps_s.len();
-        let columns: Vec<_> = widths.values().map(|width| vec(value.clone(), samples * width)).collect();
+        let columns: Vec<_> =
+            widths.values().map(|width| vec(value.clone(), samples * width)).collect();
         columns.prop_map(move |columns| {
             let until = |i| steps_s[..i].iter().sum::<f64>();
             let time_s = (0..samples).map(until).collect();
             let channels = widths.iter().zip(columns);
-            let channels =
-                channels.map(|((name, &width), values)| (name.clone(), Channel { width, values })).collect();
+            let channels = channels
+                .map(|((name, &width), values)| (name.clone(), Channel { width, values }))
+                .collect();
             Source { time_s, channels }
         })
     })
@@ -82,7 +85,8 @@ fn small_flight() -> FlightLog {
     for i in 0..250 {
         let time_s = f64::from(i) / 100.0;
         let omega = [time_s.sin(), time_s.cos(), 0.0];
-        log.source_mut("imu").push(time_s, &[("omega_body_rad_s", &omega), ("temperature_k", &[293.0])]);
+        log.source_mut("imu")
+            .push(time_s, &[("omega_body_rad_s", &omega), ("temperature_k", &[293.0])]);
         if i % 10 == 0 {
             log.source_mut("control.outer").push(time_s, &[("thrust_n", &[5.4 + time_s])]);
         }
@@ -112,7 +116,11 @@ fn messages_stand_in_order_of_time_then_of_source_name() {
     assert_eq!(messages.len(), 275);
     assert_eq!(messages[0].channel.topic, "control.outer");
     assert_eq!(messages[1].channel.topic, "imu");
-    assert!(messages.iter().is_sorted_by_key(|message| (message.log_time, message.channel.topic.clone())));
+    assert!(
+        messages
+            .iter()
+            .is_sorted_by_key(|message| (message.log_time, message.channel.topic.clone()))
+    );
     assert_eq!(messages[274].log_time, 2_490_000_000);
     assert_eq!(messages[274].sequence, 249);
 }
@@ -145,16 +153,24 @@ fn the_schema_in_the_file_names_the_channels() {
     let schema = summary.schemas.values().find(|schema| schema.name == "squirrel.Imu").unwrap();
     assert!(summary.schemas.values().any(|schema| schema.name == "squirrel.ControlOuter"));
     let set = prost_types::FileDescriptorSet::decode(&*schema.data).unwrap();
-    let fields: Vec<_> =
-        set.file[0].message_type[0].field.iter().map(|field| (field.name(), field.number())).collect();
-    assert_eq!(fields, [("time_s", 1), ("omega_body_rad_s", 2), ("temperature_k", 3), ("crc32", 1000)]);
+    let fields: Vec<_> = set.file[0].message_type[0]
+        .field
+        .iter()
+        .map(|field| (field.name(), field.number()))
+        .collect();
+    assert_eq!(
+        fields,
+        [("time_s", 1), ("omega_body_rad_s", 2), ("temperature_k", 3), ("crc32", 1000)]
+    );
 }
 
 #[test]
 fn a_source_without_samples_is_a_source_that_the_log_lacks() {
     let file = path("no_samples.mcap");
     let mut log = small_flight();
-    log.source_mut("gnss").channels.insert("position_ned_m".to_owned(), Channel { width: 3, values: vec![] });
+    log.source_mut("gnss")
+        .channels
+        .insert("position_ned_m".to_owned(), Channel { width: 3, values: vec![] });
     log.write(&file).unwrap();
     assert_same_bits(&small_flight(), &FlightLog::read(&file).unwrap());
 }
@@ -168,18 +184,24 @@ fn refusal(name: &str, change: impl FnOnce(&mut FlightLog)) -> String {
     let error: LogError = log.write(&file).unwrap_err();
     assert!(!file.exists());
     let text = error.to_string();
-    text.strip_prefix(&format!("{}: ", file.display())).expect("starts with the file name").to_owned()
+    text.strip_prefix(&format!("{}: ", file.display()))
+        .expect("starts with the file name")
+        .to_owned()
 }
 
 #[test]
 fn a_log_that_breaks_a_rule_is_refused_with_its_place() {
-    let time =
-        |index: usize, time_s: f64| refusal("time.mcap", |log| log.source_mut("imu").time_s[index] = time_s);
+    let time = |index: usize, time_s: f64| {
+        refusal("time.mcap", |log| log.source_mut("imu").time_s[index] = time_s)
+    };
     assert_eq!(time(3, f64::NAN), "imu: time_s[3] = NaN: not finite");
     assert_eq!(time(249, f64::INFINITY), "imu: time_s[249] = inf: not finite");
     assert_eq!(time(0, -0.5), "imu: time_s[0] = -0.5: before 0 s");
     assert_eq!(time(3, 0.02), "imu: time_s[3] = 0.02: not after the sample before it (0.02)");
-    assert_eq!(time(249, 2e10), "imu: time_s[249] = 20000000000: after 1.8e10 s, the last that a file holds");
+    assert_eq!(
+        time(249, 2e10),
+        "imu: time_s[249] = 20000000000: after 1.8e10 s, the last that a file holds"
+    );
 
     let omega = |log: &mut FlightLog, width, values| {
         let channel = Channel { width, values: vec![0.0; values] };

@@ -1,9 +1,11 @@
-//! Networks over many windows at once: forward, and exact gradients by backpropagation through time.
+//! Networks over many windows at once: forward, and exact gradients by backpropagation through
+//! time.
 //!
-//! Windows lie side by side in registers ([`simd`]); the forward pass is that of `squirrel-core`, on registers. What the
-//! backward pass needs is kept on a tape. Sums over windows have one order whatever the width of the registers: window `k`
-//! of a batch goes to column `k mod 16`, a column takes its windows in order and each window its ticks in order, and the
-//! sixteen columns are added as a tree at the end.
+//! Windows lie side by side in registers ([`simd`]); the forward pass is that of `squirrel-core`,
+//! on registers. What the backward pass needs is kept on a tape. Sums over windows have one order
+//! whatever the width of the registers: window `k` of a batch goes to column `k mod 16`, a column
+//! takes its windows in order and each window its ticks in order, and the sixteen columns are added
+//! as a tree at the end.
 
 pub use squirrel_sim::batch::simd;
 mod tape;
@@ -20,7 +22,8 @@ use tape::Tape;
 /// Parameters of a network with these outputs, or gradients by them.
 pub(crate) type Net<S, const OUT: usize> = Elman<INPUTS, HIDDEN, OUT, S>;
 
-/// Outputs of a network for each of many windows, oldest row first, of which the last `STEPS` rows are seen.
+/// Outputs of a network for each of many windows, oldest row first, of which the last `STEPS` rows
+/// are seen.
 ///
 /// The same bits as [`Elman::window`] on each of them, on every path.
 ///

@@ -8,7 +8,8 @@
 //! W2x' = sum_t h1[t] d2[t]^T      W2h' = sum_t h2[t-1] d2[t]^T     b2' = sum_t d2[t]      and so for the first layer
 //! ```
 //!
-//! Both passes run in time; the sums over time come after them, a tile of weights at once, so that a tile stays in registers.
+//! Both passes run in time; the sums over time come after them, a tile of weights at once, so that
+//! a tile stays in registers.
 
 use super::Net;
 use super::simd::Register;
@@ -127,10 +128,16 @@ fn layer<L: Register, const IN: usize, const ROWS: usize>(
     }
 }
 
-/// `sum += sum over steps of values[t] pulls[t]^T`, in tiles of `ROWS` x `COLUMNS` that divide the matrix. Steps that only one
-/// of the two has are left out.
+/// `sum += sum over steps of values[t] pulls[t]^T`, in tiles of `ROWS` x `COLUMNS` that divide the
+/// matrix. Steps that only one of the two has are left out.
 #[inline(always)]
-fn outer<L: Register, const IN: usize, const OUT: usize, const ROWS: usize, const COLUMNS: usize>(
+fn outer<
+    L: Register,
+    const IN: usize,
+    const OUT: usize,
+    const ROWS: usize,
+    const COLUMNS: usize,
+>(
     sum: &mut [[L; OUT]; IN],
     values: &[[L; IN]],
     pulls: &[[L; OUT]],

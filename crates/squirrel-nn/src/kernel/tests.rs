@@ -1,4 +1,5 @@
-//! Gradients against finite differences in f64, forces and gradients against PyTorch, and one result on every path.
+//! Gradients against finite differences in f64, forces and gradients against PyTorch, and one
+//! result on every path.
 
 use super::simd::{Path, Paths};
 use crate::heads::Sample;
@@ -32,8 +33,9 @@ impl Draw {
     fn samples<S: Paths>(&mut self, count: usize) -> Vec<Sample<S>> {
         let mut samples: Vec<Sample<S>> = Vec::new();
         for k in 0..count {
-            let rows: [[S; INPUTS]; WINDOW] =
-                core::array::from_fn(|_| [convert(self.between(0.0, 1.0)), convert(self.between(-1.5, 1.5))]);
+            let rows: [[S; INPUTS]; WINDOW] = core::array::from_fn(|_| {
+                [convert(self.between(0.0, 1.0)), convert(self.between(-1.5, 1.5))]
+            });
             let speed = if k == 0 { 0.02 } else { 8.0 };
             let velocity = core::array::from_fn(|_| convert(self.between(-speed, speed)));
             let target = core::array::from_fn(|_| convert(self.between(-2.0, 2.0)));
@@ -106,7 +108,8 @@ fn every_path_gives_the_same_bits() {
             let members: Vec<u32> = all(count).into_iter().rev().collect();
             let results = Path::available().into_iter().map(|path| {
                 let mut gradient = vec![0.0; parameters.len()];
-                let loss = model.gradient(path, &parameters, 0.04, &samples, &members, &mut gradient);
+                let loss =
+                    model.gradient(path, &parameters, 0.04, &samples, &members, &mut gradient);
                 let forces = model.forces(path, &parameters, 0.04, &samples);
                 let bits: Vec<u32> =
                     gradient.iter().chain(forces.as_flattened()).map(|x| x.to_bits()).collect();
@@ -164,12 +167,16 @@ struct GoldenModel {
 }
 
 fn close(ours: f64, theirs: f64, tolerance: f64, what: &str) {
-    assert!((ours - theirs).abs() < tolerance * theirs.abs().max(1.0), "{what}: {ours}, PyTorch {theirs}");
+    assert!(
+        (ours - theirs).abs() < tolerance * theirs.abs().max(1.0),
+        "{what}: {ours}, PyTorch {theirs}"
+    );
 }
 
 #[test]
 fn forces_and_gradients_are_those_of_pytorch() {
-    let golden: Golden = serde_json::from_str(include_str!("../../tests/golden/models.json")).unwrap();
+    let golden: Golden =
+        serde_json::from_str(include_str!("../../tests/golden/models.json")).unwrap();
     assert_eq!(golden.models.len(), NETWORKS.len());
     let windows = golden.windows.iter().map(|w| Window {
         rows: w.rows,
@@ -187,7 +194,8 @@ fn forces_and_gradients_are_those_of_pytorch() {
         for path in Path::available() {
             let parameters = &torch.parameters;
             let members = all(samples.len());
-            let loss = model.gradient(path, parameters, golden.area_m2, &samples, &members, &mut gradient);
+            let loss =
+                model.gradient(path, parameters, golden.area_m2, &samples, &members, &mut gradient);
             let forces = model.forces(path, parameters, golden.area_m2, &samples);
             close(loss, torch.loss_n2, 1e-5, name);
             for (ours, theirs) in forces.as_flattened().iter().zip(torch.forces_n.as_flattened()) {

@@ -1,4 +1,5 @@
-//! Weights survive the file bit for bit, and what is wrong with a file is said in one line that names it.
+//! Weights survive the file bit for bit, and what is wrong with a file is said in one line that
+//! names it.
 
 use super::support::{AREA_M2, cambered, flight, folder, sets};
 use safetensors::tensor::TensorView;
@@ -14,7 +15,8 @@ use std::path::Path;
 fn trained(model: Model) -> Trained {
     let (training, validation) = sets();
     let settings = Settings { epochs: 2, seed: u64::MAX, ..Settings::default() };
-    let mut trainer = Trainer::new(model, "squirrel", AREA_M2, &training, &validation, settings).unwrap();
+    let mut trainer =
+        Trainer::new(model, "squirrel", AREA_M2, &training, &validation, settings).unwrap();
     while trainer.epoch().unwrap().is_some() {}
     let mut trained = trainer.best();
     trained.card.figures.insert("validation_rms_n".to_owned(), 0.1 + 0.2);
@@ -84,7 +86,10 @@ fn parameters_from_elsewhere_take_the_place_of_our_own() {
 fn the_card_says_where_weights_come_from() {
     let (training, _) = sets();
     let card = trained(Model::Parnn).card;
-    assert_eq!((card.model, card.vehicle.as_str(), card.seed), (Model::Parnn, "squirrel", u64::MAX));
+    assert_eq!(
+        (card.model, card.vehicle.as_str(), card.seed),
+        (Model::Parnn, "squirrel", u64::MAX)
+    );
     assert_eq!(card.data_hash, format!("{:016x}", training.hash()));
     assert!(card.domain.speed_m_s[1] > 7.0 && card.domain.speed_m_s[1] < 9.0, "{:?}", card.domain);
     assert!(card.domain.alpha_rad[0] < -0.3 && card.domain.alpha_rad[1] > 0.3, "{:?}", card.domain);
@@ -126,14 +131,23 @@ fn a_wrong_card_is_named() {
     };
     assert_eq!(said(&good, |_, text| *text = None), "metadata squirrel: missing");
     assert!(with("\"seed\"", "\"sead\"").starts_with("metadata squirrel: unknown field `sead`"));
-    assert!(with("\"parnn\"", "\"lstm\"").starts_with("metadata squirrel: model = lstm: must be one of"));
+    assert!(
+        with("\"parnn\"", "\"lstm\"")
+            .starts_with("metadata squirrel: model = lstm: must be one of")
+    );
     assert_eq!(with("\"format\":1", "\"format\":2"), "format = 2: this version reads 1");
     assert_eq!(with("\"area_m2\":0.04", "\"area_m2\":-0.04"), "area_m2 = -0.04: must be positive");
     let error = with("\"speed_scale_m_s\":10.0", "\"speed_scale_m_s\":12.0");
     assert_eq!(error, "normalisation.speed_scale_m_s = 12: the flight code divides by 10");
-    assert_eq!(with("\"rows\":10", "\"rows\":5"), "normalisation.rows = 5: the flight code keeps 10");
+    assert_eq!(
+        with("\"rows\":10", "\"rows\":5"),
+        "normalisation.rows = 5: the flight code keeps 10"
+    );
     // Another model's weights under this card.
-    assert_eq!(with("\"parnn\"", "\"vanilla\""), "tensor output.weight: shape [8, 2], must be [8, 3]");
+    assert_eq!(
+        with("\"parnn\"", "\"vanilla\""),
+        "tensor output.weight: shape [8, 2], must be [8, 3]"
+    );
 }
 
 #[test]
@@ -145,7 +159,10 @@ fn damaged_files_are_refused_without_panic() {
     for length in (0..bytes.len()).step_by(7) {
         fs::write(&bad, &bytes[..length]).unwrap();
         let error = Trained::load(&bad).unwrap_err().to_string();
-        assert!(error.contains("bad.safetensors: not a whole safetensors file: "), "{length}: {error}");
+        assert!(
+            error.contains("bad.safetensors: not a whole safetensors file: "),
+            "{length}: {error}"
+        );
     }
     fs::write(&bad, [0xff; 64]).unwrap();
     assert!(Trained::load(&bad).is_err());
@@ -207,12 +224,20 @@ fn bad_windows_are_refused_by_flight_place_and_field() {
         Windows::new().push("f7", &windows).unwrap_err().to_string()
     };
     let error = says(&|w| w.velocity_body_m_s[2] = f32::INFINITY);
-    assert!(error.starts_with("f7: window 13: velocity_body_m_s = [") && error.ends_with("must be finite"));
+    assert!(
+        error.starts_with("f7: window 13: velocity_body_m_s = [")
+            && error.ends_with("must be finite")
+    );
     assert!(says(&|w| w.rows[4][1] = f32::NAN).starts_with("f7: window 13: rows = ["));
-    assert!(says(&|w| w.label_body_n[0] = f32::NAN).starts_with("f7: window 13: label_body_n = [NaN"));
+    assert!(
+        says(&|w| w.label_body_n[0] = f32::NAN).starts_with("f7: window 13: label_body_n = [NaN")
+    );
     assert!(says(&|w| w.truth_body_n = Some([f32::NAN; 3])).contains("truth_body_n = [NaN"));
     let error = says(&|w| w.q_ned_from_body_wxyz = [0.0; 4]);
-    assert_eq!(error, "f7: window 13: q_ned_from_body_wxyz = [0.0, 0.0, 0.0, 0.0]: must have norm 1");
+    assert_eq!(
+        error,
+        "f7: window 13: q_ned_from_body_wxyz = [0.0, 0.0, 0.0, 0.0]: must have norm 1"
+    );
 
     let mut windows = Windows::new();
     windows.push("a", &good).unwrap();

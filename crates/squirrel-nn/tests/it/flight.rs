@@ -1,4 +1,5 @@
-//! What was trained is what flies: the same bits from training's registers, the flight code and the simulator's wing.
+//! What was trained is what flies: the same bits from training's registers, the flight code and the
+//! simulator's wing.
 
 use super::support::{AREA_M2, cambered, flight, folder, sets};
 use squirrel_core::dynamics::State;
@@ -23,7 +24,8 @@ fn compare(file: &Path) {
 
     let vehicle = VehicleFile::squirrel();
     let wing = ParnnWing { parnn: *flies, lateral_arm_m: 0.09 };
-    let servo = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.03 };
+    let servo =
+        ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.03 };
     let wing = WingPlant::Parnn { parnn: Box::new(wing), servo };
     let plant = Plant::new(vehicle.vehicle, vehicle.effects, wing, None, 1e-3).unwrap();
     let mut state = plant.initial_state(State::at_rest(), 1.0);
@@ -46,7 +48,9 @@ fn compare(file: &Path) {
 
 #[test]
 fn weights_have_the_same_bits_in_training_in_flight_and_in_the_plant() {
-    compare(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles/squirrel-parnn.safetensors"));
+    compare(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles/squirrel-parnn.safetensors"),
+    );
     let (training, validation) = sets();
     let settings = Settings { epochs: 3, seed: 9, ..Settings::default() };
     let mut trainer =
@@ -63,14 +67,16 @@ fn models_that_do_not_fly_are_refused_by_the_simulator() {
     let (training, validation) = sets();
     for model in Model::ALL {
         let settings = Settings { epochs: 1, ..Settings::default() };
-        let mut trainer = Trainer::new(model, "squirrel", AREA_M2, &training, &validation, settings).unwrap();
+        let mut trainer =
+            Trainer::new(model, "squirrel", AREA_M2, &training, &validation, settings).unwrap();
         trainer.epoch().unwrap();
         let file = folder.join(model.name());
         trainer.best().save(&file).unwrap();
         match (model, ParnnWeights::load(&file)) {
             (Model::Parnn, flies) => assert!(flies.is_ok(), "{flies:?}"),
             (_, refused) => {
-                let expected = format!("{}: model = {}: of all models", file.display(), model.name());
+                let expected =
+                    format!("{}: model = {}: of all models", file.display(), model.name());
                 let error = refused.unwrap_err().to_string();
                 assert!(error.starts_with(&expected), "{error}");
             }

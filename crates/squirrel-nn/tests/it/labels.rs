@@ -1,4 +1,5 @@
-//! Labels from flight logs: what the accelerometer says the wings did, against what the simulator knows.
+//! Labels from flight logs: what the accelerometer says the wings did, against what the simulator
+//! knows.
 #![allow(clippy::print_stdout, reason = "tests")]
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -17,7 +18,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 fn flight() -> (VehicleFile, FlightLog) {
     let vehicle = VehicleFile::squirrel();
     let scenario = Scenario::find("excite_rich").unwrap();
-    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    let setup =
+        Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
     (vehicle, setup.fly(true, |_| {}).unwrap().log.unwrap())
 }
 
@@ -51,8 +53,9 @@ fn a_label_is_the_force_on_the_wings_but_for_noise() {
     Windows::new().push("rich", &found).unwrap();
 }
 
-/// E9 by hand and by another way: acceleration from the change of true velocity, thrust from the rotors' speeds, no
-/// accelerometer. The paper leaves the airframe's drag out; here it is taken off.
+/// E9 by hand and by another way: acceleration from the change of true velocity, thrust from the
+/// rotors' speeds, no accelerometer. The paper leaves the airframe's drag out; here it is taken
+/// off.
 #[test]
 fn the_label_in_ned_is_what_is_left_of_the_papers_balance_of_forces() {
     let vehicle = VehicleFile::squirrel();
@@ -71,20 +74,25 @@ fn the_label_in_ned_is_what_is_left_of_the_papers_balance_of_forces() {
     let vector = |name: &str, t: f64| Vector3::from_column_slice(&row(name, t));
     let (mut error, mut size) = (0.0, 0.0);
     for (k, window) in found.iter().enumerate() {
-        // All sources begin at 0: rows are at 0.05 s, 0.15 s, ..., and the first window ends with the tenth.
+        // All sources begin at 0: rows are at 0.05 s, 0.15 s, ..., and the first window ends with
+        // the tenth.
         let t = 0.05 + 0.1 * (k + WINDOW - 1) as f64;
         let [before, after] = [t - 0.05, t + 0.05].map(|t| vector("truth.velocity_ned_m_s", t));
         let inertia = (after - before) * (mass_kg / 0.1);
         let mut others = Vector3::zeros();
         for i in 0..=30 {
-            // By the trapezoidal rule: thrust turns with the vehicle, so that half a sample late would be seen.
-            let (t, share) = (t - 0.05 + f64::from(i) / 300.0, if i % 30 == 0 { 0.5 } else { 1.0 } / 30.0);
+            // By the trapezoidal rule: thrust turns with the vehicle, so that half a sample late
+            // would be seen.
+            let (t, share) =
+                (t - 0.05 + f64::from(i) / 300.0, if i % 30 == 0 { 0.5 } else { 1.0 } / 30.0);
             let q = row("truth.q_ned_from_body_wxyz", t);
-            let down = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3])) * Vector3::z();
+            let down = UnitQuaternion::new_normalize(Quaternion::new(q[0], q[1], q[2], q[3]))
+                * Vector3::z();
             let squares: f64 = row("rotor.speed_rad_s", t).iter().map(|w| w * w).sum();
             let v = vector("truth.velocity_ned_m_s", t);
             let drag = v * (0.5 * AIR_DENSITY_KG_M3 * parameters.drag.area_m2 * v.norm());
-            others -= (down * (parameters.propulsion.thrust_coefficient_n_s2 * squares) + drag) * share;
+            others -=
+                (down * (parameters.propulsion.thrust_coefficient_n_s2 * squares) + drag) * share;
         }
         let by_hand = inertia - weight - others;
         error += (Vector3::from(window.label_ned_n()).cast::<f64>() - by_hand).norm_squared();
@@ -92,7 +100,8 @@ fn the_label_in_ned_is_what_is_left_of_the_papers_balance_of_forces() {
     }
     let [error, size] = [error, size].map(|sum| (sum / found.len() as f64).sqrt());
     println!("{} windows: {error:.4} N of {size:.4} N", found.len());
-    // What there is of it is the accelerometer's white noise: 0.25 m/s^2 an axis, the mean of 30 samples, three axes.
+    // What there is of it is the accelerometer's white noise: 0.25 m/s^2 an axis, the mean of 30
+    // samples, three axes.
     let noise = mass_kg * 0.25 * (3.0_f64 / 30.0).sqrt();
     assert!(
         (error / noise - 1.0).abs() < 0.15 && size > 5.0 * error,
@@ -107,7 +116,10 @@ fn a_log_that_lacks_something_says_what_and_why() {
     for (source, words) in [
         ("imu", "monday: imu.specific_force_body_m_s2: missing; the force is measured by it"),
         ("gnss", "monday: gnss.velocity_ned_m_s: missing; the air meets the wings with it"),
-        ("wing", "monday: wing.command: missing; wings must be spread where something is learned about them"),
+        (
+            "wing",
+            "monday: wing.command: missing; wings must be spread where something is learned about them",
+        ),
     ] {
         assert_eq!(problem(&without(&log, source)), words);
     }
@@ -120,7 +132,11 @@ fn a_log_that_lacks_something_says_what_and_why() {
     assert!(matches!(windows(&vehicle, "monday", &folded), Err(NnError::Folded { .. })));
     let mut damaged = log.clone();
     damaged.source_mut("imu").channels.get_mut("omega_body_rad_s").unwrap().values[7] = f64::NAN;
-    assert!(problem(&damaged).starts_with("monday: imu.omega_body_rad_s: NaN at "), "{}", problem(&damaged));
+    assert!(
+        problem(&damaged).starts_with("monday: imu.omega_body_rad_s: NaN at "),
+        "{}",
+        problem(&damaged)
+    );
     let mut narrow = log;
     narrow.source_mut("rotor").channels.get_mut("command").unwrap().width = 3;
     assert!(problem(&narrow).contains("rotor.command: has 3 numbers a sample, must have 4"));

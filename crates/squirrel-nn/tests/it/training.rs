@@ -11,11 +11,13 @@ use squirrel_nn::train::{Settings, Trainer};
 use squirrel_nn::trained::{ForceError, Trained};
 use squirrel_nn::windows::Windows;
 
-const SHORT: Settings = Settings { epochs: 6, batch: 50, rate: 3e-3, clip: 5.0, patience: 100, seed: 3 };
+const SHORT: Settings =
+    Settings { epochs: 6, batch: 50, rate: 3e-3, clip: 5.0, patience: 100, seed: 3 };
 
 fn train(model: Model, settings: Settings) -> Trained {
     let (training, validation) = sets();
-    let mut trainer = Trainer::new(model, "test", AREA_M2, &training, &validation, settings).unwrap();
+    let mut trainer =
+        Trainer::new(model, "test", AREA_M2, &training, &validation, settings).unwrap();
     while trainer.epoch().unwrap().is_some() {}
     trainer.best()
 }
@@ -54,7 +56,8 @@ fn one_number_is_found_exactly() {
     let scaled = |_: f32| Correction { alpha_w_rad: 0.0, gamma: 1.37 };
     windows.push("a", &flight(0.0, 200, scaled)).unwrap();
     let trainer =
-        Trainer::new(Model::ScaledFlatPlate, "test", AREA_M2, &windows, &Windows::new(), SHORT).unwrap();
+        Trainer::new(Model::ScaledFlatPlate, "test", AREA_M2, &windows, &Windows::new(), SHORT)
+            .unwrap();
     assert!(trainer.is_done());
     let best = trainer.best();
     let [scale] = best.parameters() else { panic!("one parameter") };
@@ -66,7 +69,8 @@ fn every_path_trains_the_same_weights() {
     let (training, validation) = sets();
     for model in [Model::Parnn, Model::VanillaBody] {
         let weights = Path::available().into_iter().map(|path| {
-            let trainer = Trainer::new(model, "test", AREA_M2, &training, &validation, SHORT).unwrap();
+            let trainer =
+                Trainer::new(model, "test", AREA_M2, &training, &validation, SHORT).unwrap();
             let mut trainer = trainer.on(path);
             while trainer.epoch().unwrap().is_some() {}
             (trainer.best().parameters().to_vec(), trainer.history().to_vec())
@@ -82,7 +86,8 @@ fn every_path_trains_the_same_weights() {
 fn a_resumed_training_ends_at_the_same_bits() {
     let (training, validation) = sets();
     let file = folder("resume").join("half.safetensors");
-    let mut trainer = Trainer::new(Model::Parnn, "test", AREA_M2, &training, &validation, SHORT).unwrap();
+    let mut trainer =
+        Trainer::new(Model::Parnn, "test", AREA_M2, &training, &validation, SHORT).unwrap();
     for epoch in 0.. {
         if epoch == 3 {
             trainer.save(&file).unwrap();
@@ -99,7 +104,10 @@ fn a_resumed_training_ends_at_the_same_bits() {
     assert_eq!(resumed.history().len(), SHORT.epochs);
 
     let error = Trainer::resume(&file, &validation, &validation).unwrap_err().to_string();
-    assert!(error.contains("half.safetensors: data_hash = ") && error.contains("at hand"), "{error}");
+    assert!(
+        error.contains("half.safetensors: data_hash = ") && error.contains("at hand"),
+        "{error}"
+    );
     let error = Trainer::resume(&file, &training, &training).unwrap_err().to_string();
     assert!(error.contains("half.safetensors: validation_hash = "), "{error}");
 }
@@ -123,7 +131,8 @@ fn training_stops_where_the_validation_gets_no_better() {
     validation.push("turned", &turned).unwrap();
     let settings = Settings { epochs: 50, patience: 4, ..SHORT };
     let mut trainer =
-        Trainer::new(Model::VanillaPlane, "test", AREA_M2, &training, &validation, settings).unwrap();
+        Trainer::new(Model::VanillaPlane, "test", AREA_M2, &training, &validation, settings)
+            .unwrap();
     while trainer.epoch().unwrap().is_some() {}
     let errors: Vec<f64> = trainer.history().iter().map(|e| e.validation.unwrap()).collect();
     let best = errors.iter().copied().fold(f64::INFINITY, f64::min);
@@ -143,7 +152,10 @@ fn a_trained_parnn_flies_with_the_same_bits() {
         for (force, window) in forces.iter().zip(held_out.all()) {
             let rows = &window.rows[window.rows.len() - model.window()..];
             let estimate = flies.estimate(rows, In::new(Vector3::from(window.velocity_body_m_s)));
-            assert_eq!(<[f32; 3]>::from(estimate.force.vector).map(f32::to_bits), force.map(f32::to_bits));
+            assert_eq!(
+                <[f32; 3]>::from(estimate.force.vector).map(f32::to_bits),
+                force.map(f32::to_bits)
+            );
         }
     }
     assert_eq!(train(Model::VanillaBody, SHORT).parnn(), None);
@@ -153,11 +165,17 @@ fn a_trained_parnn_flies_with_the_same_bits() {
 fn what_cannot_be_trained_is_one_line() {
     let (training, validation) = sets();
     let fails = |settings: Settings, area_m2: f32, training: &Windows| {
-        let mut trainer =
-            match Trainer::new(Model::VanillaBody, "test", area_m2, training, &validation, settings) {
-                Ok(trainer) => trainer,
-                Err(error) => return error.to_string(),
-            };
+        let mut trainer = match Trainer::new(
+            Model::VanillaBody,
+            "test",
+            area_m2,
+            training,
+            &validation,
+            settings,
+        ) {
+            Ok(trainer) => trainer,
+            Err(error) => return error.to_string(),
+        };
         loop {
             match trainer.epoch() {
                 Ok(Some(_)) => {}
@@ -179,7 +197,10 @@ fn what_cannot_be_trained_is_one_line() {
         assert_eq!(fails(settings, area, windows), expected);
     }
     let diverged = fails(Settings { rate: 1e30, ..SHORT }, AREA_M2, &training);
-    assert!(diverged.starts_with("vanilla_body: loss = ") && diverged.contains("in epoch 1"), "{diverged}");
+    assert!(
+        diverged.starts_with("vanilla_body: loss = ") && diverged.contains("in epoch 1"),
+        "{diverged}"
+    );
     let unknown = "lstm".parse::<Model>().unwrap_err();
     assert!(matches!(unknown, NnError::Setting { field: "model", .. }), "{unknown}");
     for model in Model::ALL {

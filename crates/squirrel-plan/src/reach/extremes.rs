@@ -1,9 +1,9 @@
 //! What the set means for climbing and braking.
 //!
-//! Upwards and against the motion with height free are values of the support function. Braking at constant height is not: it is asked
-//! of the set, not of its hull, which would mix folded and spread wings. For an attitude the thrust that holds height is
-//! `U = (m g + w f_z)/n_z`, and a search in two numbers finds the attitude: the inner one ends
-//! where thrust does.
+//! Upwards and against the motion with height free are values of the support function. Braking at
+//! constant height is not: it is asked of the set, not of its hull, which would mix folded and
+//! spread wings. For an attitude the thrust that holds height is `U = (m g + w f_z)/n_z`, and a
+//! search in two numbers finds the attitude: the inner one ends where thrust does.
 
 use super::turned::golden;
 use super::{Reach, Wings};
@@ -59,10 +59,11 @@ impl Serialize for Compared {
 pub struct Extremes {
     /// Upwards; below zero, height cannot be held.
     pub upward_m_s2: Compared,
-    /// Against the horizontal motion, whatever becomes of the height; nothing to brake without such a motion.
+    /// Against the horizontal motion, whatever becomes of the height; nothing to brake without such
+    /// a motion.
     pub braking_height_free_m_s2: Option<Compared>,
-    /// Against the horizontal motion with no vertical acceleration; nothing where height cannot be held in either
-    /// way, NaN where it cannot be held with folded wings.
+    /// Against the horizontal motion with no vertical acceleration; nothing where height cannot be
+    /// held in either way, NaN where it cannot be held with folded wings.
     pub braking_level_m_s2: Option<Compared>,
 }
 
@@ -76,7 +77,8 @@ impl Reach {
         let back = Vector3::new(-self.velocity_ned.x, -self.velocity_ned.y, 0.0);
         let back = back.try_normalize(BRAKING_SPEED_MIN_M_S);
         let level = back.and_then(|back| {
-            let [folded, spread] = [Wings::Folded, Wings::Spread].map(|wings| self.level(back, wings));
+            let [folded, spread] =
+                [Wings::Folded, Wings::Spread].map(|wings| self.level(back, wings));
             let with_wings = folded.max(spread);
             let folded = if folded.is_finite() { folded } else { f64::NAN };
             with_wings.is_finite().then_some(Compared { folded, with_wings })
@@ -88,7 +90,8 @@ impl Reach {
         }
     }
 
-    /// Acceleration along a horizontal direction at an attitude whose thrust holds height; minus infinity where none does.
+    /// Acceleration along a horizontal direction at an attitude whose thrust holds height; minus
+    /// infinity where none does.
     fn holding_height(&self, normal: Vector3<f64>, direction: Vector3<f64>, wings: Wings) -> f64 {
         let wing = match wings {
             Wings::Folded => Vector3::zeros(),
@@ -96,12 +99,18 @@ impl Reach {
         };
         let thrust = (self.mass_kg * GRAVITY_M_S2 + wing.z) / normal.z;
         let has = (0.0..=self.thrust_max_n).contains(&thrust);
-        if has { (wing - normal * thrust).dot(&direction) / self.mass_kg } else { f64::NEG_INFINITY }
+        if has {
+            (wing - normal * thrust).dot(&direction) / self.mass_kg
+        } else {
+            f64::NEG_INFINITY
+        }
     }
 
-    /// The largest acceleration along a horizontal direction at constant height; minus infinity where height cannot be held.
+    /// The largest acceleration along a horizontal direction at constant height; minus infinity
+    /// where height cannot be held.
     fn level(&self, direction: Vector3<f64>, wings: Wings) -> f64 {
-        let value = |p: f64, q: f64| self.holding_height(self.tilt.normal(p, q).0, direction, wings);
+        let value =
+            |p: f64, q: f64| self.holding_height(self.tilt.normal(p, q).0, direction, wings);
         peak(&|q| peak(&|p| value(p, q)))
     }
 }
@@ -111,14 +120,17 @@ fn peak(value: &impl Fn(f64) -> f64) -> f64 {
     let place = |i: usize| i as f64 / SAMPLES as f64;
     let samples: Vec<f64> = (0..=SAMPLES).map(|i| value(place(i))).collect();
     let best = samples.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let beside = |i: usize| [i.checked_sub(1), Some(i + 1)].map(|j| j.and_then(|j| samples.get(j)).copied());
-    let is_peak =
-        |i: &usize| samples[*i].is_finite() && beside(*i).iter().flatten().all(|x| *x <= samples[*i]);
+    let beside =
+        |i: usize| [i.checked_sub(1), Some(i + 1)].map(|j| j.and_then(|j| samples.get(j)).copied());
+    let is_peak = |i: &usize| {
+        samples[*i].is_finite() && beside(*i).iter().flatten().all(|x| *x <= samples[*i])
+    };
     let mut peaks: Vec<usize> = (0..=SAMPLES).filter(is_peak).collect();
     peaks.sort_by(|a, b| samples[*b].total_cmp(&samples[*a]));
     let refined = peaks.into_iter().take(PEAKS).flat_map(|i| {
         let ends = [place(i.saturating_sub(1)), place((i + 1).min(SAMPLES))];
-        // The thrust that holds height ends within a step: there the best is at the end of what is defined.
+        // The thrust that holds height ends within a step: there the best is at the end of what is
+        // defined.
         let ends = ends.map(|end| last_defined(value, place(i), end));
         [ends[0], golden(value, ends), ends[1]].map(value)
     });

@@ -1,10 +1,11 @@
 //! The support function of the flat plate, exact and with a certificate (docs/equations.md F.3).
 //!
-//! Spread wings push with `b (v.n) n`, `b = rho A V^2`, so for a thrust `U` of 0 or the limit `-(U + b v.n)(d.n)` is to be largest over
-//! the tilt set. Inside it the gradient is along `n` and lies in the plane of `v` and `d`; the edge is made of circles. On the great
-//! circle of that plane and on every edge the function is a trigonometric polynomial of degree two in one angle, whose second
-//! derivative is bounded, so branch and bound finds the largest value to a stated gap. That takes the place of the form with a
-//! semidefinite cone, which needs LAPACK.
+//! Spread wings push with `b (v.n) n`, `b = rho A V^2`, so for a thrust `U` of 0 or the limit
+//! `-(U + b v.n)(d.n)` is to be largest over the tilt set. Inside it the gradient is along `n` and
+//! lies in the plane of `v` and `d`; the edge is made of circles. On the great circle of that plane
+//! and on every edge the function is a trigonometric polynomial of degree two in one angle, whose
+//! second derivative is bounded, so branch and bound finds the largest value to a stated gap. That
+//! takes the place of the form with a semidefinite cone, which needs LAPACK.
 
 use super::tilt::{Circle, Region, across};
 use nalgebra::Vector3;
@@ -80,7 +81,8 @@ impl Trigonometric {
             }
             let mut halves = Vec::with_capacity(2 * open.len());
             for [a, b, at_a, at_b] in open {
-                // A function that bends so little rises above both ends of a piece by no more than this.
+                // A function that bends so little rises above both ends of a piece by no more than
+                // this.
                 let bound = at_a.max(at_b) + bend * (b - a) * (b - a) / 8.0;
                 if bound <= best + gap {
                     upper = upper.max(bound);
@@ -100,12 +102,19 @@ impl Trigonometric {
 /// The largest `-(thrust + b v.n)(d.n)` over the region, N.
 ///
 /// * `bv` - direction of motion times `b`, N
-pub(super) fn largest(region: &Region, thrust_n: f64, bv: Vector3<f64>, d: Vector3<f64>) -> Option<Largest> {
+pub(super) fn largest(
+    region: &Region,
+    thrust_n: f64,
+    bv: Vector3<f64>,
+    d: Vector3<f64>,
+) -> Option<Largest> {
     let axis = d.try_normalize(0.0)?;
     let aside = bv - axis * axis.dot(&bv);
-    // Along `d`, every plane through both will do: what the one plane misses lies on circles around `d` that meet the edge.
+    // Along `d`, every plane through both will do: what the one plane misses lies on circles around
+    // `d` that meet the edge.
     let aside = if aside.norm() > 1e-9 * bv.norm() { aside.try_normalize(0.0) } else { None };
-    let plane = Circle { centre: Vector3::zeros(), u: axis, w: aside.unwrap_or_else(|| across(axis)) };
+    let plane =
+        Circle { centre: Vector3::zeros(), u: axis, w: aside.unwrap_or_else(|| across(axis)) };
     let mut found: Option<Largest> = None;
     for circle in region.edges().chain([plane]) {
         let function = Trigonometric::new(&circle, thrust_n, bv, d);

@@ -1,7 +1,8 @@
-//! The convex hull as a closed mesh: a corner for each direction of a refined icosahedron, where the support function has its point.
+//! The convex hull as a closed mesh: a corner for each direction of a refined icosahedron, where
+//! the support function has its point.
 //!
-//! Corners lie on the hull, so the mesh lies in it but for facets that fold where the hull has an edge, and both go away as the
-//! directions get denser, four times with each step.
+//! Corners lie on the hull, so the mesh lies in it but for facets that fold where the hull has an
+//! edge, and both go away as the directions get denser, four times with each step.
 
 use super::{Reach, Wings};
 use nalgebra::Vector3;
@@ -20,15 +21,17 @@ pub struct Mesh {
 impl Mesh {
     /// Enclosed volume, (m/s^2)^3.
     pub fn volume_m3_s6(&self) -> f64 {
-        let middle =
-            self.corners.iter().map(|c| c.vector).sum::<Vector3<f64>>() / self.corners.len().max(1) as f64;
+        let middle = self.corners.iter().map(|c| c.vector).sum::<Vector3<f64>>()
+            / self.corners.len().max(1) as f64;
         let corner = |i: usize| self.corners[i].vector - middle;
-        let parts = self.triangles.iter().map(|[a, b, c]| corner(*a).dot(&corner(*b).cross(&corner(*c))));
+        let parts =
+            self.triangles.iter().map(|[a, b, c]| corner(*a).dot(&corner(*b).cross(&corner(*c))));
         parts.sum::<f64>() / 6.0
     }
 }
 
-/// Directions all around, each with the triangles between them; `halvings` of the edges of an icosahedron.
+/// Directions all around, each with the triangles between them; `halvings` of the edges of an
+/// icosahedron.
 pub(super) fn icosphere(halvings: u32) -> (Vec<Vector3<f64>>, Vec<[usize; 3]>) {
     let (mut points, mut triangles) = icosahedron();
     for _ in 0..halvings {
@@ -62,7 +65,8 @@ fn icosahedron() -> (Vec<Vector3<f64>>, Vec<[usize; 3]>) {
     };
     let points = [Vector3::z()].into_iter().chain(ring(1.0, 0.0)).chain(ring(-1.0, 0.5));
     let triangles = (0..5).flat_map(|i| {
-        let [upper, next_upper, lower, next_lower] = [1 + i, 1 + (i + 1) % 5, 6 + i, 6 + (i + 1) % 5];
+        let [upper, next_upper, lower, next_lower] =
+            [1 + i, 1 + (i + 1) % 5, 6 + i, 6 + (i + 1) % 5];
         [
             [0, upper, next_upper],
             [upper, lower, next_upper],
@@ -74,14 +78,19 @@ fn icosahedron() -> (Vec<Vector3<f64>>, Vec<[usize; 3]>) {
 }
 
 impl Reach {
-    /// The acceleration that lies furthest along a direction: with folded wings, or with a choice of both.
+    /// The acceleration that lies furthest along a direction: with folded wings, or with a choice
+    /// of both.
     pub(super) fn furthest(&self, direction: In<Ned, f64>, wings: Wings) -> In<Ned, f64> {
         let folded = self.folded(direction);
         if wings == Wings::Folded {
             return folded.acceleration;
         }
         let spread = self.spread_by(direction.vector, None);
-        if spread.value_m_s2 > folded.value_m_s2 { spread.acceleration } else { folded.acceleration }
+        if spread.value_m_s2 > folded.value_m_s2 {
+            spread.acceleration
+        } else {
+            folded.acceleration
+        }
     }
 
     /// Convex hull of the accelerations: with folded wings, or with a choice of both.
@@ -89,7 +98,10 @@ impl Reach {
     /// * `halvings` - of the edges of an icosahedron: 12, 42, 162, 642, ... corners
     pub fn hull(&self, wings: Wings, halvings: u32) -> Mesh {
         let (directions, triangles) = icosphere(halvings);
-        Mesh { corners: directions.iter().map(|d| self.furthest(In::new(*d), wings)).collect(), triangles }
+        Mesh {
+            corners: directions.iter().map(|d| self.furthest(In::new(*d), wings)).collect(),
+            triangles,
+        }
     }
 }
 

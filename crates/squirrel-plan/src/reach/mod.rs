@@ -1,12 +1,15 @@
-//! Which accelerations a multirotor can reach at once, with its wings folded and with a choice of folded or spread.
+//! Which accelerations a multirotor can reach at once, with its wings folded and with a choice of
+//! folded or spread.
 //!
 //! ```text
 //! A(v) = { g e3 - (U/m) n + w f(v, n)/m : 0 <= U <= U_max, n within the tilt limits, w = 0 or 1 }      (docs/equations.md F)
 //! ```
-//! `v` is the velocity through the air and `f` the steady force of spread wings ([`WingForce`]). Spread wings push whether wanted or not:
-//! the union over `w` is not convex and may have a gap, so the set and its convex hull are told apart. [`Reach::support`] is the largest
-//! acceleration along a direction, which both share, with a bound that no acceleration exceeds; [`Reach::volumes`] compares set and hull
-//! with those of folded wings, [`Reach::extremes`] says what that means for climbing and for braking.
+//! `v` is the velocity through the air and `f` the steady force of spread wings ([`WingForce`]).
+//! Spread wings push whether wanted or not: the union over `w` is not convex and may have a gap, so
+//! the set and its convex hull are told apart. [`Reach::support`] is the largest acceleration along
+//! a direction, which both share, with a bound that no acceleration exceeds; [`Reach::volumes`]
+//! compares set and hull with those of folded wings, [`Reach::extremes`] says what that means for
+//! climbing and for braking.
 
 mod case;
 mod extremes;
@@ -144,10 +147,11 @@ impl Reach {
         })
     }
 
-    /// The largest acceleration along a direction, wings folded or spread, whichever goes further: the support function of the set.
+    /// The largest acceleration along a direction, wings folded or spread, whichever goes further:
+    /// the support function of the set.
     ///
-    /// Exact to rounding for the flat plate. For other wings the bound is within a thousandth of a m/s^2, of the force as read between
-    /// its nodes. A direction that is not finite makes NaN.
+    /// Exact to rounding for the flat plate. For other wings the bound is within a thousandth of a
+    /// m/s^2, of the force as read between its nodes. A direction that is not finite makes NaN.
     pub fn support(&self, direction: In<Ned, f64>) -> Support {
         let [folded, spread] = [self.folded(direction), self.spread(direction)];
         let upper_m_s2 = folded.upper_m_s2.max(spread.upper_m_s2);
@@ -169,7 +173,8 @@ impl Reach {
         self.spread_by(direction.vector, Some(GAP_M_S2))
     }
 
-    /// As [`Self::spread`]; without a gap, the bound of a wing that is not flat is left out, which is faster.
+    /// As [`Self::spread`]; without a gap, the bound of a wing that is not flat is left out, which
+    /// is faster.
     fn spread_by(&self, d: Vector3<f64>, gap_m_s2: Option<f64>) -> Support {
         let length = d.norm();
         let unit = d.try_normalize(0.0).unwrap_or(d);
@@ -179,13 +184,15 @@ impl Reach {
                 Polar::Flat { force_n } => flat::largest(region, thrust_n, motion * *force_n, unit),
                 Polar::Nodes(_) => {
                     let search = Search { region, polar, thrust_n, motion: *motion, d: unit };
-                    gap_m_s2.map_or_else(|| search.largest(), |gap| search.bound(gap * self.mass_kg))
+                    gap_m_s2
+                        .map_or_else(|| search.largest(), |gap| search.bound(gap * self.mass_kg))
                 }
             };
             // Only a direction that is none has no largest value.
             let none = Largest { value: 0.0 * length, upper: 0.0 * length, normal: Vector3::z() };
             let largest = largest.unwrap_or(none);
-            let scaled = Largest { value: largest.value * length, upper: largest.upper * length, ..largest };
+            let scaled =
+                Largest { value: largest.value * length, upper: largest.upper * length, ..largest };
             self.supported(d, thrust_n, scaled, Wings::Spread)
         };
         // The acceleration is linear in thrust: one of its ends is the best.

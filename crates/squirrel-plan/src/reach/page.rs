@@ -1,4 +1,5 @@
-//! The set as a page without network: both hulls in three dimensions, what is compared over thrust, every number.
+//! The set as a page without network: both hulls in three dimensions, what is compared over thrust,
+//! every number.
 
 use super::{Case, Compared, Question, Reach, Wings};
 use nalgebra::Vector3;
@@ -25,7 +26,11 @@ const CHOICE: Ink = Ink::Series(1);
 ///
 /// # Errors
 /// As [`Reach::new`].
-pub fn page(question: &Question, facts: &[(String, String)], cases: &[Case]) -> Result<String, SettingError> {
+pub fn page(
+    question: &Question,
+    facts: &[(String, String)],
+    cases: &[Case],
+) -> Result<String, SettingError> {
     let lead = "Every acceleration that thrust, attitude and wings can make at once. Folded wings are compared with a choice of folded or \
                 spread; spread wings push whether wanted or not.";
     let mut page = Page::new("What wings reach", lead);
@@ -55,12 +60,14 @@ fn scene(reach: &Reach) -> Scene {
     };
     let wires = |name: &str, ink, dashed, wings| {
         let lines = wires(reach, wings).into_iter().enumerate();
-        let lines = lines.map(move |(i, line)| track(if i == 0 { name } else { "" }, ink, dashed, line));
+        let lines =
+            lines.map(move |(i, line)| track(if i == 0 { name } else { "" }, ink, dashed, line));
         lines.collect::<Vec<_>>()
     };
     let mut tracks = wires("folded", FOLDED, false, Wings::Folded);
     tracks.extend(wires("folded or spread", CHOICE, true, Wings::Spread));
-    let nothing = SceneTrack { marks: vec![[0.0; 3]], ..track("", Ink::Reference, true, vec![[0.0; 3]]) };
+    let nothing =
+        SceneTrack { marks: vec![[0.0; 3]], ..track("", Ink::Reference, true, vec![[0.0; 3]]) };
     tracks.push(nothing);
     let axes = ["north", "east", "up"].map(|name| Axis::new(name, "m/s\u{b2}"));
     let label = "hulls of the accelerations".to_owned();
@@ -90,7 +97,8 @@ fn wires(reach: &Reach, wings: Wings) -> Vec<Vec<[f64; 3]>> {
 /// A chart over the thrust-to-weight ratio for each figure that is compared.
 fn curves(question: &Question) -> Result<Vec<Figure>, SettingError> {
     let weight_n = question.mass_kg * GRAVITY_M_S2;
-    let case = |ratio: f64| Case::of(&Question { thrust_max_n: ratio * weight_n, ..question.clone() });
+    let case =
+        |ratio: f64| Case::of(&Question { thrust_max_n: ratio * weight_n, ..question.clone() });
     let cases = RATIOS.into_iter().map(case).collect::<Result<Vec<_>, _>>()?;
     let chart = |name: &str, unit: &str, least: f64, lines: [(&str, Ink, Vec<f64>); 2]| {
         let y = Axis::new(name, unit).with_range(Range::Including(least, least));
@@ -129,12 +137,20 @@ fn numbers(page: &mut Page, cases: &[Case]) {
             both.map_or_else(
                 || "\u{2013}".to_owned(),
                 |both| {
-                    format!("{:.2} \u{2192} {:.2} (\u{d7}{:.2})", both.folded, both.with_wings, both.ratio())
+                    format!(
+                        "{:.2} \u{2192} {:.2} (\u{d7}{:.2})",
+                        both.folded,
+                        both.with_wings,
+                        both.ratio()
+                    )
                 },
             )
         };
         let figures = case.figures().map(|(_, _, both)| cell(both));
-        Row { ink: None, cells: own.map(|x| format!("{x:.2}")).into_iter().chain(figures).collect() }
+        Row {
+            ink: None,
+            cells: own.map(|x| format!("{x:.2}")).into_iter().chain(figures).collect(),
+        }
     });
     page.table(&head, &rows.collect::<Vec<_>>());
 }

@@ -1,8 +1,10 @@
 //! The force of spread wings at one speed, over the angle of attack (docs/equations.md F.2).
 //!
-//! Every model pushes in the plane of the motion `v` and the normal `n`, so at one speed two numbers are all there is:
-//! `f = along v + across m`, where `n = sin(alpha) v + cos(alpha) m`. For the flat plate they are `-b sin^2` and `-b sin cos`; for the others
-//! they are asked once on nodes, with straight lines between. A set costs thousands of forces, a settled membrane tens of microseconds.
+//! Every model pushes in the plane of the motion `v` and the normal `n`, so at one speed two
+//! numbers are all there is: `f = along v + across m`, where `n = sin(alpha) v + cos(alpha) m`. For
+//! the flat plate they are `-b sin^2` and `-b sin cos`; for the others they are asked once on
+//! nodes, with straight lines between. A set costs thousands of forces, a settled membrane tens of
+//! microseconds.
 
 use crate::wing::WingForce;
 use nalgebra::Vector3;
@@ -12,7 +14,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Intervals between nodes; a line misses the membrane by less than a millinewton.
 const INTERVALS: usize = 1600;
-/// A membrane in fast air bulges to either side of edge on: the node there is two, this far from it, rad.
+/// A membrane in fast air bulges to either side of edge on: the node there is two, this far from
+/// it, rad.
 const EDGE_ON_RAD: f64 = 1e-7;
 
 /// Force in the plane of motion and normal, N.
@@ -53,7 +56,8 @@ impl Polar {
 
     /// The nodes around an angle.
     fn around(nodes: &[Node], alpha_rad: f64) -> [Node; 2] {
-        let after = nodes.partition_point(|node| node.alpha_rad < alpha_rad).clamp(1, nodes.len() - 1);
+        let after =
+            nodes.partition_point(|node| node.alpha_rad < alpha_rad).clamp(1, nodes.len() - 1);
         [nodes[after - 1], nodes[after]]
     }
 
@@ -100,7 +104,9 @@ impl Polar {
                 let last = nodes.partition_point(|node| node.alpha_rad < to).max(first);
                 [0, 1].map(|i| {
                     let inner = nodes[first..last].iter().map(|node| node.force_n[i]);
-                    inner.fold([a[i].min(b[i]), a[i].max(b[i])], |[low, high], x| [low.min(x), high.max(x)])
+                    inner.fold([a[i].min(b[i]), a[i].max(b[i])], |[low, high], x| {
+                        [low.min(x), high.max(x)]
+                    })
                 })
             }
         }

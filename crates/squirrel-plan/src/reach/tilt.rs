@@ -1,8 +1,10 @@
 //! Where thrust may point: the tilt set as a part of the unit sphere (docs/equations.md F.1).
 //!
-//! Limits of roll and pitch, `n = R_z(yaw) (sin(pitch) cos(roll), -sin(roll), cos(pitch) cos(roll))`, and a cone are both half-spaces
-//! cut out of the sphere: `|n_x| <= tan(pitch_max) n_z` and `|n_y| <= sin(roll_max)` in the frame turned by yaw, `n_z >= cos(max)`. What
-//! bounds the set are then circles, and a linear function is largest in its own direction, on one of those circles, or where two meet.
+//! Limits of roll and pitch,
+//! `n = R_z(yaw) (sin(pitch) cos(roll), -sin(roll), cos(pitch) cos(roll))`, and a cone are both
+//! half-spaces cut out of the sphere: `|n_x| <= tan(pitch_max) n_z` and `|n_y| <= sin(roll_max)` in
+//! the frame turned by yaw, `n_z >= cos(max)`. What bounds the set are then circles, and a linear
+//! function is largest in its own direction, on one of those circles, or where two meet.
 
 use nalgebra::Vector3;
 use squirrel_sim::setting::SettingError;
@@ -70,12 +72,15 @@ impl Tilt {
         }
     }
 
-    /// A normal for each point of the unit square, and the solid angle that a unit of area there stands for.
+    /// A normal for each point of the unit square, and the solid angle that a unit of area there
+    /// stands for.
     pub(super) fn normal(&self, p: f64, q: f64) -> (Vector3<f64>, f64) {
         match *self {
             Self::Box { roll_max_rad, pitch_max_rad, yaw_rad } => {
-                let (roll, pitch) = (roll_max_rad * (2.0 * p - 1.0), pitch_max_rad * (2.0 * q - 1.0));
-                let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) = (roll.sin_cos(), pitch.sin_cos());
+                let (roll, pitch) =
+                    (roll_max_rad * (2.0 * p - 1.0), pitch_max_rad * (2.0 * q - 1.0));
+                let ((sin_roll, cos_roll), (sin_pitch, cos_pitch)) =
+                    (roll.sin_cos(), pitch.sin_cos());
                 let n = Vector3::new(sin_pitch * cos_roll, -sin_roll, cos_pitch * cos_roll);
                 (turned(n, yaw_rad), cos_roll * 4.0 * roll_max_rad * pitch_max_rad)
             }
@@ -118,7 +123,8 @@ pub(super) struct Circle {
 }
 
 impl Circle {
-    /// Normals at this sine above the plane across `axis`, a unit vector; `towards`, across the axis, is where the angle is zero.
+    /// Normals at this sine above the plane across `axis`, a unit vector; `towards`, across the
+    /// axis, is where the angle is zero.
     pub(super) fn around(axis: Vector3<f64>, sine: f64, towards: Vector3<f64>) -> Self {
         let radius = (1.0 - sine * sine).max(0.0).sqrt();
         Self { centre: axis * sine, u: towards * radius, w: axis.cross(&towards) * radius }
@@ -153,12 +159,14 @@ impl Region {
     pub(super) fn new(tilt: &Tilt) -> Self {
         let faces = match *tilt {
             Tilt::Box { roll_max_rad, pitch_max_rad, yaw_rad } => {
-                let ((sin_pitch, cos_pitch), sin_roll) = (pitch_max_rad.sin_cos(), roll_max_rad.sin());
+                let ((sin_pitch, cos_pitch), sin_roll) =
+                    (pitch_max_rad.sin_cos(), roll_max_rad.sin());
                 let pitch = |sign: f64| Face {
                     outward: Vector3::new(sign * cos_pitch, 0.0, -sin_pitch),
                     offset: 0.0,
                 };
-                let roll = |sign: f64| Face { outward: Vector3::new(0.0, sign, 0.0), offset: sin_roll };
+                let roll =
+                    |sign: f64| Face { outward: Vector3::new(0.0, sign, 0.0), offset: sin_roll };
                 let turn = |face: Face| Face { outward: turned(face.outward, yaw_rad), ..face };
                 [pitch(1.0), pitch(-1.0), roll(1.0), roll(-1.0)].map(turn).to_vec()
             }
@@ -194,7 +202,8 @@ impl Region {
         }
         let mut best: Option<Vector3<f64>> = None;
         let mut offer = |n: Vector3<f64>| {
-            if best.is_none_or(|best| direction.dot(&n) > direction.dot(&best)) && self.contains(n) {
+            if best.is_none_or(|best| direction.dot(&n) > direction.dot(&best)) && self.contains(n)
+            {
                 best = Some(n);
             }
         };
@@ -216,7 +225,9 @@ impl Region {
         cuts.push(first + TAU);
         let starts = std::iter::once(first).chain(cuts.iter().copied());
         let pieces = starts.zip(cuts.iter().copied()).map(|(from, to)| [from, to]);
-        pieces.filter(|[from, to]| to > from && self.contains(circle.at(0.5 * (from + to)))).collect()
+        pieces
+            .filter(|[from, to]| to > from && self.contains(circle.at(0.5 * (from + to))))
+            .collect()
     }
 }
 
@@ -226,7 +237,8 @@ mod tests {
 
     const BOX: Tilt = Tilt::Box { roll_max_rad: 0.4, pitch_max_rad: 0.6, yaw_rad: 0.7 };
 
-    /// The square covers the set and nothing else, and its density adds up to the solid angle of the arcs of a cap.
+    /// The square covers the set and nothing else, and its density adds up to the solid angle of
+    /// the arcs of a cap.
     #[test]
     fn the_square_is_the_region() {
         for tilt in [BOX, Tilt::Cone { max_rad: 0.5 }] {
@@ -237,7 +249,10 @@ mod tests {
             }
             assert!(!region.contains(tilt.normal(1.02, 0.5).0), "{tilt:?}");
         }
-        assert!((Tilt::Cone { max_rad: 0.5 }.normal(0.1, 0.1).1 - TAU * (1.0 - 0.5_f64.cos())).abs() < 1e-14);
+        assert!(
+            (Tilt::Cone { max_rad: 0.5 }.normal(0.1, 0.1).1 - TAU * (1.0 - 0.5_f64.cos())).abs()
+                < 1e-14
+        );
     }
 
     /// The furthest point is as far as the best of a fine grid and a little farther.
@@ -249,11 +264,16 @@ mod tests {
                 let t = f64::from(k) * 0.37;
                 let d = Vector3::new(t.cos(), (1.7 * t).sin(), (0.6 * t).cos());
                 let found = region.furthest(d).unwrap();
-                let grid = (0..=100).flat_map(|i| (0..=100).map(move |j| (f64::from(i), f64::from(j))));
-                let best =
-                    grid.map(|(i, j)| tilt.normal(0.01 * i, 0.01 * j).0.dot(&d)).fold(f64::MIN, f64::max);
+                let grid =
+                    (0..=100).flat_map(|i| (0..=100).map(move |j| (f64::from(i), f64::from(j))));
+                let best = grid
+                    .map(|(i, j)| tilt.normal(0.01 * i, 0.01 * j).0.dot(&d))
+                    .fold(f64::MIN, f64::max);
                 assert!(region.contains(found), "{tilt:?} {d}");
-                assert!((0.0..2e-3).contains(&(found.dot(&d) - best + 1e-12)), "{tilt:?} {d}: {best}");
+                assert!(
+                    (0.0..2e-3).contains(&(found.dot(&d) - best + 1e-12)),
+                    "{tilt:?} {d}: {best}"
+                );
             }
         }
     }

@@ -1,9 +1,12 @@
-//! The support function for any wing whose force lies in the plane of motion and normal (docs/equations.md F.4).
+//! The support function for any wing whose force lies in the plane of motion and normal
+//! (docs/equations.md F.4).
 //!
-//! At one angle of attack the normals form a circle around the motion, `n = sin(alpha) v + cos(alpha) m`, and thrust and wings push by
-//! `(F_v - U sin(alpha)) d.v + (F_m - U cos(alpha)) d.m`: linear in `m`, so the best point of the circle is its nearest or farthest one, or one
-//! on the edge of the tilt set. What is left is a search in one angle. [`Search::largest`] samples and refines; [`Search::bound`]
-//! proves: over a band of angles each term has a largest value, and branch and bound narrows the bands.
+//! At one angle of attack the normals form a circle around the motion,
+//! `n = sin(alpha) v + cos(alpha) m`, and thrust and wings push by
+//! `(F_v - U sin(alpha)) d.v + (F_m - U cos(alpha)) d.m`: linear in `m`, so the best point of the
+//! circle is its nearest or farthest one, or one on the edge of the tilt set. What is left is a
+//! search in one angle. [`Search::largest`] samples and refines; [`Search::bound`] proves: over a
+//! band of angles each term has a largest value, and branch and bound narrows the bands.
 
 use super::flat::Largest;
 use super::polar::Polar;
@@ -73,7 +76,8 @@ impl Search<'_> {
         let value = |alpha: f64| self.at(alpha).map_or(f64::NEG_INFINITY, |(value, _)| value);
         let samples: Vec<f64> = (0..SAMPLES).map(|i| value(angle(i))).collect();
         let is_peak = |i: &usize| {
-            let beside = |j: Option<usize>| j.and_then(|j| samples.get(j)).is_none_or(|x| *x <= samples[*i]);
+            let beside =
+                |j: Option<usize>| j.and_then(|j| samples.get(j)).is_none_or(|x| *x <= samples[*i]);
             beside(i.checked_sub(1)) && beside(Some(i + 1))
         };
         let mut peaks: Vec<usize> = (0..SAMPLES).filter(is_peak).collect();
@@ -120,7 +124,8 @@ impl Search<'_> {
         let part = self.region.band(self.motion, sines);
         let thrust = -self.thrust_n * part.furthest(-self.d)?.dot(&self.d);
         let (towards, length) = self.aside();
-        let [low, high] = [part.furthest(-towards)?, part.furthest(towards)?].map(|n| n.dot(&towards));
+        let [low, high] =
+            [part.furthest(-towards)?, part.furthest(towards)?].map(|n| n.dot(&towards));
         let cosines = band.map(f64::cos);
         let least = cosines[0].min(cosines[1]);
         let most = if band[0] <= 0.0 && band[1] >= 0.0 { 1.0 } else { cosines[0].max(cosines[1]) };
@@ -130,10 +135,12 @@ impl Search<'_> {
         let [along, cross] = self.polar.range(band);
         let forward = self.motion.dot(&self.d);
         let largest = |along: [f64; 2], cross: [f64; 2]| {
-            let corners = cross.iter().flat_map(|f| [f * low, f * high]).fold(f64::NEG_INFINITY, f64::max);
+            let corners =
+                cross.iter().flat_map(|f| [f * low, f * high]).fold(f64::NEG_INFINITY, f64::max);
             (along[0] * forward).max(along[1] * forward) + length * corners
         };
-        // Thrust by itself is the better bound of a wide band; with the wings, of a narrow one, where both want the same `m`.
+        // Thrust by itself is the better bound of a wide band; with the wings, of a narrow one,
+        // where both want the same `m`.
         let apart = thrust + largest(along, cross);
         let with_thrust = |[low, high]: [f64; 2], [least, most]: [f64; 2]| {
             [low - self.thrust_n * most, high - self.thrust_n * least]

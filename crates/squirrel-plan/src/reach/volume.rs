@@ -1,9 +1,12 @@
-//! How much there is to choose from: the volume of the set and of its convex hull (docs/equations.md F.5).
+//! How much there is to choose from: the volume of the set and of its convex hull
+//! (docs/equations.md F.5).
 //!
-//! With a flat plate the set is made of stretches along `-n`: thrust and wings together are `r n` with `0 <= r <= U_max` folded and
-//! `b c <= r <= b c + U_max` spread, `c = v.n`, and the volume is the integral of `r^2` over both. Where `|b c| > U_max` there is a gap between
-//! them. For any wing, spread accelerations are an image of (normal, thrust) with the Jacobian `|F_m - U cos| |U - F_v' cos + F_m' sin|` over
-//! angle of attack, turn and thrust; what folded wings reach too is left out, and what is hit several times counts once.
+//! With a flat plate the set is made of stretches along `-n`: thrust and wings together are `r n`
+//! with `0 <= r <= U_max` folded and `b c <= r <= b c + U_max` spread, `c = v.n`, and the volume is
+//! the integral of `r^2` over both. Where `|b c| > U_max` there is a gap between them. For any
+//! wing, spread accelerations are an image of (normal, thrust) with the Jacobian
+//! `|F_m - U cos| |U - F_v' cos + F_m' sin|` over angle of attack, turn and thrust; what folded
+//! wings reach too is left out, and what is hit several times counts once.
 
 use super::polar::Polar;
 use super::{Compared, Reach, Wings};
@@ -42,7 +45,8 @@ impl Reach {
             Polar::Nodes(_) => folded + self.beyond_folded(),
         };
         let hull = |wings: Wings| {
-            let [coarse, fine] = [HALVINGS, HALVINGS + 1].map(|halvings| self.hull(wings, halvings));
+            let [coarse, fine] =
+                [HALVINGS, HALVINGS + 1].map(|halvings| self.hull(wings, halvings));
             let [coarse, fine] = [coarse.volume_m3_s6(), fine.volume_m3_s6()];
             // Half the edges, a quarter of the error.
             fine + (fine - coarse) / 3.0
@@ -90,7 +94,8 @@ impl Reach {
         let of = |n: Vector3<f64>| {
             let s = n.dot(&self.motion).clamp(-1.0, 1.0);
             let (alpha, c) = (s.asin(), (1.0 - s * s).sqrt());
-            let ([_, cross], [along_slope, cross_slope]) = (self.polar.force(alpha), self.polar.slope(alpha));
+            let ([_, cross], [along_slope, cross_slope]) =
+                (self.polar.force(alpha), self.polar.slope(alpha));
             let wing = self.wing_force(n);
             let step = self.thrust_max_n / f64::from(STEPS);
             let at = |i: u32| {
@@ -110,7 +115,8 @@ impl Reach {
     /// Whether folded wings reach a force of thrust and wings, N.
     fn folds(&self, force: Vector3<f64>) -> bool {
         let thrust = force.norm();
-        thrust <= self.thrust_max_n && force.try_normalize(0.0).is_none_or(|f| self.region.contains(-f))
+        thrust <= self.thrust_max_n
+            && force.try_normalize(0.0).is_none_or(|f| self.region.contains(-f))
     }
 
     fn lookup(&self) -> Lookup {
@@ -169,8 +175,11 @@ mod tests {
     #[test]
     fn the_two_volumes_of_a_flat_wing_agree() {
         let [roll_max_rad, pitch_max_rad, yaw_rad] = [0.5, 0.6, 0.4];
-        for tilt in [Tilt::Cone { max_rad: 0.7 }, Tilt::Box { roll_max_rad, pitch_max_rad, yaw_rad }] {
-            for velocity in [[7.0, 0.0, 0.0], [4.0, 3.0, 6.0], [0.0, 0.0, 12.0], [2.0, 1.0, -11.0]] {
+        for tilt in
+            [Tilt::Cone { max_rad: 0.7 }, Tilt::Box { roll_max_rad, pitch_max_rad, yaw_rad }]
+        {
+            for velocity in [[7.0, 0.0, 0.0], [4.0, 3.0, 6.0], [0.0, 0.0, 12.0], [2.0, 1.0, -11.0]]
+            {
                 let question = Question {
                     mass_kg: 0.548,
                     thrust_max_n: 6.0,

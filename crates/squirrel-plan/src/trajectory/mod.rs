@@ -1,7 +1,8 @@
 //! Wing-aware trajectories by successive convexification (docs/equations.md G.1).
 //!
-//! A [`Task`] says where a vehicle is, what it should be near to and what it must stay out of; a [`Craft`] what it can do. A [`Planner`]
-//! makes a [`Plan`] of both. It always does: its [`Status`] says whether every constraint holds.
+//! A [`Task`] says where a vehicle is, what it should be near to and what it must stay out of; a
+//! [`Craft`] what it can do. A [`Planner`] makes a [`Plan`] of both. It always does: its [`Status`]
+//! says whether every constraint holds.
 //!
 //! ```
 //! use nalgebra::{Vector2, Vector3};

@@ -5,8 +5,8 @@
 //! T = U n: thrust along body z (down)            0 <= w <= 1
 //! v+ = v + h (a + a+) / 2             p+ = p + h v + h^2 (2 a + a+) / 6             accelerations are linear between nodes
 //! ```
-//! docs/equations.md G.1. Differs: `T` is linear between nodes and not constant, because an attitude has no steps; wings fold and spread in
-//! parts, at the rate of their servo.
+//! docs/equations.md G.1. Differs: `T` is linear between nodes and not constant, because an
+//! attitude has no steps; wings fold and spread in parts, at the rate of their servo.
 
 use crate::wing::{WingForce, WingModel};
 use nalgebra::{Matrix3, Vector3};
@@ -18,9 +18,11 @@ use squirrel_core::lane::{Dual, Lane};
 use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Rounds in which the acceleration at the end of a step is found, which depends on the velocity there. Each gains a factor of a hundred.
+/// Rounds in which the acceleration at the end of a step is found, which depends on the velocity
+/// there. Each gains a factor of a hundred.
 const ROUNDS: u32 = 4;
-/// Step of the derivatives of a wing that has no formula: of the velocity, m/s, and of the normal, 1.
+/// Step of the derivatives of a wing that has no formula: of the velocity, m/s, and of the normal,
+/// 1.
 const DIFFERENCE: f64 = 1e-3;
 
 /// The vehicle as a plan knows it.
@@ -38,8 +40,9 @@ pub struct Craft {
     pub delay_s: f64,
     /// How fast the attitude follows, rad/s.
     pub tilt_rate_max_rad_s: f64,
-    /// Thrust that is given up for turning, over the horizontal thrust's second derivative, north and east at zero yaw, s^2: a rotor at its
-    /// limit can only turn the vehicle by giving less on the other side.
+    /// Thrust that is given up for turning, over the horizontal thrust's second derivative, north
+    /// and east at zero yaw, s^2: a rotor at its limit can only turn the vehicle by giving less on
+    /// the other side.
     pub turning_s2: [f64; 2],
     /// How fast thrust follows, N/s.
     pub thrust_rate_max_n_s: f64,
@@ -85,7 +88,8 @@ impl Craft {
     ///
     /// * `thrust_max_n` - of the flight code: the vehicle's limit, or less
     /// * `wing` - what is believed of the wings; `None` plans without them
-    /// * `reserve` - part of thrust and tilt that is left to whoever follows the plan, [`RESERVE`] or less
+    /// * `reserve` - part of thrust and tilt that is left to whoever follows the plan, [`RESERVE`]
+    ///   or less
     ///
     /// # Errors
     /// One line that names what the vehicle lacks, or what cannot be.
@@ -108,11 +112,14 @@ impl Craft {
                 100.0 * reserve
             ));
         }
-        let servo_s = vehicle.wing.servo().map_or(0.2, |s| 1.0 / s.rate_max_per_s + s.time_constant_s);
+        let servo_s =
+            vehicle.wing.servo().map_or(0.2, |s| 1.0 / s.rate_max_per_s + s.time_constant_s);
         let linear = p.drag.linear_n_s_per_m;
         Ok(Self {
             mass_kg: p.mass_kg,
-            thrust_min_n: vehicle.control.map_or(0.1 * weight_n, |c| f64::from(c.twcc.thrust_min_n)),
+            thrust_min_n: vehicle
+                .control
+                .map_or(0.1 * weight_n, |c| f64::from(c.twcc.thrust_min_n)),
             thrust_max_n,
             tilt_max_rad: p.limits.tilt_max_rad * (1.0 - reserve),
             delay_s: DELAY_S,
@@ -137,7 +144,12 @@ impl Craft {
     /// * `v` - velocity, m/s
     /// * `thrust` - `U n`, N
     /// * `spread` - deployment of the wings, 0 to 1
-    pub fn acceleration(&self, v: &Vector3<f64>, thrust: &Vector3<f64>, spread: f64) -> Vector3<f64> {
+    pub fn acceleration(
+        &self,
+        v: &Vector3<f64>,
+        thrust: &Vector3<f64>,
+        spread: f64,
+    ) -> Vector3<f64> {
         let through = v - self.air.wind;
         let mut force = -thrust - Vector3::from(self.drag(&through.into()));
         if spread > 0.0 {
@@ -148,7 +160,9 @@ impl Craft {
 
     /// * `v` - through the air, m/s
     fn wing_force(&self, v: &Vector3<f64>, n: &Vector3<f64>) -> Vector3<f64> {
-        self.wing.as_ref().map_or_else(Vector3::zeros, |wing| wing.force(In::new(*v), In::new(*n)).vector)
+        self.wing
+            .as_ref()
+            .map_or_else(Vector3::zeros, |wing| wing.force(In::new(*v), In::new(*n)).vector)
     }
 
     /// How the acceleration changes with velocity, thrust and wings, at a place in that space.
@@ -162,7 +176,8 @@ impl Craft {
         if spread > 0.0 {
             let (wing_by_velocity, wing_by_normal) = self.wing_slopes(&v, &n, &force);
             by_velocity += wing_by_velocity * spread;
-            let normal_by_thrust = (Matrix3::identity() - n * n.transpose()) / thrust.norm().max(1e-6);
+            let normal_by_thrust =
+                (Matrix3::identity() - n * n.transpose()) / thrust.norm().max(1e-6);
             by_thrust += wing_by_normal * normal_by_thrust * spread;
         }
         Slopes {
@@ -172,10 +187,14 @@ impl Craft {
         }
     }
 
-    /// Drag, world axes, against the motion, N: the airframe's is taken for the same along all axes.
+    /// Drag, world axes, against the motion, N: the airframe's is taken for the same along all
+    /// axes.
     fn drag<L: Lane<Element = f64>>(&self, through: &[L; 3]) -> [L; 3] {
-        let flow =
-            Airflow { velocity: *through, speed: dot(through, through).root(), omega: [L::of(0.0); 3] };
+        let flow = Airflow {
+            velocity: *through,
+            speed: dot(through, through).root(),
+            omega: [L::of(0.0); 3],
+        };
         aero::drag(&[L::splat(self.drag_n_s_m); 3], L::splat(self.drag_n_s2_m2), &flow)
     }
 
@@ -235,11 +254,13 @@ impl Craft {
     }
 }
 
-/// `J / (d m g)` for pitch and roll: `U <= n F_max - |tau| / d` with rotors at distance `d` from the axis, and `tau = J T'' / U`.
+/// `J / (d m g)` for pitch and roll: `U <= n F_max - |tau| / d` with rotors at distance `d` from
+/// the axis, and `tau = J T'' / U`.
 fn turning_s2(vehicle: &VehicleFile) -> [f64; 2] {
     let (p, rotors) = (vehicle.vehicle.parameters(), vehicle.vehicle.rotors());
     let arm_m = |axis: usize| {
-        rotors.iter().map(|rotor| rotor.position.vector[axis].abs()).sum::<f64>() / rotors.len() as f64
+        rotors.iter().map(|rotor| rotor.position.vector[axis].abs()).sum::<f64>()
+            / rotors.len() as f64
     };
     let inertia = p.inertia_kg_m2;
     [(1, 0), (0, 1)]
@@ -287,7 +308,8 @@ mod tests {
         Craft::of(&vehicle, 2.0 * vehicle.vehicle.weight_n(), Some(wing), RESERVE).unwrap()
     }
 
-    /// Every derivative is the difference quotient, for the wing with a formula and for those without.
+    /// Every derivative is the difference quotient, for the wing with a formula and for those
+    /// without.
     #[test]
     fn slopes_are_slopes() {
         let v = Vector3::new(6.0, -1.0, 0.8);
@@ -305,10 +327,17 @@ mod tests {
                 let a = |v: Vector3<f64>, t: Vector3<f64>| craft.acceleration(&v, &t, 0.7);
                 let by_velocity = by(a(v + e, thrust), a(v - e, thrust));
                 let by_thrust = by(a(v, thrust + e), a(v, thrust - e));
-                assert!((slopes.by_velocity.column(axis) - by_velocity).norm() < tolerance, "{model:?}");
-                assert!((slopes.by_thrust.column(axis) - by_thrust).norm() < tolerance, "{model:?}");
+                assert!(
+                    (slopes.by_velocity.column(axis) - by_velocity).norm() < tolerance,
+                    "{model:?}"
+                );
+                assert!(
+                    (slopes.by_thrust.column(axis) - by_thrust).norm() < tolerance,
+                    "{model:?}"
+                );
             }
-            let by_spread = craft.acceleration(&v, &thrust, 1.0) - craft.acceleration(&v, &thrust, 0.0);
+            let by_spread =
+                craft.acceleration(&v, &thrust, 1.0) - craft.acceleration(&v, &thrust, 0.0);
             assert!((slopes.by_spread - by_spread).norm() < 1e-9);
         }
     }
@@ -335,9 +364,13 @@ mod tests {
     #[test]
     fn a_vehicle_that_cannot_hover_is_refused() {
         let vehicle = VehicleFile::squirrel();
-        let error = Craft::of(&vehicle, 1.02 * vehicle.vehicle.weight_n(), None, RESERVE).unwrap_err();
+        let error =
+            Craft::of(&vehicle, 1.02 * vehicle.vehicle.weight_n(), None, RESERVE).unwrap_err();
         assert!(error.contains("thrust_max_n"), "{error}");
         assert!(Craft::of(&vehicle, f64::NAN, None, RESERVE).is_err());
-        assert_eq!(Craft::of(&vehicle, 9.0, None, 0.9).unwrap_err(), "reserve = 0.9: must be 0 to 0.5");
+        assert_eq!(
+            Craft::of(&vehicle, 9.0, None, 0.9).unwrap_err(),
+            "reserve = 0.9: must be 0 to 0.5"
+        );
     }
 }

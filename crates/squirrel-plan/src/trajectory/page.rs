@@ -1,4 +1,5 @@
-//! Plans of one task as an HTML page: where they lead, how far the wings are spread, and what they ask of rotors and attitude.
+//! Plans of one task as an HTML page: where they lead, how far the wings are spread, and what they
+//! ask of rotors and attitude.
 
 use super::task::{Plan, Task};
 use nalgebra::Vector3;
@@ -20,13 +21,16 @@ pub struct Shown<'a> {
 
 /// The page. The same plans give the same bytes.
 pub fn page(title: &str, facts: &[(String, String)], plans: &[Shown<'_>]) -> String {
-    let mut page =
-        Page::new(title, "What a plan makes of it that knows it all before: planned motion, not flown.");
+    let mut page = Page::new(
+        title,
+        "What a plan makes of it that knows it all before: planned motion, not flown.",
+    );
     page.facts(facts);
     page.section("Plans", "The same weights and limits; only the wings differ.");
     let heads = plans.first().map_or(&[][..], |shown| &shown.view.summary);
-    let head: Vec<String> =
-        std::iter::once("wings".to_owned()).chain(heads.iter().map(|(name, _)| name.clone())).collect();
+    let head: Vec<String> = std::iter::once("wings".to_owned())
+        .chain(heads.iter().map(|(name, _)| name.clone()))
+        .collect();
     let row = |(i, shown): (usize, &Shown<'_>)| {
         let cells = shown.view.summary.iter().map(|(_, value)| value.clone());
         Row {

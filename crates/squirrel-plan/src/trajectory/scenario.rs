@@ -1,6 +1,8 @@
-//! A scenario as a task: what its mission would lead along if it were followed exactly, and what stands there.
+//! A scenario as a task: what its mission would lead along if it were followed exactly, and what
+//! stands there.
 //!
-//! The planner knows all of it from the beginning, so a plan brakes before the turn that an obstacle will bring about.
+//! The planner knows all of it from the beginning, so a plan brakes before the turn that an
+//! obstacle will bring about.
 
 use super::model::Craft;
 use super::task::{Begin, KeepOut, STEPS_MAX, Task, Wanted};
@@ -42,7 +44,9 @@ impl Task {
         }
         let steps = (horizon_s.min(scenario.duration_s) / step_s).round();
         if !(2.0..=STEPS_MAX as f64).contains(&steps) {
-            return Err(format!("horizon_s = {horizon_s}: makes {steps} steps, must make 2 to {STEPS_MAX}"));
+            return Err(format!(
+                "horizon_s = {horizon_s}: makes {steps} steps, must make 2 to {STEPS_MAX}"
+            ));
         }
         let trunks = scenario.all_obstacles();
         let wanted = reference(&mission, &trunks, steps as usize, step_s);
@@ -50,9 +54,8 @@ impl Task {
             let centre = Vector2::new(*north, *east);
             wanted.iter().any(|node| (node.position.xy() - centre).norm() < AROUND_M)
         };
-        let keep_out = trunks.iter().filter(|trunk| near(trunk)).map(|[north, east, radius]| KeepOut {
-            centre: Vector2::new(*north, *east),
-            radius_m: radius + spare_m,
+        let keep_out = trunks.iter().filter(|trunk| near(trunk)).map(|[north, east, radius]| {
+            KeepOut { centre: Vector2::new(*north, *east), radius_m: radius + spare_m }
         });
         let begin = Begin {
             position: Vector3::new(0.0, 0.0, -scenario.height_m),
@@ -71,7 +74,11 @@ fn reference(mission: &Mission, trunks: &[[f64; 3]], steps: usize, step_s: f64) 
     let obstacles: Vec<Obstacle> = trunks
         .iter()
         .enumerate()
-        .map(|(i, [north, east, _])| Obstacle { id: i as u32, north_m: *north as f32, east_m: *east as f32 })
+        .map(|(i, [north, east, _])| Obstacle {
+            id: i as u32,
+            north_m: *north as f32,
+            east_m: *east as f32,
+        })
         .collect();
     let mut state = MissionState::default();
     let mut wanted = Vec::with_capacity(steps + 1);

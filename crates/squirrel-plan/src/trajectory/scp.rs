@@ -1,8 +1,10 @@
-//! Successive convexification: solve about an iterate, fly the answer through the model, believe it as far as the model agreed.
+//! Successive convexification: solve about an iterate, fly the answer through the model, believe it
+//! as far as the model agreed.
 //!
-//! Every iterate is a motion that the model really makes, so a plan that is stopped early can be flown. The wings stay folded until the way
-//! without them is found and may open from there: a plan with wings is never worse than the one without. Where the reference leads through
-//! obstacles, both sides of up to two of them are tried first.
+//! Every iterate is a motion that the model really makes, so a plan that is stopped early can be
+//! flown. The wings stay folded until the way without them is found and may open from there: a plan
+//! with wings is never worse than the one without. Where the reference leads through obstacles,
+//! both sides of up to two of them are tried first.
 
 use super::model::{Craft, Motion};
 use super::sides::guesses;
@@ -66,7 +68,8 @@ impl Planner {
         let mut work = Work::default();
         let mut held = self.begin(craft, task, warm, &mut work);
         self.improve(craft, task, false, self.iterations_max, &mut held, &mut work);
-        // As many rounds for a craft without wings: what wings are worth is not what more rounds are.
+        // As many rounds for a craft without wings: what wings are worth is not what more rounds
+        // are.
         (held.is_settled, held.trust_n) = (false, held.trust_n.max(WARM_TRUST_N));
         self.improve(craft, task, true, self.iterations_max, &mut held, &mut work);
         self.finish(task, held, &work)
@@ -77,7 +80,8 @@ impl Planner {
         let (cost, _) = self.weights.cost(task, &path, &controls);
         let depths = path.windows(2).map(|pair| task.violation_m(&pair[0], &pair[1]));
         let violation_m = depths.fold(0.0, f64::max);
-        let overspeed_m_s = path.iter().skip(1).map(|node| task.overspeed_m_s(node)).fold(0.0, f64::max);
+        let overspeed_m_s =
+            path.iter().skip(1).map(|node| task.overspeed_m_s(node)).fold(0.0, f64::max);
         let is_motion = path.iter().all(|node| node.position.iter().all(|x| x.is_finite()));
         let holds = is_motion && violation_m <= TOUCH_M && overspeed_m_s <= TOO_FAST_M_S;
         let status = match (holds, held.is_settled) {
@@ -98,7 +102,13 @@ impl Planner {
     }
 
     /// The best of a few first guesses.
-    fn begin(&self, craft: &Craft, task: &Task, warm: Option<(&Track, f64)>, work: &mut Work) -> Held {
+    fn begin(
+        &self,
+        craft: &Craft,
+        task: &Task,
+        warm: Option<(&Track, f64)>,
+        work: &mut Work,
+    ) -> Held {
         let controls = first_controls(craft, task, warm);
         let told = warm.and_then(|(track, passed_s)| track.at(passed_s));
         let told = told.map_or(controls[0].0, |point| craft.limited(&-point.thrust));
@@ -178,7 +188,8 @@ impl Planner {
     }
 }
 
-/// Thrusts to start from: those of the earlier plan, or what carries the weight; wings fold where nothing else is known.
+/// Thrusts to start from: those of the earlier plan, or what carries the weight; wings fold where
+/// nothing else is known.
 fn first_controls(craft: &Craft, task: &Task, warm: Option<(&Track, f64)>) -> Vec<Control> {
     let begin = task.begin();
     let rate = craft.wing_rate_max_per_s * task.step_s();

@@ -1,7 +1,7 @@
 //! On which side to pass what stands in the way: the choice that a convex problem cannot make.
 //!
-//! Obstacles that leave no gap between them are passed together. Both sides of the nearest groups are offered, as paths about which
-//! obstacles are linearised; who plans takes the best.
+//! Obstacles that leave no gap between them are passed together. Both sides of the nearest groups
+//! are offered, as paths about which obstacles are linearised; who plans takes the best.
 
 use super::task::{KeepOut, Task};
 use nalgebra::Vector2;
@@ -12,7 +12,8 @@ const GROUPS: usize = 2;
 /// Paths that pass what the base path runs into; the base path alone where there is nothing.
 pub(super) fn guesses(task: &Task, base: &[Vector2<f64>]) -> Vec<Vec<Vector2<f64>>> {
     let Some(begin) = base.first() else { return vec![Vec::new()] };
-    let blocks = |keep: &KeepOut| base.iter().any(|place| (place - keep.centre).norm() < keep.radius_m);
+    let blocks =
+        |keep: &KeepOut| base.iter().any(|place| (place - keep.centre).norm() < keep.radius_m);
     let near = |group: &Vec<KeepOut>| {
         group.iter().map(|keep| (keep.centre - begin).norm()).fold(f64::INFINITY, f64::min)
     };
@@ -32,7 +33,8 @@ pub(super) fn guesses(task: &Task, base: &[Vector2<f64>]) -> Vec<Vec<Vector2<f64
 fn groups(keep_out: &[KeepOut]) -> Vec<Vec<KeepOut>> {
     let mut groups: Vec<Vec<KeepOut>> = Vec::new();
     for keep in keep_out {
-        let touches = |other: &KeepOut| (other.centre - keep.centre).norm() < other.radius_m + keep.radius_m;
+        let touches =
+            |other: &KeepOut| (other.centre - keep.centre).norm() < other.radius_m + keep.radius_m;
         let (touching, apart) =
             groups.into_iter().partition(|group: &Vec<KeepOut>| group.iter().any(touches));
         groups = apart;
@@ -50,7 +52,8 @@ fn past(group: &[KeepOut], side: f64, path: &[Vector2<f64>]) -> Vec<Vector2<f64>
     let across = Vector2::new(-way.y, way.x) * side;
     let move_out = |place: &Vector2<f64>| {
         let edge = |keep: &KeepOut| {
-            let (along, off) = ((place - keep.centre).dot(&way), (place - keep.centre).dot(&across));
+            let (along, off) =
+                ((place - keep.centre).dot(&way), (place - keep.centre).dot(&across));
             let width = keep.radius_m * keep.radius_m - along * along;
             if width > 0.0 { width.sqrt() - off } else { 0.0 }
         };

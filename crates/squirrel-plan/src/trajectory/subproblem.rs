@@ -1,7 +1,8 @@
 //! One convex problem of the successive convexification, for Clarabel.
 //!
-//! The model is linear about an iterate; obstacles are half-spaces that touch them where the iterate is nearest, so that whoever stays in
-//! the half-space stays out of the obstacle. Constraints that may have no solution have a slack that costs more than anything else.
+//! The model is linear about an iterate; obstacles are half-spaces that touch them where the
+//! iterate is nearest, so that whoever stays in the half-space stays out of the obstacle.
+//! Constraints that may have no solution have a slack that costs more than anything else.
 //!
 //! ```text
 //! min  sum_k |p - p_ref|_P^2 + |v - v_ref|_V^2 + r |T+ - T|^2 + c |w+ - w| + d w + mu s + nu f
@@ -9,7 +10,8 @@
 //! |T| + r <= T_max     r >= c |T+ - 2 T + T-|_xy / h^2     T_z >= T_min     |T_x| <= tan(tilt) T_z     |T_y| <= tan(tilt) (T_x, T_z).e     |T+ - T| <= rates     |T - T_bar| <= trust
 //! 0 <= w <= 1      |w+ - w| <= rate      d.(p - centre) + s >= radius      |v_xy| <= v_max + f
 //! ```
-//! The roll limit `|T_y| <= tan(tilt) |(T_x, T_z)|` is not convex; its tangent at the iterate lies inside of it (docs/equations.md F).
+//! The roll limit `|T_y| <= tan(tilt) |(T_x, T_z)|` is not convex; its tangent at the iterate lies
+//! inside of it (docs/equations.md F).
 
 use super::model::{Craft, Motion};
 use super::task::Task;
@@ -32,8 +34,8 @@ pub struct Weights {
     pub wing_move: f64,
     /// Of spread wings at a node: they fold where they hardly help.
     pub wing_spread: f64,
-    /// Of the depth in an obstacle, 1/m: more than any reference is worth that leads away from where there is a way, such as one that turned
-    /// back.
+    /// Of the depth in an obstacle, 1/m: more than any reference is worth that leads away from
+    /// where there is a way, such as one that turned back.
     pub violation_per_m: f64,
     /// Of being too fast, s/m.
     pub overspeed_s_per_m: f64,
@@ -45,14 +47,16 @@ impl Weights {
         let (mut cost, mut violations) = (0.0, 0.0);
         for (k, (motion, wanted)) in path.iter().zip(task.wanted()).enumerate() {
             let share = if k + 1 == path.len() { self.last } else { 1.0 };
-            let (off, slip) = (motion.position - wanted.position, motion.velocity - wanted.velocity);
+            let (off, slip) =
+                (motion.position - wanted.position, motion.velocity - wanted.velocity);
             let [level, height] = self.position_per_m2;
             let place = level * off.xy().norm_squared() + height * off.z * off.z;
             cost += share * (place + self.velocity_s2_per_m2 * slip.norm_squared());
             if k > 0 {
                 violations += self.violation_per_m * task.violation_m(&path[k - 1], motion)
                     + self.overspeed_s_per_m * task.overspeed_m_s(motion);
-                let ((thrust, spread), (thrust_before, spread_before)) = (controls[k], controls[k - 1]);
+                let ((thrust, spread), (thrust_before, spread_before)) =
+                    (controls[k], controls[k - 1]);
                 cost += self.thrust_change_per_n2 * (thrust - thrust_before).norm_squared()
                     + self.wing_move * (spread - spread_before).abs()
                     + self.wing_spread * spread;
@@ -85,7 +89,8 @@ pub(super) type Control = (Vector3<f64>, f64);
 pub(super) struct Iterate {
     /// At each node.
     pub(super) controls: Vec<Control>,
-    /// Thrust at the first node as it was planned before: how the vehicle was told to turn. What it is measured to be there lags behind.
+    /// Thrust at the first node as it was planned before: how the vehicle was told to turn. What it
+    /// is measured to be there lags behind.
     pub(super) told: Vector3<f64>,
     /// Where they lead.
     pub(super) path: Vec<Motion>,
@@ -93,8 +98,8 @@ pub(super) struct Iterate {
     pub(super) sides: Vec<Vector2<f64>>,
 }
 
-/// Numbers of a node: position, velocity, acceleration, thrust, deployment, its change, depth in what to stay out of, thrust given up for
-/// turning, how much too fast.
+/// Numbers of a node: position, velocity, acceleration, thrust, deployment, its change, depth in
+/// what to stay out of, thrust given up for turning, how much too fast.
 const WIDTH: usize = 17;
 const P: usize = 0;
 const V: usize = 3;
@@ -156,7 +161,8 @@ impl Subproblem<'_> {
         1 + (self.craft.delay_s / self.task.step_s()).round() as usize
     }
 
-    /// Controls, and where the linear model takes them to lead; `None` where Clarabel finds no solution, which only numbers out of all proportion bring about.
+    /// Controls, and where the linear model takes them to lead; `None` where Clarabel finds no
+    /// solution, which only numbers out of all proportion bring about.
     ///
     /// * `iterations` - grows by those of Clarabel
     pub(super) fn solve(&self, iterations: &mut u32) -> Option<(Vec<Control>, Vec<Motion>)> {
@@ -167,8 +173,10 @@ impl Subproblem<'_> {
         let equalities = rows.b.len();
         self.bounds(&mut rows);
         let inequalities = rows.b.len() - equalities;
-        let mut cones =
-            vec![SupportedConeT::ZeroConeT(equalities), SupportedConeT::NonnegativeConeT(inequalities)];
+        let mut cones = vec![
+            SupportedConeT::ZeroConeT(equalities),
+            SupportedConeT::NonnegativeConeT(inequalities),
+        ];
         self.cones(&mut rows, &mut cones);
         let size = (rows.b.len(), nodes * WIDTH);
         let a = CscMatrix::new_from_triplets(size.0, size.1, rows.row, rows.column, rows.value);
@@ -276,7 +284,10 @@ impl Subproblem<'_> {
                     let ((p, p_next), (v, v_next), (a, a_next)) = (of(P), of(V), of(A));
                     rows.push(&[(v_next, 1.0), (v, -1.0), (a, -h / 2.0), (a_next, -h / 2.0)], 0.0);
                     let h2 = h * h;
-                    rows.push(&[(p_next, 1.0), (p, -1.0), (v, -h), (a, -h2 / 3.0), (a_next, -h2 / 6.0)], 0.0);
+                    rows.push(
+                        &[(p_next, 1.0), (p, -1.0), (v, -h), (a, -h2 / 3.0), (a_next, -h2 / 6.0)],
+                        0.0,
+                    );
                 }
             }
         }
@@ -307,7 +318,8 @@ impl Subproblem<'_> {
             rows.push(&[(z, 1.0)], thrust.z + trust);
             let (x, y) = (at(k, T), at(k, T + 1));
             let forward =
-                Vector2::new(thrust.x, thrust.z).try_normalize(1e-9).unwrap_or_else(Vector2::y) * slope;
+                Vector2::new(thrust.x, thrust.z).try_normalize(1e-9).unwrap_or_else(Vector2::y)
+                    * slope;
             for sign in [1.0, -1.0] {
                 rows.push(&[(x, sign), (z, -slope)], 0.0);
                 rows.push(&[(x, -forward.x), (y, sign), (z, -forward.y)], 0.0);
@@ -345,8 +357,9 @@ impl Subproblem<'_> {
             }
         }
         if k + 1 == self.held() {
-            // That thrust is on its way. Where it leaves nothing for turning, a turn that was begun may still end as it was planned to.
-            // A newton beyond costs what a metre in an obstacle does, so that there is always a solution.
+            // That thrust is on its way. Where it leaves nothing for turning, a turn that was begun
+            // may still end as it was planned to. A newton beyond costs what a metre in an obstacle
+            // does, so that there is always a solution.
             let left = self.craft.thrust_max_n - self.iterate.controls[k].0.norm();
             rows.push(&[(at(k, R), 1.0), (at(k, S), -1.0)], left.max(self.turned(k)));
         }
@@ -356,8 +369,9 @@ impl Subproblem<'_> {
     fn turned(&self, k: usize) -> f64 {
         let controls = &self.iterate.controls;
         let before = if k == 1 { self.iterate.told } else { controls[k - 1].0 };
-        let bend =
-            controls.get(k + 1).map_or_else(Vector3::zeros, |after| after.0 - controls[k].0 * 2.0 + before);
+        let bend = controls
+            .get(k + 1)
+            .map_or_else(Vector3::zeros, |after| after.0 - controls[k].0 * 2.0 + before);
         let h2 = self.task.step_s() * self.task.step_s();
         (0..2).map(|axis| self.craft.turning_s2[axis] * bend[axis].abs() / h2).fold(0.0, f64::max)
     }
@@ -377,7 +391,8 @@ impl Subproblem<'_> {
         rows.push(&[(change, 1.0)], craft.wing_rate_max_per_s * h);
     }
 
-    /// Obstacles near a node, and near the middle of the way to it: between two nodes a path cuts corners.
+    /// Obstacles near a node, and near the middle of the way to it: between two nodes a path cuts
+    /// corners.
     fn half_spaces(&self, k: usize, rows: &mut Rows) {
         let h = self.task.step_s();
         for keep in self.task.keep_out() {

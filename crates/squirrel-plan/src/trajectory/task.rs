@@ -144,13 +144,14 @@ impl Task {
         (now.velocity.xy().norm() - self.speed_max_m_s).max(0.0)
     }
 
-    /// How deep the end of a step of a path is in what it must stay out of, and its middle, m; 0 outside. Nothing can be done about where a
-    /// path begins.
+    /// How deep the end of a step of a path is in what it must stay out of, and its middle, m; 0
+    /// outside. Nothing can be done about where a path begins.
     pub(crate) fn violation_m(&self, before: &Motion, now: &Motion) -> f64 {
-        let middle =
-            (before.position + now.position) * 0.5 + (before.velocity - now.velocity) * (self.step_s / 8.0);
+        let middle = (before.position + now.position) * 0.5
+            + (before.velocity - now.velocity) * (self.step_s / 8.0);
         let depth = |place: Vector2<f64>| {
-            let depths = self.keep_out.iter().map(|keep| keep.radius_m - (place - keep.centre).norm());
+            let depths =
+                self.keep_out.iter().map(|keep| keep.radius_m - (place - keep.centre).norm());
             depths.fold(0.0, f64::max)
         };
         depth(now.position.xy()).max(depth(middle.xy()))

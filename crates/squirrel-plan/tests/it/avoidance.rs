@@ -1,5 +1,5 @@
-//! Two hundred random avoidance tasks: how many are solved, how much work it is, and that what is planned is a motion that the vehicle can
-//! make.
+//! Two hundred random avoidance tasks: how many are solved, how much work it is, and that what is
+//! planned is a motion that the vehicle can make.
 
 use super::tasks::{Draw, craft, random};
 use nalgebra::Vector3;
@@ -29,7 +29,8 @@ fn flown(plan: &Plan, task: &Task) -> Vec<Vector3<f64>> {
     path
 }
 
-/// Every limit of the vehicle, at the nodes and, where nodes do not speak for what is between them, there.
+/// Every limit of the vehicle, at the nodes and, where nodes do not speak for what is between them,
+/// there.
 fn check(craft: &Craft, task: &Task, plan: &Plan) {
     let points = plan.track.points();
     for pair in points.windows(2) {
@@ -38,7 +39,10 @@ fn check(craft: &Craft, task: &Task, plan: &Plan) {
         assert!(u.norm() <= craft.thrust_max_n + 1e-4 && u.z >= craft.thrust_min_n - 1e-4, "{u}");
         let pitch_rad = u.x.atan2(u.z);
         let roll_rad = -u.y.atan2(u.x.hypot(u.z));
-        assert!(pitch_rad.abs() <= craft.tilt_max_rad + 1e-4 && roll_rad.abs() <= craft.tilt_max_rad + 1e-4);
+        assert!(
+            pitch_rad.abs() <= craft.tilt_max_rad + 1e-4
+                && roll_rad.abs() <= craft.tilt_max_rad + 1e-4
+        );
         let change = b.thrust - a.thrust;
         let sideways = craft.tilt_rate_max_rad_s * craft.hover().z * 0.1;
         assert!(change.x.abs() <= sideways + 1e-4 && change.y.abs() <= sideways + 1e-4, "{change}");
@@ -47,7 +51,10 @@ fn check(craft: &Craft, task: &Task, plan: &Plan) {
                 && (0.0..=1.0).contains(&b.wing)
         );
     }
-    assert_eq!(points[1].thrust, points[0].thrust, "what is commanded now acts a tenth of a second later");
+    assert_eq!(
+        points[1].thrust, points[0].thrust,
+        "what is commanded now acts a tenth of a second later"
+    );
     let path = flown(plan, task);
     let end = points.last().unwrap().position;
     // Between nodes the wings' force is not as straight as the plan takes it to be.
@@ -64,8 +71,9 @@ fn middle_and_most(mut counts: Vec<u32>) -> (u32, u32) {
     (counts[counts.len() / 2], counts[counts.len() - 1])
 }
 
-/// Work is counted: the same on a fast machine and on a busy one; `benches/plan.rs` has the time. Measured: 6 problems and 65 to 73
-/// iterations in the middle; at most 18 to 22 and 257 to 330 with wings, 13 or 14 and 177 to 189 without.
+/// Work is counted: the same on a fast machine and on a busy one; `benches/plan.rs` has the time.
+/// Measured: 6 problems and 65 to 73 iterations in the middle; at most 18 to 22 and 257 to 330 with
+/// wings, 13 or 14 and 177 to 189 without.
 #[test]
 fn ninety_five_of_a_hundred_are_solved_within_a_bounded_number_of_iterations() {
     for ratio in [1.2, 1.5, 2.0] {
@@ -87,10 +95,14 @@ fn ninety_five_of_a_hundred_are_solved_within_a_bounded_number_of_iterations() {
                 "T/W {ratio}, wings {wing:?}: {solved} of 200 solved; {problems:?} problems, {iterations:?} iterations, middle and most"
             );
             assert!(solved >= 190, "{solved} of 200 at {ratio}");
-            // Half as much again as was measured: room for another target's rounding, none for twice the work.
+            // Half as much again as was measured: room for another target's rounding, none for
+            // twice the work.
             let most = if wing.is_some() { (33, 480) } else { (21, 280) };
             assert!(problems.0 <= 9 && problems.1 <= most.0, "{problems:?} problems at {ratio}");
-            assert!(iterations.0 <= 105 && iterations.1 <= most.1, "{iterations:?} iterations at {ratio}");
+            assert!(
+                iterations.0 <= 105 && iterations.1 <= most.1,
+                "{iterations:?} iterations at {ratio}"
+            );
         }
     }
 }

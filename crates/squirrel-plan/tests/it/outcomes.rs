@@ -1,4 +1,5 @@
-//! How plans end: wings never make one worse, an impossible task has a plan all the same, and nonsense is refused.
+//! How plans end: wings never make one worse, an impossible task has a plan all the same, and
+//! nonsense is refused.
 
 use super::tasks::{Draw, craft, random, straight};
 use nalgebra::{Vector2, Vector3};
@@ -12,8 +13,10 @@ fn wings_never_make_a_plan_worse_and_open_where_they_brake() {
     let mut draw = Draw(7);
     for _ in 0..40 {
         let task = random(&with, &mut draw);
-        let (a, b) =
-            (Planner::default().plan(&with, &task, None), Planner::default().plan(&without, &task, None));
+        let (a, b) = (
+            Planner::default().plan(&with, &task, None),
+            Planner::default().plan(&without, &task, None),
+        );
         // Both begin with the same way without wings; from there it gets cheaper only.
         assert!(
             b.status == Status::Infeasible || a.cost <= b.cost * 1.01 + 0.01,
@@ -26,14 +29,17 @@ fn wings_never_make_a_plan_worse_and_open_where_they_brake() {
     let begin = Begin { position: Vector3::zeros(), velocity, thrust: -with.hover(), spread: 0.0 };
     let stop = vec![Wanted { position: Vector3::zeros(), velocity: Vector3::zeros() }; 21];
     let task = Task::new(begin, stop, Vec::new(), 0.1, f64::INFINITY).unwrap();
-    let (a, b) =
-        (Planner::default().plan(&with, &task, None), Planner::default().plan(&without, &task, None));
+    let (a, b) = (
+        Planner::default().plan(&with, &task, None),
+        Planner::default().plan(&without, &task, None),
+    );
     let open = a.track.points().iter().filter(|point| point.wing > 0.9).count();
     assert!(open >= 8 && a.cost < 0.97 * b.cost, "{open} nodes open, {} for {}", a.cost, b.cost);
     assert!(b.track.points().iter().all(|point| point.wing == 0.0));
 }
 
-/// Half a metre ahead at 8 m/s nothing helps: the plan says so, and goes less deep than straight on.
+/// Half a metre ahead at 8 m/s nothing helps: the plan says so, and goes less deep than straight
+/// on.
 #[test]
 fn an_impossible_task_ends_with_the_plan_that_violates_least() {
     let craft = craft(1.5, Some(WingModel::Flat));
@@ -43,15 +49,24 @@ fn an_impossible_task_ends_with_the_plan_that_violates_least() {
         let plan = Planner::default().plan(&craft, &task, None);
         assert_eq!(plan.status, Status::Infeasible, "{ahead_m} m ahead");
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite());
-        assert!(plan.track.points().iter().all(|point| finite(&point.position) && finite(&point.thrust)));
-        // What counts is the sum of depths. Where the trunk is entered before anything can be changed, it is hardly less than straight on.
+        assert!(
+            plan.track
+                .points()
+                .iter()
+                .all(|point| finite(&point.position) && finite(&point.thrust))
+        );
+        // What counts is the sum of depths. Where the trunk is entered before anything can be
+        // changed, it is hardly less than straight on.
         let depths = |path: &mut dyn Iterator<Item = Vector3<f64>>| -> f64 {
             path.skip(1).map(|p| (radius_m - (p.xy() - trunk.centre).norm()).max(0.0)).sum()
         };
         let planned = depths(&mut plan.track.points().iter().map(|point| point.position));
         let straight_on = depths(&mut task.wanted().iter().map(|wanted| wanted.position));
         let less = if ahead_m > 2.0 { 0.95 } else { 1.01 };
-        assert!(planned <= less * straight_on, "{planned} m deep in all, straight on {straight_on}");
+        assert!(
+            planned <= less * straight_on,
+            "{planned} m deep in all, straight on {straight_on}"
+        );
         // It gets out sooner than it would.
         let inside = |path: &dyn Fn(usize) -> Vector2<f64>| {
             (0..21).filter(|k| (path(*k) - trunk.centre).norm() < radius_m - 0.01).count()
@@ -94,7 +109,11 @@ fn nonsense_is_refused_by_name() {
             thrust: Vector3::new(0.0, 0.0, -5.0),
             spread: 0.0,
         };
-        (begin, vec![Wanted { position: Vector3::zeros(), velocity: Vector3::zeros() }; 5], Vec::new())
+        (
+            begin,
+            vec![Wanted { position: Vector3::zeros(), velocity: Vector3::zeros() }; 5],
+            Vec::new(),
+        )
     };
     let refused = |change: &dyn Fn(&mut Input), step_s: f64| {
         let mut input = good();
@@ -114,7 +133,10 @@ fn nonsense_is_refused_by_name() {
         (refused(&|i| i.1.clear(), 0.1), "reference: has 0 steps"),
         (refused(&|i| i.1 = vec![i.1[0]; 5000], 0.1), "reference: has 4999 steps"),
         (
-            refused(&|i| i.2.push(KeepOut { centre: Vector2::new(0.0, f64::NAN), radius_m: 1.0 }), 0.1),
+            refused(
+                &|i| i.2.push(KeepOut { centre: Vector2::new(0.0, f64::NAN), radius_m: 1.0 }),
+                0.1,
+            ),
             "obstacles[0] = NaN",
         ),
         (
@@ -128,7 +150,8 @@ fn nonsense_is_refused_by_name() {
     }
 }
 
-/// A limit of speed that is not held is said: at 6 m/s nobody is at 3 m/s a tenth of a second later.
+/// A limit of speed that is not held is said: at 6 m/s nobody is at 3 m/s a tenth of a second
+/// later.
 #[test]
 fn a_limit_of_speed_that_is_not_held_is_said() {
     let craft = craft(2.0, None);
@@ -140,7 +163,11 @@ fn a_limit_of_speed_that_is_not_held_is_said() {
     };
     let (held, broken) = (of(6.5), of(3.0));
     assert!(held.status == Status::Solved && held.overspeed_m_s <= 0.05, "{}", held.overspeed_m_s);
-    assert!(broken.status == Status::Infeasible && broken.overspeed_m_s > 1.0, "{}", broken.overspeed_m_s);
+    assert!(
+        broken.status == Status::Infeasible && broken.overspeed_m_s > 1.0,
+        "{}",
+        broken.overspeed_m_s
+    );
     let last = broken.track.points().last().unwrap().velocity.norm();
     assert!(last < 4.0, "it slows down to {last} m/s all the same");
 }

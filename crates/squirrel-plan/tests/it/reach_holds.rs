@@ -19,7 +19,10 @@ fn a_support_function_is_convex_and_homogeneous() {
             for _ in 0..10 {
                 let other = dice.direction() * dice.between(0.1, 3.0);
                 let (value, sum) = (h(d).value_m_s2, h(d + other).value_m_s2);
-                assert!(sum <= h(d).upper_m_s2 + h(other).upper_m_s2 + 1e-9, "{question:?} {d} {other}");
+                assert!(
+                    sum <= h(d).upper_m_s2 + h(other).upper_m_s2 + 1e-9,
+                    "{question:?} {d} {other}"
+                );
                 assert!(
                     (h(2.5 * d).value_m_s2 - 2.5 * value).abs() < 1e-9 * value.abs().max(G),
                     "{question:?} {d}"
@@ -79,7 +82,9 @@ fn braking_at_constant_height_is_what_a_grid_finds() {
     const CELLS: u32 = 150;
     for wing in wings() {
         for (question, _) in any(&wing, 5, 10) {
-            let Some(level) = Reach::new(&question).unwrap().extremes().braking_level_m_s2 else { continue };
+            let Some(level) = Reach::new(&question).unwrap().extremes().braking_level_m_s2 else {
+                continue;
+            };
             let v = question.velocity.vector;
             let back = -Vector3::new(v.x, v.y, 0.0) / v.x.hypot(v.y);
             let at = |p: u32, q: u32| {
@@ -96,7 +101,10 @@ fn braking_at_constant_height_is_what_a_grid_finds() {
             let most = grid.fold(f64::NEG_INFINITY, f64::max);
             println!("{:.4} m/s^2, {most:.4} on a grid", level.with_wings);
             // A grid stops short of where thrust ends.
-            assert!((-1e-3..1e-2).contains(&(level.with_wings - most)), "{question:?}: {level:?} {most}");
+            assert!(
+                (-1e-3..1e-2).contains(&(level.with_wings - most)),
+                "{question:?}: {level:?} {most}"
+            );
         }
     }
 }
@@ -113,7 +121,8 @@ fn a_volume_is_what_random_points_find() {
             let axis = Vector3::ith(i, 1.0);
             [-reach.support(In::new(-axis)).value_m_s2, reach.support(In::new(axis)).value_m_s2]
         });
-        let point = |dice: &mut Dice| Vector3::from(ends.map(|[low, high]| dice.between(low, high)));
+        let point =
+            |dice: &mut Dice| Vector3::from(ends.map(|[low, high]| dice.between(low, high)));
         let inside = (0..POINTS).filter(|_| reach.contains(In::new(point(&mut dice)))).count();
         let size: f64 = ends.iter().map(|[low, high]| high - low).product();
         let (volume, random) =
@@ -126,12 +135,17 @@ fn a_volume_is_what_random_points_find() {
 #[test]
 fn a_cone_does_not_care_for_the_heading() {
     for wing in wings() {
-        for (question, d) in any(&wing, 40, 9).filter(|(q, _)| matches!(q.tilt, Tilt::Cone { .. })) {
+        for (question, d) in any(&wing, 40, 9).filter(|(q, _)| matches!(q.tilt, Tilt::Cone { .. }))
+        {
             let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), 2.2);
-            let turned = Question { velocity: In::new(turn * question.velocity.vector), ..question.clone() };
+            let turned =
+                Question { velocity: In::new(turn * question.velocity.vector), ..question.clone() };
             let [there, here] = [&turned, &question].map(|question| Reach::new(question).unwrap());
             let [a, b] = [there.support(In::new(turn * d)), here.support(In::new(d))];
-            assert!((a.value_m_s2 - b.value_m_s2).abs() < 1e-4 * G, "{question:?} {d}: {a:?} {b:?}");
+            assert!(
+                (a.value_m_s2 - b.value_m_s2).abs() < 1e-4 * G,
+                "{question:?} {d}: {a:?} {b:?}"
+            );
         }
     }
 }

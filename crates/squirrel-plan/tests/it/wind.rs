@@ -14,7 +14,8 @@ fn avoid(arm: Arm, wind: [f64; 3]) -> Setup {
     Setup { vehicle: VehicleFile::squirrel(), arm, scenario, integrator: Integrator::Rk4 }
 }
 
-/// With a wind from behind wings do little at the speed that is flown, and a plan that counts on them sinks.
+/// With a wind from behind wings do little at the speed that is flown, and a plan that counts on
+/// them sinks.
 #[test]
 fn a_tail_wind_is_noticed() {
     for arm in [Arm::PlanWings, Arm::PlanNoWings] {
@@ -25,15 +26,19 @@ fn a_tail_wind_is_noticed() {
         let (time_s, wind) = log.channel("offboard.believed.wind_ned_m_s").unwrap();
         let last = wind.row(time_s.len() - 1);
         // Wings that do less than the flat plate that is believed in pass for more of it.
-        assert!((1.0..7.0).contains(&last[0]) && last[1].hypot(last[2]) < last[0], "{arm:?}: {last:?}");
+        assert!(
+            (1.0..7.0).contains(&last[0]) && last[1].hypot(last[2]) < last[0],
+            "{arm:?}: {last:?}"
+        );
     }
 }
 
 /// Against the wind they do more, and so they are worth more.
 #[test]
 fn a_head_wind_is_used() {
-    let rmse_m =
-        |arm, north| pilot::fly(&avoid(arm, [north, 0.0, 0.0]), false, |_| {}).unwrap().metrics.rmse_m;
+    let rmse_m = |arm, north| {
+        pilot::fly(&avoid(arm, [north, 0.0, 0.0]), false, |_| {}).unwrap().metrics.rmse_m
+    };
     let gain = |north| rmse_m(Arm::PlanNoWings, north) / rmse_m(Arm::PlanWings, north);
     let (calm, windy) = (gain(0.0), gain(-3.0));
     assert!(windy > 1.1 * calm && calm > 1.1, "{windy} for {calm}");

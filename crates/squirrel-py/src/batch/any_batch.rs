@@ -16,9 +16,11 @@ use squirrel_sim::batch::{BODY_NUMBERS, Batch, BatchError, BatchVehicle, Setting
 use squirrel_sim::plant::{GustModel, WindParameters, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// Vehicle steps between two looks at Ctrl-C: a hundredth of a second, or some tenths where everything is slow.
+/// Vehicle steps between two looks at Ctrl-C: a hundredth of a second, or some tenths where
+/// everything is slow.
 const STEPS_A_LOOK: usize = 1_000_000;
-/// Vehicle steps, some microseconds, below which handing the interpreter's lock to others takes longer than what they wait for.
+/// Vehicle steps, some microseconds, below which handing the interpreter's lock to others takes
+/// longer than what they wait for.
 const FEW_STEPS: usize = 500;
 
 /// A batch of any scalar and any number of rotors.
@@ -37,8 +39,11 @@ pub(super) trait AnyBatch: Send {
     fn rotors(&self) -> usize;
     fn command(&mut self, command: &Bound<'_, PyAny>) -> PyResult<()>;
     fn command_wings(&mut self, command: &Bound<'_, PyAny>) -> PyResult<()>;
-    fn states<'py>(&mut self, py: Python<'py>, out: Option<Bound<'py, PyAny>>)
-    -> PyResult<Bound<'py, PyAny>>;
+    fn states<'py>(
+        &mut self,
+        py: Python<'py>,
+        out: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>>;
     fn deployments<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
     fn battery<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>>;
     fn reset(&mut self, states: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()>;
@@ -96,7 +101,9 @@ impl<T: Paths + Float, const ROTORS: usize> AnyBatch for Batch<T, ROTORS> {
         let command = command.numbers();
         with_rows::<T, ROTORS>(py, self.len(), out, |rows| {
             match steps.saturating_mul(self.len()) {
-                few if few < FEW_STEPS => return Self::fly(self, command, steps, rows).map_err(value),
+                few if few < FEW_STEPS => {
+                    return Self::fly(self, command, steps, rows).map_err(value);
+                }
                 STEPS_A_LOOK.. => {}
                 _ => return py.detach(|| Self::fly(self, command, steps, rows).map_err(value)),
             }
@@ -111,12 +118,14 @@ impl<T: Paths + Float, const ROTORS: usize> AnyBatch for Batch<T, ROTORS> {
     }
     fn battery<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let none = [convert(f64::NAN); 3];
-        let rows = (0..self.len()).map(|number| Ok(self.battery(number).map_err(value)?.unwrap_or(none)));
+        let rows =
+            (0..self.len()).map(|number| Ok(self.battery(number).map_err(value)?.unwrap_or(none)));
         Ok(table(py, rows.collect::<PyResult<Vec<_>>>()?.into_flattened(), 3)?.into_any())
     }
     fn reset(&mut self, states: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()> {
         let width = BODY_NUMBERS + ROTORS;
-        let rows = rows::<T>("state", states, &[Some(vehicles.len()), Some(width)], Numbers::Finite)?;
+        let rows =
+            rows::<T>("state", states, &[Some(vehicles.len()), Some(width)], Numbers::Finite)?;
         check_attitudes("state", rows.numbers(), width, 6)?;
         for (vehicle, row) in vehicles.iter().zip(rows.numbers().chunks_exact(width)) {
             Self::reset(self, *vehicle, &state(row)).map_err(value)?;
@@ -125,8 +134,11 @@ impl<T: Paths + Float, const ROTORS: usize> AnyBatch for Batch<T, ROTORS> {
     }
     fn set_charge(&mut self, charge: &Bound<'_, PyAny>, vehicles: &[usize]) -> PyResult<()> {
         let charges = rows::<T>("charge", charge, &[Some(vehicles.len())], Numbers::Finite)?;
-        let charges: Vec<f64> =
-            charges.numbers().iter().map(|x| nalgebra::try_convert(*x).unwrap_or(f64::NAN)).collect();
+        let charges: Vec<f64> = charges
+            .numbers()
+            .iter()
+            .map(|x| nalgebra::try_convert(*x).unwrap_or(f64::NAN))
+            .collect();
         if let Some(at) = charges.iter().position(|charge| !(0.0..=1.0).contains(charge)) {
             return Err(value(format!("charge[{at}] = {}: must be 0 to 1", charges[at])));
         }
@@ -138,7 +150,8 @@ impl<T: Paths + Float, const ROTORS: usize> AnyBatch for Batch<T, ROTORS> {
     fn set_wind(&mut self, wind: &Bound<'_, PyAny>) -> PyResult<()> {
         let wind = rows::<T>("wind_ned_m_s", wind, &[Some(self.len()), Some(3)], Numbers::Finite)?;
         for vehicle in 0..self.len() {
-            Self::set_wind(self, vehicle, In::new(Vector3::from(wind.row(vehicle)))).map_err(value)?;
+            Self::set_wind(self, vehicle, In::new(Vector3::from(wind.row(vehicle))))
+                .map_err(value)?;
         }
         Ok(())
     }
@@ -150,9 +163,9 @@ impl<T: Paths + Float, const ROTORS: usize> AnyBatch for Batch<T, ROTORS> {
         seed: u64,
     ) -> PyResult<()> {
         Self::set_air(self, number, member, air, seed).map_err(|error| match error {
-            BatchError::NotFitted { .. } => {
-                value("gust_sigma_m_s: the base model has no gusts; set_wind between steps moves its air")
-            }
+            BatchError::NotFitted { .. } => value(
+                "gust_sigma_m_s: the base model has no gusts; set_wind between steps moves its air",
+            ),
             error => value(error),
         })
     }
@@ -244,7 +257,11 @@ pub(super) fn any_batch(
         // An empty list is the batch's to refuse.
         0 | 4 if whole => {
             let members: Vec<BatchVehicle> = files.into_iter().map(BatchVehicle::from).collect();
-            if in_32 { of_members::<f32>(&members, settings) } else { of_members::<f64>(&members, settings) }
+            if in_32 {
+                of_members::<f32>(&members, settings)
+            } else {
+                of_members::<f64>(&members, settings)
+            }
         }
         0 | 4 => of_airframes::<4>(&files, settings, in_32),
         6 | 8 if whole && files.iter().any(|file| !is_base(file)) => Err(value(format!(
@@ -261,7 +278,10 @@ fn is_base(file: &VehicleFile) -> bool {
     matches!(file.wing, WingPlant::None) && file.battery.is_none() && !file.effects.any()
 }
 
-fn of_members<T: Paths + Float>(members: &[BatchVehicle], settings: Settings) -> PyResult<Box<dyn AnyBatch>> {
+fn of_members<T: Paths + Float>(
+    members: &[BatchVehicle],
+    settings: Settings,
+) -> PyResult<Box<dyn AnyBatch>> {
     Ok(Box::new(Batch::<T, 4>::with(members, settings).map_err(refused)?))
 }
 
@@ -277,7 +297,9 @@ fn of<T: Paths + Float, const ROTORS: usize>(
     files: &[&VehicleFile],
     settings: Settings,
 ) -> PyResult<Box<dyn AnyBatch>> {
-    let airframes =
-        files.iter().map(|file| file.vehicle.cast::<T>().map_err(value)).collect::<PyResult<Vec<_>>>()?;
+    let airframes = files
+        .iter()
+        .map(|file| file.vehicle.cast::<T>().map_err(value))
+        .collect::<PyResult<Vec<_>>>()?;
     Ok(Box::new(Batch::<T, ROTORS>::new(&airframes, settings).map_err(value)?))
 }

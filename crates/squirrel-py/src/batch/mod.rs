@@ -1,4 +1,5 @@
-//! Many vehicles at once: `squirrel_sim::batch` behind one class for both scalars and all numbers of rotors.
+//! Many vehicles at once: `squirrel_sim::batch` behind one class for both scalars and all numbers
+//! of rotors.
 
 mod any_batch;
 pub(crate) mod rollout;
@@ -29,10 +30,12 @@ pub(crate) fn settings(
     };
     let path = match registers {
         None => Path::best(),
-        Some(name) => Path::available().into_iter().find(|path| path.name() == name).ok_or_else(|| {
-            let names: Vec<&str> = Path::available().into_iter().map(Path::name).collect();
-            value(format!("registers = {name}: this processor has {}", names.join(", ")))
-        })?,
+        Some(name) => {
+            Path::available().into_iter().find(|path| path.name() == name).ok_or_else(|| {
+                let names: Vec<&str> = Path::available().into_iter().map(Path::name).collect();
+                value(format!("registers = {name}: this processor has {}", names.join(", ")))
+            })?
+        }
     };
     let all = Settings::default();
     Ok(Settings { dt_s, scheme, threads: threads.unwrap_or(all.threads), path })
@@ -40,13 +43,15 @@ pub(crate) fn settings(
 
 /// Many vehicles at once, each with numbers of its own.
 ///
-/// All have rigid body, rotors with lag, drag and wind; wings with their servos, batteries and effects fly where a vehicle has them,
-/// as they do in `simulate`, and what no vehicle of the batch has costs nothing. The base model alone, ``whole=False``, is about three
-/// times as fast as a vehicle with wings and battery.
+/// All have rigid body, rotors with lag, drag and wind; wings with their servos, batteries and
+/// effects fly where a vehicle has them, as they do in `simulate`, and what no vehicle of the batch
+/// has costs nothing. The base model alone, ``whole=False``, is about three times as fast as a
+/// vehicle with wings and battery.
 ///
-/// Vehicles start at rest at the origin, level, rotors stopped, wings folded, batteries full. What a vehicle does depends on nothing
-/// but itself: the same bits in a batch of any size, at any place in it, on any number of threads and any registers, in one call or
-/// in many. Several threads may call at once; they wait for each other.
+/// Vehicles start at rest at the origin, level, rotors stopped, wings folded, batteries full. What
+/// a vehicle does depends on nothing but itself: the same bits in a batch of any size, at any place
+/// in it, on any number of threads and any registers, in one call or in many. Several threads may
+/// call at once; they wait for each other.
 ///
 /// Parameters
 /// ----------
@@ -110,13 +115,19 @@ impl Batch {
         whole: bool,
     ) -> PyResult<Self> {
         let mut batch = any_batch(&vehicles, settings, in_32, whole)?;
-        let any = |has: fn(&Vehicle) -> bool| whole && vehicles.iter().any(|vehicle| has(vehicle.get()));
+        let any =
+            |has: fn(&Vehicle) -> bool| whole && vehicles.iter().any(|vehicle| has(vehicle.get()));
         let has_wings = any(|vehicle| !matches!(vehicle.file.wing, WingPlant::None));
         let has_battery = any(|vehicle| vehicle.file.battery.is_some());
         for (number, vehicle) in vehicles.iter().enumerate() {
             let file = &vehicle.get().file;
             if whole && file.effects.gust().is_some() {
-                batch.set_air(number, &BatchVehicle::from(file), air([0.0; 3], 0.0), number as u64)?;
+                batch.set_air(
+                    number,
+                    &BatchVehicle::from(file),
+                    air([0.0; 3], 0.0),
+                    number as u64,
+                )?;
             }
         }
         let count = vehicles.len();
@@ -126,7 +137,8 @@ impl Batch {
     }
 
     fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Locked>> {
-        let broken = |_| PyRuntimeError::new_err("a call on this batch has panicked; make a new one");
+        let broken =
+            |_| PyRuntimeError::new_err("a call on this batch has panicked; make a new one");
         self.locked.lock_py_attached(py).map_err(broken)
     }
 
@@ -148,7 +160,8 @@ impl Batch {
 
     /// Refuses a call about something that no vehicle has, which would do nothing.
     fn needs(&self, is_there: bool, what: &str) -> PyResult<()> {
-        let why = if self.whole { "no vehicle of it has any" } else { "it was made with whole=False" };
+        let why =
+            if self.whole { "no vehicle of it has any" } else { "it was made with whole=False" };
         if is_there { Ok(()) } else { Err(value(format!("the batch has no {what}: {why}"))) }
     }
 }
@@ -208,7 +221,8 @@ impl Batch {
 
     /// Fly on, commands held.
     ///
-    /// A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it. Ctrl-C ends the call between two steps.
+    /// A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it. Ctrl-C
+    /// ends the call between two steps.
     ///
     /// Parameters
     /// ----------
@@ -219,7 +233,8 @@ impl Batch {
         advance(py, &mut *self.lock(py)?.batch, steps)
     }
 
-    /// Command, fly on, and look: `command`, `step` and `states` in one call, with the same bits and in less time.
+    /// Command, fly on, and look: `command`, `step` and `states` in one call, with the same bits
+    /// and in less time.
     ///
     /// Parameters
     /// ----------
@@ -269,7 +284,11 @@ impl Batch {
     ///     `out` has another dtype, shape or order, or cannot be written to.
     #[pyo3(signature = (out = None))]
     #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[typing.Any]", imports = ("numpy.typing", "typing")))]
-    fn states<'py>(&self, py: Python<'py>, out: Option<ArrayAny<'py>>) -> PyResult<Bound<'py, PyAny>> {
+    fn states<'py>(
+        &self,
+        py: Python<'py>,
+        out: Option<ArrayAny<'py>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
         self.lock(py)?.batch.states(py, out.map(|out| out.0))
     }
 
@@ -307,8 +326,8 @@ impl Batch {
         self.lock(py)?.batch.battery(py)
     }
 
-    /// Put vehicles somewhere else: wings folded, batteries full. Their air stays and so does what their rotors are told; commands on
-    /// their way are lost.
+    /// Put vehicles somewhere else: wings folded, batteries full. Their air stays and so does what
+    /// their rotors are told; commands on their way are lost.
     ///
     /// Parameters
     /// ----------
@@ -324,7 +343,12 @@ impl Batch {
     /// ValueError
     ///     Another dtype or shape, a number that is not finite, an attitude that is no rotation.
     #[pyo3(signature = (state, *, vehicles = None))]
-    fn reset(&self, py: Python<'_>, state: ArrayAny<'_>, vehicles: Option<Indices>) -> PyResult<()> {
+    fn reset(
+        &self,
+        py: Python<'_>,
+        state: ArrayAny<'_>,
+        vehicles: Option<Indices>,
+    ) -> PyResult<()> {
         let vehicles = self.numbers(vehicles)?;
         self.lock(py)?.batch.reset(&state.0, &vehicles)
     }
@@ -345,13 +369,19 @@ impl Batch {
     /// ValueError
     ///     Another dtype or shape, a charge out of range, a batch without batteries.
     #[pyo3(signature = (charge, *, vehicles = None))]
-    fn set_charge(&self, py: Python<'_>, charge: ArrayAny<'_>, vehicles: Option<Indices>) -> PyResult<()> {
+    fn set_charge(
+        &self,
+        py: Python<'_>,
+        charge: ArrayAny<'_>,
+        vehicles: Option<Indices>,
+    ) -> PyResult<()> {
         self.needs(self.has_battery, "battery")?;
         let vehicles = self.numbers(vehicles)?;
         self.lock(py)?.batch.set_charge(&charge.0, &vehicles)
     }
 
-    /// Velocity of the air about each vehicle from now on; gusts end, those of the effect ``gust`` too.
+    /// Velocity of the air about each vehicle from now on; gusts end, those of the effect ``gust``
+    /// too.
     ///
     /// Parameters
     /// ----------
@@ -367,8 +397,8 @@ impl Batch {
 
     /// Moving air about vehicles from now on, as a flight of `simulate` with the same seed has it.
     ///
-    /// Gusts are a Gauss-Markov process of 1.5 s per axis that moves at 300 Hz. Those of the effect ``gust`` blow on top of them; where
-    /// nothing was set, with the number of the vehicle as seed.
+    /// Gusts are a Gauss-Markov process of 1.5 s per axis that moves at 300 Hz. Those of the effect
+    /// ``gust`` blow on top of them; where nothing was set, with the number of the vehicle as seed.
     ///
     /// Parameters
     /// ----------
@@ -398,10 +428,13 @@ impl Batch {
     ) -> PyResult<()> {
         let vehicles = self.numbers(vehicles)?;
         let n = vehicles.len();
-        let wind = rows::<f64>("wind_ned_m_s", &wind_ned_m_s.0, &[Some(n), Some(3)], Numbers::Finite)?;
+        let wind =
+            rows::<f64>("wind_ned_m_s", &wind_ned_m_s.0, &[Some(n), Some(3)], Numbers::Finite)?;
         let name = "gust_sigma_m_s";
-        let sigma = gust_sigma_m_s.map(|sigma| rows::<f64>(name, &sigma.0, &[Some(n)], Numbers::Finite));
-        let sigma = sigma.transpose()?.map_or_else(|| vec![0.0; n], |sigma| sigma.numbers().to_vec());
+        let sigma =
+            gust_sigma_m_s.map(|sigma| rows::<f64>(name, &sigma.0, &[Some(n)], Numbers::Finite));
+        let sigma =
+            sigma.transpose()?.map_or_else(|| vec![0.0; n], |sigma| sigma.numbers().to_vec());
         if let Some(at) = sigma.iter().position(|sigma| *sigma < 0.0) {
             return Err(value(format!("{name}[{at}] = {}: must be >= 0", sigma[at])));
         }
@@ -418,8 +451,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Another vehicle in the place of one, as for a domain that is drawn anew; motion, air, charge of the battery, and what rotors
-    /// and wings are told stay.
+    /// Another vehicle in the place of one, as for a domain that is drawn anew; motion, air, charge
+    /// of the battery, and what rotors and wings are told stay.
     ///
     /// Parameters
     /// ----------
@@ -440,7 +473,9 @@ impl Batch {
         let mut locked = self.lock(py)?;
         let (has, must) = (file.vehicle.rotors().len(), locked.batch.rotors());
         if has != must {
-            return Err(value(format!("vehicle: {has} rotors, this batch holds vehicles of {must}")));
+            return Err(value(format!(
+                "vehicle: {has} rotors, this batch holds vehicles of {must}"
+            )));
         }
         if self.whole {
             locked.batch.refit(index, &BatchVehicle::from(file))?;

@@ -84,7 +84,8 @@ fn periods<'py, T: Float>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let rotors = batch.lock(py)?.batch.rotors();
     let (n, width) = (batch.vehicles, BODY_NUMBERS + rotors);
-    let commands = rows::<T>("command", &command.0, &[None, Some(n), Some(rotors)], Numbers::Finite)?;
+    let commands =
+        rows::<T>("command", &command.0, &[None, Some(n), Some(rotors)], Numbers::Finite)?;
     let count = commands.numbers().len() / (n * rotors);
     if let Some(wings) = wing_command {
         rows::<T>("wing_command", &wings.0, &[Some(count), Some(n), Some(2)], Numbers::Finite)?;

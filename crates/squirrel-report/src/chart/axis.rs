@@ -40,12 +40,17 @@ impl Axis {
 
     /// Label and unit as drawn: `tilt [deg]`.
     pub(super) fn title(&self) -> String {
-        if self.unit.is_empty() { self.label.clone() } else { format!("{} [{}]", self.label, self.unit) }
+        if self.unit.is_empty() {
+            self.label.clone()
+        } else {
+            format!("{} [{}]", self.label, self.unit)
+        }
     }
 
     /// The scale for this data.
     pub(super) fn scale(&self, data: impl Iterator<Item = f64>, intervals: usize) -> Scale {
-        let bounds = |given: &[f64]| extent(data.chain(given.iter().copied())).unwrap_or((0.0, 1.0));
+        let bounds =
+            |given: &[f64]| extent(data.chain(given.iter().copied())).unwrap_or((0.0, 1.0));
         match self.range {
             Range::Exact(lo, hi) => Scale::exact(lo, hi, intervals),
             Range::Data => {

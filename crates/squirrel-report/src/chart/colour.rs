@@ -50,7 +50,8 @@ pub(super) enum Ramp {
     Heat,
 }
 
-/// What colour measures in a chart: a label, a unit and the range shared by all charts that are compared.
+/// What colour measures in a chart: a label, a unit and the range shared by all charts that are
+/// compared.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Values {
     title: String,
@@ -81,7 +82,13 @@ impl Values {
             // Neighbours overlap by half a pixel: no hairline between them when the page is scaled.
             // Where colours are transparent, an overlap would show.
             let overlap = if bin + 1 < BINS && ramp == Ramp::Track { 0.5 } else { 0.0 };
-            canvas.rect(&format!("fill {prefix}{bin}"), left + step * bin as f64, y, step + overlap, 9.0);
+            canvas.rect(
+                &format!("fill {prefix}{bin}"),
+                left + step * bin as f64,
+                y,
+                step + overlap,
+                9.0,
+            );
         }
         for &tick in self.scale.ticks() {
             let x = left + width * self.scale.fraction(tick);

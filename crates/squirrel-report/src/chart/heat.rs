@@ -1,7 +1,9 @@
-//! Heat maps: rows of cells over a shared axis, with strips of what went on meanwhile; and matrices of named rows.
+//! Heat maps: rows of cells over a shared axis, with strips of what went on meanwhile; and matrices
+//! of named rows.
 //!
-//! Cells of one step of the colour map are one path, and neighbours in a row one piece of it: a map of ten thousand cells is a
-//! few kilobytes. The map fades to the ground, so that what is small is quiet in light and in dark.
+//! Cells of one step of the colour map are one path, and neighbours in a row one piece of it: a map
+//! of ten thousand cells is a few kilobytes. The map fades to the ground, so that what is small is
+//! quiet in light and in dark.
 
 use super::axis::{Axis, extent};
 use super::colour::{BINS, Ramp, Values};
@@ -105,7 +107,13 @@ impl HeatMap {
         }
         self.cells(&mut canvas, top, &x_px);
         for (i, strip) in self.strips.iter().enumerate() {
-            self.strip(&mut canvas, strip, cells_end + 8.0 + STRIP * i as f64, [left, right], &x_px);
+            self.strip(
+                &mut canvas,
+                strip,
+                cells_end + 8.0 + STRIP * i as f64,
+                [left, right],
+                &x_px,
+            );
         }
         for &tick in scale.ticks() {
             let x = x_px(tick);
@@ -131,9 +139,11 @@ impl HeatMap {
                 let mut start = 0;
                 while start < values.len() {
                     let bin = self.values.bin(values[start]);
-                    let run = values[start..].iter().take_while(|v| self.values.bin(**v) == bin).count();
+                    let run =
+                        values[start..].iter().take_while(|v| self.values.bin(**v) == bin).count();
                     if let Some(bin) = bin {
-                        let [a, b] = [start, start + run].map(|k| x_px(self.from + self.cell * k as f64));
+                        let [a, b] =
+                            [start, start + run].map(|k| x_px(self.from + self.cell * k as f64));
                         let (x, y, w, h) = (px(a), px(y + 1.0), px(b - a), px(ROW - 2.0));
                         let _ = write!(paths[bin], "M{x} {y}h{w}v{h}h-{w}z");
                     }
@@ -156,7 +166,8 @@ impl HeatMap {
         x_px: &impl Fn(f64) -> f64,
     ) {
         let height = STRIP - 8.0;
-        let (lowest, largest) = extent(strip.values.iter().copied().chain([0.0])).unwrap_or((0.0, 0.0));
+        let (lowest, largest) =
+            extent(strip.values.iter().copied().chain([0.0])).unwrap_or((0.0, 0.0));
         let scale = Scale::exact(lowest, if largest > lowest { largest } else { lowest + 1.0 }, 2);
         let points = strip.values.iter().enumerate().map(|(k, v)| {
             let x = x_px(self.from + self.cell * (k as f64 + 0.5));

@@ -15,7 +15,8 @@ pub(super) enum Key {
     Dot,
 }
 
-/// A legend under construction: the rows are known before anything is drawn, because they push the plot down.
+/// A legend under construction: the rows are known before anything is drawn, because they push the
+/// plot down.
 #[derive(Debug)]
 pub(super) struct Legend {
     left: f64,
@@ -26,7 +27,8 @@ pub(super) struct Legend {
 }
 
 impl Legend {
-    /// An empty legend between `left` and `right`, whose first row begins at `first` (there may be a title before).
+    /// An empty legend between `left` and `right`, whose first row begins at `first` (there may be
+    /// a title before).
     pub(super) fn new(left: f64, right: f64, first: f64) -> Self {
         Self { left, right, x: first, row: 0, entries: Vec::new() }
     }
@@ -60,7 +62,9 @@ impl Legend {
         for (key, class, name, [x, row]) in &self.entries {
             let y = y + row;
             match key {
-                Key::Line => canvas.line(&format!("line {class}"), [*x, y - 4.0], [x + KEY, y - 4.0]),
+                Key::Line => {
+                    canvas.line(&format!("line {class}"), [*x, y - 4.0], [x + KEY, y - 4.0]);
+                }
                 Key::Swatch => canvas.rect(&format!("fill {class}"), *x, y - 10.0, KEY, 11.0),
                 Key::Dot => canvas.circle(&format!("dot {class}"), [x + KEY - 6.0, y - 4.0], 4.0),
             }

@@ -38,7 +38,8 @@ impl Series {
         Self { step: true, ..Self::line(name, ink, x, y) }
     }
 
-    /// A vertical stroke from `low` to `high` at each `x`: the stems of a correlation from zero, the spread of a mean.
+    /// A vertical stroke from `low` to `high` at each `x`: the stems of a correlation from zero,
+    /// the spread of a mean.
     pub fn strokes(name: &str, ink: Ink, x: &[f64], low: &[f64], high: &[f64]) -> Self {
         let places = x.iter().zip(low).zip(high);
         let x = x.iter().flat_map(|x| [*x; 3]).collect();
@@ -152,8 +153,14 @@ impl LineChart {
         let lanes_bottom =
             bottom + if self.lanes.is_empty() { 0.0 } else { 6.0 } + LANE * self.lanes.len() as f64;
         let mut canvas = Canvas::new(self.width, lanes_bottom + 38.0);
-        let plot =
-            Plot { x: self.x_scale(), y: self.y_scale(), left: LEFT, right: self.width - RIGHT, top, bottom };
+        let plot = Plot {
+            x: self.x_scale(),
+            y: self.y_scale(),
+            left: LEFT,
+            right: self.width - RIGHT,
+            top,
+            bottom,
+        };
 
         for span in &self.spans {
             draw_span(&mut canvas, &plot, span, "shade", top, self.plot_height);
@@ -168,7 +175,8 @@ impl LineChart {
         }
         for series in &self.series {
             let corners = series.corners().into_iter().map(|p| plot.point(p)).collect::<Vec<_>>();
-            canvas.path(&format!("line {}", series.class()), &Path::through(columns(&corners, 1.5)));
+            canvas
+                .path(&format!("line {}", series.class()), &Path::through(columns(&corners, 1.5)));
         }
         for limit in self.limits.iter().filter(|l| drawable(l.y)) {
             let y = plot.y_px(limit.y);

@@ -1,9 +1,10 @@
 //! A small chart toolkit: numbers in, inline SVG out.
 //!
-//! [`LineChart`] draws curves over a shared axis, [`TrackChart`] a track whose colour is a value, [`Scene`] the same
-//! track in three dimensions, [`RowChart`] bars, intervals and dots beside names, [`HeatMap`] numbers as colour over time,
-//! [`Matrix`] numbers between names, [`Wheel`] closed lines over spokes. NaN breaks a line. Curves are thinned to what the pixels can show, so a long flight
-//! does not make a large file.
+//! [`LineChart`] draws curves over a shared axis, [`TrackChart`] a track whose colour is a value,
+//! [`Scene`] the same track in three dimensions, [`RowChart`] bars, intervals and dots beside
+//! names, [`HeatMap`] numbers as colour over time, [`Matrix`] numbers between names, [`Wheel`]
+//! closed lines over spokes. NaN breaks a line. Curves are thinned to what the pixels can show, so
+//! a long flight does not make a large file.
 //!
 //! ```
 //! use squirrel_report::chart::{Axis, Ink, LineChart, Range, Series};

@@ -28,7 +28,8 @@ impl Plot {
         if drawable(x) && drawable(y) { [self.x_px(x), self.y_px(y)] } else { [f64::NAN; 2] }
     }
 
-    /// Grid lines, tick labels left of the plot and below `labels_top`, which lies under the plot if lanes are between.
+    /// Grid lines, tick labels left of the plot and below `labels_top`, which lies under the plot
+    /// if lanes are between.
     pub(super) fn grid(&self, canvas: &mut Canvas, labels_top: f64) {
         for &tick in self.y.ticks() {
             let y = self.y_px(tick);

@@ -1,7 +1,7 @@
 //! Row charts: one row a name, with bars, intervals and dots over a shared axis.
 //!
-//! A bar chart of evidence, an interval plot of parameters and a dot plot of errors are the same drawing: names to the left,
-//! marks in the middle, figures to the right.
+//! A bar chart of evidence, an interval plot of parameters and a dot plot of errors are the same
+//! drawing: names to the left, marks in the middle, figures to the right.
 
 use super::axis::Axis;
 use super::colour::Ink;
@@ -74,7 +74,8 @@ impl RowChart {
 
     /// Draws the chart.
     pub fn svg(&self) -> Svg {
-        let widest = |texts: &mut dyn Iterator<Item = &str>| texts.map(text_width).fold(0.0, f64::max);
+        let widest =
+            |texts: &mut dyn Iterator<Item = &str>| texts.map(text_width).fold(0.0, f64::max);
         let left = widest(&mut self.rows.iter().map(|r| r.label.as_str())) + 16.0;
         let notes = widest(&mut self.rows.iter().map(|r| r.note.as_str()));
         // However long the texts, a fifth of the width stays for the marks.

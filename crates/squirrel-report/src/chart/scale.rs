@@ -1,6 +1,7 @@
 //! Scales: from any two numbers to an axis with ticks at 1, 2 or 5 times a power of ten.
 //!
-//! A diverged flight may hold 1e300 or a constant: a scale always has a positive, finite span and few ticks.
+//! A diverged flight may hold 1e300 or a constant: a scale always has a positive, finite span and
+//! few ticks.
 
 /// Magnitude above which a number is not drawn, as if it were NaN: spans and products stay finite.
 pub const LARGEST: f64 = 1e100;
@@ -22,9 +23,11 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// A scale that covers `lo` to `hi` and begins and ends at a tick, with about `intervals` tick intervals.
+    /// A scale that covers `lo` to `hi` and begins and ends at a tick, with about `intervals` tick
+    /// intervals.
     ///
-    /// Equal, swapped and undrawable ends are accepted: the scale is then widened, swapped or 0 to 1.
+    /// Equal, swapped and undrawable ends are accepted: the scale is then widened, swapped or 0 to
+    /// 1.
     pub fn nice(lo: f64, hi: f64, intervals: usize) -> Self {
         let (lo, hi) = sane(lo, hi);
         let mut scale = Self::with_step(lo, hi, intervals);
@@ -88,11 +91,13 @@ impl Scale {
         let raw = (hi - lo) / intervals.max(1) as f64;
         let mut exponent = raw.log10().floor() as i32;
         let ratio = raw / scaled(1.0, exponent);
-        // The margin keeps 0 to 10 in five intervals at a step of 2, whatever the last bit of the ratio says.
-        let mantissa = [1.0, 2.0, 5.0].into_iter().find(|m| ratio <= m * (1.0 + 1e-9)).unwrap_or_else(|| {
-            exponent += 1;
-            1.0
-        });
+        // The margin keeps 0 to 10 in five intervals at a step of 2, whatever the last bit of the
+        // ratio says.
+        let mantissa =
+            [1.0, 2.0, 5.0].into_iter().find(|m| ratio <= m * (1.0 + 1e-9)).unwrap_or_else(|| {
+                exponent += 1;
+                1.0
+            });
         Self { lo, hi, ticks: Vec::new(), mantissa, exponent }
     }
 
@@ -116,14 +121,16 @@ impl Scale {
     }
 }
 
-/// `mantissa * 10^exponent`; divides for negative exponents because a power of ten is exact, its inverse is not.
+/// `mantissa * 10^exponent`; divides for negative exponents because a power of ten is exact, its
+/// inverse is not.
 fn scaled(mantissa: f64, exponent: i32) -> f64 {
     if exponent < 0 { mantissa / 10f64.powi(-exponent) } else { mantissa * 10f64.powi(exponent) }
 }
 
 /// A rising range with a span that arithmetic can resolve.
 fn sane(lo: f64, hi: f64) -> (f64, f64) {
-    let clamp = |v: f64, otherwise: f64| if v.is_nan() { otherwise } else { v.clamp(-LARGEST, LARGEST) };
+    let clamp =
+        |v: f64, otherwise: f64| if v.is_nan() { otherwise } else { v.clamp(-LARGEST, LARGEST) };
     let (a, b) = (clamp(lo, 0.0), clamp(hi, 1.0));
     let (lo, hi) = (a.min(b), a.max(b));
     let size = lo.abs().max(hi.abs());

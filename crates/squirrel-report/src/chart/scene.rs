@@ -1,7 +1,9 @@
-//! Tracks in three dimensions: an orthographic view from a fixed side, which the script of the page can turn.
+//! Tracks in three dimensions: an orthographic view from a fixed side, which the script of the page
+//! can turn.
 //!
-//! Points are stored in the drawing as pixels around the middle of the box (`data-p`, `data-c`, `data-t`), so the script
-//! only rotates; this file draws the first view with the same formulas, and the picture stands without the script.
+//! Points are stored in the drawing as pixels around the middle of the box (`data-p`, `data-c`,
+//! `data-t`), so the script only rotates; this file draws the first view with the same formulas,
+//! and the picture stands without the script.
 
 use super::axis::{Axis, extent};
 use super::colour::{Ink, Ramp, Values};
@@ -93,7 +95,10 @@ impl Frame {
         let zoom = self.zoom();
         let (right, away) = (e * cos_a + n * sin_a, n * cos_a - e * sin_a);
         let middle = 0.5 * (HEIGHT + TOP - EDGE);
-        ([0.5 * WIDTH + zoom * right, middle - zoom * (h * cos_e + away * sin_e)], away * cos_e - h * sin_e)
+        (
+            [0.5 * WIDTH + zoom * right, middle - zoom * (h * cos_e + away * sin_e)],
+            away * cos_e - h * sin_e,
+        )
     }
 
     /// Shrinks the view so that the box fits whatever the azimuth.
@@ -118,7 +123,8 @@ impl Scene {
             for stretch in stretches(&points, usize::MAX, |_| None) {
                 canvas.raw(&polyline(&frame, &shadow, &stretch.1));
             }
-            // Stems tie the dots to the shadow: without them the eye cannot tell height from distance.
+            // Stems tie the dots to the shadow: without them the eye cannot tell height from
+            // distance.
             for mark in track.marks.iter().map(|m| frame.place(*m)).filter(|m| !m[0].is_nan()) {
                 canvas.raw(&polyline(&frame, &shadow, &[mark, [mark[0], mark[1], -frame.half[2]]]));
             }
@@ -144,11 +150,13 @@ impl Scene {
                 [centre - c.radius_m, centre + c.radius_m]
             })
         };
-        let range = |axis: usize| extent(points().map(|p| p[axis]).chain(disc(axis))).unwrap_or((0.0, 1.0));
+        let range =
+            |axis: usize| extent(points().map(|p| p[axis]).chain(disc(axis))).unwrap_or((0.0, 1.0));
         let ((n_lo, n_hi), (e_lo, e_hi)) = (range(0), range(1));
         let (north, east) = (Scale::nice(n_lo, n_hi, 6), Scale::nice(e_lo, e_hi, 6));
         let (h_lo, h_hi) = extent(points().map(|p| p[2])).unwrap_or((0.0, 1.0));
-        // The ground is the floor unless the flight is so high that the tracks would float far above it.
+        // The ground is the floor unless the flight is so high that the tracks would float far
+        // above it.
         let ground = h_lo >= 0.0 && h_lo <= (n_hi - n_lo).max(e_hi - e_lo);
         let height = Scale::nice(if ground { 0.0 } else { h_lo }, h_hi, 3);
         let spans = [&east, &north, &height].map(|s| s.hi() - s.lo());
@@ -163,7 +171,10 @@ impl Scene {
             let middle = frame.place([c.north_m, c.east_m, frame.height.lo()]);
             let radius = c.radius_m * frame.px_per_m;
             if radius > 0.0 && radius.is_finite() && !middle[0].is_nan() {
-                solids.push((frame.view([middle[0], middle[1], 0.0]).1, cylinder(frame, middle, radius)));
+                solids.push((
+                    frame.view([middle[0], middle[1], 0.0]).1,
+                    cylinder(frame, middle, radius),
+                ));
             }
         }
         for track in &self.tracks {
@@ -237,7 +248,8 @@ fn cylinder(frame: &Frame, [e, n, floor]: [f64; 3], radius: f64) -> String {
     let top = -floor;
     let [[x, low], [_, high]] = [floor, top].map(|h| frame.view([e, n, h]).0);
     let rx = frame.zoom() * radius;
-    let [left, right, low, high, rx, ry] = [x - rx, x + rx, low, high, rx, rx * ELEVATION.sin()].map(px);
+    let [left, right, low, high, rx, ry] =
+        [x - rx, x + rx, low, high, rx, rx * ELEVATION.sin()].map(px);
     format!(
         r#"<path class="obstacle" d="M{left} {low}A{rx} {ry} 0 0 0 {right} {low}L{right} {high}A{rx} {ry} 0 0 0 {left} {high}ZM{left} {high}A{rx} {ry} 0 0 0 {right} {high}" data-c="{},{}"/>"#,
         triple([e, n, floor]),
@@ -248,8 +260,9 @@ fn cylinder(frame: &Frame, [e, n, floor]: [f64; 3], radius: f64) -> String {
 /// Grid on the floor, upright scale of height, and labels on the edges that face the reader.
 fn draw_floor(canvas: &mut Canvas, frame: &Frame, axes: &[Axis; 3]) {
     let [half_e, half_n, half_h] = frame.half;
-    let [east, north] = [(&frame.east, half_e), (&frame.north, half_n)]
-        .map(|(s, half)| s.ticks().iter().map(|t| (2.0 * s.fraction(*t) - 1.0) * half).collect::<Vec<_>>());
+    let [east, north] = [(&frame.east, half_e), (&frame.north, half_n)].map(|(s, half)| {
+        s.ticks().iter().map(|t| (2.0 * s.fraction(*t) - 1.0) * half).collect::<Vec<_>>()
+    });
     for &e in &east {
         canvas.raw(&polyline(frame, "grid", &[[e, -half_n, -half_h], [e, half_n, -half_h]]));
     }
@@ -262,7 +275,8 @@ fn draw_floor(canvas: &mut Canvas, frame: &Frame, axes: &[Axis; 3]) {
     for (n, scale) in north.iter().zip(frame.north.ticks()) {
         canvas.raw(&label(frame, 'n', *n, 26.0, "tick", &frame.north.label(*scale)));
     }
-    // The floor itself goes without a number: the corner below already carries those of the floor edges.
+    // The floor itself goes without a number: the corner below already carries those of the floor
+    // edges.
     for tick in frame.height.ticks().iter().skip(1) {
         let h = (2.0 * frame.height.fraction(*tick) - 1.0) * half_h;
         canvas.raw(&label(frame, 'h', h, 14.0, "tick", &frame.height.label(*tick)));

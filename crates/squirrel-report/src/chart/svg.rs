@@ -23,7 +23,8 @@ impl Svg {
     }
 }
 
-/// Text made safe for HTML and SVG, in elements and in attributes; control characters become U+FFFD.
+/// Text made safe for HTML and SVG, in elements and in attributes; control characters become
+/// U+FFFD.
 pub fn escape(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -44,7 +45,11 @@ pub fn escape(text: &str) -> String {
 pub(super) fn px(value: f64) -> String {
     let tenths = (value.clamp(-1e6, 1e6) * 10.0).round() as i64;
     let (sign, size) = (if tenths < 0 { "-" } else { "" }, tenths.abs());
-    if size % 10 == 0 { format!("{sign}{}", size / 10) } else { format!("{sign}{}.{}", size / 10, size % 10) }
+    if size % 10 == 0 {
+        format!("{sign}{}", size / 10)
+    } else {
+        format!("{sign}{}.{}", size / 10, size % 10)
+    }
 }
 
 /// Width of a text in pixels, guessed on the safe side: the font is the reader's.
@@ -148,13 +153,16 @@ impl Canvas {
 
     pub(super) fn rect(&mut self, class: &str, x: f64, y: f64, width: f64, height: f64) {
         let (x, y, width, height) = (px(x), px(y), px(width), px(height));
-        let _ =
-            write!(self.body, r#"<rect class="{class}" x="{x}" y="{y}" width="{width}" height="{height}"/>"#);
+        let _ = write!(
+            self.body,
+            r#"<rect class="{class}" x="{x}" y="{y}" width="{width}" height="{height}"/>"#
+        );
     }
 
     pub(super) fn circle(&mut self, class: &str, centre: [f64; 2], radius: f64) {
         let [x, y] = centre.map(px);
-        let _ = write!(self.body, r#"<circle class="{class}" cx="{x}" cy="{y}" r="{}"/>"#, px(radius));
+        let _ =
+            write!(self.body, r#"<circle class="{class}" cx="{x}" cy="{y}" r="{}"/>"#, px(radius));
     }
 
     pub(super) fn text(&mut self, class: &str, at: [f64; 2], anchor: Anchor, text: &str) {

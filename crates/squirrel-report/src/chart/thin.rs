@@ -34,7 +34,8 @@ fn column_of(point: [f64; 2], column_px: f64) -> Option<i64> {
     (point[0].is_finite() && point[1].is_finite()).then(|| (point[0] / column_px).floor() as i64)
 }
 
-/// Indices of the points of a track that are at least `step` from the last kept one, its ends and its gaps.
+/// Indices of the points of a track that are at least `step` from the last kept one, its ends and
+/// its gaps.
 pub(super) fn along<const N: usize>(points: &[[f64; N]], step: f64) -> Vec<usize> {
     let gap = |i: usize| points[i].iter().any(|v| !v.is_finite());
     let mut kept: Vec<usize> = Vec::new();
@@ -53,7 +54,8 @@ pub(super) fn along<const N: usize>(points: &[[f64; N]], step: f64) -> Vec<usize
     kept
 }
 
-/// A stretch of a track with one colour: indices of its first and last point, and the step of the colour map.
+/// A stretch of a track with one colour: indices of its first and last point, and the step of the
+/// colour map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Run {
     pub(super) first: usize,
@@ -61,9 +63,11 @@ pub(super) struct Run {
     pub(super) bin: Option<usize>,
 }
 
-/// Cuts `count` points into stretches of equal colour and at most `longest` segments; neighbours share a point.
+/// Cuts `count` points into stretches of equal colour and at most `longest` segments; neighbours
+/// share a point.
 ///
-/// `bin_of(i)` is the colour of the segment from point `i` to `i + 1`, `gap(i)` whether that segment is missing.
+/// `bin_of(i)` is the colour of the segment from point `i` to `i + 1`, `gap(i)` whether that
+/// segment is missing.
 pub(super) fn runs(
     count: usize,
     longest: usize,
@@ -77,7 +81,9 @@ pub(super) fn runs(
         }
         let bin = bin_of(i);
         match runs.last_mut() {
-            Some(run) if run.last == i && run.bin == bin && i - run.first < longest => run.last = i + 1,
+            Some(run) if run.last == i && run.bin == bin && i - run.first < longest => {
+                run.last = i + 1;
+            }
             _ => runs.push(Run { first: i, last: i + 1, bin }),
         }
     }

@@ -1,4 +1,5 @@
-//! Track plots: a path in a plane whose colour is a value, with obstacles, and equal scales where shape matters.
+//! Track plots: a path in a plane whose colour is a value, with obstacles, and equal scales where
+//! shape matters.
 
 use super::axis::{Axis, Range, extent};
 use super::colour::{Ink, Ramp, Values};
@@ -62,7 +63,8 @@ pub struct TrackChart {
     pub label: String,
     /// Width, px.
     pub width: f64,
-    /// Height of the plot area, px; `None` for equal scales on both axes, which then decide the height.
+    /// Height of the plot area, px; `None` for equal scales on both axes, which then decide the
+    /// height.
     pub plot_height: Option<f64>,
     /// Horizontal axis.
     pub x: Axis,
@@ -112,9 +114,15 @@ impl TrackChart {
         }
         for note in &self.notes {
             let [x, y] = plot.point(note.at);
-            let (anchor, x) = if note.ends { (Anchor::End, x - 8.0) } else { (Anchor::Start, x + 8.0) };
+            let (anchor, x) =
+                if note.ends { (Anchor::End, x - 8.0) } else { (Anchor::Start, x + 8.0) };
             if x.is_finite() {
-                canvas.text(&format!("note {}", note.ink.class()), [x, y + 4.0], anchor, &note.text);
+                canvas.text(
+                    &format!("note {}", note.ink.class()),
+                    [x, y + 4.0],
+                    anchor,
+                    &note.text,
+                );
             }
         }
         canvas.text("axis", [4.0, 12.0], Anchor::Start, &self.y.title());
@@ -144,7 +152,8 @@ impl TrackChart {
             .map(|r| Scale::exact(r[0], r[1], 2))
             .map(|s| [f64::midpoint(s.lo(), s.hi()), s.hi() - s.lo()]);
         let [[x_middle, x_span], [y_middle, y_span]] = spans;
-        // Equal scales: a long narrow track gets air on its sides instead of a very tall or flat plot.
+        // Equal scales: a long narrow track gets air on its sides instead of a very tall or flat
+        // plot.
         let height = (width * (y_span / x_span).clamp(0.4, 1.3)).min(TALLEST);
         let per_px = (x_span / width).max(y_span / height);
         let scale = |middle: f64, px: f64| {

@@ -1,7 +1,7 @@
 //! Wheels: a spoke for each case, and a closed line through one number on each.
 //!
-//! The first spoke points up, the others follow clockwise. The centre is the low end of the axis, which need not be zero: lines that
-//! lie near one another are told apart, areas mean nothing.
+//! The first spoke points up, the others follow clockwise. The centre is the low end of the axis,
+//! which need not be zero: lines that lie near one another are told apart, areas mean nothing.
 
 use super::axis::Axis;
 use super::colour::Ink;
@@ -30,7 +30,8 @@ pub struct Wheel {
     pub width: f64,
     /// Radius of the rim, px; legend and names come on top of it.
     pub rim_px: f64,
-    /// What the distance from the centre measures. What is beyond its range lies at the rim or in the centre.
+    /// What the distance from the centre measures. What is beyond its range lies at the rim or in
+    /// the centre.
     pub radius: Axis,
     /// Names of the spokes.
     pub spokes: Vec<String>,
@@ -56,7 +57,8 @@ impl Wheel {
         let top = 10.0 + legend.height() + NAMES;
         let mut canvas = Canvas::new(self.width, top + 2.0 * self.rim_px + NAMES);
         let centre = [0.5 * self.width, top + self.rim_px];
-        let data = self.lines.iter().flat_map(|line| line.values.iter().take(self.spokes.len()).copied());
+        let data =
+            self.lines.iter().flat_map(|line| line.values.iter().take(self.spokes.len()).copied());
         let scale = self.radius.scale(data.chain(self.limits.iter().map(|limit| limit.y)), 4);
         let radius_px = |value: f64| self.rim_px * scale.fraction(value).clamp(0.0, 1.0);
         let place = |spoke: usize, radius_px: f64| {
@@ -87,7 +89,8 @@ impl Wheel {
                 _ => [f64::NAN; 2],
             };
             // Once round, and to the first spoke again.
-            let round = (0..self.spokes.len()).chain([0]).filter(|i| *i < self.spokes.len()).map(point);
+            let round =
+                (0..self.spokes.len()).chain([0]).filter(|i| *i < self.spokes.len()).map(point);
             canvas.path(&format!("line {}", line.ink.class()), &Path::through(round));
         }
         // In front of the lines, left of the spoke that points up.

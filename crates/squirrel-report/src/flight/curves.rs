@@ -1,4 +1,5 @@
-//! From a flight log to the curves of the report. What the log lacks comes back as a sentence, not as a failure.
+//! From a flight log to the curves of the report. What the log lacks comes back as a sentence, not
+//! as a failure.
 
 use crate::chart::drawable;
 use squirrel_log::flight_code::FOLLOWED;
@@ -39,7 +40,11 @@ pub(super) struct Errors {
 pub(super) type Lack = String;
 
 /// A channel and its time axis, checked to be of this width and complete.
-fn channel<'a>(log: &'a FlightLog, name: &str, width: usize) -> Result<(&'a [f64], &'a Channel), Lack> {
+fn channel<'a>(
+    log: &'a FlightLog,
+    name: &str,
+    width: usize,
+) -> Result<(&'a [f64], &'a Channel), Lack> {
     let (time, channel) = log.channel(name).ok_or_else(|| name.to_owned())?;
     if time.is_empty() {
         return Err(format!("samples of {name}"));
@@ -55,7 +60,12 @@ fn channel<'a>(log: &'a FlightLog, name: &str, width: usize) -> Result<(&'a [f64
 }
 
 /// A curve from each row of a channel.
-fn curve(log: &FlightLog, name: &str, width: usize, value: impl Fn(&[f64]) -> f64) -> Result<Curve, Lack> {
+fn curve(
+    log: &FlightLog,
+    name: &str,
+    width: usize,
+    value: impl Fn(&[f64]) -> f64,
+) -> Result<Curve, Lack> {
     let (time, channel) = channel(log, name, width)?;
     let values = (0..time.len()).map(|i| value(channel.row(i))).collect();
     Ok(Curve { time_s: time.to_vec(), values })
@@ -77,7 +87,8 @@ pub(super) fn reference(log: &FlightLog) -> Result<Path, Lack> {
     path(log, &format!("{}.position_ned_m", followed(log)))
 }
 
-/// Source of what was to be followed: that of an offboard computer where it does not follow the mission.
+/// Source of what was to be followed: that of an offboard computer where it does not follow the
+/// mission.
 pub(super) fn followed(log: &FlightLog) -> &'static str {
     if log.sources.contains_key(FOLLOWED) { FOLLOWED } else { "reference" }
 }
@@ -90,7 +101,8 @@ pub(super) fn speed(log: &FlightLog, source: &str) -> Result<Curve, Lack> {
 /// Angle between body z and world z, deg.
 pub(super) fn tilt_deg(log: &FlightLog) -> Result<Curve, Lack> {
     curve(log, "truth.q_ned_from_body_wxyz", 4, |q| {
-        // Half angle from both its sine and its cosine: exact near level, and the norm of q drops out.
+        // Half angle from both its sine and its cosine: exact near level, and the norm of q drops
+        // out.
         let (sin, cos) = (q[1].hypot(q[2]), q[0].hypot(q[3]));
         if sin == 0.0 && cos == 0.0 { f64::NAN } else { (2.0 * sin.atan2(cos)).to_degrees() }
     })
@@ -136,7 +148,9 @@ impl Path {
         if t0 == time_s {
             return p0;
         }
-        let Some((t1, p1)) = self.time_s.get(after).zip(self.points.get(after)) else { return [f64::NAN; 3] };
+        let Some((t1, p1)) = self.time_s.get(after).zip(self.points.get(after)) else {
+            return [f64::NAN; 3];
+        };
         let share = (time_s - t0) / (t1 - t0);
         [0, 1, 2].map(|axis| p0[axis] + share * (p1[axis] - p0[axis]))
     }
@@ -161,7 +175,8 @@ impl Path {
         self.points.iter().map(step).collect()
     }
 
-    /// Distance flown where the path is nearest to a point (north, east, m); `None` for a path without points.
+    /// Distance flown where the path is nearest to a point (north, east, m); `None` for a path
+    /// without points.
     pub(super) fn nearest(&self, [north, east]: [f64; 2]) -> Option<f64> {
         let away = |p: &[f64; 3]| (p[0] - north).hypot(p[1] - east);
         let distances =

@@ -1,7 +1,7 @@
 //! The report of one manoeuvre flown by several controller arms: `report.html`.
 //!
-//! Reads `truth.*`, `reference.*`, `wing.*` and `control.*` of each log. A log may lack any of them: the panel then
-//! names the missing channel and shows the other arms.
+//! Reads `truth.*`, `reference.*`, `wing.*` and `control.*` of each log. A log may lack any of
+//! them: the panel then names the missing channel and shows the other arms.
 mod curves;
 mod time;
 mod tracks;
@@ -81,7 +81,8 @@ fn arms(page: &mut Page, flights: &[FlightView<'_>]) {
         found.map_or_else(|| "\u{2013}".to_owned(), |(_, value)| value.clone())
     };
     let rows = flights.iter().enumerate().map(|(i, flight)| {
-        let cells = std::iter::once(flight.arm.to_owned()).chain(head[1..].iter().map(|c| cell(flight, c)));
+        let cells =
+            std::iter::once(flight.arm.to_owned()).chain(head[1..].iter().map(|c| cell(flight, c)));
         Row { ink: Some(Ink::Series(i)), cells: cells.collect() }
     });
     let rows = rows.collect::<Vec<_>>();

@@ -13,7 +13,9 @@ struct Time<'a> {
 
 /// Adds the panels.
 pub(super) fn add(page: &mut Page, flights: &[FlightView<'_>]) {
-    let times = || flights.iter().flat_map(|f| f.log.sources.values()).flat_map(|s| s.time_s.iter().copied());
+    let times = || {
+        flights.iter().flat_map(|f| f.log.sources.values()).flat_map(|s| s.time_s.iter().copied())
+    };
     let time = Time { flights, range_s: extent(times()).unwrap_or((0.0, 1.0)) };
 
     page.section("Limits", "");
@@ -23,14 +25,18 @@ pub(super) fn add(page: &mut Page, flights: &[FlightView<'_>]) {
     let error = "Look for the arm that is nearest to the reference at the end of the turn, and what it paid in height.";
     if let [flight] = flights {
         page.section("Wings and speed", wings);
-        page.figures(Columns::Two, &[time.wings(0, flight, Columns::Two), time.speed(Columns::Two)]);
+        page.figures(
+            Columns::Two,
+            &[time.wings(0, flight, Columns::Two), time.speed(Columns::Two)],
+        );
         page.section("Tracking error", error);
         page.figures(Columns::Three, &time.errors(Columns::Three));
         return;
     }
     let columns = columns_for(flights.len());
     page.section("Wings", wings);
-    let figures = flights.iter().enumerate().map(|(i, f)| time.wings(i, f, columns)).collect::<Vec<_>>();
+    let figures =
+        flights.iter().enumerate().map(|(i, f)| time.wings(i, f, columns)).collect::<Vec<_>>();
     page.figures(columns, &figures);
     page.section("Tracking error", error);
     let mut figures = time.errors(Columns::Two).to_vec();
@@ -41,7 +47,8 @@ pub(super) fn add(page: &mut Page, flights: &[FlightView<'_>]) {
 impl Time<'_> {
     fn chart(&self, label: &str, columns: Columns, y: Axis) -> LineChart {
         let (from, to) = self.range_s;
-        let mut chart = LineChart::new(label, Axis::new("time", "s").with_range(Range::Exact(from, to)), y);
+        let mut chart =
+            LineChart::new(label, Axis::new("time", "s").with_range(Range::Exact(from, to)), y);
         chart.width = columns.width();
         chart.link = Some("time");
         chart
@@ -57,7 +64,12 @@ impl Time<'_> {
         for (i, flight) in self.flights.iter().enumerate() {
             match read(flight) {
                 Ok(curve) => {
-                    chart.series.push(Series::line(flight.arm, Ink::Series(i), curve.time_s, curve.values));
+                    chart.series.push(Series::line(
+                        flight.arm,
+                        Ink::Series(i),
+                        curve.time_s,
+                        curve.values,
+                    ));
                 }
                 Err(lack) => notes.push(lacks(flight, &lack)),
             }
@@ -70,14 +82,14 @@ impl Time<'_> {
         self.all(&mut chart, &mut notes, |flight| tilt_deg(flight.log));
         let limits = self.flights.iter().map(|f| (f.tilt_max_rad, f.tilt_max_rad.to_degrees()));
         chart.limits = distinct_limits(limits, "deg");
-        let caption =
-            "Look for arms that sit at the limit: they ask for more sideways force than tilt can give.";
+        let caption = "Look for arms that sit at the limit: they ask for more sideways force than tilt can give.";
         figure("Tilt", caption, &chart, notes)
     }
 
     fn thrust(&self) -> Figure {
         let y = Axis::new("thrust", "N");
-        let (mut chart, mut notes) = (self.chart("collective thrust over time", Columns::Two, y), Vec::new());
+        let (mut chart, mut notes) =
+            (self.chart("collective thrust over time", Columns::Two, y), Vec::new());
         for (i, flight) in self.flights.iter().enumerate() {
             match scalar(flight.log, "control.inner.thrust_n") {
                 Ok(c) => {
@@ -89,11 +101,19 @@ impl Time<'_> {
         }
         for (i, flight) in self.flights.iter().enumerate() {
             match scalar(flight.log, "control.outer.thrust_command_n") {
-                Ok(c) => chart.series.push(Series::steps(flight.arm, Ink::Series(i), c.time_s, c.values)),
+                Ok(c) => {
+                    chart.series.push(Series::steps(
+                        flight.arm,
+                        Ink::Series(i),
+                        c.time_s,
+                        c.values,
+                    ));
+                }
                 Err(lack) => notes.push(lacks(flight, &lack)),
             }
         }
-        chart.limits = distinct_limits(self.flights.iter().map(|f| (f.thrust_max_n, f.thrust_max_n)), "N");
+        chart.limits =
+            distinct_limits(self.flights.iter().map(|f| (f.thrust_max_n, f.thrust_max_n)), "N");
         let caption = "Look for commands that reach the limit: there the vehicle sinks; steps are the outer loop, thin \
                        lines the inner loop.";
         figure("Collective thrust command", caption, &chart, notes)
@@ -101,7 +121,8 @@ impl Time<'_> {
 
     fn wings(&self, i: usize, flight: &FlightView<'_>, columns: Columns) -> Figure {
         let y = Axis::new("deployment", "").with_range(Range::Including(0.0, 1.0));
-        let mut chart = self.chart(&format!("{}: wings, flag and mode over time", flight.arm), columns, y);
+        let mut chart =
+            self.chart(&format!("{}: wings, flag and mode over time", flight.arm), columns, y);
         chart.plot_height = 130.0;
         let mut notes = Vec::new();
         let mut note = |lack: &Lack| notes.push(lacks(flight, lack));
@@ -131,8 +152,12 @@ impl Time<'_> {
             for (i, (flight, errors)) in self.flights.iter().zip(&read).enumerate() {
                 match errors {
                     Ok(e) => {
-                        let line =
-                            Series::line(flight.arm, Ink::Series(i), e.time_s.clone(), pick(e).clone());
+                        let line = Series::line(
+                            flight.arm,
+                            Ink::Series(i),
+                            e.time_s.clone(),
+                            pick(e).clone(),
+                        );
                         chart.series.push(line);
                     }
                     Err(lack) => notes.push(lacks(flight, lack)),
@@ -143,7 +168,9 @@ impl Time<'_> {
         let distance = || Axis::new("error", "m").with_range(Range::Including(0.0, 0.1));
         [
             panel("3-D error", "Distance to the reference.", distance(), |e| &e.distance_m),
-            panel("Horizontal error", "The part that avoids the obstacle.", distance(), |e| &e.horizontal_m),
+            panel("Horizontal error", "The part that avoids the obstacle.", distance(), |e| {
+                &e.horizontal_m
+            }),
             panel(
                 "Height error",
                 "Above zero is too high; look for sinking while the wings are open.",
@@ -199,8 +226,8 @@ fn spans(curve: &Curve, meaning: impl Fn(f64) -> Option<(Ink, &'static str)>) ->
     named.map(|(from, to, (ink, name))| Span { from, to, ink, name: name.to_owned() }).collect()
 }
 
-/// A span of no length: names a state that may never come, so that the legends, and the plots below them, align from arm
-/// to arm.
+/// A span of no length: names a state that may never come, so that the legends, and the plots below
+/// them, align from arm to arm.
 fn never(ink: Ink, name: &str) -> Span {
     Span { from: 0.0, to: 0.0, ink, name: name.to_owned() }
 }
@@ -217,5 +244,8 @@ fn lane(modes: &Curve) -> Lane {
     let inks = [(Ink::Muted, "pc"), (Ink::Reference, "wiic"), (Ink::Limit, "thrust limit")];
     let meaning = |mode: f64| (0..inks.len()).find(|&i| i as f64 == mode).map(|i| inks[i]);
     let names = inks.map(|(ink, name)| never(ink, name));
-    Lane { label: "mode".to_owned(), spans: names.into_iter().chain(spans(modes, meaning)).collect() }
+    Lane {
+        label: "mode".to_owned(),
+        spans: names.into_iter().chain(spans(modes, meaning)).collect(),
+    }
 }

@@ -3,7 +3,8 @@
 use super::curves::{Lack, Path, flown, reference, speed};
 use super::{FlightView, columns_for, lacks};
 use crate::chart::{
-    Axis, Cylinder, Ink, Obstacle, Range, Scale, Scene, SceneTrack, Svg, Track, TrackChart, Values, extent,
+    Axis, Cylinder, Ink, Obstacle, Range, Scale, Scene, SceneTrack, Svg, Track, TrackChart, Values,
+    extent,
 };
 use crate::page::{Columns, Figure, Page};
 
@@ -70,13 +71,18 @@ impl<'a> Tracks<'a> {
         let obstacles = || flights.iter().flat_map(|f| &f.obstacles);
         let extents = [0, 1, 2].map(|axis| {
             let points = paths().flat_map(|p| p.points.iter().map(|p| p[axis]));
-            let discs = obstacles().filter(|_| axis < 2).flat_map(|o| [o[axis] - o[2], o[axis] + o[2]]);
+            let discs =
+                obstacles().filter(|_| axis < 2).flat_map(|o| [o[axis] - o[2], o[axis] + o[2]]);
             extent(points.chain(discs)).unwrap_or((0.0, 1.0))
         });
         let speeds = || flown.iter().filter_map(|f| f.speed.as_ref().ok()).flatten().copied();
         let values = extent(speeds()).map(|_| Values::new(&Axis::new("speed", "m/s"), speeds()));
-        let times =
-            extent(flown.iter().filter_map(|f| f.path.as_ref().ok()).flat_map(|p| p.time_s.iter().copied()));
+        let times = extent(
+            flown
+                .iter()
+                .filter_map(|f| f.path.as_ref().ok())
+                .flat_map(|p| p.time_s.iter().copied()),
+        );
         let duration = times.map_or(1.0, |(from, to)| to - from);
         let mark_every_s = Scale::nice(0.0, duration, 15).step().max(1.0);
         Self { flights, inks, flown, values, mark_every_s, extents }
@@ -122,8 +128,13 @@ impl<'a> Tracks<'a> {
             }
         }
         let axes = ["north", "east", "height"].map(|name| Axis::new(name, "m"));
-        let scene =
-            Scene { label: "3-D tracks".to_owned(), axes, tracks, cylinders, values: self.values.clone() };
+        let scene = Scene {
+            label: "3-D tracks".to_owned(),
+            axes,
+            tracks,
+            cylinders,
+            values: self.values.clone(),
+        };
         Figure {
             title: "3-D track of every arm".to_owned(),
             caption: format!(
@@ -144,20 +155,25 @@ impl<'a> Tracks<'a> {
         self.view(i, "from above", columns, (east, north), &flat, discs.collect())
     }
 
-    /// The track unrolled: height over the distance flown. An obstacle stands where the arm passes it.
+    /// The track unrolled: height over the distance flown. An obstacle stands where the arm passes
+    /// it.
     fn side(&self, i: usize, columns: Columns) -> Svg {
         let paths = || self.flown.iter().flat_map(|f| f.path.iter().chain(&f.reference));
         let longest = extent(paths().flat_map(Path::distances)).map_or(1.0, |(_, longest)| longest);
         let distance = Axis::new("distance flown", "m").with_range(Range::Including(0.0, longest));
         let mut columns_passed = Vec::new();
         if let Ok(path) = &self.flown[i].path {
-            let passed =
-                self.flights[i].obstacles.iter().filter_map(|o| Some((path.nearest([o[0], o[1]])?, o[2])));
-            columns_passed
-                .extend(passed.map(|(at, radius)| Obstacle::Column { x: [at - radius, at + radius] }));
+            let passed = self.flights[i]
+                .obstacles
+                .iter()
+                .filter_map(|o| Some((path.nearest([o[0], o[1]])?, o[2])));
+            columns_passed.extend(
+                passed.map(|(at, radius)| Obstacle::Column { x: [at - radius, at + radius] }),
+            );
         }
-        let flat =
-            |path: &Path| path.distances().into_iter().zip(&path.points).map(|(d, p)| [d, p[2]]).collect();
+        let flat = |path: &Path| {
+            path.distances().into_iter().zip(&path.points).map(|(d, p)| [d, p[2]]).collect()
+        };
         self.view(i, "from the side", columns, (distance, self.axis(2)), &flat, columns_passed)
     }
 

@@ -2,12 +2,20 @@
 
 use proptest::prelude::*;
 use squirrel_report::chart::{
-    Axis, BINS, Ink, LARGEST, LineChart, Note, Range, Scale, Series, Svg, Track, TrackChart, Values, escape,
+    Axis, BINS, Ink, LARGEST, LineChart, Note, Range, Scale, Series, Svg, Track, TrackChart,
+    Values, escape,
 };
 use squirrel_report::picture::picture;
 
 fn any_number() -> impl Strategy<Value = f64> {
-    prop_oneof![any::<f64>(), -1e3..1e3, Just(0.0), Just(f64::NAN), Just(f64::INFINITY), Just(f64::MAX)]
+    prop_oneof![
+        any::<f64>(),
+        -1e3..1e3,
+        Just(0.0),
+        Just(f64::NAN),
+        Just(f64::INFINITY),
+        Just(f64::MAX)
+    ]
 }
 
 fn check_scale(scale: &Scale) -> Result<(), TestCaseError> {
@@ -23,7 +31,9 @@ fn check_scale(scale: &Scale) -> Result<(), TestCaseError> {
         prop_assert_ne!(scale.label(pair[0]), scale.label(pair[1]));
     }
     let margin = 1e-5 * scale.step();
-    prop_assert!(scale.ticks().iter().all(|t| *t >= scale.lo() - margin && *t <= scale.hi() + margin));
+    prop_assert!(
+        scale.ticks().iter().all(|t| *t >= scale.lo() - margin && *t <= scale.hi() + margin)
+    );
     Ok(())
 }
 
@@ -82,8 +92,11 @@ fn a_constant_lies_in_the_middle() {
 }
 
 fn curve_of(series: Series) -> String {
-    let mut chart =
-        LineChart::new("", Axis::new("x", "s"), Axis::new("y", "m").with_range(Range::Exact(0.0, 1.0)));
+    let mut chart = LineChart::new(
+        "",
+        Axis::new("x", "s"),
+        Axis::new("y", "m").with_range(Range::Exact(0.0, 1.0)),
+    );
     chart.series.push(series);
     let svg = chart.svg();
     let path = svg.as_str().split("<path class=\"line s0\" d=\"").nth(1).unwrap();
@@ -146,7 +159,8 @@ fn colour_grows_with_the_value_and_is_grey_without_one() {
         notes: Vec::new(),
     };
     let svg = chart.svg();
-    let classes = svg.as_str().split("class=\"track ").skip(1).map(|p| p.split('"').next().unwrap());
+    let classes =
+        svg.as_str().split("class=\"track ").skip(1).map(|p| p.split('"').next().unwrap());
     let wanted = (0..BINS * 3 / 4).map(|bin| format!("v{bin}")).chain(["muted".to_owned()]);
     assert_eq!(classes.collect::<Vec<_>>(), wanted.collect::<Vec<_>>());
 }
@@ -173,9 +187,18 @@ fn equal_scales_are_equal() {
             notes: Vec::new(),
         };
         let svg = chart.svg();
-        let d = svg.as_str().split("<path class=\"line s0\" d=\"").nth(1).unwrap().split('"').next().unwrap();
-        let n =
-            d[1..].split(' ').map(|w| w.trim_end_matches("h0").parse::<f64>().unwrap()).collect::<Vec<_>>();
+        let d = svg
+            .as_str()
+            .split("<path class=\"line s0\" d=\"")
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap();
+        let n = d[1..]
+            .split(' ')
+            .map(|w| w.trim_end_matches("h0").parse::<f64>().unwrap())
+            .collect::<Vec<_>>();
         let (dx, dy) = (n[2] - n[0], n[1] - n[3]);
         assert!((dx * north - dy * east).abs() <= 0.2 * (north + east), "{east} {north}: {d}");
         assert!(n.iter().all(|v| (0.0..=600.0).contains(v)), "{d}");
@@ -201,7 +224,11 @@ fn noted(notes: Vec<Note>) -> Svg {
 #[test]
 fn a_note_stands_beside_its_point() {
     let note = |at, ends| Note { at, text: "pc & others".to_owned(), ink: Ink::Series(3), ends };
-    let svg = noted(vec![note([50.0, 50.0], false), note([50.0, 0.0], true), note([f64::NAN, 0.0], true)]);
+    let svg = noted(vec![
+        note([50.0, 50.0], false),
+        note([50.0, 0.0], true),
+        note([f64::NAN, 0.0], true),
+    ]);
     let texts: Vec<_> = svg.as_str().split("<text class=\"note s3\"").skip(1).collect();
     assert_eq!(texts.len(), 2, "{}", svg.as_str());
     // The plot begins 46 px from the left and 38 px from the top.
@@ -218,9 +245,14 @@ fn a_picture_needs_nothing_else_and_is_light() {
     let drawing = noted(Vec::new());
     let [width, height] = drawing.size();
     let text = picture("left & right", &["first", "second"], &[drawing.clone(), drawing]);
-    assert!(text.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"576\" "), "{}", &text[..200]);
+    assert!(
+        text.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"576\" "),
+        "{}",
+        &text[..200]
+    );
     assert_eq!(
-        text.matches(&format!("<svg width=\"{width}\" height=\"{height}\" class=\"chart\"")).count(),
+        text.matches(&format!("<svg width=\"{width}\" height=\"{height}\" class=\"chart\""))
+            .count(),
         2
     );
     assert!(text.contains(">left &amp; right</text>") && text.contains(">second</text>"));

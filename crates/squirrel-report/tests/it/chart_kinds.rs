@@ -1,13 +1,21 @@
-//! Heat maps, matrices, row charts and wheels: cells, rows and spokes where the numbers say, and nothing drawn for what is no number.
+//! Heat maps, matrices, row charts and wheels: cells, rows and spokes where the numbers say, and
+//! nothing drawn for what is no number.
 
 use proptest::prelude::*;
 use squirrel_report::chart::{
-    Axis, ChartRow, Dot, Extent, HeatGroup, HeatMap, Ink, Level, Limit, LineChart, Matrix, Range, RowChart,
-    Series, Strip, Svg, Values, Wheel, WheelLine,
+    Axis, ChartRow, Dot, Extent, HeatGroup, HeatMap, Ink, Level, Limit, LineChart, Matrix, Range,
+    RowChart, Series, Strip, Svg, Values, Wheel, WheelLine,
 };
 
 fn any_number() -> impl Strategy<Value = f64> {
-    prop_oneof![any::<f64>(), -1e3..1e3, Just(0.0), Just(f64::NAN), Just(f64::INFINITY), Just(f64::MAX)]
+    prop_oneof![
+        any::<f64>(),
+        -1e3..1e3,
+        Just(0.0),
+        Just(f64::NAN),
+        Just(f64::INFINITY),
+        Just(f64::MAX)
+    ]
 }
 
 fn map(values: Vec<f64>) -> HeatMap {
@@ -19,7 +27,10 @@ fn map(values: Vec<f64>) -> HeatMap {
         from: 0.0,
         cell: 1.0,
         values: Values::new(&scale, std::iter::empty()),
-        groups: vec![HeatGroup { title: "before".to_owned(), rows: vec![("fx".to_owned(), values.clone())] }],
+        groups: vec![HeatGroup {
+            title: "before".to_owned(),
+            rows: vec![("fx".to_owned(), values.clone())],
+        }],
         strips: vec![Strip { label: "speed".to_owned(), unit: "m/s".to_owned(), values }],
     }
 }
@@ -59,7 +70,10 @@ fn wheel(range: Range, names: &[&str], values: Vec<f64>) -> Wheel {
 
 fn is_drawn(svg: &Svg) -> bool {
     let text = svg.as_str();
-    text.starts_with("<svg") && !text.contains("NaN") && !text.contains("inf\"") && !text.contains("1000000")
+    text.starts_with("<svg")
+        && !text.contains("NaN")
+        && !text.contains("inf\"")
+        && !text.contains("1000000")
 }
 
 proptest! {
@@ -96,7 +110,15 @@ fn bars_reach_as_far_as_their_numbers_say() {
     let text = svg.as_str();
     let number = |class: &str, key: &str| -> f64 {
         let element = text.split(&format!("class=\"{class}\"")).nth(1).unwrap();
-        element.split(&format!(" {key}=\"")).nth(1).unwrap().split('"').next().unwrap().parse().unwrap()
+        element
+            .split(&format!(" {key}=\""))
+            .nth(1)
+            .unwrap()
+            .split('"')
+            .next()
+            .unwrap()
+            .parse()
+            .unwrap()
     };
     // The first of each class is its key in no legend: legends come last.
     let (bar, band) = (number("fill s0", "width"), number("shade s0", "width"));
@@ -108,9 +130,17 @@ fn bars_reach_as_far_as_their_numbers_say() {
 /// The pairs of numbers of the wheel's line, without those of its key in the legend.
 fn round(wheel: &Wheel) -> (String, Vec<[f64; 2]>) {
     let svg = wheel.svg();
-    let d = svg.as_str().split("<path class=\"line s0\" d=\"").nth(1).unwrap().split('"').next().unwrap();
+    let d = svg
+        .as_str()
+        .split("<path class=\"line s0\" d=\"")
+        .nth(1)
+        .unwrap()
+        .split('"')
+        .next()
+        .unwrap();
     let numbers = d.split(['M', ' ']).filter(|word| !word.is_empty());
-    let numbers: Vec<f64> = numbers.map(|word| word.trim_end_matches("h0").parse().unwrap()).collect();
+    let numbers: Vec<f64> =
+        numbers.map(|word| word.trim_end_matches("h0").parse().unwrap()).collect();
     (d.to_owned(), numbers.as_chunks().0.to_vec())
 }
 
@@ -122,10 +152,15 @@ fn a_wheel_has_its_numbers_on_its_spokes() {
     let circle = text.split("<circle class=\"line limit\" cx=\"").nth(1).unwrap();
     let [x, y, ring] = [0, 2, 4].map(|i| circle.split('"').nth(i).unwrap().parse::<f64>().unwrap());
     assert_eq!(ring, 0.5 * wheel.rim_px);
-    // Half way up, at the rim to the right, in the centre, beyond the axis at the rim to the left, and closed.
+    // Half way up, at the rim to the right, in the centre, beyond the axis at the rim to the left,
+    // and closed.
     let wanted = [[x, y - ring], [x + 2.0 * ring, y], [x, y], [x - 2.0 * ring, y], [x, y - ring]];
     assert_eq!(points, wanted);
-    assert!(text.contains(">a&lt;b</text>") && text.contains(">pc</text>") && text.contains(">w</text>"));
+    assert!(
+        text.contains(">a&lt;b</text>")
+            && text.contains(">pc</text>")
+            && text.contains(">w</text>")
+    );
 }
 
 #[test]
@@ -138,8 +173,12 @@ fn a_spoke_without_a_number_opens_the_wheel() {
 
 #[test]
 fn a_matrix_marks_what_is_below_its_levels() {
-    let svg =
-        matrix(vec![vec![f64::NAN, 8.9, 9.0], vec![8.9, f64::NAN, 25.0], vec![9.0, 25.0, f64::NAN]]).svg();
+    let svg = matrix(vec![
+        vec![f64::NAN, 8.9, 9.0],
+        vec![8.9, f64::NAN, 25.0],
+        vec![9.0, 25.0, f64::NAN],
+    ])
+    .svg();
     let text = svg.as_str();
     // One more each for the legend.
     assert_eq!((text.matches("fill h8").count(), text.matches("fill h3").count()), (3, 3));
@@ -159,7 +198,14 @@ fn strokes_stand_alone() {
         &[0.5, -0.5, f64::NAN],
     ));
     let svg = chart.svg();
-    let d = svg.as_str().split("<path class=\"line s0\" d=\"").nth(1).unwrap().split('"').next().unwrap();
+    let d = svg
+        .as_str()
+        .split("<path class=\"line s0\" d=\"")
+        .nth(1)
+        .unwrap()
+        .split('"')
+        .next()
+        .unwrap();
     assert_eq!(d.matches('M').count(), 3, "{d}");
     assert_eq!(d.matches("h0").count(), 1, "the end that is no number leaves a dot at zero: {d}");
 }

@@ -38,8 +38,10 @@ fn attributes<'a>(markup: &'a str, kind: &'a str) -> impl Iterator<Item = &'a st
 
 /// Points in all paths of curves and tracks.
 fn drawn_points(markup: &str) -> usize {
-    let curves =
-        markup.split("<path class=\"").skip(1).filter(|p| p.starts_with("line ") || p.starts_with("track "));
+    let curves = markup
+        .split("<path class=\"")
+        .skip(1)
+        .filter(|p| p.starts_with("line ") || p.starts_with("track "));
     curves.map(|p| attributes(p, " d=\"").next().unwrap().split([' ', 'M']).count() / 2).sum()
 }
 
@@ -58,7 +60,10 @@ fn check(html: &str) {
         assert_eq!(tag.matches('"').count() % 2, 0, "quotes in {tag}");
         for value in tag.split('"').skip(1).step_by(2).chain(piece.split('>').nth(1)) {
             for word in ["NaN", "inf", "Infinity"] {
-                assert!(!value.split([' ', ',']).any(|w| w.trim_matches('-') == word), "{word} in {piece}");
+                assert!(
+                    !value.split([' ', ',']).any(|w| w.trim_matches('-') == word),
+                    "{word} in {piece}"
+                );
             }
         }
     }
@@ -80,7 +85,8 @@ fn the_report_is_one_small_file_that_needs_no_network() {
     let short = logs(6.0);
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
     std::fs::write(folder.join("report.html"), report(&short)).unwrap();
-    std::fs::write(folder.join("report_one_arm.html"), render(&heading(), &views(&short)[2..])).unwrap();
+    std::fs::write(folder.join("report_one_arm.html"), render(&heading(), &views(&short)[2..]))
+        .unwrap();
 }
 
 #[test]
@@ -108,7 +114,11 @@ fn every_panel_is_there_and_holds_data() {
         assert!(markup.contains(">limit "), "{title} shows its limit");
     }
     for (_, markup) in &found[1..4] {
-        assert_eq!(markup.matches("obstacle").count(), 4, "two obstacles from above and from the side");
+        assert_eq!(
+            markup.matches("obstacle").count(),
+            4,
+            "two obstacles from above and from the side"
+        );
         assert!(markup.contains("track v0") || markup.contains("track v2"), "speed is the colour");
     }
     let alone = render(&heading(), &views(&logs)[..1]);
@@ -140,7 +150,8 @@ fn a_missing_channel_is_named_and_the_other_arms_stay() {
         assert!(html.contains(&format!("twcc_flat: the log lacks {name}.")), "{name}");
         assert!(!html.contains("pc: the log lacks"), "{name}");
     }
-    let html = report(&[const { FlightLog { metadata: BTreeMap::new(), sources: BTreeMap::new() } }; 3]);
+    let html =
+        report(&[const { FlightLog { metadata: BTreeMap::new(), sources: BTreeMap::new() } }; 3]);
     check(&html);
     for name in CHANNELS {
         assert_eq!(html.matches(name).count() % 3, 0, "{name}");
@@ -156,8 +167,14 @@ fn a_channel_of_the_wrong_shape_is_named_too() {
     truth.channels.get_mut("q_ned_from_body_wxyz").unwrap().values.truncate(7);
     let html = report(&logs);
     check(&html);
-    assert!(html.contains("pc: the log lacks truth.velocity_ned_m_s with 3 numbers a sample (it has 2)."));
-    assert!(html.contains("pc: the log lacks truth.q_ned_from_body_wxyz with 2404 numbers (it has 7)."));
+    assert!(
+        html.contains(
+            "pc: the log lacks truth.velocity_ned_m_s with 3 numbers a sample (it has 2)."
+        )
+    );
+    assert!(
+        html.contains("pc: the log lacks truth.q_ned_from_body_wxyz with 2404 numbers (it has 7).")
+    );
 }
 
 #[test]
@@ -208,8 +225,16 @@ fn broken_flights_neither_panic_nor_leave_numbers_that_are_none() {
             channel.values.fill(value);
         }
     };
-    for value in [0.0, 1e300, -1e300, f64::MIN_POSITIVE, f64::MAX, f64::INFINITY, f64::NEG_INFINITY, f64::NAN]
-    {
+    for value in [
+        0.0,
+        1e300,
+        -1e300,
+        f64::MIN_POSITIVE,
+        f64::MAX,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::NAN,
+    ] {
         let mut logs = logs(1.0);
         set(&mut logs[0], value);
         check(&report(&logs));
@@ -233,8 +258,12 @@ fn broken_flights_neither_panic_nor_leave_numbers_that_are_none() {
     let mut flights = views(&logs);
     for (flight, bad) in flights.iter_mut().zip([f64::NAN, f64::INFINITY, 1e308]) {
         (flight.tilt_max_rad, flight.thrust_max_n) = (bad, bad);
-        flight.obstacles =
-            vec![[f64::NAN, 0.0, 1.0], [0.0, 0.0, f64::INFINITY], [1e300, 0.0, 1.0], [0.0, 0.0, -1.0]];
+        flight.obstacles = vec![
+            [f64::NAN, 0.0, 1.0],
+            [0.0, 0.0, f64::INFINITY],
+            [1e300, 0.0, 1.0],
+            [0.0, 0.0, -1.0],
+        ];
     }
     check(&render(&heading(), &flights));
     check(&render(&Heading::default(), &[]));

@@ -10,8 +10,8 @@ use squirrel_core::dynamics::State;
 use squirrel_core::frames::{In, Ned};
 
 impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
-    /// Puts one vehicle somewhere else: wings folded, battery full, load hanging. Its command and its wind stay; commands on their
-    /// way are lost.
+    /// Puts one vehicle somewhere else: wings folded, battery full, load hanging. Its command and
+    /// its wind stay; commands on their way are lost.
     ///
     /// * `state` - rotor speeds only where the vehicle has rotors
     ///
@@ -50,13 +50,16 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         }
         let (chunk, block, lane) = place(number);
         let mut chunk = self.pool.chunk(chunk);
-        if let Some(packs) = chunk.blocks[block].extra.as_mut().and_then(|extra| extra.packs.as_mut()) {
+        if let Some(packs) =
+            chunk.blocks[block].extra.as_mut().and_then(|extra| extra.packs.as_mut())
+        {
             packs.rest(lane, convert(charge));
         }
         Ok(())
     }
 
-    /// Charge (0..1), terminal voltage (V) and current (A) of one vehicle's battery; `None` where no vehicle has one.
+    /// Charge (0..1), terminal voltage (V) and current (A) of one vehicle's battery; `None` where
+    /// no vehicle has one.
     ///
     /// # Errors
     /// No such vehicle.
@@ -93,7 +96,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
 
     /// Tells the wings what to do from now on; nothing where no vehicle has any.
     ///
-    /// * `commands` - a row of two for each vehicle, left and right, 0 folded to 1 spread; limited, and 0 for NaN
+    /// * `commands` - a row of two for each vehicle, left and right, 0 folded to 1 spread; limited,
+    ///   and 0 for NaN
     ///
     /// # Errors
     /// A length that is not twice [`Self::len`].
@@ -117,8 +121,9 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         Ok(())
     }
 
-    /// Moving air about one vehicle from now on, as in a flight with this wind and seed: steady wind, its gusts, and those of the
-    /// vehicle's `gust` effect. Gusts move at the rate of the flight code, 300 Hz.
+    /// Moving air about one vehicle from now on, as in a flight with this wind and seed: steady
+    /// wind, its gusts, and those of the vehicle's `gust` effect. Gusts move at the rate of the
+    /// flight code, 300 Hz.
     ///
     /// * `member` - the vehicle, for its effect
     ///

@@ -1,7 +1,9 @@
-//! Moving air about the vehicles of a block: steady wind and gusts, in the numbers of [`crate::plant::Wind`].
+//! Moving air about the vehicles of a block: steady wind and gusts, in the numbers of
+//! [`crate::plant::Wind`].
 //!
-//! Air moves between steps, at the rate of the flight code. Gusts that do not ask how fast a vehicle meets them are known beforehand:
-//! a [`Forecast`] hands them to the steps, which then need not be cut where air moves.
+//! Air moves between steps, at the rate of the flight code. Gusts that do not ask how fast a
+//! vehicle meets them are known beforehand: a [`Forecast`] hands them to the steps, which then need
+//! not be cut where air moves.
 
 use super::simd::{BLOCK, Paths};
 use crate::flight::CONTROL_RATE_HZ;
@@ -50,7 +52,8 @@ impl Airs {
         self.of.iter().any(|airs| !airs.is_empty())
     }
 
-    /// Other air about a vehicle. The first that moves finds its clock where it were if there had always been some.
+    /// Other air about a vehicle. The first that moves finds its clock where it were if there had
+    /// always been some.
     ///
     /// * `clock` - steps that the block has taken
     pub(super) fn put(&mut self, lane: usize, airs: Vec<Wind>, clock: u64, dt_s: f64) {

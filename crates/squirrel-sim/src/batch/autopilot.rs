@@ -1,8 +1,10 @@
-//! The inner loop of the flight code on registers: set points to rotor speeds, between steps of the batch.
+//! The inner loop of the flight code on registers: set points to rotor speeds, between steps of the
+//! batch.
 //!
-//! Yaw lead, command filter, quaternion backstepping (docs/equations.md B.3) and mixer are those of `squirrel_core::control`, and
-//! what rotors are told is what they make of the flight code's commands: in `f32` a vehicle has the flight code's bits
-//! (`tests/batch_autopilot.rs`, `tests/tasks.rs`).
+//! Yaw lead, command filter, quaternion backstepping (docs/equations.md B.3) and mixer are those of
+//! `squirrel_core::control`, and what rotors are told is what they make of the flight code's
+//! commands: in `f32` a vehicle has the flight code's bits (`tests/batch_autopilot.rs`,
+//! `tests/tasks.rs`).
 
 use super::rows::Block;
 use super::simd::{BLOCK, Kernel, Paths, Register};
@@ -25,7 +27,8 @@ use std::slice;
 /// What the numbers of a set point are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SetPoint {
-    /// Roll, pitch, yaw, rad, and collective thrust, N. Yaw is turned to as in flight: by 20 deg ahead of the measured one at most.
+    /// Roll, pitch, yaw, rad, and collective thrust, N. Yaw is turned to as in flight: by 20 deg
+    /// ahead of the measured one at most.
     Attitude,
     /// Body rates, rad/s, and collective thrust, N.
     BodyRate,
@@ -68,7 +71,8 @@ pub(super) struct Autopilots<S: Copy, const ROTORS: usize> {
     mixer: Table<Row<S>, ROTORS>,
     /// What the mixer gave last, N.
     thrust: [Row<S>; ROTORS],
-    /// Of vehicles whose commands are pulses or voltages: these are rounded on the way from a thrust to a speed.
+    /// Of vehicles whose commands are pulses or voltages: these are rounded on the way from a
+    /// thrust to a speed.
     rounding: [Option<Box<Vehicle<f32>>>; BLOCK],
     /// Steps until the loops act again.
     wait: usize,
@@ -91,12 +95,14 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
     /// The loop of another vehicle in column `lane`.
     fn fit(&mut self, lane: usize, vehicle: &Vehicle<f32>, gains: &AttitudeGains, mixer: &Mixer) {
         let p = vehicle.parameters();
-        let [c1, c2, lambda] = [gains.c1_per_s, gains.c2_per_s, gains.lambda_per_s2].map(Into::into);
+        let [c1, c2, lambda] =
+            [gains.c1_per_s, gains.c2_per_s, gains.lambda_per_s2].map(Into::into);
         let law = Law::<f32>::from_euler_gains(&c1, &c2, &lambda, &p.inertia_kg_m2.into());
         let poles = Poles::new(gains.filter_frequency_rad_s, gains.filter_damping);
-        let is_part = matches!(p.propulsion.command, CommandKind::SpeedFraction | CommandKind::Duty);
-        let rounds =
-            p.propulsion.thrust_curve.is_some() || p.propulsion.command == CommandKind::PwmMicroseconds;
+        let is_part =
+            matches!(p.propulsion.command, CommandKind::SpeedFraction | CommandKind::Duty);
+        let rounds = p.propulsion.thrust_curve.is_some()
+            || p.propulsion.command == CommandKind::PwmMicroseconds;
         self.rounding[lane] = rounds.then(|| Box::new(*vehicle));
         let numbers = Gains {
             c1: law.c1,
@@ -220,7 +226,8 @@ impl<L: Register> Gains<L> {
         Law { c1, c2, lambda, k, inertia }
     }
 
-    /// What a rotor makes of the command for a thrust, as `Propulsion` does with a part of the full speed or with the thrust itself.
+    /// What a rotor makes of the command for a thrust, as `Propulsion` does with a part of the full
+    /// speed or with the thrust itself.
     #[inline(always)]
     fn target_speed(&self, thrust_n: L) -> L {
         let (none, one) = (L::of(0.0), L::of(1.0));
@@ -237,7 +244,9 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         for (lane, vehicle) in autopilots.rounding.iter().enumerate() {
             let Some(vehicle) = vehicle else { continue };
             let (propulsion, rotors) = (&vehicle.parameters().propulsion, vehicle.rotors().len());
-            for (speed, thrust) in self.held.target_speed.iter_mut().zip(&autopilots.thrust).take(rotors) {
+            for (speed, thrust) in
+                self.held.target_speed.iter_mut().zip(&autopilots.thrust).take(rotors)
+            {
                 let thrust_n = nalgebra::try_convert(thrust[lane]).unwrap_or(f64::NAN) as f32;
                 let command = propulsion.command_for_thrust(thrust_n);
                 speed[lane] = real(f64::from(propulsion.target_speed_rad_s(command)));
@@ -294,13 +303,14 @@ pub(super) fn flown<T: Paths, const ROTORS: usize>(
 }
 
 impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
-    /// Puts an inner loop between the steps and [`Self::set_points`] in the place of [`Self::command`]. All of them hold what they
-    /// have now, with no thrust, until they are told.
+    /// Puts an inner loop between the steps and [`Self::set_points`] in the place of
+    /// [`Self::command`]. All of them hold what they have now, with no thrust, until they are told.
     ///
     /// * `tuned` - one for each vehicle
     ///
     /// # Errors
-    /// A length that is not [`Self::len`], a period of no steps, gains or a layout that cannot be used.
+    /// A length that is not [`Self::len`], a period of no steps, gains or a layout that cannot be
+    /// used.
     pub fn engage(&mut self, autopilot: Autopilot, tuned: &[Tuned]) -> Result<(), BatchError> {
         shape("vehicles of the autopilot", tuned.len(), self.len())?;
         if autopilot.period_steps == 0 {
@@ -352,7 +362,9 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         for (chunk, rows) in rows.chunks(4 * BLOCK * CHUNK).enumerate() {
             let mut chunk = self.pool.chunk(chunk);
             for (block, rows) in chunk.blocks.iter_mut().zip(rows.chunks(4 * BLOCK)) {
-                let Some(autopilots) = &mut block.autopilots else { return Err(BatchError::NoAutopilot) };
+                let Some(autopilots) = &mut block.autopilots else {
+                    return Err(BatchError::NoAutopilot);
+                };
                 autopilots.set(rows);
             }
         }

@@ -1,4 +1,5 @@
-//! Batteries of a block: `squirrel_core::dynamics::battery`, the table of open-circuit voltages by selection.
+//! Batteries of a block: `squirrel_core::dynamics::battery`, the table of open-circuit voltages by
+//! selection.
 
 use super::simd::{BLOCK, Paths, Register};
 use crate::plant::BatteryParameters;

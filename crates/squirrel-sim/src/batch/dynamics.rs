@@ -1,6 +1,7 @@
 //! Steps of blocks: the equations of `squirrel_core::dynamics` on registers of vehicles.
 //!
-//! The core's own, so that a vehicle in a batch has the numbers of a vehicle alone. No closures and no iterators in here: code must end up in the function that was compiled for the registers.
+//! The core's own, so that a vehicle in a batch has the numbers of a vehicle alone. No closures and
+//! no iterators in here: code must end up in the function that was compiled for the registers.
 
 use super::Scheme;
 use super::air::Forecast;
@@ -18,7 +19,8 @@ use squirrel_core::lane::vector::{minus, rotation, unit};
 use squirrel_core::lane::{Row, load, store};
 use squirrel_core::math::real;
 
-/// Some steps of some blocks. Each block takes all of its steps before the next one takes its first.
+/// Some steps of some blocks. Each block takes all of its steps before the next one takes its
+/// first.
 pub(super) struct Advance<'a, S: Copy, const ROTORS: usize> {
     pub(super) blocks: &'a mut [Block<S, ROTORS>],
     pub(super) scheme: Scheme,
@@ -26,12 +28,15 @@ pub(super) struct Advance<'a, S: Copy, const ROTORS: usize> {
     pub(super) steps: usize,
 }
 
-/// [`Advance`] of blocks that have more than the base model: a kernel of its own, because one function with all variants has
-/// a frame that overflows the stack where the compiler does not optimise.
+/// [`Advance`] of blocks that have more than the base model: a kernel of its own, because one
+/// function with all variants has a frame that overflows the stack where the compiler does not
+/// optimise.
 pub(super) struct AdvanceWhole<'a, S: Copy, const ROTORS: usize>(pub(super) Advance<'a, S, ROTORS>);
 
 #[inline(always)]
-fn splat<L: Register, const STAGES: usize>(stages: Stages<L::Element, STAGES>) -> Stages<L, STAGES> {
+fn splat<L: Register, const STAGES: usize>(
+    stages: Stages<L::Element, STAGES>,
+) -> Stages<L, STAGES> {
     let mut registers = [[L::of(0.0); 2]; STAGES];
     for k in 0..STAGES {
         registers[k] = [L::splat(stages[k][0]), L::splat(stages[k][1])];
@@ -46,8 +51,12 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Advance<'_, S, ROTORS> {
     fn run<L: Register<Element = S>>(self) {
         for block in self.blocks {
             match self.scheme {
-                Scheme::Euler => plain::<L, ROTORS, 1>(block, self.steps as u64, [[real(0.0), self.dt_s]]),
-                Scheme::Rk4 => plain::<L, ROTORS, 4>(block, self.steps as u64, runge_kutta(self.dt_s)),
+                Scheme::Euler => {
+                    plain::<L, ROTORS, 1>(block, self.steps as u64, [[real(0.0), self.dt_s]]);
+                }
+                Scheme::Rk4 => {
+                    plain::<L, ROTORS, 4>(block, self.steps as u64, runge_kutta(self.dt_s));
+                }
             }
         }
     }
@@ -72,7 +81,8 @@ impl<S: Paths, const ROTORS: usize> AdvanceWhole<'_, S, ROTORS> {
         let Advance { blocks, dt_s: dt, steps, .. } = self.0;
         let mut forecast = Forecast::empty();
         for block in blocks {
-            let Some(kind) = block.extra.as_ref().map(|extra| (extra.wing, extra.present.act_in_steps()))
+            let Some(kind) =
+                block.extra.as_ref().map(|extra| (extra.wing, extra.present.act_in_steps()))
             else {
                 continue;
             };
@@ -82,12 +92,22 @@ impl<S: Paths, const ROTORS: usize> AdvanceWhole<'_, S, ROTORS> {
                 let winds = forecast.winds();
                 left -= steps;
                 match kind {
-                    (NONE, _) => fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, winds, stages, dt),
-                    (FLAT, _) => fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, winds, stages, dt),
-                    (_, false) => {
-                        fitted::<L, ROTORS, STAGES, MEMBRANE, false>(block, steps, winds, stages, dt);
+                    (NONE, _) => {
+                        fitted::<L, ROTORS, STAGES, NONE, true>(block, steps, winds, stages, dt);
                     }
-                    (_, true) => fitted::<L, ROTORS, STAGES, MEMBRANE, true>(block, steps, winds, stages, dt),
+                    (FLAT, _) => {
+                        fitted::<L, ROTORS, STAGES, FLAT, true>(block, steps, winds, stages, dt);
+                    }
+                    (_, false) => {
+                        fitted::<L, ROTORS, STAGES, MEMBRANE, false>(
+                            block, steps, winds, stages, dt,
+                        );
+                    }
+                    (_, true) => {
+                        fitted::<L, ROTORS, STAGES, MEMBRANE, true>(
+                            block, steps, winds, stages, dt,
+                        );
+                    }
                 }
             }
         }
@@ -130,7 +150,13 @@ fn plain<L: Register, const ROTORS: usize, const STAGES: usize>(
 ///
 /// * `winds` - that come, see `Forecast`
 #[inline(always)]
-fn fitted<L: Register, const ROTORS: usize, const STAGES: usize, const WING: u8, const EFFECTS: bool>(
+fn fitted<
+    L: Register,
+    const ROTORS: usize,
+    const STAGES: usize,
+    const WING: u8,
+    const EFFECTS: bool,
+>(
     block: &mut Block<L::Element, ROTORS>,
     steps: u64,
     winds: &[(u64, [Row<L::Element>; 3])],

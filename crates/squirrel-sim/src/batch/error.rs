@@ -17,7 +17,9 @@ pub enum BatchError {
         places: usize,
     },
     /// An effect that acts on sensors only.
-    #[error("vehicles[{vehicle}]: effects.{effect}: acts on sensors or stamps only, a batch has none")]
+    #[error(
+        "vehicles[{vehicle}]: effects.{effect}: acts on sensors or stamps only, a batch has none"
+    )]
     Effect {
         /// Which.
         vehicle: usize,
@@ -69,7 +71,9 @@ pub enum BatchError {
         dt_s: f64,
     },
     /// A step that cannot follow the rotors of a vehicle.
-    #[error("vehicles[{vehicle}]: dt_s = {dt_s} must be at most twice propulsion.{key} = {time_constant_s}")]
+    #[error(
+        "vehicles[{vehicle}]: dt_s = {dt_s} must be at most twice propulsion.{key} = {time_constant_s}"
+    )]
     TimeConstant {
         /// Which.
         vehicle: usize,

@@ -1,8 +1,10 @@
-//! One pass over the vehicles: commands go in, steps are taken, motions come out, each chunk's while it is in the processor.
+//! One pass over the vehicles: commands go in, steps are taken, motions come out, each chunk's
+//! while it is in the processor.
 //!
-//! The threads of a pool outlive every call, so rows cannot be lent to them: they are handed addresses. [`Batch::pass`] keeps the rows
-//! borrowed until all threads are done, and every chunk touches the rows of its own vehicles only. Beside [`super::simd`], the only
-//! module with `unsafe`.
+//! The threads of a pool outlive every call, so rows cannot be lent to them: they are handed
+//! addresses. [`Batch::pass`] keeps the rows borrowed until all threads are done, and every chunk
+//! touches the rows of its own vehicles only. Beside [`super::simd`], the only module with
+//! `unsafe`.
 
 use super::rows::{Block, Drive};
 use super::simd::{BLOCK, Paths};
@@ -34,7 +36,8 @@ impl<T: Paths, const ROTORS: usize> Chunk<T, ROTORS> {
 #[derive(Debug, Clone, Copy)]
 struct Rows<P>(P);
 
-// SAFETY: each stands for rows that `Batch::pass` has borrowed, and of which no two threads touch the same.
+// SAFETY: each stands for rows that `Batch::pass` has borrowed, and of which no two threads touch
+// the same.
 #[allow(unsafe_code, reason = "addresses are not sent otherwise")]
 unsafe impl<T: Sync> Send for Rows<*const T> {}
 // SAFETY: as above.
@@ -52,13 +55,18 @@ pub(super) struct Job<T: Copy, const ROTORS: usize> {
 }
 
 /// What a thread does with a chunk.
-pub(super) fn do_job<T: Paths, const ROTORS: usize>(chunk: &mut Chunk<T, ROTORS>, job: Job<T, ROTORS>) {
+pub(super) fn do_job<T: Paths, const ROTORS: usize>(
+    chunk: &mut Chunk<T, ROTORS>,
+    job: Job<T, ROTORS>,
+) {
     let Chunk { first, blocks, drives } = chunk;
     let width = BODY_NUMBERS + ROTORS;
     if let Some(Rows(commands)) = job.commands {
-        // SAFETY: `Batch::pass` has checked that there are rows of all vehicles, keeps them borrowed, and nobody writes to them.
+        // SAFETY: `Batch::pass` has checked that there are rows of all vehicles, keeps them
+        // borrowed, and nobody writes to them.
         #[allow(unsafe_code, reason = "see the module")]
-        let commands = unsafe { slice::from_raw_parts(commands.add(*first * ROTORS), drives.len() * ROTORS) };
+        let commands =
+            unsafe { slice::from_raw_parts(commands.add(*first * ROTORS), drives.len() * ROTORS) };
         let rows = commands.chunks(ROTORS * BLOCK).zip(drives.chunks(BLOCK));
         for (block, (commands, drives)) in blocks.iter_mut().zip(rows) {
             block.command(commands, drives);
@@ -71,17 +79,19 @@ pub(super) fn do_job<T: Paths, const ROTORS: usize>(chunk: &mut Chunk<T, ROTORS>
         }
     }
     if let Some(Rows(states)) = job.states {
-        // SAFETY: as above, but that these rows are borrowed for writing; chunks have no vehicle in common, and one thread at a time
-        // has a chunk.
+        // SAFETY: as above, but that these rows are borrowed for writing; chunks have no vehicle in
+        // common, and one thread at a time has a chunk.
         #[allow(unsafe_code, reason = "see the module")]
-        let states = unsafe { slice::from_raw_parts_mut(states.add(*first * width), drives.len() * width) };
+        let states =
+            unsafe { slice::from_raw_parts_mut(states.add(*first * width), drives.len() * width) };
         for (block, rows) in blocks.iter().zip(states.chunks_mut(width * BLOCK)) {
             block.write_states(rows);
         }
     }
 }
 
-/// Ends the process when it is dropped: other threads may still have addresses of rows that are about to go.
+/// Ends the process when it is dropped: other threads may still have addresses of rows that are
+/// about to go.
 struct NoWayBack;
 
 impl Drop for NoWayBack {
@@ -126,7 +136,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         Ok(())
     }
 
-    /// Flies on, commands and wind held. A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it.
+    /// Flies on, commands and wind held. A vehicle that leaves all bounds becomes NaN, and none of
+    /// its neighbours with it.
     pub fn step(&mut self, steps: usize) {
         // Without rows there is nothing to refuse.
         let _ = self.pass(None, steps, None);
@@ -134,8 +145,9 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
 
     /// Tells the rotors what to do from now on.
     ///
-    /// * `commands` - a row of `ROTORS` numbers for each vehicle, in the unit that it declares; limited to their range, and the
-    ///   least of it for NaN; not looked at where a vehicle has no rotor
+    /// * `commands` - a row of `ROTORS` numbers for each vehicle, in the unit that it declares;
+    ///   limited to their range, and the least of it for NaN; not looked at where a vehicle has no
+    ///   rotor
     ///
     /// # Errors
     /// A length that is not [`Self::len`] times `ROTORS`.
@@ -143,8 +155,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         self.pass(Some(commands), 0, None)
     }
 
-    /// Motion of all vehicles, a row each: position (NED, m), velocity (NED, m/s), attitude (body to NED, w x y z), angular
-    /// rate (body, rad/s), rotor speeds (rad/s).
+    /// Motion of all vehicles, a row each: position (NED, m), velocity (NED, m/s), attitude (body
+    /// to NED, w x y z), angular rate (body, rad/s), rotor speeds (rad/s).
     ///
     /// * `rows` - [`Self::len`] times [`BODY_NUMBERS`]` + ROTORS` numbers
     ///
@@ -154,8 +166,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         self.pass(None, 0, Some(rows))
     }
 
-    /// [`Self::command`], [`Self::step`] and [`Self::write_states`] in one pass: the same bits, in less time where there are many
-    /// vehicles and few steps.
+    /// [`Self::command`], [`Self::step`] and [`Self::write_states`] in one pass: the same bits, in
+    /// less time where there are many vehicles and few steps.
     ///
     /// # Errors
     /// As those.

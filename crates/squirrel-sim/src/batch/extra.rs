@@ -1,7 +1,9 @@
-//! What vehicles of a block have on top of the base model: wings, battery, effects, gusts, commands on their way.
+//! What vehicles of a block have on top of the base model: wings, battery, effects, gusts, commands
+//! on their way.
 //!
-//! Late commands, and gusts that ask for the airspeed, change between steps. The steps of a call are therefore cut where the next of
-//! them is due, which changes no number: a flight is the same however it is cut.
+//! Late commands, and gusts that ask for the airspeed, change between steps. The steps of a call
+//! are therefore cut where the next of them is due, which changes no number: a flight is the same
+//! however it is cut.
 
 use super::air::{Airs, Forecast};
 use super::battery::Packs;
@@ -77,7 +79,12 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
             membrane: Membrane::all(none),
             sides: [Side { attached: one, ..Side::all(none) }; 2],
             wing_angle: [none; 2],
-            servo: Servo { rate_max_per_s: one, opening_s: one, closing_s: one, ..Servo::all(none) },
+            servo: Servo {
+                rate_max_per_s: one,
+                opening_s: one,
+                closing_s: one,
+                ..Servo::all(none)
+            },
             deployment: [ServoState::all(none); 2],
             packs: (fitted.stretches > 0).then(|| Packs::empty(fitted.stretches)),
             present: fitted.present,
@@ -114,7 +121,8 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
         self.late.push_back(Late { due, lane, command });
     }
 
-    /// Tells the servos of a vehicle where to go; a command that changes within the dead time replaces the one that waits.
+    /// Tells the servos of a vehicle where to go; a command that changes within the dead time
+    /// replaces the one that waits.
     pub(super) fn ask_wings(&mut self, lane: usize, command: [S; 2]) {
         for (rows, command) in self.deployment.iter_mut().zip(command) {
             let mut state = rows.take(lane);
@@ -152,7 +160,8 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         let airspeed_m_s = |lane| {
             let mut through = through_air(&take(&motion.velocity, lane), &take(&wind, lane));
             if effects_blow {
-                let wind = effects.take(lane).wind(*present, real::<S>(0.0) - motion.position[2][lane]);
+                let wind =
+                    effects.take(lane).wind(*present, real::<S>(0.0) - motion.position[2][lane]);
                 let [north, east] = wind.map(|x| try_convert::<S, f64>(x).unwrap_or(f64::NAN));
                 through -= Vector3::new(north, east, 0.0);
             }
@@ -164,11 +173,12 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         steps
     }
 
-    /// Where the block has wings, what the vehicle in column `lane` shows of them: deployment, left and right.
+    /// Where the block has wings, what the vehicle in column `lane` shows of them: deployment, left
+    /// and right.
     pub(super) fn deployment(&self, lane: usize) -> [S; 2] {
-        self.extra
-            .as_ref()
-            .map_or([real(0.0); 2], |extra| [0, 1].map(|side| extra.deployment[side].deployment[lane]))
+        self.extra.as_ref().map_or([real(0.0); 2], |extra| {
+            [0, 1].map(|side| extra.deployment[side].deployment[lane])
+        })
     }
 }
 

@@ -1,17 +1,19 @@
-//! Many vehicles at once: rigid body, rotors with lag, drag, wind; wings, battery, gusts and effects where vehicles have them;
-//! each vehicle with numbers of its own.
+//! Many vehicles at once: rigid body, rotors with lag, drag, wind; wings, battery, gusts and
+//! effects where vehicles have them; each vehicle with numbers of its own.
 //!
-//! Sixteen vehicles lie side by side (`rows`), and the equations of `squirrel_core::dynamics` run on registers of them
-//! ([`simd`], `dynamics`), on as many threads as asked for (`pool`). All steps of a call are done block by block, so that a
-//! block stays in the processor for all of them. What a vehicle does depends on nothing but itself: the same bits in a batch
-//! of any size, at any place in it, on any registers, on any number of threads, in one call or in many, and the numbers of
+//! Sixteen vehicles lie side by side (`rows`), and the equations of `squirrel_core::dynamics` run
+//! on registers of them ([`simd`], `dynamics`), on as many threads as asked for (`pool`). All steps
+//! of a call are done block by block, so that a block stays in the processor for all of them. What
+//! a vehicle does depends on nothing but itself: the same bits in a batch of any size, at any place
+//! in it, on any registers, on any number of threads, in one call or in many, and the numbers of
 //! `squirrel_core::dynamics` in the same scalar.
 //!
-//! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles ([`BatchVehicle`]): flat wings and
-//! membranes with their servos, batteries (`battery`), effects, gusts (`air`) and late commands (`extra`), with the equations of
-//! [`crate::plant::Plant`], which `squirrel_core` has once for both. What no vehicle of the batch has is not computed. A wing that is a network, and
-//! effects that act on sensors or stamps (accel_bias, accel_scale, clock_skew, clock_step, compass_current, gnss_latency,
-//! gyro_scale, heading_bias), are refused.
+//! [`Batch::new`] takes airframes and flies the base model. [`Batch::with`] takes whole vehicles
+//! ([`BatchVehicle`]): flat wings and membranes with their servos, batteries (`battery`), effects,
+//! gusts (`air`) and late commands (`extra`), with the equations of [`crate::plant::Plant`], which
+//! `squirrel_core` has once for both. What no vehicle of the batch has is not computed. A wing that
+//! is a network, and effects that act on sensors or stamps (accel_bias, accel_scale, clock_skew,
+//! clock_step, compass_current, gnss_latency, gyro_scale, heading_bias), are refused.
 //!
 //! - [`Batch`]: vehicles side by side, in one scalar, of up to so many rotors
 //! - [`BatchVehicle`]: one of them, with all that it may have
@@ -63,7 +65,8 @@ use squirrel_core::math::real;
 use squirrel_core::vehicle::{MAX_ROTORS, Vehicle};
 use vehicle::Fitted;
 
-/// Blocks that a thread takes at once: little enough to share out evenly, enough to be worth claiming.
+/// Blocks that a thread takes at once: little enough to share out evenly, enough to be worth
+/// claiming.
 const CHUNK: usize = 4;
 /// Numbers of a vehicle's motion in a row of [`Batch::write_states`], before those of its rotors.
 pub const BODY_NUMBERS: usize = 13;
@@ -145,11 +148,12 @@ fn place(vehicle: usize) -> (usize, usize, usize) {
 impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// Vehicles at rest at the origin, level, rotors stopped and told to stay so, in calm air.
     ///
-    /// * `vehicles` - with what effects change once, see `Effects::alter`; rotors beyond `rotor_count` are not there
+    /// * `vehicles` - with what effects change once, see `Effects::alter`; rotors beyond
+    ///   `rotor_count` are not there
     ///
     /// # Errors
-    /// No vehicle, one with more than `ROTORS` rotors, a step that is not positive or longer than twice a rotor time constant,
-    /// no threads.
+    /// No vehicle, one with more than `ROTORS` rotors, a step that is not positive or longer than
+    /// twice a rotor time constant, no threads.
     pub fn new(vehicles: &[Vehicle<T>], settings: Settings) -> Result<Self, BatchError> {
         let drives: Vec<Drive<T>> = vehicles.iter().map(Drive::new).collect();
         let mut batch = Self::empty(&drives, Fitted::all(&[])?, None, settings, plain)?;
@@ -159,29 +163,39 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         Ok(batch)
     }
 
-    /// As [`Self::new`], of whole vehicles: wings folded, batteries full, loads hanging. What the batch has a place for is what
-    /// any of them has.
+    /// As [`Self::new`], of whole vehicles: wings folded, batteries full, loads hanging. What the
+    /// batch has a place for is what any of them has.
     ///
     /// # Errors
-    /// As [`Self::new`]; a wing that is a network, flat wings beside membranes, an effect that does not act in a batch, effects
-    /// that leave no airframe.
+    /// As [`Self::new`]; a wing that is a network, flat wings beside membranes, an effect that does
+    /// not act in a batch, effects that leave no airframe.
     pub fn with(members: &[BatchVehicle], settings: Settings) -> Result<Self, BatchError> {
         Self::with_room(members.len(), members, settings)
     }
 
-    /// As [`Self::with`], of `count` vehicles, in turn those of `members`; there is room for any of these at any place.
+    /// As [`Self::with`], of `count` vehicles, in turn those of `members`; there is room for any of
+    /// these at any place.
     ///
     /// # Errors
     /// As [`Self::with`].
-    pub fn with_room(count: usize, members: &[BatchVehicle], settings: Settings) -> Result<Self, BatchError> {
+    pub fn with_room(
+        count: usize,
+        members: &[BatchVehicle],
+        settings: Settings,
+    ) -> Result<Self, BatchError> {
         let fitted = Fitted::all(members)?;
         let mut kinds = Vec::with_capacity(members.len());
         for (number, member) in members.iter().enumerate() {
             kinds.push(Drive::new(&airframe(number, member)?.0));
         }
         let drives: Vec<Drive<T>> = kinds.iter().copied().cycle().take(count).collect();
-        let mut batch =
-            Self::empty(&drives, fitted, members.first().map(|member| &member.vehicle), settings, whole)?;
+        let mut batch = Self::empty(
+            &drives,
+            fitted,
+            members.first().map(|member| &member.vehicle),
+            settings,
+            whole,
+        )?;
         for (number, member) in members.iter().cycle().take(count).enumerate() {
             batch.refit(number, member)?;
             batch.reset(number, &State::at_rest())?;
@@ -231,7 +245,8 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         &self.settings
     }
 
-    /// Another airframe for one vehicle; it keeps its motion, its rotors their targets, and its wings, battery and effects.
+    /// Another airframe for one vehicle; it keeps its motion, its rotors their targets, and its
+    /// wings, battery and effects.
     ///
     /// # Errors
     /// As [`Self::new`]; or there is no such vehicle.
@@ -240,8 +255,9 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         self.put(number, vehicle, &Tuning::none())
     }
 
-    /// Another vehicle in the place of one; it keeps its motion, and its rotors and servos their targets. Its battery is not
-    /// charged and its air does not change before [`Self::reset`] and [`Self::set_air`].
+    /// Another vehicle in the place of one; it keeps its motion, and its rotors and servos their
+    /// targets. Its battery is not charged and its air does not change before [`Self::reset`] and
+    /// [`Self::set_air`].
     ///
     /// # Errors
     /// As [`Self::with`]; something that the batch has no place for; no such vehicle.
@@ -258,15 +274,23 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         // It may be the first in a form of an effect that others have.
         extra.present = extra.present.or(present);
         let own = whole.parameters().wing;
-        let still = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.0 };
+        let still = ServoParameters {
+            dead_time_s: 0.0,
+            rate_max_per_s: f64::INFINITY,
+            time_constant_s: 0.0,
+        };
         let (plate, membrane, servo) = match &member.wing {
             WingPlant::Flat { wing, servo } => (Some(*wing), None, servo),
             WingPlant::Membrane { membrane, servo } => (own, Some(*membrane.parameters()), servo),
             WingPlant::None | WingPlant::Parnn { .. } => (own, None, &still),
         };
-        // Without wings in the plant there is nothing that air could push, but effects still see the declared wing.
-        let plate =
-            if self.fitted.wing == FLAT && matches!(member.wing, WingPlant::None) { None } else { plate };
+        // Without wings in the plant there is nothing that air could push, but effects still see
+        // the declared wing.
+        let plate = if self.fitted.wing == FLAT && matches!(member.wing, WingPlant::None) {
+            None
+        } else {
+            plate
+        };
         let none = flat_plate::Pair::all(0.0);
         extra.plate.put(lane, &plate.as_ref().map_or(none, flat_plate::Pair::new).map(real));
         let gain = if membrane.is_some() { 1.0 } else { 0.0 };
@@ -289,10 +313,19 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         Ok(())
     }
 
-    fn put(&mut self, number: usize, vehicle: &Vehicle<T>, tuning: &Tuning<T>) -> Result<(), BatchError> {
+    fn put(
+        &mut self,
+        number: usize,
+        vehicle: &Vehicle<T>,
+        tuning: &Tuning<T>,
+    ) -> Result<(), BatchError> {
         let p = vehicle.parameters();
         if p.rotor_count > ROTORS {
-            return Err(BatchError::Rotors { vehicle: number, rotors: p.rotor_count, places: ROTORS });
+            return Err(BatchError::Rotors {
+                vehicle: number,
+                rotors: p.rotor_count,
+                places: ROTORS,
+            });
         }
         let dt_s = self.settings.dt_s;
         for (key, tau) in [
@@ -301,7 +334,12 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         ] {
             let time_constant_s = nalgebra::try_convert(tau).unwrap_or(f64::NAN);
             if time_constant_s > 0.0 && dt_s > 2.0 * time_constant_s {
-                return Err(BatchError::TimeConstant { vehicle: number, dt_s, key, time_constant_s });
+                return Err(BatchError::TimeConstant {
+                    vehicle: number,
+                    dt_s,
+                    key,
+                    time_constant_s,
+                });
             }
         }
         let (chunk, block, lane) = place(number);

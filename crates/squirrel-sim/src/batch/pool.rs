@@ -1,8 +1,9 @@
 //! Threads that live as long as their batch.
 //!
-//! Starting a thread costs more than a step of thousands of vehicles, and so does waking one that sleeps. A thread that has
-//! run out of work therefore spins a while before it parks, and the caller takes its share of the work instead of waiting.
-//! The work lies in chunks behind a mutex each, which nobody ever waits for: a chunk is claimed by number first.
+//! Starting a thread costs more than a step of thousands of vehicles, and so does waking one that
+//! sleeps. A thread that has run out of work therefore spins a while before it parks, and the
+//! caller takes its share of the work instead of waiting. The work lies in chunks behind a mutex
+//! each, which nobody ever waits for: a chunk is claimed by number first.
 
 use std::hint::spin_loop;
 use std::io;
@@ -13,9 +14,11 @@ use std::thread::{self, JoinHandle};
 /// Stack of a thread: an optimised step needs a few kilobytes, one that is not some megabytes.
 const STACK_BYTES: usize = 16 << 20;
 
-/// Looks at the ticket before a thread parks: about a millisecond, longer than what usually happens between two steps.
+/// Looks at the ticket before a thread parks: about a millisecond, longer than what usually happens
+/// between two steps.
 const SPINS: usize = 20_000;
-/// Looks of the caller at what is left before it yields: who still holds a chunk may need this very core.
+/// Looks of the caller at what is left before it yields: who still holds a chunk may need this very
+/// core.
 const CALLER_SPINS: usize = 500;
 
 /// Chunks `C`, and threads that do jobs `J` on them.
@@ -31,8 +34,8 @@ struct Shared<C, J> {
     work: fn(&mut C, J),
     /// What to do; none to end.
     job: Mutex<Option<J>>,
-    /// Number of the job in the high half, next chunk that nobody has claimed in the low half. One number, so that a thread
-    /// that comes late cannot claim a chunk of a job that it has not read.
+    /// Number of the job in the high half, next chunk that nobody has claimed in the low half. One
+    /// number, so that a thread that comes late cannot claim a chunk of a job that it has not read.
     ticket: AtomicU64,
     /// Chunks of this job that are done.
     done: AtomicUsize,
@@ -54,8 +57,12 @@ impl<C, J: Copy> Shared<C, J> {
             if job_number(ticket) != job || chunk >= self.chunks.len() {
                 return None;
             }
-            let taken =
-                self.ticket.compare_exchange_weak(ticket, ticket + 1, Ordering::AcqRel, Ordering::Acquire);
+            let taken = self.ticket.compare_exchange_weak(
+                ticket,
+                ticket + 1,
+                Ordering::AcqRel,
+                Ordering::Acquire,
+            );
             match taken {
                 Ok(_) => return Some(chunk),
                 Err(now) => ticket = now,
@@ -118,7 +125,8 @@ impl<C: Send + 'static, J: Copy + Send + 'static> Pool<C, J> {
         let mut pool = Self { shared, threads: Vec::new() };
         for _ in 0..helpers {
             let shared = Arc::clone(&pool.shared);
-            let thread = thread::Builder::new().name("squirrel-batch".into()).stack_size(STACK_BYTES);
+            let thread =
+                thread::Builder::new().name("squirrel-batch".into()).stack_size(STACK_BYTES);
             pool.threads.push(thread.spawn(move || shared.serve())?);
         }
         Ok(pool)

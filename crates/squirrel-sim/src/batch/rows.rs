@@ -1,7 +1,7 @@
 //! How vehicles lie in memory: sixteen side by side, one row a number.
 //!
-//! The structures are those of `squirrel_core::dynamics`, each used twice: on rows, of [`BLOCK`] vehicles in memory, and on
-//! registers, of as many as one of them holds.
+//! The structures are those of `squirrel_core::dynamics`, each used twice: on rows, of [`BLOCK`]
+//! vehicles in memory, and on registers, of as many as one of them holds.
 
 use super::BODY_NUMBERS;
 use super::autopilot::Autopilots;
@@ -35,7 +35,8 @@ impl<S: Paths> Drive<S> {
         core::array::from_fn(|i| self.only(i, self.propulsion.target_speed_rad_s(command[i])))
     }
 
-    /// Speed at full command, rad/s, where a command is a part of it and there are as many rotors as places.
+    /// Speed at full command, rad/s, where a command is a part of it and there are as many rotors
+    /// as places.
     fn full_speed<const ROTORS: usize>(&self) -> Option<S> {
         let p = &self.propulsion;
         let is_part = matches!(p.command, CommandKind::SpeedFraction | CommandKind::Duty);
@@ -64,8 +65,13 @@ impl<S: Paths> Tuning<S> {
     }
 
     /// What is between a vehicle as declared and with its effects.
-    pub(super) fn between(declared: &Vehicle<f64>, altered: &Vehicle<f64>, effects: &Effects<f64>) -> Self {
-        let mut out = Self { lag_s: effects.rotor_extra_time_constant_s().map(real), ..Self::none() };
+    pub(super) fn between(
+        declared: &Vehicle<f64>,
+        altered: &Vehicle<f64>,
+        effects: &Effects<f64>,
+    ) -> Self {
+        let mut out =
+            Self { lag_s: effects.rotor_extra_time_constant_s().map(real), ..Self::none() };
         let of = |vehicle| Airframe::<f64, MAX_ROTORS>::new(vehicle, [0.0; 2]);
         let (now, before) = (of(altered), of(declared));
         let ratio = |now: f64, before: f64| real(if before == 0.0 { 1.0 } else { now / before });
@@ -87,7 +93,8 @@ pub(super) struct Block<S: Copy, const ROTORS: usize> {
     pub(super) vehicles: usize,
     /// Some rotors have no lag.
     pub(super) lagless: bool,
-    /// Speed of the rotors at full command, rad/s, where a command is a part of it and there is a rotor in every place; NaN elsewhere.
+    /// Speed of the rotors at full command, rad/s, where a command is a part of it and there is a
+    /// rotor in every place; NaN elsewhere.
     full_speed: Row<S>,
     /// It is so for every vehicle.
     commands_are_parts: bool,
@@ -100,13 +107,16 @@ pub(super) struct Block<S: Copy, const ROTORS: usize> {
 impl<S: Copy, const ROTORS: usize> Block<S, ROTORS> {
     /// Where registers begin between which all its vehicles are.
     #[inline(always)]
-    pub(super) fn starts<L: Register<Element = S>>(&self) -> impl Iterator<Item = usize> + use<L, S, ROTORS> {
+    pub(super) fn starts<L: Register<Element = S>>(
+        &self,
+    ) -> impl Iterator<Item = usize> + use<L, S, ROTORS> {
         (0..self.vehicles.div_ceil(L::WIDTH)).map(|group| group * L::WIDTH)
     }
 }
 
 impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
-    /// Columns without a vehicle: nothing moves, nothing pulls, and no number ever becomes slow or infinite.
+    /// Columns without a vehicle: nothing moves, nothing pulls, and no number ever becomes slow or
+    /// infinite.
     pub(super) fn empty() -> Self {
         let none = [<S as Lane>::of(0.0); BLOCK];
         let one = [real::<S>(1.0); BLOCK];
@@ -139,7 +149,8 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         let rows = &mut self.airframe;
         rows.put(lane, &airframe);
         self.lagless = rows.inverse_lag.as_flattened().contains(&zero);
-        self.full_speed[lane] = Drive::new(vehicle).full_speed::<ROTORS>().unwrap_or(real(f64::NAN));
+        self.full_speed[lane] =
+            Drive::new(vehicle).full_speed::<ROTORS>().unwrap_or(real(f64::NAN));
         self.commands_are_parts = self.full_speed[..self.vehicles].iter().all(S::is_finite);
         for i in p.rotor_count..ROTORS {
             self.motion.rotor_speed[i][lane] = zero;
@@ -169,7 +180,8 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         }
     }
 
-    /// Motions of the first vehicles, one after the other, as [`super::Batch::write_states`] orders them.
+    /// Motions of the first vehicles, one after the other, as [`super::Batch::write_states`] orders
+    /// them.
     pub(super) fn write_states(&self, rows: &mut [S]) {
         let motion = &self.motion;
         for (lane, row) in rows.chunks_exact_mut(BODY_NUMBERS + ROTORS).enumerate() {
@@ -182,10 +194,13 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         }
     }
 
-    /// Targets of the rotors of the first vehicles from their commands, one vehicle after the other.
+    /// Targets of the rotors of the first vehicles from their commands, one vehicle after the
+    /// other.
     pub(super) fn command(&mut self, commands: &[S], drives: &[Drive<S>]) {
-        let is_late =
-            self.extra.as_ref().is_some_and(|extra| extra.latency_steps.iter().any(|steps| *steps > 0));
+        let is_late = self
+            .extra
+            .as_ref()
+            .is_some_and(|extra| extra.latency_steps.iter().any(|steps| *steps > 0));
         if self.commands_are_parts && self.vehicles == BLOCK && !is_late {
             // What `Drive::targets` does, in an order that the compiler makes registers of.
             let (none, one) = (<S as Lane>::of(0.0), real::<S>(1.0));
@@ -199,7 +214,9 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
         for (lane, (commands, drive)) in commands.chunks_exact(ROTORS).zip(drives).enumerate() {
             let targets = drive.targets(commands);
             match &mut self.extra {
-                Some(extra) if extra.latency_steps[lane] > 0 => extra.send(lane, Command::Rotors(targets)),
+                Some(extra) if extra.latency_steps[lane] > 0 => {
+                    extra.send(lane, Command::Rotors(targets));
+                }
                 _ => put(&mut self.held.target_speed, lane, targets),
             }
         }

@@ -1,11 +1,13 @@
 //! Registers, and the one place that asks the processor what it can do.
 //!
-//! A register ([`Register`]) holds one number of each of several vehicles, or of several windows of a network. Work that is
-//! generic over it ([`Kernel`]) is run on the widest registers there are, without being compiled for one machine. All
-//! operations are rounded the same way on every path and there is no fused multiply-add, so the paths differ in speed only.
+//! A register ([`Register`]) holds one number of each of several vehicles, or of several windows of
+//! a network. Work that is generic over it ([`Kernel`]) is run on the widest registers there are,
+//! without being compiled for one machine. All operations are rounded the same way on every path
+//! and there is no fused multiply-add, so the paths differ in speed only.
 //!
-//! `unsafe` is here, because intrinsics may run only where the processor has them, and in `batch/exchange.rs`. The types of a path
-//! are private to this module and only [`Paths::run`] hands them out, and a [`Path`] that the processor lacks cannot be made.
+//! `unsafe` is here, because intrinsics may run only where the processor has them, and in
+//! `batch/exchange.rs`. The types of a path are private to this module and only [`Paths::run`]
+//! hands them out, and a [`Path`] that the processor lacks cannot be made.
 
 pub use squirrel_core::lane::{BLOCK, Register};
 
@@ -16,8 +18,8 @@ use squirrel_core::math::Real;
 pub trait Kernel<S> {
     /// What comes out; the same bits for every `L`.
     type Output;
-    /// The work. To be marked `inline(always)`, as all that it calls in its inner loops: code is compiled for the features of
-    /// the function that it ends up in.
+    /// The work. To be marked `inline(always)`, as all that it calls in its inner loops: code is
+    /// compiled for the features of the function that it ends up in.
     fn run<L: Register<Element = S>>(self) -> Self::Output;
 }
 
@@ -111,7 +113,9 @@ mod x86 {
     use super::Kernel;
     use core::arch::x86_64 as intrinsic;
     use core::ops::{Add, Div, Mul, Sub};
-    use squirrel_core::lane::{BLOCK, Lane, ROUND_F32, ROUND_F64, Register, THIRD_F32, THIRDS_F32, net_tanh};
+    use squirrel_core::lane::{
+        BLOCK, Lane, ROUND_F32, ROUND_F64, Register, THIRD_F32, THIRDS_F32, net_tanh,
+    };
 
     macro_rules! register {
         (
@@ -131,8 +135,8 @@ mod x86 {
                 fn inside<K: Kernel<$scalar>>(kernel: K) -> K::Output {
                     kernel.run::<$register>()
                 }
-                // SAFETY: only `Paths::run` calls this, with a `Path` that was made after the processor said that it has this
-                // feature.
+                // SAFETY: only `Paths::run` calls this, with a `Path` that was made after the
+                // processor said that it has this feature.
                 unsafe { inside(kernel) }
             }
 
@@ -140,7 +144,8 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn $method(self, other: Self) -> Self {
-                    // SAFETY: values of this type exist only where the processor has its instructions.
+                    // SAFETY: values of this type exist only where the processor has its
+                    // instructions.
                     Self(unsafe { intrinsic::$operation(self.0, other.0) })
                 }
             })*
@@ -149,7 +154,8 @@ mod x86 {
                 type Element = $scalar;
                 #[inline(always)]
                 fn splat(element: $scalar) -> Self {
-                    // SAFETY: called by kernels only, and those run on this type only inside of its entry.
+                    // SAFETY: called by kernels only, and those run on this type only inside of its
+                    // entry.
                     Self(unsafe { intrinsic::$splat(element) })
                 }
                 #[inline(always)]
@@ -158,8 +164,8 @@ mod x86 {
                 }
                 #[inline(always)]
                 fn lower(self, bound: Self) -> Self {
-                    // The second operand where one is NaN, as `math::lower` does.
-                    // SAFETY: values of this type exist only where the processor has its instructions.
+                    // The second operand where one is NaN, as `math::lower` does. SAFETY: values of
+                    // this type exist only where the processor has its instructions.
                     Self(unsafe { intrinsic::$lower(self.0, bound.0) })
                 }
                 #[inline(always)]
@@ -212,13 +218,15 @@ mod x86 {
                 #[inline(always)]
                 fn load(from: &[$scalar]) -> Self {
                     let from = &from[..$width];
-                    // SAFETY: the slice has as many numbers as are read, alignment is not needed; else as for `splat`.
+                    // SAFETY: the slice has as many numbers as are read, alignment is not needed;
+                    // else as for `splat`.
                     Self(unsafe { intrinsic::$load(from.as_ptr()) })
                 }
                 #[inline(always)]
                 fn store(self, to: &mut [$scalar]) {
                     let to = &mut to[..$width];
-                    // SAFETY: the slice has as many numbers as are written, alignment is not needed; else as for `lower`.
+                    // SAFETY: the slice has as many numbers as are written, alignment is not
+                    // needed; else as for `lower`.
                     unsafe { intrinsic::$store(to.as_mut_ptr(), self.0) };
                 }
             }
@@ -237,7 +245,10 @@ mod x86 {
             #[inline]
             fn $power(x: intrinsic::$register) -> intrinsic::$register {
                 let one = intrinsic::$splat((1.0 as $scalar).to_bits().cast_signed());
-                intrinsic::$from(intrinsic::$add(intrinsic::$left::<$mantissa>(intrinsic::$to(x)), one))
+                intrinsic::$from(intrinsic::$add(
+                    intrinsic::$left::<$mantissa>(intrinsic::$to(x)),
+                    one,
+                ))
             }
             #[target_feature(enable = $feature)]
             #[inline]
@@ -254,7 +265,8 @@ mod x86 {
                 let bits = intrinsic::$to(x);
                 let mantissa = intrinsic::$or(intrinsic::$and(bits, low), one);
                 let whole = intrinsic::$splat(round.to_bits().cast_signed());
-                let whole = intrinsic::$from(intrinsic::$or(whole, intrinsic::$right::<$mantissa>(bits)));
+                let whole =
+                    intrinsic::$from(intrinsic::$or(whole, intrinsic::$right::<$mantissa>(bits)));
                 (intrinsic::$from(mantissa), intrinsic::$sub(whole, intrinsic::$set(round + $bias)))
             }
         };

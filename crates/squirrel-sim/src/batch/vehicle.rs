@@ -67,7 +67,8 @@ impl Fitted {
             WingPlant::Membrane { .. } => MEMBRANE,
             WingPlant::Parnn { .. } => return Err(BatchError::Network { vehicle }),
         };
-        let stretches = member.battery.as_ref().map_or(0, |b| b.ocv_v_of_charge.len().saturating_sub(1));
+        let stretches =
+            member.battery.as_ref().map_or(0, |b| b.ocv_v_of_charge.len().saturating_sub(1));
         let present = Present::of(&member.effects);
         if let Some(effect) = present.of_sensors() {
             return Err(BatchError::Effect { vehicle, effect });
@@ -84,7 +85,11 @@ impl Fitted {
     ///
     /// # Errors
     /// What there is no place for.
-    pub(super) fn fits(&self, member: &BatchVehicle, vehicle: usize) -> Result<Present, BatchError> {
+    pub(super) fn fits(
+        &self,
+        member: &BatchVehicle,
+        vehicle: usize,
+    ) -> Result<Present, BatchError> {
         let needs = Self::one(member, vehicle)?;
         let what = if needs.wing != NONE && needs.wing != self.wing {
             Some("wing")

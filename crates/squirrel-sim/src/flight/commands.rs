@@ -17,7 +17,10 @@ pub(super) struct Command {
 impl Command {
     /// Of the flight code.
     pub(super) fn of(output: &StackOutput) -> Self {
-        Self { rotor: output.rotor_command.map(f64::from), wing: output.wing_command.map(f64::from) }
+        Self {
+            rotor: output.rotor_command.map(f64::from),
+            wing: output.wing_command.map(f64::from),
+        }
     }
 }
 
@@ -31,7 +34,11 @@ pub(super) struct CommandLine {
 impl CommandLine {
     /// * `first` - acts until the first command arrives
     pub(super) fn new(latency_s: f64, first: Command) -> Self {
-        Self { latency_us: (latency_s * 1e6).round() as u64, waiting: VecDeque::new(), acting: first }
+        Self {
+            latency_us: (latency_s * 1e6).round() as u64,
+            waiting: VecDeque::new(),
+            acting: first,
+        }
     }
 
     /// Sends a command. Times must not run backwards.
@@ -39,9 +46,13 @@ impl CommandLine {
         self.waiting.push_back((time_us.saturating_add(self.latency_us), command));
     }
 
-    /// The command that acts in the plant step from a time on: it begins to at the step nearest to its arrival.
+    /// The command that acts in the plant step from a time on: it begins to at the step nearest to
+    /// its arrival.
     pub(super) fn acting(&mut self, time_us: u64) -> Command {
-        while self.waiting.front().is_some_and(|(arrival, _)| *arrival < time_us + PLANT_STEP_US.div_ceil(2))
+        while self
+            .waiting
+            .front()
+            .is_some_and(|(arrival, _)| *arrival < time_us + PLANT_STEP_US.div_ceil(2))
         {
             if let Some((_, command)) = self.waiting.pop_front() {
                 self.acting = command;
@@ -66,7 +77,11 @@ mod tests {
             for step in 0..100u64 {
                 line.send(step * PLANT_STEP_US, command(step as f64));
                 let expected = step as f64 - f64::from(late_steps);
-                assert_eq!(line.acting(step * PLANT_STEP_US), command(expected.max(-1.0)), "{latency_s} s");
+                assert_eq!(
+                    line.acting(step * PLANT_STEP_US),
+                    command(expected.max(-1.0)),
+                    "{latency_s} s"
+                );
             }
         }
         let mut never = CommandLine::new(1e300, command(-1.0));

@@ -96,19 +96,25 @@ impl Failing {
 
     /// Whether rotors are weak now.
     pub(super) fn is_weak(&self, time_us: u64) -> bool {
-        self.active(time_us).any(|(kind, _)| matches!(kind, FaultKind::MotorWeak | FaultKind::BatterySag))
+        self.active(time_us)
+            .any(|(kind, _)| matches!(kind, FaultKind::MotorWeak | FaultKind::BatterySag))
     }
 
     /// A vehicle's effects and those of its rotors' faults; `None` where there are none.
     ///
     /// # Errors
     /// The vehicle has such an effect already, or rotors fail at different times.
-    pub(super) fn weakened(&self, effects: &Effects<f64>) -> Result<Option<Effects<f64>>, FlightError> {
+    pub(super) fn weakened(
+        &self,
+        effects: &Effects<f64>,
+    ) -> Result<Option<Effects<f64>>, FlightError> {
         let (mut effects, mut first) = (*effects, None::<FaultTable>);
         for (kind, table) in &self.faults {
             let size = table.size.unwrap_or(0.0);
             let (effect, values) = match kind {
-                FaultKind::MotorWeak => ("weak_rotor", vec![f64::from(table.which.unwrap_or(1)), size]),
+                FaultKind::MotorWeak => {
+                    ("weak_rotor", vec![f64::from(table.which.unwrap_or(1)), size])
+                }
                 FaultKind::BatterySag => ("thrust_coefficient", vec![-size]),
                 _ => continue,
             };

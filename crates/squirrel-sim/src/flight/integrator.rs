@@ -1,7 +1,7 @@
 //! What moves the body: RK4 in the open, rapier near contact; or rapier throughout.
 //!
-//! rapier's step is of first order, RK4's of fourth (the figures are in `world`), so free flight stays with RK4 unless asked
-//! otherwise. A flight with nothing solid in it never needs the world.
+//! rapier's step is of first order, RK4's of fourth (the figures are in `world`), so free flight
+//! stays with RK4 unless asked otherwise. A flight with nothing solid in it never needs the world.
 
 use super::{FlightError, Setup};
 use crate::plant::{Plant, PlantState};
@@ -31,11 +31,13 @@ impl Integrator {
     /// # Errors
     /// One line that lists the names.
     pub fn parse(name: &str) -> Result<Self, SettingError> {
-        [Self::Rk4, Self::Rapier].into_iter().find(|i| i.name() == name).ok_or_else(|| SettingError::Name {
-            field: "integrator",
-            name: name.to_owned(),
-            what: "integrator",
-            known: "rk4, rapier".to_owned(),
+        [Self::Rk4, Self::Rapier].into_iter().find(|i| i.name() == name).ok_or_else(|| {
+            SettingError::Name {
+                field: "integrator",
+                name: name.to_owned(),
+                what: "integrator",
+                known: "rk4, rapier".to_owned(),
+            }
         })
     }
 }
@@ -80,8 +82,8 @@ impl Mover {
             restitution: 0.2,
             friction: 0.6,
         };
-        let world =
-            World::new(&setup.vehicle.vehicle, &parameters).map_err(|e| FlightError(e.to_string()))?;
+        let world = World::new(&setup.vehicle.vehicle, &parameters)
+            .map_err(|e| FlightError(e.to_string()))?;
         Ok(Self { integrator: setup.integrator, world })
     }
 
@@ -119,7 +121,9 @@ pub(super) struct Mover;
 impl Mover {
     pub(super) fn new(setup: &Setup, _obstacles: &[[f64; 3]]) -> Result<Self, FlightError> {
         if setup.integrator == Integrator::Rapier || setup.scenario.solid_obstacles {
-            return Err(FlightError("this build has no world: it lacks the feature `rapier`".to_owned()));
+            return Err(FlightError(
+                "this build has no world: it lacks the feature `rapier`".to_owned(),
+            ));
         }
         Ok(Self)
     }

@@ -21,7 +21,8 @@ pub struct Metrics {
     pub rmse_m: f64,
     /// The same without height, m.
     pub rmse_horizontal_m: f64,
-    /// Root mean square of the distance to the reference by satellite fix and barometer, as they arrive, m; absent without either.
+    /// Root mean square of the distance to the reference by satellite fix and barometer, as they
+    /// arrive, m; absent without either.
     pub rmse_measured_m: Option<f64>,
     /// Largest sink below the reference height, m.
     pub height_lost_m: f64,
@@ -31,7 +32,8 @@ pub struct Metrics {
     pub wings_open_s: f64,
     /// Time in which WIIC flew, s.
     pub wiic_s: f64,
-    /// Smallest distance to the surface of an obstacle, m; negative inside; absent without obstacles.
+    /// Smallest distance to the surface of an obstacle, m; negative inside; absent without
+    /// obstacles.
     pub clearance_m: Option<f64>,
     /// Horizontal way of the whole flight until it touched something, m.
     pub path_m: f64,
@@ -51,8 +53,9 @@ pub struct Metrics {
     pub not_finite: bool,
     /// Largest tilt of the whole flight, rad.
     pub tilt_max_rad: f64,
-    /// What the flight code found not to be as it should, in the order of [`Health::NAMES`], and why its failsafe acted; from the first
-    /// of the scenario's faults on, where there is one, until it turns over or touches something.
+    /// What the flight code found not to be as it should, in the order of [`Health::NAMES`], and
+    /// why its failsafe acted; from the first of the scenario's faults on, where there is one,
+    /// until it turns over or touches something.
     #[serde(serialize_with = "names")]
     pub flags: Flags,
 }
@@ -71,8 +74,12 @@ impl Flags {
     pub fn names(self) -> Vec<String> {
         let bit = |bits: u16, i: usize| bits >> i & 1 == 1;
         let health = Health::NAMES.iter().enumerate().filter(|(i, _)| bit(self.health.0, *i));
-        let reasons = FailsafeReason::ALL.iter().filter(|reason| bit(self.reasons, **reason as usize));
-        health.map(|(_, name)| (*name).to_owned()).chain(reasons.map(|r| r.name().to_owned())).collect()
+        let reasons =
+            FailsafeReason::ALL.iter().filter(|reason| bit(self.reasons, **reason as usize));
+        health
+            .map(|(_, name)| (*name).to_owned())
+            .chain(reasons.map(|r| r.name().to_owned()))
+            .collect()
     }
 }
 
@@ -127,7 +134,8 @@ impl<'a> Meter<'a> {
             tilt_max_rad: 0.0,
             flags: Flags::default(),
         };
-        let first = scenario.faults.values().map(|fault| fault.start_s).fold(f64::INFINITY, f64::min);
+        let first =
+            scenario.faults.values().map(|fault| fault.start_s).fold(f64::INFINITY, f64::min);
         Self {
             scenario,
             from: None,
@@ -217,7 +225,8 @@ impl<'a> Meter<'a> {
     fn pass(&mut self, at: Vector2<f64>, obstacles: &mut Surroundings) {
         for (_, [north, east, radius]) in obstacles.near(at) {
             let square = (north - at.x).powi(2) + (east - at.y).powi(2);
-            let near = self.metrics.clearance_m.map_or(f64::INFINITY, |clearance| clearance + radius);
+            let near =
+                self.metrics.clearance_m.map_or(f64::INFINITY, |clearance| clearance + radius);
             if square < near.max(0.0).powi(2) {
                 self.metrics.clearance_m = Some(square.sqrt() - radius);
             }
@@ -225,7 +234,8 @@ impl<'a> Meter<'a> {
         self.way(at);
     }
 
-    /// How far it has come; a flight through a forest ends where it has come through, or has touched something.
+    /// How far it has come; a flight through a forest ends where it has come through, or has
+    /// touched something.
     fn way(&mut self, at: Vector2<f64>) {
         let [start, before] = self.from.unwrap_or([at; 2]);
         self.from = Some([start, at]);
@@ -233,8 +243,10 @@ impl<'a> Meter<'a> {
             self.metrics.path_m += (at - before).norm();
             self.metrics.displacement_m = (at - start).into();
         }
-        let come_through = |path_m| self.metrics.contact_s.is_some() || self.metrics.path_m >= path_m;
-        self.over |= self.scenario.forest.as_ref().is_some_and(|forest| come_through(forest.path_m));
+        let come_through =
+            |path_m| self.metrics.contact_s.is_some() || self.metrics.path_m >= path_m;
+        self.over |=
+            self.scenario.forest.as_ref().is_some_and(|forest| come_through(forest.path_m));
     }
 
     /// * `speed_m_s` - before it

@@ -1,8 +1,9 @@
 //! Flights: plant, sensors and flight code in closed loop.
 //!
-//! The plant steps at its own rate (1 kHz by default); the flight code runs at the first plant step at or after each
-//! 1/300 s, wind and sensors are sampled there. Everything random comes from the scenario's seed. Before the flight the flight code hears
-//! its sensors at rest for a second, as it would on the ground.
+//! The plant steps at its own rate (1 kHz by default); the flight code runs at the first plant step
+//! at or after each 1/300 s, wind and sensors are sampled there. Everything random comes from the
+//! scenario's seed. Before the flight the flight code hears its sensors at rest for a second, as it
+//! would on the ground.
 
 mod commands;
 mod failing;
@@ -117,7 +118,8 @@ impl Setup {
         self.arm
             .configure(&mut parameters.twcc, self.vehicle.weights.as_ref())
             .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
-        if let (Some(plus), Some(speed)) = (&mut parameters.twcc.plus, self.scenario.speed_max_m_s) {
+        if let (Some(plus), Some(speed)) = (&mut parameters.twcc.plus, self.scenario.speed_max_m_s)
+        {
             plus.position.speed_max_m_s = speed as f32;
         }
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
@@ -159,7 +161,8 @@ impl Setup {
         Ok(navigation)
     }
 
-    /// The scenario, and that its faults hit something of this vehicle: one that hits nothing would prove nothing.
+    /// The scenario, and that its faults hit something of this vehicle: one that hits nothing would
+    /// prove nothing.
     fn check(&self) -> Result<(), FlightError> {
         self.scenario.check().map_err(FlightError)?;
         let sensors = self.sensors();
@@ -168,11 +171,16 @@ impl Setup {
             let name = kind.name();
             let which = table.which.unwrap_or(1) as usize;
             let problem = match kind {
-                FaultKind::MotorWeak if which > rotors => format!("which = {which}: must be 1 to {rotors}"),
+                FaultKind::MotorWeak if which > rotors => {
+                    format!("which = {which}: must be 1 to {rotors}")
+                }
                 FaultKind::CompassSwung if sensors.magnetometer.is_none() => {
                     "start_s: given, but there is no magnetometer".to_owned()
                 }
-                FaultKind::ImuSpike | FaultKind::ImuStuck | FaultKind::ImuNan | FaultKind::ImuDead
+                FaultKind::ImuSpike
+                | FaultKind::ImuStuck
+                | FaultKind::ImuNan
+                | FaultKind::ImuDead
                     if which > sensors.imu.units as usize =>
                 {
                     format!("which = {which}: must be 1, there is one inertial unit")
@@ -191,8 +199,9 @@ impl Setup {
         In::new(Vector3::new(0.0, 0.0, -self.scenario.height_m))
     }
 
-    /// The vehicle as the flight code may use it: with the scenario's thrust-to-weight ratio, no rotor is asked for more than
-    /// its share. The plant keeps its rotors, so that a command means the same in every flight of the vehicle.
+    /// The vehicle as the flight code may use it: with the scenario's thrust-to-weight ratio, no
+    /// rotor is asked for more than its share. The plant keeps its rotors, so that a command means
+    /// the same in every flight of the vehicle.
     fn limited_vehicle(&self) -> Result<Vehicle<f64>, FlightError> {
         let mut p = *self.vehicle.vehicle.parameters();
         if let Some(ratio) = self.scenario.thrust_to_weight {
@@ -205,7 +214,8 @@ impl Setup {
     /// Most collective thrust that the flight code may ask for, over the weight.
     pub fn thrust_to_weight(&self) -> f64 {
         let vehicle = &self.vehicle.vehicle;
-        let rotors = vehicle.rotor_thrust_max_n() * vehicle.rotors().len() as f64 / vehicle.weight_n();
+        let rotors =
+            vehicle.rotor_thrust_max_n() * vehicle.rotors().len() as f64 / vehicle.weight_n();
         let limit = vehicle.parameters().limits.thrust_max_n / vehicle.weight_n();
         self.scenario.thrust_to_weight.unwrap_or(limit).min(rotors)
     }
@@ -228,7 +238,8 @@ impl Setup {
         self.fly_on(&mut InProcess::new(self.stack()?), None, record, progress)
     }
 
-    /// As [`Setup::fly`], with the flight code on `computer`, which has this setup's [`Setup::stack`].
+    /// As [`Setup::fly`], with the flight code on `computer`, which has this setup's
+    /// [`Setup::stack`].
     ///
     /// * `pilot` - commands instead of the flight code's outer loop
     ///
@@ -244,7 +255,8 @@ impl Setup {
         self.check()?;
         let dt_s = PLANT_STEP_US as f64 * 1e-6;
         let plant_with = |effects| {
-            let (wing, battery) = (self.arm.plant_wing(&self.vehicle.wing), self.vehicle.battery.clone());
+            let (wing, battery) =
+                (self.arm.plant_wing(&self.vehicle.wing), self.vehicle.battery.clone());
             Plant::new(self.vehicle.vehicle, effects, wing, battery, dt_s).map_err(FlightError)
         };
         let well = plant_with(self.vehicle.effects)?;
@@ -263,8 +275,8 @@ impl Setup {
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
         let mut metrics = metrics::Meter::new(&self.scenario);
-        let mut recorder =
-            record.then(|| record::Recorder::new(self, pilot.as_deref(), plant.vehicle().rotors().len()));
+        let mut recorder = record
+            .then(|| record::Recorder::new(self, pilot.as_deref(), plant.vehicle().rotors().len()));
         let hover = Command { rotor: [hover_command(plant.vehicle()); MAX_ROTORS], wing: [0.0; 2] };
         let mut commands = CommandLine::new(plant.effects().command_latency_s(), hover);
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
@@ -276,9 +288,12 @@ impl Setup {
             let time_us = step * PLANT_STEP_US;
             let plant = plant_at(&failing, time_us);
             if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
-                let through_air = state.body.velocity - total_wind(plant.acting(), &state.body, air);
+                let through_air =
+                    state.body.velocity - total_wind(plant.acting(), &state.body, air);
                 for wind in &mut winds {
-                    wind.advance((time_us - last_tick_us) as f64 * 1e-6, || through_air.vector.norm());
+                    wind.advance((time_us - last_tick_us) as f64 * 1e-6, || {
+                        through_air.vector.norm()
+                    });
                 }
                 air = velocity_of(&winds);
                 let mut truth = truth(plant, &state, air);
@@ -289,7 +304,8 @@ impl Setup {
                 failing.spoil(&mut frame);
                 frame.set_obstacles(&obstacles.seen(&state.body, believed.as_ref()));
                 if self.arm.is_given_the_force() {
-                    let as_if_spread = state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
+                    let as_if_spread =
+                        state.body.ned_from_body() * plant.wing_force(&state, air, [1.0; 2]);
                     frame.wing_force = Some(In::new(as_if_spread.vector.map(|x| x as f32)));
                 }
                 if let Some(pilot) = &mut pilot {
@@ -328,7 +344,8 @@ impl Setup {
             failing.hold(time_us, &mut command);
             let contact = mover.step(plant, &mut state, &command.rotor, command.wing, air)?;
             metrics.contact(contact, before.vector.norm());
-            // While something pushes back, an accelerometer reads the whole change of velocity less gravity.
+            // While something pushes back, an accelerometer reads the whole change of velocity less
+            // gravity.
             contact_specific_force = (contact == integrator::Contact::Touching).then(|| {
                 (state.body.velocity - before) * (1.0 / dt_s) - In::new(Vector3::z() * GRAVITY_M_S2)
             });
@@ -364,7 +381,8 @@ fn hover_command(vehicle: &Vehicle<f64>) -> f64 {
     vehicle.parameters().propulsion.command_for_thrust(share)
 }
 
-/// A frame with what the flight code believes instead of what sensors say: for who commands from outside.
+/// A frame with what the flight code believes instead of what sensors say: for who commands from
+/// outside.
 fn seen(frame: &SensorFrame, believed: Option<&NavigationTerms>) -> SensorFrame {
     let mut seen = SensorFrame::empty(frame.time_us);
     seen.set_obstacles(frame.obstacles());

@@ -1,4 +1,5 @@
-//! Who commands instead of the flight code's outer loop: an offboard computer, of which the flight code knows nothing but the commands.
+//! Who commands instead of the flight code's outer loop: an offboard computer, of which the flight
+//! code knows nothing but the commands.
 
 use super::{CONTROL_RATE_HZ, FlightError, Setup};
 use crate::track::{Track, TrackPoint};
@@ -16,7 +17,8 @@ const FOLLOW_RATE_HZ: u64 = 50;
 
 /// An offboard computer.
 pub trait Offboard {
-    /// Looks at the frame of a step of the flight code; what to fly from here on, where that changes in this step.
+    /// Looks at the frame of a step of the flight code; what to fly from here on, where that
+    /// changes in this step.
     ///
     /// * `tick` - number of the step
     fn command(&mut self, tick: u64, frame: &SensorFrame) -> Option<PilotCommand>;
@@ -64,7 +66,8 @@ impl Follower {
         let stack = setup.stack()?;
         let vehicle = stack.vehicle();
         let tilt_max_rad = vehicle.parameters().limits.tilt_max_rad;
-        let airframe = OuterAirframe::new(vehicle, stack.parameters().twcc.thrust_min_n, tilt_max_rad);
+        let airframe =
+            OuterAirframe::new(vehicle, stack.parameters().twcc.thrust_min_n, tilt_max_rad);
         Ok(Self {
             track: Track::default(),
             begin_us: 0,
@@ -93,7 +96,8 @@ impl Follower {
         self.time_us = frame.time_us;
     }
 
-    /// Motion as known from the frames so far, at the heading that the flight code takes commands to be of.
+    /// Motion as known from the frames so far, at the heading that the flight code takes commands
+    /// to be of.
     pub fn motion(&self) -> Option<MeasuredMotion> {
         let (gnss, attitude) = (self.known.gnss?, self.known.attitude?);
         let mut position = gnss.position;

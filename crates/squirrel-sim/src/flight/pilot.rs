@@ -1,7 +1,9 @@
-//! A learned policy in the loop: it sees what the flight code sees, and its answers come back as commands from outside.
+//! A learned policy in the loop: it sees what the flight code sees, and its answers come back as
+//! commands from outside.
 //!
-//! The policy is asked 50 times a second, on the last valid measurements. It follows the mission as if no obstacle were met,
-//! and knows what its lookout knows: avoiding is its own business. The flight code treats it as any offboard computer.
+//! The policy is asked 50 times a second, on the last valid measurements. It follows the mission as
+//! if no obstacle were met, and knows what its lookout knows: avoiding is its own business. The
+//! flight code treats it as any offboard computer.
 
 use super::{CONTROL_RATE_HZ, FlightError, Offboard, Setup};
 use crate::weights::PolicyWeights;

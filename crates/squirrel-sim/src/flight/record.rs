@@ -1,4 +1,5 @@
-//! Recording: what a flight of the simulator adds to the channels of its flight code, and the log's metadata.
+//! Recording: what a flight of the simulator adds to the channels of its flight code, and the log's
+//! metadata.
 
 use super::{Offboard, Setup};
 use crate::plant::PlantState;
@@ -29,7 +30,8 @@ impl Recorder {
         let mut log = FlightLog::default();
         let scenario = &setup.scenario;
         let vehicle = setup.vehicle.vehicle.parameters();
-        let obstacles: Vec<String> = scenario.all_obstacles().iter().map(|o| format!("{o:?}")).collect();
+        let obstacles: Vec<String> =
+            scenario.all_obstacles().iter().map(|o| format!("{o:?}")).collect();
         let thrust_max_n = setup.thrust_to_weight() * setup.vehicle.vehicle.weight_n();
         for (key, value) in [
             ("format", FORMAT.to_owned()),
@@ -51,7 +53,8 @@ impl Recorder {
             log.metadata.insert(PARNN_WEIGHTS.to_owned(), weights.to_hex());
         }
         if let Some(pilot) = pilot {
-            log.metadata.extend(pilot.facts().into_iter().map(|(key, value)| (key.to_owned(), value)));
+            log.metadata
+                .extend(pilot.facts().into_iter().map(|(key, value)| (key.to_owned(), value)));
         }
         let estimates = setup.vehicle.estimator.is_filter();
         Self { log, rotors, effects: setup.vehicle.effects, inputs: Inputs::new(estimates) }
@@ -81,7 +84,8 @@ impl Recorder {
         self.plant(t, state, air, wing_force);
     }
 
-    /// What an offboard computer follows, where that is not the mission, and what it believes besides.
+    /// What an offboard computer follows, where that is not the mission, and what it believes
+    /// besides.
     pub(super) fn followed(
         &mut self,
         time_us: u64,
@@ -93,7 +97,8 @@ impl Recorder {
             record_reference(&mut self.log, FOLLOWED, t, reference);
         }
         let vectors = pilot.map(Offboard::believed).unwrap_or_default();
-        let rows: Vec<(&str, &[f64])> = vectors.iter().map(|(name, v)| (*name, v.as_slice())).collect();
+        let rows: Vec<(&str, &[f64])> =
+            vectors.iter().map(|(name, v)| (*name, v.as_slice())).collect();
         if !rows.is_empty() {
             self.log.source_mut(BELIEVED).push(t, &rows);
         }

@@ -1,4 +1,5 @@
-//! Obstacles of a flight: a forest has thousands of which a few are near, and who is asked three hundred times a second looks at those.
+//! Obstacles of a flight: a forest has thousands of which a few are near, and who is asked three
+//! hundred times a second looks at those.
 
 use squirrel_core::dynamics::State;
 use squirrel_core::estimate::navigator::NavigationTerms;
@@ -38,19 +39,25 @@ impl Surroundings {
     pub(super) fn near(&mut self, place: Vector2<f64>) -> impl Iterator<Item = (usize, &[f64; 3])> {
         if self.place.is_none_or(|before| !((place - before).norm() < STALE_M)) {
             let reach_m = HORIZON_M + STALE_M;
-            let is_near =
-                |obstacle: &[f64; 3]| self.all.len() <= FEW || apart(obstacle, place) < reach_m * reach_m;
+            let is_near = |obstacle: &[f64; 3]| {
+                self.all.len() <= FEW || apart(obstacle, place) < reach_m * reach_m
+            };
             self.near = (0..self.all.len()).filter(|i| is_near(&self.all[*i])).collect();
             self.place = Some(place);
         }
         self.near.iter().map(|i| (*i, &self.all[*i]))
     }
 
-    /// The nearest ones where the flight code takes them to be: it sees them from where it is, and knows that as well as it knows its own
-    /// place.
-    pub(super) fn seen(&mut self, body: &State<f64>, believed: Option<&NavigationTerms>) -> Vec<Obstacle> {
+    /// The nearest ones where the flight code takes them to be: it sees them from where it is, and
+    /// knows that as well as it knows its own place.
+    pub(super) fn seen(
+        &mut self,
+        body: &State<f64>,
+        believed: Option<&NavigationTerms>,
+    ) -> Vec<Obstacle> {
         let at = body.position.vector;
-        let off = believed.map_or(Vector3::zeros(), |terms| terms.position.vector.cast::<f64>() - at);
+        let off =
+            believed.map_or(Vector3::zeros(), |terms| terms.position.vector.cast::<f64>() - at);
         let mut near: Vec<(f64, usize)> = self
             .near(at.xy())
             .map(|(i, obstacle)| (apart(obstacle, at.xy()), i))
@@ -61,7 +68,11 @@ impl Surroundings {
         near.iter()
             .map(|(_, i)| {
                 let [north, east, _] = self.all[*i];
-                Obstacle { id: *i as u32, north_m: (north + off.x) as f32, east_m: (east + off.y) as f32 }
+                Obstacle {
+                    id: *i as u32,
+                    north_m: (north + off.x) as f32,
+                    east_m: (east + off.y) as f32,
+                }
             })
             .collect()
     }

@@ -1,6 +1,7 @@
 //! The numbers of a battery; its equations are [`squirrel_core::dynamics::battery`].
 //!
-//! The simulator always computes the voltage; thrust feels it only through the `battery_sag` effect.
+//! The simulator always computes the voltage; thrust feels it only through the `battery_sag`
+//! effect.
 
 use crate::setting::SettingError;
 use squirrel_core::dynamics::battery::{self, Pack, Stretch};
@@ -41,7 +42,11 @@ impl BatteryParameters {
         ];
         for (key, x) in positive {
             if !(x.is_finite() && x > 0.0) {
-                return Err(SettingError::value(format!("battery.{key}"), x, "must be finite and > 0"));
+                return Err(SettingError::value(
+                    format!("battery.{key}"),
+                    x,
+                    "must be finite and > 0",
+                ));
             }
         }
         if self.efficiency > 1.0 {
@@ -60,7 +65,11 @@ impl BatteryParameters {
             |[charge, volt]: &[f64; 2]| (0.0..=1.0).contains(charge) && (0.5..=6.0).contains(volt);
         if table.len() < 2 || !rising || !table.iter().all(plausible) {
             let reason = "must be at least two rising pairs [charge 0..1, cell volt 0.5..6]";
-            return Err(SettingError::value("battery.ocv_v_of_charge", format!("{table:?}"), reason));
+            return Err(SettingError::value(
+                "battery.ocv_v_of_charge",
+                format!("{table:?}"),
+                reason,
+            ));
         }
         Ok(())
     }
@@ -69,7 +78,12 @@ impl BatteryParameters {
     ///
     /// * `charge` - 0..1
     pub fn rested(&self, charge: f64) -> BatteryState {
-        BatteryState { charge, rc_voltage_v: 0.0, voltage_v: self.open_circuit_v(charge), current_a: 0.0 }
+        BatteryState {
+            charge,
+            rc_voltage_v: 0.0,
+            voltage_v: self.open_circuit_v(charge),
+            current_a: 0.0,
+        }
     }
 
     /// What does not change in steps of a length, s.

@@ -1,8 +1,10 @@
 //! How the motion after a step changes with the motion before it, by dual numbers.
 //!
-//! The step of [`Plant::step`] on lanes that carry derivatives by position, attitude, velocity and rate, twelve in all. An attitude
-//! changes by a rotation vector in the body frame: `q <- q (1, delta / 2)`. Rotor speeds, membranes, servos, battery and load are
-//! what they are; what of them depends on the motion within the step, as the rate of the angle of attack does, is followed.
+//! The step of [`Plant::step`] on lanes that carry derivatives by position, attitude, velocity and
+//! rate, twelve in all. An attitude changes by a rotation vector in the body frame:
+//! `q <- q (1, delta / 2)`. Rotor speeds, membranes, servos, battery and load are what they are;
+//! what of them depends on the motion within the step, as the rate of the angle of attack does, is
+//! followed.
 
 use super::{Plant, PlantState, WingPlant};
 use squirrel_core::aero::flat_plate;
@@ -27,7 +29,8 @@ type Variable = Dual<VARIABLES>;
 pub type Jacobian = SMatrix<f64, VARIABLES, VARIABLES>;
 
 impl Plant {
-    /// Derivatives of the motion after a step by the motion before it; `None` where the wings are a network.
+    /// Derivatives of the motion after a step by the motion before it; `None` where the wings are a
+    /// network.
     ///
     /// * arguments as in [`Self::step`], which moves the state; this does not
     pub fn jacobian(
@@ -99,7 +102,9 @@ impl Plant {
         }
         let stages = runge_kutta(constant(self.dt_s()));
         let (after, _) = match self.wing {
-            WingPlant::None => whole::step::<_, ROTORS, 4, NONE, true>(&vehicle, &stages, &before, &sides),
+            WingPlant::None => {
+                whole::step::<_, ROTORS, 4, NONE, true>(&vehicle, &stages, &before, &sides)
+            }
             WingPlant::Flat { .. } => {
                 whole::step::<_, ROTORS, 4, FLAT, true>(&vehicle, &stages, &before, &sides)
             }
@@ -118,8 +123,9 @@ fn along(q: Quaternion<f64>, axis: usize) -> Quaternion<f64> {
 
 /// A motion whose derivatives by itself are one.
 fn variables<const ROTORS: usize>(motion: &Motion<f64, ROTORS>) -> Motion<Variable, ROTORS> {
-    let three =
-        |numbers: [f64; 3], from: usize| [0, 1, 2].map(|axis| Variable::variable(numbers[axis], from + axis));
+    let three = |numbers: [f64; 3], from: usize| {
+        [0, 1, 2].map(|axis| Variable::variable(numbers[axis], from + axis))
+    };
     let [w, x, y, z] = motion.attitude;
     let mut attitude = motion.attitude.map(Variable::constant);
     for axis in 0..3 {

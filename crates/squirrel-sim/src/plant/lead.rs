@@ -1,12 +1,14 @@
 //! The plant led along a measured motion: what it says there, without integrating the rigid body.
 //!
-//! A residual of a flight compares what sensors measured with what the model says at the measured motion. Only what is not
-//! measured moves by itself here: rotors and wing servos by their exact solutions, the membrane by RK4 in steps that its own
-//! time constants allow. A call costs less than one RK4 step and may span any time.
+//! A residual of a flight compares what sensors measured with what the model says at the measured
+//! motion. Only what is not measured moves by itself here: rotors and wing servos by their exact
+//! solutions, the membrane by RK4 in steps that its own time constants allow. A call costs less
+//! than one RK4 step and may span any time.
 //!
-//! A slung load swings with the vehicle's acceleration, which is taken from successive measured velocities: their difference
-//! is the mean acceleration that the load of the flying plant felt too, so that a perfect log gives the same swing, while
-//! the model's own prediction would feed each of its errors to the load. It is known when the next motion arrives.
+//! A slung load swings with the vehicle's acceleration, which is taken from successive measured
+//! velocities: their difference is the mean acceleration that the load of the flying plant felt
+//! too, so that a perfect log gives the same swing, while the model's own prediction would feed
+//! each of its errors to the load. It is known when the next motion arrives.
 
 use super::{Membrane, Plant, PlantState, ServoState, WingPlant};
 use squirrel_core::aero::Air;
@@ -26,8 +28,8 @@ pub struct Led {
     pub angular_acceleration: In<Body, f64>,
 }
 
-/// Rotors and wing servos at one moment of a led flight: what depends on commands, voltage and their lags alone, so that
-/// plants which share those can be led along the same ones.
+/// Rotors and wing servos at one moment of a led flight: what depends on commands, voltage and
+/// their lags alone, so that plants which share those can be led along the same ones.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Actuators {
     rotor_speed_rad_s: PerRotor<f64>,
@@ -44,11 +46,12 @@ impl Actuators {
 }
 
 impl Plant {
-    /// What the plant says at a measured motion, in air that moves only by effects; then moves on what is not measured
-    /// (rotors, wing servos, membrane, slung load) under held commands. The battery is not stepped: its voltage is measured.
+    /// What the plant says at a measured motion, in air that moves only by effects; then moves on
+    /// what is not measured (rotors, wing servos, membrane, slung load) under held commands. The
+    /// battery is not stepped: its voltage is measured.
     ///
-    /// Of the effects on sensors only those on the accelerometer are in the answer; command latency, clocks and the other
-    /// sensors belong to whoever reads the measurements.
+    /// Of the effects on sensors only those on the accelerometer are in the answer; command
+    /// latency, clocks and the other sensors belong to whoever reads the measurements.
     ///
     /// * `motion` - measured; its rotor speeds are not looked at
     /// * `rotor_command` - in the vehicle's unit; `wing_command` - left, right, 0..1
@@ -111,7 +114,8 @@ impl Plant {
         }
     }
 
-    /// Puts a state into a measured motion with actuators as they are there; a slung load has swung until then.
+    /// Puts a state into a measured motion with actuators as they are there; a slung load has swung
+    /// until then.
     pub fn meet(&self, state: &mut PlantState, motion: &State<f64>, actuators: &Actuators) {
         if let Some(load) = &self.load
             && state.led_s > 0.0
@@ -136,7 +140,11 @@ impl Plant {
         Led {
             wrench,
             specific_force,
-            angular_acceleration: dynamics::angular_acceleration(&self.vehicle, state.body.omega, &wrench),
+            angular_acceleration: dynamics::angular_acceleration(
+                &self.vehicle,
+                state.body.omega,
+                &wrench,
+            ),
         }
     }
 
@@ -154,13 +162,16 @@ impl Plant {
 
     /// Lets time pass until the next motion: what is neither measured nor an actuator moves on.
     ///
-    /// * `deployment` - of the wings, left and right, at the beginning and the end; `None` if they are folded and stay so for
-    ///   longer than [`Self::wing_memory_s`], which saves most of the time
+    /// * `deployment` - of the wings, left and right, at the beginning and the end; `None` if they
+    ///   are folded and stay so for longer than [`Self::wing_memory_s`], which saves most of the
+    ///   time
     pub fn pass(&self, state: &mut PlantState, deployment: Option<[[f64; 2]; 2]>, dt_s: f64) {
         state.led_s = dt_s;
         state.time_s += dt_s;
         let Some([before, after]) = deployment.filter(|_| dt_s > 0.0) else { return };
-        let air = || dynamics::air(&state.body, dynamics::total_wind(&self.acting, &state.body, In::zero()));
+        let air = || {
+            dynamics::air(&state.body, dynamics::total_wind(&self.acting, &state.body, In::zero()))
+        };
         match &self.wing {
             WingPlant::None | WingPlant::Flat { .. } => {}
             WingPlant::Membrane { membrane, .. } => {
@@ -184,7 +195,8 @@ impl Plant {
         dt_s: f64,
     ) {
         state.turn_wings(membrane.angle_of_attack(air), dt_s);
-        // A quarter of the shortest lag is far inside what RK4 follows; after many of the longest the wing has settled.
+        // A quarter of the shortest lag is far inside what RK4 follows; after many of the longest
+        // the wing has settled.
         let span_s = dt_s.min(self.wing_memory_s());
         let steps = (4.0 * span_s / membrane.parameters().camber_time_constant_s).ceil();
         for _ in 0..steps as usize {
@@ -227,7 +239,8 @@ mod tests {
         (rotor, if (step / 200).is_multiple_of(2) { [1.0, 0.8] } else { [0.0, 0.1] })
     }
 
-    /// Largest difference of force, N, and moment, N m, between a plant that steps and one led along it.
+    /// Largest difference of force, N, and moment, N m, between a plant that steps and one led
+    /// along it.
     fn worst(plant: &Plant, stride: usize) -> (f64, f64) {
         let mut start = State::at_rest();
         start.velocity = In::new(Vector3::new(5.0, 1.0, 0.5));
@@ -248,15 +261,22 @@ mod tests {
                     STEP_S * stride as f64,
                 );
                 let (mut was, mut copy) = (Wrench::zero(), truth);
-                let Ok(()) = plant.step_with::<Infallible>(&mut copy, &rotor, wing, In::zero(), |body, w| {
-                    was = *w;
-                    Ok(*body)
-                });
+                let Ok(()) = plant.step_with::<Infallible>(
+                    &mut copy,
+                    &rotor,
+                    wing,
+                    In::zero(),
+                    |body, w| {
+                        was = *w;
+                        Ok(*body)
+                    },
+                );
                 force = force.max((led.wrench.force - was.force).vector.norm());
                 moment = moment.max((led.wrench.moment - was.moment).vector.norm());
                 let rate = plant.vehicle().inertia_inverse() * led.wrench.moment.vector;
                 let spin = plant.vehicle().parameters().inertia_kg_m2 * truth.body.omega.vector;
-                let gyroscopic = plant.vehicle().inertia_inverse() * truth.body.omega.vector.cross(&spin);
+                let gyroscopic =
+                    plant.vehicle().inertia_inverse() * truth.body.omega.vector.cross(&spin);
                 assert!((led.angular_acceleration.vector - (rate - gyroscopic)).norm() < 1e-9);
             }
             plant.step(&mut truth, &rotor, wing, In::zero());
@@ -270,7 +290,8 @@ mod tests {
             for model in ["none", "flat"] {
                 for stride in [1, 8, 40] {
                     let (force, moment) = worst(&plant(model, effects), stride);
-                    // Over several steps the load has felt their mean acceleration, and wings their mean lag.
+                    // Over several steps the load has felt their mean acceleration, and wings their
+                    // mean lag.
                     let force_max = if stride == 1 || effects.is_empty() { 1e-9 } else { 2e-3 };
                     assert!(force < force_max, "{model}, {stride}: {force:e} N");
                     assert!(moment < 1e-9, "{model}, {stride}: {moment:e} N m");

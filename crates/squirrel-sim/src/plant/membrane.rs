@@ -1,4 +1,5 @@
-//! The simulator's wings: a checked pair of membranes, whose equations are [`squirrel_core::aero::membrane`].
+//! The simulator's wings: a checked pair of membranes, whose equations are
+//! [`squirrel_core::aero::membrane`].
 //!
 //! Left and right are evaluated as one register, so that they share each instruction.
 
@@ -20,7 +21,8 @@ use squirrel_core::vehicle::ParameterError;
 /// Left and right.
 type Pair = Portable<f64, 2>;
 
-/// Memory of the wings, `[left, right]`; as a rate, the derivative of each number per second. See [`Side`].
+/// Memory of the wings, `[left, right]`; as a rate, the derivative of each number per second. See
+/// [`Side`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MembraneState {
     /// Elastic camber over chord, positive where the load comes from the belly.
@@ -86,18 +88,20 @@ impl Membrane {
         &self.parameters
     }
 
-    /// Angle of attack of each side, `[left, right]`, rad, in [-pi/2, pi/2], positive where the air hits the belly; 0 below
-    /// 0.3 m/s. Its difference over a step is the rate that [`Self::evaluate`] takes.
+    /// Angle of attack of each side, `[left, right]`, rad, in [-pi/2, pi/2], positive where the air
+    /// hits the belly; 0 below 0.3 m/s. Its difference over a step is the rate that
+    /// [`Self::evaluate`] takes.
     pub fn angle_of_attack(&self, air: &Air<f64>) -> [f64; 2] {
         angle_of_attack(&both(air), self.lateral()).0
     }
 
     /// Wrench of both wings about the centre of mass, and the rates of their state.
     ///
-    /// Force and moment scale with deployment; the state evolves as if spread. Finite for any finite state and airspeeds
-    /// up to 1e6 m/s; exactly no force without airspeed.
+    /// Force and moment scale with deployment; the state evolves as if spread. Finite for any
+    /// finite state and airspeeds up to 1e6 m/s; exactly no force without airspeed.
     ///
-    /// * `angle_rate_rad_s` - rate of the angle of attack of each side, rad/s, held over a step; limited to 20
+    /// * `angle_rate_rad_s` - rate of the angle of attack of each side, rad/s, held over a step;
+    ///   limited to 20
     /// * `deployment` - 0 folded to 1 spread, each side
     #[inline(always)]
     pub fn evaluate(
@@ -110,7 +114,8 @@ impl Membrane {
         let (rate, deployment) = (Portable(angle_rate_rad_s), Portable(deployment));
         let ([force, moment], rates) =
             self.numbers.evaluate(&both(air), self.lateral(), rate, deployment, &state.sides());
-        let sum = |[x, y, z]: [Pair; 3]| In::new(Vector3::new(x, y, z).map(|Portable([l, r])| l + r));
+        let sum =
+            |[x, y, z]: [Pair; 3]| In::new(Vector3::new(x, y, z).map(|Portable([l, r])| l + r));
         (Wrench { force: sum(force), moment: sum(moment) }, rates.into())
     }
 
@@ -125,7 +130,11 @@ impl Membrane {
 #[inline(always)]
 fn both(air: &Air<f64>) -> Airflow<Pair> {
     let Airflow { velocity, speed, omega } = Airflow::from(air);
-    Airflow { velocity: velocity.map(Pair::splat), speed: Pair::splat(speed), omega: omega.map(Pair::splat) }
+    Airflow {
+        velocity: velocity.map(Pair::splat),
+        speed: Pair::splat(speed),
+        omega: omega.map(Pair::splat),
+    }
 }
 
 impl MembraneParameters {

@@ -1,7 +1,8 @@
 //! The plant: what really flies. Rigid body and rotors by RK4, wings, battery, servos, wind. f64.
 //!
-//! One step holds the commands, the battery voltage, the wind and the pull of a slung load, and integrates rigid body, rotor
-//! speeds and membrane together by RK4. Battery, servos, load and wind are stepped exactly beside it.
+//! One step holds the commands, the battery voltage, the wind and the pull of a slung load, and
+//! integrates rigid body, rotor speeds and membrane together by RK4. Battery, servos, load and wind
+//! are stepped exactly beside it.
 
 mod battery;
 mod jacobian;
@@ -146,7 +147,8 @@ impl VectorSpace<f64> for Moving {
 
 impl Plant {
     /// # Errors
-    /// A step that is not positive, or longer than twice a rotor time constant, which RK4 could not follow.
+    /// A step that is not positive, or longer than twice a rotor time constant, which RK4 could not
+    /// follow.
     pub fn new(
         vehicle: Vehicle<f64>,
         effects: Effects<f64>,
@@ -170,7 +172,8 @@ impl Plant {
             }
         }
         let vehicle = effects.alter(&vehicle).map_err(|e| format!("with effects, {e}"))?;
-        let servo = wing.servo().map(|servo| servo.over(effects.wing_extra_time_constant_s(), dt_s));
+        let servo =
+            wing.servo().map(|servo| servo.over(effects.wing_extra_time_constant_s(), dt_s));
         let load = effects.pendulum();
         let swing = load.map(|load| load.over(dt_s));
         let battery = battery.map(|battery| {
@@ -229,7 +232,8 @@ impl Plant {
 
     /// One step by RK4.
     ///
-    /// * `rotor_command` - in the vehicle's unit; `wing_command` - left, right, 0..1; `wind` - m/s; all held
+    /// * `rotor_command` - in the vehicle's unit; `wing_command` - left, right, 0..1; `wind` - m/s;
+    ///   all held
     pub fn step(
         &self,
         state: &mut PlantState,
@@ -241,8 +245,9 @@ impl Plant {
         self.advance(state, wing_command, wind, |next| next);
     }
 
-    /// One step in which another integrator moves the rigid body: rotors and wings as in [`Self::step`], while `body` gets
-    /// the wrench without gravity at the start of the step and gives the new body. Its rotor speeds are not looked at.
+    /// One step in which another integrator moves the rigid body: rotors and wings as in
+    /// [`Self::step`], while `body` gets the wrench without gravity at the start of the step and
+    /// gives the new body. Its rotor speeds are not looked at.
     ///
     /// # Errors
     /// What `body` says.
@@ -264,7 +269,8 @@ impl Plant {
         Ok(())
     }
 
-    /// The same plant whose rotor commands are speeds, rad/s, that its rotors have at once: they were measured.
+    /// The same plant whose rotor commands are speeds, rad/s, that its rotors have at once: they
+    /// were measured.
     #[must_use]
     pub fn told_rotor_speeds(mut self) -> Self {
         self.rotor_speeds = true;
@@ -272,7 +278,11 @@ impl Plant {
     }
 
     /// What a command asks of the rotors at a battery's voltage.
-    pub fn rotor_drive(&self, rotor_command: &PerRotor<f64>, battery_voltage_v: f64) -> RotorDrive<f64> {
+    pub fn rotor_drive(
+        &self,
+        rotor_command: &PerRotor<f64>,
+        battery_voltage_v: f64,
+    ) -> RotorDrive<f64> {
         if self.rotor_speeds {
             RotorDrive::holding(*rotor_command)
         } else {
@@ -305,7 +315,9 @@ impl Plant {
         let next = match &self.wing {
             WingPlant::None => {
                 let held = self.held(state, wind, [0.0; 2]);
-                rk4(before, dt, |s| dynamics::derivative(vehicle, effects, s, &held, |_| Wrench::zero()))
+                rk4(before, dt, |s| {
+                    dynamics::derivative(vehicle, effects, s, &held, |_| Wrench::zero())
+                })
             }
             WingPlant::Flat { wing, .. } => {
                 let deployment = self.deploy(state, wing_command);
@@ -325,7 +337,8 @@ impl Plant {
                 let moved = rk4(Moving { body: before, membrane: state.membrane }, dt, |s| {
                     let mut membrane_rate = s.membrane;
                     let body = dynamics::derivative(vehicle, effects, &s.body, &held, |air| {
-                        let (wrench, change) = membrane.evaluate(air, rate, deployment, &s.membrane);
+                        let (wrench, change) =
+                            membrane.evaluate(air, rate, deployment, &s.membrane);
                         membrane_rate = change;
                         wrench
                     });
@@ -377,7 +390,12 @@ impl Plant {
     }
 
     /// Wrench of the wings alone at a deployment, left and right.
-    fn wing_wrench(&self, state: &PlantState, air: &Air<f64>, deployment: [f64; 2]) -> Wrench<Body, f64> {
+    fn wing_wrench(
+        &self,
+        state: &PlantState,
+        air: &Air<f64>,
+        deployment: [f64; 2],
+    ) -> Wrench<Body, f64> {
         match &self.wing {
             WingPlant::None => Wrench::zero(),
             WingPlant::Flat { wing, .. } => flat_plate::wing_pair(wing, air, deployment),
@@ -397,8 +415,14 @@ impl Plant {
         })
     }
 
-    /// Force of the wings at a deployment, left and right, N: [`PlantState::deployment`] for now, 1 for as if spread.
-    pub fn wing_force(&self, state: &PlantState, wind: In<Ned, f64>, deployment: [f64; 2]) -> In<Body, f64> {
+    /// Force of the wings at a deployment, left and right, N: [`PlantState::deployment`] for now, 1
+    /// for as if spread.
+    pub fn wing_force(
+        &self,
+        state: &PlantState,
+        wind: In<Ned, f64>,
+        deployment: [f64; 2],
+    ) -> In<Body, f64> {
         let air = dynamics::air(&state.body, dynamics::total_wind(&self.acting, &state.body, wind));
         self.wing_wrench(state, &air, deployment).force
     }

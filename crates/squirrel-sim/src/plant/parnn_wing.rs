@@ -1,9 +1,11 @@
-//! The paper's network as the truth about the wings: its "simulation mode", in which plant and controller agree.
+//! The paper's network as the truth about the wings: its "simulation mode", in which plant and
+//! controller agree.
 //!
-//! Ten times a second the network sees the motion through the air and says its correction; in between the correction is held,
-//! and the corrected flat plate follows the air at once (docs/equations.md E.2). There is no guard: the network's word is the
-//! truth here. Before its window is full the wing is the flat plate. Forces are the `f32` of the flight code, so that where
-//! both see the same they say the same, bit for bit.
+//! Ten times a second the network sees the motion through the air and says its correction; in
+//! between the correction is held, and the corrected flat plate follows the air at once
+//! (docs/equations.md E.2). There is no guard: the network's word is the truth here. Before its
+//! window is full the wing is the flat plate. Forces are the `f32` of the flight code, so that
+//! where both see the same they say the same, bit for bit.
 
 use squirrel_core::aero::Air;
 use squirrel_core::frames::{Body, In, Wrench};
@@ -70,7 +72,8 @@ impl ParnnWing {
         }
     }
 
-    /// Force and moment in this air at a deployment, left and right, 0..1. Each side carries half of the force.
+    /// Force and moment in this air at a deployment, left and right, 0..1. Each side carries half
+    /// of the force.
     #[inline(always)]
     pub(super) fn wrench(
         &self,
@@ -169,7 +172,10 @@ mod tests {
             let air = Air::new(In::new(Vector3::new(x, -x, x)), In::zero());
             wing.pass(&mut state, &air, 2.0);
             let wrench = wing.wrench(&state, &air, [1.0, 0.3]);
-            assert!(wrench.force.vector.iter().chain(&wrench.moment.vector).all(|f| f.is_finite()), "{x}");
+            assert!(
+                wrench.force.vector.iter().chain(&wrench.moment.vector).all(|f| f.is_finite()),
+                "{x}"
+            );
         }
     }
 }

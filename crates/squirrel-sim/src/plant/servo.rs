@@ -20,10 +20,18 @@ pub type ServoState = servo::ServoState<f64>;
 impl ServoParameters {
     pub(crate) fn check(&self) -> Result<(), SettingError> {
         if !(0.0..=1.0).contains(&self.dead_time_s) {
-            return Err(SettingError::value("wing.dead_time_s", self.dead_time_s, "must be 0 to 1"));
+            return Err(SettingError::value(
+                "wing.dead_time_s",
+                self.dead_time_s,
+                "must be 0 to 1",
+            ));
         }
         if !(self.rate_max_per_s > 0.0) {
-            return Err(SettingError::value("wing.rate_max_per_s", self.rate_max_per_s, "must be > 0"));
+            return Err(SettingError::value(
+                "wing.rate_max_per_s",
+                self.rate_max_per_s,
+                "must be > 0",
+            ));
         }
         Ok(())
     }
@@ -33,7 +41,8 @@ impl ServoParameters {
     /// * `extra_s` - added to the time constant, opening and closing
     pub fn over(&self, extra_s: [f64; 2], dt_s: f64) -> Servo<f64> {
         // An effect may take away more than there is; what is left is then no lag.
-        let [opening_s, closing_s] = extra_s.map(|extra| (self.time_constant_s + extra).max(SHORTEST_S));
+        let [opening_s, closing_s] =
+            extra_s.map(|extra| (self.time_constant_s + extra).max(SHORTEST_S));
         let keep = |tau: f64| (-dt_s / tau).exp();
         Servo {
             dead_time_s: self.dead_time_s,
@@ -69,25 +78,35 @@ mod tests {
 
     #[test]
     fn dead_time_rate_and_lag_each_cost_their_time() {
-        let free = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.03 };
+        let free = ServoParameters {
+            dead_time_s: 0.0,
+            rate_max_per_s: f64::INFINITY,
+            time_constant_s: 0.03,
+        };
         assert!((opening_time(&free, 1.0 - (-1.0_f64).exp()) - 0.03).abs() < 2e-3);
         let late = ServoParameters { dead_time_s: 0.02, ..free };
         assert!((opening_time(&late, 0.5) - opening_time(&free, 0.5) - 0.02).abs() < 1.5e-3);
         let slow = ServoParameters { rate_max_per_s: 5.0, ..free };
-        assert!((opening_time(&slow, 0.8) - 0.16).abs() < 0.02, "0.8 of the stroke at 5 per second");
+        assert!(
+            (opening_time(&slow, 0.8) - 0.16).abs() < 0.02,
+            "0.8 of the stroke at 5 per second"
+        );
     }
 
-    /// Dead time, rate limit and lag end inside steps; where a servo gets to does not depend on them.
+    /// Dead time, rate limit and lag end inside steps; where a servo gets to does not depend on
+    /// them.
     #[test]
     fn long_and_short_steps_end_at_the_same_place() {
-        let servo = ServoParameters { dead_time_s: 0.021, rate_max_per_s: 6.0, time_constant_s: 0.03 };
+        let servo =
+            ServoParameters { dead_time_s: 0.021, rate_max_per_s: 6.0, time_constant_s: 0.03 };
         let after = |steps: u32, command: f64, mut state: ServoState| {
             let dt_s = 0.21 / f64::from(steps);
             let servo = servo.over([0.0; 2], dt_s);
             (0..steps).for_each(|_| lead(&servo, &mut state, command, dt_s));
             state
         };
-        let (long, short) = (after(1, 1.0, ServoState::at_rest()), after(999, 1.0, ServoState::at_rest()));
+        let (long, short) =
+            (after(1, 1.0, ServoState::at_rest()), after(999, 1.0, ServoState::at_rest()));
         // 21 ms dead, 0.82 at 6 per second, then the lag.
         let by_hand = 1.0 - 0.18 * (-(0.21 - 0.021 - 0.82 / 6.0) / 0.03_f64).exp();
         assert!((long.deployment - by_hand).abs() < 1e-12, "{} for {by_hand}", long.deployment);
@@ -98,7 +117,11 @@ mod tests {
 
     #[test]
     fn opening_and_closing_may_lag_differently() {
-        let servo = ServoParameters { dead_time_s: 0.0, rate_max_per_s: f64::INFINITY, time_constant_s: 0.1 };
+        let servo = ServoParameters {
+            dead_time_s: 0.0,
+            rate_max_per_s: f64::INFINITY,
+            time_constant_s: 0.1,
+        };
         let servo = servo.over([0.1, 0.3], 0.2);
         let mut state = ServoState::at_rest();
         lead(&servo, &mut state, 1.0, 0.2);
@@ -110,7 +133,8 @@ mod tests {
 
     #[test]
     fn deployment_stays_between_folded_and_spread() {
-        let servo = ServoParameters { dead_time_s: 0.01, rate_max_per_s: 50.0, time_constant_s: 0.01 };
+        let servo =
+            ServoParameters { dead_time_s: 0.01, rate_max_per_s: 50.0, time_constant_s: 0.01 };
         let mut state = ServoState::at_rest();
         let servo = servo.over([0.0; 2], 1e-3);
         let (mut least, mut most) = (1.0_f64, 0.0_f64);

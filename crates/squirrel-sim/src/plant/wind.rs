@@ -1,8 +1,9 @@
 //! Moving air: a steady part and gusts.
 //!
-//! Gusts are a Gauss-Markov process per axis (`u' = -u / tau + noise`, discretised exactly), or the Dryden spectra with
-//! their scale length: longitudinal first order, lateral and vertical second order (MIL-F-8785C form), with the
-//! longitudinal axis along north. Both have the stated standard deviation whatever the step.
+//! Gusts are a Gauss-Markov process per axis (`u' = -u / tau + noise`, discretised exactly), or the
+//! Dryden spectra with their scale length: longitudinal first order, lateral and vertical second
+//! order (MIL-F-8785C form), with the longitudinal axis along north. Both have the stated standard
+//! deviation whatever the step.
 
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -110,13 +111,14 @@ impl Wind {
         wind
     }
 
-    /// All winds of a flight: the steady one with its gusts, and those of the `gust` effect. Each has a stream of its own, which the
-    /// flight's seed starts.
+    /// All winds of a flight: the steady one with its gusts, and those of the `gust` effect. Each
+    /// has a stream of its own, which the flight's seed starts.
     pub fn of_flight(wind: WindParameters, effects: &Effects<f64>, seed: u64) -> Vec<Self> {
         const STEADY: u64 = 0x5851_F42D_4C95_7F2D;
         const GUST_EFFECT: u64 = 0x9E6C_63D0_876A_3F1B;
-        let gusts =
-            effects.gust().map(|gusts| Self::new(WindParameters::of_gusts(gusts), seed ^ GUST_EFFECT));
+        let gusts = effects
+            .gust()
+            .map(|gusts| Self::new(WindParameters::of_gusts(gusts), seed ^ GUST_EFFECT));
         [Self::new(wind, seed ^ STEADY)].into_iter().chain(gusts).collect()
     }
 
@@ -136,12 +138,14 @@ impl Wind {
 
     /// Whether gusts come as fast as a vehicle meets them.
     pub(crate) fn asks_for_airspeed(&self) -> bool {
-        self.parameters.gust_sigma_m_s != 0.0 && matches!(self.parameters.gust, GustModel::Dryden { .. })
+        self.parameters.gust_sigma_m_s != 0.0
+            && matches!(self.parameters.gust, GustModel::Dryden { .. })
     }
 
     /// Moves the air on by `dt_s`.
     ///
-    /// * `airspeed_m_s` - of the vehicle, which meets the Dryden field at that speed, not below 1 m/s; not asked for other gusts
+    /// * `airspeed_m_s` - of the vehicle, which meets the Dryden field at that speed, not below 1
+    ///   m/s; not asked for other gusts
     pub fn advance(&mut self, dt_s: f64, airspeed_m_s: impl FnOnce() -> f64) {
         if self.parameters.gust_sigma_m_s == 0.0 {
             return;
@@ -159,7 +163,8 @@ impl Wind {
             }
             GustModel::Dryden { scale_length_m } => {
                 let keep = exp(-dt_s * airspeed_m_s().max(1.0) / scale_length_m);
-                // With unit noise the first stage has variance 1/2, so that the shaped output has variance 1.
+                // With unit noise the first stage has variance 1/2, so that the shaped output has
+                // variance 1.
                 let before = self.first;
                 self.first = self.first * keep + self.noise() * ((1.0 - keep * keep) * 0.5).sqrt();
                 self.second = self.second * keep + (before + self.first) * (0.5 * (1.0 - keep));
@@ -177,8 +182,10 @@ mod tests {
     use super::*;
 
     fn spread(gust: GustModel, dt_s: f64) -> [f64; 3] {
-        let mut wind =
-            Wind::new(WindParameters { mean_ned_m_s: [2.0, 0.0, 0.0], gust_sigma_m_s: 1.5, gust }, 1);
+        let mut wind = Wind::new(
+            WindParameters { mean_ned_m_s: [2.0, 0.0, 0.0], gust_sigma_m_s: 1.5, gust },
+            1,
+        );
         let n = 400_000;
         let mut square = Vector3::zeros();
         for _ in 0..n {
@@ -192,9 +199,10 @@ mod tests {
     #[test]
     fn gusts_have_the_stated_size_whatever_the_step() {
         for dt_s in [0.003, 0.05] {
-            for gust in
-                [GustModel::GaussMarkov { time_constant_s: 0.5 }, GustModel::Dryden { scale_length_m: 2.0 }]
-            {
+            for gust in [
+                GustModel::GaussMarkov { time_constant_s: 0.5 },
+                GustModel::Dryden { scale_length_m: 2.0 },
+            ] {
                 for sigma in spread(gust, dt_s) {
                     assert!((sigma / 1.5 - 1.0).abs() < 0.06, "{gust:?} at {dt_s} s: {sigma}");
                 }

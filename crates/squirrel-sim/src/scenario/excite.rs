@@ -1,8 +1,10 @@
-//! Excitation flights: from a few numbers and a seed to the legs that the flight code flies, and to words for a pilot.
+//! Excitation flights: from a few numbers and a seed to the legs that the flight code flies, and to
+//! words for a pilot.
 //!
-//! Two blocks in the order of the seed. The ladder goes down to each height of [`ExciteTable::heights_m`], turns while it
-//! moves and hovers there, and climbs back. The dashes go out and back along both horizontal axes, wings spread in the middle
-//! of each. The seed also draws directions, the sense of turning, the moments of the wings and the multisine's phases.
+//! Two blocks in the order of the seed. The ladder goes down to each height of
+//! [`ExciteTable::heights_m`], turns while it moves and hovers there, and climbs back. The dashes
+//! go out and back along both horizontal axes, wings spread in the middle of each. The seed also
+//! draws directions, the sense of turning, the moments of the wings and the multisine's phases.
 
 use crate::setting::SettingError;
 use serde::{Deserialize, Serialize};
@@ -41,15 +43,18 @@ pub struct ExciteTable {
     pub speed_m_s: f64,
     /// Heights above the ground to hover at, in this order.
     pub heights_m: Vec<f64>,
-    /// A full turn over the ladder, and dashes back at another heading; otherwise the nose stays north.
+    /// A full turn over the ladder, and dashes back at another heading; otherwise the nose stays
+    /// north.
     pub turn: bool,
     /// Wings are spread in each dash; otherwise they stay folded.
     pub wings: bool,
-    /// Amplitude of each line of the multisine on roll, pitch, yaw, below 3 Hz; above it falls with frequency.
+    /// Amplitude of each line of the multisine on roll, pitch, yaw, below 3 Hz; above it falls with
+    /// frequency.
     pub multisine_angle_rad: [f64; 3],
     /// Amplitude of each line of the multisine on thrust, as a share of the command.
     pub multisine_thrust_share: f64,
-    /// Charge at the start of flights with an even seed; those with an odd seed start at `battery_charge`.
+    /// Charge at the start of flights with an even seed; those with an odd seed start at
+    /// `battery_charge`.
     pub even_seed_charge: f64,
 }
 
@@ -102,17 +107,26 @@ impl ExciteTable {
             let reason = format!("must be 1 to {MAX_HEIGHTS} heights");
             return Err(SettingError::value("heights_m", format!("{:?}", self.heights_m), reason));
         }
-        if let Some(x) = self.heights_m.iter().find(|x| !(x.is_finite() && **x > 0.0 && **x <= 1e5)) {
+        if let Some(x) = self.heights_m.iter().find(|x| !(x.is_finite() && **x > 0.0 && **x <= 1e5))
+        {
             return Err(SettingError::value("heights_m", x, "must be > 0 and <= 1e5"));
         }
         if !(0.0..=1.0).contains(&self.even_seed_charge) {
-            return Err(SettingError::value("even_seed_charge", self.even_seed_charge, "must be 0 to 1"));
+            return Err(SettingError::value(
+                "even_seed_charge",
+                self.even_seed_charge,
+                "must be 0 to 1",
+            ));
         }
         Ok(self.multisine(0).map(|_| ())?)
     }
 
     fn multisine(&self, seed: u32) -> Result<Multisine, ParameterError> {
-        Multisine::new(self.multisine_angle_rad.map(|x| x as f32), self.multisine_thrust_share as f32, seed)
+        Multisine::new(
+            self.multisine_angle_rad.map(|x| x as f32),
+            self.multisine_thrust_share as f32,
+            seed,
+        )
     }
 
     /// What the flight code flies, from this height above the ground.
@@ -121,7 +135,8 @@ impl ExciteTable {
         let draw = Draw { seed };
         let start = In::new(Vector3::new(0.0, 0.0, -height_m as f32));
         let (ladder, dashes) = (self.ladder(start, &draw), self.dashes(start, &draw));
-        let legs: Vec<Leg> = if draw.coin(0) { [ladder, dashes].concat() } else { [dashes, ladder].concat() };
+        let legs: Vec<Leg> =
+            if draw.coin(0) { [ladder, dashes].concat() } else { [dashes, ladder].concat() };
         debug_assert!(legs.len() <= MAX_LEGS);
         Programme::new(start, &legs, self.multisine(seed)?)
     }
@@ -139,7 +154,14 @@ impl ExciteTable {
                 (hover_s, STEP_S, 0.5 * STEP_S)
             };
             let yaw_rad = step * (i + 1) as f32;
-            legs.push(Leg { duration_s, move_s, ramp_s, to: at(*height_m), yaw_rad, wings_s: [0.0; 2] });
+            legs.push(Leg {
+                duration_s,
+                move_s,
+                ramp_s,
+                to: at(*height_m),
+                yaw_rad,
+                wings_s: [0.0; 2],
+            });
         }
         let yaw_rad = step * hovers;
         legs.push(Leg {
@@ -163,7 +185,8 @@ impl ExciteTable {
         for (i, axis) in axes.iter().enumerate() {
             for back in [false, true] {
                 let late = WINGS_DRAW_S * (2.0 * draw.share(5 + legs.len() as u32) - 1.0);
-                let yaw = if self.turn && back { draw.sign(9 + i as u32) * DASH_YAW_RAD } else { 0.0 };
+                let yaw =
+                    if self.turn && back { draw.sign(9 + i as u32) * DASH_YAW_RAD } else { 0.0 };
                 legs.push(Leg {
                     duration_s: DASH_S,
                     move_s: DASH_S,
@@ -194,7 +217,11 @@ pub(super) fn card(programme: &Programme, height_m: f64) -> String {
                 (false, true) => "east",
                 (false, false) => "west",
             };
-            format!("dash {:.0} m {course} at {speed_m_s:.1} m/s, height {:.1} m", way.norm(), -to.z)
+            format!(
+                "dash {:.0} m {course} at {speed_m_s:.1} m/s, height {:.1} m",
+                way.norm(),
+                -to.z
+            )
         } else {
             let verb = if way.z > 0.0 { "descend" } else { "climb" };
             format!("{verb} to {:.1} m at {speed_m_s:.1} m/s", -to.z)

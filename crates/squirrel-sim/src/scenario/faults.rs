@@ -75,7 +75,9 @@ impl FaultKind {
     /// Which of it may fail: inertial units, rotors, wings.
     fn count(self, rotors: usize) -> Option<usize> {
         match self {
-            Self::ImuSpike | Self::ImuStuck | Self::ImuNan | Self::ImuDead | Self::WingStuck => Some(2),
+            Self::ImuSpike | Self::ImuStuck | Self::ImuNan | Self::ImuDead | Self::WingStuck => {
+                Some(2)
+            }
             Self::MotorWeak => Some(rotors),
             _ => None,
         }
@@ -94,7 +96,8 @@ pub struct FaultTable {
     /// How much, in the unit of the kind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<f64>,
-    /// Which inertial unit (1, 2), rotor (1 and so on) or wing (1 left, 2 right); both units or wings if left out.
+    /// Which inertial unit (1, 2), rotor (1 and so on) or wing (1 left, 2 right); both units or
+    /// wings if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub which: Option<u32>,
 }
@@ -117,7 +120,11 @@ impl FaultTable {
         let name = kind.name();
         for (field, x) in [("start_s", Some(self.start_s)), ("duration_s", self.duration_s)] {
             if let Some(x) = x.filter(|x| !(0.0..=1e5).contains(x)) {
-                return Err(SettingError::value(format!("faults.{name}.{field}"), x, "must be 0 to 1e5"));
+                return Err(SettingError::value(
+                    format!("faults.{name}.{field}"),
+                    x,
+                    "must be 0 to 1e5",
+                ));
             }
         }
         match (kind.sizes(), self.size) {
@@ -137,14 +144,16 @@ impl FaultTable {
                 }
             }
         }
-        let refused = |which, reason| SettingError::value(format!("faults.{name}.which"), which, reason);
+        let refused =
+            |which, reason| SettingError::value(format!("faults.{name}.which"), which, reason);
         match (kind.count(rotors), self.which) {
             (Some(count), Some(which)) if (1..=count).contains(&(which as usize)) => Ok(()),
             (Some(count), Some(which)) => Err(refused(which, format!("must be 1 to {count}"))),
             (None, Some(which)) => Err(refused(which, "given, but there is only one".to_owned())),
-            (_, None) if kind == FaultKind::MotorWeak => {
-                Err(SettingError::Missing { field: format!("faults.{name}.which"), what: "a rotor's number" })
-            }
+            (_, None) if kind == FaultKind::MotorWeak => Err(SettingError::Missing {
+                field: format!("faults.{name}.which"),
+                what: "a rotor's number",
+            }),
             (_, None) => Ok(()),
         }
     }

@@ -1,14 +1,17 @@
-//! The paper's forest (section V.C): trunks at regular intervals, drawn from the scenario's seed, and a way to fly through them.
+//! The paper's forest (section V.C): trunks at regular intervals, drawn from the scenario's seed,
+//! and a way to fly through them.
 //!
-//! Rows lie one after the other northwards, trunks of a row one after the other eastwards, each interval drawn anew. The flight begins in
-//! the middle, where there is a gap, and ends with the first contact or after its way.
+//! Rows lie one after the other northwards, trunks of a row one after the other eastwards, each
+//! interval drawn anew. The flight begins in the middle, where there is a gap, and ends with the
+//! first contact or after its way.
 
 use crate::setting::SettingError;
 use squirrel_core::guidance::mission::scramble;
 
 use serde::{Deserialize, Serialize};
 
-/// No trunk is nearer to the start, m: it is not on the first metres that a controller shows what it can.
+/// No trunk is nearer to the start, m: it is not on the first metres that a controller shows what
+/// it can.
 const GAP_M: f64 = 6.0;
 
 /// Trunks around the start of a flight that is over when it has touched one, or come through.
@@ -26,8 +29,8 @@ pub struct ForestTable {
 }
 
 impl ForestTable {
-    /// That of the paper, but 400 m in every direction: in a square of 400 m some flights come to its edge, and are through without having met
-    /// what they should.
+    /// That of the paper, but 400 m in every direction: in a square of 400 m some flights come to
+    /// its edge, and are through without having met what they should.
     pub(super) fn built_in() -> Self {
         Self { size_m: 820.0, spacing_m: [10.5, 13.5], radius_m: 0.5, path_m: 400.0 }
     }
@@ -45,7 +48,11 @@ impl ForestTable {
         }
         if !(low >= 1.0 && low <= high && high.is_finite()) {
             let value = format!("[{low}, {high}]");
-            return Err(SettingError::value("spacing_m", value, "must be 1 or more, the shortest first"));
+            return Err(SettingError::value(
+                "spacing_m",
+                value,
+                "must be 1 or more, the shortest first",
+            ));
         }
         Ok(())
     }
@@ -80,7 +87,8 @@ impl ForestTable {
 mod tests {
     use super::*;
 
-    /// A trunk on 144 m^2, no two nearer than the shortest interval in a row, none at the start, others for another seed.
+    /// A trunk on 144 m^2, no two nearer than the shortest interval in a row, none at the start,
+    /// others for another seed.
     #[test]
     fn trunks_stand_as_in_the_paper() {
         let table = ForestTable::built_in();

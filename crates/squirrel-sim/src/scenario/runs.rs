@@ -1,8 +1,10 @@
-//! Random runs with spread wings: flights to learn the force of the wings from, and to judge what was learned by.
+//! Random runs with spread wings: flights to learn the force of the wings from, and to judge what
+//! was learned by.
 //!
-//! One straight run after the other, each in a direction, at a speed, to a height and with a turn of the nose that the seed
-//! draws; a multisine sways roll and pitch on top. Runs begin and end at rest in reference terms, so that a flight passes
-//! through all speeds up to its top speed and through braking, where the air hits the belly.
+//! One straight run after the other, each in a direction, at a speed, to a height and with a turn
+//! of the nose that the seed draws; a multisine sways roll and pitch on top. Runs begin and end at
+//! rest in reference terms, so that a flight passes through all speeds up to its top speed and
+//! through braking, where the air hits the belly.
 
 use super::excite::Draw;
 use crate::setting::SettingError;
@@ -61,7 +63,8 @@ impl RunsTable {
     pub(super) fn programme(&self, height_m: f64, seed: u64) -> Result<Programme, ParameterError> {
         let seed = (seed ^ (seed >> 32)) as u32;
         let draw = Draw { seed };
-        let [speed, climb, sway] = [self.speed_m_s, self.climb_m_s, self.sway_rad].map(|x| x as f32);
+        let [speed, climb, sway] =
+            [self.speed_m_s, self.climb_m_s, self.sway_rad].map(|x| x as f32);
         let height_m = height_m as f32;
         let start = In::new(Vector3::new(0.0, 0.0, -height_m));
         let (mut to, mut yaw_rad) = (start, 0.0);
@@ -73,7 +76,8 @@ impl RunsTable {
                 let duration_s = RUN_S[0] + (RUN_S[1] - RUN_S[0]) * share(0);
                 let ramp_s = RAMP_SHARE * duration_s;
                 let at_top_s = duration_s - ramp_s;
-                let length_m = speed * at_top_s * (SLOWEST_SHARE + (1.0 - SLOWEST_SHARE) * share(1));
+                let length_m =
+                    speed * at_top_s * (SLOWEST_SHARE + (1.0 - SLOWEST_SHARE) * share(1));
                 let course_rad = PI * either(2);
                 let wanted_m = height_m * (1.0 + HEIGHT_SHARE * either(3));
                 let reach_m = climb * at_top_s * share(4);
@@ -81,7 +85,14 @@ impl RunsTable {
                 let along = Rotation::<Ned, Ned, f32>::from_euler(0.0, 0.0, course_rad);
                 to = to + along * In::new(Vector3::new(length_m, 0.0, -rise_m));
                 yaw_rad = wrap_angle(yaw_rad + TURN_MAX_RAD * either(5));
-                Leg { duration_s, move_s: duration_s, ramp_s, to, yaw_rad, wings_s: [0.0, f32::MAX] }
+                Leg {
+                    duration_s,
+                    move_s: duration_s,
+                    ramp_s,
+                    to,
+                    yaw_rad,
+                    wings_s: [0.0, f32::MAX],
+                }
             })
             .collect();
         Programme::new(start, &legs, Multisine::new([sway, sway, 0.0], 0.0, seed)?)

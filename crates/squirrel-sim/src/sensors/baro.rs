@@ -1,13 +1,17 @@
 //! Barometer.
 //!
-//! The air around the body is not at the pressure of the air at rest: where it flows past the opening it sucks or presses. The height read is
-//! off by `dh = (c + c_w d) . (v_x^2, v_y^2, v_z^2) / 2g`: `v` the velocity through the air in body axes, `c` the coefficients
-//! forward, side and up, `c_w` what wings that are fully spread add to each, `d` the mean deployment (docs/equations.md, C.3). A
-//! positive coefficient is suction and reads too high. The squares are those of PX4's EKF2_PCOEF_*, of the other sign, with the same
-//! coefficient both ways along an axis; coefficients of different sign make the error change its own with attitude.
+//! The air around the body is not at the pressure of the air at rest: where it flows past the
+//! opening it sucks or presses. The height read is off by
+//! `dh = (c + c_w d) . (v_x^2, v_y^2, v_z^2) / 2g`: `v` the velocity through the air in body axes,
+//! `c` the coefficients forward, side and up, `c_w` what wings that are fully spread add to each,
+//! `d` the mean deployment (docs/equations.md, C.3). A positive coefficient is suction and reads
+//! too high. The squares are those of PX4's EKF2_PCOEF_*, of the other sign, with the same
+//! coefficient both ways along an axis; coefficients of different sign make the error change its
+//! own with attitude.
 //!
-//! The opening follows the pressure with a first-order lag, exact where the height is linear between calls. Weather and
-//! temperature make the reading walk (variance `K^2 t`). Then constant error, white noise and the steps of the converter.
+//! The opening follows the pressure with a first-order lag, exact where the height is linear
+//! between calls. Weather and temperature make the reading walk (variance `K^2 t`). Then constant
+//! error, white noise and the steps of the converter.
 
 use super::Truth;
 use super::line::{Line, Stopwatch, Stream, fork, noise, quantised};

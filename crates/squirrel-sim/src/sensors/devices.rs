@@ -1,11 +1,13 @@
 //! Devices that can be bought: `device = "..."` in a sensor's table.
 //!
-//! Figures are the datasheets' typical ones, in the datasheets' units; "assumed" stands where a datasheet says nothing. Those of the MPU-6000 were
-//! read against the datasheet's text; the others were not yet, so read your part's before you rely on one. What depends
-//! on the airframe (vibration, iron, mounting, air flow) and on the settings (rate, latency) is not the device's. White
-//! noise per sample is the density times the root of the rate, as if the device's filter let all of the noise through.
-//! Offsets at first power-up are calibrated away by whoever builds the vehicle; a flight draws what ten degrees of temperature since then do
-//! (assumed). Tolerances of scale are taken for three standard deviations (assumed).
+//! Figures are the datasheets' typical ones, in the datasheets' units; "assumed" stands where a
+//! datasheet says nothing. Those of the MPU-6000 were read against the datasheet's text; the others
+//! were not yet, so read your part's before you rely on one. What depends on the airframe
+//! (vibration, iron, mounting, air flow) and on the settings (rate, latency) is not the device's.
+//! White noise per sample is the density times the root of the rate, as if the device's filter let
+//! all of the noise through. Offsets at first power-up are calibrated away by whoever builds the
+//! vehicle; a flight draws what ten degrees of temperature since then do (assumed). Tolerances of
+//! scale are taken for three standard deviations (assumed).
 
 use super::parameters::{BaroSensor, GnssSensor, ImuSensor, MagnetometerSensor};
 use squirrel_core::math::GRAVITY_M_S2;
@@ -46,7 +48,8 @@ struct Imu {
 
 pub(super) fn fit_imu(p: &mut ImuSensor, device: &str) {
     let imu = match device {
-        // TDK DS-000347: 2.8 mdps/rtHz, 65 (x, y) and 70 (z) ug/rtHz, 5 mdps/K, 0.15 mg/K, 0.5 %, 0.5 %.
+        // TDK DS-000347: 2.8 mdps/rtHz, 65 (x, y) and 70 (z) ug/rtHz, 5 mdps/K, 0.15 mg/K, 0.5 %,
+        // 0.5 %.
         "icm_42688_p" => Imu {
             gyro_deg_s_root_hz: 0.0028,
             accel_micro_g_root_hz: 70.0,
@@ -55,7 +58,8 @@ pub(super) fn fit_imu(p: &mut ImuSensor, device: &str) {
             gyro_scale: 0.5,
             accel_scale: 0.5,
         },
-        // Bosch BST-BMI270-DS000: 7 mdps/rtHz, 160 ug/rtHz, 20 mdps/K, 0.25 mg/K, 0.4 % after its retrimming, 0.4 %.
+        // Bosch BST-BMI270-DS000: 7 mdps/rtHz, 160 ug/rtHz, 20 mdps/K, 0.25 mg/K, 0.4 % after its
+        // retrimming, 0.4 %.
         "bmi270" => Imu {
             gyro_deg_s_root_hz: 0.007,
             accel_micro_g_root_hz: 160.0,
@@ -64,7 +68,8 @@ pub(super) fn fit_imu(p: &mut ImuSensor, device: &str) {
             gyro_scale: 0.4,
             accel_scale: 0.4,
         },
-        // InvenSense PS-MPU-6000A-00 rev. 3.4: 5 mdps/rtHz, 400 ug/rtHz, +-20 deg/s over 125 K, +-35 mg over 70 K, 3 %, 3 %.
+        // InvenSense PS-MPU-6000A-00 rev. 3.4: 5 mdps/rtHz, 400 ug/rtHz, +-20 deg/s over 125 K,
+        // +-35 mg over 70 K, 3 %, 3 %.
         "mpu_6000" => Imu {
             gyro_deg_s_root_hz: 0.005,
             accel_micro_g_root_hz: 400.0,
@@ -90,9 +95,11 @@ pub(super) fn fit_imu(p: &mut ImuSensor, device: &str) {
 
 pub(super) fn fit_gnss(p: &mut GnssSensor, device: &str) {
     let (cep_m, noise_m) = match device {
-        // u-blox UBX-19014285: position 2.0 m CEP. Noise from fix to fix assumed (docs/equations.md, C.4).
+        // u-blox UBX-19014285: position 2.0 m CEP. Noise from fix to fix assumed
+        // (docs/equations.md, C.4).
         "neo_m9n" => (2.0, 0.05),
-        // u-blox UBX-17051259: position 0.01 m CEP with a fixed RTK solution, base near. Noise from fix to fix assumed.
+        // u-blox UBX-17051259: position 0.01 m CEP with a fixed RTK solution, base near. Noise from
+        // fix to fix assumed.
         "zed_f9p_rtk" => (0.01, 0.005),
         _ => return,
     };
@@ -106,9 +113,11 @@ pub(super) fn fit_gnss(p: &mut GnssSensor, device: &str) {
 
 pub(super) fn fit_baro(p: &mut BaroSensor, device: &str) {
     let (noise_pa, step_pa, offset_pa_k) = match device {
-        // Bosch BST-BMP390-DS002: steps 0.016 Pa, 0.6 Pa/K; noise 0.02 Pa with oversampling 32 and a filter, at 50 Hz and 8 assumed 0.9.
+        // Bosch BST-BMP390-DS002: steps 0.016 Pa, 0.6 Pa/K; noise 0.02 Pa with oversampling 32 and
+        // a filter, at 50 Hz and 8 assumed 0.9.
         "bmp390" => (0.9, 0.016, 0.6),
-        // TE MS5611-01BA03: 0.012 mbar RMS at oversampling 4096, output in 0.01 mbar; 2 Pa/K assumed from its error band.
+        // TE MS5611-01BA03: 0.012 mbar RMS at oversampling 4096, output in 0.01 mbar; 2 Pa/K
+        // assumed from its error band.
         "ms5611" => (1.2, 1.0, 2.0),
         // Infineon DPS310: 0.4 Pa RMS at oversampling 8, steps 0.06 Pa, 0.5 Pa/K.
         "dps310" => (0.4, 0.06, 0.5),
@@ -122,7 +131,8 @@ pub(super) fn fit_baro(p: &mut BaroSensor, device: &str) {
 
 pub(super) fn fit_magnetometer(p: &mut MagnetometerSensor, device: &str) {
     let (noise_ut, range_ut, step_ut) = match device {
-        // iSentek IST8310: +-1600 uT in x and y (z more), 0.3 uT a step; noise of about a step with 16 averages assumed.
+        // iSentek IST8310: +-1600 uT in x and y (z more), 0.3 uT a step; noise of about a step with
+        // 16 averages assumed.
         "ist8310" => (0.3, 1600.0, 0.3),
         // QST QMC5883L: +-8 G, 3000 steps a gauss, noise 2 mG.
         "qmc5883l" => (0.2, 800.0, 100.0 / 3000.0),

@@ -1,9 +1,10 @@
 //! Satellite receiver.
 //!
-//! Position is off by a constant, white noise and a slow wander per axis, a Gauss-Markov process (`e' = -e / T + noise`, discretised
-//! exactly) that is stationary from the start: nobody took the error at take-off off. A share of the fixes jumps by
-//! `outlier_m` to some side. Fixes are missing for times that are exponentially distributed and begin at a constant rate.
-//! Sizes: docs/equations.md, C.4.
+//! Position is off by a constant, white noise and a slow wander per axis, a Gauss-Markov process
+//! (`e' = -e / T + noise`, discretised exactly) that is stationary from the start: nobody took the
+//! error at take-off off. A share of the fixes jumps by `outlier_m` to some side. Fixes are missing
+//! for times that are exponentially distributed and begin at a constant rate. Sizes:
+//! docs/equations.md, C.4.
 
 use super::Truth;
 use super::line::{Line, Stopwatch, Stream, fork, noise, uniform};
@@ -46,7 +47,8 @@ impl Receiver {
     }
 
     pub(super) fn poll(&mut self, p: &GnssSensor, time_us: u64, truth: &Truth) -> Option<Gnss> {
-        let Self { line, wander_rng, wander, watch, outlier_rng, dropout_rng, dropped, change_s } = self;
+        let Self { line, wander_rng, wander, watch, outlier_rng, dropout_rng, dropped, change_s } =
+            self;
         line.poll(time_us, |rng| {
             if p.position_wander_m > 0.0 {
                 let kept = (-watch.lap_s(time_us) / p.wander_time_s).exp();
@@ -86,7 +88,9 @@ impl Receiver {
     }
 
     pub(super) fn fork(&mut self) {
-        for rng in [&mut self.line.rng, &mut self.wander_rng, &mut self.outlier_rng, &mut self.dropout_rng] {
+        for rng in
+            [&mut self.line.rng, &mut self.wander_rng, &mut self.outlier_rng, &mut self.dropout_rng]
+        {
             fork(rng);
         }
     }

@@ -1,4 +1,5 @@
-//! What all sensors share: a line of samples with rate and latency, random streams, and errors that several sensors have.
+//! What all sensors share: a line of samples with rate and latency, random streams, and errors that
+//! several sensors have.
 
 use super::parameters::Timing;
 use rand::SeedableRng;
@@ -7,7 +8,8 @@ use rand_pcg::Pcg64Mcg;
 use squirrel_core::nalgebra::Vector3;
 use std::collections::VecDeque;
 
-/// Random streams of a flight's sensors. A number never changes its meaning: old seeds fly old flights.
+/// Random streams of a flight's sensors. A number never changes its meaning: old seeds fly old
+/// flights.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Stream {
     Imu = 1,
@@ -44,7 +46,8 @@ fn apart(stream: u64) -> u64 {
     stream.wrapping_mul(0x9E37_79B9_7F4A_7C15)
 }
 
-/// Another stream that begins where this one is, for a copy of the sensors whose noise is to be another.
+/// Another stream that begins where this one is, for a copy of the sensors whose noise is to be
+/// another.
 pub(super) fn fork(rng: &mut Pcg64Mcg) {
     let bits: u64 = StandardUniform.sample(rng);
     *rng = Pcg64Mcg::seed_from_u64(bits ^ 0xD1B5_4A32_D192_ED03);
@@ -96,7 +99,8 @@ impl<S> Line<S> {
         Self { timing, rng: Pcg64Mcg::seed_from_u64(seed), taken: 0, waiting: VecDeque::new() }
     }
 
-    /// Takes a sample if one is due, and returns the newest that has arrived. A sensor may have nothing to say when it is due.
+    /// Takes a sample if one is due, and returns the newest that has arrived. A sensor may have
+    /// nothing to say when it is due.
     pub(super) fn poll(
         &mut self,
         time_us: u64,
@@ -109,7 +113,8 @@ impl<S> Line<S> {
                 self.waiting.push_back((time_us.saturating_add(late), value));
             }
             // Periods shorter than the polling interval do not pile up.
-            self.taken = (self.taken + 1).max((time_us as f64 * 1e-6 * self.timing.rate_hz) as u64 + 1);
+            self.taken =
+                (self.taken + 1).max((time_us as f64 * 1e-6 * self.timing.rate_hz) as u64 + 1);
         }
         let mut newest = None;
         while self.waiting.front().is_some_and(|(arrival, _)| *arrival <= time_us) {

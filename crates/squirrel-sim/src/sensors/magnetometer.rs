@@ -1,10 +1,12 @@
 //! Magnetometer.
 //!
-//! The earth's field is `B = F (cos I, 0, sin I)` in north, east, down: north of the mission is magnetic north, so there is no
-//! declination. Reading: `m = (1 + S) R^T B + h + k i + n`, with soft iron `S` (symmetric, every entry drawn), hard iron `h` (drawn),
-//! the field of the supply wires `k i` at battery current `i`, and white noise; then range and steps of the converter. Form and
-//! symbols after Vasconcelos et al., IEEE Trans. AES 47 (2011) 1293. The effect `heading_bias` turns the field as it turns the
-//! measured attitude, so that a heading worked out of it has the same error.
+//! The earth's field is `B = F (cos I, 0, sin I)` in north, east, down: north of the mission is
+//! magnetic north, so there is no declination. Reading: `m = (1 + S) R^T B + h + k i + n`, with
+//! soft iron `S` (symmetric, every entry drawn), hard iron `h` (drawn), the field of the supply
+//! wires `k i` at battery current `i`, and white noise; then range and steps of the converter. Form
+//! and symbols after Vasconcelos et al., IEEE Trans. AES 47 (2011) 1293. The effect `heading_bias`
+//! turns the field as it turns the measured attitude, so that a heading worked out of it has the
+//! same error.
 
 use super::Truth;
 use super::line::{Line, Stream, fork, noise, quantised};

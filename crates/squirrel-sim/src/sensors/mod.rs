@@ -1,9 +1,11 @@
 //! Sensors: what the flight code gets to know, and when.
 //!
-//! Each sensor has a rate, a latency, its errors and its own random streams, so that switching one sensor's noise on changes
-//! nothing in another's. A sample is taken at the sensor's rate and handed over when its latency has passed, never before.
-//! Effects on sensors (biases that a vehicle file hides from the flight code, more latency) act here. What a sensor reads is
-//! in its file; the attitude is as simple as truth, bias and white noise. Those that the flight code does not hear are in `logged`.
+//! Each sensor has a rate, a latency, its errors and its own random streams, so that switching one
+//! sensor's noise on changes nothing in another's. A sample is taken at the sensor's rate and
+//! handed over when its latency has passed, never before. Effects on sensors (biases that a vehicle
+//! file hides from the flight code, more latency) act here. What a sensor reads is in its file; the
+//! attitude is as simple as truth, bias and white noise. Those that the flight code does not hear
+//! are in `logged`.
 
 mod baro;
 mod devices;
@@ -19,7 +21,9 @@ mod table;
 mod tests;
 
 pub use logged::BatterySensor;
-pub use parameters::{AttitudeSensor, BaroSensor, GnssSensor, ImuSensor, MagnetometerSensor, Timing};
+pub use parameters::{
+    AttitudeSensor, BaroSensor, GnssSensor, ImuSensor, MagnetometerSensor, Timing,
+};
 pub use suite::{SUITES, SensorParameters};
 
 use baro::Barometer;
@@ -112,7 +116,8 @@ impl Sensors {
         Self {
             effects: *effects,
             imu: Unit::new(&p.imu, seed, [Stream::Imu, Stream::ImuErrors]),
-            imu_2: (p.imu.units > 1).then(|| Unit::new(&p.imu, seed, [Stream::Imu2, Stream::Imu2Errors])),
+            imu_2: (p.imu.units > 1)
+                .then(|| Unit::new(&p.imu, seed, [Stream::Imu2, Stream::Imu2Errors])),
             vibration: Vibration::new(&p.imu, seed),
             attitude: Line::new(p.attitude.timing, seed, Stream::Attitude),
             gnss: Receiver::new(&p.gnss, seed),
@@ -123,7 +128,8 @@ impl Sensors {
         }
     }
 
-    /// What has arrived at a time, us, for the flight code, and for the log by its source. Times must not run backwards.
+    /// What has arrived at a time, us, for the flight code, and for the log by its source. Times
+    /// must not run backwards.
     pub fn poll(&mut self, time_us: u64, truth: &Truth) -> (SensorFrame, Vec<(&'static str, Row)>) {
         let p = &self.parameters;
         let time_s = time_us as f64 * 1e-6;
@@ -136,8 +142,8 @@ impl Sensors {
             let [rate, force] = vibration.shake(&p.imu, time_us, truth);
             moved = [moved[0] + rate, moved[1] + force];
         }
-        let scales =
-            [self.effects.gyro_scale(), self.effects.accel_scale()].map(|s| s.vector.add_scalar(1.0));
+        let scales = [self.effects.gyro_scale(), self.effects.accel_scale()]
+            .map(|s| s.vector.add_scalar(1.0));
         let scaled = [moved[0].component_mul(&scales[0]), moved[1].component_mul(&scales[1])];
         frame.imu = self.imu.poll(&p.imu, time_us, scaled, force_bias);
         if let Some(unit) = &mut self.imu_2 {
@@ -160,9 +166,11 @@ impl Sensors {
         (frame, logged)
     }
 
-    /// What these sensors say in a second at rest before the flight, or longer where inertial units are slow, at their rate: level on the ground, rotors
-    /// standing. Biases, scales, iron and the satellite receiver's slow error are the flight's, at its start; white noise is another, as
-    /// it would be a second earlier. The flight's own streams are untouched. Ask before the first [`Self::poll`].
+    /// What these sensors say in a second at rest before the flight, or longer where inertial units
+    /// are slow, at their rate: level on the ground, rotors standing. Biases, scales, iron and the
+    /// satellite receiver's slow error are the flight's, at its start; white noise is another, as
+    /// it would be a second earlier. The flight's own streams are untouched. Ask before the first
+    /// [`Self::poll`].
     ///
     /// * `position` - where the mission starts, m
     /// * `heading_rad` - from north towards east
@@ -183,6 +191,8 @@ impl Sensors {
         // As many as a flight code wants to hear, and those that are still on their way.
         let late = (self.parameters.imu.timing.latency_s * rate_hz).ceil();
         let samples = (f64::max(rate_hz.round(), SAMPLES_AT_REST) + late) as u64;
-        (0..samples).map(|k| copy.poll((k as f64 * 1e6 / rate_hz).ceil() as u64, &truth).0).collect()
+        (0..samples)
+            .map(|k| copy.poll((k as f64 * 1e6 / rate_hz).ceil() as u64, &truth).0)
+            .collect()
     }
 }

@@ -1,7 +1,8 @@
 //! Numbers of the sensors; the table `[sensors]` of a vehicle file.
 //!
-//! Defaults are of the size of docs/equations.md C: a consumer inertial unit, and a 10 Hz receiver over a flight of seconds, in which
-//! its slow position error does not show. No sensor is late by default, and what is drawn for each flight is off.
+//! Defaults are of the size of docs/equations.md C: a consumer inertial unit, and a 10 Hz receiver
+//! over a flight of seconds, in which its slow position error does not show. No sensor is late by
+//! default, and what is drawn for each flight is off.
 
 use super::devices;
 use super::table::Limit::{AboveZero, Signed, Size, Within};
@@ -135,11 +136,14 @@ sensor! {
     accel_resolution_m_s2: f64 = 0.0, Size;
     /// Angle about each body axis by which a unit sits askew, standard deviation, rad.
     misalignment_sd_rad: f64 = 0.0, Within(0.0, 0.5);
-    /// Amplitude on each axis of the rate that one rotor shakes up at `vibration_speed_rad_s`, rad/s.
+    /// Amplitude on each axis of the rate that one rotor shakes up at `vibration_speed_rad_s`,
+    /// rad/s.
     vibration_gyro_rad_s: f64 = 0.0, Size;
-    /// Amplitude on each axis of the specific force that one rotor shakes up at `vibration_speed_rad_s`, m/s^2.
+    /// Amplitude on each axis of the specific force that one rotor shakes up at
+    /// `vibration_speed_rad_s`, m/s^2.
     vibration_accel_m_s2: f64 = 0.0, Size;
-    /// Speed of a rotor at which vibration has the given size, rad/s; it grows with the square of the speed.
+    /// Speed of a rotor at which vibration has the given size, rad/s; it grows with the square of
+    /// the speed.
     vibration_speed_rad_s: f64 = 1000.0, Within(1.0, 1e5);
     /// Corner frequency of the device's low-pass filter, which weakens vibration, Hz.
     bandwidth_hz: f64 = f64::INFINITY, AboveZero;
@@ -190,7 +194,8 @@ sensor! {
     drift_m_root_s: f64 = 0.0, Size;
     /// Time constant with which it follows the height, s.
     lag_s: f64 = 0.0, Within(0.0, 10.0);
-    /// Error of static pressure over dynamic pressure for air along the body's x, y and z; positive reads too high.
+    /// Error of static pressure over dynamic pressure for air along the body's x, y and z; positive
+    /// reads too high.
     pressure_coefficient: [f64; 3] = [0.0; 3], Within(-2.0, 2.0);
     /// What fully spread wings add to each of them.
     pressure_coefficient_wing: f64 = 0.0, Within(-2.0, 2.0);
@@ -207,9 +212,11 @@ sensor! {
     inclination_rad: f64 = 1.13, Within(-1.6, 1.6);
     /// White noise per axis, uT.
     noise_ut: f64 = 0.0, Size;
-    /// Field of the vehicle's own iron that each flight draws for each axis, standard deviation, uT.
+    /// Field of the vehicle's own iron that each flight draws for each axis, standard deviation,
+    /// uT.
     hard_iron_sd_ut: f64 = 0.0, Size;
-    /// Error that each flight draws for each entry of the symmetric matrix of soft iron, standard deviation.
+    /// Error that each flight draws for each entry of the symmetric matrix of soft iron, standard
+    /// deviation.
     soft_iron_sd: f64 = 0.0, Within(0.0, 0.3);
     /// Field of the battery's current along the body axes, uT/A.
     current_ut_per_a: [f64; 3] = [0.0; 3], Signed;

@@ -1,8 +1,9 @@
 //! All sensors of a vehicle: reading `[sensors]`, checking it, and whole suites for studies.
 //!
-//! What is the device's comes from `devices.rs`; what is the airframe's is assumed here, of the size that docs/equations.md, C gives and
-//! flight logs of small multirotors show. A vehicle file may start from a suite, `suite = "hobby"`, and change numbers of it; noise
-//! per sample is for the suite's rates, so a table with another rate names its `device` again.
+//! What is the device's comes from `devices.rs`; what is the airframe's is assumed here, of the
+//! size that docs/equations.md, C gives and flight logs of small multirotors show. A vehicle file
+//! may start from a suite, `suite = "hobby"`, and change numbers of it; noise per sample is for the
+//! suite's rates, so a table with another rate names its `device` again.
 
 use super::logged::Logged;
 use super::parameters::{AttitudeSensor, BaroSensor, GnssSensor, ImuSensor, MagnetometerSensor};
@@ -34,13 +35,15 @@ pub const SUITES: [&str; 4] = ["nominal", "hobby", "research", "rtk"];
 
 const SUITE: &str = "suite";
 /// Keys of `[sensors]`; all but the suite are tables.
-static KEYS: LazyLock<Vec<&'static str>> =
-    LazyLock::new(|| [&["imu", "attitude", "gnss", "baro", "magnetometer", SUITE], Logged::NAMES].concat());
+static KEYS: LazyLock<Vec<&'static str>> = LazyLock::new(|| {
+    [&["imu", "attitude", "gnss", "baro", "magnetometer", SUITE], Logged::NAMES].concat()
+});
 
 /// What the airframe of a suite does to its devices.
 struct SuiteAirframe {
     devices: [&'static str; 4],
-    /// One rotor at 1000 rad/s, behind the filter of the device: rate, rad/s, and specific force, m/s^2.
+    /// One rotor at 1000 rad/s, behind the filter of the device: rate, rad/s, and specific force,
+    /// m/s^2.
     vibration: [f64; 2],
     /// Random walk of the biases, rad/s and m/s^2 in a second.
     walk: [f64; 2],
@@ -57,7 +60,8 @@ struct SuiteAirframe {
 
 /// Speed of the rotors at which suites give their vibration: about hover of the shipped squirrel.
 const HOVER_RAD_S: f64 = 1500.0;
-/// Low-pass filter of the suites' inertial units, as such devices have one to choose (98 Hz in an MPU-6000), Hz.
+/// Low-pass filter of the suites' inertial units, as such devices have one to choose (98 Hz in an
+/// MPU-6000), Hz.
 const BANDWIDTH_HZ: f64 = 98.0;
 
 impl SensorParameters {
@@ -76,12 +80,14 @@ impl SensorParameters {
         p
     }
 
-    /// A complete set of sensors by its name in [`SUITES`]; `None` for another name. All have two inertial units and a magnetometer.
+    /// A complete set of sensors by its name in [`SUITES`]; `None` for another name. All have two
+    /// inertial units and a magnetometer.
     ///
     /// - `nominal`: errors as by default.
     /// - `hobby`: cheap devices on an airframe that shakes, roughly calibrated.
     /// - `research`: good devices, damped and calibrated.
-    /// - `rtk`: as `research`, with a receiver that has corrections, and a better barometer and magnetometer.
+    /// - `rtk`: as `research`, with a receiver that has corrections, and a better barometer and
+    ///   magnetometer.
     pub fn suite(name: &str) -> Option<Self> {
         let research = SuiteAirframe {
             devices: ["icm_42688_p", "neo_m9n", "bmp390", "ist8310"],
@@ -99,7 +105,8 @@ impl SensorParameters {
             "nominal" => {
                 let mut p = Self::default();
                 p.imu.units = 2;
-                p.magnetometer = Some(MagnetometerSensor { noise_ut: 0.5, ..MagnetometerSensor::default() });
+                p.magnetometer =
+                    Some(MagnetometerSensor { noise_ut: 0.5, ..MagnetometerSensor::default() });
                 Some(p)
             }
             "hobby" => Some(Self::of(&SuiteAirframe {
@@ -184,15 +191,21 @@ impl<'de> Deserialize<'de> for SensorParameters {
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 f.write_str("a table of sensors")
             }
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<SensorParameters, A::Error> {
+            fn visit_map<A: MapAccess<'de>>(
+                self,
+                mut map: A,
+            ) -> Result<SensorParameters, A::Error> {
                 let mut like = SensorParameters::default();
                 let mut suite = None;
                 let mut said: Vec<(&str, Said)> = Vec::new();
-                while let Some(key) = map.next_key_seed(OneOf { names: KEYS.as_slice(), what: None })? {
+                while let Some(key) =
+                    map.next_key_seed(OneOf { names: KEYS.as_slice(), what: None })?
+                {
                     if let Some(table) = like.table(key) {
                         said.push((key, map.next_value_seed(Reader::of(table))?));
                     } else {
-                        suite = Some(map.next_value_seed(OneOf { names: &SUITES, what: Some(SUITE) })?);
+                        suite =
+                            Some(map.next_value_seed(OneOf { names: &SUITES, what: Some(SUITE) })?);
                     }
                 }
                 // The suite acts before the tables wherever it stands.

@@ -1,6 +1,8 @@
-//! One table of `[sensors]` in a vehicle file: keys, limits and reading are the same for all sensors.
+//! One table of `[sensors]` in a vehicle file: keys, limits and reading are the same for all
+//! sensors.
 //!
-//! What a table says is kept until all of it is known, because `device` acts before the other keys wherever it stands.
+//! What a table says is kept until all of it is known, because `device` acts before the other keys
+//! wherever it stands.
 
 use super::parameters::Timing;
 use crate::quantity::plain;
@@ -31,7 +33,9 @@ impl Limit {
             Self::Signed => (x.is_finite(), "must be finite".to_owned()),
             Self::Size => (x.is_finite() && x >= 0.0, "must be finite and >= 0".to_owned()),
             Self::AboveZero => (x > 0.0, "must be > 0".to_owned()),
-            Self::Within(low, high) => ((low..=high).contains(&x), format!("must be {low} to {high}")),
+            Self::Within(low, high) => {
+                ((low..=high).contains(&x), format!("must be {low} to {high}"))
+            }
         };
         (!holds).then_some(reason)
     }
@@ -79,7 +83,11 @@ impl Field<'_> {
         };
         for x in numbers {
             if let Some(reason) = self.limit.broken(*x) {
-                return Err(SettingError::value(format!("sensors.{sensor}.{}", self.key), x, reason));
+                return Err(SettingError::value(
+                    format!("sensors.{sensor}.{}", self.key),
+                    x,
+                    reason,
+                ));
             }
         }
         Ok(())
@@ -175,7 +183,8 @@ impl<'de> Visitor<'de> for Reader<'_> {
         let mut said = Said::default();
         while let Some(key) = map.next_key_seed(OneOf { names: self.keys, what: None })? {
             if key == DEVICE {
-                said.device = Some(map.next_value_seed(OneOf { names: self.devices, what: Some(DEVICE) })?);
+                said.device =
+                    Some(map.next_value_seed(OneOf { names: self.devices, what: Some(DEVICE) })?);
                 continue;
             }
             // Every key but the device has a field.

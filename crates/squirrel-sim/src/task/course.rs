@@ -1,10 +1,12 @@
 //! Courses: what an episode asks for, and what it is worth.
 //!
 //! - [`CourseKind::Track`]: follow a smooth curve, sums of one sine an axis.
-//! - [`CourseKind::Avoid`]: follow the paper's straight run (section V.B) past trunks that stand in the way and are seen late.
+//! - [`CourseKind::Avoid`]: follow the paper's straight run (section V.B) past trunks that stand in
+//!   the way and are seen late.
 //!
-//! The reward of a step is its length times how near the vehicle is to where it should be, from 1 to 0, less a little for turning;
-//! an episode of ten seconds is worth ten at most. A vehicle that hits a trunk, overturns or strays is lost, which costs five.
+//! The reward of a step is its length times how near the vehicle is to where it should be, from 1
+//! to 0, less a little for turning; an episode of ten seconds is worth ten at most. A vehicle that
+//! hits a trunk, overturns or strays is lost, which costs five.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -180,6 +182,11 @@ impl Sines {
             a[axis] = -size * rate * rate * s;
         }
         p.z -= HEIGHT_M;
-        Reference { position: In::new(p), velocity: In::new(v), acceleration: In::new(a), yaw_rad: 0.0 }
+        Reference {
+            position: In::new(p),
+            velocity: In::new(v),
+            acceleration: In::new(a),
+            yaw_rad: 0.0,
+        }
     }
 }

@@ -1,5 +1,5 @@
-//! What the numbers of an action are. Each is limited to [-1, 1]; NaN counts as -1. The last one is for both wings, from -1
-//! folded to 1 spread.
+//! What the numbers of an action are. Each is limited to [-1, 1]; NaN counts as -1. The last one is
+//! for both wings, from -1 folded to 1 spread.
 
 use crate::batch::SetPoint;
 use squirrel_core::control::wiic::Envelope;
@@ -15,10 +15,11 @@ pub const RATE_MAX_RAD_S: [f32; 3] = [6.0, 6.0, 3.0];
 pub enum Level {
     /// Thrust of each rotor, from none to all that it has, and wings.
     Motor,
-    /// Rates of roll, pitch and yaw in [`RATE_MAX_RAD_S`], thrust in weights above hover, and wings.
+    /// Rates of roll, pitch and yaw in [`RATE_MAX_RAD_S`], thrust in weights above hover, and
+    /// wings.
     BodyRate,
-    /// As [`Span::command`]: roll, pitch, thrust and wings; heading is held north; limited as the flight code limits commands. What
-    /// [`squirrel_core::policy`] flies.
+    /// As [`Span::command`]: roll, pitch, thrust and wings; heading is held north; limited as the
+    /// flight code limits commands. What [`squirrel_core::policy`] flies.
     AttitudeWing,
 }
 

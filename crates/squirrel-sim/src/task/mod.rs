@@ -3,10 +3,12 @@
 //! ```text
 //! action --level--> set points --[batch: autopilot, steps]--> state --[sensors]--> observation, reward, end of the episode
 //! ```
-//! The observation and the meaning of attitude actions are those of [`squirrel_core::policy`], so what was learned here flies there.
-//! Each environment draws from a stream of its own: what happens in it does not depend on how many there are, nor on threads.
-//! An episode that has ended is followed by a new one in the next step, whose action is not looked at (Gymnasium's next-step
-//! autoreset). Domain randomisation: each episode takes one of the vehicles at hand, with whatever effects it has.
+//! The observation and the meaning of attitude actions are those of [`squirrel_core::policy`], so
+//! what was learned here flies there. Each environment draws from a stream of its own: what happens
+//! in it does not depend on how many there are, nor on threads. An episode that has ended is
+//! followed by a new one in the next step, whose action is not looked at (Gymnasium's next-step
+//! autoreset). Domain randomisation: each episode takes one of the vehicles at hand, with whatever
+//! effects it has.
 
 pub mod course;
 mod level;
@@ -36,7 +38,8 @@ pub struct TaskSettings {
     pub level: Level,
     /// Length of an episode, s.
     pub episode_s: f64,
-    /// Observations come from the vehicle's sensors, with their rates, delays and noise, instead of the true state.
+    /// Observations come from the vehicle's sensors, with their rates, delays and noise, instead of
+    /// the true state.
     pub sensors: bool,
     /// How steps of 2 ms are taken.
     pub scheme: Scheme,
@@ -99,7 +102,8 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
     /// * `seed` - environment k draws from `seed + k`
     ///
     /// # Errors
-    /// No environments, an episode without steps, a vehicle that a batch or an inner loop cannot take.
+    /// No environments, an episode without steps, a vehicle that a batch or an inner loop cannot
+    /// take.
     pub fn new(
         vehicles: &[VehicleFile],
         count: usize,
@@ -120,13 +124,21 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
         if settings.threads == 0 {
             return Err(BatchError::NoThreads.into());
         }
-        let candidates = vehicles.iter().enumerate().map(|(number, file)| Candidate::new(number, file));
+        let candidates =
+            vehicles.iter().enumerate().map(|(number, file)| Candidate::new(number, file));
         let candidates: Arc<[Candidate]> = candidates.collect::<Result<_, _>>()?;
         let parts = (0..count).step_by(PART).map(|first| {
-            Part::new(&candidates, PART.min(count - first), seed.wrapping_add(first as u64), settings)
+            Part::new(
+                &candidates,
+                PART.min(count - first),
+                seed.wrapping_add(first as u64),
+                settings,
+            )
         });
         let parts = parts.collect::<Result<_, _>>()?;
-        let parts = Pool::new(parts, settings.threads, |part: &mut Part<ROTORS>, ()| part.went = part.step());
+        let parts = Pool::new(parts, settings.threads, |part: &mut Part<ROTORS>, ()| {
+            part.went = part.step();
+        });
         Ok(Self { settings, count, parts: parts.map_err(BatchError::from)? })
     }
 
@@ -169,13 +181,18 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
         Ok(())
     }
 
-    /// Starts a new episode in every environment that `which` says, and hands out what all of them see.
+    /// Starts a new episode in every environment that `which` says, and hands out what all of them
+    /// see.
     ///
     /// * `observation` - [`OBSERVATION`] numbers for each environment
     ///
     /// # Errors
     /// Lengths that are not those of the environments.
-    pub fn reset(&mut self, which: impl Fn(usize) -> bool, observation: &mut [f32]) -> Result<(), TaskError> {
+    pub fn reset(
+        &mut self,
+        which: impl Fn(usize) -> bool,
+        observation: &mut [f32],
+    ) -> Result<(), TaskError> {
         self.check("observation", observation.len(), OBSERVATION)?;
         for (number, seen) in observation.chunks_mut(PART * OBSERVATION).enumerate() {
             let mut part = self.parts.chunk(number);

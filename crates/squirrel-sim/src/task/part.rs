@@ -82,9 +82,11 @@ impl Candidate {
         let vehicle = file.vehicle.cast::<f32>().map_err(fail)?;
         let span = Span::of(&vehicle);
         let tilt_max_rad = vehicle.parameters().limits.tilt_max_rad;
-        let envelope = OuterAirframe::new(&vehicle, control.twcc.thrust_min_n, tilt_max_rad).envelope;
+        let envelope =
+            OuterAirframe::new(&vehicle, control.twcc.thrust_min_n, tilt_max_rad).envelope;
         let each = span.weight_n / vehicle.rotors().len() as f32;
-        let hover_speed_rad_s = (each / vehicle.parameters().propulsion.thrust_coefficient_n_s2).sqrt();
+        let hover_speed_rad_s =
+            (each / vehicle.parameters().propulsion.thrust_coefficient_n_s2).sqrt();
         let tuned = Tuned { vehicle, gains: control.attitude };
         Ok(Self {
             member: BatchVehicle::from(file),
@@ -185,8 +187,12 @@ impl<const ROTORS: usize> Part<ROTORS> {
         for (number, action) in self.actions.chunks_exact(level.numbers(ROTORS)).enumerate() {
             let episode = &mut self.episodes[number];
             let candidate = &self.candidates[episode.candidate];
-            let command =
-                level.command(action, &candidate.span, &candidate.envelope, &candidate.tuned.vehicle);
+            let command = level.command(
+                action,
+                &candidate.span,
+                &candidate.envelope,
+                &candidate.tuned.vehicle,
+            );
             self.set_points[width * number..][..width].copy_from_slice(&command.rotors[..width]);
             self.wings[2 * number..][..2].fill(command.wing);
             episode.wing = command.wing;
@@ -204,7 +210,8 @@ impl<const ROTORS: usize> Part<ROTORS> {
             if self.episodes[number].ended {
                 self.begin(number)?;
                 self.look(number)?;
-                (self.reward[number], self.terminated[number], self.truncated[number]) = (0.0, false, false);
+                (self.reward[number], self.terminated[number], self.truncated[number]) =
+                    (0.0, false, false);
                 continue;
             }
             let state = self.batch.state(number)?;

@@ -3,11 +3,13 @@
 use super::VehicleFile;
 use super::tables::{
     AngleLawName, AttitudeTable, BatteryTable, CommandName, ControlTable, EffectValue, FormName,
-    InertiaValue, PlusTable, PositionTable, PropulsionTable, RotorTable, ThrustLawName, TriggerName,
-    VehicleTable, WingControlTable, WingName, WingTable, WingTestName,
+    InertiaValue, PlusTable, PositionTable, PropulsionTable, RotorTable, ThrustLawName,
+    TriggerName, VehicleTable, WingControlTable, WingName, WingTable, WingTestName,
 };
 use crate::estimator::Estimator;
-use crate::plant::{BatteryParameters, Membrane, MembraneParameters, ParnnWing, ServoParameters, WingPlant};
+use crate::plant::{
+    BatteryParameters, Membrane, MembraneParameters, ParnnWing, ServoParameters, WingPlant,
+};
 use crate::quantity::Quantity;
 use crate::weights::ParnnWeights;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
@@ -23,13 +25,15 @@ use squirrel_core::frames::In;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::stack::StackParameters;
 use squirrel_core::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, ThrustCurve, Vehicle, Wing,
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, ThrustCurve, Vehicle,
+    Wing,
 };
 use std::collections::BTreeMap;
 
 type Problem = String;
 
-/// Weights may be trained on one individual and flown on another; beyond this share of the area it is another wing.
+/// Weights may be trained on one individual and flown on another; beyond this share of the area it
+/// is another wing.
 const AREA_DEVIATION: f64 = 0.1;
 
 /// * `find` - the weights of a name in the file, where they are at hand
@@ -87,7 +91,10 @@ pub(super) fn build(
     let control = t.control.as_ref().map(control);
     if let Some(gains) = &control {
         gains.attitude.check().map_err(|e| e.to_string())?;
-        gains.twcc.check(vehicle.parameters().limits.thrust_max_n as f32).map_err(|e| e.to_string())?;
+        gains
+            .twcc
+            .check(vehicle.parameters().limits.thrust_max_n as f32)
+            .map_err(|e| e.to_string())?;
     }
     t.sensors.check()?;
     Ok(VehicleFile {
@@ -99,7 +106,11 @@ pub(super) fn build(
         weights,
         battery: t.battery.map(battery).transpose()?,
         control,
-        estimator: t.estimation.filter.as_deref().map_or(Ok(Estimator::default()), Estimator::parse)?,
+        estimator: t
+            .estimation
+            .filter
+            .as_deref()
+            .map_or(Ok(Estimator::default()), Estimator::parse)?,
         sensors: t.sensors,
         effects: effects(t.effects, &vehicle)?,
         provenance: Vec::new(),
@@ -119,8 +130,9 @@ fn rotor_factors(rotors: &[RotorTable]) -> [[f64; MAX_ROTORS]; 2] {
 
 /// A box that holds all hubs, for a vehicle that states no size.
 fn default_size(vehicle: &Vehicle<f64>) -> [f64; 3] {
-    let reach =
-        |axis: usize| vehicle.rotors().iter().map(|r| r.position.vector[axis].abs()).fold(0.02, f64::max);
+    let reach = |axis: usize| {
+        vehicle.rotors().iter().map(|r| r.position.vector[axis].abs()).fold(0.02, f64::max)
+    };
     [2.0 * reach(0), 2.0 * reach(1), 0.04]
 }
 
@@ -152,7 +164,10 @@ fn propulsion(t: &PropulsionTable) -> Result<Propulsion<f64>, Problem> {
     })
 }
 
-fn wing(t: &WingTable, weights: Option<&ParnnWeights>) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
+fn wing(
+    t: &WingTable,
+    weights: Option<&ParnnWeights>,
+) -> Result<(Option<Wing<f64>>, WingPlant), Problem> {
     let given = [
         ("area_per_side_m2", &t.area_per_side_m2),
         ("normal_force_slope", &t.normal_force_slope),
@@ -168,12 +183,15 @@ fn wing(t: &WingTable, weights: Option<&ParnnWeights>) -> Result<(Option<Wing<f6
                 return Err(format!("wing.{key} = {}: given, but wing.model names no wing", q.0));
             }
             if let Some(name) = &t.parnn_weights {
-                return Err(format!("wing.parnn_weights = {name}: given, but wing.model names no wing"));
+                return Err(format!(
+                    "wing.parnn_weights = {name}: given, but wing.model names no wing"
+                ));
             }
             return match t.membrane.first_key_value() {
-                Some((key, q)) => {
-                    Err(format!("wing.membrane.{key} = {}: given, but wing.model names no wing", q.0))
-                }
+                Some((key, q)) => Err(format!(
+                    "wing.membrane.{key} = {}: given, but wing.model names no wing",
+                    q.0
+                )),
                 None => Ok((None, WingPlant::None)),
             };
         }
@@ -196,7 +214,9 @@ fn wing(t: &WingTable, weights: Option<&ParnnWeights>) -> Result<(Option<Wing<f6
     servo.check()?;
     let parnn = parnn_wing(t, weights, &wing)?;
     let no_membrane = |model: &str| match t.membrane.first_key_value() {
-        Some((key, q)) => Err(format!("wing.membrane.{key} = {}: given, but wing.model is \"{model}\"", q.0)),
+        Some((key, q)) => {
+            Err(format!("wing.membrane.{key} = {}: given, but wing.model is \"{model}\"", q.0))
+        }
         None => Ok(()),
     };
     let plant = match model {
@@ -208,7 +228,9 @@ fn wing(t: &WingTable, weights: Option<&ParnnWeights>) -> Result<(Option<Wing<f6
             no_membrane("parnn")?;
             let parnn = parnn.ok_or_else(|| match &t.parnn_weights {
                 Some(name) => {
-                    format!("wing.parnn_weights = {name}: not at hand; load the vehicle from its file")
+                    format!(
+                        "wing.parnn_weights = {name}: not at hand; load the vehicle from its file"
+                    )
                 }
                 None => "wing.parnn_weights: missing; wing.model = \"parnn\" needs it".to_owned(),
             })?;
@@ -238,7 +260,10 @@ fn parnn_wing(
 }
 
 /// Overrides of the membrane model's defaults.
-fn membrane(given: &BTreeMap<String, Quantity<f64>>, wing: &Wing<f64>) -> Result<Membrane, Problem> {
+fn membrane(
+    given: &BTreeMap<String, Quantity<f64>>,
+    wing: &Wing<f64>,
+) -> Result<Membrane, Problem> {
     let mut table = toml::Table::new();
     for (key, q) in given {
         if matches!(key.as_str(), "area_per_side_m2" | "lateral_arm_m") {
@@ -280,7 +305,8 @@ fn effects(
             return Err(format!("effects.{name}: no such effect; known are {known}"));
         };
         let names = forms(found.parameters);
-        // Keys may depend on the form, so it is looked at first; an impossible one is refused with its field below.
+        // Keys may depend on the form, so it is looked at first; an impossible one is refused with
+        // its field below.
         let form = match table.get(FORM) {
             Some(EffectValue::Name(form)) => form.as_str(),
             _ => names.first().copied().unwrap_or_default(),
@@ -300,12 +326,16 @@ fn effects(
             let sum = found.parameters[i].base_number(vehicle);
             if let Some((own, base)) = sum.filter(|(_, base)| base + found.values[i] < 0.0) {
                 let value = found.values[i];
-                return Err(format!("{field} = {value}: takes away more than there is, {own} = {base}"));
+                return Err(format!(
+                    "{field} = {value}: takes away more than there is, {own} = {base}"
+                ));
             }
         }
-        let needed = |p: &&EffectParameter| p.key != FORM && p.exists_in(form) && !table.contains_key(p.key);
+        let needed =
+            |p: &&EffectParameter| p.key != FORM && p.exists_in(form) && !table.contains_key(p.key);
         if let Some(missing) = found.parameters.iter().find(needed) {
-            let why = missing.forms.map_or(String::new(), |_| format!("; the form \"{form}\" needs it"));
+            let why =
+                missing.forms.map_or(String::new(), |_| format!("; the form \"{form}\" needs it"));
             return Err(format!("effects.{name}.{}: missing{why}", missing.key));
         }
     }
@@ -417,7 +447,8 @@ fn twcc(
     }
 }
 
-/// Gains that are not in the table are those of the primary controller; the reference's motion is fed forward whole.
+/// Gains that are not in the table are those of the primary controller; the reference's motion is
+/// fed forward whole.
 fn plus(t: &PlusTable, position: &PositionGains) -> Plus {
     Plus {
         position: PositionGains {

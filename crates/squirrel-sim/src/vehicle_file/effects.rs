@@ -28,7 +28,8 @@ pub struct ListedParameter {
     pub forms: &'static [&'static str],
     /// Names to choose from; none for a number.
     pub names: &'static [&'static str],
-    /// Smallest and largest plausible size on the vehicle of the paper, 0.548 kg; `None` for what counts or chooses.
+    /// Smallest and largest plausible size on the vehicle of the paper, 0.548 kg; `None` for what
+    /// counts or chooses.
     pub range: Option<[f64; 2]>,
     /// What both grow with from one vehicle to another; empty for nothing.
     pub grows_with: &'static str,

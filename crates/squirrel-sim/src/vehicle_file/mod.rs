@@ -1,7 +1,7 @@
 //! Vehicle files: TOML in, checked vehicle, plant parameters and gains out.
 //!
-//! Any number may be plain or `{ value, sd, source }`. Unknown keys are refused. An error is one line that names the file,
-//! the field and the value.
+//! Any number may be plain or `{ value, sd, source }`. Unknown keys are refused. An error is one
+//! line that names the file, the field and the value.
 
 mod build;
 mod effects;
@@ -23,10 +23,12 @@ use std::path::{Path, PathBuf};
 /// The squirrel of the paper, as shipped.
 pub const SQUIRREL_TOML: &str = include_str!("../../../../vehicles/squirrel.toml");
 
-/// Its weights, under the name that its file gives them. They are part of the program: a copy or a patch of the file finds
-/// them wherever it lies.
-const SQUIRREL_PARNN: (&str, &[u8]) =
-    ("squirrel-parnn.safetensors", include_bytes!("../../../../vehicles/squirrel-parnn.safetensors"));
+/// Its weights, under the name that its file gives them. They are part of the program: a copy or a
+/// patch of the file finds them wherever it lies.
+const SQUIRREL_PARNN: (&str, &[u8]) = (
+    "squirrel-parnn.safetensors",
+    include_bytes!("../../../../vehicles/squirrel-parnn.safetensors"),
+);
 
 /// Everything that a vehicle file says.
 #[derive(Debug, Clone)]
@@ -41,7 +43,8 @@ pub struct VehicleFile {
     pub size_body_m: [f64; 3],
     /// How the wing behaves in the simulator.
     pub wing: WingPlant,
-    /// The network that `wing.parnn_weights` names; `None` where it names none, or one that was not at hand.
+    /// The network that `wing.parnn_weights` names; `None` where it names none, or one that was not
+    /// at hand.
     pub weights: Option<ParnnWeights>,
     /// Battery; without one the voltage stays at the reference.
     pub battery: Option<BatteryParameters>,
@@ -92,7 +95,8 @@ pub enum VehicleFileError {
 }
 
 impl VehicleFile {
-    /// Reads and checks a file, and the weights that it names: a path relative to the file's folder.
+    /// Reads and checks a file, and the weights that it names: a path relative to the file's
+    /// folder.
     ///
     /// # Errors
     /// One line that names the file, the field or tensor, and the value.
@@ -104,7 +108,8 @@ impl VehicleFile {
         };
         Self::read(&text, &file, |name| {
             match (ParnnWeights::load(&beside(path, name)), shipped(name)) {
-                // The shipped ones stand in for a file that is not there, not for one that is damaged.
+                // The shipped ones stand in for a file that is not there, not for one that is
+                // damaged.
                 (Err(WeightsError::Io { error, .. }), Some(weights))
                     if error.kind() == io::ErrorKind::NotFound =>
                 {
@@ -115,14 +120,16 @@ impl VehicleFile {
         })
     }
 
-    /// The file of the weights that a vehicle file names; `None` where it names none, cannot be read, or is no file: a pipe is read once.
+    /// The file of the weights that a vehicle file names; `None` where it names none, cannot be
+    /// read, or is no file: a pipe is read once.
     pub fn weights_path(path: &Path) -> Option<PathBuf> {
         let path = Some(path).filter(|path| path.is_file())?;
         let table: toml::Table = std::fs::read_to_string(path).ok()?.parse().ok()?;
         Some(beside(path, table.get("wing")?.get("parnn_weights")?.as_str()?))
     }
 
-    /// Checks the text of a file. A text lies in no folder, so of weights only the shipped ones are at hand.
+    /// Checks the text of a file. A text lies in no folder, so of weights only the shipped ones are
+    /// at hand.
     ///
     /// * `file` - what errors call it
     ///
@@ -179,7 +186,8 @@ impl VehicleFile {
         Self::parse(SQUIRREL_TOML, "squirrel.toml").expect("the shipped vehicle is sound")
     }
 
-    /// The same vehicle with wings that do what its network says: the paper's simulation, in which plant and controller agree.
+    /// The same vehicle with wings that do what its network says: the paper's simulation, in which
+    /// plant and controller agree.
     ///
     /// # Errors
     /// One line where there are no wings or no weights.

@@ -35,7 +35,8 @@ pub struct TrainedOn {
     pub data_hash: String,
 }
 
-/// The metadata of weights. `M` is the model: its name where only one matters, the models themselves where they are trained.
+/// The metadata of weights. `M` is the model: its name where only one matters, the models
+/// themselves where they are trained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Card<M> {
@@ -63,7 +64,13 @@ impl<M> Card<M> {
     /// Before training: no figures yet.
     ///
     /// * `area_m2` - area of the flat plate
-    pub fn new(model: M, vehicle: &str, area_m2: f32, data: impl Into<TrainedOn>, seed: u64) -> Self {
+    pub fn new(
+        model: M,
+        vehicle: &str,
+        area_m2: f32,
+        data: impl Into<TrainedOn>,
+        seed: u64,
+    ) -> Self {
         let TrainedOn { domain, data_hash } = data.into();
         Self {
             format: FORMAT,
@@ -87,7 +94,11 @@ impl<M> Card<M> {
     pub fn check(&self, contents: &Contents) -> Result<(), WeightsError> {
         let scale = self.normalisation.speed_scale_m_s;
         if self.format != FORMAT {
-            return Err(contents.field("format", &self.format, &format!("this version reads {FORMAT}")));
+            return Err(contents.field(
+                "format",
+                &self.format,
+                &format!("this version reads {FORMAT}"),
+            ));
         }
         if scale.to_bits() != SPEED_SCALE_M_S.to_bits() {
             let reason = format!("the flight code divides by {SPEED_SCALE_M_S}");

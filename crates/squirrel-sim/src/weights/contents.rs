@@ -8,11 +8,12 @@ use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::path::Path;
 
-/// Key of the metadata record. There is one only, because the format keeps metadata in a hash map: several would stand in
-/// another order in every file.
+/// Key of the metadata record. There is one only, because the format keeps metadata in a hash map:
+/// several would stand in another order in every file.
 pub const RECORD: &str = "squirrel";
 
-/// Tensors and the metadata record of a file. Tensors are taken out one by one; what is left at the end does not belong.
+/// Tensors and the metadata record of a file. Tensors are taken out one by one; what is left at the
+/// end does not belong.
 #[derive(Debug)]
 pub struct Contents {
     file: String,
@@ -27,7 +28,8 @@ impl Contents {
     /// The disk refuses, or as [`Contents::parse`].
     pub fn read(path: &Path) -> Result<Self, WeightsError> {
         let file = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|error| WeightsError::Io { file: file.clone(), error })?;
+        let bytes =
+            std::fs::read(path).map_err(|error| WeightsError::Io { file: file.clone(), error })?;
         Self::parse(file, &bytes)
     }
 
@@ -45,17 +47,28 @@ impl Contents {
         let parsed = SafeTensors::deserialize(bytes).map_err(format)?;
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(format)?;
         let text = header.metadata().as_ref().and_then(|records| records.get(RECORD)).cloned();
-        let text =
-            text.ok_or_else(|| WeightsError::Metadata { file: file.clone(), problem: "missing".to_owned() })?;
+        let text = text.ok_or_else(|| WeightsError::Metadata {
+            file: file.clone(),
+            problem: "missing".to_owned(),
+        })?;
         // Sorted, so that of several problems the same is named every time.
         let views: BTreeMap<String, TensorView<'_>> = parsed.tensors().into_iter().collect();
         let mut tensors = BTreeMap::new();
         for (tensor, view) in views {
             if view.dtype() != Dtype::F32 {
-                return Err(WeightsError::Type { file, tensor, found: format!("{:?}", view.dtype()) });
+                return Err(WeightsError::Type {
+                    file,
+                    tensor,
+                    found: format!("{:?}", view.dtype()),
+                });
             }
-            let numbers =
-                view.data().as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect::<Vec<_>>();
+            let numbers = view
+                .data()
+                .as_chunks()
+                .0
+                .iter()
+                .map(|b| f32::from_le_bytes(*b))
+                .collect::<Vec<_>>();
             if let Some(index) = numbers.iter().position(|x| !x.is_finite()) {
                 let value = numbers[index];
                 return Err(WeightsError::NotFinite { file, tensor, index, value });

@@ -47,8 +47,9 @@ impl ParnnWeights {
     /// * `file` - what errors call it
     ///
     /// # Errors
-    /// One line that names the file, and the tensor or the field with its value: not a safetensors file, another model, a tensor
-    /// that is missing, unknown, of another shape or not finite, metadata that does not fit the flight code.
+    /// One line that names the file, and the tensor or the field with its value: not a safetensors
+    /// file, another model, a tensor that is missing, unknown, of another shape or not finite,
+    /// metadata that does not fit the flight code.
     pub fn parse(file: &str, bytes: Vec<u8>) -> Result<Self, WeightsError> {
         let mut contents = Contents::parse(file.to_owned(), &bytes)?;
         let card: Card<String> = contents.record()?;
@@ -63,7 +64,9 @@ impl ParnnWeights {
         }
         contents.finish()?;
         let parnn = Parnn { net, area_m2: card.area_m2, domain: card.domain };
-        parnn.check().map_err(|problem| WeightsError::Parameter { file: file.to_owned(), problem })?;
+        parnn
+            .check()
+            .map_err(|problem| WeightsError::Parameter { file: file.to_owned(), problem })?;
         Ok(Self { parnn, bytes })
     }
 

@@ -49,7 +49,11 @@ impl PolicyCard {
             return Err(contents.field("kind", &self.kind, &format!("must be \"{KIND}\"")));
         }
         if self.format != FORMAT {
-            return Err(contents.field("format", &self.format, &format!("this version reads {FORMAT}")));
+            return Err(contents.field(
+                "format",
+                &self.format,
+                &format!("this version reads {FORMAT}"),
+            ));
         }
         for (field, found, needed) in [
             ("observation", self.observation, ours.observation),
@@ -57,7 +61,11 @@ impl PolicyCard {
             ("action", self.action, ours.action),
         ] {
             if found != needed {
-                return Err(contents.field(field, &found, &format!("the flight code has {needed}")));
+                return Err(contents.field(
+                    field,
+                    &found,
+                    &format!("the flight code has {needed}"),
+                ));
             }
         }
         Ok(())
@@ -77,8 +85,9 @@ impl PolicyWeights {
     /// Reads a file.
     ///
     /// # Errors
-    /// The disk refuses, or one line that names the file, and the tensor or the field with its value: not a safetensors file, no
-    /// policy, one of other sizes, a tensor that is missing, unknown, of another shape or not finite.
+    /// The disk refuses, or one line that names the file, and the tensor or the field with its
+    /// value: not a safetensors file, no policy, one of other sizes, a tensor that is missing,
+    /// unknown, of another shape or not finite.
     pub fn load(path: &Path) -> Result<Self, WeightsError> {
         let mut contents = Contents::read(path)?;
         contents.record::<PolicyCard>()?.check(&contents)?;
@@ -91,7 +100,8 @@ impl PolicyWeights {
         Ok(Self { policy, name })
     }
 
-    /// Writes a file that [`PolicyWeights::load`] reads. It appears under its name only when it is whole.
+    /// Writes a file that [`PolicyWeights::load`] reads. It appears under its name only when it is
+    /// whole.
     ///
     /// # Errors
     /// A weight is not finite, or the disk refuses.

@@ -1,4 +1,5 @@
-//! Writing safetensors files of `f32` with one metadata record; [`Contents`](super::Contents) reads them.
+//! Writing safetensors files of `f32` with one metadata record; [`Contents`](super::Contents) reads
+//! them.
 
 use super::{RECORD, WeightsError};
 use safetensors::Dtype;
@@ -22,9 +23,14 @@ pub struct Tensor<'a> {
 ///
 /// # Errors
 /// A number is not finite, a tensor is of another shape than its numbers, or the disk refuses.
-pub fn write(path: &Path, record: &impl Serialize, tensors: &[Tensor<'_>]) -> Result<(), WeightsError> {
+pub fn write(
+    path: &Path,
+    record: &impl Serialize,
+    tensors: &[Tensor<'_>],
+) -> Result<(), WeightsError> {
     let file = path.display().to_string();
-    let format = |problem: String| WeightsError::Format { file: path.display().to_string(), problem };
+    let format =
+        |problem: String| WeightsError::Format { file: path.display().to_string(), problem };
     let text = serde_json::to_string(record)
         .map_err(|e| WeightsError::Metadata { file: file.clone(), problem: e.to_string() })?;
     let bytes: Vec<Vec<u8>> =
@@ -39,7 +45,8 @@ pub fn write(path: &Path, record: &impl Serialize, tensors: &[Tensor<'_>]) -> Re
         views.push((tensor.name.as_str(), view.map_err(|e| format(e.to_string()))?));
     }
     let metadata = [(RECORD.to_owned(), text)].into_iter().collect();
-    let content = safetensors::serialize(views, Some(metadata)).map_err(|e| format(e.to_string()))?;
+    let content =
+        safetensors::serialize(views, Some(metadata)).map_err(|e| format(e.to_string()))?;
 
     write_whole(path, &content).map_err(|error| WeightsError::Io { file, error })
 }

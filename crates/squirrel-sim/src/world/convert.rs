@@ -44,7 +44,8 @@ mod tests {
 
     #[test]
     fn a_full_inertia_matrix_survives_its_principal_axes() {
-        let inertia = Matrix3::new(3.2e-3, 4.0e-4, -2.0e-4, 4.0e-4, 4.7e-3, 3.0e-4, -2.0e-4, 3.0e-4, 7.1e-3);
+        let inertia =
+            Matrix3::new(3.2e-3, 4.0e-4, -2.0e-4, 4.0e-4, 4.7e-3, 3.0e-4, -2.0e-4, 3.0e-4, 7.1e-3);
         let p = mass_properties(0.548, &inertia);
         assert_eq!(p.mass(), 0.548);
         let axes = UnitQuaternion::from(p.principal_inertia_local_frame).to_rotation_matrix();

@@ -1,8 +1,10 @@
-//! Distance to the nearest of many vertical cylinders, cheap enough for every step of a flight through a forest.
+//! Distance to the nearest of many vertical cylinders, cheap enough for every step of a flight
+//! through a forest.
 //!
-//! A uniform grid over the plan view. Each cell lists the cylinders whose square outline overlaps it; the lists lie row
-//! by row in one array, so the cells of a row are one slice. The cell edge is at least a cylinder's diameter, so that
-//! no cylinder is listed more than four times, and large enough that there are at most about three cells a cylinder.
+//! A uniform grid over the plan view. Each cell lists the cylinders whose square outline overlaps
+//! it; the lists lie row by row in one array, so the cells of a row are one slice. The cell edge is
+//! at least a cylinder's diameter, so that no cylinder is listed more than four times, and large
+//! enough that there are at most about three cells a cylinder.
 
 use super::parameters::Cylinder;
 use nalgebra::Vector3;
@@ -20,7 +22,8 @@ pub(super) struct Grid {
 
 impl Grid {
     pub(super) fn new(cylinders: &[Cylinder]) -> Self {
-        let (mut low, mut high, mut diameter) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], 0.0_f64);
+        let (mut low, mut high, mut diameter) =
+            ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], 0.0_f64);
         for c in cylinders {
             for (axis, centre) in [c.north_m, c.east_m].into_iter().enumerate() {
                 low[axis] = low[axis].min(centre - c.radius_m);
@@ -39,7 +42,10 @@ impl Grid {
         }
         let extent = [high[0] - low[0], high[1] - low[1]];
         let count = cylinders.len() as f64;
-        let edge = (extent[0] * extent[1] / count).sqrt().max(extent[0].max(extent[1]) / count).max(diameter);
+        let edge = (extent[0] * extent[1] / count)
+            .sqrt()
+            .max(extent[0].max(extent[1]) / count)
+            .max(diameter);
         let cells = extent.map(|e| (e / edge) as usize + 1);
         let mut grid = Self {
             corner_m: low,
@@ -74,15 +80,17 @@ impl Grid {
         grid
     }
 
-    /// The rows (axis 0) or columns (axis 1) that `centre - reach ..= centre + reach` overlaps. A cast to an integer
-    /// saturates, and one formula for cylinders and queries rounds both alike, so that no overlap is missed.
+    /// The rows (axis 0) or columns (axis 1) that `centre - reach ..= centre + reach` overlaps. A
+    /// cast to an integer saturates, and one formula for cylinders and queries rounds both alike,
+    /// so that no overlap is missed.
     fn span(&self, axis: usize, centre: f64, reach: f64) -> core::ops::Range<usize> {
         let cell = |x: f64| ((x - self.corner_m[axis]) * self.cells_per_m) as usize;
         let end = cell(centre + reach).saturating_add(1).min(self.cells[axis]);
         cell(centre - reach).min(end)..end
     }
 
-    /// Distance from a point to the nearest cylinder, m; 0 inside one; infinite if none is within `reach_m`.
+    /// Distance from a point to the nearest cylinder, m; 0 inside one; infinite if none is within
+    /// `reach_m`.
     pub(super) fn distance_m(&self, point_ned: Vector3<f64>, reach_m: f64) -> f64 {
         let columns = self.span(1, point_ned.y, reach_m);
         let mut nearest = f64::INFINITY;
@@ -91,7 +99,8 @@ impl Grid {
         }
         for row in self.span(0, point_ned.x, reach_m) {
             let first = row * self.cells[1];
-            let list = self.starts[first + columns.start] as usize..self.starts[first + columns.end] as usize;
+            let list = self.starts[first + columns.start] as usize
+                ..self.starts[first + columns.end] as usize;
             for c in &self.listed[list] {
                 nearest = nearest.min(distance_m(c, point_ned));
             }

@@ -1,12 +1,13 @@
 //! The world around the vehicle: ground, obstacles and contact, solved by rapier.
 //!
-//! Free flight belongs to the RK4 of `squirrel_core::dynamics`. Contact needs a solver, so near the ground or an obstacle
-//! [`World::step`] takes over; [`World::is_near`] says when. State goes in and comes out at every step, so the two may
-//! alternate at will. The only memory between steps is which contacts are old, for those do not bounce again.
+//! Free flight belongs to the RK4 of `squirrel_core::dynamics`. Contact needs a solver, so near the
+//! ground or an obstacle [`World::step`] takes over; [`World::is_near`] says when. State goes in
+//! and comes out at every step, so the two may alternate at will. The only memory between steps is
+//! which contacts are old, for those do not bounce again.
 //!
-//! The price of `step` is order one: rapier's semi-implicit Euler (four substeps a step), and a force and moment
-//! that keep their world direction over the step. Error against RK4 after 1 s of a tumbling, thrusting vehicle
-//! (`tests/world_free_flight.rs` prints it):
+//! The price of `step` is order one: rapier's semi-implicit Euler (four substeps a step), and a
+//! force and moment that keep their world direction over the step. Error against RK4 after 1 s of a
+//! tumbling, thrusting vehicle (`tests/world_free_flight.rs` prints it):
 //!
 //! ```text
 //! step    attitude     position
@@ -15,9 +16,10 @@
 //! 1 ms    0.027 deg    1.44 mm
 //! ```
 //!
-//! Contact is a model too. At rest the box sinks into the ground by 0.16 mm for 25 mm of thickness. Steps should be 1 ms or
-//! less near solids: contact keeps its lever arms over the step, and a fast tumble gains up to 0.5 % of its energy in the
-//! course of its impacts at 1 ms, 1 % at 4 ms (`tests/world_contact.rs`).
+//! Contact is a model too. At rest the box sinks into the ground by 0.16 mm for 25 mm of thickness.
+//! Steps should be 1 ms or less near solids: contact keeps its lever arms over the step, and a fast
+//! tumble gains up to 0.5 % of its energy in the course of its impacts at 1 ms, 1 % at 4 ms
+//! (`tests/world_contact.rs`).
 
 mod convert;
 mod grid;
@@ -80,8 +82,9 @@ impl World {
         integration.length_unit = parameters.size_body_m.into_iter().fold(f64::INFINITY, f64::min);
         // No cap on speed, which is 400 m/s by default.
         integration.normalized_max_linear_velocity = f64::MAX;
-        // Impulses carried over from the step before push on a body that has bounced or turned since: tumbling impacts
-        // gained up to 6 % of energy that way, 0.5 % without. More iterations make up for the worse first guess.
+        // Impulses carried over from the step before push on a body that has bounced or turned
+        // since: tumbling impacts gained up to 6 % of energy that way, 0.5 % without. More
+        // iterations make up for the worse first guess.
         integration.warmstart_coefficient = 0.0;
         integration.num_internal_pgs_iterations = 4;
         integration.num_internal_stabilization_iterations = 4;
@@ -97,19 +100,25 @@ impl World {
             .additional_mass_properties(convert::mass_properties(p.mass_kg, &p.inertia_kg_m2))
             .can_sleep(false)
             .allow_fast_rotation(true)
-            // Contacts are looked for along the way of the step, so that impact happens at the surface. What is faster
-            // than that meets rapier's sweep of fast bodies, which is on by default and drops the rest of the step.
+            // Contacts are looked for along the way of the step, so that impact happens at the
+            // surface. What is faster than that meets rapier's sweep of fast bodies, which is on by
+            // default and drops the rest of the step.
             .soft_ccd_prediction(half.norm());
-        let (body, shape) = physics.insert(body, surface(SharedShape::cuboid(half.x, half.y, half.z)));
+        let (body, shape) =
+            physics.insert(body, surface(SharedShape::cuboid(half.x, half.y, half.z)));
         if parameters.ground {
             // A slab and not a half-space: rapier does not stop a fast body at the latter.
             let slab = surface(SharedShape::cuboid(2e5, 2e5, 50.0))
-                .position(convert::to_pose(Vector3::new(0.0, 0.0, 50.0), UnitQuaternion::identity()))
+                .position(convert::to_pose(
+                    Vector3::new(0.0, 0.0, 50.0),
+                    UnitQuaternion::identity(),
+                ))
                 .user_data(GROUND);
             physics.insert_collider(slab, None);
         }
         // rapier's cylinders stand along y.
-        let upright = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::FRAC_PI_2);
+        let upright =
+            UnitQuaternion::from_axis_angle(&Vector3::x_axis(), core::f64::consts::FRAC_PI_2);
         for (i, c) in parameters.obstacles.iter().enumerate() {
             let centre = Vector3::new(c.north_m, c.east_m, -0.5 * c.height_m);
             let trunk = surface(SharedShape::cylinder(0.5 * c.height_m, c.radius_m))
@@ -128,8 +137,8 @@ impl World {
         })
     }
 
-    /// Distance from the vehicle's bounding sphere to the nearest solid, m, at most `horizon_m`; negative where the
-    /// sphere reaches into one. NaN if an argument is.
+    /// Distance from the vehicle's bounding sphere to the nearest solid, m, at most `horizon_m`;
+    /// negative where the sphere reaches into one. NaN if an argument is.
     pub fn clearance(&self, position: In<Ned, f64>, horizon_m: f64) -> f64 {
         let p = position.vector;
         if (p.x + p.y + p.z + horizon_m).is_nan() {
@@ -143,10 +152,11 @@ impl World {
         (distance_m - self.bounding_radius_m).min(horizon_m)
     }
 
-    /// Whether the next step might touch something and belongs to [`Self::step`]. A state that is not finite is near,
-    /// so that `step` names what is wrong with it.
+    /// Whether the next step might touch something and belongs to [`Self::step`]. A state that is
+    /// not finite is near, so that `step` names what is wrong with it.
     pub fn is_near(&self, state: &State<f64>, dt_s: f64) -> bool {
-        // Twice the way at the present speed and a tenth of the radius: room for what the step itself accelerates.
+        // Twice the way at the present speed and a tenth of the radius: room for what the step
+        // itself accelerates.
         let margin_m = 2.0 * state.velocity.vector.norm() * dt_s + 0.1 * self.bounding_radius_m;
         let spare_m = self.clearance(state.position, margin_m) - margin_m;
         spare_m < 0.0 || spare_m.is_nan()
@@ -158,7 +168,8 @@ impl World {
     ///
     /// # Errors
     /// [`WorldError::Value`] names an input that is not finite, or a step that is not positive;
-    /// [`WorldError::Overflow`] if the step leaves the finite numbers. The world stays usable after either.
+    /// [`WorldError::Overflow`] if the step leaves the finite numbers. The world stays usable after
+    /// either.
     pub fn step(
         &mut self,
         state: &State<f64>,
@@ -201,10 +212,13 @@ impl World {
                 moment_n_m: wrench.moment.vector.norm(),
             });
         }
-        let free_m_s2 = (ned_from_body * wrench.force).vector / self.mass_kg + Vector3::z() * GRAVITY_M_S2;
+        let free_m_s2 =
+            (ned_from_body * wrench.force).vector / self.mass_kg + Vector3::z() * GRAVITY_M_S2;
         let pushed_m_s = ((next.velocity - state.velocity).vector - free_m_s2 * dt_s).norm();
-        let rounding_m_s =
-            1e-12 * (state.velocity.vector.norm() + next.velocity.vector.norm() + free_m_s2.norm() * dt_s);
+        let rounding_m_s = 1e-12
+            * (state.velocity.vector.norm()
+                + next.velocity.vector.norm()
+                + free_m_s2.norm() * dt_s);
         let contact = if pushed_m_s > rounding_m_s {
             self.contact(self.mass_kg * pushed_m_s)
         } else {
@@ -213,8 +227,9 @@ impl World {
         Ok((next, contact))
     }
 
-    /// Who gave the impulse. How large it was is known better from the balance of momentum: rapier's reports, which
-    /// serve to compare the obstacles, count pushes that a later iteration of the same step undid.
+    /// Who gave the impulse. How large it was is known better from the balance of momentum:
+    /// rapier's reports, which serve to compare the obstacles, count pushes that a later iteration
+    /// of the same step undid.
     fn contact(&self, impulse_n_s: f64) -> Contact {
         let mut contact = Contact { impulse_n_s, ..Contact::default() };
         let mut hardest_n_s = 0.0;
@@ -247,7 +262,8 @@ impl core::fmt::Debug for World {
     }
 }
 
-/// Longest step, s: a contact that takes longer is no contact any more, and its solver may take for ever.
+/// Longest step, s: a contact that takes longer is no contact any more, and its solver may take for
+/// ever.
 const STEP_MAX_S: f64 = 1.0;
 
 fn check(state: &State<f64>, wrench: &Wrench<Body, f64>, dt_s: f64) -> Result<(), ParameterError> {

@@ -5,8 +5,8 @@ use squirrel_core::vehicle::ParameterError;
 /// Most obstacles of a world.
 pub const MAX_OBSTACLES: usize = 10_000;
 
-/// Top restitution. Above it the impacts of a fast tumble give back more energy than they took: measured over 300 such
-/// flights, 12 % more with 0.8 at a step of 4 ms.
+/// Top restitution. Above it the impacts of a fast tumble give back more energy than they took:
+/// measured over 300 such flights, 12 % more with 0.8 at a step of 4 ms.
 pub const RESTITUTION_MAX: f64 = 0.5;
 
 /// A vertical cylinder that stands on the plane down = 0: a trunk, a pole, a tower.
@@ -25,13 +25,15 @@ pub struct Cylinder {
 /// The world and the vehicle's shape in it, unchecked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorldParameters {
-    /// Edges of the box that the airframe fills, along the body axes, m; centred on the centre of mass.
+    /// Edges of the box that the airframe fills, along the body axes, m; centred on the centre of
+    /// mass.
     pub size_body_m: [f64; 3],
     /// Fixed obstacles. [`super::Contact::obstacle`] is an index into this list.
     pub obstacles: Vec<Cylinder>,
     /// Whether the plane down = 0 is solid ground, 200 km around the origin and 100 m deep.
     pub ground: bool,
-    /// Speed after over speed before an impact, along the normal, 0 to [`RESTITUTION_MAX`]; 0 stays where it lands.
+    /// Speed after over speed before an impact, along the normal, 0 to [`RESTITUTION_MAX`]; 0 stays
+    /// where it lands.
     pub restitution: f64,
     /// Coulomb's coefficient, for sticking and for sliding.
     pub friction: f64,
@@ -94,8 +96,20 @@ pub(super) fn check(p: &WorldParameters) -> Result<(), ParameterError> {
         let place = "must be finite and within 100 km";
         within("obstacles[].north_m", Some(i), c.north_m, [-1e5, 1e5], place)?;
         within("obstacles[].east_m", Some(i), c.east_m, [-1e5, 1e5], place)?;
-        within("obstacles[].radius_m", Some(i), c.radius_m, [1e-3, 1e3], "must be 0.001 to 1000 m")?;
-        within("obstacles[].height_m", Some(i), c.height_m, [1e-3, 1e3], "must be 0.001 to 1000 m")?;
+        within(
+            "obstacles[].radius_m",
+            Some(i),
+            c.radius_m,
+            [1e-3, 1e3],
+            "must be 0.001 to 1000 m",
+        )?;
+        within(
+            "obstacles[].height_m",
+            Some(i),
+            c.height_m,
+            [1e-3, 1e3],
+            "must be 0.001 to 1000 m",
+        )?;
     }
     Ok(())
 }
@@ -107,7 +121,12 @@ pub(super) fn finite<'a>(
 ) -> Result<(), ParameterError> {
     for (i, value) in values.into_iter().enumerate() {
         if !value.is_finite() {
-            return Err(ParameterError { field, index: Some(i), value: *value, reason: "must be finite" });
+            return Err(ParameterError {
+                field,
+                index: Some(i),
+                value: *value,
+                reason: "must be finite",
+            });
         }
     }
     Ok(())

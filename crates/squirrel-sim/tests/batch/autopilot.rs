@@ -1,4 +1,5 @@
-//! The inner loop in a batch is the flight code's, and what it does to a vehicle depends on nothing but the vehicle.
+//! The inner loop in a batch is the flight code's, and what it does to a vehicle depends on nothing
+//! but the vehicle.
 
 use super::support::{Thrown, bits};
 use nalgebra::Vector3;
@@ -26,18 +27,24 @@ fn attitudes(period_steps: usize) -> Autopilot {
 /// Set points that a vehicle of this number follows in this half second.
 fn set_point(number: usize, half_second: usize) -> [f32; 4] {
     let k = (number * 7 + half_second * 3) as f32;
-    [0.5 * (k * 0.9).sin(), 0.5 * (k * 1.7).cos(), 2.0 * (k * 0.3).sin(), 5.4 + 2.0 * (k * 0.5).sin()]
+    [
+        0.5 * (k * 0.9).sin(),
+        0.5 * (k * 1.7).cos(),
+        2.0 * (k * 0.3).sin(),
+        5.4 + 2.0 * (k * 0.5).sin(),
+    ]
 }
 
 /// The squirrel with commands of another kind.
 fn commanded(kind: &str) -> Tuned {
-    let text = include_str!("../../../../vehicles/squirrel.toml").replace("\"speed_fraction\"", kind);
+    let text =
+        include_str!("../../../../vehicles/squirrel.toml").replace("\"speed_fraction\"", kind);
     let vehicle = VehicleFile::parse(&text, "test").unwrap().vehicle.cast().unwrap();
     Tuned { vehicle, ..squirrel() }
 }
 
-/// The flight code and the loop in the batch, each flying the same plant: the same bits, at the rotors' limits and with yaw far
-/// behind, too.
+/// The flight code and the loop in the batch, each flying the same plant: the same bits, at the
+/// rotors' limits and with yaw far behind, too.
 fn flies_as_the_flight_code(tuned: &Tuned) {
     let settings = settings(1, Path::best());
     let mut batch: Batch<f32> = Batch::new(&[tuned.vehicle], settings).unwrap();
@@ -50,7 +57,8 @@ fn flies_as_the_flight_code(tuned: &Tuned) {
     let (mut tilted, mut beyond, mut led) = (0.0_f32, 0, 0);
     for step in 0..2000 {
         let t = step as f32 * 2e-3;
-        let [roll, pitch, yaw] = [0.5 * (2.0 * t).sin(), 0.4 * (1.5 * t).sin(), 3.0 * (0.7 * t).sin()];
+        let [roll, pitch, yaw] =
+            [0.5 * (2.0 * t).sin(), 0.4 * (1.5 * t).sin(), 3.0 * (0.7 * t).sin()];
         let thrust_n = 6.4 + 4.0 * (1.1 * t).sin();
         let state = plant.state(0).unwrap();
         let measured_rad = state.ned_from_body().heading();
@@ -105,7 +113,8 @@ fn flown<const N: usize>(
     let (mut done, mut turn) = (0, 0);
     while done < 300 {
         if done % 100 == 0 {
-            let rows: Vec<f32> = (0..count).flat_map(|number| set_point(number, done / 100)).collect();
+            let rows: Vec<f32> =
+                (0..count).flat_map(|number| set_point(number, done / 100)).collect();
             batch.set_points(&rows).unwrap();
         }
         let steps = pattern[turn % N].min(100 - done % 100);
@@ -146,7 +155,8 @@ fn body_rates_are_reached_and_thrust_is_the_thrust_asked_for() {
     assert!((thrust - 6.0).abs() < 0.05, "{thrust}");
 }
 
-/// More than the rotors have: tilt first, then thrust, yaw last; and what was not met is not integrated.
+/// More than the rotors have: tilt first, then thrust, yaw last; and what was not met is not
+/// integrated.
 #[test]
 fn limits_hold_and_tilt_comes_first() {
     let tuned = squirrel();
@@ -158,7 +168,10 @@ fn limits_hold_and_tilt_comes_first() {
     for _ in 0..1000 {
         batch.step(1);
         let speeds = batch.state(0).unwrap().rotor_speed_rad_s;
-        assert!(speeds.iter().all(|speed| (0.0..=(most / k).sqrt() * 1.0001).contains(speed)), "{speeds:?}");
+        assert!(
+            speeds.iter().all(|speed| (0.0..=(most / k).sqrt() * 1.0001).contains(speed)),
+            "{speeds:?}"
+        );
     }
     let (roll, _, _) = batch.state(0).unwrap().ned_from_body().euler();
     assert!((roll - 0.6).abs() < 0.1, "{roll}");
@@ -172,10 +185,14 @@ fn what_cannot_be_engaged_is_named() {
     assert!(matches!(error, BatchError::NoAutopilot), "{error}");
     let error = batch.engage(attitudes(1), std::slice::from_ref(&tuned)).unwrap_err().to_string();
     assert_eq!(error, "vehicles of the autopilot: 1 numbers, must be 2");
-    let error = batch.engage(attitudes(0), &[tuned.clone(), tuned.clone()]).unwrap_err().to_string();
+    let error =
+        batch.engage(attitudes(0), &[tuned.clone(), tuned.clone()]).unwrap_err().to_string();
     assert_eq!(error, "period_steps = 0: must be at least 1");
     let mut bad = tuned.clone();
     bad.gains.c1_per_s.y = f32::NAN;
     let error = batch.engage(attitudes(1), &[tuned, bad]).unwrap_err().to_string();
-    assert!(error.contains("vehicles[1]") && error.contains("control.attitude.c1_per_s[1] = NaN"), "{error}");
+    assert!(
+        error.contains("vehicles[1]") && error.contains("control.attitude.c1_per_s[1] = NaN"),
+        "{error}"
+    );
 }

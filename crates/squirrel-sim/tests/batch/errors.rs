@@ -43,7 +43,8 @@ fn states_that_are_none() {
     state.attitude.w = 0.5;
     let text = batch.reset(1, &state).unwrap_err().to_string();
     assert_eq!(text, "attitude of vehicle 1: norm 0.5, must be 1 to within 1e-3");
-    let text = batch.set_wind(2, In::new(Vector3::new(0.0, f32::INFINITY, 0.0))).unwrap_err().to_string();
+    let text =
+        batch.set_wind(2, In::new(Vector3::new(0.0, f32::INFINITY, 0.0))).unwrap_err().to_string();
     assert_eq!(text, "wind of vehicle 2: not finite");
     assert_eq!(batch.state(1).unwrap(), before, "what is refused changes nothing");
 }
@@ -54,8 +55,14 @@ fn shapes_that_do_not_fit() {
     let text = "vehicle 3: the batch has 3";
     assert_eq!(batch.state(3).unwrap_err().to_string(), text);
     assert_eq!(batch.reset(3, &State::at_rest()).unwrap_err().to_string(), text);
-    assert_eq!(batch.command(&[0.5; 11]).unwrap_err().to_string(), "commands: 11 numbers, must be 12");
-    assert_eq!(batch.write_states(&mut [0.0; 52]).unwrap_err().to_string(), "rows: 52 numbers, must be 51");
+    assert_eq!(
+        batch.command(&[0.5; 11]).unwrap_err().to_string(),
+        "commands: 11 numbers, must be 12"
+    );
+    assert_eq!(
+        batch.write_states(&mut [0.0; 52]).unwrap_err().to_string(),
+        "rows: 52 numbers, must be 51"
+    );
 }
 
 /// As for a vehicle alone: a command is limited, and NaN asks for nothing.

@@ -1,4 +1,5 @@
-//! What a vehicle does in a batch has one result, to the last bit, and it is that of the vehicle alone.
+//! What a vehicle does in a batch has one result, to the last bit, and it is that of the vehicle
+//! alone.
 
 use super::support::{Thrown, bits};
 use nalgebra::{Vector3, convert};
@@ -107,7 +108,11 @@ fn a_vehicle_alone_is_the_same_among_a_thousand() {
             winds: all.winds[999..].to_vec(),
             commands: all.commands[4 * 999..].to_vec(),
         };
-        assert_eq!(flown(&last, settings(scheme), &[200])[0], thousand[999], "in the first column, too");
+        assert_eq!(
+            flown(&last, settings(scheme), &[200])[0],
+            thousand[999],
+            "in the first column, too"
+        );
     }
 }
 
@@ -141,7 +146,11 @@ fn a_batch_is_the_core<T: Paths>() {
             }
             batch.step(1);
             for (number, state) in states.iter().enumerate() {
-                assert_eq!(batch.state(number).unwrap(), *state, "{scheme:?}, vehicle {number}, step {step}");
+                assert_eq!(
+                    batch.state(number).unwrap(),
+                    *state,
+                    "{scheme:?}, vehicle {number}, step {step}"
+                );
             }
         }
     }
@@ -187,8 +196,11 @@ fn places_without_a_rotor_are_still() {
         wide.reset(number, &state).unwrap();
         wide.set_wind(number, In::new(Vector3::from(thrown.winds[number]))).unwrap();
     }
-    let commands: Vec<f32> =
-        thrown.commands.chunks(4).flat_map(|c| [c[0], c[1], c[2], c[3], 1.0, f32::NAN, 0.5, -1.0]).collect();
+    let commands: Vec<f32> = thrown
+        .commands
+        .chunks(4)
+        .flat_map(|c| [c[0], c[1], c[2], c[3], 1.0, f32::NAN, 0.5, -1.0])
+        .collect();
     wide.command(&commands).unwrap();
     wide.step(300);
     for (wide, expected) in bits(&mut wide).iter().zip(&expected) {

@@ -1,4 +1,5 @@
-//! `squirrel_core::lane` on every register of this processor: the elementary functions, and the mixer.
+//! `squirrel_core::lane` on every register of this processor: the elementary functions, and the
+//! mixer.
 
 use core::f64::consts::{PI, TAU};
 use squirrel_core::control::mix::Table;
@@ -23,7 +24,8 @@ impl<S: Paths> Kernel<S> for Functions<S> {
             let x = L::load(&self.0[start..]);
             let fraction = x / (x + L::of(1.0));
             let cosine = (L::of(1.0) - fraction * fraction).root();
-            let (half_sine, half_cosine) = half_turn_sine_and_cosine((fraction - L::of(0.5)) * L::of(PI));
+            let (half_sine, half_cosine) =
+                half_turn_sine_and_cosine((fraction - L::of(0.5)) * L::of(PI));
             let results = [
                 exp(L::of(0.0) - x),
                 ln(x),
@@ -106,7 +108,8 @@ impl Kernel<f32> for Mixes<'_> {
     }
 }
 
-/// A batch mixes as the flight code does, to the bit: 100 000 demands on each register, half of them beyond what rotors give.
+/// A batch mixes as the flight code does, to the bit: 100 000 demands on each register, half of
+/// them beyond what rotors give.
 #[test]
 fn the_mixer_is_the_flight_codes_on_every_path() {
     let mixer = Mixer::new(&VehicleFile::squirrel().vehicle.cast().unwrap()).unwrap();
@@ -114,7 +117,8 @@ fn the_mixer_is_the_flight_codes_on_every_path() {
     (0..BLOCK).for_each(|lane| table.put(lane, &mixer.table().first()));
     let mut state = 1_u64;
     let mut draw = |size: f32| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         size * ((state >> 40) as f32 / 16_777_216.0 - 0.5)
     };
     let (mut beyond, mut asked) = (0, 0);
@@ -130,7 +134,13 @@ fn the_mixer_is_the_flight_codes_on_every_path() {
             for (lane, alone) in alone.iter().enumerate() {
                 for rotor in 0..4 {
                     let (one, other) = (together[rotor][lane], alone.rotor_thrust_n[rotor]);
-                    assert_eq!(one.to_bits(), other.to_bits(), "{}: {:?}", path.name(), demands[lane]);
+                    assert_eq!(
+                        one.to_bits(),
+                        other.to_bits(),
+                        "{}: {:?}",
+                        path.name(),
+                        demands[lane]
+                    );
                 }
                 assert_eq!(together[4][lane] > 0.0, alone.saturated, "{}", path.name());
             }

@@ -1,4 +1,5 @@
-//! The tests of batches and of environments over them. One binary: what they share is compiled and linked once.
+//! The tests of batches and of environments over them. One binary: what they share is compiled and
+//! linked once.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod autopilot;

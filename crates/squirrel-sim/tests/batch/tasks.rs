@@ -1,4 +1,5 @@
-//! Environments: what happens in one depends on nothing but its seed, and rewards are for what they say.
+//! Environments: what happens in one depends on nothing but its seed, and rewards are for what they
+//! say.
 
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::In;
@@ -58,7 +59,8 @@ fn step(tasks: &mut Tasks, actions: &[f32]) -> Seen {
 
 /// A hand-made pilot: leans towards where it should be.
 fn lean(observation: &[f32]) -> [f32; 4] {
-    let gain = |k: usize| 0.5 * (observation[k] * 2.0 * 1.2 + observation[3 + k] * 5.0 * 1.4) / 9.8 / 0.6;
+    let gain =
+        |k: usize| 0.5 * (observation[k] * 2.0 * 1.2 + observation[3 + k] * 5.0 * 1.4) / 9.8 / 0.6;
     let thrust = (0.8 * observation[2] * 2.0 + 1.6 * observation[5] * 5.0) / -9.8;
     [gain(1) * 2.0, -gain(0) * 2.0, thrust, -1.0]
 }
@@ -76,13 +78,14 @@ fn fly(tasks: &mut Tasks, steps: usize, pilot: impl Fn(&[f32]) -> Vec<f32>) -> V
     all
 }
 
-/// The flight code beside a task: the same actions on the same plant, the same bits after each. It gets true attitude and rates at
-/// 500 Hz, as the task's inner loop has them.
+/// The flight code beside a task: the same actions on the same plant, the same bits after each. It
+/// gets true attitude and rates at 500 Hz, as the task's inner loop has them.
 #[test]
 fn an_action_turns_the_rotors_in_a_task_as_in_the_flight_code() {
     let vehicle = VehicleFile::squirrel();
     let scenario = Scenario::find("hover").unwrap();
-    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    let setup =
+        Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
     let stack = setup.stack().unwrap();
     let span = Span::of(stack.vehicle());
     let settings = TaskSettings { threads: 1, ..settings(CourseKind::Track, Level::AttitudeWing) };
@@ -96,7 +99,8 @@ fn an_action_turns_the_rotors_in_a_task_as_in_the_flight_code() {
     let mut known = StackState::default();
     let mut control = |time_us: u64, state: &State<f32>, command: Option<PilotCommand>| {
         let mut frame = SensorFrame::empty(time_us);
-        frame.imu = Some(Imu { omega: state.omega, specific_force: In::new(Vector3::new(0.0, 0.0, -9.8)) });
+        frame.imu =
+            Some(Imu { omega: state.omega, specific_force: In::new(Vector3::new(0.0, 0.0, -9.8)) });
         frame.attitude = Some(state.ned_from_body());
         frame.gnss = Some(Gnss { position: state.position, velocity: state.velocity });
         frame.command = command;
@@ -108,7 +112,12 @@ fn an_action_turns_the_rotors_in_a_task_as_in_the_flight_code() {
     for count in 0..300 {
         // Leans, throws, and cuts thrust below what the flight code allows.
         let k = count as f32;
-        let throw = [0.9 * (k * 0.5).sin(), 0.9 * (k * 0.3).cos(), 1.2 * (k * 0.11).sin(), (k * 0.05).sin()];
+        let throw = [
+            0.9 * (k * 0.5).sin(),
+            0.9 * (k * 0.3).cos(),
+            1.2 * (k * 0.11).sin(),
+            (k * 0.05).sin(),
+        ];
         let action = if count % 50 < 25 { lean(&observation) } else { throw };
         let command = span.command(&action);
         for tick in 0..10 {
@@ -131,7 +140,9 @@ fn an_action_turns_the_rotors_in_a_task_as_in_the_flight_code() {
 
 #[test]
 fn an_environment_is_the_same_among_many_and_on_any_registers() {
-    for (kind, level) in [(CourseKind::Avoid, Level::AttitudeWing), (CourseKind::Track, Level::Motor)] {
+    for (kind, level) in
+        [(CourseKind::Avoid, Level::AttitudeWing), (CourseKind::Track, Level::Motor)]
+    {
         for sensors in [false, true] {
             let settings = TaskSettings { sensors, ..settings(kind, level) };
             let pilot = |observation: &[f32]| match level {
@@ -143,7 +154,8 @@ fn an_environment_is_the_same_among_many_and_on_any_registers() {
                 fly(&mut tasks, 150, pilot)
             };
             let one = run(1, 7, settings);
-            let slow = run(1, 7, TaskSettings { path: Path::available()[0], threads: 1, ..settings });
+            let slow =
+                run(1, 7, TaskSettings { path: Path::available()[0], threads: 1, ..settings });
             assert_eq!(one, slow);
             // More than a thread takes at once.
             let count = 300;
@@ -159,7 +171,10 @@ fn an_environment_is_the_same_among_many_and_on_any_registers() {
                 }
             }
             let first: Vec<&[f32]> = many[0].observation.chunks(OBSERVATION).take(40).collect();
-            assert!(first.iter().all(|row| *row == first[0] || row[..3] != first[0][..3]), "seeds differ");
+            assert!(
+                first.iter().all(|row| *row == first[0] || row[..3] != first[0][..3]),
+                "seeds differ"
+            );
         }
     }
 }
@@ -167,18 +182,21 @@ fn an_environment_is_the_same_among_many_and_on_any_registers() {
 #[test]
 fn who_follows_is_paid_and_who_falls_is_lost() {
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 50, 3, settings(CourseKind::Track, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 50, 3, settings(CourseKind::Track, Level::AttitudeWing))
+            .unwrap();
     let good = fly(&mut tasks, 499, |observation| lean(observation).to_vec());
     let total: f32 = good.iter().flat_map(|seen| &seen.reward).sum::<f32>() / 50.0;
     assert!(total > 6.0, "{total}");
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 50, 3, settings(CourseKind::Track, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 50, 3, settings(CourseKind::Track, Level::AttitudeWing))
+            .unwrap();
     let bad = fly(&mut tasks, 200, |_| vec![0.0, 0.0, -1.0, -1.0]);
     let lost = (0..50).filter(|k| bad.iter().any(|seen| seen.terminated[*k])).count();
     assert_eq!(lost, 50);
 }
 
-/// An episode ends at its time; the step after it starts another one, whatever the action, and pays nothing.
+/// An episode ends at its time; the step after it starts another one, whatever the action, and pays
+/// nothing.
 #[test]
 fn episodes_end_in_time_and_begin_again() {
     let short = TaskSettings { episode_s: 0.1, ..settings(CourseKind::Avoid, Level::AttitudeWing) };
@@ -196,7 +214,8 @@ fn episodes_end_in_time_and_begin_again() {
 #[test]
 fn trunks_are_solid_and_seen_before_they_are_hit() {
     let mut tasks: Tasks =
-        Tasks::new(&vehicles()[..1], 100, 5, settings(CourseKind::Avoid, Level::AttitudeWing)).unwrap();
+        Tasks::new(&vehicles()[..1], 100, 5, settings(CourseKind::Avoid, Level::AttitudeWing))
+            .unwrap();
     let trunks: Vec<_> = (0..100).map(|k| tasks.obstacles(k).unwrap()).collect();
     let seen = fly(&mut tasks, 450, |observation| lean(observation).to_vec());
     let (mut hits, mut warned) = (0, 0);
@@ -222,7 +241,8 @@ fn what_cannot_be_learned_is_named() {
     let mut uncontrolled = vehicles();
     uncontrolled[1].control = None;
     assert!(bad(&uncontrolled, 1, 1.0).starts_with("vehicles[1]: [control] is missing"));
-    let mut tasks: Tasks = Tasks::new(&vehicles(), 2, 0, settings(CourseKind::Avoid, Level::Motor)).unwrap();
+    let mut tasks: Tasks =
+        Tasks::new(&vehicles(), 2, 0, settings(CourseKind::Avoid, Level::Motor)).unwrap();
     let error = tasks.reset(|_| true, &mut [0.0; 3]).unwrap_err().to_string();
     assert_eq!(error, "observation: 3 numbers, must be 50");
 }

@@ -1,4 +1,5 @@
-//! Whole vehicles in batches: wings, battery, moving air and every effect fly as in the plant, and have one result.
+//! Whole vehicles in batches: wings, battery, moving air and every effect fly as in the plant, and
+//! have one result.
 
 use super::support::{Thrown, bits};
 use nalgebra::{Vector3, convert, try_convert};
@@ -30,18 +31,22 @@ fn put(effects: &mut Effects<f64>, name: &str, form: usize, share: f64) {
 
 fn member(wing: &str) -> BatchVehicle {
     let mut member = BatchVehicle::from(&VehicleFile::squirrel());
-    let WingPlant::Membrane { servo, .. } = &member.wing else { panic!("the squirrel has membranes") };
+    let WingPlant::Membrane { servo, .. } = &member.wing else {
+        panic!("the squirrel has membranes")
+    };
     match wing {
         "none" => member.wing = WingPlant::None,
         "flat" => {
-            member.wing = WingPlant::Flat { wing: member.vehicle.parameters().wing.unwrap(), servo: *servo }
+            member.wing =
+                WingPlant::Flat { wing: member.vehicle.parameters().wing.unwrap(), servo: *servo }
         }
         _ => {}
     }
     member
 }
 
-/// Crafts with these wings, each with the airframe of a thrown vehicle and its share of effects, in turn of their forms.
+/// Crafts with these wings, each with the airframe of a thrown vehicle and its share of effects, in
+/// turn of their forms.
 fn members<T: Paths>(thrown: &Thrown<T>, wing: &str, names: &[&str]) -> Vec<BatchVehicle> {
     let mut out = Vec::new();
     for (number, vehicle) in thrown.vehicles.iter().enumerate() {
@@ -115,7 +120,11 @@ fn neither_registers_nor_threads_nor_calls_matter<T: Paths>(wing: &str) {
             for (threads, call) in [(2, 100), (1, 1), (5, 20)] {
                 let other = Settings { path, threads, ..settings };
                 let same = flown(&thrown, &members, other, call) == expected;
-                assert!(same, "{wing}, {scheme:?}, {}, {threads} threads, {call} steps a call", path.name());
+                assert!(
+                    same,
+                    "{wing}, {scheme:?}, {}, {threads} threads, {call} steps a call",
+                    path.name()
+                );
             }
         }
     }
@@ -148,7 +157,8 @@ fn a_vehicle_alone_is_the_same_among_a_thousand() {
     }
 }
 
-/// Largest difference of position (m), velocity (m/s) and voltage (V) between a batch and plants that fly the same.
+/// Largest difference of position (m), velocity (m/s) and voltage (V) between a batch and plants
+/// that fly the same.
 fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
     let thrown = Thrown::<T>::new(21);
     let members = members(&thrown, wing, names);
@@ -157,8 +167,13 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
         .iter()
         .enumerate()
         .map(|(number, member)| {
-            let plant =
-                Plant::new(member.vehicle, member.effects, member.wing.clone(), member.battery.clone(), 1e-3);
+            let plant = Plant::new(
+                member.vehicle,
+                member.effects,
+                member.wing.clone(),
+                member.battery.clone(),
+                1e-3,
+            );
             let plant = plant.unwrap();
             let start = &thrown.states[number];
             let to = |x: T| try_convert::<T, f64>(x).unwrap();
@@ -190,7 +205,8 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
         let air = |winds: &[Wind]| winds.iter().fold(In::zero(), |sum, wind| sum + wind.velocity());
         for step in 0..steps {
             if step * 300 >= tick * 1000 {
-                let through = state.body.velocity - total_wind(plant.acting(), &state.body, air(&winds));
+                let through =
+                    state.body.velocity - total_wind(plant.acting(), &state.body, air(&winds));
                 for wind in &mut winds {
                     wind.advance((step - last) as f64 * 1e-3, || through.vector.norm());
                 }
@@ -215,8 +231,9 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
     worst
 }
 
-/// In f64 the operations are the plant's, but for its servo within the step in which a rate limit ends (a polynomial there, relative
-/// error 6e-11) and for factors of rotors; a tumbling vehicle makes these larger.
+/// In f64 the operations are the plant's, but for its servo within the step in which a rate limit
+/// ends (a polynomial there, relative error 6e-11) and for factors of rotors; a tumbling vehicle
+/// makes these larger.
 #[test]
 fn vehicles_in_f64_fly_as_the_plant_does() {
     for wing in ["none", "flat", "membrane"] {
@@ -237,7 +254,8 @@ fn every_effect_acts_as_in_the_plant() {
 
 #[test]
 fn in_f32_a_vehicle_stays_near_the_plant() {
-    let worst = off_the_plant::<f32>("membrane", &["battery_sag", "ground_effect", "payload_swing"], 200);
+    let worst =
+        off_the_plant::<f32>("membrane", &["battery_sag", "ground_effect", "payload_swing"], 200);
     assert!(worst < 5e-3, "{worst:e}");
 }
 
@@ -277,17 +295,24 @@ fn what_does_not_fly_in_a_batch_is_named() {
     assert!(text.starts_with("vehicles[0]: added_mass: the batch was made without"), "{text}");
     put(&mut heavy.effects, "actuation_latency", 0, 0.5);
     let text = batch.refit(0, &heavy).unwrap_err().to_string();
-    assert!(text.starts_with("vehicles[0]: added_mass: the batch was made without"), "steps first: {text}");
+    assert!(
+        text.starts_with("vehicles[0]: added_mass: the batch was made without"),
+        "steps first: {text}"
+    );
     // What changes the airframe once has a place everywhere.
     let mut other = member("none");
     put(&mut other.effects, "mass_error", 0, 0.5);
     put(&mut other.effects, "motor_lag", 0, 0.5);
     batch.refit(0, &other).unwrap();
-    assert_eq!(batch.set_charge(0, 1.5).unwrap_err().to_string(), "charge of vehicle 0: 1.5, must be 0 to 1");
+    assert_eq!(
+        batch.set_charge(0, 1.5).unwrap_err().to_string(),
+        "charge of vehicle 0: 1.5, must be 0 to 1"
+    );
 }
 
-/// A vehicle may come into a batch with another form of an effect that is there: it then flies as in a batch made with it, and its
-/// neighbour does not notice. A form that is an equation of its own has no place.
+/// A vehicle may come into a batch with another form of an effect that is there: it then flies as
+/// in a batch made with it, and its neighbour does not notice. A form that is an equation of its
+/// own has no place.
 #[test]
 fn another_form_may_come_later() {
     let formed = |name: &str, form: usize| {
@@ -314,7 +339,8 @@ fn another_form_may_come_later() {
     ] {
         let (first, other) = (formed(name, 0), formed(name, form));
         let made = Batch::with(&[first.clone(), other.clone()], Settings::default()).unwrap();
-        let mut refitted = Batch::with(&[first.clone(), first.clone()], Settings::default()).unwrap();
+        let mut refitted =
+            Batch::with(&[first.clone(), first.clone()], Settings::default()).unwrap();
         refitted.refit(1, &other).unwrap();
         let (expected, alike) =
             (fly(made), fly(Batch::with(&[first.clone(), first], Settings::default()).unwrap()));
@@ -324,7 +350,10 @@ fn another_form_may_come_later() {
     for name in ["constant_wind", "ground_effect"] {
         let mut batch = Batch::<f64>::with(&[formed(name, 0)], Settings::default()).unwrap();
         let text = batch.refit(0, &formed(name, 1)).unwrap_err().to_string();
-        assert!(text.starts_with(&format!("vehicles[0]: {name}: the batch was made without")), "{text}");
+        assert!(
+            text.starts_with(&format!("vehicles[0]: {name}: the batch was made without")),
+            "{text}"
+        );
         let mut batch = Batch::<f64>::with(&[formed(name, 1)], Settings::default()).unwrap();
         batch.refit(0, &formed(name, 0)).unwrap();
     }

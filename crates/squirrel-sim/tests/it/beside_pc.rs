@@ -1,5 +1,6 @@
-//! Our controllers beside the paper's simplest one, in every scenario and down to hardly any thrust to spare: who is cleverer must not lose what the
-//! simplest holds. On seeds that nothing was chosen by.
+//! Our controllers beside the paper's simplest one, in every scenario and down to hardly any thrust
+//! to spare: who is cleverer must not lose what the simplest holds. On seeds that nothing was
+//! chosen by.
 
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Metrics, Setup};
@@ -10,25 +11,29 @@ const SEEDS: [u64; 3] = [31, 32, 33];
 const OURS: [Arm; 2] = [Arm::TwccPlus, Arm::PcPlus];
 
 fn flown(vehicle: &VehicleFile, arm: Arm, scenario: &str, ratio: f64, seed: u64) -> Metrics {
-    let scenario = Scenario { seed, thrust_to_weight: Some(ratio), ..Scenario::find(scenario).unwrap() };
+    let scenario =
+        Scenario { seed, thrust_to_weight: Some(ratio), ..Scenario::find(scenario).unwrap() };
     let setup = Setup { vehicle: vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 };
     setup.fly(false, |_| ()).unwrap().metrics
 }
 
-/// Of the flights that `pc` brings home: none lost, and at most a twentieth more error in the mean, or 5 cm. Errors count where nothing is solid: in the forest
-/// a flight ends at a trunk, and who gets on has the larger ones.
+/// Of the flights that `pc` brings home: none lost, and at most a twentieth more error in the mean,
+/// or 5 cm. Errors count where nothing is solid: in the forest a flight ends at a trunk, and who
+/// gets on has the larger ones.
 #[test]
 fn what_the_simplest_controller_holds_is_held() {
     let vehicle = VehicleFile::squirrel();
     let mut worse = Vec::new();
     for scenario in BUILT_IN {
         let is_long = scenario.starts_with("excite") || scenario == "random_spread";
-        let ratios: &[f64] = if is_long { &[1.1, 1.25, 1.5] } else { &[1.1, 1.15, 1.2, 1.25, 1.5, 2.0] };
+        let ratios: &[f64] =
+            if is_long { &[1.1, 1.25, 1.5] } else { &[1.1, 1.15, 1.2, 1.25, 1.5, 2.0] };
         for &ratio in ratios {
             let pc = SEEDS.map(|seed| (seed, flown(&vehicle, Arm::Pc, scenario, ratio, seed)));
             let held: Vec<_> = pc.iter().filter(|(_, flight)| flight.contact_s.is_none()).collect();
             for arm in OURS {
-                let fly = |(seed, _): &&(u64, Metrics)| flown(&vehicle, arm, scenario, ratio, *seed);
+                let fly =
+                    |(seed, _): &&(u64, Metrics)| flown(&vehicle, arm, scenario, ratio, *seed);
                 let ours: Vec<Metrics> = held.iter().map(fly).collect();
                 let name = format!("{} in {scenario} at {ratio}", arm.name());
                 let lost = ours.iter().filter(|flight| flight.contact_s.is_some()).count();
@@ -39,7 +44,10 @@ fn what_the_simplest_controller_holds_is_held() {
                 let rival = held.iter().map(|(_, m)| m.rmse_m).sum::<f64>();
                 let most = (1.05 * rival).max(rival + 0.05 * held.len() as f64);
                 if scenario != "forest" && error > most {
-                    worse.push(format!("{name}: {error:.2} m in {} flights, pc {rival:.2} m", held.len()));
+                    worse.push(format!(
+                        "{name}: {error:.2} m in {} flights, pc {rival:.2} m",
+                        held.len()
+                    ));
                 }
             }
         }

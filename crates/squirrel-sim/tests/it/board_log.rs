@@ -18,8 +18,12 @@ fn wire(value: &impl Wire) -> Vec<u8> {
 /// A flight, and each of its records as a board would send it: the setup first.
 fn flown() -> (FlightLog, Vec<Vec<u8>>) {
     let scenario = Scenario { duration_s: 4.0, ..Scenario::find("random_spread").unwrap() };
-    let setup =
-        Setup { vehicle: VehicleFile::squirrel(), arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
+    let setup = Setup {
+        vehicle: VehicleFile::squirrel(),
+        arm: Arm::TwccFlat,
+        scenario,
+        integrator: Integrator::Rk4,
+    };
     let log = setup.fly(true, |_| {}).unwrap().log.unwrap();
     let stack: Stack = setup.stack().unwrap();
     let sent = |record: &Record| {
@@ -54,7 +58,11 @@ fn assert_same(log: &FlightLog, again: &FlightLog, until_s: f64) {
         for (channel, values) in &again.sources[name].channels {
             let rows = n * values.width;
             let bits = |x: &[f64]| x[..rows].iter().map(|v| v.to_bits()).collect::<Vec<_>>();
-            assert_eq!(bits(&source.channels[channel].values), bits(&values.values), "{name}.{channel}");
+            assert_eq!(
+                bits(&source.channels[channel].values),
+                bits(&values.values),
+                "{name}.{channel}"
+            );
             compared += rows;
         }
     }

@@ -1,5 +1,5 @@
-//! Effects in vehicle files and in flights: every effect and form can be written, and what sensors, clocks and servos do shows in
-//! the log.
+//! Effects in vehicle files and in flights: every effect and form can be written, and what sensors,
+//! clocks and servos do shows in the log.
 
 use squirrel_core::dynamics::State;
 use squirrel_core::effects::{Effects, FORM, Kind, forms};
@@ -51,8 +51,12 @@ fn every_effect_and_form_can_be_written_in_a_file() {
             for p in found.parameters.iter().filter(|p| p.key != FORM) {
                 let line = full.lines().find(|l| l.starts_with(&format!("{} = ", p.key)));
                 let (text, expected) = match line {
-                    Some(line) => (full.replace(&format!("{line}\n"), ""), format!("{}: missing", p.key)),
-                    None => (format!("{full}{} = 0.1\n", p.key), format!("{} = 0.1: not in", p.key)),
+                    Some(line) => {
+                        (full.replace(&format!("{line}\n"), ""), format!("{}: missing", p.key))
+                    }
+                    None => {
+                        (format!("{full}{} = 0.1\n", p.key), format!("{} = 0.1: not in", p.key))
+                    }
                 };
                 let refused = parse(&text).unwrap_err();
                 assert!(refused.contains(&format!("effects.{name}.{expected}")), "{refused}");
@@ -61,7 +65,10 @@ fn every_effect_and_form_can_be_written_in_a_file() {
         }
         if let Some(standard) = names.first() {
             let unsaid = table(name, standard).replace(&format!("form = \"{standard}\"\n"), "");
-            assert_eq!(parse(&unsaid).unwrap().effects, parse(&table(name, standard)).unwrap().effects);
+            assert_eq!(
+                parse(&unsaid).unwrap().effects,
+                parse(&table(name, standard)).unwrap().effects
+            );
         }
     }
 }
@@ -91,7 +98,10 @@ fn forms_that_cannot_be_are_refused() {
             format!("{wind}form = \"spiral\""),
             "effects.constant_wind.form = \"spiral\": must be one of constant, log_profile",
         ),
-        (format!("{wind}form = 1"), "effects.constant_wind.form = 1: must be one of constant, log_profile"),
+        (
+            format!("{wind}form = 1"),
+            "effects.constant_wind.form = 1: must be one of constant, log_profile",
+        ),
         (
             format!("{wind}roughness_m = 0.1"),
             "effects.constant_wind.roughness_m = 0.1: not in the form \"constant\", only in log_profile",
@@ -217,12 +227,17 @@ fn a_skewed_clock_stamps_commands_and_nothing_else() {
     assert_eq!(log.sources["truth"].time_s, log.sources["frame"].time_s);
 }
 
-/// Forwards nothing has a stamp within the step; backwards what would be stamped a second time is not written.
+/// Forwards nothing has a stamp within the step; backwards what would be stamped a second time is
+/// not written.
 #[test]
 fn a_clock_that_jumps_leaves_a_gap_of_its_step() {
     for (step_s, gap_s) in [(0.05, 0.05), (-0.05, 0.0)] {
-        let log =
-            fly(&format!("[effects.clock_step]\nstep_s = {step_s}\nat_s = 1.0\n"), Arm::Pc, "hover", 2.0);
+        let log = fly(
+            &format!("[effects.clock_step]\nstep_s = {step_s}\nat_s = 1.0\n"),
+            Arm::Pc,
+            "hover",
+            2.0,
+        );
         let (stamps, frames) = (&log.sources["rotor"].time_s, &log.sources["frame"].time_s);
         let period_s = frames[1] - frames[0];
         let jump = stamps.windows(2).position(|w| w[1] - w[0] > 1.5 * period_s);
@@ -266,7 +281,10 @@ fn scales_and_current_show_in_the_log() {
         speed[..4].copy_from_slice(at(&speeds, t));
         let load = vehicle.rotor_load(&speed);
         let error = (rotation(&measured) * rotation(at(&attitude, t)).inverse()).scaled_axis();
-        assert!(error.xy().norm() < 1e-5 && (error.z - 0.2 * load).abs() < 1e-5, "{error}, {load} at {t} s");
+        assert!(
+            error.xy().norm() < 1e-5 && (error.z - 0.2 * load).abs() < 1e-5,
+            "{error}, {load} at {t} s"
+        );
         loads.push(load);
     }
     assert!((loads[0] - 1.0).abs() < 0.05 && loads.iter().any(|load| *load > 1.1), "{loads:?}");
@@ -290,7 +308,8 @@ fn gusts_move_the_air_by_the_seed_of_the_flight() {
         let log = fly(&gust, Arm::Pc, "hover", 60.0);
         let air = rows(&log, "truth.wind_ned_m_s");
         for axis in 0..3 {
-            let sd = (air.iter().map(|(_, w)| w[axis] * w[axis]).sum::<f64>() / air.len() as f64).sqrt();
+            let sd =
+                (air.iter().map(|(_, w)| w[axis] * w[axis]).sum::<f64>() / air.len() as f64).sqrt();
             assert!((0.6..1.5).contains(&sd), "{form}, axis {axis}: {sd} m/s");
         }
         assert!(log == fly(&gust, Arm::Pc, "hover", 60.0), "one seed, one air");
@@ -301,11 +320,13 @@ fn gusts_move_the_air_by_the_seed_of_the_flight() {
 
 #[test]
 fn a_load_is_carried_and_swings() {
-    let log = fly("[effects.payload_swing]\nmass_kg = 0.1\nlength_m = 0.5\n", Arm::Pc, "hover", 12.0);
+    let log =
+        fly("[effects.payload_swing]\nmass_kg = 0.1\nlength_m = 0.5\n", Arm::Pc, "hover", 12.0);
     let speeds = rows(&log, "rotor.speed_rad_s");
     let last: Vec<_> = speeds.iter().filter(|(t, _)| *t > 10.0).collect();
-    let thrust: f64 = last.iter().map(|(_, row)| row.iter().map(|w| 6e-7 * w * w).sum::<f64>()).sum::<f64>()
-        / last.len() as f64;
+    let thrust: f64 =
+        last.iter().map(|(_, row)| row.iter().map(|w| 6e-7 * w * w).sum::<f64>()).sum::<f64>()
+            / last.len() as f64;
     assert!((thrust / GRAVITY_M_S2 - 0.648).abs() < 0.005, "{} kg in hover", thrust / GRAVITY_M_S2);
 }
 
@@ -319,7 +340,8 @@ fn slow_servos_open_late() {
     assert!((0.1..0.25).contains(&late), "{late} s");
 }
 
-/// Without noise a log says exactly what the plant did, so the led plant predicts the accelerometer of the same flight.
+/// Without noise a log says exactly what the plant did, so the led plant predicts the accelerometer
+/// of the same flight.
 #[test]
 fn a_led_plant_reads_the_accelerometer_of_the_log() {
     let effects = "[effects.payload_swing]\nmass_kg = 0.1\nlength_m = 0.5\n[effects.cg_offset]\ncg_x_m = 0.01\n\
@@ -332,7 +354,8 @@ fn a_led_plant_reads_the_accelerometer_of_the_log() {
     let channel = |name: &str| rows(&log, name);
     let vector = |row: &[f64]| Vector3::new(row[0], row[1], row[2]);
     let (position, velocity) = (channel("truth.position_ned_m"), channel("truth.velocity_ned_m_s"));
-    let (attitude, omega) = (channel("truth.q_ned_from_body_wxyz"), channel("truth.omega_body_rad_s"));
+    let (attitude, omega) =
+        (channel("truth.q_ned_from_body_wxyz"), channel("truth.omega_body_rad_s"));
     let (commands, read) = (channel("rotor.command"), channel("imu.specific_force_body_m_s2"));
     let mut state = None;
     let (mut worst, mut drift) = (0.0_f64, 0.0_f64);
@@ -358,6 +381,7 @@ fn a_led_plant_reads_the_accelerometer_of_the_log() {
         drift = state.time_s - read[i + 1].0;
     }
     assert!(drift.abs() < 1e-9, "the plant's clock is {drift} s off the log's");
-    // What is left is the rounding of the log's sensors to single precision, and the load between samples.
+    // What is left is the rounding of the log's sensors to single precision, and the load between
+    // samples.
     assert!(worst < 1e-4, "{worst} m/s^2");
 }

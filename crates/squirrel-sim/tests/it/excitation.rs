@@ -39,10 +39,14 @@ fn flights(name: &str) -> Vec<(String, FlightLog)> {
     // What is asked for is seen best where nothing is estimated.
     let right = |vehicle| VehicleFile { estimator: Estimator::Oracle, ..vehicle };
     let squirrel = (0..4).map(|seed| {
-        (format!("squirrel {name} {seed}"), fly(right(VehicleFile::squirrel()), Arm::Pc, name, seed))
+        (
+            format!("squirrel {name} {seed}"),
+            fly(right(VehicleFile::squirrel()), Arm::Pc, name, seed),
+        )
     });
-    let other =
-        (4..6).map(|seed| (format!("practice {name} {seed}"), fly(right(practice()), Arm::Pc, name, seed)));
+    let other = (4..6).map(|seed| {
+        (format!("practice {name} {seed}"), fly(right(practice()), Arm::Pc, name, seed))
+    });
     squirrel.chain(other).collect()
 }
 
@@ -93,7 +97,8 @@ impl Figures {
             (least, most) = (least.min(turned), most.max(turned));
             for (k, seconds) in f.headings_s.iter_mut().enumerate() {
                 let off = wrapped(yaw - k as f64 * PI / 2.0).abs();
-                *seconds += if off < 10_f64.to_radians() && speed < 0.3 { 1.0 / 300.0 } else { 0.0 };
+                *seconds +=
+                    if off < 10_f64.to_radians() && speed < 0.3 { 1.0 / 300.0 } else { 0.0 };
             }
             if i > 0 && wing.row(i) != wing.row(i - 1) {
                 f.edges += 1;
@@ -143,7 +148,10 @@ fn normal_flights_are_half_as_fast_and_calm_ones_stay_slow_folded_and_straight()
     for (name, log) in flights("excite_normal") {
         let f = Figures::of(&log);
         assert!(f.top_m_s.iter().all(|v| (4.2..5.3).contains(v)), "{name}: {f:#.2?}");
-        assert!((1.4..2.1).contains(&f.climb_m_s) && (1.4..2.0).contains(&f.sink_m_s), "{name}: {f:#.2?}");
+        assert!(
+            (1.4..2.1).contains(&f.climb_m_s) && (1.4..2.0).contains(&f.sink_m_s),
+            "{name}: {f:#.2?}"
+        );
         assert!(f.turned_rad > 0.98 * TAU && f.lowest_m > 0.12 && f.edges == 8, "{name}: {f:#.2?}");
     }
     for (name, log) in flights("excite_calm") {
@@ -163,14 +171,15 @@ fn line(time: &[f64], signal: &[f64], frequency_hz: f64) -> f64 {
     2.0 * (re * re + im * im) / (signal.len() * signal.len()) as f64
 }
 
-/// Body rates, and the moments behind them, hold every line of the multisine up to 6 Hz, far above what a flight without it
-/// holds there.
+/// Body rates, and the moments behind them, hold every line of the multisine up to 6 Hz, far above
+/// what a flight without it holds there.
 #[test]
 fn rates_and_moments_hold_the_multisine_up_to_6_hz() {
     for vehicle in [VehicleFile::squirrel(), practice()] {
         let rich = setup_of(vehicle.clone(), Arm::Pc, "excite_rich", 1);
         let Mission::Excite(programme) = rich.scenario.mission().unwrap() else { unreachable!() };
-        let logs = ["excite_rich", "excite_normal"].map(|name| fly(vehicle.clone(), Arm::Pc, name, 1));
+        let logs =
+            ["excite_rich", "excite_normal"].map(|name| fly(vehicle.clone(), Arm::Pc, name, 1));
         for (channel, ratio) in
             [("truth.omega_body_rad_s", 10.0), ("control.inner.achieved_torque_n_m", 10.0)]
         {
@@ -178,7 +187,10 @@ fn rates_and_moments_hold_the_multisine_up_to_6_hz() {
                 let powers = logs.each_ref().map(|log| {
                     let (time, c) = log.channel(channel).unwrap();
                     let signal: Vec<f64> = (0..time.len()).map(|i| c.row(i)[axis]).collect();
-                    programme.multisine().frequencies_hz(axis).map(|f| line(time, &signal, f64::from(f)))
+                    programme
+                        .multisine()
+                        .frequencies_hz(axis)
+                        .map(|f| line(time, &signal, f64::from(f)))
                 });
                 // Below 2 Hz the manoeuvres and the position loop have their say as well.
                 let high = LINES - 3..LINES;
@@ -203,9 +215,14 @@ fn seeds_change_order_directions_phases_and_charge() {
     assert_eq!([0, 1, 2, 3].map(|seed| of(seed).start_charge()), [0.5, 1.0, 0.5, 1.0]);
     assert_eq!(Scenario::find("hover").unwrap().start_charge(), 1.0);
     let cards: Vec<String> = (0..32).map(|seed| of(seed).pilot_card().unwrap().unwrap()).collect();
-    assert!(cards.iter().enumerate().all(|(i, card)| !cards[..i].contains(card)), "two seeds fly alike");
-    let ladder_first =
-        cards.iter().filter(|c| c.contains("s  descend") && c.find("descend") < c.find("dash")).count();
+    assert!(
+        cards.iter().enumerate().all(|(i, card)| !cards[..i].contains(card)),
+        "two seeds fly alike"
+    );
+    let ladder_first = cards
+        .iter()
+        .filter(|c| c.contains("s  descend") && c.find("descend") < c.find("dash"))
+        .count();
     let north_first = cards.iter().filter(|c| c.find("m north") < c.find("m south")).count();
     assert!((8..24).contains(&ladder_first) && (8..24).contains(&north_first));
 }
@@ -224,7 +241,9 @@ fn every_arm_flies_the_forced_wings_and_replays_bit_for_bit() {
 #[test]
 fn cards_are_for_excitation_scenarios_and_name_what_is_flown() {
     let rich = pilot_card("excite_rich").unwrap();
-    for words in ["8.8 m/s", "to 0.2 m", "wings open at", "0.3 to 6 Hz", "turn 90 deg", "climb to 10.8 m"] {
+    for words in
+        ["8.8 m/s", "to 0.2 m", "wings open at", "0.3 to 6 Hz", "turn 90 deg", "climb to 10.8 m"]
+    {
         assert!(rich.contains(words), "{words}:\n{rich}");
     }
     let calm = pilot_card("excite_calm").unwrap();

@@ -1,4 +1,5 @@
-//! Ten thousand flights in which a sensor fails: outputs stay inside limits, the failsafe says why, and control comes back.
+//! Ten thousand flights in which a sensor fails: outputs stay inside limits, the failsafe says why,
+//! and control comes back.
 
 use squirrel_core::stack::StackState;
 use squirrel_core::stack::failsafe::{Failsafe, FailsafeReason as Reason, RECOVERY_US};
@@ -12,7 +13,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// What must be reported, where the window is long enough: the reason and after which time, us.
 ///
-/// A sensor that hangs in flight contradicts itself only once the flight would have changed it; the core tests say when.
+/// A sensor that hangs in flight contradicts itself only once the flight would have changed it; the
+/// core tests say when.
 fn expected(fault: &Fault) -> Option<(Reason, u64)> {
     let silent = fault.kind != SensorFaultKind::Stuck;
     match fault.sensor {
@@ -23,7 +25,9 @@ fn expected(fault: &Fault) -> Option<(Reason, u64)> {
         Sensor::Gnss if silent => Some((Reason::GnssLost, 1_500_000)),
         Sensor::Altitude if silent => Some((Reason::AltitudeLost, 1_000_000)),
         // The first of them that is missed.
-        Sensor::All if matches!(fault.kind, SensorFaultKind::NotANumber | SensorFaultKind::Infinite) => {
+        Sensor::All
+            if matches!(fault.kind, SensorFaultKind::NotANumber | SensorFaultKind::Infinite) =>
+        {
             Some((Reason::ImuLost, 100_000))
         }
         _ => None,
@@ -65,8 +69,10 @@ fn ten_thousand_faults_are_survived_and_named() {
                     "{seed}: {at}"
                 );
             }
-            // A receiver speaks ten times a second, so its age may reach up to a period beyond the fault.
-            let well = at < fault.start_us || at > fault.end_us + 100_000 + u64::from(RECOVERY_US) + 10_000;
+            // A receiver speaks ten times a second, so its age may reach up to a period beyond the
+            // fault.
+            let well = at < fault.start_us
+                || at > fault.end_us + 100_000 + u64::from(RECOVERY_US) + 10_000;
             if well {
                 assert_eq!(output.failsafe, Failsafe::default(), "{seed}: {fault:?}: {at}");
             }

@@ -26,8 +26,10 @@ fn the_shipped_practice_and_crazyflie_vehicles_are_sound_and_every_number_has_a_
         let path = format!("{}/../../vehicles/{name}.toml", env!("CARGO_MANIFEST_DIR"));
         let file = VehicleFile::load(path.as_ref()).unwrap();
         // Counts and signs are not measured: they are how the vehicle is built.
-        let bare: Vec<&str> =
-            file.without_source().filter(|f| !f.ends_with("yaw_sign") && *f != "battery.cells").collect();
+        let bare: Vec<&str> = file
+            .without_source()
+            .filter(|f| !f.ends_with("yaw_sign") && *f != "battery.cells")
+            .collect();
         assert!(bare.is_empty(), "{name}: without a source: {bare:?}");
     }
 }
@@ -44,7 +46,8 @@ fn one_seed_one_flight() {
     assert!(one(4) != one(5));
 }
 
-/// As in the paper's real flights: the wingless drone sinks when thrust is scarce, and not otherwise.
+/// As in the paper's real flights: the wingless drone sinks when thrust is scarce, and not
+/// otherwise.
 #[test]
 fn the_wingless_drone_sinks_only_when_thrust_is_scarce() {
     let lost = |arm, ratio| {
@@ -65,11 +68,15 @@ fn arms_do_what_they_are_named_for() {
     let no_wings = of(Arm::WiicNoWings);
     assert!(no_wings.wiic_s > 0.5 && no_wings.wings_open_s == 0.0);
     let phantom = of(Arm::Phantom);
-    assert!(phantom.wiic_s > 0.2 && phantom.wings_open_s == 0.0, "it believes in wings that are not there");
+    assert!(
+        phantom.wiic_s > 0.2 && phantom.wings_open_s == 0.0,
+        "it believes in wings that are not there"
+    );
     assert!(of(Arm::TwccOracle).wings_open_s > 0.2);
 }
 
-/// The paper's battery hypothesis, as physics: with `battery_sag` the rotors feel the voltage, without it they do not.
+/// The paper's battery hypothesis, as physics: with `battery_sag` the rotors feel the voltage,
+/// without it they do not.
 #[test]
 fn thrust_feels_the_battery_only_through_its_effect() {
     let text = format!(
@@ -82,7 +89,8 @@ fn thrust_feels_the_battery_only_through_its_effect() {
         setup.scenario.battery_charge = charge;
         let log = setup.fly(true, |_| {}).unwrap().log.unwrap();
         let (_, command) = log.channel("rotor.command").unwrap();
-        command.values[command.values.len() / 2..].iter().sum::<f64>() / (command.values.len() / 2) as f64
+        command.values[command.values.len() / 2..].iter().sum::<f64>()
+            / (command.values.len() / 2) as f64
     };
     let plain = squirrel_sim::vehicle_file::SQUIRREL_TOML;
     assert!((rotor_command(plain, 1.0) - rotor_command(plain, 0.2)).abs() < 2e-3);

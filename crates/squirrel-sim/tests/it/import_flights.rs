@@ -1,4 +1,5 @@
-//! The maps in `vehicles/maps` against real flights: what they import must obey physics in NED and FRD.
+//! The maps in `vehicles/maps` against real flights: what they import must obey physics in NED and
+//! FRD.
 #![allow(clippy::print_stdout, reason = "tests")]
 
 use std::fmt::Write as _;
@@ -15,7 +16,8 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 const GRAVITY_M_S2: f64 = 9.80665;
 
-/// Measured flights: the cut-outs in `tests/data/flights`, or the whole flights in the folder `SQUIRREL_FLIGHTS`.
+/// Measured flights: the cut-outs in `tests/data/flights`, or the whole flights in the folder
+/// `SQUIRREL_FLIGHTS`.
 fn flights() -> PathBuf {
     let cut_outs = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
     std::env::var_os("SQUIRREL_FLIGHTS").map_or_else(cut_outs, PathBuf::from)
@@ -70,14 +72,16 @@ fn windows(time_s: &[f64], step: usize) -> Vec<usize> {
     (0..time_s.len() - step).filter(|&i| time_s[i + step] - time_s[i] < typical).collect()
 }
 
-/// Mean body rate over windows of `step` samples: by gyro, and by the attitude's turn over the window.
+/// Mean body rate over windows of `step` samples: by gyro, and by the attitude's turn over the
+/// window.
 fn rates(log: &FlightLog, step: usize) -> (Vec<Vector3<f64>>, Vec<Vector3<f64>>) {
     let (time_s, omega) = vectors(log, "imu.omega_body_rad_s");
     let q = attitudes(log);
     windows(&time_s, step)
         .into_iter()
         .map(|i| {
-            let turn = (q[i].inverse() * q[i + step]).scaled_axis() / (time_s[i + step] - time_s[i]);
+            let turn =
+                (q[i].inverse() * q[i + step]).scaled_axis() / (time_s[i + step] - time_s[i]);
             (mean(&omega[i..i + step]), turn)
         })
         .unzip()
@@ -98,8 +102,9 @@ fn velocities(log: &FlightLog, step: usize) -> (Vec<Vector3<f64>>, Vec<Vector3<f
         .unzip()
 }
 
-/// Correlation of the angular acceleration, `lag` samples later, with what an X quadrotor's rotors ask for: rotors 1 to
-/// 4 front right, back right, back left, front left; reaction of 1 and 3 about +z (down), of 2 and 4 about -z.
+/// Correlation of the angular acceleration, `lag` samples later, with what an X quadrotor's rotors
+/// ask for: rotors 1 to 4 front right, back right, back left, front left; reaction of 1 and 3 about
+/// +z (down), of 2 and 4 about -z.
 fn motor_geometry(log: &FlightLog, lag: usize, step: usize) -> Vector3<f64> {
     let (time_s, omega) = vectors(log, "imu.omega_body_rad_s");
     let (_, command) = log.channel("rotor.command").unwrap();
@@ -121,7 +126,8 @@ fn motor_geometry(log: &FlightLog, lag: usize, step: usize) -> Vector3<f64> {
 #[test]
 fn nanobench_obeys_physics() {
     let folder = flights().join("nanobench");
-    // Flights with much motion in roll and pitch, and one with little: its Vicon attitude is mostly noise.
+    // Flights with much motion in roll and pitch, and one with little: its Vicon attitude is mostly
+    // noise.
     for (file, least) in [
         ("B2_circle_medium_rep1.csv", bar(0.9, 0.85)),
         ("B3_figure8_fast_rep1.csv", 0.9),
@@ -209,12 +215,14 @@ fn csv(log: &FlightLog, names: &str, channels: &[&str]) -> String {
     text
 }
 
-/// One folder a flight, nothing to convert: what a flight of ours writes into such files comes back as it was.
+/// One folder a flight, nothing to convert: what a flight of ours writes into such files comes back
+/// as it was.
 #[test]
 fn practice_files_are_in_our_frames_and_units() {
     let vehicle = VehicleFile { estimator: Estimator::External, ..VehicleFile::squirrel() };
     let scenario = Scenario::find("excite_rich").unwrap();
-    let flown = Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 }.fly(true, |_| {});
+    let flown =
+        Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 }.fly(true, |_| {});
     let log = flown.unwrap().log.unwrap();
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("practice-flight");
     std::fs::create_dir_all(&folder).unwrap();
@@ -242,13 +250,15 @@ fn practice_files_are_in_our_frames_and_units() {
         let ((time_s, ours), (imported_s, theirs)) =
             (log.channel(channel).unwrap(), imported.channel(channel).unwrap());
         assert_eq!(time_s.len(), imported_s.len(), "{channel}");
-        let off = ours.values.iter().zip(&theirs.values).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let off =
+            ours.values.iter().zip(&theirs.values).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         // A quaternion is made a unit again.
         assert!(off < 1e-6, "{channel}: {off}");
     }
 }
 
-/// Mean thrust that a vehicle file makes of the rotor commands, over mass times the mean upward specific force.
+/// Mean thrust that a vehicle file makes of the rotor commands, over mass times the mean upward
+/// specific force.
 fn thrust_over_force(vehicle: &str, log: &FlightLog) -> f64 {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../vehicles").join(vehicle);
     let vehicle = VehicleFile::load(&path).unwrap().vehicle;
@@ -256,7 +266,8 @@ fn thrust_over_force(vehicle: &str, log: &FlightLog) -> f64 {
     let (_, force) = vectors(log, "imu.specific_force_body_m_s2");
     let (_, command) = log.channel("rotor.command").unwrap();
     let speeds = command.values.iter().map(|&u| propulsion.target_speed_rad_s(u));
-    let thrust_n: f64 = speeds.map(|speed| propulsion.thrust_coefficient_n_s2 * speed * speed).sum();
+    let thrust_n: f64 =
+        speeds.map(|speed| propulsion.thrust_coefficient_n_s2 * speed * speed).sum();
     let force_m_s2 = -mean(&force).z;
     // In the mean over a flight the rotors carry the weight, whatever happens in between.
     assert!((force_m_s2 / GRAVITY_M_S2 - 1.0).abs() < 0.05, "{force_m_s2}");
@@ -281,7 +292,12 @@ fn the_thrust_of_the_vehicle_files_carries_the_weight() {
             "nanobench/B3_figure8_fast_rep1.csv",
             bar(0.01, 0.03),
         ),
-        ("nanobench.toml", "crazyflie21_brushed_curve.toml", "nanobench/B2_circle_medium_rep1.csv", 0.05),
+        (
+            "nanobench.toml",
+            "crazyflie21_brushed_curve.toml",
+            "nanobench/B2_circle_medium_rep1.csv",
+            0.05,
+        ),
     ] {
         let (log, _) = import_with(map, folder.join(file));
         let ratio = thrust_over_force(vehicle, &log);

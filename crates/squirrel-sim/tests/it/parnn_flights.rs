@@ -33,13 +33,16 @@ fn guards(log: &FlightLog) -> Vec<u8> {
     column(log, "control.parnn.guard").iter().map(|g| *g as u8).collect()
 }
 
-/// Below 0.3 m/s the network's wing has no force and the plate a tiny one; above, nothing at all may differ.
+/// Below 0.3 m/s the network's wing has no force and the plate a tiny one; above, nothing at all
+/// may differ.
 #[test]
 fn a_silent_network_flies_exactly_as_the_flat_plate() {
     let silent = vehicle("silent", "membrane", &silent());
     for seed in 1..4 {
-        let (plate, network) =
-            (fly(&silent, Arm::TwccFlat, "avoid", seed), fly(&silent, Arm::TwccParnn, "avoid", seed));
+        let (plate, network) = (
+            fly(&silent, Arm::TwccFlat, "avoid", seed),
+            fly(&silent, Arm::TwccParnn, "avoid", seed),
+        );
         assert_eq!(plate.metrics, network.metrics);
         assert!(network.metrics.wiic_s > 0.2, "the estimate is used: {:?}", network.metrics);
         let (plate, network) = (plate.log.unwrap(), network.log.unwrap());
@@ -56,7 +59,11 @@ fn a_silent_network_flies_exactly_as_the_flat_plate() {
                     if by_force && speed_at(&plate, *t) < 0.3 {
                         continue;
                     }
-                    assert_eq!(values.row(i), b.channels[channel].row(i), "{name}.{channel} at {t} s");
+                    assert_eq!(
+                        values.row(i),
+                        b.channels[channel].row(i),
+                        "{name}.{channel} at {t} s"
+                    );
                 }
             }
         }
@@ -97,7 +104,10 @@ fn the_network_flies_another_way_and_the_log_shows_its_words() {
         }
     }
     let alpha_w = column(&log, "control.parnn.alpha_w_rad");
-    assert!(alpha_w[9..].iter().any(|a| a.abs() > 0.05), "trained weights correct something: {alpha_w:?}");
+    assert!(
+        alpha_w[9..].iter().any(|a| a.abs() > 0.05),
+        "trained weights correct something: {alpha_w:?}"
+    );
 }
 
 /// Trained on nothing that this flight does, the arm is `twcc_flat`; and it says why.
@@ -108,14 +118,17 @@ fn outside_what_was_trained_the_arm_is_the_flat_plates() {
     {
         let narrow = changed(|_, text| set_domain(text, speed_m_s, alpha_rad));
         let narrow = vehicle(&format!("narrow_{}", guard as u8), "membrane", &narrow);
-        let (flat, network) =
-            (log_of(&narrow, Arm::TwccFlat, "avoid", 2), log_of(&narrow, Arm::TwccParnn, "avoid", 2));
+        let (flat, network) = (
+            log_of(&narrow, Arm::TwccFlat, "avoid", 2),
+            log_of(&narrow, Arm::TwccParnn, "avoid", 2),
+        );
         for name in ["truth", "control.outer", "control.inner", "rotor", "wing"] {
             assert_eq!(flat.sources[name], network.sources[name], "{name}");
         }
         assert!(guards(&network)[9..].iter().all(|g| *g == guard as u8));
     }
-    // A top speed in between: the guard closes while the vehicle is faster, and opens a window later.
+    // A top speed in between: the guard closes while the vehicle is faster, and opens a window
+    // later.
     let slow = changed(|_, text| set_domain(text, [0.0, 6.0], [-2.0, 2.0]));
     let log = log_of(&vehicle("slow", "membrane", &slow), Arm::TwccParnn, "avoid", 2);
     let (times, _) = log.channel("control.parnn.guard").unwrap();
@@ -228,6 +241,9 @@ fn a_log_with_changed_or_lost_weights_is_found_out() {
     assert!(error.contains("arm = twcc_parnn: needs weights"), "{error}");
     for broken in ["", "0", "zz", &hex[1..], &hex[..400]] {
         let error = setup(&with(Some(broken.to_owned()))).unwrap_err();
-        assert!(error.starts_with("metadata parnn_weights_hex: not a whole safetensors file: "), "{error}");
+        assert!(
+            error.starts_with("metadata parnn_weights_hex: not a whole safetensors file: "),
+            "{error}"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! A policy in the loop: what it commands flies, is logged as an input, and is taken over by the outer loop where it ceases.
+//! A policy in the loop: what it commands flies, is logged as an input, and is taken over by the
+//! outer loop where it ceases.
 
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::policy::{Policy, Span};
@@ -7,7 +8,9 @@ use squirrel_core::stack::{SensorFrame, StackOutput};
 use squirrel_log::FlightLog;
 use squirrel_log::flight_code::INPUT_SOURCES;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{Flight, FlightComputer, FlightError, InProcess, Integrator, Pilot, Setup};
+use squirrel_sim::flight::{
+    Flight, FlightComputer, FlightError, InProcess, Integrator, Pilot, Setup,
+};
 use squirrel_sim::replay::{replay, setup as setup_of};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -18,8 +21,8 @@ fn setup(scenario: &str) -> Setup {
     Setup { vehicle: VehicleFile::squirrel(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 }
 }
 
-/// A controller that anybody would write, as a network: acceleration from position and velocity errors, where tanh is
-/// nearly linear; wings folded.
+/// A controller that anybody would write, as a network: acceleration from position and velocity
+/// errors, where tanh is nearly linear; wings folded.
 fn by_hand(span: &Span) -> Policy {
     const POSITION_PER_S2: f32 = 1.5;
     const VELOCITY_PER_S: f32 = 2.2;
@@ -149,7 +152,10 @@ fn when_the_link_breaks_the_outer_loop_flies_the_mission() {
     let log = fly(&setup, &mut deaf, &hand_of(&setup)).log.unwrap();
     let (lost_us, resumed_us) = (deaf.lost_us.unwrap(), deaf.resumed_us.unwrap());
     let limit_us = u64::from(COMMAND_LIMIT_US);
-    assert!((8_000_000 + limit_us - 20_000..=8_000_000 + limit_us + 4000).contains(&lost_us), "{lost_us}");
+    assert!(
+        (8_000_000 + limit_us - 20_000..=8_000_000 + limit_us + 4000).contains(&lost_us),
+        "{lost_us}"
+    );
     assert!(resumed_us - lost_us < 100_000, "{resumed_us}");
     // In the end it is where a flight without any policy is.
     let alone = setup.fly(true, |_| {}).unwrap().log.unwrap();

@@ -1,4 +1,5 @@
-//! A policy's file: its bits come back, and what is wrong with it is said in one line that names it.
+//! A policy's file: its bits come back, and what is wrong with it is said in one line that names
+//! it.
 
 use super::weights_support::{Parts, folder, shipped};
 use safetensors::tensor::TensorView;
@@ -61,7 +62,10 @@ fn said(change: impl FnOnce(&mut Parts, &mut String)) -> String {
     fs::write(&path, safetensors::serialize(views, Some(metadata)).unwrap()).unwrap();
     let error = PolicyWeights::load(&path).unwrap_err().to_string();
     assert!(!error.contains('\n'), "{error}");
-    error.strip_prefix(&format!("{}: ", path.display())).unwrap_or_else(|| panic!("{error}")).to_owned()
+    error
+        .strip_prefix(&format!("{}: ", path.display()))
+        .unwrap_or_else(|| panic!("{error}"))
+        .to_owned()
 }
 
 #[test]
@@ -69,10 +73,12 @@ fn what_is_wrong_is_named_with_its_value() {
     assert_eq!(said(|p, _| drop(p.remove("second.bias"))), "tensor second.bias: missing");
     let shape = said(|p, _| p.get_mut("first.weight").unwrap().1 = vec![32, 25]);
     assert_eq!(shape, "tensor first.weight: shape [32, 25], must be [25, 32]");
-    let nan =
-        said(|p, _| p.get_mut("output.bias").unwrap().2[8..12].copy_from_slice(&f32::NAN.to_le_bytes()));
+    let nan = said(|p, _| {
+        p.get_mut("output.bias").unwrap().2[8..12].copy_from_slice(&f32::NAN.to_le_bytes());
+    });
     assert_eq!(nan, "tensor output.bias[2] = NaN: must be finite");
-    let more = said(|p, _| drop(p.insert("third.bias".to_owned(), (Dtype::F32, vec![1], vec![0; 4]))));
+    let more =
+        said(|p, _| drop(p.insert("third.bias".to_owned(), (Dtype::F32, vec![1], vec![0; 4]))));
     assert_eq!(more, "tensor third.bias: unknown to this model");
     let with = |from: &str, to: &str| {
         said(|_, text| {

@@ -1,4 +1,5 @@
-//! Replay: the same bits from the same inputs, and the first thing that differs where something was changed.
+//! Replay: the same bits from the same inputs, and the first thing that differs where something was
+//! changed.
 
 use squirrel_log::FlightLog;
 use squirrel_log::flight_code::INPUT_SOURCES;
@@ -39,12 +40,15 @@ fn every_arm_replays_bit_for_bit_through_a_file() {
 #[test]
 fn a_changed_gain_is_found_at_the_first_output_that_it_reaches() {
     let mut log = flown(Arm::TwccFlat);
-    let changed =
-        log.metadata["vehicle_toml"].replace("c1_per_s = { value = [9.0,", "c1_per_s = { value = [9.001,");
+    let changed = log.metadata["vehicle_toml"]
+        .replace("c1_per_s = { value = [9.0,", "c1_per_s = { value = [9.001,");
     assert_ne!(changed, log.metadata["vehicle_toml"]);
     log.metadata.insert("vehicle_toml".to_owned(), changed);
     let difference = replay(&log, &setup(&log).unwrap()).unwrap().first_difference.unwrap();
-    assert!(difference.time_s < 0.1 && difference.channel.starts_with("control.inner."), "{difference:?}");
+    assert!(
+        difference.time_s < 0.1 && difference.channel.starts_with("control.inner."),
+        "{difference:?}"
+    );
 }
 
 /// Every input source matters: a changed number changes an output.
@@ -73,7 +77,10 @@ fn a_changed_input_changes_an_output() {
         let t = log.sources[source].time_s[row];
         let difference = replay(&changed, &setup(log).unwrap()).unwrap().first_difference;
         let difference = difference.unwrap_or_else(|| panic!("{channel} does not matter"));
-        assert!(difference.time_s >= t && difference.time_s <= t + 0.11, "{channel} at {t}: {difference:?}");
+        assert!(
+            difference.time_s >= t && difference.time_s <= t + 0.11,
+            "{channel} at {t}: {difference:?}"
+        );
     }
 }
 
@@ -85,10 +92,16 @@ fn a_log_without_what_replay_needs_is_refused_by_name() {
     assert!(setup(&bare).unwrap_err().starts_with("metadata vehicle_toml: missing"));
     let mut frameless = log.clone();
     frameless.sources.remove("frame");
-    assert!(replay(&frameless, &setup(&log).unwrap()).unwrap_err().starts_with("frame.time_us: missing"));
+    assert!(
+        replay(&frameless, &setup(&log).unwrap())
+            .unwrap_err()
+            .starts_with("frame.time_us: missing")
+    );
     let mut outputless = log.clone();
     outputless.sources.remove(OUTPUT_SOURCES[0]);
     assert!(
-        replay(&outputless, &setup(&log).unwrap()).unwrap_err().starts_with("control.status: in only one")
+        replay(&outputless, &setup(&log).unwrap())
+            .unwrap_err()
+            .starts_with("control.status: in only one")
     );
 }

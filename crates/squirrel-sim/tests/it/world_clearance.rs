@@ -9,12 +9,14 @@ use squirrel_core::nalgebra::Vector3;
 use squirrel_sim::world::{Contact, Cylinder, World, WorldParameters};
 
 fn cylinders(span_m: f64) -> impl Strategy<Value = Vec<Cylinder>> {
-    let one = (-span_m..span_m, -span_m..span_m, 0.01..2.0, 0.1..20.0)
-        .prop_map(|(north_m, east_m, radius_m, height_m)| Cylinder { north_m, east_m, radius_m, height_m });
+    let one = (-span_m..span_m, -span_m..span_m, 0.01..2.0, 0.1..20.0).prop_map(
+        |(north_m, east_m, radius_m, height_m)| Cylinder { north_m, east_m, radius_m, height_m },
+    );
     prop::collection::vec(one, 0..200)
 }
 
-/// Distance from a point to every solid, without a grid: along the surface's own cylindrical coordinates.
+/// Distance from a point to every solid, without a grid: along the surface's own cylindrical
+/// coordinates.
 fn by_hand(parameters: &WorldParameters, p: Vector3<f64>, horizon_m: f64) -> f64 {
     let to_solid = parameters.obstacles.iter().map(|c| {
         let axis = (p.x - c.north_m).hypot(p.y - c.east_m);

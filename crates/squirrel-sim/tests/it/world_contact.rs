@@ -1,4 +1,5 @@
-//! Facts of contact: things come to rest, do not pass through each other, and what they gain in energy by it is small.
+//! Facts of contact: things come to rest, do not pass through each other, and what they gain in
+//! energy by it is small.
 #![cfg(feature = "rapier")]
 
 use super::world_fixture::{SIZE_BODY_M, open_field, thrown, vehicle};
@@ -44,8 +45,16 @@ fn a_tilted_drop_comes_to_rest_flat_on_the_ground_and_stays() {
             (state, last) = world.step(&state, &Wrench::zero(), dt_s).unwrap();
             time_s += dt_s;
             if time_s > 3.0 {
-                assert!(state.velocity.vector.norm() < 1e-4, "{dt_s} s: {}", state.velocity.vector.norm());
-                assert!(state.omega.vector.norm() < 1e-3, "{dt_s} s: {}", state.omega.vector.norm());
+                assert!(
+                    state.velocity.vector.norm() < 1e-4,
+                    "{dt_s} s: {}",
+                    state.velocity.vector.norm()
+                );
+                assert!(
+                    state.omega.vector.norm() < 1e-3,
+                    "{dt_s} s: {}",
+                    state.omega.vector.norm()
+                );
                 let sunk_m = HALF_THICKNESS_M - height_m(&state);
                 assert!(sunk_m.abs() < 0.3e-3, "{dt_s} s: sunk by {sunk_m} m");
             }
@@ -76,7 +85,8 @@ fn nothing_is_touched_before_the_fall_is_over() {
 
 #[test]
 fn a_trunk_throws_back_what_hits_it_and_tells_its_index() {
-    let obstacles = vec![cylinder(2.5, 3.0, 0.5), cylinder(2.5, 0.0, 0.5), cylinder(-2.0, 0.0, 0.5)];
+    let obstacles =
+        vec![cylinder(2.5, 3.0, 0.5), cylinder(2.5, 0.0, 0.5), cylinder(-2.0, 0.0, 0.5)];
     let parameters = WorldParameters { obstacles, restitution: 0.5, ..open_field() };
     let mut world = World::new(&vehicle(), &parameters).unwrap();
     let mut state = thrown(5.0, [7.0, 0.0, 0.0], [0.0; 3]);
@@ -90,11 +100,17 @@ fn a_trunk_throws_back_what_hits_it_and_tells_its_index() {
         state = next;
     }
     let total_n_s: f64 = given.iter().map(|c| c.impulse_n_s).sum();
-    assert!(!given.is_empty() && given.iter().all(|c| c.obstacle == Some(1) && !c.ground), "{given:?}");
+    assert!(
+        !given.is_empty() && given.iter().all(|c| c.obstacle == Some(1) && !c.ground),
+        "{given:?}"
+    );
     let back_m_s = -state.velocity.vector.x;
     assert!((3.3..=3.7).contains(&back_m_s), "half of 7 m/s comes back: {back_m_s}");
     let momentum_n_s = vehicle().parameters().mass_kg * (7.0 + back_m_s);
-    assert!((total_n_s / momentum_n_s - 1.0).abs() < 0.02, "{total_n_s} N s for {momentum_n_s} N s");
+    assert!(
+        (total_n_s / momentum_n_s - 1.0).abs() < 0.02,
+        "{total_n_s} N s for {momentum_n_s} N s"
+    );
     assert!(kinetic_j(&state) < before_j);
 }
 
@@ -117,7 +133,10 @@ fn a_fast_vehicle_passes_neither_ground_nor_trunk_nor_pole() {
                 state = world.step(&state, &weightless(&state), 1e-3).unwrap().0;
                 let p = state.position.vector;
                 let beside = (p.x - 2.0 - radius_m).hypot(p.y) - radius_m;
-                assert!(beside > 0.0, "{attitude:?}: the centre of mass is {beside} m into {radius_m} m");
+                assert!(
+                    beside > 0.0,
+                    "{attitude:?}: the centre of mass is {beside} m into {radius_m} m"
+                );
             }
         }
     }
@@ -126,7 +145,8 @@ fn a_fast_vehicle_passes_neither_ground_nor_trunk_nor_pole() {
 #[test]
 fn two_runs_give_the_same_bits() {
     let fly = || {
-        let obstacles = (0..50).map(|i| cylinder(1.0 + 0.5 * f64::from(i), f64::from(i % 3) - 1.0, 0.2));
+        let obstacles =
+            (0..50).map(|i| cylinder(1.0 + 0.5 * f64::from(i), f64::from(i % 3) - 1.0, 0.2));
         let parameters = WorldParameters { obstacles: obstacles.collect(), ..open_field() };
         let mut world = World::new(&vehicle(), &parameters).unwrap();
         let mut state = thrown(1.0, [7.0, 0.3, 0.0], [0.1, -0.2, 0.3]);
@@ -153,7 +173,8 @@ fn a_flight_that_changes_from_rk4_to_the_world_lands() {
     let drive = RotorDrive::new(&vehicle, &calm, &[0.0; 8], 14.8);
     let free = |state: State<f64>| {
         rk4(state, 1e-3, |s| {
-            let held = Held { drive, wind: In::zero(), deployment: [0.0; 2], tether_force: In::zero() };
+            let held =
+                Held { drive, wind: In::zero(), deployment: [0.0; 2], tether_force: In::zero() };
             derivative(&vehicle, &calm, s, &held, |_| Wrench::zero())
         })
         .normalised()

@@ -46,10 +46,22 @@ fn a_step_that_cannot_be_names_the_quantity_and_the_world_goes_on() {
     };
     let nan_ned = In::new(nan.vector);
     for (text, starts) in [
-        (refused(good, Wrench::from_force(nan), 1e-3), "wrench.force_body_n[1] = NaN: must be finite"),
-        (refused(good, Wrench { moment: nan, ..no_force }, 1e-3), "wrench.moment_body_n_m[1] = NaN"),
-        (refused(State { position: nan_ned, ..good }, no_force, 1e-3), "state.position_ned_m[1] = NaN"),
-        (refused(State { velocity: nan_ned, ..good }, no_force, 1e-3), "state.velocity_ned_m_s[1] = NaN"),
+        (
+            refused(good, Wrench::from_force(nan), 1e-3),
+            "wrench.force_body_n[1] = NaN: must be finite",
+        ),
+        (
+            refused(good, Wrench { moment: nan, ..no_force }, 1e-3),
+            "wrench.moment_body_n_m[1] = NaN",
+        ),
+        (
+            refused(State { position: nan_ned, ..good }, no_force, 1e-3),
+            "state.position_ned_m[1] = NaN",
+        ),
+        (
+            refused(State { velocity: nan_ned, ..good }, no_force, 1e-3),
+            "state.velocity_ned_m_s[1] = NaN",
+        ),
         (refused(State { omega: nan, ..good }, no_force, 1e-3), "state.omega_body_rad_s[1] = NaN"),
         (
             refused(
@@ -60,7 +72,11 @@ fn a_step_that_cannot_be_names_the_quantity_and_the_world_goes_on() {
             "state.q_ned_from_body_wxyz[0] = inf",
         ),
         (
-            refused(State { attitude: Quaternion::new(0.0, 0.0, 0.0, 0.0), ..good }, no_force, 1e-3),
+            refused(
+                State { attitude: Quaternion::new(0.0, 0.0, 0.0, 0.0), ..good },
+                no_force,
+                1e-3,
+            ),
             "norm of state.q_ned_from_body_wxyz = 0",
         ),
         (refused(good, no_force, 0.0), "dt_s = 0: must be > 0 and <= 1"),

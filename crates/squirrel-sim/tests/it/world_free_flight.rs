@@ -1,5 +1,5 @@
-//! Free flight through rapier agrees with RK4 to first order in the step. Prints the table of the module's header:
-//! `cargo test -p squirrel-sim --release --test world_free_flight -- --nocapture`
+//! Free flight through rapier agrees with RK4 to first order in the step. Prints the table of the
+//! module's header: `cargo test -p squirrel-sim --release --test world_free_flight -- --nocapture`
 #![cfg(feature = "rapier")]
 
 use super::world_fixture::{open_field, thrown, vehicle};
@@ -54,7 +54,8 @@ fn by_rapier(steps: usize) -> State<f64> {
             &in_still_air(drive),
             no_surfaces,
         );
-        let (next, contact) = world.step(&state, &held, 1.0 / steps as f64).expect("a possible step");
+        let (next, contact) =
+            world.step(&state, &held, 1.0 / steps as f64).expect("a possible step");
         assert_eq!(contact, Contact::default());
         state = next;
     }
@@ -81,7 +82,10 @@ fn rapier_agrees_with_rk4_to_first_order() {
         );
     }
     let [attitude, position] = errors[2].1;
-    assert!(attitude.to_degrees() < 0.05 && position < 2e-3, "at 1 ms: {attitude} rad, {position} m");
+    assert!(
+        attitude.to_degrees() < 0.05 && position < 2e-3,
+        "at 1 ms: {attitude} rad, {position} m"
+    );
     for pair in errors.windows(2) {
         for (coarse, fine) in pair[0].1.iter().zip(&pair[1].1) {
             let ratio = coarse / fine;
@@ -98,6 +102,7 @@ fn neither_speed_nor_rate_is_capped() {
     state.omega = In::new(Vector3::new(0.0, 0.0, 300.0));
     let next = world.step(&state, &Wrench::zero(), 1e-2).unwrap().0;
     assert!((next.velocity.vector.x - 700.0).abs() < 1e-9, "{}", next.velocity.vector);
-    // The principal axes are off the body's, so the rate precesses; its size is what a cap would change.
+    // The principal axes are off the body's, so the rate precesses; its size is what a cap would
+    // change.
     assert!((next.omega.vector.norm() - 300.0).abs() < 30.0, "{}", next.omega.vector);
 }

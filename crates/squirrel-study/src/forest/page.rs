@@ -32,9 +32,10 @@ pub fn page(study: &Forest, plan: &Plan) -> Result<String, FlightError> {
              the height; above the trees nothing is proven. Wilson's 95 % intervals."
         ),
     );
-    let successes = [("in band", (|row| row.in_band) as fn(&Row) -> Share), ("through", |row| row.through)];
-    let figures =
-        successes.map(|(what, of)| figure(what.to_owned(), String::new(), success(study, what, of)));
+    let successes =
+        [("in band", (|row| row.in_band) as fn(&Row) -> Share), ("through", |row| row.through)];
+    let figures = successes
+        .map(|(what, of)| figure(what.to_owned(), String::new(), success(study, what, of)));
     page.figures(Columns::Two, &figures);
     maps(&mut page, study, plan)?;
     numbers(&mut page, study);
@@ -43,7 +44,8 @@ pub fn page(study: &Forest, plan: &Plan) -> Result<String, FlightError> {
 
 fn success(study: &Forest, what: &str, of: fn(&Row) -> Share) -> Svg {
     let axis = Axis::new(what, "%").with_range(Range::Exact(0.0, 100.0));
-    let mut chart = RowChart::new(&format!("share of flights {what} by arm"), Columns::Two.width(), axis);
+    let mut chart =
+        RowChart::new(&format!("share of flights {what} by arm"), Columns::Two.width(), axis);
     chart.rows.extend(study.rows.iter().map(|row| {
         let Share { count, of, share } = of(row);
         chart_row(row.arm, share, format!("{count} of {of}"))
@@ -91,7 +93,8 @@ fn maps(page: &mut Page, study: &Forest, plan: &Plan) -> Result<(), FlightError>
     let first = study.rows.iter().map(fly).collect::<Result<Vec<_>, _>>()?;
     let ends = study.rows.iter().flat_map(|row| &row.ends).map(|end| end.displacement_m);
     let places = ends.chain(first.iter().flat_map(|first| first.points.iter().copied()));
-    let farthest = places.flatten().filter(|x| x.is_finite()).fold(20.0, |most: f64, x| most.max(x.abs()));
+    let farthest =
+        places.flatten().filter(|x| x.is_finite()).fold(20.0, |most: f64, x| most.max(x.abs()));
     let speed = Axis::new("speed", "m/s").with_range(Range::Including(0.0, 7.0));
     let maps = Maps {
         trunks: &scenario.all_obstacles(),
@@ -118,7 +121,8 @@ fn maps(page: &mut Page, study: &Forest, plan: &Plan) -> Result<(), FlightError>
 
 impl Maps<'_> {
     fn draw(&self, row: &Row, first: &First) -> Svg {
-        let axis = |name| Axis::new(name, "m").with_range(Range::Exact(-self.reach_m, self.reach_m));
+        let axis =
+            |name| Axis::new(name, "m").with_range(Range::Exact(-self.reach_m, self.reach_m));
         let plain = |ink, points| Track {
             name: String::new(),
             ink,
@@ -127,7 +131,8 @@ impl Maps<'_> {
             values: Vec::new(),
             marks: Vec::new(),
         };
-        let inside = |[north, east, _]: &&[f64; 3]| north.abs() < self.reach_m && east.abs() < self.reach_m;
+        let inside =
+            |[north, east, _]: &&[f64; 3]| north.abs() < self.reach_m && east.abs() < self.reach_m;
         // Points between gaps are dots.
         let trunks = self.trunks.iter().filter(inside);
         let trunks = trunks.flat_map(|[north, east, _]| [[*east, *north], [f64::NAN; 2]]).collect();
@@ -145,7 +150,8 @@ impl Maps<'_> {
             if end.through {
                 through.extend(round([east, north], size, 12).chain([[f64::NAN; 2]]));
             } else {
-                // From the middle, because the ink of limits is dashed: no arm is as long as a dash.
+                // From the middle, because the ink of limits is dashed: no arm is as long as a
+                // dash.
                 for (x, y) in [(-size, -size), (-size, size), (size, -size), (size, size)] {
                     hit.extend([[east, north], [east + x, north + y], [f64::NAN; 2]]);
                 }
@@ -206,7 +212,12 @@ fn numbers(page: &mut Page, study: &Forest) {
     };
     let cells = |of: &Row| {
         let over = [of.over_phantom, of.over_pc_plus].map(|over| percent(over, 0));
-        let means = [(of.path_m, 0), (of.displacement_m, 0), (of.height_gained_m, 1), (of.height_lost_m, 1)];
+        let means = [
+            (of.path_m, 0),
+            (of.displacement_m, 0),
+            (of.height_gained_m, 1),
+            (of.height_lost_m, 1),
+        ];
         let rest = [(of.encounters, 1), (of.wings_open_s, 1)];
         let means = means.into_iter().chain(rest).map(|(x, digits)| format!("{x:.digits$}"));
         let counts = share(of.in_band).into_iter().chain(share(of.through));

@@ -43,7 +43,8 @@ fn fly(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightE
 /// The tasks again; how long their plans take is no part of the figures that are kept.
 fn timed(plan: &Plan) -> Result<Timed, FlightError> {
     let mut rows = Vec::new();
-    for (kind, ratio) in KINDS.iter().flat_map(|kind| THRUST_TO_WEIGHT.map(|ratio| (*kind, ratio))) {
+    for (kind, ratio) in KINDS.iter().flat_map(|kind| THRUST_TO_WEIGHT.map(|ratio| (*kind, ratio)))
+    {
         for arm in ARMS {
             let work = |(craft, task)| -> Work {
                 Box::new(move || drop(black_box(Planner::default().plan(&craft, &task, None))))

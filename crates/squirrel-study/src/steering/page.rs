@@ -1,6 +1,9 @@
-//! Steering angles and speeds as a page: the paper's wheels (Fig. 9), tracks of one cell, and every number.
+//! Steering angles and speeds as a page: the paper's wheels (Fig. 9), tracks of one cell, and every
+//! number.
 
-use super::{ANGLES_DEG, Mean, SPEEDS_M_S, Steering, THRUST_TO_WEIGHT, Wings, conditions, ratio, words};
+use super::{
+    ANGLES_DEG, Mean, SPEEDS_M_S, Steering, THRUST_TO_WEIGHT, Wings, conditions, ratio, words,
+};
 use crate::campaign::Plan;
 use crate::pages::{begin, figure, head, ink, row, tracks};
 use squirrel_report::chart::{Axis, Limit, Range, Svg, Wheel, WheelLine};
@@ -72,11 +75,13 @@ fn wheels(page: &mut Page, study: &Steering, shown: &dyn Fn(&str) -> bool) {
     let mut figures: Vec<Figure> = Vec::new();
     for thrust_to_weight in THRUST_TO_WEIGHT {
         let of_ratio = |mean: &&Mean| mean.thrust_to_weight == thrust_to_weight && shown(mean.arm);
-        let means = || study.means.iter().filter(of_ratio).filter(|mean| mean.arm != Arm::Pc.name());
+        let means =
+            || study.means.iter().filter(of_ratio).filter(|mean| mean.arm != Arm::Pc.name());
         let ratios = |mean: &Mean| [&mean.ratio_by_angle[..], &mean.ratio_by_speed].concat();
         // Too large on one plant is too large on both: the same arms are compared.
-        let most =
-            |arm: &str| largest(&means().filter(|mean| mean.arm == arm).flat_map(ratios).collect::<Vec<_>>());
+        let most = |arm: &str| {
+            largest(&means().filter(|mean| mean.arm == arm).flat_map(ratios).collect::<Vec<_>>())
+        };
         let is_large = |arm: &str| most(arm) > LARGEST_RATIO;
         let mut drawn: Vec<&Mean> = means().filter(|mean| !is_large(mean.arm)).collect();
         // The paper's arm in front: others may hide behind it.
@@ -88,15 +93,19 @@ fn wheels(page: &mut Page, study: &Steering, shown: &dyn Fn(&str) -> bool) {
         if drawn.iter().any(|mean| is_plus(mean.arm)) {
             range[0] = 0.0;
         }
-        let of_plant = means().filter(|mean| mean.wings == Wings::Independent && is_large(mean.arm));
+        let of_plant =
+            means().filter(|mean| mean.wings == Wings::Independent && is_large(mean.arm));
         let left_out: Vec<String> = of_plant
-            .map(|mean| format!("{} is left out, with ratios up to {:.2}", mean.arm, most(mean.arm)))
+            .map(|mean| {
+                format!("{} is left out, with ratios up to {:.2}", mean.arm, most(mean.arm))
+            })
             .collect();
         let caption = if left_out.is_empty() { String::new() } else { left_out.join("; ") + "." };
         for wings in Wings::ALL {
             for (what, spokes, names) in &by {
                 let title = format!("{}, T/W {thrust_to_weight:.1}, by {what}", wings.name());
-                let of: Vec<&Mean> = drawn.iter().filter(|mean| mean.wings == wings).copied().collect();
+                let of: Vec<&Mean> =
+                    drawn.iter().filter(|mean| mean.wings == wings).copied().collect();
                 let drawing = wheel(&title, names, &of, *spokes, range);
                 figures.push(figure(title, caption.clone(), drawing));
             }
@@ -109,7 +118,13 @@ fn largest(ratios: &[f64]) -> f64 {
     ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max)
 }
 
-fn wheel(title: &str, names: &[String], means: &[&Mean], spokes: Spokes, [low, high]: [f64; 2]) -> Svg {
+fn wheel(
+    title: &str,
+    names: &[String],
+    means: &[&Mean],
+    spokes: Spokes,
+    [low, high]: [f64; 2],
+) -> Svg {
     let axis = Axis::new("error over pc", "").with_range(Range::Including(low, high));
     let mut wheel = Wheel::new(&format!("error over that of pc, {title}"), axis, names.to_vec());
     wheel.width = Columns::Two.width();
@@ -133,11 +148,15 @@ fn flown(page: &mut Page, study: &Steering, plan: &Plan) -> Result<(), FlightErr
             && is(cell.speed_m_s, SHOWN_M_S)
     };
     let conditions = conditions(&plan.vehicle)?;
-    let Some(condition) = study.cells.iter().position(is_shown).and_then(|i| conditions.get(i)) else {
+    let Some(condition) = study.cells.iter().position(is_shown).and_then(|i| conditions.get(i))
+    else {
         return Ok(());
     };
     page.section(
-        &format!("One cell: {SHOWN_DEG:.0} deg at {SHOWN_M_S:.0} m/s, T/W {:.1}", THRUST_TO_WEIGHT[0]),
+        &format!(
+            "One cell: {SHOWN_DEG:.0} deg at {SHOWN_M_S:.0} m/s, T/W {:.1}",
+            THRUST_TO_WEIGHT[0]
+        ),
         "The first trial on the independent plant, coloured by speed.",
     );
     tracks(page, plan, condition, &SHOWN)
@@ -151,20 +170,27 @@ fn numbers(page: &mut Page, study: &Steering) {
             "Means over {cells} cells of the error over that of pc; horizontal: of errors without height; better: in how many cells."
         ),
     );
-    let mut names = head(&["arm", "plant", "T/W", "all", "horizontal", "better than pc", "than twcc_flat"]);
+    let mut names =
+        head(&["arm", "plant", "T/W", "all", "horizontal", "better than pc", "than twcc_flat"]);
     names.extend(ANGLES_DEG.iter().map(|angle| format!("{angle:.0} deg")));
     names.extend(SPEEDS_M_S.iter().map(|speed| format!("{speed:.0} m/s")));
     let of_mean = |mean: &Mean| {
         let place = [mean.wings.name().to_owned(), format!("{:.1}", mean.thrust_to_weight)];
         let all = [mean.ratio, mean.ratio_horizontal].map(|ratio| format!("{ratio:.3}"));
         let better = [mean.better, mean.better_than_flat].map(|count| count.to_string());
-        let ratios =
-            mean.ratio_by_angle.iter().chain(&mean.ratio_by_speed).map(|ratio| format!("{ratio:.3}"));
+        let ratios = mean
+            .ratio_by_angle
+            .iter()
+            .chain(&mean.ratio_by_speed)
+            .map(|ratio| format!("{ratio:.3}"));
         row(mean.arm, place.into_iter().chain(all).chain(better).chain(ratios))
     };
     page.table(&names, &study.means.iter().map(of_mean).collect::<Vec<_>>());
 
-    page.section("Every number", "Ratio: of the mean error to that of pc, with its paired 95 % interval.");
+    page.section(
+        "Every number",
+        "Ratio: of the mean error to that of pc, with its paired 95 % interval.",
+    );
     let names = [
         "arm",
         "plant",

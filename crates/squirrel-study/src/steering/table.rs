@@ -36,7 +36,8 @@ fn fly(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightE
 }
 
 fn means(study: &Steering) -> Vec<Vec<String>> {
-    let mut names: Vec<String> = ["plant", "T/W", "arm", "all", "horizontal"].map(str::to_owned).to_vec();
+    let mut names: Vec<String> =
+        ["plant", "T/W", "arm", "all", "horizontal"].map(str::to_owned).to_vec();
     names.extend(ANGLES_DEG.iter().map(|angle| format!("{angle:.0} deg")));
     names.extend(SPEEDS_M_S.iter().map(|speed| format!("{speed:.0} m/s")));
     let mut table = vec![names];

@@ -1,9 +1,11 @@
-//! Table II of the paper, with what it leaves out: how well models of the wing force predict flights that they have not seen.
+//! Table II of the paper, with what it leaves out: how well models of the wing force predict
+//! flights that they have not seen.
 //!
-//! In each trial every model learns from the same random flights, of 30, 120 and 300 s, the shorter ones a part of the longer,
-//! and is judged on its own training flights and on four sets of others ([`Kind`]). Errors are to the labels, which is all that
-//! a flight has, and to the true force, which only a simulator has. There is no validation set: the paper has none, so all
-//! epochs are trained and the last weights count.
+//! In each trial every model learns from the same random flights, of 30, 120 and 300 s, the shorter
+//! ones a part of the longer, and is judged on its own training flights and on four sets of others
+//! ([`Kind`]). Errors are to the labels, which is all that a flight has, and to the true force,
+//! which only a simulator has. There is no validation set: the paper has none, so all epochs are
+//! trained and the last weights count.
 
 mod report;
 mod table;
@@ -93,8 +95,8 @@ pub struct Set {
     pub speed_m_s: [f64; 2],
     /// The true force, root mean square, N.
     pub force_rms_n: Spread,
-    /// Labels against truth, root mean square, N: what the true force would have on labels. In wind it holds the drag of the
-    /// airframe, which a log without airspeed cannot tell from the wings'.
+    /// Labels against truth, root mean square, N: what the true force would have on labels. In wind
+    /// it holds the drag of the airframe, which a log without airspeed cannot tell from the wings'.
     pub label_noise_n: Spread,
 }
 
@@ -105,9 +107,11 @@ pub struct Word {
     pub training_s: u32,
     /// [`Kind::name`].
     pub set: &'static str,
-    /// Share of them in which the angle of attack that the wing seems to have is larger than the one it has.
+    /// Share of them in which the angle of attack that the wing seems to have is larger than the
+    /// one it has.
     pub alpha_larger_share: Spread,
-    /// The same where it is beyond 10 deg: below, the wing may still be bulged by the flow of a moment before.
+    /// The same where it is beyond 10 deg: below, the wing may still be bulged by the flow of a
+    /// moment before.
     pub alpha_larger_share_beyond_10_deg: Spread,
     /// Median of how much stronger the flow seems to act.
     pub gamma_median: Spread,
@@ -172,15 +176,16 @@ fn steps_of_a_trial() -> usize {
     flights + TRAINING_FLIGHTS.len() * Model::ALL.len()
 }
 
-/// Flies and trains on all cores; the result depends neither on how many there are nor on how often the study was stopped. `None` where
-/// only a part of it is done here.
+/// Flies and trains on all cores; the result depends neither on how many there are nor on how often
+/// the study was stopped. `None` where only a part of it is done here.
 ///
 /// * `plan` - whose arms do not matter
 /// * `epochs` - passes over the windows; 800 in the paper
 /// * `keep` - keeps the trials
 ///
 /// # Errors
-/// A vehicle that cannot fly or has no wings, no trials, no epochs, or a folder that cannot be written.
+/// A vehicle that cannot fly or has no wings, no trials, no epochs, or a folder that cannot be
+/// written.
 pub fn run(plan: &Plan, epochs: usize, keep: &Keep<'_>) -> Result<Option<Table2>, FlightError> {
     check_trials(plan.trials)?;
     let identity = identity("table2", &plan.vehicle, plan.seed);
@@ -204,7 +209,8 @@ pub fn run(plan: &Plan, epochs: usize, keep: &Keep<'_>) -> Result<Option<Table2>
     let models = Model::ALL.len();
     for (length, flights) in TRAINING_FLIGHTS.into_iter().enumerate() {
         let training_s = flights * FLIGHT_S;
-        let of = |model: usize| trials.iter().map(move |trial| &trial.judged[length * models + model]);
+        let of =
+            |model: usize| trials.iter().map(move |trial| &trial.judged[length * models + model]);
         for (set, kind) in Kind::ALL.iter().enumerate() {
             for (m, model) in Model::ALL.into_iter().enumerate() {
                 let error = |errors: fn(&Judged) -> &[ForceError]| {
@@ -230,7 +236,11 @@ pub fn run(plan: &Plan, epochs: usize, keep: &Keep<'_>) -> Result<Option<Table2>
         trials: plan.trials,
         seed: plan.seed,
         epochs,
-        sets: Kind::ALL.into_iter().enumerate().map(|(i, kind)| describe(kind, i, &trials)).collect(),
+        sets: Kind::ALL
+            .into_iter()
+            .enumerate()
+            .map(|(i, kind)| describe(kind, i, &trials))
+            .collect(),
         rows,
         words,
     }))
@@ -245,7 +255,9 @@ fn spread(x: &[f64]) -> Spread {
 
 fn summary(errors: &[ForceError], parnn: &[f64]) -> Error {
     let over: Vec<f64> = errors.iter().zip(parnn).map(|(e, parnn)| e.rms_n / parnn - 1.0).collect();
-    let of = |figure: &dyn Fn(&ForceError) -> f64| spread(&errors.iter().map(figure).collect::<Vec<f64>>());
+    let of = |figure: &dyn Fn(&ForceError) -> f64| {
+        spread(&errors.iter().map(figure).collect::<Vec<f64>>())
+    };
     Error {
         rmse_n: of(&|e| e.rms_n),
         axis_rmse_n: [0, 1, 2].map(|axis| of(&|e| e.axis_rms_n[axis])),
@@ -253,7 +265,8 @@ fn summary(errors: &[ForceError], parnn: &[f64]) -> Error {
     }
 }
 
-/// The scenario of the first flight of each kind, to fly it or its kin by hand; with another seed the wind keeps its direction.
+/// The scenario of the first flight of each kind, to fly it or its kin by hand; with another seed
+/// the wind keeps its direction.
 ///
 /// # Errors
 /// As [`Kind::scenario`].
@@ -265,7 +278,8 @@ pub fn scenarios(plan: &Plan) -> Result<Vec<Scenario>, FlightError> {
     Kind::ALL.into_iter().map(named).collect()
 }
 
-/// Of the flights of a kind in a trial, which count up from it: a hundred a kind, a thousand a trial.
+/// Of the flights of a kind in a trial, which count up from it: a hundred a kind, a thousand a
+/// trial.
 fn first_seed(plan: &Plan, trial: u32, kind: Kind) -> u64 {
     let place = Kind::ALL.iter().position(|other| *other == kind).unwrap_or_default() as u64;
     plan.trial_seed(trial).wrapping_mul(1000).wrapping_add(100 * place)
@@ -280,8 +294,10 @@ fn trial(
 ) -> Result<Trial, WingFlightError> {
     let flights = fly(plan, number, progress)?;
     let seed = plan.trial_seed(number);
-    let tasks: Vec<(u32, Model)> =
-        TRAINING_FLIGHTS.into_iter().flat_map(|flights| Model::ALL.map(|model| (flights, model))).collect();
+    let tasks: Vec<(u32, Model)> = TRAINING_FLIGHTS
+        .into_iter()
+        .flat_map(|flights| Model::ALL.map(|model| (flights, model)))
+        .collect();
     let judged = tasks
         .par_iter()
         .map(|(number, model)| {
@@ -337,7 +353,8 @@ fn train(
         training.push(&format!("training {flight}"), windows)?;
     }
     let area_m2 = labels::plate_area_m2(vehicle);
-    let mut trainer = Trainer::new(model, &vehicle.name, area_m2, &training, &Windows::new(), settings)?;
+    let mut trainer =
+        Trainer::new(model, &vehicle.name, area_m2, &training, &Windows::new(), settings)?;
     while trainer.epoch()?.is_some() {}
     let trained = trainer.best();
 
@@ -363,7 +380,8 @@ fn truths_of(windows: &[Window]) -> Vec<[f32; 3]> {
     windows.iter().filter_map(|w| w.truth_body_n).collect()
 }
 
-/// Shares of larger angles of attack, of all and of the large ones, and median gamma; zero where nothing is fast enough.
+/// Shares of larger angles of attack, of all and of the large ones, and median gamma; zero where
+/// nothing is fast enough.
 fn words(trained: &Trained, windows: &[Window]) -> [f64; 3] {
     let Some(parnn) = trained.parnn() else { return [0.0; 3] };
     let (mut all, mut large, mut gammas) = (Vec::new(), Vec::new(), Vec::new());
@@ -372,7 +390,8 @@ fn words(trained: &Trained, windows: &[Window]) -> [f64; 3] {
         if speed * SPEED_SCALE_M_S <= ALPHA_FROM_M_S {
             continue;
         }
-        let estimate = parnn.estimate(&window.rows, In::new(Vector3::from(window.velocity_body_m_s)));
+        let estimate =
+            parnn.estimate(&window.rows, In::new(Vector3::from(window.velocity_body_m_s)));
         let is_larger = f64::from(u8::from(estimate.alpha_est_rad.abs() > alpha_rad.abs()));
         all.push(is_larger);
         if alpha_rad.abs() > LARGE_ALPHA_RAD {

@@ -2,7 +2,9 @@
 
 use super::{ERRORS, Spread, Table2};
 use squirrel_nn::model::Model;
-use squirrel_report::chart::{Axis, ChartRow, Dot, Extent, Ink, LineChart, Range, RowChart, Series, Svg};
+use squirrel_report::chart::{
+    Axis, ChartRow, Dot, Extent, Ink, LineChart, Range, RowChart, Series, Svg,
+};
 use squirrel_report::page::{self, Columns, Figure, Page};
 
 /// The study as a page without network, the same bytes for the same study.
@@ -105,14 +107,19 @@ fn sets(page: &mut Page, study: &Table2) {
 
 fn by_model(study: &Table2, set: &str, training_s: u32) -> Svg {
     let axis = Axis::new("RMSE to truth", "N").with_range(Range::Including(0.0, 0.0));
-    let mut chart = RowChart::new(&format!("error of each model on {set}"), Columns::Two.width(), axis);
+    let mut chart =
+        RowChart::new(&format!("error of each model on {set}"), Columns::Two.width(), axis);
     let noise = study.sets.iter().find(|s| s.set == set).map_or(0.0, |s| s.label_noise_n.mean);
     for found in study.rows.iter().filter(|r| r.set == set && r.training_s == training_s) {
         let Spread { mean, sd } = found.to_truth.rmse_n;
         let place = Model::ALL.iter().position(|model| *model == found.model).unwrap_or_default();
         let (ink, sd) = (Ink::Series(place), sd.unwrap_or(0.0));
-        let extent =
-            |from: f64, to: f64, ink: Ink, name: &str| Extent { from, to, ink, name: name.to_owned() };
+        let extent = |from: f64, to: f64, ink: Ink, name: &str| Extent {
+            from,
+            to,
+            ink,
+            name: name.to_owned(),
+        };
         chart.rows.push(ChartRow {
             label: found.model.name().to_owned(),
             // Plus zero turns a rounded minus zero round.
@@ -128,7 +135,8 @@ fn by_model(study: &Table2, set: &str, training_s: u32) -> Svg {
 
 fn by_data(study: &Table2, set: &str) -> Svg {
     let y = Axis::new("RMSE to truth", "N").with_range(Range::Including(0.0, 0.0));
-    let mut chart = LineChart::new(&format!("error over training on {set}"), Axis::new("training", "s"), y);
+    let mut chart =
+        LineChart::new(&format!("error over training on {set}"), Axis::new("training", "s"), y);
     chart.width = Columns::Two.width();
     chart.x.range = Range::Including(0.0, 0.0);
     for (place, model) in Model::ALL.into_iter().enumerate() {
@@ -145,8 +153,11 @@ fn numbers(page: &mut Page, study: &Table2) {
     for found in &study.rows {
         for (words, error) in ERRORS {
             let error = error(found);
-            let mut cells =
-                vec![found.training_s.to_string(), found.set.to_owned(), found.model.name().to_owned()];
+            let mut cells = vec![
+                found.training_s.to_string(),
+                found.set.to_owned(),
+                found.model.name().to_owned(),
+            ];
             cells.extend([words.to_owned(), plus_minus(error.rmse_n, 1.0, 4)]);
             cells.extend(error.axis_rmse_n.map(|axis| plus_minus(axis, 1.0, 4)));
             cells.push(plus_minus(error.over_parnn, 100.0, 1));

@@ -48,9 +48,14 @@ fn show(found: &mut Found, study: &Table2) {
         study.vehicle, study.trials, study.seed, study.epochs
     ));
     found.shown.push(Shown::Table(sets(study)));
-    let lengths: Vec<u32> = study.rows.chunk_by(|a, b| a.training_s == b.training_s).map(length).collect();
+    let lengths: Vec<u32> =
+        study.rows.chunk_by(|a, b| a.training_s == b.training_s).map(length).collect();
     for rows in study.rows.chunk_by(|a, b| a.training_s == b.training_s && a.set == b.set) {
-        found.say(format!("\n{} s of training, {}: RMSE in N, over paRNN in %", length(rows), rows[0].set));
+        found.say(format!(
+            "\n{} s of training, {}: RMSE in N, over paRNN in %",
+            length(rows),
+            rows[0].set
+        ));
         let columns = ["to labels", "x", "y", "z", "over", "to truth", "x", "y", "z", "over"];
         let mut table = vec![head(&[&["model"][..], &columns].concat())];
         for row in rows {
@@ -106,7 +111,8 @@ fn sets(study: &Table2) -> Vec<Vec<String>> {
             newtons(set.force_rms_n),
             newtons(set.label_noise_n),
             word.map(|w| plus_minus(w.alpha_larger_share, 100.0, 1)).unwrap_or_default(),
-            word.map(|w| plus_minus(w.alpha_larger_share_beyond_10_deg, 100.0, 1)).unwrap_or_default(),
+            word.map(|w| plus_minus(w.alpha_larger_share_beyond_10_deg, 100.0, 1))
+                .unwrap_or_default(),
             word.map(|w| plus_minus(w.gamma_median, 1.0, 2)).unwrap_or_default(),
         ]);
     }

@@ -16,7 +16,8 @@ pub fn page(study: &Thrust) -> String {
     let lead = "What wings are worth as a function of the effective thrust-to-weight ratio: the avoidance manoeuvre, 7.3 m/s, R_d 4 m, a \
                 turn of 110 to 130 deg. Gain is the mean error of pc over that of the arm, minus 1.";
     let facts = facts(&study.vehicle, study.trials, study.seed);
-    let mut page = begin("What wings are worth where thrust is scarce", lead, &facts, &words(study));
+    let mut page =
+        begin("What wings are worth where thrust is scarce", lead, &facts, &words(study));
     let views = views(study);
     let figures = |draw: &dyn Fn(&View<'_>) -> Svg| -> Vec<Figure> {
         views.iter().map(|view| figure(view.title.to_owned(), String::new(), draw(view))).collect()
@@ -43,7 +44,8 @@ pub fn page(study: &Thrust) -> String {
     };
     page.figures(Columns::Two, &figures(&|view| view.by_arm("height lost", "m", &height)));
     let rows = study.points.iter().flat_map(|point| {
-        let charge = point.charge.map_or_else(|| "\u{2013}".to_owned(), |charge| format!("{charge:.2}"));
+        let charge =
+            point.charge.map_or_else(|| "\u{2013}".to_owned(), |charge| format!("{charge:.2}"));
         let place = vec![point.series.to_owned(), format!("{:.2}", point.thrust_to_weight), charge];
         point.rows.iter().map(move |row| (place.clone(), row))
     });
@@ -80,15 +82,25 @@ impl View<'_> {
     fn chart(&self, figure: &str, unit: &str) -> LineChart {
         let axis = |name: &str, unit: &str| Axis::new(name, unit);
         let y = axis(figure, unit).with_range(Range::Including(0.0, 0.0));
-        let mut chart =
-            LineChart::new(&format!("{figure} over T/W, {}", self.title), axis("effective T/W", ""), y);
+        let mut chart = LineChart::new(
+            &format!("{figure} over T/W, {}", self.title),
+            axis("effective T/W", ""),
+            y,
+        );
         chart.width = Columns::Two.width();
         chart.plot_height = 240.0;
         chart
     }
 
-    /// A figure of an arm at every point, with its interval as strokes that are moved by `aside` of the axis.
-    fn add(&self, chart: &mut LineChart, arm: &str, aside: f64, figure: &dyn Fn(&Row) -> Option<Estimate>) {
+    /// A figure of an arm at every point, with its interval as strokes that are moved by `aside` of
+    /// the axis.
+    fn add(
+        &self,
+        chart: &mut LineChart,
+        arm: &str,
+        aside: f64,
+        figure: &dyn Fn(&Row) -> Option<Estimate>,
+    ) {
         let found = self.points.iter().filter_map(|point| {
             let row = point.rows.iter().find(|row| row.arm == arm)?;
             Some((point.thrust_to_weight, figure(row)?))
@@ -96,8 +108,9 @@ impl View<'_> {
         let (x, found): (Vec<f64>, Vec<Estimate>) = found.unzip();
         let (first, last) = (x.first().copied().unwrap_or(0.0), x.last().copied().unwrap_or(0.0));
         let beside: Vec<f64> = x.iter().map(|x| x + aside * (last - first)).collect();
-        let [value, low, high] = [|e: &Estimate| e.value, |e: &Estimate| e.low, |e: &Estimate| e.high]
-            .map(|f| found.iter().map(f).collect());
+        let [value, low, high] =
+            [|e: &Estimate| e.value, |e: &Estimate| e.low, |e: &Estimate| e.high]
+                .map(|f| found.iter().map(f).collect());
         let (low, high): (Vec<f64>, Vec<f64>) = (low, high);
         if low.iter().any(|low| low.is_finite()) {
             chart.series.push(Series::strokes("", ink(arm), &beside, &low, &high));
@@ -123,7 +136,9 @@ impl View<'_> {
 
     fn over_pc_plus(&self) -> Svg {
         let mut chart = self.chart("gain of twcc_plus over pc_plus", "%");
-        self.add(&mut chart, Arm::TwccPlus.name(), 0.0, &|row| row.gain_over_pc_plus.map(in_percent));
+        self.add(&mut chart, Arm::TwccPlus.name(), 0.0, &|row| {
+            row.gain_over_pc_plus.map(in_percent)
+        });
         // There is one line, and the axis says which.
         chart.series.iter_mut().for_each(|series| series.name.clear());
         chart.svg()

@@ -1,7 +1,9 @@
-//! docs/claims.md says what the studies say: every figure in it has the place that it is from behind it, as `<!--study path format-->`.
+//! docs/claims.md says what the studies say: every figure in it has the place that it is from
+//! behind it, as `<!--study path format-->`.
 //!
-//! A path leads through the study's JSON: names, places in lists, and `list[key=value,...]` for the first entry that has these. The format is `%1`
-//! for percent with one digit or `.2` for a number with two. `SQUIRREL_CLAIMS_WRITE=1` writes the figures anew.
+//! A path leads through the study's JSON: names, places in lists, and `list[key=value,...]` for the
+//! first entry that has these. The format is `%1` for percent with one digit or `.2` for a number
+//! with two. `SQUIRREL_CLAIMS_WRITE=1` writes the figures anew.
 
 use serde_json::Value;
 use squirrel_nn::train::EPOCHS;
@@ -16,8 +18,8 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 
 const IDS: [&str; 21] = [
-    "C1", "C2", "C3", "C4", "N5", "N6", "N7", "N8", "C9", "C10", "C11", "C12", "C13", "C14", "X1", "X2",
-    "X3", "X4", "X5", "X6", "X7",
+    "C1", "C2", "C3", "C4", "N5", "N6", "N7", "N8", "C9", "C10", "C11", "C12", "C13", "C14", "X1",
+    "X2", "X3", "X4", "X5", "X6", "X7",
 ];
 
 fn plan(trials: u32) -> Plan {
@@ -98,7 +100,8 @@ fn every_figure_is_the_studies_own() {
         };
         let kept = before.trim_end_matches(|c: char| c.is_ascii_digit() || "+-.".contains(c));
         assert!(kept.len() < before.len(), "`{place}`: no figure before it");
-        let value = find(studies.get(study).unwrap_or_else(|| panic!("`{place}`: no such study")), path);
+        let value =
+            find(studies.get(study).unwrap_or_else(|| panic!("`{place}`: no such study")), path);
         now += kept;
         now += &figure(value, path, format);
         now += &["<!--", place, "-->"].concat();
@@ -119,8 +122,10 @@ fn every_figure_is_the_studies_own() {
 #[test]
 fn every_claim_has_a_row_and_a_test() {
     let text = std::fs::read_to_string(repository().join("docs/claims.md")).unwrap();
-    let rows: BTreeMap<&str, &str> =
-        text.lines().filter_map(|line| Some((line.strip_prefix("| ")?.split(" |").next()?, line))).collect();
+    let rows: BTreeMap<&str, &str> = text
+        .lines()
+        .filter_map(|line| Some((line.strip_prefix("| ")?.split(" |").next()?, line)))
+        .collect();
     let mut sources = String::new();
     let mut folders = vec![repository().join("crates")];
     while let Some(folder) = folders.pop() {
@@ -165,7 +170,10 @@ fn the_better_controller_comes_through_and_the_papers_arms_owe_nothing_to_wings(
 
     // The law without wings comes through the plane, at heights where no forest is.
     let climbing = row("wiic_no_wings");
-    assert!(climbing.through.share.low > row("pc").through.share.high && climbing.height_gained_m > 20.0);
+    assert!(
+        climbing.through.share.low > row("pc").through.share.high
+            && climbing.height_gained_m > 20.0
+    );
     assert!(climbing.in_band.share.value < 0.1);
     for arm in ["twcc_flat", "twcc_parnn"] {
         let over = row(arm).over_phantom.unwrap();

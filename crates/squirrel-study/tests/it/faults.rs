@@ -54,7 +54,8 @@ fn a_study_that_was_stopped_goes_on_to_the_same_bytes() {
     assert_eq!(json(&pool.install(|| study(24, Some(&folder)))), whole);
     assert_eq!(std::fs::read_to_string(&file).unwrap().lines().count(), 25);
     // Nothing is flown again: what is in the file is what comes out.
-    let changed = std::fs::read_to_string(&file).unwrap().replace("\"survived\":true", "\"survived\":false");
+    let changed =
+        std::fs::read_to_string(&file).unwrap().replace("\"survived\":true", "\"survived\":false");
     std::fs::write(&file, changed).unwrap();
     assert_eq!(study(24, Some(&folder)).survived_share, 0.0);
     let other = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials: 24, seed: 4 };

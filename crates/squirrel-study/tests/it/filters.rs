@@ -10,15 +10,24 @@ fn study(trials: u32) -> Filters {
     run(&plan, &Keep::default()).unwrap().unwrap()
 }
 
-/// The paper's filter bears accelerations if the gyro is calibrated, the plain one never does, and the default does in any case.
+/// The paper's filter bears accelerations if the gyro is calibrated, the plain one never does, and
+/// the default does in any case.
 #[test]
 fn the_default_needs_no_calibration_and_the_papers_filter_does() {
     let study = study(50);
     let rms = |filter: &str, calibrated: bool| {
-        let row = study.rows.iter().find(|row| row.filter == filter && row.calibrated == calibrated).unwrap();
+        let row = study
+            .rows
+            .iter()
+            .find(|row| row.filter == filter && row.calibrated == calibrated)
+            .unwrap();
         row.inclination_rms_deg
     };
-    assert!(rms("eskf", false).high <= 1.0 && rms("eskf", true).high <= 1.0, "{:?}", rms("eskf", false));
+    assert!(
+        rms("eskf", false).high <= 1.0 && rms("eskf", true).high <= 1.0,
+        "{:?}",
+        rms("eskf", false)
+    );
     assert!(rms("rkf_mtf", true).high <= 1.2, "{:?}", rms("rkf_mtf", true));
     assert!(rms("rkf_mtf", false).low > 2.0, "{:?}", rms("rkf_mtf", false));
     assert!(rms("kalman", false).low > 4.0, "{:?}", rms("kalman", false));

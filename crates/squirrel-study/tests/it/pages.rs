@@ -1,4 +1,5 @@
-//! The pages of the studies of controllers: the same study gives the same bytes, and every arm and figure is there.
+//! The pages of the studies of controllers: the same study gives the same bytes, and every arm and
+//! figure is there.
 
 use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -46,7 +47,8 @@ fn steering_has_its_wheels_and_the_tracks_of_one_cell() {
     let plan = plan(&[Arm::TwccParnn, Arm::PcPlus]);
     let study = steering::run(&plan, &Keep::default()).unwrap().unwrap();
     let page = steering::page(&study, &plan).unwrap();
-    // Two sections of wheels by plant, ratio, angle and speed; the scene, and a track each of pc and twcc_parnn.
+    // Two sections of wheels by plant, ratio, angle and speed; the scene, and a track each of pc
+    // and twcc_parnn.
     check(&page, 2 * 8 + 1 + 2, &[Arm::Pc, Arm::TwccParnn, Arm::PcPlus]);
     assert_eq!(page, steering::page(&study, &plan).unwrap());
 }
@@ -61,7 +63,8 @@ fn the_real_flights_and_the_ratios_have_their_figures() {
     assert_eq!(page, table3::page(&study, &plan).unwrap());
     let study = thrust::run(&plan, &Keep::default()).unwrap().unwrap();
     let page = thrust::page(&study);
-    // Gain over pc, gain over pc_plus and height: by the limit where it is scarce, by the limit, by the battery.
+    // Gain over pc, gain over pc_plus and height: by the limit where it is scarce, by the limit, by
+    // the battery.
     check(&page, 9, &arms);
     assert_eq!(page, thrust::page(&study));
 }

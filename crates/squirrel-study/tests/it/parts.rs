@@ -1,4 +1,5 @@
-//! Studies that were stopped, flown on other numbers of threads, or in parts that were merged, leave the same bytes.
+//! Studies that were stopped, flown on other numbers of threads, or in parts that were merged,
+//! leave the same bytes.
 
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
@@ -21,7 +22,8 @@ fn fly(study: &Study, keep: &Keep<'_>) -> Result<Option<String>, FlightError> {
     if let Arms::Fixed(arms) = study.arms {
         plan.arms = arms.to_vec();
     }
-    let options: Vec<f64> = study.options.iter().map(|o| if o.whole { 1.0 } else { o.default }).collect();
+    let options: Vec<f64> =
+        study.options.iter().map(|o| if o.whole { 1.0 } else { o.default }).collect();
     Ok((study.fly)(&plan, &options, keep)?.map(|found| found.json))
 }
 
@@ -30,7 +32,8 @@ struct Folder(PathBuf);
 
 impl Folder {
     fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("squirrel-parts-{name}-{}", std::process::id()));
+        let folder =
+            std::env::temp_dir().join(format!("squirrel-parts-{name}-{}", std::process::id()));
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();
         Self(folder)
@@ -67,7 +70,12 @@ fn stopped_threaded_and_merged_studies_leave_the_same_bytes() {
     for known in STUDIES {
         let (name, study) = (known.name, |keep: &Keep<'_>| fly(known, keep));
         let folder = Folder::new(name);
-        let keep = |folder, part| Keep { folder: Some(folder), part, command: &command, ..Keep::default() };
+        let keep = |folder, part| Keep {
+            folder: Some(folder),
+            part,
+            command: &command,
+            ..Keep::default()
+        };
         let whole = folder.below("whole");
         let result = pool(2).install(|| study(&keep(&whole, Part::All))).unwrap();
         assert!(result.is_some(), "{name}");
@@ -78,13 +86,21 @@ fn stopped_threaded_and_merged_studies_leave_the_same_bytes() {
         for (file, bytes) in journals(&whole) {
             fs::write(stopped.join(file), &bytes[..bytes.len() / 2]).unwrap();
         }
-        assert_eq!(pool(1).install(|| study(&keep(&stopped, Part::All))).unwrap(), result, "{name}: stopped");
+        assert_eq!(
+            pool(1).install(|| study(&keep(&stopped, Part::All))).unwrap(),
+            result,
+            "{name}: stopped"
+        );
         assert_eq!(journals(&stopped), journals(&whole), "{name}: stopped");
 
         let parts: Vec<PathBuf> = (1..=4).map(|k| folder.below(&format!("part{k}"))).collect();
         for (k, part) in parts.iter().enumerate() {
             let shard = format!("{}/4", k + 1).parse().unwrap();
-            assert_eq!(study(&keep(part, Part::Shard(shard))).unwrap(), None, "{name}: a part has no result");
+            assert_eq!(
+                study(&keep(part, Part::Shard(shard))).unwrap(),
+                None,
+                "{name}: a part has no result"
+            );
         }
         let merged = folder.below("merged");
         assert_eq!(merge(&parts, &merged).unwrap(), command);
@@ -95,11 +111,15 @@ fn stopped_threaded_and_merged_studies_leave_the_same_bytes() {
         let three = folder.below("three");
         merge(&parts[1..], &three).unwrap();
         let error = study(&keep(&three, Part::Merged)).unwrap_err().to_string();
-        assert!(error.contains("flight = 0: missing, in none of the merged folders"), "{name}: {error}");
+        assert!(
+            error.contains("flight = 0: missing, in none of the merged folders"),
+            "{name}: {error}"
+        );
     }
 }
 
-/// More trials than before: the parts say so, and the whole has them all. Other weights: another plan. What cannot be flown leaves nothing.
+/// More trials than before: the parts say so, and the whole has them all. Other weights: another
+/// plan. What cannot be flown leaves nothing.
 #[test]
 fn a_study_that_changes_does_not_go_on_as_it_was() {
     let folder = Folder::new("changed");
@@ -123,7 +143,8 @@ fn a_study_that_changes_does_not_go_on_as_it_was() {
 
     let kept = Keep { folder: Some(&merged), ..Keep::default() };
     let other =
-        VehicleFile::parse(&plan(1).vehicle.text.replace("parnn_weights", "# parnn_weights"), "v").unwrap();
+        VehicleFile::parse(&plan(1).vehicle.text.replace("parnn_weights", "# parnn_weights"), "v")
+            .unwrap();
     let mut changed = plan(2);
     changed.vehicle.weights = other.weights;
     let error = thrust::run(&changed, &kept).unwrap_err().to_string();
@@ -135,7 +156,12 @@ fn a_study_that_changes_does_not_go_on_as_it_was() {
     let mut bare = plan(1);
     bare.vehicle.control = None;
     assert!(table3::run(&bare, &nothing).is_err());
-    assert!(thrust::run(&plan(100_001), &nothing).unwrap_err().to_string().starts_with("trials = 100001"));
+    assert!(
+        thrust::run(&plan(100_001), &nothing)
+            .unwrap_err()
+            .to_string()
+            .starts_with("trials = 100001")
+    );
     assert!(journals(&empty).is_empty(), "what cannot be flown is not begun");
 }
 
@@ -162,7 +188,8 @@ fn what_cannot_be_merged_is_named() {
     let (one, other, into) = (folder.below("one"), folder.below("other"), folder.below("into"));
     let command = ["thrust".to_owned()];
     let fly = |folder: &Path, trials| {
-        let keep = Keep { folder: Some(folder), part: Part::All, command: &command, ..Keep::default() };
+        let keep =
+            Keep { folder: Some(folder), part: Part::All, command: &command, ..Keep::default() };
         thrust::run(&Plan { seed: u64::from(trials), ..plan(trials) }, &keep).unwrap();
     };
     let error = |folders: &[PathBuf]| merge(folders, &into).unwrap_err().to_string();
@@ -175,12 +202,18 @@ fn what_cannot_be_merged_is_named() {
     let file = "thrust.trials.jsonl";
     let text = fs::read_to_string(one.join(file)).unwrap();
     fs::write(other.join(file), text.replacen("\"rmse_m\":", "\"rmse_m\":1", 1)).unwrap();
-    assert!(error(&both).contains("flight = 0: has another result in another folder"), "{}", error(&both));
+    assert!(
+        error(&both).contains("flight = 0: has another result in another folder"),
+        "{}",
+        error(&both)
+    );
     fs::write(other.join(file), "").unwrap();
     assert!(error(&both).contains("thrust.trials.jsonl: holds nothing"));
     for bad in ["0/4", "5/4", "4", "a/b", "1/0"] {
         assert!(bad.parse::<squirrel_study::journal::Shard>().is_err(), "{bad}");
     }
     let keep = Keep { part: Part::Shard("1/2".parse().unwrap()), ..Keep::default() };
-    assert!(thrust::run(&plan(1), &keep).unwrap_err().to_string().starts_with("shard: needs a folder"));
+    assert!(
+        thrust::run(&plan(1), &keep).unwrap_err().to_string().starts_with("shard: needs a folder")
+    );
 }

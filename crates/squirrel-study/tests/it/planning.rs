@@ -9,14 +9,16 @@ use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
 use squirrel_study::planning::{self, ARMS, Row};
 
-/// The bars of the trajectories on the full plant, with sensors and filters: nearly all are solved, none that passes trunks touches one,
-/// none leaves its plan by 0.3 m, and wings gain where there is braking at little thrust.
+/// The bars of the trajectories on the full plant, with sensors and filters: nearly all are solved,
+/// none that passes trunks touches one, none leaves its plan by 0.3 m, and wings gain where there
+/// is braking at little thrust.
 #[test]
 fn plans_are_followed_on_the_full_plant() {
     let plan = Plan { vehicle: VehicleFile::squirrel(), arms: ARMS.to_vec(), trials: 40, seed: 1 };
     let study = planning::run(&plan, &Keep::default()).unwrap().unwrap();
     let row = |kind: &str, ratio: f64, arm: Arm| -> &Row {
-        let is = |row: &&Row| row.kind == kind && row.thrust_to_weight == ratio && row.arm == arm.name();
+        let is =
+            |row: &&Row| row.kind == kind && row.thrust_to_weight == ratio && row.arm == arm.name();
         study.rows.iter().find(is).unwrap()
     };
     for r in &study.rows {
@@ -25,24 +27,33 @@ fn plans_are_followed_on_the_full_plant() {
     for arm in ARMS {
         for ratio in planning::THRUST_TO_WEIGHT {
             let r = row("pass", ratio, arm);
-            assert!(r.clear.count == 40 && r.followed.count == 40 && r.tracking_rmse_m[1] <= 0.3, "{r:?}");
+            assert!(
+                r.clear.count == 40 && r.followed.count == 40 && r.tracking_rmse_m[1] <= 0.3,
+                "{r:?}"
+            );
         }
     }
     for ratio in planning::THRUST_TO_WEIGHT {
         assert!(ARMS.iter().all(|arm| row("turn", ratio, *arm).followed.count == 40), "{ratio}");
     }
     let gain = |ratio| row("turn", ratio, Arm::PlanWings).gain_over_no_wings;
-    assert!(gain(1.2).low > 0.02 && gain(1.2).value > gain(1.5).value && gain(1.5).value > gain(2.0).value);
+    assert!(
+        gain(1.2).low > 0.02
+            && gain(1.2).value > gain(1.5).value
+            && gain(1.5).value > gain(2.0).value
+    );
     assert!(row("turn", 1.2, Arm::PlanNoWings).wings_open_s == 0.0);
 }
 
-/// Ten plans a second through the paper's manoeuvre, on what the other arms are told. Wings help where thrust is short.
+/// Ten plans a second through the paper's manoeuvre, on what the other arms are told. Wings help
+/// where thrust is short.
 #[test]
 fn a_planner_flies_the_paper_s_manoeuvre() {
     let fly = |arm, ratio| {
         let mut scenario = Scenario::find("steer").unwrap();
         scenario.thrust_to_weight = Some(ratio);
-        let setup = Setup { vehicle: VehicleFile::squirrel(), arm, scenario, integrator: Integrator::Rk4 };
+        let setup =
+            Setup { vehicle: VehicleFile::squirrel(), arm, scenario, integrator: Integrator::Rk4 };
         let flown = pilot::fly(&setup, true, |_| {}).unwrap();
         assert_eq!(
             flown.metrics,
@@ -61,7 +72,8 @@ fn a_planner_flies_the_paper_s_manoeuvre() {
         channel.row(channel.values.len() / channel.width - 1).to_vec()
     };
     assert!(
-        end("offboard.reference.velocity_ned_m_s")[0] < 0.0 && end("reference.velocity_ned_m_s")[0] > 6.0
+        end("offboard.reference.velocity_ned_m_s")[0] < 0.0
+            && end("reference.velocity_ned_m_s")[0] > 6.0
     );
     let setup = Setup {
         vehicle: VehicleFile::squirrel(),
@@ -72,8 +84,9 @@ fn a_planner_flies_the_paper_s_manoeuvre() {
     assert!(setup.fly(false, |_| {}).unwrap_err().to_string().contains("needs its planner"));
 }
 
-/// 400 m of trunks that are not known of before they come into sight. A reference that turns back this side of a trunk leads along it: who
-/// weighs that against the trunk comes through none of these.
+/// 400 m of trunks that are not known of before they come into sight. A reference that turns back
+/// this side of a trunk leads along it: who weighs that against the trunk comes through none of
+/// these.
 #[test]
 fn a_planner_comes_through_the_forest_in_its_band() {
     let through = |seed: &u64| {

@@ -9,8 +9,8 @@ use squirrel_core::stack::{Gnss, Imu};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// Flights of a Crazyflie 2.1 in a motion-capture room (NanoBench, Ullah and Baca 2026): the cut-outs in `tests/data/flights`, or
-/// the whole ones in the folder `SQUIRREL_FLIGHTS`.
+/// Flights of a Crazyflie 2.1 in a motion-capture room (NanoBench, Ullah and Baca 2026): the
+/// cut-outs in `tests/data/flights`, or the whole ones in the folder `SQUIRREL_FLIGHTS`.
 fn nanobench() -> PathBuf {
     let cut_outs = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
     std::env::var_os("SQUIRREL_FLIGHTS").map_or_else(cut_outs, PathBuf::from).join("nanobench")
@@ -31,15 +31,16 @@ fn columns(file: &Path) -> HashMap<String, Vec<f64>> {
     columns
 }
 
-/// Vertical in the body frame, FRD, of a quaternion of a body forward, left, up in a world north, west, up.
+/// Vertical in the body frame, FRD, of a quaternion of a body forward, left, up in a world north,
+/// west, up.
 fn down_of(wxyz: [f64; 4]) -> Vector3<f64> {
     let [w, x, y, z] = wxyz;
     let rotation = Rotation::<Ned, Body, f64>::from_wxyz([w, x, -y, -z]).unwrap();
     (rotation.inverse() * In::<Ned, f64>::new(Vector3::z())).vector
 }
 
-/// RMS angle between two series of directions, deg, once the turn between them that does not change and the best shift in time, of up
-/// to a tenth of a second, are taken off.
+/// RMS angle between two series of directions, deg, once the turn between them that does not change
+/// and the best shift in time, of up to a tenth of a second, are taken off.
 fn misfit_deg(estimate: &[Vector3<f64>], truth: &[Vector3<f64>], flies: &[bool]) -> f64 {
     let shifted = |shift: usize| {
         let middle = 10;
@@ -61,13 +62,18 @@ fn misfit_deg(estimate: &[Vector3<f64>], truth: &[Vector3<f64>], flies: &[bool])
     (0..=20).map(shifted).fold(f64::INFINITY, f64::min)
 }
 
-/// Motion-capture position ten times a second is all the aid there is. The autopilot had the motion capture at full rate.
+/// Motion-capture position ten times a second is all the aid there is. The autopilot had the motion
+/// capture at full rate.
 #[test]
 fn inclination_on_measured_flights_is_as_good_as_the_autopilots() {
     let folder = nanobench();
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
-    for name in ["B2_circle_medium_rep1", "B3_figure8_fast_rep1", "B8_star_slow_rep1", "B9_trefoil_slow_rep1"]
-    {
+    for name in [
+        "B2_circle_medium_rep1",
+        "B3_figure8_fast_rep1",
+        "B8_star_slow_rep1",
+        "B9_trefoil_slow_rep1",
+    ] {
         let columns = columns(&folder.join(format!("{name}.csv")));
         let row = |prefix: &str, names: [&str; 3], k: usize| {
             let [x, y, z] = names.map(|name| columns[&format!("{prefix}{name}")][k]);
@@ -78,8 +84,9 @@ fn inclination_on_measured_flights_is_as_good_as_the_autopilots() {
             ["qw", "qx", "qy", "qz"].map(|name| columns[&format!("{prefix}{name}")][k])
         };
         let time_s = &columns["t"];
-        // Between this gyro, which was logged at 73 Hz and resampled, and the rates of the motion capture lie 0.3 rad/s in flight; the
-        // accelerometer shakes by 0.03 g. Positions are of millimetres, and there are no velocities.
+        // Between this gyro, which was logged at 73 Hz and resampled, and the rates of the motion
+        // capture lie 0.3 rad/s in flight; the accelerometer shakes by 0.03 g. Positions are of
+        // millimetres, and there are no velocities.
         let parameters = EskfParameters {
             gyro_noise_rad_s: 0.3,
             accel_noise_m_s2: 0.3,
@@ -112,12 +119,15 @@ fn inclination_on_measured_flights_is_as_good_as_the_autopilots() {
                 magnetic: None,
             });
             let believed = filter.estimate().ned_from_body;
-            estimate.push((believed.inverse() * In::<Ned, f32>::new(Vector3::z())).vector.map(f64::from));
+            estimate.push(
+                (believed.inverse() * In::<Ned, f32>::new(Vector3::z())).vector.map(f64::from),
+            );
             truth.push(down_of(quaternion("", k)));
             board.push(down_of(quaternion("att_stateEstimate_", k)));
             flies.push(columns["pz"][k] > 0.4);
         }
-        let (our, their) = (misfit_deg(&estimate, &truth, &flies), misfit_deg(&board, &truth, &flies));
+        let (our, their) =
+            (misfit_deg(&estimate, &truth, &flies), misfit_deg(&board, &truth, &flies));
         println!("{name}: {our:.2} deg, the autopilot's own {their:.2} deg");
         ours.push(our);
         theirs.push(their);

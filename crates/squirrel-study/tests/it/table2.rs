@@ -33,7 +33,8 @@ fn row<'a>(study: &'a Table2, set: &str, model: Model) -> &'a Row {
     study.rows.iter().find(|r| r.training_s == 300 && r.set == set && r.model == model).unwrap()
 }
 
-/// The paper's comparison holds, and its reason is what the rival is told: with the direction of the flow it is as good.
+/// The paper's comparison holds, and its reason is what the rival is told: with the direction of
+/// the flow it is as good.
 #[test]
 fn parnn_beats_the_papers_rival_and_not_the_fair_one() {
     let study = run(&plan(2), 300, &Keep::default()).unwrap().unwrap();
@@ -43,13 +44,15 @@ fn parnn_beats_the_papers_rival_and_not_the_fair_one() {
     let fair = tests.map(|set| over(set, Model::VanillaPlane));
     println!("over paRNN: vanilla {vanilla:?}, in the plane of the flow {fair:?}");
     assert!(
-        vanilla.iter().all(|over| *over > 0.0) && vanilla.iter().filter(|over| **over > 0.2).count() >= 2
+        vanilla.iter().all(|over| *over > 0.0)
+            && vanilla.iter().filter(|over| **over > 0.2).count() >= 2
     );
     assert!(fair.iter().all(|over| over.abs() < 0.15));
     // Learning beats the plate, and one number is worth a good part of it.
     assert!(over("t2", Model::FlatPlate) > over("t2", Model::ScaledFlatPlate));
     assert!(over("t2", Model::ScaledFlatPlate) > 0.5);
-    // Where the flow is far from the wing's edge it always seems steeper than it is, as in the paper.
+    // Where the flow is far from the wing's edge it always seems steeper than it is, as in the
+    // paper.
     let word = study.words.iter().rfind(|word| word.set == "t2").unwrap();
     assert!(word.alpha_larger_share_beyond_10_deg.mean > 0.97, "{word:?}");
     // Sets are what they are called.
@@ -64,7 +67,8 @@ fn one_thread_and_two_give_the_same_numbers_and_every_step_is_told() {
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let told = Told::default();
     let keep = Keep { progress: Some(&told), ..Keep::default() };
-    let study = |threads: usize| pool(threads).install(|| run(&plan(1), 2, &keep)).unwrap().unwrap();
+    let study =
+        |threads: usize| pool(threads).install(|| run(&plan(1), 2, &keep)).unwrap().unwrap();
     assert_eq!(study(1), study(2));
     // 10 and 4 times 4 flights, and 7 models three times.
     assert_eq!([told.ahead, told.done].map(AtomicU64::into_inner), [2 * (26 + 21); 2]);
@@ -73,8 +77,15 @@ fn one_thread_and_two_give_the_same_numbers_and_every_step_is_told() {
 #[test]
 fn a_single_trial_has_no_deviation() {
     let study = run(&plan(1), 1, &Keep::default()).unwrap().unwrap();
-    assert!(study.rows.iter().all(|r| r.to_labels.rmse_n.sd.is_none() && r.to_truth.over_parnn.sd.is_none()));
-    assert!(study.rows.iter().all(|r| r.model != Model::Parnn || r.to_labels.over_parnn.mean == 0.0));
+    assert!(
+        study
+            .rows
+            .iter()
+            .all(|r| r.to_labels.rmse_n.sd.is_none() && r.to_truth.over_parnn.sd.is_none())
+    );
+    assert!(
+        study.rows.iter().all(|r| r.model != Model::Parnn || r.to_labels.over_parnn.mean == 0.0)
+    );
 }
 
 #[test]

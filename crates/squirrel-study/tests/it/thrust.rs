@@ -1,4 +1,5 @@
-//! What the studies of the avoidance manoeuvre show, on the trials that docs/guide/what-holds.md states.
+//! What the studies of the avoidance manoeuvre show, on the trials that docs/guide/what-holds.md
+//! states.
 
 use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -22,12 +23,14 @@ fn of<'a>(rows: &'a [Row], arm: &str) -> &'a Row {
 }
 
 fn row<'a>(study: &'a Thrust, arm: &str, ratio: f64) -> &'a Row {
-    let at =
-        |point: &&squirrel_study::thrust::Point| point.series == "limit" && point.thrust_to_weight == ratio;
+    let at = |point: &&squirrel_study::thrust::Point| {
+        point.series == "limit" && point.thrust_to_weight == ratio
+    };
     of(&study.points.iter().find(at).unwrap().rows, arm)
 }
 
-/// Wings help where thrust is scarce, and it is the wings that help: the same controller without them gains nothing there.
+/// Wings help where thrust is scarce, and it is the wings that help: the same controller without
+/// them gains nothing there.
 #[test]
 fn wings_help_where_thrust_is_scarce() {
     let study = study(&[Arm::TwccFlat, Arm::Phantom, Arm::TwccPlus, Arm::PcPlus], 12);
@@ -51,17 +54,21 @@ fn wings_help_where_thrust_is_scarce() {
     let alone = study.points.iter().filter(|point| point.series == "battery_alone");
     assert!(alone.map(|point| point.thrust_to_weight).fold(f64::INFINITY, f64::min) > 2.0);
 
-    // Against its fair rival the best wing controller gains most where thrust is scarce, and little where it is not. (At 1.25 it was 19 % while the rival
-    // without wings lost height to a heading that outer and inner loop did not share.)
+    // Against its fair rival the best wing controller gains most where thrust is scarce, and little
+    // where it is not. (At 1.25 it was 19 % while the rival without wings lost height to a heading
+    // that outer and inner loop did not share.)
     let over = |ratio| row("twcc_plus", ratio).gain_over_pc_plus.unwrap();
     assert!(over(1.15).low > 0.20 && over(1.25).low > 0.10, "{:?} {:?}", over(1.15), over(1.25));
     assert!(over(3.0).high < 0.05, "{:?}", over(3.0));
     assert!(
-        words(&study).iter().any(|word| word.contains("13.1 % lies, by the battery, at an effective T/W of"))
+        words(&study)
+            .iter()
+            .any(|word| word.contains("13.1 % lies, by the battery, at an effective T/W of"))
     );
 }
 
-/// By satellite fix and barometer, as in the paper: ours is better than the paper's gain over PC, and better than every arm of the paper.
+/// By satellite fix and barometer, as in the paper: ours is better than the paper's gain over PC,
+/// and better than every arm of the paper.
 #[test]
 fn the_better_controller_gains_more_than_the_paper_at_scarce_thrust() {
     let plan = plan(&Arm::ALONE, 12);
@@ -69,7 +76,12 @@ fn the_better_controller_gains_more_than_the_paper_at_scarce_thrust() {
     assert_eq!(study.points.len(), 4);
     for point in &study.points {
         let ours = of(&point.rows, "twcc_plus");
-        assert!(ours.gain_measured.low > 0.131, "{}: {:?}", point.thrust_to_weight, ours.gain_measured);
+        assert!(
+            ours.gain_measured.low > 0.131,
+            "{}: {:?}",
+            point.thrust_to_weight,
+            ours.gain_measured
+        );
         assert!(
             ours.gain_over_pc_plus.unwrap().low > 0.0,
             "{}: {:?}",
@@ -77,15 +89,23 @@ fn the_better_controller_gains_more_than_the_paper_at_scarce_thrust() {
             ours.gain_over_pc_plus
         );
         for row in point.rows.iter().filter(|row| !row.arm.ends_with("_plus")) {
-            assert!(ours.rmse_measured_m < row.rmse_measured_m, "{}: {}", point.thrust_to_weight, row.arm);
+            assert!(
+                ours.rmse_measured_m < row.rmse_measured_m,
+                "{}: {}",
+                point.thrust_to_weight,
+                row.arm
+            );
             // What the log has is near what was flown, but not the same.
-            assert!((row.rmse_measured_m - row.rmse_m).abs() < 0.2 && row.rmse_measured_m != row.rmse_m);
+            assert!(
+                (row.rmse_measured_m - row.rmse_m).abs() < 0.2 && row.rmse_measured_m != row.rmse_m
+            );
         }
     }
 }
 
-/// The shape of the paper's figure, where thrust is scarce: better everywhere, the more the faster. With thrust to spare it is not there; and
-/// in neither case does it matter much whether plant and controller agree.
+/// The shape of the paper's figure, where thrust is scarce: better everywhere, the more the faster.
+/// With thrust to spare it is not there; and in neither case does it matter much whether plant and
+/// controller agree.
 #[test]
 fn wings_help_at_every_angle_and_more_at_speed_where_thrust_is_scarce() {
     let plan = plan(&[Arm::TwccFlat, Arm::TwccParnn], 6);

@@ -1,8 +1,9 @@
-//! Nothing but control, for who estimates by himself: what it takes of flash and stack, and the proof that it cannot panic.
+//! Nothing but control, for who estimates by himself: what it takes of flash and stack, and the
+//! proof that it cannot panic.
 //!
-//! The panic handler calls a function that does not exist. Where the linker finds a way from there to a panic it must
-//! resolve that name, and fails. It is not run; the flight code's constants are hidden from the compiler, so that it cannot
-//! leave out what these would not need.
+//! The panic handler calls a function that does not exist. Where the linker finds a way from there
+//! to a panic it must resolve that name, and fails. It is not run; the flight code's constants are
+//! hidden from the compiler, so that it cannot leave out what these would not need.
 
 #![no_std]
 #![no_main]

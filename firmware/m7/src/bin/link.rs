@@ -1,7 +1,7 @@
 //! The flight code at the end of a wire: a frame comes in, its output goes out.
 //!
-//! Records of [`squirrel_core::stack::wire`] on standard input; for each frame the output and the number of encounters on
-//! standard output, behind their length. Ends with its input.
+//! Records of [`squirrel_core::stack::wire`] on standard input; for each frame the output and the
+//! number of encounters on standard output, behind their length. Ends with its input.
 
 #![no_std]
 #![no_main]

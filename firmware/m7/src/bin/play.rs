@@ -4,7 +4,8 @@
 //! `sequence STEPS HASH same|differs@STEP`, then a name and `CALLS MEAN WORST` instructions each of
 //!
 //! - `inner`, `outer`: `Stack::control` without and with the outer loop
-//! - `inertial`, `aided`: the estimator where only inertial units spoke, and where anything else did, too
+//! - `inertial`, `aided`: the estimator where only inertial units spoke, and where anything else
+//!   did, too
 //! - `whole`: `Stack::step`, all of these
 //!
 //! Each frame is flown twice, whole and in parts, and both must say the same.
@@ -81,7 +82,8 @@ impl Sequence {
         let (navigated, to_navigate) = counter.of(|| navigate(stack, state, frame));
         let (mut output, to_control) = counter.of(|| control(stack, state, &navigated.frame));
         let ((), to_watch) = counter.of(|| watch(stack, state, &navigated, &mut output));
-        let is_aided = frame.gnss.is_some() || frame.altitude_m.is_some() || frame.magnetic.is_some();
+        let is_aided =
+            frame.gnss.is_some() || frame.altitude_m.is_some() || frame.magnetic.is_some();
         let estimator = if is_aided { &mut self.aided } else { &mut self.inertial };
         estimator.add(to_navigate + to_watch);
         let loops = if output.outer.is_some() { &mut self.outer } else { &mut self.inner };

@@ -17,7 +17,8 @@ trait Board {
     fn write(&mut self, rotors: &[f32], wings: [f32; 2]);
 }
 
-/// Flies the setup that `squirrel export-vectors` wrote as its first record; returns only if it or the start is none.
+/// Flies the setup that `squirrel export-vectors` wrote as its first record; returns only if it or
+/// the start is none.
 fn fly(board: &mut impl Board, setup: &[u8], start: Start) {
     let Some(Record::Setup(setup)) = Record::take(&mut Reader::new(setup)) else { return };
     let Ok(stack) = setup.starting(start) else { return };
@@ -30,7 +31,8 @@ fn fly(board: &mut impl Board, setup: &[u8], start: Start) {
         board.write(rotors, output.wing_command);
     }
 }
-// The rest is this board: a clock that only counts, a sensor that always rests, rotors that are only looked at.
+// The rest is this board: a clock that only counts, a sensor that always rests, rotors that are
+// only looked at.
 use squirrel_core::estimate::rest::Preflight;
 use squirrel_core::frames::In;
 use squirrel_core::nalgebra::Vector3;
@@ -52,7 +54,8 @@ impl Board for Bench {
     }
 }
 
-/// Hears the sensors at rest until they say where a flight begins; a board with a pilot goes on until he arms.
+/// Hears the sensors at rest until they say where a flight begins; a board with a pilot goes on
+/// until he arms.
 fn stand(board: &mut impl Board) -> Start {
     let mut ground = Preflight::default();
     loop {

@@ -1,9 +1,9 @@
-//! Nothing but the whole step, with every estimator that a setup may choose: what it takes of flash and stack, and the proof that it
-//! cannot panic.
+//! Nothing but the whole step, with every estimator that a setup may choose: what it takes of flash
+//! and stack, and the proof that it cannot panic.
 //!
-//! The panic handler calls a function that does not exist. Where the linker finds a way from the step to a panic it must
-//! resolve that name, and fails. It is not run; the flight code's constants are hidden from the compiler, so that it cannot
-//! leave out what these would not need.
+//! The panic handler calls a function that does not exist. Where the linker finds a way from the
+//! step to a panic it must resolve that name, and fails. It is not run; the flight code's constants
+//! are hidden from the compiler, so that it cannot leave out what these would not need.
 
 #![no_std]
 #![no_main]

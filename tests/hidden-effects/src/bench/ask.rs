@@ -86,13 +86,19 @@ struct Residual {
 ///
 /// * `json` - where the program is to write it
 #[allow(clippy::disallowed_methods, reason = "a program that hangs must be seen")]
-fn residual(squirrel: &Path, vehicle: &Path, flight: &Path, json: &Path) -> Result<[f64; 6], String> {
+fn residual(
+    squirrel: &Path,
+    vehicle: &Path,
+    flight: &Path,
+    json: &Path,
+) -> Result<[f64; 6], String> {
     let mut command = Command::new(squirrel);
     command.args(["gap", "find", "--vehicle"]).arg(vehicle);
     command.arg("--flights").arg(flight).arg("--json").arg(json);
     let log = json.with_extension("txt");
     let log = std::fs::File::create(&log).map_err(|error| format!("{}: {error}", log.display()))?;
-    wait(start_of(command, squirrel, log)?, Instant::now()).map_err(|error| format!("find: {error}"))?;
+    wait(start_of(command, squirrel, log)?, Instant::now())
+        .map_err(|error| format!("find: {error}"))?;
     let text = std::fs::read_to_string(json).map_err(|error| format!("find: {error}"))?;
     let found: Finding = serde_json::from_str(&text).map_err(|error| format!("find: {error}"))?;
     let (f, m) = (found.residual.force_body_rms_n, found.residual.moment_body_rms_n_m);
@@ -105,8 +111,9 @@ fn residual(squirrel: &Path, vehicle: &Path, flight: &Path, json: &Path) -> Resu
 /// J(file) = mean over channels of MS(file) / MS(truth)      MS: mean squared residual of the held-out flight
 /// share = (J(given) - J(patched)) / (J(given) - 1)
 /// ```
-/// Truth is the given file with what is hidden in it, so that neither tolerances nor what is unmodelled count. `None` where
-/// the truth removes next to nothing of this residual, as for what acts late: `find` puts commands where the log has them.
+/// Truth is the given file with what is hidden in it, so that neither tolerances nor what is
+/// unmodelled count. `None` where the truth removes next to nothing of this residual, as for what
+/// acts late: `find` puts commands where the log has them.
 pub(super) fn removable_removed(
     squirrel: &Path,
     case: &Path,
@@ -122,7 +129,8 @@ pub(super) fn removable_removed(
 }
 
 fn share_removed(given: &[f64; 6], patched: &[f64; 6], truth: &[f64; 6]) -> Option<f64> {
-    let over = |own: &[f64; 6]| own.iter().zip(truth).map(|(own, truth)| own / truth).sum::<f64>() / 6.0;
+    let over =
+        |own: &[f64; 6]| own.iter().zip(truth).map(|(own, truth)| own / truth).sum::<f64>() / 6.0;
     let removable = over(given) - 1.0;
     (removable > REMOVABLE_MIN).then(|| (over(given) - over(patched)) / removable)
 }

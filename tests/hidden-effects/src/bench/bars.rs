@@ -69,7 +69,12 @@ impl Bar {
         let is = self.is.map_or_else(|| "-".to_owned(), |is| format!("{:.1}", 100.0 * is));
         let sign = if self.at_most { "<=" } else { ">=" };
         let word = if self.holds { "" } else { "  missed" };
-        format!("{:<24} {:<26} {is:>6} {sign} {:.1}{word}\n", self.set, self.measure, 100.0 * self.bar)
+        format!(
+            "{:<24} {:<26} {is:>6} {sign} {:.1}{word}\n",
+            self.set,
+            self.measure,
+            100.0 * self.bar
+        )
     }
 }
 

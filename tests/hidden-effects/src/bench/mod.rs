@@ -42,7 +42,10 @@ const WORKERS: usize = 2;
 pub fn spread(cases: usize) -> Vec<(Set, usize)> {
     let full: usize = Set::ALL.iter().map(|(_, count)| count).sum();
     let share = |count: usize| ((cases * count + full / 2) / full).clamp(1, count);
-    Set::ALL.iter().flat_map(|&(set, count)| (0..share(count)).map(move |index| (set, index))).collect()
+    Set::ALL
+        .iter()
+        .flat_map(|&(set, count)| (0..share(count)).map(move |index| (set, index)))
+        .collect()
 }
 
 /// Every case of a full run.
@@ -53,7 +56,8 @@ pub fn full() -> Vec<(Set, usize)> {
 /// Runs a plan. Outcomes are in the plan's order, whoever finished first.
 ///
 /// # Errors
-/// A case cannot be made or its answer not be read. What the program does wrong is an outcome, not an error.
+/// A case cannot be made or its answer not be read. What the program does wrong is an outcome, not
+/// an error.
 pub fn run(plan: &Plan) -> Result<Vec<Outcome>, CaseError> {
     let bar = progress(plan.cases.len() as u64);
     let next = AtomicUsize::new(0);
@@ -66,7 +70,9 @@ pub fn run(plan: &Plan) -> Result<Vec<Outcome>, CaseError> {
                     let Some(&(set, index)) = plan.cases.get(number) else { return };
                     let outcome = one(plan, set, index);
                     let failed = outcome.is_err();
-                    done.lock().unwrap_or_else(std::sync::PoisonError::into_inner).push((number, outcome));
+                    done.lock()
+                        .unwrap_or_else(std::sync::PoisonError::into_inner)
+                        .push((number, outcome));
                     bar.inc(1);
                     if failed {
                         // The others stop after their case.
@@ -82,7 +88,8 @@ pub fn run(plan: &Plan) -> Result<Vec<Outcome>, CaseError> {
     outcomes.into_iter().map(|(_, outcome)| outcome).collect()
 }
 
-/// Scores what an earlier run of a plan kept, without asking again: how cases are scored may change.
+/// Scores what an earlier run of a plan kept, without asking again: how cases are scored may
+/// change.
 ///
 /// # Errors
 /// An answer or the time that a case took cannot be read.
@@ -121,13 +128,17 @@ fn one(plan: &Plan, set: Set, index: usize) -> Result<Outcome, CaseError> {
     let mut outcome = score::score(&read::<Answer>(&answer)?, asked);
     if let (Some(patched), Some(_)) = (patched, case.answer.misfit) {
         let truth = answer.with_extension("toml");
-        match ask::removable_removed(&plan.squirrel, &folder, &truth, Path::new(&patched), &results) {
+        match ask::removable_removed(&plan.squirrel, &folder, &truth, Path::new(&patched), &results)
+        {
             Ok(share) => outcome.removable_removed = share,
             Err(why) => outcome.failure = Some(why),
         }
     }
     if plan.keep {
-        crate::case::write_json(&plan.folder.join("results").join(format!("{id}.score.json")), &outcome)?;
+        crate::case::write_json(
+            &plan.folder.join("results").join(format!("{id}.score.json")),
+            &outcome,
+        )?;
     } else {
         for path in [&folder, &results] {
             // A program that failed early left no results.
@@ -147,7 +158,9 @@ fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, CaseError> {
 
 fn progress(cases: u64) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(cases), ProgressDrawTarget::stderr());
-    if let Ok(style) = ProgressStyle::with_template("cases {bar:40} {pos}/{len}  {elapsed} of {duration}") {
+    if let Ok(style) =
+        ProgressStyle::with_template("cases {bar:40} {pos}/{len}  {elapsed} of {duration}")
+    {
         bar.set_style(style);
     }
     bar

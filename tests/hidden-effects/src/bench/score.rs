@@ -1,9 +1,10 @@
 //! A verdict against the answer.
 //!
-//! [`Outcome::right`] is what the set asks of a case: exactly the hidden names, or that nothing or something unknown is
-//! said where that is so. Beside an unmodelled rest and without an inertial unit the first name is enough. An erring sensor
-//! is named or flagged: a flight that is set aside, a contradiction in the data, or something outside the catalogue. Of a
-//! file that says too much, the effect is named with a number that mends the file.
+//! [`Outcome::right`] is what the set asks of a case: exactly the hidden names, or that nothing or
+//! something unknown is said where that is so. Beside an unmodelled rest and without an inertial
+//! unit the first name is enough. An erring sensor is named or flagged: a flight that is set aside,
+//! a contradiction in the data, or something outside the catalogue. Of a file that says too much,
+//! the effect is named with a number that mends the file.
 
 use super::ask::Asked;
 use super::verdict::{Verdict, Word};
@@ -35,7 +36,8 @@ pub struct Outcome {
     pub named: Vec<String>,
     /// Why it failed, if it did.
     pub failure: Option<String>,
-    /// The name with the highest evidence is hidden; nothing or "outside" is said where that is the answer.
+    /// The name with the highest evidence is hidden; nothing or "outside" is said where that is the
+    /// answer.
     pub first_right: bool,
     /// Exactly the hidden names; nothing or "outside" is said where that is the answer.
     pub exact: bool,
@@ -47,7 +49,8 @@ pub struct Outcome {
     pub right: bool,
     /// A patched vehicle file was written.
     pub patched: bool,
-    /// Part of the held-out residual that the true vehicle file removes and the patched one removes, too.
+    /// Part of the held-out residual that the true vehicle file removes and the patched one
+    /// removes, too.
     pub removable_removed: Option<f64>,
     /// Part of the held-out gap that went away.
     pub gap_removed: Option<f64>,
@@ -108,7 +111,8 @@ pub(super) fn score(answer: &Answer, asked: Asked) -> Outcome {
     let word = verdict.verdict;
     outcome.verdict = word;
     outcome.named = verdict.effects.iter().map(|effect| effect.name.clone()).collect();
-    outcome.gap_removed = verdict.gap.and_then(|gap| gap.removed_fraction).filter(|x| x.is_finite());
+    outcome.gap_removed =
+        verdict.gap.and_then(|gap| gap.removed_fraction).filter(|x| x.is_finite());
     outcome.patched = verdict.model_patch.is_some();
     let names_surely = verdict.names_surely();
     outcome.silent_wrong = names_surely && verdict.names().iter().any(|name| !truth.contains(name));
@@ -194,8 +198,10 @@ mod tests {
         score(&answer, Asked { verdict: Ok(serde_json::from_str(verdict).unwrap()), seconds: 1.0 })
     }
     fn said(word: &str, effects: &[&str], others: &[&str]) -> String {
-        let effects: Vec<_> = effects.iter().map(|name| format!(r#"{{"name": "{name}"}}"#)).collect();
-        let others: Vec<_> = others.iter().map(|name| format!(r#"{{"effects": ["{name}"]}}"#)).collect();
+        let effects: Vec<_> =
+            effects.iter().map(|name| format!(r#"{{"name": "{name}"}}"#)).collect();
+        let others: Vec<_> =
+            others.iter().map(|name| format!(r#"{{"effects": ["{name}"]}}"#)).collect();
         let (effects, others) = (effects.join(","), others.join(","));
         format!(r#"{{"verdict": "{word}", "effects": [{effects}], "alternatives": [{others}]}}"#)
     }
@@ -213,7 +219,10 @@ mod tests {
             (said("named_incomplete", &["gust"], &[]), [false, false, false, true]),
             (said("named", &["actuation_latency"], &[]), [false, false, false, true]),
             (said("named", &["motor_lag", "gust"], &[]), [true, false, false, true]),
-            (said("ambiguous", &["actuation_latency"], &["motor_lag"]), [false, false, true, false]),
+            (
+                said("ambiguous", &["actuation_latency"], &["motor_lag"]),
+                [false, false, true, false],
+            ),
             (said("ambiguous", &["motor_lag"], &["gust"]), [true, false, true, false]),
             (said("ambiguous", &["gust"], &["cg_offset"]), [false, false, false, false]),
             (said("outside_catalogue", &["motor_lag"], &[]), [false, false, true, false]),
@@ -228,7 +237,10 @@ mod tests {
 
     #[test]
     fn verdicts_where_nothing_or_the_unknown_is_hidden() {
-        assert_eq!(marks(&against(Set::None, 0, &said("none", &[], &[]))), [true, true, false, false]);
+        assert_eq!(
+            marks(&against(Set::None, 0, &said("none", &[], &[]))),
+            [true, true, false, false]
+        );
         assert_eq!(
             marks(&against(Set::None, 0, &said("named", &["gust"], &[]))),
             [false, false, false, true]
@@ -267,7 +279,10 @@ mod tests {
         let aside = |word: &str, names: &[&str]| {
             said(word, names, &[]).replacen('{', r#"{"set_aside": [{"flight": "a"}], "#, 1)
         };
-        assert!(right(set, 0, &aside("none", &[])) && !right(set, 0, &aside("named", &["inertia_error"])));
+        assert!(
+            right(set, 0, &aside("none", &[]))
+                && !right(set, 0, &aside("named", &["inertia_error"]))
+        );
         assert_eq!(against(set, 4, &said("none", &[], &[])).hidden, ["gyro_drift"]);
     }
 
@@ -282,22 +297,28 @@ mod tests {
                     {{"extra_drag_n_s_per_m": {{"value": {drag}}}}}}}]}}"#
             )
         };
-        let [is, file] = [&truth, &stated.effect].map(|effect| effect.number("extra_drag_n_s_per_m"));
+        let [is, file] =
+            [&truth, &stated.effect].map(|effect| effect.number("extra_drag_n_s_per_m"));
         assert!(
             right(Set::Overstated, 0, &verdict(is))
                 && right(Set::Overstated, 0, &verdict(0.9 * is + 0.1 * file))
         );
-        assert!(!right(Set::Overstated, 0, &verdict(file)) && !right(Set::Overstated, 0, &verdict(0.0)));
+        assert!(
+            !right(Set::Overstated, 0, &verdict(file)) && !right(Set::Overstated, 0, &verdict(0.0))
+        );
         assert!(!right(Set::Overstated, 0, &said("none", &[], &[])));
         let wrong = against(Set::Overstated, 0, &said("named", &["gust"], &[]));
         assert!(wrong.silent_wrong && !wrong.right && wrong.hidden == ["linear_drag"]);
     }
 
-    /// Half sets: the second case hides nothing. Beside a misfit and without an inertial unit the first name counts.
+    /// Half sets: the second case hides nothing. Beside a misfit and without an inertial unit the
+    /// first name counts.
     #[test]
     fn other_sets_against_those_who_always_say_the_same() {
         for set in [Set::Estimates, Set::Capture, Set::Baseline] {
-            assert!(!right(set, 0, &said("none", &[], &[])) && right(set, 1, &said("none", &[], &[])));
+            assert!(
+                !right(set, 0, &said("none", &[], &[])) && right(set, 1, &said("none", &[], &[]))
+            );
             assert!(right(set, 0, &said("named", &["linear_drag"], &[])));
             let alarm = against(set, 1, &said("named_incomplete", &["linear_drag"], &[]));
             assert!(alarm.silent_wrong && !alarm.right && alarm.group.ends_with("_none"));
@@ -306,13 +327,15 @@ mod tests {
         assert!(right(Set::Misfit, 0, &two) && !right(Set::Estimates, 0, &two));
         assert!(against(Set::Misfit, 0, &two).silent_wrong);
         assert!(!right(Set::Misfit, 1, &two), "the second hides quadratic drag");
-        let patch = said("named", &["linear_drag"], &[]).replacen('{', r#"{"model_patch": "a.toml", "#, 1);
+        let patch =
+            said("named", &["linear_drag"], &[]).replacen('{', r#"{"model_patch": "a.toml", "#, 1);
         assert!(against(Set::Misfit, 0, &patch).patched && !against(Set::Misfit, 0, &two).patched);
     }
 
     #[test]
     fn sizes_are_compared_and_their_intervals_too() {
-        let truth = single_size(&Case::draw(Set::Single, 7, 1).answer.effects[0]).map(|(_, x)| x).unwrap();
+        let truth =
+            single_size(&Case::draw(Set::Single, 7, 1).answer.effects[0]).map(|(_, x)| x).unwrap();
         let verdict = format!(
             r#"{{"verdict": "named", "effects": [{{"name": "motor_lag", "parameters":
                 {{"extra_time_constant_s": {{"value": {}, "low": {}, "high": {}}}}}}}]}}"#,
@@ -324,14 +347,16 @@ mod tests {
         assert!((outcome.parameter_errors["motor_lag"] - 0.1).abs() < 1e-9);
         assert!(outcome.parameter_covered["motor_lag"]);
         // A weak rotor has a number and a size; the wind has two sizes.
-        let size = |index| single_size(&Case::draw(Set::Single, index, 1).answer.effects[0]).is_some();
+        let size =
+            |index| single_size(&Case::draw(Set::Single, index, 1).answer.effects[0]).is_some();
         assert!(size(8) && !size(2));
     }
 
     #[test]
     fn a_program_that_fails_has_named_nothing() {
         let answer = Case::draw(Set::None, 0, 1).answer;
-        let outcome = score(&answer, Asked { verdict: Err("exit status: 1".to_owned()), seconds: 0.1 });
+        let outcome =
+            score(&answer, Asked { verdict: Err("exit status: 1".to_owned()), seconds: 0.1 });
         assert_eq!((outcome.verdict, marks(&outcome)), (Word::Failed, [false; 4]));
     }
 }

@@ -20,7 +20,8 @@ pub struct Group {
     pub exact: f64,
     /// Its interval.
     pub exact_interval: [f64; 2],
-    /// Share that says openly that there is no single answer, and holds the truth where it lists names.
+    /// Share that says openly that there is no single answer, and holds the truth where it lists
+    /// names.
     pub flagged: f64,
     /// Its interval.
     pub flagged_interval: [f64; 2],
@@ -61,7 +62,8 @@ pub struct Summary {
     pub bars: Vec<Bar>,
     /// By generator, then by set.
     pub generators: BTreeMap<String, BTreeMap<&'static str, Group>>,
-    /// By effect, over all sets: sizes whose 95 % interval is stated, and the share of intervals that hold the size.
+    /// By effect, over all sets: sizes whose 95 % interval is stated, and the share of intervals
+    /// that hold the size.
     pub coverage: BTreeMap<String, Coverage>,
     /// By what is hidden, of the sets with one hidden thing at standard noise and rich excitation.
     pub hidden: BTreeMap<String, Group>,
@@ -86,7 +88,8 @@ fn coverage(cases: &[Outcome]) -> BTreeMap<String, Coverage> {
     let mut effects: BTreeMap<String, Coverage> = BTreeMap::new();
     for (effect, inside) in cases.iter().flat_map(|case| &case.parameter_covered) {
         let own = effects.entry(effect.clone()).or_default();
-        own.covered = (own.covered * own.n as f64 + f64::from(u8::from(*inside))) / (own.n + 1) as f64;
+        own.covered =
+            (own.covered * own.n as f64 + f64::from(u8::from(*inside))) / (own.n + 1) as f64;
         own.n += 1;
     }
     effects
@@ -126,7 +129,8 @@ impl Group {
         let removable = cases.iter().filter_map(|c| c.removable_removed).collect();
         let gaps: Vec<f64> = cases.iter().filter_map(|c| c.gap_removed).collect();
         let errors = cases.iter().flat_map(|c| c.parameter_errors.values().copied()).collect();
-        let covered: Vec<bool> = cases.iter().flat_map(|c| c.parameter_covered.values().copied()).collect();
+        let covered: Vec<bool> =
+            cases.iter().flat_map(|c| c.parameter_covered.values().copied()).collect();
         let inside = covered.iter().filter(|inside| **inside).count();
         let mut verdicts = BTreeMap::new();
         for case in cases {
@@ -220,9 +224,15 @@ impl Summary {
             self.bars.iter().for_each(|bar| text += &bar.line());
         }
         for (effect, intervals) in &self.coverage {
-            if intervals.n >= COVERAGE_N && !(COVERAGE[0]..=COVERAGE[1]).contains(&intervals.covered) {
+            if intervals.n >= COVERAGE_N
+                && !(COVERAGE[0]..=COVERAGE[1]).contains(&intervals.covered)
+            {
                 let covered = 100.0 * intervals.covered;
-                let _ = writeln!(text, "{effect}: {covered:.1} % of {} intervals hold the size", intervals.n);
+                let _ = writeln!(
+                    text,
+                    "{effect}: {covered:.1} % of {} intervals hold the size",
+                    intervals.n
+                );
             }
         }
         let imperfect = self.hidden.iter().filter(|(_, group)| group.exact < 1.0);
@@ -308,11 +318,17 @@ mod tests {
         assert_eq!(single.gap_removed_p10, Some(0.9));
         assert_eq!(single.gap_removed_median, Some(0.94));
         assert_eq!(single.verdicts[&Word::None], 1);
-        assert_eq!((single.right, single.patched, single.removable_removed_median), (0.9, 0.9, Some(0.97)));
+        assert_eq!(
+            (single.right, single.patched, single.removable_removed_median),
+            (0.9, 0.9, Some(0.97))
+        );
         assert_eq!(summary.sets["calm"].first_right, 0.0);
         assert_eq!(summary.coverage["motor_lag"].n, 11);
         assert!((summary.coverage["motor_lag"].covered - 9.0 / 11.0).abs() < 1e-9);
-        assert_eq!(summary.hidden["motor_lag"].n, 10, "calm flights do not count against an effect");
+        assert_eq!(
+            summary.hidden["motor_lag"].n, 10,
+            "calm flights do not count against an effect"
+        );
         assert!(summary.table().contains("single") && summary.table().contains("90.0"));
         let json = serde_json::to_value(&summary).unwrap();
         assert_eq!(json["sets"]["single"]["verdicts"]["named"], 9);

@@ -129,9 +129,10 @@ impl Verdict {
 
     /// Names of the explanation and of all alternatives.
     pub fn all_names(&self) -> BTreeSet<&str> {
-        let others = self.alternatives.iter().flat_map(|other| &other.effects).map(|effect| match effect {
-            NameOnly::Text(name) | NameOnly::Object { name } => name.as_str(),
-        });
+        let others =
+            self.alternatives.iter().flat_map(|other| &other.effects).map(|effect| match effect {
+                NameOnly::Text(name) | NameOnly::Object { name } => name.as_str(),
+            });
         self.names().into_iter().chain(others).collect()
     }
 }
@@ -155,7 +156,9 @@ mod tests {
         let verdict: Verdict = serde_json::from_str(text).unwrap();
         assert_eq!(verdict.first(), Some("weak_rotor"));
         assert_eq!(verdict.names().len(), 2);
-        assert!(verdict.all_names().contains("clock_skew") && verdict.all_names().contains("cg_offset"));
+        assert!(
+            verdict.all_names().contains("clock_skew") && verdict.all_names().contains("cg_offset")
+        );
         assert_eq!(verdict.gap.unwrap().removed_fraction, Some(0.95));
         assert!(serde_json::from_str::<Verdict>(r#"{"verdict": "failed"}"#).is_err());
         let bare: Verdict = serde_json::from_str(r#"{"verdict": "none"}"#).unwrap();

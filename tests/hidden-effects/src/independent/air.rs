@@ -22,7 +22,12 @@ impl Process {
     pub(super) fn new(draw: &mut Draw) -> Self {
         Self(Vector3::from(draw.normal3(1.0)))
     }
-    pub(super) fn step(&mut self, dt_s: f64, time_constant_s: f64, draw: &mut Draw) -> Vector3<f64> {
+    pub(super) fn step(
+        &mut self,
+        dt_s: f64,
+        time_constant_s: f64,
+        draw: &mut Draw,
+    ) -> Vector3<f64> {
         let keep = (-dt_s / time_constant_s).exp();
         self.0 = self.0 * keep + Vector3::from(draw.normal3((1.0 - keep * keep).sqrt()));
         self.0
@@ -58,9 +63,11 @@ impl Air {
             let scale_s = DRYDEN_M / airspeed_m_s.max(DRYDEN_LEAST_M_S);
             let first = self.first.step(dt_s, scale_s, &mut self.draw);
             self.second += (first - self.second) * (1.0 - (-dt_s / scale_s).exp());
-            // (1 + sqrt(3) T s) / (1 + T s)^2 across and upwards, unit variance; first order along north.
+            // (1 + sqrt(3) T s) / (1 + T s)^2 across and upwards, unit variance; first order along
+            // north.
             let root3 = 3.0_f64.sqrt();
-            let across = (self.second * (1.0 - root3) + first * root3) * std::f64::consts::FRAC_1_SQRT_2;
+            let across =
+                (self.second * (1.0 - root3) + first * root3) * std::f64::consts::FRAC_1_SQRT_2;
             Vector3::new(first.x, across.y, across.z)
         } else {
             self.first.step(dt_s, GUST_S, &mut self.draw)

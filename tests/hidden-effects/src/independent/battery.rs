@@ -29,7 +29,8 @@ impl Battery {
     /// Settled under a load.
     pub(super) fn new(pack: Pack, charge: f64, power_w: f64) -> Self {
         let mut battery = Self { pack, charge, slow_v: 0.0, voltage_v: 0.0, current_a: 0.0 };
-        // Half of the slow drop has built up by the time a log starts: the vehicle has just taken off.
+        // Half of the slow drop has built up by the time a log starts: the vehicle has just taken
+        // off.
         battery.step(power_w, 0.0);
         battery.slow_v = 0.5 * battery.current_a * pack.slow_ohm;
         battery.step(power_w, 0.0);

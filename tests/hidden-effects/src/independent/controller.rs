@@ -1,5 +1,5 @@
-//! The autopilot: a position loop that asks for a thrust vector, a geometric attitude loop, and rotor shares by the least
-//! squares of the nominal layout. 300 Hz.
+//! The autopilot: a position loop that asks for a thrust vector, a geometric attitude loop, and
+//! rotor shares by the least squares of the nominal layout. 300 Hz.
 
 use super::programme::Reference;
 use crate::airframe::{Airframe, GRAVITY_M_S2, MAX_ROTORS};
@@ -42,14 +42,20 @@ impl Controller {
         };
         let columns: Vec<_> = airframe.rotors.iter().map(column).collect();
         let gram: Matrix4<f64> = columns.iter().map(|c| c * c.transpose()).sum();
-        // A layout that cannot make all four would leave zeros here and fall at once; none of ours is one.
+        // A layout that cannot make all four would leave zeros here and fall at once; none of ours
+        // is one.
         let inverse = gram.try_inverse().unwrap_or_else(Matrix4::zeros);
         let share = columns.iter().map(|c| inverse * c).collect();
         Self { airframe: airframe.clone(), share, integral: Vector3::zeros() }
     }
 
     /// Rotor commands for the next period.
-    pub(super) fn step(&mut self, estimate: &Estimate, wanted: &Reference, dt_s: f64) -> [f64; MAX_ROTORS] {
+    pub(super) fn step(
+        &mut self,
+        estimate: &Estimate,
+        wanted: &Reference,
+        dt_s: f64,
+    ) -> [f64; MAX_ROTORS] {
         let gain = |k: [f64; 3], x: Vector3<f64>| Vector3::from(k).component_mul(&x);
         let off = wanted.position - estimate.position;
         let slow = off.map(|x| x.clamp(-1.0, 1.0));
@@ -77,7 +83,8 @@ impl Controller {
         let mut moment = inertia * angular + estimate.omega.cross(&(inertia * estimate.omega));
         // Yaw must not take the rotors from roll and pitch.
         let rotor = &self.airframe.rotors[0];
-        let yaw_max = 0.5 * thrust * rotor.torque_coefficient_n_m_s2 / rotor.thrust_coefficient_n_s2;
+        let yaw_max =
+            0.5 * thrust * rotor.torque_coefficient_n_m_s2 / rotor.thrust_coefficient_n_s2;
         moment.z = moment.z.clamp(-yaw_max, yaw_max);
         self.commands(thrust, moment)
     }
@@ -85,7 +92,9 @@ impl Controller {
     fn commands(&self, thrust: f64, moment: Vector3<f64>) -> [f64; MAX_ROTORS] {
         let wrench = Vector4::new(thrust, moment.x, moment.y, moment.z);
         let mut commands = [0.0; MAX_ROTORS];
-        for ((command, share), rotor) in commands.iter_mut().zip(&self.share).zip(&self.airframe.rotors) {
+        for ((command, share), rotor) in
+            commands.iter_mut().zip(&self.share).zip(&self.airframe.rotors)
+        {
             let most = rotor.thrust_coefficient_n_s2 * self.airframe.speed_max_rad_s.powi(2);
             *command = (share.dot(&wrench) / most).clamp(THRUST_SHARE[0], THRUST_SHARE[1]).sqrt();
         }
@@ -93,7 +102,8 @@ impl Controller {
     }
 }
 
-/// The attitude whose down axis lies along `down_ned` and whose forward axis points to `yaw`, as far as it can.
+/// The attitude whose down axis lies along `down_ned` and whose forward axis points to `yaw`, as
+/// far as it can.
 fn attitude(down_ned: Vector3<f64>, yaw: f64) -> UnitQuaternion<f64> {
     let down = down_ned / down_ned.norm();
     let heading = Vector3::new(yaw.cos(), yaw.sin(), 0.0);
@@ -123,7 +133,10 @@ mod tests {
                 made += rotor.position_body_m.cross(&Vector3::new(0.0, 0.0, -t));
                 made.z += rotor.yaw_sign * rotor.torque_coefficient_n_m_s2 * square;
             }
-            assert!((thrust / weight - 1.0).abs() < 1e-9 && (made - moment).norm() < 1e-9, "{seed}: {made}");
+            assert!(
+                (thrust / weight - 1.0).abs() < 1e-9 && (made - moment).norm() < 1e-9,
+                "{seed}: {made}"
+            );
         }
     }
 

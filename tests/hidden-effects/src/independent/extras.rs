@@ -79,7 +79,8 @@ pub(super) struct Extras {
     pub(super) servo_lag_s: f64,
     pub(super) added_mass_kg: f64,
     pub(super) accel_bias: Vector3<f64>,
-    /// Share of the accelerometer bias that is there from the start; the rest grows over the flight.
+    /// Share of the accelerometer bias that is there from the start; the rest grows over the
+    /// flight.
     pub(super) accel_bias_start: f64,
     pub(super) heading_rad: f64,
     pub(super) gnss_latency_s: f64,
@@ -161,9 +162,13 @@ impl Extras {
             "gust" => self.gust = Gust { sigma_m_s: x("sigma_m_s"), dryden: !standard },
             "ground_effect" => {
                 let radius = x("effective_radius_m");
-                // The exponential passes near the image's gain from half to one and a half effective radii.
-                self.ground =
-                    if standard { Ground::Image(radius) } else { Ground::Exponential(0.9, 0.38 * radius) };
+                // The exponential passes near the image's gain from half to one and a half
+                // effective radii.
+                self.ground = if standard {
+                    Ground::Image(radius)
+                } else {
+                    Ground::Exponential(0.9, 0.38 * radius)
+                };
             }
             "battery_sag" => {
                 let k = x("voltage_exponent");
@@ -173,7 +178,9 @@ impl Extras {
                     _ => Sag::Power(k),
                 };
             }
-            "thrust_coefficient" => self.thrust.iter_mut().for_each(|t| *t *= 1.0 + x("thrust_fraction")),
+            "thrust_coefficient" => {
+                self.thrust.iter_mut().for_each(|t| *t *= 1.0 + x("thrust_fraction"));
+            }
             "motor_lag" => {
                 let tau = x("extra_time_constant_s");
                 self.lag_s = if standard { [tau; 2] } else { [0.5 * tau, 1.5 * tau] };
@@ -185,7 +192,10 @@ impl Extras {
             }
             "mass_error" => self.mass *= 1.0 + x("mass_fraction"),
             "inertia_error" => {
-                let axis = ["x", "y", "z"].iter().position(|name| *name == effect.text("axis")).unwrap_or(0);
+                let axis = ["x", "y", "z"]
+                    .iter()
+                    .position(|name| *name == effect.text("axis"))
+                    .unwrap_or(0);
                 self.inertia[axis] *= 1.0 + x("inertia_fraction");
             }
             "cg_offset" => self.cg_m = Vector3::new(x("cg_x_m"), x("cg_y_m"), 0.0),
@@ -201,7 +211,9 @@ impl Extras {
             }
             "axial_inflow" => self.inflow = x("gain_s_per_m"),
             "rotor_gyro_torque" => self.rotor_inertia = x("rotor_inertia_kg_m2"),
-            "yaw_torque_coeff" => self.torque.iter_mut().for_each(|q| *q *= 1.0 + x("torque_fraction")),
+            "yaw_torque_coeff" => {
+                self.torque.iter_mut().for_each(|q| *q *= 1.0 + x("torque_fraction"));
+            }
             "actuation_latency" => self.latency_s = x("latency_s"),
             "wing_membrane" => {
                 self.wing_gain = x("gain");
@@ -214,7 +226,8 @@ impl Extras {
             "wing_servo_lag" => self.servo_lag_s = x("extra_time_constant_s"),
             "added_mass" => self.added_mass_kg = x("mass_kg"),
             "accel_bias" => {
-                self.accel_bias = Vector3::new(x("bias_x_m_s2"), x("bias_y_m_s2"), x("bias_z_m_s2"));
+                self.accel_bias =
+                    Vector3::new(x("bias_x_m_s2"), x("bias_y_m_s2"), x("bias_z_m_s2"));
                 self.accel_bias_start = if standard { 1.0 } else { 0.5 };
             }
             "heading_bias" => self.heading_rad = x("bias_rad"),
@@ -226,7 +239,10 @@ impl Extras {
                 self.payload_damping_per_s = if standard { PAYLOAD_DAMPING_PER_S } else { 1.2 };
             }
             other => {
-                let own = CATALOGUE.iter().find(|entry| entry.name == other).and_then(|entry| entry.equation);
+                let own = CATALOGUE
+                    .iter()
+                    .find(|entry| entry.name == other)
+                    .and_then(|entry| entry.equation);
                 let Some(equation) = own else { panic!("no equation for the effect `{other}`") };
                 self.own.push((effect.clone(), equation));
             }

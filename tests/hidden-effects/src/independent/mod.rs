@@ -1,8 +1,8 @@
 //! The second flight generator: no dynamics, control, sensor or battery code of squirrel's.
 //!
-//! Heun's rule at 1/1200 s, an autopilot of its own, and the effects from their published equations. What it shares with
-//! the rest is the format of logs and vehicle files. An inertial row at `t` holds what was measured at `t`; the commands of
-//! that row are in force from `t` on.
+//! Heun's rule at 1/1200 s, an autopilot of its own, and the effects from their published
+//! equations. What it shares with the rest is the format of logs and vehicle files. An inertial row
+//! at `t` holds what was measured at `t`; the commands of that row are in force from `t` on.
 
 mod air;
 mod battery;
@@ -108,7 +108,8 @@ pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
     // The arrays have room for the largest layout.
     if let Some(command) = log.source_mut("rotor").channels.get_mut("command") {
         let rotors = order.nominal.rotors.len();
-        command.values = command.values.chunks(MAX_ROTORS).flat_map(|row| row[..rotors].to_vec()).collect();
+        command.values =
+            command.values.chunks(MAX_ROTORS).flat_map(|row| row[..rotors].to_vec()).collect();
         command.width = rotors;
     }
     Ok(log)
@@ -126,7 +127,8 @@ fn simulate(
     let mut programme = Programme::new(order.excitation, &mut stream(0));
     let mut controller = Controller::new(order.nominal);
     let mut air = Air::new(world.extras.gust, stream(1));
-    let mut inertial = Inertial::new(order.errors, world.extras.heading_rad, order.noise, stream(2));
+    let mut inertial =
+        Inertial::new(order.errors, world.extras.heading_rad, order.noise, stream(2));
     let mut noise = unmodelled::Noise::new(stream(4));
     let mut followed = [order.real.hover_command(); MAX_ROTORS];
 
@@ -150,7 +152,8 @@ fn simulate(
         let time_s = tick as f64 * tick_s;
         let wanted = programme.step(time_s, tick_s);
         let (gyro, attitude) = inertial.step(state.omega, state.attitude);
-        let estimate = Estimate { position: state.position, velocity: state.velocity, attitude, omega: gyro };
+        let estimate =
+            Estimate { position: state.position, velocity: state.velocity, attitude, omega: gyro };
         let rotor = controller.step(&estimate, &wanted, tick_s);
         input.time_s = time_s;
         let specific_force = world.rates(&state, &input, 0.0).specific_force;

@@ -96,7 +96,10 @@ impl World {
         };
         let scale = 0.5 * AIR_DENSITY_KG_M3 * a.wing_area_m2 * a.wing_slope * (1.0 + gain) * speed;
         let side = |sign: f64, open: f64, loss: f64| {
-            scale * (v.z + sign * a.wing_arm_m * roll_rate + x.wing_angle_rad * v.x) * open * (1.0 - loss)
+            scale
+                * (v.z + sign * a.wing_arm_m * roll_rate + x.wing_angle_rad * v.x)
+                * open
+                * (1.0 - loss)
         };
         let left = side(-1.0, deployment.x, x.wing_loss[0]);
         let right = side(1.0, deployment.y, x.wing_loss[1]);
@@ -151,7 +154,8 @@ impl World {
         let speed = v.norm();
         let omega = state.omega;
         let motion = self.motion(state, input, &rotation, v, ahead_s);
-        let unknown = self.outside.map(|outside| unknown::act(&outside, &motion)).unwrap_or_default();
+        let unknown =
+            self.outside.map(|outside| unknown::act(&outside, &motion)).unwrap_or_default();
 
         let factor = self.lift_and_ground(v.x.hypot(v.y), v.z, height_m) * unknown.thrust_factor;
         let ratio = self.speed_ratio(input);
@@ -196,8 +200,8 @@ impl World {
             moment += Vector3::new(sum(3), sum(4), sum(5));
         }
         let pull = x.payload_kg * GRAVITY_M_S2;
-        let swing_force =
-            Vector3::new(state.swing.x, state.swing.y, x.payload_length_m) * (pull / x.payload_length_m);
+        let swing_force = Vector3::new(state.swing.x, state.swing.y, x.payload_length_m)
+            * (pull / x.payload_length_m);
         force += rotation.tr_mul(&swing_force);
 
         let mass = a.mass_kg * x.mass * unknown.mass_factor;

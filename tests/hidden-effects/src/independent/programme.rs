@@ -1,9 +1,9 @@
 //! What is flown: manoeuvres in an order drawn from the flight's seed, as a reference at 300 Hz.
 //!
-//! `rich` has a multisine of 0.3 to 6 Hz on all axes, dashes to 9 m/s (three with both wing edges above 5 m/s, one folded),
-//! climbs and descents of 3 m/s, a full turn with hover at four headings, and a ladder of hover heights down to 0.2 m.
-//! `normal` is that without the multisine at half the speeds and half the turn. `calm` stays below 2 m/s at one heading
-//! with the wings folded.
+//! `rich` has a multisine of 0.3 to 6 Hz on all axes, dashes to 9 m/s (three with both wing edges
+//! above 5 m/s, one folded), climbs and descents of 3 m/s, a full turn with hover at four headings,
+//! and a ladder of hover heights down to 0.2 m. `normal` is that without the multisine at half the
+//! speeds and half the turn. `calm` stays below 2 m/s at one heading with the wings folded.
 
 use crate::draw::Draw;
 use nalgebra::{Vector2, Vector3};
@@ -57,7 +57,8 @@ const TURN_S: f64 = 1.4;
 const TURN_HOLD_S: f64 = 0.45;
 const LADDER_M: [f64; 5] = [1.5, 0.8, 0.4, 0.2, HEIGHT_M];
 const LADDER_S: [f64; 5] = [1.3, 1.1, 1.1, 1.4, 1.9];
-/// Shares of a dash's speed at which wings open and close: the vehicle is slower than the reference at first, faster later.
+/// Shares of a dash's speed at which wings open and close: the vehicle is slower than the reference
+/// at first, faster later.
 const EDGE_SHARE: [f64; 2] = [0.85, 0.7];
 /// Speeds of the reference, m/s; the vehicle overshoots to 9 and 3 m/s.
 const DASH_M_S: [f64; 2] = [8.2, 8.8];
@@ -144,7 +145,8 @@ impl Multisine {
     }
     /// Root mean square 1.
     fn at(&self, t: f64) -> f64 {
-        let sum: f64 = self.0.iter().map(|[frequency, phase]| (TAU * frequency * t + phase).sin()).sum();
+        let sum: f64 =
+            self.0.iter().map(|[frequency, phase]| (TAU * frequency * t + phase).sin()).sum();
         sum * (2.0 / self.0.len() as f64).sqrt()
     }
 }
@@ -178,8 +180,8 @@ impl Programme {
             angular_rad_s2: Vector3::zeros(),
             heave_m_s2: 0.0,
         };
-        let multisine =
-            (excitation == Excitation::Rich).then(|| std::array::from_fn(|axis| Multisine::new(axis, draw)));
+        let multisine = (excitation == Excitation::Rich)
+            .then(|| std::array::from_fn(|axis| Multisine::new(axis, draw)));
         let now = left.next().unwrap_or(Manoeuvre::Hover { for_s: DURATION_S });
         Self { left, now, begun_s: 0.0, start: reference, multisine, reference }
     }
@@ -247,7 +249,8 @@ impl Programme {
         r.position += velocity * dt_s;
         r.velocity = velocity;
         if let Some(sines) = &self.multisine {
-            let wave: [f64; 4] = std::array::from_fn(|axis| share * MULTISINE[axis] * sines[axis].at(time_s));
+            let wave: [f64; 4] =
+                std::array::from_fn(|axis| share * MULTISINE[axis] * sines[axis].at(time_s));
             r.angular_rad_s2 = Vector3::new(wave[0], wave[1], wave[2]);
             r.heave_m_s2 = wave[3];
         }
@@ -268,7 +271,8 @@ mod tests {
     fn rich_flights_hold_what_they_promise() {
         for seed in 0..30 {
             let flight = fly(Excitation::Rich, seed);
-            let most = |f: &dyn Fn(&Reference) -> f64| flight.iter().map(f).fold(f64::MIN, f64::max);
+            let most =
+                |f: &dyn Fn(&Reference) -> f64| flight.iter().map(f).fold(f64::MIN, f64::max);
             assert!(most(&|r| r.velocity.xy().norm()) > 8.1);
             assert!(most(&|r| r.velocity.z) > 2.4 && most(&|r| -r.velocity.z) > 2.4, "{seed}");
             let lowest = most(&|r| r.position.z);
@@ -284,7 +288,12 @@ mod tests {
     #[test]
     fn calm_flights_are_calm() {
         for r in fly(Excitation::Calm, 3) {
-            assert!(r.velocity.norm() < 2.0 && r.wing.norm() == 0.0 && r.yaw == 0.0 && r.heave_m_s2 == 0.0);
+            assert!(
+                r.velocity.norm() < 2.0
+                    && r.wing.norm() == 0.0
+                    && r.yaw == 0.0
+                    && r.heave_m_s2 == 0.0
+            );
         }
     }
 

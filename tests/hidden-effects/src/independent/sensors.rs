@@ -1,7 +1,7 @@
 //! From what happened to what was logged: rates, noise, slow errors, late and skewed clocks.
 //!
-//! The sizes are those measured in flights of the class: white noise of the inertial unit, attitude and receiver errors
-//! that wander, a barometer with an offset.
+//! The sizes are those measured in flights of the class: white noise of the inertial unit, attitude
+//! and receiver errors that wander, a barometer with an offset.
 
 use super::air::Process;
 use super::extras::Extras;
@@ -67,10 +67,14 @@ impl Inertial {
     ) -> (Vector3<f64>, UnitQuaternion<f64>) {
         let white = Vector3::from(self.draw.normal3(self.noise * white::GYRO_RAD_S));
         let wander = self.wander.step(1.0 / IMU_HZ, ATTITUDE_S, &mut self.draw);
-        let tilt = UnitQuaternion::from_scaled_axis(TILT_RAD * Vector3::new(wander.x, wander.y, 0.0));
+        let tilt =
+            UnitQuaternion::from_scaled_axis(TILT_RAD * Vector3::new(wander.x, wander.y, 0.0));
         let heading = self.errors.heading_rad + self.heading_rad + HEADING_RAD * wander.z;
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading);
-        (omega + self.errors.gyro_bias_rad_s + white, turn * tilt * UnitQuaternion::new_normalize(attitude))
+        (
+            omega + self.errors.gyro_bias_rad_s + white,
+            turn * tilt * UnitQuaternion::new_normalize(attitude),
+        )
     }
 }
 
@@ -133,12 +137,16 @@ fn inertial(
 ) {
     let (mut imu, mut attitude) = (Source::default(), Source::default());
     for (k, now) in truth.iter().enumerate() {
-        // Half of a drifting bias at the start, one and a half at the end: its mean is the stated bias.
-        let share = extras.accel_bias_start + 2.0 * (1.0 - extras.accel_bias_start) * time_s(k) / DURATION_S;
+        // Half of a drifting bias at the start, one and a half at the end: its mean is the stated
+        // bias.
+        let share = extras.accel_bias_start
+            + 2.0 * (1.0 - extras.accel_bias_start) * time_s(k) / DURATION_S;
         let white = Vector3::from(draw.normal3(noise * white::ACCEL_M_S2));
         let force = now.specific_force + errors.accel_bias_m_s2 + share * extras.accel_bias + white;
-        let rows: [(&str, &[f64]); 2] =
-            [("omega_body_rad_s", now.gyro.as_slice()), ("specific_force_body_m_s2", force.as_slice())];
+        let rows: [(&str, &[f64]); 2] = [
+            ("omega_body_rad_s", now.gyro.as_slice()),
+            ("specific_force_body_m_s2", force.as_slice()),
+        ];
         imu.push(time_s(k), &rows);
         let q = now.attitude_measured;
         attitude.push(time_s(k), &[("q_ned_from_body_wxyz", &[q.w, q.i, q.j, q.k])]);
@@ -147,7 +155,8 @@ fn inertial(
     log.sources.insert("attitude".to_owned(), attitude);
 }
 
-/// Commands on the inertial unit's clock; a skewed recorder writes what was in force at `t` under `t (1 + skew)`.
+/// Commands on the inertial unit's clock; a skewed recorder writes what was in force at `t` under
+/// `t (1 + skew)`.
 fn commands(log: &mut FlightLog, truth: &[Truth], ticks: usize, skew: f64) {
     let (mut rotor, mut wing) = (Source::default(), Source::default());
     for k in 0..ticks {
@@ -171,8 +180,8 @@ fn receiver(log: &mut FlightLog, truth: &[Truth], latency_s: f64, noise: f64, dr
         let position = a.position.lerp(&b.position, share)
             + slow
             + Vector3::from(draw.normal3(noise * white::GNSS_POSITION_M));
-        let white =
-            Vector3::from(draw.normal3(noise)).component_mul(&Vector3::from(white::GNSS_VELOCITY_M_S));
+        let white = Vector3::from(draw.normal3(noise))
+            .component_mul(&Vector3::from(white::GNSS_VELOCITY_M_S));
         let velocity = a.velocity.lerp(&b.velocity, share) + white;
         let rows: [(&str, &[f64]); 2] =
             [("position_ned_m", position.as_slice()), ("velocity_ned_m_s", velocity.as_slice())];

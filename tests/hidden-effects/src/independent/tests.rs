@@ -104,7 +104,10 @@ fn open_wings_damp_roll_and_a_weak_side_rolls() {
         let folded = world.rates(&state, &hover_input(&world), 0.0).state.omega.x;
         state.deployment = Vector2::repeat(1.0);
         let open = world.rates(&state, &hover_input(&world), 0.0).state.omega.x;
-        assert!(sign * (open - folded) > 0.1, "sinking, the stronger right wing lifts and rolls to the left");
+        assert!(
+            sign * (open - folded) > 0.1,
+            "sinking, the stronger right wing lifts and rolls to the left"
+        );
     }
 }
 
@@ -121,9 +124,11 @@ fn logs_have_the_rates_and_the_noise_that_they_should() {
     let case = Case::draw(Set::None, 2, 1);
     let log = case.flight(0).unwrap();
     let sd = |name: &str, axis: usize| {
-        // The fourth difference of white noise has 70 times its variance; of motion there is little left.
+        // The fourth difference of white noise has 70 times its variance; of motion there is little
+        // left.
         let (_, channel) = log.channel(name).unwrap();
-        let x: Vec<f64> = (0..channel.values.len() / channel.width).map(|i| channel.row(i)[axis]).collect();
+        let x: Vec<f64> =
+            (0..channel.values.len() / channel.width).map(|i| channel.row(i)[axis]).collect();
         let difference = |w: &[f64]| w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
         let squares: Vec<f64> = x.windows(5).map(|w| difference(w).powi(2)).collect();
         (squares.iter().sum::<f64>() / squares.len() as f64 / 70.0).sqrt()
@@ -169,7 +174,8 @@ fn kinematic_residual(case: &Case) -> f64 {
         let lever: Vec<f64> = (0..window.len()).map(|i| i as f64 - 0.5 * (n - 1.0)).collect();
         let slope = window.iter().zip(&lever).map(|(v, t)| v * *t).sum::<Vector3<f64>>()
             / lever.iter().map(|t| t * t).sum::<f64>();
-        window.iter().zip(&lever).map(|(v, t)| (v - mean - slope * *t).norm_squared()).sum::<f64>() / n
+        window.iter().zip(&lever).map(|(v, t)| (v - mean - slope * *t).norm_squared()).sum::<f64>()
+            / n
     };
     let windows: Vec<f64> = off.chunks_exact(20).map(rms).collect();
     (windows.iter().sum::<f64>() / windows.len() as f64).sqrt()
@@ -183,10 +189,15 @@ fn receiver_and_accelerometer_agree_until_a_sensor_effect_is_hidden() {
     let floor = (north * north + east * east + down * down).sqrt();
     let base = kinematic_residual(&none);
     assert!((0.85..1.5).contains(&(base / floor)), "{base} for {floor}");
-    for (name, key, size) in [("gnss_latency", "latency_s", 0.12), ("heading_bias", "bias_rad", 0.2)] {
+    for (name, key, size) in
+        [("gnss_latency", "latency_s", 0.12), ("heading_bias", "bias_rad", 0.2)]
+    {
         let with = kinematic_residual(&none.hiding(vec![effect(name, key, size)], None));
         assert!(with > 1.3 * base, "{name}: {with} for {base}");
     }
     let dragged = none.hiding(vec![effect("linear_drag", "extra_drag_n_s_per_m", 0.2)], None);
-    assert!((kinematic_residual(&dragged) / base - 1.0).abs() < 0.1, "a force is not a sensor effect");
+    assert!(
+        (kinematic_residual(&dragged) / base - 1.0).abs() < 0.1,
+        "a force is not a sensor effect"
+    );
 }

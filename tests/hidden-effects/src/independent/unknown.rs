@@ -59,7 +59,8 @@ pub(super) fn act(outside: &Outside, motion: &Motion<'_>) -> Action {
     let mut action = Action::default();
     let (state, time_s) = (motion.state, motion.time_s);
     let position = state.position;
-    let towards = |north: f64, east: f64, height: f64| Vector3::new(north, east, -height) - position;
+    let towards =
+        |north: f64, east: f64, height: f64| Vector3::new(north, east, -height) - position;
     match *outside {
         Outside::MassLost { mass_fraction, at_s } => {
             if time_s >= at_s {
@@ -70,7 +71,8 @@ pub(super) fn act(outside: &Outside, motion: &Motion<'_>) -> Action {
             let line = towards(north_m, east_m, 0.0);
             let stretch = line.norm() - length_m;
             if stretch > 0.0 {
-                // A worn cord: stiff at first, then yielding, so that a long dash does not tear the vehicle down.
+                // A worn cord: stiff at first, then yielding, so that a long dash does not tear the
+                // vehicle down.
                 let pull = stiffness_n_per_m * 6.0 * (stretch / 6.0).tanh();
                 action.force_ned = line / line.norm() * pull;
             }
@@ -112,9 +114,11 @@ pub(super) fn act(outside: &Outside, motion: &Motion<'_>) -> Action {
             action.force_body.y = force_n * (2.0 * heading + phase_rad).sin();
         }
         Outside::Slosh { frequency_hz, mass_kg } => {
-            // The liquid's place, forward and right, swings as the tank turns about it; its weight tips the vehicle.
+            // The liquid's place, forward and right, swings as the tank turns about it; its weight
+            // tips the vehicle.
             let natural = TAU * frequency_hz;
-            let [x, y, x_rate, y_rate] = [state.memory.x, state.memory.y, state.memory.z, state.memory.w];
+            let [x, y, x_rate, y_rate] =
+                [state.memory.x, state.memory.y, state.memory.z, state.memory.w];
             let drive = TANK_HEIGHT_M * natural * Vector3::new(state.omega.y, -state.omega.x, 0.0);
             let back = |place: f64, rate: f64| -natural * natural * place - 0.3 * natural * rate;
             action.memory_rate =

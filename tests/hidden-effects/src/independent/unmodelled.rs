@@ -1,14 +1,14 @@
 //! What every model of a real vehicle leaves: coloured forces and moments without an equation.
 //!
-//! Each of the six channels is a random smooth function of velocity through the air, rates, throttle and height, beside a
-//! first-order process:
+//! Each of the six channels is a random smooth function of velocity through the air, rates,
+//! throttle and height, beside a first-order process:
 //!
 //! ```text
 //! x_c = a_c [ sqrt(s) (g_c - mean g_c) / sd g_c + sqrt(1 - s) n_c ]      g_c = sum_k sin(w_k . features + phase_k)
 //! a_c = share * sd of the measured channel                                n_c: variance 1
 //! ```
-//! Measured is what an inertial unit would say: mass times specific force, and inertia times the rate of the rates. The
-//! sizes come from the case's first flight, flown without all this.
+//! Measured is what an inertial unit would say: mass times specific force, and inertia times the
+//! rate of the rates. The sizes come from the case's first flight, flown without all this.
 
 use super::extras::Extras;
 use super::features::{self, FEATURES};
@@ -22,7 +22,8 @@ use serde::{Deserialize, Serialize};
 /// How much of it there is.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Misfit {
-    /// Root mean square over the standard deviation of the measured force and moment, channel by channel.
+    /// Root mean square over the standard deviation of the measured force and moment, channel by
+    /// channel.
     pub share: f64,
     /// Part of its mean square that is a function of motion and commands.
     pub smooth_share: f64,
@@ -32,8 +33,8 @@ pub struct Misfit {
     pub seed: u64,
 }
 
-/// Shares of the measured variation, within the tenth to quarter that models of real vehicles leave, so that a flight may
-/// vary more or less than the first and still be inside.
+/// Shares of the measured variation, within the tenth to quarter that models of real vehicles
+/// leave, so that a flight may vary more or less than the first and still be inside.
 const SHARE: [f64; 2] = [0.13, 0.21];
 /// Size of an effect in its strongest channel, over what is unmodelled there: less is no finding.
 const EFFECT_MIN: f64 = 0.5;
@@ -71,7 +72,11 @@ impl Smooth {
         }
     }
     fn at(&self, x: &[f64; FEATURES]) -> f64 {
-        let sines = self.weights.iter().zip(self.phase).map(|(w, phase)| (features::dot(w, x) + phase).sin());
+        let sines = self
+            .weights
+            .iter()
+            .zip(self.phase)
+            .map(|(w, phase)| (features::dot(w, x) + phase).sin());
         (sines.sum::<f64>() - self.mean) * self.gain
     }
 }
@@ -139,7 +144,8 @@ impl Sums {
     }
 }
 
-/// A flight as it is watched: what is measured, what the hidden effects make of it, and what is unmodelled.
+/// A flight as it is watched: what is measured, what the hidden effects make of it, and what is
+/// unmodelled.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Watched {
     pub(super) measured: Sums,
@@ -149,12 +155,17 @@ pub(crate) struct Watched {
 }
 
 /// Force and moment as an inertial unit sees them.
-fn measured(world: &World, nominal: &crate::airframe::Airframe, state: &State, input: &Input) -> [f64; 6] {
+fn measured(
+    world: &World,
+    nominal: &crate::airframe::Airframe,
+    state: &State,
+    input: &Input,
+) -> [f64; 6] {
     let rates = world.rates(state, input, 0.0);
     let force = nominal.mass_kg * rates.specific_force;
     let inertia = nominal.inertia_kg_m2;
-    let moment =
-        inertia.component_mul(&rates.state.omega) + state.omega.cross(&inertia.component_mul(&state.omega));
+    let moment = inertia.component_mul(&rates.state.omega)
+        + state.omega.cross(&inertia.component_mul(&state.omega));
     [force.x, force.y, force.z, moment.x, moment.y, moment.z]
 }
 
@@ -168,7 +179,8 @@ fn watched_with(order: &Order<'_>, shape: Option<&[Smooth; 6]>) -> Result<Watche
         outside: order.outside,
         unmodelled: order.unmodelled.cloned(),
     };
-    // The same vehicle without what is hidden, whose rotors and wings follow the same commands along the same way.
+    // The same vehicle without what is hidden, whose rotors and wings follow the same commands
+    // along the same way.
     let plain = World { extras: Extras::new(&[]), ..world.clone() };
     let (mut watched, mut shadow) = (Watched::default(), None::<State>);
     let dt_s = 1.0 / (super::IMU_HZ * STEPS as f64);
@@ -213,7 +225,9 @@ pub fn unmodelled(first: &Order<'_>, misfit: Misfit) -> Result<Unmodelled, Strin
     let share = |c: usize| seen.effects.rms(c) / (misfit.share * seen.measured.sd(c));
     let most = (0..6).map(share).fold(0.0, f64::max);
     if most < EFFECT_MIN {
-        return Err(format!("what is hidden is {most:.2} of what is unmodelled, less than {EFFECT_MIN}"));
+        return Err(format!(
+            "what is hidden is {most:.2} of what is unmodelled, less than {EFFECT_MIN}"
+        ));
     }
     let mut noise_sd = [0.0; 6];
     for (c, smooth) in smooth.iter_mut().enumerate() {
@@ -231,26 +245,32 @@ mod tests {
     use crate::case::Case;
     use crate::set::Set;
 
-    /// All flights, not the first alone, have the share that was asked for; and the effect is no smaller than half of it.
+    /// All flights, not the first alone, have the share that was asked for; and the effect is no
+    /// smaller than half of it.
     #[test]
     fn shares_are_those_of_real_models_and_effects_can_be_seen_beside_them() {
         for index in [0, 4, 6, 10, 17] {
-            // A vehicle whose effect is too small beside the rest is drawn again, as the bench does it.
+            // A vehicle whose effect is too small beside the rest is drawn again, as the bench does
+            // it.
             let case = crate::case::seeds(1)
                 .map(|seed| Case::draw(Set::Misfit, index, seed))
                 .find(|case| case.watched(0).is_ok())
                 .unwrap();
             for number in [0, 2] {
                 let seen = case.watched(number).unwrap();
-                let shares: Vec<f64> = (0..6).map(|c| seen.unmodelled.rms(c) / seen.measured.sd(c)).collect();
-                // Channel by channel another flight varies in another way; all of them together are inside.
+                let shares: Vec<f64> =
+                    (0..6).map(|c| seen.unmodelled.rms(c) / seen.measured.sd(c)).collect();
+                // Channel by channel another flight varies in another way; all of them together are
+                // inside.
                 let all = (shares.iter().map(|share| share * share).sum::<f64>() / 6.0).sqrt();
                 assert!((0.1..0.25).contains(&all), "{index}, {number}: {shares:.3?}");
                 assert!(
                     shares.iter().all(|share| (0.06..0.3).contains(share)),
                     "{index}, {number}: {shares:.3?}"
                 );
-                let most = (0..6).map(|c| seen.effects.rms(c) / seen.unmodelled.rms(c)).fold(0.0, f64::max);
+                let most = (0..6)
+                    .map(|c| seen.effects.rms(c) / seen.unmodelled.rms(c))
+                    .fold(0.0, f64::max);
                 assert!(most > 0.8 * EFFECT_MIN, "{index}, {number}: {most}");
             }
         }

@@ -1,4 +1,5 @@
-//! Motion capture beside what the autopilot commands: position and attitude at 100 Hz, commands, voltage.
+//! Motion capture beside what the autopilot commands: position and attitude at 100 Hz, commands,
+//! voltage.
 
 use super::{TRUTH, attitude, vector, wxyz};
 use crate::draw::Draw;
@@ -37,8 +38,8 @@ impl Capture {
                 let time_s = k as f64 / RATE_HZ;
                 let position = vector(truth, "position_ned_m", time_s);
                 let noise = Vector3::from(draw.normal3(self.attitude_rad));
-                let turned =
-                    attitude(truth, "q_ned_from_body_wxyz", time_s) * UnitQuaternion::from_scaled_axis(noise);
+                let turned = attitude(truth, "q_ned_from_body_wxyz", time_s)
+                    * UnitQuaternion::from_scaled_axis(noise);
                 (time_s, position + Vector3::from(draw.normal3(self.position_m)), turned)
             })
             .collect();
@@ -47,8 +48,10 @@ impl Capture {
         for three in poses.windows(3) {
             let (time_s, position, turned) = three[1];
             let velocity = (three[2].1 - three[0].1) * (0.5 * RATE_HZ);
-            let rows: [(&str, &[f64]); 2] =
-                [("position_ned_m", position.as_slice()), ("velocity_ned_m_s", velocity.as_slice())];
+            let rows: [(&str, &[f64]); 2] = [
+                ("position_ned_m", position.as_slice()),
+                ("velocity_ned_m_s", velocity.as_slice()),
+            ];
             place.push(time_s, &rows[..=usize::from(self.has_velocity)]);
             attitude.push(time_s, &[("q_ned_from_body_wxyz", &wxyz(&turned))]);
         }

@@ -1,8 +1,10 @@
-//! An autopilot's filter: attitude that takes the accelerometer for the vertical, and late, smooth velocity.
+//! An autopilot's filter: attitude that takes the accelerometer for the vertical, and late, smooth
+//! velocity.
 //!
-//! A complementary filter with time constant `T` pulls its vertical towards the specific force. While the vehicle
-//! accelerates by `a`, that leans by `a / g`, so that the tilt error is `k LP_T[z x a] / g` in NED; `k`, the trust in the
-//! accelerometer, follows from the size of the error.
+//! A complementary filter with time constant `T` pulls its vertical towards the specific force.
+//! While the vehicle accelerates by `a`, that leans by `a / g`, so that the tilt error is
+//! `k LP_T[z x a] / g` in NED; `k`, the trust in the accelerometer, follows from the size of the
+//! error.
 
 use super::{rotation, vector, wxyz};
 use crate::airframe::GRAVITY_M_S2;
@@ -55,12 +57,14 @@ impl Estimator {
     }
 
     fn attitude(&self, log: &mut FlightLog, draw: &mut Draw) {
-        let (Some(imu), Some(measured)) = (log.sources.get("imu"), log.sources.get("attitude")) else {
+        let (Some(imu), Some(measured)) = (log.sources.get("imu"), log.sources.get("attitude"))
+        else {
             return;
         };
         let Some(channel) = measured.channels.get("q_ned_from_body_wxyz") else { return };
-        let attitudes: Vec<_> =
-            (0..measured.time_s.len()).map(|k| (measured.time_s[k], rotation(channel.row(k)))).collect();
+        let attitudes: Vec<_> = (0..measured.time_s.len())
+            .map(|k| (measured.time_s[k], rotation(channel.row(k))))
+            .collect();
         let mut leaning = Vec::with_capacity(attitudes.len());
         let (mut lean, mut before) = (Vector3::zeros(), None);
         for (time_s, q) in &attitudes {
@@ -77,7 +81,8 @@ impl Estimator {
         let trust = self.tilt_rad / mean_square.sqrt().max(f64::MIN_POSITIVE);
         let constant = draw.sign() * self.heading_rad * HEADING_CONSTANT.sqrt();
         let period_s = attitudes.last().map_or(0.0, |last| last.0) / attitudes.len().max(1) as f64;
-        let mut wander = Wander::new(self.heading_rad * (1.0 - HEADING_CONSTANT).sqrt(), HEADING_S, draw);
+        let mut wander =
+            Wander::new(self.heading_rad * (1.0 - HEADING_CONSTANT).sqrt(), HEADING_S, draw);
         let mut source = Source::default();
         for ((time_s, q), lean) in attitudes.iter().zip(&leaning) {
             let heading = constant + wander.step(period_s, draw).x;
@@ -112,8 +117,10 @@ fn motion(truth: &Source, latency_s: f64, draw: &mut Draw) -> Source {
         if k % every == 0 {
             let velocity = velocity[1] + off_velocity.step(1.0 / RATE_HZ, draw);
             let position = position[1] + off_position.step(1.0 / RATE_HZ, draw);
-            let rows: [(&str, &[f64]); 2] =
-                [("position_ned_m", position.as_slice()), ("velocity_ned_m_s", velocity.as_slice())];
+            let rows: [(&str, &[f64]); 2] = [
+                ("position_ned_m", position.as_slice()),
+                ("velocity_ned_m_s", velocity.as_slice()),
+            ];
             estimate.push(time_s, &rows);
         }
     }
@@ -133,12 +140,14 @@ impl Wander {
     }
     fn step(&mut self, dt_s: f64, draw: &mut Draw) -> Vector3<f64> {
         let keep = (-dt_s / self.time_constant_s).exp();
-        self.now = self.now * keep + Vector3::from(draw.normal3(self.sd * (1.0 - keep * keep).sqrt()));
+        self.now =
+            self.now * keep + Vector3::from(draw.normal3(self.sd * (1.0 - keep * keep).sqrt()));
         self.now
     }
 }
 
-/// By how much an attitude leans from another, and by how much it is turned about the vertical, rad.
+/// By how much an attitude leans from another, and by how much it is turned about the vertical,
+/// rad.
 #[cfg(test)]
 pub(super) fn tilt_and_heading(log: &FlightLog, true_attitude: &Source, time_s: f64) -> (f64, f64) {
     let estimate = super::attitude(&log.sources["attitude"], "q_ned_from_body_wxyz", time_s);

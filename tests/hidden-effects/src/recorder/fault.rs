@@ -32,7 +32,8 @@ pub enum SensorFault {
         /// At this time, s.
         at_s: f64,
     },
-    /// The gyroscope's bias grows from nothing, as in a unit that warms up. No catalogue has a name for it.
+    /// The gyroscope's bias grows from nothing, as in a unit that warms up. No catalogue has a name
+    /// for it.
     GyroDrift {
         /// By so much in a second, rad/s^2.
         drift_rad_s2: [f64; 3],
@@ -45,7 +46,8 @@ impl SensorFault {
 
     /// A kind by its number, 0 to [`Self::KINDS`].
     pub(crate) fn draw(kind: usize, draw: &mut Draw) -> Self {
-        let mut three = |low: f64, high: f64| std::array::from_fn(|_| draw.sign() * draw.uniform(low, high));
+        let mut three =
+            |low: f64, high: f64| std::array::from_fn(|_| draw.sign() * draw.uniform(low, high));
         match kind % Self::KINDS {
             0 => Self::GyroScale { scale_fraction: three(0.02, 0.06) },
             1 => Self::AccelScale { scale_fraction: three(0.01, 0.04) },
@@ -73,9 +75,12 @@ impl SensorFault {
     }
 
     pub(super) fn record(&self, log: &mut FlightLog) {
-        let scale = |fraction: [f64; 3]| move |_: f64, axis: usize, x: f64| x * (1.0 + fraction[axis]);
+        let scale =
+            |fraction: [f64; 3]| move |_: f64, axis: usize, x: f64| x * (1.0 + fraction[axis]);
         match *self {
-            Self::GyroScale { scale_fraction } => each(log, "omega_body_rad_s", scale(scale_fraction)),
+            Self::GyroScale { scale_fraction } => {
+                each(log, "omega_body_rad_s", scale(scale_fraction));
+            }
             Self::AccelScale { scale_fraction } => {
                 each(log, "specific_force_body_m_s2", scale(scale_fraction));
             }
@@ -112,13 +117,15 @@ fn lean(log: &mut FlightLog, heading_rad_per_a: f64) {
     let Some(channel) = attitude.channels.get_mut("q_ned_from_body_wxyz") else { return };
     for (row, time_s) in channel.values.chunks_mut(4).zip(&attitude.time_s) {
         let [current_a] = at::<1>(&battery, "current_a", *time_s);
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading_rad_per_a * current_a);
+        let turn =
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), heading_rad_per_a * current_a);
         row.copy_from_slice(&wxyz(&(turn * rotation(row))));
     }
 }
 
-/// What a clock writes that jumps: from `at_s` on, what was in force at `t` stands under `t + step_s`. The samples keep
-/// their regular stamps, so that these do not give it away; over a gap the last command is held.
+/// What a clock writes that jumps: from `at_s` on, what was in force at `t` stands under
+/// `t + step_s`. The samples keep their regular stamps, so that these do not give it away; over a
+/// gap the last command is held.
 fn stepped(source: &Source, step_s: f64, at_s: f64) -> Source {
     let taken = |t: &f64| {
         let real_s = if *t < at_s {

@@ -1,6 +1,6 @@
-//! What writes the log down. Flights come with the sensors' readings and the truth; a recorder turns them into what people
-//! have: the readings as they are, an autopilot's estimates, a motion capture's poses, or readings of sensors that err.
-//! The truth itself never leaves.
+//! What writes the log down. Flights come with the sensors' readings and the truth; a recorder
+//! turns them into what people have: the readings as they are, an autopilot's estimates, a motion
+//! capture's poses, or readings of sensors that err. The truth itself never leaves.
 
 mod capture;
 mod estimator;
@@ -30,7 +30,8 @@ pub enum Recorder {
     Faulty(SensorFault),
 }
 
-/// The source of a flight that holds the truth: `position_ned_m`, `velocity_ned_m_s`, `q_ned_from_body_wxyz`.
+/// The source of a flight that holds the truth: `position_ned_m`, `velocity_ned_m_s`,
+/// `q_ned_from_body_wxyz`.
 pub(crate) const TRUTH: &str = "truth";
 
 impl Recorder {
@@ -63,7 +64,8 @@ fn vector(source: &Source, channel: &str, time_s: f64) -> Vector3<f64> {
     Vector3::from(at::<3>(source, channel, time_s))
 }
 
-/// Neighbouring attitudes of a flight are close: a line between them, made a rotation again, is the way between them.
+/// Neighbouring attitudes of a flight are close: a line between them, made a rotation again, is the
+/// way between them.
 fn attitude(source: &Source, channel: &str, time_s: f64) -> UnitQuaternion<f64> {
     rotation(&at::<4>(source, channel, time_s))
 }

@@ -12,7 +12,8 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// The delay at which velocities at 50 Hz fit best, s: the bottom of their mean squared difference, on a parabola.
+/// The delay at which velocities at 50 Hz fit best, s: the bottom of their mean squared difference,
+/// on a parabola.
 fn delay_s(truth: &[Vector3<f64>], late: &[Vector3<f64>]) -> f64 {
     let at = |shift: usize| -> f64 {
         (10..truth.len()).map(|k| (truth[k - shift] - late[k]).xy().norm_squared()).sum()
@@ -28,15 +29,18 @@ fn estimates_lean_by_their_size_and_are_fifty_milliseconds_late() {
     // Cases 1 and 3 hide nothing; each generator flies one.
     for index in [1, 3] {
         let (flown, log) = both(Set::Estimates, index);
-        let Recorder::Estimator(filter) = Case::draw(Set::Estimates, index, 1).answer.recorder else {
+        let Recorder::Estimator(filter) = Case::draw(Set::Estimates, index, 1).answer.recorder
+        else {
             panic!("an estimator records")
         };
         assert!((0.5..1.5).contains(&filter.tilt_rad.to_degrees()));
         let truth = &flown.sources[TRUTH];
-        let errors: Vec<_> =
-            (0..3900).map(|k| estimator::tilt_and_heading(&log, truth, 0.01 * f64::from(k) + 0.5)).collect();
+        let errors: Vec<_> = (0..3900)
+            .map(|k| estimator::tilt_and_heading(&log, truth, 0.01 * f64::from(k) + 0.5))
+            .collect();
         let [tilt, heading] = [0, 1].map(|which| {
-            rms(&errors.iter().map(|e| if which == 0 { e.0 } else { e.1 }).collect::<Vec<_>>()).to_degrees()
+            rms(&errors.iter().map(|e| if which == 0 { e.0 } else { e.1 }).collect::<Vec<_>>())
+                .to_degrees()
         });
         // What the sensors' own attitude wanders by comes on top.
         assert!((tilt / filter.tilt_rad.to_degrees() - 1.0).abs() < 0.25, "{index}: {tilt} deg");
@@ -65,7 +69,8 @@ fn tilt_errors_follow_the_acceleration() {
             - vector(truth, "velocity_ned_m_s", time_s))
             / 0.01;
         slow += (Vector3::z().cross(&rate) - slow) * 0.005;
-        let error = attitude(estimates, channel, time_s) * attitude(truth, channel, time_s).inverse();
+        let error =
+            attitude(estimates, channel, time_s) * attitude(truth, channel, time_s).inverse();
         let error = error.scaled_axis();
         product += slow.xy().dot(&error.xy());
         squares[0] += slow.xy().norm_squared();
@@ -84,7 +89,10 @@ fn captures_hold_poses_commands_and_voltage_only() {
         };
         let names: Vec<_> = log.sources.keys().map(String::as_str).collect();
         assert_eq!(names, ["attitude", "battery", "gnss", "rotor", "wing"]);
-        assert!(log.channel("battery.current_a").is_none() && log.channel("battery.voltage_v").is_some());
+        assert!(
+            log.channel("battery.current_a").is_none()
+                && log.channel("battery.voltage_v").is_some()
+        );
         assert_eq!(log.channel("gnss.velocity_ned_m_s").is_some(), capture.has_velocity);
         let (times, positions) = log.channel("gnss.position_ned_m").unwrap();
         assert!((3950..4001).contains(&times.len()));
@@ -109,7 +117,8 @@ fn faults_have_their_size() {
         let case = Case::draw(Set::Sensors, index, 1);
         let Recorder::Faulty(fault) = case.answer.recorder else { panic!("a sensor errs") };
         let (flown, log) = (case.flown(0).unwrap(), case.flight(0).unwrap());
-        let row = |log: &FlightLog, name: &str, k: usize| log.channel(name).unwrap().1.row(k).to_vec();
+        let row =
+            |log: &FlightLog, name: &str, k: usize| log.channel(name).unwrap().1.row(k).to_vec();
         let (gyro, accel) = ("imu.omega_body_rad_s", "imu.specific_force_body_m_s2");
         match fault {
             SensorFault::GyroScale { scale_fraction } => {
@@ -124,7 +133,9 @@ fn faults_have_their_size() {
             }
             SensorFault::CompassCurrent { heading_rad_per_a } => {
                 let [current_a] = at::<1>(&flown.sources["battery"], "current_a", 3.0);
-                let q = |log: &FlightLog| attitude(&log.sources["attitude"], "q_ned_from_body_wxyz", 3.0);
+                let q = |log: &FlightLog| {
+                    attitude(&log.sources["attitude"], "q_ned_from_body_wxyz", 3.0)
+                };
                 let turned = (q(&log) * q(&flown).inverse()).scaled_axis().z;
                 assert!((turned / (heading_rad_per_a * current_a) - 1.0).abs() < 0.02, "{turned}");
             }
@@ -132,7 +143,8 @@ fn faults_have_their_size() {
                 let late = |k: usize| {
                     let time_s = k as f64 / 300.0;
                     let source = &flown.sources["rotor"];
-                    let before = source.time_s.partition_point(|t| *t <= time_s - step_s + 1e-9) - 1;
+                    let before =
+                        source.time_s.partition_point(|t| *t <= time_s - step_s + 1e-9) - 1;
                     row(&log, "rotor.command", k) == row(&flown, "rotor.command", before)
                 };
                 assert!((0.02..0.1).contains(&step_s.abs()));

@@ -1,7 +1,9 @@
-//! The first flight generator: squirrel itself, with the hidden effects in the vehicle file that flies.
+//! The first flight generator: squirrel itself, with the hidden effects in the vehicle file that
+//! flies.
 //!
-//! The individual is a vehicle file too, so that all its rotors are alike. What is logged beyond the sensors and the
-//! commands is taken out, and commands are put on the clock of the inertial unit: their own stamps would give a skew away.
+//! The individual is a vehicle file too, so that all its rotors are alike. What is logged beyond
+//! the sensors and the commands is taken out, and commands are put on the clock of the inertial
+//! unit: their own stamps would give a skew away.
 
 mod tables;
 
@@ -89,9 +91,12 @@ fn stayed_up(log: &FlightLog) -> Result<(), String> {
         return Err("the flight has no truth".to_owned());
     };
     for (k, time_s) in time_s.iter().enumerate() {
-        let (height_m, rate) = (-position.row(k)[2], omega.row(k).iter().map(|w| w * w).sum::<f64>().sqrt());
+        let (height_m, rate) =
+            (-position.row(k)[2], omega.row(k).iter().map(|w| w * w).sum::<f64>().sqrt());
         if !(height_m > 0.0 && rate < 25.0) {
-            return Err(format!("lost at {time_s:.2} s: height {height_m:.2} m, rate {rate:.1} rad/s"));
+            return Err(format!(
+                "lost at {time_s:.2} s: height {height_m:.2} m, rate {rate:.1} rad/s"
+            ));
         }
     }
     Ok(())
@@ -113,7 +118,8 @@ fn on_board(log: &FlightLog) -> FlightLog {
     kept
 }
 
-/// A source on another clock: each sample is the last one before it, the first also before the first.
+/// A source on another clock: each sample is the last one before it, the first also before the
+/// first.
 fn held(source: &Source, clock: &[f64]) -> Source {
     let at = |t: &f64| source.time_s.partition_point(|stamp| *stamp <= t + 1e-9).saturating_sub(1);
     let channels = source.channels.iter().map(|(name, channel)| {

@@ -5,7 +5,8 @@ use crate::catalogue::{HiddenEffect, Value};
 use crate::independent::white;
 use std::fmt::Write as _;
 
-/// Gains per second: they hold for every vehicle of the class, and low enough for the largest lag and latency.
+/// Gains per second: they hold for every vehicle of the class, and low enough for the largest lag
+/// and latency.
 const CONTROL: &str = "
 [control]
 thrust_min_n = 0.5
@@ -154,8 +155,11 @@ pub fn effect_table(effect: &HiddenEffect) -> String {
 }
 
 const ROUGHNESS_M: f64 = 0.05;
-const DRIFTS: [(&str, &str); 3] =
-    [("bias_x_m_s2", "drift_x_m_s3"), ("bias_y_m_s2", "drift_y_m_s3"), ("bias_z_m_s2", "drift_z_m_s3")];
+const DRIFTS: [(&str, &str); 3] = [
+    ("bias_x_m_s2", "drift_x_m_s3"),
+    ("bias_y_m_s2", "drift_y_m_s3"),
+    ("bias_z_m_s2", "drift_z_m_s3"),
+];
 
 #[cfg(test)]
 mod tests {

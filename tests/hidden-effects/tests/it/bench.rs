@@ -11,7 +11,8 @@ struct Folder(PathBuf);
 
 impl Folder {
     fn new(name: &str) -> Self {
-        let path = std::env::temp_dir().join(format!("hidden-effects-{name}-{}", std::process::id()));
+        let path =
+            std::env::temp_dir().join(format!("hidden-effects-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&path).unwrap();
         Self(path)
     }
@@ -24,7 +25,8 @@ impl Drop for Folder {
     }
 }
 
-/// A program that writes a fixed verdict into the folder after `--out`, if every file that it is given exists.
+/// A program that writes a fixed verdict into the folder after `--out`, if every file that it is
+/// given exists.
 fn program(folder: &Path, verdict: &str) -> PathBuf {
     let script = format!(
         "#!/bin/sh\nset -e\nwhile [ $# -gt 0 ]; do case \"$1\" in\n--out) test -d \"$2\"; json=\"$2/verdict.json\"; shift 2;;\n\
@@ -50,7 +52,8 @@ fn plan(folder: &Folder, verdict: &str) -> Plan {
     }
 }
 
-/// One test: a script that is being written while another thread starts a process cannot be started itself.
+/// One test: a script that is being written while another thread starts a process cannot be started
+/// itself.
 #[test]
 fn programs_that_answer_without_looking_are_seen_through() {
     says_none();
@@ -73,10 +76,12 @@ fn says_none() {
     assert!(left.is_empty(), "cases are not kept: {left:?}");
 }
 
-/// What the new sets make of a program that says nothing and of one that guesses; good flights are given where they are.
+/// What the new sets make of a program that says nothing and of one that guesses; good flights are
+/// given where they are.
 fn new_sets() {
     let folder = Folder::new("new");
-    let sets = [Set::Estimates, Set::Sensors, Set::Capture, Set::Overstated, Set::Misfit, Set::Baseline];
+    let sets =
+        [Set::Estimates, Set::Sensors, Set::Capture, Set::Overstated, Set::Misfit, Set::Baseline];
     let cases: Vec<_> = sets.into_iter().flat_map(|set| [(set, 0), (set, 1)]).collect();
     let run = |verdict: &str| {
         let plan = Plan { cases: cases.clone(), ..plan(&folder, verdict) };
@@ -87,8 +92,7 @@ fn new_sets() {
         let nothing = half.contains(&outcome.set) && outcome.hidden.is_empty();
         assert_eq!((outcome.right, outcome.failure.clone()), (nothing, None), "{outcome:?}");
     }
-    let guess =
-        r#"{"verdict": "named_incomplete", "effects": [{"name": "linear_drag"}], "model_patch": "a.toml"}"#;
+    let guess = r#"{"verdict": "named_incomplete", "effects": [{"name": "linear_drag"}], "model_patch": "a.toml"}"#;
     for outcome in run(guess) {
         // The name of the first effect is right, but it takes a number to mend a file.
         let drag = outcome.hidden == ["linear_drag"];
@@ -106,7 +110,8 @@ fn guesses_then_fails() {
     let folder = Folder::new("guess");
     let guess = r#"{"verdict": "named", "effects": [{"name": "motor_lag"}]}"#;
     let mut plan = plan(&folder, guess);
-    let wrong: Vec<bool> = bench::run(&plan).unwrap().iter().map(|outcome| outcome.silent_wrong).collect();
+    let wrong: Vec<bool> =
+        bench::run(&plan).unwrap().iter().map(|outcome| outcome.silent_wrong).collect();
     assert_eq!(wrong, [true, false, true]);
     plan.squirrel = folder.0.join("nowhere");
     let failures = bench::run(&plan).unwrap();

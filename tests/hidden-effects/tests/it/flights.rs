@@ -16,7 +16,8 @@ fn largest(values: &[f64]) -> f64 {
 
 /// Speeds over ground at the edges of the wing command, m/s.
 fn edge_speeds(log: &FlightLog) -> Vec<f64> {
-    let (north, east) = (column(log, "gnss.velocity_ned_m_s", 0), column(log, "gnss.velocity_ned_m_s", 1));
+    let (north, east) =
+        (column(log, "gnss.velocity_ned_m_s", 0), column(log, "gnss.velocity_ned_m_s", 1));
     let wing = column(log, "wing.command", 0);
     let edges = (1..wing.len()).filter(|&k| wing[k] != wing[k - 1]);
     // Receiver samples come every 30 inertial ones, the first after 30.
@@ -34,7 +35,11 @@ fn rich_flights_go_fast_climb_and_open_the_wings_at_speed() {
             let speed: Vec<f64> = north.iter().zip(&east).map(|(n, e)| n.hypot(*e)).collect();
             let climb = column(log, "gnss.velocity_ned_m_s", 2);
             assert!((8.3..11.5).contains(&largest(&speed)), "{index}: {} m/s", largest(&speed));
-            assert!((2.6..4.4).contains(&largest(&climb)), "{index}: {} m/s up or down", largest(&climb));
+            assert!(
+                (2.6..4.4).contains(&largest(&climb)),
+                "{index}: {} m/s up or down",
+                largest(&climb)
+            );
             let edges = edge_speeds(log);
             let fast = edges.iter().filter(|&&speed| speed > 4.5).count();
             assert!(edges.len() == 6 && fast >= 5, "{index}: wings move at {edges:.1?} m/s");
@@ -52,7 +57,10 @@ fn calm_flights_stay_slow_and_folded() {
         let log = Case::draw(Set::Calm, 2 * index, 3).flight(0).unwrap();
         let speeds = [0, 1].map(|axis| largest(&column(&log, "gnss.velocity_ned_m_s", axis)));
         // Noise of the receiver and its largest of 400 samples on top of 2 m/s.
-        assert!(speeds[0].hypot(speeds[1]) < 2.9 && edge_speeds(&log).is_empty(), "{index}: {speeds:?}");
+        assert!(
+            speeds[0].hypot(speeds[1]) < 2.9 && edge_speeds(&log).is_empty(),
+            "{index}: {speeds:?}"
+        );
     }
 }
 
@@ -65,7 +73,10 @@ fn a_case_is_a_folder_and_its_answer_is_elsewhere() {
     for (number, name) in case.flight_names().iter().enumerate() {
         let log = FlightLog::read(&made.join(name)).unwrap();
         assert_eq!(log, case.flight(number).unwrap());
-        assert!(log.metadata.is_empty(), "what a log says of its making could give the answer away");
+        assert!(
+            log.metadata.is_empty(),
+            "what a log says of its making could give the answer away"
+        );
     }
     let answer = folder.join("answers").join(format!("{}.json", case.answer.case));
     let answer: Answer = serde_json::from_slice(&std::fs::read(answer).unwrap()).unwrap();
@@ -82,8 +93,10 @@ fn a_case_is_a_folder_and_its_answer_is_elsewhere() {
 
 /// Every file of a folder with its bytes, by path inside it.
 fn files(folder: &Path, inside: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut entries: Vec<_> =
-        std::fs::read_dir(folder.join(inside)).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    let mut entries: Vec<_> = std::fs::read_dir(folder.join(inside))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name())
+        .collect();
     entries.sort();
     let mut all = Vec::new();
     for name in entries {
@@ -98,7 +111,8 @@ fn files(folder: &Path, inside: &Path) -> Vec<(PathBuf, Vec<u8>)> {
 
 #[test]
 fn the_same_seed_makes_the_same_bytes_in_every_new_set() {
-    let folder = |which: &str| std::env::temp_dir().join(format!("hidden-{which}-{}", std::process::id()));
+    let folder =
+        |which: &str| std::env::temp_dir().join(format!("hidden-{which}-{}", std::process::id()));
     let [first, second] = ["first", "second"].map(folder);
     for set in [
         Set::Estimates,

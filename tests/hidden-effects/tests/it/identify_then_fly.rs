@@ -1,8 +1,9 @@
-//! Identify, then fly: an effect is hidden in the vehicle, two excitation flights are diagnosed, the named effect is added to
-//! the vehicle file, and the patched vehicle flies other missions in closed loop. It must fly them as the true one does.
+//! Identify, then fly: an effect is hidden in the vehicle, two excitation flights are diagnosed,
+//! the named effect is added to the vehicle file, and the patched vehicle flies other missions in
+//! closed loop. It must fly them as the true one does.
 //!
-//! A few effects by default; `IDENTIFY_CASES=50 cargo test -p hidden-effects --release --test identify_then_fly -- --nocapture`
-//! draws as many as one likes.
+//! A few effects by default; `IDENTIFY_CASES=50 cargo test -p hidden-effects --release --test
+//! identify_then_fly -- --nocapture` draws as many as one likes.
 #![allow(clippy::print_stdout, reason = "tests")]
 
 use hidden_effects::catalogue::{CATALOGUE, CLASS_MASS_KG};
@@ -23,14 +24,20 @@ const ROTORS: usize = 4;
 /// What is flown, by whom.
 const MISSIONS: [(&str, Arm); 2] = [("track", Arm::Pc), ("avoid", Arm::TwccFlat)];
 
-fn fly(vehicle: &VehicleFile, scenario: Scenario, arm: Arm, seed: u64, record: bool) -> Option<Flight> {
+fn fly(
+    vehicle: &VehicleFile,
+    scenario: Scenario,
+    arm: Arm,
+    seed: u64,
+    record: bool,
+) -> Option<Flight> {
     let scenario = Scenario { seed, ..scenario };
     let setup = Setup { vehicle: vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 };
     setup.fly(record, |_| {}).ok()
 }
 
-/// An excitation flight that does not touch the ground, whose forces are no flight: a vehicle that is heavier than it thinks
-/// flies its ladder higher. `None` if it does not stay up at all.
+/// An excitation flight that does not touch the ground, whose forces are no flight: a vehicle that
+/// is heavier than it thinks flies its ladder higher. `None` if it does not stay up at all.
 fn excite(vehicle: &VehicleFile, seed: u64) -> Option<FlightLog> {
     let mut flown = (0..8).filter_map(|attempt| {
         let mut scenario = Scenario::find("excite_rich").unwrap();
@@ -46,7 +53,8 @@ fn excite(vehicle: &VehicleFile, seed: u64) -> Option<FlightLog> {
     flown.find(clear)
 }
 
-/// A mission that every vehicle can fly: at the scenario's own 1.25 the weakest do not even reach the obstacle.
+/// A mission that every vehicle can fly: at the scenario's own 1.25 the weakest do not even reach
+/// the obstacle.
 fn mission(name: &str) -> Scenario {
     let scenario = Scenario::find(name).unwrap();
     Scenario { thrust_to_weight: scenario.thrust_to_weight.map(|ratio| ratio.max(1.6)), ..scenario }
@@ -57,7 +65,8 @@ struct Case {
     hidden: String,
     /// The verdict and its names.
     said: String,
-    /// Difference of the patched vehicle's tracking error from the true one's, part of it, for each mission.
+    /// Difference of the patched vehicle's tracking error from the true one's, part of it, for each
+    /// mission.
     differences: [f64; 2],
     /// The same for the vehicle as it was.
     nominal: [f64; 2],
@@ -74,14 +83,16 @@ fn case(name: &str, seed: u64) -> Option<Case> {
     let entry = CATALOGUE.iter().find(|entry| entry.name == name).unwrap();
     let effect = entry.draw(&mut Draw::new(seed), "standard", CLASS_MASS_KG, ROTORS);
     let nominal = VehicleFile::squirrel();
-    let truth = VehicleFile::parse(&(SQUIRREL_TOML.to_owned() + &effect_table(&effect)), "truth").unwrap();
+    let truth =
+        VehicleFile::parse(&(SQUIRREL_TOML.to_owned() + &effect_table(&effect)), "truth").unwrap();
 
     let log = |name: &str, seed| excite(&truth, seed).map(|log| (name.to_owned(), log));
     let flights = [log("first", 2 * seed + 2)?, log("second", 2 * seed + 3)?];
     let diagnosis = diagnose(&nominal, &flights, &[], &|_| {}).unwrap();
     let names: Vec<&str> = diagnosis.verdict.effects.iter().map(|effect| effect.name).collect();
     let said = format!("{:?} {}", diagnosis.verdict.verdict, names.join(" + "));
-    let named = [Kind::Named, Kind::NamedFormDiffers, Kind::Ambiguous].contains(&diagnosis.verdict.verdict);
+    let named =
+        [Kind::Named, Kind::NamedFormDiffers, Kind::Ambiguous].contains(&diagnosis.verdict.verdict);
     let patched = if named {
         let text = add(&nominal, &diagnosis, &["first".to_owned(), "second".to_owned()]).unwrap();
         VehicleFile::parse(&text, "patched").unwrap()
@@ -90,7 +101,8 @@ fn case(name: &str, seed: u64) -> Option<Case> {
     };
 
     let rmse = |vehicle: &VehicleFile| -> Option<[f64; 2]> {
-        let [track, avoid] = MISSIONS.map(|(name, arm)| fly(vehicle, mission(name), arm, 1000 + seed, false));
+        let [track, avoid] =
+            MISSIONS.map(|(name, arm)| fly(vehicle, mission(name), arm, 1000 + seed, false));
         Some([track?.metrics.rmse_m, avoid?.metrics.rmse_m])
     };
     let (truth, lost) = (rmse(&truth)?, [f64::INFINITY; 2]);
@@ -112,7 +124,10 @@ fn the_patched_vehicle_flies_as_the_true_one() {
             .collect(),
         Err(_) => FEW.iter().enumerate().map(|(i, name)| (*name, i as u64)).collect(),
     };
-    println!("tracking error over that of the true vehicle, %: {} and {}", MISSIONS[0].0, MISSIONS[1].0);
+    println!(
+        "tracking error over that of the true vehicle, %: {} and {}",
+        MISSIONS[0].0, MISSIONS[1].0
+    );
     let (mut right, mut wrong) = (0, Vec::new());
     for (name, seed) in &cases {
         let case = (0..5).find_map(|again| case(name, seed + 100 * again)).unwrap();

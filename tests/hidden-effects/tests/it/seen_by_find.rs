@@ -1,6 +1,7 @@
-//! Flights of the independent generator against squirrel's own model: without a hidden effect the residual is that of the
-//! sensors and the tolerances, which proves that signs, frames and timing agree; with one it is larger where it should be,
-//! and goes away when the vehicle file states the effect. `SQUIRREL_EFFECT=NAME` asks for one effect alone.
+//! Flights of the independent generator against squirrel's own model: without a hidden effect the
+//! residual is that of the sensors and the tolerances, which proves that signs, frames and timing
+//! agree; with one it is larger where it should be, and goes away when the vehicle file states the
+//! effect. `SQUIRREL_EFFECT=NAME` asks for one effect alone.
 
 use hidden_effects::case::{Case, Set};
 use hidden_effects::catalogue::{CATALOGUE, Entry, HiddenEffect};
@@ -24,7 +25,12 @@ fn of(case: &Case) -> [f64; 6] {
 }
 
 fn hidden(none: &Case, entry: &Entry, seed: u64) -> HiddenEffect {
-    entry.draw(&mut Draw::new(seed), "standard", none.nominal().mass_kg, none.nominal().rotors.len())
+    entry.draw(
+        &mut Draw::new(seed),
+        "standard",
+        none.nominal().mass_kg,
+        none.nominal().rotors.len(),
+    )
 }
 
 fn is_asked_for(name: &str) -> bool {
@@ -55,8 +61,8 @@ fn without_an_effect_only_noise_and_tolerances_are_left() {
     }
 }
 
-/// Where each effect of the dynamics must show, beside those that say so in a file of their own: force x, y, z, moment x, y, z.
-/// Those of the sensors are elsewhere.
+/// Where each effect of the dynamics must show, beside those that say so in a file of their own:
+/// force x, y, z, moment x, y, z. Those of the sensors are elsewhere.
 const SHOWS: [(&str, &[usize]); 24] = [
     ("linear_drag", &[0, 1]),
     ("quadratic_drag", &[0, 1, 2]),
@@ -89,7 +95,8 @@ fn every_effect_of_the_dynamics_shows_in_its_channels() {
     let none = Case::draw(Set::None, 0, 2);
     let base = of(&none);
     let of_files = CATALOGUE.iter().filter(|e| !e.shows.is_empty()).map(|e| (e.name, e.shows));
-    for (name, channels) in SHOWS.into_iter().chain(of_files).filter(|(name, _)| is_asked_for(name)) {
+    for (name, channels) in SHOWS.into_iter().chain(of_files).filter(|(name, _)| is_asked_for(name))
+    {
         let entry = CATALOGUE.iter().find(|e| e.name == name).unwrap();
         let r = of(&none.hiding(vec![hidden(&none, entry, 2)], None));
         for &channel in channels {
@@ -101,9 +108,10 @@ fn every_effect_of_the_dynamics_shows_in_its_channels() {
     }
 }
 
-/// Effects of squirrel's core whose standard equation is compared: the same name, number and sign give the same physics.
-/// `ground_effect` and `actuation_latency` are not among them: `find` believes the barometer, whose zero is off by more than a
-/// height near the ground bears, and it knows no lateness.
+/// Effects of squirrel's core whose standard equation is compared: the same name, number and sign
+/// give the same physics. `ground_effect` and `actuation_latency` are not among them: `find`
+/// believes the barometer, whose zero is off by more than a height near the ground bears, and it
+/// knows no lateness.
 const SHARED: [&str; 19] = [
     "added_mass",
     "rotor_gyro_torque",
@@ -134,17 +142,23 @@ fn an_effect_stated_in_the_vehicle_file_is_the_effect_that_flew() {
         let of_files = CATALOGUE.iter().filter(|e| !e.shows.is_empty()).map(|e| e.name);
         for name in SHARED.into_iter().chain(of_files).filter(|name| is_asked_for(name)) {
             let entry = CATALOGUE.iter().find(|e| e.name == name).unwrap();
-            let forms = ["standard"].iter().chain(entry.forms).filter(|form| !UNSHARED_FORMS.contains(*form));
+            let forms = ["standard"]
+                .iter()
+                .chain(entry.forms)
+                .filter(|form| !UNSHARED_FORMS.contains(*form));
             for form in forms {
                 let (mass_kg, rotors) = (none.nominal().mass_kg, none.nominal().rotors.len());
                 let effect = entry.draw(&mut Draw::new(seed), form, mass_kg, rotors);
                 let toml = none.nominal().to_toml() + &effect_table(&effect);
-                let mass_or_inertia = effect.number("mass_fraction") + effect.number("inertia_fraction");
+                let mass_or_inertia =
+                    effect.number("mass_fraction") + effect.number("inertia_fraction");
                 let case = none.hiding(vec![effect], None);
                 let (without, with) = (of(&case), residual(&toml, case.flight(0).unwrap()));
                 for channel in 0..6 {
-                    let (before, after) = (without[channel] / base[channel], with[channel] / base[channel]);
-                    // A sensor's error enters through the effect, and noise of an acceleration is worth mass or inertia.
+                    let (before, after) =
+                        (without[channel] / base[channel], with[channel] / base[channel]);
+                    // A sensor's error enters through the effect, and noise of an acceleration is
+                    // worth mass or inertia.
                     let heavier = 1.0 + mass_or_inertia.abs();
                     let most = heavier * (1.15 + 0.15 * (before - 1.0).max(0.0));
                     assert!(

@@ -1,4 +1,5 @@
-//! Cases that squirrel flies itself: they hold the same channels as the others, nothing more, and stay in the air.
+//! Cases that squirrel flies itself: they hold the same channels as the others, nothing more, and
+//! stay in the air.
 
 use hidden_effects::case::{Case, Generator, Set};
 use squirrel_log::FlightLog;

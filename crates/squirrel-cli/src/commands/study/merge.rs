@@ -41,14 +41,17 @@ impl Options {
         let merged = self.merged();
         if merged.is_err() && is_new {
             // Nothing half done is left.
-            std::fs::remove_dir_all(&self.out).map_err(|e| format!("{}: {e}", self.out.display()))?;
+            std::fs::remove_dir_all(&self.out)
+                .map_err(|e| format!("{}: {e}", self.out.display()))?;
         }
         merged
     }
 
-    /// The journals that are read, and those that are written; what follows from them is the study's.
+    /// The journals that are read, and those that are written; what follows from them is the
+    /// study's.
     fn paths(&self) -> Result<Paths, String> {
-        let mut paths = Paths::default().vehicle("--vehicle", &self.vehicle).writes("--json", &self.json);
+        let mut paths =
+            Paths::default().vehicle("--vehicle", &self.vehicle).writes("--json", &self.json);
         let mut all = BTreeSet::new();
         for folder in &self.folders {
             let names = journals(folder).map_err(|e| e.to_string())?;
@@ -61,7 +64,8 @@ impl Options {
     fn merged(&self) -> Result<(), String> {
         let command = merge(&self.folders, &self.out).map_err(|e| e.to_string())?;
         let unknown = |_| format!("{}: is no study of this version", command.join(" "));
-        let Studies::Fly(mut flown) = Again::try_parse_from(&command).map_err(unknown)?.study else {
+        let Studies::Fly(mut flown) = Again::try_parse_from(&command).map_err(unknown)?.study
+        else {
             return Err("merge: no study".to_owned());
         };
         flown.common.out = Some(self.out.clone());

@@ -1,8 +1,9 @@
 //! Integral backstepping in Euler angles.
 //!
-//! Source: Bouabdallah and Siegwart 2007, the law that the paper's section III.A names; derivation in docs/equations.md B.1, B.2.
-//! Differs from the source: the exact kinematics `omega = E rate` replace "body rate = angle rate", so that the closed
-//! loop is `angle'' = nu` for any angles below 90 deg of pitch and the Lyapunov proof holds there.
+//! Source: Bouabdallah and Siegwart 2007, the law that the paper's section III.A names; derivation
+//! in docs/equations.md B.1, B.2. Differs from the source: the exact kinematics `omega = E rate`
+//! replace "body rate = angle rate", so that the closed loop is `angle'' = nu` for any angles below
+//! 90 deg of pitch and the Lyapunov proof holds there.
 //!
 //! ```text
 //! e1 = angle_d - angle          e2 = c1 e1 + rate_d + lambda chi - rate          chi' = e1

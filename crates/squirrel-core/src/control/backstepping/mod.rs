@@ -1,7 +1,8 @@
 //! Integral backstepping attitude control: attitude error to body torque.
 //!
-//! Two forms of one idea. [`euler`] is the law of the paper's source (Bouabdallah and Siegwart 2007) made exact with the
-//! Euler kinematics; [`quaternion`] has no singularity and does not unwind. Both return every term.
+//! Two forms of one idea. [`euler`] is the law of the paper's source (Bouabdallah and Siegwart
+//! 2007) made exact with the Euler kinematics; [`quaternion`] has no singularity and does not
+//! unwind. Both return every term.
 
 pub mod euler;
 pub mod quaternion;
@@ -16,7 +17,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Longest step that the inner loop integrates over, s; a longer gap counts as this.
 pub const INNER_STEP_MAX_S: f32 = 0.02;
-/// Largest yaw error that the quaternion law is given, rad: 20 deg, twice of what tight turns leave.
+/// Largest yaw error that the quaternion law is given, rad: 20 deg, twice of what tight turns
+/// leave.
 pub const YAW_LEAD_MAX_RAD: f32 = 0.35;
 
 /// Which law turns error into torque.
@@ -31,8 +33,9 @@ pub enum AttitudeForm {
 impl AttitudeForm {
     /// The yaw to turn to on the way to a commanded one.
     ///
-    /// The quaternion law turns roll, pitch and yaw together, and a large error of yaw leads it beside the thrust axis that was asked for. Yaw is
-    /// the weakest axis, and the first that is given up where thrust is short: the yaw to turn to is never further than
+    /// The quaternion law turns roll, pitch and yaw together, and a large error of yaw leads it
+    /// beside the thrust axis that was asked for. Yaw is the weakest axis, and the first that is
+    /// given up where thrust is short: the yaw to turn to is never further than
     /// [`YAW_LEAD_MAX_RAD`] from the measured one. The Euler law needs no such limit.
     pub fn yaw_target_rad(self, measured_rad: f32, commanded_rad: f32) -> f32 {
         match self {
@@ -41,10 +44,12 @@ impl AttitudeForm {
         }
     }
 
-    /// The heading that commanded roll and pitch have to be of for thrust to point where it was asked to.
+    /// The heading that commanded roll and pitch have to be of for thrust to point where it was
+    /// asked to.
     ///
-    /// The Euler law controls each angle on its own: roll and pitch act at the yaw that there is. The quaternion law turns to one attitude, of
-    /// which [`Self::yaw_target_rad`] is a part: roll and pitch of another heading would tilt beside what was asked for while yaw lags.
+    /// The Euler law controls each angle on its own: roll and pitch act at the yaw that there is.
+    /// The quaternion law turns to one attitude, of which [`Self::yaw_target_rad`] is a part: roll
+    /// and pitch of another heading would tilt beside what was asked for while yaw lags.
     pub fn heading_rad(self, measured_rad: f32, commanded_rad: f32) -> f32 {
         match self {
             Self::Euler => measured_rad,
@@ -84,7 +89,8 @@ pub struct AttitudeState {
 /// Every term of one attitude step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttitudeTerms {
-    /// Angle error as the law defines it (reference minus angle, or minus twice the vector part), rad.
+    /// Angle error as the law defines it (reference minus angle, or minus twice the vector part),
+    /// rad.
     pub angle_error: Vector3<f32>,
     /// Rate error, rad/s.
     pub rate_error: Vector3<f32>,
@@ -109,8 +115,7 @@ impl AttitudeGains {
         // Where the filter's step is stable, for the longest step that the stack takes.
         let turn = self.filter_frequency_rad_s * INNER_STEP_MAX_S;
         if turn * turn + 4.0 * self.filter_damping * turn >= 4.0 {
-            let reason =
-                "the filter would run away: with x = frequency * 0.02 s, x^2 + 4 damping x must be < 4";
+            let reason = "the filter would run away: with x = frequency * 0.02 s, x^2 + 4 damping x must be < 4";
             return Err(ParameterError::of(
                 "control.attitude.filter_frequency_rad_s",
                 self.filter_frequency_rad_s,
@@ -143,7 +148,8 @@ impl AttitudeGains {
     ) -> AttitudeTerms {
         let (torque, angle_error, rate_error) = match self.form {
             AttitudeForm::Euler => {
-                let law = euler::Law { c1: self.c1_per_s, c2: self.c2_per_s, lambda: self.lambda_per_s2 };
+                let law =
+                    euler::Law { c1: self.c1_per_s, c2: self.c2_per_s, lambda: self.lambda_per_s2 };
                 let (roll, pitch, yaw) = ned_from_body.euler();
                 let out = law.torque(
                     inertia_kg_m2,
@@ -171,7 +177,8 @@ impl AttitudeGains {
                 // The integral of half the error drives the quaternion law; its sign is opposite.
                 let chi = state.integral * -0.5;
                 let sign = if state.negative_sign { -1.0 } else { 1.0 };
-                let out = law.torque(&ned_from_body.wxyz(), &(*omega).into(), &target, &chi.into(), sign);
+                let out =
+                    law.torque(&ned_from_body.wxyz(), &(*omega).into(), &target, &chi.into(), sign);
                 state.negative_sign = out.sign < 0.0;
                 (out.torque.into(), Vector3::from(out.z1) * -2.0, -Vector3::from(out.z2))
             }
@@ -207,7 +214,8 @@ pub fn integrated<L: Lane>(integral: &[L; 3], error: &[L; 3], largest: L, dt_s: 
     next
 }
 
-/// Sines and cosines of roll and pitch, and with them the kinematics of Euler angles, `omega = E(angle) rate`.
+/// Sines and cosines of roll and pitch, and with them the kinematics of Euler angles,
+/// `omega = E(angle) rate`.
 #[derive(Debug, Clone, Copy)]
 pub struct Tilt<T> {
     sr: T,
@@ -221,7 +229,12 @@ impl<L: Lane> Tilt<L> {
     #[inline(always)]
     pub fn of_halves((sr, cr): (L, L), (sp, cp): (L, L)) -> Self {
         let (one, two) = (L::of(1.0), L::of(2.0));
-        Self { sr: two * sr * cr, cr: one - two * sr * sr, sp: two * sp * cp, cp: one - two * sp * sp }
+        Self {
+            sr: two * sr * cr,
+            cr: one - two * sr * sr,
+            sp: two * sp * cp,
+            cp: one - two * sp * sp,
+        }
     }
 
     /// `E rate`: the body rate of Euler angle rates.
@@ -297,9 +310,15 @@ mod fixtures {
 
     /// Attitudes up to `largest` rad from level about several axes, turning, with an integral.
     pub(super) fn starts(largest: f64) -> Vec<Turning> {
-        let axes = [Vector3::x(), Vector3::y(), Vector3::new(1.0, -1.0, 0.5), Vector3::new(-0.3, 1.0, 1.0)];
+        let axes = [
+            Vector3::x(),
+            Vector3::y(),
+            Vector3::new(1.0, -1.0, 0.5),
+            Vector3::new(-0.3, 1.0, 1.0),
+        ];
         let attitude = |axis: &Vector3<f64>, angle: f64| {
-            UnitQuaternion::from_axis_angle(&nalgebra::Unit::new_normalize(*axis), angle).into_inner()
+            UnitQuaternion::from_axis_angle(&nalgebra::Unit::new_normalize(*axis), angle)
+                .into_inner()
         };
         let mut all = Vec::new();
         for axis in &axes {
@@ -314,7 +333,8 @@ mod fixtures {
         all
     }
 
-    /// Flies the closed loop in continuous time and asserts that `value` never rises and comes down to nearly nothing.
+    /// Flies the closed loop in continuous time and asserts that `value` never rises and comes down
+    /// to nearly nothing.
     pub(super) fn never_rises(
         start: Turning,
         duration_s: f64,
@@ -355,7 +375,11 @@ mod fixtures {
             let j = inertia();
             let omega_dot = j.try_inverse().unwrap() * (torque - s.omega.cross(&(j * s.omega)));
             Timed(
-                Turning { q: s.q * Quaternion::from_imag(s.omega) * 0.5, omega: omega_dot, chi: integrand },
+                Turning {
+                    q: s.q * Quaternion::from_imag(s.omega) * 0.5,
+                    omega: omega_dot,
+                    chi: integrand,
+                },
                 1.0,
             )
         })

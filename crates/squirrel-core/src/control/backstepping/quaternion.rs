@@ -76,11 +76,17 @@ impl<L: Lane> Target<L> {
 }
 
 impl<L: Lane> Law<L> {
-    /// The gains that give the same small-angle loop as the Euler law: the vector part is half the angle.
+    /// The gains that give the same small-angle loop as the Euler law: the vector part is half the
+    /// angle.
     ///
     /// * `inertia` - by columns, kg m^2
     #[inline(always)]
-    pub fn from_euler_gains(c1: &[L; 3], c2: &[L; 3], lambda: &[L; 3], inertia: &[[L; 3]; 3]) -> Self {
+    pub fn from_euler_gains(
+        c1: &[L; 3],
+        c2: &[L; 3],
+        lambda: &[L; 3],
+        inertia: &[[L; 3]; 3],
+    ) -> Self {
         let two = L::of(2.0);
         let [[x, ..], [_, y, _], [.., z]] = *inertia;
         Self {
@@ -124,7 +130,8 @@ impl<L: Lane> Law<L> {
         for i in 0..3 {
             let z1_dot = (omega_e[i] * (eta * sign) + turning[i]) * half;
             z2[i] = omega_e[i] + self.c1[i] * z1[i] + self.lambda[i] * chi[i];
-            omega_dot[i] = omega_d_dot[i] - carried[i] - self.c1[i] * z1_dot - self.lambda[i] * z1[i];
+            omega_dot[i] =
+                omega_d_dot[i] - carried[i] - self.c1[i] * z1_dot - self.lambda[i] * z1[i];
         }
         let gyroscopic = cross(omega, &times(&self.inertia, omega));
         let mut torque = times(&self.inertia, &omega_dot);
@@ -155,7 +162,12 @@ mod tests {
     use nalgebra::{Matrix3, UnitQuaternion, Vector3};
 
     fn law() -> Law<f64> {
-        Law::from_euler_gains(&[9.0, 9.0, 4.0], &[14.0, 14.0, 5.0], &[8.0, 8.0, 2.0], &inertia().into())
+        Law::from_euler_gains(
+            &[9.0, 9.0, 4.0],
+            &[14.0, 14.0, 5.0],
+            &[8.0, 8.0, 2.0],
+            &inertia().into(),
+        )
     }
 
     fn four(q: &UnitQuaternion<f64>) -> [f64; 4] {
@@ -198,7 +210,8 @@ mod tests {
         }
     }
 
-    /// The start's sign is held: the error starts within 170 deg and `V` falls, so `eta` does not change sign again.
+    /// The start's sign is held: the error starts within 170 deg and `V` falls, so `eta` does not
+    /// change sign again.
     #[test]
     fn the_lyapunov_function_never_rises_for_q_and_its_antipode() {
         for sign in [1.0, -1.0] {
@@ -242,7 +255,13 @@ mod tests {
         let a = euler.torque(&inertia, &angle, &zero, &zero, &zero, &zero, &zero);
         let attitude = UnitQuaternion::from_euler_angles(-error, 0.0, 0.0);
         let none = [0.0; 3];
-        let b = law().torque(&four(&attitude), &none, &Target::from_euler(&none, &none, &none), &none, 1.0);
+        let b = law().torque(
+            &four(&attitude),
+            &none,
+            &Target::from_euler(&none, &none, &none),
+            &none,
+            1.0,
+        );
         // k is set by the largest inertia, so the loops agree to within that one term.
         assert!((a.torque.x / b.torque[0] - 1.0).abs() < 0.03, "{} {}", a.torque.x, b.torque[0]);
     }

@@ -1,11 +1,13 @@
 //! The flight code's setup, frames and outputs as bytes, the same on every target.
 //!
-//! One byte order (little endian), fields in the order of their declaration, no padding; an enumeration is one byte, an
-//! option a byte and, where that is 1, the value. A NaN is written as one NaN, because the sign of a generated NaN differs
-//! between targets. So two targets agree to the last bit exactly where their bytes agree, and [`hash`] of the bytes says so.
+//! One byte order (little endian), fields in the order of their declaration, no padding; an
+//! enumeration is one byte, an option a byte and, where that is 1, the value. A NaN is written as
+//! one NaN, because the sign of a generated NaN differs between targets. So two targets agree to
+//! the last bit exactly where their bytes agree, and [`hash`] of the bytes says so.
 //!
-//! A stream of [`Record`]s plays a flight: a setup, which also clears the state, then frames, each with the hash that its
-//! output had where the stream was made. A file starts with a [`Header`]; a live link has none.
+//! A stream of [`Record`]s plays a flight: a setup, which also clears the state, then frames, each
+//! with the hash that its output had where the stream was made. A file starts with a [`Header`]; a
+//! live link has none.
 
 mod output;
 mod setup;
@@ -24,7 +26,8 @@ pub trait Wire: Sized {
     fn take(from: &mut Reader<'_>) -> Option<Self>;
 }
 
-/// Appends bytes to a buffer of the caller. What does not fit is left out, and [`Writer::bytes`] is `None` then.
+/// Appends bytes to a buffer of the caller. What does not fit is left out, and [`Writer::bytes`] is
+/// `None` then.
 #[derive(Debug)]
 pub struct Writer<'a> {
     buffer: &'a mut [u8],
@@ -213,7 +216,8 @@ macro_rules! wire_struct {
     )*};
 }
 
-/// An enumeration without data: the number is the place in the list, and a variant that is not listed does not compile.
+/// An enumeration without data: the number is the place in the list, and a variant that is not
+/// listed does not compile.
 macro_rules! wire_enum {
     ($($name:ident { $($variant:ident),* $(,)? })*) => {$(
         impl Wire for $name {

@@ -45,7 +45,8 @@ impl Wire for SensorFrame {
         frame.magnetic = Wire::take(from)?;
         frame.wing_force = Wire::take(from)?;
         frame.command = Wire::take(from)?;
-        let mut obstacles = [Obstacle { id: 0, north_m: 0.0, east_m: 0.0 }; super::super::MAX_OBSTACLES];
+        let mut obstacles =
+            [Obstacle { id: 0, north_m: 0.0, east_m: 0.0 }; super::super::MAX_OBSTACLES];
         let seen = obstacles.get_mut(..usize::from(u8::take(from)?))?;
         for place in seen.iter_mut() {
             *place = Wire::take(from)?;

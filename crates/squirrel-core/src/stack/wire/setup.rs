@@ -1,4 +1,5 @@
-//! Everything that is constant in flight: vehicle, gains, mission. What is derived from them is derived again on the target.
+//! Everything that is constant in flight: vehicle, gains, mission. What is derived from them is
+//! derived again on the target.
 
 use super::{Reader, Wire, Writer, wire_enum, wire_struct};
 use crate::control::backstepping::{AttitudeForm, AttitudeGains};
@@ -22,7 +23,8 @@ use crate::rnn::elman::{Dense, Elman, Recurrent};
 use crate::rnn::parnn::{Domain, HIDDEN, INPUTS, Parnn};
 use crate::stack::{Stack, StackParameters};
 use crate::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, ThrustCurve, Vehicle, Wing,
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, ThrustCurve, Vehicle,
+    Wing,
 };
 
 impl Wire for Stack {

@@ -50,7 +50,8 @@ impl Wire for Header {
 pub enum Record {
     /// The flight code from here on; the state is a new one.
     Setup(Stack),
-    /// The next step, and the hash of all outputs of its sequence up to it; 0 where nobody knows it yet.
+    /// The next step, and the hash of all outputs of its sequence up to it; 0 where nobody knows it
+    /// yet.
     Frame(SensorFrame, u64),
 }
 

@@ -26,7 +26,9 @@ fn programme() -> Mission {
 #[test]
 fn setups_frames_and_outputs_come_back() {
     let hover = Mission::Hover { position: In::zero() };
-    for (model, mission) in [(ForceModel::FlatPlate, programme()), (ForceModel::Parnn(loud()), hover)] {
+    for (model, mission) in
+        [(ForceModel::FlatPlate, programme()), (ForceModel::Parnn(loud()), hover)]
+    {
         let stack = stack_on(&model, &mission);
         let there = bytes(&Record::Setup(stack));
         assert_eq!(back::<Record>(&there), Some(Record::Setup(stack)));

@@ -10,7 +10,8 @@ use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 
-/// A set of measured flights: the cut-outs in `tests/data/flights`, or the whole flights in the folder `SQUIRREL_FLIGHTS`.
+/// A set of measured flights: the cut-outs in `tests/data/flights`, or the whole flights in the
+/// folder `SQUIRREL_FLIGHTS`.
 pub(crate) fn flights(set: &str) -> PathBuf {
     let cut_outs = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/flights");
     std::env::var_os("SQUIRREL_FLIGHTS").map_or_else(cut_outs, PathBuf::from).join(set)
@@ -82,6 +83,7 @@ pub(crate) fn fly_rich(vehicle: &VehicleFile, seed: u64) -> (String, FlightLog) 
 pub(crate) fn fly(scenario: &str, vehicle: &VehicleFile, seed: u64) -> (String, FlightLog) {
     let mut scenario = Scenario::find(scenario).unwrap();
     scenario.seed = seed;
-    let setup = Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+    let setup =
+        Setup { vehicle: vehicle.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
     (format!("flight {seed}"), setup.fly(true, |_| {}).unwrap().log.unwrap())
 }

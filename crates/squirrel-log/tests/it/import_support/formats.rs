@@ -22,7 +22,8 @@ pub(crate) enum Cells {
     Texts(Vec<Option<String>>),
 }
 
-/// A Parquet file: `schema` is the inside of a `message`, one line a column; rows go into groups of `group_rows`.
+/// A Parquet file: `schema` is the inside of a `message`, one line a column; rows go into groups of
+/// `group_rows`.
 pub(crate) fn parquet_bytes(
     schema: &str,
     columns: &[Cells],
@@ -44,7 +45,8 @@ pub(crate) fn parquet_bytes(
                 (ColumnWriter::Int32ColumnWriter(w), Cells::Ints(x)) => write(w, &x[rows]),
                 (ColumnWriter::BoolColumnWriter(w), Cells::Bools(x)) => write(w, &x[rows]),
                 (ColumnWriter::ByteArrayColumnWriter(w), Cells::Texts(x)) => {
-                    let texts: Vec<_> = x[rows].iter().map(|t| t.as_deref().map(Into::into)).collect();
+                    let texts: Vec<_> =
+                        x[rows].iter().map(|t| t.as_deref().map(Into::into)).collect();
                     write(w, &texts);
                 }
                 _ => panic!("schema and cells differ"),
@@ -130,8 +132,12 @@ pub(crate) fn mcap_bytes(messages: &[McapMessage<'_>], chunk_bytes: u64) -> Vec<
     let mut writer = options.create(&mut file).unwrap();
     for (sequence, (topic, encoding, log_time, text)) in (0..).zip(messages) {
         let channel_id = writer.add_channel(0, topic, encoding, &BTreeMap::new()).unwrap();
-        let header =
-            MessageHeader { channel_id, sequence, log_time: *log_time, publish_time: log_time + 500 };
+        let header = MessageHeader {
+            channel_id,
+            sequence,
+            log_time: *log_time,
+            publish_time: log_time + 500,
+        };
         writer.write_to_known_channel(&header, text.as_bytes()).unwrap();
     }
     writer.finish().unwrap();

@@ -11,11 +11,14 @@ use squirrel_log::FlightLog;
 use squirrel_log::import::{ImportError, ImportMap, ImportReport, import};
 
 /// A channel that needs no conversion.
-pub(crate) const OMEGA: &str = r#""imu.omega_body_rad_s" = { columns = ["x", "y", "z"], body = "frd" }"#;
+pub(crate) const OMEGA: &str =
+    r#""imu.omega_body_rad_s" = { columns = ["x", "y", "z"], body = "frd" }"#;
 
 /// A map with these channels and time in seconds in column `t`.
 pub(crate) fn one_source(channels: &str) -> String {
-    format!("[[source]]\ntime = {{ column = \"t\", unit = \"s\" }}\n[source.channels]\n{channels}\n")
+    format!(
+        "[[source]]\ntime = {{ column = \"t\", unit = \"s\" }}\n[source.channels]\n{channels}\n"
+    )
 }
 
 /// Is removed when dropped.
@@ -27,8 +30,8 @@ impl Flight {
     pub(crate) fn new(name: &str, files: &[(&str, &str)]) -> Self {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let folder =
-            std::env::temp_dir().join(format!("squirrel-import-{}-{count}-{name}", std::process::id()));
+        let folder = std::env::temp_dir()
+            .join(format!("squirrel-import-{}-{count}-{name}", std::process::id()));
         let flight = Self { folder };
         fs::create_dir_all(&flight.folder).unwrap();
         for (file, text) in files {
@@ -48,13 +51,20 @@ impl Flight {
     }
 
     /// Imports some files of the folder; `""` is the folder itself.
-    pub(crate) fn import(&self, map: &str, paths: &[&str]) -> Result<(FlightLog, ImportReport), ImportError> {
+    pub(crate) fn import(
+        &self,
+        map: &str,
+        paths: &[&str],
+    ) -> Result<(FlightLog, ImportReport), ImportError> {
         let paths: Vec<PathBuf> = paths.iter().map(|path| self.folder.join(path)).collect();
         import(&ImportMap::parse(map, "map.toml")?, &paths)
     }
 
     /// Imports the folder.
-    pub(crate) fn import_folder(&self, map: &str) -> Result<(FlightLog, ImportReport), ImportError> {
+    pub(crate) fn import_folder(
+        &self,
+        map: &str,
+    ) -> Result<(FlightLog, ImportReport), ImportError> {
         self.import(map, &[""])
     }
 

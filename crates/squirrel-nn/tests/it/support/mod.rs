@@ -10,7 +10,11 @@ use std::path::PathBuf;
 pub(crate) const AREA_M2: f32 = 0.04;
 
 /// A swinging flight at up to 8 m/s whose wing follows the corrected flat plate.
-pub(crate) fn flight(phase: f32, count: usize, correction: impl Fn(f32) -> Correction<f32>) -> Vec<Window> {
+pub(crate) fn flight(
+    phase: f32,
+    count: usize,
+    correction: impl Fn(f32) -> Correction<f32>,
+) -> Vec<Window> {
     let (mut history, mut windows) = (History::new(), Vec::new());
     let mut k = 0;
     while windows.len() < count {
@@ -34,7 +38,8 @@ pub(crate) fn flight(phase: f32, count: usize, correction: impl Fn(f32) -> Corre
     windows
 }
 
-/// A wing that feels a larger angle than there is, the more so the larger it is, and half as much force again.
+/// A wing that feels a larger angle than there is, the more so the larger it is, and half as much
+/// force again.
 pub(crate) fn cambered(alpha_rad: f32) -> Correction<f32> {
     Correction { alpha_w_rad: 0.4 * alpha_rad, gamma: 1.5 - 0.3 * alpha_rad.abs() }
 }

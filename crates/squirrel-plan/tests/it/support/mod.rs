@@ -76,7 +76,8 @@ pub(crate) fn sample(question: &Question, d: Vector3<f64>, at: [f64; 2]) -> f64 
 
 /// The largest acceleration of a dense grid, and of denser ones around its best point.
 pub(crate) fn sampled(question: &Question, d: Vector3<f64>, cells: u32, rounds: u32) -> f64 {
-    let grid = |cells: u32| (0..=cells).flat_map(move |i| (0..=cells).map(move |j| [i, j].map(f64::from)));
+    let grid =
+        |cells: u32| (0..=cells).flat_map(move |i| (0..=cells).map(move |j| [i, j].map(f64::from)));
     let value = |at: [f64; 2]| (sample(question, d, at), at);
     let best = |places: &mut dyn Iterator<Item = [f64; 2]>| {
         places.map(value).max_by(|a, b| a.0.total_cmp(&b.0)).unwrap()
@@ -100,7 +101,11 @@ pub(crate) fn sampled(question: &Question, d: Vector3<f64>, cells: u32, rounds: 
 }
 
 /// Questions and a direction for each model of the wings.
-pub(crate) fn any(wing: &WingForce, count: u32, seed: u64) -> impl Iterator<Item = (Question, Vector3<f64>)> {
+pub(crate) fn any(
+    wing: &WingForce,
+    count: u32,
+    seed: u64,
+) -> impl Iterator<Item = (Question, Vector3<f64>)> {
     let mut dice = Dice(Pcg64Mcg::seed_from_u64(seed));
     (0..count).map(move |_| dice.case(wing))
 }

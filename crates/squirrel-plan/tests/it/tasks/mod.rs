@@ -10,7 +10,8 @@ pub(crate) struct Draw(pub(crate) u64);
 
 impl Draw {
     pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         low + (high - low) * (self.0 >> 11) as f64 / (1u64 << 53) as f64
     }
 }
@@ -25,7 +26,8 @@ pub(crate) fn straight(craft: &Craft, speed_m_s: f64, keep_out: Vec<KeepOut>) ->
     let velocity = Vector3::new(speed_m_s, 0.0, 0.0);
     let position = Vector3::new(0.0, 0.0, -30.0);
     let begin = Begin { position, velocity, thrust: -craft.hover(), spread: 0.0 };
-    let wanted = (0..=20).map(|k| Wanted { position: position + velocity * (0.1 * f64::from(k)), velocity });
+    let wanted =
+        (0..=20).map(|k| Wanted { position: position + velocity * (0.1 * f64::from(k)), velocity });
     Task::new(begin, wanted.collect(), keep_out, 0.1, f64::INFINITY).unwrap()
 }
 

@@ -1,4 +1,5 @@
-//! A turn at 7 m/s in front of a wall of trees, flown by a point mass with three limits of sideways acceleration.
+//! A turn at 7 m/s in front of a wall of trees, flown by a point mass with three limits of sideways
+//! acceleration.
 
 use std::collections::BTreeMap;
 
@@ -68,7 +69,8 @@ pub(crate) fn fly(hold_m_s2: f64, wings: bool, duration_s: f64) -> FlightLog {
         if i % 30 == 0 {
             flag = f64::from(u8::from(wings && size > 4.8));
             let cos = (limit.min(size) / GRAVITY_M_S2).atan().min(30f64.to_radians()).cos();
-            thrust_command = (MASS_KG * GRAVITY_M_S2 / cos + 0.9 * (2.0 - position[2])).clamp(2.0, 6.6);
+            thrust_command =
+                (MASS_KG * GRAVITY_M_S2 / cos + 0.9 * (2.0 - position[2])).clamp(2.0, 6.6);
             let mode = if flag == 0.0 {
                 0.0
             } else if thrust_command >= 6.6 {
@@ -86,10 +88,11 @@ pub(crate) fn fly(hold_m_s2: f64, wings: bool, duration_s: f64) -> FlightLog {
         tilt_n += (wanted[0].clamp(-5.66, 5.66) / GRAVITY_M_S2 - tilt_n) * dt / 0.09;
         tilt_e += (wanted[1].clamp(-5.66, 5.66) / GRAVITY_M_S2 - tilt_e) * dt / 0.09;
         let more = 1.0 + open * (limit / 5.66 - 1.0).max(0.0);
-        let sink =
-            -1.6 * (wanted[0].hypot(wanted[1]) / 9.0).powi(2) - 2.0 * velocity[2] + 2.0 * (2.0 - position[2]);
-        for (k, a) in
-            [tilt_n * GRAVITY_M_S2 * more, tilt_e * GRAVITY_M_S2 * more, sink].into_iter().enumerate()
+        let sink = -1.6 * (wanted[0].hypot(wanted[1]) / 9.0).powi(2) - 2.0 * velocity[2]
+            + 2.0 * (2.0 - position[2]);
+        for (k, a) in [tilt_n * GRAVITY_M_S2 * more, tilt_e * GRAVITY_M_S2 * more, sink]
+            .into_iter()
+            .enumerate()
         {
             velocity[k] += a * dt;
             position[k] += velocity[k] * dt;
@@ -122,11 +125,20 @@ pub(crate) fn fly(hold_m_s2: f64, wings: bool, duration_s: f64) -> FlightLog {
                 ],
             ),
         ),
-        ("reference", source(time.clone(), vec![("position_ned_m", 3, r), ("velocity_ned_m_s", 3, r_dot)])),
-        ("wing", source(time.clone(), vec![("deployment", 2, deployment), ("command", 2, command)])),
+        (
+            "reference",
+            source(time.clone(), vec![("position_ned_m", 3, r), ("velocity_ned_m_s", 3, r_dot)]),
+        ),
+        (
+            "wing",
+            source(time.clone(), vec![("deployment", 2, deployment), ("command", 2, command)]),
+        ),
         (
             "control.outer",
-            source(outer_time, vec![("flag", 1, flags), ("mode", 1, modes), ("thrust_command_n", 1, thrust)]),
+            source(
+                outer_time,
+                vec![("flag", 1, flags), ("mode", 1, modes), ("thrust_command_n", 1, thrust)],
+            ),
         ),
         ("control.inner", source(time, vec![("thrust_n", 1, inner)])),
     ];

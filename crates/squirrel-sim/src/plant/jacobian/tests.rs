@@ -50,8 +50,8 @@ fn difference(high: &State<f64>, low: &State<f64>) -> [f64; VARIABLES] {
     core::array::from_fn(|i| parts[i / 3][i % 3] / (2.0 * STEP))
 }
 
-/// A thousand flights, half with each wing, half with effects: after a few steps with wings that open, duals are what
-/// differences say, to a millionth of each row.
+/// A thousand flights, half with each wing, half with effects: after a few steps with wings that
+/// open, duals are what differences say, to a millionth of each row.
 #[test]
 fn duals_are_central_differences() {
     let mut rng = Pcg64Mcg::seed_from_u64(11);
@@ -84,7 +84,11 @@ fn duals_are_central_differences() {
             for (row, number) in numbers.into_iter().enumerate() {
                 let scale = jacobian.row(row).amax();
                 let off = (jacobian[(row, column)] - number).abs() / scale;
-                assert!(off < 1e-6, "{case}: {row}, {column}: {} for {number}", jacobian[(row, column)]);
+                assert!(
+                    off < 1e-6,
+                    "{case}: {row}, {column}: {} for {number}",
+                    jacobian[(row, column)]
+                );
             }
         }
     }

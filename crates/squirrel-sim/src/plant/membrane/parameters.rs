@@ -3,7 +3,8 @@
 use serde::Deserialize;
 use squirrel_core::vehicle::ParameterError;
 
-/// The numbers of a pair of membrane wings. Area and arm have no default; the others have those of docs/equations.md D.1 to D.3.
+/// The numbers of a pair of membrane wings. Area and arm have no default; the others have those of
+/// docs/equations.md D.1 to D.3.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MembraneParameters {
@@ -14,10 +15,12 @@ pub struct MembraneParameters {
     /// Chord, m; 0.2 (D.3).
     #[serde(default = "chord_m")]
     pub chord_m: f64,
-    /// Potential part K_p of the attached normal force, `C_N = K_p sin cos`; 1.9, Helmbold at aspect ratio 1.35 (D.1).
+    /// Potential part K_p of the attached normal force, `C_N = K_p sin cos`; 1.9, Helmbold at
+    /// aspect ratio 1.35 (D.1).
     #[serde(default = "lift_slope")]
     pub lift_slope: f64,
-    /// Vortex part K_v of the attached normal force, `C_N = K_v sin^2`; 2.6, below the theoretical pi (D.1).
+    /// Vortex part K_v of the attached normal force, `C_N = K_v sin^2`; 2.6, below the theoretical
+    /// pi (D.1).
     #[serde(default = "vortex_slope")]
     pub vortex_slope: f64,
     /// Normal force coefficient C_D90 at 90 deg; 1.17, Hoerner at aspect ratio 1 (D.1).
@@ -53,7 +56,8 @@ pub struct MembraneParameters {
     /// Factor g_s on force and moment; 1 (D.3).
     #[serde(default = "force_gain")]
     pub force_gain: f64,
-    /// Travel of the pressure centre, 0 for none to 1 for a quarter chord at small angles; 0.5, mid-range of D.3.
+    /// Travel of the pressure centre, 0 for none to 1 for a quarter chord at small angles; 0.5,
+    /// mid-range of D.3.
     #[serde(default = "pressure_centre_shift")]
     pub pressure_centre_shift: f64,
 }
@@ -116,7 +120,8 @@ impl MembraneParameters {
             ("force_gain", self.force_gain),
             ("pressure_centre_shift", self.pressure_centre_shift),
         ];
-        let refuse = |field, value, reason| Err(ParameterError { field, index: None, value, reason });
+        let refuse =
+            |field, value, reason| Err(ParameterError { field, index: None, value, reason });
         for (field, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return refuse(field, value, "must be finite and > 0");
@@ -155,7 +160,8 @@ mod tests {
 
     #[test]
     fn misspelt_and_missing_keys_are_refused() {
-        let error = |text: &str| toml::from_str::<MembraneParameters>(text).unwrap_err().to_string();
+        let error =
+            |text: &str| toml::from_str::<MembraneParameters>(text).unwrap_err().to_string();
         let misspelt = error("area_per_side_m2 = 0.02\nlateral_arm_m = 0.09\nprestrian = 0.1");
         assert!(misspelt.contains("prestrian"), "{misspelt}");
         let missing = error("area_per_side_m2 = 0.02");
@@ -173,7 +179,12 @@ mod tests {
         assert_eq!(error(|p| p.prestrain = -0.1), "prestrain = -0.1: must be finite and >= 0");
         assert!(error(|p| p.lift_slope = f64::NAN).starts_with("lift_slope = NaN"));
         assert!(error(|p| p.tension_n_per_m = f64::INFINITY).starts_with("tension_n_per_m = inf"));
-        assert!(error(|p| p.stall_angle_rad = 34.0).starts_with("stall_angle_rad = 34: must be <= pi/2"));
-        assert!(error(|p| p.pressure_centre_shift = 1.5).starts_with("pressure_centre_shift = 1.5"));
+        assert!(
+            error(|p| p.stall_angle_rad = 34.0)
+                .starts_with("stall_angle_rad = 34: must be <= pi/2")
+        );
+        assert!(
+            error(|p| p.pressure_centre_shift = 1.5).starts_with("pressure_centre_shift = 1.5")
+        );
     }
 }

@@ -58,11 +58,18 @@ fn still_wings_take_energy_out_of_air_from_everywhere() {
             [[1.0, 0.1, 0.03], [0.3, 1.0, 0.5], [0.1, 0.2, 1.0], [1.0, 0.0, 0.5], [1.0, 0.5, 1e-9]]
         {
             for speed_m_s in [0.01, 1.0, 7.0] {
-                let d = Vector3::new(sign(1) * direction[0], sign(2) * direction[1], sign(4) * direction[2]);
+                let d = Vector3::new(
+                    sign(1) * direction[0],
+                    sign(2) * direction[1],
+                    sign(4) * direction[2],
+                );
                 let air = air(d * (speed_m_s / d.norm()), Vector3::zeros());
                 for state in [MembraneState::at_rest(), steady(&wing, &air)] {
                     let force = wing.evaluate(&air, STILL, SPREAD, &state).0.force.vector;
-                    assert!(force.dot(&air.velocity.vector) < 0.0, "{d:?} at {speed_m_s} m/s, {state:?}");
+                    assert!(
+                        force.dot(&air.velocity.vector) < 0.0,
+                        "{d:?} at {speed_m_s} m/s, {state:?}"
+                    );
                 }
             }
         }
@@ -72,7 +79,8 @@ fn still_wings_take_energy_out_of_air_from_everywhere() {
 #[test]
 fn steady_lift_rises_then_stalls() {
     let wing = wing();
-    let lift: Vec<f64> = (0..=90).map(|a| steady_coefficients(&wing, 7.0, f64::from(a)).lift).collect();
+    let lift: Vec<f64> =
+        (0..=90).map(|a| steady_coefficients(&wing, 7.0, f64::from(a)).lift).collect();
     let peak = (0..lift.len()).max_by(|a, b| lift[*a].total_cmp(&lift[*b])).unwrap();
     println!("lift peaks at {peak} deg with {:.3}; {:?}", lift[peak], lift);
     assert!((28..=45).contains(&peak), "stall at {peak} deg");
@@ -97,7 +105,10 @@ fn broadside_air_finds_a_disc() {
     let state = steady(&wing(), &air);
     let camber = state.fast_camber[0] + state.creep_camber[0];
     let cup = coefficients(&wing(), &air, &state).normal;
-    assert!((cup / (1.17 * (1.0 + 1.5 * camber)) - 1.0).abs() < 1e-3 && camber > 0.05, "{cup}, {camber}");
+    assert!(
+        (cup / (1.17 * (1.0 + 1.5 * camber)) - 1.0).abs() < 1e-3 && camber > 0.05,
+        "{cup}, {camber}"
+    );
 }
 
 #[test]
@@ -120,11 +131,14 @@ fn stall_depends_on_where_one_comes_from() {
     };
     let (up, down) = (ramp(0.0, 60.0), ramp(60.0, 0.0));
     let highest = |curve: &[(f64, f64)]| curve.iter().map(|c| c.1).fold(f64::MIN, f64::max);
-    let statically =
-        (20..=50).map(|a| steady_coefficients(&wing, 7.0, f64::from(a)).lift).fold(f64::MIN, f64::max);
+    let statically = (20..=50)
+        .map(|a| steady_coefficients(&wing, 7.0, f64::from(a)).lift)
+        .fold(f64::MIN, f64::max);
     println!("static {statically:.3} up {:.3} down {:.3}", highest(&up), highest(&down));
     assert!(highest(&up) > 1.1 * statically, "no overshoot: {} over {statically}", highest(&up));
-    let at = |curve: &[(f64, f64)], angle: f64| curve.iter().find(|c| (c.0 - angle).abs() < 0.1).unwrap().1;
+    let at = |curve: &[(f64, f64)], angle: f64| {
+        curve.iter().find(|c| (c.0 - angle).abs() < 0.1).unwrap().1
+    };
     assert!(at(&down, 32.0) < 0.8 * at(&up, 32.0), "no hysteresis");
     let recovered = steady(&wing, &gliding(7.0, 0.1)).attached[0];
     assert!(recovered > 0.99, "a stalled wing recovers, {recovered}");
@@ -148,7 +162,11 @@ fn symmetric_air_does_not_roll_and_rolling_is_damped() {
     };
     assert_eq!(roll(0.0), 0.0);
     for omega_x in [0.1, 1.0, 5.0] {
-        assert!(roll(omega_x) < 0.0 && roll(-omega_x) > 0.0, "{omega_x} rad/s: {} N m", roll(omega_x));
+        assert!(
+            roll(omega_x) < 0.0 && roll(-omega_x) > 0.0,
+            "{omega_x} rad/s: {} N m",
+            roll(omega_x)
+        );
     }
 }
 
@@ -158,8 +176,11 @@ fn left_and_right_mirror_and_so_do_belly_and_back() {
     let swap = |x: [f64; 2]| [x[1], x[0]];
     let (v, omega) = (Vector3::new(5.0, 1.5, 2.0), Vector3::new(0.7, -0.4, 1.1));
     let (rate, deployment) = ([2.0, -1.0], [0.9, 0.4]);
-    let state =
-        MembraneState { fast_camber: [0.05, 0.08], creep_camber: [0.02, -0.01], attached: [0.9, 0.4] };
+    let state = MembraneState {
+        fast_camber: [0.05, 0.08],
+        creep_camber: [0.02, -0.01],
+        attached: [0.9, 0.4],
+    };
     let (wrench, rates) = wing.evaluate(&air(v, omega), rate, deployment, &state);
     let (f, m) = (wrench.force.vector, wrench.moment.vector);
     assert!(f.amin() > 1e-3 && m.amin() > 1e-4, "a zero mirrors too easily: {f:?} {m:?}");
@@ -194,7 +215,8 @@ fn left_and_right_mirror_and_so_do_belly_and_back() {
 
 #[test]
 fn steady_camber_solves_the_cubic() {
-    let residual = |k: f64, prestrain: f64, load: f64| 8.0 * k * prestrain + 64.0 / 3.0 * k.powi(3) - load;
+    let residual =
+        |k: f64, prestrain: f64, load: f64| 8.0 * k * prestrain + 64.0 / 3.0 * k.powi(3) - load;
     for prestrain in [0.0, 1e-6, 0.02, 1.0] {
         let wing = MembraneParameters { prestrain, ..parameters() }.numbers();
         for load in [0.0, 1e-12, 1e-6, 1e-3, 0.033, 0.5, 10.0] {
@@ -203,10 +225,12 @@ fn steady_camber_solves_the_cubic() {
             assert!(residual(k, prestrain, load).abs() <= 1e-9 * load, "{prestrain} {load}: {k:?}");
         }
     }
-    // Settled in the air, the elastic camber carries the load that the force shows; the creep is its fraction.
+    // Settled in the air, the elastic camber carries the load that the force shows; the creep is
+    // its fraction.
     let air = gliding(7.0, 0.4);
     let state = steady(&wing(), &air);
-    let load = 0.5 * AIR_DENSITY_KG_M3 * 49.0 * 0.2 / 275.0 * coefficients(&wing(), &air, &state).normal;
+    let load =
+        0.5 * AIR_DENSITY_KG_M3 * 49.0 * 0.2 / 275.0 * coefficients(&wing(), &air, &state).normal;
     assert!(residual(state.fast_camber[0], 0.02, load).abs() < 1e-9);
     assert!((state.creep_camber[0] / state.fast_camber[0] - 0.3).abs() < 1e-9);
     assert!((0.05..0.2).contains(&state.fast_camber[0]), "{state:?}");
@@ -245,7 +269,11 @@ fn fast_edge_on_air_bulges_the_membrane_and_slow_does_not() {
 fn no_airspeed_no_force_and_never_a_nan() {
     let states = [
         MembraneState::at_rest(),
-        MembraneState { fast_camber: [0.1, -0.1], creep_camber: [-0.05, 0.0], attached: [0.0, 0.5] },
+        MembraneState {
+            fast_camber: [0.1, -0.1],
+            creep_camber: [-0.05, 0.0],
+            attached: [0.0, 0.5],
+        },
     ];
     let mut directions = vec![Vector3::zeros()];
     for x in [-1.0, 0.0, 1e-160, 1e-9, 1.0] {
@@ -260,7 +288,8 @@ fn no_airspeed_no_force_and_never_a_nan() {
                 for direction in &directions {
                     for omega in [Vector3::zeros(), Vector3::new(1e-12, 3.0, -30.0)] {
                         let air = air(direction * speed, omega);
-                        let (wrench, rates) = wing.evaluate(&air, [-1e3, f64::INFINITY], SPREAD, state);
+                        let (wrench, rates) =
+                            wing.evaluate(&air, [-1e3, f64::INFINITY], SPREAD, state);
                         let (f, m) = (wrench.force.vector, wrench.moment.vector);
                         let all = [
                             rates.fast_camber,
@@ -304,14 +333,16 @@ fn deployment_scales_each_side_and_leaves_the_membrane_alone() {
 #[test]
 fn the_pressure_centre_lies_towards_the_flow() {
     let state = MembraneState::at_rest();
-    let moment =
-        |v: Vector3<f64>| wing().evaluate(&air(v, Vector3::zeros()), STILL, SPREAD, &state).0.moment.vector;
+    let moment = |v: Vector3<f64>| {
+        wing().evaluate(&air(v, Vector3::zeros()), STILL, SPREAD, &state).0.moment.vector
+    };
     let ahead = moment(Vector3::new(6.0, 0.0, 2.0));
     assert!(ahead.y > 0.0 && ahead.x == 0.0 && ahead.z == 0.0, "nose up: {ahead:?}");
     let right = moment(Vector3::new(0.0, 6.0, 2.0));
     assert!(right.x < 0.0 && right.y.abs() < 1e-15, "right wing up: {right:?}");
     assert_eq!(moment(Vector3::new(0.0, 0.0, 6.0)), Vector3::zeros());
-    let fixed = Membrane::new(MembraneParameters { pressure_centre_shift: 0.0, ..parameters() }).unwrap();
+    let fixed =
+        Membrane::new(MembraneParameters { pressure_centre_shift: 0.0, ..parameters() }).unwrap();
     assert_eq!(fixed.evaluate(&gliding(7.0, 0.3), STILL, SPREAD, &state).0.moment.vector.y, 0.0);
 }
 
@@ -329,8 +360,8 @@ fn each_side_has_its_own_angle_of_attack() {
     assert_eq!(wing.angle_of_attack(&air(Vector3::z() * 0.2, Vector3::zeros())), [0.0; 2]);
 }
 
-/// Thin flat plates of Pelletier and Mueller (J. Aircraft 37(5), 2000), read off the diagrams to about 5 %: rows of aspect
-/// ratio, angle of attack in deg, C_L, C_D.
+/// Thin flat plates of Pelletier and Mueller (J. Aircraft 37(5), 2000), read off the diagrams to
+/// about 5 %: rows of aspect ratio, angle of attack in deg, C_L, C_D.
 const MEASURED_PLATES: [[f64; 4]; 17] = [
     [1.0, 0.0, 0.0, 0.015],
     [1.0, 3.0, 0.075, 0.02],
@@ -351,10 +382,11 @@ const MEASURED_PLATES: [[f64; 4]; 17] = [
     [2.0, 25.0, 0.67, 0.33],
 ];
 
-/// What fits: the attached branch (C_L within 0.06, C_D within 0.04 up to 15 deg), and with the stall angle and the edge drag
-/// of a rigid plate everything up to the last measured angle. What does not: a plate stalls near 24 deg, so that the
-/// default stall angle, which is a membrane's, is 0.13 high in C_L at 20 deg and 0.29 at 25 deg; and the default
-/// tangential force is twice a thin plate's drag edge on.
+/// What fits: the attached branch (C_L within 0.06, C_D within 0.04 up to 15 deg), and with the
+/// stall angle and the edge drag of a rigid plate everything up to the last measured angle. What
+/// does not: a plate stalls near 24 deg, so that the default stall angle, which is a membrane's, is
+/// 0.13 high in C_L at 20 deg and 0.29 at 25 deg; and the default tangential force is twice a thin
+/// plate's drag edge on.
 #[test]
 fn a_stiff_wing_lies_near_measured_plates() {
     let rigid = Membrane::new(MembraneParameters {

@@ -1,6 +1,8 @@
-//! Sensors that the flight code does not hear: what they read is late like any other's, and goes into the log alone.
+//! Sensors that the flight code does not hear: what they read is late like any other's, and goes
+//! into the log alone.
 //!
-//! Each is one file, with the keys of its table in `[sensors]`, its devices and what it reads ([`Reads`]), and a line of [`Logged`].
+//! Each is one file, with the keys of its table in `[sensors]`, its devices and what it reads
+//! ([`Reads`]), and a line of [`Logged`].
 
 mod battery;
 mod range_finder;
@@ -24,8 +26,9 @@ trait Reads: std::fmt::Debug + Send + Sync {
     fn read(&self, truth: &Truth, rng: &mut Pcg64Mcg) -> Option<Row>;
 }
 
-/// The sensors: name of the table, which is that of the source in the log, numbers, those that a vehicle has if its file says nothing, and the random
-/// stream, whose number never changes its meaning (`line.rs` has the others).
+/// The sensors: name of the table, which is that of the source in the log, numbers, those that a
+/// vehicle has if its file says nothing, and the random stream, whose number never changes its
+/// meaning (`line.rs` has the others).
 macro_rules! logged {
     ($($(#[$doc:meta])* $name:ident: $kind:ty = $default:expr, stream $stream:literal;)*) => {
         /// Those of a vehicle, each where there is one.

@@ -1,7 +1,9 @@
-//! Range finder that looks down along the body: how far it is to flat ground at the origin's height.
+//! Range finder that looks down along the body: how far it is to flat ground at the origin's
+//! height.
 //!
-//! At height `h` and tilt `t` the beam is `d = h / cos t` long; the reading is `d + n`, with `n` of the standard deviation `max(s, k d)`, in steps of
-//! the converter. There is no reading below the ground, nearer or farther than the range, and beyond a tilt, where the ground sends too little
+//! At height `h` and tilt `t` the beam is `d = h / cos t` long; the reading is `d + n`, with `n` of
+//! the standard deviation `max(s, k d)`, in steps of the converter. There is no reading below the
+//! ground, nearer or farther than the range, and beyond a tilt, where the ground sends too little
 //! light back. Obstacles are not seen.
 
 use super::super::line::{noise, quantised};
@@ -33,8 +35,8 @@ static DEVICES: [&str; 1] = ["tfmini_plus"];
 
 fn fit(p: &mut RangeFinderSensor, device: &str) {
     if device == "tfmini_plus" {
-        // Benewake SJ-GU-TFmini-Plus-01 A02: 0.1 to 12 m on a white board indoors, +-5 cm up to 6 m and +-1 % from there, steps of 5 mm.
-        // Taken for three standard deviations (assumed).
+        // Benewake SJ-GU-TFmini-Plus-01 A02: 0.1 to 12 m on a white board indoors, +-5 cm up to 6 m
+        // and +-1 % from there, steps of 5 mm. Taken for three standard deviations (assumed).
         (p.min_m, p.max_m) = (0.1, 12.0);
         (p.noise_m, p.noise_share) = (0.05 / 3.0, 0.01 / 3.0);
         p.resolution_m = 0.005;
@@ -90,7 +92,11 @@ mod tests {
         // 60 deg: the beam is twice as long.
         let long = read(&mut ideal, 10_000, &at(1.5, 60.0_f64.to_radians())).unwrap();
         assert!((long - 3.0).abs() < 1e-12, "{long}");
-        assert_eq!(read(&mut ideal, 20_000, &at(1.5, 65.0_f64.to_radians())), None, "too much tilt");
+        assert_eq!(
+            read(&mut ideal, 20_000, &at(1.5, 65.0_f64.to_radians())),
+            None,
+            "too much tilt"
+        );
         assert_eq!(read(&mut ideal, 30_000, &at(4.1, 0.0)), None, "too far");
         assert_eq!(read(&mut ideal, 40_000, &at(1.0, 180.0_f64.to_radians())), None, "on its back");
         assert_eq!(read(&mut ideal, 50_000, &at(1.0, 0.0)), Some(1.0), "it comes back");
@@ -108,7 +114,10 @@ mod tests {
         let mean = read.iter().sum::<f64>() / read.len() as f64;
         let sd = (read.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / read.len() as f64).sqrt();
         assert!((mean - 3.0).abs() < 0.002 && (sd - 0.0167).abs() < 0.001, "{mean} {sd}");
-        assert!(read.iter().all(|x| ((x / 0.005).round() - x / 0.005).abs() < 1e-9), "steps of 5 mm");
+        assert!(
+            read.iter().all(|x| ((x / 0.005).round() - x / 0.005).abs() < 1e-9),
+            "steps of 5 mm"
+        );
     }
 
     /// The log has it and can be read back; the flight is what it was.

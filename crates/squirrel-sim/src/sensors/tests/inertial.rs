@@ -1,4 +1,5 @@
-//! Inertial units: walk, scale, mounting, range, steps, vibration, and that two of them err each for itself.
+//! Inertial units: walk, scale, mounting, range, steps, vibration, and that two of them err each
+//! for itself.
 
 use super::*;
 
@@ -11,7 +12,11 @@ fn with(rate_hz: f64, wrong: impl FnOnce(&mut ImuSensor)) -> SensorParameters {
 }
 
 fn rates(frames: &[SensorFrame]) -> Vec<Vector3<f64>> {
-    frames.iter().filter_map(|f| f.imu).map(|i| i.omega.vector.cast() - truth().omega.vector).collect()
+    frames
+        .iter()
+        .filter_map(|f| f.imu)
+        .map(|i| i.omega.vector.cast() - truth().omega.vector)
+        .collect()
 }
 
 /// Variance of the bias after T is K^2 T, at any rate.
@@ -107,7 +112,8 @@ fn amplitude(samples: &[f64], rate_hz: f64, frequency_hz: f64) -> f64 {
     2.0 * sin.hypot(cos) / samples.len() as f64
 }
 
-/// A rotor at 220 Hz, sampled at 300 Hz, shows at 80 Hz; its size goes with the square of its speed.
+/// A rotor at 220 Hz, sampled at 300 Hz, shows at 80 Hz; its size goes with the square of its
+/// speed.
 #[test]
 fn vibration_shows_at_its_alias() {
     let p = with(300.0, |imu| {
@@ -125,7 +131,11 @@ fn vibration_shows_at_its_alias() {
         rate.push(f64::from(imu.omega.vector.z) - 0.3);
     }
     // Stamps are whole microseconds, 1e-3 rad of the rotor's phase.
-    assert!((amplitude(&force, 300.0, 80.0) - 8.0).abs() < 0.02, "{}", amplitude(&force, 300.0, 80.0));
+    assert!(
+        (amplitude(&force, 300.0, 80.0) - 8.0).abs() < 0.02,
+        "{}",
+        amplitude(&force, 300.0, 80.0)
+    );
     assert!((amplitude(&rate, 300.0, 80.0) - 0.4).abs() < 1e-3);
     assert!(amplitude(&force, 300.0, 60.0) < 0.02 && amplitude(&force, 300.0, 140.0) < 0.02);
     now.rotor_count = 0;

@@ -39,7 +39,8 @@ fn sd(list: &[f64]) -> f64 {
 
 fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let (of_a, of_b) = (mean(a), mean(b));
-    mean(&a.iter().zip(b).map(|(x, y)| (x - of_a) * (y - of_b)).collect::<Vec<_>>()) / (sd(a) * sd(b))
+    mean(&a.iter().zip(b).map(|(x, y)| (x - of_a) * (y - of_b)).collect::<Vec<_>>())
+        / (sd(a) * sd(b))
 }
 
 #[test]
@@ -82,12 +83,16 @@ fn noise_has_its_size_and_bias_its_place() {
     p.baro.noise_m = 0.2;
     p.baro.bias_m = 1.0;
     p.baro.timing.rate_hz = 1000.0;
-    let read: Vec<f64> =
-        frames(&p, 3, 1000, 20).iter().filter_map(|f| f.altitude_m).map(|a| f64::from(a) - 3.0).collect();
+    let read: Vec<f64> = frames(&p, 3, 1000, 20)
+        .iter()
+        .filter_map(|f| f.altitude_m)
+        .map(|a| f64::from(a) - 3.0)
+        .collect();
     assert!((mean(&read) - 1.0).abs() < 0.01 && (sd(&read) - 0.2).abs() < 0.005);
 }
 
-/// One sensor's errors do not shift another's stream, nor does one error another of the same sensor.
+/// One sensor's errors do not shift another's stream, nor does one error another of the same
+/// sensor.
 #[test]
 fn streams_are_independent() {
     let base = || SensorParameters::suite("nominal").unwrap();
@@ -110,7 +115,10 @@ fn streams_are_independent() {
         .zip(&quiet)
         .filter_map(|(b, a)| b.gnss.map(|b| (Some(b), a.gnss)))
         .collect();
-    assert!(heard.len() < 20 && heard.iter().all(|(b, a)| a == b), "what is left of the fixes is the same");
+    assert!(
+        heard.len() < 20 && heard.iter().all(|(b, a)| a == b),
+        "what is left of the fixes is the same"
+    );
 }
 
 #[test]
@@ -122,7 +130,8 @@ fn same_seed_same_bits_and_another_seed_others() {
     }
 }
 
-/// Hashes of what the sensors said before there were second units, wander and the rest: old seeds fly old flights.
+/// Hashes of what the sensors said before there were second units, wander and the rest: old seeds
+/// fly old flights.
 #[test]
 fn readings_of_old_flights_keep_their_bits() {
     let mut p = SensorParameters::default();
@@ -188,7 +197,9 @@ fn a_second_at_rest_tells_of_the_flight_and_leaves_it_alone() {
     assert!((mean(&before) - mean(&later)).abs() < 3e-4, "the bias is the same");
     assert!(correlation(&before, &later).abs() < 0.2, "the noise is not");
     let fix = |list: &[SensorFrame]| list.iter().find_map(|f| f.gnss).unwrap().position.vector;
-    assert!((fix(&rest) - fix(&flight)).norm() < 0.4 && (fix(&rest) - at.vector.cast()).norm() > 0.2);
+    assert!(
+        (fix(&rest) - fix(&flight)).norm() < 0.4 && (fix(&rest) - at.vector.cast()).norm() > 0.2
+    );
     let heading = rest[0].attitude.unwrap().euler().2;
     assert!((heading - 0.5).abs() < 0.02);
 }

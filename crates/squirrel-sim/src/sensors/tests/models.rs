@@ -3,7 +3,8 @@
 use super::*;
 use squirrel_core::math::GRAVITY_M_S2;
 
-/// Standard deviation over seeds, the same at the start and later, and a correlation that falls to 1/e in the time constant.
+/// Standard deviation over seeds, the same at the start and later, and a correlation that falls to
+/// 1/e in the time constant.
 #[test]
 fn the_receiver_wanders() {
     let mut p = SensorParameters::ideal();
@@ -12,10 +13,12 @@ fn the_receiver_wanders() {
     for seed in 0..600 {
         let sampled = frames(&p, seed, 10, 21);
         for (list, k) in [(&mut start, 0), (&mut later, 200)] {
-            let error = sampled[k].gnss.unwrap().position.vector.cast::<f64>() - truth().position.vector;
+            let error =
+                sampled[k].gnss.unwrap().position.vector.cast::<f64>() - truth().position.vector;
             list.extend_from_slice(error.as_slice());
         }
-        let step = sampled[1].gnss.unwrap().position.vector - sampled[0].gnss.unwrap().position.vector;
+        let step =
+            sampled[1].gnss.unwrap().position.vector - sampled[0].gnss.unwrap().position.vector;
         // sd of a step: 1.5 sqrt(2 * 0.1 / 20) = 0.15.
         assert!(step.norm() < 1.0, "it wanders, it does not jump");
     }
@@ -53,7 +56,8 @@ fn dropouts_have_their_rate_and_length() {
     let sampled: Vec<bool> = frames(&p, 4, 10, 20_000).iter().map(|f| f.gnss.is_some()).collect();
     let gaps = sampled.windows(2).filter(|pair| pair[0] && !pair[1]).count();
     let missing = sampled.iter().filter(|heard| !**heard).count();
-    // One every 20 + 3 s: 870, each 30 fixes long, give or take 1/sqrt(870); those shorter than a fix may go unseen.
+    // One every 20 + 3 s: 870, each 30 fixes long, give or take 1/sqrt(870); those shorter than a
+    // fix may go unseen.
     assert!((740..960).contains(&gaps), "{gaps}");
     assert!((missing as f64 / 200_000.0 / (3.0 / 23.0) - 1.0).abs() < 0.15, "{missing}");
 }
@@ -120,7 +124,8 @@ fn a_barometer_drifts_and_has_steps() {
 
 #[test]
 fn a_magnetometer_points_north_and_down_and_sees_the_current() {
-    let compass = MagnetometerSensor { current_ut_per_a: [0.1, 0.0, -0.2], ..MagnetometerSensor::default() };
+    let compass =
+        MagnetometerSensor { current_ut_per_a: [0.1, 0.0, -0.2], ..MagnetometerSensor::default() };
     let p = SensorParameters { magnetometer: Some(compass), ..SensorParameters::ideal() };
     let mut effects = Effects::none();
     effects.insert("heading_bias").unwrap().values[0] = 0.2;
@@ -130,7 +135,9 @@ fn a_magnetometer_points_north_and_down_and_sees_the_current() {
         let mut sensors = Sensors::new(p, &effects, 1);
         let frame = sensors.poll(0, &now).0;
         let field = frame.magnetic.unwrap().vector;
-        assert!((field.norm() - 48.0).abs() < 1e-4 && ((field.z / 48.0).asin() - 1.13).abs() < 1e-5);
+        assert!(
+            (field.norm() - 48.0).abs() < 1e-4 && ((field.z / 48.0).asin() - 1.13).abs() < 1e-5
+        );
         let heading = (-field.y).atan2(field.x);
         assert!((f64::from(heading) - std::f64::consts::FRAC_PI_2 - bias).abs() < 1e-6);
         let sampled = frame.attitude.unwrap().euler().2;
@@ -144,13 +151,18 @@ fn a_magnetometer_points_north_and_down_and_sees_the_current() {
 #[test]
 fn iron_is_drawn_for_each_flight() {
     let field = |hard, soft, seed| {
-        let compass =
-            MagnetometerSensor { hard_iron_sd_ut: hard, soft_iron_sd: soft, ..MagnetometerSensor::default() };
+        let compass = MagnetometerSensor {
+            hard_iron_sd_ut: hard,
+            soft_iron_sd: soft,
+            ..MagnetometerSensor::default()
+        };
         let p = SensorParameters { magnetometer: Some(compass), ..SensorParameters::ideal() };
         frames(&p, seed, 50, 1)[0].magnetic.unwrap().vector.cast::<f64>()
     };
     let errors = |hard, soft| -> Vec<f64> {
-        (0..500).flat_map(|seed| (field(hard, soft, seed) - field(0.0, 0.0, seed)).data.0[0]).collect()
+        (0..500)
+            .flat_map(|seed| (field(hard, soft, seed) - field(0.0, 0.0, seed)).data.0[0])
+            .collect()
     };
     assert!((sd(&errors(2.0, 0.0)) / 2.0 - 1.0).abs() < 0.08);
     // A row of independent entries times the field: its strength counts.

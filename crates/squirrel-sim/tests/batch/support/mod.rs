@@ -24,10 +24,15 @@ impl<T: Paths> Thrown<T> {
     /// The first vehicles of an endless row: those of a smaller number are the same.
     pub(crate) fn new(count: usize) -> Self {
         let mut generator = Pcg64Mcg::seed_from_u64(6);
-        let mut between =
-            |low: f64, high: f64| low + (high - low) * f64::from(generator.next_u32()) / 4_294_967_296.0;
-        let mut out =
-            Self { vehicles: Vec::new(), states: Vec::new(), winds: Vec::new(), commands: Vec::new() };
+        let mut between = |low: f64, high: f64| {
+            low + (high - low) * f64::from(generator.next_u32()) / 4_294_967_296.0
+        };
+        let mut out = Self {
+            vehicles: Vec::new(),
+            states: Vec::new(),
+            winds: Vec::new(),
+            commands: Vec::new(),
+        };
         for number in 0..count {
             let mut p = *VehicleFile::squirrel().vehicle.parameters();
             p.mass_kg *= between(0.7, 1.4);
@@ -36,7 +41,8 @@ impl<T: Paths> Thrown<T> {
             p.inertia_kg_m2[(1, 0)] = p.inertia_kg_m2[(0, 1)];
             p.drag.area_m2 *= between(0.5, 2.0);
             p.drag.linear_n_s_per_m = Vector3::from_fn(|_, _| between(0.0, 0.1));
-            p.propulsion.time_constant_up_s = if number % 5 == 3 { 0.0 } else { between(0.02, 0.05) };
+            p.propulsion.time_constant_up_s =
+                if number % 5 == 3 { 0.0 } else { between(0.02, 0.05) };
             let vehicle = Vehicle::new(p).unwrap();
             out.vehicles.push(vehicle.cast().unwrap());
             let mut state = State::at_rest();

@@ -14,7 +14,8 @@ pub(crate) type Parts = BTreeMap<String, (Dtype, Vec<usize>, Vec<u8>)>;
 
 /// The bytes of the shipped weights.
 pub(crate) fn shipped() -> Vec<u8> {
-    fs::read(format!("{}/../../vehicles/squirrel-parnn.safetensors", env!("CARGO_MANIFEST_DIR"))).unwrap()
+    fs::read(format!("{}/../../vehicles/squirrel-parnn.safetensors", env!("CARGO_MANIFEST_DIR")))
+        .unwrap()
 }
 
 /// The shipped weights written again after a change of tensors and of the metadata.

@@ -1,4 +1,5 @@
-//! The airframe of the world's tests: the squirrel's mass and rotors with an inertia that is not diagonal.
+//! The airframe of the world's tests: the squirrel's mass and rotors with an inertia that is not
+//! diagonal.
 
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{In, Rotation};
@@ -15,8 +16,9 @@ pub(crate) fn vehicle() -> Vehicle<f64> {
     static VEHICLE: OnceLock<Vehicle<f64>> = OnceLock::new();
     *VEHICLE.get_or_init(|| {
         let mut parameters = *VehicleFile::squirrel().vehicle.parameters();
-        parameters.inertia_kg_m2 =
-            Matrix3::new(3.22e-3, 2.0e-4, -1.0e-4, 2.0e-4, 4.68e-3, 1.5e-4, -1.0e-4, 1.5e-4, 7.72e-3);
+        parameters.inertia_kg_m2 = Matrix3::new(
+            3.22e-3, 2.0e-4, -1.0e-4, 2.0e-4, 4.68e-3, 1.5e-4, -1.0e-4, 1.5e-4, 7.72e-3,
+        );
         Vehicle::new(parameters).expect("the fixture is a possible airframe")
     })
 }
@@ -34,15 +36,20 @@ pub(crate) fn open_field() -> WorldParameters {
 
 /// Height over ground, m; velocity, m/s; roll, pitch and yaw, rad.
 #[allow(dead_code)] // Not every test file throws the vehicle.
-pub(crate) fn thrown(height_m: f64, velocity: [f64; 3], [roll, pitch, yaw]: [f64; 3]) -> State<f64> {
+pub(crate) fn thrown(
+    height_m: f64,
+    velocity: [f64; 3],
+    [roll, pitch, yaw]: [f64; 3],
+) -> State<f64> {
     State {
         position: In::new(Vector3::new(0.0, 0.0, -height_m)),
         velocity: In::new(Vector3::from(velocity)),
-        attitude: Rotation::<squirrel_core::frames::Ned, squirrel_core::frames::Body, f64>::from_euler(
-            roll, pitch, yaw,
-        )
-        .quaternion
-        .into_inner(),
+        attitude:
+            Rotation::<squirrel_core::frames::Ned, squirrel_core::frames::Body, f64>::from_euler(
+                roll, pitch, yaw,
+            )
+            .quaternion
+            .into_inner(),
         ..State::at_rest()
     }
 }

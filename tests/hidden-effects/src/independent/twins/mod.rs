@@ -1,7 +1,7 @@
 //! Effects whose equation stands in a file of its own, with what the bench draws of them.
 //!
-//! Written from publications, as all of this generator, and not from the core's files: what is wrong there must not be wrong
-//! here, too.
+//! Written from publications, as all of this generator, and not from the core's files: what is
+//! wrong there must not be wrong here, too.
 
 pub(crate) mod angular_damping;
 pub(crate) mod flapping_moment;
