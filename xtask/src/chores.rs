@@ -5,7 +5,7 @@
 //! demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
-use crate::{effect, firmware, python, thumb, weights, wheel};
+use crate::{firmware, python, thumb, weights, wheel};
 use std::path::Path;
 use std::process::Command;
 
@@ -34,10 +34,9 @@ const LINT: [Step; 4] = [
     },
 ];
 
-const TEST: [Step; 10] = [
+const TEST: [Step; 9] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
-    Step { name: "effect", action: Action::Function(effect::step) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
     Step { name: "firmware", action: Action::Function(firmware::step) },
     Step { name: "deny", action: Action::Function(deny) },
