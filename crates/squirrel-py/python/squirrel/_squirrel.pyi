@@ -93,13 +93,15 @@ class Batch:
     r"""
     Many vehicles at once, each with numbers of its own.
     
-    All have rigid body, rotors with lag, drag and wind; wings with their servos, batteries and effects fly where a vehicle has them,
-    as they do in `simulate`, and what no vehicle of the batch has costs nothing. The base model alone, ``whole=False``, is about three
-    times as fast as a vehicle with wings and battery.
+    All have rigid body, rotors with lag, drag and wind; wings with their servos, batteries and
+    effects fly where a vehicle has them, as they do in `simulate`, and what no vehicle of the batch
+    has costs nothing. The base model alone, ``whole=False``, is about three times as fast as a
+    vehicle with wings and battery.
     
-    Vehicles start at rest at the origin, level, rotors stopped, wings folded, batteries full. What a vehicle does depends on nothing
-    but itself: the same bits in a batch of any size, at any place in it, on any number of threads and any registers, in one call or
-    in many. Several threads may call at once; they wait for each other.
+    Vehicles start at rest at the origin, level, rotors stopped, wings folded, batteries full. What
+    a vehicle does depends on nothing but itself: the same bits in a batch of any size, at any place
+    in it, on any number of threads and any registers, in one call or in many. Several threads may
+    call at once; they wait for each other.
     
     Parameters
     ----------
@@ -190,7 +192,8 @@ class Batch:
         r"""
         Fly on, commands held.
         
-        A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it. Ctrl-C ends the call between two steps.
+        A vehicle that leaves all bounds becomes NaN, and none of its neighbours with it. Ctrl-C
+        ends the call between two steps.
         
         Parameters
         ----------
@@ -199,7 +202,8 @@ class Batch:
         """
     def fly(self, command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], steps: builtins.int = 1, *, out: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None) -> numpy.typing.NDArray[typing.Any]:
         r"""
-        Command, fly on, and look: `command`, `step` and `states` in one call, with the same bits and in less time.
+        Command, fly on, and look: `command`, `step` and `states` in one call, with the same bits
+        and in less time.
         
         Parameters
         ----------
@@ -269,8 +273,8 @@ class Batch:
         """
     def reset(self, state: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], *, vehicles: typing.Optional[typing.Iterable[typing.SupportsIndex]] = None) -> None:
         r"""
-        Put vehicles somewhere else: wings folded, batteries full. Their air stays and so does what their rotors are told; commands on
-        their way are lost.
+        Put vehicles somewhere else: wings folded, batteries full. Their air stays and so does what
+        their rotors are told; commands on their way are lost.
         
         Parameters
         ----------
@@ -306,7 +310,8 @@ class Batch:
         """
     def set_wind(self, wind_ned_m_s: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]) -> None:
         r"""
-        Velocity of the air about each vehicle from now on; gusts end, those of the effect ``gust`` too.
+        Velocity of the air about each vehicle from now on; gusts end, those of the effect ``gust``
+        too.
         
         Parameters
         ----------
@@ -321,8 +326,8 @@ class Batch:
         r"""
         Moving air about vehicles from now on, as a flight of `simulate` with the same seed has it.
         
-        Gusts are a Gauss-Markov process of 1.5 s per axis that moves at 300 Hz. Those of the effect ``gust`` blow on top of them; where
-        nothing was set, with the number of the vehicle as seed.
+        Gusts are a Gauss-Markov process of 1.5 s per axis that moves at 300 Hz. Those of the effect
+        ``gust`` blow on top of them; where nothing was set, with the number of the vehicle as seed.
         
         Parameters
         ----------
@@ -344,8 +349,8 @@ class Batch:
         """
     def replace(self, index: builtins.int, vehicle: Vehicle) -> None:
         r"""
-        Another vehicle in the place of one, as for a domain that is drawn anew; motion, air, charge of the battery, and what rotors
-        and wings are told stay.
+        Another vehicle in the place of one, as for a domain that is drawn anew; motion, air, charge
+        of the battery, and what rotors and wings are told stay.
         
         Parameters
         ----------
@@ -367,10 +372,11 @@ class Batch:
 @typing.final
 class FlightLog:
     r"""
-    A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their channels as arrays.
+    A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their
+    channels as arrays.
     
-    An array is the caller's own, one copy of a column of the log. Files hold their samples row by row, compressed, so that there is
-    nothing in them to look at in place.
+    An array is the caller's own, one copy of a column of the log. Files hold their samples row by
+    row, compressed, so that there is nothing in them to look at in place.
     
     Examples
     --------
@@ -392,7 +398,8 @@ class FlightLog:
     @property
     def metrics(self) -> dict[str, float | None] | None:
         r"""
-        What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was read.
+        What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was
+        read.
         """
     @staticmethod
     def read(path: builtins.str | os.PathLike | pathlib.Path) -> FlightLog:
@@ -507,13 +514,15 @@ class Model:
     @property
     def card(self) -> dict[str, typing.Any]:
         r"""
-        Where the weights come from: model, vehicle, area, what was flown in training, seed, figures.
+        Where the weights come from: model, vehicle, area, what was flown in training, seed,
+        figures.
         """
     @property
     def history(self) -> numpy.typing.NDArray[numpy.float64]:
         r"""
-        Root mean squared errors of each epoch, N, shape (epochs, 2): over the training windows while the weights moved, and over
-        the validation windows after it (NaN where there are none). Empty for a model that was loaded.
+        Root mean squared errors of each epoch, N, shape (epochs, 2): over the training windows
+        while the weights moved, and over the validation windows after it (NaN where there are
+        none). Empty for a model that was loaded.
         """
     def save(self, path: builtins.str | os.PathLike | pathlib.Path) -> None:
         r"""
@@ -561,10 +570,11 @@ class Model:
 @typing.final
 class Policy:
     r"""
-    A policy that flies: two layers of 32 tanh neurons and a linear output, from 25 numbers seen to 4 numbers commanded.
+    A policy that flies: two layers of 32 tanh neurons and a linear output, from 25 numbers seen to
+    4 numbers commanded.
     
-    What the numbers mean is written in `squirrel.policy`. Layers are ``(weight, bias)`` as `torch.nn.Linear` has them:
-    ``y = weight @ x + bias``.
+    What the numbers mean is written in `squirrel.policy`. Layers are
+    ``(weight, bias)`` as `torch.nn.Linear` has them: ``y = weight @ x + bias``.
     
     Parameters
     ----------
@@ -606,7 +616,8 @@ class Policy:
         """
     def save(self, path: builtins.str | os.PathLike | pathlib.Path) -> None:
         r"""
-        Write a safetensors file for ``squirrel fly --policy``; it appears under its name only when it is whole.
+        Write a safetensors file for ``squirrel fly --policy``; it appears under its name only when
+        it is whole.
         
         Parameters
         ----------
@@ -665,8 +676,8 @@ class Stack:
         r"""
         One step of each vehicle.
         
-        A measurement that is left out was not made in this step. One that is not finite is the flight code's to refuse: it
-        keeps the last valid one and counts ``rejected``.
+        A measurement that is left out was not made in this step. One that is not finite is the
+        flight code's to refuse: it keeps the last valid one and counts ``rejected``.
         
         Parameters
         ----------
@@ -714,8 +725,9 @@ class Tasks:
     r"""
     Environments to learn in, side by side: what the classes of `squirrel.envs` are made of.
     
-    An action is 20 ms of flight. An episode that has ended is followed by a new one in the next step, whose action is not looked at.
-    Environment k draws from ``seed + k``: what happens in it does not depend on how many there are, nor on threads.
+    An action is 20 ms of flight. An episode that has ended is followed by a new one in the next
+    step, whose action is not looked at. Environment k draws from ``seed + k``: what happens in it
+    does not depend on how many there are, nor on threads.
     
     Parameters
     ----------
@@ -847,7 +859,8 @@ class Tasks:
 @typing.final
 class Twcc:
     r"""
-    Thrust-wing coordination: from a reference to angles, thrust and wings, the flight code's own law (float32).
+    Thrust-wing coordination: from a reference to angles, thrust and wings, the flight code's own
+    law (float32).
     
     Parameters
     ----------
@@ -876,7 +889,8 @@ class Twcc:
             Attitude.
         reference_position_ned_m : ndarray of float32, shape (count, 3)
             What to follow.
-        reference_velocity_ned_m_s, reference_acceleration_ned_m_s2 : ndarray of float32, shape (count, 3), optional
+        reference_velocity_ned_m_s, reference_acceleration_ned_m_s2 : ndarray of float32, shape
+        (count, 3), optional
             Its derivatives; zero if left out.
         reference_yaw_rad : float
             Heading, clockwise from north.
@@ -904,10 +918,11 @@ class Twcc:
 @typing.final
 class Vehicle:
     r"""
-    A vehicle: airframe, rotors, wings, battery, gains, sensors and effects, checked when it is made and never changed.
+    A vehicle: airframe, rotors, wings, battery, gains, sensors and effects, checked when it is made
+    and never changed.
     
-    Keys are those of vehicle files, with the unit in the name: ``mass.mass_kg``, ``rotor[0].position_body_m``,
-    ``effects.battery_sag.voltage_exponent``.
+    Keys are those of vehicle files, with the unit in the name:
+    ``mass.mass_kg``, ``rotor[0].position_body_m``, ``effects.battery_sag.voltage_exponent``.
     
     Examples
     --------
@@ -1037,7 +1052,8 @@ class Vehicle:
         """
     def validate(self) -> builtins.list[builtins.str]:
         r"""
-        What a careful reader still wants to know of a vehicle whose numbers are all sound, as every vehicle's are.
+        What a careful reader still wants to know of a vehicle whose numbers are all sound, as every
+        vehicle's are.
         
         Returns
         -------
@@ -1171,7 +1187,8 @@ def load(path: builtins.str | os.PathLike | pathlib.Path) -> Model:
 
 def plan_reach(vehicle: Vehicle, velocity_ned_m_s: typing.Sequence[builtins.float], thrust_to_weight: typing.Optional[builtins.float], wing: builtins.str, tilt: builtins.str, yaw_rad: typing.Optional[builtins.float], directions: typing.Optional[numpy.typing.NDArray[numpy.float64]]) -> tuple[dict[str, typing.Any], dict[str, typing.Any] | None]:
     r"""
-    What wings make reachable, as a case in the JSON of ``squirrel reach``, and the support function along directions as arrays.
+    What wings make reachable, as a case in the JSON of ``squirrel reach``, and the support function
+    along directions as arrays.
     
     * `yaw_rad` - of the box; the heading of the velocity if left out
     """
