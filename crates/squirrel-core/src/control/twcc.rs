@@ -54,8 +54,8 @@ pub enum Mode {
     /// PC.
     #[default]
     Primary = 0,
-    /// Wings open: WIIC, or the answer of [`plus`](super::plus) with wings. Files and logs call it
-    /// `wiic`.
+    /// Wings open: WIIC, or the answer of [`plus`](mod@super::plus) with wings. Files and logs call
+    /// it `wiic`.
     WingsOpen = 1,
     /// PC's angles at full thrust.
     FullThrust = 2,

@@ -2,7 +2,7 @@
 //! into the log alone.
 //!
 //! Each is one file, with the keys of its table in `[sensors]`, its devices and what it reads
-//! ([`Reads`]), and a line of [`Logged`].
+//! (`Reads`), and a line of [`Logged`].
 
 mod battery;
 mod range_finder;
