@@ -63,8 +63,9 @@ numbers! {
     }
 }
 
-/// The loops of a block.
+/// The loops of a block. Rows first, as in a [`Block`].
 #[derive(Debug, Clone)]
+#[repr(C, align(64))]
 pub(super) struct Autopilots<S: Copy, const ROTORS: usize> {
     course: Course<Row<S>>,
     gains: Gains<Row<S>>,

@@ -37,11 +37,10 @@ struct Late<S, const ROTORS: usize> {
     command: Command<S, ROTORS>,
 }
 
-/// See the module.
+/// See the module. Rows first, as in a [`Block`].
 #[derive(Debug, Clone)]
+#[repr(C, align(64))]
 pub(super) struct Extra<S: Copy, const ROTORS: usize> {
-    /// `NONE`, `FLAT` or `MEMBRANE` of `dynamics::whole`, for the whole batch.
-    pub(super) wing: u8,
     pub(super) plate: flat_plate::Pair<Row<S>>,
     pub(super) membrane: Membrane<Row<S>>,
     /// Left and right, as all that has two of a thing.
@@ -50,14 +49,16 @@ pub(super) struct Extra<S: Copy, const ROTORS: usize> {
     pub(super) wing_angle: [Row<S>; 2],
     pub(super) servo: Servo<Row<S>>,
     pub(super) deployment: [ServoState<Row<S>>; 2],
-    pub(super) packs: Option<Packs<S>>,
-    pub(super) present: Present,
     pub(super) effects: Prepared<Row<S>>,
     /// Signs of the rotors' spin about +z.
     pub(super) spin: [Row<S>; ROTORS],
     /// A load over a step; without weight where there is none.
     pub(super) swing: Swing<Row<S>>,
     pub(super) load: PendulumState<Row<S>>,
+    /// `NONE`, `FLAT` or `MEMBRANE` of `dynamics::whole`, for the whole batch.
+    pub(super) wing: u8,
+    pub(super) present: Present,
+    pub(super) packs: Option<Packs<S>>,
     pub(super) latency_steps: [u64; BLOCK],
     late: VecDeque<Late<S, ROTORS>>,
     /// Steps that the block has taken.

@@ -82,20 +82,21 @@ impl<S: Paths> Tuning<S> {
     }
 }
 
-/// Sixteen vehicles. Aligned so that no load of a row touches two lines of the cache.
+/// Sixteen vehicles. Rows come first, in the order of the source: with the alignment no load of a
+/// row touches two lines of the cache.
 #[derive(Debug, Clone)]
-#[repr(align(64))]
+#[repr(C, align(64))]
 pub(super) struct Block<S: Copy, const ROTORS: usize> {
     pub(super) motion: Motion<Row<S>, ROTORS>,
     pub(super) airframe: Airframe<Row<S>, ROTORS>,
     pub(super) held: Held<Row<S>, ROTORS>,
+    /// Speed of the rotors at full command, rad/s, where a command is a part of it and there is a
+    /// rotor in every place; NaN elsewhere.
+    full_speed: Row<S>,
     /// Columns with a vehicle, the first ones.
     pub(super) vehicles: usize,
     /// Some rotors have no lag.
     pub(super) lagless: bool,
-    /// Speed of the rotors at full command, rad/s, where a command is a part of it and there is a
-    /// rotor in every place; NaN elsewhere.
-    full_speed: Row<S>,
     /// It is so for every vehicle.
     commands_are_parts: bool,
     /// What is not part of the base model, where the batch has any of it.
