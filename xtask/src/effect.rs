@@ -1,7 +1,7 @@
 //! One more effect, as `docs/adding-an-effect.md` adds it, in a copy of the repository: that page
 //! is true, and an effect is a file and a line.
 
-use crate::run::{call, output, root, target_directory};
+use crate::run::{root, target_directory};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -44,15 +44,13 @@ pub(crate) fn chore(_: &[String]) -> Result<(), String> {
     for (path, text) in &page.files {
         write(&copy.join(path), text.as_bytes())?;
     }
-    let patch = copy.join("effect.patch");
-    write(&patch, page.patch.as_bytes())?;
-    // The copy may lie in a repository, of which it is no part.
-    call(
-        Command::new("git")
-            .current_dir(&copy)
-            .env("GIT_CEILING_DIRECTORIES", copy.parent().unwrap_or(&copy))
-            .args(["apply", "effect.patch"]),
-    )?;
+    for (path, before, after) in page.hunks() {
+        let (file, text) = (copy.join(&path), read(&copy.join(&path))?);
+        if text.matches(&before).count() != 1 {
+            return Err(format!("{path}: the patch of {PAGE} does not fit"));
+        }
+        write(&file, text.replacen(&before, &after, 1).as_bytes())?;
+    }
     let since = modified(&root.join(PAGE))?;
     for path in page.paths() {
         keep_time(
@@ -131,6 +129,27 @@ impl Page {
         self.files.iter().map(|(path, _)| path.as_str()).chain(changed)
     }
 
+    /// Of each hunk: the file, the lines that it finds there, and those that it leaves.
+    fn hunks(&self) -> Vec<(String, String, String)> {
+        let (mut path, mut hunks) = ("", Vec::<(String, String, String)>::new());
+        for line in self.patch.lines().filter(|line| !line.starts_with("--- ")) {
+            if let Some(name) = line.strip_prefix("+++ b/") {
+                path = name;
+            } else if line.starts_with("@@") {
+                hunks.push((path.to_owned(), String::new(), String::new()));
+            } else if let Some((_, before, after)) = hunks.last_mut() {
+                let text = [line.get(1..).unwrap_or_default(), "\n"].concat();
+                if !line.starts_with('+') {
+                    *before += &text;
+                }
+                if !line.starts_with('-') {
+                    *after += &text;
+                }
+            }
+        }
+        hunks
+    }
+
     /// Lines that the patch adds or takes away.
     fn changed_lines(&self) -> Vec<&str> {
         let is_head = |line: &&str| line.starts_with("+++ ") || line.starts_with("--- ");
@@ -138,21 +157,33 @@ impl Page {
     }
 }
 
-/// Copies what git knows, and what it does not ignore, as it lies there now. Times are kept, so
-/// that cargo builds again what the page changes and no more.
+/// Copies the sources as they lie there now, but not what was built or is hidden. Times are kept,
+/// so that cargo builds again what the page changes and no more.
 fn copied(root: &Path, copy: &Path) -> Result<(), String> {
     if copy.exists() {
         fs::remove_dir_all(copy).map_err(|error| format!("{}: {error}", copy.display()))?;
     }
-    let list = ["ls-files", "--cached", "--others", "--exclude-standard"];
-    let names =
-        output(Command::new("git").current_dir(root).args(list)).ok_or("git ls-files: failed")?;
-    for name in names.lines() {
-        let (from, to) = (root.join(name), copy.join(name));
-        // One that was taken away and is not committed is none.
-        if from.is_file() {
-            write(&to, &fs::read(&from).map_err(|error| format!("{name}: {error}"))?)?;
-            keep_time(&to, modified(&from)?)?;
+    let mut folders = vec![PathBuf::new()];
+    while let Some(folder) = folders.pop() {
+        let at = root.join(&folder);
+        let say = |error: std::io::Error| format!("{}: {error}", at.display());
+        for entry in fs::read_dir(&at).map_err(say)? {
+            let entry = entry.map_err(say)?;
+            let name = entry.file_name();
+            let is_built = ["target", "__pycache__", "squirrel-demo"].iter().any(|no| name == *no);
+            let is_hidden = name.to_string_lossy().starts_with('.') && name != ".cargo";
+            if is_built || is_hidden {
+                continue;
+            }
+            let (from, path) = (entry.path(), folder.join(&name));
+            if entry.file_type().map_err(say)?.is_dir() {
+                folders.push(path);
+            } else if from.is_file() {
+                let bytes =
+                    fs::read(&from).map_err(|error| format!("{}: {error}", from.display()))?;
+                write(&copy.join(&path), &bytes)?;
+                keep_time(&copy.join(&path), modified(&from)?)?;
+            }
         }
     }
     Ok(())
@@ -198,7 +229,10 @@ mod tests {
             page.paths().collect::<Vec<_>>(),
             ["crates/squirrel-core/src/effects/tail.rs", "x", "v"]
         );
-        assert!(page.patch.starts_with("--- a/x\n") && page.patch.ends_with("+u\n"));
+        let hunk = |path: &str, before: &str, after: &str| {
+            (path.to_owned(), before.to_owned(), after.to_owned())
+        };
+        assert_eq!(page.hunks(), [hunk("x", "y\n", "y\nz\n"), hunk("v", "w\n", "u\n")]);
     }
 
     #[test]
