@@ -889,8 +889,7 @@ class Twcc:
             Attitude.
         reference_position_ned_m : ndarray of float32, shape (count, 3)
             What to follow.
-        reference_velocity_ned_m_s, reference_acceleration_ned_m_s2 : ndarray of float32, shape
-        (count, 3), optional
+        reference_velocity_ned_m_s, reference_acceleration_ned_m_s2 : ndarray of float32, shape (count, 3), optional
             Its derivatives; zero if left out.
         reference_yaw_rad : float
             Heading, clockwise from north.

@@ -164,8 +164,9 @@ mod x86 {
                 }
                 #[inline(always)]
                 fn lower(self, bound: Self) -> Self {
-                    // The second operand where one is NaN, as `math::lower` does. SAFETY: values of
-                    // this type exist only where the processor has its instructions.
+                    // The second operand where one is NaN, as `math::lower` does.
+                    // SAFETY: values of this type exist only where the processor has its
+                    // instructions.
                     Self(unsafe { intrinsic::$lower(self.0, bound.0) })
                 }
                 #[inline(always)]
