@@ -1,12 +1,10 @@
 //! A policy's file: its bits come back, and what is wrong with it is said in one line that names
 //! it.
 
-use super::weights_support::{Parts, folder, shipped};
-use safetensors::tensor::TensorView;
+use super::weights_support::{Parts, folder, rewritten, shipped};
 use safetensors::{Dtype, SafeTensors};
 use squirrel_core::policy::Policy;
 use squirrel_sim::weights::PolicyWeights;
-use std::collections::BTreeMap;
 use std::fs;
 
 fn policy() -> Policy {
@@ -42,24 +40,7 @@ fn said(change: impl FnOnce(&mut Parts, &mut String)) -> String {
     let folder = folder("policy_wrong");
     let path = folder.join("own.safetensors");
     PolicyWeights::save(&policy(), &path).unwrap();
-    let bytes = fs::read(&path).unwrap();
-    let file = SafeTensors::deserialize(&bytes).unwrap();
-    let mut parts: Parts = file
-        .tensors()
-        .into_iter()
-        .map(|(name, view)| (name, (view.dtype(), view.shape().to_vec(), view.data().to_vec())))
-        .collect();
-    let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
-    let mut text = header.metadata().as_ref().unwrap()["squirrel"].clone();
-    change(&mut parts, &mut text);
-    let views: BTreeMap<&str, _> = parts
-        .iter()
-        .map(|(name, (dtype, shape, data))| {
-            (name.as_str(), TensorView::new(*dtype, shape.clone(), data).unwrap())
-        })
-        .collect();
-    let metadata = [("squirrel".to_owned(), text)].into_iter().collect();
-    fs::write(&path, safetensors::serialize(views, Some(metadata)).unwrap()).unwrap();
+    fs::write(&path, rewritten(&fs::read(&path).unwrap(), change)).unwrap();
     let error = PolicyWeights::load(&path).unwrap_err().to_string();
     assert!(!error.contains('\n'), "{error}");
     error

@@ -18,16 +18,20 @@ pub(crate) fn shipped() -> Vec<u8> {
         .unwrap()
 }
 
-/// The shipped weights written again after a change of tensors and of the metadata.
+/// The shipped weights with something changed.
 pub(crate) fn changed(change: impl FnOnce(&mut Parts, &mut String)) -> Vec<u8> {
-    let bytes = shipped();
-    let file = SafeTensors::deserialize(&bytes).unwrap();
+    rewritten(&shipped(), change)
+}
+
+/// Weights written again after a change of tensors and of the metadata.
+pub(crate) fn rewritten(bytes: &[u8], change: impl FnOnce(&mut Parts, &mut String)) -> Vec<u8> {
+    let file = SafeTensors::deserialize(bytes).unwrap();
     let mut parts: Parts = file
         .tensors()
         .into_iter()
         .map(|(name, view)| (name, (view.dtype(), view.shape().to_vec(), view.data().to_vec())))
         .collect();
-    let (_, header) = SafeTensors::read_metadata(&bytes).unwrap();
+    let (_, header) = SafeTensors::read_metadata(bytes).unwrap();
     let mut text = header.metadata().as_ref().unwrap()["squirrel"].clone();
     change(&mut parts, &mut text);
     let views = parts.iter().map(|(name, (dtype, shape, data))| {
