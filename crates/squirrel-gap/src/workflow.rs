@@ -70,8 +70,10 @@ impl Workflow {
     /// # Errors
     /// As [`add`](crate::add()).
     pub fn patched(&self, fit: bool) -> Result<Result<Patched, String>, String> {
-        let text = patched(&self.vehicle, &self.diagnosis, &self.flights, fit)?;
-        text.map(|text| self.read(text)).map_or_else(|why| Ok(Err(why)), |patched| patched.map(Ok))
+        match patched(&self.vehicle, &self.diagnosis, &self.flights, fit)? {
+            Ok(text) => self.read(text).map(Ok),
+            Err(why) => Ok(Err(why)),
+        }
     }
 
     /// The vehicle file with one effect of an answer that is several.
