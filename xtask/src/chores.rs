@@ -6,7 +6,7 @@
 
 use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
 use crate::{firmware, python, thumb, weights, wheel};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const LINT: [Step; 4] = [
@@ -98,18 +98,16 @@ pub(crate) fn pictures(_: &[String]) -> Result<(), String> {
 
 /// `cargo xtask gap-bench`: the blind bench of the gap workflow on the program as it is built now.
 pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
-    call(cargo()?.args([
-        "build",
-        "--release",
-        "--locked",
-        "-p",
-        "squirrel-cli",
-        "-p",
-        "hidden-effects",
-    ]))?;
-    let built = target_directory()?.join("release");
+    let built = blind_bench()?;
     let mut command = Command::new(built.join("hidden-effects"));
     call(command.args(["bench", "--squirrel"]).arg(built.join("squirrel")).args(arguments))
+}
+
+/// Builds the program and its blind bench; the folder that they are in.
+pub(crate) fn blind_bench() -> Result<PathBuf, String> {
+    let packages = ["-p", "squirrel-cli", "-p", "hidden-effects"];
+    call(cargo()?.args(["build", "--release", "--locked"]).args(packages))?;
+    Ok(target_directory()?.join("release"))
 }
 
 /// The files in the crates' `benches` folders, without extension, in order.

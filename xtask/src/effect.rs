@@ -34,22 +34,13 @@ pub(crate) fn chore(_: &[String]) -> Result<(), String> {
     copied(&root, &copy)?;
     // A version of its own: cargo takes the crates of two folders that share a target folder for the
     // same, and what is built here would be what is run there.
-    let manifest = copy.join("Cargo.toml");
-    let (own, other) = (format!("\nversion = \"{VERSION}\"\n"), "\nversion = \"0.0.0-effect\"\n");
-    let text = read(&manifest)?;
-    if !text.contains(&own) {
-        return Err(format!("{}: no version {VERSION}", manifest.display()));
-    }
-    write(&manifest, text.replacen(&own, other, 1).as_bytes())?;
+    let own = format!("\nversion = \"{VERSION}\"\n");
+    replace(&copy.join("Cargo.toml"), &own, "\nversion = \"0.0.0-effect\"\n")?;
     for (path, text) in &page.files {
         write(&copy.join(path), text.as_bytes())?;
     }
     for (path, before, after) in page.hunks() {
-        let (file, text) = (copy.join(&path), read(&copy.join(&path))?);
-        if text.matches(&before).count() != 1 {
-            return Err(format!("{path}: the patch of {PAGE} does not fit"));
-        }
-        write(&file, text.replacen(&before, &after, 1).as_bytes())?;
+        replace(&copy.join(path), &before, &after)?;
     }
     let since = modified(&root.join(PAGE))?;
     for path in page.paths() {
@@ -199,6 +190,19 @@ fn keep_time(path: &Path, time: SystemTime) -> Result<(), String> {
     let file = fs::File::options().write(true).open(path);
     file.and_then(|file| file.set_modified(time))
         .map_err(|error| format!("{}: {error}", path.display()))
+}
+
+/// Replaces what stands in a file once.
+fn replace(path: &Path, before: &str, after: &str) -> Result<(), String> {
+    let text = read(path)?;
+    let places = text.matches(before).count();
+    if places != 1 {
+        return Err(format!(
+            "{}: must have once, and has {places} times: {before}",
+            path.display()
+        ));
+    }
+    write(path, text.replace(before, after).as_bytes())
 }
 
 fn read(path: &Path) -> Result<String, String> {

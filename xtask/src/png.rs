@@ -1,7 +1,8 @@
 //! A report as a picture, to look at it where there is no browser window: any report, or that of a
 //! hidden effect which is made, flown and diagnosed for it.
 
-use crate::run::{call, cargo, succeeds, target_directory};
+use crate::chores::blind_bench;
+use crate::run::{call, succeeds, target_directory};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -43,17 +44,7 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
 /// Makes a case, has the program diagnose it, checks that the report has all panels, and draws it
 /// into `target/gap-report`.
 fn gap_report() -> Result<(), String> {
-    call(cargo()?.args([
-        "build",
-        "--release",
-        "--locked",
-        "-p",
-        "squirrel-cli",
-        "-p",
-        "hidden-effects",
-    ]))?;
-    let (built, folder) =
-        (target_directory()?.join("release"), target_directory()?.join("gap-report"));
+    let (built, folder) = (blind_bench()?, target_directory()?.join("gap-report"));
     if folder.exists() {
         std::fs::remove_dir_all(&folder)
             .map_err(|error| format!("{}: {error}", folder.display()))?;
