@@ -43,13 +43,17 @@ mod payload_swing;
 mod profile;
 mod quadratic_drag;
 mod rotor_gyro_torque;
+mod rotor_wash;
 mod thrust_coefficient;
 mod thrust_misalignment;
 mod translational_lift;
+mod vortex_ring;
 mod weak_rotor;
 mod wing_asymmetry;
 mod wing_membrane;
+mod wing_moment;
 mod wing_servo_lag;
+mod wing_tangential;
 mod yaw_torque_coeff;
 
 pub use actuation_latency::ActuationLatency;
@@ -268,11 +272,17 @@ pub struct Situation<'a, L> {
     pub flow: &'a Airflow<L>,
     /// Thrust of all rotors, N, effects on thrust included.
     pub thrust_n: L,
+    /// Thrust of each, N, before effects on thrust.
+    pub rotor_thrust_n: &'a [L],
+    /// What effects make of each.
+    pub thrust_factor: L,
     /// Force of rotors, drag and wings, body frame, N, before effects that add to it.
     pub force: [L; 3],
     /// Sum of the rotor speeds about +z, each with the sign of its spin, rad/s, and its rate,
     /// rad/s^2; 0 where no effect [feels it](Acts::FEELS_ROTOR_SPIN).
     pub rotor_spin: [L; 2],
+    /// Force of its wings alone, likewise, N.
+    pub wing_force: [L; 3],
     /// The vehicle's wings; without area where it has none.
     pub wings: &'a flat_plate::Pair<L>,
     /// Deployment of the left and the right wing, 0..1.

@@ -17,6 +17,9 @@ const WING: Wing<f64> = Wing {
     area_per_side_m2: 0.02,
     normal_force_slope: 2.0,
     lateral_arm_m: 0.1,
+    longitudinal_arm_m: 0.0,
+    vertical_arm_m: 0.0,
+    chord_m: 0.2,
     time_constant_s: 0.1,
 };
 fn vehicle() -> Vehicle<f64> {
@@ -26,12 +29,21 @@ fn thrust_factor(effects: &Effects<f64>, height_m: f64) -> f64 {
     let acting = Acting::new(effects, &vehicle());
     acting.numbers().thrust_factor(acting.present(), &Airflow::from(&air()), height_m)
 }
+/// Where rotors sink into their own wake.
+fn sinking_factor(effects: &Effects<f64>) -> f64 {
+    let acting = Acting::new(effects, &vehicle());
+    let sinking = Air::new(In::new(Vector3::new(0.0, 1.0, 9.0)), In::zero());
+    acting.numbers().thrust_factor(acting.present(), &Airflow::from(&sinking), HEIGHT_M)
+}
 fn wrench_of(effects: &Effects<f64>) -> Wrench<Body, f64> {
     let acting = Acting::new(effects, &vehicle());
     let at = Situation {
         flow: &Airflow::from(&air()),
         thrust_n: 5.0,
+        rotor_thrust_n: &[1.25; 4],
+        thrust_factor: 1.0,
         force: [0.2, 0.1, -5.0],
+        wing_force: [-0.1, 0.05, -0.8],
         rotor_spin: [100.0, -4000.0],
         wings: &flat_plate::Pair::new(&WING),
         deployment: [1.0, 0.5],
@@ -75,6 +87,7 @@ fn actions(effects: &Effects<f64>) -> Vec<f64> {
         effects.gnss_latency_s(),
         acting.numbers().added_mass_kg(acting.present()),
         thrust_factor(effects, HEIGHT_M),
+        sinking_factor(effects),
         altered.inverse_mass(),
     ];
     all.extend(targets(effects));

@@ -95,6 +95,7 @@ pub(super) struct PropulsionTable {
     pub(super) time_constant_s: Option<Number>,
     pub(super) time_constant_up_s: Option<Number>,
     pub(super) time_constant_down_s: Option<Number>,
+    pub(super) propeller_diameter_m: Option<Number>,
     pub(super) reference_voltage_v: Number,
     pub(super) pwm_to_thrust_n: Option<Quantity<[f64; 4]>>,
 }
@@ -122,6 +123,9 @@ pub(super) struct WingTable {
     pub(super) area_per_side_m2: Option<Number>,
     pub(super) normal_force_slope: Option<Number>,
     pub(super) lateral_arm_m: Option<Number>,
+    pub(super) longitudinal_arm_m: Option<Number>,
+    pub(super) vertical_arm_m: Option<Number>,
+    pub(super) chord_m: Option<Number>,
     pub(super) time_constant_s: Option<Number>,
     pub(super) dead_time_s: Option<Number>,
     pub(super) rate_max_per_s: Option<Number>,

@@ -212,10 +212,13 @@ wire_struct! {
     Rotor<f32> { position, yaw_sign }
     Propulsion<f32> {
         command, speed_max_rad_s, thrust_coefficient_n_s2, torque_coefficient_n_m_s2, time_constant_up_s,
-        time_constant_down_s, reference_voltage_v, thrust_curve,
+        time_constant_down_s, propeller_radius_m, reference_voltage_v, thrust_curve,
     }
     Drag<f32> { linear_n_s_per_m, area_m2 }
-    Wing<f32> { area_per_side_m2, normal_force_slope, lateral_arm_m, time_constant_s }
+    Wing<f32> {
+        area_per_side_m2, normal_force_slope, lateral_arm_m, longitudinal_arm_m, vertical_arm_m, chord_m,
+        time_constant_s,
+    }
     Limits<f32> { tilt_max_rad, thrust_max_n, rotor_thrust_max_n }
     StackParameters { attitude, twcc, navigation }
     AttitudeGains {
