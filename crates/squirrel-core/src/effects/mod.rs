@@ -323,6 +323,11 @@ pub trait Effect<T: Real>: Copy {
     /// place for or not.
     const FORMS_APART: bool = false;
 
+    /// Whether a vehicle has some of it as a number of its own, to which the effect adds.
+    #[inline(always)]
+    fn is_declared(_vehicle: &Vehicle<T>) -> bool {
+        false
+    }
     /// Gusts that the effect adds to the air.
     #[inline(always)]
     fn gust(&self) -> Option<GustSpectrum<T>> {

@@ -11,10 +11,10 @@
 //! within 0.3 to 1.7, the bounds of helicopters (Leishman, Principles of Helicopter Aerodynamics, ch.
 //! 2).
 
-use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
-use crate::math::{Real, real};
+use crate::math::Real;
 use crate::numbers;
 use crate::vehicle::Vehicle;
 
@@ -26,8 +26,10 @@ pub(super) struct VortexRing<T>(pub(super) [T; 2]);
 
 impl<T: Real> Effect<T> for VortexRing<T> {
     const NAME: &'static str = "vortex_ring";
-    const PARAMETERS: &'static [EffectParameter] =
-        &[EffectParameter::signed("gain", 0.05, 0.3), EffectParameter::form(&["classic", "early"])];
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("gain", 0.05, 0.3).declared(Declared::VortexRing),
+        EffectParameter::form(&["classic", "early"]),
+    ];
     const WORDS: Words = Words {
         what: "sinking into the own wake",
         more: "Rotors lift less when they sink into their own wake",
@@ -35,6 +37,10 @@ impl<T: Real> Effect<T> for VortexRing<T> {
         fly: "straight descents of 4 to 10 m/s, a second each, wings folded, high above the ground",
     };
     const SHOWN: Shown = Shown::NOTHING;
+
+    fn is_declared(vehicle: &Vehicle<T>) -> bool {
+        vehicle.parameters().propulsion.air.vortex_ring_fraction != T::zero()
+    }
 }
 
 numbers! {
@@ -42,35 +48,40 @@ numbers! {
     Numbers {
         /// Part of the thrust that is lost at worst.
         gain,
+        /// The same of a ring that comes early.
+        early,
         /// `1 / v_h`, s/m.
-        per_hover,
-        /// `x` of the worst.
-        middle,
-        /// `1 /` half the width in `x`.
-        per_width
+        per_hover
     }
 }
 
 impl<T: Real> VortexRing<T> {
     pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
-        let [gain, form] = self.0;
-        let [middle, width] = if is(form, EARLY) { [1.0, 0.7] } else { [1.25, 0.6] };
-        Numbers {
-            gain,
-            per_hover: T::one() / vehicle.hover_induced_speed_m_s(),
-            middle: real(middle),
-            per_width: real(1.0 / width),
-        }
+        let [extra, form] = self.0;
+        let own = vehicle.parameters().propulsion.air.vortex_ring_fraction;
+        let [gain, early] = if is(form, EARLY) { [own, extra] } else { [own + extra, T::zero()] };
+        Numbers { gain, early, per_hover: T::one() / vehicle.hover_induced_speed_m_s() }
     }
+}
+
+/// 1 at `middle`, 0 beyond `width` of it.
+#[inline(always)]
+fn bump<L: Lane>(x: L, [middle, width]: [f64; 2]) -> L {
+    let off = (x - L::of(middle)) * L::of(1.0 / width);
+    let inside = (L::of(1.0) - off * off).upper(L::of(0.0));
+    inside * inside
 }
 
 impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
-    fn thrust_factor(&self, flow: &Airflow<L>, _height_m: L, _: Forms) -> L {
-        let ([u, v, w], one, none) = (flow.velocity, L::of(1.0), L::of(0.0));
-        let off = (w * self.per_hover - self.middle) * self.per_width;
-        let bump = (one - off * off).upper(none);
+    fn thrust_factor(&self, flow: &Airflow<L>, _height_m: L, forms: Forms) -> L {
+        let ([u, v, w], one) = (flow.velocity, L::of(1.0));
+        let sinking = w * self.per_hover;
+        let mut lost = self.gain * bump(sinking, [1.25, 0.6]);
+        if forms.has(EARLY) {
+            lost = lost + self.early * bump(sinking, [1.0, 0.7]);
+        }
         let across = (u * u + v * v) * self.per_hover * self.per_hover;
-        one - self.gain * bump * bump * (one - across).upper(none)
+        one - lost * (one - across).upper(L::of(0.0))
     }
 }

@@ -2,7 +2,7 @@
 
 use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle, Wing,
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, RotorAir, Vehicle, Wing,
 };
 
 /// Rotor hubs of the paper's X, m: front left, back left, back right, front right.
@@ -30,6 +30,7 @@ pub(crate) fn vehicle(positions: &[[f64; 2]], signs: &[f64]) -> Vehicle<f32> {
             time_constant_up_s: 0.03,
             time_constant_down_s: 0.03,
             propeller_radius_m: 0.0508,
+            air: RotorAir::still(),
             reference_voltage_v: 14.8,
             thrust_curve: None,
         },

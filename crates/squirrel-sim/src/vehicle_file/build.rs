@@ -25,8 +25,8 @@ use squirrel_core::frames::In;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::stack::StackParameters;
 use squirrel_core::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, ThrustCurve, Vehicle,
-    Wing,
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, RotorAir, ThrustCurve,
+    Vehicle, Wing,
 };
 use std::collections::BTreeMap;
 
@@ -136,6 +136,10 @@ fn default_size(vehicle: &Vehicle<f64>) -> [f64; 3] {
     [2.0 * reach(0), 2.0 * reach(1), 0.04]
 }
 
+fn or_zero(number: &Option<Quantity<f64>>) -> f64 {
+    number.as_ref().map_or(0.0, |q| q.0)
+}
+
 /// Radius of propellers whose file does not say: three quarters of what neighbours leave each
 /// other, m.
 fn default_propeller_radius_m(rotors: &[Rotor<f64>]) -> f64 {
@@ -179,6 +183,12 @@ fn propulsion(t: &PropulsionTable, rotors: &[Rotor<f64>]) -> Result<Propulsion<f
             .propeller_diameter_m
             .as_ref()
             .map_or_else(|| default_propeller_radius_m(rotors), |q| 0.5 * q.0),
+        air: RotorAir {
+            axial_inflow_s_per_m: or_zero(&t.axial_inflow_s_per_m),
+            translational_lift_s2_per_m2: or_zero(&t.translational_lift_s2_per_m2),
+            flapping_moment_n_m_s_per_m: or_zero(&t.flapping_moment_n_m_s_per_m),
+            vortex_ring_fraction: or_zero(&t.vortex_ring_fraction),
+        },
         reference_voltage_v: t.reference_voltage_v.0,
         thrust_curve,
     })
@@ -224,7 +234,6 @@ fn wing(
         None => Err(format!("wing.{key}: missing; a wing needs it")),
     };
     let area_per_side_m2 = need("area_per_side_m2", &t.area_per_side_m2)?;
-    let or_zero = |q: &Option<Quantity<f64>>| q.as_ref().map_or(0.0, |q| q.0);
     let chord = t.chord_m.as_ref().or_else(|| t.membrane.get("chord_m"));
     let wing = Wing {
         area_per_side_m2,

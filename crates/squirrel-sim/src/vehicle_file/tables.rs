@@ -96,6 +96,10 @@ pub(super) struct PropulsionTable {
     pub(super) time_constant_up_s: Option<Number>,
     pub(super) time_constant_down_s: Option<Number>,
     pub(super) propeller_diameter_m: Option<Number>,
+    pub(super) axial_inflow_s_per_m: Option<Number>,
+    pub(super) translational_lift_s2_per_m2: Option<Number>,
+    pub(super) flapping_moment_n_m_s_per_m: Option<Number>,
+    pub(super) vortex_ring_fraction: Option<Number>,
     pub(super) reference_voltage_v: Number,
     pub(super) pwm_to_thrust_n: Option<Quantity<[f64; 4]>>,
 }
