@@ -5,10 +5,12 @@
 
 mod build;
 mod effects;
+mod means;
 mod tables;
 
 pub use crate::quantity::Provenance;
 pub use effects::{ListedEffect, ListedParameter, effects_page, listed_effects};
+pub use means::Means;
 
 use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, ParnnWing, WingPlant};
