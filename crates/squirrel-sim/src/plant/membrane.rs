@@ -3,6 +3,8 @@
 //!
 //! Left and right are evaluated as one register, so that they share each instruction.
 
+#[cfg(test)]
+mod measured;
 mod parameters;
 #[cfg(test)]
 mod tests;
@@ -97,7 +99,7 @@ impl Membrane {
 
     /// Wrench of both wings about the centre of mass, and the rates of their state.
     ///
-    /// Force and moment scale with deployment; the state evolves as if spread. Finite for any
+    /// Force, moment and the camber that the state tends to scale with deployment. Finite for any
     /// finite state and airspeeds up to 1e6 m/s; exactly no force without airspeed.
     ///
     /// * `angle_rate_rad_s` - rate of the angle of attack of each side, rad/s, held over a step;
@@ -153,7 +155,7 @@ impl MembraneParameters {
             arm_m: self.lateral_arm_m,
             lift_slope: self.lift_slope,
             vortex_slope: self.vortex_slope,
-            normal_drag: self.normal_drag,
+            separated_slope: self.normal_drag / 0.59,
             tangential_zero: self.tangential_zero,
             tangential_camber: self.tangential_camber,
             creep_fraction: self.creep_fraction,
