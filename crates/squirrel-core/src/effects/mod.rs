@@ -266,6 +266,8 @@ fn up_and_down<T: Real>(lag_s: T, asymmetry: T) -> [T; 2] {
 pub struct Situation<'a, L> {
     /// Motion through the air.
     pub flow: &'a Airflow<L>,
+    /// Angular rate of the airframe, rad/s, whether the air turns or not.
+    pub omega: &'a [L; 3],
     /// Thrust of all rotors, N, effects on thrust included.
     pub thrust_n: L,
     /// Force of rotors, drag and wings, body frame, N, before effects that add to it.

@@ -30,6 +30,7 @@ fn wrench_of(effects: &Effects<f64>) -> Wrench<Body, f64> {
     let acting = Acting::new(effects, &vehicle());
     let at = Situation {
         flow: &Airflow::from(&air()),
+        omega: &air().omega.vector.into(),
         thrust_n: 5.0,
         force: [0.2, 0.1, -5.0],
         rotor_spin: [100.0, -4000.0],

@@ -22,7 +22,7 @@ pub(crate) use record::{ESTIMATOR, PARNN_WEIGHTS};
 
 use crate::arm::Arm;
 use crate::estimator::Estimator;
-use crate::plant::{Plant, PlantState, Wind, WingPlant};
+use crate::plant::{Meeting, Plant, PlantState, Wind, WingPlant};
 use crate::scenario::{FaultKind, Scenario};
 use crate::sensors::{SensorParameters, Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
@@ -271,7 +271,8 @@ impl Setup {
         let mut mover = Mover::new(self, obstacles.all())?;
         let mut state = plant.initial_state(self.hovering(plant), self.scenario.start_charge());
         let seed = self.scenario.seed;
-        let mut winds = Wind::of_flight(self.scenario.wind(), plant.effects(), seed);
+        let mut winds =
+            Wind::of_flight(self.scenario.wind(), &self.vehicle.vehicle, plant.effects(), seed);
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
         let mut metrics = metrics::Meter::new(&self.scenario);
@@ -290,12 +291,13 @@ impl Setup {
             if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
                 let through_air =
                     state.body.velocity - total_wind(plant.acting(), &state.body, air);
+                let height_m = -state.body.position.vector.z;
                 for wind in &mut winds {
-                    wind.advance((time_us - last_tick_us) as f64 * 1e-6, || {
-                        through_air.vector.norm()
-                    });
+                    let passed_s = (time_us - last_tick_us) as f64 * 1e-6;
+                    wind.advance(passed_s, || Meeting { through_air, height_m });
                 }
                 air = velocity_of(&winds);
+                state.air_omega = winds.iter().find_map(Wind::angular_velocity);
                 let mut truth = truth(plant, &state, air);
                 if let Some(push) = contact_specific_force {
                     truth.specific_force = state.body.ned_from_body().inverse() * push;
