@@ -1,12 +1,14 @@
 //! Scenarios: what to fly, in which air, among which obstacles. A TOML file or one of the built-in
 //! ones.
 
+mod conditions;
 mod excite;
 mod faults;
 mod forest;
 mod runs;
 mod wind;
 
+pub use conditions::Conditions;
 pub use excite::ExciteTable;
 pub use faults::{FaultKind, FaultTable};
 pub use forest::ForestTable;
@@ -52,6 +54,9 @@ pub struct Scenario {
     /// Errors are measured from the first encounter for this long, s; 0 for the whole flight.
     #[serde(default)]
     pub measured_window_s: f64,
+    /// What the day brings.
+    #[serde(default, skip_serializing_if = "Conditions::is_calm")]
+    pub conditions: Conditions,
     /// Obstacles are solid; otherwise they are only seen, as in the paper's flights.
     #[serde(default)]
     pub solid_obstacles: bool,
@@ -184,6 +189,7 @@ impl Scenario {
             obstacles: Vec::new(),
             forest: None,
             mission,
+            conditions: Conditions::Calm,
             wind: WindTable::default(),
             faults: BTreeMap::new(),
         }
@@ -383,9 +389,9 @@ impl Scenario {
         Ok(mission)
     }
 
-    /// The moving air.
+    /// The moving air, with what the conditions bring.
     pub fn wind(&self) -> WindParameters {
-        self.wind.parameters()
+        self.conditions.air(&self.wind, self.seed).parameters()
     }
 }
 
