@@ -63,6 +63,7 @@ impl Conditions {
         })
     }
 
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
     pub(super) fn is_calm(&self) -> bool {
         *self == Self::Calm
     }
