@@ -7,11 +7,18 @@
 use crate::aero::{Air, Airflow, BodyWrench};
 use crate::frames::{Body, Frame, In, Wrench};
 use crate::lane::Lane;
+use crate::lane::functions::size;
 use crate::lane::vector::{dot, scaled};
 use crate::math::{AIR_DENSITY_KG_M3, Real, real};
 use crate::numbers;
 use crate::vehicle::Wing;
 use nalgebra::Vector3;
+
+/// Normal force coefficient broadside of plates about as long as wide (Hoerner, Fluid-Dynamic Drag,
+/// ch. 3).
+pub const NORMAL_DRAG: f64 = 1.17;
+/// Stands for 0 where a division must stay finite, m/s.
+const TINY: f64 = 1e-12;
 
 /// Force of the air on the plate, N, in the frame of its arguments.
 ///
@@ -36,6 +43,19 @@ pub fn impedance<L: Lane>(area_m2: L, speed: L) -> L {
     L::of(-AIR_DENSITY_KG_M3) * area_m2 * speed
 }
 
+/// Pressure along -z on a plate behind whose edges the flow has separated, N/m^2.
+///
+/// `1/2 rho V w C`, `C = C_90 / (0.56 + 0.44 |w| / V)`: the Kirchhoff and Rayleigh law of a broad
+/// plate, with the drag of a finite one broadside (docs/equations.md D.3).
+///
+/// * `down` - velocity through the air along the plate's normal, m/s
+/// * `speed` - relative to the air, m/s
+#[inline(always)]
+pub fn stalled<L: Lane>(down: L, speed: L) -> L {
+    let edge = L::of(0.56) * speed + L::of(0.44) * size(down);
+    L::of(0.5 * AIR_DENSITY_KG_M3 * NORMAL_DRAG) * speed * speed * down / edge.upper(L::of(TINY))
+}
+
 /// Wrench of a left and a right plate.
 ///
 /// * `deployment` - left, right, 0..1
@@ -51,7 +71,9 @@ numbers! {
         /// `1/2 rho S c_N`, N s^2/m^2; 0 for no wing.
         per_square,
         /// Distance of each side's centre from the x axis, m.
-        arm_m
+        arm_m,
+        /// How far ahead of the centre of mass the centres are, m.
+        ahead_m
     }
 }
 
@@ -61,33 +83,32 @@ impl<T: Real> Pair<T> {
     pub fn new(wing: &Wing<T>) -> Self {
         let per_square =
             real::<T>(0.5 * AIR_DENSITY_KG_M3) * wing.area_per_side_m2 * wing.normal_force_slope;
-        Self { per_square, arm_m: wing.lateral_arm_m }
+        Self { per_square, arm_m: wing.lateral_arm_m, ahead_m: wing.longitudinal_arm_m }
     }
 }
 
 impl<L: Lane> Pair<L> {
     /// Forces along -z of a left and a right plate, N: `N = 1/2 rho S c_N |v| w`, with `w` the z
-    /// component of the air's velocity at that side, so that roll is damped.
+    /// component of the air's velocity at that side, so that roll and pitch are damped.
     ///
     /// * `deployment` - left, right, 0..1
     #[inline(always)]
     pub fn normal_forces(&self, flow: &Airflow<L>, deployment: &[L; 2]) -> [L; 2] {
         let slope = self.per_square * flow.speed;
         let roll_down = flow.omega[0] * self.arm_m;
-        [
-            slope * (flow.velocity[2] - roll_down) * deployment[0],
-            slope * (flow.velocity[2] + roll_down) * deployment[1],
-        ]
+        let down = flow.velocity[2] - flow.omega[1] * self.ahead_m;
+        [slope * (down - roll_down) * deployment[0], slope * (down + roll_down) * deployment[1]]
     }
 
-    /// Wrench of forces along -z at `y = -+ arm`, left and right, N.
+    /// Wrench of forces along -z at `x = ahead`, `y = -+ arm`, left and right, N.
     #[inline(always)]
     pub fn wrench(&self, [left, right]: [L; 2]) -> BodyWrench<L> {
         let none = L::of(0.0);
-        // (0, -+arm, 0) x (0, 0, -N)
+        let sum = left + right;
+        // (ahead, -+arm, z) x (0, 0, -N)
         BodyWrench {
-            force: [none, none, none - (left + right)],
-            moment: [(left - right) * self.arm_m, none, none],
+            force: [none, none, none - sum],
+            moment: [(left - right) * self.arm_m, sum * self.ahead_m, none],
         }
     }
 }
@@ -144,6 +165,9 @@ mod tests {
             area_per_side_m2: 0.02,
             normal_force_slope: 2.0,
             lateral_arm_m: 0.1,
+            longitudinal_arm_m: 0.0,
+            vertical_arm_m: 0.0,
+            chord_m: 0.2,
             time_constant_s: 0.1,
         };
         let velocity = In::<Body, f64>::new(Vector3::new(6.0, 1.0, 3.0));

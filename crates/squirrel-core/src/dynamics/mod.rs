@@ -10,6 +10,7 @@
 
 pub mod battery;
 pub mod body;
+pub mod induced;
 pub mod lanes;
 mod rk4;
 pub mod rotors;
@@ -27,7 +28,7 @@ use crate::frames::{Body, In, Ned, Wrench};
 use crate::lane::Lane;
 use crate::lane::vector::{cross, plus, rotation, transposed_times};
 use crate::math::{GRAVITY_M_S2, Real};
-use crate::vehicle::Vehicle;
+use crate::vehicle::{MAX_ROTORS, Vehicle};
 use nalgebra::{Matrix3, Vector3};
 
 /// Motion of the airframe through the air.
@@ -120,17 +121,19 @@ fn wrench_in<T: Real>(
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> Wrench<Body, T> {
     let rotors = rotors::wrench(vehicle, &state.rotor_speed_rad_s);
-    let rest = Wrench::from_force(drag(vehicle, air)) + surfaces(air);
+    let wings = surfaces(air);
+    let rest = Wrench::from_force(drag(vehicle, air)) + wings;
     if !effects.any() {
         return rotors + rest;
     }
     // Copies, so that without effects nothing here needs an address and all of it stays in
     // registers.
     let (state, air, ned_from_body) = (*state, *air, *ned_from_body);
-    affected(vehicle, effects, &state, held, &air, &ned_from_body, [rotors, rest])
+    affected(vehicle, effects, &state, held, &air, &ned_from_body, [rotors, rest, wings])
 }
 
-/// The wrench of `[rotors, rest]` with everything that effects do to it.
+/// The wrench of `[rotors, rest, wings]`, the wings a part of the rest, with everything that effects
+/// do to it.
 #[inline(never)]
 fn affected<T: Real>(
     vehicle: &Vehicle<T>,
@@ -139,7 +142,7 @@ fn affected<T: Real>(
     held: &Held<T>,
     air: &Air<T>,
     ned_from_body: &Matrix3<T>,
-    wrenches: [Wrench<Body, T>; 2],
+    wrenches: [Wrench<Body, T>; 3],
 ) -> Wrench<Body, T> {
     let (present, numbers) = (effects.present(), effects.numbers());
     let speed = &state.rotor_speed_rad_s;
@@ -150,6 +153,11 @@ fn affected<T: Real>(
     } else {
         [T::zero(); 2]
     };
+    let mut rotor_thrust_n = [T::zero(); MAX_ROTORS];
+    let per_square = &vehicle.rotor_wrench_per_speed_squared().thrust;
+    for i in 0..MAX_ROTORS {
+        rotor_thrust_n[i] = per_square[i] * speed[i] * speed[i];
+    }
     let none = flat_plate::Pair::all(T::zero());
     let at = Surroundings {
         flow: &Airflow::from(air),
@@ -158,11 +166,13 @@ fn affected<T: Real>(
         height_m: -state.position.vector.z,
         inverse_mass: vehicle.inverse_mass(),
         rotor_spin,
+        wing_force: wrenches[2].force.vector.into(),
+        rotor_thrust_n: &rotor_thrust_n[..vehicle.parameters().rotor_count.min(MAX_ROTORS)],
         wings: &vehicle.parameters().wing.as_ref().map_or(none, flat_plate::Pair::new),
         deployment: held.deployment,
         tether_force: Some(held.tether_force.vector.into()),
     };
-    let [rotors, rest] = wrenches.map(BodyWrench::from);
+    let [rotors, rest, _] = wrenches.map(BodyWrench::from);
     with_effects(numbers, present, [&rotors, &rest], &at).into()
 }
 
@@ -181,6 +191,10 @@ pub struct Surroundings<'a, L> {
     pub inverse_mass: L,
     /// Sum of the rotor speeds about +z, rad/s, and its rate, rad/s^2, where an effect feels them.
     pub rotor_spin: [L; 2],
+    /// Thrust of each rotor before effects on thrust, N.
+    pub rotor_thrust_n: &'a [L],
+    /// Force of the wings that fly, body frame, N.
+    pub wing_force: [L; 3],
     /// The flat wings that the vehicle declares.
     pub wings: &'a flat_plate::Pair<L>,
     /// Left and right, 0..1.
@@ -210,8 +224,11 @@ pub fn with_effects<L: Lane>(
             flow: at.flow,
             omega: at.omega,
             thrust_n: L::of(0.0) - lifted.force[2],
+            rotor_thrust_n: at.rotor_thrust_n,
+            thrust_factor: factor,
             force: base.force,
             rotor_spin: at.rotor_spin,
+            wing_force: at.wing_force,
             wings: at.wings,
             deployment: at.deployment,
         },

@@ -140,12 +140,18 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
         rest = BodyWrench { force: vector::plus(&f, &g), moment: vector::plus(&m, &n) };
         sides_rate = [left, right];
     }
+    let wing_force = rest.force;
     rest.force = minus(&rest.force, &drag(&airframe.linear_drag, airframe.quadratic_drag, &air));
     let rotor_rate = rotor_rates(airframe, &whole.held, &state.rotor_speed);
     let sum = if EFFECTS {
         let mut rotor_spin = [none; 2];
         if Prepared::<L>::feel_rotor_spin(whole.present) {
             rotor_spin = [spin(&whole.spin, &state.rotor_speed), spin(&whole.spin, &rotor_rate)];
+        }
+        let mut rotor_thrust_n = state.rotor_speed;
+        for i in 0..ROTORS {
+            let speed = state.rotor_speed[i];
+            rotor_thrust_n[i] = airframe.thrust[i] * speed * speed;
         }
         let at = Surroundings {
             flow: &air,
@@ -154,6 +160,8 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
             height_m: none - state.position[2],
             inverse_mass: airframe.inverse_mass,
             rotor_spin,
+            rotor_thrust_n: &rotor_thrust_n,
+            wing_force,
             wings: &whole.plate,
             deployment: whole.deployment,
             tether_force: if whole.present.has_load() {

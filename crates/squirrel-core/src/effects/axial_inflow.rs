@@ -3,7 +3,7 @@
 //!
 //! Form `quadratic`: `T (1 + k w + k_2 w |w|)`.
 
-use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
 use crate::lane::functions::size;
@@ -20,7 +20,7 @@ pub(super) struct AxialInflow<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for AxialInflow<T> {
     const NAME: &'static str = "axial_inflow";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("gain_s_per_m", 0.012, 0.06),
+        EffectParameter::signed("gain_s_per_m", 0.012, 0.06).declared(Declared::AxialInflow),
         EffectParameter::signed("quadratic_s2_per_m2", 4e-3, 0.03).only_in(&["quadratic"]),
         EffectParameter::form(&["linear", "quadratic"]),
     ];
@@ -31,6 +31,10 @@ impl<T: Real> Effect<T> for AxialInflow<T> {
         fly: "climbs and descents of 3 m/s with heave doublets, wings folded",
     };
     const SHOWN: Shown = Shown::HORIZONTAL;
+
+    fn is_declared(vehicle: &Vehicle<T>) -> bool {
+        vehicle.parameters().propulsion.air.axial_inflow_s_per_m != T::zero()
+    }
 }
 
 numbers! {
@@ -44,8 +48,9 @@ numbers! {
 }
 
 impl<T: Real> AxialInflow<T> {
-    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
-        let [gain, quadratic, form] = self.0;
+    pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
+        let [extra, quadratic, form] = self.0;
+        let gain = vehicle.parameters().propulsion.air.axial_inflow_s_per_m + extra;
         Numbers { gain, quadratic: if is(form, QUADRATIC) { quadratic } else { T::zero() } }
     }
 }

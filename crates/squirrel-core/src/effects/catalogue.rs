@@ -188,11 +188,19 @@ macro_rules! catalogue {
         }
 
         impl Present {
-            /// Those of a vehicle.
+            /// Those that are added to a vehicle.
             pub fn of<T: Real>(effects: &Effects<T>) -> Self {
                 Self { $($field: effects.$field.as_ref().map_or_else(Forms::default, |effect| {
                     form_of(<super::$field::$effect<T> as Effect<T>>::PARAMETERS, &effect.0)
                 }),)+ }
+            }
+            /// Those, and what the vehicle has as numbers of its own.
+            pub fn on<T: Real>(vehicle: &Vehicle<T>, effects: &Effects<T>) -> Self {
+                let mut out = Self::of(effects);
+                $(if <super::$field::$effect<T> as Effect<T>>::is_declared(vehicle) {
+                    out.$field = out.$field.or(Forms::only(0));
+                })+
+                out
             }
             /// Those of either.
             #[must_use]
@@ -362,7 +370,7 @@ impl<T: Real> Acting<T> {
     ///
     /// * `vehicle` - with what effects change once, see [`Effects::alter`]
     pub fn new(effects: &Effects<T>, vehicle: &Vehicle<T>) -> Self {
-        let present = Present::of(effects);
+        let present = Present::on(vehicle, effects);
         Self {
             any: present.act_in_steps(),
             present,
@@ -420,12 +428,16 @@ catalogue! {
     payload_swing: PayloadSwing,
     quadratic_drag: QuadraticDrag => quadratic_drag,
     rotor_gyro_torque: RotorGyroTorque => rotor_gyro_torque,
+    rotor_wash: RotorWash => rotor_wash,
     thrust_coefficient: ThrustCoefficient,
     thrust_misalignment: ThrustMisalignment => thrust_misalignment,
     translational_lift: TranslationalLift => translational_lift,
+    vortex_ring: VortexRing => vortex_ring,
     weak_rotor: WeakRotor,
     wing_asymmetry: WingAsymmetry => wing_asymmetry,
     wing_membrane: WingMembrane => wing_membrane,
+    wing_moment: WingMoment => wing_moment,
     wing_servo_lag: WingServoLag,
+    wing_tangential: WingTangential => wing_tangential,
     yaw_torque_coeff: YawTorqueCoeff,
 }

@@ -3,7 +3,9 @@
 //! Form `saturating`: the velocity is divided by `1 + V_h / scale`, `V_h` the airspeed in the rotor
 //! plane.
 
-use super::{Acts, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is};
+use super::{
+    Acts, Declared, Effect, EffectParameter, Forms, Scale, Shown, Situation, Words, absent, is,
+};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::math::Real;
@@ -19,7 +21,9 @@ pub(super) struct FlappingMoment<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for FlappingMoment<T> {
     const NAME: &'static str = "flapping_moment";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("gain_n_m_s_per_m", 1e-3, 6e-3).growing_with(Scale::MassTimesArm),
+        EffectParameter::signed("gain_n_m_s_per_m", 1e-3, 6e-3)
+            .growing_with(Scale::MassTimesArm)
+            .declared(Declared::FlappingMoment),
         EffectParameter::size("speed_scale_m_s", 3.0, 20.0).only_in(&["saturating"]),
         EffectParameter::form(&["linear", "saturating"]),
     ];
@@ -31,6 +35,10 @@ impl<T: Real> Effect<T> for FlappingMoment<T> {
     };
     const SHOWN: Shown = Shown::MOMENTS.and(Shown::LASTING);
     const IS_OF_MOMENTS: bool = true;
+
+    fn is_declared(vehicle: &Vehicle<T>) -> bool {
+        vehicle.parameters().propulsion.air.flapping_moment_n_m_s_per_m != T::zero()
+    }
 }
 
 numbers! {
@@ -38,22 +46,26 @@ numbers! {
     Numbers {
         /// N m s/m.
         gain,
+        /// What saturates of it, likewise.
+        saturating,
         /// Over the speed at which it saturates, s/m; 0 for a gain that stays.
         per_scale
     }
 }
 
 impl<T: Real> FlappingMoment<T> {
-    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
-        let [gain, scale, form] = self.0;
+    pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
+        let [extra, scale, form] = self.0;
+        let (gain, none) =
+            (vehicle.parameters().propulsion.air.flapping_moment_n_m_s_per_m, T::zero());
         if !is(form, SATURATING) {
-            return Numbers { gain, per_scale: T::zero() };
+            return Numbers { gain: gain + extra, saturating: none, per_scale: none };
         }
         // A scale of 0 saturates at once.
-        if scale > T::zero() {
-            Numbers { gain, per_scale: T::one() / scale }
+        if scale > none {
+            Numbers { gain, saturating: extra, per_scale: T::one() / scale }
         } else {
-            Numbers::all(T::zero())
+            Numbers { gain, saturating: none, per_scale: none }
         }
     }
 }
@@ -64,7 +76,8 @@ impl<L: Lane> Acts<L> for Numbers<L> {
         let [u, v, _] = at.flow.velocity;
         let mut slope = self.gain;
         if forms.has(SATURATING) {
-            slope = slope / (L::of(1.0) + (u * u + v * v).root() * self.per_scale);
+            slope =
+                slope + self.saturating / (L::of(1.0) + (u * u + v * v).root() * self.per_scale);
         }
         BodyWrench::from_moment([absent::<L>() - v * slope, u * slope, absent()])
     }

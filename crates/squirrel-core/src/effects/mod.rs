@@ -43,13 +43,17 @@ mod payload_swing;
 mod profile;
 mod quadratic_drag;
 mod rotor_gyro_torque;
+mod rotor_wash;
 mod thrust_coefficient;
 mod thrust_misalignment;
 mod translational_lift;
+mod vortex_ring;
 mod weak_rotor;
 mod wing_asymmetry;
 mod wing_membrane;
+mod wing_moment;
 mod wing_servo_lag;
+mod wing_tangential;
 mod yaw_torque_coeff;
 
 pub use actuation_latency::ActuationLatency;
@@ -270,11 +274,17 @@ pub struct Situation<'a, L> {
     pub omega: &'a [L; 3],
     /// Thrust of all rotors, N, effects on thrust included.
     pub thrust_n: L,
+    /// Thrust of each, N, before effects on thrust.
+    pub rotor_thrust_n: &'a [L],
+    /// What effects make of each.
+    pub thrust_factor: L,
     /// Force of rotors, drag and wings, body frame, N, before effects that add to it.
     pub force: [L; 3],
     /// Sum of the rotor speeds about +z, each with the sign of its spin, rad/s, and its rate,
     /// rad/s^2; 0 where no effect [feels it](Acts::FEELS_ROTOR_SPIN).
     pub rotor_spin: [L; 2],
+    /// Force of its wings alone, likewise, N.
+    pub wing_force: [L; 3],
     /// The vehicle's wings; without area where it has none.
     pub wings: &'a flat_plate::Pair<L>,
     /// Deployment of the left and the right wing, 0..1.
@@ -315,6 +325,11 @@ pub trait Effect<T: Real>: Copy {
     /// place for or not.
     const FORMS_APART: bool = false;
 
+    /// Whether a vehicle has some of it as a number of its own, to which the effect adds.
+    #[inline(always)]
+    fn is_declared(_vehicle: &Vehicle<T>) -> bool {
+        false
+    }
     /// Gusts that the effect adds to the air.
     #[inline(always)]
     fn gust(&self) -> Option<GustSpectrum<T>> {

@@ -163,6 +163,14 @@ pub enum Declared {
     LinearDrag(usize),
     /// Drag area; added to.
     DragArea,
+    /// Inflow of the rotors in climbs; added to.
+    AxialInflow,
+    /// Lift of the rotors in forward flight; added to.
+    TranslationalLift,
+    /// Moment of blade flapping; added to.
+    FlappingMoment,
+    /// Part of the thrust that is lost in the own wake; added to.
+    VortexRing,
     /// Time constant of the rotors; added to.
     RotorLag,
     /// Time constant of the wings; added to.

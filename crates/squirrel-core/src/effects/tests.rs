@@ -4,7 +4,7 @@ use super::*;
 use crate::aero::Air;
 use crate::frames::Wrench;
 use crate::vehicle::fixtures::squirrel;
-use crate::vehicle::{MAX_ROTORS, Vehicle, Wing};
+use crate::vehicle::{MAX_ROTORS, RotorAir, Vehicle, Wing};
 use nalgebra::Vector3;
 
 const HEIGHT_M: f64 = 0.3;
@@ -17,6 +17,9 @@ const WING: Wing<f64> = Wing {
     area_per_side_m2: 0.02,
     normal_force_slope: 2.0,
     lateral_arm_m: 0.1,
+    longitudinal_arm_m: 0.0,
+    vertical_arm_m: 0.0,
+    chord_m: 0.2,
     time_constant_s: 0.1,
 };
 fn vehicle() -> Vehicle<f64> {
@@ -26,13 +29,22 @@ fn thrust_factor(effects: &Effects<f64>, height_m: f64) -> f64 {
     let acting = Acting::new(effects, &vehicle());
     acting.numbers().thrust_factor(acting.present(), &Airflow::from(&air()), height_m)
 }
+/// Where rotors sink into their own wake.
+fn sinking_factor(effects: &Effects<f64>) -> f64 {
+    let acting = Acting::new(effects, &vehicle());
+    let sinking = Air::new(In::new(Vector3::new(0.0, 1.0, 9.0)), In::zero());
+    acting.numbers().thrust_factor(acting.present(), &Airflow::from(&sinking), HEIGHT_M)
+}
 fn wrench_of(effects: &Effects<f64>) -> Wrench<Body, f64> {
     let acting = Acting::new(effects, &vehicle());
     let at = Situation {
         flow: &Airflow::from(&air()),
         omega: &air().omega.vector.into(),
         thrust_n: 5.0,
+        rotor_thrust_n: &[1.25; 4],
+        thrust_factor: 1.0,
         force: [0.2, 0.1, -5.0],
+        wing_force: [-0.1, 0.05, -0.8],
         rotor_spin: [100.0, -4000.0],
         wings: &flat_plate::Pair::new(&WING),
         deployment: [1.0, 0.5],
@@ -76,6 +88,7 @@ fn actions(effects: &Effects<f64>) -> Vec<f64> {
         effects.gnss_latency_s(),
         acting.numbers().added_mass_kg(acting.present()),
         thrust_factor(effects, HEIGHT_M),
+        sinking_factor(effects),
         altered.inverse_mass(),
     ];
     all.extend(targets(effects));
@@ -410,4 +423,55 @@ fn forms_choose_among_parameters() {
             );
         }
     }
+}
+
+/// A number of the vehicle does what the effect of its name does, and the effect adds to it.
+#[test]
+fn what_a_vehicle_declares_of_its_rotors_acts_as_the_effect_does() {
+    let declaring = |size: f64| {
+        let mut p = squirrel::<f64>();
+        p.propulsion.air = RotorAir {
+            axial_inflow_s_per_m: 0.03 * size,
+            translational_lift_s2_per_m2: 1e-3 * size,
+            flapping_moment_n_m_s_per_m: 2e-3 * size,
+            vortex_ring_fraction: 0.1 * size,
+        };
+        Vehicle::new(p).unwrap()
+    };
+    let all = |size: f64| {
+        let mut effects = Effects::none();
+        for (name, gain) in [
+            ("axial_inflow", 0.03),
+            ("translational_lift", 1e-3),
+            ("flapping_moment", 2e-3),
+            ("vortex_ring", 0.1),
+        ] {
+            effects.insert(name).unwrap().values[0] = gain * size;
+        }
+        effects
+    };
+    let flow = Airflow::from(&Air::new(In::new(Vector3::new(1.0, -2.0, 7.0)), In::zero()));
+    let acts = |vehicle: &Vehicle<f64>, effects: &Effects<f64>| {
+        let acting = Acting::new(effects, vehicle);
+        let factor = acting.numbers().thrust_factor(acting.present(), &flow, HEIGHT_M);
+        let at = Situation {
+            flow: &flow,
+            thrust_n: 5.0,
+            rotor_thrust_n: &[1.25; 4],
+            thrust_factor: 1.0,
+            force: [0.0; 3],
+            wing_force: [0.0; 3],
+            rotor_spin: [0.0; 2],
+            wings: &flat_plate::Pair::new(&WING),
+            deployment: [0.0; 2],
+        };
+        (factor, acting.numbers().wrench(acting.present(), &at).moment)
+    };
+    let (plain, none) = (vehicle(), Effects::none());
+    let (factor, moment) = acts(&declaring(1.0), &none);
+    assert_eq!((factor, moment), acts(&plain, &all(1.0)));
+    assert!(factor != 1.0 && moment[1] != 0.0);
+    let ((half, _), (double, _)) = (acts(&declaring(1.0), &all(1.0)), acts(&plain, &all(2.0)));
+    assert!((half - double).abs() < 1e-12, "{half} for {double}");
+    assert!(!Acting::new(&none, &plain).any());
 }

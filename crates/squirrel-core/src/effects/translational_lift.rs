@@ -3,15 +3,17 @@
 //!
 //! Form `linear`: `T (1 + k V_h)`. Form `quadratic`: `T (1 + k V_h^2)`, without saturation.
 
-use super::{Acts, Effect, EffectParameter, Forms, Shown, Words, is};
+use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Words, is};
 use crate::aero::Airflow;
 use crate::lane::Lane;
-use crate::math::{Real, real};
+use crate::math::Real;
 use crate::numbers;
 use crate::vehicle::Vehicle;
 
 const LINEAR: usize = 1;
 const QUADRATIC: usize = 2;
+/// Where the standard form saturates, s^2/m^2.
+const SATURATION: f64 = 0.004;
 
 /// Gain of thrust with speed across the rotors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +22,9 @@ pub(super) struct TranslationalLift<T>(pub(super) [T; 3]);
 impl<T: Real> Effect<T> for TranslationalLift<T> {
     const NAME: &'static str = "translational_lift";
     const PARAMETERS: &'static [EffectParameter] = &[
-        EffectParameter::signed("gain_s2_per_m2", 6e-4, 3e-3).only_in(&["saturating", "quadratic"]),
+        EffectParameter::signed("gain_s2_per_m2", 6e-4, 3e-3)
+            .declared(Declared::TranslationalLift)
+            .only_in(&["saturating", "quadratic"]),
         EffectParameter::signed("gain_s_per_m", 3e-3, 0.02).only_in(&["linear"]),
         EffectParameter::form(&["saturating", "linear", "quadratic"]),
     ];
@@ -31,28 +35,36 @@ impl<T: Real> Effect<T> for TranslationalLift<T> {
         fly: "dashes to 9 m/s at constant height with the wings folded",
     };
     const SHOWN: Shown = Shown::HORIZONTAL;
+
+    fn is_declared(vehicle: &Vehicle<T>) -> bool {
+        vehicle.parameters().propulsion.air.translational_lift_s2_per_m2 != T::zero()
+    }
 }
 
 numbers! {
     /// Gain of thrust.
     Numbers {
-        /// Over speed squared, s^2/m^2.
+        /// Over speed squared, where it saturates, s^2/m^2.
         gain,
-        /// Where that saturates, s^2/m^2; 0 for a gain that stays.
-        limit,
+        /// The same without an end.
+        endless,
         /// Over speed, s/m.
         linear
     }
 }
 
 impl<T: Real> TranslationalLift<T> {
-    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
-        let [gain, linear, form] = self.0;
+    pub(super) fn prepare(&self, vehicle: &Vehicle<T>) -> Numbers<T> {
+        let [extra, linear, form] = self.0;
+        let (gain, none) =
+            (vehicle.parameters().propulsion.air.translational_lift_s2_per_m2, T::zero());
         if is(form, LINEAR) {
-            return Numbers { linear, ..Numbers::all(T::zero()) };
+            Numbers { gain, endless: none, linear }
+        } else if is(form, QUADRATIC) {
+            Numbers { gain, endless: extra, linear: none }
+        } else {
+            Numbers { gain: gain + extra, endless: none, linear: none }
         }
-        let limit = if is(form, QUADRATIC) { T::zero() } else { real(0.004) };
-        Numbers { gain, limit, linear: T::zero() }
     }
 }
 
@@ -61,7 +73,10 @@ impl<L: Lane> Acts<L> for Numbers<L> {
     fn thrust_factor(&self, flow: &Airflow<L>, _height_m: L, forms: Forms) -> L {
         let ([u, v, _], one) = (flow.velocity, L::of(1.0));
         let across = u * u + v * v;
-        let mut factor = one + self.gain * across / (one + across * self.limit);
+        let mut factor = one + self.gain * across / (one + across * L::of(SATURATION));
+        if forms.has(QUADRATIC) {
+            factor = factor + self.endless * across;
+        }
         if forms.has(LINEAR) {
             factor = factor + self.linear * across.root();
         }

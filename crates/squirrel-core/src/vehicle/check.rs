@@ -106,6 +106,25 @@ pub(super) fn check<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {
     not_negative("propulsion.torque_coefficient_n_m_s2", propulsion.torque_coefficient_n_m_s2)?;
     not_negative("propulsion.time_constant_up_s", propulsion.time_constant_up_s)?;
     not_negative("propulsion.time_constant_down_s", propulsion.time_constant_down_s)?;
+    positive("propulsion.propeller_diameter_m", propulsion.propeller_radius_m)?;
+    for (field, number, most) in [
+        ("propulsion.axial_inflow_s_per_m", propulsion.air.axial_inflow_s_per_m, 1.0),
+        (
+            "propulsion.translational_lift_s2_per_m2",
+            propulsion.air.translational_lift_s2_per_m2,
+            1.0,
+        ),
+        (
+            "propulsion.flapping_moment_n_m_s_per_m",
+            propulsion.air.flapping_moment_n_m_s_per_m,
+            100.0,
+        ),
+        ("propulsion.vortex_ring_fraction", propulsion.air.vortex_ring_fraction, 1.0),
+    ] {
+        if !(plain(number).abs() <= most) {
+            return Err(ParameterError::of(field, number, "must be finite and plausible in size"));
+        }
+    }
     positive("propulsion.reference_voltage_v", propulsion.reference_voltage_v)?;
     each_not_negative("drag.linear_n_s_per_m", p.drag.linear_n_s_per_m.as_slice())?;
     not_negative("drag.area_m2", p.drag.area_m2)?;
@@ -113,6 +132,15 @@ pub(super) fn check<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {
         positive("wing.area_per_side_m2", wing.area_per_side_m2)?;
         positive("wing.normal_force_slope", wing.normal_force_slope)?;
         not_negative("wing.lateral_arm_m", wing.lateral_arm_m)?;
+        for (field, place) in [
+            ("wing.longitudinal_arm_m", wing.longitudinal_arm_m),
+            ("wing.vertical_arm_m", wing.vertical_arm_m),
+        ] {
+            if !place.is_finite() || plain(place).abs() > 100.0 {
+                return Err(ParameterError::of(field, place, "must be finite and within 100 m"));
+            }
+        }
+        positive("wing.chord_m", wing.chord_m)?;
         positive("wing.time_constant_s", wing.time_constant_s)?;
     }
     positive("limits.tilt_max_rad", p.limits.tilt_max_rad)?;

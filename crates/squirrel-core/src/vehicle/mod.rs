@@ -63,11 +63,53 @@ pub struct Propulsion<T> {
     pub time_constant_up_s: T,
     /// First-order lag of rotor speed when slowing down, s; 0 for none.
     pub time_constant_down_s: T,
+    /// Radius of a propeller, m: its disc's area makes the speed of its jet.
+    pub propeller_radius_m: T,
+    /// What motion through the air makes of thrust.
+    pub air: RotorAir<T>,
     /// Battery voltage at which the numbers above hold, V.
     pub reference_voltage_v: T,
     /// The paper's cubic from the voltage that a duty cycle applies to thrust; replaces the square
     /// law of the command.
     pub thrust_curve: Option<ThrustCurve<T>>,
+}
+
+/// What motion through the air makes of the rotors' thrust, in the standard forms of the effects of
+/// these names, which add to it. The flight code does not ask.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RotorAir<T> {
+    /// See the effect `axial_inflow`, s/m.
+    pub axial_inflow_s_per_m: T,
+    /// See the effect `translational_lift`, s^2/m^2.
+    pub translational_lift_s2_per_m2: T,
+    /// See the effect `flapping_moment`, N m s/m.
+    pub flapping_moment_n_m_s_per_m: T,
+    /// See the effect `vortex_ring`, a part of the thrust.
+    pub vortex_ring_fraction: T,
+}
+
+impl<T: Real> RotorAir<T> {
+    /// Thrust that asks for rotor speed alone.
+    pub fn still() -> Self {
+        Self::from_array([T::zero(); 4])
+    }
+    /// In the order of the fields.
+    fn from_array([inflow, lift, flapping, ring]: [T; 4]) -> Self {
+        Self {
+            axial_inflow_s_per_m: inflow,
+            translational_lift_s2_per_m2: lift,
+            flapping_moment_n_m_s_per_m: flapping,
+            vortex_ring_fraction: ring,
+        }
+    }
+    fn to_array(self) -> [T; 4] {
+        [
+            self.axial_inflow_s_per_m,
+            self.translational_lift_s2_per_m2,
+            self.flapping_moment_n_m_s_per_m,
+            self.vortex_ring_fraction,
+        ]
+    }
 }
 
 /// Drag of airframe and rotors without wings.
@@ -96,6 +138,12 @@ pub struct Wing<T> {
     pub normal_force_slope: T,
     /// Distance of each side's centre from the x axis, m.
     pub lateral_arm_m: T,
+    /// How far ahead of the centre of mass the centres are, m.
+    pub longitudinal_arm_m: T,
+    /// How far below the centre of mass they are, m.
+    pub vertical_arm_m: T,
+    /// Length along the flight, m; with the area it gives each side's span.
+    pub chord_m: T,
     /// First-order lag of deployment, s.
     pub time_constant_s: T,
 }
@@ -350,6 +398,16 @@ impl<T: Real> Vehicle<T> {
     pub fn weight_n(&self) -> T {
         self.parameters.mass_kg * real(crate::math::GRAVITY_M_S2)
     }
+    /// Induced speed of the rotors in hover, m/s, by momentum theory.
+    pub fn hover_induced_speed_m_s(&self) -> T {
+        let share = self.weight_n() / real(self.parameters.rotor_count as f64);
+        crate::math::sqrt(
+            share
+                * crate::dynamics::induced::per_thrust(
+                    self.parameters.propulsion.propeller_radius_m,
+                ),
+        )
+    }
     /// Most thrust that one rotor may be asked for, N: its top thrust at the reference voltage, or
     /// its limit if lower.
     pub fn rotor_thrust_max_n(&self) -> T {
@@ -380,6 +438,8 @@ impl<T: Real> Vehicle<T> {
             torque_coefficient_n_m_s2: to(p.propulsion.torque_coefficient_n_m_s2),
             time_constant_up_s: to(p.propulsion.time_constant_up_s),
             time_constant_down_s: to(p.propulsion.time_constant_down_s),
+            propeller_radius_m: to(p.propulsion.propeller_radius_m),
+            air: RotorAir::from_array(p.propulsion.air.to_array().map(to)),
             reference_voltage_v: to(p.propulsion.reference_voltage_v),
             thrust_curve: match p.propulsion.thrust_curve {
                 Some(curve) => Some(ThrustCurve::new(
@@ -406,6 +466,9 @@ impl<T: Real> Vehicle<T> {
                 area_per_side_m2: to(w.area_per_side_m2),
                 normal_force_slope: to(w.normal_force_slope),
                 lateral_arm_m: to(w.lateral_arm_m),
+                longitudinal_arm_m: to(w.longitudinal_arm_m),
+                vertical_arm_m: to(w.vertical_arm_m),
+                chord_m: to(w.chord_m),
                 time_constant_s: to(w.time_constant_s),
             }),
             limits: Limits {
@@ -488,6 +551,8 @@ pub(crate) mod fixtures {
                 torque_coefficient_n_m_s2: real(6.6e-9),
                 time_constant_up_s: real(0.03),
                 time_constant_down_s: real(0.04),
+                propeller_radius_m: real(0.0508),
+                air: RotorAir::still(),
                 reference_voltage_v: real(14.8),
                 thrust_curve: None,
             },
@@ -496,6 +561,9 @@ pub(crate) mod fixtures {
                 area_per_side_m2: real(0.02),
                 normal_force_slope: real(2.0),
                 lateral_arm_m: real(0.09),
+                longitudinal_arm_m: T::zero(),
+                vertical_arm_m: real(0.02),
+                chord_m: real(0.2),
                 time_constant_s: real(0.07),
             }),
             limits: Limits {

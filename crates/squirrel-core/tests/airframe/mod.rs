@@ -2,7 +2,7 @@
 
 use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, Vehicle, Wing,
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, RotorAir, Vehicle, Wing,
 };
 
 /// Rotor hubs of the paper's X, m: front left, back left, back right, front right.
@@ -29,6 +29,8 @@ pub(crate) fn vehicle(positions: &[[f64; 2]], signs: &[f64]) -> Vehicle<f32> {
             torque_coefficient_n_m_s2: 6.6e-9,
             time_constant_up_s: 0.03,
             time_constant_down_s: 0.03,
+            propeller_radius_m: 0.0508,
+            air: RotorAir::still(),
             reference_voltage_v: 14.8,
             thrust_curve: None,
         },
@@ -37,6 +39,9 @@ pub(crate) fn vehicle(positions: &[[f64; 2]], signs: &[f64]) -> Vehicle<f32> {
             area_per_side_m2: 0.02,
             normal_force_slope: 2.0,
             lateral_arm_m: 0.09,
+            longitudinal_arm_m: 0.0,
+            vertical_arm_m: 0.0,
+            chord_m: 0.2,
             time_constant_s: 0.03,
         }),
         limits: Limits { tilt_max_rad: 0.52, thrust_max_n: 20.0, rotor_thrust_max_n: None },

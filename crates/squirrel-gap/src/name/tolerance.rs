@@ -103,6 +103,20 @@ pub(super) fn tolerance(
             let drag = "drag.linear_n_s_per_m";
             Ok(deviation(vehicle, drag, axis, p.drag.linear_n_s_per_m[axis])?.unwrap_or(none))
         }
+        Declared::AxialInflow => {
+            number("propulsion.axial_inflow_s_per_m", propulsion.air.axial_inflow_s_per_m)
+        }
+        Declared::TranslationalLift => number(
+            "propulsion.translational_lift_s2_per_m2",
+            propulsion.air.translational_lift_s2_per_m2,
+        ),
+        Declared::FlappingMoment => number(
+            "propulsion.flapping_moment_n_m_s_per_m",
+            propulsion.air.flapping_moment_n_m_s_per_m,
+        ),
+        Declared::VortexRing => {
+            number("propulsion.vortex_ring_fraction", propulsion.air.vortex_ring_fraction)
+        }
         Declared::DragArea => number("drag.area_m2", p.drag.area_m2),
         Declared::WingForce => match p.wing {
             Some(wing) => fraction("wing.normal_force_slope", 0, wing.normal_force_slope),

@@ -10,7 +10,7 @@ use numpy::{PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use squirrel_core::effects::GUST_TIME_CONSTANT_S;
 use squirrel_core::frames::In;
-use squirrel_core::vehicle::Vehicle as Airframe;
+use squirrel_core::vehicle::{RotorAir, Vehicle as Airframe};
 use squirrel_sim::batch::simd::Paths;
 use squirrel_sim::batch::{BODY_NUMBERS, Batch, BatchError, BatchVehicle, Settings};
 use squirrel_sim::plant::{GustModel, WindParameters, WingPlant};
@@ -275,7 +275,10 @@ pub(super) fn any_batch(
 
 /// Whether the base model is all that a vehicle has.
 fn is_base(file: &VehicleFile) -> bool {
-    matches!(file.wing, WingPlant::None) && file.battery.is_none() && !file.effects.any()
+    matches!(file.wing, WingPlant::None)
+        && file.battery.is_none()
+        && !file.effects.any()
+        && file.vehicle.parameters().propulsion.air == RotorAir::still()
 }
 
 fn of_members<T: Paths + Float>(

@@ -69,7 +69,7 @@ impl Fitted {
         };
         let stretches =
             member.battery.as_ref().map_or(0, |b| b.ocv_v_of_charge.len().saturating_sub(1));
-        let present = Present::of(&member.effects);
+        let present = Present::on(&member.vehicle, &member.effects);
         if let Some(effect) = present.of_sensors() {
             return Err(BatchError::Effect { vehicle, effect });
         }

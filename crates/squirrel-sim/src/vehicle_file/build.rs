@@ -25,8 +25,8 @@ use squirrel_core::frames::In;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
 use squirrel_core::stack::StackParameters;
 use squirrel_core::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, ThrustCurve, Vehicle,
-    Wing,
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, RotorAir, ThrustCurve,
+    Vehicle, Wing,
 };
 use std::collections::BTreeMap;
 
@@ -62,7 +62,7 @@ pub(super) fn build(
         },
         rotors,
         rotor_count: t.rotor.len(),
-        propulsion: propulsion(&t.propulsion)?,
+        propulsion: propulsion(&t.propulsion, &rotors[..t.rotor.len().min(MAX_ROTORS)])?,
         drag: Drag {
             linear_n_s_per_m: Vector3::from(t.drag.linear_n_s_per_m.map_or([0.0; 3], |q| q.0)),
             area_m2: t.drag.area_m2.map_or(0.0, |q| q.0),
@@ -136,7 +136,27 @@ fn default_size(vehicle: &Vehicle<f64>) -> [f64; 3] {
     [2.0 * reach(0), 2.0 * reach(1), 0.04]
 }
 
-fn propulsion(t: &PropulsionTable) -> Result<Propulsion<f64>, Problem> {
+fn or_zero(number: &Option<Quantity<f64>>) -> f64 {
+    number.as_ref().map_or(0.0, |q| q.0)
+}
+
+/// Radius of propellers whose file does not say: three quarters of what neighbours leave each
+/// other, m.
+fn default_propeller_radius_m(rotors: &[Rotor<f64>]) -> f64 {
+    let mut apart_m = f64::INFINITY;
+    for (i, rotor) in rotors.iter().enumerate() {
+        for other in &rotors[..i] {
+            let across = (rotor.position - other.position).vector.xy().norm();
+            // Coaxial rotors share their disc.
+            if across > 1e-3 {
+                apart_m = apart_m.min(across);
+            }
+        }
+    }
+    if apart_m.is_finite() { 0.375 * apart_m } else { 0.1 }
+}
+
+fn propulsion(t: &PropulsionTable, rotors: &[Rotor<f64>]) -> Result<Propulsion<f64>, Problem> {
     let both = t.time_constant_s.as_ref().map(|q| q.0);
     let lag = |own: &Option<Quantity<f64>>, key: &str| {
         own.as_ref().map(|q| q.0).or(both).ok_or_else(|| {
@@ -159,6 +179,16 @@ fn propulsion(t: &PropulsionTable) -> Result<Propulsion<f64>, Problem> {
         torque_coefficient_n_m_s2: t.torque_coefficient_n_m_s2.0,
         time_constant_up_s: lag(&t.time_constant_up_s, "time_constant_up_s")?,
         time_constant_down_s: lag(&t.time_constant_down_s, "time_constant_down_s")?,
+        propeller_radius_m: t
+            .propeller_diameter_m
+            .as_ref()
+            .map_or_else(|| default_propeller_radius_m(rotors), |q| 0.5 * q.0),
+        air: RotorAir {
+            axial_inflow_s_per_m: or_zero(&t.axial_inflow_s_per_m),
+            translational_lift_s2_per_m2: or_zero(&t.translational_lift_s2_per_m2),
+            flapping_moment_n_m_s_per_m: or_zero(&t.flapping_moment_n_m_s_per_m),
+            vortex_ring_fraction: or_zero(&t.vortex_ring_fraction),
+        },
         reference_voltage_v: t.reference_voltage_v.0,
         thrust_curve,
     })
@@ -172,6 +202,9 @@ fn wing(
         ("area_per_side_m2", &t.area_per_side_m2),
         ("normal_force_slope", &t.normal_force_slope),
         ("lateral_arm_m", &t.lateral_arm_m),
+        ("longitudinal_arm_m", &t.longitudinal_arm_m),
+        ("vertical_arm_m", &t.vertical_arm_m),
+        ("chord_m", &t.chord_m),
         ("time_constant_s", &t.time_constant_s),
         ("dead_time_s", &t.dead_time_s),
         ("rate_max_per_s", &t.rate_max_per_s),
@@ -200,14 +233,20 @@ fn wing(
         Some(q) => Ok(q.0),
         None => Err(format!("wing.{key}: missing; a wing needs it")),
     };
+    let area_per_side_m2 = need("area_per_side_m2", &t.area_per_side_m2)?;
+    let chord = t.chord_m.as_ref().or_else(|| t.membrane.get("chord_m"));
     let wing = Wing {
-        area_per_side_m2: need("area_per_side_m2", &t.area_per_side_m2)?,
+        area_per_side_m2,
         normal_force_slope: need("normal_force_slope", &t.normal_force_slope)?,
         lateral_arm_m: need("lateral_arm_m", &t.lateral_arm_m)?,
+        longitudinal_arm_m: or_zero(&t.longitudinal_arm_m),
+        vertical_arm_m: or_zero(&t.vertical_arm_m),
+        // Twice as long as wide, where the file does not say.
+        chord_m: chord.map_or_else(|| (2.0 * area_per_side_m2).sqrt(), |q| q.0),
         time_constant_s: need("time_constant_s", &t.time_constant_s)?,
     };
     let servo = ServoParameters {
-        dead_time_s: t.dead_time_s.as_ref().map_or(0.0, |q| q.0),
+        dead_time_s: or_zero(&t.dead_time_s),
         rate_max_per_s: t.rate_max_per_s.as_ref().map_or(f64::INFINITY, |q| q.0),
         time_constant_s: wing.time_constant_s,
     };
@@ -266,13 +305,18 @@ fn membrane(
 ) -> Result<Membrane, Problem> {
     let mut table = toml::Table::new();
     for (key, q) in given {
-        if matches!(key.as_str(), "area_per_side_m2" | "lateral_arm_m") {
+        let is_of_the_wing = matches!(
+            key.as_str(),
+            "area_per_side_m2" | "lateral_arm_m" | "longitudinal_arm_m" | "vertical_arm_m"
+        );
+        if is_of_the_wing || key == "chord_m" && q.0 != wing.chord_m {
             return Err(format!("wing.membrane.{key} = {}: belongs into [wing]", q.0));
         }
         table.insert(key.clone(), toml::Value::Float(q.0));
     }
     table.insert("area_per_side_m2".to_owned(), toml::Value::Float(wing.area_per_side_m2));
     table.insert("lateral_arm_m".to_owned(), toml::Value::Float(wing.lateral_arm_m));
+    table.insert("chord_m".to_owned(), toml::Value::Float(wing.chord_m));
     let parameters: MembraneParameters =
         table.try_into().map_err(|e: toml::de::Error| format!("wing.membrane: {}", e.message()))?;
     Membrane::new(parameters).map_err(|e| format!("wing.membrane: {e}"))

@@ -23,8 +23,8 @@ use crate::rnn::elman::{Dense, Elman, Recurrent};
 use crate::rnn::parnn::{Domain, HIDDEN, INPUTS, Parnn};
 use crate::stack::{Stack, StackParameters};
 use crate::vehicle::{
-    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, ThrustCurve, Vehicle,
-    Wing,
+    CommandKind, Drag, Limits, MAX_ROTORS, Parameters, Propulsion, Rotor, RotorAir, ThrustCurve,
+    Vehicle, Wing,
 };
 
 impl Wire for Stack {
@@ -212,10 +212,17 @@ wire_struct! {
     Rotor<f32> { position, yaw_sign }
     Propulsion<f32> {
         command, speed_max_rad_s, thrust_coefficient_n_s2, torque_coefficient_n_m_s2, time_constant_up_s,
-        time_constant_down_s, reference_voltage_v, thrust_curve,
+        time_constant_down_s, propeller_radius_m, air,
+        reference_voltage_v, thrust_curve,
+    }
+    RotorAir<f32> {
+        axial_inflow_s_per_m, translational_lift_s2_per_m2, flapping_moment_n_m_s_per_m, vortex_ring_fraction,
     }
     Drag<f32> { linear_n_s_per_m, area_m2 }
-    Wing<f32> { area_per_side_m2, normal_force_slope, lateral_arm_m, time_constant_s }
+    Wing<f32> {
+        area_per_side_m2, normal_force_slope, lateral_arm_m, longitudinal_arm_m, vertical_arm_m, chord_m,
+        time_constant_s,
+    }
     Limits<f32> { tilt_max_rad, thrust_max_n, rotor_thrust_max_n }
     StackParameters { attitude, twcc, navigation }
     AttitudeGains {

@@ -1,0 +1,71 @@
+//! Centre of pressure of the wings beside their declared place: `M += r x F`, `r = (x, 0, z)`.
+//!
+//! `F` is the force of the wings that the vehicle flies, effects on it apart. Form `travelling`: the
+//! pressure moves back to the declared place as the wings stand across the air, `x (1 - |sin
+//! alpha|)`.
+
+use super::{
+    Acts, Effect, EffectParameter, Forms, Mimic, Scale, Shown, Situation, Words, absent, is,
+};
+use crate::aero::BodyWrench;
+use crate::lane::Lane;
+use crate::lane::functions::size;
+use crate::math::Real;
+use crate::numbers;
+use crate::vehicle::Vehicle;
+
+const TRAVELLING: usize = 1;
+/// Stands for 0 where a division must stay finite, m/s.
+const TINY: f64 = 1e-12;
+
+/// Where the wings push, from where the file says.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct WingMoment<T>(pub(super) [T; 3]);
+
+impl<T: Real> Effect<T> for WingMoment<T> {
+    const NAME: &'static str = "wing_moment";
+    const PARAMETERS: &'static [EffectParameter] = &[
+        EffectParameter::signed("place_x_m", 0.006, 0.05).growing_with(Scale::Arm),
+        EffectParameter::signed("place_z_m", 0.012, 0.05).growing_with(Scale::Arm),
+        EffectParameter::form(&["fixed", "travelling"]),
+    ];
+    const WORDS: Words = Words {
+        what: "place of the wings' pressure",
+        more: "The wings push ahead of their place",
+        less: "The wings push behind their place",
+        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+    };
+    const SHOWN: Shown = Shown::MOMENTS;
+    const MIMIC: Mimic = Mimic::Gusts;
+    const IS_OF_MOMENTS: bool = true;
+    const IS_OF_WINGS: bool = true;
+}
+
+numbers! {
+    /// Place.
+    Numbers {
+        /// Ahead, m.
+        x_m,
+        /// Down, m.
+        z_m,
+        /// Part of `x_m` that goes as the sine of the angle of attack grows.
+        travels
+    }
+}
+
+impl<T: Real> WingMoment<T> {
+    pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
+        let [x_m, z_m, form] = self.0;
+        Numbers { x_m, z_m, travels: if is(form, TRAVELLING) { T::one() } else { T::zero() } }
+    }
+}
+
+impl<L: Lane> Acts<L> for Numbers<L> {
+    #[inline(always)]
+    fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
+        let [fx, fy, fz] = at.wing_force;
+        let sine = size(at.flow.velocity[2]) / at.flow.speed.upper(L::of(TINY));
+        let (x, z) = (self.x_m * (L::of(1.0) - self.travels * sine), self.z_m);
+        BodyWrench::from_moment([absent::<L>() - z * fy, z * fx - x * fz, x * fy])
+    }
+}
