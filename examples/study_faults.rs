@@ -12,6 +12,7 @@
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
 use squirrel_examples::Outcome;
+use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::faults::{self, Faults};
@@ -19,7 +20,13 @@ use squirrel_study::journal::Keep;
 use squirrel_study::statistics::Share;
 
 fn study() -> Outcome<Faults> {
-    let plan = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials: 100, seed: 1 };
+    let plan = Plan {
+        vehicle: VehicleFile::squirrel(),
+        arms: Vec::new(),
+        trials: 100,
+        seed: 1,
+        conditions: Conditions::Calm,
+    };
     Ok(faults::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 

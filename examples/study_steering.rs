@@ -14,6 +14,7 @@
 
 use squirrel_examples::Outcome;
 use squirrel_sim::arm::Arm;
+use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
@@ -21,7 +22,13 @@ use squirrel_study::steering::{self, ANGLES_DEG, SPEEDS_M_S, Steering};
 
 fn study() -> Outcome<Steering> {
     let arms = vec![Arm::TwccFlat, Arm::TwccParnn];
-    let plan = Plan { vehicle: VehicleFile::squirrel(), arms, trials: 1, seed: 1 };
+    let plan = Plan {
+        vehicle: VehicleFile::squirrel(),
+        arms,
+        trials: 1,
+        seed: 1,
+        conditions: Conditions::Calm,
+    };
     Ok(steering::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 

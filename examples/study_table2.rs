@@ -15,6 +15,7 @@
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
 use squirrel_examples::Outcome;
+use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
@@ -24,7 +25,13 @@ use squirrel_study::table2::{self, Row, Table2};
 const TRAINING_S: u32 = 300;
 
 fn study() -> Outcome<Table2> {
-    let plan = Plan { vehicle: VehicleFile::squirrel(), arms: Vec::new(), trials: 1, seed: 1 };
+    let plan = Plan {
+        vehicle: VehicleFile::squirrel(),
+        arms: Vec::new(),
+        trials: 1,
+        seed: 1,
+        conditions: Conditions::Calm,
+    };
     Ok(table2::run(&plan, 5, &Keep::default())?.ok_or("a part of a study")?)
 }
 

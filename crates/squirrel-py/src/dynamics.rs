@@ -67,6 +67,7 @@ impl<'py> Model<'py> {
                 .winds
                 .as_ref()
                 .map_or_else(In::zero, |winds| In::new(Vector3::from(winds.row(i)))),
+            air_omega: None,
             deployment: [0.0; 2],
             tether_force: In::zero(),
         }

@@ -1,17 +1,21 @@
 //! Scenarios: what to fly, in which air, among which obstacles. A TOML file or one of the built-in
 //! ones.
 
+mod conditions;
 mod excite;
 mod faults;
 mod forest;
 mod runs;
+mod wind;
 
+pub use conditions::Conditions;
 pub use excite::ExciteTable;
 pub use faults::{FaultKind, FaultTable};
 pub use forest::ForestTable;
 pub use runs::RunsTable;
+pub use wind::WindTable;
 
-use crate::plant::{GustModel, WindParameters};
+use crate::plant::WindParameters;
 use serde::{Deserialize, Serialize};
 use squirrel_core::frames::In;
 use squirrel_core::guidance::mission::{Mission, Steering};
@@ -50,6 +54,9 @@ pub struct Scenario {
     /// Errors are measured from the first encounter for this long, s; 0 for the whole flight.
     #[serde(default)]
     pub measured_window_s: f64,
+    /// What the day brings.
+    #[serde(default, skip_serializing_if = "Conditions::is_calm")]
+    pub conditions: Conditions,
     /// Obstacles are solid; otherwise they are only seen, as in the paper's flights.
     #[serde(default)]
     pub solid_obstacles: bool,
@@ -111,31 +118,6 @@ pub enum MissionTable {
     Excite(ExciteTable),
     /// Random runs with spread wings.
     Runs(RunsTable),
-}
-
-/// Moving air.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct WindTable {
-    /// Steady wind: where the air moves to.
-    pub mean_ned_m_s: [f64; 3],
-    /// Standard deviation of gusts per axis.
-    pub gust_sigma_m_s: f64,
-    /// Correlation time of Gauss-Markov gusts.
-    pub gust_time_constant_s: f64,
-    /// Scale length; where given, gusts have the Dryden spectra instead.
-    pub gust_dryden_length_m: Option<f64>,
-}
-
-impl Default for WindTable {
-    fn default() -> Self {
-        Self {
-            mean_ned_m_s: [0.0; 3],
-            gust_sigma_m_s: 0.0,
-            gust_time_constant_s: 1.5,
-            gust_dryden_length_m: None,
-        }
-    }
 }
 
 /// Names of the built-in scenarios.
@@ -207,6 +189,7 @@ impl Scenario {
             obstacles: Vec::new(),
             forest: None,
             mission,
+            conditions: Conditions::Calm,
             wind: WindTable::default(),
             faults: BTreeMap::new(),
         }
@@ -326,21 +309,7 @@ impl Scenario {
         if let Some(forest) = &self.forest {
             forest.check().map_err(|problem| format!("forest.{problem}"))?;
         }
-        let wind = &self.wind;
-        if let Some(x) = wind.mean_ned_m_s.iter().find(|x| x.is_nan() || x.abs() > 100.0) {
-            return Err(format!("wind.mean_ned_m_s = {x}: must be within 100"));
-        }
-        if !(0.0..=50.0).contains(&wind.gust_sigma_m_s) {
-            return Err(format!("wind.gust_sigma_m_s = {}: must be 0 to 50", wind.gust_sigma_m_s));
-        }
-        for (field, x) in [
-            ("wind.gust_time_constant_s", wind.gust_time_constant_s),
-            ("wind.gust_dryden_length_m", wind.gust_dryden_length_m.unwrap_or(1.0)),
-        ] {
-            if !(x.is_finite() && x > 0.0) {
-                return Err(format!("{field} = {x}: must be finite and > 0"));
-            }
-        }
+        self.wind.check()?;
         for (kind, table) in &self.faults {
             table.check(*kind, MAX_ROTORS)?;
         }
@@ -420,17 +389,9 @@ impl Scenario {
         Ok(mission)
     }
 
-    /// The moving air.
+    /// The moving air, with what the conditions bring.
     pub fn wind(&self) -> WindParameters {
-        let gust = match self.wind.gust_dryden_length_m {
-            Some(scale_length_m) => GustModel::Dryden { scale_length_m },
-            None => GustModel::GaussMarkov { time_constant_s: self.wind.gust_time_constant_s },
-        };
-        WindParameters {
-            mean_ned_m_s: self.wind.mean_ned_m_s,
-            gust_sigma_m_s: self.wind.gust_sigma_m_s,
-            gust,
-        }
+        self.conditions.air(&self.wind, self.seed).parameters()
     }
 }
 

@@ -11,7 +11,7 @@ use squirrel_core::guidance::mission::scramble;
 use squirrel_core::stack::wire::{HASH_START, hash};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{FlightError, Integrator, Setup};
-use squirrel_sim::scenario::Scenario;
+use squirrel_sim::scenario::{Conditions, Scenario, WindTable};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// What to run.
@@ -25,6 +25,8 @@ pub struct Plan {
     pub trials: u32,
     /// Seed of all trials.
     pub seed: u64,
+    /// What the day brings.
+    pub conditions: Conditions,
 }
 
 impl Plan {
@@ -61,6 +63,16 @@ impl Plan {
             "{}, arms {arms}, scenarios {texts:016x}",
             identity(study, &self.vehicle, self.seed)
         )
+    }
+
+    /// A scenario on this plan's day, which outdoors has its own wind and gusts.
+    #[must_use]
+    pub fn outside(&self, mut scenario: Scenario) -> Scenario {
+        scenario.conditions = self.conditions;
+        if self.conditions == Conditions::Outdoors {
+            scenario.wind = WindTable::default();
+        }
+        scenario
     }
 
     /// That every arm can fly a scenario: asked before anything is kept.

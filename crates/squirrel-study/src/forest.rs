@@ -167,7 +167,7 @@ pub fn scenario(plan: &Plan, thrust_to_weight: f64, trial: u32) -> Result<Scenar
     let mut scenario = Scenario::find("forest").map_err(FlightError)?;
     scenario.seed = plan.trial_seed(trial);
     scenario.thrust_to_weight = Some(thrust_to_weight);
-    Ok(scenario)
+    Ok(plan.outside(scenario))
 }
 
 fn fly(plan: &Plan, arm: Arm, thrust_to_weight: f64, trial: u32) -> Result<Flight, FlightError> {

@@ -210,7 +210,7 @@ fn scenario(plan: &Plan, kind: &str, ratio: f64, trial: u32) -> (Drawn, Scenario
     scenario.measured_window_s = HORIZON_S;
     scenario.thrust_to_weight = Some(ratio);
     scenario.seed = seed;
-    (drawn, scenario)
+    (drawn, plan.outside(scenario))
 }
 
 /// One plan, made at [`BEGIN_S`] and followed.

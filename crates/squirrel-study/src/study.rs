@@ -20,6 +20,8 @@ pub struct Study {
     pub trials: (u32, &'static str),
     /// Who flies.
     pub arms: Arms,
+    /// Whether `--conditions` says on what day its flights are flown.
+    pub days: bool,
     /// What else can be asked for.
     pub options: &'static [Choice],
     /// What the progress bar counts.
@@ -111,6 +113,7 @@ impl Study {
             about,
             trials,
             arms: Arms::Fixed(&[]),
+            days: false,
             options: &[],
             unit: "flights",
             others: |_| Vec::new(),

@@ -27,6 +27,7 @@ pub const THRUST_TO_WEIGHT: [f64; 4] = [1.20, 1.25, 1.30, 2.00];
 /// On the command line.
 pub const STUDY: Study = Study {
     arms: Arms::Asked(&Arm::ALONE),
+    days: true,
     ..Study::new(
         "table3",
         "The paper's Table III: its real flights, with the error as satellite fix and barometer have it",

@@ -46,6 +46,7 @@ pub const PAPER_GAIN: f64 = 0.131;
 /// On the command line.
 pub const STUDY: Study = Study {
     arms: Arms::Asked(&Arm::ALONE),
+    days: true,
     ..Study::new(
         "thrust",
         "What wings are worth as a function of the thrust-to-weight ratio, with a battery that sags and without",

@@ -94,8 +94,9 @@ pub fn run(
     for condition in conditions {
         plan.check(&condition.vehicle, &condition.scenario)?;
     }
-    let scenarios = conditions.iter().map(|condition| &condition.scenario);
-    let journal = Journal::open(keep, name, &plan.identity(name, scenarios))?;
+    let scenarios: Vec<_> =
+        conditions.iter().map(|condition| plan.outside(condition.scenario.clone())).collect();
+    let journal = Journal::open(keep, name, &plan.identity(name, &scenarios))?;
     let one = |arm, condition: usize, trial| fly(&plan, &conditions[condition], arm, trial);
     let flown = campaign::run(&plan, conditions.len(), &journal, one)?;
     let rows = |flown: Flown<Flight>| {
@@ -109,6 +110,7 @@ pub fn run(
 pub fn setup(plan: &Plan, condition: &Condition, arm: Arm, trial: u32) -> Setup {
     let Condition { vehicle, mut scenario } = condition.clone();
     scenario.seed = plan.trial_seed(trial);
+    let scenario = plan.outside(scenario);
     Setup { vehicle, arm, scenario, integrator: Integrator::Rk4 }
 }
 

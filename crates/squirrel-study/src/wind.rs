@@ -4,7 +4,8 @@
 //! Wind comes from ahead, from behind or from the left of a vehicle that heads north: on the circle
 //! it does so all along, in the manoeuvre up to the turn. The vehicle does not know the wind. On
 //! the circle, wings stay folded, so that arms which differ only in wings fly alike; in the turn
-//! they open. A flight is *lost* where the vehicle turns over, meets the ground or leaves the
+//! they open. Outdoors the winds are still those of the study; the rest of the day comes on top. A
+//! flight is *lost* where the vehicle turns over, meets the ground or leaves the
 //! numbers, and *flagged* where the flight code reports anything.
 
 use crate::campaign::{self, Flown, Plan};
@@ -23,6 +24,7 @@ use squirrel_sim::scenario::Scenario;
 /// On the command line.
 pub const STUDY: Study = Study {
     arms: Arms::Asked(&[Arm::Pc, Arm::TwccFlat, Arm::TwccPlus, Arm::PcPlus]),
+    days: true,
     ..Study::new(
         "wind",
         "How each controller holds in wind from ahead, from behind and from the side, on a circle and in a turn",
@@ -92,7 +94,7 @@ pub struct Wind {
 /// Mission, ratio, where the wind comes from, its speed, and what is flown in it.
 type Condition = (&'static str, f64, &'static str, f64, Scenario);
 
-fn conditions() -> Result<Vec<Condition>, FlightError> {
+fn conditions(plan: &Plan) -> Result<Vec<Condition>, FlightError> {
     let mut all = Vec::new();
     for (mission, ratio) in
         MISSIONS.into_iter().flat_map(|m| THRUST_TO_WEIGHT.map(|ratio| (m, ratio)))
@@ -102,6 +104,7 @@ fn conditions() -> Result<Vec<Condition>, FlightError> {
         for (from, to, speed) in std::iter::once(("calm", [0.0; 2], 0.0)).chain(blown) {
             let mut scenario = Scenario::find(mission).map_err(FlightError)?;
             scenario.thrust_to_weight = Some(ratio);
+            scenario.conditions = plan.conditions;
             scenario.wind.mean_ned_m_s = [speed * to[0], speed * to[1], 0.0];
             scenario.wind.gust_sigma_m_s = GUST_M_S;
             all.push((mission, ratio, from, speed, scenario));
@@ -115,7 +118,7 @@ fn conditions() -> Result<Vec<Condition>, FlightError> {
 /// # Errors
 /// A vehicle that cannot fly, or a folder that cannot be written.
 pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Wind>, FlightError> {
-    let all = conditions()?;
+    let all = conditions(plan)?;
     for (.., scenario) in &all {
         plan.check(&plan.vehicle, scenario)?;
     }

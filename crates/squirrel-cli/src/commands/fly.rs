@@ -16,7 +16,7 @@ use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{
     FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Setup,
 };
-use squirrel_sim::scenario::{MissionTable, Scenario};
+use squirrel_sim::scenario::{Conditions, MissionTable, Scenario};
 use squirrel_sim::track::Track;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_sim::weights::PolicyWeights;
@@ -48,6 +48,10 @@ pub(crate) struct Fly {
     /// Seed of everything random; overrides the scenario's.
     #[arg(long)]
     seed: Option<u64>,
+    /// What the day brings: nothing (calm), or wind with turbulence, battery sag and late fixes
+    /// (outdoors); overrides the scenario's.
+    #[arg(long)]
+    conditions: Option<String>,
     /// Largest collective thrust over weight; overrides vehicle and scenario.
     #[arg(long)]
     thrust_to_weight: Option<f64>,
@@ -167,6 +171,9 @@ impl Fly {
         let mut scenario = Scenario::find(&self.scenario)?;
         if let Some(seed) = self.seed {
             scenario.seed = seed;
+        }
+        if let Some(name) = &self.conditions {
+            scenario.conditions = Conditions::parse(name)?;
         }
         if self.thrust_to_weight.is_some() {
             scenario.thrust_to_weight = self.thrust_to_weight;

@@ -10,6 +10,7 @@ use clap::error::ErrorKind;
 use clap::{Arg, ArgMatches, Args as _, Command, FromArgMatches, value_parser};
 use indicatif::ProgressBar;
 use squirrel_sim::arm::Arm;
+use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::STUDIES;
 use squirrel_study::campaign::Plan;
@@ -116,6 +117,13 @@ fn options(study: &'static Study) -> Command {
         );
         command = command.arg(value("arms").help(help).value_delimiter(','));
     }
+    if study.days {
+        let names = Conditions::ALL.map(Conditions::name);
+        let help = "What the day brings: nothing (calm), or wind with turbulence, battery sag and \
+                    late fixes (outdoors)";
+        command =
+            command.arg(value("conditions").help(help).default_value(names[0]).value_parser(names));
+    }
     // The arguments bring an `about` of their own.
     Common::augment_args(command).about(study.about)
 }
@@ -212,7 +220,12 @@ impl Flown {
             Arms::Asked(_) => arms,
             Arms::Fixed(arms) => arms.to_vec(),
         };
-        Ok(Plan { vehicle, arms, trials: self.trials, seed: self.common.seed })
+        let conditions = match self.own.try_get_one::<String>("conditions") {
+            Ok(Some(name)) => Conditions::parse(name)?,
+            _ => Conditions::Calm,
+        };
+        let (trials, seed) = (self.trials, self.common.seed);
+        Ok(Plan { vehicle, arms, trials, seed, conditions })
     }
 
     /// The vehicle, once it is known that results can be written: nobody wants to learn that
@@ -252,6 +265,9 @@ impl Flown {
         ];
         if let Arms::Asked(_) = self.study.arms {
             words.push(format!("--arms={}", names(&plan.arms).join(",")));
+        }
+        if plan.conditions != Conditions::Calm {
+            words.push(format!("--conditions={}", plan.conditions.name()));
         }
         let own = self.study.options.iter().zip(own);
         words.extend(own.map(|(choice, value)| format!("--{}={value}", choice.name)));

@@ -16,12 +16,13 @@ pub struct Air<T: Real> {
     pub velocity: In<Body, T>,
     /// Its norm, m/s.
     pub speed: T,
-    /// Angular rate of the airframe, rad/s.
+    /// Angular rate of the airframe relative to the air, rad/s.
     pub omega: In<Body, T>,
 }
 
 impl<T: Real> Air<T> {
-    /// From the velocity relative to the air, m/s, and the angular rate, rad/s.
+    /// From the velocity relative to the air, m/s, and the angular rate
+    /// relative to it, rad/s.
     #[inline(always)]
     pub fn new(velocity: In<Body, T>, omega: In<Body, T>) -> Self {
         Self { velocity, speed: velocity.vector.norm(), omega }
@@ -35,7 +36,7 @@ pub struct Airflow<L> {
     pub velocity: [L; 3],
     /// Its norm, m/s.
     pub speed: L,
-    /// Angular rate of the airframe, rad/s.
+    /// Angular rate of the airframe relative to the air, rad/s.
     pub omega: [L; 3],
 }
 

@@ -34,20 +34,29 @@ use nalgebra::{Matrix3, Vector3};
 /// Motion of the airframe through the air.
 ///
 /// * `wind` - velocity of the air, m/s
+/// * `air_omega` - its angular velocity, rad/s, where it turns
 #[inline(always)]
-pub fn air<T: Real>(state: &State<T>, wind: In<Ned, T>) -> Air<T> {
-    air_in(state, wind, &rotation_matrix(state))
+pub fn air<T: Real>(state: &State<T>, wind: In<Ned, T>, air_omega: Option<In<Ned, T>>) -> Air<T> {
+    air_in(state, wind, air_omega, &rotation_matrix(state))
 }
 
 #[inline(always)]
-fn air_in<T: Real>(state: &State<T>, wind: In<Ned, T>, ned_from_body: &Matrix3<T>) -> Air<T> {
+fn air_in<T: Real>(
+    state: &State<T>,
+    wind: In<Ned, T>,
+    air_omega: Option<In<Ned, T>>,
+    ned_from_body: &Matrix3<T>,
+) -> Air<T> {
     let relative_ned = (state.velocity - wind).vector;
     // The norm is that of the body velocity too; taken before the rotation, its root does not wait
     // for it.
     Air {
         velocity: In::new(ned_from_body.tr_mul(&relative_ned)),
         speed: relative_ned.norm(),
-        omega: state.omega,
+        omega: match air_omega {
+            None => state.omega,
+            Some(air_omega) => state.omega - In::new(ned_from_body.tr_mul(&air_omega.vector)),
+        },
     }
 }
 
@@ -73,6 +82,8 @@ pub struct Held<T: Real> {
     pub drive: RotorDrive<T>,
     /// Wind velocity, m/s, without what effects add to it.
     pub wind: In<Ned, T>,
+    /// Angular velocity of the air, rad/s, where it turns.
+    pub air_omega: Option<In<Ned, T>>,
     /// Deployment of the left and the right wing, 0..1; for effects on wings.
     pub deployment: [T; 2],
     /// Pull of a load at the centre of mass, N; acts only where there are effects.
@@ -94,7 +105,8 @@ pub fn wrench<T: Real>(
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> Wrench<Body, T> {
     let ned_from_body = rotation_matrix(state);
-    let air = air_in(state, total_wind(effects, state, held.wind), &ned_from_body);
+    let wind = total_wind(effects, state, held.wind);
+    let air = air_in(state, wind, held.air_omega, &ned_from_body);
     wrench_in(vehicle, effects, state, held, &air, &ned_from_body, surfaces)
 }
 
@@ -149,6 +161,7 @@ fn affected<T: Real>(
     let none = flat_plate::Pair::all(T::zero());
     let at = Surroundings {
         flow: &Airflow::from(air),
+        omega: &state.omega.vector.into(),
         ned_from_body: &(*ned_from_body).into(),
         height_m: -state.position.vector.z,
         inverse_mass: vehicle.inverse_mass(),
@@ -168,6 +181,8 @@ fn affected<T: Real>(
 pub struct Surroundings<'a, L> {
     /// Motion through the air.
     pub flow: &'a Airflow<L>,
+    /// Angular rate of the airframe, rad/s, whether the air turns or not.
+    pub omega: &'a [L; 3],
     /// By columns.
     pub ned_from_body: &'a [[L; 3]; 3],
     /// Above the origin's level, m.
@@ -207,6 +222,7 @@ pub fn with_effects<L: Lane>(
         present,
         &Situation {
             flow: at.flow,
+            omega: at.omega,
             thrust_n: L::of(0.0) - lifted.force[2],
             rotor_thrust_n: at.rotor_thrust_n,
             thrust_factor: factor,
@@ -223,7 +239,9 @@ pub fn with_effects<L: Lane>(
     if present.has_added_mass() {
         let added_mass_kg = numbers.added_mass_kg(present);
         let gravity_z = at.ned_from_body[2][2] * L::of(GRAVITY_M_S2);
-        let turning = cross(&at.flow.omega, &at.flow.velocity)[2];
+        // The body axes turn beneath the velocity through the air, at the airframe's own rate:
+        // what the air's rotation adds to the wind at the centre of mass is the wind's to say.
+        let turning = cross(at.omega, &at.flow.velocity)[2];
         let rate = (sum.force[2] * at.inverse_mass + gravity_z - turning)
             / (L::of(1.0) + added_mass_kg * at.inverse_mass);
         sum.force[2] = sum.force[2] - added_mass_kg * rate;
@@ -256,7 +274,8 @@ pub fn derivative<T: Real>(
     surfaces: impl FnOnce(&Air<T>) -> Wrench<Body, T>,
 ) -> State<T> {
     let ned_from_body = rotation_matrix(state);
-    let air = air_in(state, total_wind(effects, state, held.wind), &ned_from_body);
+    let wind = total_wind(effects, state, held.wind);
+    let air = air_in(state, wind, held.air_omega, &ned_from_body);
     let wrench = wrench_in(vehicle, effects, state, held, &air, &ned_from_body, surfaces);
     let columns = ned_from_body.into();
     let acceleration =
@@ -322,7 +341,13 @@ mod tests {
     }
 
     fn still(drive: RotorDrive<f64>) -> Held<f64> {
-        Held { drive, wind: In::zero(), deployment: [0.0; 2], tether_force: In::zero() }
+        Held {
+            drive,
+            wind: In::zero(),
+            air_omega: None,
+            deployment: [0.0; 2],
+            tether_force: In::zero(),
+        }
     }
 
     #[test]
@@ -482,6 +507,42 @@ mod tests {
         assert!((more.vector - by_hand).norm() < 1e-12, "{more:?}");
     }
 
+    /// In air that turns as the airframe does nothing damps it, but its rotors are gyroscopes and
+    /// its axes turn as ever.
+    #[test]
+    fn air_that_turns_along_is_felt_by_surfaces_alone() {
+        let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
+        let mut state = State { omega: In::new(Vector3::new(0.5, -0.2, 0.3)), ..State::at_rest() };
+        state.attitude =
+            *nalgebra::UnitQuaternion::from_euler_angles(0.3, -0.2, core::f64::consts::FRAC_PI_2);
+        state.velocity = In::new(Vector3::new(3.0, 1.0, -0.5));
+        state.rotor_speed_rad_s[0] = 900.0;
+        let mut held = still(RotorDrive::holding(state.rotor_speed_rad_s));
+        let along = Some(state.ned_from_body() * state.omega);
+        assert!(air(&state, held.wind, along).omega.vector.norm() < 1e-15);
+        let mut change = |name: &str, values: &[f64]| {
+            held.air_omega = None;
+            let before = affected_by(name, values, &state, &held);
+            held.air_omega = along;
+            let after = affected_by(name, values, &state, &held);
+            (after.force - before.force, after.moment - before.moment)
+        };
+        let (_, freed) = change("angular_damping", &[1e-3, 1e-3]);
+        assert!((freed.vector.x - 0.5e-3).abs() < 1e-12, "{freed:?}");
+        assert_eq!(change("rotor_gyro_torque", &[1e-5]), (In::zero(), In::zero()));
+        assert_eq!(change("added_mass", &[0.1]), (In::zero(), In::zero()));
+        let rolled = |held: &Held<f64>| {
+            let mut omega = In::zero();
+            let none = acting(&Effects::none());
+            wrench(&vehicle, &none, &state, held, |air| {
+                omega = air.omega;
+                Wrench::zero()
+            });
+            omega.vector.norm()
+        };
+        assert!(rolled(&held) < 1e-15, "wings see it, too");
+    }
+
     #[test]
     fn a_tether_pulls_in_the_world() {
         let mut state = State::at_rest();
@@ -499,7 +560,7 @@ mod tests {
     #[test]
     fn drag_opposes_the_motion_through_the_air_not_over_ground() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
-        let air = air(&State::at_rest(), In::new(Vector3::new(5.0, 0.0, 0.0)));
+        let air = air(&State::at_rest(), In::new(Vector3::new(5.0, 0.0, 0.0)), None);
         assert!(drag(&vehicle, &air).vector.x > 0.0, "a hovering vehicle is pushed with the wind");
     }
 }

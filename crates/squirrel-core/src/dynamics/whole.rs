@@ -11,7 +11,7 @@ use crate::aero::membrane::{Membrane, Side};
 use crate::aero::{Airflow, BodyWrench, drag, flat_plate};
 use crate::effects::{PendulumState, Prepared, Present, Swing};
 use crate::lane::Lane;
-use crate::lane::vector::{self, minus, rotation, unit};
+use crate::lane::vector::{self, minus, rotation, transposed_times, unit};
 
 /// No wing.
 pub const NONE: u8 = 0;
@@ -27,6 +27,8 @@ pub struct Whole<L: Lane, const ROTORS: usize> {
     pub airframe: Airframe<L, ROTORS>,
     /// Wind and rotor targets.
     pub held: Held<L, ROTORS>,
+    /// Angular velocity of the air, NED, rad/s, where it turns.
+    pub air_omega: Option<[L; 3]>,
     /// Flat wings.
     pub plate: flat_plate::Pair<L>,
     /// Membrane wings.
@@ -105,7 +107,11 @@ pub fn air<L: Lane, const ROTORS: usize, const EFFECTS: bool>(
         let [north, east] = whole.effects.wind(whole.present, L::of(0.0) - state.position[2]);
         (wind[0], wind[1]) = (wind[0] + north, wind[1] + east);
     }
-    airflow(state, &wind, columns)
+    let mut air = airflow(state, &wind, columns);
+    if let Some(air_omega) = &whole.air_omega {
+        air.omega = minus(&air.omega, &transposed_times(columns, air_omega));
+    }
+    air
 }
 
 /// Rate of the motion and of the membranes.
@@ -149,6 +155,7 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
         }
         let at = Surroundings {
             flow: &air,
+            omega: &state.omega,
             ned_from_body: &columns,
             height_m: none - state.position[2],
             inverse_mass: airframe.inverse_mass,

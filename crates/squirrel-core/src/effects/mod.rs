@@ -270,6 +270,8 @@ fn up_and_down<T: Real>(lag_s: T, asymmetry: T) -> [T; 2] {
 pub struct Situation<'a, L> {
     /// Motion through the air.
     pub flow: &'a Airflow<L>,
+    /// Angular rate of the airframe, rad/s, whether the air turns or not.
+    pub omega: &'a [L; 3],
     /// Thrust of all rotors, N, effects on thrust included.
     pub thrust_n: L,
     /// Thrust of each, N, before effects on thrust.

@@ -49,7 +49,7 @@ impl<L: Lane> Acts<L> for Numbers<L> {
 
     #[inline(always)]
     fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
-        let ([p, q, _], [spin, rate]) = (at.flow.omega, at.rotor_spin);
+        let (&[p, q, _], [spin, rate]) = (at.omega, at.rotor_spin);
         BodyWrench::from_moment([
             absent::<L>() - q * spin * self.inertia,
             p * spin * self.inertia,

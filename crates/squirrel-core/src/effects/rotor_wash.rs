@@ -201,6 +201,7 @@ mod tests {
         let flow = Airflow::from(&Air::new(In::new(Vector3::from(velocity)), In::zero()));
         let at = Situation {
             flow: &flow,
+            omega: &flow.omega,
             thrust_n: rotor_thrust_n.iter().sum(),
             rotor_thrust_n: &rotor_thrust_n,
             thrust_factor: 1.0,

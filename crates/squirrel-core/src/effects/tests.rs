@@ -39,6 +39,7 @@ fn wrench_of(effects: &Effects<f64>) -> Wrench<Body, f64> {
     let acting = Acting::new(effects, &vehicle());
     let at = Situation {
         flow: &Airflow::from(&air()),
+        omega: &air().omega.vector.into(),
         thrust_n: 5.0,
         rotor_thrust_n: &[1.25; 4],
         thrust_factor: 1.0,
@@ -455,6 +456,7 @@ fn what_a_vehicle_declares_of_its_rotors_acts_as_the_effect_does() {
         let factor = acting.numbers().thrust_factor(acting.present(), &flow, HEIGHT_M);
         let at = Situation {
             flow: &flow,
+            omega: &flow.omega,
             thrust_n: 5.0,
             rotor_thrust_n: &[1.25; 4],
             thrust_factor: 1.0,

@@ -4,10 +4,11 @@ use super::exchange::Chunk;
 use super::extra::Command;
 use super::simd::{BLOCK, Paths};
 use super::{Batch, BatchError, BatchVehicle, CHUNK, autopilot, place, shape};
-use crate::plant::{Wind, WindParameters};
+use crate::plant::{GustModel, Wind, WindParameters};
 use nalgebra::convert;
 use squirrel_core::dynamics::State;
 use squirrel_core::frames::{In, Ned};
+use squirrel_core::lane::put;
 
 impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// Puts one vehicle somewhere else: wings folded, battery full, load hanging. Its command and
@@ -137,10 +138,14 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         seed: u64,
     ) -> Result<(), BatchError> {
         self.check(number)?;
-        if !wind.mean_ned_m_s.iter().chain([&wind.gust_sigma_m_s]).all(|x| x.is_finite()) {
+        let strength = match wind.gust {
+            GustModel::Mil { wind_6m_m_s } => wind_6m_m_s,
+            GustModel::GaussMarkov { .. } | GustModel::Dryden { .. } => wind.gust_sigma_m_s,
+        };
+        if !wind.mean_ned_m_s.iter().chain([&strength]).all(|x| x.is_finite()) {
             return Err(BatchError::NotFinite { what: "wind", vehicle: number });
         }
-        let airs = Wind::of_flight(wind, &member.effects, seed);
+        let airs = Wind::of_flight(wind, &member.vehicle, &member.effects, seed);
         let (chunk, block, lane) = place(number);
         let mut chunk = self.pool.chunk(chunk);
         let block = &mut chunk.blocks[block];
@@ -148,6 +153,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
             return Err(BatchError::NotFitted { vehicle: number, what: "gust" });
         };
         extra.airs.put(lane, airs, extra.clock, self.settings.dt_s);
+        put(&mut extra.air_omega, lane, extra.airs.angular_velocity(lane).vector.into());
         if let Some(air) = extra.airs.velocity(lane) {
             block.put_wind(lane, air);
         }
@@ -168,6 +174,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         chunk.blocks[block].put_wind(lane, wind);
         if let Some(extra) = &mut chunk.blocks[block].extra {
             extra.airs.put(lane, Vec::new(), extra.clock, self.settings.dt_s);
+            put(&mut extra.air_omega, lane, [convert(0.0); 3]);
         }
         Ok(())
     }

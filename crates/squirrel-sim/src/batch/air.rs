@@ -7,7 +7,7 @@
 
 use super::simd::{BLOCK, Paths};
 use crate::flight::CONTROL_RATE_HZ;
-use crate::plant::Wind;
+use crate::plant::{Meeting, Wind};
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::{Row, put};
 use squirrel_core::math::real;
@@ -19,6 +19,8 @@ const AHEAD: usize = 16;
 #[derive(Debug, Clone)]
 pub(super) struct Airs {
     of: Vec<Vec<Wind>>,
+    /// Some of it turns.
+    turning: bool,
     /// Moves so far, and the block's clock at the last.
     ticks: u64,
     clock: u64,
@@ -45,7 +47,7 @@ impl<S: Paths> Forecast<S> {
 
 impl Airs {
     pub(super) fn none() -> Self {
-        Self { of: vec![Vec::new(); BLOCK], ticks: 0, clock: 0, dt_s: 0.0 }
+        Self { of: vec![Vec::new(); BLOCK], turning: false, ticks: 0, clock: 0, dt_s: 0.0 }
     }
 
     pub(super) fn any(&self) -> bool {
@@ -68,6 +70,7 @@ impl Airs {
             self.ticks = (self.clock as f64 * per_step + 1e-6) as u64 + 1;
         }
         self.of[lane] = airs;
+        self.turning = self.of.iter().flatten().any(|air| air.angular_velocity().is_some());
     }
 
     /// Velocity of the air about a vehicle that has air of its own, m/s.
@@ -77,32 +80,52 @@ impl Airs {
         (!airs.is_empty()).then(|| In::new(sum.vector.map(real)))
     }
 
+    /// Whether the air about any vehicle turns.
+    #[inline(always)]
+    pub(super) fn turn(&self) -> bool {
+        self.turning
+    }
+
+    /// Angular velocity of the air about a vehicle, rad/s; 0 where it does not turn.
+    pub(super) fn angular_velocity<S: Paths>(&self, lane: usize) -> In<Ned, S> {
+        let turning = self.of[lane].iter().find_map(Wind::angular_velocity);
+        turning.map_or_else(In::zero, |turning| In::new(turning.vector.map(real)))
+    }
+
     /// Moves the air as far as it is due; clock, at most `until`, at which it moves again.
     ///
     /// * `clock` - of the block, now
-    /// * `wind` - what the vehicles feel now
-    /// * `airspeed_m_s` - of the vehicle in a column
+    /// * `wind`, `air_omega` - what the vehicles feel now
+    /// * `meeting` - of the vehicle in a column with its air
     pub(super) fn advance<S: Paths>(
         &mut self,
         clock: u64,
         until: u64,
-        wind: &mut [Row<S>; 3],
+        [wind, air_omega]: [&mut [Row<S>; 3]; 2],
         forecast: &mut Forecast<S>,
-        airspeed_m_s: impl Fn(usize) -> f64,
+        meeting: impl Fn(usize) -> Meeting,
     ) -> u64 {
         forecast.known = 0;
         if !self.any() {
             return until;
         }
         if self.due() <= clock {
-            self.advance_to(clock, wind, airspeed_m_s);
+            self.advance_to(clock, wind, meeting);
+            if self.turning {
+                for lane in 0..BLOCK {
+                    put(air_omega, lane, self.angular_velocity(lane).vector.into());
+                }
+            }
         }
-        if !self.of.iter().flatten().any(Wind::asks_for_airspeed) {
+        if !self.of.iter().flatten().any(Wind::asks_the_vehicle) {
             let mut to_come = *wind;
             while self.due() < until && forecast.known < AHEAD {
                 // The clock of a move is a step of its own even where moves are faster than steps.
                 let at = self.due().max(self.clock + 1);
-                self.advance_to(at, &mut to_come, |_| 0.0);
+                self.advance_to(at, &mut to_come, |_| Meeting {
+                    through_air: In::zero(),
+                    height_m: 0.0,
+                });
                 forecast.winds[forecast.known] = (at - clock, to_come);
                 forecast.known += 1;
             }
@@ -114,12 +137,12 @@ impl Airs {
         &mut self,
         clock: u64,
         wind: &mut [Row<S>; 3],
-        airspeed_m_s: impl Fn(usize) -> f64,
+        meeting: impl Fn(usize) -> Meeting,
     ) {
         let passed_s = (clock - self.clock) as f64 * self.dt_s;
         for lane in 0..BLOCK {
             for air in &mut self.of[lane] {
-                air.advance(passed_s, || airspeed_m_s(lane));
+                air.advance(passed_s, || meeting(lane));
             }
             if let Some(air) = self.velocity(lane) {
                 put(wind, lane, air.vector.into());

@@ -174,6 +174,7 @@ fn fitted<
         let mut vehicle = Whole {
             airframe: Airframe::load(&block.airframe, start),
             held,
+            air_omega: if extra.airs.turn() { Some(load(&extra.air_omega, start)) } else { None },
             plate: flat_plate::Pair::load(&extra.plate, start),
             membrane: Membrane::load(&extra.membrane, start),
             present: extra.present,

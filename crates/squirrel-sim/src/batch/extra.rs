@@ -1,7 +1,7 @@
 //! What vehicles of a block have on top of the base model: wings, battery, effects, gusts, commands
 //! on their way.
 //!
-//! Late commands, and gusts that ask for the airspeed, change between steps. The steps of a call
+//! Late commands, and gusts that ask how a vehicle meets them, change between steps. The steps of a call
 //! are therefore cut where the next of them is due, which changes no number: a flight is the same
 //! however it is cut.
 
@@ -10,11 +10,13 @@ use super::battery::Packs;
 use super::rows::Block;
 use super::simd::{BLOCK, Paths};
 use super::vehicle::Fitted;
+use crate::plant::Meeting;
 use nalgebra::{Vector3, try_convert};
 use squirrel_core::aero::flat_plate;
 use squirrel_core::aero::membrane::{Membrane, Side};
 use squirrel_core::dynamics::servo::{Servo, ServoState};
 use squirrel_core::effects::{Effects, PendulumState, Prepared, Present, Swing};
+use squirrel_core::frames::In;
 use squirrel_core::lane::{Row, put, take};
 use squirrel_core::math::real;
 use squirrel_core::vehicle::Vehicle;
@@ -52,6 +54,8 @@ pub(super) struct Extra<S: Copy, const ROTORS: usize> {
     pub(super) effects: Prepared<Row<S>>,
     /// Signs of the rotors' spin about +z.
     pub(super) spin: [Row<S>; ROTORS],
+    /// Angular velocity of the air, NED, rad/s; 0 where it does not turn.
+    pub(super) air_omega: [Row<S>; 3],
     /// A load over a step; without weight where there is none.
     pub(super) swing: Swing<Row<S>>,
     pub(super) load: PendulumState<Row<S>>,
@@ -91,6 +95,7 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
             present: fitted.present,
             effects: without_effects.map(|number| [real(number); BLOCK]),
             spin: [none; ROTORS],
+            air_omega: [none; 3],
             swing: Swing::all(none),
             load: PendulumState::all(none),
             latency_steps: [0; BLOCK],
@@ -155,10 +160,10 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 Command::Wings(wings) => extra.ask_wings(lane, wings),
             }
         }
-        let Extra { airs, effects, present, clock, .. } = &mut **extra;
+        let Extra { airs, air_omega, effects, present, clock, .. } = &mut **extra;
         let (motion, wind) = (&self.motion, self.held.wind);
         let effects_blow = Prepared::<S>::blow(*present);
-        let airspeed_m_s = |lane| {
+        let meeting = |lane| {
             let mut through = through_air(&take(&motion.velocity, lane), &take(&wind, lane));
             if effects_blow {
                 let wind =
@@ -166,9 +171,11 @@ impl<S: Paths, const ROTORS: usize> Block<S, ROTORS> {
                 let [north, east] = wind.map(|x| try_convert::<S, f64>(x).unwrap_or(f64::NAN));
                 through -= Vector3::new(north, east, 0.0);
             }
-            through.norm()
+            let down_m = try_convert::<S, f64>(motion.position[2][lane]).unwrap_or(f64::NAN);
+            Meeting { through_air: In::new(through), height_m: -down_m }
         };
-        until = airs.advance(*clock, until, &mut self.held.wind, forecast, airspeed_m_s);
+        let felt = [&mut self.held.wind, air_omega];
+        until = airs.advance(*clock, until, felt, forecast, meeting);
         let steps = until - extra.clock;
         extra.clock = until;
         steps

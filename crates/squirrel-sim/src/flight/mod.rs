@@ -22,7 +22,7 @@ pub(crate) use record::{ESTIMATOR, PARNN_WEIGHTS};
 
 use crate::arm::Arm;
 use crate::estimator::Estimator;
-use crate::plant::{Plant, PlantState, Wind, WingPlant};
+use crate::plant::{Meeting, Plant, PlantState, Wind, WingPlant};
 use crate::scenario::{FaultKind, Scenario};
 use crate::sensors::{SensorParameters, Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
@@ -30,6 +30,7 @@ use commands::{Command, CommandLine};
 use failing::Failing;
 use integrator::Mover;
 use squirrel_core::dynamics::{State, specific_force, total_wind};
+use squirrel_core::effects::Effects;
 use squirrel_core::estimate::navigator::{Navigation, NavigationTerms};
 use squirrel_core::estimate::rest::Preflight;
 use squirrel_core::frames::{In, Ned};
@@ -132,8 +133,13 @@ impl Setup {
         if self.vehicle.estimator == Estimator::Oracle {
             SensorParameters::ideal()
         } else {
-            self.vehicle.sensors
+            self.scenario.conditions.sensors(self.vehicle.sensors)
         }
+    }
+
+    /// The effects that act on this setup's plant: its vehicle's, and those of the conditions.
+    fn effects(&self) -> Effects<f64> {
+        self.scenario.conditions.effects(&self.vehicle)
     }
 
     /// Who estimates, and from where on.
@@ -143,7 +149,7 @@ impl Setup {
         let altitude = Estimator::altitude(&parameters);
         let mut navigation = Navigation { filter, altitude, ..Navigation::external() };
         if self.vehicle.estimator.is_filter() {
-            let sensors = Sensors::new(parameters, &self.vehicle.effects, self.scenario.seed);
+            let sensors = Sensors::new(parameters, &self.effects(), self.scenario.seed);
             let mut preflight = Preflight::default();
             let position = self.start_position();
             for frame in sensors.at_rest(position, 0.0) {
@@ -259,9 +265,9 @@ impl Setup {
                 (self.arm.plant_wing(&self.vehicle.wing), self.vehicle.battery.clone());
             Plant::new(self.vehicle.vehicle, effects, wing, battery, dt_s).map_err(FlightError)
         };
-        let well = plant_with(self.vehicle.effects)?;
+        let well = plant_with(self.effects())?;
         let mut failing = Failing::new(&self.scenario);
-        let weak = failing.weakened(&self.vehicle.effects)?.map(plant_with).transpose()?;
+        let weak = failing.weakened(well.effects())?.map(plant_with).transpose()?;
         let plant_at = |failing: &Failing, time_us| match &weak {
             Some(weak) if failing.is_weak(time_us) => weak,
             _ => &well,
@@ -271,7 +277,8 @@ impl Setup {
         let mut mover = Mover::new(self, obstacles.all())?;
         let mut state = plant.initial_state(self.hovering(plant), self.scenario.start_charge());
         let seed = self.scenario.seed;
-        let mut winds = Wind::of_flight(self.scenario.wind(), plant.effects(), seed);
+        let mut winds =
+            Wind::of_flight(self.scenario.wind(), &self.vehicle.vehicle, plant.effects(), seed);
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
         let mut metrics = metrics::Meter::new(&self.scenario);
@@ -290,12 +297,13 @@ impl Setup {
             if time_us * CONTROL_RATE_HZ >= tick * 1_000_000 {
                 let through_air =
                     state.body.velocity - total_wind(plant.acting(), &state.body, air);
+                let height_m = -state.body.position.vector.z;
                 for wind in &mut winds {
-                    wind.advance((time_us - last_tick_us) as f64 * 1e-6, || {
-                        through_air.vector.norm()
-                    });
+                    let passed_s = (time_us - last_tick_us) as f64 * 1e-6;
+                    wind.advance(passed_s, || Meeting { through_air, height_m });
                 }
                 air = velocity_of(&winds);
+                state.air_omega = winds.iter().find_map(Wind::angular_velocity);
                 let mut truth = truth(plant, &state, air);
                 if let Some(push) = contact_specific_force {
                     truth.specific_force = state.body.ned_from_body().inverse() * push;

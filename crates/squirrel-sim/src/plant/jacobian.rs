@@ -74,6 +74,7 @@ impl Plant {
                 wind: <[f64; 3]>::from(wind.vector).map(constant),
                 target_speed: first(&state.drive.target_rad_s),
             },
+            air_omega: state.air_omega.map(|air| <[f64; 3]>::from(air.vector).map(constant)),
             plate: plate.map(constant),
             membrane: membrane.unwrap_or(Membrane::all(0.0)).map(constant),
             present: self.acting().present(),

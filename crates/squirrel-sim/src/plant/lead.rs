@@ -169,9 +169,7 @@ impl Plant {
         state.led_s = dt_s;
         state.time_s += dt_s;
         let Some([before, after]) = deployment.filter(|_| dt_s > 0.0) else { return };
-        let air = || {
-            dynamics::air(&state.body, dynamics::total_wind(&self.acting, &state.body, In::zero()))
-        };
+        let air = || self.air(state, In::zero());
         match &self.wing {
             WingPlant::None | WingPlant::Flat { .. } => {}
             WingPlant::Membrane { membrane, .. } => {

@@ -18,7 +18,7 @@ pub use lead::{Actuators, Led};
 pub use membrane::{Membrane, MembraneParameters, MembraneState};
 pub use parnn_wing::{ParnnWing, ParnnWingState};
 pub use servo::{ServoParameters, ServoState};
-pub use wind::{GustModel, Wind, WindParameters};
+pub use wind::{GustModel, Meeting, Wind, WindParameters};
 
 use squirrel_core::aero::Air;
 use squirrel_core::aero::flat_plate;
@@ -107,6 +107,9 @@ pub struct PlantState {
     pub time_s: f64,
     /// The load under the vehicle; at rest without one.
     pub load: PendulumState<f64>,
+    /// Angular velocity of the air about the vehicle, rad/s, where it turns: held, as the wind that
+    /// comes with each step, until whoever moves the air says another.
+    pub air_omega: Option<In<Ned, f64>>,
     /// What the rotors were last told.
     drive: RotorDrive<f64>,
     /// Time from the body's motion to the next measured one, s; 0 unless the plant was led there.
@@ -225,6 +228,7 @@ impl Plant {
             battery,
             time_s: 0.0,
             load: PendulumState::at_rest(),
+            air_omega: None,
             drive: RotorDrive::holding(body.rotor_speed_rad_s),
             led_s: 0.0,
         }
@@ -299,7 +303,14 @@ impl Plant {
     fn held(&self, state: &PlantState, wind: In<Ned, f64>, deployment: [f64; 2]) -> Held<f64> {
         let tether_force =
             self.swing.map_or(In::zero(), |swing| In::new(Vector3::from(swing.force(&state.load))));
-        Held { drive: state.drive, wind, deployment, tether_force }
+        Held { drive: state.drive, wind, air_omega: state.air_omega, deployment, tether_force }
+    }
+
+    /// Motion of the airframe through the air.
+    #[inline(always)]
+    fn air(&self, state: &PlantState, wind: In<Ned, f64>) -> Air<f64> {
+        let wind = dynamics::total_wind(&self.acting, &state.body, wind);
+        dynamics::air(&state.body, wind, state.air_omega)
     }
 
     #[inline(always)]
@@ -331,7 +342,7 @@ impl Plant {
             WingPlant::Membrane { membrane, .. } => {
                 let deployment = self.deploy(state, wing_command);
                 let held = self.held(state, wind, deployment);
-                let air = dynamics::air(&before, dynamics::total_wind(effects, &before, wind));
+                let air = self.air(state, wind);
                 state.turn_wings(membrane.angle_of_attack(&air), dt);
                 let rate = state.wing_angle_rate_rad_s;
                 let moved = rk4(Moving { body: before, membrane: state.membrane }, dt, |s| {
@@ -360,7 +371,7 @@ impl Plant {
         };
         state.body = body(next).normalised();
         if let WingPlant::Parnn { parnn, .. } = &self.wing {
-            let air = dynamics::air(&state.body, dynamics::total_wind(effects, &state.body, wind));
+            let air = self.air(state, wind);
             parnn.pass(&mut state.parnn, &air, dt);
         }
         if let Some((battery, pack)) = &self.battery {
@@ -423,7 +434,7 @@ impl Plant {
         wind: In<Ned, f64>,
         deployment: [f64; 2],
     ) -> In<Body, f64> {
-        let air = dynamics::air(&state.body, dynamics::total_wind(&self.acting, &state.body, wind));
+        let air = self.air(state, wind);
         self.wing_wrench(state, &air, deployment).force
     }
 }

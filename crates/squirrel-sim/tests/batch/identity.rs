@@ -134,6 +134,7 @@ fn a_batch_is_the_core<T: Paths>() {
                 let held = Held {
                     drive,
                     wind: In::new(Vector3::from(thrown.winds[number])),
+                    air_omega: None,
                     deployment: [convert(0.0); 2],
                     tether_force: In::zero(),
                 };

@@ -9,7 +9,7 @@ use squirrel_core::frames::In;
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_sim::batch::simd::{Path, Paths};
 use squirrel_sim::batch::{Batch, BatchVehicle, Scheme, Settings};
-use squirrel_sim::plant::{GustModel, Plant, Wind, WindParameters, WingPlant};
+use squirrel_sim::plant::{GustModel, Meeting, Plant, Wind, WindParameters, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Sizes of one effect in one form, between its smallest and its largest.
@@ -66,12 +66,28 @@ const WIND: WindParameters = WindParameters {
     gust: GustModel::Dryden { scale_length_m: 6.0 },
 };
 
+/// Gusts that depend on the height and on where a vehicle flies, in air that turns.
+const MIL: WindParameters = WindParameters {
+    mean_ned_m_s: [2.0, -1.0, 0.3],
+    gust_sigma_m_s: 0.0,
+    gust: GustModel::Mil { wind_6m_m_s: 9.0 },
+};
+
 fn batch<T: Paths>(thrown: &Thrown<T>, members: &[BatchVehicle], settings: Settings) -> Batch<T> {
+    batch_in(WIND, thrown, members, settings)
+}
+
+fn batch_in<T: Paths>(
+    wind: WindParameters,
+    thrown: &Thrown<T>,
+    members: &[BatchVehicle],
+    settings: Settings,
+) -> Batch<T> {
     let mut batch = Batch::with(members, settings).unwrap();
     for (number, member) in members.iter().enumerate() {
         batch.reset(number, &thrown.states[number]).unwrap();
         batch.set_charge(number, 0.5 + 0.4 * (number % 2) as f64).unwrap();
-        batch.set_air(number, member, WIND, number as u64).unwrap();
+        batch.set_air(number, member, wind, number as u64).unwrap();
     }
     batch.command(&thrown.commands[..4 * members.len()]).unwrap();
     batch
@@ -159,10 +175,11 @@ fn a_vehicle_alone_is_the_same_among_a_thousand() {
 
 /// Largest difference of position (m), velocity (m/s) and voltage (V) between a batch and plants
 /// that fly the same.
-fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
+fn off_the_plant<T: Paths>(wind: WindParameters, wing: &str, names: &[&str], steps: usize) -> f64 {
     let thrown = Thrown::<T>::new(21);
     let members = members(&thrown, wing, names);
-    let mut batch = batch(&thrown, &members, Settings { threads: 1, ..Settings::default() });
+    let settings = Settings { threads: 1, ..Settings::default() };
+    let mut batch = batch_in(wind, &thrown, &members, settings);
     let states: Vec<_> = members
         .iter()
         .enumerate()
@@ -185,7 +202,7 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
             body.rotor_speed_rad_s = start.rotor_speed_rad_s.map(to);
             let state = plant.initial_state(body, 0.5 + 0.4 * (number % 2) as f64);
             let seed = number as u64;
-            let winds = Wind::of_flight(WIND, &member.effects, seed);
+            let winds = Wind::of_flight(wind, &member.vehicle, &member.effects, seed);
             let mut command = [0.0; MAX_ROTORS];
             for i in 0..4 {
                 command[i] = to(thrown.commands[4 * number + i]);
@@ -205,11 +222,15 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
         let air = |winds: &[Wind]| winds.iter().fold(In::zero(), |sum, wind| sum + wind.velocity());
         for step in 0..steps {
             if step * 300 >= tick * 1000 {
-                let through =
-                    state.body.velocity - total_wind(plant.acting(), &state.body, air(&winds));
+                let meeting = Meeting {
+                    through_air: state.body.velocity
+                        - total_wind(plant.acting(), &state.body, air(&winds)),
+                    height_m: -state.body.position.vector.z,
+                };
                 for wind in &mut winds {
-                    wind.advance((step - last) as f64 * 1e-3, || through.vector.norm());
+                    wind.advance((step - last) as f64 * 1e-3, || meeting);
                 }
+                state.air_omega = winds.iter().find_map(Wind::angular_velocity);
                 (tick, last) = (tick + 1, step);
             }
             let (rotor, wing) = match step.checked_sub(late) {
@@ -237,7 +258,7 @@ fn off_the_plant<T: Paths>(wing: &str, names: &[&str], steps: usize) -> f64 {
 #[test]
 fn vehicles_in_f64_fly_as_the_plant_does() {
     for wing in ["none", "flat", "membrane"] {
-        let worst = off_the_plant::<f64>(wing, &[], 400);
+        let worst = off_the_plant::<f64>(WIND, wing, &[], 400);
         assert!(worst < 1e-8, "{wing}: {worst:e}");
     }
 }
@@ -246,16 +267,54 @@ fn vehicles_in_f64_fly_as_the_plant_does() {
 fn every_effect_acts_as_in_the_plant() {
     for name in all_effects() {
         for wing in ["membrane", "flat"] {
-            let worst = off_the_plant::<f64>(wing, &[name], 300);
+            let worst = off_the_plant::<f64>(WIND, wing, &[name], 300);
             assert!(worst < 1e-7, "{name}, {wing}: {worst:e}");
         }
     }
 }
 
 #[test]
+fn air_that_turns_is_felt_as_by_the_plant() {
+    for wing in ["none", "flat", "membrane"] {
+        for names in [&[] as &[&str], &["angular_damping"], &["rotor_gyro_torque", "added_mass"]] {
+            let worst = off_the_plant::<f64>(MIL, wing, names, 400);
+            assert!(worst < 1e-8, "{wing}, {names:?}: {worst:e}");
+        }
+    }
+}
+
+#[test]
+fn in_air_that_turns_calls_registers_and_neighbours_do_not_matter() {
+    let thrown = Thrown::<f32>::new(40);
+    let members = members(&thrown, "membrane", &[]);
+    let fly = |count: usize, settings: Settings, call: usize| {
+        let mut batch = batch_in(MIL, &thrown, &members[..count], settings);
+        for _ in 0..200 / call {
+            batch.step(call);
+        }
+        bits(&mut batch)
+    };
+    let settings = Settings { threads: 1, ..Settings::default() };
+    let all = fly(40, settings, 200);
+    assert_ne!(all, {
+        let mut calm = batch(&thrown, &members, settings);
+        calm.step(200);
+        bits(&mut calm)
+    });
+    assert!(fly(17, settings, 200)[..] == all[..17]);
+    for path in Path::available() {
+        assert!(fly(40, Settings { path, ..settings }, 20) == all, "{}", path.name());
+    }
+}
+
+#[test]
 fn in_f32_a_vehicle_stays_near_the_plant() {
-    let worst =
-        off_the_plant::<f32>("membrane", &["battery_sag", "ground_effect", "payload_swing"], 200);
+    let worst = off_the_plant::<f32>(
+        WIND,
+        "membrane",
+        &["battery_sag", "ground_effect", "payload_swing"],
+        200,
+    );
     assert!(worst < 5e-3, "{worst:e}");
 }
 

@@ -7,7 +7,7 @@ use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
 use squirrel_sim::replay::{OUTPUT_SOURCES, replay, setup};
-use squirrel_sim::scenario::Scenario;
+use squirrel_sim::scenario::{Conditions, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 fn flown(arm: Arm) -> FlightLog {
@@ -35,6 +35,28 @@ fn every_arm_replays_bit_for_bit_through_a_file() {
         assert!(result.steps > 3000 && result.values > 100_000);
     }
     std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// Wind, late fixes and sag are the flight's, and the log says so: it replays, and another seed has
+/// another wind.
+#[test]
+fn a_flight_outdoors_replays_from_its_log() {
+    let fly = |seed, conditions| {
+        let scenario =
+            Scenario { seed, conditions, duration_s: 5.0, ..Scenario::find("hover").unwrap() };
+        let vehicle = VehicleFile::squirrel();
+        let setup = Setup { vehicle, arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
+        setup.fly(true, |_| {}).unwrap()
+    };
+    let flight = fly(7, Conditions::Outdoors);
+    let log = flight.log.unwrap();
+    assert_eq!(replay(&log, &setup(&log).unwrap()).unwrap().first_difference, None);
+    let wind = |log: &FlightLog| log.sources["truth"].channels["wind_ned_m_s"].row(0).to_vec();
+    let calm = fly(7, Conditions::Calm);
+    assert!(wind(&calm.log.unwrap()).iter().all(|x| *x == 0.0));
+    assert!(wind(&log)[0].hypot(wind(&log)[1]) > 1.0);
+    assert_ne!(wind(&log), wind(&fly(8, Conditions::Outdoors).log.unwrap()));
+    assert!(flight.metrics.rmse_m > calm.metrics.rmse_m);
 }
 
 #[test]

@@ -11,7 +11,13 @@ use squirrel_core::nalgebra::Vector3;
 use squirrel_sim::world::{Contact, World};
 
 fn in_still_air(drive: RotorDrive<f64>) -> Held<f64> {
-    Held { drive, wind: In::zero(), deployment: [0.0; 2], tether_force: In::zero() }
+    Held {
+        drive,
+        wind: In::zero(),
+        air_omega: None,
+        deployment: [0.0; 2],
+        tether_force: In::zero(),
+    }
 }
 
 fn no_surfaces(_: &Air<f64>) -> Wrench<Body, f64> {

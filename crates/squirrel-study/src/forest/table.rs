@@ -17,6 +17,7 @@ pub const STUDY: Study = Study {
         default: 2.0,
         whole: false,
     }],
+    days: true,
     ..Study::new(
         "forest",
         "Who comes through the paper's forest, in its height band and at all, and who owes it to wings",

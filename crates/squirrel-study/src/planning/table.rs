@@ -12,6 +12,7 @@ use std::hint::black_box;
 /// On the command line.
 pub const STUDY: Study = Study {
     arms: Arms::Fixed(&ARMS),
+    days: true,
     ..Study::new(
         "planning",
         "What wings buy where both plan: avoidance tasks, planned with wings and without, and flown",

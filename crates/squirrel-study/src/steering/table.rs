@@ -11,6 +11,7 @@ use squirrel_sim::flight::FlightError;
 /// On the command line.
 pub const STUDY: Study = Study {
     arms: Arms::Asked(&Arm::ALONE),
+    days: true,
     ..Study::new(
         "steering",
         "The paper's figure of steering angles and speeds, in paper mode and on the independent plant",

@@ -8,6 +8,7 @@
 use serde_json::Value;
 use squirrel_nn::train::EPOCHS;
 use squirrel_sim::arm::Arm;
+use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::forest::{self, Forest};
@@ -23,7 +24,13 @@ const IDS: [&str; 21] = [
 ];
 
 fn plan(trials: u32) -> Plan {
-    Plan { vehicle: VehicleFile::squirrel(), arms: Arm::ALONE.to_vec(), trials, seed: 1 }
+    Plan {
+        vehicle: VehicleFile::squirrel(),
+        arms: Arm::ALONE.to_vec(),
+        trials,
+        seed: 1,
+        conditions: Conditions::Calm,
+    }
 }
 
 /// A hundred and five trials of every arm, for both tests.

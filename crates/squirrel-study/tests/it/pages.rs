@@ -2,13 +2,20 @@
 //! figure is there.
 
 use squirrel_sim::arm::Arm;
+use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
 use squirrel_study::{forest, steering, table3, thrust};
 
 fn plan(arms: &[Arm]) -> Plan {
-    Plan { vehicle: VehicleFile::squirrel(), arms: arms.to_vec(), trials: 1, seed: 1 }
+    Plan {
+        vehicle: VehicleFile::squirrel(),
+        arms: arms.to_vec(),
+        trials: 1,
+        seed: 1,
+        conditions: Conditions::Calm,
+    }
 }
 
 /// Drawings and tables hold numbers only, and there are so many figures.

@@ -2,6 +2,7 @@
 //! states.
 
 use squirrel_sim::arm::Arm;
+use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
@@ -11,7 +12,13 @@ use squirrel_study::thrust::{Thrust, run, words};
 use squirrel_study::tracking::Row;
 
 fn plan(arms: &[Arm], trials: u32) -> Plan {
-    Plan { vehicle: VehicleFile::squirrel(), arms: arms.to_vec(), trials, seed: 1 }
+    Plan {
+        vehicle: VehicleFile::squirrel(),
+        arms: arms.to_vec(),
+        trials,
+        seed: 1,
+        conditions: Conditions::Calm,
+    }
 }
 
 fn study(arms: &[Arm], trials: u32) -> Thrust {

@@ -3,8 +3,15 @@
 //! Gusts are a Gauss-Markov process per axis (`u' = -u / tau + noise`, discretised exactly), or the
 //! Dryden spectra with their scale length: longitudinal first order, lateral and vertical second
 //! order (MIL-F-8785C form), with the longitudinal axis along north. Both have the stated standard
-//! deviation whatever the step.
+//! deviation whatever the step. Or they are all of MIL-F-8785C near the ground ([`mil`]): by height,
+//! along the flight, with a rotation of the air.
 
+mod dryden;
+mod mil;
+
+pub use mil::Meeting;
+
+use mil::{Mil, SLOWEST_M_S};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -12,6 +19,7 @@ use squirrel_core::effects::{Effects, GUST_SCALE_LENGTH_M, GUST_TIME_CONSTANT_S,
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::functions::exp;
 use squirrel_core::nalgebra::Vector3;
+use squirrel_core::vehicle::Vehicle;
 
 /// Shape of the gusts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -26,6 +34,12 @@ pub enum GustModel {
         /// Scale length, m.
         scale_length_m: f64,
     },
+    /// The low-altitude model of MIL-F-8785C, whose lengths and standard deviations depend on the
+    /// height.
+    Mil {
+        /// Wind at 6 m (20 ft), which says how strong the turbulence is, m/s.
+        wind_6m_m_s: f64,
+    },
 }
 
 /// Numbers of the moving air.
@@ -33,7 +47,7 @@ pub enum GustModel {
 pub struct WindParameters {
     /// Steady wind, m/s.
     pub mean_ned_m_s: [f64; 3],
-    /// Standard deviation of the gusts per axis, m/s.
+    /// Standard deviation of the gusts per axis, m/s; not looked at where the model has its own.
     pub gust_sigma_m_s: f64,
     /// Shape of the gusts.
     pub gust: GustModel,
@@ -69,6 +83,8 @@ pub struct Wind {
     second: Vector3<f64>,
     /// Of the last two lengths of steps: a clock whose ticks are cut to whole numbers has two.
     decays: [Decay; 2],
+    /// Where the gusts are those of MIL-F-8785C and there are any.
+    mil: Option<Box<Mil>>,
 }
 
 /// What a step does to Gauss-Markov gusts.
@@ -90,63 +106,89 @@ impl Decay {
 
 impl Wind {
     /// Gusts start in their stationary distribution.
-    pub fn new(parameters: WindParameters, seed: u64) -> Self {
+    ///
+    /// * `span_m` - over which air that turns is felt; for gusts after MIL-F-8785C
+    pub fn new(parameters: WindParameters, span_m: f64, seed: u64) -> Self {
         let mut wind = Self {
             parameters,
             rng: Pcg64Mcg::seed_from_u64(seed),
             first: Vector3::zeros(),
             second: Vector3::zeros(),
             decays: [Decay::new(0.0, 1.0); 2],
+            mil: None,
         };
         match parameters.gust {
             GustModel::GaussMarkov { .. } => wind.first = wind.noise(),
             // The second-order axes forget their start within a few of these steps.
             GustModel::Dryden { scale_length_m } if parameters.gust_sigma_m_s > 0.0 => {
                 for _ in 0..400 {
-                    wind.advance(0.02 * scale_length_m, || 1.0);
+                    wind.move_dryden(0.02 * scale_length_m, 1.0, scale_length_m);
                 }
             }
-            GustModel::Dryden { .. } => {}
+            GustModel::Mil { wind_6m_m_s } if wind_6m_m_s > 0.0 => {
+                let (mean, rng) = (Vector3::from(parameters.mean_ned_m_s), &mut wind.rng);
+                let normal = || StandardNormal.sample(rng);
+                wind.mil = Some(Box::new(Mil::new(wind_6m_m_s, mean, span_m, normal)));
+            }
+            GustModel::Dryden { .. } | GustModel::Mil { .. } => {}
         }
         wind
     }
 
     /// All winds of a flight: the steady one with its gusts, and those of the `gust` effect. Each
     /// has a stream of its own, which the flight's seed starts.
-    pub fn of_flight(wind: WindParameters, effects: &Effects<f64>, seed: u64) -> Vec<Self> {
+    pub fn of_flight(
+        wind: WindParameters,
+        vehicle: &Vehicle<f64>,
+        effects: &Effects<f64>,
+        seed: u64,
+    ) -> Vec<Self> {
         const STEADY: u64 = 0x5851_F42D_4C95_7F2D;
         const GUST_EFFECT: u64 = 0x9E6C_63D0_876A_3F1B;
+        let span_m = span_m(vehicle);
         let gusts = effects
             .gust()
-            .map(|gusts| Self::new(WindParameters::of_gusts(gusts), seed ^ GUST_EFFECT));
-        [Self::new(wind, seed ^ STEADY)].into_iter().chain(gusts).collect()
+            .map(|gusts| Self::new(WindParameters::of_gusts(gusts), span_m, seed ^ GUST_EFFECT));
+        [Self::new(wind, span_m, seed ^ STEADY)].into_iter().chain(gusts).collect()
     }
 
     /// Velocity of the air now, m/s.
     pub fn velocity(&self) -> In<Ned, f64> {
         let mean = Vector3::from(self.parameters.mean_ned_m_s);
+        if let Some(mil) = &self.mil {
+            return In::new(mean + mil.velocity());
+        }
         let gust = match self.parameters.gust {
-            GustModel::GaussMarkov { .. } => self.first,
+            GustModel::GaussMarkov { .. } | GustModel::Mil { .. } => self.first,
             GustModel::Dryden { .. } => {
-                let root3 = 3.0_f64.sqrt();
-                let shaped = self.second * (1.0 - root3) + self.first * root3;
-                Vector3::new(self.first.x * std::f64::consts::SQRT_2, shaped.y, shaped.z)
+                let shaped = dryden::across(&self.first, &self.second);
+                Vector3::new(dryden::along(self.first.x), shaped.y, shaped.z)
             }
         };
         In::new(mean + gust * self.parameters.gust_sigma_m_s)
     }
 
-    /// Whether gusts come as fast as a vehicle meets them.
-    pub(crate) fn asks_for_airspeed(&self) -> bool {
-        self.parameters.gust_sigma_m_s != 0.0
-            && matches!(self.parameters.gust, GustModel::Dryden { .. })
+    /// Angular velocity of the air now, rad/s, where it turns.
+    pub fn angular_velocity(&self) -> Option<In<Ned, f64>> {
+        self.mil.as_ref().map(|mil| In::new(mil.angular_velocity()))
+    }
+
+    /// Whether gusts depend on how a vehicle meets them.
+    pub(crate) fn asks_the_vehicle(&self) -> bool {
+        self.mil.is_some()
+            || self.parameters.gust_sigma_m_s != 0.0
+                && matches!(self.parameters.gust, GustModel::Dryden { .. })
     }
 
     /// Moves the air on by `dt_s`.
     ///
-    /// * `airspeed_m_s` - of the vehicle, which meets the Dryden field at that speed, not below 1
-    ///   m/s; not asked for other gusts
-    pub fn advance(&mut self, dt_s: f64, airspeed_m_s: impl FnOnce() -> f64) {
+    /// * `meeting` - with the vehicle, which meets Dryden fields at its airspeed, not below 1 m/s;
+    ///   not asked for other gusts
+    pub fn advance(&mut self, dt_s: f64, meeting: impl FnOnce() -> Meeting) {
+        if let Some(mil) = &mut self.mil {
+            let rng = &mut self.rng;
+            return mil.advance(dt_s, &meeting(), || StandardNormal.sample(rng));
+        }
         if self.parameters.gust_sigma_m_s == 0.0 {
             return;
         }
@@ -162,13 +204,18 @@ impl Wind {
                 self.first = self.first * keep + self.noise() * fresh;
             }
             GustModel::Dryden { scale_length_m } => {
-                let keep = exp(-dt_s * airspeed_m_s().max(1.0) / scale_length_m);
-                // With unit noise the first stage has variance 1/2, so that the shaped output has
-                // variance 1.
-                let before = self.first;
-                self.first = self.first * keep + self.noise() * ((1.0 - keep * keep) * 0.5).sqrt();
-                self.second = self.second * keep + (before + self.first) * (0.5 * (1.0 - keep));
+                let airspeed_m_s = meeting().through_air.vector.norm();
+                self.move_dryden(dt_s, airspeed_m_s, scale_length_m);
             }
+            GustModel::Mil { .. } => {}
+        }
+    }
+
+    fn move_dryden(&mut self, dt_s: f64, airspeed_m_s: f64, scale_length_m: f64) {
+        let keep = exp(-dt_s * airspeed_m_s.max(SLOWEST_M_S) / scale_length_m);
+        let noise = self.noise();
+        for (axis, noise) in noise.iter().enumerate() {
+            dryden::advance([&mut self.first[axis], &mut self.second[axis]], keep, *noise);
         }
     }
 
@@ -177,19 +224,34 @@ impl Wind {
     }
 }
 
+/// Width of what the air gets hold of: the wings, from tip to tip, or what the rotors stand apart.
+fn span_m(vehicle: &Vehicle<f64>) -> f64 {
+    /// Of what is narrower, air is asked no finer.
+    const LEAST_M: f64 = 0.05;
+    let rotors = vehicle.rotors().iter().map(|rotor| 2.0 * rotor.position.vector.y.abs());
+    // The middle of each side is half of its way from the middle to the tip.
+    let wings = vehicle.parameters().wing.map(|wing| 4.0 * wing.lateral_arm_m);
+    rotors.chain(wings).fold(LEAST_M, f64::max)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn meeting() -> Meeting {
+        Meeting { through_air: In::new(Vector3::new(5.0, 0.0, 0.0)), height_m: 30.0 }
+    }
+
     fn spread(gust: GustModel, dt_s: f64) -> [f64; 3] {
         let mut wind = Wind::new(
             WindParameters { mean_ned_m_s: [2.0, 0.0, 0.0], gust_sigma_m_s: 1.5, gust },
+            0.4,
             1,
         );
         let n = 400_000;
         let mut square = Vector3::zeros();
         for _ in 0..n {
-            wind.advance(dt_s, || 5.0);
+            wind.advance(dt_s, meeting);
             let gust = wind.velocity().vector - Vector3::new(2.0, 0.0, 0.0);
             square += gust.component_mul(&gust);
         }
@@ -218,8 +280,8 @@ mod tests {
             gust: GustModel::GaussMarkov { time_constant_s: 1.5 },
         };
         let run = |seed| {
-            let mut wind = Wind::new(parameters, seed);
-            (0..100).for_each(|_| wind.advance(0.01, || 5.0));
+            let mut wind = Wind::new(parameters, 0.4, seed);
+            (0..100).for_each(|_| wind.advance(0.01, meeting));
             wind.velocity().vector
         };
         assert_eq!(run(7), run(7));
