@@ -1,7 +1,7 @@
 //! Reduced-order membrane wing (docs/equations.md D.3).
 //!
 //! It shares nothing with what a controller may believe: neither the flat plate nor a network. Each
-//! side feels its own air, which damps roll, and carries three states: the elastic camber, its
+//! side feels its own air where it is, which damps roll and pitch, and carries three states: the elastic camber, its
 //! creep and the attached fraction of the flow (Goman-Khrabrov).
 //!
 //! ```text
@@ -33,9 +33,10 @@
 //! One side is evaluated at a time, on lanes: a plant takes its two sides as one register, a batch
 //! both sides of many vehicles.
 
-use super::Airflow;
+use super::{Airflow, flat_plate};
 use crate::lane::Lane;
 use crate::lane::functions::{angle, cbrt, limit, sign, size, tanh};
+use crate::lane::vector::cross;
 use crate::numbers;
 
 /// Stands for 0 where a division must stay finite.
@@ -71,12 +72,14 @@ numbers! {
         creep_rate,
         /// Distance of each side's centre from the x axis, m.
         arm_m,
+        /// How far ahead of the centre of mass and below it the centres are, m.
+        place_m [2],
         /// `K_p`.
         lift_slope,
         /// `K_v`.
         vortex_slope,
-        /// `C_D90 / 0.59`.
-        separated_slope,
+        /// `C_D90`.
+        normal_drag,
         /// `C_T0`.
         tangential_zero,
         /// `k_T`.
@@ -117,9 +120,9 @@ struct Flow<L> {
 }
 
 #[inline(always)]
-fn flow<L: Lane>(air: &Airflow<L>, y: L) -> Flow<L> {
-    let [u, v, w] = air.velocity;
-    let velocity = [u - air.omega[2] * y, v, w + air.omega[0] * y];
+fn flow<L: Lane>(air: &Airflow<L>, [x, y, z]: [L; 3]) -> Flow<L> {
+    let ([u, v, w], [p, q, r]) = (air.velocity, air.omega);
+    let velocity = [u - r * y + q * z, v + r * x - p * z, w + p * y - q * x];
     let in_plane_squared = velocity[0] * velocity[0] + velocity[1] * velocity[1];
     let speed_squared = in_plane_squared + velocity[2] * velocity[2];
     let (in_plane_speed, speed) = (in_plane_squared.root(), speed_squared.root());
@@ -128,16 +131,22 @@ fn flow<L: Lane>(air: &Airflow<L>, y: L) -> Flow<L> {
     Flow { velocity, in_plane_speed, speed, speed_squared, per_speed, sine, cosine }
 }
 
-/// Angle of attack of the side at `y`, m, in rad, in [-pi/2, pi/2], positive where the air hits the
-/// belly; 0 below 0.3 m/s.
-#[inline(always)]
-pub fn angle_of_attack<L: Lane>(air: &Airflow<L>, y: L) -> L {
-    let flow = flow(air, y);
-    let magnitude = angle(size(flow.sine), flow.cosine) * sign(flow.sine);
-    (L::of(ANGLE_SPEED_M_S) - flow.speed).where_positive(L::of(0.0), magnitude)
-}
-
 impl<L: Lane> Membrane<L> {
+    /// Angle of attack of the side at `y`, m, in rad, in [-pi/2, pi/2], positive where the air hits
+    /// the belly; 0 below 0.3 m/s.
+    #[inline(always)]
+    pub fn angle_of_attack(&self, air: &Airflow<L>, y: L) -> L {
+        let flow = flow(air, self.place(y));
+        let magnitude = angle(size(flow.sine), flow.cosine) * sign(flow.sine);
+        (L::of(ANGLE_SPEED_M_S) - flow.speed).where_positive(L::of(0.0), magnitude)
+    }
+
+    /// From the centre of mass.
+    #[inline(always)]
+    fn place(&self, y: L) -> [L; 3] {
+        [self.place_m[0], y, self.place_m[1]]
+    }
+
     /// Force and moment about the centre of mass of the side at `y`, m, and the rates of its state.
     ///
     /// Force, moment and the camber that the state tends to scale with deployment. Finite for any
@@ -155,7 +164,8 @@ impl<L: Lane> Membrane<L> {
         state: &Side<L>,
     ) -> ([[L; 3]; 2], Side<L>) {
         let (none, one) = (L::of(0.0), L::of(1.0));
-        let flow = flow(air, y);
+        let place = self.place(y);
+        let flow = flow(air, place);
         let camber = state.fast_camber + state.creep_camber;
         let (sine, sign) = (size(flow.sine), sign(flow.sine));
         // All with the sign of the angle of attack.
@@ -163,9 +173,8 @@ impl<L: Lane> Membrane<L> {
         let normal_attached = self.lift_slope * flow.cosine * flow.sine
             + self.vortex_slope * flow.sine * sine
             + arched;
-        let normal_separated = self.separated_slope
-            * flow.sine
-            * (one / (L::of(0.56) + L::of(0.44) * sine) - L::of(0.41))
+        let normal_separated = self.normal_drag
+            * flat_plate::separated(flow.sine)
             * (one + L::of(1.5) * (camber * sign).upper(none));
         let normal = normal_separated + state.attached * (normal_attached - normal_separated);
         let tangential =
@@ -178,8 +187,8 @@ impl<L: Lane> Membrane<L> {
         let force =
             [pressure * tangential * along[0], pressure * tangential * along[1], pressure * normal];
         let lever = self.ahead_m * (one - sine) * pressure * (normal - state.attached * arched);
-        let moment =
-            [y * force[2] + lever * along[1], none - lever * along[0], none - y * force[0]];
+        let [roll, pitch, yaw] = cross(&place, &force);
+        let moment = [roll + lever * along[1], pitch - lever * along[0], yaw];
 
         let load = self.load_scale * flow.speed_squared * normal;
         let steady = self.steady_camber(load) * deployment;

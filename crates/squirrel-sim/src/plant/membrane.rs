@@ -11,7 +11,7 @@ mod tests;
 
 pub use parameters::MembraneParameters;
 
-use squirrel_core::aero::membrane::{self, Side, angle_of_attack};
+use squirrel_core::aero::membrane::{self, Side};
 use squirrel_core::aero::{Air, Airflow};
 use squirrel_core::dynamics::VectorSpace;
 use squirrel_core::frames::{Body, In, Wrench};
@@ -94,7 +94,7 @@ impl Membrane {
     /// hits the belly; 0 below 0.3 m/s. Its difference over a step is the rate that
     /// [`Self::evaluate`] takes.
     pub fn angle_of_attack(&self, air: &Air<f64>) -> [f64; 2] {
-        angle_of_attack(&both(air), self.lateral()).0
+        self.numbers.angle_of_attack(&both(air), self.lateral()).0
     }
 
     /// Wrench of both wings about the centre of mass, and the rates of their state.
@@ -153,9 +153,10 @@ impl MembraneParameters {
             camber_rate: 1.0 / self.camber_time_constant_s,
             creep_rate: 1.0 / self.creep_time_constant_s,
             arm_m: self.lateral_arm_m,
+            place_m: [self.longitudinal_arm_m, self.vertical_arm_m],
             lift_slope: self.lift_slope,
             vortex_slope: self.vortex_slope,
-            separated_slope: self.normal_drag / 0.59,
+            normal_drag: self.normal_drag,
             tangential_zero: self.tangential_zero,
             tangential_camber: self.tangential_camber,
             creep_fraction: self.creep_fraction,

@@ -12,6 +12,12 @@ pub struct MembraneParameters {
     pub area_per_side_m2: f64,
     /// Distance of each side's centre from the x axis, m.
     pub lateral_arm_m: f64,
+    /// How far ahead of the centre of mass the centres are, m; 0.
+    #[serde(default)]
+    pub longitudinal_arm_m: f64,
+    /// How far below the centre of mass they are, m; 0.
+    #[serde(default)]
+    pub vertical_arm_m: f64,
     /// Chord, m; 0.2 (D.3).
     #[serde(default = "chord_m")]
     pub chord_m: f64,
@@ -99,7 +105,13 @@ macro_rules! defaults {
             /// * `area_per_side_m2` - area of one side, m^2
             /// * `lateral_arm_m` - distance of each side's centre from the x axis, m
             pub fn new(area_per_side_m2: f64, lateral_arm_m: f64) -> Self {
-                Self { area_per_side_m2, lateral_arm_m, $($field: $field(),)* }
+                Self {
+                    area_per_side_m2,
+                    lateral_arm_m,
+                    longitudinal_arm_m: 0.0,
+                    vertical_arm_m: 0.0,
+                    $($field: $field(),)*
+                }
             }
         }
     };
@@ -164,6 +176,14 @@ impl MembraneParameters {
         for (field, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return refuse(field, value, "must be finite and > 0");
+            }
+        }
+        for (field, value) in [
+            ("longitudinal_arm_m", self.longitudinal_arm_m),
+            ("vertical_arm_m", self.vertical_arm_m),
+        ] {
+            if !value.is_finite() {
+                return refuse(field, value, "must be finite");
             }
         }
         for (field, value) in not_negative {
