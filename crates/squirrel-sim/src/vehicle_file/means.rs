@@ -110,8 +110,8 @@ mod tests {
         assert!((means.hover_command - (1.3435_f64 / 5.4).sqrt()).abs() < 1e-3, "{means:?}");
         assert!((means.thrust_to_weight - 4.019).abs() < 1e-2);
         assert!((means.hover_induced_speed_m_s - 8.22).abs() < 0.02);
-        // 0.18 N s/m and 0.01 m^2 at 7 m/s.
-        assert!((means.drag_at_7_m_s_n - (1.26 + 0.5 * 1.225 * 0.01 * 49.0)).abs() < 1e-6);
+        // 0.01 m^2 at 7 m/s.
+        assert!((means.drag_at_7_m_s_n - (0.5 * 1.225 * 0.01 * 49.0)).abs() < 1e-6);
         assert_eq!(means.wing_download_in_hover_n, Some(0.0), "no rotor_wash in the file");
         assert!((means.roll_authority_n_m - 4.0 * 0.085 * 1.3435).abs() < 1e-3);
         let washed = format!("{SQUIRREL_TOML}\n[effects.rotor_wash]\ngain = 1.0\n");

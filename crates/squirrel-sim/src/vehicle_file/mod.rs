@@ -188,25 +188,15 @@ impl VehicleFile {
         Self::parse(SQUIRREL_TOML, "squirrel.toml").expect("the shipped vehicle is sound")
     }
 
-    /// The same with rotors whose thrust asks for their speed alone, and without their drag: the
-    /// kinder air in which the paper's equations stand.
+    /// The same with rotors as small propellers are measured: drag, inflow, lift in forward flight,
+    /// flapping and a vortex ring. `vehicles/squirrel_air.toml`.
     ///
     /// # Panics
     /// Never: a test parses it.
     #[allow(clippy::expect_used, reason = "the text is part of the program and tested")]
-    pub fn squirrel_without_rotor_air() -> Self {
-        const OF_ROTOR_AIR: [&str; 5] = [
-            "axial_inflow_s_per_m",
-            "translational_lift_s2_per_m2",
-            "flapping_moment_n_m_s_per_m",
-            "vortex_ring_fraction",
-            "linear_n_s_per_m",
-        ];
-        let kept = SQUIRREL_TOML
-            .lines()
-            .filter(|line| !OF_ROTOR_AIR.iter().any(|key| line.starts_with(key)))
-            .fold(String::new(), |text, line| text + line + "\n");
-        Self::parse(&kept, "squirrel.toml without rotor air").expect("it is sound")
+    pub fn squirrel_in_air() -> Self {
+        const TEXT: &str = include_str!("../../../../vehicles/squirrel_air.toml");
+        Self::parse(TEXT, "squirrel_air.toml").expect("the shipped vehicle is sound")
     }
 
     /// The same vehicle with wings that do what its network says: the paper's simulation, in which

@@ -22,12 +22,7 @@ fn flown(vehicle: &VehicleFile, arm: Arm, scenario: &str, ratio: f64, seed: u64)
 /// gets on has the larger ones.
 #[test]
 fn what_the_simplest_controller_holds_is_held() {
-    let mut worse = worse_than_pc(&VehicleFile::squirrel_without_rotor_air());
-    // The flight code takes thrust for what it asked, which rotors with inflow and drag do not give.
-    // One loss is known, a tenth more error than `pc`.
-    let mut with_inflow = worse_than_pc(&VehicleFile::squirrel());
-    with_inflow.retain(|line| !line.starts_with("twcc_plus in avoid at 1.1:"));
-    worse.extend(with_inflow);
+    let worse = worse_than_pc(&VehicleFile::squirrel());
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
 

@@ -15,7 +15,7 @@ pub(crate) fn vehicle() -> Vehicle<f64> {
     // Read once: it is asked for in every step of some tests.
     static VEHICLE: OnceLock<Vehicle<f64>> = OnceLock::new();
     *VEHICLE.get_or_init(|| {
-        let mut parameters = *VehicleFile::squirrel_without_rotor_air().vehicle.parameters();
+        let mut parameters = *VehicleFile::squirrel().vehicle.parameters();
         parameters.inertia_kg_m2 = Matrix3::new(
             3.22e-3, 2.0e-4, -1.0e-4, 2.0e-4, 4.68e-3, 1.5e-4, -1.0e-4, 1.5e-4, 7.72e-3,
         );
