@@ -31,6 +31,8 @@ pub mod tolerance {
     pub const WING: f64 = 0.01;
     /// Servo lag.
     pub const SERVO_LAG: f64 = 0.1;
+    /// How far ahead and below the wings are, m, each.
+    pub const PLACE_M: f64 = 0.001;
     /// Accelerometer bias, m/s^2, each axis.
     pub const ACCEL_BIAS_M_S2: f64 = 0.02;
     /// Heading, rad.
@@ -79,6 +81,21 @@ pub struct Airframe {
     pub wing_arm_m: f64,
     /// Servo lag, s.
     pub servo_time_constant_s: f64,
+    /// Propellers and wings in more detail, where the file has it.
+    pub planform: Option<Planform>,
+}
+
+/// How large propellers and wings are beside each other, and where the wings are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Planform {
+    /// Radius of a propeller, m.
+    pub propeller_radius_m: f64,
+    /// How far ahead of the middle the wings' centres are, m.
+    pub longitudinal_arm_m: f64,
+    /// How far below it, m.
+    pub vertical_arm_m: f64,
+    /// Length of a wing along the flight, m.
+    pub chord_m: f64,
 }
 
 /// Errors of the sensors of one individual that stay within their tolerance.
@@ -173,6 +190,7 @@ impl Airframe {
             wing_slope: about(draw, 1.6, 0.1),
             wing_arm_m: about(draw, 0.12 * length, 0.08),
             servo_time_constant_s: about(draw, 0.08, 0.15),
+            planform: None,
         }
     }
 
@@ -203,7 +221,52 @@ impl Airframe {
             gyro_bias_rad_s: Vector3::from(draw.normal3(t::GYRO_BIAS_RAD_S)),
             heading_rad: draw.normal(t::HEADING_RAD),
         };
+        if let Some(planform) = &mut real.planform {
+            let arm = planform.longitudinal_arm_m;
+            planform.longitudinal_arm_m = arm + draw.normal(t::PLACE_M);
+            planform.vertical_arm_m += draw.normal(t::PLACE_M);
+        }
         (real, errors)
+    }
+
+    /// The same vehicle with propellers and wings of a detail that is drawn.
+    #[must_use]
+    pub fn detailed(mut self, draw: &mut Draw) -> Self {
+        let usual = self.planform();
+        let length = (self.mass_kg / CLASS_MASS_KG).cbrt();
+        self.planform = Some(Planform {
+            propeller_radius_m: 0.5
+                * round(2.0 * usual.propeller_radius_m * draw.uniform(0.8, 1.2)),
+            longitudinal_arm_m: round(length * draw.uniform(-0.01, 0.01)),
+            vertical_arm_m: round(length * draw.uniform(0.01, 0.07)),
+            chord_m: round(usual.chord_m * draw.uniform(0.75, 1.15)),
+        });
+        self
+    }
+
+    /// Propellers and wings as a file without their detail means them: propellers of three quarters
+    /// of the room that they have, wings twice as long as wide beside the middle.
+    pub fn planform(&self) -> Planform {
+        let hubs = self.rotors.iter().map(|rotor| rotor.position_body_m);
+        let mut apart = f64::INFINITY;
+        for (i, one) in hubs.clone().enumerate() {
+            for other in hubs.clone().skip(i + 1) {
+                apart = apart.min((one - other).norm());
+            }
+        }
+        self.planform.unwrap_or(Planform {
+            propeller_radius_m: 0.375 * apart,
+            longitudinal_arm_m: 0.0,
+            vertical_arm_m: 0.0,
+            chord_m: (2.0 * self.wing_area_m2).sqrt(),
+        })
+    }
+
+    /// Speed of the air through the propellers that carries the weight, m/s.
+    pub fn hover_induced_m_s(&self) -> f64 {
+        let radius_m = self.planform().propeller_radius_m;
+        let discs_m2 = self.rotors.len() as f64 * std::f64::consts::PI * radius_m.powi(2);
+        (self.mass_kg * GRAVITY_M_S2 / (2.0 * AIR_DENSITY_KG_M3 * discs_m2)).sqrt()
     }
 
     /// A machine of a fleet that one file stands for: mass, thrust, inertia, drag and the place of
@@ -280,6 +343,10 @@ impl Airframe {
             "reference_voltage_v = {{ value = {:e}, {SOURCE} }}",
             self.reference_voltage_v
         );
+        if let Some(planform) = self.planform {
+            let diameter = 2.0 * planform.propeller_radius_m;
+            let _ = writeln!(text, "propeller_diameter_m = {{ value = {diameter:e}, {SOURCE} }}");
+        }
         text += "\n[drag]\n";
         triple(
             &mut text,
@@ -292,6 +359,11 @@ impl Airframe {
         number(&mut text, "area_per_side_m2", self.wing_area_m2, t::WING * self.wing_area_m2);
         number(&mut text, "normal_force_slope", self.wing_slope, t::WING * self.wing_slope);
         number(&mut text, "lateral_arm_m", self.wing_arm_m, t::WING * self.wing_arm_m);
+        if let Some(planform) = self.planform {
+            number(&mut text, "longitudinal_arm_m", planform.longitudinal_arm_m, t::PLACE_M);
+            number(&mut text, "vertical_arm_m", planform.vertical_arm_m, t::PLACE_M);
+            let _ = writeln!(text, "chord_m = {{ value = {:e}, {SOURCE} }}", planform.chord_m);
+        }
         let lag = self.servo_time_constant_s;
         number(&mut text, "time_constant_s", lag, t::SERVO_LAG * lag);
         let most = thrust * self.speed_max_rad_s.powi(2) * self.rotors.len() as f64;

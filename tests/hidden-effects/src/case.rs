@@ -4,6 +4,7 @@
 use crate::airframe::{Airframe, SensorErrors};
 use crate::catalogue::{CATALOGUE, CLASS_MASS_KG, Entry, HiddenEffect};
 use crate::draw::{Draw, mix};
+use crate::further::{BLOWN, Further};
 use crate::independent::{self, Excitation, Misfit, Order, Pack};
 use crate::outside::Outside;
 use crate::overstate::{Overstatement, Stated};
@@ -39,6 +40,9 @@ pub struct Answer {
     pub recorder: Recorder,
     /// Part of the variation of force and moment that is unmodelled.
     pub misfit: Option<Misfit>,
+    /// What is flown, or stated, for the sake of what is hidden.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
 }
 
 impl Answer {
@@ -98,6 +102,9 @@ impl CaseError {
 
 const STANDARD: &str = "standard";
 
+/// What jets do depends on what files need not say; part of the vehicles whose file says it.
+const DETAILED: f64 = 0.7;
+
 /// A case whose vehicle does not stay up is drawn anew so often: an effect near its largest can
 /// make a low hover impossible.
 const REDRAWS: u64 = 12;
@@ -127,6 +134,7 @@ impl Case {
             stated: None,
             recorder: Recorder::Board,
             misfit: None,
+            notes: Vec::new(),
         };
         let turn = if set.is_half() { index / 2 } else { index };
         let hides_nothing = set.is_half() && index % 2 == 1;
@@ -169,7 +177,31 @@ impl Case {
             Set::Misfit => answer.misfit = Some(Misfit::draw(&mut draw)),
             _ => {}
         }
-        Self { answer, nominal, seed }
+        let mut case = Self { answer, nominal, seed };
+        let mut draw = Draw::new(mix(seed, 5));
+        // Some say no more of their propellers than most files do.
+        if case.about().any(|name| name == BLOWN) && draw.uniform(0.0, 1.0) < DETAILED {
+            case.nominal = case.nominal.detailed(&mut draw);
+            case.answer.notes.push(
+                "vehicle.toml: diameter of the propellers, place and chord of the wings".to_owned(),
+            );
+        }
+        case.answer.notes.extend(case.further().notes());
+        case
+    }
+
+    /// Names of the effects that it hides, or that its file states too much of.
+    fn about(&self) -> impl Iterator<Item = &str> + Clone {
+        let stated = self.answer.stated.iter().map(|stated| &stated.effect);
+        self.answer.effects.iter().chain(stated).map(|effect| effect.name.as_str())
+    }
+
+    /// What is flown after the programme. Flights that are to excite less have nothing more.
+    fn further(&self) -> Further {
+        match self.answer.excitation {
+            Excitation::Rich => Further::of(&self.about(), &self.nominal),
+            Excitation::Normal | Excitation::Calm => Further::default(),
+        }
     }
 
     /// Draws a case and makes it in a folder, as [`Self::make`]; one that cannot be flown is drawn
@@ -202,6 +234,7 @@ impl Case {
     pub fn hiding(&self, effects: Vec<HiddenEffect>, outside: Option<Outside>) -> Self {
         let mut other = self.clone();
         (other.answer.effects, other.answer.outside) = (effects, outside);
+        other.answer.notes = other.further().notes();
         other
     }
 
@@ -287,6 +320,7 @@ impl Case {
                 resistance_ohm: order.pack.resistance_ohm,
                 effects: order.effects,
                 excitation: order.excitation,
+                further: order.further,
                 noise: order.noise,
                 charge: order.charge,
                 seed: order.seed,
@@ -331,6 +365,7 @@ impl Case {
             effects,
             outside: self.answer.outside,
             excitation: self.answer.excitation,
+            further: self.further(),
             noise: self.answer.noise,
             charge: charges[number],
             unmodelled: None,
@@ -432,16 +467,16 @@ mod tests {
             let share = misfit.misfit.unwrap().share;
             assert!((0.1..0.25).contains(&share) && misfit.effects.len() == 1);
         }
-        let stated = (0..28)
+        let stated = (0..32)
             .map(|index| Case::draw(Set::Overstated, index, 1).answer.stated.unwrap().effect.name);
         let names: BTreeSet<_> = stated.collect();
-        assert!(names.len() == 28 && !names.contains("gust"));
+        assert!(names.len() == 32 && !names.contains("gust"));
     }
 
     /// The file says what the answer says it says.
     #[test]
     fn overstated_files_carry_the_effect() {
-        for index in 0..112 {
+        for index in 0..128 {
             let case = Case::draw(Set::Overstated, index, 1);
             let stated = case.answer.stated.clone().unwrap();
             let file = VehicleFile::parse(&case.vehicle_toml(), "vehicle.toml").unwrap();

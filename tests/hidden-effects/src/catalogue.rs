@@ -4,7 +4,10 @@
 //! drawn above the lower end for vehicles heavier than the class that the ranges were made for.
 
 use crate::draw::Draw;
-use crate::independent::twins::{Equation, angular_damping, flapping_moment};
+use crate::independent::twins::{
+    Equation, angular_damping, flapping_moment, rotor_wash, vortex_ring, wing_moment,
+    wing_tangential,
+};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -71,7 +74,8 @@ impl HiddenEffect {
             | Quantity::OneOf { .. } => None,
             Quantity::Size { key, .. }
             | Quantity::Extensive { key, .. }
-            | Quantity::Signed { key, .. } => Some(vec![key]),
+            | Quantity::Signed { key, .. }
+            | Quantity::Along { key, .. } => Some(vec![key]),
             Quantity::Plane { keys, .. } => Some(keys.to_vec()),
             Quantity::Space { keys, .. } => Some(keys.to_vec()),
         });
@@ -88,6 +92,8 @@ pub(crate) enum Quantity {
     Extensive { key: &'static str, smallest: f64, largest: f64 },
     /// The same with either sign.
     Signed { key: &'static str, smallest: f64, largest: f64 },
+    /// The same, a length that grows with the vehicle's.
+    Along { key: &'static str, smallest: f64, largest: f64 },
     /// A vector of such a length in the plane.
     Plane { keys: [&'static str; 2], smallest: f64, largest: f64 },
     /// A vector of such a length in space.
@@ -137,6 +143,9 @@ pub(crate) const fn extensive(key: &'static str, smallest: f64, largest: f64) ->
 }
 pub(crate) const fn signed(key: &'static str, smallest: f64, largest: f64) -> Quantity {
     Quantity::Signed { key, smallest, largest }
+}
+pub(crate) const fn along(key: &'static str, smallest: f64, largest: f64) -> Quantity {
+    Quantity::Along { key, smallest, largest }
 }
 pub(crate) const fn entry(
     name: &'static str,
@@ -247,6 +256,10 @@ pub const CATALOGUE: &[Entry] = &[
         &["damped"],
         &[extensive("mass_kg", 0.03, 0.12), size("length_m", 0.3, 0.9)],
     ),
+    rotor_wash::ENTRY,
+    vortex_ring::ENTRY,
+    wing_moment::ENTRY,
+    wing_tangential::ENTRY,
 ];
 
 /// Pairs of different kinds that flights tell apart only by the tolerances, or where one hides the
@@ -306,6 +319,11 @@ impl Entry {
                         ),
                     );
                 }
+                Quantity::Along { key, smallest, largest } => {
+                    let length = (mass_kg / CLASS_MASS_KG).cbrt();
+                    let size = draw.uniform(raised(smallest, largest), largest);
+                    put(key, Value::Number(draw.sign() * length * size));
+                }
                 Quantity::Plane { keys, smallest, largest } => {
                     let (length, angle) =
                         (draw.uniform(raised(smallest, largest), largest), draw.angle());
@@ -337,7 +355,10 @@ impl Entry {
         let signed = |quantity: &Quantity| {
             matches!(
                 quantity,
-                Quantity::Signed { .. } | Quantity::Plane { .. } | Quantity::Space { .. }
+                Quantity::Signed { .. }
+                    | Quantity::Along { .. }
+                    | Quantity::Plane { .. }
+                    | Quantity::Space { .. }
             )
         };
         self.quantities.iter().any(signed)

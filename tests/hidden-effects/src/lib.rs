@@ -11,6 +11,7 @@ pub mod bench;
 pub mod case;
 pub mod catalogue;
 pub mod draw;
+pub mod further;
 pub mod independent;
 pub mod outside;
 pub mod overstate;

@@ -10,8 +10,12 @@ use std::process::ExitCode;
 
 const USAGE: &str = "\
 hidden-effects make  --set NAME --n N --seed S --out DIR
-hidden-effects bench --squirrel PROGRAM --seed S (--full | --cases N [--set NAME]) [--json FILE] [--keep DIR]
+hidden-effects bench --squirrel PROGRAM --seed S (--full | --cases N [--set NAME [--effect NAME]]) [--json FILE] [--keep DIR]
+                     [--effect NAME]: the first N cases of the set that hide it
                      [--score-again]: what --keep has from an earlier run, without asking again";
+
+/// Where a search for cases that hide an effect ends.
+const LAST: usize = 10_000;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -31,7 +35,7 @@ fn run(arguments: &[String]) -> Result<(), String> {
         }
         Some((command, rest)) if command == "bench" => score(&Options::new(
             rest,
-            &["squirrel", "seed", "full", "cases", "set", "json", "keep", "score-again"],
+            &["squirrel", "seed", "full", "cases", "set", "effect", "json", "keep", "score-again"],
         )?),
         Some((command, _)) => Err(format!("no command '{command}'\n{USAGE}")),
         None => Err(format!("which command?\n{USAGE}")),
@@ -54,7 +58,15 @@ fn score(options: &Options) -> Result<(), String> {
         (None, None) => bench::spread(options.number("cases")? as usize),
         (None, Some(name)) => {
             let set = set(name)?;
-            (0..options.number("cases")? as usize).map(|index| (set, index)).collect()
+            let hides = |index: &usize| match options.get("effect") {
+                None => true,
+                Some(name) => {
+                    let effects = Case::draw(set, *index, seed).answer.effects;
+                    effects.iter().any(|effect| effect.name == name)
+                }
+            };
+            let most = options.number("cases")? as usize;
+            (0..LAST).filter(hides).take(most).map(|index| (set, index)).collect()
         }
     };
     let keep = options.get("keep").map(PathBuf::from);

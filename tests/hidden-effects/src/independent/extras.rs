@@ -94,8 +94,8 @@ pub(super) struct Extras {
 
 impl Extras {
     /// Force and moment of those whose equation stands in a file of its own.
-    pub(super) fn wrenches(&self, at: Sight) -> impl Iterator<Item = [Vector3<f64>; 2]> {
-        self.own.iter().map(move |(effect, equation)| equation(effect, &at))
+    pub(super) fn wrenches(&self, at: &Sight) -> impl Iterator<Item = [Vector3<f64>; 2]> {
+        self.own.iter().map(move |(effect, equation)| equation(effect, at))
     }
 
     pub(super) fn new(effects: &[HiddenEffect]) -> Self {

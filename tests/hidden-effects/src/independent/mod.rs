@@ -20,8 +20,10 @@ mod unmodelled;
 pub use battery::Pack;
 pub use features::FEATURES;
 pub(crate) use features::weights;
+pub(crate) use programme::DURATION_S;
 pub use programme::Excitation;
 pub use sensors::white;
+pub(crate) use twins::rotor_wash::OF_THRUST;
 pub use unmodelled::{Misfit, Unmodelled, unmodelled};
 #[cfg(test)]
 pub(crate) use unmodelled::{Watched, watched};
@@ -29,6 +31,7 @@ pub(crate) use unmodelled::{Watched, watched};
 use crate::airframe::{Airframe, MAX_ROTORS, SensorErrors};
 use crate::catalogue::HiddenEffect;
 use crate::draw::{Draw, mix};
+use crate::further::Further;
 use crate::outside::Outside;
 use air::Air;
 use battery::Battery;
@@ -36,7 +39,7 @@ use controller::{Controller, Estimate};
 use extras::Extras;
 use nalgebra::{Quaternion, Vector2, Vector3, Vector4};
 use physics::{Input, World};
-use programme::{DURATION_S, Programme};
+use programme::Programme;
 use sensors::Inertial;
 use squirrel_log::FlightLog;
 use state::State;
@@ -65,6 +68,8 @@ pub struct Order<'a> {
     pub outside: Option<Outside>,
     /// What is flown.
     pub excitation: Excitation,
+    /// What is flown after that.
+    pub further: Further,
     /// Factor on the white noise of all sensors.
     pub noise: f64,
     /// Charge at take-off, 0 to 1.
@@ -73,6 +78,13 @@ pub struct Order<'a> {
     pub unmodelled: Option<&'a Unmodelled>,
     /// Order of manoeuvres, turbulence and noise.
     pub seed: u64,
+}
+
+impl Order<'_> {
+    /// Length of the log, s.
+    fn duration_s(&self) -> f64 {
+        DURATION_S + self.further.duration_s()
+    }
 }
 
 /// What happened at one tick.
@@ -104,7 +116,7 @@ pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
     };
     let stream = |salt: u64| Draw::new(mix(order.seed, salt));
     let truth = simulate(order, &world, stream, |_, _, _| {})?;
-    let mut log = sensors::log(&truth, &extras, &order.errors, order.noise, stream(3));
+    let mut log = sensors::log(order, &truth, &extras, stream(3));
     // The arrays have room for the largest layout.
     if let Some(command) = log.source_mut("rotor").channels.get_mut("command") {
         let rotors = order.nominal.rotors.len();
@@ -124,7 +136,7 @@ fn simulate(
 ) -> Result<Vec<Truth>, String> {
     let tick_s = 1.0 / IMU_HZ;
     let dt_s = tick_s / STEPS as f64;
-    let mut programme = Programme::new(order.excitation, &mut stream(0));
+    let mut programme = Programme::new(order.excitation, order.further, &mut stream(0));
     let mut controller = Controller::new(order.nominal);
     let mut air = Air::new(world.extras.gust, stream(1));
     let mut inertial =
@@ -137,7 +149,7 @@ fn simulate(
     let hover_power = power_w(order.real, &state);
     let mut battery = Battery::new(order.pack, order.charge, hover_power);
     let hover_current = battery.current_a;
-    let ticks = (DURATION_S * IMU_HZ) as usize + MARGIN;
+    let ticks = (order.duration_s() * IMU_HZ) as usize + MARGIN;
     let mut truth: Vec<Truth> = Vec::with_capacity(ticks);
     let mut input = Input {
         time_s: 0.0,

@@ -3,7 +3,7 @@
 use super::extras::{Extras, Ground, Lift, Sag};
 use super::features::{self, FEATURES};
 use super::state::State;
-use super::twins::Sight;
+use super::twins::{Jet, Rotors, Sight, Wings};
 use super::unknown::{self, Motion};
 use super::unmodelled::Unmodelled;
 use crate::airframe::{AIR_DENSITY_KG_M3, Airframe, GRAVITY_M_S2, MAX_ROTORS};
@@ -162,11 +162,13 @@ impl World {
         let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros());
         let (mut thrust, mut spin, mut spin_rate) = (0.0, 0.0, 0.0);
         let mut rotor_rates = state.rotors * 0.0;
+        let mut rotors = Rotors::default();
         for (i, rotor) in a.rotors.iter().enumerate() {
             let weak = if unknown.weak_rotor == Some(i) { 1.0 - unknown.weak_loss } else { 1.0 };
             let square = state.rotors[i] * state.rotors[i] * weak;
             let t = rotor.thrust_coefficient_n_s2 * x.thrust[i] * square * factor;
             thrust += t;
+            rotors.push(Jet { position: rotor.position_body_m, thrust_n: t });
             moment += rotor.position_body_m.cross(&Vector3::new(0.0, 0.0, -t));
             moment.z += rotor.yaw_sign * rotor.torque_coefficient_n_m_s2 * x.torque[i] * square;
             let gap = input.rotor[i] * a.speed_max_rad_s * ratio - state.rotors[i];
@@ -182,12 +184,36 @@ impl World {
         let (wing_force, wing_moment) = self.wings(v, omega.x, deployment);
         force.z += wing_force;
         moment.x += wing_moment;
+        let planform = a.planform();
+        moment.y -= planform.longitudinal_arm_m * wing_force;
         // The centre of mass is off the point that all this refers to.
         moment -= x.cg_m.cross(&force);
         force -= thrust * Vector3::new(x.tilt.x, x.tilt.y, 0.0);
-        for [own_force, own_moment] in x.wrenches(Sight { air_body: v, omega }) {
+        let pushed = |jet: &Jet| jet.position.cross(&Vector3::new(0.0, 0.0, -jet.thrust_n));
+        let sight = Sight {
+            air_body: v,
+            omega,
+            rotors,
+            thrust_wrench: [
+                -thrust * Vector3::new(x.tilt.x, x.tilt.y, 1.0),
+                rotors.all().iter().map(pushed).sum(),
+            ],
+            weight_n: a.mass_kg * GRAVITY_M_S2,
+            propeller_radius_m: planform.propeller_radius_m,
+            wings: Wings {
+                area_m2: a.wing_area_m2,
+                slope: a.wing_slope,
+                lateral_arm_m: a.wing_arm_m,
+                longitudinal_arm_m: planform.longitudinal_arm_m,
+                vertical_arm_m: planform.vertical_arm_m,
+                chord_m: planform.chord_m,
+                deployment,
+                force_z_n: wing_force,
+            },
+        };
+        for [own_force, own_moment] in x.wrenches(&sight) {
             force += own_force;
-            moment += own_moment;
+            moment += own_moment - x.cg_m.cross(&own_force);
         }
         let e3 = Vector3::z();
         moment -= x.rotor_inertia * (omega.cross(&e3) * spin + e3 * spin_rate);

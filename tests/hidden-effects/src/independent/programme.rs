@@ -3,9 +3,11 @@
 //! `rich` has a multisine of 0.3 to 6 Hz on all axes, dashes to 9 m/s (three with both wing edges
 //! above 5 m/s, one folded), climbs and descents of 3 m/s, a full turn with hover at four headings,
 //! and a ladder of hover heights down to 0.2 m. `normal` is that without the multisine at half the
-//! speeds and half the turn. `calm` stays below 2 m/s at one heading with the wings folded.
+//! speeds and half the turn. `calm` stays below 2 m/s at one heading with the wings folded. What
+//! [`Further`] asks for comes after that.
 
 use crate::draw::Draw;
+use crate::further::Further;
 use nalgebra::{Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
@@ -38,21 +40,52 @@ pub(super) struct Reference {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Manoeuvre {
-    Hover { for_s: f64 },
-    Dash { course: f64, speed: f64, wings: bool },
-    Heave { speed: f64 },
-    Turn { sign: f64, step: f64 },
+    Hover {
+        for_s: f64,
+    },
+    Dash {
+        course: f64,
+        speed: f64,
+        wings: bool,
+    },
+    Heave {
+        speed: f64,
+        wings: bool,
+    },
+    /// Hover in which the wings open and close.
+    Open,
+    /// Straight up, or down where it is negative.
+    Rise {
+        by_m: f64,
+        speed: f64,
+        rate: f64,
+    },
+    Turn {
+        sign: f64,
+        step: f64,
+    },
     Ladder,
 }
 
 /// Length of a flight, s.
-pub(super) const DURATION_S: f64 = 40.0;
+pub(crate) const DURATION_S: f64 = 40.0;
 const HEIGHT_M: f64 = 3.0;
 const DASH_M_S2: f64 = 5.5;
 const CRUISE_S: f64 = 0.7;
 const SETTLE_S: f64 = 0.6;
 const HEAVE_M_S2: f64 = 4.0;
 const HEAVE_S: f64 = 0.5;
+/// With open wings.
+const HEAVE_OPEN_S: f64 = 1.0;
+const OPEN_S: [f64; 3] = [0.2, 1.2, 2.2];
+const SLOW_DASH_M_S: f64 = 5.0;
+const RISE_M_S: f64 = 6.0;
+const RISE_M_S2: f64 = 4.0;
+const SINK_M_S2: f64 = 5.0;
+/// Above [`HEIGHT_M`], and how far down from there.
+const HIGH_M: f64 = 25.0;
+const SINK_M: f64 = 22.0;
+const RECOVERY_S: f64 = 1.0;
 const TURN_S: f64 = 1.4;
 const TURN_HOLD_S: f64 = 0.45;
 const LADDER_M: [f64; 5] = [1.5, 0.8, 0.4, 0.2, HEIGHT_M];
@@ -69,11 +102,19 @@ impl Manoeuvre {
         match self {
             Self::Hover { for_s } => for_s,
             Self::Dash { speed, .. } => 2.0 * speed / DASH_M_S2 + CRUISE_S + SETTLE_S,
-            Self::Heave { speed } => 4.0 * speed / HEAVE_M_S2 + 2.0 * HEAVE_S + SETTLE_S,
+            Self::Heave { speed, wings } => {
+                4.0 * speed / HEAVE_M_S2 + 2.0 * heave_hold_s(wings) + SETTLE_S
+            }
+            Self::Open => OPEN_S[2],
+            Self::Rise { by_m, speed, rate } => by_m.abs() / speed + speed / rate + RECOVERY_S,
             Self::Turn { .. } => 4.0 * (TURN_S + TURN_HOLD_S),
             Self::Ladder => LADDER_S.iter().sum(),
         }
     }
+}
+
+fn heave_hold_s(wings: bool) -> f64 {
+    if wings { HEAVE_OPEN_S } else { HEAVE_S }
 }
 
 /// Speed and acceleration of a ramp up, a hold and a ramp down.
@@ -102,7 +143,7 @@ fn manoeuvres(excitation: Excitation, draw: &mut Draw) -> Vec<Manoeuvre> {
                 list.push(Manoeuvre::Dash { course, speed: draw.uniform(0.9, 1.6), wings: false });
                 list.push(Manoeuvre::Hover { for_s: draw.uniform(0.5, 2.0) });
             }
-            list.push(Manoeuvre::Heave { speed: 0.3 });
+            list.push(Manoeuvre::Heave { speed: 0.3, wings: false });
             list.push(Manoeuvre::Hover { for_s: DURATION_S });
             return list;
         }
@@ -121,7 +162,7 @@ fn manoeuvres(excitation: Excitation, draw: &mut Draw) -> Vec<Manoeuvre> {
     if let Manoeuvre::Dash { wings, .. } = &mut dashes[folded] {
         *wings = false;
     }
-    list.push(Manoeuvre::Heave { speed: HEAVE_M_S * amplitude });
+    list.push(Manoeuvre::Heave { speed: HEAVE_M_S * amplitude, wings: false });
     list.push(Manoeuvre::Turn { sign: draw.sign(), step: 0.5 * PI * amplitude });
     list.push(Manoeuvre::Ladder);
     draw.shuffle(&mut list);
@@ -130,6 +171,25 @@ fn manoeuvres(excitation: Excitation, draw: &mut Draw) -> Vec<Manoeuvre> {
     list.splice(4..4, [dashes[2], dashes[3]]);
     list.insert(0, Manoeuvre::Hover { for_s: 1.2 });
     list.push(Manoeuvre::Hover { for_s: DURATION_S });
+    list
+}
+
+/// What follows, after which the flight hovers.
+fn further(further: Further, draw: &mut Draw) -> Vec<Manoeuvre> {
+    let mut list = Vec::new();
+    if further.opens_wings {
+        let course = draw.angle();
+        list.extend([Manoeuvre::Open; 2]);
+        list.push(Manoeuvre::Heave { speed: HEAVE_M_S, wings: true });
+        let dash = |course| Manoeuvre::Dash { course, speed: SLOW_DASH_M_S, wings: true };
+        list.extend([dash(course), dash(course + PI)]);
+    }
+    let mut by_m = HIGH_M;
+    for speed in further.descents_m_s.into_iter().flatten() {
+        list.push(Manoeuvre::Rise { by_m, speed: RISE_M_S, rate: RISE_M_S2 });
+        list.push(Manoeuvre::Rise { by_m: -SINK_M, speed, rate: SINK_M_S2 });
+        by_m = SINK_M;
+    }
     list
 }
 
@@ -168,8 +228,8 @@ pub(super) struct Programme {
 }
 
 impl Programme {
-    pub(super) fn new(excitation: Excitation, draw: &mut Draw) -> Self {
-        let mut left = manoeuvres(excitation, draw).into_iter();
+    pub(super) fn new(excitation: Excitation, more: Further, draw: &mut Draw) -> Self {
+        let mut list = manoeuvres(excitation, draw);
         let reference = Reference {
             position: Vector3::new(0.0, 0.0, -HEIGHT_M),
             velocity: Vector3::zeros(),
@@ -182,6 +242,13 @@ impl Programme {
         };
         let multisine = (excitation == Excitation::Rich)
             .then(|| std::array::from_fn(|axis| Multisine::new(axis, draw)));
+        let more = further(more, draw);
+        if let Some(Manoeuvre::Hover { for_s }) = list.last_mut().filter(|_| !more.is_empty()) {
+            *for_s = SETTLE_S;
+            list.extend(more);
+            list.push(Manoeuvre::Hover { for_s: DURATION_S });
+        }
+        let mut left = list.into_iter();
         let now = left.next().unwrap_or(Manoeuvre::Hover { for_s: DURATION_S });
         Self { left, now, begun_s: 0.0, start: reference, multisine, reference }
     }
@@ -202,6 +269,16 @@ impl Programme {
         let mut share = 1.0;
         match self.now {
             Manoeuvre::Hover { .. } => {}
+            Manoeuvre::Open => {
+                if t > OPEN_S[0] && t < OPEN_S[1] {
+                    r.wing = Vector2::repeat(1.0);
+                }
+            }
+            Manoeuvre::Rise { by_m, speed, rate } => {
+                let (v, a) = trapezoid(t, speed, rate, by_m.abs() / speed - speed / rate);
+                velocity.z = -v * by_m.signum();
+                r.acceleration.z = -a * by_m.signum();
+            }
             Manoeuvre::Dash { course, speed, wings } => {
                 let (v, a) = trapezoid(t, speed, DASH_M_S2, CRUISE_S);
                 let direction = Vector3::new(course.cos(), course.sin(), 0.0);
@@ -212,10 +289,14 @@ impl Programme {
                     r.wing = Vector2::repeat(1.0);
                 }
             }
-            Manoeuvre::Heave { speed } => {
-                let half = 2.0 * speed / HEAVE_M_S2 + HEAVE_S;
+            Manoeuvre::Heave { speed, wings } => {
+                let hold_s = heave_hold_s(wings);
+                let half = 2.0 * speed / HEAVE_M_S2 + hold_s;
                 let (up, t) = if t < half { (-1.0, t) } else { (1.0, t - half) };
-                let (v, a) = trapezoid(t, speed, HEAVE_M_S2, HEAVE_S);
+                let (v, a) = trapezoid(t, speed, HEAVE_M_S2, hold_s);
+                if wings && v > EDGE_SHARE[0] * speed {
+                    r.wing = Vector2::repeat(1.0);
+                }
                 velocity.z = up * v;
                 r.acceleration.z = up * a;
             }
@@ -263,8 +344,12 @@ mod tests {
     use super::*;
 
     fn fly(excitation: Excitation, seed: u64) -> Vec<Reference> {
-        let mut programme = Programme::new(excitation, &mut Draw::new(seed));
-        (0..12_000).map(|k| programme.step(f64::from(k) / 300.0, 1.0 / 300.0)).collect()
+        fly_further(excitation, Further::default(), seed)
+    }
+    fn fly_further(excitation: Excitation, further: Further, seed: u64) -> Vec<Reference> {
+        let mut programme = Programme::new(excitation, further, &mut Draw::new(seed));
+        let ticks = (300.0 * (DURATION_S + further.duration_s())) as usize;
+        (0..ticks).map(|k| programme.step(k as f64 / 300.0, 1.0 / 300.0)).collect()
     }
 
     #[test]
@@ -282,6 +367,33 @@ mod tests {
             let fast_edges =
                 flight.windows(2).filter(|w| w[0].wing != w[1].wing && w[0].velocity.norm() > 5.5);
             assert_eq!(fast_edges.count(), 6, "{seed}");
+        }
+    }
+
+    /// The programme is the same to its last manoeuvre, and all that follows ends before the log.
+    #[test]
+    fn further_legs_come_after_the_programme() {
+        for seed in 0..10 {
+            let plain = fly(Excitation::Rich, seed);
+            for (descents_m_s, opens_wings) in
+                [(None, true), (Some([6.5, 9.5]), false), (Some([4.0, 10.0]), true)]
+            {
+                let further = Further { descents_m_s, opens_wings };
+                let flight = fly_further(Excitation::Rich, further, seed);
+                assert!(flight[..10_800].iter().zip(&plain).all(|(a, b)| a.position == b.position));
+                let rest = &flight[11_000..];
+                let edges = rest.windows(2).filter(|w| w[0].wing != w[1].wing).count();
+                assert_eq!(edges, if opens_wings { 12 } else { 0 });
+                let fastest = rest.iter().map(|r| r.velocity.z).fold(0.0, f64::max);
+                assert!(
+                    (fastest - descents_m_s.map_or(if opens_wings { 2.5 } else { 0.0 }, |v| v[1]))
+                        .abs()
+                        < 0.1
+                );
+                let lowest = rest.iter().map(|r| r.position.z).fold(f64::MIN, f64::max);
+                assert!(lowest < -2.9, "{lowest}");
+                assert_eq!(rest[rest.len() - 60].velocity.norm(), 0.0, "{seed} {further:?}");
+            }
         }
     }
 

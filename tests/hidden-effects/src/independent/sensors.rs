@@ -5,8 +5,7 @@
 
 use super::air::Process;
 use super::extras::Extras;
-use super::programme::DURATION_S;
-use super::{IMU_HZ, Truth};
+use super::{IMU_HZ, Order, Truth};
 use crate::airframe::SensorErrors;
 use crate::draw::Draw;
 use crate::recorder::TRUTH;
@@ -80,15 +79,14 @@ impl Inertial {
 
 /// The log of a flight.
 pub(super) fn log(
+    order: &Order<'_>,
     truth: &[Truth],
     extras: &Extras,
-    errors: &SensorErrors,
-    noise: f64,
     mut draw: Draw,
 ) -> FlightLog {
-    let mut log = FlightLog::default();
-    let ticks = (DURATION_S * IMU_HZ) as usize;
-    inertial(&mut log, &truth[..ticks], extras, errors, noise, &mut draw);
+    let (mut log, noise) = (FlightLog::default(), order.noise);
+    let ticks = (order.duration_s() * IMU_HZ) as usize;
+    inertial(&mut log, &truth[..ticks], extras, &order.errors, noise, &mut draw);
     commands(&mut log, truth, ticks, extras.skew);
     receiver(&mut log, &truth[..ticks], extras.gnss_latency_s, noise, &mut draw);
     let mut wander = Process::new(&mut draw);
@@ -140,7 +138,7 @@ fn inertial(
         // Half of a drifting bias at the start, one and a half at the end: its mean is the stated
         // bias.
         let share = extras.accel_bias_start
-            + 2.0 * (1.0 - extras.accel_bias_start) * time_s(k) / DURATION_S;
+            + 2.0 * (1.0 - extras.accel_bias_start) * time_s(k) / time_s(truth.len());
         let white = Vector3::from(draw.normal3(noise * white::ACCEL_M_S2));
         let force = now.specific_force + errors.accel_bias_m_s2 + share * extras.accel_bias + white;
         let rows: [(&str, &[f64]); 2] = [

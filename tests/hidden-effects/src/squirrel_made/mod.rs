@@ -5,17 +5,19 @@
 //! the sensors and the commands is taken out, and commands are put on the clock of the inertial
 //! unit: their own stamps would give a skew away.
 
+mod legs;
 mod tables;
 
 pub use tables::effect_table;
 
 use crate::airframe::{Airframe, SensorErrors};
 use crate::catalogue::HiddenEffect;
-use crate::independent::Excitation;
+use crate::further::Further;
+use crate::independent::{DURATION_S, Excitation};
 use crate::recorder::TRUTH;
 use squirrel_log::{Channel, FlightLog, Source};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::flight::{InProcess, Integrator, Setup};
 use squirrel_sim::scenario::{MissionTable, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -32,6 +34,8 @@ pub struct Order<'a> {
     pub effects: &'a [HiddenEffect],
     /// What is flown.
     pub excitation: Excitation,
+    /// What is flown after that.
+    pub further: Further,
     /// Factor on the white noise of all sensors.
     pub noise: f64,
     /// Charge at take-off, 0 to 1.
@@ -70,11 +74,18 @@ pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
     let mut scenario = Scenario::find(name)?;
     (scenario.seed, scenario.battery_charge) = (order.seed, order.charge);
     (scenario.wind.gust_sigma_m_s, scenario.wind.gust_time_constant_s) = TURBULENCE;
+    scenario.duration_s = DURATION_S + order.further.duration_s();
     if let MissionTable::Excite(table) = &mut scenario.mission {
         table.even_seed_charge = order.charge;
     }
     let setup = Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
-    let flight = setup.fly(true, |_| {}).map_err(|error| error.to_string())?;
+    let flight = if order.further == Further::default() {
+        setup.fly(true, |_| {})
+    } else {
+        let mut computer = InProcess::new(legs::stack(&setup, order.further)?);
+        setup.fly_on(&mut computer, None, true, |_| {})
+    };
+    let flight = flight.map_err(|error| error.to_string())?;
     if let Some(time_s) = flight.metrics.contact_s {
         return Err(format!("touched the ground at {time_s:.2} s"));
     }

@@ -2,7 +2,7 @@
 
 use super::Order;
 use crate::catalogue::{HiddenEffect, Value};
-use crate::independent::white;
+use crate::independent::{OF_THRUST, white};
 use std::fmt::Write as _;
 
 /// Gains per second: they hold for every vehicle of the class, and low enough for the largest lag
@@ -126,6 +126,12 @@ pub fn effect_table(effect: &HiddenEffect) -> String {
             kept.clear();
             more.push(("damping_n_m_s2_per_rad2", x("damping_n_m_s_per_rad")));
         }
+        ("rotor_wash", "of_thrust") => {
+            kept.clear();
+            more.push(("thrust_fraction", OF_THRUST * x("gain")));
+        }
+        // Nothing where the wings are flat, but a file must say it.
+        ("wing_moment", _) => more.push(("place_z_m", 0.0)),
         ("wing_membrane", "speed_dependent") => more.push(("full_speed_m_s", 5.0)),
         ("accel_bias", "drifting") => {
             // Half at the start, one and a half after 40 s.
