@@ -13,7 +13,7 @@ HUBS_M = [(0.085, -0.085), (-0.085, -0.085), (-0.085, 0.085), (0.085, 0.085)]
 RADIUS_M = 0.0508
 BELOW_M = 0.02
 CHORD_M, SPAN_M, MIDDLE_M = 0.2, 0.1, 0.09
-BROADSIDE = 1.17
+BROADSIDE = 1.13
 
 
 def induced(thrust_n, across_m_s, climb_m_s):
@@ -33,7 +33,8 @@ def normal_pressure(u, v, w):
     """Along -z on a stalled plate that moves with (u, v, w) through the air."""
     speed = np.sqrt(u * u + v * v + w * w)
     sine = w / max(speed, 1e-12)
-    return 0.5 * RHO_KG_M3 * speed**2 * BROADSIDE * sine / (0.56 + 0.44 * abs(sine))
+    coefficient = BROADSIDE / 0.59 * sine * (1 / (0.56 + 0.44 * abs(sine)) - 0.41)
+    return 0.5 * RHO_KG_M3 * speed**2 * coefficient
 
 
 def plate_pressure(u, v, w):

@@ -71,7 +71,12 @@ const CHORES: [Chore; 13] = [
         "one more effect, as docs/adding-an-effect.md adds it, in a copy: it flies and is named",
         effect::chore,
     ),
-    ("pictures", "", "fly the README's picture again, into docs/pictures", chores::pictures),
+    (
+        "pictures",
+        "",
+        "draw the pictures of README and guide again, into docs/pictures",
+        chores::pictures,
+    ),
     (
         "clean-fresh",
         "",

@@ -1,21 +1,31 @@
 //! Reduced-order membrane wing (docs/equations.md D.3).
 //!
 //! It shares nothing with what a controller may believe: neither the flat plate nor a network. Each
-//! side feels its own air, which damps roll, and carries three states: the elastic camber, its
+//! side feels its own air where it is, which damps roll and pitch, and carries three states: the elastic camber, its
 //! creep and the attached fraction of the flow (Goman-Khrabrov).
 //!
 //! ```text
-//! a = |alpha|, s = sign alpha, k = s (kappa_1 + kappa_2)
-//! C_att = K_p sin a cos a + K_v sin^2 a + 2 K_p k cos a
-//! C_sep = C_D90 sin a / (0.56 + 0.44 sin a) (1 + 1.5 max(k, 0))
-//! C_N = X C_att + (1 - X) C_sep                C_T = C_T0 cos a + k_T |k C_N|
-//! f = -q A g (C_N s n + C_T e_t)               e_t = v_t / max(|v_t|, 0.05 m/s)
-//! X' = (X_0 - X) V / (4 c)                     X_0 = (1 - tanh((a - 2.5 (c / V) s alpha' - alpha*) / Delta)) / 2
-//! kappa_1' = (kappa - kappa_1) / tau           kappa_2' = (creep kappa - kappa_2) / tau_creep
+//! a = |alpha|, s = sign alpha, k = s (kappa_1 + kappa_2), d = deployment
+//! C_att = K_p sin a cos a + K_v sin^2 a + C_arc         C_arc = 2 K_p k cos a
+//! C_sep = C_D90 / 0.59 sin a (1 / (0.56 + 0.44 sin a) - 0.41) (1 + 1.5 max(k, 0))
+//! C_N = X C_att + (1 - X) C_sep                          C_T = (C_T0 + k_T |k C_N|) cos a
+//! f = -d q A g (C_N s n + C_T e_t)                       e_t = v_t / max(|v_t|, 0.05 m/s)
+//! x = x_0 (1 - sin a) (C_N - X C_arc) / C_N              ahead of the centre, along e_t
+//! X' = (X_0 - X) V / (4 c)     X_0 = (1 - tanh((a - 2.5 (c / V) s alpha' - alpha*) / Delta)) / 2
+//! kappa_1' = (d kappa - kappa_1) / tau          kappa_2' = (creep d kappa - kappa_2) / tau_creep
 //! 8 kappa lambda_0 + (64 / 3) kappa^3 = q s C_N c / (E t)
 //! ```
+//! `C_att` is Polhamus's for a plate without sweep: its vortices roll up at the side edges alone,
+//! so that `K_v` falls with aspect ratio. `C_sep` is Hoerner's for an infinite plate with
+//! Lindenburg's term for a short one. At 90 deg nothing is left along the plate and nothing of
+//! lift. docs/guide/wing.md holds both to measured plates.
+//!
+//! The pressure of the angle of attack acts up to a quarter chord ahead of the centre, that of an
+//! arc at the centre. Camber folds with the wing: a folded membrane is flat once its lag and its
+//! creep are over, and opens flat.
+//!
 //! Cambers are signed along the load, not along the angle of attack: a membrane takes time to snap
-//! through when alpha changes sign. Where `2 (1 + creep) K_p q c > 8 lambda_0 E t` (8.5 m/s with
+//! through when alpha changes sign. Where `2 (1 + creep) K_p q c > 8 lambda_0 E t` (9.7 m/s with
 //! the defaults) a flat membrane is unstable edge on and bulges to either side: that follows from
 //! the equations, and slack sails do it. The code carries `s` inside `sin alpha` and `C_N`, which
 //! saves most of the sign changes.
@@ -23,9 +33,10 @@
 //! One side is evaluated at a time, on lanes: a plant takes its two sides as one register, a batch
 //! both sides of many vehicles.
 
-use super::Airflow;
+use super::{Airflow, flat_plate};
 use crate::lane::Lane;
 use crate::lane::functions::{angle, cbrt, limit, sign, size, tanh};
+use crate::lane::vector::cross;
 use crate::numbers;
 
 /// Stands for 0 where a division must stay finite.
@@ -61,6 +72,8 @@ numbers! {
         creep_rate,
         /// Distance of each side's centre from the x axis, m.
         arm_m,
+        /// How far ahead of the centre of mass and below it the centres are, m.
+        place_m [2],
         /// `K_p`.
         lift_slope,
         /// `K_v`.
@@ -75,7 +88,7 @@ numbers! {
         creep_fraction,
         /// `alpha*`, rad.
         stall_angle_rad,
-        /// How far the pressure centre is ahead at small angles, m.
+        /// `x_0`, how far the pressure centre is ahead at small angles, m.
         ahead_m
     }
 }
@@ -107,9 +120,9 @@ struct Flow<L> {
 }
 
 #[inline(always)]
-fn flow<L: Lane>(air: &Airflow<L>, y: L) -> Flow<L> {
-    let [u, v, w] = air.velocity;
-    let velocity = [u - air.omega[2] * y, v, w + air.omega[0] * y];
+fn flow<L: Lane>(air: &Airflow<L>, [x, y, z]: [L; 3]) -> Flow<L> {
+    let ([u, v, w], [p, q, r]) = (air.velocity, air.omega);
+    let velocity = [u - r * y + q * z, v + r * x - p * z, w + p * y - q * x];
     let in_plane_squared = velocity[0] * velocity[0] + velocity[1] * velocity[1];
     let speed_squared = in_plane_squared + velocity[2] * velocity[2];
     let (in_plane_speed, speed) = (in_plane_squared.root(), speed_squared.root());
@@ -118,19 +131,25 @@ fn flow<L: Lane>(air: &Airflow<L>, y: L) -> Flow<L> {
     Flow { velocity, in_plane_speed, speed, speed_squared, per_speed, sine, cosine }
 }
 
-/// Angle of attack of the side at `y`, m, in rad, in [-pi/2, pi/2], positive where the air hits the
-/// belly; 0 below 0.3 m/s.
-#[inline(always)]
-pub fn angle_of_attack<L: Lane>(air: &Airflow<L>, y: L) -> L {
-    let flow = flow(air, y);
-    let magnitude = angle(size(flow.sine), flow.cosine) * sign(flow.sine);
-    (L::of(ANGLE_SPEED_M_S) - flow.speed).where_positive(L::of(0.0), magnitude)
-}
-
 impl<L: Lane> Membrane<L> {
+    /// Angle of attack of the side at `y`, m, in rad, in [-pi/2, pi/2], positive where the air hits
+    /// the belly; 0 below 0.3 m/s.
+    #[inline(always)]
+    pub fn angle_of_attack(&self, air: &Airflow<L>, y: L) -> L {
+        let flow = flow(air, self.place(y));
+        let magnitude = angle(size(flow.sine), flow.cosine) * sign(flow.sine);
+        (L::of(ANGLE_SPEED_M_S) - flow.speed).where_positive(L::of(0.0), magnitude)
+    }
+
+    /// From the centre of mass.
+    #[inline(always)]
+    fn place(&self, y: L) -> [L; 3] {
+        [self.place_m[0], y, self.place_m[1]]
+    }
+
     /// Force and moment about the centre of mass of the side at `y`, m, and the rates of its state.
     ///
-    /// Force and moment scale with deployment; the state evolves as if spread. Finite for any
+    /// Force, moment and the camber that the state tends to scale with deployment. Finite for any
     /// finite state and airspeeds up to 1e6 m/s; exactly no force without airspeed.
     ///
     /// * `angle_rate` - of the angle of attack, rad/s, held over a step; limited to 20
@@ -145,17 +164,21 @@ impl<L: Lane> Membrane<L> {
         state: &Side<L>,
     ) -> ([[L; 3]; 2], Side<L>) {
         let (none, one) = (L::of(0.0), L::of(1.0));
-        let flow = flow(air, y);
+        let place = self.place(y);
+        let flow = flow(air, place);
         let camber = state.fast_camber + state.creep_camber;
         let (sine, sign) = (size(flow.sine), sign(flow.sine));
-        // Both with the sign of the angle of attack.
-        let normal_attached = self.lift_slope * flow.cosine * (flow.sine + L::of(2.0) * camber)
-            + self.vortex_slope * flow.sine * sine;
-        let normal_separated = self.normal_drag * flow.sine / (L::of(0.56) + L::of(0.44) * sine)
+        // All with the sign of the angle of attack.
+        let arched = L::of(2.0) * self.lift_slope * camber * flow.cosine;
+        let normal_attached = self.lift_slope * flow.cosine * flow.sine
+            + self.vortex_slope * flow.sine * sine
+            + arched;
+        let normal_separated = self.normal_drag
+            * flat_plate::separated(flow.sine)
             * (one + L::of(1.5) * (camber * sign).upper(none));
         let normal = normal_separated + state.attached * (normal_attached - normal_separated);
         let tangential =
-            self.tangential_zero * flow.cosine + self.tangential_camber * size(camber * normal);
+            (self.tangential_zero + self.tangential_camber * size(camber * normal)) * flow.cosine;
 
         // Minus, because the force opposes the motion through the air.
         let pressure = (none - self.force_scale) * flow.speed_squared * deployment;
@@ -163,15 +186,12 @@ impl<L: Lane> Membrane<L> {
         let along = [flow.velocity[0] * per_slip, flow.velocity[1] * per_slip];
         let force =
             [pressure * tangential * along[0], pressure * tangential * along[1], pressure * normal];
-        let ahead_m = self.ahead_m * (one - sine);
-        let point = [ahead_m * along[0], ahead_m * along[1] + y];
-        let moment = [
-            point[1] * force[2],
-            none - point[0] * force[2],
-            point[0] * force[1] - point[1] * force[0],
-        ];
+        let lever = self.ahead_m * (one - sine) * pressure * (normal - state.attached * arched);
+        let [roll, pitch, yaw] = cross(&place, &force);
+        let moment = [roll + lever * along[1], pitch - lever * along[0], yaw];
 
-        let steady = self.steady_camber(self.load_scale * flow.speed_squared * normal);
+        let load = self.load_scale * flow.speed_squared * normal;
+        let steady = self.steady_camber(load) * deployment;
         let attach_rate = flow.speed.upper(L::of(SPEED_FLOOR_M_S)) * self.attach_per_m;
         let steady_attached = self.steady_attached(&flow, sine, sign, angle_rate);
         let rates = Side {

@@ -8,7 +8,7 @@
 //! wing the wing has stalled air of the jet instead of its own:
 //!
 //! ```text
-//! dN = g S_c (1/2 rho V_j (w - v_j) C(a_j) - N / S)     V_j^2 = u^2 + v^2 + (w - v_j)^2
+//! dN = g S_c (1/2 rho V_j^2 C(a_j) - N / S)     V_j^2 = u^2 + v^2 + (w - v_j)^2
 //! ```
 //! with the flat plate's `N / S` taken away. Form `of_thrust`: a part of the thrust, whatever the
 //! speed (10 % on a tilt rotor: Felker and Light 1988). Neither knows of the wings' work on the
@@ -18,12 +18,16 @@ use super::{Acts, Effect, EffectParameter, Forms, Mimic, Shown, Situation, Words
 use crate::aero::{BodyWrench, flat_plate};
 use crate::dynamics::induced;
 use crate::lane::Lane;
-use crate::math::{Real, real, sqrt};
+use crate::math::{AIR_DENSITY_KG_M3, Real, real, sqrt};
 use crate::numbers;
 use crate::vehicle::{MAX_ROTORS, Vehicle};
 
 const JETS: usize = 0;
 const OF_THRUST: usize = 1;
+/// Normal force coefficient of a wing about as long as wide, broadside (docs/guide/wing.md).
+const NORMAL_DRAG: f64 = 1.13;
+/// Stands for 0 where a division must stay finite, m^2/s^2.
+const TINY: f64 = 1e-12;
 /// A jet falls no slower past the wings than this, m/s: one that does not arrive covers nothing.
 const SLOWEST_M_S: f64 = 0.1;
 
@@ -132,7 +136,10 @@ impl<L: Lane> Numbers<L> {
         let square = at.rotor_thrust_n[rotor] * at.thrust_factor * self.per_thrust;
         let speed = induced::speed(square, across, none - w) * self.faster;
         let down = w - speed;
-        let pressure = flat_plate::stalled(down, (across + down * down).root());
+        let squared = across + down * down;
+        let sine = down / squared.upper(L::of(TINY)).root();
+        let pressure =
+            L::of(0.5 * AIR_DENSITY_KG_M3 * NORMAL_DRAG) * squared * flat_plate::separated(sine);
         let late = self.gap_m / (speed - w).upper(L::of(SLOWEST_M_S));
         let (x, y) = (self.x_m[rotor] - u * late, self.y_m[rotor] - v * late);
         let [inner, outer] = self.span_m;
@@ -225,13 +232,13 @@ mod tests {
         let rolling = [1.2 * HOVER_N, 1.2 * HOVER_N, 0.8 * HOVER_N, 0.8 * HOVER_N];
         let (cos, sin) = (30.0_f64.to_radians().cos(), 0.5);
         for (what, thrusts, velocity, [down, roll, pitch]) in [
-            ("hover", even, [0.0; 3], [1.5370, 0.0, 0.0]),
-            ("climb", even, [0.0, 0.0, -3.0], [1.6761, 0.0, 0.0]),
-            ("descent", even, [0.0, 0.0, 3.0], [1.5221, 0.0, 0.0]),
-            ("forward", even, [7.0, 0.0, 0.0], [1.4417, 0.0, -0.01923]),
-            ("braking", even, [7.0 * cos, 0.0, 7.0 * sin], [1.5905, 0.0, -0.02109]),
-            ("rolling", rolling, [0.0; 3], [1.5370, -0.02613, 0.0]),
-            ("sideways", even, [0.0, 7.0, 0.0], [1.3754, -0.02288, 0.0]),
+            ("hover", even, [0.0; 3], [1.4844, 0.0, 0.0]),
+            ("climb", even, [0.0, 0.0, -3.0], [1.6124, 0.0, 0.0]),
+            ("descent", even, [0.0, 0.0, 3.0], [1.4764, 0.0, 0.0]),
+            ("forward", even, [7.0, 0.0, 0.0], [1.4765, 0.0, -0.01969]),
+            ("braking", even, [7.0 * cos, 0.0, 7.0 * sin], [1.6163, 0.0, -0.02143]),
+            ("rolling", rolling, [0.0; 3], [1.4844, -0.02524, 0.0]),
+            ("sideways", even, [0.0, 7.0, 0.0], [1.4087, -0.02343, 0.0]),
         ] {
             let [force, m_x, m_y] = washed("jets", 1.0, thrusts, velocity, [1.0; 2]);
             assert!((force / down - 1.0).abs() < 0.05, "{what}: {force} N for {down} N");

@@ -3,8 +3,12 @@
 
 use crate::support::{flights, imported, vehicle, vehicle_with};
 use squirrel_gap::{diagnose, find};
+use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+
+/// The drag in `crazyflie21_brushed.toml`, as published.
+const DRAG: &str = "value = [0.0068, 0.0068, 0.0], sd";
 
 /// A Python with NumPy: `SQUIRREL_PYTHON`, or else `python3`, or else an environment of its own
 /// under `target`.
@@ -38,13 +42,10 @@ fn numpy_finds_the_same_residual_force() {
     let csv = flights("nanobench").join("B2_circle_medium_rep1.csv");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/residual_numpy.py");
     let shipped = vehicle("crazyflie21_brushed.toml");
-    // The shipped numbers have no drag, so that attitude and velocity would go unchecked.
+    // The shipped drag is small; a large one shows what attitude and velocity do.
     let draggy = vehicle_with(
         "crazyflie21_brushed.toml",
-        &[
-            ("value = [0.0, 0.0, 0.0], sd", "value = [0.02, 0.04, 0.1], sd"),
-            ("value = 0.0, sd", "value = 0.003, sd"),
-        ],
+        &[(DRAG, "value = [0.02, 0.04, 0.1], sd"), ("value = 0.0, sd", "value = 0.003, sd")],
     );
     let flights = [("B2".to_owned(), imported("nanobench.toml", &csv))];
     let mut forces = Vec::new();
@@ -114,5 +115,35 @@ fn without_their_imu_flights_still_name_the_sag() {
         assert!(
             verdict.notes.iter().any(|n| n.contains("forces are those of gnss.position_ned_m"))
         );
+    }
+}
+
+/// Force along x and y of flights that no drag was fitted to: less is left with the published one
+/// than without, and less again with the one that B8 and B3 show.
+#[test]
+fn rotor_drag_predicts_held_out_flights() {
+    let folder = flights("nanobench");
+    let held_out: Vec<_> = ["B2_circle_medium_rep1", "B9_trefoil_slow_rep1"]
+        .map(|name| {
+            (name.to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv"))))
+        })
+        .into();
+    let left = |vehicle: &VehicleFile| find(vehicle, &held_out).unwrap().residual.per_flight;
+    let with = |drag: &str| left(&vehicle_with("crazyflie21_brushed.toml", &[(DRAG, drag)]));
+    let none = with("value = [0.0, 0.0, 0.0], sd");
+    let fitted = with("value = [0.0106, 0.0106, 0.0], sd");
+    let shipped = left(&vehicle("crazyflie21_brushed.toml"));
+    let datasheet = left(&vehicle("crazyflie21_datasheet.toml"));
+    for name in none.keys() {
+        let of_all = [&none, &shipped, &fitted, &datasheet];
+        for axis in 0..2 {
+            let [none, shipped, fitted, datasheet] =
+                of_all.map(|all| all[name].force_body_rms_n[axis]);
+            println!("{name}, axis {axis}: {none:.5}, {shipped:.5}, {fitted:.5} N");
+            for left in [shipped, datasheet] {
+                assert!(left < 0.8 * none, "{name}, axis {axis}: {left} N of {none} N");
+            }
+            assert!(fitted < shipped, "{name}, axis {axis}: {fitted} N, shipped {shipped} N");
+        }
     }
 }

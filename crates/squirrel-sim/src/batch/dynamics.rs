@@ -8,7 +8,7 @@ use super::air::Forecast;
 use super::rows::Block;
 use super::simd::{Kernel, Paths, Register};
 use squirrel_core::aero::flat_plate;
-use squirrel_core::aero::membrane::{Membrane, Side, angle_of_attack};
+use squirrel_core::aero::membrane::{Membrane, Side};
 use squirrel_core::dynamics::battery::Charge;
 use squirrel_core::dynamics::lanes::{Airframe, Held, Motion, derivative, plus_scaled, settle};
 use squirrel_core::dynamics::servo::{Servo, ServoState};
@@ -220,7 +220,7 @@ fn fitted<
                 let air = whole::air::<L, ROTORS, EFFECTS>(&vehicle, &state, &columns);
                 let lateral = lateral(vehicle.membrane.arm_m);
                 for side in 0..2 {
-                    let now = angle_of_attack(&air, lateral[side]);
+                    let now = vehicle.membrane.angle_of_attack(&air, lateral[side]);
                     vehicle.angle_rate[side] = (now - angle[side]) * per_step;
                     angle[side] = now;
                 }

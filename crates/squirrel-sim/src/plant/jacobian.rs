@@ -8,7 +8,7 @@
 
 use super::{Plant, PlantState, WingPlant};
 use squirrel_core::aero::flat_plate;
-use squirrel_core::aero::membrane::{Membrane, Side, angle_of_attack};
+use squirrel_core::aero::membrane::{Membrane, Side};
 use squirrel_core::dynamics::lanes::{Airframe, Held, Motion};
 use squirrel_core::dynamics::rotors::spin_signs;
 use squirrel_core::dynamics::runge_kutta;
@@ -97,7 +97,8 @@ impl Plant {
             let air = whole::air::<_, ROTORS, true>(&vehicle, &before, &rotation(&before.attitude));
             let y = lateral(vehicle.membrane.arm_m);
             for side in 0..2 {
-                let turned = angle_of_attack(&air, y[side]) - constant(state.wing_angle_rad[side]);
+                let turned = vehicle.membrane.angle_of_attack(&air, y[side])
+                    - constant(state.wing_angle_rad[side]);
                 vehicle.angle_rate[side] = turned / constant(self.dt_s());
             }
         }

@@ -3,13 +3,15 @@
 //!
 //! Left and right are evaluated as one register, so that they share each instruction.
 
+#[cfg(test)]
+mod measured;
 mod parameters;
 #[cfg(test)]
 mod tests;
 
 pub use parameters::MembraneParameters;
 
-use squirrel_core::aero::membrane::{self, Side, angle_of_attack};
+use squirrel_core::aero::membrane::{self, Side};
 use squirrel_core::aero::{Air, Airflow};
 use squirrel_core::dynamics::VectorSpace;
 use squirrel_core::frames::{Body, In, Wrench};
@@ -92,12 +94,12 @@ impl Membrane {
     /// hits the belly; 0 below 0.3 m/s. Its difference over a step is the rate that
     /// [`Self::evaluate`] takes.
     pub fn angle_of_attack(&self, air: &Air<f64>) -> [f64; 2] {
-        angle_of_attack(&both(air), self.lateral()).0
+        self.numbers.angle_of_attack(&both(air), self.lateral()).0
     }
 
     /// Wrench of both wings about the centre of mass, and the rates of their state.
     ///
-    /// Force and moment scale with deployment; the state evolves as if spread. Finite for any
+    /// Force, moment and the camber that the state tends to scale with deployment. Finite for any
     /// finite state and airspeeds up to 1e6 m/s; exactly no force without airspeed.
     ///
     /// * `angle_rate_rad_s` - rate of the angle of attack of each side, rad/s, held over a step;
@@ -151,6 +153,7 @@ impl MembraneParameters {
             camber_rate: 1.0 / self.camber_time_constant_s,
             creep_rate: 1.0 / self.creep_time_constant_s,
             arm_m: self.lateral_arm_m,
+            place_m: [self.longitudinal_arm_m, self.vertical_arm_m],
             lift_slope: self.lift_slope,
             vortex_slope: self.vortex_slope,
             normal_drag: self.normal_drag,

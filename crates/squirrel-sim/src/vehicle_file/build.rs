@@ -316,6 +316,11 @@ fn membrane(
     }
     table.insert("area_per_side_m2".to_owned(), toml::Value::Float(wing.area_per_side_m2));
     table.insert("lateral_arm_m".to_owned(), toml::Value::Float(wing.lateral_arm_m));
+    for (key, arm_m) in
+        [("longitudinal_arm_m", wing.longitudinal_arm_m), ("vertical_arm_m", wing.vertical_arm_m)]
+    {
+        table.insert(key.to_owned(), toml::Value::Float(arm_m));
+    }
     table.insert("chord_m".to_owned(), toml::Value::Float(wing.chord_m));
     let parameters: MembraneParameters =
         table.try_into().map_err(|e: toml::de::Error| format!("wing.membrane: {}", e.message()))?;

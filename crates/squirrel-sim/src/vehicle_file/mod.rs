@@ -5,10 +5,12 @@
 
 mod build;
 mod effects;
+mod means;
 mod tables;
 
 pub use crate::quantity::Provenance;
 pub use effects::{ListedEffect, ListedParameter, effects_page, listed_effects};
+pub use means::Means;
 
 use crate::estimator::Estimator;
 use crate::plant::{BatteryParameters, ParnnWing, WingPlant};
@@ -184,6 +186,17 @@ impl VehicleFile {
     #[allow(clippy::expect_used, reason = "the text is part of the program and tested")]
     pub fn squirrel() -> Self {
         Self::parse(SQUIRREL_TOML, "squirrel.toml").expect("the shipped vehicle is sound")
+    }
+
+    /// The same with rotors as small propellers are measured: drag, inflow, lift in forward flight,
+    /// flapping and a vortex ring. `vehicles/squirrel_air.toml`.
+    ///
+    /// # Panics
+    /// Never: a test parses it.
+    #[allow(clippy::expect_used, reason = "the text is part of the program and tested")]
+    pub fn squirrel_in_air() -> Self {
+        const TEXT: &str = include_str!("../../../../vehicles/squirrel_air.toml");
+        Self::parse(TEXT, "squirrel_air.toml").expect("the shipped vehicle is sound")
     }
 
     /// The same vehicle with wings that do what its network says: the paper's simulation, in which

@@ -1,4 +1,4 @@
-//! The wing against physics, and against measured plates.
+//! The wing against physics; against measured plates it stands in `measured`.
 
 use super::*;
 use core::f64::consts::FRAC_PI_2;
@@ -8,7 +8,7 @@ const AREA_M2: f64 = 0.04;
 const SPREAD: [f64; 2] = [1.0; 2];
 const STILL: [f64; 2] = [0.0; 2];
 
-fn parameters() -> MembraneParameters {
+pub(super) fn parameters() -> MembraneParameters {
     MembraneParameters::new(0.5 * AREA_M2, 0.09)
 }
 fn wing() -> Membrane {
@@ -33,10 +33,10 @@ fn steady(wing: &Membrane, air: &Air<f64>) -> MembraneState {
     state
 }
 /// Lift, drag and normal coefficient in air without sideslip or rotation.
-struct Coefficients {
-    lift: f64,
-    drag: f64,
-    normal: f64,
+pub(super) struct Coefficients {
+    pub(super) lift: f64,
+    pub(super) drag: f64,
+    pub(super) normal: f64,
 }
 fn coefficients(wing: &Membrane, air: &Air<f64>, state: &MembraneState) -> Coefficients {
     let force = wing.evaluate(air, STILL, SPREAD, state).0.force.vector;
@@ -44,7 +44,7 @@ fn coefficients(wing: &Membrane, air: &Air<f64>, state: &MembraneState) -> Coeff
     let v = air.velocity.vector / air.speed;
     Coefficients { lift: c.z * v.x - c.x * v.z, drag: c.dot(&v), normal: c.z }
 }
-fn steady_coefficients(wing: &Membrane, speed_m_s: f64, angle_deg: f64) -> Coefficients {
+pub(super) fn steady_coefficients(wing: &Membrane, speed_m_s: f64, angle_deg: f64) -> Coefficients {
     let air = gliding(speed_m_s, angle_deg.to_radians());
     coefficients(wing, &air, &steady(wing, &air))
 }
@@ -93,20 +93,20 @@ fn small_angles_have_the_potential_slope() {
     let state = MembraneState::at_rest();
     let angle = 1e-3;
     let slope = coefficients(&wing(), &gliding(7.0, angle), &state).normal / angle;
-    assert!((slope / 1.9 - 1.0).abs() < 0.005, "{slope}");
+    assert!((slope / 1.483 - 1.0).abs() < 0.005, "{slope}");
 }
 
 #[test]
 fn broadside_air_finds_a_disc() {
     let flat = steady_coefficients(&stiff(), 7.0, 90.0);
-    assert!((flat.normal / 1.17 - 1.0).abs() < 1e-3, "{}", flat.normal);
+    assert!((flat.normal / 1.128 - 1.0).abs() < 1e-3, "{}", flat.normal);
     // A cup holds more air, by the factor of the separated branch.
     let air = gliding(7.0, FRAC_PI_2);
     let state = steady(&wing(), &air);
     let camber = state.fast_camber[0] + state.creep_camber[0];
     let cup = coefficients(&wing(), &air, &state).normal;
     assert!(
-        (cup / (1.17 * (1.0 + 1.5 * camber)) - 1.0).abs() < 1e-3 && camber > 0.05,
+        (cup / (1.128 * (1.0 + 1.5 * camber)) - 1.0).abs() < 1e-3 && camber > 0.05,
         "{cup}, {camber}"
     );
 }
@@ -315,19 +315,52 @@ fn no_airspeed_no_force_and_never_a_nan() {
 }
 
 #[test]
-fn deployment_scales_each_side_and_leaves_the_membrane_alone() {
+fn deployment_scales_each_side_and_the_camber_it_tends_to() {
     let (wing, air) = (wing(), gliding(7.0, 0.4));
     let state = steady(&wing, &air);
     let (full, rates) = wing.evaluate(&air, STILL, SPREAD, &state);
     let (half, half_rates) = wing.evaluate(&air, STILL, [0.5; 2], &state);
     assert!((half.force.vector * 2.0 - full.force.vector).norm() < 1e-12);
     assert!((half.moment.vector * 2.0 - full.moment.vector).norm() < 1e-12);
-    assert_eq!(half_rates, rates);
+    assert_eq!(half_rates.attached, rates.attached);
+    // Settled at full deployment; at half of it the membrane goes to half of its camber.
+    let p = wing.parameters();
+    for (rate, camber, lag_s) in [
+        (half_rates.fast_camber, state.fast_camber, p.camber_time_constant_s),
+        (half_rates.creep_camber, state.creep_camber, p.creep_time_constant_s),
+    ] {
+        assert!((rate[0] * lag_s / camber[0] + 0.5).abs() < 1e-6, "{rate:?} {camber:?}");
+    }
     let left = wing.evaluate(&air, STILL, [1.0, 0.0], &state).0;
     assert!((left.force.vector * 2.0 - full.force.vector).norm() < 1e-12);
     assert!(left.moment.vector.x > 0.0, "lift on the left rolls to the right");
     let folded = wing.evaluate(&air, STILL, [0.0; 2], &state).0;
     assert_eq!((folded.force.vector.norm(), folded.moment.vector.norm()), (0.0, 0.0));
+}
+
+#[test]
+fn a_wing_that_was_folded_opens_flat_and_fills() {
+    let (wing, air) = (wing(), gliding(7.0, 0.4));
+    let full = steady(&wing, &air);
+    let lead = |mut state: MembraneState, deployment: [f64; 2], duration_s: f64| {
+        for _ in 0..(duration_s * 500.0) as u32 {
+            state = rk4(state, 2e-3, |s| wing.evaluate(&air, STILL, deployment, s).1);
+        }
+        state
+    };
+    let camber = |state: &MembraneState| state.fast_camber[0] + state.creep_camber[0];
+    // The stretch is gone; creep, which recovers with 0.5 s, leaves 0.4 % of the chord.
+    let folded = lead(full, [0.0; 2], 1.0);
+    println!("camber {:.4}, folded for 1 s {:.4}", camber(&full), camber(&folded));
+    assert!(folded.fast_camber[0].abs() < 1e-6 && camber(&folded) < 0.04 * camber(&full));
+    let normal = |state: &MembraneState| coefficients(&wing, &air, state).normal;
+    let flat = normal(&MembraneState { attached: folded.attached, ..MembraneState::at_rest() });
+    assert!((normal(&folded) / flat - 1.0).abs() < 0.02, "{} {flat}", normal(&folded));
+    let never_opened = lead(MembraneState::at_rest(), [0.0; 2], 1.0);
+    assert_eq!(camber(&never_opened), 0.0, "what was never spread has no camber");
+    // Opened again, it has most of it after a few lags.
+    let opened = lead(folded, SPREAD, 0.2);
+    assert!(camber(&opened) > 0.7 * camber(&full), "{}", camber(&opened));
 }
 
 #[test]
@@ -341,6 +374,16 @@ fn the_pressure_centre_lies_towards_the_flow() {
     let right = moment(Vector3::new(0.0, 6.0, 2.0));
     assert!(right.x < 0.0 && right.y.abs() < 1e-15, "right wing up: {right:?}");
     assert_eq!(moment(Vector3::new(0.0, 0.0, 6.0)), Vector3::zeros());
+    // A flat wing's pressure lies a quarter chord ahead at small angles, as plates show, an arc's
+    // edge on at its middle.
+    let centre_m = |state: &MembraneState, angle_rad: f64| {
+        let wrench = wing().evaluate(&gliding(7.0, angle_rad), STILL, SPREAD, state).0;
+        -wrench.moment.vector.y / wrench.force.vector.z
+    };
+    assert!((centre_m(&state, 1e-3) - 0.05).abs() < 1e-4);
+    let arc = MembraneState { fast_camber: [0.1; 2], ..state };
+    assert!(centre_m(&arc, 0.0).abs() < 1e-12);
+    assert!(centre_m(&arc, 0.3) < centre_m(&state, 0.3) && centre_m(&arc, 0.3) > 0.01);
     let fixed =
         Membrane::new(MembraneParameters { pressure_centre_shift: 0.0, ..parameters() }).unwrap();
     assert_eq!(fixed.evaluate(&gliding(7.0, 0.3), STILL, SPREAD, &state).0.moment.vector.y, 0.0);
@@ -358,64 +401,4 @@ fn each_side_has_its_own_angle_of_attack() {
     let [left, right] = wing.angle_of_attack(&air(Vector3::x() * 7.0, Vector3::x()));
     assert!((right - (0.09f64 / 7.0).atan()).abs() < 2e-9 && left == -right, "{left} {right}");
     assert_eq!(wing.angle_of_attack(&air(Vector3::z() * 0.2, Vector3::zeros())), [0.0; 2]);
-}
-
-/// Thin flat plates of Pelletier and Mueller (J. Aircraft 37(5), 2000), read off the diagrams to
-/// about 5 %: rows of aspect ratio, angle of attack in deg, C_L, C_D.
-const MEASURED_PLATES: [[f64; 4]; 17] = [
-    [1.0, 0.0, 0.0, 0.015],
-    [1.0, 3.0, 0.075, 0.02],
-    [1.0, 6.0, 0.15, 0.03],
-    [1.0, 8.0, 0.2, 0.04],
-    [1.0, 10.0, 0.25, 0.06],
-    [1.0, 15.0, 0.5, 0.15],
-    [1.0, 20.0, 0.7, 0.28],
-    [1.0, 25.0, 0.8, 0.42],
-    [1.0, 28.0, 0.8, 0.48],
-    [2.0, 0.0, 0.0, 0.015],
-    [2.0, 3.0, 0.15, 0.02],
-    [2.0, 6.0, 0.3, 0.035],
-    [2.0, 8.0, 0.4, 0.06],
-    [2.0, 10.0, 0.5, 0.08],
-    [2.0, 15.0, 0.7, 0.18],
-    [2.0, 20.0, 0.75, 0.28],
-    [2.0, 25.0, 0.67, 0.33],
-];
-
-/// What fits: the attached branch (C_L within 0.06, C_D within 0.04 up to 15 deg), and with the
-/// stall angle and the edge drag of a rigid plate everything up to the last measured angle. What
-/// does not: a plate stalls near 24 deg, so that the default stall angle, which is a membrane's, is
-/// 0.13 high in C_L at 20 deg and 0.29 at 25 deg; and the default tangential force is twice a thin
-/// plate's drag edge on.
-#[test]
-fn a_stiff_wing_lies_near_measured_plates() {
-    let rigid = Membrane::new(MembraneParameters {
-        tension_n_per_m: 1e12,
-        stall_angle_rad: 24f64.to_radians(),
-        tangential_zero: 0.015,
-        ..parameters()
-    })
-    .unwrap();
-    let of_ratio = |ratio: f64| MEASURED_PLATES.iter().filter(move |row| row[0] == ratio);
-    let mut compared = 0;
-    for low in of_ratio(1.0) {
-        // By straight line in aspect ratio: the model's slope is that of 1.35.
-        let Some(high) = of_ratio(2.0).find(|row| row[1] == low[1]) else { continue };
-        let angle_deg = low[1];
-        let [lift, drag] = [2, 3].map(|i| low[i] + 0.35 * (high[i] - low[i]));
-        let default = steady_coefficients(&stiff(), 7.0, angle_deg);
-        let rigid = steady_coefficients(&rigid, 7.0, angle_deg);
-        println!(
-            "{angle_deg:4} deg: C_L {lift:.3}, default {:.3}, rigid {:.3}; C_D {drag:.3}, default {:.3}, rigid {:.3}",
-            default.lift, rigid.lift, default.drag, rigid.drag
-        );
-        if angle_deg <= 15.0 {
-            assert!((default.lift - lift).abs() < 0.06, "C_L at {angle_deg} deg");
-            assert!((default.drag - drag).abs() < 0.04, "C_D at {angle_deg} deg");
-        }
-        assert!((rigid.lift - lift).abs() < 0.08, "rigid C_L at {angle_deg} deg");
-        assert!((rigid.drag - drag).abs() < 0.03, "rigid C_D at {angle_deg} deg");
-        compared += 1;
-    }
-    assert!(compared >= 8, "{compared} angles in both aspect ratios");
 }

@@ -1,8 +1,11 @@
-//! The picture of the README: `cargo xtask pictures`.
+//! The pictures of README and guide: `cargo xtask pictures`.
 //!
-//! Flies the manoeuvre of `squirrel demo` (scenario `avoid`, seed 1) with a little less thrust, and
-//! writes `avoidance.svg` into the folder that is its argument: the tracks from above, and height
-//! over time. `twcc_plus` stands for `twcc_oracle`, whose track hides that of `twcc_flat`.
+//! Writes two files into the folder that is its argument. `wing.svg` is the wing over measured
+//! plates. `avoidance.svg` flies the manoeuvre of `squirrel demo` (scenario `avoid`, seed 1) with a
+//! little less thrust: the tracks from above, and height over time. `twcc_plus` stands for
+//! `twcc_oracle`, whose track hides that of `twcc_flat`.
+
+mod wing;
 
 use squirrel_log::FlightLog;
 use squirrel_report::chart::{Axis, Ink, Note, Obstacle, Range, Svg, Track, TrackChart};
@@ -67,6 +70,8 @@ fn seen_s(log: &FlightLog) -> Result<f64, Box<dyn Error>> {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(std::env::args().nth(1).ok_or("usage: pictures FOLDER")?);
+    std::fs::create_dir_all(&folder)?;
+    wing::draw(&folder)?;
     let scenario =
         Scenario { seed: 1, thrust_to_weight: Some(THRUST_TO_WEIGHT), ..Scenario::find("avoid")? };
     let (mut paths, mut references, mut lost_m) = (Vec::new(), Vec::new(), Vec::new());
@@ -89,7 +94,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     ];
     let text =
         picture("The avoidance manoeuvre: with folded wings the drone sinks", &lead, &drawings);
-    std::fs::create_dir_all(&folder)?;
     Ok(std::fs::write(folder.join("avoidance.svg"), text)?)
 }
 
