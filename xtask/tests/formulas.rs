@@ -12,11 +12,11 @@ use std::collections::BTreeMap;
 use std::fs;
 
 /// Formula, pieces of its text without spaces, and where it stands.
-const FORMULAS: [(&str, &[&str], &str); 33] = [
+const FORMULAS: [(&str, &[&str], &str); 38] = [
     ("drag of the airframe", &["linear[i]*flow.velocity[i]"], "core/src/aero/mod.rs"),
     (
         "flat plate",
-        &["L::of(-AIR_DENSITY_KG_M3)*", "self.per_square*flow.speed"],
+        &["L::of(-AIR_DENSITY_KG_M3)*", "self.per_square*flow.speed", "L::of(0.56)+"],
         "core/src/aero/flat_plate.rs",
     ),
     (
@@ -31,11 +31,7 @@ const FORMULAS: [(&str, &[&str], &str); 33] = [
         "core/src/dynamics/body.rs",
     ),
     ("rotation matrix", &["ww+ii-jj-kk"], "core/src/lane/vector.rs"),
-    (
-        "membrane",
-        &["0.56)+", "steady-state.fast_camber", "c2*(c2+l)+l2"],
-        "core/src/aero/membrane.rs",
-    ),
+    ("membrane", &["steady-state.fast_camber", "c2*(c2+l)+l2"], "core/src/aero/membrane.rs"),
     (
         "battery",
         &["current*self.r1_ohm", "torque_coefficient*speed*speed*speed"],
@@ -85,17 +81,29 @@ const FORMULAS: [(&str, &[&str], &str); 33] = [
     ("linear_drag", &["-x*u,"], "core/src/effects/linear_drag.rs"),
     ("payload_swing", &["v*self.decay+x*self.stiffness"], "core/src/effects/payload_swing.rs"),
     ("quadratic_drag", &["self.per_square[i]*at.flow"], "core/src/effects/quadratic_drag.rs"),
+    ("induced speed", &["v*v*flow-square*square"], "core/src/aero/induced.rs"),
     ("rotor_gyro_torque", &["q*spin*self.inertia"], "core/src/effects/rotor_gyro_torque.rs"),
+    ("rotor_wash", &["covered*(own[side]-pressure)"], "core/src/effects/rotor_wash.rs"),
     ("thrust_misalignment", &["at.thrust_n*x"], "core/src/effects/thrust_misalignment.rs"),
-    ("translational_lift", &["one+across*self.limit"], "core/src/effects/translational_lift.rs"),
+    (
+        "translational_lift",
+        &["one+across*L::of(SATURATION)"],
+        "core/src/effects/translational_lift.rs",
+    ),
+    ("vortex_ring", &["self.gain*bump("], "core/src/effects/vortex_ring.rs"),
     ("wing_asymmetry", &["left*self.loss[0]"], "core/src/effects/wing_asymmetry.rs"),
     ("wing_membrane", &["flow.speed*per_speed).lower("], "core/src/effects/wing_membrane.rs"),
+    ("wing_moment", &["z*fx-x*fz"], "core/src/effects/wing_moment.rs"),
+    ("wing_tangential", &["spread*speed+tilted"], "core/src/effects/wing_tangential.rs"),
 ];
 
 /// Files in which the density of the air becomes a force: one a law.
-const DENSITY: [&str; 5] = [
+const DENSITY: [&str; 8] = [
     "core/src/aero/flat_plate.rs",
+    "core/src/aero/induced.rs",
     "core/src/effects/quadratic_drag.rs",
+    "core/src/effects/rotor_wash.rs",
+    "core/src/effects/wing_tangential.rs",
     "core/src/math.rs",
     "core/src/vehicle/mod.rs",
     "sim/src/plant/membrane.rs",

@@ -23,7 +23,7 @@ const ARROWS: [(&str, &[&str]); 12] = [
             "squirrel-core",
         ],
     ),
-    ("hidden-effects", &["squirrel-sim", "squirrel-log"]),
+    ("hidden-effects", &["squirrel-core", "squirrel-sim", "squirrel-log"]),
     (
         "squirrel-py",
         &[

@@ -1,6 +1,7 @@
 //! Aerodynamics: motion through the air, drag of the airframe, flat plate and membrane.
 
 pub mod flat_plate;
+pub mod induced;
 pub mod membrane;
 
 use crate::frames::{Body, In, Wrench};

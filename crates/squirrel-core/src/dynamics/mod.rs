@@ -10,7 +10,6 @@
 
 pub mod battery;
 pub mod body;
-pub mod induced;
 pub mod lanes;
 mod rk4;
 pub mod rotors;

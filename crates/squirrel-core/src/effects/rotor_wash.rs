@@ -1,7 +1,7 @@
 //! Rotor wash: the rotors blow on spread wings.
 //!
 //! Form `jets`: each rotor's jet has the speed of momentum theory
-//! ([`induced`](crate::dynamics::induced)), `v_j = v_i k` with `k = 1 + s / sqrt(1 + s^2)` at `s`
+//! ([`induced`](crate::aero::induced)), `v_j = v_i k` with `k = 1 + s / sqrt(1 + s^2)` at `s`
 //! radii below the disc (Leishman, Principles of Helicopter Aerodynamics, ch. 2: a contracting
 //! wake), and the area that goes with it. It is taken as a square, so that what it covers of a wing
 //! is a product of two lengths, and is carried back by `(u, v) gap / (v_j - w)`. Where it covers a
@@ -15,8 +15,7 @@
 //! rotors, nor of swirl.
 
 use super::{Acts, Effect, EffectParameter, Forms, Mimic, Shown, Situation, Words, absent, is};
-use crate::aero::{BodyWrench, flat_plate};
-use crate::dynamics::induced;
+use crate::aero::{BodyWrench, flat_plate, induced};
 use crate::lane::Lane;
 use crate::math::{AIR_DENSITY_KG_M3, Real, real, sqrt};
 use crate::numbers;

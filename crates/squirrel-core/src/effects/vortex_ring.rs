@@ -12,7 +12,7 @@
 //! 2).
 
 use super::{Acts, Declared, Effect, EffectParameter, Forms, Shown, Words, is};
-use crate::aero::Airflow;
+use crate::aero::{Airflow, induced};
 use crate::lane::Lane;
 use crate::math::Real;
 use crate::numbers;
@@ -60,7 +60,7 @@ impl<T: Real> VortexRing<T> {
         let [extra, form] = self.0;
         let own = vehicle.parameters().propulsion.air.vortex_ring_fraction;
         let [gain, early] = if is(form, EARLY) { [own, extra] } else { [own + extra, T::zero()] };
-        Numbers { gain, early, per_hover: T::one() / vehicle.hover_induced_speed_m_s() }
+        Numbers { gain, early, per_hover: T::one() / induced::in_hover(vehicle) }
     }
 }
 

@@ -398,16 +398,6 @@ impl<T: Real> Vehicle<T> {
     pub fn weight_n(&self) -> T {
         self.parameters.mass_kg * real(crate::math::GRAVITY_M_S2)
     }
-    /// Induced speed of the rotors in hover, m/s, by momentum theory.
-    pub fn hover_induced_speed_m_s(&self) -> T {
-        let share = self.weight_n() / real(self.parameters.rotor_count as f64);
-        crate::math::sqrt(
-            share
-                * crate::dynamics::induced::per_thrust(
-                    self.parameters.propulsion.propeller_radius_m,
-                ),
-        )
-    }
     /// Most thrust that one rotor may be asked for, N: its top thrust at the reference voltage, or
     /// its limit if lower.
     pub fn rotor_thrust_max_n(&self) -> T {

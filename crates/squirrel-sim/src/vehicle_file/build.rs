@@ -136,8 +136,8 @@ fn default_size(vehicle: &Vehicle<f64>) -> [f64; 3] {
     [2.0 * reach(0), 2.0 * reach(1), 0.04]
 }
 
-fn or_zero(number: &Option<Quantity<f64>>) -> f64 {
-    number.as_ref().map_or(0.0, |q| q.0)
+fn or_zero(number: Option<&Quantity<f64>>) -> f64 {
+    number.map_or(0.0, |q| q.0)
 }
 
 /// Radius of propellers whose file does not say: three quarters of what neighbours leave each
@@ -184,10 +184,10 @@ fn propulsion(t: &PropulsionTable, rotors: &[Rotor<f64>]) -> Result<Propulsion<f
             .as_ref()
             .map_or_else(|| default_propeller_radius_m(rotors), |q| 0.5 * q.0),
         air: RotorAir {
-            axial_inflow_s_per_m: or_zero(&t.axial_inflow_s_per_m),
-            translational_lift_s2_per_m2: or_zero(&t.translational_lift_s2_per_m2),
-            flapping_moment_n_m_s_per_m: or_zero(&t.flapping_moment_n_m_s_per_m),
-            vortex_ring_fraction: or_zero(&t.vortex_ring_fraction),
+            axial_inflow_s_per_m: or_zero(t.axial_inflow_s_per_m.as_ref()),
+            translational_lift_s2_per_m2: or_zero(t.translational_lift_s2_per_m2.as_ref()),
+            flapping_moment_n_m_s_per_m: or_zero(t.flapping_moment_n_m_s_per_m.as_ref()),
+            vortex_ring_fraction: or_zero(t.vortex_ring_fraction.as_ref()),
         },
         reference_voltage_v: t.reference_voltage_v.0,
         thrust_curve,
@@ -239,14 +239,14 @@ fn wing(
         area_per_side_m2,
         normal_force_slope: need("normal_force_slope", &t.normal_force_slope)?,
         lateral_arm_m: need("lateral_arm_m", &t.lateral_arm_m)?,
-        longitudinal_arm_m: or_zero(&t.longitudinal_arm_m),
-        vertical_arm_m: or_zero(&t.vertical_arm_m),
+        longitudinal_arm_m: or_zero(t.longitudinal_arm_m.as_ref()),
+        vertical_arm_m: or_zero(t.vertical_arm_m.as_ref()),
         // Twice as long as wide, where the file does not say.
         chord_m: chord.map_or_else(|| (2.0 * area_per_side_m2).sqrt(), |q| q.0),
         time_constant_s: need("time_constant_s", &t.time_constant_s)?,
     };
     let servo = ServoParameters {
-        dead_time_s: or_zero(&t.dead_time_s),
+        dead_time_s: or_zero(t.dead_time_s.as_ref()),
         rate_max_per_s: t.rate_max_per_s.as_ref().map_or(f64::INFINITY, |q| q.0),
         time_constant_s: wing.time_constant_s,
     };

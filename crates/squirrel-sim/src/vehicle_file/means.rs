@@ -5,7 +5,7 @@
 use super::VehicleFile;
 use crate::plant::{MembraneState, Plant, PlantState, WingPlant};
 use serde::Serialize;
-use squirrel_core::aero::Air;
+use squirrel_core::aero::{Air, induced};
 use squirrel_core::dynamics::{State, VectorSpace};
 use squirrel_core::frames::{In, Wrench};
 use squirrel_core::nalgebra::Vector3;
@@ -70,7 +70,7 @@ impl VehicleFile {
         Ok(Means {
             hover_command: p.propulsion.command_for_thrust(hover_n),
             thrust_to_weight: p.limits.thrust_max_n.min(count * most_n) / vehicle.weight_n(),
-            hover_induced_speed_m_s: vehicle.hover_induced_speed_m_s(),
+            hover_induced_speed_m_s: induced::in_hover(&vehicle),
             drag_at_7_m_s_n: -force(&moving).x,
             wing_download_in_hover_n: wings.then(|| force(&spread).z - force(&hovering).z),
             wing_force_at_30_deg_n: wings.then(|| self.filled_wing_force_n(&plant, &spread)),

@@ -10,7 +10,8 @@
 //! descent. Momentum theory ends where a rotor sinks into its own wake: the climb does not count below `-v_h`.
 
 use crate::lane::Lane;
-use crate::math::AIR_DENSITY_KG_M3;
+use crate::math::{AIR_DENSITY_KG_M3, Real, real, sqrt};
+use crate::vehicle::Vehicle;
 
 /// Stands for 0 where a division must stay finite, m^2/s^2.
 const TINY: f64 = 1e-12;
@@ -43,6 +44,13 @@ pub fn speed<L: Lane>(hover_squared: L, across_squared: L, climb: L) -> L {
         v = v - (v * v * flow - square * square) / slope;
     }
     (hover_squared - L::of(TINY)).where_positive(v, none)
+}
+
+/// Of a vehicle's rotors in hover, m/s.
+pub fn in_hover<T: Real>(vehicle: &Vehicle<T>) -> T {
+    let p = vehicle.parameters();
+    let share_n = vehicle.weight_n() / real(p.rotor_count as f64);
+    sqrt(share_n * per_thrust(p.propulsion.propeller_radius_m))
 }
 
 #[cfg(test)]
