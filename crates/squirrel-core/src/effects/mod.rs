@@ -315,6 +315,9 @@ pub trait Effect<T: Real>: Copy {
     const IS_OF_MOMENTS: bool = false;
     /// Whether only a vehicle with wings can have it.
     const IS_OF_WINGS: bool = false;
+    /// Whether it acts only in a state that most flights never come to, so that flights which do not
+    /// show it lack nothing.
+    const IS_OF_A_STATE: bool = false;
     /// Whether it fades with height, so that the zero of the barometer matters to it.
     const FEELS_HEIGHT: bool = false;
     /// Whether it acts on sensors and stamps alone, which a flight without them does not show.

@@ -216,6 +216,8 @@ pub struct Profile {
     pub is_of_moments: bool,
     /// See [`Effect::IS_OF_WINGS`].
     pub is_of_wings: bool,
+    /// See [`Effect::IS_OF_A_STATE`].
+    pub is_of_a_state: bool,
     /// See [`Effect::FEELS_HEIGHT`].
     pub feels_height: bool,
 }
@@ -233,6 +235,7 @@ impl Profile {
             timing: E::TIMING,
             is_of_moments: E::IS_OF_MOMENTS,
             is_of_wings: E::IS_OF_WINGS,
+            is_of_a_state: E::IS_OF_A_STATE,
             feels_height: E::FEELS_HEIGHT,
         }
     }

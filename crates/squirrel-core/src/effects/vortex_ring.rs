@@ -37,6 +37,7 @@ impl<T: Real> Effect<T> for VortexRing<T> {
         fly: "straight descents of 4 to 10 m/s, a second each, wings folded, high above the ground",
     };
     const SHOWN: Shown = Shown::NOTHING;
+    const IS_OF_A_STATE: bool = true;
 
     fn is_declared(vehicle: &Vehicle<T>) -> bool {
         vehicle.parameters().propulsion.air.vortex_ring_fraction != T::zero()

@@ -6,6 +6,7 @@ use super::point::Member;
 use super::refine::Scored;
 use super::search::{Found, Search};
 use crate::GapError;
+use squirrel_core::effects::Effects;
 use std::collections::BTreeSet;
 
 /// Rivals that are refined for each named effect.
@@ -83,7 +84,9 @@ impl Search<'_> {
         let offset = set.free.len();
         let mut all = self.catalogue.unseen.clone();
         for candidate in &self.catalogue.candidates {
+            let profile = Effects::<f64>::profile(candidate.effect);
             if all.contains(&candidate.effect)
+                || profile.is_some_and(|profile| profile.is_of_a_state)
                 || set.members.iter().any(|m| self.effect(m) == candidate.effect)
             {
                 continue;
