@@ -197,6 +197,7 @@ impl Declared {
 
 /// All of this that stands in the file of one effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(clippy::struct_excessive_bools, reason = "each is an answer about an effect of its own")]
 pub struct Profile {
     /// See [`Effect::WORDS`].
     pub words: Words,
