@@ -12,7 +12,6 @@
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
 use squirrel_examples::Outcome;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::faults::{self, Faults};
@@ -20,13 +19,7 @@ use squirrel_study::journal::Keep;
 use squirrel_study::statistics::Share;
 
 fn study() -> Outcome<Faults> {
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Vec::new(),
-        trials: 100,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), Vec::new(), 100, 1);
     Ok(faults::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 

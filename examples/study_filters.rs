@@ -13,20 +13,13 @@
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
 use squirrel_examples::Outcome;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::filters::{self, Filters};
 use squirrel_study::journal::Keep;
 
 fn study() -> Outcome<Filters> {
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Vec::new(),
-        trials: 3,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), Vec::new(), 3, 1);
     Ok(filters::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 

@@ -14,7 +14,6 @@
 
 use squirrel_examples::Outcome;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::forest::{self, Forest};
@@ -26,13 +25,7 @@ const THRUST_TO_WEIGHT: f64 = 2.0;
 fn study() -> Outcome<Forest> {
     // `phantom` flies in any case.
     let arms = vec![Arm::Pc, Arm::TwccFlat, Arm::PcPlus, Arm::TwccPlus];
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms,
-        trials: 12,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), arms, 12, 1);
     Ok(forest::run(&plan, THRUST_TO_WEIGHT, &Keep::default())?.ok_or("a part of a study")?)
 }
 

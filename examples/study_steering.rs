@@ -14,7 +14,6 @@
 
 use squirrel_examples::Outcome;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
@@ -22,13 +21,7 @@ use squirrel_study::steering::{self, ANGLES_DEG, SPEEDS_M_S, Steering};
 
 fn study() -> Outcome<Steering> {
     let arms = vec![Arm::TwccFlat, Arm::TwccParnn];
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms,
-        trials: 1,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), arms, 1, 1);
     Ok(steering::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 

@@ -15,7 +15,6 @@
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
 use squirrel_examples::Outcome;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
@@ -25,13 +24,7 @@ use squirrel_study::table2::{self, Row, Table2};
 const TRAINING_S: u32 = 300;
 
 fn study() -> Outcome<Table2> {
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Vec::new(),
-        trials: 1,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), Vec::new(), 1, 1);
     Ok(table2::run(&plan, 5, &Keep::default())?.ok_or("a part of a study")?)
 }
 

@@ -14,7 +14,6 @@
 
 use squirrel_examples::{Outcome, percent};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
@@ -23,13 +22,7 @@ use squirrel_study::thrust::{self, Thrust};
 fn study() -> Outcome<Thrust> {
     // `pc` flies in any case: gains are over it.
     let arms = vec![Arm::TwccPlus, Arm::PcPlus];
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms,
-        trials: 3,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), arms, 3, 1);
     Ok(thrust::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
 }
 

@@ -61,15 +61,13 @@ impl<'py> Model<'py> {
         let mut command = [0.0; MAX_ROTORS];
         command[..self.rotors]
             .copy_from_slice(&self.commands.numbers()[i * self.rotors..][..self.rotors]);
+        let drive = RotorDrive::new(&self.vehicle, &self.effects, &command, self.voltage_v);
         Held {
-            drive: RotorDrive::new(&self.vehicle, &self.effects, &command, self.voltage_v),
             wind: self
                 .winds
                 .as_ref()
                 .map_or_else(In::zero, |winds| In::new(Vector3::from(winds.row(i)))),
-            air_omega: None,
-            deployment: [0.0; 2],
-            tether_force: In::zero(),
+            ..Held::in_still_air(drive)
         }
     }
 

@@ -30,6 +30,11 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// On a calm day.
+    pub fn calm(vehicle: VehicleFile, arms: Vec<Arm>, trials: u32, seed: u64) -> Self {
+        Self { vehicle, arms, trials, seed, conditions: Conditions::Calm }
+    }
+
     /// With `arm` among the arms, each of them once and in their order.
     ///
     /// # Errors

@@ -7,7 +7,8 @@
 //! ```
 //! Two steps of Newton's method from `v_h^2 / sqrt(V_a^2 + l^2)`, with `l = V_c / 2 + sqrt(V_c^2 /
 //! 4 + v_h^2)`, which is exact on both axes: within 0.2 % in level flight and climb, 2 % in a
-//! descent. Momentum theory ends where a rotor sinks into its own wake: the climb does not count below `-v_h`.
+//! descent. Momentum theory ends where a rotor sinks into its own wake: the climb does not count
+//! below `-v_h`.
 
 use crate::lane::Lane;
 use crate::math::{AIR_DENSITY_KG_M3, Real, real, sqrt};

@@ -89,6 +89,19 @@ pub struct Held<T: Real> {
     pub tether_force: In<Ned, T>,
 }
 
+impl<T: Real> Held<T> {
+    /// Nothing but rotors, in air that stands still.
+    pub fn in_still_air(drive: RotorDrive<T>) -> Self {
+        Self {
+            drive,
+            wind: In::zero(),
+            air_omega: None,
+            deployment: [T::zero(); 2],
+            tether_force: In::zero(),
+        }
+    }
+}
+
 /// Force and moment on the airframe without gravity, body frame.
 ///
 /// * `vehicle` - with what effects change once, see
@@ -152,11 +165,6 @@ fn affected<T: Real>(
     } else {
         [T::zero(); 2]
     };
-    let mut rotor_thrust_n = [T::zero(); MAX_ROTORS];
-    let per_square = &vehicle.rotor_wrench_per_speed_squared().thrust;
-    for i in 0..MAX_ROTORS {
-        rotor_thrust_n[i] = per_square[i] * speed[i] * speed[i];
-    }
     let none = flat_plate::Pair::all(T::zero());
     let at = Surroundings {
         flow: &Airflow::from(air),
@@ -166,7 +174,7 @@ fn affected<T: Real>(
         inverse_mass: vehicle.inverse_mass(),
         rotor_spin,
         wing_force: wrenches[2].force.vector.into(),
-        rotor_thrust_n: &rotor_thrust_n[..vehicle.parameters().rotor_count.min(MAX_ROTORS)],
+        rotor_speed: &speed[..vehicle.parameters().rotor_count.min(MAX_ROTORS)],
         wings: &vehicle.parameters().wing.as_ref().map_or(none, flat_plate::Pair::new),
         deployment: held.deployment,
         tether_force: Some(held.tether_force.vector.into()),
@@ -190,8 +198,8 @@ pub struct Surroundings<'a, L> {
     pub inverse_mass: L,
     /// Sum of the rotor speeds about +z, rad/s, and its rate, rad/s^2, where an effect feels them.
     pub rotor_spin: [L; 2],
-    /// Thrust of each rotor before effects on thrust, N.
-    pub rotor_thrust_n: &'a [L],
+    /// Speed of each rotor, rad/s.
+    pub rotor_speed: &'a [L],
     /// Force of the wings that fly, body frame, N.
     pub wing_force: [L; 3],
     /// The flat wings that the vehicle declares.
@@ -223,7 +231,7 @@ pub fn with_effects<L: Lane>(
             flow: at.flow,
             omega: at.omega,
             thrust_n: L::of(0.0) - lifted.force[2],
-            rotor_thrust_n: at.rotor_thrust_n,
+            rotor_speed: at.rotor_speed,
             thrust_factor: factor,
             force: base.force,
             rotor_spin: at.rotor_spin,
@@ -339,16 +347,6 @@ mod tests {
         Wrench::zero()
     }
 
-    fn still(drive: RotorDrive<f64>) -> Held<f64> {
-        Held {
-            drive,
-            wind: In::zero(),
-            air_omega: None,
-            deployment: [0.0; 2],
-            tether_force: In::zero(),
-        }
-    }
-
     #[test]
     fn hover_trim_stands_still() {
         let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
@@ -359,7 +357,13 @@ mod tests {
         state.rotor_speed_rad_s = drive.target_rad_s;
         for _ in 0..1000 {
             state = rk4(state, 1e-3, |s| {
-                derivative(&vehicle, &acting(&Effects::none()), s, &still(drive), no_surfaces)
+                derivative(
+                    &vehicle,
+                    &acting(&Effects::none()),
+                    s,
+                    &Held::in_still_air(drive),
+                    no_surfaces,
+                )
             });
         }
         assert!(state.position.vector.norm() < 1e-9 && state.omega.vector.norm() < 1e-9);
@@ -381,7 +385,13 @@ mod tests {
         let (energy, momentum_ned) = invariants(&state);
         for _ in 0..10_000 {
             state = rk4(state, 1e-3, |s| {
-                derivative(&vehicle, &acting(&Effects::none()), s, &still(drive), no_surfaces)
+                derivative(
+                    &vehicle,
+                    &acting(&Effects::none()),
+                    s,
+                    &Held::in_still_air(drive),
+                    no_surfaces,
+                )
             })
             .normalised();
         }
@@ -408,7 +418,13 @@ mod tests {
                 State { velocity: In::new(Vector3::new(3.0, -1.0, 0.5)), ..State::at_rest() };
             for _ in 0..steps {
                 state = rk4(state, 0.4 / steps as f64, |s| {
-                    derivative(&vehicle, &acting(&Effects::none()), s, &still(drive), no_surfaces)
+                    derivative(
+                        &vehicle,
+                        &acting(&Effects::none()),
+                        s,
+                        &Held::in_still_air(drive),
+                        no_surfaces,
+                    )
                 });
             }
             state.position.vector
@@ -424,7 +440,7 @@ mod tests {
         let mut state = State::at_rest();
         let speed = (vehicle.weight_n() / 4.0 / 6.0e-7).sqrt();
         state.rotor_speed_rad_s = [speed, speed, speed, speed, 0.0, 0.0, 0.0, 0.0];
-        let held = still(RotorDrive::holding(state.rotor_speed_rad_s));
+        let held = Held::in_still_air(RotorDrive::holding(state.rotor_speed_rad_s));
         let w = wrench(&vehicle, &acting(&Effects::none()), &state, &held, no_surfaces);
         let read = specific_force(&vehicle, &Effects::none(), state.omega, &w);
         assert!((read.vector - Vector3::new(0.0, 0.0, -GRAVITY_M_S2)).norm() < 1e-9);
@@ -462,7 +478,7 @@ mod tests {
     #[test]
     fn added_mass_is_carried_along_but_not_attracted() {
         let mut state = State::at_rest();
-        let held = still(RotorDrive::holding([0.0; MAX_ROTORS]));
+        let held = Held::in_still_air(RotorDrive::holding([0.0; MAX_ROTORS]));
         let fall = 0.548 * GRAVITY_M_S2 / (0.548 + 0.1);
         let force = affected_by("added_mass", &[0.1], &state, &held).force.vector.z;
         assert!((force + 0.1 * fall).abs() < 1e-12, "{force}");
@@ -499,9 +515,16 @@ mod tests {
         );
         let mut state = State { omega: In::new(Vector3::new(0.5, -0.2, 0.0)), ..State::at_rest() };
         state.rotor_speed_rad_s[0] = 900.0;
-        let base = wrench(&vehicle, &acting(&Effects::none()), &state, &still(drive), no_surfaces);
-        let more =
-            affected_by("rotor_gyro_torque", &[1e-5], &state, &still(drive)).moment - base.moment;
+        let base = wrench(
+            &vehicle,
+            &acting(&Effects::none()),
+            &state,
+            &Held::in_still_air(drive),
+            no_surfaces,
+        );
+        let more = affected_by("rotor_gyro_torque", &[1e-5], &state, &Held::in_still_air(drive))
+            .moment
+            - base.moment;
         let by_hand = Vector3::new(0.2 * 900.0, 0.5 * 900.0, -600.0 / 0.03) * 1e-5;
         assert!((more.vector - by_hand).norm() < 1e-12, "{more:?}");
     }
@@ -516,7 +539,7 @@ mod tests {
             *nalgebra::UnitQuaternion::from_euler_angles(0.3, -0.2, core::f64::consts::FRAC_PI_2);
         state.velocity = In::new(Vector3::new(3.0, 1.0, -0.5));
         state.rotor_speed_rad_s[0] = 900.0;
-        let mut held = still(RotorDrive::holding(state.rotor_speed_rad_s));
+        let mut held = Held::in_still_air(RotorDrive::holding(state.rotor_speed_rad_s));
         let along = Some(state.ned_from_body() * state.omega);
         assert!(air(&state, held.wind, along).omega.vector.norm() < 1e-15);
         let mut change = |name: &str, values: &[f64]| {
@@ -547,7 +570,7 @@ mod tests {
         let mut state = State::at_rest();
         state.attitude =
             *nalgebra::UnitQuaternion::from_euler_angles(0.0, 0.0, core::f64::consts::FRAC_PI_2);
-        let mut held = still(RotorDrive::holding([0.0; MAX_ROTORS]));
+        let mut held = Held::in_still_air(RotorDrive::holding([0.0; MAX_ROTORS]));
         held.tether_force = In::new(Vector3::new(1.0, 0.0, 2.0));
         let pull = affected_by("payload_swing", &[0.1, 0.5], &state, &held).force.vector;
         assert!(

@@ -148,11 +148,6 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
         if Prepared::<L>::feel_rotor_spin(whole.present) {
             rotor_spin = [spin(&whole.spin, &state.rotor_speed), spin(&whole.spin, &rotor_rate)];
         }
-        let mut rotor_thrust_n = state.rotor_speed;
-        for i in 0..ROTORS {
-            let speed = state.rotor_speed[i];
-            rotor_thrust_n[i] = airframe.thrust[i] * speed * speed;
-        }
         let at = Surroundings {
             flow: &air,
             omega: &state.omega,
@@ -160,7 +155,7 @@ fn derivative<L: Lane, const ROTORS: usize, const WING: u8, const EFFECTS: bool>
             height_m: none - state.position[2],
             inverse_mass: airframe.inverse_mass,
             rotor_spin,
-            rotor_thrust_n: &rotor_thrust_n,
+            rotor_speed: &state.rotor_speed,
             wing_force,
             wings: &whole.plate,
             deployment: whole.deployment,

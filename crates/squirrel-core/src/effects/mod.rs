@@ -274,9 +274,9 @@ pub struct Situation<'a, L> {
     pub omega: &'a [L; 3],
     /// Thrust of all rotors, N, effects on thrust included.
     pub thrust_n: L,
-    /// Thrust of each, N, before effects on thrust.
-    pub rotor_thrust_n: &'a [L],
-    /// What effects make of each.
+    /// Speed of each, rad/s.
+    pub rotor_speed: &'a [L],
+    /// What effects make of the thrust of each.
     pub thrust_factor: L,
     /// Force of rotors, drag and wings, body frame, N, before effects that add to it.
     pub force: [L; 3],

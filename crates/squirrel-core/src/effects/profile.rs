@@ -21,6 +21,10 @@ pub struct Words {
     pub fly: &'static str,
 }
 
+/// What shows how spread wings push.
+pub(super) const WINGS_AT_SPEED: &str =
+    "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking";
+
 /// What an effect is known by; several at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shown(u8);

@@ -60,8 +60,8 @@ numbers! {
         gain,
         /// Part of the thrust that pushes down with both wings spread.
         of_thrust,
-        /// Square of the induced speed in hover over a rotor's thrust.
-        per_thrust,
+        /// Square of a rotor's induced speed in hover over its own.
+        per_square [MAX_ROTORS],
         /// Speed of a jet at the wings over that at the disc.
         faster,
         /// Half the side of a jet, m.
@@ -96,6 +96,8 @@ impl<T: Real> RotorWash<T> {
         let mut plane_m = T::zero();
         for (i, rotor) in rotors.iter().enumerate() {
             (out.x_m[i], out.y_m[i]) = (rotor.position.vector.x, rotor.position.vector.y);
+            out.per_square[i] =
+                vehicle.rotor_wrench_per_speed_squared().thrust[i] * induced::per_thrust(radius_m);
             plane_m += rotor.position.vector.z / real(rotors.len() as f64);
         }
         let gap_m = wing.vertical_arm_m - plane_m;
@@ -106,7 +108,6 @@ impl<T: Real> RotorWash<T> {
             (half * wing.chord_m, half * wing.area_per_side_m2 / wing.chord_m);
         Numbers {
             gain,
-            per_thrust: induced::per_thrust(radius_m),
             faster,
             half_m,
             gap_m,
@@ -132,7 +133,8 @@ impl<L: Lane> Numbers<L> {
         let none = L::of(0.0);
         let [u, v, w] = at.flow.velocity;
         let across = u * u + v * v;
-        let square = at.rotor_thrust_n[rotor] * at.thrust_factor * self.per_thrust;
+        let own_speed = at.rotor_speed[rotor];
+        let square = own_speed * own_speed * self.per_square[rotor] * at.thrust_factor;
         let speed = induced::speed(square, across, none - w) * self.faster;
         let down = w - speed;
         let squared = across + down * down;
@@ -166,7 +168,7 @@ impl<L: Lane> Acts<L> for Numbers<L> {
             // Of the plate's own air, over its area.
             let mut own = at.wings.normal_forces(at.flow, &[L::of(1.0); 2]);
             own = [own[0] * self.per_area, own[1] * self.per_area];
-            for rotor in 0..at.rotor_thrust_n.len().min(MAX_ROTORS) {
+            for rotor in 0..at.rotor_speed.len().min(MAX_ROTORS) {
                 sum = sum.plus(&self.jet(at, rotor, &own));
             }
         }
@@ -209,7 +211,7 @@ mod tests {
             flow: &flow,
             omega: &flow.omega,
             thrust_n: rotor_thrust_n.iter().sum(),
-            rotor_thrust_n: &rotor_thrust_n,
+            rotor_speed: &rotor_thrust_n.map(|thrust_n| (thrust_n / 6.0e-7_f64).sqrt()),
             thrust_factor: 1.0,
             force: [0.0; 3],
             rotor_spin: [0.0; 2],

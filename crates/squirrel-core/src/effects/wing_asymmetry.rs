@@ -1,5 +1,6 @@
 //! One wing gives less: `N (1 - e)` on its side, taken from the flat plate's force.
 
+use super::profile::WINGS_AT_SPEED;
 use super::{
     Acts, Declared, Effect, EffectParameter, Fitted, Forms, Kind, Mimic, Shown, Situation, Words,
     absent, is,
@@ -24,7 +25,7 @@ impl<T: Real> Effect<T> for WingAsymmetry<T> {
         what: "force of the @ wing",
         more: "The @ wing gives less force",
         less: "The @ wing gives more force",
-        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+        fly: WINGS_AT_SPEED,
     };
     const SHOWN: Shown = Shown::MOMENTS;
     const FITTED: Fitted = Fitted::ExceptToBaselines;

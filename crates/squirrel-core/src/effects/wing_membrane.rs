@@ -5,6 +5,7 @@
 //! two numbers; added to whatever wing the vehicle flies, as a difference to the flat plate. Form
 //! `speed_dependent`: the gain grows with airspeed, `g min(V / V_full, 1)`, as the membrane fills.
 
+use super::profile::WINGS_AT_SPEED;
 use super::{Acts, Declared, Effect, EffectParameter, Forms, Mimic, Shown, Situation, Words, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
@@ -30,7 +31,7 @@ impl<T: Real> Effect<T> for WingMembrane<T> {
         what: "force of the soft wings",
         more: "The wings give more force",
         less: "The wings give less force",
-        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+        fly: WINGS_AT_SPEED,
     };
     const SHOWN: Shown = Shown::NOTHING;
     const MIMIC: Mimic = Mimic::Gusts;

@@ -4,6 +4,7 @@
 //! pressure moves back to the declared place as the wings stand across the air, `x (1 - |sin
 //! alpha|)`.
 
+use super::profile::WINGS_AT_SPEED;
 use super::{
     Acts, Effect, EffectParameter, Forms, Mimic, Scale, Shown, Situation, Words, absent, is,
 };
@@ -33,7 +34,7 @@ impl<T: Real> Effect<T> for WingMoment<T> {
         what: "place of the wings' pressure",
         more: "The wings push ahead of their place",
         less: "The wings push behind their place",
-        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+        fly: WINGS_AT_SPEED,
     };
     const SHOWN: Shown = Shown::MOMENTS;
     const MIMIC: Mimic = Mimic::Gusts;

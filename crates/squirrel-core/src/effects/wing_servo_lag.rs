@@ -2,6 +2,7 @@
 //!
 //! Form `asymmetric`: `extra (1 - e)` when opening and `extra (1 + e)` when closing.
 
+use super::profile::WINGS_AT_SPEED;
 use super::{Declared, Effect, EffectParameter, Response, Shown, Words, is, up_and_down};
 use crate::math::Real;
 
@@ -22,7 +23,7 @@ impl<T: Real> Effect<T> for WingServoLag<T> {
         what: "lag of the wing servos",
         more: "Wings open and close more slowly",
         less: "Wings open and close faster",
-        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+        fly: WINGS_AT_SPEED,
     };
     const SHOWN: Shown = Shown::NOTHING;
     const RESPONSE: Response = Response::Bends;

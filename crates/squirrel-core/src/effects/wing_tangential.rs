@@ -3,6 +3,7 @@
 //! A coefficient of friction and edges, `C_T = g cos alpha`. Form `camber`: `C_T = g |C_N| cos
 //! alpha` with the flat plate's normal force, which a cambered wing tilts back.
 
+use super::profile::WINGS_AT_SPEED;
 use super::{Acts, Effect, EffectParameter, Forms, Mimic, Shown, Situation, Words, absent, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
@@ -29,7 +30,7 @@ impl<T: Real> Effect<T> for WingTangential<T> {
         what: "drag along the wings",
         more: "The wings drag more along themselves",
         less: "The wings drag less along themselves",
-        fly: "opening and closing the wings six times or more at 5 m/s and faster, in dashes and in braking",
+        fly: WINGS_AT_SPEED,
     };
     const SHOWN: Shown = Shown::HORIZONTAL;
     const MIMIC: Mimic = Mimic::Gusts;

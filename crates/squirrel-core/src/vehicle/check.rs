@@ -69,6 +69,16 @@ pub(crate) fn not_negative<T: Real>(field: &'static str, value: T) -> Result<(),
     Err(ParameterError::of(field, value, "must be finite and >= 0"))
 }
 
+/// `value` must be finite and of a size up to `most`.
+pub(super) fn at_most<T: Real>(
+    field: &'static str,
+    value: T,
+    most: f64,
+    reason: &'static str,
+) -> Result<(), ParameterError> {
+    if plain(value).abs() <= most { Ok(()) } else { Err(ParameterError::of(field, value, reason)) }
+}
+
 /// Every number of a list must be finite and > 0.
 pub(crate) fn each_positive<T: Real>(
     field: &'static str,
@@ -107,24 +117,7 @@ pub(super) fn check<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {
     not_negative("propulsion.time_constant_up_s", propulsion.time_constant_up_s)?;
     not_negative("propulsion.time_constant_down_s", propulsion.time_constant_down_s)?;
     positive("propulsion.propeller_diameter_m", propulsion.propeller_radius_m)?;
-    for (field, number, most) in [
-        ("propulsion.axial_inflow_s_per_m", propulsion.air.axial_inflow_s_per_m, 1.0),
-        (
-            "propulsion.translational_lift_s2_per_m2",
-            propulsion.air.translational_lift_s2_per_m2,
-            1.0,
-        ),
-        (
-            "propulsion.flapping_moment_n_m_s_per_m",
-            propulsion.air.flapping_moment_n_m_s_per_m,
-            100.0,
-        ),
-        ("propulsion.vortex_ring_fraction", propulsion.air.vortex_ring_fraction, 1.0),
-    ] {
-        if !(plain(number).abs() <= most) {
-            return Err(ParameterError::of(field, number, "must be finite and plausible in size"));
-        }
-    }
+    propulsion.air.check()?;
     positive("propulsion.reference_voltage_v", propulsion.reference_voltage_v)?;
     each_not_negative("drag.linear_n_s_per_m", p.drag.linear_n_s_per_m.as_slice())?;
     not_negative("drag.area_m2", p.drag.area_m2)?;
@@ -136,9 +129,7 @@ pub(super) fn check<T: Real>(p: &Parameters<T>) -> Result<(), ParameterError> {
             ("wing.longitudinal_arm_m", wing.longitudinal_arm_m),
             ("wing.vertical_arm_m", wing.vertical_arm_m),
         ] {
-            if !place.is_finite() || plain(place).abs() > 100.0 {
-                return Err(ParameterError::of(field, place, "must be finite and within 100 m"));
-            }
+            at_most(field, place, 100.0, "must be finite and within 100 m")?;
         }
         positive("wing.chord_m", wing.chord_m)?;
         positive("wing.time_constant_s", wing.time_constant_s)?;

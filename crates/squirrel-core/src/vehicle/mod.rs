@@ -6,10 +6,12 @@
 //! it, and the value.
 
 mod check;
+mod rotor_air;
 mod thrust_curve;
 
 pub use check::ParameterError;
 pub(crate) use check::{each_not_negative, each_positive, not_negative, positive};
+pub use rotor_air::RotorAir;
 pub use thrust_curve::ThrustCurve;
 
 use crate::frames::{Body, In};
@@ -72,44 +74,6 @@ pub struct Propulsion<T> {
     /// The paper's cubic from the voltage that a duty cycle applies to thrust; replaces the square
     /// law of the command.
     pub thrust_curve: Option<ThrustCurve<T>>,
-}
-
-/// What motion through the air makes of the rotors' thrust, in the standard forms of the effects of
-/// these names, which add to it. The flight code does not ask.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RotorAir<T> {
-    /// See the effect `axial_inflow`, s/m.
-    pub axial_inflow_s_per_m: T,
-    /// See the effect `translational_lift`, s^2/m^2.
-    pub translational_lift_s2_per_m2: T,
-    /// See the effect `flapping_moment`, N m s/m.
-    pub flapping_moment_n_m_s_per_m: T,
-    /// See the effect `vortex_ring`, a part of the thrust.
-    pub vortex_ring_fraction: T,
-}
-
-impl<T: Real> RotorAir<T> {
-    /// Thrust that asks for rotor speed alone.
-    pub fn still() -> Self {
-        Self::from_array([T::zero(); 4])
-    }
-    /// In the order of the fields.
-    fn from_array([inflow, lift, flapping, ring]: [T; 4]) -> Self {
-        Self {
-            axial_inflow_s_per_m: inflow,
-            translational_lift_s2_per_m2: lift,
-            flapping_moment_n_m_s_per_m: flapping,
-            vortex_ring_fraction: ring,
-        }
-    }
-    fn to_array(self) -> [T; 4] {
-        [
-            self.axial_inflow_s_per_m,
-            self.translational_lift_s2_per_m2,
-            self.flapping_moment_n_m_s_per_m,
-            self.vortex_ring_fraction,
-        ]
-    }
 }
 
 /// Drag of airframe and rotors without wings.
@@ -429,7 +393,7 @@ impl<T: Real> Vehicle<T> {
             time_constant_up_s: to(p.propulsion.time_constant_up_s),
             time_constant_down_s: to(p.propulsion.time_constant_down_s),
             propeller_radius_m: to(p.propulsion.propeller_radius_m),
-            air: RotorAir::from_array(p.propulsion.air.to_array().map(to)),
+            air: p.propulsion.air.map(to),
             reference_voltage_v: to(p.propulsion.reference_voltage_v),
             thrust_curve: match p.propulsion.thrust_curve {
                 Some(curve) => Some(ThrustCurve::new(

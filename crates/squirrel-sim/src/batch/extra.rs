@@ -1,9 +1,9 @@
 //! What vehicles of a block have on top of the base model: wings, battery, effects, gusts, commands
 //! on their way.
 //!
-//! Late commands, and gusts that ask how a vehicle meets them, change between steps. The steps of a call
-//! are therefore cut where the next of them is due, which changes no number: a flight is the same
-//! however it is cut.
+//! Late commands, and gusts that ask how a vehicle meets them, change between steps. The steps of
+//! a call are therefore cut where the next of them is due, which changes no number: a flight is the
+//! same however it is cut.
 
 use super::air::{Airs, Forecast};
 use super::battery::Packs;

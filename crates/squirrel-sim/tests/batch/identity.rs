@@ -131,13 +131,8 @@ fn a_batch_is_the_core<T: Paths>() {
                 command[..4].copy_from_slice(&thrown.commands[4 * number..4 * number + 4]);
                 let drive = RotorDrive::new(vehicle, &none, &command, convert(14.8));
                 drive.settle(&mut state.rotor_speed_rad_s);
-                let held = Held {
-                    drive,
-                    wind: In::new(Vector3::from(thrown.winds[number])),
-                    air_omega: None,
-                    deployment: [convert(0.0); 2],
-                    tether_force: In::zero(),
-                };
+                let wind = In::new(Vector3::from(thrown.winds[number]));
+                let held = Held { wind, ..Held::in_still_air(drive) };
                 let rate = |s: &State<T>| derivative(vehicle, &none, s, &held, |_| Wrench::zero());
                 let next = match scheme {
                     Scheme::Rk4 => rk4(*state, dt, rate),

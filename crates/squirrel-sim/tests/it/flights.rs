@@ -36,6 +36,25 @@ fn the_shipped_practice_and_crazyflie_vehicles_are_sound_and_every_number_has_a_
     }
 }
 
+/// Both files are whole, and only what rotors do in the air is said twice.
+#[test]
+fn the_squirrel_in_air_is_the_squirrel_but_for_its_rotors() {
+    let of_rotors = [
+        "name =",
+        "linear_n_s_per_m =",
+        "axial_inflow_s_per_m =",
+        "translational_lift_s2_per_m2 =",
+        "flapping_moment_n_m_s_per_m =",
+        "vortex_ring_fraction =",
+        "#",
+    ];
+    let rest = |file: VehicleFile| -> Vec<String> {
+        let lines = file.text.lines().filter(|line| !of_rotors.iter().any(|o| line.starts_with(o)));
+        lines.map(str::to_owned).collect()
+    };
+    assert_eq!(rest(VehicleFile::squirrel_in_air()), rest(VehicleFile::squirrel()));
+}
+
 #[test]
 fn one_seed_one_flight() {
     let one = |seed| {

@@ -173,13 +173,7 @@ fn a_flight_that_changes_from_rk4_to_the_world_lands() {
     let drive = RotorDrive::new(&vehicle, &calm, &[0.0; 8], 14.8);
     let free = |state: State<f64>| {
         rk4(state, 1e-3, |s| {
-            let held = Held {
-                drive,
-                wind: In::zero(),
-                air_omega: None,
-                deployment: [0.0; 2],
-                tether_force: In::zero(),
-            };
+            let held = Held::in_still_air(drive);
             derivative(&vehicle, &calm, s, &held, |_| Wrench::zero())
         })
         .normalised()

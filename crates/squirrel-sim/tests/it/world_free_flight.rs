@@ -10,16 +10,6 @@ use squirrel_core::frames::{Body, In, Wrench};
 use squirrel_core::nalgebra::Vector3;
 use squirrel_sim::world::{Contact, World};
 
-fn in_still_air(drive: RotorDrive<f64>) -> Held<f64> {
-    Held {
-        drive,
-        wind: In::zero(),
-        air_omega: None,
-        deployment: [0.0; 2],
-        tether_force: In::zero(),
-    }
-}
-
 fn no_surfaces(_: &Air<f64>) -> Wrench<Body, f64> {
     Wrench::zero()
 }
@@ -40,7 +30,7 @@ fn by_rk4(steps: usize) -> State<f64> {
     drive.target_rad_s = state.rotor_speed_rad_s;
     for _ in 0..steps {
         state = rk4(state, 1.0 / steps as f64, |s| {
-            derivative(&vehicle, &calm, s, &in_still_air(drive), no_surfaces)
+            derivative(&vehicle, &calm, s, &Held::in_still_air(drive), no_surfaces)
         })
         .normalised();
     }
@@ -57,7 +47,7 @@ fn by_rapier(steps: usize) -> State<f64> {
             &vehicle,
             &Acting::new(&Effects::none(), &vehicle),
             &state,
-            &in_still_air(drive),
+            &Held::in_still_air(drive),
             no_surfaces,
         );
         let (next, contact) =

@@ -8,7 +8,6 @@
 use serde_json::Value;
 use squirrel_nn::train::EPOCHS;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::forest::{self, Forest};
@@ -24,13 +23,7 @@ const IDS: [&str; 21] = [
 ];
 
 fn plan(trials: u32) -> Plan {
-    Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Arm::ALONE.to_vec(),
-        trials,
-        seed: 1,
-        conditions: Conditions::Calm,
-    }
+    Plan::calm(VehicleFile::squirrel(), Arm::ALONE.to_vec(), trials, 1)
 }
 
 /// A hundred and five trials of every arm, for both tests.
@@ -159,7 +152,7 @@ fn every_claim_has_a_row_and_a_test() {
 
 /// At T/W 2.
 #[test]
-fn the_better_controller_comes_through_and_the_papers_arms_owe_nothing_to_wings() {
+fn the_better_controller_comes_through_and_the_papers_arms_owe_little_to_wings() {
     let study = &*FOREST;
     let row = |arm: &str| study.rows.iter().find(|row| row.arm == arm).unwrap();
     assert_eq!(study.rows.len(), 9);
@@ -182,10 +175,9 @@ fn the_better_controller_comes_through_and_the_papers_arms_owe_nothing_to_wings(
             && climbing.height_gained_m > 20.0
     );
     assert!(climbing.in_band.share.value < 0.1);
-    for arm in ["twcc_flat", "twcc_parnn"] {
+    for (arm, least) in [("twcc_flat", 0.0), ("twcc_parnn", 0.05)] {
         let over = row(arm).over_phantom.unwrap();
-        // The learned force of the wing as measured saves a few flights; most of it is the law's.
-        assert!(over.low < 0.05 && over.high < 0.2, "{arm}: {over:?}");
+        assert!(over.low < least && over.high < 0.2, "{arm}: {over:?}");
     }
     let said = forest::words(study);
     assert!(

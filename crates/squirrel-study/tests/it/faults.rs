@@ -1,6 +1,5 @@
 //! Flights in which one thing fails, and studies that are stopped.
 
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::faults::{Faults, run};
@@ -8,13 +7,7 @@ use squirrel_study::journal::Keep;
 use std::path::Path;
 
 fn study(trials: u32, folder: Option<&Path>) -> Faults {
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Vec::new(),
-        trials,
-        seed: 3,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), Vec::new(), trials, 3);
     run(&plan, &Keep { folder, ..Keep::default() }).unwrap().unwrap()
 }
 
@@ -65,13 +58,7 @@ fn a_study_that_was_stopped_goes_on_to_the_same_bytes() {
         std::fs::read_to_string(&file).unwrap().replace("\"survived\":true", "\"survived\":false");
     std::fs::write(&file, changed).unwrap();
     assert_eq!(study(24, Some(&folder)).survived_share, 0.0);
-    let other = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Vec::new(),
-        trials: 24,
-        seed: 4,
-        conditions: Conditions::Calm,
-    };
+    let other = Plan::calm(VehicleFile::squirrel(), Vec::new(), 24, 4);
     let there = Keep { folder: Some(&folder), ..Keep::default() };
     let error = run(&other, &there).unwrap_err().to_string();
     assert!(error.contains("faults.trials.jsonl: is of another plan"), "{error}");

@@ -1,19 +1,12 @@
 //! What estimators of attitude are worth in flight.
 
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::filters::{Filters, run};
 use squirrel_study::journal::Keep;
 
 fn study(trials: u32) -> Filters {
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Vec::new(),
-        trials,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), Vec::new(), trials, 1);
     run(&plan, &Keep::default()).unwrap().unwrap()
 }
 
@@ -54,12 +47,6 @@ fn one_thread_and_two_give_the_same_numbers() {
 
 #[test]
 fn no_trials_is_an_error() {
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Vec::new(),
-        trials: 0,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), Vec::new(), 0, 1);
     assert!(run(&plan, &Keep::default()).unwrap_err().to_string().starts_with("trials = 0"));
 }

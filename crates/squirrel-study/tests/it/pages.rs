@@ -2,20 +2,13 @@
 //! figure is there.
 
 use squirrel_sim::arm::Arm;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
 use squirrel_study::{forest, steering, table3, thrust};
 
 fn plan(arms: &[Arm]) -> Plan {
-    Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: arms.to_vec(),
-        trials: 1,
-        seed: 1,
-        conditions: Conditions::Calm,
-    }
+    Plan::calm(VehicleFile::squirrel(), arms.to_vec(), 1, 1)
 }
 
 /// Drawings and tables hold numbers only, and there are so many figures.

@@ -3,7 +3,6 @@
 
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::{Keep, Part};
@@ -14,13 +13,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 fn plan(trials: u32) -> Plan {
-    Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: vec![Arm::Pc, Arm::TwccPlus],
-        trials,
-        seed: 5,
-        conditions: Conditions::Calm,
-    }
+    Plan::calm(VehicleFile::squirrel(), vec![Arm::Pc, Arm::TwccPlus], trials, 5)
 }
 
 /// A study's result as JSON, where it has one: two trials, with as little to do as there can be.

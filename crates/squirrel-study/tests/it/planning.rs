@@ -3,7 +3,7 @@
 use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::scenario::{Conditions, Scenario};
+use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
@@ -14,13 +14,7 @@ use squirrel_study::planning::{self, ARMS, Row};
 /// is braking at little thrust.
 #[test]
 fn plans_are_followed_on_the_full_plant() {
-    let plan = Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: ARMS.to_vec(),
-        trials: 40,
-        seed: 1,
-        conditions: Conditions::Calm,
-    };
+    let plan = Plan::calm(VehicleFile::squirrel(), ARMS.to_vec(), 40, 1);
     let study = planning::run(&plan, &Keep::default()).unwrap().unwrap();
     let row = |kind: &str, ratio: f64, arm: Arm| -> &Row {
         let is =

@@ -3,7 +3,6 @@
 #![allow(clippy::print_stdout, reason = "a test may panic and print figures")]
 
 use squirrel_nn::model::Model;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::{Keep, Progress};
@@ -11,13 +10,7 @@ use squirrel_study::table2::{Row, Table2, run};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 fn plan(trials: u32) -> Plan {
-    Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: Vec::new(),
-        trials,
-        seed: 1,
-        conditions: Conditions::Calm,
-    }
+    Plan::calm(VehicleFile::squirrel(), Vec::new(), trials, 1)
 }
 
 #[derive(Debug, Default)]

@@ -2,7 +2,6 @@
 //! states.
 
 use squirrel_sim::arm::Arm;
-use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::Keep;
@@ -12,13 +11,7 @@ use squirrel_study::thrust::{Thrust, run, words};
 use squirrel_study::tracking::Row;
 
 fn plan(arms: &[Arm], trials: u32) -> Plan {
-    Plan {
-        vehicle: VehicleFile::squirrel(),
-        arms: arms.to_vec(),
-        trials,
-        seed: 1,
-        conditions: Conditions::Calm,
-    }
+    Plan::calm(VehicleFile::squirrel(), arms.to_vec(), trials, 1)
 }
 
 fn study(arms: &[Arm], trials: u32) -> Thrust {
