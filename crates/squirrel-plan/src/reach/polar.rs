@@ -76,20 +76,6 @@ impl Polar {
         }
     }
 
-    /// Change of [`Self::force`] with the angle, N/rad.
-    pub(super) fn slope(&self, alpha_rad: f64) -> [f64; 2] {
-        match self {
-            Self::Flat { force_n } => {
-                let (s, c) = (2.0 * alpha_rad).sin_cos();
-                [-force_n * s, -force_n * c]
-            }
-            Self::Nodes(nodes) => {
-                let [a, b] = Self::around(nodes, alpha_rad);
-                [0, 1].map(|i| (b.force_n[i] - a.force_n[i]) / (b.alpha_rad - a.alpha_rad))
-            }
-        }
-    }
-
     /// Least and largest force between two angles.
     pub(super) fn range(&self, [from, to]: [f64; 2]) -> [[f64; 2]; 2] {
         let [a, b] = [self.force(from), self.force(to)];

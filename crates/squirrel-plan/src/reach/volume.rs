@@ -4,21 +4,24 @@
 //! With a flat plate the set is made of stretches along `-n`: thrust and wings together are `r n`
 //! with `0 <= r <= U_max` folded and `b c <= r <= b c + U_max` spread, `c = v.n`, and the volume is
 //! the integral of `r^2` over both. Where `|b c| > U_max` there is a gap between them. For any
-//! wing, spread accelerations are an image of (normal, thrust) with the Jacobian
-//! `|F_m - U cos| |U - F_v' cos + F_m' sin|` over angle of attack, turn and thrust; what folded
-//! wings reach too is left out, and what is hit several times counts once.
+//! wing the force is in the plane of motion and normal, so which angles of attack reach
+//! `a v + b m` does not depend on the turn of `m` around the motion; the tilt limits cut arcs out
+//! of that turn, and the volume is the integral of `b` times what those arcs cover. What is
+//! reached several times, or with folded wings too, counts once.
 
 use super::polar::Polar;
+use super::tilt::{Circle, across};
 use super::{Compared, Reach, Wings};
 use nalgebra::Vector3;
 use serde::Serialize;
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::math::GRAVITY_M_S2;
+use std::f64::consts::{PI, TAU};
 
 /// Cells of the tilt set along each of its two numbers.
 const CELLS: u32 = 96;
-/// Steps of thrust.
-const STEPS: u32 = 48;
+/// Cells of forces along the motion and across it.
+const FORCES: u32 = 400;
 /// Steps in which an acceleration is looked for among angles of attack.
 const ANGLES: u32 = 400;
 /// Directions of a hull: 642 and 2562.
@@ -42,7 +45,7 @@ impl Reach {
         let folded = self.folded_volume();
         let with_wings = match self.polar {
             Polar::Flat { force_n } => self.flat_volume(force_n),
-            Polar::Nodes(_) => folded + self.beyond_folded(),
+            Polar::Nodes(_) => self.turned_volume(),
         };
         let hull = |wings: Wings| {
             let [coarse, fine] =
@@ -88,39 +91,49 @@ impl Reach {
         self.over_tilt(of) / self.mass_kg.powi(3)
     }
 
-    /// Volume that spread wings alone reach, by the Jacobian.
-    pub(super) fn beyond_folded(&self) -> f64 {
+    /// The integral over forces along the motion and across it.
+    pub(super) fn turned_volume(&self) -> f64 {
         let lookup = self.lookup();
-        let of = |n: Vector3<f64>| {
-            let s = n.dot(&self.motion).clamp(-1.0, 1.0);
-            let (alpha, c) = (s.asin(), (1.0 - s * s).sqrt());
-            let ([_, cross], [along_slope, cross_slope]) =
-                (self.polar.force(alpha), self.polar.slope(alpha));
-            let wing = self.wing_force(n);
-            let step = self.thrust_max_n / f64::from(STEPS);
-            let at = |i: u32| {
-                let thrust = step * (f64::from(i) + 0.5);
-                let force = wing - n * thrust;
-                if self.folds(force) {
-                    return 0.0;
-                }
-                let jacobian = (cross - thrust * c) * (thrust - along_slope * c + cross_slope * s);
-                jacobian.abs() / c.max(1e-9) / f64::from(self.ways(force, &lookup).max(1))
-            };
-            (0..STEPS).map(at).sum::<f64>() * step
-        };
-        self.over_tilt(of) / self.mass_kg.powi(3)
+        let [along, aside] = self.box_of_forces(&lookup);
+        let step = [along, aside].map(|[low, high]| (high - low) / f64::from(FORCES));
+        let middle = |i: u32, from: f64, step: f64| from + step * (f64::from(i) + 0.5);
+        let mut arcs = Vec::new();
+        let mut volume = 0.0;
+        for i in 0..FORCES {
+            for j in 0..FORCES {
+                let (along, aside) = (middle(i, along[0], step[0]), middle(j, aside[0], step[1]));
+                self.normals(along, aside, &lookup, |normal| arcs.extend(self.arcs(normal)));
+                volume += aside * covered(&mut arcs);
+                arcs.clear();
+            }
+        }
+        volume * step[0] * step[1] / self.mass_kg.powi(3)
     }
 
-    /// Whether folded wings reach a force of thrust and wings, N.
-    fn folds(&self, force: Vector3<f64>) -> bool {
-        let thrust = force.norm();
-        thrust <= self.thrust_max_n
-            && force.try_normalize(0.0).is_none_or(|f| self.region.contains(-f))
+    /// Turns around the motion in which a normal, its sine and cosine with the motion, is allowed.
+    fn arcs(&self, [sine, cosine]: [f64; 2]) -> Vec<[f64; 2]> {
+        let circle = Circle::around(self.motion, sine, across(self.motion) * cosine.signum());
+        self.region.arcs(&circle)
+    }
+
+    /// Least and largest force along the motion and across it, N, of all allowed normals.
+    fn box_of_forces(&self, lookup: &Lookup) -> [[f64; 2]; 2] {
+        let allowed = lookup.iter().filter(|[s, c, ..]| !self.arcs([*s, *c]).is_empty());
+        let forces = allowed.flat_map(|[s, c, f, g]| {
+            [[0.0, 0.0], [*f, *g]].into_iter().flat_map(move |[f, g]| {
+                [0.0, self.thrust_max_n].map(|thrust| [f - thrust * s, g - thrust * c])
+            })
+        });
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let widest = |[low, high]: [f64; 2], x: f64| [low.min(x), high.max(x)];
+        // No force at all is among them, so that forces across start at none.
+        forces.fold([none, [0.0, 0.0]], |[along, aside], [a, b]| {
+            [widest(along, a), widest(aside, b.abs())]
+        })
     }
 
     fn lookup(&self) -> Lookup {
-        let angle = |i: u32| std::f64::consts::PI * (f64::from(i) / f64::from(ANGLES) - 0.5);
+        let angle = |i: u32| PI * (f64::from(i) / f64::from(ANGLES) - 0.5);
         let at = |alpha: f64| {
             let [along, cross] = self.polar.force(alpha);
             [alpha.sin(), alpha.cos(), along, cross]
@@ -128,14 +141,16 @@ impl Reach {
         (0..=ANGLES).map(|i| at(angle(i))).collect()
     }
 
-    /// In how many ways spread wings reach a force of thrust and wings, N.
-    fn ways(&self, force: Vector3<f64>, lookup: &Lookup) -> u32 {
-        let along = force.dot(&self.motion);
-        let aside = force - self.motion * along;
-        let towards = aside.try_normalize(0.0).unwrap_or_else(|| super::tilt::across(self.motion));
-        let mut ways = 0;
+    /// Normals, as sine and cosine with the motion, that reach a force of thrust and wings, folded
+    /// or spread, N; a cosine below zero is on the other side of the motion.
+    fn normals(&self, along: f64, aside: f64, lookup: &Lookup, mut found: impl FnMut([f64; 2])) {
+        let thrust = along.hypot(aside);
+        if thrust <= self.thrust_max_n {
+            let none = [0.0, -1.0];
+            found(if thrust > 0.0 { [-along / thrust, -aside / thrust] } else { none });
+        }
         for sign in [1.0, -1.0] {
-            let cross = sign * aside.norm();
+            let cross = sign * aside;
             // Across thrust nothing may be left, and along it what is left is the thrust.
             let left = |[s, c, f, g]: [f64; 4]| {
                 [(along - f) * c - (cross - g) * s, -(along - f) * s - (cross - g) * c]
@@ -147,21 +162,44 @@ impl Reach {
                 }
                 let share = a[0] / (a[0] - b[0]);
                 let thrust = a[1] + share * (b[1] - a[1]);
-                let [s, c] = [0, 1].map(|i| pair[0][i] + share * (pair[1][i] - pair[0][i]));
-                let normal = self.motion * s + towards * (sign * c);
-                if (0.0..=self.thrust_max_n).contains(&thrust) && self.region.contains(normal) {
-                    ways += 1;
+                if (0.0..=self.thrust_max_n).contains(&thrust) {
+                    let [s, c] = [0, 1].map(|i| pair[0][i] + share * (pair[1][i] - pair[0][i]));
+                    found([s, sign * c]);
                 }
             }
         }
-        ways
     }
 
     /// Whether an acceleration can be had, m/s^2.
     pub fn contains(&self, acceleration: In<Ned, f64>) -> bool {
         let force = (acceleration.vector - Vector3::z() * GRAVITY_M_S2) * self.mass_kg;
-        self.folds(force) || self.ways(force, &self.lookup()) > 0
+        let along = force.dot(&self.motion);
+        let aside = force - self.motion * along;
+        let towards = aside.try_normalize(0.0).unwrap_or_else(|| across(self.motion));
+        let mut has = false;
+        self.normals(along, aside.norm(), &self.lookup(), |[s, c]| {
+            has |= self.region.contains(self.motion * s + towards * c);
+        });
+        has
     }
+}
+
+/// How much of a turn arcs cover together, rad; the arcs are put in order.
+fn covered(arcs: &mut Vec<[f64; 2]>) -> f64 {
+    for i in 0..arcs.len() {
+        let [from, to] = arcs[i];
+        let start = from.rem_euclid(TAU);
+        let end = start + (to - from);
+        arcs[i] = [start, end.min(TAU)];
+        if end > TAU {
+            arcs.push([0.0, end - TAU]);
+        }
+    }
+    arcs.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let sweep = |[sum, reached]: [f64; 2], [from, to]: &[f64; 2]| {
+        [sum + (to - from.max(reached)).max(0.0), to.max(reached)]
+    };
+    arcs.iter().fold([0.0, 0.0], sweep)[0]
 }
 
 #[cfg(test)]
@@ -171,7 +209,7 @@ mod tests {
     use nalgebra::Vector3;
     use squirrel_core::frames::In;
 
-    /// The formula for the flat plate and the Jacobian for any wing are two ways to one number.
+    /// The formula for the flat plate and the integral for any wing are two ways to one number.
     #[test]
     fn the_two_volumes_of_a_flat_wing_agree() {
         let [roll_max_rad, pitch_max_rad, yaw_rad] = [0.5, 0.6, 0.4];
@@ -189,10 +227,10 @@ mod tests {
                 };
                 let reach = Reach::new(&question).unwrap();
                 let by_formula = reach.volumes().set_volume_m3_s6.with_wings;
-                let by_jacobian = reach.folded_volume() + reach.beyond_folded();
+                let by_turns = reach.turned_volume();
                 assert!(
-                    (by_jacobian / by_formula - 1.0).abs() < 3e-3,
-                    "{tilt:?} {velocity:?}: {by_jacobian} {by_formula}"
+                    (by_turns / by_formula - 1.0).abs() < 2e-3,
+                    "{tilt:?} {velocity:?}: {by_turns} {by_formula}"
                 );
             }
         }

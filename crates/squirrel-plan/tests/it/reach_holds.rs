@@ -112,10 +112,17 @@ fn braking_at_constant_height_is_what_a_grid_finds() {
 /// A box around the hull, and the share of random points in it that can be had.
 #[test]
 fn a_volume_is_what_random_points_find() {
-    const POINTS: u32 = 40_000;
+    const POINTS: u32 = 60_000;
     let mut dice = Dice(Pcg64Mcg::seed_from_u64(8));
-    for wing in &wings()[..2] {
-        let question = question(1.3, [6.0, 1.0, 3.0], ROLL_AND_PITCH, wing);
+    // The second has the motion just inside the limit: there wings stall over a few attitudes.
+    let cases = [
+        (1.3, [6.0, 1.0, 3.0], ROLL_AND_PITCH),
+        (3.5, [-0.3, 1.2, 2.1], Tilt::Cone { max_rad: 0.54 }),
+    ];
+    for (wing, (ratio, velocity, tilt)) in
+        wings()[..2].iter().flat_map(|wing| cases.map(|case| (wing, case)))
+    {
+        let question = question(ratio, velocity, tilt, wing);
         let reach = Reach::new(&question).unwrap();
         let ends = [0, 1, 2].map(|i| {
             let axis = Vector3::ith(i, 1.0);
@@ -128,7 +135,7 @@ fn a_volume_is_what_random_points_find() {
         let (volume, random) =
             (reach.volumes().set_volume_m3_s6.with_wings, size * inside as f64 / f64::from(POINTS));
         println!("{volume:.1} (m/s^2)^3, {random:.1} by random points");
-        assert!((volume / random - 1.0).abs() < 0.03, "{volume} for {random}");
+        assert!((volume / random - 1.0).abs() < 0.02, "{volume} for {random}");
     }
 }
 

@@ -48,9 +48,10 @@ fn parnn_beats_the_papers_rival_and_not_the_fair_one() {
             && vanilla.iter().filter(|over| **over > 0.2).count() >= 2
     );
     assert!(fair.iter().all(|over| over.abs() < 0.15));
-    // Learning beats the plate, and one number is worth a good part of it.
-    assert!(over("t2", Model::FlatPlate) > over("t2", Model::ScaledFlatPlate));
-    assert!(over("t2", Model::ScaledFlatPlate) > 0.5);
+    // One number is worth most of what the plate lacks, and learning more: the rest is the stall.
+    let [plate, scaled] = [Model::FlatPlate, Model::ScaledFlatPlate].map(|model| over("t2", model));
+    println!("over paRNN: flat plate {plate}, scaled {scaled}");
+    assert!(scaled > 0.2 && scaled < 0.5 * plate, "{scaled} {plate}");
     // Where the flow is far from the wing's edge it always seems steeper than it is, as in the
     // paper.
     let word = study.words.iter().rfind(|word| word.set == "t2").unwrap();
