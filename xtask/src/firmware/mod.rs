@@ -11,7 +11,7 @@
 //!    no hardware is tested.
 //! 5. Instructions of control and of the estimator, size of the images that hold nothing but one of
 //!    them or the whole step, worst-case stack, against `firmware/figures.txt` and the budget;
-//!    `--write` takes the new ones.
+//!    `--write` takes the new ones, and writes the setup that the board's tests read.
 
 mod board;
 mod elf;
@@ -40,6 +40,7 @@ const ARMS: [&str; 9] = [
 ];
 /// Which of them has the most to do.
 const LEARNED: usize = 5;
+const SETUP: &str = "firmware/h747/testdata/setup.bin";
 const FAULTS: &str = "100";
 
 /// `cargo xtask firmware`.
@@ -47,6 +48,7 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     match arguments {
         [] => check().map(|_| ()),
         [write] if write == "--write" => {
+            host()?.write_setup()?;
             let figures = measure()?;
             check_budget(&figures)?;
             let path = root()?.join(FIGURES);
@@ -99,13 +101,17 @@ pub(crate) fn check() -> Result<String, String> {
     }
 }
 
-fn measure() -> Result<Figures, String> {
-    emulator()?;
+/// Builds the host's program.
+fn host() -> Result<Squirrel, String> {
     let folder = target_directory()?.join("firmware");
     std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
     call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli"]))?;
-    let squirrel = Squirrel { program: target_directory()?.join("release/squirrel"), folder };
+    Ok(Squirrel { program: target_directory()?.join("release/squirrel"), folder })
+}
 
+fn measure() -> Result<Figures, String> {
+    emulator()?;
+    let squirrel = host()?;
     board::check()?;
     squirrel.record()?;
     // Both negative controls first: the real images take their places.
@@ -241,6 +247,17 @@ impl Squirrel {
         self.run(&export)?;
         self.run(&["export-vectors", "--out", "commanded", commanded])?;
         self.run(&["export-vectors", "--out", "faults", "--faults", FAULTS, &logs[LEARNED]])
+    }
+
+    /// The setup that the tests of the real part's image read: of a hover, in the version of today.
+    fn write_setup(&self) -> Result<(), String> {
+        self.run(&["fly", "--scenario", "hover", "--out", "hover.mcap"])?;
+        self.run(&["export-vectors", "--out", "hover", "hover.mcap"])?;
+        let path = root()?.join(SETUP);
+        std::fs::copy(self.folder.join("hover/setup-0.bin"), &path)
+            .map_err(|error| format!("{}: {error}", path.display()))?;
+        eprintln!("wrote {SETUP}");
+        Ok(())
     }
 
     fn play(&self, vectors: &str) -> Result<Played, String> {

@@ -1,16 +1,15 @@
 //! Centre of pressure of the wings beside their declared place: `M += r x F`, `r = (x, 0, z)`.
 //!
 //! `F` is the force of the wings that the vehicle flies, effects on it apart. Form `travelling`: the
-//! pressure moves back to the declared place as the wings stand across the air, `x (1 - |sin
-//! alpha|)`.
+//! pressure is ahead along the flow, wherever that comes from, and moves back to the declared place
+//! as the wings stand across it: `r = x (1 - |sin alpha|) (u, v)/|(u, v)| + (0, 0, z)`.
 
 use super::profile::WINGS_AT_SPEED;
-use super::{
-    Acts, Effect, EffectParameter, Forms, Mimic, Scale, Shown, Situation, Words, absent, is,
-};
+use super::{Acts, Effect, EffectParameter, Forms, Mimic, Scale, Shown, Situation, Words, is};
 use crate::aero::BodyWrench;
 use crate::lane::Lane;
 use crate::lane::functions::size;
+use crate::lane::vector::cross;
 use crate::math::Real;
 use crate::numbers;
 use crate::vehicle::Vehicle;
@@ -49,24 +48,28 @@ numbers! {
         x_m,
         /// Down, m.
         z_m,
-        /// Part of `x_m` that goes as the sine of the angle of attack grows.
-        travels
+        /// Upstream at small angles of attack, m.
+        upstream_m
     }
 }
 
 impl<T: Real> WingMoment<T> {
     pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [x_m, z_m, form] = self.0;
-        Numbers { x_m, z_m, travels: if is(form, TRAVELLING) { T::one() } else { T::zero() } }
+        let none = T::zero();
+        let [x_m, upstream_m] = if is(form, TRAVELLING) { [none, x_m] } else { [x_m, none] };
+        Numbers { x_m, z_m, upstream_m }
     }
 }
 
 impl<L: Lane> Acts<L> for Numbers<L> {
     #[inline(always)]
     fn wrench(&self, at: &Situation<'_, L>, _: Forms) -> BodyWrench<L> {
-        let [fx, fy, fz] = at.wing_force;
-        let sine = size(at.flow.velocity[2]) / at.flow.speed.upper(L::of(TINY));
-        let (x, z) = (self.x_m * (L::of(1.0) - self.travels * sine), self.z_m);
-        BodyWrench::from_moment([absent::<L>() - z * fy, z * fx - x * fz, x * fy])
+        let [u, v, w] = at.flow.velocity;
+        let in_plane = (u * u + v * v).root().upper(L::of(TINY));
+        let sine = size(w) / at.flow.speed.upper(L::of(TINY));
+        let upstream = self.upstream_m * (L::of(1.0) - sine) / in_plane;
+        let place = [self.x_m + upstream * u, upstream * v, self.z_m];
+        BodyWrench::from_moment(cross(&place, &at.wing_force))
     }
 }
