@@ -168,6 +168,9 @@ pub struct EffectParameter {
     pub tolerance: Tolerance,
     /// Whether it is never larger than its largest plausible size, whatever flights ask for.
     pub is_capped: bool,
+    /// Of a form: whether each is looked for by itself, because what one explains says nothing of
+    /// the other.
+    pub is_apart: bool,
 }
 
 /// Key of the parameter that chooses the form of an effect.
@@ -175,7 +178,8 @@ pub const FORM: &str = "form";
 
 impl EffectParameter {
     const fn new(key: &'static str, kind: Kind) -> Self {
-        Self { key, kind, forms: None, tolerance: Tolerance::PartOfSmallest, is_capped: false }
+        let tolerance = Tolerance::PartOfSmallest;
+        Self { key, kind, forms: None, tolerance, is_capped: false, is_apart: false }
     }
     /// A size that is not negative.
     const fn size(key: &'static str, smallest: f64, largest: f64) -> Self {
@@ -212,6 +216,11 @@ impl EffectParameter {
     /// The same, never larger than plausible.
     const fn capped(mut self) -> Self {
         self.is_capped = true;
+        self
+    }
+    /// The same choice of a form, each looked for by itself.
+    const fn apart(mut self) -> Self {
+        self.is_apart = true;
         self
     }
     /// Its plausible sizes on a vehicle; `None` for what counts or chooses.

@@ -62,6 +62,7 @@ impl Search<'_> {
             .map(|form| {
                 let mut other = member.clone();
                 other.values[slot] = form as f64;
+                other.candidate = self.catalogue.other_form(member.candidate, form, slot);
                 for (value, parameter) in other.values.iter_mut().zip(list) {
                     let Some(range) = parameter.range(&self.predictor.vehicle.vehicle) else {
                         continue;

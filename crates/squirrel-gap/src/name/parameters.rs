@@ -201,6 +201,38 @@ impl Catalogue {
         self.parameters.iter().find(|p| p.is_behind(number)).map_or(0.0, |p| p.tolerance)
     }
 
+    /// Whether two candidates are one effect with the same choices, but for its form.
+    pub(super) fn is_one_thing(&self, candidate: usize, other: usize) -> bool {
+        self.in_form(candidate, None) == self.in_form(other, None)
+    }
+
+    /// The candidate that is the same effect with the same choices in another form, where each form
+    /// is looked for by itself; otherwise the same one.
+    ///
+    /// * `form` - index of the form, and its slot
+    pub(super) fn other_form(&self, candidate: usize, form: usize, slot: usize) -> usize {
+        let wanted = self.in_form(candidate, Some((slot, form as f64)));
+        let all = 0..self.candidates.len();
+        all.into_iter()
+            .find(|other| {
+                let own = self.candidates[*other].fixed.iter().find(|(s, _)| *s == slot);
+                self.in_form(*other, own.copied()) == wanted
+            })
+            .unwrap_or(candidate)
+    }
+
+    /// An effect and its choices, with a form in place of its own.
+    fn in_form(
+        &self,
+        candidate: usize,
+        form: Option<(usize, f64)>,
+    ) -> (&'static str, Vec<(usize, f64)>) {
+        let Candidate { effect, fixed, .. } = &self.candidates[candidate];
+        let list = Effects::<f64>::parameters(effect).unwrap_or_default();
+        let choices = fixed.iter().copied().filter(|(slot, _)| list[*slot].key != FORM);
+        (effect, choices.chain(form).collect())
+    }
+
     /// Tolerances of what has no number of its own.
     ///
     /// * `timing_s` - by how much commands may act beside their time
@@ -219,15 +251,22 @@ impl Catalogue {
         fixed: Vec<(usize, f64)>,
         shape: &[(&str, f64)],
     ) -> Result<(), GapError> {
-        let standard = list.iter().find_map(|p| match p.kind {
-            Kind::OneOf(names) if p.key == FORM => Some(names[0]),
+        let form = list.iter().enumerate().find_map(|(slot, p)| match p.kind {
+            Kind::OneOf(names) if p.key == FORM => {
+                let made = fixed.iter().find(|(other, _)| *other == slot);
+                made.map(|(_, value)| (names[*value as usize], *value, slot))
+            }
             _ => None,
         });
-        let standard = standard.unwrap_or_default();
+        let (form, index, slot) = form.unwrap_or_default();
+        let mut effects = vehicle.effects;
+        let own = effects.has(effect).then(|| effects.insert(effect).map(|e| e.values[slot]));
+        // An effect has one form, the file's or the standard one: that alone floats.
+        let floats = !list.iter().any(|p| p.is_apart) || index == own.flatten().unwrap_or(0.0);
         let (candidate, mut own, mut started) = (self.candidates.len(), Vec::new(), Vec::new());
         for (slot, parameter) in list.iter().enumerate() {
             let Some(range) = parameter.range(&vehicle.vehicle) else { continue };
-            if !parameter.exists_in(standard) {
+            if !parameter.exists_in(form) {
                 continue;
             }
             if let Some((_, start)) = shape.iter().find(|(key, _)| *key == parameter.key) {
@@ -244,7 +283,11 @@ impl Catalogue {
                 largest: range.largest,
                 signed: range.signed,
                 bounds: bounds(&vehicle.vehicle, parameter, &range),
-                tolerance: tolerance(vehicle, parameter.tolerance, slot, &fixed, range.smallest)?,
+                tolerance: if floats {
+                    tolerance(vehicle, parameter.tolerance, slot, &fixed, range.smallest)?
+                } else {
+                    0.0
+                },
                 slab: SLAB_OF_LARGEST * range.largest,
                 spread: 0.0,
             });
@@ -288,7 +331,7 @@ fn choices(list: &[EffectParameter], rotors: usize) -> Vec<Vec<(usize, f64)>> {
     for (slot, parameter) in list.iter().enumerate() {
         let values: Vec<f64> = match parameter.kind {
             Kind::Rotor => (1..=rotors).map(|i| i as f64).collect(),
-            Kind::OneOf(_) if parameter.key == FORM => vec![0.0],
+            Kind::OneOf(_) if parameter.key == FORM && !parameter.is_apart => vec![0.0],
             Kind::OneOf(names) => (0..names.len()).map(|i| i as f64).collect(),
             Kind::Size { .. } => continue,
         };

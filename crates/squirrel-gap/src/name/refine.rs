@@ -211,13 +211,11 @@ impl Search<'_> {
         let mut point = Point { members: members.to_vec(), base: base.to_vec() };
         let mut spikes = linear.tolerance.clone();
         for member in members {
-            let candidate = &self.catalogue.candidates[member.candidate];
             for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
-                let other = &self.catalogue.candidates[parameter.candidate];
                 // Another rotor may still be off by its tolerance; the payload is one thing at
                 // several lengths.
                 let same = parameter.candidate == member.candidate
-                    || (other.effect == candidate.effect && other.fixed == candidate.fixed);
+                    || self.catalogue.is_one_thing(parameter.candidate, member.candidate);
                 if same {
                     spikes[p] = 0.0;
                     point.base[p] = 0.0;
