@@ -170,7 +170,7 @@ pub struct EffectParameter {
     pub is_capped: bool,
     /// Of a form: whether each is looked for by itself, because what one explains says nothing of
     /// the other.
-    pub is_apart: bool,
+    pub each_is_sought: bool,
 }
 
 /// Key of the parameter that chooses the form of an effect.
@@ -179,7 +179,7 @@ pub const FORM: &str = "form";
 impl EffectParameter {
     const fn new(key: &'static str, kind: Kind) -> Self {
         let tolerance = Tolerance::PartOfSmallest;
-        Self { key, kind, forms: None, tolerance, is_capped: false, is_apart: false }
+        Self { key, kind, forms: None, tolerance, is_capped: false, each_is_sought: false }
     }
     /// A size that is not negative.
     const fn size(key: &'static str, smallest: f64, largest: f64) -> Self {
@@ -219,8 +219,8 @@ impl EffectParameter {
         self
     }
     /// The same choice of a form, each looked for by itself.
-    const fn apart(mut self) -> Self {
-        self.is_apart = true;
+    const fn each_sought(mut self) -> Self {
+        self.each_is_sought = true;
         self
     }
     /// Its plausible sizes on a vehicle; `None` for what counts or chooses.

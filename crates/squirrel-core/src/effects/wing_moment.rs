@@ -27,7 +27,7 @@ impl<T: Real> Effect<T> for WingMoment<T> {
     const PARAMETERS: &'static [EffectParameter] = &[
         EffectParameter::signed("place_x_m", 0.006, 0.05).growing_with(Scale::Arm),
         EffectParameter::signed("place_z_m", 0.012, 0.05).growing_with(Scale::Arm),
-        EffectParameter::form(&["fixed", "travelling"]).apart(),
+        EffectParameter::form(&["fixed", "travelling"]).each_sought(),
     ];
     const WORDS: Words = Words {
         what: "place of the wings' pressure",
@@ -44,10 +44,8 @@ impl<T: Real> Effect<T> for WingMoment<T> {
 numbers! {
     /// Place.
     Numbers {
-        /// Ahead, m.
-        x_m,
-        /// Down, m.
-        z_m,
+        /// Ahead and down, m.
+        place_m [2],
         /// Upstream at small angles of attack, m.
         upstream_m
     }
@@ -57,8 +55,8 @@ impl<T: Real> WingMoment<T> {
     pub(super) fn prepare(&self, _vehicle: &Vehicle<T>) -> Numbers<T> {
         let [x_m, z_m, form] = self.0;
         let none = T::zero();
-        let [x_m, upstream_m] = if is(form, TRAVELLING) { [none, x_m] } else { [x_m, none] };
-        Numbers { x_m, z_m, upstream_m }
+        let [ahead_m, upstream_m] = if is(form, TRAVELLING) { [none, x_m] } else { [x_m, none] };
+        Numbers { place_m: [ahead_m, z_m], upstream_m }
     }
 }
 
@@ -69,7 +67,8 @@ impl<L: Lane> Acts<L> for Numbers<L> {
         let in_plane = (u * u + v * v).root().upper(L::of(TINY));
         let sine = size(w) / at.flow.speed.upper(L::of(TINY));
         let upstream = self.upstream_m * (L::of(1.0) - sine) / in_plane;
-        let place = [self.x_m + upstream * u, upstream * v, self.z_m];
+        let [ahead, down] = self.place_m;
+        let place = [ahead + upstream * u, upstream * v, down];
         BodyWrench::from_moment(cross(&place, &at.wing_force))
     }
 }

@@ -262,7 +262,8 @@ impl Catalogue {
         let mut effects = vehicle.effects;
         let own = effects.has(effect).then(|| effects.insert(effect).map(|e| e.values[slot]));
         // An effect has one form, the file's or the standard one: that alone floats.
-        let floats = !list.iter().any(|p| p.is_apart) || index == own.flatten().unwrap_or(0.0);
+        let floats =
+            !list.iter().any(|p| p.each_is_sought) || index == own.flatten().unwrap_or(0.0);
         let (candidate, mut own, mut started) = (self.candidates.len(), Vec::new(), Vec::new());
         for (slot, parameter) in list.iter().enumerate() {
             let Some(range) = parameter.range(&vehicle.vehicle) else { continue };
@@ -331,7 +332,7 @@ fn choices(list: &[EffectParameter], rotors: usize) -> Vec<Vec<(usize, f64)>> {
     for (slot, parameter) in list.iter().enumerate() {
         let values: Vec<f64> = match parameter.kind {
             Kind::Rotor => (1..=rotors).map(|i| i as f64).collect(),
-            Kind::OneOf(_) if parameter.key == FORM && !parameter.is_apart => vec![0.0],
+            Kind::OneOf(_) if parameter.key == FORM && !parameter.each_is_sought => vec![0.0],
             Kind::OneOf(names) => (0..names.len()).map(|i| i as f64).collect(),
             Kind::Size { .. } => continue,
         };
