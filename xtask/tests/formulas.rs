@@ -93,7 +93,11 @@ const FORMULAS: [(&str, &[&str], &str); 38] = [
     ("vortex_ring", &["self.gain*bump("], "core/src/effects/vortex_ring.rs"),
     ("wing_asymmetry", &["left*self.loss[0]"], "core/src/effects/wing_asymmetry.rs"),
     ("wing_membrane", &["flow.speed*per_speed).lower("], "core/src/effects/wing_membrane.rs"),
-    ("wing_moment", &["z*fx-x*fz"], "core/src/effects/wing_moment.rs"),
+    (
+        "wing_moment",
+        &["self.upstream_m*(L::of(1.0)-sine)/in_plane"],
+        "core/src/effects/wing_moment.rs",
+    ),
     ("wing_tangential", &["spread*speed+tilted"], "core/src/effects/wing_tangential.rs"),
 ];
 
