@@ -21,10 +21,13 @@
 //!   it brakes;
 //! - height is part of the residual with the weight `W_z`, so that it is held unless the horizontal
 //!   gains more; a sink weighs the more the less thrust there is to end it;
+//! - what the inertial unit feels beside all this is added ([`super::position::ForceResidual`]): thrust that is
+//!   short, drag and wind, and what spread wings did beside the plate, so that wings which harm fold
+//!   again, and stay folded for a while;
 //! - the way to the reference is flown no faster than rotors alone can brake it beside what the
 //!   reference itself asks for;
 //! - velocity and acceleration of the reference are fed forward by the position loop
-//!   ([`super::position::PositionGains`]).
+//!   ([`PositionGains`]).
 //!
 //! Wings open where they make the residual smaller by [`Plus::open_above_m_s2`], and fold where
 //! they no longer make it smaller. Without wings it is the same controller: the fair rival.
@@ -70,15 +73,28 @@ pub struct Plus {
     pub open_above_m_s2: f32,
 }
 
+/// The vehicle in its air, in the heading frame: forward, right, down.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Believed<'a> {
+    /// What flies.
+    pub(super) airframe: &'a OuterAirframe,
+    /// Over ground, m/s.
+    pub(super) velocity: Vector3<f32>,
+    /// Thrust that is short, N: see [`super::position::ForceResidual`].
+    pub(super) short_n: f32,
+    /// Force across the thrust, N.
+    pub(super) across: Vector3<f32>,
+    /// What spread wings do beside the flat plate, along body z, N.
+    pub(super) wings_n: f32,
+}
+
 /// What is asked for, in the heading frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Demand<'a> {
     /// What flies.
-    pub(super) airframe: &'a OuterAirframe,
+    pub(super) believed: Believed<'a>,
     /// Acceleration command: forward, right, down, m/s^2.
     pub(super) acceleration: Vector3<f32>,
-    /// Velocity: forward, right, down, m/s.
-    pub(super) velocity: Vector3<f32>,
     /// `W_z^2`.
     pub(super) weight: f32,
 }
@@ -119,11 +135,11 @@ impl Plus {
 
     /// With what the way to the reference can be braked without wings while height is held and the
     /// reference's own acceleration is flown, m/s^2.
-    pub(super) fn approach_m_s2(&self, airframe: &OuterAirframe, reference: &Reference) -> f32 {
-        let Envelope { tilt_max_rad, thrust_max_n, .. } = airframe.envelope;
-        let weight_n = airframe.mass_kg * GRAVITY_M_S2 as f32;
-        let spare =
-            sqrt(upper(thrust_max_n * thrust_max_n - weight_n * weight_n, 0.0)) / airframe.mass_kg;
+    pub(super) fn approach_m_s2(&self, believed: &Believed<'_>, reference: &Reference) -> f32 {
+        let OuterAirframe { mass_kg, envelope: Envelope { tilt_max_rad, .. }, .. } =
+            *believed.airframe;
+        let (weight_n, most_n) = (mass_kg * GRAVITY_M_S2 as f32, believed.thrust_max_n());
+        let spare = sqrt(upper(most_n * most_n - weight_n * weight_n, 0.0)) / mass_kg;
         let level = lower(spare, GRAVITY_M_S2 as f32 * libm::tanf(tilt_max_rad));
         self.approach_share * upper(level - reference.acceleration.vector.xy().norm(), 0.1 * level)
     }
@@ -132,9 +148,9 @@ impl Plus {
     /// turn of a climb or sink.
     ///
     /// * `down_m`, `down_m_s` - position and velocity less those of the reference
-    pub(super) fn weight(&self, airframe: &OuterAirframe, down_m: f32, down_m_s: f32) -> f32 {
+    pub(super) fn weight(&self, believed: &Believed<'_>, down_m: f32, down_m_s: f32) -> f32 {
         // Gravity ends a climb; a sink is ended by what thrust there is above the weight.
-        let spare = airframe.envelope.thrust_max_n / airframe.mass_kg - GRAVITY_M_S2 as f32;
+        let spare = believed.thrust_max_n() / believed.airframe.mass_kg - GRAVITY_M_S2 as f32;
         let turn = if down_m_s > 0.0 { limit(spare, TURN_MIN_M_S2, TURN_M_S2) } else { TURN_M_S2 };
         let foreseen_m = down_m + down_m_s * down_m_s.abs() / (2.0 * turn);
         let share = foreseen_m / self.height_band_m;
@@ -148,29 +164,6 @@ impl Plus {
 /// * `folded`, `spread` - the best without and with them
 pub(super) fn saved(folded: &Choice, spread: &Choice) -> f32 {
     sqrt(folded.cost) - sqrt(spread.cost)
-}
-
-/// Acceleration at an attitude, heading frame, m/s^2.
-///
-/// * `wings` - 0 folded to 1 spread
-pub(super) fn acceleration(
-    airframe: &OuterAirframe,
-    velocity: &Vector3<f32>,
-    command: &AttitudeThrust,
-    wings: f32,
-) -> Vector3<f32> {
-    let n = normal(command.roll_rad, command.pitch_rad);
-    free_of_thrust(airframe, velocity, &n, wings) - n * (command.thrust_n / airframe.mass_kg)
-}
-
-/// Force of the air on spread wings at an attitude, heading frame, N.
-pub(super) fn wing_force(
-    airframe: &OuterAirframe,
-    velocity: &Vector3<f32>,
-    at: &AttitudeThrust,
-) -> Vector3<f32> {
-    let n = normal(at.roll_rad, at.pitch_rad);
-    flat_plate::force::<Ned, f32>(In::new(*velocity), In::new(n), airframe.wing_area_m2).vector
 }
 
 /// An attitude on the way from one to another, with the latter's thrust.
@@ -188,27 +181,44 @@ fn normal(roll_rad: f32, pitch_rad: f32) -> Vector3<f32> {
     Vector3::new(sp * cr, -sr, cp * cr)
 }
 
-/// Gravity and wings, m/s^2.
-fn free_of_thrust(
-    airframe: &OuterAirframe,
-    velocity: &Vector3<f32>,
-    n: &Vector3<f32>,
-    wings: f32,
-) -> Vector3<f32> {
-    let force = flat_plate::force::<Ned, f32>(
-        In::new(*velocity),
-        In::new(*n),
-        wings * airframe.wing_area_m2,
-    );
-    force.vector / airframe.mass_kg + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32)
+impl Believed<'_> {
+    /// Acceleration at an attitude, m/s^2.
+    ///
+    /// * `wings` - 0 folded to 1 spread
+    pub(super) fn acceleration(&self, command: &AttitudeThrust, wings: f32) -> Vector3<f32> {
+        let n = normal(command.roll_rad, command.pitch_rad);
+        self.free_of_thrust(&n, wings) - n * (command.thrust_n / self.airframe.mass_kg)
+    }
+
+    /// Force on spread wings at an attitude, N.
+    pub(super) fn wing_force(&self, at: &AttitudeThrust) -> Vector3<f32> {
+        self.wings(&normal(at.roll_rad, at.pitch_rad), 1.0)
+    }
+
+    /// Most thrust that comes, N.
+    fn thrust_max_n(&self) -> f32 {
+        self.airframe.envelope.thrust_max_n - self.short_n
+    }
+
+    fn wings(&self, n: &Vector3<f32>, wings: f32) -> Vector3<f32> {
+        let area_m2 = wings * self.airframe.wing_area_m2;
+        let plate = flat_plate::force::<Ned, f32>(In::new(self.velocity), In::new(*n), area_m2);
+        plate.vector + n * (wings * self.wings_n)
+    }
+
+    /// All but the thrust that is asked for, m/s^2.
+    fn free_of_thrust(&self, n: &Vector3<f32>, wings: f32) -> Vector3<f32> {
+        let force = self.wings(n, wings) + self.across + n * self.short_n;
+        force / self.airframe.mass_kg + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32)
+    }
 }
 
 impl Demand<'_> {
     /// The best thrust at an attitude, and what is left.
     pub(super) fn at(&self, roll_rad: f32, pitch_rad: f32, wings: f32) -> Choice {
-        let OuterAirframe { mass_kg, envelope, .. } = *self.airframe;
+        let OuterAirframe { mass_kg, envelope, .. } = *self.believed.airframe;
         let n = normal(roll_rad, pitch_rad);
-        let need = free_of_thrust(self.airframe, &self.velocity, &n, wings) - self.acceleration;
+        let need = self.believed.free_of_thrust(&n, wings) - self.acceleration;
         let weighted = Vector3::new(n.x, n.y, self.weight * n.z);
         let thrust_n = limit(
             mass_kg * weighted.dot(&need) / weighted.dot(&n),
@@ -223,8 +233,8 @@ impl Demand<'_> {
     /// The best attitude near a first guess.
     #[inline(never)]
     pub(super) fn best(&self, guess: &AttitudeThrust, wings: f32) -> Choice {
-        let max = self.airframe.envelope.tilt_max_rad;
-        let guess = self.airframe.envelope.limit(guess);
+        let max = self.believed.airframe.envelope.tilt_max_rad;
+        let guess = self.believed.airframe.envelope.limit(guess);
         let mut best = self.at(guess.roll_rad, guess.pitch_rad, wings);
         let mut step = STEP_RAD;
         for _ in 0..ROUNDS {
@@ -274,13 +284,14 @@ mod tests {
         }
     }
 
+    fn calm(airframe: &OuterAirframe) -> Believed<'_> {
+        let none = Vector3::zeros();
+        Believed { airframe, velocity: none, short_n: 0.0, across: none, wings_n: 0.0 }
+    }
+
     fn demand(airframe: &OuterAirframe, acceleration: [f32; 3], velocity: [f32; 3]) -> Demand<'_> {
-        Demand {
-            airframe,
-            acceleration: acceleration.into(),
-            velocity: velocity.into(),
-            weight: 0.25,
-        }
+        let believed = Believed { velocity: velocity.into(), ..calm(airframe) };
+        Demand { believed, acceleration: acceleration.into(), weight: 0.25 }
     }
 
     /// Braking from 7 m/s, level, the goal here.
@@ -315,7 +326,7 @@ mod tests {
             prop_assume!(best.command.roll_rad.abs() < 0.5 && best.command.pitch_rad.abs() < 0.5);
             prop_assume!(best.command.thrust_n > 0.6 && best.command.thrust_n < 9.9);
             prop_assert!(best.cost < 0.02, "{best:?}");
-            let got = super::acceleration(&airframe, &demand.velocity, &best.command, f32::from(wings));
+            let got = demand.believed.acceleration(&best.command, f32::from(wings));
             prop_assert!((got - demand.acceleration).norm() < 0.3, "{got} for {}", demand.acceleration);
         }
 
@@ -360,7 +371,7 @@ mod tests {
     fn a_climb_ends_in_the_band() {
         let plus = plus();
         let airframe = airframe();
-        let weight = |down_m, down_m_s| plus.weight(&airframe, down_m, down_m_s);
+        let weight = |down_m, down_m_s| plus.weight(&calm(&airframe), down_m, down_m_s);
         assert_eq!(weight(0.0, 0.0), 0.25);
         assert_eq!(weight(-1.5, 0.0), 1.0, "twice the weight at the band's edge");
         let rising = weight(-1.0, -5.0);

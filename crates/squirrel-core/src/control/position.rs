@@ -87,6 +87,17 @@ pub struct PositionTerms {
     pub request: AttitudeThrust,
 }
 
+/// Force that nobody commanded, as felt, N: what [`super::plus`] adds to what it believes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ForceResidual {
+    /// Along body z, wings folded: thrust that is short.
+    pub short_n: f32,
+    /// Across body z.
+    pub across: In<Ned, f32>,
+    /// Along body z of spread wings, beside the flat plate in still air.
+    pub wings_n: f32,
+}
+
 /// Measured motion at a tick.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeasuredMotion {
@@ -101,11 +112,13 @@ pub struct MeasuredMotion {
     /// The heading that roll and pitch are of, measured and commanded ones, rad: see
     /// [`super::backstepping::AttitudeForm::heading_rad`].
     pub heading_rad: f32,
+    /// Force that nobody commanded; the paper's laws know of none.
+    pub residual: ForceResidual,
 }
 
 impl MeasuredMotion {
     /// With the thrust axis of an attitude, as roll and pitch at a heading that need not be the
-    /// measured one.
+    /// measured one, and no residual.
     pub fn new(
         position: In<Ned, f32>,
         velocity: In<Ned, f32>,
@@ -115,7 +128,9 @@ impl MeasuredMotion {
         let down = (*ned_from_body * In::new(Vector3::z())).vector;
         let level = heading_frame(&down, heading_rad);
         let roll_rad = -libm::asinf(limit(level.y, -1.0, 1.0));
-        Self { position, velocity, roll_rad, pitch_rad: libm::atan2f(level.x, down.z), heading_rad }
+        let pitch_rad = libm::atan2f(level.x, down.z);
+        let residual = ForceResidual::default();
+        Self { position, velocity, roll_rad, pitch_rad, heading_rad, residual }
     }
 }
 
@@ -278,6 +293,7 @@ pub(super) mod fixtures {
             roll_rad: 0.0,
             pitch_rad: 0.0,
             heading_rad: 0.0,
+            residual: ForceResidual::default(),
         }
     }
     pub(in super::super) fn at(north: f32, east: f32, down: f32) -> Reference {

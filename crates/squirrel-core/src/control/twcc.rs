@@ -11,7 +11,7 @@
 //! - PC's integral is frozen while WIIC flies or anything is clamped;
 //! - every decision has a [`Reason`].
 
-use super::plus::{self, Demand, Plus};
+use super::plus::{self, Believed, Demand, Plus};
 use super::position::{MeasuredMotion, PositionGains, PositionState, PositionTerms, heading_frame};
 use super::wiic::{self, Envelope, ThrustLaw};
 use super::wing_force::{ForceModel, ParnnTerms};
@@ -169,8 +169,7 @@ impl OuterAirframe {
         let p = vehicle.parameters();
         Self {
             mass_kg: p.mass_kg,
-            // Two sides; the flat plate's own slope is 2.
-            wing_area_m2: p.wing.map_or(0.0, |w| w.area_per_side_m2 * w.normal_force_slope),
+            wing_area_m2: vehicle.plate_area_m2(),
             envelope: Envelope { tilt_max_rad, thrust_min_n, thrust_max_n: p.limits.thrust_max_n },
         }
     }
@@ -322,12 +321,19 @@ impl TwccParameters {
             pitch_rad: motion.pitch_rad,
             thrust_n: 0.0,
         };
-        let velocity = heading(&motion.velocity.vector);
+        let felt = &motion.residual;
+        let believed = Believed {
+            airframe,
+            velocity: heading(&motion.velocity.vector),
+            short_n: felt.short_n,
+            across: heading(&felt.across.vector),
+            wings_n: felt.wings_n,
+        };
         let (mut ahead, mut goal) = (*motion, *reference);
         if let Some(last) = state.last {
             let wings = f32::from(state.mode != Mode::Primary);
             let meanwhile = plus::between(&now, &last, 0.5);
-            let a = plus::acceleration(airframe, &velocity, &meanwhile, wings);
+            let a = believed.acceleration(&meanwhile, wings);
             let back = heading_frame(&a, -motion.heading_rad);
             let change = Vector3::new(back.x, back.y, a.z) * plus.delay_s;
             ahead.position.vector += (motion.velocity.vector + change * 0.5) * plus.delay_s;
@@ -338,18 +344,17 @@ impl TwccParameters {
             goal.velocity.vector += reference.acceleration.vector * plus.delay_s;
         }
         let gains = PositionGains {
-            approach_max_m_s2: plus.approach_m_s2(airframe, reference),
+            approach_max_m_s2: plus.approach_m_s2(&believed, reference),
             ..plus.position
         };
         let position =
             gains.update(&mut state.position, airframe.mass_kg, &ahead, &goal, state.clamped, dt_s);
         let request = &position.request;
         let demand = Demand {
-            airframe,
+            believed: Believed { velocity: heading(&ahead.velocity.vector), ..believed },
             acceleration: heading(&position.acceleration.vector),
-            velocity: heading(&ahead.velocity.vector),
             weight: plus.weight(
-                airframe,
+                &believed,
                 ahead.position.vector.z - goal.position.vector.z,
                 ahead.velocity.vector.z - goal.velocity.vector.z,
             ),
@@ -386,7 +391,7 @@ impl TwccParameters {
         // A residual of this size is what a search of so many rounds leaves.
         let clamped = best.cost > 0.01 || position.acceleration != position.acceleration_demand;
         state.clamped = clamped;
-        let force = plus::wing_force(airframe, &demand.velocity, &best.command);
+        let force = demand.believed.wing_force(&best.command);
         let back = heading_frame(&force, -motion.heading_rad);
         let wing_force = In::new(Vector3::new(back.x, back.y, force.z));
         state.flag = state.mode != Mode::Primary;

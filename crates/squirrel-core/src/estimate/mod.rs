@@ -12,12 +12,13 @@
 //! [`altitude`] is the paper's height filter, for those that have none of their own; [`rest`] finds
 //! the gyro's bias before take-off. [`voting`] makes one inertial measurement of two units',
 //! [`navigator`] runs what was chosen and tells control, [`monitor`] sees whether rotors push as
-//! told. All are fixed in size, take bounded work a step, and stay finite for whatever is finite.
+//! told, and what else pushes. All are fixed in size, take bounded work a step, and stay finite for whatever is finite.
 //! Which of them errs how much: docs/equations.md C.
 
 pub mod altitude;
 mod covariance;
 pub mod eskf;
+mod force_residual;
 pub mod mahony;
 pub mod mekf;
 pub mod monitor;

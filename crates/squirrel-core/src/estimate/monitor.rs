@@ -8,10 +8,12 @@
 //! means over [`MEAN_S`], for a weak rotor, a sagging battery or a stuck wing stays, and noise and
 //! gusts do not. While wings are spread on purpose they push too, and nothing is learnt.
 
+use super::force_residual::{Felt, Step};
 use super::navigator::Health;
 use crate::control::mixer::ThrustTorque;
+use crate::control::position::ForceResidual;
 use crate::frame::Imu;
-use crate::frames::{Body, Ned, Rotation};
+use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{all_finite, lower};
 use crate::vehicle::Vehicle;
 use nalgebra::Vector3;
@@ -35,6 +37,7 @@ pub struct Monitor {
     missing_n: f32,
     torque_n_m: Vector3<f32>,
     spread_ago_s: f32,
+    felt: Felt,
     /// Since the last inertial measurement.
     waited_s: f32,
 }
@@ -47,6 +50,7 @@ impl Default for Monitor {
             missing_n: 0.0,
             torque_n_m: Vector3::zeros(),
             spread_ago_s: FOLDED_S,
+            felt: Felt::default(),
             waited_s: 0.0,
         }
     }
@@ -56,12 +60,14 @@ impl Monitor {
     /// Looks at a step.
     ///
     /// * `achieved` - what the mixer promised in this step; `None` where the rotors stand
+    /// * `motion` - attitude and velocity over ground, as believed, where both are
     /// * `wings` - largest of the wings' commands, 0..1
     pub(crate) fn look(
         &mut self,
         vehicle: &Vehicle<f32>,
         achieved: Option<&ThrustTorque>,
         imu: Option<&Imu>,
+        motion: Option<(&Rotation<Ned, Body, f32>, In<Ned, f32>)>,
         wings: f32,
         dt_s: f32,
     ) {
@@ -94,6 +100,18 @@ impl Monitor {
         } else {
             0.0
         };
+        if let Some((ned_from_body, velocity)) = motion {
+            self.felt.look(&Step {
+                force: imu.specific_force.vector * p.mass_kg
+                    + Vector3::new(0.0, 0.0, self.commanded.thrust_n),
+                ned_from_body,
+                velocity,
+                wing_area_m2: vehicle.plate_area_m2(),
+                weight_n: vehicle.weight_n(),
+                wings,
+                dt_s,
+            });
+        }
         let spin = p.inertia_kg_m2 * omega;
         let turned = p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin)
             - self.commanded.torque_n_m;
@@ -103,6 +121,11 @@ impl Monitor {
         if !(self.missing_n.is_finite() && all_finite(&self.torque_n_m)) {
             *self = Self::default();
         }
+    }
+
+    /// Force that nobody commanded.
+    pub(crate) fn residual(&self) -> ForceResidual {
+        self.felt.residual()
     }
 
     /// Health, with what was found.

@@ -235,10 +235,12 @@ impl Stack {
     pub fn watch(&self, state: &mut StackState, navigated: &Navigated, output: &mut StackOutput) {
         let achieved = output.inner.as_ref().map(|inner| &inner.mixer.achieved);
         let dt_s = lower(navigated.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
+        let (attitude, gnss) = (state.known.attitude.as_ref(), state.known.gnss.as_ref());
         state.monitor.look(
             &self.vehicle,
             achieved,
             navigated.frame.imu.as_ref(),
+            attitude.zip(gnss).map(|(attitude, gnss)| (attitude, gnss.velocity)),
             state.wing_command,
             dt_s,
         );
@@ -357,7 +359,11 @@ impl Stack {
         );
         let reference = self.mission.reference(&state.mission, frame.time_us);
         let heading_rad = self.heading_rad(frame.time_us, &ned_from_body);
-        let motion = MeasuredMotion::new(position, gnss.velocity, &ned_from_body, heading_rad);
+        let residual = state.monitor.residual();
+        let motion = MeasuredMotion {
+            residual,
+            ..MeasuredMotion::new(position, gnss.velocity, &ned_from_body, heading_rad)
+        };
         let terms = self.parameters.twcc.update(
             &mut state.twcc,
             &self.airframe,

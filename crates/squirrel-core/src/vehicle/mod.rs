@@ -362,6 +362,12 @@ impl<T: Real> Vehicle<T> {
     pub fn weight_n(&self) -> T {
         self.parameters.mass_kg * real(crate::math::GRAVITY_M_S2)
     }
+    /// Area of the flat plate that has the force of both wings, m^2; 0 for none.
+    pub fn plate_area_m2(&self) -> T {
+        // Two sides; the flat plate's own slope is 2.
+        let area = |w: &Wing<T>| w.area_per_side_m2 * w.normal_force_slope;
+        self.parameters.wing.as_ref().map_or(T::zero(), area)
+    }
     /// Most thrust that one rotor may be asked for, N: its top thrust at the reference voltage, or
     /// its limit if lower.
     pub fn rotor_thrust_max_n(&self) -> T {

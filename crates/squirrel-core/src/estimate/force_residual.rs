@@ -1,0 +1,107 @@
+//! Force that nobody commanded: what the inertial unit feels beside the thrust that the mixer
+//! promised and, with wings spread, beside the flat plate (incremental inversion: Smeur, de Croon
+//! and Chu, JGCD 39(3), 2016; docs/equations.md E.6).
+//!
+//! ```text
+//! folded    r_z  = m f_z + T              r_xy = m f_xy           means over 0.3 s
+//! spread    w_z  = (m f_z + T - r_z) / d - N_z                    mean over 0.05 s
+//! ```
+//! `d` is how far they are spread. `r_z` goes with the body (thrust that is short: sag, inflow, load), `r_xy` with the world (drag,
+//! wind); `r_z` rests while wings are not folded. `w_z` is what spread wings do beside the plate in
+//! still air: wind, the rotors' wash, a wing that is weaker. It is kept after they fold and
+//! forgotten slowly, so that wings that harmed open again no sooner than that.
+
+use crate::aero::flat_plate;
+use crate::control::position::ForceResidual;
+use crate::frames::{Body, In, Ned, Rotation};
+use crate::math::{limit, lower};
+use nalgebra::Vector3;
+
+/// Time constant of what is felt with wings folded, s.
+const FOLDED_MEAN_S: f32 = 0.3;
+/// Time constant of what spread wings do, s: no longer than they may harm.
+const SPREAD_MEAN_S: f32 = 0.05;
+/// From the command to spread until they are, s, at an even rate.
+const SPREADING_S: f32 = 0.2;
+/// Deployment from which what wings do can be told.
+const SPREAD_ENOUGH: f32 = 0.5;
+/// From the command to fold until they are and the means can be believed, s.
+const FOLDING_S: f32 = 0.4;
+/// With which what spread wings do is forgotten, s.
+const MEMORY_S: f32 = 10.0;
+/// Weights that may be short, and that may be too much: on the ground the ground carries.
+const SHORT_MAX: f32 = 0.5;
+const SPARE_MAX: f32 = 0.2;
+
+/// What is remembered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Felt {
+    residual: ForceResidual,
+    /// Since the wings were commanded to be where they are, s.
+    spread_s: f32,
+    folded_s: f32,
+}
+
+impl Default for Felt {
+    fn default() -> Self {
+        Self { residual: ForceResidual::default(), spread_s: 0.0, folded_s: FOLDING_S }
+    }
+}
+
+/// What a step brings.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Step<'a> {
+    /// `m f + T e_3`, N.
+    pub force: Vector3<f32>,
+    pub ned_from_body: &'a Rotation<Ned, Body, f32>,
+    /// Over ground, m/s.
+    pub velocity: In<Ned, f32>,
+    /// Of the flat plate, m^2.
+    pub wing_area_m2: f32,
+    pub weight_n: f32,
+    /// Largest of the wings' commands, 0..1.
+    pub wings: f32,
+    pub dt_s: f32,
+}
+
+impl Felt {
+    pub(super) fn residual(&self) -> ForceResidual {
+        self.residual
+    }
+
+    pub(super) fn look(&mut self, step: &Step<'_>) {
+        let Step { force, ned_from_body, weight_n, dt_s, .. } = *step;
+        let before = *self;
+        if step.wings > 0.0 {
+            (self.spread_s, self.folded_s) = (lower(self.spread_s + dt_s, SPREADING_S), 0.0);
+        } else {
+            (self.spread_s, self.folded_s) = (0.0, lower(self.folded_s + dt_s, FOLDING_S));
+        }
+        let r = &mut self.residual;
+        let follow = |mean_s: f32| dt_s / (dt_s + mean_s);
+        let across = *ned_from_body * In::new(Vector3::new(force.x, force.y, 0.0));
+        r.across.vector += (across.vector - r.across.vector) * follow(FOLDED_MEAN_S);
+        if self.folded_s >= FOLDING_S {
+            r.short_n += (force.z - r.short_n) * follow(FOLDED_MEAN_S);
+        }
+        let spread = step.wings * self.spread_s / SPREADING_S;
+        if spread >= SPREAD_ENOUGH {
+            let velocity = (ned_from_body.inverse() * step.velocity).vector;
+            let down = [0.0, 0.0, 1.0];
+            let plate_n = flat_plate::plate(&velocity.into(), &down, step.wing_area_m2)[2];
+            let wings_n = (force.z - r.short_n) / spread - plate_n;
+            r.wings_n += (wings_n - r.wings_n) * follow(SPREAD_MEAN_S);
+        } else if step.wings <= 0.0 {
+            r.wings_n -= r.wings_n * follow(MEMORY_S);
+        }
+        r.short_n = limit(r.short_n, -SPARE_MAX * weight_n, SHORT_MAX * weight_n);
+        r.wings_n = limit(r.wings_n, -weight_n, weight_n);
+        let across_n = r.across.vector.norm();
+        if across_n > weight_n {
+            r.across.vector *= weight_n / across_n;
+        }
+        if !(r.short_n.is_finite() && r.wings_n.is_finite() && across_n.is_finite()) {
+            *self = Self { residual: ForceResidual::default(), ..before };
+        }
+    }
+}
