@@ -14,6 +14,7 @@ pub mod merge;
 pub mod pages;
 pub mod paper;
 pub mod planning;
+pub mod rivals;
 pub mod sheet;
 pub mod statistics;
 pub mod steering;
@@ -31,6 +32,7 @@ pub static STUDIES: &[study::Study] = &[
     filters::STUDY,
     forest::STUDY,
     planning::STUDY,
+    rivals::STUDY,
     steering::STUDY,
     table2::STUDY,
     table3::STUDY,

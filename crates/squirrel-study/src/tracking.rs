@@ -42,6 +42,8 @@ pub struct Flight {
     pub wings_open_s: f64,
     /// Mean voltage of the battery in the window, V.
     pub voltage_v: f64,
+    /// It never came to the obstacle: its figures are of the whole flight.
+    pub unmet: bool,
 }
 
 /// One arm under one condition.
@@ -63,6 +65,8 @@ pub struct Row {
     pub wings_open_s: f64,
     /// Of [`Flight::voltage_v`].
     pub voltage_v: f64,
+    /// How many flights are [`Flight::unmet`].
+    pub unmet: u32,
     /// The paper's gain, `mean(pc) / mean(arm) - 1`, with its 95 % interval over paired trials.
     pub gain: Estimate,
     /// The same of the errors without height.
@@ -124,6 +128,7 @@ fn fly(plan: &Plan, condition: &Condition, arm: Arm, trial: u32) -> Result<Fligh
         height_gained_m: m.height_gained_m,
         wings_open_s: m.wings_open_s,
         voltage_v: m.voltage_mean_v,
+        unmet: m.encounters == 0,
     })
 }
 
@@ -145,6 +150,7 @@ fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
         height_gained_m: average(|flight| flight.height_gained_m),
         wings_open_s: average(|flight| flight.wings_open_s),
         voltage_v: average(|flight| flight.voltage_v),
+        unmet: flown.of(arm, condition).iter().filter(|flight| flight.unmet).count() as u32,
         gain: over(Arm::Pc, |flight| flight.rmse_m),
         gain_horizontal: over(Arm::Pc, |flight| flight.rmse_horizontal_m),
         gain_measured: over(Arm::Pc, |flight| flight.rmse_measured_m),
@@ -154,7 +160,7 @@ fn row(flown: &Flown<Flight>, arm: Arm, condition: usize) -> Row {
 }
 
 /// A row of a sheet.
-pub fn columns(row: &Row) -> [Column<'_>; 11] {
+pub fn columns(row: &Row) -> [Column<'_>; 12] {
     [
         ("arm", "arm", Cell::Text(row.arm)),
         ("RMSE 3-D m", "rmse_m", Cell::Number(row.rmse_m, 2)),
@@ -175,5 +181,6 @@ pub fn columns(row: &Row) -> [Column<'_>; 11] {
         ("lost m", "height_lost_m", Cell::Number(row.height_lost_m, 2)),
         ("gained m", "height_gained_m", Cell::Number(row.height_gained_m, 2)),
         ("wings s", "wings_open_s", Cell::Number(row.wings_open_s, 2)),
+        ("unmet", "unmet", Cell::Number(f64::from(row.unmet), 0)),
     ]
 }

@@ -242,6 +242,12 @@ impl Fly {
         let mut table = Table::new(&cells.iter().map(|(n, _)| n.as_str()).collect::<Vec<_>>());
         table.row(cells.iter().map(|(_, v)| v.clone()).collect());
         table.print();
+        if setup.scenario.measured_window_s > 0.0 && flight.metrics.encounters == 0 {
+            let duration_s = setup.scenario.duration_s;
+            talk(&format!(
+                "no encounter in duration_s = {duration_s}: the figures are of the whole flight"
+            ));
+        }
         if let Some(log) = &mut flight.log {
             if let Some(path) = &self.out {
                 write_log(log, path)?;

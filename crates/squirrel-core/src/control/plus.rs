@@ -38,7 +38,7 @@ use super::wiic::Envelope;
 use super::{AttitudeThrust, Reference};
 use crate::aero::flat_plate;
 use crate::frames::{In, Ned};
-use crate::math::{GRAVITY_M_S2, limit, lower, sqrt, upper};
+use crate::math::{GRAVITY_M_S2, cos, limit, lower, sqrt, upper};
 use crate::vehicle::{ParameterError, positive};
 use nalgebra::Vector3;
 
@@ -48,6 +48,8 @@ const ROUNDS: u32 = 7;
 const TURN_M_S2: f32 = 5.0;
 /// With which a sink is turned at least, m/s^2: no thrust to spare is no reason to divide by it.
 const TURN_MIN_M_S2: f32 = 2.0;
+/// Share of the weight by which lift at the tilt limit must be above it to hold height.
+const HELD_SHARE: f32 = 0.02;
 /// First step of the search, rad.
 const STEP_RAD: f32 = 0.2;
 
@@ -61,9 +63,12 @@ pub struct Plus {
     /// `W_z`: what a vertical acceleration counts that differs from the command, over a horizontal
     /// one.
     pub vertical_weight: f32,
-    /// Height that may be lost or gained before it counts: where that much is foreseen, `W_z` is
-    /// twice as large, m.
+    /// Height that may be gained before it counts: where that much is foreseen, `W_z` is twice as
+    /// large, m. A climb brakes, and ends by itself.
     pub height_band_m: f32,
+    /// Height that may be lost before it counts, likewise, m, where thrust holds height at the tilt
+    /// limit. Where it does not, holding it would give up the way: there it is `height_band_m`.
+    pub sink_band_m: f32,
     /// Share of the way from the present to the commanded attitude for which thrust is chosen.
     pub thrust_share: f32,
     /// Share of the acceleration that rotors have to spare in level flight with which an approach
@@ -71,6 +76,9 @@ pub struct Plus {
     pub approach_share: f32,
     /// Wings open where they bring the acceleration closer to the command by this much, m/s^2.
     pub open_above_m_s2: f32,
+    /// Push of the rotors on both wings spread, in hover, N down, as far as it is known
+    /// beforehand; what is felt in flight comes on top.
+    pub wing_download_n: f32,
 }
 
 /// The vehicle in its air, in the heading frame: forward, right, down.
@@ -124,10 +132,16 @@ impl Plus {
         for (field, x) in [
             ("control.plus.vertical_weight", self.vertical_weight),
             ("control.plus.height_band_m", self.height_band_m),
+            ("control.plus.sink_band_m", self.sink_band_m),
         ] {
             if !(0.01..=100.0).contains(&x) {
                 return Err(ParameterError::of(field, x, "must be 0.01 to 100"));
             }
+        }
+        if !self.wing_download_n.is_finite() {
+            let reason = "must be finite";
+            let field = "control.plus.wing_download_n";
+            return Err(ParameterError::of(field, self.wing_download_n, reason));
         }
         positive("control.plus.approach_share", self.approach_share)?;
         positive("control.plus.open_above_m_s2", self.open_above_m_s2)
@@ -144,6 +158,16 @@ impl Plus {
         self.approach_share * upper(level - reference.acceleration.vector.xy().norm(), 0.1 * level)
     }
 
+    // By what the file says, not by what is felt: a preference that changed with the flow would
+    // chase the flight.
+    fn sink_band(&self, airframe: &OuterAirframe) -> f32 {
+        let OuterAirframe { mass_kg, envelope, .. } = *airframe;
+        let lift_n = envelope.thrust_max_n * cos(envelope.tilt_max_rad);
+        let spare = lift_n / (mass_kg * GRAVITY_M_S2 as f32) - 1.0;
+        let held = limit(spare / HELD_SHARE, 0.0, 1.0);
+        self.height_band_m + (self.sink_band_m - self.height_band_m) * held
+    }
+
     /// `W_z^2` for a height error and its rate: it grows with the error that is foreseen at the
     /// turn of a climb or sink.
     ///
@@ -153,7 +177,9 @@ impl Plus {
         let spare = believed.thrust_max_n() / believed.airframe.mass_kg - GRAVITY_M_S2 as f32;
         let turn = if down_m_s > 0.0 { limit(spare, TURN_MIN_M_S2, TURN_M_S2) } else { TURN_M_S2 };
         let foreseen_m = down_m + down_m_s * down_m_s.abs() / (2.0 * turn);
-        let share = foreseen_m / self.height_band_m;
+        let band_m =
+            if foreseen_m > 0.0 { self.sink_band(believed.airframe) } else { self.height_band_m };
+        let share = foreseen_m / band_m;
         let weight = self.vertical_weight * (1.0 + share * share);
         weight * weight
     }
@@ -278,9 +304,11 @@ mod tests {
             delay_s: 0.1,
             vertical_weight: 0.5,
             height_band_m: 1.5,
+            sink_band_m: 0.5,
             thrust_share: 0.5,
             approach_share: 0.5,
             open_above_m_s2: 0.3,
+            wing_download_n: 0.0,
         }
     }
 
@@ -374,6 +402,7 @@ mod tests {
         let weight = |down_m, down_m_s| plus.weight(&calm(&airframe), down_m, down_m_s);
         assert_eq!(weight(0.0, 0.0), 0.25);
         assert_eq!(weight(-1.5, 0.0), 1.0, "twice the weight at the band's edge");
+        assert_eq!(weight(0.5, 0.0), 1.0, "a sink counts sooner");
         let rising = weight(-1.0, -5.0);
         assert!(rising > weight(-1.0, 0.0) && weight(-1.0, 3.0) < rising);
         let brake =

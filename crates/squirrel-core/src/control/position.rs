@@ -94,7 +94,8 @@ pub struct ForceResidual {
     pub short_n: f32,
     /// Across body z.
     pub across: In<Ned, f32>,
-    /// Along body z of spread wings, beside the flat plate in still air.
+    /// Along body z of spread wings, beside the flat plate in still air and
+    /// [`wing_download_n`](super::plus::Plus::wing_download_n).
     pub wings_n: f32,
 }
 

@@ -327,7 +327,7 @@ impl TwccParameters {
             velocity: heading(&motion.velocity.vector),
             short_n: felt.short_n,
             across: heading(&felt.across.vector),
-            wings_n: felt.wings_n,
+            wings_n: plus.wing_download_n + felt.wings_n,
         };
         let (mut ahead, mut goal) = (*motion, *reference);
         if let Some(last) = state.last {

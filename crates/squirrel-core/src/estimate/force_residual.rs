@@ -58,6 +58,8 @@ pub(super) struct Step<'a> {
     pub velocity: In<Ned, f32>,
     /// Of the flat plate, m^2.
     pub wing_area_m2: f32,
+    /// Known push of the rotors on spread wings, N.
+    pub download_n: f32,
     pub weight_n: f32,
     /// Largest of the wings' commands, 0..1.
     pub wings: f32,
@@ -89,7 +91,7 @@ impl Felt {
             let velocity = (ned_from_body.inverse() * step.velocity).vector;
             let down = [0.0, 0.0, 1.0];
             let plate_n = flat_plate::plate(&velocity.into(), &down, step.wing_area_m2)[2];
-            let wings_n = (force.z - r.short_n) / spread - plate_n;
+            let wings_n = (force.z - r.short_n) / spread - plate_n - step.download_n;
             r.wings_n += (wings_n - r.wings_n) * follow(SPREAD_MEAN_S);
         } else if step.wings <= 0.0 {
             r.wings_n -= r.wings_n * follow(MEMORY_S);

@@ -61,6 +61,7 @@ impl Monitor {
     ///
     /// * `achieved` - what the mixer promised in this step; `None` where the rotors stand
     /// * `motion` - attitude and velocity over ground, as believed, where both are
+    /// * `download_n` - what is known of the rotors' push on spread wings
     /// * `wings` - largest of the wings' commands, 0..1
     pub(crate) fn look(
         &mut self,
@@ -68,6 +69,7 @@ impl Monitor {
         achieved: Option<&ThrustTorque>,
         imu: Option<&Imu>,
         motion: Option<(&Rotation<Ned, Body, f32>, In<Ned, f32>)>,
+        download_n: f32,
         wings: f32,
         dt_s: f32,
     ) {
@@ -107,6 +109,7 @@ impl Monitor {
                 ned_from_body,
                 velocity,
                 wing_area_m2: vehicle.plate_area_m2(),
+                download_n,
                 weight_n: vehicle.weight_n(),
                 wings,
                 dt_s,

@@ -241,6 +241,7 @@ impl Stack {
             achieved,
             navigated.frame.imu.as_ref(),
             attitude.zip(gnss).map(|(attitude, gnss)| (attitude, gnss.velocity)),
+            self.parameters.twcc.plus.map_or(0.0, |plus| plus.wing_download_n),
             state.wing_command,
             dt_s,
         );

@@ -4,7 +4,6 @@ use super::integrator::Contact;
 use super::surroundings::Surroundings;
 use crate::plant::PlantState;
 use crate::scenario::Scenario;
-use crate::setting::SettingError;
 use serde::Serialize;
 use squirrel_core::control::Reference;
 use squirrel_core::control::twcc::Mode;
@@ -14,7 +13,8 @@ use squirrel_core::nalgebra::{Vector2, Vector3};
 use squirrel_core::stack::failsafe::FailsafeReason;
 use squirrel_core::stack::{SensorFrame, StackOutput};
 
-/// Figures of one flight, over the measured window.
+/// Figures of one flight, over the measured window; over the whole flight where the window's
+/// encounter never came, `encounters` being 0.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Metrics {
     /// Root mean square of the distance to the reference, m.
@@ -98,18 +98,24 @@ pub(super) struct Meter<'a> {
     start_us: Option<u64>,
     last_us: u64,
     over: bool,
+    sums: Sums,
+    altitude_m: Option<f32>,
+    mode: Mode,
+    faults_from_s: f64,
+    metrics: Metrics,
+}
+
+/// What is summed up over the measured window.
+#[derive(Default)]
+struct Sums {
     samples: u64,
     square: f64,
     square_horizontal: f64,
-    altitude_m: Option<f32>,
     fixes: u64,
     square_measured: f64,
     volt: f64,
     wings_us: u64,
     wiic_us: u64,
-    mode: Mode,
-    faults_from_s: f64,
-    metrics: Metrics,
 }
 
 impl<'a> Meter<'a> {
@@ -142,15 +148,8 @@ impl<'a> Meter<'a> {
             start_us: None,
             last_us: 0,
             over: false,
-            samples: 0,
-            square: 0.0,
-            square_horizontal: 0.0,
+            sums: Sums::default(),
             altitude_m: None,
-            fixes: 0,
-            square_measured: 0.0,
-            volt: 0.0,
-            wings_us: 0,
-            wiic_us: 0,
             mode: Mode::Primary,
             faults_from_s: if first.is_finite() { first } else { 0.0 },
             metrics,
@@ -191,34 +190,41 @@ impl<'a> Meter<'a> {
         let at = state.body.position.vector;
         self.pass(at.xy(), obstacles);
         let windowed = self.scenario.measured_window_s > 0.0;
-        if self.start_us.is_none() && (!windowed || encounters > 0) {
-            self.start_us = Some(time_us);
+        if self.start_us.is_none() && windowed && encounters > 0 {
+            self.begin(time_us);
         }
-        let Some(start_us) = self.start_us else { return };
-        let elapsed_s = (time_us - start_us) as f64 * 1e-6;
-        if windowed && elapsed_s > self.scenario.measured_window_s {
+        let elapsed_s = (time_us - self.start_us.unwrap_or(0)) as f64 * 1e-6;
+        if self.start_us.is_some() && elapsed_s > self.scenario.measured_window_s {
             self.over = true;
             return;
         }
         let error = at - reference.position.vector.cast::<f64>();
-        self.samples += 1;
-        self.square += error.norm_squared();
-        self.square_horizontal += error.xy().norm_squared();
+        let sums = &mut self.sums;
+        sums.samples += 1;
+        sums.square += error.norm_squared();
+        sums.square_horizontal += error.xy().norm_squared();
         if let (Some(fix), Some(altitude_m)) = (&frame.gnss, self.altitude_m) {
             let at = Vector3::new(fix.position.vector.x, fix.position.vector.y, -altitude_m);
-            self.fixes += 1;
-            self.square_measured += f64::from((at - reference.position.vector).norm_squared());
+            sums.fixes += 1;
+            sums.square_measured += f64::from((at - reference.position.vector).norm_squared());
         }
-        self.volt += state.battery.voltage_v;
+        sums.volt += state.battery.voltage_v;
         self.metrics.window_s = elapsed_s;
         self.metrics.height_lost_m = self.metrics.height_lost_m.max(error.z);
         self.metrics.height_gained_m = self.metrics.height_gained_m.max(-error.z);
         if state.deployment().iter().sum::<f64>() > 1.0 {
-            self.wings_us += step_us;
+            sums.wings_us += step_us;
         }
         if self.mode == Mode::WingsOpen {
-            self.wiic_us += step_us;
+            sums.wiic_us += step_us;
         }
+    }
+
+    /// The window begins: what was before does not count.
+    fn begin(&mut self, time_us: u64) {
+        self.start_us = Some(time_us);
+        self.sums = Sums::default();
+        (self.metrics.height_lost_m, self.metrics.height_gained_m) = (0.0, 0.0);
     }
 
     /// What it passes, and how far it has come.
@@ -262,21 +268,16 @@ impl<'a> Meter<'a> {
         self.over
     }
 
-    /// # Errors
-    /// The measured window never began: a flight without an encounter has no error to report.
-    pub(super) fn finish(mut self) -> Result<Metrics, SettingError> {
-        if self.samples == 0 {
-            let reason = "no encounter in that time, so there is nothing to measure";
-            return Err(SettingError::value("duration_s", self.scenario.duration_s, reason));
-        }
-        let n = self.samples as f64;
-        self.metrics.rmse_m = (self.square / n).sqrt();
-        self.metrics.rmse_horizontal_m = (self.square_horizontal / n).sqrt();
+    pub(super) fn finish(mut self) -> Metrics {
+        let sums = self.sums;
+        let n = sums.samples.max(1) as f64;
+        self.metrics.rmse_m = (sums.square / n).sqrt();
+        self.metrics.rmse_horizontal_m = (sums.square_horizontal / n).sqrt();
         self.metrics.rmse_measured_m =
-            (self.fixes > 0).then(|| (self.square_measured / self.fixes as f64).sqrt());
-        self.metrics.voltage_mean_v = self.volt / n;
-        self.metrics.wings_open_s = self.wings_us as f64 * 1e-6;
-        self.metrics.wiic_s = self.wiic_us as f64 * 1e-6;
-        Ok(self.metrics)
+            (sums.fixes > 0).then(|| (sums.square_measured / sums.fixes as f64).sqrt());
+        self.metrics.voltage_mean_v = sums.volt / n;
+        self.metrics.wings_open_s = sums.wings_us as f64 * 1e-6;
+        self.metrics.wiic_s = sums.wiic_us as f64 * 1e-6;
+        self.metrics
     }
 }

@@ -510,8 +510,12 @@ fn plus(t: &PlusTable, position: &PositionGains) -> Plus {
         delay_s: t.delay_s.0 as f32,
         vertical_weight: t.vertical_weight.0 as f32,
         height_band_m: t.height_band_m.0 as f32,
+        // Files of before this number have one band.
+        sink_band_m: t.sink_band_m.as_ref().unwrap_or(&t.height_band_m).0 as f32,
         thrust_share: t.thrust_share.0 as f32,
         approach_share: t.approach_share.0 as f32,
         open_above_m_s2: t.open_above_m_s2.0 as f32,
+        // The flight's effects say it.
+        wing_download_n: 0.0,
     }
 }

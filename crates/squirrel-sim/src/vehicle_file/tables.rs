@@ -247,6 +247,7 @@ pub(super) struct PlusTable {
     pub(super) delay_s: Number,
     pub(super) vertical_weight: Number,
     pub(super) height_band_m: Number,
+    pub(super) sink_band_m: Option<Number>,
     pub(super) thrust_share: Number,
     #[serde(default = "approach_share")]
     pub(super) approach_share: Number,

@@ -245,7 +245,7 @@ wire_struct! {
     TwccParameters {
         position, wing_events, thrust_law, trigger, force_model, policy, dwell_s, thrust_min_n, plus,
     }
-    Plus { position, delay_s, vertical_weight, height_band_m, thrust_share, approach_share, open_above_m_s2 }
+    Plus { position, delay_s, vertical_weight, height_band_m, sink_band_m, thrust_share, approach_share, open_above_m_s2, wing_download_n }
     PositionGains {
         position_per_s, velocity_per_s, integral_per_s2, derivative, velocity_feed_forward, acceleration_feed_forward, approach_max_m_s2,
         speed_max_m_s, acceleration_max_horizontal_m_s2, acceleration_max_vertical_m_s2, integral_max_m, angle_law,
