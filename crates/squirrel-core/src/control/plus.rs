@@ -284,7 +284,7 @@ impl Demand<'_> {
 #[cfg(test)]
 mod tests {
     use super::super::position::fixtures::{at, gains, still};
-    use super::super::position::{AngleLaw, MeasuredMotion};
+    use super::super::position::{AngleLaw, ForceResidual, MeasuredMotion};
     use super::super::twcc::fixtures::{airframe, parameters};
     use super::super::twcc::{Reason, TwccParameters, TwccState, TwccTerms, WingPolicy};
     use super::*;
@@ -324,7 +324,17 @@ mod tests {
 
     /// Braking from 7 m/s, level, the goal here.
     fn tick(p: &TwccParameters, state: &mut TwccState, thrust_max_n: f32) -> TwccTerms {
-        let motion = MeasuredMotion { velocity: In::new(Vector3::new(7.0, 0.0, 0.0)), ..still() };
+        tick_with(p, state, thrust_max_n, ForceResidual::default())
+    }
+
+    fn tick_with(
+        p: &TwccParameters,
+        state: &mut TwccState,
+        thrust_max_n: f32,
+        residual: ForceResidual,
+    ) -> TwccTerms {
+        let velocity = In::new(Vector3::new(7.0, 0.0, 0.0));
+        let motion = MeasuredMotion { velocity, residual, ..still() };
         let mut airframe = airframe();
         airframe.envelope.thrust_max_n = thrust_max_n;
         p.update(
@@ -392,6 +402,43 @@ mod tests {
         assert_eq!(theirs.wing_command, 0.0);
         let folded = TwccParameters { policy: WingPolicy::Folded, ..p };
         assert_eq!(tick(&folded, &mut TwccState::default(), 6.45).wing_command, 0.0);
+    }
+
+    /// The same turn, after wings that were open were felt to be pushed down, or where the file says
+    /// beforehand that they are.
+    #[test]
+    fn wings_that_harm_stay_folded() {
+        let opened = |residual_n: f32, download_n: f32| {
+            let plus = Plus { wing_download_n: download_n, ..plus() };
+            let residual = ForceResidual { wings_n: residual_n, ..ForceResidual::default() };
+            let p = TwccParameters { plus: Some(plus), ..parameters() };
+            tick_with(&p, &mut TwccState::default(), 6.45, residual).wing_command
+        };
+        assert_eq!(opened(0.0, 0.0), 1.0);
+        assert_eq!(opened(2.5, 0.0), 0.0);
+        assert_eq!(opened(0.0, 2.5), 0.0);
+        assert_eq!(opened(-2.5, 2.5), 1.0, "felt to be no push after all");
+    }
+
+    /// Thrust that is short is asked for on top, and drag is left to do its part.
+    #[test]
+    fn what_is_felt_is_made_up_for() {
+        let p = TwccParameters { plus: Some(plus()), policy: WingPolicy::Folded, ..parameters() };
+        let hover = |residual| {
+            let airframe = airframe();
+            let motion = MeasuredMotion { residual, ..still() };
+            let attitude = Rotation::<Ned, Body, f32>::identity();
+            let (state, goal) = (&mut TwccState::default(), at(0.0, 0.0, 0.0));
+            p.update(state, &airframe, &motion, &attitude, None, &goal, 0.1).command
+        };
+        let none = hover(ForceResidual::default());
+        let short = hover(ForceResidual { short_n: 0.8, ..ForceResidual::default() });
+        assert!((short.thrust_n - none.thrust_n - 0.8).abs() < 0.01, "{short:?} {none:?}");
+        let across = In::new(Vector3::new(-1.0, 0.0, 0.0));
+        let blown = hover(ForceResidual { across, ..ForceResidual::default() });
+        // Nose down against a push to the south: tan = F / (m g).
+        let wanted = -libm::atanf(1.0 / (0.548 * GRAVITY_M_S2 as f32));
+        assert!((blown.pitch_rad - wanted).abs() < 0.01, "{blown:?}");
     }
 
     /// What is foreseen 4 m above the reference weighs so much that hardly any thrust is left.

@@ -107,3 +107,74 @@ impl Felt {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WEIGHT_N: f32 = 5.4;
+    const AREA_M2: f32 = 0.04;
+
+    /// What is felt of a force on a level body, for a while.
+    fn feels(felt: &mut Felt, force: [f32; 3], velocity: [f32; 3], wings: f32, seconds: f32) {
+        let step = Step {
+            force: force.into(),
+            ned_from_body: &Rotation::identity(),
+            velocity: In::new(velocity.into()),
+            wing_area_m2: AREA_M2,
+            download_n: 0.0,
+            weight_n: WEIGHT_N,
+            wings,
+            dt_s: 1.0 / 300.0,
+        };
+        for _ in 0..(seconds * 300.0) as u32 {
+            felt.look(&step);
+        }
+    }
+
+    #[test]
+    fn thrust_that_is_short_and_drag_are_felt_within_a_second() {
+        let mut felt = Felt::default();
+        feels(&mut felt, [-0.6, 0.2, 0.8], [5.0, 0.0, 0.0], 0.0, 1.5);
+        let r = felt.residual();
+        assert!((r.short_n - 0.8).abs() < 0.02 && r.wings_n == 0.0, "{r:?}");
+        assert!((r.across.vector - Vector3::new(-0.6, 0.2, 0.0)).norm() < 0.02, "{r:?}");
+        // Wings that open do not make thrust short.
+        feels(&mut felt, [-0.6, 0.2, 2.8], [5.0, 0.0, 0.0], 1.0, 1.0);
+        assert!((felt.residual().short_n - 0.8).abs() < 0.02, "{:?}", felt.residual());
+    }
+
+    /// A wash of 1.5 N on wings that nobody expects: known before the wings have been spread for a
+    /// tenth of a second, kept while they are folded, forgotten in a minute.
+    #[test]
+    fn wings_that_are_pushed_down_are_felt_and_remembered() {
+        let mut felt = Felt::default();
+        feels(&mut felt, [0.0, 0.0, 1.5], [0.0; 3], 1.0, SPREADING_S + 0.1);
+        assert!((felt.residual().wings_n - 1.5).abs() < 0.3, "{:?}", felt.residual());
+        feels(&mut felt, [0.0; 3], [0.0; 3], 0.0, 2.0);
+        assert!(felt.residual().wings_n > 1.0, "{:?}", felt.residual());
+        feels(&mut felt, [0.0; 3], [0.0; 3], 0.0, 60.0);
+        assert!(felt.residual().wings_n < 0.02, "{:?}", felt.residual());
+    }
+
+    /// Falling at 4 m/s on a plate: -rho A v^2, which is expected.
+    #[test]
+    fn the_plate_itself_is_no_residual() {
+        let mut felt = Felt::default();
+        let plate_n = -1.225 * AREA_M2 * 16.0;
+        feels(&mut felt, [0.0, 0.0, plate_n], [0.0, 0.0, 4.0], 1.0, 1.0);
+        assert!(felt.residual().wings_n.abs() < 0.02, "{:?}", felt.residual());
+    }
+
+    /// On the ground the ground carries: not a sign that rotors push twice as hard.
+    #[test]
+    fn what_is_felt_is_bounded_and_finite() {
+        let mut felt = Felt::default();
+        feels(&mut felt, [1e6, 0.0, -WEIGHT_N], [0.0; 3], 0.0, 2.0);
+        let r = felt.residual();
+        assert_eq!(r.short_n, -SPARE_MAX * WEIGHT_N);
+        assert!(r.across.vector.norm() <= 1.001 * WEIGHT_N, "{r:?}");
+        feels(&mut felt, [f32::NAN, 0.0, 0.0], [0.0; 3], 1.0, 0.1);
+        assert_eq!(felt.residual(), ForceResidual::default());
+    }
+}

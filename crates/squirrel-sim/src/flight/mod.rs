@@ -119,13 +119,9 @@ impl Setup {
         self.arm
             .configure(&mut parameters.twcc, self.vehicle.weights.as_ref())
             .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
-        if let Some(plus) = &mut parameters.twcc.plus {
-            if let Some(speed) = self.scenario.speed_max_m_s {
-                plus.position.speed_max_m_s = speed as f32;
-            }
-            let means = self.vehicle.means().map_err(FlightError)?;
-            let download_n = means.wing_download_in_hover_n;
-            plus.wing_download_n = download_n.unwrap_or(0.0) as f32;
+        if let (Some(plus), Some(speed)) = (&mut parameters.twcc.plus, self.scenario.speed_max_m_s)
+        {
+            plus.position.speed_max_m_s = speed as f32;
         }
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
         parameters.navigation = self.navigation()?;

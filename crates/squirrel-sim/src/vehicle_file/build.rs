@@ -89,6 +89,8 @@ pub(super) fn build(
         }
     }
     let control = t.control.as_ref().map(control);
+    let download_is_given = t.control.as_ref().and_then(|control| control.plus.as_ref());
+    let download_is_given = download_is_given.is_some_and(|plus| plus.wing_download_n.is_some());
     if let Some(gains) = &control {
         gains.attitude.check().map_err(|e| e.to_string())?;
         gains
@@ -97,7 +99,7 @@ pub(super) fn build(
             .map_err(|e| e.to_string())?;
     }
     t.sensors.check()?;
-    Ok(VehicleFile {
+    let mut built = VehicleFile {
         name: t.name,
         text: String::new(),
         vehicle,
@@ -114,7 +116,14 @@ pub(super) fn build(
         sensors: t.sensors,
         effects: effects(t.effects, &vehicle)?,
         provenance: Vec::new(),
-    })
+    };
+    if !download_is_given && built.effects.any() {
+        let download_n = built.means()?.wing_download_in_hover_n;
+        if let Some(plus) = built.control.as_mut().and_then(|control| control.twcc.plus.as_mut()) {
+            plus.wing_download_n = download_n.unwrap_or(0.0) as f32;
+        }
+    }
+    Ok(built)
 }
 
 /// Thrust and torque of each rotor over what the propulsion numbers give.
@@ -515,7 +524,6 @@ fn plus(t: &PlusTable, position: &PositionGains) -> Plus {
         thrust_share: t.thrust_share.0 as f32,
         approach_share: t.approach_share.0 as f32,
         open_above_m_s2: t.open_above_m_s2.0 as f32,
-        // The flight's effects say it.
-        wing_download_n: 0.0,
+        wing_download_n: t.wing_download_n.as_ref().map_or(0.0, |n| n.0 as f32),
     }
 }

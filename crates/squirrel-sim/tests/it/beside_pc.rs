@@ -26,6 +26,34 @@ fn what_the_simplest_controller_holds_is_held() {
     assert!(worse.is_empty(), "{}", worse.join("\n"));
 }
 
+/// From behind, the air pushes wings down that the flat plate in still air believes to carry: they
+/// must be folded again as soon as that is felt. Mean error and sink of the avoidance manoeuvre.
+#[test]
+fn wings_do_no_harm_in_a_tail_wind() {
+    let vehicle = VehicleFile::squirrel();
+    let fly = |arm, wind_m_s: f64| -> [f64; 2] {
+        let flown = SEEDS.map(|seed| {
+            let avoid = Scenario::find("avoid").unwrap();
+            let mut scenario = Scenario { seed, thrust_to_weight: Some(1.2), ..avoid };
+            (scenario.duration_s, scenario.measured_window_s) = (25.0, 18.0);
+            scenario.wind.mean_ned_m_s = [wind_m_s, 0.0, 0.0];
+            let setup =
+                Setup { vehicle: vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 };
+            setup.fly(false, |_| ()).unwrap().metrics
+        });
+        let mean = |figure: fn(&Metrics) -> f64| {
+            flown.iter().map(figure).sum::<f64>() / SEEDS.len() as f64
+        };
+        [mean(|m| m.rmse_m), mean(|m| m.height_lost_m)]
+    };
+    for wind_m_s in [3.0, 5.0, 8.0] {
+        let ([ours_m, sink_m], [rival_m, _]) =
+            (fly(Arm::TwccPlus, wind_m_s), fly(Arm::PcPlus, wind_m_s));
+        assert!(ours_m < 1.05 * rival_m, "{wind_m_s} m/s: {ours_m} m, folded {rival_m} m");
+        assert!(sink_m < 1.5, "{wind_m_s} m/s: sinks {sink_m} m");
+    }
+}
+
 fn worse_than_pc(vehicle: &VehicleFile) -> Vec<String> {
     let mut worse = Vec::new();
     for scenario in BUILT_IN {
