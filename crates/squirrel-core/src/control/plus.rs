@@ -21,9 +21,9 @@
 //!   it brakes;
 //! - height is part of the residual with the weight `W_z`, so that it is held unless the horizontal
 //!   gains more; a sink weighs the more the less thrust there is to end it;
-//! - what the inertial unit feels beside all this is added ([`super::position::ForceResidual`]): thrust that is
-//!   short, drag and wind, and what spread wings did beside the plate, so that wings which harm fold
-//!   again, and stay folded for a while;
+//! - what the inertial unit feels along body z beside all this is added
+//!   ([`super::position::ForceResidual`]): thrust that is short, and what spread wings did beside
+//!   the plate, so that wings which harm fold again, and stay folded for a while;
 //! - the way to the reference is flown no faster than rotors alone can brake it beside what the
 //!   reference itself asks for;
 //! - velocity and acceleration of the reference are fed forward by the position loop
@@ -48,8 +48,8 @@ const ROUNDS: u32 = 7;
 const TURN_M_S2: f32 = 5.0;
 /// With which a sink is turned at least, m/s^2: no thrust to spare is no reason to divide by it.
 const TURN_MIN_M_S2: f32 = 2.0;
-/// Share of the weight by which lift at the tilt limit must be above it to hold height.
-const HELD_SHARE: f32 = 0.02;
+/// Share of the weight by which lift at the tilt limit must be above it to hold height and the way.
+const HELD_SHARE: f32 = 0.08;
 /// First step of the search, rad.
 const STEP_RAD: f32 = 0.2;
 
@@ -67,7 +67,8 @@ pub struct Plus {
     /// large, m. A climb brakes, and ends by itself.
     pub height_band_m: f32,
     /// Height that may be lost before it counts, likewise, m, where thrust holds height at the tilt
-    /// limit. Where it does not, holding it would give up the way: there it is `height_band_m`.
+    /// limit with something to spare. Where it does not, holding it would give up the way: there it
+    /// is `height_band_m`.
     pub sink_band_m: f32,
     /// Share of the way from the present to the commanded attitude for which thrust is chosen.
     pub thrust_share: f32,
@@ -90,8 +91,6 @@ pub(super) struct Believed<'a> {
     pub(super) velocity: Vector3<f32>,
     /// Thrust that is short, N: see [`super::position::ForceResidual`].
     pub(super) short_n: f32,
-    /// Force across the thrust, N.
-    pub(super) across: Vector3<f32>,
     /// What spread wings do beside the flat plate, along body z, N.
     pub(super) wings_n: f32,
 }
@@ -234,7 +233,7 @@ impl Believed<'_> {
 
     /// All but the thrust that is asked for, m/s^2.
     fn free_of_thrust(&self, n: &Vector3<f32>, wings: f32) -> Vector3<f32> {
-        let force = self.wings(n, wings) + self.across + n * self.short_n;
+        let force = self.wings(n, wings) + n * self.short_n;
         force / self.airframe.mass_kg + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32)
     }
 }
@@ -313,8 +312,7 @@ mod tests {
     }
 
     fn calm(airframe: &OuterAirframe) -> Believed<'_> {
-        let none = Vector3::zeros();
-        Believed { airframe, velocity: none, short_n: 0.0, across: none, wings_n: 0.0 }
+        Believed { airframe, velocity: Vector3::zeros(), short_n: 0.0, wings_n: 0.0 }
     }
 
     fn demand(airframe: &OuterAirframe, acceleration: [f32; 3], velocity: [f32; 3]) -> Demand<'_> {
@@ -420,7 +418,7 @@ mod tests {
         assert_eq!(opened(-2.5, 2.5), 1.0, "felt to be no push after all");
     }
 
-    /// Thrust that is short is asked for on top, and drag is left to do its part.
+    /// Thrust that is short is asked for on top.
     #[test]
     fn what_is_felt_is_made_up_for() {
         let p = TwccParameters { plus: Some(plus()), policy: WingPolicy::Folded, ..parameters() };
@@ -434,11 +432,6 @@ mod tests {
         let none = hover(ForceResidual::default());
         let short = hover(ForceResidual { short_n: 0.8, ..ForceResidual::default() });
         assert!((short.thrust_n - none.thrust_n - 0.8).abs() < 0.01, "{short:?} {none:?}");
-        let across = In::new(Vector3::new(-1.0, 0.0, 0.0));
-        let blown = hover(ForceResidual { across, ..ForceResidual::default() });
-        // Nose down against a push to the south: tan = F / (m g).
-        let wanted = -libm::atanf(1.0 / (0.548 * GRAVITY_M_S2 as f32));
-        assert!((blown.pitch_rad - wanted).abs() < 0.01, "{blown:?}");
     }
 
     /// What is foreseen 4 m above the reference weighs so much that hardly any thrust is left.

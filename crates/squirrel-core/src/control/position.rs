@@ -87,14 +87,12 @@ pub struct PositionTerms {
     pub request: AttitudeThrust,
 }
 
-/// Force that nobody commanded, as felt, N: what [`super::plus`] adds to what it believes.
+/// Force along body z that nobody commanded, as felt, N: what [`super::plus`] adds to what it believes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ForceResidual {
-    /// Along body z, wings folded: thrust that is short.
+    /// With wings folded: thrust that is short.
     pub short_n: f32,
-    /// Across body z.
-    pub across: In<Ned, f32>,
-    /// Along body z of spread wings, beside the flat plate in still air and
+    /// Of spread wings, beside the flat plate in still air and
     /// [`wing_download_n`](super::plus::Plus::wing_download_n).
     pub wings_n: f32,
 }

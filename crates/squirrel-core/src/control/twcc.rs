@@ -326,7 +326,6 @@ impl TwccParameters {
             airframe,
             velocity: heading(&motion.velocity.vector),
             short_n: felt.short_n,
-            across: heading(&felt.across.vector),
             wings_n: plus.wing_download_n + felt.wings_n,
         };
         let (mut ahead, mut goal) = (*motion, *reference);

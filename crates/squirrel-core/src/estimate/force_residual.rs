@@ -1,13 +1,13 @@
-//! Force that nobody commanded: what the inertial unit feels beside the thrust that the mixer
-//! promised and, with wings spread, beside the flat plate (incremental inversion: Smeur, de Croon
+//! Force along body z that nobody commanded: what the inertial unit feels beside the thrust that the
+//! mixer promised and, with wings spread, beside the flat plate (incremental inversion: Smeur, de Croon
 //! and Chu, JGCD 39(3), 2016; docs/equations.md E.6).
 //!
 //! ```text
-//! folded    r_z  = m f_z + T              r_xy = m f_xy           means over 0.3 s
+//! folded    r_z  = m f_z + T                                      mean over 0.3 s
 //! spread    w_z  = (m f_z + T - r_z) / d - N_z                    mean over 0.05 s
 //! ```
-//! `d` is how far they are spread. `r_z` goes with the body (thrust that is short: sag, inflow, load), `r_xy` with the world (drag,
-//! wind); `r_z` rests while wings are not folded. `w_z` is what spread wings do beside the plate in
+//! `d` is how far they are spread. `r_z` is thrust that is short (sag, inflow, load); it rests while wings
+//! are not folded. `w_z` is what spread wings do beside the plate in
 //! still air: wind, the rotors' wash, a wing that is weaker. It is kept after they fold and
 //! forgotten slowly, so that wings that harmed open again no sooner than that.
 
@@ -15,7 +15,6 @@ use crate::aero::flat_plate;
 use crate::control::position::ForceResidual;
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::math::{limit, lower};
-use nalgebra::Vector3;
 
 /// Time constant of what is felt with wings folded, s.
 const FOLDED_MEAN_S: f32 = 0.3;
@@ -51,8 +50,8 @@ impl Default for Felt {
 /// What a step brings.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step<'a> {
-    /// `m f + T e_3`, N.
-    pub force: Vector3<f32>,
+    /// `m f_z + T`, N.
+    pub force_n: f32,
     pub ned_from_body: &'a Rotation<Ned, Body, f32>,
     /// Over ground, m/s.
     pub velocity: In<Ned, f32>,
@@ -72,7 +71,7 @@ impl Felt {
     }
 
     pub(super) fn look(&mut self, step: &Step<'_>) {
-        let Step { force, ned_from_body, weight_n, dt_s, .. } = *step;
+        let Step { force_n, ned_from_body, weight_n, dt_s, .. } = *step;
         let before = *self;
         if step.wings > 0.0 {
             (self.spread_s, self.folded_s) = (lower(self.spread_s + dt_s, SPREADING_S), 0.0);
@@ -81,28 +80,22 @@ impl Felt {
         }
         let r = &mut self.residual;
         let follow = |mean_s: f32| dt_s / (dt_s + mean_s);
-        let across = *ned_from_body * In::new(Vector3::new(force.x, force.y, 0.0));
-        r.across.vector += (across.vector - r.across.vector) * follow(FOLDED_MEAN_S);
         if self.folded_s >= FOLDING_S {
-            r.short_n += (force.z - r.short_n) * follow(FOLDED_MEAN_S);
+            r.short_n += (force_n - r.short_n) * follow(FOLDED_MEAN_S);
         }
         let spread = step.wings * self.spread_s / SPREADING_S;
         if spread >= SPREAD_ENOUGH {
             let velocity = (ned_from_body.inverse() * step.velocity).vector;
             let down = [0.0, 0.0, 1.0];
             let plate_n = flat_plate::plate(&velocity.into(), &down, step.wing_area_m2)[2];
-            let wings_n = (force.z - r.short_n) / spread - plate_n - step.download_n;
+            let wings_n = (force_n - r.short_n) / spread - plate_n - step.download_n;
             r.wings_n += (wings_n - r.wings_n) * follow(SPREAD_MEAN_S);
         } else if step.wings <= 0.0 {
             r.wings_n -= r.wings_n * follow(MEMORY_S);
         }
         r.short_n = limit(r.short_n, -SPARE_MAX * weight_n, SHORT_MAX * weight_n);
         r.wings_n = limit(r.wings_n, -weight_n, weight_n);
-        let across_n = r.across.vector.norm();
-        if across_n > weight_n {
-            r.across.vector *= weight_n / across_n;
-        }
-        if !(r.short_n.is_finite() && r.wings_n.is_finite() && across_n.is_finite()) {
+        if !(r.short_n.is_finite() && r.wings_n.is_finite()) {
             *self = Self { residual: ForceResidual::default(), ..before };
         }
     }
@@ -116,9 +109,9 @@ mod tests {
     const AREA_M2: f32 = 0.04;
 
     /// What is felt of a force on a level body, for a while.
-    fn feels(felt: &mut Felt, force: [f32; 3], velocity: [f32; 3], wings: f32, seconds: f32) {
+    fn feels(felt: &mut Felt, force_n: f32, velocity: [f32; 3], wings: f32, seconds: f32) {
         let step = Step {
-            force: force.into(),
+            force_n,
             ned_from_body: &Rotation::identity(),
             velocity: In::new(velocity.into()),
             wing_area_m2: AREA_M2,
@@ -133,14 +126,13 @@ mod tests {
     }
 
     #[test]
-    fn thrust_that_is_short_and_drag_are_felt_within_a_second() {
+    fn thrust_that_is_short_is_felt_within_a_second() {
         let mut felt = Felt::default();
-        feels(&mut felt, [-0.6, 0.2, 0.8], [5.0, 0.0, 0.0], 0.0, 1.5);
+        feels(&mut felt, 0.8, [5.0, 0.0, 0.0], 0.0, 1.5);
         let r = felt.residual();
         assert!((r.short_n - 0.8).abs() < 0.02 && r.wings_n == 0.0, "{r:?}");
-        assert!((r.across.vector - Vector3::new(-0.6, 0.2, 0.0)).norm() < 0.02, "{r:?}");
         // Wings that open do not make thrust short.
-        feels(&mut felt, [-0.6, 0.2, 2.8], [5.0, 0.0, 0.0], 1.0, 1.0);
+        feels(&mut felt, 2.8, [5.0, 0.0, 0.0], 1.0, 1.0);
         assert!((felt.residual().short_n - 0.8).abs() < 0.02, "{:?}", felt.residual());
     }
 
@@ -149,11 +141,11 @@ mod tests {
     #[test]
     fn wings_that_are_pushed_down_are_felt_and_remembered() {
         let mut felt = Felt::default();
-        feels(&mut felt, [0.0, 0.0, 1.5], [0.0; 3], 1.0, SPREADING_S + 0.1);
+        feels(&mut felt, 1.5, [0.0; 3], 1.0, SPREADING_S + 0.1);
         assert!((felt.residual().wings_n - 1.5).abs() < 0.3, "{:?}", felt.residual());
-        feels(&mut felt, [0.0; 3], [0.0; 3], 0.0, 2.0);
+        feels(&mut felt, 0.0, [0.0; 3], 0.0, 2.0);
         assert!(felt.residual().wings_n > 1.0, "{:?}", felt.residual());
-        feels(&mut felt, [0.0; 3], [0.0; 3], 0.0, 60.0);
+        feels(&mut felt, 0.0, [0.0; 3], 0.0, 60.0);
         assert!(felt.residual().wings_n < 0.02, "{:?}", felt.residual());
     }
 
@@ -162,7 +154,7 @@ mod tests {
     fn the_plate_itself_is_no_residual() {
         let mut felt = Felt::default();
         let plate_n = -1.225 * AREA_M2 * 16.0;
-        feels(&mut felt, [0.0, 0.0, plate_n], [0.0, 0.0, 4.0], 1.0, 1.0);
+        feels(&mut felt, plate_n, [0.0, 0.0, 4.0], 1.0, 1.0);
         assert!(felt.residual().wings_n.abs() < 0.02, "{:?}", felt.residual());
     }
 
@@ -170,11 +162,10 @@ mod tests {
     #[test]
     fn what_is_felt_is_bounded_and_finite() {
         let mut felt = Felt::default();
-        feels(&mut felt, [1e6, 0.0, -WEIGHT_N], [0.0; 3], 0.0, 2.0);
+        feels(&mut felt, -WEIGHT_N, [0.0; 3], 0.0, 2.0);
         let r = felt.residual();
         assert_eq!(r.short_n, -SPARE_MAX * WEIGHT_N);
-        assert!(r.across.vector.norm() <= 1.001 * WEIGHT_N, "{r:?}");
-        feels(&mut felt, [f32::NAN, 0.0, 0.0], [0.0; 3], 1.0, 0.1);
+        feels(&mut felt, f32::NAN, [0.0; 3], 1.0, 0.1);
         assert_eq!(felt.residual(), ForceResidual::default());
     }
 }

@@ -104,8 +104,7 @@ impl Monitor {
         };
         if let Some((ned_from_body, velocity)) = motion {
             self.felt.look(&Step {
-                force: imu.specific_force.vector * p.mass_kg
-                    + Vector3::new(0.0, 0.0, self.commanded.thrust_n),
+                force_n: self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z,
                 ned_from_body,
                 velocity,
                 wing_area_m2: vehicle.plate_area_m2(),

@@ -47,10 +47,11 @@ fn wings_do_no_harm_in_a_tail_wind() {
         [mean(|m| m.rmse_m), mean(|m| m.height_lost_m)]
     };
     for wind_m_s in [3.0, 5.0, 8.0] {
-        let ([ours_m, sink_m], [rival_m, _]) =
+        let ([ours_m, sink_m], [rival_m, rival_sink_m]) =
             (fly(Arm::TwccPlus, wind_m_s), fly(Arm::PcPlus, wind_m_s));
         assert!(ours_m < 1.05 * rival_m, "{wind_m_s} m/s: {ours_m} m, folded {rival_m} m");
-        assert!(sink_m < 1.5, "{wind_m_s} m/s: sinks {sink_m} m");
+        let most_m = rival_sink_m + 0.2;
+        assert!(sink_m < most_m, "{wind_m_s} m/s: sinks {sink_m} m, folded {rival_sink_m} m");
     }
 }
 
