@@ -56,23 +56,28 @@ impl Default for Monitor {
     }
 }
 
+/// What a step is looked at by.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seen<'a> {
+    /// What the mixer promised; `None` where the rotors stand.
+    pub achieved: Option<&'a ThrustTorque>,
+    pub imu: Option<&'a Imu>,
+    /// As believed.
+    pub attitude: Option<&'a Rotation<Ned, Body, f32>>,
+    /// Over ground, as believed, m/s.
+    pub velocity: Option<In<Ned, f32>>,
+    /// What is known of the rotors' push on spread wings, N.
+    pub download_n: f32,
+    /// Largest of the wings' commands, 0..1.
+    pub wings: f32,
+    /// Since the last step, s.
+    pub dt_s: f32,
+}
+
 impl Monitor {
     /// Looks at a step.
-    ///
-    /// * `achieved` - what the mixer promised in this step; `None` where the rotors stand
-    /// * `motion` - attitude and velocity over ground, as believed, where both are
-    /// * `download_n` - what is known of the rotors' push on spread wings
-    /// * `wings` - largest of the wings' commands, 0..1
-    pub(crate) fn look(
-        &mut self,
-        vehicle: &Vehicle<f32>,
-        achieved: Option<&ThrustTorque>,
-        imu: Option<&Imu>,
-        motion: Option<(&Rotation<Ned, Body, f32>, In<Ned, f32>)>,
-        download_n: f32,
-        wings: f32,
-        dt_s: f32,
-    ) {
+    pub(crate) fn look(&mut self, vehicle: &Vehicle<f32>, seen: &Seen<'_>) {
+        let Seen { achieved, imu, wings, dt_s, .. } = *seen;
         let Some(achieved) = achieved else {
             *self = Self::default();
             return;
@@ -102,13 +107,13 @@ impl Monitor {
         } else {
             0.0
         };
-        if let Some((ned_from_body, velocity)) = motion {
+        if let (Some(ned_from_body), Some(velocity)) = (seen.attitude, seen.velocity) {
             self.felt.look(&Step {
                 force_n: self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z,
                 ned_from_body,
                 velocity,
                 wing_area_m2: vehicle.plate_area_m2(),
-                download_n,
+                download_n: seen.download_n,
                 weight_n: vehicle.weight_n(),
                 wings,
                 dt_s,

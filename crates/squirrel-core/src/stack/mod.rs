@@ -23,7 +23,7 @@ use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
 use crate::control::position::MeasuredMotion;
 use crate::control::twcc::{OuterAirframe, TwccParameters, TwccState, TwccTerms};
 use crate::control::{AttitudeThrust, Reference};
-use crate::estimate::monitor::Monitor;
+use crate::estimate::monitor::{Monitor, Seen};
 use crate::estimate::navigator::{
     Health, Navigated, Navigation, NavigationState, NavigationTerms, Start,
 };
@@ -233,18 +233,16 @@ impl Stack {
     /// The last part of a step: whether the rotors push as control told them, and what is to be
     /// logged of the estimate.
     pub fn watch(&self, state: &mut StackState, navigated: &Navigated, output: &mut StackOutput) {
-        let achieved = output.inner.as_ref().map(|inner| &inner.mixer.achieved);
-        let dt_s = lower(navigated.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S);
-        let (attitude, gnss) = (state.known.attitude.as_ref(), state.known.gnss.as_ref());
-        state.monitor.look(
-            &self.vehicle,
-            achieved,
-            navigated.frame.imu.as_ref(),
-            attitude.zip(gnss).map(|(attitude, gnss)| (attitude, gnss.velocity)),
-            self.parameters.twcc.plus.map_or(0.0, |plus| plus.wing_download_n),
-            state.wing_command,
-            dt_s,
-        );
+        let seen = Seen {
+            achieved: output.inner.as_ref().map(|inner| &inner.mixer.achieved),
+            imu: navigated.frame.imu.as_ref(),
+            attitude: state.known.attitude.as_ref(),
+            velocity: state.known.gnss.map(|gnss| gnss.velocity),
+            download_n: self.parameters.twcc.plus.map_or(0.0, |plus| plus.wing_download_n),
+            wings: state.wing_command,
+            dt_s: lower(navigated.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S),
+        };
+        state.monitor.look(&self.vehicle, &seen);
         output.health = state.monitor.judge(
             &self.vehicle,
             navigated.frame.attitude.as_ref(),
