@@ -1,15 +1,15 @@
-//! Force along body z that nobody commanded: what the inertial unit feels beside the thrust that the
-//! mixer promised and, with wings spread, beside the flat plate (incremental inversion: Smeur, de Croon
-//! and Chu, JGCD 39(3), 2016; docs/equations.md E.6).
+//! Force along body z that nobody commanded: what the inertial unit feels beside the thrust that
+//! the mixer promised and, with wings spread, beside the flat plate (incremental inversion: Smeur,
+//! Chu and de Croon, JGCD 39(3), 2016; docs/equations.md E.6).
 //!
 //! ```text
 //! folded    r_z  = m f_z + T                                      mean over 0.3 s
 //! spread    w_z  = (m f_z + T - r_z) / d - N_z                    mean over 0.05 s
 //! ```
-//! `d` is how far they are spread. `r_z` is thrust that is short (sag, inflow, load); it rests while wings
-//! are not folded. `w_z` is what spread wings do beside the plate in
-//! still air: wind, the rotors' wash, a wing that is weaker. It is kept after they fold and
-//! forgotten slowly, so that wings that harmed open again no sooner than that.
+//! `d` is how far they are spread. `r_z` is thrust that is short (sag, inflow, load); it rests while
+//! wings are not folded. `w_z` is what spread wings do beside the plate in still air: wind, the
+//! rotors' wash, a wing that is weaker. It is kept after they fold and forgotten slowly, so that
+//! wings that harmed open again no sooner than that.
 
 use crate::aero::flat_plate;
 use crate::control::position::ForceResidual;
@@ -36,8 +36,9 @@ const SPARE_MAX: f32 = 0.2;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Felt {
     residual: ForceResidual,
-    /// Since the wings were commanded to be where they are, s.
+    /// Since the wings were commanded to spread, s; 0 while they are not.
     spread_s: f32,
+    /// Since they were commanded to fold, likewise.
     folded_s: f32,
 }
 
