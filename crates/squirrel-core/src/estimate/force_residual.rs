@@ -166,7 +166,7 @@ mod tests {
         feels(&mut felt, -WEIGHT_N, [0.0; 3], 0.0, 2.0);
         let r = felt.residual();
         assert_eq!(r.short_n, -SPARE_MAX * WEIGHT_N);
-        feels(&mut felt, f32::NAN, [0.0; 3], 1.0, 0.1);
+        feels(&mut felt, f32::NAN, [0.0; 3], 1.0, 0.3);
         assert_eq!(felt.residual(), ForceResidual::default());
     }
 }
