@@ -73,7 +73,6 @@ impl Felt {
 
     pub(super) fn look(&mut self, step: &Step<'_>) {
         let Step { force_n, ned_from_body, weight_n, dt_s, .. } = *step;
-        let before = *self;
         if step.wings > 0.0 {
             (self.spread_s, self.folded_s) = (lower(self.spread_s + dt_s, SPREADING_S), 0.0);
         } else {
@@ -94,11 +93,12 @@ impl Felt {
         } else if step.wings <= 0.0 {
             r.wings_n -= r.wings_n * follow(MEMORY_S);
         }
+        if !(r.short_n.is_finite() && r.wings_n.is_finite()) {
+            // Before the limits, which make a number of what is none.
+            *r = ForceResidual::default();
+        }
         r.short_n = limit(r.short_n, -SPARE_MAX * weight_n, SHORT_MAX * weight_n);
         r.wings_n = limit(r.wings_n, -weight_n, weight_n);
-        if !(r.short_n.is_finite() && r.wings_n.is_finite()) {
-            *self = Self { residual: ForceResidual::default(), ..before };
-        }
     }
 }
 
