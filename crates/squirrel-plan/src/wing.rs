@@ -101,13 +101,11 @@ impl WingForce {
     /// One line that names what of the vehicle file the model needs and does not find.
     pub fn of(vehicle: &VehicleFile, model: WingModel) -> Result<Self, WingError> {
         let name = || vehicle.name.clone();
-        let Some(wing) = vehicle.vehicle.parameters().wing else {
+        if vehicle.vehicle.parameters().wing.is_none() {
             return Err(WingError::NoWing(name()));
-        };
+        }
         match (model, &vehicle.wing, &vehicle.weights) {
-            (WingModel::Flat, _, _) => {
-                Ok(Self::Flat { area_m2: wing.area_per_side_m2 * wing.normal_force_slope })
-            }
+            (WingModel::Flat, _, _) => Ok(Self::Flat { area_m2: vehicle.vehicle.plate_area_m2() }),
             (WingModel::Membrane, WingPlant::Membrane { membrane, .. }, _) => {
                 Ok(Self::Membrane(membrane.clone()))
             }

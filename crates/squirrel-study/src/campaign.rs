@@ -4,13 +4,14 @@
 //! Trial `k` has one seed, whichever arm flies it and under whatever condition, so that differences
 //! between arms are of pairs.
 
-use crate::journal::{Journal, check_trials, identity};
+use crate::journal::{Journal, Keep, check_trials, identity};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use squirrel_core::guidance::mission::scramble;
 use squirrel_core::stack::wire::{HASH_START, hash};
+use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, Integrator, Setup};
+use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
 use squirrel_sim::scenario::{Conditions, Scenario, WindTable};
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -127,6 +128,32 @@ pub fn run<T: Serialize + DeserializeOwned + Send>(
     };
     let all = journal.run(plan.trials * (conditions * arms) as u32, one)?;
     Ok(all.map(|all| Flown { arms: plan.arms.clone(), conditions, all }))
+}
+
+/// Flies scenarios with a plan's own vehicle; the conditions are their numbers. `None` where only a
+/// part is flown here.
+///
+/// * `name` - of the study
+/// * `amounts` - what is kept of a flight
+///
+/// # Errors
+/// A vehicle that cannot fly, or a folder that cannot be written.
+pub fn run_scenarios<T: Serialize + DeserializeOwned + Send>(
+    plan: &Plan,
+    name: &str,
+    scenarios: &[Scenario],
+    keep: &Keep<'_>,
+    amounts: impl Fn(&Metrics) -> T + Sync,
+) -> Result<Option<Flown<T>>, FlightError> {
+    for scenario in scenarios {
+        plan.check(&plan.vehicle, scenario)?;
+    }
+    let journal = Journal::open(keep, name, &plan.identity(name, scenarios))?;
+    let fly = |arm, condition: usize, trial| {
+        let scenario = Scenario { seed: plan.trial_seed(trial), ..scenarios[condition].clone() };
+        Ok(amounts(&pilot::fly(&plan.setup(arm, scenario), false, |_| {})?.metrics))
+    };
+    run(plan, scenarios.len(), &journal, fly)
 }
 
 impl<T> Flown<T> {

@@ -6,14 +6,13 @@
 //! on has the larger ones: there only losses count.
 
 use crate::campaign::{self, Flown, Plan};
-use crate::journal::{Journal, Keep};
+use crate::journal::Keep;
 use crate::sheet::{Cell, Sheet};
 use crate::statistics::{Estimate, mean, paired};
 use crate::study::{Arms, Found, Study};
 use serde::{Deserialize, Serialize};
-use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, OVER_RAD};
+use squirrel_sim::flight::{FlightError, Metrics, OVER_RAD};
 use squirrel_sim::scenario::{BUILT_IN, Scenario};
 
 /// On the command line.
@@ -111,13 +110,9 @@ fn conditions(plan: &Plan) -> Result<Vec<Condition>, FlightError> {
 pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Rivals>, FlightError> {
     let plan = &plan.beside(Arm::Pc)?;
     let all = conditions(plan)?;
-    for (.., scenario) in &all {
-        plan.check(&plan.vehicle, scenario)?;
-    }
-    let identity = plan.identity("rivals", all.iter().map(|(.., scenario)| scenario));
-    let journal = Journal::open(keep, "rivals", &identity)?;
-    let fly = |arm, condition: usize, trial| fly(plan, &all[condition].2, arm, trial);
-    let Some(flown) = campaign::run(plan, all.len(), &journal, fly)? else { return Ok(None) };
+    let scenarios: Vec<Scenario> = all.iter().map(|(.., scenario)| scenario.clone()).collect();
+    let flown = campaign::run_scenarios(plan, "rivals", &scenarios, keep, Flight::of)?;
+    let Some(flown) = flown else { return Ok(None) };
     let rows = all.iter().enumerate().flat_map(|(place, condition)| {
         let flown = &flown;
         let rivals = plan.arms.iter().filter(|arm| **arm != Arm::Pc);
@@ -127,15 +122,15 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Rivals>, FlightError> 
     Ok(Some(Rivals { vehicle, trials: plan.trials, seed: plan.seed, rows: rows.collect() }))
 }
 
-fn fly(plan: &Plan, scenario: &Scenario, arm: Arm, trial: u32) -> Result<Flight, FlightError> {
-    let scenario = Scenario { seed: plan.trial_seed(trial), ..scenario.clone() };
-    let m = pilot::fly(&plan.setup(arm, scenario), false, |_| {})?.metrics;
-    Ok(Flight {
-        rmse_m: m.rmse_m,
-        height_lost_m: m.height_lost_m,
-        lost: m.contact_s.is_some() || m.tilt_max_rad > OVER_RAD || m.not_finite,
-        flagged: !m.flags.names().is_empty(),
-    })
+impl Flight {
+    fn of(m: &Metrics) -> Self {
+        Self {
+            rmse_m: m.rmse_m,
+            height_lost_m: m.height_lost_m,
+            lost: m.contact_s.is_some() || m.tilt_max_rad > OVER_RAD || m.not_finite,
+            flagged: !m.flags.names().is_empty(),
+        }
+    }
 }
 
 fn row(flown: &Flown<Flight>, arm: Arm, place: usize, condition: &Condition) -> Row {

@@ -3,22 +3,21 @@
 //!
 //! Wind comes from ahead, from behind or from the left of a vehicle that heads north: on the circle
 //! it does so all along, in the manoeuvre up to the turn. The vehicle does not know the wind. On
-//! the circle, wings stay folded, so that arms which differ only in wings fly alike; in the turn
-//! they open, and what follows is measured for 18 s. Outdoors the winds are still those of the study; the rest of the day comes on top. A
-//! flight is *lost* where the vehicle turns over, meets the ground or leaves the
-//! numbers, and *flagged* where the flight code reports anything.
+//! the circle wings hardly open, so that arms which differ only in wings fly nearly alike; in the
+//! turn they do, and what follows is measured for 18 s. Outdoors the winds are still those of the
+//! study; the rest of the day comes on top. A flight is *lost* where the vehicle turns over, meets
+//! the ground or leaves the numbers, and *flagged* where the flight code reports anything.
 
 use crate::campaign::{self, Flown, Plan};
 use crate::faults::is_lost;
-use crate::journal::{Journal, Keep};
+use crate::journal::Keep;
 use crate::sheet::{Cell, Sheet};
 use crate::statistics::{Estimate, Share, mean, paired};
 use crate::study::{Arms, Found, Study};
 use crate::tracking::GUST_M_S;
 use serde::{Deserialize, Serialize};
-use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::FlightError;
+use squirrel_sim::flight::{FlightError, Metrics};
 use squirrel_sim::scenario::Scenario;
 
 /// On the command line.
@@ -127,13 +126,9 @@ fn conditions(plan: &Plan) -> Result<Vec<Condition>, FlightError> {
 /// A vehicle that cannot fly, or a folder that cannot be written.
 pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Wind>, FlightError> {
     let all = conditions(plan)?;
-    for (.., scenario) in &all {
-        plan.check(&plan.vehicle, scenario)?;
-    }
-    let identity = plan.identity("wind", all.iter().map(|(.., scenario)| scenario));
-    let journal = Journal::open(keep, "wind", &identity)?;
-    let fly = |arm, condition: usize, trial| fly(plan, &all[condition].4, arm, trial);
-    let Some(flown) = campaign::run(plan, all.len(), &journal, fly)? else { return Ok(None) };
+    let scenarios: Vec<Scenario> = all.iter().map(|(.., scenario)| scenario.clone()).collect();
+    let flown = campaign::run_scenarios(plan, "wind", &scenarios, keep, Flight::of)?;
+    let Some(flown) = flown else { return Ok(None) };
     let rows = all.iter().enumerate().flat_map(|(place, condition)| {
         let flown = &flown;
         plan.arms.iter().map(move |arm| row(flown, *arm, place, condition))
@@ -142,16 +137,16 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Wind>, FlightError> {
     Ok(Some(Wind { vehicle, trials: plan.trials, seed: plan.seed, rows: rows.collect() }))
 }
 
-fn fly(plan: &Plan, scenario: &Scenario, arm: Arm, trial: u32) -> Result<Flight, FlightError> {
-    let scenario = Scenario { seed: plan.trial_seed(trial), ..scenario.clone() };
-    let m = pilot::fly(&plan.setup(arm, scenario), false, |_| {})?.metrics;
-    Ok(Flight {
-        rmse_m: m.rmse_m,
-        height_lost_m: m.height_lost_m,
-        wings_open_s: m.wings_open_s,
-        lost: is_lost(&m),
-        flagged: !m.flags.names().is_empty(),
-    })
+impl Flight {
+    fn of(m: &Metrics) -> Self {
+        Self {
+            rmse_m: m.rmse_m,
+            height_lost_m: m.height_lost_m,
+            wings_open_s: m.wings_open_s,
+            lost: is_lost(m),
+            flagged: !m.flags.names().is_empty(),
+        }
+    }
 }
 
 fn row(flown: &Flown<Flight>, arm: Arm, place: usize, condition: &Condition) -> Row {

@@ -33,19 +33,11 @@ const SHORT_MAX: f32 = 0.5;
 const SPARE_MAX: f32 = 0.2;
 
 /// What is remembered.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Felt {
     residual: ForceResidual,
     /// Since the wings were commanded to spread, s; 0 while they are not.
     spread_s: f32,
-    /// Since they were commanded to fold, likewise.
-    folded_s: f32,
-}
-
-impl Default for Felt {
-    fn default() -> Self {
-        Self { residual: ForceResidual::default(), spread_s: 0.0, folded_s: FOLDING_S }
-    }
 }
 
 /// What a step brings.
@@ -63,6 +55,8 @@ pub(super) struct Step<'a> {
     pub weight_n: f32,
     /// Largest of the wings' commands, 0..1.
     pub wings: f32,
+    /// Since they were last commanded to be anything but folded, s.
+    pub spread_ago_s: f32,
     pub dt_s: f32,
 }
 
@@ -73,14 +67,11 @@ impl Felt {
 
     pub(super) fn look(&mut self, step: &Step<'_>) {
         let Step { force_n, ned_from_body, weight_n, dt_s, .. } = *step;
-        if step.wings > 0.0 {
-            (self.spread_s, self.folded_s) = (lower(self.spread_s + dt_s, SPREADING_S), 0.0);
-        } else {
-            (self.spread_s, self.folded_s) = (0.0, lower(self.folded_s + dt_s, FOLDING_S));
-        }
+        self.spread_s =
+            if step.wings > 0.0 { lower(self.spread_s + dt_s, SPREADING_S) } else { 0.0 };
         let r = &mut self.residual;
         let follow = |mean_s: f32| dt_s / (dt_s + mean_s);
-        if self.folded_s >= FOLDING_S {
+        if step.spread_ago_s >= FOLDING_S {
             r.short_n += (force_n - r.short_n) * follow(FOLDED_MEAN_S);
         }
         let spread = step.wings * self.spread_s / SPREADING_S;
@@ -119,6 +110,7 @@ mod tests {
             download_n: 0.0,
             weight_n: WEIGHT_N,
             wings,
+            spread_ago_s: if wings > 0.0 { 0.0 } else { FOLDING_S },
             dt_s: 1.0 / 300.0,
         };
         for _ in 0..(seconds * 300.0) as u32 {

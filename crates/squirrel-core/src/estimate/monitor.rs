@@ -26,7 +26,7 @@ const SHORT_SHARE: f32 = 0.15;
 const OFF_SHARE: f32 = 0.04;
 /// Cosine of the tilt beyond which control was lost: 60 deg.
 const UPSET_COSINE: f32 = 0.5;
-/// After wings folded, s.
+/// After wings folded, s; longer than [`Felt`] waits.
 const FOLDED_S: f32 = 0.7;
 
 /// What is remembered.
@@ -102,20 +102,18 @@ impl Monitor {
         self.commanded.torque_n_m += (achieved.torque_n_m - self.commanded.torque_n_m) * follow;
         let learn = dt_s / (dt_s + MEAN_S);
         let is_folded = self.spread_ago_s >= FOLDED_S;
-        let missing_n = if is_folded {
-            self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z
-        } else {
-            0.0
-        };
+        let felt_n = self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z;
+        let missing_n = if is_folded { felt_n } else { 0.0 };
         if let (Some(ned_from_body), Some(velocity)) = (seen.attitude, seen.velocity) {
             self.felt.look(&Step {
-                force_n: self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z,
+                force_n: felt_n,
                 ned_from_body,
                 velocity,
                 wing_area_m2: vehicle.plate_area_m2(),
                 download_n: seen.download_n,
                 weight_n: vehicle.weight_n(),
                 wings,
+                spread_ago_s: self.spread_ago_s,
                 dt_s,
             });
         }

@@ -238,7 +238,7 @@ impl Stack {
             imu: navigated.frame.imu.as_ref(),
             attitude: state.known.attitude.as_ref(),
             velocity: state.known.gnss.map(|gnss| gnss.velocity),
-            download_n: self.parameters.twcc.plus.map_or(0.0, |plus| plus.wing_download_n),
+            download_n: self.parameters.twcc.plus.as_ref().map_or(0.0, |plus| plus.wing_download_n),
             wings: state.wing_command,
             dt_s: lower(navigated.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S),
         };

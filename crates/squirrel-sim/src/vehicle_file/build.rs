@@ -89,8 +89,8 @@ pub(super) fn build(
         }
     }
     let control = t.control.as_ref().map(control);
-    let download_is_given = t.control.as_ref().and_then(|control| control.plus.as_ref());
-    let download_is_given = download_is_given.is_some_and(|plus| plus.wing_download_n.is_some());
+    let plus = t.control.as_ref().and_then(|control| control.plus.as_ref());
+    let asks_download = plus.is_some_and(|plus| plus.wing_download_n.is_none());
     if let Some(gains) = &control {
         gains.attitude.check().map_err(|e| e.to_string())?;
         gains
@@ -117,7 +117,7 @@ pub(super) fn build(
         effects: effects(t.effects, &vehicle)?,
         provenance: Vec::new(),
     };
-    if !download_is_given && built.effects.any() {
+    if asks_download && built.effects.any() {
         let download_n = built.means()?.wing_download_in_hover_n;
         if let Some(plus) = built.control.as_mut().and_then(|control| control.twcc.plus.as_mut()) {
             plus.wing_download_n = download_n.unwrap_or(0.0) as f32;

@@ -10,9 +10,11 @@ use squirrel_sim::vehicle_file::VehicleFile;
 const SEEDS: [u64; 3] = [31, 32, 33];
 const OURS: [Arm; 2] = [Arm::TwccPlus, Arm::PcPlus];
 
-fn flown(vehicle: &VehicleFile, arm: Arm, scenario: &str, ratio: f64, seed: u64) -> Metrics {
-    let scenario =
-        Scenario { seed, thrust_to_weight: Some(ratio), ..Scenario::find(scenario).unwrap() };
+fn at(scenario: &str, ratio: f64, seed: u64) -> Scenario {
+    Scenario { seed, thrust_to_weight: Some(ratio), ..Scenario::find(scenario).unwrap() }
+}
+
+fn flown(vehicle: &VehicleFile, arm: Arm, scenario: Scenario) -> Metrics {
     let setup = Setup { vehicle: vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 };
     setup.fly(false, |_| ()).unwrap().metrics
 }
@@ -32,17 +34,14 @@ fn what_the_simplest_controller_holds_is_held() {
 fn wings_do_no_harm_in_a_tail_wind() {
     let vehicle = VehicleFile::squirrel();
     let fly = |arm, wind_m_s: f64| -> [f64; 2] {
-        let flown = SEEDS.map(|seed| {
-            let avoid = Scenario::find("avoid").unwrap();
-            let mut scenario = Scenario { seed, thrust_to_weight: Some(1.2), ..avoid };
+        let flights = SEEDS.map(|seed| {
+            let mut scenario = at("avoid", 1.2, seed);
             (scenario.duration_s, scenario.measured_window_s) = (25.0, 18.0);
             scenario.wind.mean_ned_m_s = [wind_m_s, 0.0, 0.0];
-            let setup =
-                Setup { vehicle: vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 };
-            setup.fly(false, |_| ()).unwrap().metrics
+            flown(&vehicle, arm, scenario)
         });
         let mean = |figure: fn(&Metrics) -> f64| {
-            flown.iter().map(figure).sum::<f64>() / SEEDS.len() as f64
+            flights.iter().map(figure).sum::<f64>() / SEEDS.len() as f64
         };
         [mean(|m| m.rmse_m), mean(|m| m.height_lost_m)]
     };
@@ -62,10 +61,11 @@ fn worse_than_pc(vehicle: &VehicleFile) -> Vec<String> {
         let ratios: &[f64] =
             if is_long { &[1.1, 1.25, 1.5] } else { &[1.1, 1.15, 1.2, 1.25, 1.5, 2.0] };
         for &ratio in ratios {
-            let pc = SEEDS.map(|seed| (seed, flown(vehicle, Arm::Pc, scenario, ratio, seed)));
+            let pc = SEEDS.map(|seed| (seed, flown(vehicle, Arm::Pc, at(scenario, ratio, seed))));
             let held: Vec<_> = pc.iter().filter(|(_, flight)| flight.contact_s.is_none()).collect();
             for arm in OURS {
-                let fly = |(seed, _): &&(u64, Metrics)| flown(vehicle, arm, scenario, ratio, *seed);
+                let fly =
+                    |(seed, _): &&(u64, Metrics)| flown(vehicle, arm, at(scenario, ratio, *seed));
                 let ours: Vec<Metrics> = held.iter().map(fly).collect();
                 let name = format!("{} in {scenario} at {ratio}", arm.name());
                 let lost = ours.iter().filter(|flight| flight.contact_s.is_some()).count();
