@@ -249,16 +249,18 @@ impl<'a> Journal<'a> {
         let one = |trial: u32| {
             let result = match self.done.get(&trial) {
                 Some(line) => self.read(line)?,
-                None if self.keep.part == Part::Merged => {
-                    return Err(self
-                        .at(&format!("flight = {trial}: missing, in none of the merged folders")));
-                }
                 None => self.write_down(trial, &fly(trial)?)?,
             };
             self.keep.done(1);
             Ok(result)
         };
         let mine = self.keep.mine(trials);
+        // Looked for in order, before the threads: the error names the first on any number of them.
+        let missing = mine.iter().find(|trial| !self.done.contains_key(trial));
+        if let (Part::Merged, Some(trial)) = (self.keep.part, missing) {
+            let problem = format!("flight = {trial}: missing, in none of the merged folders");
+            return Err(self.at(&problem));
+        }
         self.keep.ahead(mine.len());
         let all: Vec<T> = mine.into_par_iter().map(one).collect::<Result<_, _>>()?;
         if let Part::Shard(_) = self.keep.part {
