@@ -7,6 +7,7 @@ use airframe::{PAPER_SIGNS, PAPER_X, vehicle};
 use criterion::{Criterion, criterion_group, criterion_main};
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
 use squirrel_core::control::position::{AngleLaw, PositionGains};
+use squirrel_core::control::supply::ThrustByVoltage;
 use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::wing_force::ForceModel;
@@ -59,7 +60,12 @@ fn stack(form: AttitudeForm, force_model: &ForceModel) -> Stack {
     };
     Stack::new(
         vehicle,
-        StackParameters { attitude, twcc, navigation: Navigation::external() },
+        StackParameters {
+            attitude,
+            twcc,
+            navigation: Navigation::external(),
+            thrust: ThrustByVoltage::CONSTANT,
+        },
         Mission::Hover { position: In::zero() },
     )
     .expect("sound")

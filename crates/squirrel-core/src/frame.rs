@@ -12,6 +12,7 @@ const FORCE_MAX_M_S2: f32 = 1e4;
 pub(crate) const POSITION_MAX_M: f32 = 1e6;
 const VELOCITY_MAX_M_S: f32 = 1e3;
 const FIELD_MAX_UT: f32 = 1e4;
+const VOLTAGE_MAX_V: f32 = 1e3;
 
 /// One sample of an inertial measurement unit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +35,11 @@ impl Gnss {
         self.position.vector.iter().all(|x| x.abs() <= POSITION_MAX_M)
             && self.velocity.vector.iter().all(|x| x.abs() <= VELOCITY_MAX_M_S)
     }
+}
+
+/// Whether a battery can have this voltage, V.
+pub(crate) fn is_voltage(battery_v: f32) -> bool {
+    battery_v > 0.0 && battery_v <= VOLTAGE_MAX_V
 }
 
 /// One satellite fix.
@@ -63,6 +69,8 @@ pub struct SensorFrame {
     /// Magnetic field of the earth, and what of the vehicle's own a compass cannot tell from it,
     /// uT.
     pub magnetic: Option<In<Body, f32>>,
+    /// Voltage of the battery under load, V.
+    pub battery_v: Option<f32>,
     /// Wing force as if spread, N, where something outside the flight code knows it.
     pub wing_force: Option<In<Ned, f32>>,
     /// What to fly instead of the outer loop's command.
@@ -82,6 +90,7 @@ impl SensorFrame {
             gnss: None,
             altitude_m: None,
             magnetic: None,
+            battery_v: None,
             wing_force: None,
             command: None,
             obstacles: [Obstacle { id: 0, north_m: 0.0, east_m: 0.0 }; MAX_OBSTACLES],

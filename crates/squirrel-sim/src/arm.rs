@@ -4,8 +4,10 @@
 use crate::plant::WingPlant;
 use crate::vehicle_file::VehicleFile;
 use crate::weights::ParnnWeights;
+use squirrel_core::control::plus::{Feels, Plus};
 use squirrel_core::control::twcc::{TwccParameters, WingPolicy};
 use squirrel_core::control::wing_force::ForceModel;
+use squirrel_core::nalgebra::Vector3;
 
 /// A controller and what it flies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -18,16 +20,26 @@ pub enum Arm {
     WiicNoWings,
     /// The controller of [`Arm::TwccFlat`]; the plant has no wings.
     Phantom,
+    /// The controller of [`Arm::TwccParnn`], likewise.
+    PhantomParnn,
     /// TWCC that believes in the flat plate.
     TwccFlat,
     /// TWCC that believes in the paper's network.
     TwccParnn,
     /// TWCC that is told what the plant's wing would do.
     TwccOracle,
+    /// [`Arm::TwccFlat`], as well armed as ours: with the reference's motion fed forward and the
+    /// limits of `[control.plus]`.
+    TwccFlatFf,
+    /// [`Arm::TwccParnn`], likewise.
+    TwccParnnFf,
     /// [`squirrel_core::control::plus`] with wings: ours.
     TwccPlus,
     /// The same with the wings folded: its fair rival.
     PcPlus,
+    /// The same by incremental inversion ([`Feels::Everything`]): what feeling instead of believing
+    /// is worth.
+    Indi,
     /// A planner that uses the wings, outside of the flight code (`squirrel-plan`).
     PlanWings,
     /// The same planner with the wings folded: its fair rival.
@@ -36,16 +48,20 @@ pub enum Arm {
 
 impl Arm {
     /// The arms that the flight code flies alone.
-    pub const ALONE: [Self; 9] = [
+    pub const ALONE: [Self; 13] = [
         Self::Pc,
         Self::PcWingsOpen,
         Self::WiicNoWings,
         Self::Phantom,
+        Self::PhantomParnn,
         Self::TwccFlat,
         Self::TwccParnn,
         Self::TwccOracle,
+        Self::TwccFlatFf,
+        Self::TwccParnnFf,
         Self::TwccPlus,
         Self::PcPlus,
+        Self::Indi,
     ];
 
     /// All arms.
@@ -65,11 +81,15 @@ impl Arm {
             Self::PcWingsOpen => "pc_wings_open",
             Self::WiicNoWings => "wiic_no_wings",
             Self::Phantom => "phantom",
+            Self::PhantomParnn => "phantom_parnn",
             Self::TwccFlat => "twcc_flat",
             Self::TwccParnn => "twcc_parnn",
             Self::TwccOracle => "twcc_oracle",
+            Self::TwccFlatFf => "twcc_flat_ff",
+            Self::TwccParnnFf => "twcc_parnn_ff",
             Self::TwccPlus => "twcc_plus",
             Self::PcPlus => "pc_plus",
+            Self::Indi => "indi",
             Self::PlanWings => "plan_wings",
             Self::PlanNoWings => "plan_no_wings",
         }
@@ -94,7 +114,7 @@ impl Arm {
 
     /// Gives the flight code this arm's policy.
     ///
-    /// * `weights` - of the vehicle's network; [`Arm::TwccParnn`] needs them
+    /// * `weights` - of the vehicle's network, which arms that believe it need
     ///
     /// # Errors
     /// One line where they are needed and there are none.
@@ -105,18 +125,25 @@ impl Arm {
     ) -> Result<(), String> {
         twcc.policy = match self {
             // Of a planner: what flies before its first command, and where it is lost.
-            Self::Pc | Self::PcPlus | Self::PlanWings | Self::PlanNoWings => WingPolicy::Folded,
+            Self::Pc | Self::PcPlus | Self::Indi | Self::PlanWings | Self::PlanNoWings => {
+                WingPolicy::Folded
+            }
             Self::PcWingsOpen => WingPolicy::Open,
             Self::WiicNoWings => WingPolicy::CoordinatedWithoutWings,
             Self::Phantom
+            | Self::PhantomParnn
             | Self::TwccFlat
             | Self::TwccParnn
             | Self::TwccOracle
+            | Self::TwccFlatFf
+            | Self::TwccParnnFf
             | Self::TwccPlus => WingPolicy::Coordinated,
         };
         twcc.force_model = match (self, weights) {
-            (Self::TwccParnn, Some(weights)) => ForceModel::Parnn(*weights.parnn()),
-            (Self::TwccParnn, None) => {
+            (arm, Some(weights)) if arm.believes_the_network() => {
+                ForceModel::Parnn(*weights.parnn())
+            }
+            (arm, None) if arm.believes_the_network() => {
                 let name = self.name();
                 return Err(format!(
                     "arm = {name}: needs weights; wing.parnn_weights of the vehicle names none that were read"
@@ -125,25 +152,44 @@ impl Arm {
             (arm, _) if arm.is_given_the_force() => ForceModel::Given,
             _ => ForceModel::FlatPlate,
         };
-        if !self.is_plus() && !self.plans() {
-            twcc.plus = None;
-        } else if self.is_plus() && twcc.plus.is_none() {
-            return Err(format!(
-                "arm = {}: needs [control.plus] of the vehicle, which is missing",
-                self.name()
-            ));
+        let needs_plus = matches!(
+            self,
+            Self::TwccPlus | Self::PcPlus | Self::Indi | Self::TwccFlatFf | Self::TwccParnnFf
+        );
+        let plus = match twcc.plus.take() {
+            None if needs_plus => {
+                let name = self.name();
+                return Err(format!(
+                    "arm = {name}: needs [control.plus] of the vehicle, which is missing"
+                ));
+            }
+            plus => plus,
+        };
+        match (self, plus) {
+            (Self::TwccFlatFf | Self::TwccParnnFf, Some(plus)) => twcc.position = plus.position,
+            (Self::Indi, Some(mut plus)) => {
+                // What is felt is all that an integral would find.
+                plus.position.integral_per_s2 = Vector3::zeros();
+                twcc.plus = Some(Plus { feels: Feels::Everything, ..plus });
+            }
+            // Of planners it is what flies where commands cease.
+            (arm, plus) if needs_plus || arm.plans() => twcc.plus = plus,
+            _ => {}
         }
         Ok(())
     }
 
-    /// Whether the law is [`squirrel_core::control::plus`].
-    fn is_plus(self) -> bool {
-        matches!(self, Self::TwccPlus | Self::PcPlus)
+    fn believes_the_network(self) -> bool {
+        matches!(self, Self::TwccParnn | Self::TwccParnnFf | Self::PhantomParnn)
     }
 
     /// The wing that the plant of this arm has.
     pub fn plant_wing(self, wing: &WingPlant) -> WingPlant {
-        if self == Self::Phantom { WingPlant::None } else { wing.clone() }
+        if matches!(self, Self::Phantom | Self::PhantomParnn) {
+            WingPlant::None
+        } else {
+            wing.clone()
+        }
     }
 
     /// Whether the simulator tells the flight code what the wings would do.
@@ -155,6 +201,38 @@ impl Arm {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Rivals as well armed: the paper's law with our gains, ours with another belief.
+    #[test]
+    fn rivals_have_what_ours_has() {
+        let file = crate::vehicle_file::VehicleFile::squirrel();
+        let of = |arm: Arm| {
+            let mut twcc = file.control.unwrap().twcc;
+            arm.configure(&mut twcc, file.weights.as_ref()).unwrap();
+            twcc
+        };
+        let ours = of(Arm::TwccPlus);
+        let plus = ours.plus.unwrap();
+        let fed = of(Arm::TwccFlatFf);
+        assert_eq!(fed.position, plus.position);
+        assert_eq!(
+            TwccParameters { position: of(Arm::TwccFlat).position, ..fed },
+            of(Arm::TwccFlat)
+        );
+        assert_eq!(of(Arm::TwccParnnFf).force_model, of(Arm::TwccParnn).force_model);
+        assert_eq!(of(Arm::PhantomParnn), of(Arm::TwccParnn));
+        let indi = of(Arm::Indi);
+        assert_eq!(
+            (indi.policy, indi.plus.unwrap().feels),
+            (WingPolicy::Folded, Feels::Everything)
+        );
+        let mut bare = file.control.unwrap().twcc;
+        bare.plus = None;
+        for arm in [Arm::TwccFlatFf, Arm::Indi] {
+            let error = arm.configure(&mut bare.clone(), None).unwrap_err();
+            assert!(error.contains("needs [control.plus]"), "{error}");
+        }
+    }
 
     #[test]
     fn names_and_arms_are_one_to_one() {

@@ -17,7 +17,7 @@ use squirrel_sim::scenario::{BUILT_IN, Scenario};
 
 /// On the command line.
 pub const STUDY: Study = Study {
-    arms: Arms::Asked(&[Arm::TwccPlus, Arm::PcPlus]),
+    arms: Arms::Asked(&[Arm::TwccPlus, Arm::PcPlus, Arm::Indi]),
     days: true,
     ..Study::new(
         "rivals",

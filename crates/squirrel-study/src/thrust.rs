@@ -5,12 +5,12 @@
 //! encounter. Two series:
 //! - `limit`: the collective thrust that the flight code may ask for, at a battery that does not
 //!   sag;
-//! - `battery`: one such limit, [`BATTERY_RATIO`], and a battery that is emptier from flight to
-//!   flight. Thrust follows its voltage (`battery_sag`), which the flight code does not know, and
-//!   what is left of the limit is the effective ratio.
+//! - `battery`: slower rotors, which give [`BATTERY_RATIO`] at full speed and the reference
+//!   voltage, and a battery that is emptier from flight to flight. Thrust follows its voltage
+//!   (`battery_sag`), which the flight code knows; what the voltage leaves is the effective ratio.
 //!
-//! The last rows of `battery` have the vehicle's own limit, to see where the battery alone brings
-//! it. Little is expected of wings from the ratio on at which the tilt limit holds height, 1.155
+//! The last rows, `battery_alone`, have the vehicle's own rotors, to see where the battery alone
+//! brings it. Little is expected of wings from the ratio on at which the tilt limit holds height, 1.155
 //! with one angle at 30 deg and 1.33 with both (docs/equations.md E.4); what is gained there is
 //! said beside the fair rival `pc_plus`.
 
@@ -25,6 +25,7 @@ use crate::statistics::{Estimate, FEW};
 use crate::study::{Arms, Found, Study};
 use crate::tracking::{self, Condition, GUST_M_S, Row};
 use serde::Serialize;
+use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::scenario::Scenario;
@@ -32,7 +33,7 @@ use squirrel_sim::vehicle_file::VehicleFile;
 
 /// Ratios of the largest collective thrust to the weight.
 pub const THRUST_TO_WEIGHT: [f64; 7] = [1.15, 1.20, 1.25, 1.30, 1.50, 2.00, 3.00];
-/// The ratio that the battery takes its share of.
+/// What rotors give at the reference voltage, of which the battery takes its share.
 pub const BATTERY_RATIO: f64 = 1.4;
 /// Charges of the battery.
 const CHARGE: [f64; 7] = [1.0, 0.6, 0.3, 0.15, 0.08, 0.05, 0.02];
@@ -151,7 +152,8 @@ const SERIES: [&str; 3] = ["limit", "battery", "battery_alone"];
 fn planned(vehicle: &VehicleFile) -> Vec<(&'static str, Option<f64>, f64)> {
     let mut all: Vec<_> = THRUST_TO_WEIGHT.iter().map(|ratio| (SERIES[0], None, *ratio)).collect();
     if vehicle.battery.is_some() {
-        let own = vehicle.vehicle.parameters().limits.thrust_max_n / vehicle.vehicle.weight_n();
+        let count = vehicle.vehicle.rotors().len() as f64;
+        let own = count * vehicle.vehicle.rotor_thrust_max_n() / vehicle.vehicle.weight_n();
         all.extend(CHARGE.iter().map(|charge| (SERIES[1], Some(*charge), BATTERY_RATIO)));
         all.extend(FREE_CHARGE.iter().map(|charge| (SERIES[2], Some(*charge), own)));
     }
@@ -165,19 +167,30 @@ fn planned(vehicle: &VehicleFile) -> Vec<(&'static str, Option<f64>, f64)> {
 pub fn conditions(vehicle: &VehicleFile) -> Result<Vec<Condition>, FlightError> {
     let condition = |(_, charge, ratio): (&str, Option<f64>, f64)| {
         let mut scenario = Scenario::find("avoid").map_err(FlightError)?;
-        scenario.thrust_to_weight = Some(ratio);
         scenario.wind.gust_sigma_m_s = GUST_M_S;
         let mut vehicle = vehicle.clone();
         if let Some(charge) = charge {
+            scenario.thrust_to_weight = None;
             scenario.battery_charge = charge;
+            vehicle.vehicle = with_rotors(&vehicle.vehicle, ratio)?;
             let Some(sag) = vehicle.effects.insert("battery_sag") else {
                 return Err(FlightError("effects.battery_sag: unknown".to_owned()));
             };
             sag.values[0] = VOLTAGE_EXPONENT;
+        } else {
+            scenario.thrust_to_weight = Some(ratio);
         }
         Ok(Condition { vehicle, scenario })
     };
     planned(vehicle).into_iter().map(condition).collect()
+}
+
+/// The same vehicle with rotors that turn as fast as a ratio asks for at the reference voltage.
+fn with_rotors(vehicle: &Vehicle<f64>, ratio: f64) -> Result<Vehicle<f64>, FlightError> {
+    let mut p = *vehicle.parameters();
+    let rotor_n = ratio * vehicle.weight_n() / vehicle.rotors().len() as f64;
+    p.propulsion.speed_max_rad_s = (rotor_n / p.propulsion.thrust_coefficient_n_s2).sqrt();
+    Vehicle::new(p).map_err(|e| FlightError(e.to_string()))
 }
 
 /// The largest ratio at which an arm's gain passes the paper's, on straight lines between points.
@@ -223,7 +236,7 @@ pub fn words(study: &Thrust) -> Vec<String> {
     let alone = study.points.iter().filter(|point| point.series == SERIES[2]);
     if let Some(least) = alone.map(|point| point.thrust_to_weight).min_by(f64::total_cmp) {
         words.push(format!(
-            "The battery alone, empty, leaves the vehicle's own limit at an effective T/W of {least:.2}."
+            "The battery alone, empty, leaves the vehicle's own rotors at an effective T/W of {least:.2}."
         ));
     }
     let gains: Vec<String> = study

@@ -13,8 +13,8 @@
 //! 2. the thrust nearest to the demand that some yaw allows at that `s`;
 //! 3. the yaw torque nearest to the demand at both.
 //!
-//! `F_max` is the vehicle's limit at the reference voltage; it does not follow the measured battery
-//! voltage.
+//! `F_max` is the vehicle's limit at the reference voltage; [`Mixer::allocate_within`] takes
+//! what the battery leaves of it.
 //!
 //! The rule itself is [`mix`](super::mix), on lanes: flight and batches have the same.
 
@@ -30,6 +30,12 @@ pub struct ThrustTorque {
     pub thrust_n: f32,
     /// Torque about the body axes, N m.
     pub torque_n_m: Vector3<f32>,
+}
+
+impl ThrustTorque {
+    fn scaled(&self, by: f32) -> Self {
+        Self { thrust_n: self.thrust_n * by, torque_n_m: self.torque_n_m * by }
+    }
 }
 
 /// Rotor thrusts and what they achieve.
@@ -165,6 +171,16 @@ impl Mixer {
             roll_pitch_share: mixed.roll_pitch_share,
             saturated: mixed.saturated > 0.0,
         }
+    }
+
+    /// [`Self::allocate`] with another limit of each rotor's thrust, N, > 0: the rule knows shares
+    /// of the limit only.
+    pub fn allocate_within(&self, thrust_max_n: f32, demand: &ThrustTorque) -> MixerTerms {
+        let larger = thrust_max_n / self.table.thrust_max_n;
+        let mut terms = self.allocate(&demand.scaled(1.0 / larger));
+        terms.rotor_thrust_n = terms.rotor_thrust_n.map(|thrust_n| thrust_n * larger);
+        terms.achieved = terms.achieved.scaled(larger);
+        terms
     }
 
     /// Number of rotors, with the bound that [`Vehicle`] keeps: here the compiler sees that no loop

@@ -5,7 +5,8 @@
 //! [`wiic`] takes over where the angles are at their limit. Or [`plus`], which chooses angles,
 //! thrust and wings together. Or [`follow`], outside of the step, on a plan. Inner loop, 300 Hz:
 //! [`command_filter`] smooths the 10 Hz steps, [`backstepping`] turns attitude error into torque,
-//! [`mixer`] turns thrust and torque into rotor thrusts, by the rule in [`mix`].
+//! [`mixer`] turns thrust and torque into rotor thrusts, by the rule in [`mix`]; [`supply`] is what
+//! the battery leaves of them.
 
 pub mod backstepping;
 pub mod command_filter;
@@ -14,6 +15,7 @@ pub mod mix;
 pub mod mixer;
 pub mod plus;
 pub mod position;
+pub mod supply;
 pub mod twcc;
 pub mod wiic;
 pub mod wing_force;

@@ -29,10 +29,15 @@
 //! - velocity and acceleration of the reference are fed forward by the position loop
 //!   ([`PositionGains`]).
 //!
+//! With [`Feels::Everything`] it is incremental inversion (INDI, outer loop: Smeur, de Croon and Chu,
+//! Control Engineering Practice 73, 2018): all that the accelerometer feels beside thrust is taken
+//! as what acts a moment later, whatever makes it, in place of an integral. It is a rival, and has
+//! no wings.
+//!
 //! Wings open where they make the residual smaller by [`Plus::open_above_m_s2`], and fold where
 //! they no longer make it smaller. Without wings it is the same controller: the fair rival.
 
-use super::position::PositionGains;
+use super::position::{ForceResidual, PositionGains};
 use super::twcc::OuterAirframe;
 use super::wiic::Envelope;
 use super::{AttitudeThrust, Reference};
@@ -52,6 +57,15 @@ const TURN_MIN_M_S2: f32 = 2.0;
 const HELD_SHARE: f32 = 0.08;
 /// First step of the search, rad.
 const STEP_RAD: f32 = 0.2;
+
+/// What of the force that nobody commanded the law believes to act on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Feels {
+    /// That along body z: thrust that is short, and what spread wings do.
+    BodyZ,
+    /// All of it, wings folded.
+    Everything,
+}
 
 /// Parameters of the law.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,6 +94,8 @@ pub struct Plus {
     /// Push of the rotors on both wings spread, in hover, N down, as far as it is known
     /// beforehand; what is felt in flight comes on top.
     pub wing_download_n: f32,
+    /// What is felt in flight.
+    pub feels: Feels,
 }
 
 /// The vehicle in its air, in the heading frame: forward, right, down.
@@ -89,10 +105,19 @@ pub(super) struct Believed<'a> {
     pub(super) airframe: &'a OuterAirframe,
     /// Over ground, m/s.
     pub(super) velocity: Vector3<f32>,
-    /// Thrust that is short, N: see [`super::position::ForceResidual`].
+    /// What nobody commanded: along body z, and what of it has its direction in this frame.
+    pub(super) residual: Residual,
+}
+
+/// [`ForceResidual`] as the law believes it, N.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Residual {
+    /// Thrust that is short.
     pub(super) short_n: f32,
-    /// What spread wings do beside the flat plate, along body z, N.
+    /// What spread wings do beside the flat plate, along body z.
     pub(super) wings_n: f32,
+    /// What acts besides, in the heading frame.
+    pub(super) beside: Vector3<f32>,
 }
 
 /// What is asked for, in the heading frame.
@@ -155,6 +180,26 @@ impl Plus {
         let spare = sqrt(upper(most_n * most_n - weight_n * weight_n, 0.0)) / mass_kg;
         let level = lower(spare, GRAVITY_M_S2 as f32 * libm::tanf(tilt_max_rad));
         self.approach_share * upper(level - reference.acceleration.vector.xy().norm(), 0.1 * level)
+    }
+
+    /// Of what is felt, that which is believed.
+    ///
+    /// * `heading` - turns a NED vector into the heading frame
+    pub(super) fn believes(
+        &self,
+        felt: &ForceResidual,
+        heading: impl Fn(&Vector3<f32>) -> Vector3<f32>,
+    ) -> Residual {
+        match self.feels {
+            Feels::BodyZ => Residual {
+                short_n: felt.short_n,
+                wings_n: self.wing_download_n + felt.wings_n,
+                beside: Vector3::zeros(),
+            },
+            Feels::Everything => {
+                Residual { beside: heading(&felt.beside.vector), ..Residual::default() }
+            }
+        }
     }
 
     // By what the file says, not by what is felt: a preference that changed with the flow would
@@ -222,18 +267,19 @@ impl Believed<'_> {
 
     /// Most thrust that comes, N.
     fn thrust_max_n(&self) -> f32 {
-        self.airframe.envelope.thrust_max_n - self.short_n
+        self.airframe.envelope.thrust_max_n - self.residual.short_n
     }
 
     fn wings(&self, n: &Vector3<f32>, wings: f32) -> Vector3<f32> {
         let area_m2 = wings * self.airframe.wing_area_m2;
         let plate = flat_plate::force::<Ned, f32>(In::new(self.velocity), In::new(*n), area_m2);
-        plate.vector + n * (wings * self.wings_n)
+        plate.vector + n * (wings * self.residual.wings_n)
     }
 
     /// All but the thrust that is asked for, m/s^2.
     fn free_of_thrust(&self, n: &Vector3<f32>, wings: f32) -> Vector3<f32> {
-        let force = self.wings(n, wings) + n * self.short_n;
+        let felt = n * self.residual.short_n + self.residual.beside;
+        let force = self.wings(n, wings) + felt;
         force / self.airframe.mass_kg + Vector3::new(0.0, 0.0, GRAVITY_M_S2 as f32)
     }
 }
@@ -308,11 +354,12 @@ mod tests {
             approach_share: 0.5,
             open_above_m_s2: 0.3,
             wing_download_n: 0.0,
+            feels: Feels::BodyZ,
         }
     }
 
     fn calm(airframe: &OuterAirframe) -> Believed<'_> {
-        Believed { airframe, velocity: Vector3::zeros(), short_n: 0.0, wings_n: 0.0 }
+        Believed { airframe, velocity: Vector3::zeros(), residual: Residual::default() }
     }
 
     fn demand(airframe: &OuterAirframe, acceleration: [f32; 3], velocity: [f32; 3]) -> Demand<'_> {
@@ -432,6 +479,40 @@ mod tests {
         let none = hover(ForceResidual::default());
         let short = hover(ForceResidual { short_n: 0.8, ..ForceResidual::default() });
         assert!((short.thrust_n - none.thrust_n - 0.8).abs() < 0.01, "{short:?} {none:?}");
+    }
+
+    /// Incremental inversion: on the spot, thrust, weight and whatever is felt add up to nothing; what
+    /// has its direction in the body moves nothing of it.
+    #[test]
+    fn whatever_is_felt_is_cancelled() {
+        let position = PositionGains { integral_per_s2: Vector3::zeros(), ..plus().position };
+        let incremental = Plus { position, feels: Feels::Everything, ..plus() };
+        let p =
+            TwccParameters { plus: Some(incremental), policy: WingPolicy::Folded, ..parameters() };
+        let airframe = airframe();
+        let weight = Vector3::new(0.0, 0.0, airframe.mass_kg * GRAVITY_M_S2 as f32);
+        for beside in [[0.0; 3], [1.0, -0.5, 0.3], [-1.5, 0.7, -0.8]] {
+            let residual = ForceResidual {
+                short_n: 1.0,
+                wings_n: 1.0,
+                beside: In::new(Vector3::from(beside)),
+            };
+            let mut state = TwccState::default();
+            let mut command = AttitudeThrust::default();
+            // Attitude follows at once, so that thrust is chosen for where it is.
+            for _ in 0..5 {
+                let AttitudeThrust { roll_rad, pitch_rad, .. } = command;
+                let motion = MeasuredMotion { residual, roll_rad, pitch_rad, ..still() };
+                let attitude = Rotation::<Ned, Body, f32>::from_euler(roll_rad, pitch_rad, 0.0);
+                state.last = None;
+                let goal = at(0.0, 0.0, 0.0);
+                command =
+                    p.update(&mut state, &airframe, &motion, &attitude, None, &goal, 0.1).command;
+            }
+            let n = normal(command.roll_rad, command.pitch_rad);
+            let sum = weight + Vector3::from(beside) - n * command.thrust_n;
+            assert!(sum.norm() < 0.05, "{beside:?}: {sum} of {command:?}");
+        }
     }
 
     /// What is foreseen 4 m above the reference weighs so much that hardly any thrust is left.

@@ -87,7 +87,8 @@ pub struct PositionTerms {
     pub request: AttitudeThrust,
 }
 
-/// Force along body z that nobody commanded, as felt, N: what [`super::plus`] adds to what it believes.
+/// Force that nobody commanded, as felt, N: what [`super::plus`] adds to what it believes, along
+/// body z or whole ([`super::plus::Feels`]).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ForceResidual {
     /// With wings folded: thrust that is short.
@@ -95,6 +96,8 @@ pub struct ForceResidual {
     /// Of spread wings, beside the flat plate in still air and
     /// [`wing_download_n`](super::plus::Plus::wing_download_n).
     pub wings_n: f32,
+    /// All that acts beside thrust and gravity.
+    pub beside: In<Ned, f32>,
 }
 
 /// Measured motion at a tick.

@@ -19,6 +19,7 @@ use super::woeg::{WingEvents, WingFlag};
 use super::{AttitudeThrust, Reference};
 use crate::aero::angle_of_attack;
 use crate::frames::{Body, In, Ned, Rotation};
+use crate::math::lower;
 use crate::rnn::parnn::History;
 use crate::vehicle::{ParameterError, Vehicle};
 use nalgebra::Vector3;
@@ -159,6 +160,8 @@ pub struct OuterAirframe {
     pub wing_area_m2: f32,
     /// Limits of angle and thrust.
     pub envelope: Envelope,
+    /// What all rotors give at full speed and the reference voltage, N.
+    pub rotors_n: f32,
 }
 
 impl OuterAirframe {
@@ -171,7 +174,15 @@ impl OuterAirframe {
             mass_kg: p.mass_kg,
             wing_area_m2: vehicle.plate_area_m2(),
             envelope: Envelope { tilt_max_rad, thrust_min_n, thrust_max_n: p.limits.thrust_max_n },
+            rotors_n: vehicle.rotor_thrust_top_n() * vehicle.rotors().len() as f32,
         }
+    }
+
+    /// Where the battery leaves a share of the rotors' thrust.
+    pub(crate) fn supplied(mut self, share: f32) -> Self {
+        let e = &mut self.envelope;
+        e.thrust_max_n = lower(e.thrust_max_n, self.rotors_n * share);
+        self
     }
 }
 
@@ -321,12 +332,10 @@ impl TwccParameters {
             pitch_rad: motion.pitch_rad,
             thrust_n: 0.0,
         };
-        let felt = &motion.residual;
         let believed = Believed {
             airframe,
             velocity: heading(&motion.velocity.vector),
-            short_n: felt.short_n,
-            wings_n: plus.wing_download_n + felt.wings_n,
+            residual: plus.believes(&motion.residual, heading),
         };
         let (mut ahead, mut goal) = (*motion, *reference);
         if let Some(last) = state.last {
@@ -476,7 +485,7 @@ pub(crate) mod fixtures {
             thrust_min_n: 0.5,
             thrust_max_n: 10.0,
         };
-        OuterAirframe { mass_kg: 0.548, wing_area_m2: 0.04, envelope }
+        OuterAirframe { mass_kg: 0.548, wing_area_m2: 0.04, envelope, rotors_n: 21.6 }
     }
 }
 

@@ -4,6 +4,7 @@
 //!
 //! ```text
 //! folded    r_z  = m f_z + T                                      mean over 0.3 s
+//! all       f_0  = R (m f + T)                                    mean over 0.1 s
 //! spread    w_z  = (m f_z + T - r_z) / d - N_z                    mean over 0.05 s
 //! ```
 //! `d` is how far they are spread. `r_z` is thrust that is short (sag, inflow, load); it rests while
@@ -14,10 +15,12 @@
 use crate::aero::flat_plate;
 use crate::control::position::ForceResidual;
 use crate::frames::{Body, In, Ned, Rotation};
-use crate::math::{limit, lower};
+use crate::math::{all_finite, limit, limit_norm, lower};
 
 /// Time constant of what is felt with wings folded, s.
 const FOLDED_MEAN_S: f32 = 0.3;
+/// Time constant of all that acts, s: an outer step, so that it is news and not noise.
+const BESIDE_MEAN_S: f32 = 0.1;
 /// Time constant of what spread wings do, s: no longer than they may harm.
 const SPREAD_MEAN_S: f32 = 0.05;
 /// From the command to spread until they are, s, at an even rate.
@@ -43,8 +46,8 @@ pub(super) struct Felt {
 /// What a step brings.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Step<'a> {
-    /// `m f_z + T`, N.
-    pub force_n: f32,
+    /// `m f + T`, N.
+    pub force: In<Body, f32>,
     pub ned_from_body: &'a Rotation<Ned, Body, f32>,
     /// Over ground, m/s.
     pub velocity: In<Ned, f32>,
@@ -66,11 +69,14 @@ impl Felt {
     }
 
     pub(super) fn look(&mut self, step: &Step<'_>) {
-        let Step { force_n, ned_from_body, weight_n, dt_s, .. } = *step;
+        let Step { ned_from_body, weight_n, dt_s, .. } = *step;
+        let force_n = step.force.vector.z;
         self.spread_s =
             if step.wings > 0.0 { lower(self.spread_s + dt_s, SPREADING_S) } else { 0.0 };
         let r = &mut self.residual;
         let follow = |mean_s: f32| dt_s / (dt_s + mean_s);
+        let beside = (*ned_from_body * step.force).vector;
+        r.beside.vector += (beside - r.beside.vector) * follow(BESIDE_MEAN_S);
         if step.spread_ago_s >= FOLDING_S {
             r.short_n += (force_n - r.short_n) * follow(FOLDED_MEAN_S);
         }
@@ -84,18 +90,20 @@ impl Felt {
         } else if step.wings <= 0.0 {
             r.wings_n -= r.wings_n * follow(MEMORY_S);
         }
-        if !(r.short_n.is_finite() && r.wings_n.is_finite()) {
+        if !(r.short_n.is_finite() && r.wings_n.is_finite() && all_finite(&r.beside.vector)) {
             // Before the limits, which make a number of what is none.
             *r = ForceResidual::default();
         }
         r.short_n = limit(r.short_n, -SPARE_MAX * weight_n, SHORT_MAX * weight_n);
         r.wings_n = limit(r.wings_n, -weight_n, weight_n);
+        r.beside.vector = limit_norm(r.beside.vector, SHORT_MAX * weight_n);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::Vector3;
 
     const WEIGHT_N: f32 = 5.4;
     const AREA_M2: f32 = 0.04;
@@ -103,7 +111,7 @@ mod tests {
     /// What is felt of a force on a level body, for a while.
     fn feels(felt: &mut Felt, force_n: f32, velocity: [f32; 3], wings: f32, seconds: f32) {
         let step = Step {
-            force_n,
+            force: In::new(Vector3::new(0.2, -0.1, force_n)),
             ned_from_body: &Rotation::identity(),
             velocity: In::new(velocity.into()),
             wing_area_m2: AREA_M2,

@@ -102,11 +102,12 @@ impl Monitor {
         self.commanded.torque_n_m += (achieved.torque_n_m - self.commanded.torque_n_m) * follow;
         let learn = dt_s / (dt_s + MEAN_S);
         let is_folded = self.spread_ago_s >= FOLDED_S;
-        let felt_n = self.commanded.thrust_n + p.mass_kg * imu.specific_force.vector.z;
-        let missing_n = if is_folded { felt_n } else { 0.0 };
+        let mut felt = imu.specific_force.vector * p.mass_kg;
+        felt.z += self.commanded.thrust_n;
+        let missing_n = if is_folded { felt.z } else { 0.0 };
         if let (Some(ned_from_body), Some(velocity)) = (seen.attitude, seen.velocity) {
             self.felt.look(&Step {
-                force_n: felt_n,
+                force: In::new(felt),
                 ned_from_body,
                 velocity,
                 wing_area_m2: vehicle.plate_area_m2(),

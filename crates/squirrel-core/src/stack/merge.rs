@@ -2,7 +2,7 @@
 
 use super::Known;
 use crate::command::PilotCommand;
-use crate::frame::{POSITION_MAX_M, SensorFrame};
+use crate::frame::{POSITION_MAX_M, SensorFrame, is_voltage};
 use crate::frames::{Body, Ned, Rotation};
 use crate::math::all_finite;
 
@@ -26,6 +26,7 @@ impl SensorFrame {
         {
             known.wing_force = Some(force);
         }
+        let voltage_v = self.battery_v.filter(|voltage_v| accept(is_voltage(*voltage_v)));
         let mut commanded = false;
         if let Some(PilotCommand { attitude: a, wing }) = self.command
             // Finite where all of them are.
@@ -39,6 +40,7 @@ impl SensorFrame {
             attitude: Heard::replace(&mut known.attitude, attitude),
             gnss: Heard::replace(&mut known.gnss, gnss),
             altitude: Heard::replace(&mut known.altitude_m, altitude_m),
+            voltage_v,
             commanded,
             rejected,
         }
@@ -72,6 +74,8 @@ pub(super) struct Merged {
     pub(super) attitude: Heard,
     pub(super) gnss: Heard,
     pub(super) altitude: Heard,
+    /// Voltage of the battery, V.
+    pub(super) voltage_v: Option<f32>,
     /// A command came from outside.
     pub(super) commanded: bool,
     /// Measurements that were not finite, or larger than any flight.

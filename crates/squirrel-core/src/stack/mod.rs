@@ -21,6 +21,7 @@ use crate::control::backstepping::{AttitudeGains, AttitudeState, AttitudeTerms, 
 use crate::control::command_filter::{self, EulerReference};
 use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
 use crate::control::position::MeasuredMotion;
+use crate::control::supply::{Supply, ThrustByVoltage};
 use crate::control::twcc::{OuterAirframe, TwccParameters, TwccState, TwccTerms};
 use crate::control::{AttitudeThrust, Reference};
 use crate::estimate::monitor::{Monitor, Seen};
@@ -50,6 +51,8 @@ pub struct StackParameters {
     pub twcc: TwccParameters,
     /// Estimation.
     pub navigation: Navigation,
+    /// How thrust follows the battery's voltage.
+    pub thrust: ThrustByVoltage,
 }
 
 /// The flight code of one vehicle on one mission.
@@ -93,6 +96,8 @@ pub struct StackState {
     pub navigation: NavigationState,
     /// Whether rotors push as they are commanded.
     pub monitor: Monitor,
+    /// What the battery leaves of their thrust.
+    pub supply: Supply,
     /// Latest valid measurements.
     pub known: Known,
     /// Time of the last frame, us; `None` before the first.
@@ -171,6 +176,7 @@ impl Stack {
         parameters.attitude.check()?;
         parameters.twcc.check(p.limits.thrust_max_n)?;
         parameters.navigation.check()?;
+        parameters.thrust.check()?;
         mission.check()?;
         let tilt_max_rad = p.limits.tilt_max_rad - mission.excitation_tilt_rad();
         if !(tilt_max_rad > 0.0) {
@@ -257,6 +263,10 @@ impl Stack {
         let elapsed_us = elapsed_us(state, frame);
         state.time_us = Some(frame.time_us);
         let merged = frame.merge_into(&mut state.known);
+        if let Some(voltage_v) = merged.voltage_v {
+            state.supply.hear(voltage_v, &self.parameters.thrust);
+        }
+        let supplied = state.supply.share();
         state.rejected = state.rejected.saturating_add(merged.rejected);
         let was = state.failsafe.active.mode;
         let estimate = Estimated {
@@ -269,7 +279,7 @@ impl Stack {
         if failsafe.mode != was || !is_well || alone {
             self.forget(state, was);
         } else if let Some(command) = &state.known.command {
-            state.command = self.airframe.envelope.limit(&command.attitude);
+            state.command = self.airframe.supplied(supplied).envelope.limit(&command.attitude);
             state.wing_command = limit(command.wing, 0.0, 1.0);
         }
 
@@ -303,7 +313,7 @@ impl Stack {
         let propulsion = &self.vehicle.parameters().propulsion;
         for (i, command) in rotor_command.iter_mut().take(self.vehicle.rotors().len()).enumerate() {
             let thrust = inner.as_ref().map_or(0.0, |terms| terms.mixer.rotor_thrust_n[i]);
-            *command = propulsion.command_for_thrust(thrust);
+            *command = propulsion.command_for_thrust(thrust / supplied);
         }
         StackOutput {
             rotor_command,
@@ -365,7 +375,7 @@ impl Stack {
         };
         let terms = self.parameters.twcc.update(
             &mut state.twcc,
-            &self.airframe,
+            &self.airframe.supplied(state.supply.share()),
             &motion,
             &ned_from_body,
             state.known.wing_force,
@@ -413,7 +423,8 @@ impl Stack {
             dt_s,
         );
         let demand = ThrustTorque { thrust_n, torque_n_m: attitude.torque_n_m };
-        let mixer = self.mixer.allocate(&demand);
+        let most_n = self.vehicle.rotor_thrust_at_n(state.supply.share());
+        let mixer = self.mixer.allocate_within(most_n, &demand);
         state.saturated = mixer.saturated;
         Some(InnerTerms { filter: state.filter, excitation, attitude, demand, mixer })
     }

@@ -43,7 +43,12 @@ fn flying(force_model: &ForceModel, form: AttitudeForm, mission: &Mission) -> St
         filter_damping: 1.0,
     };
     let twcc = TwccParameters { force_model: *force_model, ..twcc::fixtures::parameters() };
-    let parameters = StackParameters { attitude, twcc, navigation: Navigation::external() };
+    let parameters = StackParameters {
+        attitude,
+        twcc,
+        navigation: Navigation::external(),
+        thrust: ThrustByVoltage::CONSTANT,
+    };
     Stack::new(Vehicle::new(squirrel()).unwrap(), parameters, *mission).unwrap()
 }
 

@@ -371,15 +371,23 @@ impl<T: Real> Vehicle<T> {
     /// Most thrust that one rotor may be asked for, N: its top thrust at the reference voltage, or
     /// its limit if lower.
     pub fn rotor_thrust_max_n(&self) -> T {
-        let p = &self.parameters.propulsion;
-        let top = match p.thrust_curve {
-            Some(curve) => curve.thrust_n(p.reference_voltage_v),
-            None => p.thrust_coefficient_n_s2 * p.speed_max_rad_s * p.speed_max_rad_s,
-        };
+        self.rotor_thrust_at_n(T::one())
+    }
+    /// [`Self::rotor_thrust_max_n`] where the battery leaves a share of the top thrust.
+    pub fn rotor_thrust_at_n(&self, share: T) -> T {
+        let top = self.rotor_thrust_top_n() * share;
         self.parameters
             .limits
             .rotor_thrust_max_n
             .map_or(top, |limit| crate::math::lower(limit, top))
+    }
+    /// Top thrust of one rotor at the reference voltage, N.
+    pub(crate) fn rotor_thrust_top_n(&self) -> T {
+        let p = &self.parameters.propulsion;
+        match p.thrust_curve {
+            Some(curve) => curve.thrust_n(p.reference_voltage_v),
+            None => p.thrust_coefficient_n_s2 * p.speed_max_rad_s * p.speed_max_rad_s,
+        }
     }
     /// The same vehicle in another scalar, checked again: what is sound in `f64` may degenerate in
     /// `f32`.

@@ -11,7 +11,7 @@ use squirrel_core::policy::PilotCommand;
 use squirrel_core::stack::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
 
 /// Sources that the flight code reads. `frame` has a sample for each step of the flight code.
-pub const INPUT_SOURCES: [&str; 10] = [
+pub const INPUT_SOURCES: [&str; 11] = [
     "frame",
     "imu",
     "imu_2",
@@ -19,6 +19,7 @@ pub const INPUT_SOURCES: [&str; 10] = [
     "gnss",
     "baro",
     "magnetometer",
+    "battery",
     "obstacle",
     "wing_force",
     "offboard",
@@ -178,6 +179,7 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
     let velocity = channel("gnss.velocity_ned_m_s", 3)?;
     let mut baro = channel("baro.altitude_m", 1)?;
     let mut magnetic = channel("magnetometer.field_body_ut", 3)?;
+    let mut voltage = channel("battery.voltage_v", 1)?;
     let mut obstacle = channel("obstacle.id_north_m_east_m", 3 * MAX_OBSTACLES)?;
     let mut wing_force = channel("wing_force.as_if_spread_ned_n", 3)?;
     let mut command = channel(&format!("offboard.{COMMAND}"), 4)?;
@@ -220,6 +222,11 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
         {
             frame.magnetic = Some(In::new(narrow(field.row(i))));
         }
+        if let Some((cursor, voltage)) = &mut voltage
+            && let Some(i) = cursor.at(*t)
+        {
+            frame.battery_v = Some(voltage.row(i)[0] as f32);
+        }
         if let Some((cursor, rows)) = &mut obstacle
             && let Some(i) = cursor.at(*t)
         {
@@ -244,8 +251,18 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
         }
         all.push(frame);
     }
-    let cursors =
-        [&imu, &imu_2, &attitude, &gnss, &baro, &magnetic, &obstacle, &wing_force, &command];
+    let cursors = [
+        &imu,
+        &imu_2,
+        &attitude,
+        &gnss,
+        &baro,
+        &magnetic,
+        &voltage,
+        &obstacle,
+        &wing_force,
+        &command,
+    ];
     for (cursor, _) in cursors.into_iter().flatten() {
         if let Some(t) = cursor.time_s.get(cursor.next) {
             return Err(InputError::NoStep { time_s: *t });

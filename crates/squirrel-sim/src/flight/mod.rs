@@ -29,6 +29,7 @@ use crate::vehicle_file::VehicleFile;
 use commands::{Command, CommandLine};
 use failing::Failing;
 use integrator::Mover;
+use squirrel_core::control::supply::ThrustByVoltage;
 use squirrel_core::dynamics::{State, specific_force, total_wind};
 use squirrel_core::effects::Effects;
 use squirrel_core::estimate::navigator::{Navigation, NavigationTerms};
@@ -116,15 +117,16 @@ impl Setup {
                 self.vehicle.name
             )));
         };
-        self.arm
-            .configure(&mut parameters.twcc, self.vehicle.weights.as_ref())
-            .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
         if let (Some(plus), Some(speed)) = (&mut parameters.twcc.plus, self.scenario.speed_max_m_s)
         {
             plus.position.speed_max_m_s = speed as f32;
         }
+        self.arm
+            .configure(&mut parameters.twcc, self.vehicle.weights.as_ref())
+            .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
         parameters.navigation = self.navigation()?;
+        parameters.thrust = self.thrust();
         Stack::new(vehicle, parameters, self.scenario.mission().map_err(fail)?).map_err(fail)
     }
 
@@ -140,6 +142,14 @@ impl Setup {
     /// The effects that act on this setup's plant: its vehicle's, and those of the conditions.
     fn effects(&self) -> Effects<f64> {
         self.scenario.conditions.effects(&self.vehicle)
+    }
+
+    /// What the flight code knows of thrust and voltage: the sag that acts, as a power.
+    fn thrust(&self) -> ThrustByVoltage {
+        let mut effects = self.effects();
+        let exponent = effects.get_mut("battery_sag").map_or(0.0, |sag| sag.values[0]);
+        let reference_v = self.vehicle.vehicle.parameters().propulsion.reference_voltage_v;
+        ThrustByVoltage { exponent: exponent as f32, reference_v: reference_v as f32 }
     }
 
     /// Who estimates, and from where on.

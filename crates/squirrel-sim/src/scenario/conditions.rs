@@ -86,7 +86,7 @@ impl Conditions {
     }
 
     /// Effects of a vehicle on this day: with a battery whose sag its file does not speak of,
-    /// rotors feel it. The flight code does not know.
+    /// rotors feel it.
     pub(crate) fn effects(self, vehicle: &VehicleFile) -> Effects<f64> {
         let mut effects = vehicle.effects;
         let is_said = effects.has(SAG);

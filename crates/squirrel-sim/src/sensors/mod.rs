@@ -4,8 +4,8 @@
 //! sensor's noise on changes nothing in another's. A sample is taken at the sensor's rate and
 //! handed over when its latency has passed, never before. Effects on sensors (biases that a vehicle
 //! file hides from the flight code, more latency) act here. What a sensor reads is in its file; the
-//! attitude is as simple as truth, bias and white noise. Those that the flight code does not hear
-//! are in `logged`.
+//! attitude is as simple as truth, bias and white noise. Those that are logged as they are, of which
+//! the flight code hears the voltage, are in `logged`.
 
 mod baro;
 mod devices;
@@ -30,7 +30,7 @@ use baro::Barometer;
 use gnss::Receiver;
 use imu::{Unit, Vibration};
 use line::{Line, Stream, fork, noise};
-use logged::{LoggedLine, Row};
+use logged::{LoggedLine, Row, VOLTAGE};
 use magnetometer::Compass;
 use squirrel_core::effects::Effects;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
@@ -162,7 +162,10 @@ impl Sensors {
             let measured = Rotation::new(heading_bias.quaternion * truth.ned_from_body.quaternion);
             frame.magnetic = compass.poll(p, time_us, measured, truth);
         }
-        let logged = self.logged.iter_mut().filter_map(|line| line.poll(time_us, truth)).collect();
+        let logged: Vec<_> =
+            self.logged.iter_mut().filter_map(|line| line.poll(time_us, truth)).collect();
+        let heard = logged.iter().flat_map(|(_, row)| row).find(|(name, _)| *name == VOLTAGE);
+        frame.battery_v = heard.map(|(_, voltage_v)| *voltage_v as f32);
         (frame, logged)
     }
 

@@ -13,8 +13,9 @@ use crate::plant::{
 use crate::quantity::Quantity;
 use crate::weights::ParnnWeights;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains};
-use squirrel_core::control::plus::Plus;
+use squirrel_core::control::plus::{Feels, Plus};
 use squirrel_core::control::position::{AngleLaw, PositionGains};
+use squirrel_core::control::supply::ThrustByVoltage;
 use squirrel_core::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use squirrel_core::control::wiic::ThrustLaw;
 use squirrel_core::control::wing_force::ForceModel;
@@ -433,6 +434,8 @@ fn control(t: &ControlTable) -> StackParameters {
         twcc: twcc(&t.position, &t.wing, t.plus.as_ref(), t.thrust_min_n.0 as f32),
         // A flight makes its own, from the sensors.
         navigation: Navigation::external(),
+        // So does it for its day.
+        thrust: ThrustByVoltage::CONSTANT,
     }
 }
 
@@ -525,5 +528,6 @@ fn plus(t: &PlusTable, position: &PositionGains) -> Plus {
         approach_share: t.approach_share.0 as f32,
         open_above_m_s2: t.open_above_m_s2.0 as f32,
         wing_download_n: t.wing_download_n.as_ref().map_or(0.0, |n| n.0 as f32),
+        feels: Feels::BodyZ,
     }
 }

@@ -8,7 +8,7 @@ use squirrel_sim::scenario::{BUILT_IN, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 
 const SEEDS: [u64; 3] = [31, 32, 33];
-const OURS: [Arm; 2] = [Arm::TwccPlus, Arm::PcPlus];
+const OURS: [Arm; 3] = [Arm::TwccPlus, Arm::PcPlus, Arm::Indi];
 
 fn at(scenario: &str, ratio: f64, seed: u64) -> Scenario {
     Scenario { seed, thrust_to_weight: Some(ratio), ..Scenario::find(scenario).unwrap() }
@@ -51,6 +51,27 @@ fn wings_do_no_harm_in_a_tail_wind() {
         assert!(ours_m < 1.05 * rival_m, "{wind_m_s} m/s: {ours_m} m, folded {rival_m} m");
         let most_m = rival_sink_m + 0.2;
         assert!(sink_m < most_m, "{wind_m_s} m/s: sinks {sink_m} m, folded {rival_sink_m} m");
+    }
+}
+
+/// Thrust follows the voltage and the flight code knows: an all but empty battery costs no height
+/// where rotors have thrust to spare. Before it knew, the paper's controller sank 8 m.
+#[test]
+fn a_weak_battery_costs_no_height_where_there_is_thrust_to_spare() {
+    let mut vehicle = VehicleFile::squirrel();
+    vehicle.effects.insert("battery_sag").unwrap().values[0] = 0.9;
+    for (scenario, ratio, arm, most_m) in [
+        ("hover", 3.0, Arm::Pc, 0.1),
+        ("track", 3.0, Arm::Pc, 0.5),
+        ("avoid", 3.0, Arm::Pc, 0.5),
+        ("avoid", 1.25, Arm::TwccPlus, 1.0),
+    ] {
+        for charge in [1.0, 0.1, 0.02] {
+            let scenario = Scenario { battery_charge: charge, ..at(scenario, ratio, 31) };
+            let (name, sunk_m) =
+                (scenario.name.clone(), flown(&vehicle, arm, scenario).height_lost_m);
+            assert!(sunk_m < most_m, "{name}, {arm:?}, charge {charge}: sinks {sunk_m} m");
+        }
     }
 }
 

@@ -78,7 +78,13 @@ fn a_changed_gain_is_found_at_the_first_output_that_it_reaches() {
 fn a_changed_input_changes_an_output() {
     let mut outside = VehicleFile::squirrel();
     outside.estimator = Estimator::External;
-    let logs = [flown(Arm::TwccOracle), flown_by(outside, Arm::TwccOracle)];
+    let sag = "\n[effects.battery_sag]\nvoltage_exponent = 0.9\n";
+    let sagging = VehicleFile::parse(&(VehicleFile::squirrel().text + sag), "vehicle").unwrap();
+    let logs = [
+        flown(Arm::TwccOracle),
+        flown_by(outside, Arm::TwccOracle),
+        flown_by(sagging, Arm::TwccOracle),
+    ];
     for (log, channel, row) in [
         (&logs[0], "imu.omega_body_rad_s", 1000),
         (&logs[0], "imu.specific_force_body_m_s2", 1000),
@@ -88,6 +94,7 @@ fn a_changed_input_changes_an_output() {
         (&logs[0], "gnss.velocity_ned_m_s", 50),
         (&logs[0], "baro.altitude_m", 250),
         (&logs[0], "magnetometer.field_body_ut", 250),
+        (&logs[2], "battery.voltage_v", 250),
         (&logs[0], "wing_force.as_if_spread_ned_n", 1500),
     ] {
         let (source, name) = channel.rsplit_once('.').unwrap();

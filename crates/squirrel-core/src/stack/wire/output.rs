@@ -28,6 +28,7 @@ impl Wire for SensorFrame {
         self.gnss.put(to);
         self.altitude_m.put(to);
         self.magnetic.put(to);
+        self.battery_v.put(to);
         self.wing_force.put(to);
         self.command.put(to);
         (self.obstacles().len() as u8).put(to);
@@ -43,6 +44,7 @@ impl Wire for SensorFrame {
         frame.gnss = Wire::take(from)?;
         frame.altitude_m = Wire::take(from)?;
         frame.magnetic = Wire::take(from)?;
+        frame.battery_v = Wire::take(from)?;
         frame.wing_force = Wire::take(from)?;
         frame.command = Wire::take(from)?;
         let mut obstacles =

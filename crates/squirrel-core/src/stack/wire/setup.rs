@@ -3,8 +3,9 @@
 
 use super::{Reader, Wire, Writer, wire_enum, wire_struct};
 use crate::control::backstepping::{AttitudeForm, AttitudeGains};
-use crate::control::plus::Plus;
+use crate::control::plus::{Feels, Plus};
 use crate::control::position::{AngleLaw, PositionGains};
+use crate::control::supply::ThrustByVoltage;
 use crate::control::twcc::{Trigger, TwccParameters, WingPolicy};
 use crate::control::wiic::ThrustLaw;
 use crate::control::wing_force::ForceModel;
@@ -224,7 +225,8 @@ wire_struct! {
         time_constant_s,
     }
     Limits<f32> { tilt_max_rad, thrust_max_n, rotor_thrust_max_n }
-    StackParameters { attitude, twcc, navigation }
+    StackParameters { attitude, twcc, navigation, thrust }
+    ThrustByVoltage { exponent, reference_v }
     AttitudeGains {
         form, c1_per_s, c2_per_s, lambda_per_s2, integral_max_rad_s, filter_frequency_rad_s, filter_damping,
     }
@@ -245,7 +247,7 @@ wire_struct! {
     TwccParameters {
         position, wing_events, thrust_law, trigger, force_model, policy, dwell_s, thrust_min_n, plus,
     }
-    Plus { position, delay_s, vertical_weight, height_band_m, sink_band_m, thrust_share, approach_share, open_above_m_s2, wing_download_n }
+    Plus { position, delay_s, vertical_weight, height_band_m, sink_band_m, thrust_share, approach_share, open_above_m_s2, wing_download_n, feels }
     PositionGains {
         position_per_s, velocity_per_s, integral_per_s2, derivative, velocity_feed_forward, acceleration_feed_forward, approach_max_m_s2,
         speed_max_m_s, acceleration_max_horizontal_m_s2, acceleration_max_vertical_m_s2, integral_max_m, angle_law,
@@ -272,5 +274,6 @@ wire_enum! {
     WingTest { Normal, Acceleration }
     ThrustLaw { Literal, Exact }
     Trigger { Angle, AngleOrThrust }
+    Feels { BodyZ, Everything }
     WingPolicy { Folded, Open, Coordinated, CoordinatedWithoutWings }
 }

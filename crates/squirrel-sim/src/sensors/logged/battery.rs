@@ -6,6 +6,9 @@ use super::super::table::Limit::{Signed, Size};
 use super::{Reads, Row, Truth};
 use rand_pcg::Pcg64Mcg;
 
+/// Channel that the flight code hears, too.
+pub(in super::super) const VOLTAGE: &str = "voltage_v";
+
 sensor! {
     /// Battery monitor.
     BatterySensor at 50.0 Hz;
@@ -28,7 +31,7 @@ impl Reads for BatterySensor {
         let voltage_v = truth.voltage_v + self.voltage_bias_v + noise(rng, self.voltage_noise_v).x;
         let current_a = truth.current_a + self.current_bias_a + noise(rng, self.current_noise_a).x;
         Some(vec![
-            ("voltage_v", quantised(voltage_v, self.voltage_resolution_v)),
+            (VOLTAGE, quantised(voltage_v, self.voltage_resolution_v)),
             ("current_a", quantised(current_a, self.current_resolution_a)),
         ])
     }

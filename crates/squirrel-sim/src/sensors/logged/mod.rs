@@ -1,5 +1,5 @@
-//! Sensors that the flight code does not hear: what they read is late like any other's, and goes
-//! into the log alone.
+//! Sensors whose samples go into the log as they are, late like any other's; of them the flight code
+//! hears the voltage alone.
 //!
 //! Each is one file, with the keys of its table in `[sensors]`, its devices and what it reads
 //! (`Reads`), and a line of [`Logged`].
@@ -8,6 +8,7 @@ mod battery;
 mod range_finder;
 
 pub use battery::BatterySensor;
+pub(super) use battery::VOLTAGE;
 pub use range_finder::RangeFinderSensor;
 
 use super::Truth;
