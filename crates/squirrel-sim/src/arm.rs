@@ -7,7 +7,6 @@ use crate::weights::ParnnWeights;
 use squirrel_core::control::plus::{Feels, Plus};
 use squirrel_core::control::twcc::{TwccParameters, WingPolicy};
 use squirrel_core::control::wing_force::ForceModel;
-use squirrel_core::nalgebra::Vector3;
 
 /// A controller and what it flies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -167,9 +166,7 @@ impl Arm {
         };
         match (self, plus) {
             (Self::TwccFlatFf | Self::TwccParnnFf, Some(plus)) => twcc.position = plus.position,
-            (Self::Indi, Some(mut plus)) => {
-                // What is felt is all that an integral would find.
-                plus.position.integral_per_s2 = Vector3::zeros();
+            (Self::Indi, Some(plus)) => {
                 twcc.plus = Some(Plus { feels: Feels::Everything, ..plus });
             }
             // Of planners it is what flies where commands cease.

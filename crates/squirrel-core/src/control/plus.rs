@@ -31,8 +31,7 @@
 //!
 //! With [`Feels::Everything`] it is incremental inversion (INDI, outer loop: Smeur, de Croon and Chu,
 //! Control Engineering Practice 73, 2018): all that the accelerometer feels beside thrust is taken
-//! as what acts a moment later, whatever makes it, in place of an integral. It is a rival, and has
-//! no wings.
+//! as what acts a moment later, whatever makes it. It is a rival, and has no wings.
 //!
 //! Wings open where they make the residual smaller by [`Plus::open_above_m_s2`], and fold where
 //! they no longer make it smaller. Without wings it is the same controller: the fair rival.
@@ -265,9 +264,10 @@ impl Believed<'_> {
         self.wings(&normal(at.roll_rad, at.pitch_rad), 1.0)
     }
 
-    /// Most thrust that comes, N.
+    /// Most thrust that comes, less what pushes down, N.
     fn thrust_max_n(&self) -> f32 {
-        self.airframe.envelope.thrust_max_n - self.residual.short_n
+        let Residual { short_n, beside, .. } = self.residual;
+        self.airframe.envelope.thrust_max_n - short_n - beside.z
     }
 
     fn wings(&self, n: &Vector3<f32>, wings: f32) -> Vector3<f32> {

@@ -5,11 +5,14 @@
 
 mod build;
 mod effects;
+mod hovering;
+pub mod margins;
 mod means;
 mod tables;
 
 pub use crate::quantity::Provenance;
 pub use effects::{ListedEffect, ListedParameter, effects_page, listed_effects};
+pub use hovering::{Hovering, StepAnswer};
 pub use means::Means;
 
 use crate::estimator::Estimator;

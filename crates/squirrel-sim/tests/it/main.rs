@@ -8,6 +8,7 @@ mod excitation;
 mod faults;
 mod flights;
 mod import_flights;
+mod margins;
 mod parnn_flights;
 mod pilot;
 mod policy_weights;
