@@ -18,7 +18,7 @@
 //!   attitude bandwidth is compensated, and a servo has travelled by the time that the attitude it
 //!   was opened for is there;
 //! - thrust is for the attitude on the way there, not for its end, so that it does not lift before
-//!   it brakes;
+//!   it brakes, and for the present one where there is plenty of it;
 //! - height is part of the residual with the weight `W_z`, so that it is held unless the horizontal
 //!   gains more; a sink weighs the more the less thrust there is to end it;
 //! - what the inertial unit feels along body z beside all this is added
@@ -54,6 +54,8 @@ const TURN_M_S2: f32 = 5.0;
 const TURN_MIN_M_S2: f32 = 2.0;
 /// Share of the weight by which lift at the tilt limit must be above it to hold height and the way.
 const HELD_SHARE: f32 = 0.08;
+/// From which on there is plenty.
+const PLENTY_SHARE: f32 = 0.2;
 /// First step of the search, rad.
 const STEP_RAD: f32 = 0.2;
 
@@ -83,7 +85,8 @@ pub struct Plus {
     /// limit with something to spare. Where it does not, holding it would give up the way: there it
     /// is `height_band_m`.
     pub sink_band_m: f32,
-    /// Share of the way from the present to the commanded attitude for which thrust is chosen.
+    /// Share of the way from the present to the commanded attitude for which thrust is chosen, where
+    /// it is scarce; with plenty of it, it is chosen for the present attitude.
     pub thrust_share: f32,
     /// Share of the acceleration that rotors have to spare in level flight with which an approach
     /// to the reference is braked.
@@ -201,14 +204,18 @@ impl Plus {
         }
     }
 
-    // By what the file says, not by what is felt: a preference that changed with the flow would
-    // chase the flight.
     fn sink_band(&self, airframe: &OuterAirframe) -> f32 {
-        let OuterAirframe { mass_kg, envelope, .. } = *airframe;
-        let lift_n = envelope.thrust_max_n * cos(envelope.tilt_max_rad);
-        let spare = lift_n / (mass_kg * GRAVITY_M_S2 as f32) - 1.0;
-        let held = limit(spare / HELD_SHARE, 0.0, 1.0);
+        let held = limit(lift_to_spare(airframe) / HELD_SHARE, 0.0, 1.0);
         self.height_band_m + (self.sink_band_m - self.height_band_m) * held
+    }
+
+    /// Share of the way to the commanded attitude for which thrust is chosen.
+    ///
+    /// Where thrust is scarce a turn begins with all of it, before the attitude is there: lift that
+    /// is lost later. Where there is plenty that only climbs, and pushes on along the old way.
+    pub(super) fn thrust_share(&self, airframe: &OuterAirframe) -> f32 {
+        let plenty = (lift_to_spare(airframe) - HELD_SHARE) / (PLENTY_SHARE - HELD_SHARE);
+        self.thrust_share * (1.0 - limit(plenty, 0.0, 1.0))
     }
 
     /// `W_z^2` for a height error and its rate: it grows with the error that is foreseen at the
@@ -226,6 +233,14 @@ impl Plus {
         let weight = self.vertical_weight * (1.0 + share * share);
         weight * weight
     }
+}
+
+/// Lift at the tilt limit over the weight, less 1: by what the file says, not by what is felt, for a
+/// preference that changed with the flow would chase the flight.
+fn lift_to_spare(airframe: &OuterAirframe) -> f32 {
+    let OuterAirframe { mass_kg, envelope, .. } = *airframe;
+    let lift_n = envelope.thrust_max_n * cos(envelope.tilt_max_rad);
+    lift_n / (mass_kg * GRAVITY_M_S2 as f32) - 1.0
 }
 
 /// How much closer wings bring the acceleration to the command, m/s^2.
@@ -513,6 +528,34 @@ mod tests {
             let sum = weight + Vector3::from(beside) - n * command.thrust_n;
             assert!(sum.norm() < 0.05, "{beside:?}: {sum} of {command:?}");
         }
+    }
+
+    /// With plenty of thrust none is spent on the way that the vehicle still leans; where it is scarce
+    /// a turn begins with all of it.
+    #[test]
+    fn thrust_waits_for_the_attitude_where_there_is_plenty() {
+        let weight_n = airframe().mass_kg * GRAVITY_M_S2 as f32;
+        let share = |ratio: f32| {
+            let mut airframe = airframe();
+            airframe.envelope.thrust_max_n = ratio * weight_n;
+            plus().thrust_share(&airframe)
+        };
+        assert_eq!((share(1.1), share(1.24), share(1.4), share(3.0)), (0.5, 0.5, 0.0, 0.0));
+        assert!(share(1.3) > 0.2 && share(1.3) < 0.4, "{}", share(1.3));
+        let p = TwccParameters { plus: Some(plus()), policy: WingPolicy::Folded, ..parameters() };
+        let leaning = MeasuredMotion {
+            velocity: In::new(Vector3::new(7.0, 0.0, 0.0)),
+            pitch_rad: -0.3,
+            ..still()
+        };
+        let thrust = |ratio: f32| {
+            let mut airframe = airframe();
+            airframe.envelope.thrust_max_n = ratio * weight_n;
+            let attitude = Rotation::<Ned, Body, f32>::from_euler(0.0, -0.3, 0.0);
+            let (state, goal) = (&mut TwccState::default(), at(0.0, 0.0, 0.0));
+            p.update(state, &airframe, &leaning, &attitude, None, &goal, 0.1).command.thrust_n
+        };
+        assert!(thrust(1.2) > 1.19 * weight_n && thrust(2.0) < weight_n);
     }
 
     /// What is foreseen 4 m above the reference weighs so much that hardly any thrust is left.

@@ -391,7 +391,7 @@ impl TwccParameters {
             }
         }
         let wing_command = f32::from(state.mode != Mode::Primary);
-        let meanwhile = plus::between(&now, &best.command, plus.thrust_share);
+        let meanwhile = plus::between(&now, &best.command, plus.thrust_share(airframe));
         let AttitudeThrust { thrust_n, .. } =
             demand.at(meanwhile.roll_rad, meanwhile.pitch_rad, wing_command).command;
         let command = AttitudeThrust { thrust_n, ..best.command };
