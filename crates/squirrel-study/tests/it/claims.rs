@@ -22,8 +22,11 @@ const IDS: [&str; 21] = [
     "X2", "X3", "X4", "X5", "X6", "X7",
 ];
 
+/// Nothing was chosen on it: numbers of controllers were on seeds 1 to 10.
+const SEED: u64 = 11;
+
 fn plan(trials: u32) -> Plan {
-    Plan::calm(VehicleFile::squirrel(), Arm::ALONE.to_vec(), trials, 1)
+    Plan::calm(VehicleFile::squirrel(), Arm::ALONE.to_vec(), trials, SEED)
 }
 
 /// A hundred and five trials of every arm, for both tests.
@@ -155,7 +158,7 @@ fn every_claim_has_a_row_and_a_test() {
 fn the_better_controller_comes_through_and_the_papers_arms_owe_little_to_wings() {
     let study = &*FOREST;
     let row = |arm: &str| study.rows.iter().find(|row| row.arm == arm).unwrap();
-    assert_eq!(study.rows.len(), 9);
+    assert_eq!(study.rows.len(), Arm::ALONE.len());
     let papers = ["pc", "pc_wings_open", "wiic_no_wings", "twcc_flat", "twcc_parnn", "twcc_oracle"];
     let best = papers.iter().map(|arm| row(arm).in_band.share.value).fold(0.0, f64::max);
     let ours = row("twcc_plus").in_band.share;
