@@ -4,8 +4,12 @@
 //! line that names the file, the field and the value.
 
 mod build;
+pub mod diff;
 mod effects;
+pub mod export;
+pub mod fit;
 mod means;
+pub mod new;
 mod tables;
 
 pub use crate::quantity::Provenance;
