@@ -138,7 +138,9 @@ fn of_effect(file: &VehicleFile, keeps: &Keeps, name: &str) -> Option<String> {
         "weak_rotor" => Some("all rotors alike: their mean".to_owned()),
         "linear_drag" => match (keeps.linear, form) {
             (Axes::None, _) => left_out(),
-            (Axes::Each, _) | (_, "isotropic" | "") => None,
+            (Axes::Each, _) => None,
+            (Axes::Alike, "isotropic" | "") => Some("acts along z, too".to_owned()),
+            (_, "isotropic" | "") => None,
             _ => Some("one number for x and y: the mean".to_owned()),
         },
         "quadratic_drag" => match (keeps.quadratic, form) {

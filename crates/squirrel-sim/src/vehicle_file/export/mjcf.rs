@@ -32,7 +32,8 @@ pub(super) fn text(flat: &Flat, keeps: &Keeps) -> String {
     let j = &flat.inertia_kg_m2;
     let d = digits;
     let viscosity = keeps.linear_of(flat)[0] / (6.0 * PI * BALL_M);
-    let blunt = keeps.area_of(flat)[0] / (PI * BALL_M * BALL_M);
+    // Blunt drag there has no half before the density.
+    let blunt = keeps.area_of(flat)[0] / (2.0 * PI * BALL_M * BALL_M);
     let cg = [flat.cg[0], -flat.cg[1], -flat.cg[2]];
     let place = |p: [f64; 3]| format!("{} {} {}", d(p[0]), d(p[1]), d(p[2]));
     let mut out = String::new();

@@ -79,7 +79,7 @@ pub(super) fn text(flat: &Flat, keeps: &Keeps) -> String {
         let _ = writeln!(
             out,
             "    <link name=\"rotor_{i}\">\n      <pose>{} {} {} 0 0 0</pose>\n      <inertial><mass>{}</mass><inertia>\
-             <ixx>{3}</ixx><ixy>0</ixy><ixz>0</ixz><iyy>{4}</iyy><iyz>0</iyz><izz>{5}</izz></inertia></inertial>\n      \
+             <ixx>{4}</ixx><ixy>0</ixy><ixz>0</ixz><iyy>{4}</iyy><iyz>0</iyz><izz>{5}</izz></inertia></inertial>\n      \
              <visual name=\"disc\"><geometry><cylinder><radius>{6}</radius><length>0.002</length></cylinder></geometry></visual>\n    \
              </link>\n    <joint name=\"rotor_{i}_joint\" type=\"revolute\">\n      <parent>base_link</parent>\n      \
              <child>rotor_{i}</child>\n      <axis><xyz>0 0 1</xyz><limit><lower>-1e16</lower><upper>1e16</upper></limit></axis>\n    \

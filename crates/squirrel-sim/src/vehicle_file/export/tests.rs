@@ -113,3 +113,30 @@ fn files_are_well_formed() {
     let hexa = VehicleFile::parse(&hexa, "five").unwrap();
     assert!(export(&hexa, Target::Crazyflow).unwrap_err().contains("5 rotors"));
 }
+
+/// Rotors are links of their own there: with the body they must weigh and turn as the vehicle does.
+#[test]
+fn links_of_sdf_add_up_to_the_vehicle() {
+    let squirrel = VehicleFile::parse(SQUIRREL_TOML, "squirrel").unwrap();
+    let text = export(&squirrel, Target::Sdf).unwrap().text;
+    let number = |link: &str, tag: &str| -> Vec<f64> {
+        let inside = link.split(&format!("<{tag}>")).nth(1).unwrap().split('<').next().unwrap();
+        inside.split_whitespace().map(|x| x.parse().unwrap()).collect()
+    };
+    let (mut mass, mut inertia) = (0.0, [0.0; 3]);
+    for (i, link) in text.split("<link ").skip(1).enumerate() {
+        let own = number(link, "mass")[0];
+        let place = if i == 0 { vec![0.0; 6] } else { number(link, "pose") };
+        mass += own;
+        let [x, y, z] = [place[0], place[1], place[2]];
+        let beside = [y * y + z * z, x * x + z * z, x * x + y * y];
+        for (axis, tag) in ["ixx", "iyy", "izz"].into_iter().enumerate() {
+            inertia[axis] += number(link, tag)[0] + own * beside[axis];
+        }
+    }
+    assert!((mass - 0.548).abs() < 1e-8, "{mass}");
+    for (axis, truth) in [3.22e-3, 4.68e-3, 7.72e-3].into_iter().enumerate() {
+        // A rotor's own is what the body keeps.
+        assert!((inertia[axis] / truth - 1.0).abs() < 1e-3, "{inertia:?}");
+    }
+}

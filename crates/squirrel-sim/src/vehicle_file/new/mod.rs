@@ -265,7 +265,7 @@ impl Given {
             &Number {
                 value: volt.value * cells,
                 sd: volt.value * cells * volt.sd_fraction,
-                source: format!("{} cells of 3.7 V, {}", sizes.cells, sizes.cells_source),
+                source: format!("3.7 V a cell, cells: {}", sizes.cells_source),
             },
         );
         if let Some(square) = self.thrust_square_fraction.as_ref().filter(|said| said.value < 1.0) {
