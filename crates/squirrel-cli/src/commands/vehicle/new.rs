@@ -98,7 +98,7 @@ impl New {
         talk("An empty line leaves a number to be guessed.");
         if self.frame.is_none() {
             let names: Vec<&str> = Frame::ALL.iter().map(|(name, _)| *name).collect();
-            self.frame = asked(&format!("frame ({})", names.join(", ")), |text| Frame::parse(text));
+            self.frame = asked(&format!("frame ({})", names.join(", ")), Frame::parse);
         }
         let number = |text: &str| text.parse::<f64>().map_err(|_| format!("{text}: is no number"));
         for (place, question) in [

@@ -108,15 +108,15 @@ pub(super) fn without(effects: &Effects<f64>, name: &str) -> Effects<f64> {
     out
 }
 
-pub(super) fn plant(file: &VehicleFile, effects: Effects<f64>) -> Result<Plant, String> {
-    Plant::new(file.vehicle, effects, WingPlant::None, None, STEP_S)
+pub(super) fn plant(file: &VehicleFile, effects: &Effects<f64>) -> Result<Plant, String> {
+    Plant::new(file.vehicle, *effects, WingPlant::None, None, STEP_S)
         .map_err(|e| format!("{}: {e}", file.name))
 }
 
 impl Flat {
     pub(super) fn of(file: &VehicleFile) -> Result<Self, String> {
         let effects = &file.effects;
-        let plant = plant(file, *effects)?;
+        let plant = plant(file, effects)?;
         let vehicle = *plant.vehicle();
         let p = vehicle.parameters();
         let of = |name: &str, key: &str| number(effects, name, key);

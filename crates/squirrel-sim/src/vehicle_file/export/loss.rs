@@ -138,9 +138,8 @@ fn of_effect(file: &VehicleFile, keeps: &Keeps, name: &str) -> Option<String> {
         "weak_rotor" => Some("all rotors alike: their mean".to_owned()),
         "linear_drag" => match (keeps.linear, form) {
             (Axes::None, _) => left_out(),
-            (Axes::Each, _) => None,
             (Axes::Alike, "isotropic" | "") => Some("acts along z, too".to_owned()),
-            (_, "isotropic" | "") => None,
+            (Axes::Each, _) | (_, "isotropic" | "") => None,
             _ => Some("one number for x and y: the mean".to_owned()),
         },
         "quadratic_drag" => match (keeps.quadratic, form) {
@@ -165,7 +164,7 @@ fn of_effect(file: &VehicleFile, keeps: &Keeps, name: &str) -> Option<String> {
 
 /// What an effect alone does to force and moment.
 fn size(file: &VehicleFile, flat: &Flat, name: &str) -> Result<Option<[Error; 2]>, String> {
-    let rest = flat::plant(file, flat::without(&file.effects, name))?;
+    let rest = flat::plant(file, &flat::without(&file.effects, name))?;
     let at = |velocity| {
         let without = flat::wrench(&rest, velocity, flat.hover_rad_s, flat.rotors.len());
         difference(flat.plant_wrench(velocity), without)

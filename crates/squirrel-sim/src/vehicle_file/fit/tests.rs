@@ -1,5 +1,6 @@
 use super::*;
 use squirrel_log::{Channel, Source};
+use std::fmt::Write;
 
 fn squirrel() -> VehicleFile {
     VehicleFile::squirrel()
@@ -18,7 +19,7 @@ fn a_stand_gives_back_what_it_was_made_of() {
         let speed = 2800.0 * u;
         let (rpm, grams) =
             (speed * 60.0 / std::f64::consts::TAU, 5e-7 * speed * speed / 9.80665e-3);
-        text.push_str(&format!("{u},{rpm},{grams},{},15.5\n", 6e-9 * speed * speed));
+        writeln!(text, "{u},{rpm},{grams},{},15.5", 6e-9 * speed * speed).unwrap();
     }
     let stand = Stand::parse(&text, "stand.csv").unwrap();
     let fit = stand.fit(&squirrel(), "stand.csv").unwrap();
@@ -46,7 +47,7 @@ fn a_stand_that_is_no_square_gets_a_curve() {
     let mut text = "command,thrust_n\n".to_owned();
     for i in 1..=12 {
         let u = f64::from(i) / 12.0;
-        text.push_str(&format!("{u},{}\n", 3.0 * u + 2.0 * u * u));
+        writeln!(text, "{u},{}", 3.0 * u + 2.0 * u * u).unwrap();
     }
     let fit = Stand::parse(&text, "s").unwrap().fit(&squirrel(), "s").unwrap();
     let file = VehicleFile::parse(&patched(&squirrel(), &fit.numbers).unwrap(), "f").unwrap();

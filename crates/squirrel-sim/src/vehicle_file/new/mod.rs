@@ -187,7 +187,7 @@ impl Given {
         lines.line("# A first file, made by `squirrel vehicle new`. What nobody gave is guessed from published machines: `sd` is how far those lie");
         lines.line("# apart, and `squirrel gap run` moves a number within it. A thrust stand, a hover or a swing narrow it: `squirrel vehicle fit`.");
         lines.line(&format!("name = {}", text::quoted(&self.name)));
-        self.mass(&mut lines, &sizes);
+        mass(&mut lines, &sizes);
         self.rotors(&mut lines, &sizes);
         self.propulsion(&mut lines, &sizes);
         drag(&mut lines, &sizes);
@@ -199,29 +199,6 @@ impl Given {
         lines.line("suite = \"nominal\"");
         lines.append(&gains::toml(&sizes.airframe()));
         lines.text()
-    }
-
-    fn mass(&self, lines: &mut Lines, sizes: &Sizes) {
-        lines.table("[mass]");
-        lines.number("mass_kg", &sizes.mass_kg);
-        let arm = sizes.arm_m.value;
-        let arm_spread = sizes.arm_m.sd / arm;
-        let moment = |rule: Rule| {
-            let value = sizes.mass_kg.value * (rule.value * arm).powi(2);
-            let spread = 2.0 * rule.sd_fraction.hypot(arm_spread);
-            (value, value * spread)
-        };
-        let ((xy, xy_sd), (z, z_sd)) = (moment(scaling::GYRATION_XY), moment(scaling::GYRATION_Z));
-        // No body has more about z than about x and y together.
-        let z = z.min(1.98 * xy);
-        let source = format!(
-            "guess by scaling: radii of gyration of {} and {} arms, as published quadrotors; {:.0} and {:.0} %",
-            scaling::GYRATION_XY.value,
-            scaling::GYRATION_Z.value,
-            100.0 * xy_sd / xy,
-            100.0 * z_sd / z,
-        );
-        lines.list("inertia_kg_m2", &[xy, xy, z], &[xy_sd, xy_sd, z_sd], &source);
     }
 
     fn rotors(&self, lines: &mut Lines, sizes: &Sizes) {
@@ -305,6 +282,29 @@ impl Given {
             "ocv_v_of_charge = {{ value = {CELL_OCV}, source = \"usual lithium polymer cell at rest\" }}"
         ));
     }
+}
+
+fn mass(lines: &mut Lines, sizes: &Sizes) {
+    lines.table("[mass]");
+    lines.number("mass_kg", &sizes.mass_kg);
+    let arm = sizes.arm_m.value;
+    let arm_spread = sizes.arm_m.sd / arm;
+    let moment = |rule: Rule| {
+        let value = sizes.mass_kg.value * (rule.value * arm).powi(2);
+        let spread = 2.0 * rule.sd_fraction.hypot(arm_spread);
+        (value, value * spread)
+    };
+    let ((xy, xy_sd), (z, z_sd)) = (moment(scaling::GYRATION_XY), moment(scaling::GYRATION_Z));
+    // No body has more about z than about x and y together.
+    let z = z.min(1.98 * xy);
+    let source = format!(
+        "guess by scaling: radii of gyration of {} and {} arms, as published quadrotors; {:.0} and {:.0} %",
+        scaling::GYRATION_XY.value,
+        scaling::GYRATION_Z.value,
+        100.0 * xy_sd / xy,
+        100.0 * z_sd / z,
+    );
+    lines.list("inertia_kg_m2", &[xy, xy, z], &[xy_sd, xy_sd, z_sd], &source);
 }
 
 fn drag(lines: &mut Lines, sizes: &Sizes) {

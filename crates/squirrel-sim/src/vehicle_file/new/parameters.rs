@@ -65,7 +65,7 @@ impl LogParameters {
         let hover = self.said("MPC_THR_HOVER", log, 1.0);
         fill(
             &mut given.hover_thrust_fraction,
-            hover.filter(|said| said.value != PX4_DEFAULT_HOVER),
+            hover.filter(|said| !is_unset(said.value, PX4_DEFAULT_HOVER)),
         );
         if let Some(square) = self.get("THR_MDL_FAC") {
             let source = format!("THR_MDL_FAC in {log}");
@@ -113,7 +113,7 @@ impl LogParameters {
             }
             source = format!("{source}, scaled to {}", arm.source);
         }
-        if levers.iter().any(|lever| *lever != PX4_DEFAULT_KM) {
+        if levers.iter().any(|lever| !is_unset(*lever, PX4_DEFAULT_KM)) {
             let value = levers.iter().sum::<f64>() / count;
             let source = format!("mean of CA_ROTOR*_KM in {log}");
             fill(&mut given.torque_per_thrust_m, Some(Said { value, source }));
@@ -168,6 +168,11 @@ impl LogParameters {
     }
 }
 
+/// Whether a number is what nobody has set; logs have them in single precision.
+fn is_unset(value: f64, default: f64) -> bool {
+    (value - default).abs() < 1e-6
+}
+
 fn fill(place: &mut Option<Said>, said: Option<Said>) {
     if place.is_none() {
         *place = said;
@@ -178,6 +183,7 @@ fn fill(place: &mut Option<Said>, said: Option<Said>) {
 mod tests {
     use super::*;
 
+    #[allow(clippy::unnecessary_wraps, reason = "every field of what is given is optional")]
     fn said(value: f64) -> Option<Said> {
         Some(Said { value, source: "test".to_owned() })
     }

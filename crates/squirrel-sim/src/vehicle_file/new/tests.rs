@@ -5,6 +5,7 @@ use super::*;
 use crate::arm::Arm;
 use crate::quantity::Provenance;
 
+#[allow(clippy::unnecessary_wraps, reason = "every field of what is given is optional")]
 fn said(value: f64) -> Option<Said> {
     Some(Said { value, source: "test".to_owned() })
 }
