@@ -25,15 +25,13 @@ def flipped_quaternion(wxyz):
 
 def rotorpy(text, starts, commands, dt_s, nominal):
     """RotorPy's own derivative of the state, by RK4."""
-    from rotorpy.vehicles.multirotor import Multirotor
-
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "params.py"
         path.write_text(text)
         spec = importlib.util.spec_from_file_location("params", path)
         module = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(module)
-    vehicle = Multirotor(module.quad_params)
+    vehicle = module.Vehicle()
     paths = []
     for start, speeds in zip(starts, commands):
         w, x, y, z = flipped_quaternion(start["q"])

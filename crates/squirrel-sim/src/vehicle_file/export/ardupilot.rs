@@ -4,7 +4,7 @@
 //! (`mdrag_coef`, with the root of thrust times disc area) takes its part and a drag area the rest.
 
 use super::flat::{self, Flat, SPEED_M_S};
-use super::{Axes, Keeps, digits};
+use super::{Axes, Keeps, Pulls, digits};
 use serde_json::{Map, Value, json};
 use squirrel_core::math::AIR_DENSITY_KG_M3;
 use std::f64::consts::PI;
@@ -14,6 +14,7 @@ pub(super) const KEEPS: Keeps = Keeps {
     lags: 0,
     linear: Axes::Plane,
     quadratic: Axes::Alike,
+    pulls: Pulls::AtCentreOfMass,
     axial: false,
     lift: false,
     flapping: false,

@@ -2,7 +2,7 @@
 //! them, body FLU, rotor speeds in rpm.
 
 use super::flat::Flat;
-use super::{Axes, Keeps, digits};
+use super::{Axes, Keeps, Pulls, digits};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 
@@ -11,6 +11,7 @@ pub(super) const KEEPS: Keeps = Keeps {
     lags: 2,
     linear: Axes::Each,
     quadratic: Axes::None,
+    pulls: Pulls::AtCentreOfMass,
     axial: false,
     lift: false,
     flapping: false,

@@ -1,7 +1,7 @@
 //! What a target cannot express, and the error that remains.
 
 use super::flat::{self, Flat, SPEED_M_S};
-use super::{Axes, Keeps};
+use super::{Axes, Keeps, Pulls};
 use crate::vehicle_file::VehicleFile;
 use serde::Serialize;
 use squirrel_core::effects::Effects;
@@ -90,8 +90,25 @@ fn target_wrench(flat: &Flat, keeps: &Keeps, velocity: [f64; 3]) -> [[f64; 3]; 2
         }
     }
     let (linear, area) = (keeps.linear_of(flat), keeps.area_of(flat));
-    for axis in 0..3 {
-        force[axis] -= (linear[axis] + flat::per_square(area[axis]) * speed) * air[axis];
+    let line = [0, 1, 2].map(|axis| -linear[axis] * air[axis]);
+    let square = [0, 1, 2].map(|axis| -flat::per_square(area[axis]) * speed * air[axis]);
+    let count = flat.rotors.len() as f64;
+    let hubs =
+        [0, 1, 2].map(|axis| flat.rotors.iter().map(|r| r.position[axis]).sum::<f64>() / count);
+    let centre = flat.cg.map(|x| -x);
+    let [at_line, at_square] = match keeps.pulls {
+        Pulls::AtCentreOfMass => [[0.0; 3]; 2],
+        Pulls::AtCentre => [centre, centre],
+        Pulls::LinearAtHubs => [hubs, [0.0; 3]],
+    };
+    for (place, drag) in [(at_line, line), (at_square, square)] {
+        let [x, y, z] = place;
+        let about =
+            [y * drag[2] - z * drag[1], z * drag[0] - x * drag[2], x * drag[1] - y * drag[0]];
+        for axis in 0..3 {
+            force[axis] += drag[axis];
+            moment[axis] += about[axis];
+        }
     }
     if keeps.flapping {
         moment[0] -= flat.flapping * air[1];

@@ -5,7 +5,7 @@
 //! `MuJoCo`'s fluid model: viscosity gives what is linear, density what is quadratic.
 
 use super::flat::Flat;
-use super::{Axes, Keeps, digits};
+use super::{Axes, Keeps, Pulls, digits};
 use squirrel_core::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2};
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -15,6 +15,7 @@ pub(super) const KEEPS: Keeps = Keeps {
     lags: 1,
     linear: Axes::Alike,
     quadratic: Axes::Alike,
+    pulls: Pulls::AtCentre,
     axial: false,
     lift: false,
     flapping: false,
@@ -67,11 +68,10 @@ pub(super) fn text(flat: &Flat, keeps: &Keeps) -> String {
     let _ = writeln!(
         out,
         "      <geom name=\"airframe\" type=\"box\" size=\"{}\" mass=\"0\" contype=\"0\" conaffinity=\"0\"/>\n      \
-         <geom name=\"drag\" type=\"sphere\" size=\"{}\" pos=\"{}\" mass=\"0\" contype=\"0\" conaffinity=\"0\" fluidshape=\"ellipsoid\" \
+         <geom name=\"drag\" type=\"sphere\" size=\"{}\" mass=\"0\" contype=\"0\" conaffinity=\"0\" fluidshape=\"ellipsoid\" \
          fluidcoef=\"{} 0 0 0 0\"/>",
         place(half),
         d(BALL_M),
-        place(cg),
         d(blunt),
     );
     for (i, rotor) in flat.rotors.iter().enumerate() {

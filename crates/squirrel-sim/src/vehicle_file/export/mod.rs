@@ -105,6 +105,15 @@ impl Axes {
     }
 }
 
+/// Where drag pulls in a target; here it is at the centre of the airframe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Pulls {
+    AtCentreOfMass,
+    AtCentre,
+    /// What is linear at the hubs, what is quadratic at the centre of mass.
+    LinearAtHubs,
+}
+
 /// What a target has of a vehicle. All have mass, inertia and places of rotors.
 #[derive(Debug, Clone, Copy)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a term that a target has or has not")]
@@ -116,6 +125,7 @@ struct Keeps {
     linear: Axes,
     /// Drag with the square of speed; a target without takes what it has at 5 m/s as linear drag.
     quadratic: Axes,
+    pulls: Pulls,
     axial: bool,
     lift: bool,
     flapping: bool,
@@ -176,7 +186,7 @@ pub fn export(file: &VehicleFile, target: Target) -> Result<Exported, String> {
         Target::ArdupilotJson => ardupilot::text(&flat, &keeps)?,
         Target::Px4Params => px4::text(&flat, &keeps),
         Target::Mjcf => mjcf::text(&flat, &keeps),
-        Target::Rotorpy => rotorpy::text(&flat, &keeps),
+        Target::Rotorpy => rotorpy::text(&flat, &keeps)?,
         Target::Crazyflow => crazyflow::text(&flat, &keeps)?,
     };
     Ok(Exported {

@@ -2,7 +2,7 @@
 //! thrust model, and the vehicle of simulation in hardware (`SIH_*`, a quadrotor in X).
 
 use super::flat::Flat;
-use super::{Axes, Keeps};
+use super::{Axes, Keeps, Pulls};
 use std::fmt::Write;
 
 pub(super) const KEEPS: Keeps = Keeps {
@@ -10,6 +10,7 @@ pub(super) const KEEPS: Keeps = Keeps {
     lags: 1,
     linear: Axes::Alike,
     quadratic: Axes::None,
+    pulls: Pulls::AtCentreOfMass,
     axial: false,
     lift: false,
     flapping: false,

@@ -1,9 +1,11 @@
 //! `RotorPy` (Folk, Paulos, Kumar 2023): a module with the dictionary `quad_params`, body FLU.
 //!
-//! Rotor drag there goes with rotor speed: the numbers are right at the speed of hover.
+//! Rotor drag there goes with rotor speed: the numbers are right at the speed of hover. It acts at the
+//! hubs and damps rotation, which squirrel has as an effect of its own: the module's class `Vehicle`
+//! leaves that out.
 
 use super::flat::Flat;
-use super::{Axes, Keeps, digits, flat};
+use super::{Axes, Keeps, Pulls, digits, flat};
 use std::fmt::Write;
 
 pub(super) const KEEPS: Keeps = Keeps {
@@ -11,6 +13,7 @@ pub(super) const KEEPS: Keeps = Keeps {
     lags: 1,
     linear: Axes::PlaneAndZ,
     quadratic: Axes::Each,
+    pulls: Pulls::LinearAtHubs,
     axial: true,
     lift: true,
     flapping: true,
@@ -20,7 +23,27 @@ pub(super) const KEEPS: Keeps = Keeps {
     damping: false,
 };
 
-pub(super) fn text(flat: &Flat, keeps: &Keeps) -> String {
+/// What follows the numbers.
+const CLASS: &str = r#"
+
+class Vehicle(Multirotor):
+    """As squirrel flies it: rotor drag does not damp rotation, gravity is 9.80665 m/s^2."""
+
+    def __init__(self, **options):
+        super().__init__(quad_params, **options)
+        self.g = 9.80665
+        self.weight = np.array([0.0, 0.0, -self.mass * self.g])
+
+    def compute_body_wrench(self, body_rates, rotor_speeds, body_airspeed_vector):
+        return super().compute_body_wrench(np.zeros(3), rotor_speeds, body_airspeed_vector)
+"#;
+
+/// # Errors
+/// Another number of rotors than four.
+pub(super) fn text(flat: &Flat, keeps: &Keeps) -> Result<String, String> {
+    if flat.rotors.len() != 4 {
+        return Err(format!("{}: {} rotors: RotorPy has four", flat.name, flat.rotors.len()));
+    }
     let [thrust, torque] = flat.mean_rotor();
     let count = flat.rotors.len() as f64;
     let all_speeds = count * flat.hover_rad_s;
@@ -32,7 +55,7 @@ pub(super) fn text(flat: &Flat, keeps: &Keeps) -> String {
     let _ = writeln!(
         out,
         "# {}, for RotorPy: body FLU (x ahead, y left, z up), SI. Made by `squirrel vehicle export --to rotorpy`.\n\
-         import numpy as np\n\nquad_params = {{",
+         import numpy as np\nfrom rotorpy.vehicles.multirotor import Multirotor\n\nquad_params = {{",
         super::plain_name(&flat.name)
     );
     let mut line = |key: &str, value: f64| {
@@ -77,5 +100,6 @@ pub(super) fn text(flat: &Flat, keeps: &Keeps) -> String {
         "    }},\n    'rotor_directions': np.array([{}]),\n    'rI': np.array([0.0, 0.0, 0.0]),\n}}",
         directions.join(", ")
     );
-    out
+    out.push_str(CLASS);
+    Ok(out)
 }

@@ -3,7 +3,7 @@
 //! Drag of a rotor there goes with its speed: the number is right at the speed of hover.
 
 use super::flat::Flat;
-use super::{Axes, Keeps, digits};
+use super::{Axes, Keeps, Pulls, digits};
 use std::fmt::Write;
 
 pub(super) const KEEPS: Keeps = Keeps {
@@ -11,6 +11,7 @@ pub(super) const KEEPS: Keeps = Keeps {
     lags: 2,
     linear: Axes::Plane,
     quadratic: Axes::None,
+    pulls: Pulls::LinearAtHubs,
     axial: false,
     lift: false,
     flapping: false,

@@ -112,7 +112,9 @@ fn files_are_well_formed() {
         1,
     );
     let hexa = VehicleFile::parse(&hexa, "five").unwrap();
-    assert!(export(&hexa, Target::Crazyflow).unwrap_err().contains("5 rotors"));
+    for target in [Target::Crazyflow, Target::Rotorpy] {
+        assert!(export(&hexa, target).unwrap_err().contains("5 rotors"), "{target:?}");
+    }
 }
 
 /// Rotors are links of their own there: with the body they must weigh and turn as the vehicle does.
