@@ -36,7 +36,7 @@ pub(super) fn text(flat: &Flat, keeps: &Keeps) -> Result<String, String> {
     let thrust_n = weight_n / angle.cos();
     let momentum = angle.cos().powi(2) * (thrust_n * AIR_DENSITY_KG_M3 * disc_m2).sqrt();
     // Power in the air behind propellers of momentum theory, of which 0.6 of the battery's is left.
-    let induced_m_s = (weight_n / (2.0 * AIR_DENSITY_KG_M3 * disc_m2)).sqrt();
+    let induced_m_s = flat.induced_m_s;
     let arm = |r: &flat::FlatRotor| r.position[0].hypot(r.position[1]);
     let arm_m = flat.rotors.iter().map(arm).sum::<f64>() / flat.rotors.len() as f64;
     let [thrust, torque] = flat.mean_rotor();

@@ -3,11 +3,12 @@
 
 use crate::plant::{Plant, WingPlant};
 use crate::vehicle_file::VehicleFile;
+use squirrel_core::aero::induced;
 use squirrel_core::effects::{Effects, FORM, Kind};
 use squirrel_core::frames::In;
-use squirrel_core::math::{AIR_DENSITY_KG_M3, GRAVITY_M_S2};
+use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::{Matrix3, Vector3};
-use squirrel_core::vehicle::Propulsion;
+use squirrel_core::vehicle::{Drag, Propulsion};
 
 /// Airspeed at which what is curved is taken as straight, m/s.
 pub(super) const SPEED_M_S: f64 = 5.0;
@@ -45,6 +46,8 @@ pub(super) struct Flat {
     pub(super) propeller_radius_m: f64,
     /// Speed of each rotor in hover, all alike, rad/s.
     pub(super) hover_rad_s: f64,
+    /// Speed of the air through the rotors in hover, m/s.
+    pub(super) induced_m_s: f64,
     /// Lags of rotor speed, up and down, s.
     pub(super) lag_s: [f64; 2],
     /// N s/m along each axis.
@@ -146,6 +149,7 @@ impl Flat {
             propulsion: p.propulsion,
             propeller_radius_m: p.propulsion.propeller_radius_m,
             hover_rad_s,
+            induced_m_s: induced::in_hover(&vehicle),
             lag_s: [
                 p.propulsion.time_constant_up_s + extra_s[0],
                 p.propulsion.time_constant_down_s + extra_s[1],
@@ -265,5 +269,5 @@ fn flapping(effects: &Effects<f64>) -> f64 {
 
 /// Half of the density of air times a drag area, N s^2/m^2.
 pub(super) fn per_square(area_m2: f64) -> f64 {
-    0.5 * AIR_DENSITY_KG_M3 * area_m2
+    Drag { linear_n_s_per_m: Vector3::zeros(), area_m2 }.per_square()
 }

@@ -12,8 +12,6 @@ mod mjcf;
 mod px4;
 mod rotorpy;
 mod sdf;
-#[cfg(test)]
-mod tests;
 
 pub use loss::{Error, Lost, Remains};
 
@@ -212,3 +210,6 @@ fn plain_name(name: &str) -> String {
     let name: String = name.chars().map(kept).collect();
     if name.is_empty() { "vehicle".to_owned() } else { name }
 }
+
+#[cfg(test)]
+mod tests;

@@ -8,8 +8,6 @@ mod frame;
 mod gains;
 mod parameters;
 mod scaling;
-#[cfg(test)]
-mod tests;
 mod text;
 
 pub use frame::{Frame, Place};
@@ -523,3 +521,6 @@ fn arm(given: &Given, diameter_m: Option<&Said>, count: usize) -> Number {
         }
     })
 }
+
+#[cfg(test)]
+mod tests;
