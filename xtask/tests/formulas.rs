@@ -102,7 +102,7 @@ const FORMULAS: [(&str, &[&str], &str); 38] = [
 ];
 
 /// Files in which the density of the air becomes a force: one a law.
-const DENSITY: [&str; 8] = [
+const DENSITY: [&str; 11] = [
     "core/src/aero/flat_plate.rs",
     "core/src/aero/induced.rs",
     "core/src/effects/quadratic_drag.rs",
@@ -111,6 +111,10 @@ const DENSITY: [&str; 8] = [
     "core/src/math.rs",
     "core/src/vehicle/mod.rs",
     "sim/src/plant/membrane.rs",
+    // Other simulators are told it, and coefficients of propellers are over it.
+    "sim/src/vehicle_file/export/ardupilot.rs",
+    "sim/src/vehicle_file/export/mjcf.rs",
+    "sim/src/vehicle_file/new/mod.rs",
 ];
 
 /// What a file calls, without spaces, instead of writing it again.

@@ -52,7 +52,7 @@ enum Command {
     Plan(commands::plan::PlanCommand),
     /// What spread wings add to the accelerations that a vehicle can reach.
     Reach(commands::reach::Reach),
-    /// Check vehicle files.
+    /// Make, check, fit, compare and export vehicle files.
     #[command(subcommand)]
     Vehicle(commands::vehicle::VehicleCommand),
 }
@@ -80,7 +80,13 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Gap(gap) => gap.run(),
         Command::Plan(plan) => plan.run(),
         Command::Reach(reach) => reach.run(),
-        Command::Vehicle(vehicle) => vehicle.run(),
+        Command::Vehicle(mut vehicle) => match vehicle.lacks() {
+            Some(usage) => {
+                output::talk(&format!("error: {usage}"));
+                return 2;
+            }
+            None => vehicle.run(),
+        },
     };
     match done {
         Ok(()) => 0,

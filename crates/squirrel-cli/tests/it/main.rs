@@ -9,3 +9,4 @@ mod program;
 mod reach;
 mod support;
 mod train;
+mod vehicle;

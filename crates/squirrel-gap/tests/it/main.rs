@@ -9,6 +9,7 @@ mod data_problems;
 mod errors;
 mod far_off;
 mod file_with_effects;
+mod first_file;
 mod first_screen;
 mod fit;
 mod foreign;

@@ -37,6 +37,8 @@ pub struct Means {
     pub roll_authority_n_m: f64,
     /// Most pitch moment, likewise.
     pub pitch_authority_n_m: f64,
+    /// Most yaw moment, likewise.
+    pub yaw_authority_n_m: f64,
 }
 
 impl VehicleFile {
@@ -76,6 +78,8 @@ impl VehicleFile {
             wing_force_at_30_deg_n: wings.then(|| self.filled_wing_force_n(&plant, &spread)),
             roll_authority_n_m: authority(1),
             pitch_authority_n_m: authority(0),
+            yaw_authority_n_m: count * to_spare_n * p.propulsion.torque_coefficient_n_m_s2
+                / p.propulsion.thrust_coefficient_n_s2,
         })
     }
 
@@ -114,6 +118,7 @@ mod tests {
         assert!((means.drag_at_7_m_s_n - (0.5 * 1.225 * 0.01 * 49.0)).abs() < 1e-6);
         assert_eq!(means.wing_download_in_hover_n, Some(0.0), "no rotor_wash in the file");
         assert!((means.roll_authority_n_m - 4.0 * 0.085 * 1.3435).abs() < 1e-3);
+        assert!((means.yaw_authority_n_m - 0.011 * 5.374).abs() < 1e-3);
         let washed = format!("{SQUIRREL_TOML}\n[effects.rotor_wash]\ngain = 1.0\n");
         let washed = VehicleFile::parse(&washed, "file").unwrap().means().unwrap();
         let download = washed.wing_download_in_hover_n.unwrap();

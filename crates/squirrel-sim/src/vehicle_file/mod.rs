@@ -4,10 +4,14 @@
 //! line that names the file, the field and the value.
 
 mod build;
+pub mod diff;
 mod effects;
 mod hovering;
 pub mod margins;
+pub mod export;
+pub mod fit;
 mod means;
+pub mod new;
 mod tables;
 
 pub use crate::quantity::Provenance;

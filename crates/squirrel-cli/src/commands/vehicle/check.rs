@@ -1,4 +1,4 @@
-//! `squirrel vehicle`: vehicle files.
+//! `squirrel vehicle check`: the numbers of a file.
 
 use crate::output::{self, Table, say};
 use crate::paths::Paths;
@@ -7,17 +7,14 @@ use squirrel_sim::vehicle_file::{Means, Provenance, VehicleFile};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// What to do with a vehicle file.
-#[derive(Debug, clap::Subcommand)]
-pub(crate) enum VehicleCommand {
-    /// Check a file and show its numbers with tolerance and source.
-    Check {
-        /// Vehicle file.
-        file: PathBuf,
-        /// Write the numbers here as JSON.
-        #[arg(long)]
-        json: Option<PathBuf>,
-    },
+/// Options of the command.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Check {
+    /// Vehicle file.
+    file: PathBuf,
+    /// Write the numbers here as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
 }
 
 /// Longer values, such as a table of voltages, are cut in print; the JSON has them whole.
@@ -31,9 +28,9 @@ struct Checked<'a> {
     numbers: BTreeMap<&'a str, &'a Provenance>,
 }
 
-impl VehicleCommand {
+impl Check {
     pub(crate) fn run(&self) -> Result<(), String> {
-        let Self::Check { file, json } = self;
+        let Self { file, json } = self;
         Paths::default().vehicle("FILE", [file]).writes("--json", json).check()?;
         let vehicle = VehicleFile::load(file).map_err(|e| e.to_string())?;
         let means = vehicle.means().map_err(|e| format!("{}: {e}", file.display()))?;
@@ -70,7 +67,7 @@ impl VehicleCommand {
 }
 
 /// What the numbers mean together.
-fn in_words(means: &Means) -> Table {
+pub(super) fn in_words(means: &Means) -> Table {
     let mut table = Table::new(&["what", "size"]);
     let mut row = |what: &str, size: String| table.row(vec![what.to_owned(), size]);
     row("command of a rotor in hover", format!("{:.3}", means.hover_command));
@@ -85,5 +82,6 @@ fn in_words(means: &Means) -> Table {
     }
     row("roll authority about hover", format!("{:.3} N m", means.roll_authority_n_m));
     row("pitch authority about hover", format!("{:.3} N m", means.pitch_authority_n_m));
+    row("yaw authority about hover", format!("{:.3} N m", means.yaw_authority_n_m));
     table
 }

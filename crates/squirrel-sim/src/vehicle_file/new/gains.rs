@@ -1,0 +1,134 @@
+//! Gains of the flight code from the numbers of an airframe, by a stated rule.
+//!
+//! The laws ask for accelerations, so inertia and mass are in them already; what bounds their gains
+//! is how late a rotor answers. The gains of `vehicles/squirrel.toml` are flown with a rotor lag of
+//! 0.04 s; with a command filter's and a sensor's delay that is about 0.07 s. Roll, pitch and yaw
+//! scale with the inverse of that time, the outer loop, which must stay slower, with its root.
+//! Yaw is turned by reaction torque alone: its gains are capped by the acceleration that is to be
+//! had.
+
+/// What the rule looks at.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Airframe {
+    pub(super) weight_n: f64,
+    /// Most thrust over the weight.
+    pub(super) thrust_to_weight: f64,
+    pub(super) lag_s: f64,
+    /// Most yaw acceleration about hover, rad/s^2.
+    pub(super) yaw_acceleration_rad_s2: f64,
+    pub(super) tilt_max_rad: f64,
+}
+
+/// Gains that the rule chooses; what is the same for all vehicles is in [`toml`].
+#[derive(Debug, Clone, Copy)]
+struct Gains {
+    c1_per_s: [f64; 3],
+    c2_per_s: [f64; 3],
+    lambda_per_s2: [f64; 3],
+    filter_frequency_rad_s: f64,
+    position_per_s: [f64; 3],
+    velocity_per_s: [f64; 3],
+    acceleration_horizontal_m_s2: f64,
+    acceleration_vertical_m_s2: f64,
+}
+
+/// Rotor lag of the vehicle whose gains are scaled, and the other delays in its inner loop, s.
+const REFERENCE: (f64, f64) = (0.04, 0.03);
+/// Yaw acceleration of that vehicle about hover, rad/s^2.
+const REFERENCE_YAW: f64 = 7.6;
+
+fn by_rule(airframe: &Airframe) -> Gains {
+    let (lag_s, other_s) = REFERENCE;
+    let quick = ((lag_s + other_s) / (airframe.lag_s + other_s)).clamp(0.5, 1.5);
+    let slow = quick.sqrt().min(1.0);
+    let yaw = quick.min((airframe.yaw_acceleration_rad_s2 / REFERENCE_YAW).sqrt().max(0.3));
+    let scaled = |of: [f64; 3], power: i32| {
+        [of[0] * quick.powi(power), of[1] * quick.powi(power), of[2] * yaw.powi(power)]
+    };
+    let outer = |of: [f64; 3]| of.map(|gain| gain * slow);
+    let g = squirrel_core::math::GRAVITY_M_S2;
+    Gains {
+        c1_per_s: scaled([9.0, 9.0, 4.0], 1),
+        c2_per_s: scaled([14.0, 14.0, 5.0], 1),
+        lambda_per_s2: scaled([8.0, 8.0, 2.0], 2),
+        filter_frequency_rad_s: 20.0 * quick,
+        position_per_s: outer([1.6, 1.6, 0.8]),
+        velocity_per_s: outer([2.5, 2.5, 1.6]),
+        acceleration_horizontal_m_s2: 0.9 * g * airframe.tilt_max_rad.tan(),
+        acceleration_vertical_m_s2: (0.4 * g * (airframe.thrust_to_weight - 1.0)).clamp(0.5, 3.0),
+    }
+}
+
+/// The table `[control]` of a vehicle file.
+pub(super) fn toml(airframe: &Airframe) -> String {
+    let Gains {
+        c1_per_s,
+        c2_per_s,
+        lambda_per_s2,
+        filter_frequency_rad_s,
+        position_per_s,
+        velocity_per_s,
+        acceleration_horizontal_m_s2,
+        acceleration_vertical_m_s2,
+    } = by_rule(airframe);
+    let one = super::text::rounded;
+    let three = |of: [f64; 3]| format!("{:?}", of.map(one));
+    let rule = "by rule: squirrel.toml's, scaled by the time in which a rotor answers";
+    let same = "as squirrel.toml";
+    format!(
+        "[control]
+thrust_min_n = {{ value = {thrust_min:?}, source = \"a tenth of the weight\" }}
+
+[control.attitude]
+form = \"quaternion\"
+c1_per_s = {{ value = {c1}, source = \"{rule}\" }}
+c2_per_s = {{ value = {c2}, source = \"{rule}\" }}
+lambda_per_s2 = {{ value = {lambda}, source = \"{rule}\" }}
+integral_max_rad_s = {{ value = 0.1, source = \"{same}\" }}
+filter_frequency_rad_s = {{ value = {filter:?}, source = \"{rule}\" }}
+filter_damping = {{ value = 1.0, source = \"{same}\" }}
+
+[control.position]
+angle_law = \"exact\"
+position_per_s = {{ value = {position}, source = \"{rule}\" }}
+velocity_per_s = {{ value = {velocity}, source = \"{rule}\" }}
+integral_per_s2 = {{ value = [0.15, 0.15, 0.15], source = \"{same}\" }}
+derivative = {{ value = [0.05, 0.05, 0.05], source = \"{same}\" }}
+velocity_feed_forward = {{ value = 0.0, source = \"{same}\" }}
+acceleration_max_horizontal_m_s2 = {{ value = {horizontal:?}, source = \"what nine tenths of the tilt limit give\" }}
+acceleration_max_vertical_m_s2 = {{ value = {vertical:?}, source = \"by rule: 0.4 of the thrust above the weight\" }}
+integral_max_m = {{ value = 2.0, source = \"{same}\" }}
+
+[control.plus]
+delay_s = {{ value = {delay:?}, source = \"the command filter's: twice its damping over its frequency\" }}
+vertical_weight = {{ value = 0.5, source = \"{same}\" }}
+height_band_m = {{ value = 1.5, source = \"{same}\" }}
+sink_band_m = {{ value = 0.3, source = \"{same}\" }}
+thrust_share = {{ value = 0.5, source = \"{same}\" }}
+approach_share = {{ value = 0.5, source = \"{same}\" }}
+open_above_m_s2 = {{ value = 0.3, source = \"{same}\" }}
+acceleration_max_horizontal_m_s2 = {{ value = 30.0, source = \"{same}\" }}
+acceleration_max_vertical_m_s2 = {{ value = {plus_vertical:?}, source = \"twice that of [control.position]\" }}
+
+# Without wings these do nothing; the table has to be there.
+[control.wing]
+test = \"normal\"
+thrust_law = \"exact\"
+trigger = \"angle\"
+open_above_n = 0.1
+close_below_n = 0.05
+dwell_s = 0.3
+",
+        thrust_min = one(0.1 * airframe.weight_n),
+        c1 = three(c1_per_s),
+        c2 = three(c2_per_s),
+        lambda = three(lambda_per_s2),
+        filter = one(filter_frequency_rad_s),
+        position = three(position_per_s),
+        velocity = three(velocity_per_s),
+        horizontal = one(acceleration_horizontal_m_s2),
+        vertical = one(acceleration_vertical_m_s2),
+        delay = one(2.0 / filter_frequency_rad_s),
+        plus_vertical = one(2.0 * acceleration_vertical_m_s2),
+    )
+}
