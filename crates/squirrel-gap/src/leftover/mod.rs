@@ -26,7 +26,7 @@ const NEIGHBOURS: usize = 2;
 const DRAWS: usize = 8;
 const GUST_DRAWS: usize = 40;
 /// How far above the noise's mean a channel may be, slow and as a whole, in rms.
-const SLOW_RATIO: f64 = 1.6;
+pub(crate) const SLOW_RATIO: f64 = 1.6;
 const WHOLE_RATIO: f64 = 1.25;
 /// Part of what the model explains that it may get wrong without an effect being missing.
 const MODEL_ERROR: f64 = 0.015;
@@ -157,6 +157,16 @@ pub(crate) fn gusts(
     sigma_m_s: f64,
 ) -> Vec<Vec<f64>> {
     floor::draws(predictor, wind_columns, sigma_m_s, GUST_DRAWS)
+}
+
+/// The slow part of the horizontal force that draws leave, by axis and piece, rms.
+pub(crate) fn slow_horizontal(predictor: &Predictor, draws: &[Vec<f64>]) -> Vec<f64> {
+    let own = predictor.segments.iter().filter(|s| is_judged(s) && s.channel < 2);
+    own.map(|segment| {
+        let squares = draws.iter().map(|draw| rms_of_means(&draw[segment.rows.clone()]).powi(2));
+        (squares.sum::<f64>() / draws.len() as f64).sqrt()
+    })
+    .collect()
 }
 
 /// Compares a leftover with what noise alone leaves.
