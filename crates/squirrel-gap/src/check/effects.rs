@@ -3,13 +3,16 @@
 use crate::GapError;
 use crate::checked::{Choice, EffectCheck, NumberCheck, Shows};
 use crate::diagnose::curve_hides_sag;
-use crate::name::{Catalogue, Search, Showable, catalogue, gust_sizes};
+use crate::name::{Catalogue, Search, Showable, air_hides_names, catalogue, gust_sizes};
 use crate::predictor::{Predictor, TURNING};
 use squirrel_core::effects::{
     BatterySag, Effect, Effects, FORM, Gust, Kind, Profile, Response, Shown,
 };
 use squirrel_sim::plant::WingPlant;
 use std::collections::BTreeMap;
+
+/// Why nothing can be shown where the air pushes in a way that nobody knows.
+const UNKNOWN_AIR: &str = "gnss.velocity_ned_m_s, attitude: without both the air pushes these flights by more than their noise, and nobody knows how much";
 
 /// * `nominal` - residual of the vehicle as it is
 /// * `command_hz` - how often commands change
@@ -21,6 +24,7 @@ pub(super) fn effects(
     let catalogue = catalogue(predictor, nominal)?;
     let search = Search { predictor, catalogue: &catalogue, gust_m_s: None, progress: &|| () };
     let showable = search.showable()?;
+    let air_hides = air_hides_names(predictor)?;
     let hides_sag = curve_hides_sag(predictor, nominal)?;
     let mut all = Vec::new();
     for name in Effects::<f64>::NAMES {
@@ -51,6 +55,9 @@ pub(super) fn effects(
         if hides_sag && *name == BatterySag::<f64>::NAME {
             effect.lacks =
                 Some("propulsion.pwm_to_thrust_n: its sd does what a sag does".to_owned());
+        }
+        if air_hides && effect.lacks.is_none() {
+            effect.lacks = Some(UNKNOWN_AIR.to_owned());
         }
         let can =
             effect.lacks.is_none() && effect.decisive().is_some_and(NumberCheck::can_be_shown);

@@ -16,6 +16,7 @@ pub(crate) use features::{Moment, moment};
 use features::{families, one_way, place_share, predicted_share};
 use nalgebra::Matrix3;
 use squirrel_core::math::GRAVITY_M_S2;
+use std::ops::Range;
 use std::rc::Rc;
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
@@ -159,9 +160,13 @@ pub(crate) fn gusts(
     floor::draws(predictor, wind_columns, sigma_m_s, GUST_DRAWS)
 }
 
-/// The slow part of the horizontal force that draws leave, by axis and piece, rms.
-pub(crate) fn slow_horizontal(predictor: &Predictor, draws: &[Vec<f64>]) -> Vec<f64> {
-    let own = predictor.segments.iter().filter(|s| is_judged(s) && s.channel < 2);
+/// The slow part of some channels that draws leave, by channel and piece, rms.
+pub(crate) fn slow_parts(
+    predictor: &Predictor,
+    draws: &[Vec<f64>],
+    channels: Range<usize>,
+) -> Vec<f64> {
+    let own = predictor.segments.iter().filter(|s| is_judged(s) && channels.contains(&s.channel));
     own.map(|segment| {
         let squares = draws.iter().map(|draw| rms_of_means(&draw[segment.rows.clone()]).powi(2));
         (squares.sum::<f64>() / draws.len() as f64).sqrt()

@@ -38,7 +38,7 @@ use payload::payload_lengths_m;
 pub(crate) use point::{Member, Point, Scatter, hypothesis};
 pub(crate) use refine::Scored;
 pub(crate) use search::{Found, NATS_MIN, Search};
-pub(crate) use showable::{Showable, gust_sizes};
+pub(crate) use showable::{Showable, air_hides_names, gust_sizes};
 use step::clock_step_s;
 use tolerance::unlogged_sag;
 pub(crate) use tolerance::{notes as silent_tolerances, sds};

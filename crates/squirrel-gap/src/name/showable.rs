@@ -18,9 +18,10 @@ use super::parameters::Candidate;
 use super::search::{Search, TOLERANCES_MIN};
 use super::{GUST_M_S, GUST_SHARE};
 use crate::GapError;
-use crate::leftover::{SLOW_RATIO, noise, slow_horizontal};
+use crate::leftover::{SLOW_RATIO, noise, slow_parts};
 use crate::predictor::{Predictor, TURBULENCE_M_S};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// What a name must be worth over another one that would be wrong, nats.
 const OVER_RIVALS_NATS: f64 = 3.0;
@@ -108,12 +109,13 @@ impl Search<'_> {
                     never_below: over_nothing.size(nats, -CHANCE).max(beyond(-CHANCE)),
                     rivals: Vec::new(),
                 };
+                let shows = found.from <= parameter.largest;
                 let is_other = |(rival, _): &(&Candidate, _)| rival.effect != candidate.effect;
                 for (rival, other) in candidates.iter().zip(&hypotheses).filter(is_other) {
                     let Some(other) = other else { continue };
                     let over = lead(other);
                     let from = over.size(OVER_RIVALS_NATS, CHANCE);
-                    if from > parameter.largest && !found.rivals.contains(&rival.effect) {
+                    if shows && from > parameter.largest && !found.rivals.contains(&rival.effect) {
                         found.rivals.push(rival.effect);
                     }
                     found.from = found.from.max(from);
@@ -138,10 +140,8 @@ fn covariance(gram: &DMatrix<f64>, tolerance: &[f64]) -> DMatrix<f64> {
 /// # Errors
 /// What the predictor says.
 pub(crate) fn gust_sizes(predictor: &Predictor) -> Result<(f64, f64), GapError> {
-    let wind = predictor.wind_columns(&predictor.nominal())?;
-    let slow = |sigma| slow_horizontal(predictor, &noise(predictor, &wind, sigma));
     // The floor is noise and wind, squared; two floors tell them apart.
-    let (calm, windy) = (slow(TURBULENCE_M_S), slow(TURBULENCE_M_S + 1.0));
+    let [calm, windy] = slow_in(predictor, [TURBULENCE_M_S, TURBULENCE_M_S + 1.0], 0..2)?;
     let span = (TURBULENCE_M_S + 1.0).powi(2) - TURBULENCE_M_S.powi(2);
     let (mut from, mut never_below) = (0.0_f64, f64::INFINITY);
     for (calm, windy) in calm.iter().zip(&windy) {
@@ -158,6 +158,34 @@ pub(crate) fn gust_sizes(predictor: &Predictor) -> Result<(f64, f64), GapError> 
     }
     let (least, _) = GUST_M_S;
     Ok(((GUST_CHANCE.1 * from).max(least), (GUST_CHANCE.0 * never_below).max(least)))
+}
+
+/// Speed through the air of flights that do not say it, m/s.
+const UNKNOWN_SPEED_M_S: f64 = 2.0;
+
+/// Whether the air may push flights up and down by more than noise at a speed that they do not say:
+/// no name accounts for that.
+///
+/// # Errors
+/// What the predictor says.
+pub(crate) fn air_hides_names(predictor: &Predictor) -> Result<bool, GapError> {
+    if predictor.has_motion() {
+        return Ok(false);
+    }
+    let [calm, moving] = slow_in(predictor, [TURBULENCE_M_S, UNKNOWN_SPEED_M_S], 2..3)?;
+    Ok(calm.iter().zip(&moving).any(|(calm, moving)| *moving > SLOW_RATIO * calm))
+}
+
+/// The slow part that noise and winds of two deviations, m/s, leave in some channels, by channel and
+/// piece.
+fn slow_in(
+    predictor: &Predictor,
+    winds_m_s: [f64; 2],
+    channels: Range<usize>,
+) -> Result<[Vec<f64>; 2], GapError> {
+    let columns = predictor.wind_columns(&predictor.nominal())?;
+    Ok(winds_m_s
+        .map(|sigma| slow_parts(predictor, &noise(predictor, &columns, sigma), channels.clone())))
 }
 
 #[cfg(test)]

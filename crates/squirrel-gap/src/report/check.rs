@@ -2,6 +2,7 @@
 
 use super::{WIDTH, figure};
 use crate::checked::{ChannelCheck, Check, EffectCheck, FlightCheck, NumberCheck, Shows};
+use crate::words::short;
 use squirrel_report::chart::{Axis, ChartRow, Extent, Ink, Range, RowChart};
 use squirrel_report::page::{Columns, Figure, Page, Row};
 use std::collections::BTreeMap;
@@ -54,12 +55,15 @@ fn flights(page: &mut Page, all: &[FlightCheck]) {
         Row {
             ink: None,
             cells: vec![
-                flight.flight.clone(),
+                short(&flight.flight),
                 role.to_owned(),
                 format!("{:.1}", flight.duration_s),
                 format!("{:.1}", flight.usable_s),
                 saturated.map_or_else(|| "\u{2013}".to_owned(), percent),
-                flight.problem.as_ref().map_or_else(|| "none".to_owned(), |p| p.words.clone()),
+                flight.problem.as_ref().map_or_else(
+                    || "none".to_owned(),
+                    |p| p.words.replace(&flight.flight, &short(&flight.flight)),
+                ),
             ],
         }
     };
@@ -93,7 +97,7 @@ fn channels(page: &mut Page, all: &[FlightCheck]) {
         let gap = own.iter().max_by(|a, b| a.1.largest_gap_s.total_cmp(&b.1.largest_gap_s));
         let gap = gap.map_or_else(String::new, |(flight, c)| {
             let at = format!("at {:.2} s", c.largest_gap_at_s);
-            let at = if all.len() > 1 { format!("{flight}, {at}") } else { at };
+            let at = if all.len() > 1 { format!("{}, {at}", short(flight)) } else { at };
             format!("{} ({at})", figure(c.largest_gap_s))
         });
         Row {
