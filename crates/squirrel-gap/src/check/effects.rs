@@ -14,6 +14,9 @@ use std::collections::BTreeMap;
 /// Why nothing can be shown where the air pushes in a way that nobody knows.
 const UNKNOWN_AIR: &str = "gnss.velocity_ned_m_s, attitude: without both the air pushes these flights by more than their noise, and nobody knows how much";
 
+/// Why a sag cannot.
+const THRUST_CURVE: &str = "propulsion.pwm_to_thrust_n: its sd does what a sag does";
+
 /// * `nominal` - residual of the vehicle as it is
 /// * `command_hz` - how often commands change
 pub(super) fn effects(
@@ -53,11 +56,10 @@ pub(super) fn effects(
             hold_for(&mut effect, hz);
         }
         if hides_sag && *name == BatterySag::<f64>::NAME {
-            effect.lacks =
-                Some("propulsion.pwm_to_thrust_n: its sd does what a sag does".to_owned());
+            hide(&mut effect, THRUST_CURVE);
         }
-        if air_hides && effect.lacks.is_none() {
-            effect.lacks = Some(UNKNOWN_AIR.to_owned());
+        if air_hides {
+            hide(&mut effect, UNKNOWN_AIR);
         }
         let can =
             effect.lacks.is_none() && effect.decisive().is_some_and(NumberCheck::can_be_shown);
@@ -129,6 +131,19 @@ fn gust(predictor: &Predictor<'_>) -> Result<NumberCheck, GapError> {
         (f64::INFINITY, f64::INFINITY)
     };
     Ok(number(parameter.key, BTreeMap::new(), sizes, shown))
+}
+
+/// No size is shown, for a reason that may be another one already.
+fn hide(effect: &mut EffectCheck, why: &str) {
+    for number in &mut effect.numbers {
+        *number = number_of_no_size(number);
+    }
+    effect.lacks.get_or_insert_with(|| why.to_owned());
+}
+
+fn number_of_no_size(of: &NumberCheck) -> NumberCheck {
+    let sizes = (of.smallest, of.largest);
+    number(of.key, of.choices.clone(), sizes, (f64::INFINITY, f64::INFINITY))
 }
 
 /// A time below that for which commands are held may be anything.

@@ -154,6 +154,7 @@ fn paragraph(flights: &[FlightCheck], effects: &[EffectCheck]) -> String {
     let (n, usable_s) = fitted.fold((0, 0.0), |(n, sum), flight| (n + 1, sum + flight.usable_s));
     let data = match (bad, flights.len()) {
         (0, 1) => "The data of the flight agree with themselves".to_owned(),
+        (0, 2) => "The data of both flights agree with themselves".to_owned(),
         (0, all) => format!("The data of all {all} flights agree with themselves"),
         (bad, all) => format!("{bad} of {all} flights contradict themselves"),
     };
@@ -168,11 +169,7 @@ fn paragraph(flights: &[FlightCheck], effects: &[EffectCheck]) -> String {
         format!("{} of {} effects", effects.len() - cannot.len(), effects.len())
     };
     let flights = if n == 1 { "one flight".to_owned() } else { format!("{n} flights together") };
-    let mut text =
-        format!("{data}. {usable_s:.0} s of {flights} could show {what} at a plausible size");
-    if !cannot.is_empty() {
-        text.push_str(&format!(", and not {}", cannot.join(", ")));
-    }
-    text.push('.');
-    text
+    let beside =
+        if cannot.is_empty() { String::new() } else { format!(", and not {}", cannot.join(", ")) };
+    format!("{data}. {usable_s:.0} s of {flights} could show {what} at a plausible size{beside}.")
 }

@@ -10,6 +10,8 @@ use std::collections::BTreeMap;
 /// Identifiers of the panels.
 const FLIGHTS: &str = "check-flights";
 const EFFECTS: &str = "check-effects";
+/// Periods without a sample that are a gap worth its place.
+const PERIODS: f64 = 3.0;
 
 /// The page of `squirrel gap check` as one HTML file.
 pub fn render_check(vehicle: &str, check: &Check) -> String {
@@ -20,7 +22,8 @@ pub fn render_check(vehicle: &str, check: &Check) -> String {
 
 /// Both panels.
 pub(super) fn panels(page: &mut Page, check: &Check) {
-    let text = "Rates, gaps and held samples as they are in the logs, and commands at their ends. A flight whose data \
+    let text = "Rates, gaps and held samples as they are in the logs, and commands at their ends. Commands are held by what \
+                they drive; what is measured is not. A flight whose data \
                 contradict themselves is set aside, and the line says what to change.";
     page.panel(FLIGHTS, "Before any verdict: the data", text, |page| {
         flights(page, &check.flights);
@@ -96,6 +99,9 @@ fn channels(page: &mut Page, all: &[FlightCheck]) {
         let rate = if same { figure(low) } else { format!("{} to {}", figure(low), figure(high)) };
         let gap = own.iter().max_by(|a, b| a.1.largest_gap_s.total_cmp(&b.1.largest_gap_s));
         let gap = gap.map_or_else(String::new, |(flight, c)| {
+            if c.largest_gap_s * c.rate_hz < PERIODS {
+                return figure(c.largest_gap_s);
+            }
             let at = format!("at {:.2} s", c.largest_gap_at_s);
             let at = if all.len() > 1 { format!("{}, {at}", short(flight)) } else { at };
             format!("{} ({at})", figure(c.largest_gap_s))

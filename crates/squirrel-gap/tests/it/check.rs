@@ -42,18 +42,24 @@ fn a_hover_shows_little_and_a_rich_flight_nearly_all() {
     assert!(hover.words.contains("linear_drag") && !rich.words.contains("linear_drag"));
 }
 
-/// Where noise alone stands against an effect, twice the smallest size takes a quarter of the
-/// flights. Those effects have no number in the vehicle file that may be off; flights of other
-/// seeds fly other manoeuvres at other times.
+/// Where noise alone stands against an effect, half the smallest size takes four times the flights;
+/// where a tolerance does, no number of flights helps. In calm air quick flights are what lacks for
+/// lift and drag, and a rotor's inertia is seen well.
 #[test]
 fn sizes_fall_with_the_root_of_the_number_of_flights() {
-    let all: Flights = (1..=4).map(|seed| fly_rich(&VehicleFile::squirrel(), seed)).collect();
+    let calm = |seed| fly("excite_calm", &VehicleFile::squirrel(), seed);
+    let all: Flights = (1..=4).map(calm).collect();
     let [one, four] = [looked(&all[..1]), looked(&all)];
-    for name in ["rotor_gyro_torque", "angular_damping", "wing_servo_lag"] {
+    let ratio = |name: &str| {
         let [one, four] = [&one, &four].map(|check| number(check, name).smallest_shown.unwrap());
         println!("{name}: {one:.3e} to {four:.3e}");
-        assert!((1.6..2.5).contains(&(one / four)), "{name}: {one} {four}");
-    }
+        one / four
+    };
+    // Flights of other seeds fly other manoeuvres; the price of a number among more data is a
+    // logarithm.
+    assert!((1.85..2.15).contains(&ratio("translational_lift")));
+    assert!((1.7..2.2).contains(&ratio("quadratic_drag")));
+    assert!((0.98..1.02).contains(&ratio("rotor_gyro_torque")));
 }
 
 /// The names of the flights of a vehicle with so much drag more than its file.
