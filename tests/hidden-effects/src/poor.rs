@@ -36,7 +36,7 @@ impl Poor {
     /// What is left of a log.
     pub fn of(self, mut log: FlightLog) -> FlightLog {
         if !self.has_fixes {
-            FIXES.iter().for_each(|source| drop(log.sources.remove(*source)));
+            log.sources.retain(|name, _| !FIXES.contains(&name.as_str()));
         }
         let first = log.sources.values().filter_map(|source| source.time_s.first());
         let end_s = first.copied().fold(f64::INFINITY, f64::min) + self.seconds;

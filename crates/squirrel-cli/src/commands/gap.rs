@@ -131,7 +131,7 @@ impl Looked {
             .flights("--held-out", &self.held_out)?
             .writes_json(self.json.as_ref(), kept.as_ref());
         if let Some(folder) = &self.out {
-            paths = paths.writes_into(folder, &[CHECK_PAGE, CHECK]);
+            paths = paths.writes_into(folder, [CHECK_PAGE, CHECK]);
         }
         paths.check()?;
         let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
