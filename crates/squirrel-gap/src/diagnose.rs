@@ -9,8 +9,7 @@ use crate::diagnosis::{Covered, Details, Diagnosis, Own};
 use crate::find;
 use crate::fitted;
 use crate::name::{
-    Catalogue, NATS_MIN, Search, clock_step_s, explain_flights, only, payload_lengths_m, sds,
-    silent_tolerances, standing,
+    NATS_MIN, Search, catalogue, explain_flights, only, sds, silent_tolerances, standing,
 };
 use crate::picture;
 use crate::predictor::{Hypothesis, Predictor};
@@ -176,17 +175,10 @@ fn judged(
     ready: Ready<'_>,
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, GapError> {
-    let Ready { mut predictor, nominal, mut unseen } = ready;
-    let domain = covered(&predictor);
-    let places = find::places(&predictor, &nominal)?;
-    let nominal = if let Some(parts) = predictor.in_parts(flights)? {
-        predictor = parts;
-        predictor.residual(&predictor.nominal())?
-    } else {
-        nominal
-    };
+    let domain = covered(&ready.predictor);
+    let places = find::places(&ready.predictor, &ready.nominal)?;
     let moments = baseline.map_or(Moments::IfKnown, |baseline| baseline.moments);
-    compatibility::leave_out(&mut predictor, &nominal, moments);
+    let Ready { mut predictor, nominal, mut unseen } = ready.narrowed(flights, moments)?;
     let has_other_moments = predictor.has_motion() && !predictor.has_channel(3);
     if let Some(unseen) = &mut unseen {
         unseen.keep_moments_of(&predictor);
@@ -199,9 +191,7 @@ fn judged(
     }
     predictor.notes.extend(silent_tolerances(vehicle));
     progress("naming");
-    let lengths_m = payload_lengths_m(&predictor, &nominal);
-    let mut catalogue =
-        Catalogue::new(&predictor, &lengths_m, clock_step_s(&predictor, &nominal)?)?;
+    let mut catalogue = catalogue(&predictor, &nominal)?;
     if let Some(baseline) = baseline {
         catalogue.take(&baseline.scatter);
     }
@@ -262,7 +252,7 @@ fn judged(
 
 /// Whether the thrust curve of the vehicle file, moved by its sd, changes the vertical force more
 /// than the smallest sag worth reporting: then nothing tells the two apart.
-fn curve_hides_sag(predictor: &Predictor, nominal: &[f64]) -> Result<bool, GapError> {
+pub(crate) fn curve_hides_sag(predictor: &Predictor, nominal: &[f64]) -> Result<bool, GapError> {
     if !predictor.has_voltage() {
         return Ok(false);
     }

@@ -1,7 +1,8 @@
 //! The gap workflow: where simulation and measurement disagree, which missing effect explains it,
 //! and what adding it is worth on flights that were not used to find it.
 //!
-//! - [`check()`] tells which flights contradict themselves, and what to change in their import map.
+//! - [`check()`] tells what flights are worth: which of them contradict themselves and what to change
+//!   in their import map, and from which size on they show each effect.
 //! - [`find`](mod@find) measures the disagreement: residual force and moment of flights against a
 //!   vehicle.
 //! - [`diagnose()`] names what is missing and proves it on held-out flights in open loop.
@@ -13,6 +14,8 @@
 
 mod add;
 mod baseline;
+mod check;
+mod checked;
 mod closed_loop;
 mod compatibility;
 mod decide;
@@ -36,8 +39,10 @@ mod workflow;
 
 pub use add::{add, add_effect, difference, fit, patched};
 pub use baseline::Baseline;
+pub use check::check;
+pub use checked::{ChannelCheck, Check, Choice, EffectCheck, FlightCheck, NumberCheck, Shows};
 pub use closed_loop::{ClosedLoop, closed_loop};
-pub use compatibility::check;
+pub use compatibility::contradictions;
 pub use diagnose::{diagnose, diagnose_since, diagnose_with};
 pub use diagnosis::{Covered, Diagnosis};
 pub use error::GapError;

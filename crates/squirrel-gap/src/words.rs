@@ -4,6 +4,7 @@ use crate::number::significant;
 use crate::verdict::{Kind, NamedEffect, Value, Verdict};
 use squirrel_core::effects::Effects;
 use std::fmt::Write;
+use std::path::Path;
 
 /// Channels as files and panels call them, and as pilots do.
 const CHANNELS: [(&str, &str); 21] = [
@@ -38,6 +39,16 @@ pub(crate) fn spoken(text: &str) -> String {
 /// The manoeuvre that shows an effect and tells it from those it is confused with.
 pub(crate) fn manoeuvre(effect: &str) -> &'static str {
     Effects::<f64>::profile(effect).map_or("the excite_rich scenario", |profile| profile.words.fly)
+}
+
+/// A path as it may be shown: of an absolute one, the last folder and the file.
+pub(crate) fn short(name: &str) -> String {
+    let path = Path::new(name);
+    if !path.is_absolute() {
+        return name.to_owned();
+    }
+    let parts: Vec<_> = path.iter().skip(1).map(|part| part.to_string_lossy()).collect();
+    parts[parts.len().saturating_sub(2)..].join("/")
 }
 
 /// What to fly to see or to separate some effects.

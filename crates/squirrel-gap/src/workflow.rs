@@ -4,6 +4,7 @@
 
 use crate::GapError;
 use crate::add::{add_effect, patched};
+use crate::checked::Check;
 use crate::closed_loop::closed_loop;
 use crate::diagnose::diagnose_with;
 use crate::diagnosis::Diagnosis;
@@ -20,6 +21,9 @@ pub type Flights = Vec<(String, FlightLog)>;
 pub struct Workflow {
     /// What was found out.
     pub diagnosis: Diagnosis,
+    /// What the flights are worth before any verdict, for the report; none until somebody looks, see
+    /// [`check`](crate::check()).
+    pub check: Option<Check>,
     vehicle: VehicleFile,
     flights: Vec<String>,
     held_out: Flights,
@@ -55,7 +59,7 @@ impl Workflow {
         held_out.retain(|(name, _)| looked_at(name));
         let flights =
             flights.into_iter().map(|(name, _)| name).filter(|name| looked_at(name)).collect();
-        Ok(Self { diagnosis, vehicle, flights, held_out })
+        Ok(Self { diagnosis, check: None, vehicle, flights, held_out })
     }
 
     /// The vehicle file as it was given.
@@ -107,6 +111,8 @@ impl Workflow {
     pub fn report(&self, patched: Option<&Patched>) -> String {
         let held_out: Vec<String> = self.held_out.iter().map(|(name, _)| name.clone()).collect();
         let text = patched.map(|patched| patched.text.as_str());
-        report::render(&picture(&self.vehicle, &self.diagnosis, &self.flights, &held_out, text))
+        let mut data = picture(&self.vehicle, &self.diagnosis, &self.flights, &held_out, text);
+        data.check.clone_from(&self.check);
+        report::render(&data)
     }
 }

@@ -37,6 +37,25 @@ pub(crate) fn gap_effects(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
     json(py, &listed_effects())
 }
 
+/// What flights are worth before any verdict, as the JSON of ``squirrel gap check``.
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+#[gen_stub(override_return_type(type_repr = "dict[str, typing.Any]", imports = ("typing")))]
+pub(crate) fn gap_check<'py>(
+    py: Python<'py>,
+    vehicle: &Bound<'py, Vehicle>,
+    #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] flights: &Bound<'py, PyDict>,
+    #[gen_stub(override_type(type_repr = "dict[str, FlightLog]"))] held_out: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let vehicle = vehicle.get().file.clone();
+    let (flights, held_out) = (logs("flights", flights)?, logs("held_out", held_out)?);
+    let found = interruptible(py, move |stop| {
+        squirrel_gap::check(&vehicle, &flights, &held_out, &|_: &str| stop.check())
+    })?
+    .map_err(value)?;
+    json(py, &found)
+}
+
 /// Where flights disagree with a vehicle, as the JSON of ``squirrel gap find``.
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
@@ -89,8 +108,11 @@ fn diagnose(
     stop: &Stop,
 ) -> PyResult<(Verdict, Option<VehicleFile>)> {
     let tick = |_: &str| stop.check();
+    // For the report alone: whatever it finds, the verdict is what it would be without.
+    let check = out.and_then(|_| squirrel_gap::check(&vehicle, &flights, &held_out, &tick).ok());
     let mut found =
         Workflow::diagnose(vehicle, &baseline, flights, held_out, &tick).map_err(value)?;
+    found.check = check;
     let patched = found.patched(fit).map_err(value)?.ok();
     if fly_again && let Some(patched) = &patched {
         stop.check();

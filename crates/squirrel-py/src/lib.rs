@@ -73,7 +73,7 @@ mod _squirrel {
     #[pymodule_export]
     use super::flight::simulate;
     #[pymodule_export]
-    use super::gap::{gap_diagnose, gap_effects, gap_find};
+    use super::gap::{gap_check, gap_diagnose, gap_effects, gap_find};
     #[pymodule_export]
     use super::log::FlightLog;
     #[pymodule_export]

@@ -25,6 +25,19 @@ def test_find_says_where(vehicle: squirrel.Vehicle, sagging: dict[str, squirrel.
     assert "force_body_z_n" in {place.channel for place in finding.where}
 
 
+def test_check_says_what_flights_could_show(
+    vehicle: squirrel.Vehicle, sagging: dict[str, squirrel.FlightLog]
+) -> None:
+    flights = {name: sagging[name] for name in ("f1", "f2")}
+    found = squirrel.gap.check(vehicle=vehicle, flights=flights, held_out={"f3": sagging["f3"]})
+    assert [flight["is_held_out"] for flight in found["flights"]] == [False, False, True]
+    assert all(flight["problem"] is None and flight["usable_s"] > 30 for flight in found["flights"])
+    sag = next(effect for effect in found["effects"] if effect["name"] == "battery_sag")
+    assert sag["shown"] == "can" and sag["numbers"][0]["smallest_shown"] < 0.9
+    with pytest.raises(ValueError, match="none given"):
+        squirrel.gap.check(vehicle=vehicle, flights={})
+
+
 def test_effects_are_those_that_a_vehicle_file_may_name(vehicle: squirrel.Vehicle) -> None:
     listed = {effect["name"]: effect for effect in squirrel.gap.effects()}
     assert list(listed) == sorted(listed)

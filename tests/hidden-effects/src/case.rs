@@ -8,6 +8,7 @@ use crate::further::{BLOWN, Further};
 use crate::independent::{self, Excitation, Misfit, Order, Pack};
 use crate::outside::Outside;
 use crate::overstate::{Overstatement, Stated};
+use crate::poor::Poor;
 use crate::recorder::{Capture, Estimator, Recorder, SensorFault};
 use crate::set::forms;
 pub use crate::set::{Generator, Set};
@@ -40,6 +41,9 @@ pub struct Answer {
     pub recorder: Recorder,
     /// Part of the variation of force and moment that is unmodelled.
     pub misfit: Option<Misfit>,
+    /// What is poor about its flights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poor: Option<Poor>,
     /// What is flown, or stated, for the sake of what is hidden.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub notes: Vec<String>,
@@ -134,6 +138,7 @@ impl Case {
             stated: None,
             recorder: Recorder::Board,
             misfit: None,
+            poor: None,
             notes: Vec::new(),
         };
         let turn = if set.is_half() { index / 2 } else { index };
@@ -175,6 +180,11 @@ impl Case {
             Set::Estimates => answer.recorder = Recorder::Estimator(Estimator::draw(&mut draw)),
             Set::Capture => answer.recorder = Recorder::Capture(Capture::draw(&mut draw)),
             Set::Misfit => answer.misfit = Some(Misfit::draw(&mut draw)),
+            Set::Poor => {
+                let poor = Poor::draw(index, &mut draw);
+                answer.excitation = poor.excitation;
+                answer.poor = Some(poor);
+            }
             _ => {}
         }
         let mut case = Self { answer, nominal, seed };
@@ -307,7 +317,8 @@ impl Case {
         let late = |effect: &&HiddenEffect| effect.name == "gnss_latency";
         let latency_s =
             self.answer.effects.iter().find(late).map_or(0.0, |effect| effect.number("latency_s"));
-        Ok(self.answer.recorder.record(log, latency_s, draw))
+        let log = self.answer.recorder.record(log, latency_s, draw);
+        Ok(self.answer.poor.map_or(log.clone(), |poor| poor.of(log)))
     }
 
     /// A flight with the sensors' readings and the truth.

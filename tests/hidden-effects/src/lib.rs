@@ -15,6 +15,7 @@ pub mod further;
 pub mod independent;
 pub mod outside;
 pub mod overstate;
+pub mod poor;
 pub mod recorder;
 pub mod set;
 pub mod squirrel_made;

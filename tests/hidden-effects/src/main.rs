@@ -10,8 +10,9 @@ use std::process::ExitCode;
 
 const USAGE: &str = "\
 hidden-effects make  --set NAME --n N --seed S --out DIR
-hidden-effects bench --squirrel PROGRAM --seed S (--full | --cases N [--set NAME [--effect NAME]]) [--json FILE] [--keep DIR]
+hidden-effects bench --squirrel PROGRAM --seed S (--full | --cases N [--set NAME [--effect NAME]]) [--json FILE] [--keep DIR] [--check]
                      [--effect NAME]: the first N cases of the set that hide it
+                     [--check]: ask `gap check` beforehand, too, and count what it foresees against what is named
                      [--score-again]: what --keep has from an earlier run, without asking again";
 
 /// Where a search for cases that hide an effect ends.
@@ -35,7 +36,18 @@ fn run(arguments: &[String]) -> Result<(), String> {
         }
         Some((command, rest)) if command == "bench" => score(&Options::new(
             rest,
-            &["squirrel", "seed", "full", "cases", "set", "effect", "json", "keep", "score-again"],
+            &[
+                "squirrel",
+                "seed",
+                "full",
+                "cases",
+                "set",
+                "effect",
+                "json",
+                "keep",
+                "check",
+                "score-again",
+            ],
         )?),
         Some((command, _)) => Err(format!("no command '{command}'\n{USAGE}")),
         None => Err(format!("which command?\n{USAGE}")),
@@ -76,6 +88,7 @@ fn score(options: &Options) -> Result<(), String> {
         cases,
         seed,
         keep: keep.is_some(),
+        check: options.get("check").is_some(),
         folder: keep.unwrap_or_else(|| temporary.clone()),
     };
     let run = if options.get("score-again").is_some() { bench::score_again } else { bench::run };
@@ -103,7 +116,7 @@ impl Options {
         while let Some(argument) = left.next() {
             let key = argument.strip_prefix("--").filter(|key| known.contains(key));
             let key = key.ok_or_else(|| format!("no option '{argument}'\n{USAGE}"))?;
-            let value = if ["full", "score-again"].contains(&key) {
+            let value = if ["full", "check", "score-again"].contains(&key) {
                 Some("")
             } else {
                 left.next().map(String::as_str)

@@ -39,11 +39,13 @@ pub enum Set {
     /// A vehicle that is off its file, with good flights of its own; then one effect more, or
     /// nothing.
     Baseline,
+    /// One effect in poor flights: short, short and calm, or without fixes.
+    Poor,
 }
 
 impl Set {
     /// All sets with the number of cases of a full run.
-    pub const ALL: [(Self, usize); 15] = [
+    pub const ALL: [(Self, usize); 16] = [
         (Self::Single, 290),
         (Self::Two, 200),
         (Self::None, 300),
@@ -59,6 +61,7 @@ impl Set {
         (Self::Overstated, 112),
         (Self::Misfit, 105),
         (Self::Baseline, 116),
+        (Self::Poor, 66),
     ];
 
     /// Name as on the command line and in files.
@@ -79,6 +82,7 @@ impl Set {
             Self::Overstated => "overstated",
             Self::Misfit => "misfit",
             Self::Baseline => "baseline",
+            Self::Poor => "poor",
         }
     }
 

@@ -1,6 +1,8 @@
 //! `squirrel gap`: where simulation and measurement disagree, what is missing, and what adding it
 //! is worth.
 
+mod check;
+
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use crate::paths::log_files;
@@ -17,11 +19,16 @@ use std::path::PathBuf;
 /// What the steps write into the folder of `--out`.
 const FIND: &str = "find.json";
 const VERDICT: &str = "verdict.json";
+const CHECK: &str = "check.json";
+const CHECK_PAGE: &str = "check.html";
 const REPORT: &str = "report.html";
 
 /// Steps of the gap workflow.
 #[derive(Debug, clap::Subcommand)]
 pub(crate) enum Gap {
+    /// Before any verdict: whether the data agree with themselves, from which size on the flights
+    /// show each effect, and what to fly.
+    Check(Looked),
     /// Residual force and moment of measured flights against a vehicle, per channel and window,
     /// ranked.
     Find(Given),
@@ -45,7 +52,7 @@ pub(crate) enum Gap {
     },
     /// What the missing effect is worth on held-out flights, re-simulated.
     Shrink(Given),
-    /// All of it, with a report.
+    /// All of it, from the check on, with a report.
     Run {
         #[command(flatten)]
         flights: Given,
@@ -56,7 +63,27 @@ pub(crate) enum Gap {
     },
 }
 
-/// What every step is given.
+/// What is looked at before any verdict.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Looked {
+    /// Vehicle file.
+    #[arg(long)]
+    vehicle: PathBuf,
+    /// Flight logs, or folders of them, from which effects are to be named.
+    #[arg(long, required = true, num_args = 1..)]
+    flights: Vec<PathBuf>,
+    /// Flight logs, or folders of them, for the proof: their data alone are looked at.
+    #[arg(long, num_args = 1..)]
+    held_out: Vec<PathBuf>,
+    /// Folder for the result and its page.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Write the result here as JSON.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+/// What every other step is given.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Given {
     /// Vehicle file.
@@ -83,6 +110,7 @@ pub(crate) struct Given {
 impl Gap {
     pub(crate) fn run(&self) -> Result<(), String> {
         match self {
+            Self::Check(flights) => flights.run(),
             Self::Find(flights) => flights.find(),
             Self::Name(flights) => flights.name(),
             Self::Add { flights, effect, fit, dry_run } => {
@@ -92,6 +120,48 @@ impl Gap {
             Self::Run { flights, fit } => flights.everything(*fit),
         }
     }
+}
+
+impl Looked {
+    fn run(&self) -> Result<(), String> {
+        let kept = self.out.as_ref().map(|folder| folder.join(CHECK));
+        let mut paths = Paths::default()
+            .vehicle("--vehicle", [&self.vehicle])
+            .flights("--flights", &self.flights)?
+            .flights("--held-out", &self.held_out)?
+            .writes_json(self.json.as_ref(), kept.as_ref());
+        if let Some(folder) = &self.out {
+            paths = paths.writes_into(folder, [CHECK_PAGE, CHECK]);
+        }
+        paths.check()?;
+        let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
+        let (flights, held_out) = (logs(&self.flights)?, logs(&self.held_out)?);
+        let found = looked(&vehicle, &flights, &held_out)?;
+        check::show(&found);
+        notes(&found.notes);
+        if let Some(folder) = &self.out {
+            output::folder(folder)?;
+            output::write_json(Some(&folder.join(CHECK)), &found)?;
+            let path = folder.join(CHECK_PAGE);
+            let page = squirrel_gap::report::render_check(&vehicle.name, &found);
+            output::write_file(&path, page.as_bytes())?;
+            say(&format!("report: {}", path.display()));
+        }
+        output::write_json(self.json.as_deref(), &found)
+    }
+}
+
+/// What flights are worth before any verdict.
+fn looked(
+    vehicle: &VehicleFile,
+    flights: &[(String, FlightLog)],
+    held_out: &[(String, FlightLog)],
+) -> Result<squirrel_gap::Check, String> {
+    let bar = output::spinner();
+    let tell = |what: &str| bar.set_message(what.to_owned());
+    let found = squirrel_gap::check(vehicle, flights, held_out, &tell);
+    bar.finish_and_clear();
+    found.map_err(|e| e.to_string())
 }
 
 impl Given {
@@ -119,6 +189,15 @@ impl Given {
 
     fn diagnose(&self) -> Result<Workflow, String> {
         let (vehicle, flights, held_out) = self.read()?;
+        self.diagnosed(vehicle, flights, held_out)
+    }
+
+    fn diagnosed(
+        &self,
+        vehicle: VehicleFile,
+        flights: Flights,
+        held_out: Flights,
+    ) -> Result<Workflow, String> {
         let good = logs(&self.baseline)?;
         let bar = output::spinner();
         let tell = |what: &str| {
@@ -215,7 +294,14 @@ impl Given {
     fn everything(&self, fit: bool) -> Result<(), String> {
         self.patch_path()?;
         self.check(&[self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
-        let mut found = self.diagnose()?;
+        let (vehicle, flights, held_out) = self.read()?;
+        // Whatever it finds, the verdict is what it would be without.
+        let check = looked(&vehicle, &flights, &held_out).ok();
+        let mut found = self.diagnosed(vehicle, flights, held_out)?;
+        if let Some(check) = &check {
+            talk(&check.words);
+        }
+        found.check = check;
         let patched = found.patched(fit)?;
         if let Ok(patched) = &patched {
             fly_again(&mut found, patched)?;

@@ -6,8 +6,8 @@ use super::support::{Folder, SQUIRREL, json};
 use squirrel_log::FlightLog;
 use std::fs;
 
-/// The steps of the workflow that look for a name.
-const STEPS: [&str; 5] = ["find", "name", "add", "shrink", "run"];
+/// The steps of the workflow.
+const STEPS: [&str; 6] = ["check", "find", "name", "add", "shrink", "run"];
 
 /// The shipped vehicle, and the one that flies: its rotors lag.
 fn write_vehicles(folder: &Folder) {
@@ -120,6 +120,52 @@ fn a_vehicle_file_that_will_not_do_is_one_line() {
         &["gap", "shrink", "--vehicle", "squirrel.toml", "--flights", "f.mcap", "--out", "out"],
         &["--held-out"],
     );
+}
+
+/// Problems are what `check` is to find: they are told, and it has done its work.
+#[test]
+fn check_says_what_flights_are_worth_and_run_begins_with_it() {
+    let folder = Folder::new("gap-check");
+    write_vehicles(&folder);
+    for (seed, out) in [("1", "f.mcap"), ("2", "g.mcap")] {
+        folder.succeeds(&[
+            "fly",
+            "--arm",
+            "pc",
+            "--scenario",
+            "hover",
+            "--seed",
+            seed,
+            "--out",
+            out,
+        ]);
+    }
+    let mut stuck = FlightLog::read(&folder.0.join("g.mcap")).unwrap();
+    let imu = stuck.sources.get_mut("imu").unwrap();
+    for channel in imu.channels.values_mut() {
+        let (width, old) = (channel.width, channel.values.clone());
+        for (i, x) in channel.values.iter_mut().enumerate() {
+            *x = old[i / width / 9 * 9 * width + i % width];
+        }
+    }
+    stuck.write(&folder.0.join("stuck.mcap")).unwrap();
+    let flights = ["--vehicle", "squirrel.toml", "--flights", "f.mcap", "stuck.mcap"];
+    let said = folder.succeeds(
+        &[&["gap", "check"], &flights[..], &["--out", "out", "--json", "c.json"]].concat(),
+    );
+    for words in
+        ["1 of 2 flights contradict", "set aside: stuck.mcap: imu.", "linear_drag", "what to fly"]
+    {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    let read = |file: &str| fs::read_to_string(folder.0.join(file)).unwrap();
+    assert_eq!(read("c.json"), read("out/check.json"));
+    assert!(read("out/check.html").contains("check-effects"));
+    let found = json(&folder, "c.json");
+    assert_eq!(found["flights"][1]["usable_s"], 0.0);
+    folder.succeeds(&[&["gap", "run"], &flights[..], &["--out", "run"]].concat());
+    assert!(read("run/report.html").contains("check-effects"));
+    folder.fails(&[&["gap", "check"], &flights[..], &["--json", "f.mcap"]].concat(), &["f.mcap"]);
 }
 
 /// The lines of a text stand in another one in their order.

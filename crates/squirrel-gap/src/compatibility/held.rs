@@ -49,16 +49,21 @@ pub(super) fn held(log: &FlightLog, spans: &[Span]) -> Found {
 }
 
 /// How often a channel says something new.
-struct Repeats {
+pub(super) struct Repeats {
     samples: usize,
     changes: usize,
     time_s: f64,
     /// Longest time without a change: first and last time, s, and samples.
-    run: (f64, f64, usize),
+    pub(super) run: (f64, f64, usize),
 }
 
 impl Repeats {
+    /// Of a channel with enough samples to say something.
     fn of(log: &FlightLog, name: &str, spans: &[Span]) -> Option<Self> {
+        Self::counted(log, name, spans).filter(|found| found.samples >= SAMPLES_MIN)
+    }
+
+    pub(super) fn counted(log: &FlightLog, name: &str, spans: &[Span]) -> Option<Self> {
         let (time_s, channel) = log.channel(name)?;
         let mut found = Self { samples: 0, changes: 0, time_s: 0.0, run: (0.0, 0.0, 0) };
         for (from_s, until_s) in spans {
@@ -76,10 +81,11 @@ impl Repeats {
                 }
             }
         }
-        (found.samples >= SAMPLES_MIN).then_some(found)
+        Some(found)
     }
 
-    fn fresh(&self) -> f64 {
+    /// Part of the samples that differ from the one before.
+    pub(super) fn fresh(&self) -> f64 {
         self.changes as f64 / self.samples as f64
     }
 

@@ -8,6 +8,7 @@
 //! effect of the catalogue does. A flight with a problem is set aside, and the others go on.
 
 mod attitude;
+mod channels;
 mod clock;
 mod drift;
 mod fixes;
@@ -21,6 +22,7 @@ mod units;
 use crate::GapError;
 use crate::predictor::Predictor;
 use crate::verdict::{Kind, SetAside, Verdict};
+pub(crate) use channels::{channels, saturation};
 use flight::Flight;
 use pairs::Pairs;
 use squirrel_log::FlightLog;
@@ -51,13 +53,31 @@ impl<'a> Ready<'a> {
         let nominal = predictor.residual(&predictor.nominal())?;
         Ok(Self { predictor, nominal, unseen })
     }
+
+    /// The same with what names come from alone: parts of long flights, without what is not known
+    /// of them.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn narrowed(
+        mut self,
+        flights: &'a [(String, FlightLog)],
+        moments: Moments,
+    ) -> Result<Self, GapError> {
+        if let Some(parts) = self.predictor.in_parts(flights)? {
+            self.nominal = parts.residual(&parts.nominal())?;
+            self.predictor = parts;
+        }
+        leave_out(&mut self.predictor, &self.nominal, moments);
+        Ok(self)
+    }
 }
 
 /// Flights whose data contradict themselves or repeat another flight, in order.
 ///
 /// # Errors
 /// [`GapError`]: a flight that cannot be read.
-pub fn check(
+pub fn contradictions(
     vehicle: &VehicleFile,
     flights: &[(String, FlightLog)],
 ) -> Result<Vec<SetAside>, GapError> {

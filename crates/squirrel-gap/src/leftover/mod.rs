@@ -16,6 +16,7 @@ pub(crate) use features::{Moment, moment};
 use features::{families, one_way, place_share, predicted_share};
 use nalgebra::Matrix3;
 use squirrel_core::math::GRAVITY_M_S2;
+use std::ops::Range;
 use std::rc::Rc;
 
 /// Rows of the residual in one block: 0.27 s at 30 Hz.
@@ -26,7 +27,7 @@ const NEIGHBOURS: usize = 2;
 const DRAWS: usize = 8;
 const GUST_DRAWS: usize = 40;
 /// How far above the noise's mean a channel may be, slow and as a whole, in rms.
-const SLOW_RATIO: f64 = 1.6;
+pub(crate) const SLOW_RATIO: f64 = 1.6;
 const WHOLE_RATIO: f64 = 1.25;
 /// Part of what the model explains that it may get wrong without an effect being missing.
 const MODEL_ERROR: f64 = 0.015;
@@ -157,6 +158,20 @@ pub(crate) fn gusts(
     sigma_m_s: f64,
 ) -> Vec<Vec<f64>> {
     floor::draws(predictor, wind_columns, sigma_m_s, GUST_DRAWS)
+}
+
+/// The slow part of some channels that draws leave, by channel and piece, rms.
+pub(crate) fn slow_parts(
+    predictor: &Predictor,
+    draws: &[Vec<f64>],
+    channels: Range<usize>,
+) -> Vec<f64> {
+    let own = predictor.segments.iter().filter(|s| is_judged(s) && channels.contains(&s.channel));
+    own.map(|segment| {
+        let squares = draws.iter().map(|draw| rms_of_means(&draw[segment.rows.clone()]).powi(2));
+        (squares.sum::<f64>() / draws.len() as f64).sqrt()
+    })
+    .collect()
 }
 
 /// Compares a leftover with what noise alone leaves.

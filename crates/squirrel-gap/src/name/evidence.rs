@@ -30,6 +30,7 @@ pub(crate) struct Posterior {
     pub(crate) mean: DVector<f64>,
     factor: Factor,
     sd: DVector<f64>,
+    beta: f64,
     /// Where in the factor each parameter is; one that is left out is not.
     places: Vec<Option<usize>>,
 }
@@ -167,12 +168,35 @@ impl Gram {
             mean,
             factor,
             sd,
+            beta,
             places,
         })
     }
 }
 
 impl Posterior {
+    /// What the same priors make of another measurement: `E[theta] = beta D A^-1 D b`.
+    ///
+    /// * `b` - its inner products with the columns
+    pub(crate) fn mean_of(&self, b: &DVector<f64>) -> DVector<f64> {
+        let mut scaled = DVector::zeros(self.places.iter().flatten().count());
+        let held = self.places.iter().enumerate().filter_map(|(i, place)| Some((i, (*place)?)));
+        for (i, place) in held.clone() {
+            scaled[place] = self.sd[i] * b[i] * self.beta;
+        }
+        let solved = self.factor.solve(&scaled);
+        let mut mean = DVector::zeros(self.sd.len());
+        for (i, place) in held {
+            mean[i] = self.sd[i] * solved[place];
+        }
+        mean
+    }
+
+    /// What of the log evidence no measurement changes: `-1/2 ln det A`, nats.
+    pub(crate) fn log_volume(&self) -> f64 {
+        -0.5 * self.factor.log_determinant()
+    }
+
     /// Posterior variance of one parameter: `s_i^2 |L^-1 e_i|^2` where `A = L L'`.
     pub(crate) fn variance(&self, i: usize) -> f64 {
         self.places[i]

@@ -24,6 +24,7 @@ mod refine;
 mod rivals;
 mod rotors;
 mod search;
+mod showable;
 mod slow;
 mod step;
 mod tolerance;
@@ -33,18 +34,19 @@ pub(crate) use day::explain_flights;
 pub(crate) use evidence::BETA;
 pub(crate) use linear::settle_flights;
 pub(crate) use parameters::Catalogue;
-pub(crate) use payload::payload_lengths_m;
+use payload::payload_lengths_m;
 pub(crate) use point::{Member, Point, Scatter, hypothesis};
 pub(crate) use refine::Scored;
 pub(crate) use search::{Found, NATS_MIN, Search};
-pub(crate) use step::clock_step_s;
+pub(crate) use showable::{Showable, air_hides_names, gust_sizes};
+use step::clock_step_s;
 use tolerance::unlogged_sag;
 pub(crate) use tolerance::{notes as silent_tolerances, sds};
 
 use crate::GapError;
 use crate::leftover::{Leftover, Slack, gusts, leftover, noise};
 pub(crate) use crate::predictor::TURBULENCE_M_S;
-use crate::predictor::{Hypothesis, Motion};
+use crate::predictor::{Hypothesis, Motion, Predictor};
 use crate::verdict::Left;
 use squirrel_core::effects::Timing;
 use std::rc::Rc;
@@ -72,6 +74,17 @@ pub(crate) struct Naming {
     /// Whether its names stand although something is left: each leads by far, and held-out flights
     /// want it.
     pub(crate) stands: bool,
+}
+
+/// Everything that can be named on the vehicle of some flights.
+///
+/// * `nominal` - residual of the vehicle as it is
+///
+/// # Errors
+/// The vehicle file lacks a tolerance that is needed; what the predictor says.
+pub(crate) fn catalogue(predictor: &Predictor, nominal: &[f64]) -> Result<Catalogue, GapError> {
+    let lengths_m = payload_lengths_m(predictor, nominal);
+    Catalogue::new(predictor, &lengths_m, clock_step_s(predictor, nominal)?)
 }
 
 /// Finds the best explanation.

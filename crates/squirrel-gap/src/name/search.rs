@@ -28,7 +28,7 @@ const JUMP_NATS: f64 = 40.0;
 /// one, too.
 const LEANS_NATS: f64 = 12.0;
 /// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
-const TOLERANCES_MIN: f64 = 3.0;
+pub(super) const TOLERANCES_MIN: f64 = 3.0;
 /// Part of its smallest size that a number without a sign has at least.
 pub(super) const LEAST: f64 = 0.02;
 /// Part of its bounds at which a number is at its end.
@@ -128,7 +128,7 @@ impl Search<'_> {
     }
 
     /// The predictor linearised about the vehicle file, and what it says if nothing has a name.
-    fn about_nothing(&self) -> Result<(Linear, Scored), GapError> {
+    pub(super) fn about_nothing(&self) -> Result<(Linear, Scored), GapError> {
         let linear = self.linear(&self.nothing(), None)?;
         let set = self.score(&linear, &[])?;
         Ok((linear, set))
@@ -377,6 +377,24 @@ impl Search<'_> {
         })
     }
 
+    /// Priors of a set with one candidate more, as large as is plausible.
+    pub(super) fn widened(&self, set: &Scored, candidate: &Candidate) -> Vec<f64> {
+        let offset = set.free.len();
+        let mut prior = set.prior.clone();
+        // A payload is one thing at several lengths.
+        if swings(&candidate.profile) {
+            for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
+                if self.catalogue.candidates[parameter.candidate].effect == candidate.effect {
+                    prior[offset + p] = 0.0;
+                }
+            }
+        }
+        for p in &candidate.parameters {
+            prior[offset + p] = self.catalogue.parameters[*p].slab;
+        }
+        prior
+    }
+
     /// Candidates by the evidence that a linear model gives them beside a set, best first, with
     /// their linear numbers.
     pub(crate) fn ranked(&self, set: &Scored, except: &[&str]) -> Vec<(f64, Member)> {
@@ -390,18 +408,9 @@ impl Search<'_> {
             if in_set || except.contains(&candidate.effect) {
                 continue;
             }
-            let mut prior = set.prior.clone();
-            if swings(&candidate.profile) {
-                for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
-                    if self.catalogue.candidates[parameter.candidate].effect == candidate.effect {
-                        prior[offset + p] = 0.0;
-                    }
-                }
-            }
-            for p in &candidate.parameters {
-                prior[offset + p] = self.catalogue.parameters[*p].slab;
-            }
-            let Some(posterior) = set.gram.posterior(&prior, BETA) else { continue };
+            let Some(posterior) = set.gram.posterior(&self.widened(set, candidate), BETA) else {
+                continue;
+            };
             let mut member = self.catalogue.absent(self.predictor, index);
             let mut plausible = true;
             for p in &candidate.parameters {

@@ -25,9 +25,9 @@ use crate::report::{
 };
 use crate::shrink::{BIN_S, BINS, CHANNELS as FLOWN_CHANNELS};
 use crate::verdict::{Kind, NamedEffect, RotorHealth, Value};
+use crate::words::short;
 use squirrel_core::effects::{Effect, Effects, Gust, Kind as ParameterKind, SizeRange};
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::path::Path;
 use units::{unit, without_unit};
 
 pub use screen::first_screen;
@@ -180,16 +180,6 @@ pub fn picture(
 fn rotor(health: &RotorHealth) -> Option<RotorRow> {
     let Value::Number { value: loss, low, high } = health.thrust_loss_fraction else { return None };
     Some(RotorRow { rotor: health.rotor, loss, low, high, usual: health.usual })
-}
-
-/// A path as it may be shown: of an absolute one, the last folder and the file.
-fn short(name: &str) -> String {
-    let path = Path::new(name);
-    if !path.is_absolute() {
-        return name.to_owned();
-    }
-    let parts: Vec<_> = path.iter().skip(1).map(|part| part.to_string_lossy()).collect();
-    parts[parts.len().saturating_sub(2)..].join("/")
 }
 
 /// Single effects as the linear search ranks them, in the place of those that were refined their

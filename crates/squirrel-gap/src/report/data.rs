@@ -5,6 +5,7 @@
 //! empty say so on the page.
 
 use crate::ClosedLoop;
+use crate::checked::Check;
 use serde::Serialize;
 
 /// Everything on one page.
@@ -17,6 +18,8 @@ pub struct ReportData {
     pub screen: Vec<Answer>,
     /// Flights that were set aside, each with what to change; a line each.
     pub set_aside: Vec<String>,
+    /// What the flights are worth before any verdict; none where nobody asked.
+    pub check: Option<Check>,
     /// The verdict as one paragraph in plain words.
     pub verdict: String,
     /// Why nothing could be computed and the panels are empty; empty where they are not.

@@ -8,6 +8,7 @@
 //! | panel | question |
 //! |---|---|
 //! | `answers` | what is missing, how sure, how much better it predicts, what remains, what to fly next: the first screen |
+//! | `check-flights`, `check-effects` | what are the flights worth, before any verdict; where they were asked that |
 //! | `panel-h` | what is the answer, where does it hold, what changes in the vehicle file |
 //! | `panel-a` | when and where do simulation and flight disagree, before and after |
 //! | `panel-b` | how much better is the answer than its rivals |
@@ -18,6 +19,7 @@
 //! | `panel-g` | which effects could these flights not tell apart, and what to fly |
 
 mod answer;
+mod check;
 mod data;
 mod first;
 mod proof;
@@ -28,6 +30,8 @@ pub use data::{
     HeldOut, HeldOutChannel, Horizon, InputCorrelation, ParameterRow, ReportData, RotorRow,
     Whiteness,
 };
+
+pub use check::render_check;
 
 use crate::number::significant;
 use squirrel_report::chart::drawable;
@@ -47,6 +51,9 @@ const WIDTH: f64 = 900.0;
 pub fn render(data: &ReportData) -> String {
     let mut page = Page::new(&data.title, "");
     first::screen(&mut page, data);
+    if let Some(check) = &data.check {
+        check::panels(&mut page, check);
+    }
     answer::verdict(&mut page, data);
     residual::over_time(&mut page, data);
     answer::evidence(&mut page, data);

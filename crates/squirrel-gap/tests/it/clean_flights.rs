@@ -5,7 +5,7 @@ use crate::support::{csv_files, imported, nanobench, vehicle, vehicle_with};
 use hidden_effects::case::{Case, Set};
 use hidden_effects::catalogue::{CATALOGUE, CLASS_MASS_KG, HiddenEffect, Value};
 use hidden_effects::draw::Draw;
-use squirrel_gap::check;
+use squirrel_gap::contradictions;
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::PathBuf;
@@ -42,7 +42,7 @@ fn parts(name: &str, log: &FlightLog, length_s: f64) -> Vec<(String, FlightLog)>
 fn alarms(vehicle: &VehicleFile, parts: &[(String, FlightLog)]) -> (usize, Vec<String>) {
     let (mut count, mut said) = (0, Vec::new());
     for part in parts {
-        match check(vehicle, std::slice::from_ref(part)) {
+        match contradictions(vehicle, std::slice::from_ref(part)) {
             Ok(found) => {
                 count += 1;
                 said.extend(found.into_iter().map(|aside| aside.words));
@@ -114,7 +114,7 @@ fn of_case(case: &Case) -> Vec<String> {
     let Ok(log) = case.flight(0) else { return Vec::new() };
     let hidden =
         format!("{:?} {:?} {:?}", case.answer.set, case.answer.effects, case.answer.outside);
-    check(&vehicle, &[("flight".to_owned(), log)])
+    contradictions(&vehicle, &[("flight".to_owned(), log)])
         .unwrap()
         .into_iter()
         .map(|aside| format!("{hidden}: {}", aside.words))

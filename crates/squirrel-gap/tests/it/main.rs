@@ -4,6 +4,7 @@ mod datasheet;
 mod support;
 
 mod baseline;
+mod check;
 mod clean_flights;
 mod data_problems;
 mod errors;

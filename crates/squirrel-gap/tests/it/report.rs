@@ -127,6 +127,7 @@ fn example() -> ReportData {
             answer("What to fly next", "One more flight", "", "Dashes at several speeds."),
         ],
         set_aside: vec!["rich 9: imu: held for 3 s".to_owned()],
+        check: None,
         title: "Gap report: squirrel, three flights".to_owned(),
         verdict: "The vehicle file lacks linear_drag: a force against the motion of 0.085 N per m/s. On a flight that was \
                   not used to find it, the error of one second of re-simulation falls from 9.3 to 1.07 times the noise \

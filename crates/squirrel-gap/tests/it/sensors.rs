@@ -89,7 +89,7 @@ fn a_gyroscope_that_drifts_is_set_aside_and_one_with_a_scale_is_not() {
     let scale = flown(
         "[effects.gyro_scale]\nscale_x_fraction = 0.1\nscale_y_fraction = 0.1\nscale_z_fraction = -0.1\n",
     );
-    assert!(squirrel_gap::check(&VehicleFile::squirrel(), &scale).unwrap().is_empty());
+    assert!(squirrel_gap::contradictions(&VehicleFile::squirrel(), &scale).unwrap().is_empty());
     let mut flights = flown("");
     for (_, log) in &mut flights {
         let imu = log.sources.get_mut("imu").unwrap();

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{hold, imported, nanobench, step, vehicle, vehicles};
-use squirrel_gap::check;
+use squirrel_gap::contradictions;
 use squirrel_log::FlightLog;
 use squirrel_log::import::{ImportMap, import};
 use std::path::Path;
@@ -175,7 +175,7 @@ fn named(
     let vehicle = vehicle("crazyflie21_brushed.toml");
     let (mut right, mut count) = (0, 0);
     for (name, log) in flights {
-        let found = check(&vehicle, &[(name.clone(), log)]).unwrap();
+        let found = contradictions(&vehicle, &[(name.clone(), log)]).unwrap();
         let first = found.first();
         if first.is_some_and(|a| channels.contains(&a.channel) && a.words.contains(remedy)) {
             right += 1;

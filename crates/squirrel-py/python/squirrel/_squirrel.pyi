@@ -20,6 +20,7 @@ __all__ = [
     "__version__",
     "derivative",
     "forward",
+    "gap_check",
     "gap_diagnose",
     "gap_effects",
     "gap_find",
@@ -1141,6 +1142,11 @@ def forward(model: Model, *, rows: numpy.typing.NDArray[numpy.float32], velocity
     ------
     ValueError
         Names the argument, what was expected and what came.
+    """
+
+def gap_check(vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog]) -> dict[str, typing.Any]:
+    r"""
+    What flights are worth before any verdict, as the JSON of ``squirrel gap check``.
     """
 
 def gap_diagnose(vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog], baseline: dict[str, FlightLog], fit: builtins.bool, fly_again: builtins.bool, out: typing.Optional[builtins.str | os.PathLike | pathlib.Path]) -> tuple[dict[str, typing.Any], Vehicle | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from squirrel._squirrel import gap_diagnose, gap_effects, gap_find
+from squirrel._squirrel import gap_check, gap_diagnose, gap_effects, gap_find
 
 if TYPE_CHECKING:
     import os
@@ -28,6 +28,7 @@ __all__ = [
     "SetAside",
     "Since",
     "Verdict",
+    "check",
     "effects",
     "find",
     "name",
@@ -381,6 +382,36 @@ def effects() -> list[dict[str, Any]]:
         0.548 kg, what that ``grows_with``, and whether it is ``signed``.
     """
     return gap_effects()
+
+
+def check(
+    *, vehicle: Vehicle, flights: dict[str, FlightLog], held_out: dict[str, FlightLog] | None = None
+) -> dict[str, Any]:
+    """Say what flights are worth before any verdict: their data, and from which size on they show each effect.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+        What is believed; its numbers have tolerances.
+    flights : dict of str to FlightLog
+        From which effects are to be named.
+    held_out : dict of str to FlightLog, optional
+        For the proof: their data alone are looked at.
+
+    Returns
+    -------
+    dict
+        As ``squirrel gap check --json`` writes it: ``words``, ``flights`` (length, rate and largest gap of each channel, held
+        samples, commands at their ends, and the ``problem`` for which one is set aside), ``effects`` (whether each is
+        ``shown``, by which ``numbers`` from which size on, what it is ``not_told_from``, what to ``fly``), ``fly_next``
+        and ``notes``.
+
+    Raises
+    ------
+    ValueError
+        One line that names the flight or the field, and the value.
+    """
+    return gap_check(vehicle, flights, held_out or {})
 
 
 def find(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Finding:

@@ -1,5 +1,6 @@
 //! Processes of the program about one case.
 
+use super::checked::Check;
 use super::verdict::Verdict;
 use crate::case::{FLIGHTS, GOOD_FROM};
 use std::path::Path;
@@ -68,6 +69,22 @@ fn wait(mut child: Child, start: Instant) -> Result<(), String> {
             None => std::thread::sleep(POLL),
         }
     }
+}
+
+/// What the program says beforehand of the flights that names come from: `gap check`.
+#[allow(clippy::disallowed_methods, reason = "a program that hangs must be seen")]
+pub(super) fn check(squirrel: &Path, case: &Path, results: &Path) -> Result<Check, String> {
+    let json = results.join("check.json");
+    let mut command = Command::new(squirrel);
+    command.args(["gap", "check", "--vehicle"]).arg(case.join("vehicle.toml"));
+    command.arg("--flights").args(FLIGHTS[..2].iter().map(|flight| case.join(flight)));
+    command.arg("--json").arg(&json);
+    let log = results.join("check-stderr.txt");
+    let log = std::fs::File::create(&log).map_err(|error| format!("{}: {error}", log.display()))?;
+    wait(start_of(command, squirrel, log)?, Instant::now())
+        .map_err(|error| format!("check: {error}"))?;
+    let text = std::fs::read_to_string(json).map_err(|error| format!("check: {error}"))?;
+    serde_json::from_str(&text).map_err(|error| format!("check: {error}"))
 }
 
 /// The part of `find`'s answer that the bench looks at.

@@ -4,11 +4,13 @@
 
 mod ask;
 mod bars;
+mod checked;
 mod score;
 mod summary;
 mod verdict;
 
 pub use bars::Bar;
+pub use checked::{Calibration, Check, Foreseen};
 pub use score::Outcome;
 pub use summary::{Coverage, Group, Summary, summarise};
 pub use verdict::Verdict;
@@ -33,6 +35,8 @@ pub struct Plan {
     pub folder: PathBuf,
     /// Whether they stay there.
     pub keep: bool,
+    /// Whether the program is asked beforehand what the flights could show.
+    pub check: bool,
 }
 
 /// Cases that are flown and asked at the same time.
@@ -106,6 +110,13 @@ pub fn score_again(plan: &Plan) -> Result<Vec<Outcome>, CaseError> {
         let verdict = ask::read(&results.join(&id).join("verdict.json"));
         let mut outcome = score::score(&answer, ask::Asked { verdict, seconds: before.seconds });
         outcome.removable_removed = before.removable_removed;
+        let check = results.join(&id).join("check.json");
+        if plan.check
+            && check.exists()
+            && let [effect] = &answer.effects[..]
+        {
+            outcome.foreseen = Some(read::<Check>(&check)?.foresees(effect));
+        }
         outcomes.push(outcome);
     }
     Ok(outcomes)
@@ -125,7 +136,16 @@ fn one(plan: &Plan, set: Set, index: usize) -> Result<Outcome, CaseError> {
     let asked = ask::ask(&plan.squirrel, &folder, &results);
     let answer = plan.folder.join("answers").join(format!("{id}.json"));
     let patched = asked.verdict.as_ref().ok().and_then(|verdict| verdict.model_patch.clone());
-    let mut outcome = score::score(&read::<Answer>(&answer)?, asked);
+    let hidden = read::<Answer>(&answer)?;
+    let mut outcome = score::score(&hidden, asked);
+    if plan.check
+        && let [effect] = &hidden.effects[..]
+    {
+        match ask::check(&plan.squirrel, &folder, &results) {
+            Ok(check) => outcome.foreseen = Some(check.foresees(effect)),
+            Err(why) => outcome.failure = Some(why),
+        }
+    }
     if let (Some(patched), Some(_)) = (patched, case.answer.misfit) {
         let truth = answer.with_extension("toml");
         match ask::removable_removed(&plan.squirrel, &folder, &truth, Path::new(&patched), &results)

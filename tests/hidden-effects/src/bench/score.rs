@@ -7,6 +7,7 @@
 //! the effect is named with a number that mends the file.
 
 use super::ask::Asked;
+use super::checked::Foreseen;
 use super::verdict::{Verdict, Word};
 use crate::case::{Answer, Generator, Set};
 use crate::catalogue::{HiddenEffect, Value};
@@ -56,6 +57,8 @@ pub struct Outcome {
     pub gap_removed: Option<f64>,
     /// Wall time, s.
     pub seconds: f64,
+    /// What the program says beforehand, where it was asked.
+    pub foreseen: Option<Foreseen>,
     /// Relative error of the size, for effects with one size.
     pub parameter_errors: BTreeMap<String, f64>,
     /// Whether the 95 % interval holds the size, likewise.
@@ -98,6 +101,7 @@ pub(super) fn score(answer: &Answer, asked: Asked) -> Outcome {
         removable_removed: None,
         gap_removed: None,
         seconds: asked.seconds,
+        foreseen: None,
         parameter_errors: BTreeMap::new(),
         parameter_covered: BTreeMap::new(),
     };

@@ -1,6 +1,7 @@
 //! Shares with their intervals, by set, generator and effect; as JSON and as a table.
 
 use super::bars::{self, Bar};
+use super::checked::{self, Calibration};
 use super::score::Outcome;
 use super::verdict::Word;
 use serde::Serialize;
@@ -67,6 +68,8 @@ pub struct Summary {
     pub coverage: BTreeMap<String, Coverage>,
     /// By what is hidden, of the sets with one hidden thing at standard noise and rich excitation.
     pub hidden: BTreeMap<String, Group>,
+    /// What was foreseen against what was named, where that was asked; see [`Calibration`].
+    pub check: Calibration,
     /// Case by case.
     pub cases: Vec<Outcome>,
 }
@@ -186,7 +189,8 @@ pub fn summarise(seed: u64, cases: Vec<Outcome>) -> Summary {
     });
     let sets = grouped(&cases, |case| Some(case.group));
     let bars = bars::of(&sets);
-    Summary { seed, bars, coverage: coverage(&cases), sets, generators, hidden, cases }
+    let check = checked::calibration(&cases);
+    Summary { seed, bars, coverage: coverage(&cases), sets, generators, hidden, check, cases }
 }
 
 impl Summary {
@@ -218,6 +222,9 @@ impl Summary {
             for (name, group) in sets {
                 row(&mut text, &format!("{generator}: {name}"), group);
             }
+        }
+        if !self.check.is_empty() {
+            text += &checked::table(&self.check);
         }
         if !self.bars.is_empty() {
             text.push_str("\nbars\n");
@@ -293,6 +300,7 @@ mod tests {
             removable_removed: right.then_some(0.97),
             gap_removed: Some(gap_removed),
             seconds: 0.5,
+            foreseen: None,
             parameter_errors: [("motor_lag".to_owned(), 0.02)].into(),
             parameter_covered: [("motor_lag".to_owned(), right)].into(),
         }

@@ -49,6 +49,7 @@ fn plan(folder: &Folder, verdict: &str) -> Plan {
         seed: 5,
         folder: folder.0.join("bench"),
         keep: false,
+        check: false,
     }
 }
 
