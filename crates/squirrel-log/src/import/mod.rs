@@ -72,7 +72,7 @@ mod files;
 mod frames;
 mod map;
 mod mask;
-mod mcap_file;
+mod mcap;
 mod meter;
 mod names;
 mod number;
@@ -137,7 +137,9 @@ pub fn import_watched(
     // A file that two sources read is worked through twice.
     let total = found.iter().filter_map(|path| Some(path.metadata().ok()?.len())).sum();
     let meter = Meter::new(total, watch);
-    let opened = (0..).zip(&found).map(|(index, path)| table::open(map, index, path, &meter));
+    let mut logs = mcap::Logs::default();
+    let opened =
+        (0..).zip(&found).map(|(index, path)| table::open(map, index, path, &mut logs, &meter));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
     check_mask_columns(map, &opened)?;
     let mut report = ImportReport::default();

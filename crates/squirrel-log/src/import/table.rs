@@ -8,7 +8,7 @@ use std::path::Path;
 use super::csv_file::CsvFile;
 use super::error::ImportError;
 use super::map::ImportMap;
-use super::mcap_file::McapFile;
+use super::mcap::Logs;
 use super::meter::Meter;
 use super::names::nearest;
 use super::number::Column;
@@ -91,6 +91,7 @@ pub(super) fn open<'a>(
     map: &ImportMap,
     index: usize,
     path: &Path,
+    logs: &mut Logs,
     meter: &'a Meter<'a>,
 ) -> Result<Box<dyn TableFile + 'a>, ImportError> {
     let file = path.display().to_string();
@@ -125,7 +126,7 @@ pub(super) fn open<'a>(
         Format::Ulog => {
             Box::new(UlogFile::open(&file, whole()?, topic, source.instance.unwrap_or(0), meter)?)
         }
-        Format::Mcap => Box::new(McapFile::open(&file, &whole()?, topic, meter)?),
+        Format::Mcap => logs.open(map, path, topic, meter)?,
         Format::Usd => Box::new(UsdFile::open(&file, whole()?, topic, meter)?),
     })
 }

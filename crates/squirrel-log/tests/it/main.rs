@@ -6,6 +6,7 @@ mod import_crazypad;
 mod import_csv;
 mod import_errors;
 mod import_formats;
+mod import_ros;
 mod import_support;
 mod import_topics;
 mod import_usd;
