@@ -79,13 +79,14 @@ mod number;
 mod parquet_file;
 mod report;
 mod table;
+mod turn;
 mod ulog_file;
 mod ulog_format;
 mod usd_file;
 mod usd_format;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub use board::{BoardReport, import_board};
 pub use error::ImportError;
@@ -120,6 +121,17 @@ pub fn import(
 /// A file that none or two of the paths offer, a path that does not exist or that nothing reads.
 pub fn files_of(map: &ImportMap, paths: &[PathBuf]) -> Result<Vec<PathBuf>, ImportError> {
     files::find(map, paths)
+}
+
+/// The map of a ROS 2 bag (MCAP with CDR) by the types of its topics, and what was chosen, a line
+/// each: `docs/guide/import.md` lists the types.
+///
+/// * `topics` - those that are taken where several say the same
+///
+/// # Errors
+/// The file cannot be read, no topic has a known type, or several have the same one.
+pub fn map_of_bag(path: &Path, topics: &[String]) -> Result<(ImportMap, Vec<String>), ImportError> {
+    mcap::map_of_bag(path, topics)
 }
 
 /// Imports one flight as [`import`] does, and says how far it is.
@@ -181,6 +193,7 @@ pub fn import_watched(
         let time_s: Vec<f64> = times[index].iter().map(|t| t - zero_s).collect();
         build::add_source(&mut log, &mut report, map, source, table, &time_s, rows)?;
     }
+    turn::turn(&mut log, &mut report, map, &sources)?;
     let mut imported_from = names;
     imported_from.dedup();
     log.metadata = BTreeMap::from([

@@ -59,6 +59,7 @@ enum Format {
 /// # Errors
 /// Neither says it, or the file cannot be read or is empty.
 fn format(path: &Path) -> Result<Format, ImportError> {
+    check_known(path)?;
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     match extension.as_str() {
         "csv" => return Ok(Format::Csv),
@@ -68,18 +69,47 @@ fn format(path: &Path) -> Result<Format, ImportError> {
         _ => {}
     }
     let file = path.display().to_string();
-    match first_byte(path) {
-        Ok(Some(first)) if is_usd(first) => Ok(Format::Usd),
-        Ok(Some(_)) => Err(ImportError::UnknownFormat { file }),
-        Ok(None) => Err(ImportError::Empty { file }),
+    match first_bytes(path) {
+        Ok(first) if first.first().is_some_and(|first| is_usd(*first)) => Ok(Format::Usd),
+        Ok(first) if first.is_empty() => Err(ImportError::Empty { file }),
+        Ok(_) => Err(ImportError::UnknownFormat { file }),
         Err(source) => Err(ImportError::Read { file, source }),
     }
 }
 
-fn first_byte(path: &Path) -> io::Result<Option<u8>> {
+/// Refuses files that another program makes readable, by name.
+///
+/// # Errors
+/// [`ImportError::Damaged`] with what to do, [`ImportError::Read`].
+pub(super) fn check_known(path: &Path) -> Result<(), ImportError> {
+    let file = path.display().to_string();
+    let first =
+        first_bytes(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
+    match CONVERTIBLE.iter().find(|(magic, _)| first.starts_with(magic)) {
+        Some((_, problem)) => Err(ImportError::Damaged { file, problem: (*problem).to_owned() }),
+        None => Ok(()),
+    }
+}
+
+/// How a file begins that import does not read, and what makes one of it that it does.
+const CONVERTIBLE: [(&[u8], &str); 3] = [
+    (
+        b"#ROSBAG V",
+        "a ROS 1 bag; import reads ROS 2's MCAP: `pip install rosbags`, then \
+         `rosbags-convert --src FLIGHT.bag --dst FOLDER --dst-storage mcap`",
+    ),
+    (
+        b"SQLite format 3",
+        "a ROS 2 bag in SQLite; import reads MCAP: `pip install rosbags`, then \
+         `rosbags-convert --src FOLDER --dst OTHER --dst-storage mcap`",
+    ),
+    (b"\x89HDF\r\n\x1a\n", "an HDF5 file; import reads CSV, Parquet and MATLAB's `save -v7`"),
+];
+
+fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
     let mut first = Vec::new();
-    fs::File::open(path)?.take(1).read_to_end(&mut first)?;
-    Ok(first.first().copied())
+    fs::File::open(path)?.take(16).read_to_end(&mut first)?;
+    Ok(first)
 }
 
 /// Opens the file of one `[[source]]`.

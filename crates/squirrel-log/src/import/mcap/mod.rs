@@ -6,6 +6,7 @@
 mod cdr;
 mod cdr_walk;
 mod json;
+mod known;
 mod ros_schema;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -21,9 +22,11 @@ use super::error::ImportError;
 use super::map::ImportMap;
 use super::meter::Meter;
 use super::names::nearest;
-use super::table::TableFile;
+use super::table::{self, TableFile};
 use cdr::CdrFile;
 use json::JsonFile;
+
+pub(super) use known::map_of_bag;
 
 /// MCAP's own times of a message as columns.
 pub(super) const LOG_TIME: &str = "log_time";
@@ -66,6 +69,22 @@ impl Topic {
     /// Messages.
     pub(super) fn len(&self) -> usize {
         self.ends.len()
+    }
+
+    /// The frame of the first message, for messages that begin with a `std_msgs/Header`; empty if
+    /// that cannot be read.
+    fn frame_id(&self) -> String {
+        let stamp_and_length = 4 + 8;
+        let read = || {
+            let bytes = (self.len() > 0).then(|| self.message(0))?;
+            let &length = bytes.get(stamp_and_length..)?.first_chunk()?;
+            let big_endian = bytes[1] & 1 == 0;
+            let length =
+                if big_endian { u32::from_be_bytes(length) } else { u32::from_le_bytes(length) };
+            let text = bytes.get(stamp_and_length + 4..)?.get(..length as usize)?;
+            Some(String::from_utf8_lossy(text).trim_end_matches('\0').to_owned())
+        };
+        read().unwrap_or_default()
     }
 
     /// The bytes of a message.
@@ -131,6 +150,8 @@ impl Log {
         }
         let damaged = |problem: String| ImportError::Damaged { file: file.clone(), problem };
         if !bytes.starts_with(MAGIC) && !MAGIC.starts_with(&bytes) {
+            // What it is instead, or that nothing reads it.
+            table::check_known(path)?;
             return Err(damaged("the first 8 bytes are not those of an MCAP file".to_owned()));
         }
         let mut reading = Reading {

@@ -280,6 +280,13 @@ def px4_messages():
                   velocity=f32(1, 2, 3), angular_velocity=f32(0, 0, 0))  # fmt: skip
 
 
+def two_imus_messages():
+    for i in range(3):
+        ns = START_NS + i * 10_000_000
+        for topic in ["/front/imu", "/rear/imu"]:
+            yield topic, "sensor_msgs/msg/Imu", ns, imu(ns, i)
+
+
 def odd_messages():
     inner = T["odd_msgs/msg/Inner"]
     for i in range(4):
@@ -356,6 +363,7 @@ for name, messages, little, compression in [
     ("ros", ros_messages, True, CompressionType.ZSTD),
     ("mocap", mocap_messages, True, CompressionType.NONE),
     ("px4", px4_messages, True, CompressionType.ZSTD),
+    ("two_imus", two_imus_messages, True, CompressionType.ZSTD),
     ("odd", odd_messages, True, CompressionType.NONE),
     ("odd_big_endian", odd_messages, False, CompressionType.NONE),
 ]:
