@@ -72,6 +72,8 @@ mod files;
 mod frames;
 mod map;
 mod mask;
+mod mat_file;
+mod mat_format;
 mod mcap;
 mod meter;
 mod names;

@@ -8,6 +8,7 @@ use std::path::Path;
 use super::csv_file::CsvFile;
 use super::error::ImportError;
 use super::map::ImportMap;
+use super::mat_file::MatFile;
 use super::mcap::Logs;
 use super::meter::Meter;
 use super::names::nearest;
@@ -49,6 +50,8 @@ enum Format {
     Parquet,
     Ulog,
     Mcap,
+    /// MATLAB.
+    Mat,
     /// Micro-SD log of a Crazyflie.
     Usd,
 }
@@ -66,6 +69,7 @@ fn format(path: &Path) -> Result<Format, ImportError> {
         "parquet" => return Ok(Format::Parquet),
         "ulg" => return Ok(Format::Ulog),
         "mcap" => return Ok(Format::Mcap),
+        "mat" => return Ok(Format::Mat),
         _ => {}
     }
     let file = path.display().to_string();
@@ -92,7 +96,7 @@ pub(super) fn check_known(path: &Path) -> Result<(), ImportError> {
 }
 
 /// How a file begins that import does not read, and what makes one of it that it does.
-const CONVERTIBLE: [(&[u8], &str); 3] = [
+const CONVERTIBLE: [(&[u8], &str); 4] = [
     (
         b"#ROSBAG V",
         "a ROS 1 bag; import reads ROS 2's MCAP: `pip install rosbags`, then \
@@ -102,6 +106,10 @@ const CONVERTIBLE: [(&[u8], &str); 3] = [
         b"SQLite format 3",
         "a ROS 2 bag in SQLite; import reads MCAP: `pip install rosbags`, then \
          `rosbags-convert --src FOLDER --dst OTHER --dst-storage mcap`",
+    ),
+    (
+        b"MATLAB 7.3 MAT-f",
+        "a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB, `save -v7 FILE.mat` writes one",
     ),
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file; import reads CSV, Parquet and MATLAB's `save -v7`"),
 ];
@@ -135,7 +143,7 @@ pub(super) fn open<'a>(
     if source.instance.is_some() && format != Format::Ulog {
         return Err(topic_error("instance", format!("means nothing for `{file}`: leave it out")));
     }
-    let has_topics = !matches!(format, Format::Csv | Format::Parquet);
+    let has_topics = !matches!(format, Format::Csv | Format::Parquet | Format::Mat);
     if source.topic.is_some() && !has_topics {
         return Err(topic_error("topic", format!("means nothing for `{file}`: leave it out")));
     }
@@ -157,6 +165,7 @@ pub(super) fn open<'a>(
             Box::new(UlogFile::open(&file, whole()?, topic, source.instance.unwrap_or(0), meter)?)
         }
         Format::Mcap => logs.open(map, path, topic, meter)?,
+        Format::Mat => Box::new(MatFile::open(&file, whole()?, meter)?),
         Format::Usd => Box::new(UsdFile::open(&file, whole()?, topic, meter)?),
     })
 }

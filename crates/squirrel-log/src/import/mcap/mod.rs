@@ -7,6 +7,7 @@ mod cdr;
 mod cdr_walk;
 mod json;
 mod known;
+mod protobuf;
 mod ros_schema;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,6 +26,7 @@ use super::names::nearest;
 use super::table::{self, TableFile};
 use cdr::CdrFile;
 use json::JsonFile;
+use protobuf::ProtobufFile;
 
 pub(super) use known::map_of_bag;
 
@@ -193,6 +195,7 @@ impl Log {
         Ok(match topic.encoding.as_str() {
             "json" => Box::new(JsonFile::open(label, topic, share, meter)?),
             "cdr" => Box::new(CdrFile::open(label, topic, share, meter)?),
+            "protobuf" => Box::new(ProtobufFile::open(label, topic, share, meter)?),
             encoding => {
                 return Err(ImportError::Damaged {
                     file: self.file.clone(),
