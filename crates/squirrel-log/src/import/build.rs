@@ -91,7 +91,7 @@ pub(super) fn add_source(
             if target.time_s == axis {
                 target.channels.insert(name.to_owned(), channel);
             } else {
-                add_at_other_times(target, name, channel, &axis);
+                add_at_other_times(target, name, &channel, &axis);
             }
         }
         log.sources.retain(|_, source| !source.channels.is_empty());
@@ -101,7 +101,7 @@ pub(super) fn add_source(
 
 /// Adds a channel with times of its own: all channels get all times, and NaN where they have no
 /// sample, so that no number is made up.
-fn add_at_other_times(source: &mut Source, name: &str, channel: Channel, time_s: &[f64]) {
+fn add_at_other_times(source: &mut Source, name: &str, channel: &Channel, time_s: &[f64]) {
     let mut union = [&source.time_s, time_s].concat();
     union.sort_unstable_by(f64::total_cmp);
     union.dedup();
@@ -121,7 +121,7 @@ fn add_at_other_times(source: &mut Source, name: &str, channel: Channel, time_s:
     for channel in source.channels.values_mut() {
         *channel = spread(channel, &before);
     }
-    let channel = spread(&channel, time_s);
+    let channel = spread(channel, time_s);
     source.channels.insert(name.to_owned(), channel);
 }
 

@@ -139,10 +139,7 @@ fn next_record(reader: &mut Reader<Input>, record: &mut ByteRecord) -> io::Resul
 
 /// The elements of a list in a cell; `None` if there is no list.
 fn list(cell: &[u8]) -> Option<impl Iterator<Item = &[u8]>> {
-    let inside = match cell {
-        [b'[', inside @ .., b']'] | [b'(', inside @ .., b')'] => inside,
-        _ => return None,
-    };
+    let ([b'[', inside @ .., b']'] | [b'(', inside @ .., b')']) = cell else { return None };
     let between = |byte: &u8| *byte == b',' || *byte == b';' || byte.is_ascii_whitespace();
     Some(inside.split(between).filter(|element| !element.is_empty()))
 }

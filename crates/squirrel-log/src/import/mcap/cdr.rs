@@ -85,12 +85,11 @@ impl TableFile for CdrFile<'_> {
         for (slot, column) in wanted.iter().enumerate() {
             // A field of that name hides MCAP's own time.
             let field = self.message.fields.iter().any(|(field, _)| field == column);
-            values.push(match self.topic.clock(column).filter(|_| !field) {
-                Some(clock) => clock.iter().map(|&ns| ns as f64).collect(),
-                None => {
-                    picks.add(column, slot);
-                    Vec::with_capacity(self.topic.len())
-                }
+            values.push(if let Some(clock) = self.topic.clock(column).filter(|_| !field) {
+                clock.iter().map(|&ns| ns as f64).collect()
+            } else {
+                picks.add(column, slot);
+                Vec::with_capacity(self.topic.len())
             });
         }
         let steps = steps(&self.message, &picks);

@@ -163,7 +163,9 @@ impl<'a> Walker<'a> {
                 Step::Time { second, nanosecond, slots } => {
                     let (second, nanosecond) = (self.number(*second)?, self.number(*nanosecond)?);
                     // Both are whole, so the sum rounds once, as MCAP's own times do.
-                    let ns = second as i64 * 1_000_000_000 + nanosecond as i64;
+                    let ns = (second as i64)
+                        .saturating_mul(1_000_000_000)
+                        .saturating_add(nanosecond as i64);
                     for (slot, number) in slots.iter().zip([ns as f64, second, nanosecond]) {
                         if let Some(slot) = slot {
                             self.row[*slot] = number;

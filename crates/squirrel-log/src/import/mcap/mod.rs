@@ -7,6 +7,7 @@ mod cdr;
 mod cdr_walk;
 mod json;
 mod known;
+mod known_channels;
 mod protobuf;
 mod ros_schema;
 
@@ -118,16 +119,15 @@ impl Logs {
         topic: &str,
         meter: &'a Meter<'a>,
     ) -> Result<Box<dyn TableFile + 'a>, ImportError> {
-        let log = match self.read.get(path) {
-            Some(log) => Rc::clone(log),
-            None => {
-                // Every topic of the map: which of them another file has is not known here.
-                let wanted: BTreeSet<&str> =
-                    map.sources.iter().filter_map(|source| source.topic.as_deref()).collect();
-                let log = Rc::new(Log::read(path, &|topic, _| wanted.contains(topic))?);
-                self.read.insert(path.to_owned(), Rc::clone(&log));
-                log
-            }
+        let log = if let Some(log) = self.read.get(path) {
+            Rc::clone(log)
+        } else {
+            // Every topic of the map: which of them another file has is not known here.
+            let wanted: BTreeSet<&str> =
+                map.sources.iter().filter_map(|source| source.topic.as_deref()).collect();
+            let log = Rc::new(Log::read(path, &|topic, _| wanted.contains(topic))?);
+            self.read.insert(path.to_owned(), Rc::clone(&log));
+            log
         };
         log.table(topic, meter)
     }

@@ -339,12 +339,12 @@ impl<'r> Raw<'r> {
 
 /// A number of its bits or its varint; `None` for types that are none.
 fn number(kind: Type, raw: u64) -> Option<f64> {
-    let zigzag = (raw >> 1) as i64 ^ -((raw & 1) as i64);
+    let zigzag = (raw >> 1).cast_signed() ^ -(raw & 1).cast_signed();
     Some(match kind {
         Type::Double => f64::from_bits(raw),
         Type::Float => f64::from(f32::from_bits(raw as u32)),
         Type::Int32 | Type::Enum | Type::Sfixed32 => f64::from(raw as i32),
-        Type::Int64 | Type::Sfixed64 => raw as i64 as f64,
+        Type::Int64 | Type::Sfixed64 => raw.cast_signed() as f64,
         Type::Uint32 | Type::Fixed32 => f64::from(raw as u32),
         Type::Uint64 | Type::Fixed64 => raw as f64,
         Type::Sint32 => f64::from(zigzag as i32),

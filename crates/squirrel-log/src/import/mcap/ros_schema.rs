@@ -57,12 +57,12 @@ impl Struct {
             if let Some(next) = line.strip_prefix("MSG:") {
                 current = short(next.trim());
                 definitions.insert(current.clone(), Vec::new());
-            } else if !line.is_empty() && line.trim_matches('=') != "" {
-                let field = field(line).ok_or_else(|| {
+            } else if !line.is_empty() && !line.trim_matches('=').is_empty() {
+                let (kind, name, is_constant) = field(line).ok_or_else(|| {
                     format!("the definition of `{current}` has the line `{line}`: not `type name`")
                 })?;
-                if let (Some(field), Some(fields)) = (field, definitions.get_mut(&current)) {
-                    fields.push(field);
+                if let (false, Some(fields)) = (is_constant, definitions.get_mut(&current)) {
+                    fields.push((kind, name));
                 }
             }
         }
@@ -80,8 +80,8 @@ fn short(name: &str) -> String {
     }
 }
 
-/// Type and name of a line; the inner `None` is a constant, the outer one no field.
-fn field(line: &str) -> Option<Option<(&str, &str)>> {
+/// Type and name of a line, and whether it is a constant; `None` is no field.
+fn field(line: &str) -> Option<(&str, &str, bool)> {
     let (kind, rest) = line.split_once(char::is_whitespace)?;
     let rest = rest.trim_start();
     let end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
@@ -89,7 +89,7 @@ fn field(line: &str) -> Option<Option<(&str, &str)>> {
     if name.is_empty() || !(rest.is_empty() || rest.starts_with([' ', '\t', '='])) {
         return None;
     }
-    Some((!rest.trim_start().starts_with('=')).then_some((kind, name)))
+    Some((kind, name, rest.trim_start().starts_with('=')))
 }
 
 struct Resolver<'t> {
