@@ -1,8 +1,9 @@
-//! Import of foreign flight logs: CSV, Parquet, ULog, MCAP and Crazyflie micro-SD files become a
-//! [`FlightLog`] in NED, FRD, SI and radians by a TOML map. The extension of a file says its
-//! format; a Crazyflie's log, which has none of its own, is known by its first byte.
+//! Import of foreign flight logs: CSV, Parquet, MATLAB, ULog, MCAP and Crazyflie micro-SD files
+//! become a [`FlightLog`] in NED, FRD, SI and radians by a TOML map. The extension of a file says
+//! its format; a Crazyflie's log, which has none of its own, is known by its first byte. ROS 2 bags
+//! make their own map: [`map_of_bag`].
 //!
-//! The map names, for each canonical channel, the columns, their scale and offset, their frame, and
+//! `docs/guide/import.md` has every key of a map with an example. The map names, for each canonical channel, the columns, their scale and offset, their frame, and
 //! how time is written:
 //!
 //! ```toml
@@ -18,8 +19,8 @@
 //! "attitude.yaw_rad"              = { columns = ["yaw"], optional = true }
 //! ```
 //!
-//! ULog files of PX4 (`.ulg`), MCAP files with JSON messages (`.mcap`) and the micro-SD logs of a
-//! Crazyflie have topics: a source reads one, its fields are the columns. `instance` counts the
+//! ULog files of PX4 (`.ulg`), MCAP files (`.mcap`: JSON, ROS 2's CDR, protobuf) and the micro-SD
+//! logs of a Crazyflie have topics: a source reads one, its fields are the columns. `instance` counts the
 //! publishers of a ULog topic from 0.
 //!
 //! ```toml
@@ -54,8 +55,12 @@
 //! - `forward_filled` drops rows that only repeat the last sample: a slow sensor written at a fast
 //!   rate gets its own slow time axis. Channels of one log source (`battery.*`) share the axis; a
 //!   row stays when any of them changes.
-//! - `optional = true` imports a file that lacks a column of the channel without it; the report
-//!   says so.
+//! - `optional = true` imports a file that lacks a column of the channel, or has no number in it,
+//!   without it; the report says so.
+//! - `turned_by` takes a vector by an attitude of the log from the world into the body or back:
+//!   `world` stands for a `_body_` channel then, and `body` for a `_ned_` one. `gravity_m_s2` makes
+//!   a specific force of an acceleration, or the other way round.
+//! - `times = "union"` lets channels of one log source have times of their own.
 //! - `keep` may join parts with `and` that look at different files. A part drops rows of each file
 //!   or topic that has its columns, and of all others, by time: their rows outside the spans in
 //!   which it keeps consecutive rows of the first. One that has the columns itself, as topics have

@@ -95,6 +95,17 @@ pub(super) fn check_known(path: &Path) -> Result<(), ImportError> {
     }
 }
 
+/// Whether a file begins with these bytes, 16 at most.
+///
+/// # Errors
+/// [`ImportError::Read`].
+pub(super) fn starts_with(path: &Path, magic: &[u8]) -> Result<bool, ImportError> {
+    match first_bytes(path) {
+        Ok(first) => Ok(first.starts_with(magic)),
+        Err(source) => Err(ImportError::Read { file: path.display().to_string(), source }),
+    }
+}
+
 /// How a file begins that import does not read, and what makes one of it that it does.
 const CONVERTIBLE: [(&[u8], &str); 4] = [
     (

@@ -134,7 +134,7 @@ fn what_is_no_bag_is_told_what_to_do() {
             "old.db3",
             "old.db3: a ROS 2 bag in SQLite; import reads MCAP: `pip install rosbags`, then `rosbags-convert --src FOLDER --dst OTHER --dst-storage mcap`",
         ),
-        ("a.csv", "a.csv: the first 8 bytes are not those of an MCAP file"),
+        ("a.csv", "a.csv: no ROS 2 bag (MCAP): say by --map what its columns are"),
         ("odd.mcap", "odd.mcap: no ROS 2 topic of a known type (px4_msgs/VehicleAngularVelocity, "),
     ] {
         let error = map_of_bag(&flight.folder().join(path), &[]).unwrap_err();

@@ -76,9 +76,13 @@ fn a_stamp_is_one_time_in_ns() {
 
 /// A bag with one topic `a` of type `p/msg/A`.
 fn bag(encoding: &str, definition: &str, messages: &[&[u8]]) -> Vec<u8> {
+    bag_of("p/msg/A", encoding, definition.as_bytes(), messages)
+}
+
+fn bag_of(name: &str, encoding: &str, definition: &[u8], messages: &[&[u8]]) -> Vec<u8> {
     let mut file = Cursor::new(Vec::new());
     let mut writer = WriteOptions::new().compression(None).create(&mut file).unwrap();
-    let schema = writer.add_schema("p/msg/A", encoding, definition.as_bytes()).unwrap();
+    let schema = writer.add_schema(name, encoding, definition).unwrap();
     let channel_id = writer.add_channel(schema, "a", "cdr", &BTreeMap::new()).unwrap();
     for (i, message) in (1..).zip(messages) {
         let header = MessageHeader {
@@ -262,4 +266,46 @@ fn a_bag_cut_anywhere_is_one_line() {
         lines.insert(message);
     }
     assert!(lines.iter().any(|line| line.contains("damaged or cut off")), "{lines:?}");
+}
+
+/// Random bytes in messages and schemas, lengths among them: an error of one line, or numbers.
+#[test]
+fn no_mutation_of_a_message_or_its_schema_ends_the_program() {
+    let flight = Flight::new("mutated", &[]);
+    let bytes = std::fs::read(data("odd.mcap")).unwrap();
+    let messages: Vec<mcap::Message> =
+        mcap::MessageStream::new(&bytes).unwrap().map(Result::unwrap).collect();
+    let schema = messages[0].channel.schema.clone().unwrap();
+    let mut state = 1_u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % below
+    };
+    let (mut refused, mut read) = (0, 0);
+    for round in 0..1500 {
+        let mut definition = schema.data.to_vec();
+        let mut data: Vec<Vec<u8>> = messages.iter().map(|message| message.data.to_vec()).collect();
+        let target =
+            if round % 4 == 0 { &mut definition } else { &mut data[random(messages.len())] };
+        let at = random(target.len());
+        match random(4) {
+            0 => target.truncate(at),
+            1 => target[at] = [0, 1, 0x7f, 0xff][random(4)],
+            2 => target[at] ^= 1 << random(8),
+            _ => {
+                let end = (at + 4).min(target.len());
+                target[at..end].fill(0xff);
+            }
+        }
+        let data: Vec<&[u8]> = data.iter().map(Vec::as_slice).collect();
+        flight.write("f.mcap", &bag_of(&schema.name, "ros2msg", &definition, &data));
+        match flight.import(&map("a", &["u8", "up_to_five[1]", "pair[1].few[0]"]), &["f.mcap"]) {
+            Ok(_) => read += 1,
+            Err(error) => {
+                assert_eq!(flight.message(&error).lines().count(), 1, "{error}");
+                refused += 1;
+            }
+        }
+    }
+    assert!(refused > 300 && read > 300, "{refused} refused, {read} read");
 }

@@ -12,6 +12,7 @@ use super::{LOG_TIME, Log, Topic};
 use crate::import::error::ImportError;
 use crate::import::map::ImportMap;
 use crate::import::meter::Meter;
+use crate::import::table;
 
 /// How far the clocks of two topics' stamps may be from each other, s; the rest is another clock.
 const CLOCKS_APART_MAX_S: f64 = 1.0;
@@ -94,6 +95,13 @@ pub(in crate::import) fn map_of_bag(
     chosen: &[String],
 ) -> Result<(ImportMap, Vec<String>), ImportError> {
     let (path, inside) = bag_in(path)?;
+    table::check_known(&path)?;
+    if !table::starts_with(&path, mcap::MAGIC)? {
+        return Err(ImportError::Damaged {
+            file: path.display().to_string(),
+            problem: "no ROS 2 bag (MCAP): say by --map what its columns are".to_owned(),
+        });
+    }
     let log = Log::read(&path, &|_, schema| !offers(schema).is_empty())?;
     let damaged = |problem| ImportError::Damaged { file: log.file.clone(), problem };
     if let Some(topic) = chosen.iter().find(|topic| !log.topics.contains_key(*topic)) {
