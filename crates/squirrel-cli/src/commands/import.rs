@@ -3,7 +3,7 @@
 use crate::output::{self, say, talk};
 use crate::paths::Paths;
 use squirrel_log::FlightLog;
-use squirrel_log::import::{ImportMap, files_of, import_board, import_watched};
+use squirrel_log::import::{ImportMap, files_of, import_board, import_watched, map_of_bag};
 use std::path::{Path, PathBuf};
 
 /// Smaller files are read before a progress bar could be seen.
@@ -12,17 +12,20 @@ const BAR_FROM_BYTES: u64 = 32 << 20;
 /// Options of an import.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Import {
-    /// Map from columns to channels (TOML).
-    #[arg(long, required_unless_present_any = ["recover", "board"])]
+    /// Map from columns to channels (TOML); ROS 2 bags (MCAP) of known types need none.
+    #[arg(long)]
     map: Option<PathBuf>,
+    /// Topic of a ROS 2 bag to take where several say the same, without --map; may be repeated.
+    #[arg(long, conflicts_with_all = ["map", "recover", "board"])]
+    topic: Vec<String>,
     /// Save what is whole of a truncated flight log.
     #[arg(long, conflicts_with = "map")]
     recover: bool,
     /// Fly what a board wrote down its serial line again: inputs and outputs of its flight code.
     #[arg(long, conflicts_with_all = ["map", "recover"])]
     board: bool,
-    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages, Crazyflie
-    /// micro-SD; with --board what the board wrote.
+    /// Files or folders of one flight: CSV, Parquet, MATLAB .mat, ULog, MCAP (JSON, ROS 2's CDR,
+    /// protobuf), Crazyflie micro-SD; with --board what the board wrote.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.
@@ -43,14 +46,18 @@ impl Import {
     }
 
     pub(crate) fn run(&self) -> Result<(), String> {
-        let Some(file) = &self.map else {
+        if self.board || self.recover {
             self.paths(&self.paths).check()?;
             return if self.board { self.board() } else { self.recover() };
+        }
+        let (map, notes) = match &self.map {
+            Some(file) => (ImportMap::load(file).map_err(|e| e.to_string())?, Vec::new()),
+            None => map_of_bag(self.one_path("an import without --map")?, &self.topic)
+                .map_err(|e| e.to_string())?,
         };
-        let map = ImportMap::load(file).map_err(|e| e.to_string())?;
         // A folder may hold more than is read; an earlier import, for one.
         let found = files_of(&map, &self.paths).map_err(|e| e.to_string())?;
-        self.paths(&found).reads("--map", [file]).check()?;
+        self.paths(&found).reads("--map", &self.map).check()?;
         let bar = output::progress(0, "bytes");
         let imported = import_watched(&map, &self.paths, &|done, total| {
             if total >= BAR_FROM_BYTES {
@@ -62,6 +69,7 @@ impl Import {
         let (log, report) = imported.map_err(|e| e.to_string())?;
         log.write(&self.out).map_err(|e| e.to_string())?;
         say(report.to_string().trim_end());
+        notes.iter().for_each(|note| say(note));
         talk(&format!("wrote {}", self.out.display()));
         output::write_json(self.json.as_deref(), &report)
     }

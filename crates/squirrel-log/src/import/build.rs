@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::error::ImportError;
 use super::frames::AttitudeFrame;
 use super::map::{ChannelMap, Conversion, ImportMap, SourceMap};
-use super::report::{ChannelReport, ImportReport};
+use super::report::{AbsentChannel, ChannelReport, ImportReport};
 use super::table::Table;
 use crate::{Channel, FlightLog, Source};
 
@@ -54,6 +54,10 @@ pub(super) fn add_source(
         let repeats_dropped = changed.as_ref().map_or(0, |changed| rows.len() - changed.len());
         let rows = changed.as_deref().unwrap_or(rows);
         if let (true, Some((_, channel))) = (rows.is_empty(), channels.first()) {
+            if channels.iter().all(|(_, channel)| channel.optional) {
+                report.absent.extend(channels.iter().map(|(_, channel)| absent(channel)));
+                continue;
+            }
             return Err(all_missing(channel, table));
         }
         let axis: Vec<f64> = rows.iter().map(|&row| time_s[row]).collect();
@@ -62,7 +66,7 @@ pub(super) fn add_source(
             .sources
             .entry(group.to_owned())
             .or_insert_with(|| Source { time_s: axis.clone(), channels: BTreeMap::new() });
-        if target.time_s != axis {
+        if target.time_s != axis && !map.union {
             return Err(axes_error(
                 channels[0].1,
                 "they are read from another file or by another time column",
@@ -70,7 +74,10 @@ pub(super) fn add_source(
             ));
         }
         for (name, map) in channels {
-            let channel = channel(map, table, rows)?;
+            let Some(channel) = channel(map, table, rows)? else {
+                report.absent.push(absent(map));
+                continue;
+            };
             let samples_missing =
                 (0..rows.len()).filter(|&i| channel.row(i).iter().any(|x| x.is_nan())).count();
             report.channels.push(ChannelReport {
@@ -81,10 +88,45 @@ pub(super) fn add_source(
                 samples_missing,
                 repeats_dropped,
             });
-            target.channels.insert(name.to_owned(), channel);
+            if target.time_s == axis {
+                target.channels.insert(name.to_owned(), channel);
+            } else {
+                add_at_other_times(target, name, &channel, &axis);
+            }
         }
+        log.sources.retain(|_, source| !source.channels.is_empty());
     }
     Ok(())
+}
+
+/// Adds a channel with times of its own: all channels get all times, and NaN where they have no
+/// sample, so that no number is made up.
+fn add_at_other_times(source: &mut Source, name: &str, channel: &Channel, time_s: &[f64]) {
+    let mut union = [&source.time_s, time_s].concat();
+    union.sort_unstable_by(f64::total_cmp);
+    union.dedup();
+    let before = std::mem::replace(&mut source.time_s, union);
+    let source_time_s = &source.time_s;
+    let spread = |channel: &Channel, time_s: &[f64]| {
+        let mut values = vec![f64::NAN; source_time_s.len() * channel.width];
+        let mut at = 0;
+        for (t, row) in time_s.iter().zip(channel.values.chunks_exact(channel.width)) {
+            while source_time_s[at] < *t {
+                at += 1;
+            }
+            values[at * channel.width..][..channel.width].copy_from_slice(row);
+        }
+        Channel { width: channel.width, values }
+    };
+    for channel in source.channels.values_mut() {
+        *channel = spread(channel, &before);
+    }
+    let channel = spread(channel, time_s);
+    source.channels.insert(name.to_owned(), channel);
+}
+
+fn absent(channel: &ChannelMap) -> AbsentChannel {
+    AbsentChannel { channel: channel.name.clone(), column: channel.columns[0].clone() }
 }
 
 /// Rows at which any column of the channels has another number than before. An empty cell is not a
@@ -112,7 +154,12 @@ fn changes(channels: &[(&str, &ChannelMap)], table: &Table, rows: &[usize]) -> V
     changed
 }
 
-fn channel(map: &ChannelMap, table: &Table, rows: &[usize]) -> Result<Channel, ImportError> {
+/// `None` is an optional channel without a number.
+fn channel(
+    map: &ChannelMap,
+    table: &Table,
+    rows: &[usize],
+) -> Result<Option<Channel>, ImportError> {
     let width = map.columns.len();
     let columns: Vec<&[f64]> = map.columns.iter().map(|name| table.column(name)).collect();
     let mut values = Vec::with_capacity(rows.len() * width);
@@ -156,10 +203,11 @@ fn channel(map: &ChannelMap, table: &Table, rows: &[usize]) -> Result<Channel, I
             (_, sample) => values.extend_from_slice(sample),
         }
     }
-    if values.iter().all(|x| x.is_nan()) {
-        return Err(all_missing(map, table));
+    match values.iter().all(|x| x.is_nan()) {
+        true if map.optional => Ok(None),
+        true => Err(all_missing(map, table)),
+        false => Ok(Some(Channel { width, values })),
     }
-    Ok(Channel { width, values })
 }
 
 fn all_missing(map: &ChannelMap, table: &Table) -> ImportError {

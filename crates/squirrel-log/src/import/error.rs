@@ -83,8 +83,8 @@ pub enum ImportError {
     },
     /// No format has this extension, nor this first byte.
     #[error(
-        "{file}: import reads .csv, .parquet, .ulg (PX4) and .mcap (JSON messages), by the file's extension, and Crazyflie \
-         micro-SD logs, by the first byte"
+        "{file}: import reads .csv, .parquet, .mat (MATLAB up to v7), .ulg (PX4) and .mcap (ROS 2, JSON, protobuf), by the file's \
+         extension, and Crazyflie micro-SD logs, by the first byte"
     )]
     UnknownFormat {
         /// Path as given.

@@ -23,6 +23,8 @@ pub struct ImportMap {
     pub(super) text: String,
     /// Conditions that must all hold for a row to be kept.
     pub(super) keep: Vec<Condition>,
+    /// Whether channels of one source of the log may have times of their own.
+    pub(super) union: bool,
     pub(super) sources: Vec<SourceMap>,
 }
 
@@ -49,8 +51,21 @@ pub(super) struct ChannelMap {
     pub(super) offset: Vec<f64>,
     pub(super) conversion: Conversion,
     pub(super) forward_filled: bool,
-    /// A file without these columns is imported without the channel.
+    /// A file without these columns, or without a number in them, is imported without the channel.
     pub(super) optional: bool,
+    pub(super) turn: Option<Turn>,
+}
+
+/// A vector that an attitude of the log takes from the world into the body, or back.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Turn {
+    /// Canonical name of the attitude.
+    pub(super) by: String,
+    /// Whether the vector comes in the world frame and becomes one of the body.
+    pub(super) into_body: bool,
+    /// Taken off an acceleration that becomes a specific force, added to one that becomes an
+    /// acceleration; 0 for other vectors, m/s2.
+    pub(super) gravity_m_s2: f64,
 }
 
 /// How the scaled columns become the numbers of the channel.
@@ -68,7 +83,18 @@ pub(super) enum Conversion {
 #[serde(deny_unknown_fields)]
 struct MapToml {
     keep: Option<String>,
+    times: Option<Times>,
     source: Vec<SourceToml>,
+}
+
+/// What becomes of channels of one source of the log that have different times.
+#[derive(Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Times {
+    /// They are refused.
+    Same,
+    /// Each gets the times of all, and NaN where it has no sample.
+    Union,
 }
 
 #[derive(Deserialize)]
@@ -113,6 +139,8 @@ struct ChannelToml {
     direction: Option<Direction>,
     rotors: Option<Vec<usize>>,
     repeats: Option<Repeats>,
+    turned_by: Option<String>,
+    gravity_m_s2: Option<f64>,
     #[serde(default)]
     optional: bool,
 }
@@ -181,7 +209,22 @@ impl ImportMap {
             sources.push(SourceMap { file, topic, instance, time, channels });
         }
         let keep = keep.map_or_else(Vec::new, Condition::into_terms);
-        Ok(Self { name: name.to_owned(), text: text.to_owned(), keep, sources })
+        let attitude = |name: &str| kind(name) == Some(Kind::Attitude) && seen.contains(name);
+        let turned = sources.iter().enumerate().flat_map(|(index, source)| {
+            source
+                .channels
+                .iter()
+                .filter_map(move |channel| Some((index + 1, channel, channel.turn.as_ref()?)))
+        });
+        for (number, channel, turn) in turned {
+            if !attitude(&turn.by) {
+                let field = format!("source {number}, `{}`", channel.name);
+                let problem = format!("turned_by: `{}` is no attitude of this map", turn.by);
+                return Err(field_error(field, problem));
+            }
+        }
+        let union = toml.times == Some(Times::Union);
+        Ok(Self { name: name.to_owned(), text: text.to_owned(), keep, union, sources })
     }
 }
 
@@ -245,12 +288,19 @@ fn channel_map(name: String, toml: ChannelToml) -> Result<ChannelMap, String> {
         let wanted = width.map_or("at least 1".to_owned(), |width| width.to_string());
         return Err(format!("columns: wants {wanted}, got {count}"));
     }
+    let turn = turn(&toml, kind)?;
     let scale = per_column("scale", toml.scale, 1.0, count)?;
     if scale.contains(&0.0) {
         return Err("scale: must not be 0".to_owned());
     }
     let offset = per_column("offset", toml.offset, 0.0, count)?;
 
+    // A vector that is turned comes in the other frame.
+    let kind = match (&turn, kind) {
+        (Some(_), Kind::VectorNed) => Kind::VectorBody,
+        (Some(_), Kind::VectorBody) => Kind::VectorNed,
+        _ => kind,
+    };
     let mut given = BTreeMap::from([
         ("world", toml.world.is_some()),
         ("body", toml.body.is_some()),
@@ -287,7 +337,25 @@ fn channel_map(name: String, toml: ChannelToml) -> Result<ChannelMap, String> {
     }
     let forward_filled = toml.repeats.is_some_and(|Repeats::ForwardFilled| true);
     let (columns, optional) = (toml.columns, toml.optional);
-    Ok(ChannelMap { name, columns, scale, offset, conversion, forward_filled, optional })
+    Ok(ChannelMap { name, columns, scale, offset, conversion, forward_filled, optional, turn })
+}
+
+fn turn(toml: &ChannelToml, kind: Kind) -> Result<Option<Turn>, String> {
+    let gravity_m_s2 = toml.gravity_m_s2.unwrap_or(0.0);
+    if !gravity_m_s2.is_finite() {
+        return Err(format!("gravity_m_s2: must be finite, got {gravity_m_s2}"));
+    }
+    let into_body = kind == Kind::VectorBody;
+    match &toml.turned_by {
+        Some(by) if into_body || kind == Kind::VectorNed => {
+            Ok(Some(Turn { by: by.clone(), into_body, gravity_m_s2 }))
+        }
+        Some(_) => Err("`turned_by` means nothing for this channel: leave it out".to_owned()),
+        None if toml.gravity_m_s2.is_some() => {
+            Err("`gravity_m_s2` means nothing without `turned_by`: leave it out".to_owned())
+        }
+        None => Ok(None),
+    }
 }
 
 fn choices(key: &str) -> &'static str {

@@ -1,8 +1,9 @@
-//! Import of foreign flight logs: CSV, Parquet, ULog, MCAP and Crazyflie micro-SD files become a
-//! [`FlightLog`] in NED, FRD, SI and radians by a TOML map. The extension of a file says its
-//! format; a Crazyflie's log, which has none of its own, is known by its first byte.
+//! Import of foreign flight logs: CSV, Parquet, MATLAB, ULog, MCAP and Crazyflie micro-SD files
+//! become a [`FlightLog`] in NED, FRD, SI and radians by a TOML map. The extension of a file says
+//! its format; a Crazyflie's log, which has none of its own, is known by its first byte. ROS 2 bags
+//! make their own map: [`map_of_bag`].
 //!
-//! The map names, for each canonical channel, the columns, their scale and offset, their frame, and
+//! `docs/guide/import.md` has every key of a map with an example. The map names, for each canonical channel, the columns, their scale and offset, their frame, and
 //! how time is written:
 //!
 //! ```toml
@@ -18,8 +19,8 @@
 //! "attitude.yaw_rad"              = { columns = ["yaw"], optional = true }
 //! ```
 //!
-//! ULog files of PX4 (`.ulg`), MCAP files with JSON messages (`.mcap`) and the micro-SD logs of a
-//! Crazyflie have topics: a source reads one, its fields are the columns. `instance` counts the
+//! ULog files of PX4 (`.ulg`), MCAP files (`.mcap`: JSON, ROS 2's CDR, protobuf) and the micro-SD
+//! logs of a Crazyflie have topics: a source reads one, its fields are the columns. `instance` counts the
 //! publishers of a ULog topic from 0.
 //!
 //! ```toml
@@ -54,8 +55,12 @@
 //! - `forward_filled` drops rows that only repeat the last sample: a slow sensor written at a fast
 //!   rate gets its own slow time axis. Channels of one log source (`battery.*`) share the axis; a
 //!   row stays when any of them changes.
-//! - `optional = true` imports a file that lacks a column of the channel without it; the report
-//!   says so.
+//! - `optional = true` imports a file that lacks a column of the channel, or has no number in it,
+//!   without it; the report says so.
+//! - `turned_by` takes a vector by an attitude of the log from the world into the body or back:
+//!   `world` stands for a `_body_` channel then, and `body` for a `_ned_` one. `gravity_m_s2` makes
+//!   a specific force of an acceleration, or the other way round.
+//! - `times = "union"` lets channels of one log source have times of their own.
 //! - `keep` may join parts with `and` that look at different files. A part drops rows of each file
 //!   or topic that has its columns, and of all others, by time: their rows outside the spans in
 //!   which it keeps consecutive rows of the first. One that has the columns itself, as topics have
@@ -72,20 +77,23 @@ mod files;
 mod frames;
 mod map;
 mod mask;
-mod mcap_file;
+mod mat_file;
+mod mat_format;
+mod mcap;
 mod meter;
 mod names;
 mod number;
 mod parquet_file;
 mod report;
 mod table;
+mod turn;
 mod ulog_file;
 mod ulog_format;
 mod usd_file;
 mod usd_format;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub use board::{BoardReport, import_board};
 pub use error::ImportError;
@@ -122,6 +130,17 @@ pub fn files_of(map: &ImportMap, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Impo
     files::find(map, paths)
 }
 
+/// The map of a ROS 2 bag (MCAP with CDR) by the types of its topics, and what was chosen, a line
+/// each: `docs/guide/import.md` lists the types.
+///
+/// * `topics` - those that are taken where several say the same
+///
+/// # Errors
+/// The file cannot be read, no topic has a known type, or several have the same one.
+pub fn map_of_bag(path: &Path, topics: &[String]) -> Result<(ImportMap, Vec<String>), ImportError> {
+    mcap::map_of_bag(path, topics)
+}
+
 /// Imports one flight as [`import`] does, and says how far it is.
 ///
 /// * `watch` - gets, about once a MiB, the bytes worked through and the bytes of all files
@@ -137,7 +156,9 @@ pub fn import_watched(
     // A file that two sources read is worked through twice.
     let total = found.iter().filter_map(|path| Some(path.metadata().ok()?.len())).sum();
     let meter = Meter::new(total, watch);
-    let opened = (0..).zip(&found).map(|(index, path)| table::open(map, index, path, &meter));
+    let mut logs = mcap::Logs::default();
+    let opened =
+        (0..).zip(&found).map(|(index, path)| table::open(map, index, path, &mut logs, &meter));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
     check_mask_columns(map, &opened)?;
     let mut report = ImportReport::default();
@@ -179,6 +200,7 @@ pub fn import_watched(
         let time_s: Vec<f64> = times[index].iter().map(|t| t - zero_s).collect();
         build::add_source(&mut log, &mut report, map, source, table, &time_s, rows)?;
     }
+    turn::turn(&mut log, &mut report, map, &sources)?;
     let mut imported_from = names;
     imported_from.dedup();
     log.metadata = BTreeMap::from([

@@ -256,7 +256,7 @@ fn mcap_messages_that_are_no_numbers_are_refused() {
             r#"{"t":1e999}"#,
             "f.mcap, topic `a`: message 2 is no JSON: number out of range at line 1 column 10",
         ),
-        ("cdr", good, "f.mcap: topic `a` has cdr messages, import reads json"),
+        ("cbor", good, "f.mcap: topic `a` has cbor messages, import reads json, cdr and protobuf"),
     ] {
         let messages = [("a", encoding, 1, good.to_owned()), ("a", encoding, 2, second.to_owned())];
         flight.write("f.mcap", &mcap_bytes(&messages, 1000));

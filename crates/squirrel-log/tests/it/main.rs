@@ -2,12 +2,17 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod files;
+mod import_bag;
 mod import_crazypad;
 mod import_csv;
 mod import_errors;
 mod import_formats;
+mod import_mat;
+mod import_page;
+mod import_ros;
 mod import_support;
 mod import_topics;
+mod import_turned;
 mod import_usd;
 mod log_damage;
 mod log_foxglove;

@@ -1,0 +1,284 @@
+//! MATLAB's MAT-files, level 5 (`save -v6` and `-v7`): which arrays of numbers are in them, and
+//! where.
+//!
+//! After a header of 128 bytes come data elements: a type and a size of 4 bytes each (or both in 4,
+//! with up to 4 bytes of data), the data, padding to 8. A variable is an element of type `matrix`,
+//! or one packed by zlib. Numbers stand column by column, in whichever type holds them.
+
+use std::ops::Range;
+
+use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
+
+use super::number::Kind;
+
+/// Text, an offset that is not used here, version and byte order.
+const HEADER_BYTES: usize = 128;
+/// Bytes that all packed variables together may have: a few hundred bytes can unpack to gigabytes.
+const UNPACKED_MAX_BYTES: usize = 1 << 30;
+/// Deeper nesting than any log has; bounds the recursion.
+const DEPTH_MAX: usize = 32;
+/// Arrays of a file; each element of a list of structures has its own.
+const ARRAYS_MAX: usize = 50_000;
+
+const MATRIX: u32 = 14;
+const COMPRESSED: u32 = 15;
+const COMPLEX: u32 = 0x0800;
+
+/// An array of numbers.
+#[derive(Debug)]
+pub(super) struct Array {
+    /// Variable, fields and elements: `log.imu[0].gyro`.
+    pub(super) path: String,
+    /// Sizes other than 1.
+    pub(super) sizes: Vec<usize>,
+    kind: Kind,
+    /// Which buffer, and where in it.
+    buffer: usize,
+    bytes: Range<usize>,
+}
+
+/// The arrays of a file.
+#[derive(Debug, Default)]
+pub(super) struct Arrays {
+    pub(super) all: Vec<Array>,
+    big_endian: bool,
+    /// The file, and what was packed in it.
+    buffers: Vec<Vec<u8>>,
+}
+
+impl Arrays {
+    /// Finds the arrays of a file.
+    ///
+    /// # Errors
+    /// Says what is wrong, and at which byte.
+    pub(super) fn read(bytes: Vec<u8>) -> Result<Self, String> {
+        Self::read_within(bytes, UNPACKED_MAX_BYTES)
+    }
+
+    fn read_within(bytes: Vec<u8>, mut left: usize) -> Result<Self, String> {
+        let version = match bytes.get(124..HEADER_BYTES) {
+            Some([0, 1, b'I', b'M']) => false,
+            Some([1, 0, b'M', b'I']) => true,
+            Some(_) => {
+                return Err("no MAT-file of level 5; in MATLAB, `save -v7` writes one".to_owned());
+            }
+            None => return Err(format!("ends inside the header, after {} bytes", bytes.len())),
+        };
+        let mut arrays = Self { big_endian: version, ..Self::default() };
+        let (mut at, mut found) = (HEADER_BYTES, Vec::new());
+        while at < bytes.len() {
+            let element = element(&bytes, at, bytes.len(), arrays.big_endian)?;
+            at = element.end;
+            if element.kind == COMPRESSED {
+                let packed = &bytes[element.data.clone()];
+                let unpacked = decompress_to_vec_zlib_with_limit(packed, left).map_err(|error| {
+                    format!(
+                        "the packed variable at byte {} cannot be unpacked to at most {left} bytes: {error}",
+                        element.data.start
+                    )
+                })?;
+                left -= unpacked.len();
+                // The file itself is the first buffer.
+                arrays.buffers.push(unpacked);
+                found.push((arrays.buffers.len(), 0));
+            } else if element.kind == MATRIX {
+                found.push((0, element.start));
+            }
+        }
+        arrays.buffers.insert(0, bytes);
+        for (buffer, start) in found {
+            let end = arrays.buffers[buffer].len();
+            let element = element(&arrays.buffers[buffer], start, end, arrays.big_endian)?;
+            if element.kind == MATRIX {
+                arrays.matrix(buffer, element.data, None, 0)?;
+            }
+        }
+        Ok(arrays)
+    }
+
+    /// A number of an array, by its place in the file.
+    pub(super) fn number(&self, array: &Array, place: usize) -> f64 {
+        let size = array.kind.size();
+        let start = array.bytes.start + place * size;
+        let bytes = self.buffers[array.buffer].get(start..start + size).unwrap_or_default();
+        if !self.big_endian {
+            return array.kind.number(bytes);
+        }
+        let mut swapped = [0; 8];
+        for (to, from) in swapped.iter_mut().zip(bytes.iter().rev()) {
+            *to = *from;
+        }
+        array.kind.number(&swapped[..bytes.len()])
+    }
+
+    /// Adds the arrays of a matrix.
+    ///
+    /// * `path` - of a field or an element; a variable has its own name
+    fn matrix(
+        &mut self,
+        buffer: usize,
+        data: Range<usize>,
+        path: Option<String>,
+        depth: usize,
+    ) -> Result<(), String> {
+        if depth == DEPTH_MAX {
+            return Err(format!("a variable is nested more than {DEPTH_MAX} deep"));
+        }
+        if data.is_empty() {
+            return Ok(()); // an empty field
+        }
+        let (bytes, big_endian) = (&self.buffers[buffer], self.big_endian);
+        let next = |at: usize| element(bytes, at, data.end, big_endian);
+        let flags = next(data.start)?;
+        let sizes = next(flags.end)?;
+        let name = next(sizes.end)?;
+        let flags = word(bytes, flags.data.start, flags.data.end, big_endian)?;
+        let class = flags & 0xff;
+        let sizes: Vec<usize> = bytes[sizes.data.clone()]
+            .chunks_exact(4)
+            .map(|size| word(size, 0, 4, big_endian).map(|size| size as usize))
+            .collect::<Result<_, _>>()?;
+        let count = sizes.iter().try_fold(1_usize, |product, size| product.checked_mul(*size));
+        let count =
+            count.ok_or_else(|| format!("the array at byte {} is too large", data.start))?;
+        let path = match path {
+            Some(path) => path,
+            None => String::from_utf8_lossy(&bytes[name.data.clone()]).into_owned(),
+        };
+        let sizes: Vec<usize> = sizes.into_iter().filter(|size| *size != 1).collect();
+        match class {
+            2 => self.structure(buffer, name.end..data.end, &path, count, depth),
+            6..=15 if flags & COMPLEX == 0 => {
+                let numbers = next(name.end)?;
+                let kind = numeric(numbers.kind).ok_or_else(|| {
+                    format!("`{path}` holds data of the unknown type {}", numbers.kind)
+                })?;
+                if count.checked_mul(kind.size()) != Some(numbers.data.len()) {
+                    return Err(format!(
+                        "`{path}` has {} bytes for {count} numbers of {}",
+                        numbers.data.len(),
+                        kind.size()
+                    ));
+                }
+                if self.all.len() == ARRAYS_MAX {
+                    return Err(format!("more than {ARRAYS_MAX} arrays"));
+                }
+                self.all.push(Array { path, sizes, kind, buffer, bytes: numbers.data });
+                Ok(())
+            }
+            // Cells, text, sparse and complex numbers, objects: none of them are columns.
+            _ => Ok(()),
+        }
+    }
+
+    /// Adds the arrays in the fields of a structure, or of a list of them.
+    fn structure(
+        &mut self,
+        buffer: usize,
+        data: Range<usize>,
+        path: &str,
+        count: usize,
+        depth: usize,
+    ) -> Result<(), String> {
+        let (bytes, big_endian) = (&self.buffers[buffer], self.big_endian);
+        let length = element(bytes, data.start, data.end, big_endian)?;
+        let names = element(bytes, length.end, data.end, big_endian)?;
+        let length = word(bytes, length.data.start, length.data.end, big_endian)? as usize;
+        if length == 0 {
+            return Err(format!("`{path}` has fields without names"));
+        }
+        let names: Vec<String> = bytes[names.data.clone()]
+            .chunks_exact(length)
+            .map(|name| {
+                String::from_utf8_lossy(name.split(|byte| *byte == 0).next().unwrap_or_default())
+                    .into_owned()
+            })
+            .collect();
+        let mut at = element(bytes, data.start, data.end, big_endian)?.end;
+        at = element(bytes, at, data.end, big_endian)?.end;
+        if names.is_empty() {
+            return Ok(());
+        }
+        for i in 0..count {
+            for name in &names {
+                let field = element(&self.buffers[buffer], at, data.end, big_endian)?;
+                at = field.end;
+                let index = if count == 1 { String::new() } else { format!("[{i}]") };
+                if field.kind == MATRIX {
+                    let path = format!("{path}{index}.{name}");
+                    self.matrix(buffer, field.data, Some(path), depth + 1)?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A data element.
+struct Element {
+    kind: u32,
+    start: usize,
+    data: Range<usize>,
+    /// Where the next one starts.
+    end: usize,
+}
+
+/// The element at a byte; all of it is before `end`.
+fn element(bytes: &[u8], at: usize, end: usize, big_endian: bool) -> Result<Element, String> {
+    let first = word(bytes, at, end, big_endian)?;
+    let (kind, start, size) = if first >> 16 == 0 {
+        (first, at + 8, word(bytes, at + 4, end, big_endian)? as usize)
+    } else {
+        (first & 0xffff, at + 4, (first >> 16) as usize)
+    };
+    let left = end.saturating_sub(start);
+    if size > left {
+        return Err(format!("ends inside the element at byte {at}: {left} of {size} bytes"));
+    }
+    let data = start..start + size;
+    // Packed ones are not padded.
+    let padded = if kind == COMPRESSED {
+        data.end
+    } else {
+        at + 8 + data.end.saturating_sub(at + 8).next_multiple_of(8)
+    };
+    Ok(Element { kind, start: at, data, end: padded.min(end) })
+}
+
+fn word(bytes: &[u8], at: usize, end: usize, big_endian: bool) -> Result<u32, String> {
+    let word = bytes.get(at..end).and_then(<[u8]>::first_chunk).copied();
+    let word = word.ok_or_else(|| format!("ends inside the element at byte {at}"))?;
+    Ok(if big_endian { u32::from_be_bytes(word) } else { u32::from_le_bytes(word) })
+}
+
+/// The types of stored numbers; `None` for text and the like.
+fn numeric(kind: u32) -> Option<Kind> {
+    Some(match kind {
+        1 => Kind::I8,
+        2 => Kind::U8,
+        3 => Kind::I16,
+        4 => Kind::U16,
+        5 => Kind::I32,
+        6 => Kind::U32,
+        7 => Kind::F32,
+        9 => Kind::F64,
+        12 => Kind::I64,
+        13 => Kind::U64,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn packed_variables_together_have_a_largest_size() {
+        let packed = || std::fs::read("tests/data/mat/packed.mat").unwrap();
+        let unpacked: usize =
+            Arrays::read(packed()).unwrap().buffers[1..].iter().map(Vec::len).sum();
+        assert!(Arrays::read_within(packed(), unpacked).is_ok());
+        let error = Arrays::read_within(packed(), unpacked - 1).unwrap_err();
+        assert!(error.contains("cannot be unpacked to at most"), "{error}");
+    }
+}

@@ -1,0 +1,161 @@
+//! MAT-files as scipy reads them, protobuf as Foxglove's reader does, and what is wrong with others.
+
+use super::import_support::Flight;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+fn map(topic: &str, time: &str, columns: &[&str]) -> String {
+    format!(
+        "[[source]]\n{topic}\ntime = {{ column = \"{time}\", unit = \"s\" }}\n\
+         channels = {{ \"truth.a\" = {{ columns = {columns:?} }} }}\n"
+    )
+}
+
+/// Column, then row from 0: the last three cells of each line.
+fn numbers(csv: &str) -> BTreeMap<String, BTreeMap<usize, f64>> {
+    let mut numbers: BTreeMap<String, BTreeMap<usize, f64>> = BTreeMap::new();
+    for line in std::fs::read_to_string(data(csv)).unwrap().lines() {
+        let mut cells = line.rsplitn(3, ',');
+        let value = cells.next().unwrap().parse().unwrap();
+        let row: usize = cells.next().unwrap().parse().unwrap();
+        let column = cells.next().unwrap().rsplit(',').next().unwrap().to_owned();
+        numbers.entry(column).or_default().insert(row - 1, value);
+    }
+    numbers
+}
+
+fn compare(flight: &Flight, map: &str, file: &str, columns: &[&str], csv: &str) -> usize {
+    let expected = numbers(csv);
+    let (log, _) = flight.import(map, &[file]).unwrap();
+    let (time_s, channel) = log.channel("truth.a").unwrap();
+    for row in 0..time_s.len() {
+        for (got, column) in channel.row(row).iter().zip(columns) {
+            let expected = expected[*column].get(&row).copied().unwrap_or(f64::NAN);
+            let same = *got == expected || got.is_nan() && expected.is_nan();
+            assert!(same, "{file} {column} row {row}: {got} is not {expected}");
+        }
+    }
+    time_s.len() * columns.len()
+}
+
+#[test]
+fn every_number_of_a_mat_file_is_what_scipy_reads() {
+    for name in ["plain", "packed", "big_endian"] {
+        let (file, csv) = (format!("{name}.mat"), format!("mat/{name}.csv"));
+        let flight = Flight::new("mat", &[]);
+        flight.write(&file, &std::fs::read(data(&format!("mat/{file}"))).unwrap());
+        let all = numbers(&csv);
+        let mut compared = 0;
+        for (time, samples) in [("t", 7), ("slow.t", 3)] {
+            let columns: Vec<&str> = all
+                .iter()
+                .filter(|(_, rows)| rows.len() == samples)
+                .map(|(column, _)| column.as_str())
+                .collect();
+            compared += compare(&flight, &map("", time, &columns), &file, &columns, &csv);
+        }
+        // All but three scalars, which are no series.
+        assert_eq!(compared, all.values().map(BTreeMap::len).sum::<usize>() - 3);
+    }
+}
+
+#[test]
+fn a_mat_file_that_says_something_else_is_one_line() {
+    let flight = Flight::new("mat", &[]);
+    let plain = std::fs::read(data("mat/plain.mat")).unwrap();
+    flight.write("f.mat", &plain);
+    for (time, column, problem) in [
+        ("t", "slow.x[0]", "f.mat: `slow.x[0]` has 3 samples, its time `t` has 7"),
+        ("t", "gyro", "f.mat: no column `gyro`; nearest: "),
+        ("t", "note", "f.mat: no column `note`; nearest: "),
+        ("t", "wave", "f.mat: no column `wave`; nearest: "),
+        ("t", "solid[0]", "f.mat: no column `solid[0]`; nearest: "),
+        (
+            "log.battery.missing",
+            "gyro[0]",
+            "f.mat, column `log.battery.missing`, row 2: `` is no time",
+        ),
+        (
+            "gyro[1]",
+            "gyro[0]",
+            "f.mat, column `gyro[1]`, row 2: time repeats: -0.2 after -0.2 in row 1",
+        ),
+    ] {
+        let error = flight.import(&map("", time, &[column]), &["f.mat"]).unwrap_err();
+        let message = flight.message(&error);
+        assert!(message.starts_with(problem) && message.lines().count() == 1, "{message}");
+    }
+    let mut later = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".to_vec();
+    later.resize(512, 0);
+    for (bytes, problem) in [
+        (
+            later,
+            "f.mat: a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB, `save -v7 FILE.mat` writes one",
+        ),
+        (plain[..100].to_vec(), "f.mat: ends inside the header, after 100 bytes"),
+        (vec![0; 200], "f.mat: no MAT-file of level 5; in MATLAB, `save -v7` writes one"),
+        (
+            [&plain[..128], &14_u32.to_le_bytes(), &[0xff; 4]].concat(),
+            "f.mat: ends inside the element at byte 128: 0 of 4294967295 bytes",
+        ),
+    ] {
+        flight.write("f.mat", &bytes);
+        let error = flight.import(&map("", "t", &["gyro[0]"]), &["f.mat"]).unwrap_err();
+        let message = flight.message(&error);
+        assert!(message.starts_with(problem) && message.lines().count() == 1, "{message}");
+    }
+}
+
+/// Every cut and every flipped byte of two small files: an error of one line or a flight.
+#[test]
+fn no_cut_and_no_flip_of_a_mat_file_ends_the_program() {
+    let flight = Flight::new("mat", &[]);
+    for name in ["plain", "packed"] {
+        let whole = std::fs::read(data(&format!("mat/{name}.mat"))).unwrap();
+        let mut told = 0;
+        for at in (0..whole.len()).step_by(5) {
+            let mut flipped = whole.clone();
+            flipped[at] ^= 0xff;
+            for bytes in [whole[..at].to_vec(), flipped] {
+                flight.write("f.mat", &bytes);
+                if let Err(error) = flight.import(&map("", "t", &["gyro[0]"]), &["f.mat"]) {
+                    assert_eq!(flight.message(&error).lines().count(), 1);
+                    told += 1;
+                }
+            }
+        }
+        assert!(told > whole.len() / 10, "{told}");
+    }
+}
+
+#[test]
+fn every_number_of_a_protobuf_message_is_what_foxglove_reads() {
+    let flight = Flight::new("protobuf", &[]);
+    let whole = std::fs::read(data("protobuf/flight.mcap")).unwrap();
+    flight.write("f.mcap", &whole);
+    let all = numbers("protobuf/flight.csv");
+    let columns: Vec<&str> = all.keys().map(String::as_str).collect();
+    let topic = "topic = \"/flight\"";
+    let by_log = map(topic, "log_time", &columns);
+    assert_eq!(
+        compare(&flight, &by_log, "f.mcap", &columns, "protobuf/flight.csv"),
+        4 * columns.len()
+    );
+    // The stamp is one time, in ns.
+    let by_stamp = map(topic, "stamp", &["maybe"]).replace("\"s\"", "\"ns\"");
+    let (log, _) = flight.import(&by_stamp, &["f.mcap"]).unwrap();
+    assert_eq!(log.metadata["time_zero_s"], "1700000000.000001");
+
+    for (at, byte) in (0..whole.len()).step_by(5).map(|at| (at, whole[at] ^ 0xff)) {
+        let mut flipped = whole.clone();
+        flipped[at] = byte;
+        flight.write("f.mcap", &flipped);
+        if let Err(error) = flight.import(&by_log, &["f.mcap"]) {
+            assert_eq!(flight.message(&error).lines().count(), 1);
+        }
+    }
+}
