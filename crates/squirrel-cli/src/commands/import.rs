@@ -3,7 +3,9 @@
 use crate::output::{self, say, talk};
 use crate::paths::Paths;
 use squirrel_log::FlightLog;
-use squirrel_log::import::{ImportMap, files_of, import_board, import_watched};
+use squirrel_log::import::{
+    ImportMap, ImportReport, files_of, import_board, import_watched, import_without_map,
+};
 use std::path::{Path, PathBuf};
 
 /// Smaller files are read before a progress bar could be seen.
@@ -12,8 +14,8 @@ const BAR_FROM_BYTES: u64 = 32 << 20;
 /// Options of an import.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Import {
-    /// Map from columns to channels (TOML).
-    #[arg(long, required_unless_present_any = ["recover", "board"])]
+    /// Map from columns to channels (TOML); logs of PX4, ArduPilot, Betaflight and INAV need none.
+    #[arg(long)]
     map: Option<PathBuf>,
     /// Save what is whole of a truncated flight log.
     #[arg(long, conflicts_with = "map")]
@@ -21,8 +23,9 @@ pub(crate) struct Import {
     /// Fly what a board wrote down its serial line again: inputs and outputs of its flight code.
     #[arg(long, conflicts_with_all = ["map", "recover"])]
     board: bool,
-    /// Files or folders of one flight: CSV, Parquet, ULog, MCAP with JSON messages, Crazyflie
-    /// micro-SD; with --board what the board wrote.
+    /// The log of an autopilot: ULog (PX4), dataflash (ArduPilot), blackbox (Betaflight, INAV);
+    /// with --map files or folders of one flight: these, CSV, Parquet, MCAP with JSON messages,
+    /// Crazyflie micro-SD; with --board what the board wrote.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.
@@ -45,21 +48,36 @@ impl Import {
     pub(crate) fn run(&self) -> Result<(), String> {
         let Some(file) = &self.map else {
             self.paths(&self.paths).check()?;
-            return if self.board { self.board() } else { self.recover() };
+            return match (self.board, self.recover) {
+                (true, _) => self.board(),
+                (false, true) => self.recover(),
+                (false, false) => self.finish(|watch| {
+                    import_without_map(self.one_path("import without --map")?, watch)
+                        .map_err(|e| e.to_string())
+                }),
+            };
         };
         let map = ImportMap::load(file).map_err(|e| e.to_string())?;
         // A folder may hold more than is read; an earlier import, for one.
         let found = files_of(&map, &self.paths).map_err(|e| e.to_string())?;
         self.paths(&found).reads("--map", [file]).check()?;
+        self.finish(|watch| import_watched(&map, &self.paths, watch).map_err(|e| e.to_string()))
+    }
+
+    /// Imports with a progress bar, writes the log and says what was read.
+    fn finish(
+        &self,
+        import: impl FnOnce(&dyn Fn(u64, u64)) -> Result<(FlightLog, ImportReport), String>,
+    ) -> Result<(), String> {
         let bar = output::progress(0, "bytes");
-        let imported = import_watched(&map, &self.paths, &|done, total| {
+        let imported = import(&|done, total| {
             if total >= BAR_FROM_BYTES {
                 bar.set_length(total);
                 bar.set_position(done);
             }
         });
         bar.finish_and_clear();
-        let (log, report) = imported.map_err(|e| e.to_string())?;
+        let (log, report) = imported?;
         log.write(&self.out).map_err(|e| e.to_string())?;
         say(report.to_string().trim_end());
         talk(&format!("wrote {}", self.out.display()));

@@ -2,11 +2,13 @@
 //! each came from.
 
 use std::fs;
-use std::io::{self, Read};
 use std::path::Path;
 
+use super::ardupilot_file::BinFile;
+use super::blackbox_file::BlackboxFile;
 use super::csv_file::CsvFile;
 use super::error::ImportError;
+use super::format::{Format, format};
 use super::map::ImportMap;
 use super::mcap_file::McapFile;
 use super::meter::Meter;
@@ -15,7 +17,6 @@ use super::number::Column;
 use super::parquet_file::ParquetFile;
 use super::ulog_file::UlogFile;
 use super::usd_file::UsdFile;
-use super::usd_format::is_usd;
 
 /// A file, or a topic of one, whose column names are known and whose numbers are not read yet.
 pub(super) trait TableFile {
@@ -42,46 +43,6 @@ pub(super) struct Table {
     pub(super) bytes_cut: u64,
 }
 
-/// What a file is.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Format {
-    Csv,
-    Parquet,
-    Ulog,
-    Mcap,
-    /// Micro-SD log of a Crazyflie.
-    Usd,
-}
-
-/// The format of a file: by its extension, or by its first byte, for the logs of a Crazyflie are
-/// called `log00`.
-///
-/// # Errors
-/// Neither says it, or the file cannot be read or is empty.
-fn format(path: &Path) -> Result<Format, ImportError> {
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    match extension.as_str() {
-        "csv" => return Ok(Format::Csv),
-        "parquet" => return Ok(Format::Parquet),
-        "ulg" => return Ok(Format::Ulog),
-        "mcap" => return Ok(Format::Mcap),
-        _ => {}
-    }
-    let file = path.display().to_string();
-    match first_byte(path) {
-        Ok(Some(first)) if is_usd(first) => Ok(Format::Usd),
-        Ok(Some(_)) => Err(ImportError::UnknownFormat { file }),
-        Ok(None) => Err(ImportError::Empty { file }),
-        Err(source) => Err(ImportError::Read { file, source }),
-    }
-}
-
-fn first_byte(path: &Path) -> io::Result<Option<u8>> {
-    let mut first = Vec::new();
-    fs::File::open(path)?.take(1).read_to_end(&mut first)?;
-    Ok(first.first().copied())
-}
-
 /// Opens the file of one `[[source]]`.
 ///
 /// # Errors
@@ -101,7 +62,7 @@ pub(super) fn open<'a>(
         problem,
     };
     let format = format(path)?;
-    if source.instance.is_some() && format != Format::Ulog {
+    if source.instance.is_some() && !matches!(format, Format::Ulog | Format::ArduPilot) {
         return Err(topic_error("instance", format!("means nothing for `{file}`: leave it out")));
     }
     let has_topics = !matches!(format, Format::Csv | Format::Parquet);
@@ -125,6 +86,11 @@ pub(super) fn open<'a>(
         Format::Ulog => {
             Box::new(UlogFile::open(&file, whole()?, topic, source.instance.unwrap_or(0), meter)?)
         }
+        Format::ArduPilot => {
+            let instance = source.instance.unwrap_or(0);
+            Box::new(BinFile::open(&file, whole()?, (topic, instance), meter)?)
+        }
+        Format::Blackbox => Box::new(BlackboxFile::open(&file, whole()?, topic, meter)?),
         Format::Mcap => Box::new(McapFile::open(&file, &whole()?, topic, meter)?),
         Format::Usd => Box::new(UsdFile::open(&file, whole()?, topic, meter)?),
     })
