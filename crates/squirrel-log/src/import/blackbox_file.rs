@@ -1,28 +1,22 @@
 //! Blackbox logs of Betaflight and its kin (INAV, Indiflight, EmuFlight): the main frames as rows.
 //!
-//! The crate `blackbox-log` decodes the frames. It takes a log only of a firmware that it knows by
-//! name and version, though how frames are written is in the header and the same for all of them;
-//! so it is handed a header whose firmware it knows. Of the other headers, two are numbers whose
-//! meaning depends on the firmware and that no frame needs; they become 0 where it does not know
-//! them. The columns are the numbers as logged, without a scale.
+//! How frames are written stands in the header, whatever firmware wrote them. The columns are the
+//! numbers as logged, without a scale.
+//!
+//! The crate `blackbox-log` 0.4.3 does not do: it averages the frame before an intra frame into the
+//! one behind it, where the firmware has the intra frame alone, so that gyroscope and accelerometer
+//! are off from there to the next intra frame; and it refuses firmware that it does not know.
 
-use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use blackbox_log::frame::{Frame, FrameDef};
-use blackbox_log::headers::ParseError;
-use blackbox_log::{Headers, ParserEvent};
-
+use super::blackbox_frames::{Plan, Walked};
 use super::error::ImportError;
 use super::meter::Meter;
 use super::rows::Rows;
 use super::table::{Table, TableFile, places};
 
 const MARKER: &[u8] = b"H Product:Blackbox flight data recorder by Nicholas Sherlock\n";
-const FIRMWARE: &str = "Firmware revision";
-/// Headers that depend on the firmware and that no frame needs.
-const NEEDLESS: [&str; 2] = ["debug_mode", "motor_pwm_protocol"];
 /// The column that every frame has beside its fields: its time, us.
 const TIME: &str = "time";
 /// The only topic.
@@ -36,9 +30,10 @@ pub(super) fn is_blackbox(start: &[u8]) -> bool {
 /// The longest log of a file.
 #[derive(Debug)]
 pub(super) struct BlackboxLog<'a> {
-    /// With a header that the decoder takes.
-    bytes: Cow<'a, [u8]>,
-    /// All headers as the file has them.
+    /// What stands behind the header.
+    data: &'a [u8],
+    plan: Plan,
+    /// All headers.
     pub(super) header: BTreeMap<String, String>,
     /// Which log of the file it is, from 1, and of how many.
     pub(super) number: usize,
@@ -48,7 +43,7 @@ pub(super) struct BlackboxLog<'a> {
 /// The numbers of some columns, without a scale.
 pub(super) struct Frames {
     columns: Vec<(String, Vec<f64>)>,
-    rows: usize,
+    pub(super) walked: Walked,
 }
 
 impl<'a> BlackboxLog<'a> {
@@ -61,96 +56,37 @@ impl<'a> BlackboxLog<'a> {
         let longest = (logs.iter().enumerate()).max_by_key(|(i, log)| (log.len(), logs.len() - i));
         let (index, log) = longest.ok_or("has no header of a blackbox log")?;
         let bytes = &file[log.clone()];
-        let header = header_lines(bytes).filter_map(|line| {
-            let (name, value) = str::from_utf8(&bytes[line]).ok()?.split_once(':')?;
-            Some((name.to_owned(), value.to_owned()))
-        });
-        let (header, number, count) = (header.collect(), index + 1, logs.len());
-        let mut log = Self { bytes: Cow::Borrowed(bytes), header, number, count };
-        log.make_readable()?;
-        Ok(log)
-    }
-
-    /// Rewrites the headers that the decoder refuses.
-    fn make_readable(&mut self) -> Result<(), String> {
-        if let Some(known) = self.header.get(FIRMWARE).and_then(|text| known_firmware(text)) {
-            self.rewrite(FIRMWARE, &known);
+        let (mut header, mut end) = (BTreeMap::new(), 0);
+        for line in header_lines(bytes) {
+            end = line.end + 1;
+            let text = str::from_utf8(&bytes[line]).ok().and_then(|text| text.split_once(':'));
+            header.extend(text.map(|(name, value)| (name.to_owned(), value.to_owned())));
         }
-        for name in NEEDLESS.iter().filter(|name| !self.header.contains_key(**name)) {
-            let line = format!("H {name}:0\n");
-            let place = self.bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n');
-            // Behind the marker and the version.
-            let at = place.map(|(at, _)| at + 1).nth(1).ok_or("ends inside the header")?;
-            self.bytes.to_mut().splice(at..at, line.into_bytes());
-        }
-        for _ in 0..=NEEDLESS.len() {
-            match self.headers().err() {
-                None => return Ok(()),
-                Some(ParseError::InvalidHeader { header, .. })
-                    if NEEDLESS.contains(&header.as_str()) =>
-                {
-                    self.rewrite(&header, "0");
-                }
-                Some(error) => return Err(problem(&error)),
-            }
-        }
-        Err("has headers that cannot be read".to_owned())
-    }
-
-    fn rewrite(&mut self, name: &str, value: &str) {
-        let own = |line: &Range<usize>| {
-            self.bytes[line.clone()]
-                .strip_prefix(name.as_bytes())
-                .is_some_and(|rest| rest.starts_with(b":"))
-        };
-        let lines: Vec<Range<usize>> = header_lines(&self.bytes).filter(own).collect();
-        // From the last on, so that the places of the others stay.
-        for line in lines.into_iter().rev() {
-            self.bytes.to_mut().splice(line.start + name.len() + 1..line.end, value.bytes());
-        }
-    }
-
-    fn headers(&self) -> Result<Headers<'_>, ParseError> {
-        let file = blackbox_log::File::new(&self.bytes);
-        file.parse(0).unwrap_or(Err(ParseError::IncompleteHeaders))
+        let plan = Plan::new(&header)?;
+        Ok(Self { data: &bytes[end..], plan, header, number: index + 1, count: logs.len() })
     }
 
     /// Names of the columns.
-    pub(super) fn columns(&self) -> Vec<String> {
-        let headers = self.headers().ok();
-        let fields = headers.iter().flat_map(|headers| headers.main_frame_def().iter());
-        // The decoder has the frame's number first, under its name.
-        let mut names: Vec<String> = fields.map(|field| field.name.to_owned()).collect();
-        names.insert(names.len().min(1), TIME.to_owned());
-        names
+    pub(super) fn columns(&self) -> &[String] {
+        &self.plan.names
     }
 
-    /// Decodes some columns of all frames.
-    ///
-    /// # Errors
-    /// What the decoder says.
-    pub(super) fn read(&self, wanted: &[&str]) -> Result<Frames, String> {
-        let headers = self.headers().map_err(|error| problem(&error))?;
-        let fields: Vec<(usize, &str, bool)> = (headers.main_frame_def().iter().enumerate())
-            .map(|(index, field)| (index, field.name, field.signed))
-            .collect();
-        let place = |name: &&str| fields.iter().find(|(_, field, _)| field == name).copied();
-        let places: Vec<(usize, &str, bool)> = wanted.iter().filter_map(place).collect();
-        let mut values = vec![Vec::new(); places.len()];
-        let (mut time, mut parser) = (Vec::new(), headers.data_parser());
-        while let Some(event) = parser.next() {
-            let ParserEvent::Main(frame) = event else { continue };
-            time.push(frame.time_raw() as f64);
-            for (&(index, _, signed), values) in places.iter().zip(&mut values) {
-                let raw = frame.get_raw(index).unwrap_or_default();
-                values.push(if signed { f64::from(raw.cast_signed()) } else { f64::from(raw) });
+    /// Decodes some columns of all frames, and their times.
+    pub(super) fn read(&self, wanted: &[&str]) -> Frames {
+        let own = self.columns().iter().map(String::as_str).enumerate();
+        let places: Vec<(usize, &str)> =
+            own.filter(|(_, name)| *name != TIME && wanted.contains(name)).collect();
+        let (mut values, mut time) = (vec![Vec::new(); places.len()], Vec::new());
+        let walked = self.plan.walk(self.data, |time_us, raw| {
+            time.push(time_us as f64);
+            for ((field, _), values) in places.iter().zip(&mut values) {
+                values.push(self.plan.number(*field, raw[*field]));
             }
-        }
-        let rows = time.len();
-        let names = places.iter().map(|(_, name, _)| (*name).to_owned());
+        });
+        let names = places.iter().map(|(_, name)| (*name).to_owned());
         let mut columns: Vec<(String, Vec<f64>)> = names.zip(values).collect();
         columns.push((TIME.to_owned(), time));
-        Ok(Frames { columns, rows })
+        Frames { columns, walked }
     }
 
     /// The numbers of the header; those of a list are `name[0]` and so on.
@@ -173,7 +109,7 @@ impl<'a> BlackboxLog<'a> {
 
 impl Rows for Frames {
     fn len(&self) -> usize {
-        self.rows
+        self.walked.frames
     }
 
     fn column(&self, name: &str) -> Option<Vec<f64>> {
@@ -213,27 +149,6 @@ fn header_lines(log: &[u8]) -> impl Iterator<Item = Range<usize>> {
     })
 }
 
-/// A firmware whose frames are written as those of this one and that the decoder knows; `None` if
-/// it knows this one.
-fn known_firmware(text: &str) -> Option<String> {
-    let mut words = text.split(' ');
-    let (name, version) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
-    let mut numbers = version.splitn(3, '.').map(|number| number.parse::<u8>().ok());
-    let version = numbers.next().flatten().zip(numbers.next().flatten());
-    let patched = numbers.next().flatten().is_some();
-    let inav = name.eq_ignore_ascii_case("inav");
-    let known = match version {
-        Some((5..=8, _)) if inav => patched,
-        Some((4, 2..=5)) if name.eq_ignore_ascii_case("betaflight") => patched,
-        _ => false,
-    };
-    (!known).then(|| if inav { "INAV 8.0.0 known" } else { "Betaflight 4.5.0 known" }.to_owned())
-}
-
-fn problem(error: &ParseError) -> String {
-    format!("the header of the blackbox log: {error}")
-}
-
 /// The frames of a file, not decoded yet.
 pub(super) struct BlackboxFile<'a> {
     /// Path as given, for error messages.
@@ -261,7 +176,8 @@ impl<'a> BlackboxFile<'a> {
         }
         let columns = BlackboxLog::open(&bytes)
             .map_err(|problem| ImportError::Damaged { file: file.to_owned(), problem })?
-            .columns();
+            .columns()
+            .to_vec();
         Ok(Self { name: format!("{file}, topic `{topic}`"), bytes, columns, meter })
     }
 }
@@ -273,15 +189,17 @@ impl TableFile for BlackboxFile<'_> {
 
     fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
         places(&self.name, &self.columns, wanted)?;
-        let damaged = |problem| ImportError::Damaged { file: self.name.clone(), problem };
-        let frames = BlackboxLog::open(&self.bytes).and_then(|log| log.read(wanted));
-        let frames = frames.map_err(damaged)?;
+        let log = BlackboxLog::open(&self.bytes)
+            .map_err(|problem| ImportError::Damaged { file: self.name.clone(), problem })?;
+        let frames = log.read(wanted);
         self.meter.add(self.bytes.len());
-        if frames.rows == 0 {
+        if frames.walked.frames == 0 {
             return Err(ImportError::HeaderOnly { file: self.name });
         }
-        let rows = (1..=frames.rows as u64).collect();
+        let rows = (1..=frames.walked.frames as u64).collect();
         let values = wanted.iter().map(|name| frames.column(name).unwrap_or_default()).collect();
-        Ok(Table::new(self.name, wanted, values, rows))
+        let mut table = Table::new(self.name, wanted, values, rows);
+        table.bytes_cut = frames.walked.bytes_lost as u64;
+        Ok(table)
     }
 }

@@ -68,6 +68,7 @@
 mod ardupilot_file;
 mod autopilot;
 mod blackbox_file;
+mod blackbox_frames;
 mod board;
 mod build;
 mod csv_file;

@@ -2,9 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod files;
+mod import_autopilot;
 mod import_crazypad;
 mod import_csv;
 mod import_errors;
+mod import_fields;
 mod import_formats;
 mod import_support;
 mod import_topics;

@@ -23,12 +23,8 @@ const VECTORS: [&str; 6] = ["gyroADC", "accSmooth", "imuQuaternion", "setpoint",
 const NUMBERS: [&str; 5] = ["vbatLatest", "vbat", "amperageLatest", "amperage", "baroAlt"];
 
 /// Decodes the columns that something is made of.
-///
-/// # Errors
-/// What the decoder says.
-pub(super) fn read(log: &BlackboxLog) -> Result<Frames, String> {
-    let columns = log.columns();
-    let wanted = columns.iter().map(String::as_str).filter(|name| {
+pub(super) fn read(log: &BlackboxLog) -> Frames {
+    let wanted = log.columns().iter().map(String::as_str).filter(|name| {
         let base = name.split('[').next().unwrap_or(name);
         VECTORS.contains(&base) || NUMBERS.contains(&base)
     });

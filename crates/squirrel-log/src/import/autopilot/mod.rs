@@ -55,19 +55,18 @@ pub(super) fn import(
             let own = ardupilot::Log { bytes, messages: &log, parameters: &parameters };
             ardupilot::collect(&own, &mut collected, &mut notes);
             if log.bytes_lost > 0 {
-                notes.push(format!(
-                    "{} of {} bytes are no message and were skipped",
-                    log.bytes_lost,
-                    bytes.len()
-                ));
+                notes.push(skipped(log.bytes_lost, bytes.len()));
             }
             (kind, rows) = ("ArduPilot dataflash".to_owned(), log.message_count());
             bytes_cut = log.bytes_cut;
         }
         Firmware::Blackbox => {
             let log = BlackboxLog::open(bytes).map_err(damaged)?;
-            let frames = blackbox::read(&log).map_err(damaged)?;
+            let frames = blackbox::read(&log);
             blackbox::collect(&log, &frames, &mut collected, &mut notes);
+            if frames.walked.bytes_lost > 0 {
+                notes.push(skipped(frames.walked.bytes_lost, bytes.len()));
+            }
             let firmware = log.header.get("Firmware revision").map_or("", |text| text);
             (kind, rows) = (format!("blackbox, {firmware}"), frames.len());
             (parameters, bytes_cut) = (log.parameters(), 0);
@@ -97,6 +96,10 @@ pub(super) fn import(
         bytes_cut,
     };
     Ok((log, ImportReport { files: vec![report], channels, notes, ..ImportReport::default() }))
+}
+
+fn skipped(lost: usize, all: usize) -> String {
+    format!("{lost} of {all} bytes are no whole message and were skipped")
 }
 
 /// The parameters of a log by name: of PX4 and ArduPilot as they were last, of a blackbox log the
