@@ -397,13 +397,12 @@ fn four(bytes: &mut Bytes) -> Option<[u32; 4]> {
     for (i, value) in (0..).zip(&mut values) {
         let halves = [0, 1, 2, 4][(lead >> (2 * i) & 3) as usize];
         for _ in 0..halves {
-            let next = match half.take() {
-                Some(low) => low,
-                None => {
-                    let byte = bytes.byte()?;
-                    half = Some(byte & 15);
-                    byte >> 4
-                }
+            let next = if let Some(low) = half.take() {
+                low
+            } else {
+                let byte = bytes.byte()?;
+                half = Some(byte & 15);
+                byte >> 4
             };
             *value = *value << 4 | next;
         }

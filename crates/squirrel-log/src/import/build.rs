@@ -58,6 +58,7 @@ pub(super) fn add_source(
         }
         let axis: Vec<f64> = rows.iter().map(|&row| time_s[row]).collect();
         let (rate_hz, gaps) = (median_rate_hz(&axis), Gaps::of(&axis));
+        let mean_rate_hz = mean_rate_hz(&axis);
         let target = log
             .sources
             .entry(group.to_owned())
@@ -79,6 +80,7 @@ pub(super) fn add_source(
                 origin: None,
                 samples: rows.len(),
                 rate_hz,
+                mean_rate_hz,
                 gaps,
                 samples_missing,
                 repeats_dropped,
@@ -196,6 +198,12 @@ impl Continuous {
         self.last = Some(q);
         Ok(q)
     }
+}
+
+/// Steps of a time axis over its length.
+pub(super) fn mean_rate_hz(time_s: &[f64]) -> Option<f64> {
+    let (first, last) = (time_s.first()?, time_s.last()?);
+    (last > first).then(|| (time_s.len() - 1) as f64 / (last - first))
 }
 
 /// One over the median step of a time axis.

@@ -55,6 +55,8 @@ pub struct ChannelReport {
     pub samples: usize,
     /// Median rate, Hz; `None` with fewer than two samples.
     pub rate_hz: Option<f64>,
+    /// Samples over the time from the first to the last, Hz; `None` with fewer than two samples.
+    pub mean_rate_hz: Option<f64>,
     /// Where samples are missing.
     pub gaps: Gaps,
     /// Samples in the log with at least one number missing (NaN).

@@ -10,6 +10,9 @@ pub(crate) fn data(file: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file)
 }
 
+/// Names and numbers of one message.
+type Fields<'t> = Vec<(&'t str, f64)>;
+
 /// Columns of one topic as they are, by a map.
 fn columns(path: &Path, topic: &str, clock: (&str, &str), wanted: &[&str]) -> Channel {
     let quoted: Vec<String> = wanted.iter().map(|name| format!("{name:?}")).collect();
@@ -59,7 +62,7 @@ fn ulog_fields_are_what_pyulog_reads() {
 fn ardupilot_fields_are_what_dfreader_reads() {
     let path = data("ardupilot/quad.bin");
     let expected = std::fs::read_to_string(data("ardupilot/quad.dfreader.csv")).unwrap();
-    let mut messages: BTreeMap<(&str, u8), Vec<Vec<(&str, f64)>>> = BTreeMap::new();
+    let mut messages: BTreeMap<(&str, u8), Vec<Fields>> = BTreeMap::new();
     let mut parameters = BTreeMap::new();
     for line in expected.lines() {
         let (name, rest) = line.split_once(',').unwrap();

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::build::median_rate_hz;
+use super::super::build::{mean_rate_hz, median_rate_hz};
 use super::super::report::{ChannelReport, Gaps};
 use super::super::rows::Rows;
 use crate::{Channel, FlightLog, Source};
@@ -168,6 +168,7 @@ impl Taken {
             origin: Some(self.origin.to_owned()),
             samples: time_s.len(),
             rate_hz: median_rate_hz(&time_s),
+            mean_rate_hz: mean_rate_hz(&time_s),
             gaps: Gaps::of(&time_s),
             samples_missing: rows.filter(|row| row.iter().any(|x| x.is_nan())).count(),
             repeats_dropped: 0,

@@ -25,7 +25,7 @@ pub(super) fn notes(firmware: Firmware, channels: &[ChannelReport]) -> Vec<Strin
         None => notes.push(format!(
             "no actuators in the log: nothing that depends on the rotors can be judged; {set}"
         )),
-        Some(report) => match report.rate_hz {
+        Some(report) => match report.mean_rate_hz {
             Some(rate_hz) if rate_hz < COMMAND_MIN_HZ => notes.push(format!(
                 "actuators at {rate_hz:.0} Hz: motor_lag and actuation_latency cannot be judged; {set}"
             )),
@@ -36,7 +36,7 @@ pub(super) fn notes(firmware: Firmware, channels: &[ChannelReport]) -> Vec<Strin
         ("imu.omega_body_rad_s", "angular rate"),
         ("imu.specific_force_body_m_s2", "specific force"),
     ] {
-        match find(name).map(|report| report.rate_hz) {
+        match find(name).map(|report| report.mean_rate_hz) {
             None => notes.push(format!("no {what} in the log: the gap workflow needs it; {set}")),
             Some(Some(rate_hz)) if rate_hz < IMU_MIN_HZ => notes.push(format!(
                 "{what} at {rate_hz:.0} Hz: effects that act within {:.0} ms cannot be judged; {set}",
