@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod files;
+mod import_attack;
 mod import_autopilot;
 mod import_crazypad;
 mod import_csv;

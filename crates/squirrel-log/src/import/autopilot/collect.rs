@@ -13,6 +13,9 @@ const QUATERNION_NORM_TOLERANCE: f64 = 0.05;
 /// A step beyond which a time must have the next behind it, us.
 const LEAP_US: f64 = 10e6;
 
+/// Thirty years: no clock of an autopilot says more.
+const CLOCK_MAX_US: f64 = 1e15;
+
 /// Messages of one topic with their times in order.
 pub(super) struct Topic<'a> {
     /// As the report calls it.
@@ -22,7 +25,7 @@ pub(super) struct Topic<'a> {
     kept: Vec<usize>,
     /// Of the kept rows.
     time_us: Vec<f64>,
-    /// Rows whose time is no number, repeats or runs backwards.
+    /// Rows whose time is none, repeats or runs backwards.
     pub(super) dropped: usize,
 }
 
@@ -40,7 +43,7 @@ impl<'a> Topic<'a> {
         for (row, t) in time.iter().map(|t| t * us).enumerate() {
             // A flipped bit makes a time far ahead, after which all others would run backwards.
             let ahead = t - last > LEAP_US && time.get(row + 1).is_some_and(|next| next * us < t);
-            if t > last && t.is_finite() && !ahead {
+            if t > last && (0.0..CLOCK_MAX_US).contains(&t) && !ahead {
                 last = t;
                 kept.push(row);
                 time_us.push(t);
