@@ -19,7 +19,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 13] = [
+const CHORES: [Chore; 14] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     (
@@ -33,6 +33,12 @@ const CHORES: [Chore; 13] = [
         "--cases N|--full --seed S [--json FILE]",
         "score the gap workflow on hidden effects; --set NAME for one set, --keep DIR for the cases",
         chores::gap_bench,
+    ),
+    (
+        "attack",
+        "[COUNT [SEED]]",
+        "so many mutated files of each kind of log against their readers (2500), under limits of memory and time",
+        chores::attack,
     ),
     (
         "batch-gate",

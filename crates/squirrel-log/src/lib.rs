@@ -9,7 +9,7 @@
 //!
 //! - [`flight_code`] records what the flight code was given and what it answered, and rebuilds its
 //!   frames from a log.
-//! - [`import`] makes a log of foreign files by a map; [`ulog_parameters`] reads an autopilot's own.
+//! - [`import`] makes a log of foreign files, by a map or by what an autopilot writes.
 //! - [`files`] writes whatever is written, whole or not at all, and tells which paths are one file.
 
 pub mod files;
@@ -24,14 +24,12 @@ mod foxglove;
 mod message;
 mod read;
 mod schema;
-mod ulog_parameters;
 mod write;
 
 use std::collections::BTreeMap;
 
 pub use error::LogError;
 pub use read::Recovery;
-pub use ulog_parameters::ulog_parameters;
 
 /// Name of the MCAP metadata record that holds [`FlightLog::metadata`].
 const METADATA_NAME: &str = "squirrel";

@@ -3,16 +3,23 @@
 use crate::output::{self, say, talk};
 use crate::paths::Paths;
 use squirrel_log::FlightLog;
-use squirrel_log::import::{ImportMap, files_of, import_board, import_watched, map_of_bag};
+use squirrel_log::import::{
+    ImportMap, ImportReport, files_of, import_board, import_watched, import_without_map, is_bag,
+    map_of_bag,
+};
 use std::path::{Path, PathBuf};
 
 /// Smaller files are read before a progress bar could be seen.
 const BAR_FROM_BYTES: u64 = 32 << 20;
 
+/// Who is told of bytes read, and of all.
+type Watch<'a> = &'a dyn Fn(u64, u64);
+
 /// Options of an import.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Import {
-    /// Map from columns to channels (TOML); ROS 2 bags (MCAP) of known types need none.
+    /// Map from columns to channels (TOML); logs of PX4, ArduPilot, Betaflight and INAV, and ROS 2 bags
+    /// of known types, need none.
     #[arg(long)]
     map: Option<PathBuf>,
     /// Topic of a ROS 2 bag to take where several say the same, without --map; may be repeated.
@@ -24,8 +31,9 @@ pub(crate) struct Import {
     /// Fly what a board wrote down its serial line again: inputs and outputs of its flight code.
     #[arg(long, conflicts_with_all = ["map", "recover"])]
     board: bool,
-    /// Files or folders of one flight: CSV, Parquet, MATLAB .mat, ULog, MCAP (JSON, ROS 2's CDR,
-    /// protobuf), Crazyflie micro-SD; with --board what the board wrote.
+    /// The log of an autopilot: ULog (PX4), dataflash (ArduPilot), blackbox (Betaflight, INAV); a ROS 2
+    /// bag (MCAP); with --map files or folders of one flight: these, CSV, Parquet, MATLAB .mat, MCAP
+    /// with JSON or protobuf, Crazyflie micro-SD; with --board what the board wrote.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.
@@ -52,21 +60,40 @@ impl Import {
         }
         let (map, notes) = match &self.map {
             Some(file) => (ImportMap::load(file).map_err(|e| e.to_string())?, Vec::new()),
-            None => map_of_bag(self.one_path("an import without --map")?, &self.topic)
-                .map_err(|e| e.to_string())?,
+            None => {
+                let path = self.one_path("an import without --map")?;
+                if !is_bag(path).map_err(|e| e.to_string())? {
+                    self.paths(&self.paths).check()?;
+                    return self.finish(&[], |watch| {
+                        import_without_map(path, watch).map_err(|e| e.to_string())
+                    });
+                }
+                map_of_bag(path, &self.topic).map_err(|e| e.to_string())?
+            }
         };
         // A folder may hold more than is read; an earlier import, for one.
         let found = files_of(&map, &self.paths).map_err(|e| e.to_string())?;
         self.paths(&found).reads("--map", &self.map).check()?;
+        self.finish(&notes, |watch| {
+            import_watched(&map, &self.paths, watch).map_err(|e| e.to_string())
+        })
+    }
+
+    /// Imports with a progress bar, writes the log and says what was read.
+    fn finish(
+        &self,
+        notes: &[String],
+        import: impl FnOnce(Watch<'_>) -> Result<(FlightLog, ImportReport), String>,
+    ) -> Result<(), String> {
         let bar = output::progress(0, "bytes");
-        let imported = import_watched(&map, &self.paths, &|done, total| {
+        let imported = import(&|done, total| {
             if total >= BAR_FROM_BYTES {
                 bar.set_length(total);
                 bar.set_position(done);
             }
         });
         bar.finish_and_clear();
-        let (log, report) = imported.map_err(|e| e.to_string())?;
+        let (log, report) = imported?;
         log.write(&self.out).map_err(|e| e.to_string())?;
         say(report.to_string().trim_end());
         notes.iter().for_each(|note| say(note));

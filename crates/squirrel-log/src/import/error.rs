@@ -81,10 +81,19 @@ pub enum ImportError {
         /// Path as given.
         path: String,
     },
-    /// No format has this extension, nor this first byte.
+    /// What the file holds does not say what its channels mean.
     #[error(
-        "{file}: import reads .csv, .parquet, .mat (MATLAB up to v7), .ulg (PX4) and .mcap (ROS 2, JSON, protobuf), by the file's \
-         extension, and Crazyflie micro-SD logs, by the first byte"
+        "{file}: needs --map: without one, import reads ULog (PX4), dataflash logs (ArduPilot), \
+         blackbox logs (Betaflight, INAV) and ROS 2 bags (MCAP), one file at a time"
+    )]
+    NeedsMap {
+        /// Path as given.
+        file: String,
+    },
+    /// No format begins like this, nor has this extension.
+    #[error(
+        "{file}: import reads ULog (PX4), dataflash logs (ArduPilot), blackbox logs (Betaflight, INAV), Crazyflie \
+         micro-SD logs, MCAP (ROS 2, JSON, protobuf), Parquet and MATLAB's .mat up to v7, by their first bytes, and .csv, by the file's extension"
     )]
     UnknownFormat {
         /// Path as given.

@@ -1,10 +1,10 @@
-//! Import of foreign flight logs: CSV, Parquet, MATLAB, ULog, MCAP and Crazyflie micro-SD files
-//! become a [`FlightLog`] in NED, FRD, SI and radians by a TOML map. The extension of a file says
-//! its format; a Crazyflie's log, which has none of its own, is known by its first byte. ROS 2 bags
-//! make their own map: [`map_of_bag`].
+//! Import of foreign flight logs: CSV, Parquet, MATLAB, ULog, dataflash, blackbox, MCAP and Crazyflie
+//! micro-SD files become a [`FlightLog`] in NED, FRD, SI and radians by a TOML map. What kind a file
+//! is, its first bytes say, and its extension where it is text. Logs of autopilots need no map:
+//! [`import_without_map`]; ROS 2 bags make their own: [`map_of_bag`].
 //!
-//! `docs/guide/import.md` has every key of a map with an example. The map names, for each canonical channel, the columns, their scale and offset, their frame, and
-//! how time is written:
+//! `docs/guide/import.md` has every key of a map with an example. The map names, for each canonical
+//! channel, the columns, their scale and offset, their frame, and how time is written:
 //!
 //! ```toml
 //! keep = "pz > 0.4"                     # rows worth importing, as a condition on source columns
@@ -69,11 +69,16 @@
 //! - The earliest kept time over all files is time zero; metadata `time_zero_s` has it in the
 //!   foreign clock.
 
+mod ardupilot_file;
+mod autopilot;
+mod blackbox_file;
+mod blackbox_frames;
 mod board;
 mod build;
 mod csv_file;
 mod error;
 mod files;
+mod format;
 mod frames;
 mod map;
 mod mask;
@@ -85,6 +90,7 @@ mod names;
 mod number;
 mod parquet_file;
 mod report;
+mod rows;
 mod table;
 mod turn;
 mod ulog_file;
@@ -98,7 +104,7 @@ use std::path::{Path, PathBuf};
 pub use board::{BoardReport, import_board};
 pub use error::ImportError;
 pub use map::ImportMap;
-pub use report::{AbsentChannel, ChannelReport, FileReport, ImportReport};
+pub use report::{AbsentChannel, ChannelReport, FileReport, Gaps, ImportReport};
 
 use crate::FlightLog;
 use map::SourceMap;
@@ -139,6 +145,56 @@ pub fn files_of(map: &ImportMap, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Impo
 /// The file cannot be read, no topic has a known type, or several have the same one.
 pub fn map_of_bag(path: &Path, topics: &[String]) -> Result<(ImportMap, Vec<String>), ImportError> {
     mcap::map_of_bag(path, topics)
+}
+
+/// Whether a path is a ROS 2 bag, or a folder that may hold one.
+///
+/// # Errors
+/// A file that cannot be read, or of a kind that import does not know.
+pub fn is_bag(path: &Path) -> Result<bool, ImportError> {
+    Ok(path.is_dir() || format::format(path)? == format::Format::Mcap)
+}
+
+/// Imports the log of an autopilot, which says itself what its channels are: PX4's ULog, ArduPilot's
+/// dataflash log, and the blackbox of Betaflight, INAV, Indiflight and the like.
+///
+/// The log has metadata `imported_from` (file name), `log_kind`, `parameters_json` (the autopilot's
+/// parameters by name) and `time_zero_s`. Channels of one source that were logged at other times
+/// each share an axis and are NaN at the times of the others.
+///
+/// * `watch` - as of [`import_watched`]
+///
+/// # Errors
+/// A file that is none of these or contradicts its format; see [`ImportError`].
+pub fn import_without_map(
+    path: &Path,
+    watch: &dyn Fn(u64, u64),
+) -> Result<(FlightLog, ImportReport), ImportError> {
+    let (firmware, bytes) = autopilot_log(path)?;
+    let meter = Meter::new(bytes.len() as u64, watch);
+    autopilot::import(firmware, path, &bytes, &meter)
+}
+
+/// The parameters that an autopilot's log has, by name: those of PX4 and ArduPilot as the log has
+/// them last, of a blackbox log the numbers of its header (`motorOutput[0]` of a list).
+///
+/// # Errors
+/// As [`import_without_map`].
+pub fn parameters(path: &Path) -> Result<BTreeMap<String, f64>, ImportError> {
+    let (firmware, bytes) = autopilot_log(path)?;
+    autopilot::parameters(firmware, path, &bytes)
+}
+
+fn autopilot_log(path: &Path) -> Result<(autopilot::Firmware, Vec<u8>), ImportError> {
+    let file = path.display().to_string();
+    let read = |source| ImportError::Read { file: file.clone(), source };
+    if path.metadata().map_err(read)?.is_dir() {
+        return Err(ImportError::NeedsMap { file });
+    }
+    match format::format(path)?.firmware() {
+        None => Err(ImportError::NeedsMap { file }),
+        Some(firmware) => Ok((firmware, std::fs::read(path).map_err(read)?)),
+    }
 }
 
 /// Imports one flight as [`import`] does, and says how far it is.

@@ -13,7 +13,11 @@ pub(super) struct Column {
 impl Column {
     /// The number in a record; NaN if the record is too short for it.
     pub(super) fn number(&self, record: &[u8]) -> f64 {
-        record.get(self.offset..).map_or(f64::NAN, |bytes| self.kind.number(bytes) * self.scale)
+        record.get(self.offset..).map_or(f64::NAN, |bytes| {
+            let stored = self.kind.number(bytes);
+            // Hundredths are divided: 0.01 is no binary number, 100 is, so this rounds once.
+            if self.scale < 1.0 { stored / self.scale.recip() } else { stored * self.scale }
+        })
     }
 }
 

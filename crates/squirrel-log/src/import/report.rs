@@ -11,6 +11,9 @@ pub struct ImportReport {
     pub channels: Vec<ChannelReport>,
     /// Optional channels that the files lack.
     pub absent: Vec<AbsentChannel>,
+    /// What else there is to know, a line each: what was chosen, what is left out, what the log is
+    /// too slow for.
+    pub notes: Vec<String>,
 }
 
 /// An optional channel of the map that the log does not have.
@@ -46,14 +49,46 @@ pub struct ChannelReport {
     pub channel: String,
     /// Columns that it is made of, in the order of the map.
     pub columns: Vec<String>,
+    /// Unit and frame of these columns, where the kind of log says them.
+    pub origin: Option<String>,
     /// Samples in the log.
     pub samples: usize,
     /// Median rate, Hz; `None` with fewer than two samples.
     pub rate_hz: Option<f64>,
+    /// Samples over the time from the first to the last, Hz; `None` with fewer than two samples.
+    pub mean_rate_hz: Option<f64>,
+    /// Where samples are missing.
+    pub gaps: Gaps,
     /// Samples in the log with at least one number missing (NaN).
     pub samples_missing: usize,
     /// Kept rows that only repeated the sample before.
     pub repeats_dropped: usize,
+}
+
+/// Steps of a time axis that are longer than [`Gaps::STEPS`] median steps.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Gaps {
+    /// How many.
+    pub count: usize,
+    /// The longest of them, s.
+    pub longest_s: f64,
+}
+
+impl Gaps {
+    /// Median steps that are no gap yet: two samples in a row may be lost.
+    pub const STEPS: f64 = 3.5;
+
+    pub(super) fn of(time_s: &[f64]) -> Self {
+        let steps = || time_s.windows(2).map(|pair| pair[1] - pair[0]);
+        let mut sorted: Vec<f64> = steps().collect();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let longest = Self::STEPS * sorted.get(sorted.len() / 2).copied().unwrap_or(f64::INFINITY);
+        let gaps = steps().filter(|&step| step > longest);
+        gaps.fold(Self::default(), |gaps, step| Self {
+            count: gaps.count + 1,
+            longest_s: gaps.longest_s.max(step),
+        })
+    }
 }
 
 impl fmt::Display for ImportReport {
@@ -77,9 +112,20 @@ impl fmt::Display for ImportReport {
         }
         for report in &self.channels {
             let columns = report.columns.join(", ");
-            write!(f, "{} from {columns}: {} samples", report.channel, report.samples)?;
+            write!(f, "{} from {columns}", report.channel)?;
+            if let Some(origin) = &report.origin {
+                write!(f, " ({origin})")?;
+            }
+            write!(f, ": {} samples", report.samples)?;
             if let Some(rate_hz) = report.rate_hz {
                 write!(f, " at {rate_hz:.1} Hz")?;
+            }
+            match report.gaps {
+                Gaps { count: 0, .. } => {}
+                Gaps { count: 1, longest_s } => write!(f, ", a gap of {longest_s:.3} s")?,
+                Gaps { count, longest_s } => {
+                    write!(f, ", {count} gaps, the longest {longest_s:.3} s")?;
+                }
             }
             if report.samples_missing > 0 {
                 write!(f, ", {} with missing numbers", report.samples_missing)?;
@@ -91,6 +137,9 @@ impl fmt::Display for ImportReport {
         }
         for AbsentChannel { channel, column } in &self.absent {
             writeln!(f, "{channel}: left out, the file has no column `{column}`")?;
+        }
+        for note in &self.notes {
+            writeln!(f, "{note}")?;
         }
         Ok(())
     }

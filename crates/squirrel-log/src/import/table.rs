@@ -2,11 +2,13 @@
 //! each came from.
 
 use std::fs;
-use std::io::{self, Read};
 use std::path::Path;
 
+use super::ardupilot_file::BinFile;
+use super::blackbox_file::BlackboxFile;
 use super::csv_file::CsvFile;
 use super::error::ImportError;
+use super::format::{Format, format};
 use super::map::ImportMap;
 use super::mat_file::MatFile;
 use super::mcap::Logs;
@@ -16,7 +18,6 @@ use super::number::Column;
 use super::parquet_file::ParquetFile;
 use super::ulog_file::UlogFile;
 use super::usd_file::UsdFile;
-use super::usd_format::is_usd;
 
 /// A file, or a topic of one, whose column names are known and whose numbers are not read yet.
 pub(super) trait TableFile {
@@ -43,94 +44,6 @@ pub(super) struct Table {
     pub(super) bytes_cut: u64,
 }
 
-/// What a file is.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Format {
-    Csv,
-    Parquet,
-    Ulog,
-    Mcap,
-    /// MATLAB.
-    Mat,
-    /// Micro-SD log of a Crazyflie.
-    Usd,
-}
-
-/// The format of a file: by its extension, or by its first byte, for the logs of a Crazyflie are
-/// called `log00`.
-///
-/// # Errors
-/// Neither says it, or the file cannot be read or is empty.
-fn format(path: &Path) -> Result<Format, ImportError> {
-    check_known(path)?;
-    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    match extension.as_str() {
-        "csv" => return Ok(Format::Csv),
-        "parquet" => return Ok(Format::Parquet),
-        "ulg" => return Ok(Format::Ulog),
-        "mcap" => return Ok(Format::Mcap),
-        "mat" => return Ok(Format::Mat),
-        _ => {}
-    }
-    let file = path.display().to_string();
-    match first_bytes(path) {
-        Ok(first) if first.first().is_some_and(|first| is_usd(*first)) => Ok(Format::Usd),
-        Ok(first) if first.is_empty() => Err(ImportError::Empty { file }),
-        Ok(_) => Err(ImportError::UnknownFormat { file }),
-        Err(source) => Err(ImportError::Read { file, source }),
-    }
-}
-
-/// Refuses files that another program makes readable, by name.
-///
-/// # Errors
-/// [`ImportError::Damaged`] with what to do, [`ImportError::Read`].
-pub(super) fn check_known(path: &Path) -> Result<(), ImportError> {
-    let file = path.display().to_string();
-    let first =
-        first_bytes(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
-    match CONVERTIBLE.iter().find(|(magic, _)| first.starts_with(magic)) {
-        Some((_, problem)) => Err(ImportError::Damaged { file, problem: (*problem).to_owned() }),
-        None => Ok(()),
-    }
-}
-
-/// Whether a file begins with these bytes, 16 at most.
-///
-/// # Errors
-/// [`ImportError::Read`].
-pub(super) fn starts_with(path: &Path, magic: &[u8]) -> Result<bool, ImportError> {
-    match first_bytes(path) {
-        Ok(first) => Ok(first.starts_with(magic)),
-        Err(source) => Err(ImportError::Read { file: path.display().to_string(), source }),
-    }
-}
-
-/// How a file begins that import does not read, and what makes one of it that it does.
-const CONVERTIBLE: [(&[u8], &str); 4] = [
-    (
-        b"#ROSBAG V",
-        "a ROS 1 bag; import reads ROS 2's MCAP: `pip install rosbags`, then \
-         `rosbags-convert --src FLIGHT.bag --dst FOLDER --dst-storage mcap`",
-    ),
-    (
-        b"SQLite format 3",
-        "a ROS 2 bag in SQLite; import reads MCAP: `pip install rosbags`, then \
-         `rosbags-convert --src FOLDER --dst OTHER --dst-storage mcap`",
-    ),
-    (
-        b"MATLAB 7.3 MAT-f",
-        "a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB, `save -v7 FILE.mat` writes one",
-    ),
-    (b"\x89HDF\r\n\x1a\n", "an HDF5 file; import reads CSV, Parquet and MATLAB's `save -v7`"),
-];
-
-fn first_bytes(path: &Path) -> io::Result<Vec<u8>> {
-    let mut first = Vec::new();
-    fs::File::open(path)?.take(16).read_to_end(&mut first)?;
-    Ok(first)
-}
-
 /// Opens the file of one `[[source]]`.
 ///
 /// # Errors
@@ -151,7 +64,7 @@ pub(super) fn open<'a>(
         problem,
     };
     let format = format(path)?;
-    if source.instance.is_some() && format != Format::Ulog {
+    if source.instance.is_some() && !matches!(format, Format::Ulog | Format::ArduPilot) {
         return Err(topic_error("instance", format!("means nothing for `{file}`: leave it out")));
     }
     let has_topics = !matches!(format, Format::Csv | Format::Parquet | Format::Mat);
@@ -175,6 +88,11 @@ pub(super) fn open<'a>(
         Format::Ulog => {
             Box::new(UlogFile::open(&file, whole()?, topic, source.instance.unwrap_or(0), meter)?)
         }
+        Format::ArduPilot => {
+            let instance = source.instance.unwrap_or(0);
+            Box::new(BinFile::open(&file, whole()?, (topic, instance), meter)?)
+        }
+        Format::Blackbox => Box::new(BlackboxFile::open(&file, whole()?, topic, meter)?),
         Format::Mcap => logs.open(map, path, topic, meter)?,
         Format::Mat => Box::new(MatFile::open(&file, whole()?, meter)?),
         Format::Usd => Box::new(UsdFile::open(&file, whole()?, topic, meter)?),

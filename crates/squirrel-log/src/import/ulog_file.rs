@@ -5,12 +5,13 @@
 //! loss of power, is read up to there, and the table says how many bytes are left out; any other
 //! damage is an error.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::error::ImportError;
 use super::meter::Meter;
 use super::names::nearest;
+use super::number::Kind;
 use super::table::{Table, TableFile};
 use super::ulog_format::Layout;
 
@@ -21,6 +22,11 @@ const HEADER_BYTES: usize = 16;
 const RECORD_HEAD_BYTES: usize = 3;
 /// The only incompatible flag that there is: data were appended after a crash.
 const FLAG_APPENDED: u8 = 1;
+
+/// Whether a file begins as a ULog.
+pub(super) fn is_ulog(start: &[u8]) -> bool {
+    start.starts_with(&MAGIC)
+}
 
 /// One topic of a ULog file, its messages not decoded yet.
 pub(super) struct UlogFile<'a> {
@@ -51,9 +57,9 @@ impl<'a> UlogFile<'a> {
     ) -> Result<Self, ImportError> {
         let damaged = |problem: String| ImportError::Damaged { file: file.to_owned(), problem };
         let wanted = label(topic, instance);
-        let mut log = Records::default();
-        log.scan(&bytes, &wanted).map_err(damaged)?;
-        if log.messages.is_empty() {
+        let mut log = UlogLog::scan(&bytes, Some(&wanted)).map_err(damaged)?;
+        let messages = log.take_messages(&wanted);
+        if messages.is_empty() {
             if log.bytes_cut > 0 {
                 let end = bytes.len() - log.bytes_cut;
                 let problem = format!(
@@ -61,7 +67,7 @@ impl<'a> UlogFile<'a> {
                 );
                 return Err(damaged(problem));
             }
-            let nearest = nearest(&wanted, log.topics.iter().map(String::as_str));
+            let nearest = nearest(&wanted, log.written());
             return Err(ImportError::MissingTopic {
                 file: file.to_owned(),
                 topic: wanted,
@@ -70,8 +76,7 @@ impl<'a> UlogFile<'a> {
         }
         let layout = Layout::new(topic, &log.definitions).map_err(damaged)?;
         let length = layout.size_logged..=layout.size;
-        if let Some(message) = log.messages.iter().find(|message| !length.contains(&message.len()))
-        {
+        if let Some(message) = messages.iter().find(|message| !length.contains(&message.len())) {
             return Err(damaged(format!(
                 "the message of `{wanted}` at byte {} has {} bytes, its format {}",
                 message.start,
@@ -81,7 +86,7 @@ impl<'a> UlogFile<'a> {
         }
         let name = format!("{file}, topic `{wanted}`");
         let columns = layout.columns.iter().map(|column| column.name.clone()).collect();
-        let Records { messages, bytes_cut, .. } = log;
+        let bytes_cut = log.bytes_cut;
         Ok(Self { name, bytes, layout, columns, messages, bytes_cut, meter })
     }
 }
@@ -108,55 +113,80 @@ fn label(topic: &str, instance: u8) -> String {
 }
 
 /// What a scan of the file gathers.
-#[derive(Default)]
-struct Records {
+#[derive(Debug, Default)]
+pub(super) struct UlogLog {
     /// Field lists by format name.
     definitions: BTreeMap<String, String>,
-    /// Topic and instance by message id.
-    subscriptions: BTreeMap<u16, String>,
-    /// All topics with messages.
-    topics: BTreeSet<String>,
-    /// Payloads of the wanted topic, without message id.
-    messages: Vec<Range<usize>>,
+    /// Topics in the order of their subscription, and by their label.
+    topics: Vec<Topic>,
+    by_label: BTreeMap<String, usize>,
+    /// Topic by message id.
+    subscriptions: BTreeMap<u16, usize>,
+    /// What the log says of parameters, at its begin and in flight; the last holds.
+    pub(super) parameters: BTreeMap<String, f64>,
+    /// Times at which the logger could not write, and how long in all, ms.
+    pub(super) dropouts: (usize, u64),
     /// Where appended data start.
     appended: Vec<usize>,
     bytes_total: usize,
-    bytes_cut: usize,
+    /// Bytes at the end that are no whole record.
+    pub(super) bytes_cut: usize,
 }
 
-impl Records {
-    fn scan(&mut self, bytes: &[u8], wanted: &str) -> Result<(), String> {
-        if !bytes.starts_with(&MAGIC) && !MAGIC.starts_with(bytes) {
+/// One publisher of a topic.
+#[derive(Debug)]
+struct Topic {
+    kept: bool,
+    written: bool,
+    /// Payloads without message id.
+    messages: Vec<Range<usize>>,
+}
+
+impl UlogLog {
+    /// Finds the messages of a file.
+    ///
+    /// * `wanted` - the topic whose messages are kept; `None` keeps all
+    ///
+    /// # Errors
+    /// Says which record contradicts the format.
+    pub(super) fn scan(bytes: &[u8], wanted: Option<&str>) -> Result<Self, String> {
+        if !is_ulog(bytes) && !MAGIC.starts_with(bytes) {
             return Err("the first 7 bytes are not those of a ULog file".to_owned());
         }
         if bytes.len() < HEADER_BYTES {
             return Err(format!("ends inside the header, after {} bytes", bytes.len()));
         }
-        self.bytes_total = bytes.len();
+        let mut log = Self { bytes_total: bytes.len(), ..Self::default() };
         let mut start = HEADER_BYTES;
         loop {
             // Appended data start where they say, and what stands before them may end inside a
             // record.
             let section_end =
-                self.appended.iter().copied().find(|&at| at > start).unwrap_or(bytes.len());
+                log.appended.iter().copied().find(|&at| at > start).unwrap_or(bytes.len());
             let rest = &bytes[start..section_end];
             match record(rest) {
                 Some((kind, payload)) => {
                     let at = start + RECORD_HEAD_BYTES;
-                    self.record(kind, payload, at, wanted)
+                    log.record(kind, payload, at, wanted)
                         .map_err(|problem| format!("the record at byte {start} {problem}"))?;
                     start = at + payload.len();
                 }
                 None if section_end < bytes.len() => start = section_end,
                 None => {
-                    self.bytes_cut = rest.len();
-                    return Ok(());
+                    log.bytes_cut = rest.len();
+                    return Ok(log);
                 }
             }
         }
     }
 
-    fn record(&mut self, kind: u8, payload: &[u8], at: usize, wanted: &str) -> Result<(), String> {
+    fn record(
+        &mut self,
+        kind: u8,
+        payload: &[u8],
+        at: usize,
+        wanted: Option<&str>,
+    ) -> Result<(), String> {
         let text =
             |bytes| str::from_utf8(bytes).map_err(|_| "has a name that is no text".to_owned());
         match kind {
@@ -177,29 +207,66 @@ impl Records {
             b'A' => {
                 let (&[instance, low, high], name) =
                     payload.split_first_chunk().ok_or("is too short for a topic")?;
-                self.subscriptions
-                    .insert(u16::from_le_bytes([low, high]), label(text(name)?, instance));
+                let label = label(text(name)?, instance);
+                let known = self.by_label.get(&label).copied();
+                let topic = known.unwrap_or(self.topics.len());
+                if known.is_none() {
+                    let kept = wanted.is_none_or(|wanted| wanted == label);
+                    self.topics.push(Topic { kept, written: false, messages: Vec::new() });
+                    self.by_label.insert(label, topic);
+                }
+                self.subscriptions.insert(u16::from_le_bytes([low, high]), topic);
             }
             b'D' => {
                 let (&id, data) =
                     payload.split_first_chunk().ok_or("is too short for a message")?;
                 let id = u16::from_le_bytes(id);
-                let topic = self
+                let &topic = self
                     .subscriptions
                     .get(&id)
                     .ok_or_else(|| format!("is a message of unknown id {id}"))?;
-                if topic == wanted {
-                    self.messages.push(at + payload.len() - data.len()..at + payload.len());
-                }
-                if !self.topics.contains(topic) {
-                    self.topics.insert(topic.clone());
+                let topic = &mut self.topics[topic];
+                topic.written = true;
+                if topic.kept {
+                    topic.messages.push(at + payload.len() - data.len()..at + payload.len());
                 }
             }
-            // Parameters, texts, drop-outs and the like are no numbers over time; later types are
-            // to be skipped.
+            b'P' => self.parameters.extend(parameter(payload)),
+            b'O' => {
+                let milliseconds = payload.first_chunk().map_or(0, |&ms| u16::from_le_bytes(ms));
+                self.dropouts.0 += 1;
+                self.dropouts.1 += u64::from(milliseconds);
+            }
+            // Texts and the like are no numbers over time; later types are to be skipped.
             _ => {}
         }
         Ok(())
+    }
+
+    /// Topics that have messages.
+    fn written(&self) -> impl Iterator<Item = &str> {
+        let written = self.by_label.iter().filter(|(_, index)| self.topics[**index].written);
+        written.map(|(label, _)| label.as_str())
+    }
+
+    /// Messages that are kept.
+    pub(super) fn message_count(&self) -> usize {
+        self.topics.iter().map(|topic| topic.messages.len()).sum()
+    }
+
+    fn take_messages(&mut self, label: &str) -> Vec<Range<usize>> {
+        let index = self.by_label.get(label);
+        index.map(|&i| std::mem::take(&mut self.topics[i].messages)).unwrap_or_default()
+    }
+
+    /// The messages of a topic and the layout of its columns; `None` if it has none, or none that
+    /// its format fits.
+    pub(super) fn messages(&self, topic: &str, instance: u8) -> Option<(Layout, &[Range<usize>])> {
+        let &index = self.by_label.get(&label(topic, instance))?;
+        let messages = self.topics[index].messages.as_slice();
+        let layout = Layout::new(topic, &self.definitions).ok()?;
+        let fits = |message: &Range<usize>| message.len() >= layout.size_logged;
+        (!messages.is_empty() && messages.iter().all(fits)).then_some((layout, messages))
     }
 
     /// Takes up to three offsets of appended data; 0 is none.
@@ -219,6 +286,19 @@ impl Records {
         self.appended.sort_unstable();
         Ok(())
     }
+}
+
+/// Name and value of a parameter: the length of a text `type name`, the text, the value.
+fn parameter(payload: &[u8]) -> Option<(String, f64)> {
+    let (&length, rest) = payload.split_first()?;
+    let (key, value) = rest.split_at_checked(usize::from(length))?;
+    let (kind, name) = str::from_utf8(key).ok()?.split_once(' ')?;
+    let value = match kind {
+        "int32_t" => Kind::I32.number(value),
+        "float" => Kind::F32.number(value),
+        _ => return None,
+    };
+    value.is_finite().then(|| (name.to_owned(), value))
 }
 
 /// Type and payload of the first record; `None` if it is not whole, or was never written.

@@ -224,7 +224,7 @@ fn a_mask_drops_rows_of_its_file_and_time_spans_of_the_others() {
     assert_eq!(
         report.to_string(),
         "imu.csv: 21 rows, 12 dropped by `keep`\ngnss.csv: 6 rows, 2 dropped by `keep`\n\
-         imu.omega_body_rad_s from x, y, z: 9 samples at 4.0 Hz\n\
+         imu.omega_body_rad_s from x, y, z: 9 samples at 4.0 Hz, a gap of 2.000 s\n\
          gnss.position_ned_m from n, e, d: 4 samples at 1.0 Hz\n"
     );
 }

@@ -213,8 +213,8 @@ fn a_bad_file_is_one_line_that_says_what_is_wrong() {
         assert_eq!(
             flight.message(&flight.import(&one_source(OMEGA), &[file]).unwrap_err()),
             format!(
-                "{file}: import reads .csv, .parquet, .mat (MATLAB up to v7), .ulg (PX4) and .mcap (ROS 2, JSON, protobuf), by the file's extension, and \
-                 Crazyflie micro-SD logs, by the first byte"
+                "{file}: import reads ULog (PX4), dataflash logs (ArduPilot), blackbox logs (Betaflight, INAV), \
+                 Crazyflie micro-SD logs, MCAP (ROS 2, JSON, protobuf), Parquet and MATLAB's .mat up to v7, by their first bytes, and .csv, by the file's extension"
             )
         );
     }

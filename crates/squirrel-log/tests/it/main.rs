@@ -2,10 +2,13 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod files;
+mod import_attack;
+mod import_autopilot;
 mod import_bag;
 mod import_crazypad;
 mod import_csv;
 mod import_errors;
+mod import_fields;
 mod import_formats;
 mod import_mat;
 mod import_page;

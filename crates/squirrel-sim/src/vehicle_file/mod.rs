@@ -6,10 +6,10 @@
 mod build;
 pub mod diff;
 mod effects;
-mod hovering;
-pub mod margins;
 pub mod export;
 pub mod fit;
+mod hovering;
+pub mod margins;
 mod means;
 pub mod new;
 mod tables;

@@ -180,7 +180,7 @@ fn guessed(file: &VehicleFile) -> Vec<&str> {
 
 /// The parameters that an autopilot wrote into its log.
 fn log_parameters(path: &Path) -> Result<BTreeMap<String, f64>, String> {
-    squirrel_log::ulog_parameters(path)
+    squirrel_log::import::parameters(path).map_err(|e| e.to_string())
 }
 
 /// One answer from the terminal; asked again until it can be used, `None` for an empty line.

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 
 use super::{LOG_TIME, Log, Topic};
 use crate::import::error::ImportError;
+use crate::import::format;
 use crate::import::map::ImportMap;
 use crate::import::meter::Meter;
-use crate::import::table;
 
 /// How far the clocks of two topics' stamps may be from each other, s; the rest is another clock.
 const CLOCKS_APART_MAX_S: f64 = 1.0;
@@ -95,8 +95,8 @@ pub(in crate::import) fn map_of_bag(
     chosen: &[String],
 ) -> Result<(ImportMap, Vec<String>), ImportError> {
     let (path, inside) = bag_in(path)?;
-    table::check_known(&path)?;
-    if !table::starts_with(&path, mcap::MAGIC)? {
+    format::check_known(&path)?;
+    if !format::starts_with(&path, mcap::MAGIC)? {
         return Err(ImportError::Damaged {
             file: path.display().to_string(),
             problem: "no ROS 2 bag (MCAP): say by --map what its columns are".to_owned(),

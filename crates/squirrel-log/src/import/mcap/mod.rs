@@ -21,10 +21,11 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{MAGIC, McapError};
 
 use super::error::ImportError;
+use super::format;
 use super::map::ImportMap;
 use super::meter::Meter;
 use super::names::nearest;
-use super::table::{self, TableFile};
+use super::table::TableFile;
 use cdr::CdrFile;
 use json::JsonFile;
 use protobuf::ProtobufFile;
@@ -153,7 +154,7 @@ impl Log {
         let damaged = |problem: String| ImportError::Damaged { file: file.clone(), problem };
         if !bytes.starts_with(MAGIC) && !MAGIC.starts_with(&bytes) {
             // What it is instead, or that nothing reads it.
-            table::check_known(path)?;
+            format::check_known(path)?;
             return Err(damaged("the first 8 bytes are not those of an MCAP file".to_owned()));
         }
         let mut reading = Reading {

@@ -1,0 +1,216 @@
+//! Every reader under mutation: bits flipped, files cut, lengths made huge, parts moved. Each kind
+//! runs in a child process whose address space and processor time are limited, so that a panic, a
+//! hang and a file that asks for too much memory all end it.
+//!
+//! MCAP is not among them yet: the decoder allots what a chunk says that it unpacks to, so that a
+//! flipped bit there asks for gigabytes.
+//!
+//! `cargo xtask attack COUNT SEED` runs more of it; a file that ends the child is kept, and belongs
+//! into `tests/data/attack/`.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use squirrel_log::import::{ImportMap, import, import_without_map, parameters};
+
+use crate::import_fields::data;
+use crate::import_support::formats::{Cells, parquet_bytes};
+use crate::import_support::{OMEGA, one_source};
+
+/// Set in the child: the kind, how many files, the seed.
+const ASKED: &str = "SQUIRREL_ATTACK_CHILD";
+/// Set by the chore: how many files a kind.
+const COUNT: &str = "SQUIRREL_ATTACK_COUNT";
+const SEED: &str = "SQUIRREL_ATTACK_SEED";
+/// Files a kind in a test, for seconds; the chore takes more.
+const COUNT_IN_TESTS: u64 = 300;
+/// Good files are cut to this, so that 64 MiB is far more than four times any of them.
+const GOOD_BYTES_MAX: usize = 24_000;
+/// Address space of a child: what the test itself maps before it reads anything, and 64 MiB.
+const CHILD_KIB: u64 = (192 + 64) << 10;
+/// Processor time of a thousand files, s: a hang of 5 s shows.
+const CHILD_S: u64 = 5;
+
+const KINDS: [&str; 8] =
+    ["ulog", "ulog-map", "ardupilot", "blackbox", "usd", "csv", "parquet", "map"];
+
+const CRAZYPAD: &str = include_str!("../../../../vehicles/maps/crazypad.toml");
+
+/// A good file of a kind.
+fn good(kind: &str) -> Vec<u8> {
+    let mut bytes = match kind {
+        "ulog" => fs::read(data("ulog/sample_cut.ulg")).unwrap(),
+        "ulog-map" => {
+            // The begin of the file is definitions; what they define stands at its end.
+            let all = fs::read(data("ulog/sample_cut.ulg")).unwrap();
+            all[..64_000].to_vec()
+        }
+        "ardupilot" => fs::read(data("ardupilot/quad.bin")).unwrap(),
+        "blackbox" => fs::read(data("blackbox/sitl.bbl")).unwrap(),
+        "usd" => return fs::read(data("crazypad/E8_log00.bin")).unwrap(),
+        "csv" => "t,x,y,z\n1,2,3,4\n2,3,4,5\n3.5,-1e-3,nan,7\n".repeat(3).into_bytes(),
+        "map" => CRAZYPAD.as_bytes().to_vec(),
+        "parquet" => {
+            let column = || (0..40).map(|i| Some(i as f32)).collect();
+            return parquet_bytes(
+                "required int64 t; required float x; optional float y; required float z;",
+                &[
+                    Cells::Longs((0..40).map(Some).collect()),
+                    Cells::Floats(column()),
+                    Cells::Floats(column()),
+                    Cells::Floats(column()),
+                ],
+                16,
+                parquet::basic::Compression::SNAPPY,
+            );
+        }
+        other => panic!("no kind `{other}`"),
+    };
+    bytes.truncate(if kind == "ulog-map" { 64_000 } else { GOOD_BYTES_MAX });
+    bytes
+}
+
+/// Reads a file as its kind is read; what comes out does not matter.
+fn read(kind: &str, path: &Path) {
+    let by_map = |map: &str| {
+        if let Ok(map) = ImportMap::parse(map, "map") {
+            let _ = import(&map, &[path.to_path_buf()]);
+        }
+    };
+    let topic = |topic: &str, time: &str, unit: &str, columns: &str| {
+        format!(
+            "[[source]]\ntopic = {topic:?}\ntime = {{ column = {time:?}, unit = {unit:?} }}\nchannels = {{ \"truth.x\" = {{ columns = [{columns}] }} }}\n"
+        )
+    };
+    match kind {
+        "ulog" | "ardupilot" | "blackbox" => {
+            let _ = parameters(path);
+            let Ok((log, report)) = import_without_map(path, &|_, _| {}) else { return };
+            assert!(!report.to_string().is_empty());
+            // What is read can be written.
+            log.write(&path.with_extension("mcap")).unwrap();
+        }
+        "ulog-map" => by_map(&topic("sensor_combined", "timestamp", "us", "\"gyro_rad[0]\"")),
+        "usd" => by_map(CRAZYPAD),
+        "csv" | "parquet" => by_map(&one_source(OMEGA)),
+        _ => {
+            if let Ok(text) = fs::read_to_string(path) {
+                let _ = ImportMap::parse(&text, "map");
+            }
+        }
+    }
+}
+
+fn mutate(good: &[u8], kind: &str, rng: &mut Pcg64Mcg) -> Vec<u8> {
+    let mut bytes = good.to_vec();
+    for _ in 0..rng.random_range(1..4) {
+        if bytes.is_empty() {
+            break;
+        }
+        // Headers are short and matter most.
+        let end = if rng.random_range(0..3) == 0 { bytes.len().min(600) } else { bytes.len() };
+        let at = rng.random_range(0..end);
+        let length = rng.random_range(1..=(bytes.len() - at).min(64));
+        match rng.random_range(0..8) {
+            0 => (0..8).for_each(|_| {
+                let at = rng.random_range(0..bytes.len());
+                bytes[at] ^= 1 << rng.random_range(0..8);
+            }),
+            1 => bytes[at] = rng.random_range(0..=255),
+            2 => bytes.truncate(at),
+            3 => bytes[at..at + length.min(8)].fill(0xFF),
+            4 => bytes[at..at + length.min(8)].fill(0),
+            5 => drop(bytes.drain(at..at + length)),
+            6 => {
+                let part = bytes[at..at + length].to_vec();
+                let to = rng.random_range(0..=bytes.len());
+                bytes.splice(to..to, part);
+            }
+            _ => {
+                // A digit more in a text, a length more in a binary.
+                let byte = rng.random_range(b'0'..=b'9');
+                bytes.insert(at, byte);
+            }
+        }
+    }
+    if kind == "usd" && bytes.len() > 4 && rng.random_range(0..4) > 0 {
+        // Else nearly all end at the sum over the file.
+        let at = bytes.len() - 4;
+        let crc = crc32fast::hash(&bytes[..at]);
+        bytes[at..].copy_from_slice(&crc.to_le_bytes());
+    }
+    bytes
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder =
+        std::env::temp_dir().join(format!("squirrel-attack-{}-{name}", std::process::id()));
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// The child's part: nothing, unless it is one.
+#[test]
+fn attack_child() {
+    let Ok(asked) = std::env::var(ASKED) else { return };
+    let [kind, count, seed, file]: [&str; 4] =
+        asked.split(' ').collect::<Vec<_>>().try_into().unwrap();
+    let (good, file) = (good(kind), Path::new(file));
+    fs::write(file, &good).unwrap();
+    read(kind, file);
+    let mut rng = Pcg64Mcg::seed_from_u64(seed.parse().unwrap());
+    for _ in 0..count.parse::<u64>().unwrap() {
+        fs::write(file, mutate(&good, kind, &mut rng)).unwrap();
+        read(kind, file);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn no_mutated_file_ends_a_reader() {
+    let number = |name: &str, default: u64| {
+        std::env::var(name).map_or(default, |text| text.parse().unwrap())
+    };
+    let (count, seed) = (number(COUNT, COUNT_IN_TESTS), number(SEED, 1));
+    let folder = folder("run");
+    for kind in KINDS {
+        let file = folder.join(format!("{kind}.mutated"));
+        let seconds = CHILD_S * count.div_ceil(1000).max(2);
+        let child = Command::new("sh")
+            .arg("-c")
+            .arg(format!("ulimit -v {CHILD_KIB} && ulimit -t {seconds} && exec \"$0\" \"$@\""))
+            .arg(std::env::current_exe().unwrap())
+            .args(["import_attack::attack_child", "--exact", "--test-threads=1"])
+            .env(ASKED, format!("{kind} {count} {seed} {}", file.display()))
+            .env("MALLOC_ARENA_MAX", "1")
+            .env("RUST_BACKTRACE", "0")
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&child.stdout);
+        assert!(
+            child.status.success() && said.contains("1 passed"),
+            "{kind}: {} by {}\n{said}{}",
+            child.status,
+            file.display(),
+            String::from_utf8_lossy(&child.stderr)
+        );
+    }
+    fs::remove_dir_all(folder).unwrap();
+}
+
+/// Files that once ended a reader.
+#[test]
+fn what_ended_a_reader_once_does_not_again() {
+    for entry in fs::read_dir(data("attack")).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let copy = folder("finds").join(&name);
+        fs::copy(&path, &copy).unwrap();
+        if let Some(kind) = KINDS.iter().rev().find(|kind| name.starts_with(&format!("{kind}."))) {
+            read(kind, &copy);
+        }
+    }
+}
