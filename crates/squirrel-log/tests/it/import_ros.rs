@@ -278,7 +278,8 @@ fn no_mutation_of_a_message_or_its_schema_ends_the_program() {
     let schema = messages[0].channel.schema.clone().unwrap();
     let mut state = 1_u64;
     let mut random = |below: usize| {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 33) as usize % below
     };
     let (mut refused, mut read) = (0, 0);
