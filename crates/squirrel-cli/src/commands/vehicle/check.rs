@@ -1,9 +1,10 @@
 //! `squirrel vehicle check`: the numbers of a file.
 
-use crate::output::{self, Table, say};
+use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use serde::Serialize;
-use squirrel_sim::vehicle_file::{Means, Provenance, VehicleFile};
+use squirrel_sim::vehicle_file::margins::{AxisMargins, WARN_BELOW_RAD};
+use squirrel_sim::vehicle_file::{Hovering, Means, Provenance, StepAnswer, VehicleFile};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -25,6 +26,10 @@ struct Checked<'a> {
     vehicle: &'a str,
     sound: bool,
     means: Means,
+    /// Roll, pitch, yaw; absent without gains.
+    margins: Option<[AxisMargins; 3]>,
+    /// Answers to a step of roll and of pitch, measured in the plant.
+    steps: Option<[StepAnswer; 2]>,
     numbers: BTreeMap<&'a str, &'a Provenance>,
 }
 
@@ -42,6 +47,29 @@ impl Check {
         ));
         in_words(&means).print();
         say("");
+        let at = |e: String| format!("{}: {e}", file.display());
+        let margins = vehicle.margins();
+        let steps = match margins {
+            None => None,
+            Some(_) => {
+                let hovering = Hovering::new(&vehicle).map_err(at)?;
+                Some([hovering.clone().answer(0), hovering.answer(1)])
+            }
+        };
+        if let (Some(margins), Some(steps)) = (&margins, &steps) {
+            margins_in_words(margins, steps).print();
+            say("");
+            for axis in margins.iter().filter(|axis| axis.nominal.phase_margin_rad < WARN_BELOW_RAD)
+            {
+                talk(&format!(
+                    "{}: {} has {:.0} deg of phase margin; below {:.0} late rotors or a late gyro make it oscillate",
+                    vehicle.name,
+                    axis.axis,
+                    axis.nominal.phase_margin_rad.to_degrees(),
+                    WARN_BELOW_RAD.to_degrees(),
+                ));
+            }
+        }
         if let Some(weights) = &vehicle.weights {
             let [slow, fast] = weights.parnn().domain.speed_m_s;
             let [low, high] = weights.parnn().domain.alpha_rad;
@@ -61,9 +89,38 @@ impl Check {
         table.print();
         let numbers: BTreeMap<&str, &Provenance> =
             vehicle.provenance.iter().map(|(field, p)| (field.as_str(), p)).collect();
-        let result = Checked { vehicle: &vehicle.name, sound: true, means, numbers };
+        let result =
+            Checked { vehicle: &vehicle.name, sound: true, means, margins, steps, numbers };
         output::write_json(json.as_deref(), &result)
     }
+}
+
+/// The attitude loop: how far it is from oscillating, and how it follows.
+fn margins_in_words(margins: &[AxisMargins], steps: &[StepAnswer]) -> Table {
+    let mut table = Table::new(&[
+        "attitude loop",
+        "crossover rad/s",
+        "phase margin deg",
+        "at twice the lag",
+        "M_s",
+        "bears delay ms",
+        "step rises in s",
+        "overshoots %",
+    ]);
+    for (i, axis) in margins.iter().enumerate() {
+        let step = |of: fn(&StepAnswer) -> String| steps.get(i).map_or("-".to_owned(), of);
+        table.row(vec![
+            axis.axis.to_owned(),
+            format!("{:.1}", axis.nominal.crossover_rad_s),
+            format!("{:.0}", axis.nominal.phase_margin_rad.to_degrees()),
+            format!("{:.0}", axis.twice_the_lag.phase_margin_rad.to_degrees()),
+            format!("{:.2}", axis.nominal.sensitivity_peak),
+            format!("{:.0}", 1e3 * axis.nominal.delay_margin_s),
+            step(|step| format!("{:.2}", step.rise_s)),
+            step(|step| format!("{:.0}", 100.0 * step.overshoot)),
+        ]);
+    }
+    table
 }
 
 /// What the numbers mean together.

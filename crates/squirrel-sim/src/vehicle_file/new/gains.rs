@@ -1,11 +1,13 @@
 //! Gains of the flight code from the numbers of an airframe, by a stated rule.
 //!
 //! The laws ask for accelerations, so inertia and mass are in them already; what bounds their gains
-//! is how late a rotor answers. The gains of `vehicles/squirrel.toml` are flown with a rotor lag of
-//! 0.04 s; with a command filter's and a sensor's delay that is about 0.07 s. Roll, pitch and yaw
-//! scale with the inverse of that time, the outer loop, which must stay slower, with its root.
-//! Yaw is turned by reaction torque alone: its gains are capped by the acceleration that is to be
-//! had.
+//! is how late a rotor answers. Those of the attitude are the fastest that have the margins of
+//! [`super::super::margins`], which `squirrel vehicle check` shows. The outer loop, which must stay
+//! slower, is `vehicles/squirrel.toml`'s, scaled by the root of the time in which a rotor and the
+//! command filter answer. Yaw is turned by reaction torque alone: its gains are capped by the
+//! acceleration that is to be had.
+
+use super::super::margins::gains_for_margins;
 
 /// What the rule looks at.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +19,8 @@ pub(super) struct Airframe {
     /// Most yaw acceleration about hover, rad/s^2.
     pub(super) yaw_acceleration_rad_s2: f64,
     pub(super) tilt_max_rad: f64,
+    /// Largest moment of inertia over those about x and y.
+    pub(super) restoring: [f64; 2],
 }
 
 /// Gains that the rule chooses; what is the same for all vehicles is in [`toml`].
@@ -34,6 +38,10 @@ struct Gains {
 
 /// Rotor lag of the vehicle whose gains are scaled, and the other delays in its inner loop, s.
 const REFERENCE: (f64, f64) = (0.04, 0.03);
+/// What is late beside the rotors: half a step of the flight code, and a gyro, s.
+const DELAY_S: f64 = 0.004;
+/// Fastest `c1` of roll and pitch, and of yaw at the acceleration below, 1/s.
+const FASTEST_PER_S: [f64; 2] = [12.0, 4.0];
 /// Yaw acceleration of that vehicle about hover, rad/s^2.
 const REFERENCE_YAW: f64 = 7.6;
 
@@ -41,16 +49,21 @@ fn by_rule(airframe: &Airframe) -> Gains {
     let (lag_s, other_s) = REFERENCE;
     let quick = ((lag_s + other_s) / (airframe.lag_s + other_s)).clamp(0.5, 1.5);
     let slow = quick.sqrt().min(1.0);
-    let yaw = quick.min((airframe.yaw_acceleration_rad_s2 / REFERENCE_YAW).sqrt().max(0.3));
-    let scaled = |of: [f64; 3], power: i32| {
-        [of[0] * quick.powi(power), of[1] * quick.powi(power), of[2] * yaw.powi(power)]
-    };
+    let yaw = (airframe.yaw_acceleration_rad_s2 / REFERENCE_YAW).sqrt().clamp(0.3, 1.5);
+    let [roll_pitch, yaw_fastest] = FASTEST_PER_S;
+    let axes = [
+        (airframe.restoring[0], roll_pitch),
+        (airframe.restoring[1], roll_pitch),
+        (1.0, yaw_fastest * yaw),
+    ]
+    .map(|(restoring, fastest)| gains_for_margins(airframe.lag_s, DELAY_S, restoring, fastest));
+    let of = |k: usize| axes.map(|axis| axis[k]);
     let outer = |of: [f64; 3]| of.map(|gain| gain * slow);
     let g = squirrel_core::math::GRAVITY_M_S2;
     Gains {
-        c1_per_s: scaled([9.0, 9.0, 4.0], 1),
-        c2_per_s: scaled([14.0, 14.0, 5.0], 1),
-        lambda_per_s2: scaled([8.0, 8.0, 2.0], 2),
+        c1_per_s: of(0),
+        c2_per_s: of(1),
+        lambda_per_s2: of(2),
         filter_frequency_rad_s: 20.0 * quick,
         position_per_s: outer([1.6, 1.6, 0.8]),
         velocity_per_s: outer([2.5, 2.5, 1.6]),
@@ -73,7 +86,8 @@ pub(super) fn toml(airframe: &Airframe) -> String {
     } = by_rule(airframe);
     let one = super::text::rounded;
     let three = |of: [f64; 3]| format!("{:?}", of.map(one));
-    let rule = "by rule: squirrel.toml's, scaled by the time in which a rotor answers";
+    let rule = "by rule: the fastest with the margins of squirrel vehicle check";
+    let scaled = "by rule: squirrel.toml's, scaled by the time in which a rotor answers";
     let same = "as squirrel.toml";
     format!(
         "[control]
@@ -85,13 +99,13 @@ c1_per_s = {{ value = {c1}, source = \"{rule}\" }}
 c2_per_s = {{ value = {c2}, source = \"{rule}\" }}
 lambda_per_s2 = {{ value = {lambda}, source = \"{rule}\" }}
 integral_max_rad_s = {{ value = 0.1, source = \"{same}\" }}
-filter_frequency_rad_s = {{ value = {filter:?}, source = \"{rule}\" }}
+filter_frequency_rad_s = {{ value = {filter:?}, source = \"{scaled}\" }}
 filter_damping = {{ value = 1.0, source = \"{same}\" }}
 
 [control.position]
 angle_law = \"exact\"
-position_per_s = {{ value = {position}, source = \"{rule}\" }}
-velocity_per_s = {{ value = {velocity}, source = \"{rule}\" }}
+position_per_s = {{ value = {position}, source = \"{scaled}\" }}
+velocity_per_s = {{ value = {velocity}, source = \"{scaled}\" }}
 integral_per_s2 = {{ value = [0.15, 0.15, 0.15], source = \"{same}\" }}
 derivative = {{ value = [0.05, 0.05, 0.05], source = \"{same}\" }}
 velocity_feed_forward = {{ value = 0.0, source = \"{same}\" }}

@@ -487,6 +487,7 @@ impl Sizes {
             lag_s: scaling::MOTOR_LAG_S.value,
             yaw_acceleration_rad_s2: ratio * to_spare_n / inertia_z,
             tilt_max_rad: self.tilt_max_rad,
+            restoring: [(scaling::GYRATION_Z.value / scaling::GYRATION_XY.value).powi(2); 2],
         }
     }
 }
