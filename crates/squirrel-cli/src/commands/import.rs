@@ -96,7 +96,9 @@ impl Import {
         let (log, report) = imported?;
         log.write(&self.out).map_err(|e| e.to_string())?;
         say(report.to_string().trim_end());
-        notes.iter().for_each(|note| say(note));
+        for note in &notes {
+            say(note);
+        }
         talk(&format!("wrote {}", self.out.display()));
         output::write_json(self.json.as_deref(), &report)
     }
