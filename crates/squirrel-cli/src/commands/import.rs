@@ -96,7 +96,7 @@ impl Import {
         let (log, report) = imported?;
         log.write(&self.out).map_err(|e| e.to_string())?;
         say(report.to_string().trim_end());
-        for note in &notes {
+        for note in notes {
             say(note);
         }
         talk(&format!("wrote {}", self.out.display()));
