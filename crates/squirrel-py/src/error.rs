@@ -4,6 +4,7 @@
 use pyo3::PyErr;
 use pyo3::exceptions::PyValueError;
 use squirrel_log::LogError;
+use squirrel_log::import::ImportError;
 use squirrel_nn::NnError;
 use squirrel_sim::vehicle_file::VehicleFileError;
 use squirrel_sim::weights::WeightsError;
@@ -31,6 +32,14 @@ pub(crate) fn vehicle(error: &VehicleFileError) -> PyErr {
 pub(crate) fn log(error: &LogError) -> PyErr {
     match error {
         LogError::Io { error: cause, .. } => system(cause.kind(), error),
+        _ => value(error),
+    }
+}
+
+/// Of a log that somebody else wrote.
+pub(crate) fn import(error: &ImportError) -> PyErr {
+    match error {
+        ImportError::Read { source, .. } => system(source.kind(), error),
         _ => value(error),
     }
 }

@@ -75,7 +75,7 @@ mod _squirrel {
     #[pymodule_export]
     use super::gap::{gap_check, gap_diagnose, gap_effects, gap_find};
     #[pymodule_export]
-    use super::log::FlightLog;
+    use super::log::{FlightLog, read_log};
     #[pymodule_export]
     use super::nn::{Model, forward, load, train, windows};
     #[pymodule_export]

@@ -6,10 +6,80 @@ use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
+use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pyfunction, gen_stub_pymethods};
+use squirrel_log::LogError;
+use squirrel_log::import::{
+    ImportError, ImportMap, import, import_without_map, is_bag, map_of_bag,
+};
 use squirrel_sim::flight::Metrics;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+/// Read a log, whoever wrote it.
+///
+/// Logs of squirrel, of PX4 (ULog), ArduPilot (dataflash), Betaflight and INAV (blackbox) and ROS 2
+/// bags of known types (MCAP) say themselves what their channels are; others need a map.
+///
+/// Parameters
+/// ----------
+/// path : str or os.PathLike
+///     The log.
+/// map : str or os.PathLike, optional
+///     Import map (TOML) from columns to channels.
+/// topics : list of str, optional
+///     Topics of a ROS 2 bag to take where several say the same.
+///
+/// Returns
+/// -------
+/// FlightLog
+///
+/// Raises
+/// ------
+/// OSError
+///     A file cannot be read.
+/// ValueError
+///     One line that names the file and what is wrong with it.
+///
+/// Examples
+/// --------
+/// >>> import squirrel, tempfile, pathlib
+/// >>> path = pathlib.Path(tempfile.mkdtemp()) / "hover.mcap"
+/// >>> squirrel.simulate(scenario="hover").write(path)
+/// >>> squirrel.read_log(path)["gnss.position_ned_m"].shape[1]
+/// 3
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+#[pyo3(signature = (path, *, map = None, topics = Vec::new()))]
+pub(crate) fn read_log(
+    py: Python<'_>,
+    path: PathBuf,
+    map: Option<PathBuf>,
+    topics: Vec<String>,
+) -> PyResult<FlightLog> {
+    let log = py.detach(|| {
+        if let Some(map) = map {
+            let map = ImportMap::load(&map).map_err(|e| error::import(&e))?;
+            return foreign(import(&map, &[path]));
+        }
+        let own = if path.is_dir() { None } else { Some(squirrel_log::FlightLog::read(&path)) };
+        match own {
+            None | Some(Err(LogError::NotMcap { .. } | LogError::Foreign { .. })) => {}
+            Some(own) => return own.map_err(|e| error::log(&e)),
+        }
+        if is_bag(&path).map_err(|e| error::import(&e))? {
+            let (map, _) = map_of_bag(&path, &topics).map_err(|e| error::import(&e))?;
+            return foreign(import(&map, &[path]));
+        }
+        foreign(import_without_map(&path, &|_, _| {}))
+    })?;
+    Ok(FlightLog::new(log, None))
+}
+
+fn foreign<R>(
+    read: Result<(squirrel_log::FlightLog, R), ImportError>,
+) -> PyResult<squirrel_log::FlightLog> {
+    read.map(|(log, _)| log).map_err(|e| error::import(&e))
+}
 
 /// A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their
 /// channels as arrays.
@@ -55,7 +125,7 @@ impl FlightLog {
     /// Parameters
     /// ----------
     /// path : str or os.PathLike
-    ///     MCAP file that squirrel wrote; ``squirrel import`` makes one of other logs.
+    ///     MCAP file that squirrel wrote; `squirrel.read_log` reads others, too.
     ///
     /// Returns
     /// -------

@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_log::files::write_whole;
+use squirrel_sim::vehicle_file::new::{Frame, Given, NewError, Said};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -88,6 +89,83 @@ impl Vehicle {
             return Err(error::value(format!("name = {name}: no such vehicle; known are {names}")));
         };
         Self::parse(text, name)
+    }
+
+    /// A first vehicle from what its owner knows; what is not given is guessed from published machines.
+    ///
+    /// Parameters
+    /// ----------
+    /// frame : str
+    ///     ``quad-x``, ``quad-plus``, ``hexa-x``, ``hexa-plus``, ``octo-x``, ``octo-plus`` (rotors numbered as PX4 and ArduPilot do),
+    ///     ``quad-x-betaflight`` or ``quad-x-crazyflie``.
+    /// mass_kg : float
+    ///     Ready to fly.
+    /// arm_m : float, optional
+    ///     From the centre to a hub; needed where the propeller is not given.
+    /// propeller_inch, pitch_inch : float, optional
+    ///     Diameter and pitch of the propellers.
+    /// cells : int, optional
+    ///     Of the battery, in series.
+    /// kv_rpm_per_v : float, optional
+    ///     Speed of a motor without load over voltage.
+    /// capacity_ah : float, optional
+    ///     Of the battery.
+    /// hover_thrust_fraction : float, optional
+    ///     Thrust in hover over the most thrust.
+    /// name : str
+    ///     Name of the vehicle.
+    ///
+    /// Returns
+    /// -------
+    /// Vehicle
+    ///     Each guessed number has its tolerance, and a source that begins with "guess".
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     One line that names what is missing, or the number that cannot be.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import squirrel
+    /// >>> vehicle = squirrel.Vehicle.new(frame="quad-x", mass_kg=0.75, propeller_inch=5.0)
+    /// >>> vehicle["mass.mass_kg"]
+    /// 0.75
+    #[staticmethod]
+    #[pyo3(name = "new", signature = (*, frame, mass_kg, arm_m = None, propeller_inch = None, pitch_inch = None, cells = None, kv_rpm_per_v = None, capacity_ah = None, hover_thrust_fraction = None, name = "vehicle"))]
+    fn first(
+        frame: &str,
+        mass_kg: f64,
+        arm_m: Option<f64>,
+        propeller_inch: Option<f64>,
+        pitch_inch: Option<f64>,
+        cells: Option<u32>,
+        kv_rpm_per_v: Option<f64>,
+        capacity_ah: Option<f64>,
+        hover_thrust_fraction: Option<f64>,
+        name: &str,
+    ) -> PyResult<Self> {
+        let said = |value: Option<f64>, argument: &str| {
+            value.map(|value| Said { value, source: argument.to_owned() })
+        };
+        let given = Given {
+            name: name.to_owned(),
+            frame: Some(Frame::parse(frame).map_err(|e| error::value(format!("frame = {e}")))?),
+            mass_kg: said(Some(mass_kg), "mass_kg"),
+            arm_m: said(arm_m, "arm_m"),
+            propeller_inch: said(propeller_inch, "propeller_inch"),
+            pitch_inch: said(pitch_inch, "pitch_inch"),
+            cells: said(cells.map(f64::from), "cells"),
+            kv_rpm_per_v: said(kv_rpm_per_v, "kv_rpm_per_v"),
+            capacity_ah: said(capacity_ah, "capacity_ah"),
+            hover_thrust_fraction: said(hover_thrust_fraction, "hover_thrust_fraction"),
+            ..Given::default()
+        };
+        match given.vehicle_file() {
+            Ok(file) => Ok(Self { file }),
+            Err(NewError::Missing(_)) => Err(error::value("propeller_inch: missing; give it or arm_m")),
+            Err(other) => Err(error::value(other)),
+        }
     }
 
     /// Check the text of a vehicle file.

@@ -1,6 +1,6 @@
 """A flight stack for multirotors that change shape.
 
-Vehicles (`Vehicle`), flights in closed loop (`simulate`) and their logs (`FlightLog`), many vehicles at once (`Batch`,
+Vehicles (`Vehicle`), flights in closed loop (`simulate`) and logs, whoever wrote them (`FlightLog`, `read_log`), many vehicles at once (`Batch`,
 `rollout`), the flight code itself (`Stack`, `squirrel.control`), the base model (`squirrel.dynamics`), learned models of the wing
 force (`squirrel.nn`), environments in which policies learn (`Tasks`; `squirrel.envs` for Gymnasium) and policies that fly (`Policy`), what
 wings make reachable (`squirrel.plan`), and what a model lacks (`squirrel.gap`). `squirrel.plot` needs matplotlib, `squirrel.torch` PyTorch.
@@ -9,7 +9,7 @@ SI units and radians; world NED, body FRD, quaternions Hamilton, body to NED, w 
 """
 
 from squirrel import control, dynamics, gap, nn, plan, policy
-from squirrel._squirrel import Batch, FlightLog, Policy, Stack, Tasks, Vehicle, __version__, rollout, simulate
+from squirrel._squirrel import Batch, FlightLog, Policy, Stack, Tasks, Vehicle, __version__, read_log, rollout, simulate
 
 __all__ = [
     "Batch",
@@ -25,6 +25,7 @@ __all__ = [
     "nn",
     "plan",
     "policy",
+    "read_log",
     "rollout",
     "simulate",
 ]
