@@ -3,8 +3,8 @@
 //!
 //! The open loop asks whether forces are right for a second. Here the controller answers to the
 //! model for the whole flight, so that what shows is what a user sees: whether the simulated drone
-//! goes where the measured one went. Only the scenario, the arm and the integrator are taken from
-//! the log; the vehicle is the one under test.
+//! goes where the measured one went. Scenario, arm, integrator and what the flight code knew of the
+//! battery are taken from the log; the vehicle is the one under test.
 
 use crate::GapError;
 use crate::flight::series::Series;
@@ -74,7 +74,12 @@ fn error_ned_m(
     measured: &Series,
 ) -> Result<[f64; 3], GapError> {
     let refused = |problem: String| GapError::Vehicle { vehicle: vehicle.name.clone(), problem };
-    let setup = Setup { vehicle: vehicle.clone(), ..setup.clone() };
+    let mut vehicle = vehicle.clone();
+    if let (Some(control), Some(flown)) = (&mut vehicle.control, &setup.vehicle.control) {
+        // A patched model does not make the flight code that flew know more.
+        control.thrust = flown.thrust;
+    }
+    let setup = Setup { vehicle, ..setup.clone() };
     let log = setup.fly(true, |_| {}).map_err(|e| refused(e.to_string()))?.log;
     let log = log.ok_or_else(|| refused("its flight was not logged".to_owned()))?;
     let flown = Series::need("closed loop", &log, CHANNEL, 3)?;

@@ -49,6 +49,54 @@ pub(super) fn frames(file: &[u8]) -> impl Iterator<Item = Frame<'_>> {
     })
 }
 
+/// Whether the texts of a record end inside it. mcap's parser makes room for what a length says
+/// before it looks whether as much is there.
+pub(super) fn lengths_fit(opcode: u8, body: &[u8]) -> bool {
+    let mut rest = Rest(body);
+    let fits = match opcode {
+        op::SCHEMA => rest.skip(2).and_then(|()| rest.texts(3)),
+        op::CHANNEL => rest.skip(4).and_then(|()| rest.texts(2)).and_then(|()| rest.map()),
+        op::METADATA => rest.texts(1).and_then(|()| rest.map()),
+        // Times, size and CRC before the name of its compression.
+        op::CHUNK => rest.skip(28).and_then(|()| rest.texts(1)),
+        _ => Some(()),
+    };
+    fits.is_some()
+}
+
+/// What is left of a record.
+struct Rest<'a>(&'a [u8]);
+
+impl<'a> Rest<'a> {
+    fn take(&mut self, length: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(length)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn skip(&mut self, length: usize) -> Option<()> {
+        self.take(length).map(|_| ())
+    }
+
+    /// Bytes behind their length.
+    fn sized(&mut self) -> Option<&'a [u8]> {
+        let length = self.take(4)?.first_chunk()?;
+        self.take(usize::try_from(u32::from_le_bytes(*length)).ok()?)
+    }
+
+    fn texts(&mut self, count: usize) -> Option<()> {
+        (0..count).try_for_each(|_| self.sized().map(|_| ()))
+    }
+
+    fn map(&mut self) -> Option<()> {
+        let mut entries = Rest(self.sized()?);
+        while !entries.0.is_empty() {
+            entries.texts(2)?;
+        }
+        Some(())
+    }
+}
+
 /// What is wrong with the frame of a file.
 #[derive(Debug)]
 pub(super) enum Damage {

@@ -174,6 +174,7 @@ impl<'a> Reader<'a> {
 
     /// One record of the file.
     fn frame(&mut self, frame: Frame) -> Result<(), LogError> {
+        self.check_lengths(frame.opcode, frame.body())?;
         if frame.opcode != mcap::records::op::CHUNK {
             return self.record(frame.opcode, frame.body());
         }
@@ -206,6 +207,13 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
+    fn check_lengths(&self, opcode: u8, body: &[u8]) -> Result<(), LogError> {
+        if envelope::lengths_fit(opcode, body) {
+            return Ok(());
+        }
+        Err(self.corrupt("a length in a record is larger than the record"))
+    }
+
     /// One record of the file or of a chunk in it.
     fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), LogError> {
         use mcap::records::op::{CHANNEL, MESSAGE, METADATA, SCHEMA};
@@ -213,6 +221,7 @@ impl<'a> Reader<'a> {
         if ![CHANNEL, MESSAGE, METADATA, SCHEMA].contains(&opcode) {
             return Ok(());
         }
+        self.check_lengths(opcode, body)?;
         match mcap::parse_record(opcode, body).map_err(|error| self.corrupt(error))? {
             Record::Metadata(record) if record.name == METADATA_NAME => {
                 self.metadata.get_or_insert_default().extend(record.metadata);

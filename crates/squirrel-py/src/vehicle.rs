@@ -6,8 +6,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyList};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_log::files::write_whole;
-use squirrel_sim::vehicle_file::new::{Frame, Given, NewError, Said};
 use squirrel_sim::vehicle_file::VehicleFile;
+use squirrel_sim::vehicle_file::new::{Frame, Given, NewError, Said};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
@@ -163,7 +163,9 @@ impl Vehicle {
         };
         match given.vehicle_file() {
             Ok(file) => Ok(Self { file }),
-            Err(NewError::Missing(_)) => Err(error::value("propeller_inch: missing; give it or arm_m")),
+            Err(NewError::Missing(_)) => {
+                Err(error::value("propeller_inch: missing; give it or arm_m"))
+            }
             Err(other) => Err(error::value(other)),
         }
     }

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 import squirrel
 
@@ -143,3 +144,20 @@ def test_ctrl_c_ends_a_long_call(program: str, tmp_path: Path) -> None:
     """And nothing prints but Python: what works on another thread stops in silence."""
     # The gap workflow takes a second alone, and may be over before a busy machine sends the signal: then once more.
     assert any(is_interrupted(program, tmp_path / str(k)) for k in range(5))
+
+
+def test_logs_of_others_are_read(tmp_path: Path) -> None:
+    """Own logs, an autopilot's and a ROS 2 bag, by their content."""
+    flown = squirrel.simulate(scenario="hover", arm="pc")
+    flown.write(tmp_path / "hover")
+    assert squirrel.read_log(tmp_path / "hover").keys() == flown.keys()
+    data = ROOT / "crates/squirrel-log/tests/data"
+    px4 = squirrel.read_log(data / "ulog/sample_cut.ulg")
+    assert px4["imu.omega_body_rad_s"].shape[1] == 3
+    bag = squirrel.read_log(data / "ros/mocap.mcap")
+    assert bag.keys()
+    with pytest.raises(FileNotFoundError):
+        squirrel.read_log(tmp_path / "no.ulg")
+    (tmp_path / "text.txt").write_text("hello")
+    with pytest.raises(ValueError, match="text.txt: import reads"):
+        squirrel.read_log(tmp_path / "text.txt")

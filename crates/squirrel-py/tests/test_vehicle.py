@@ -86,11 +86,12 @@ def test_files_that_cannot_be_are_refused(tmp_path: Path) -> None:
         squirrel.Vehicle.parse("")
 
 
-def test_a_first_vehicle_flies_and_says_what_is_guessed():
+def test_a_first_vehicle_flies_and_says_what_is_guessed() -> None:
     vehicle = squirrel.Vehicle.new(frame="quad-x", mass_kg=0.75, propeller_inch=5.0, name="mine")
     assert vehicle["mass.mass_kg"] == 0.75
     assert 'source = "guess' in vehicle.text
     flight = squirrel.simulate(vehicle=vehicle, scenario="hover", arm="pc", seed=1)
+    assert flight.metrics is not None and flight.metrics["rmse_m"] is not None
     assert flight.metrics["rmse_m"] < 0.3
     with pytest.raises(ValueError, match="propeller_inch: missing"):
         squirrel.Vehicle.new(frame="quad-x", mass_kg=0.75)

@@ -9,6 +9,7 @@ mod runs;
 mod wind;
 
 pub use conditions::Conditions;
+pub(crate) use conditions::SAG;
 pub use excite::ExciteTable;
 pub use faults::{FaultKind, FaultTable};
 pub use forest::ForestTable;

@@ -177,6 +177,9 @@ pub fn conditions(vehicle: &VehicleFile) -> Result<Vec<Condition>, FlightError> 
                 return Err(FlightError("effects.battery_sag: unknown".to_owned()));
             };
             sag.values[0] = VOLTAGE_EXPONENT;
+            if let Some(control) = &mut vehicle.control {
+                control.thrust.exponent = VOLTAGE_EXPONENT as f32;
+            }
         } else {
             scenario.thrust_to_weight = Some(ratio);
         }

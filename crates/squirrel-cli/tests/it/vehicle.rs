@@ -70,7 +70,7 @@ fn what_is_missing_is_wrong_usage_and_what_cannot_be_fails() {
     folder.write("no.ulg", "no log");
     folder.fails(
         &[&NEW[..], &["--from", "no.ulg", "--out", "x.toml"]].concat(),
-        &["no.ulg", "no ULog"],
+        &["no.ulg", "not those of a ULog"],
     );
     folder.write("bench.csv", "thrust_n,command\n1,x\n");
     folder.write("squirrel.toml", SQUIRREL);

@@ -43,7 +43,9 @@ fn without_speeds(flights: &Flights) -> Flights {
 }
 
 fn hiding(table: &str) -> VehicleFile {
-    vehicle_with("squirrel.toml", &[("[limits]", &format!("{table}\n\n[limits]"))])
+    let hidden = vehicle_with("squirrel.toml", &[("[limits]", &format!("{table}\n\n[limits]"))]);
+    // What is hidden the flight code does not know either.
+    VehicleFile { control: vehicle("squirrel.toml").control, ..hidden }
 }
 
 fn moments(finding: &Finding) -> [f64; 3] {

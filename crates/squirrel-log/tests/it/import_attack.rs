@@ -2,9 +2,6 @@
 //! runs in a child process whose address space and processor time are limited, so that a panic, a
 //! hang and a file that asks for too much memory all end it.
 //!
-//! MCAP is not among them yet: the decoder allots what a chunk says that it unpacks to, so that a
-//! flipped bit there asks for gigabytes.
-//!
 //! `cargo xtask attack COUNT SEED` runs more of it; a file that ends the child is kept, and belongs
 //! into `tests/data/attack/`.
 
@@ -14,7 +11,8 @@ use std::process::Command;
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use squirrel_log::import::{ImportMap, import, import_without_map, parameters};
+use squirrel_log::FlightLog;
+use squirrel_log::import::{ImportMap, import, import_without_map, map_of_bag, parameters};
 
 use crate::import_fields::data;
 use crate::import_support::formats::{Cells, parquet_bytes};
@@ -34,8 +32,8 @@ const CHILD_KIB: u64 = (192 + 64) << 10;
 /// Processor time of a thousand files, s: a hang of 5 s shows.
 const CHILD_S: u64 = 5;
 
-const KINDS: [&str; 8] =
-    ["ulog", "ulog-map", "ardupilot", "blackbox", "usd", "csv", "parquet", "map"];
+const KINDS: [&str; 10] =
+    ["ulog", "ulog-map", "ardupilot", "blackbox", "usd", "csv", "parquet", "map", "mcap", "bag"];
 
 const CRAZYPAD: &str = include_str!("../../../../vehicles/maps/crazypad.toml");
 
@@ -50,6 +48,8 @@ fn good(kind: &str) -> Vec<u8> {
         }
         "ardupilot" => fs::read(data("ardupilot/quad.bin")).unwrap(),
         "blackbox" => fs::read(data("blackbox/sitl.bbl")).unwrap(),
+        "mcap" => return own_log(),
+        "bag" => return fs::read(data("ros/ros.mcap")).unwrap(),
         "usd" => return fs::read(data("crazypad/E8_log00.bin")).unwrap(),
         "csv" => "t,x,y,z\n1,2,3,4\n2,3,4,5\n3.5,-1e-3,nan,7\n".repeat(3).into_bytes(),
         "map" => CRAZYPAD.as_bytes().to_vec(),
@@ -73,6 +73,21 @@ fn good(kind: &str) -> Vec<u8> {
     bytes
 }
 
+/// A flight of a second, as squirrel writes it.
+fn own_log() -> Vec<u8> {
+    let mut log = FlightLog::default();
+    log.metadata.insert("vehicle_toml".to_owned(), "name = \"x\"".repeat(40));
+    for (source, rate) in [("imu", 300_u32), ("gnss", 10)] {
+        for k in 0..rate {
+            let t = f64::from(k) / f64::from(rate);
+            log.source_mut(source).push(t, &[("x", &[t, -t, 9.81]), ("y", &[f64::from(k)])]);
+        }
+    }
+    let path = folder("own").join("own.mcap");
+    log.write(&path).unwrap();
+    fs::read(path).unwrap()
+}
+
 /// Reads a file as its kind is read; what comes out does not matter.
 fn read(kind: &str, path: &Path) {
     let by_map = |map: &str| {
@@ -94,6 +109,15 @@ fn read(kind: &str, path: &Path) {
             log.write(&path.with_extension("mcap")).unwrap();
         }
         "ulog-map" => by_map(&topic("sensor_combined", "timestamp", "us", "\"gyro_rad[0]\"")),
+        "mcap" => {
+            let _ = FlightLog::read(path);
+            let _ = FlightLog::recover(path);
+        }
+        "bag" => {
+            if let Ok((map, _)) = map_of_bag(path, &[]) {
+                let _ = import(&map, &[path.to_path_buf()]);
+            }
+        }
         "usd" => by_map(CRAZYPAD),
         "csv" | "parquet" => by_map(&one_source(OMEGA)),
         _ => {

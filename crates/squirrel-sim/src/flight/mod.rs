@@ -23,7 +23,7 @@ pub(crate) use record::{ESTIMATOR, PARNN_WEIGHTS};
 use crate::arm::Arm;
 use crate::estimator::Estimator;
 use crate::plant::{Meeting, Plant, PlantState, Wind, WingPlant};
-use crate::scenario::{FaultKind, Scenario};
+use crate::scenario::{FaultKind, SAG, Scenario};
 use crate::sensors::{SensorParameters, Sensors, Truth};
 use crate::vehicle_file::VehicleFile;
 use commands::{Command, CommandLine};
@@ -126,7 +126,7 @@ impl Setup {
             .map_err(|e| FlightError(format!("{}: {e}", self.vehicle.name)))?;
         let vehicle = self.limited_vehicle()?.cast().map_err(fail)?;
         parameters.navigation = self.navigation()?;
-        parameters.thrust = self.thrust();
+        parameters.thrust = self.thrust(parameters.thrust);
         Stack::new(vehicle, parameters, self.scenario.mission().map_err(fail)?).map_err(fail)
     }
 
@@ -144,12 +144,16 @@ impl Setup {
         self.scenario.conditions.effects(&self.vehicle)
     }
 
-    /// What the flight code knows of thrust and voltage: the sag that acts, as a power.
-    fn thrust(&self) -> ThrustByVoltage {
-        let mut effects = self.effects();
-        let exponent = effects.get_mut("battery_sag").map_or(0.0, |sag| sag.values[0]);
-        let reference_v = self.vehicle.vehicle.parameters().propulsion.reference_voltage_v;
-        ThrustByVoltage { exponent: exponent as f32, reference_v: reference_v as f32 }
+    /// What the flight code knows of thrust and voltage: what its vehicle's file says, and the sag
+    /// that comes with the day.
+    fn thrust(&self, said: ThrustByVoltage) -> ThrustByVoltage {
+        if self.vehicle.effects.has(SAG) {
+            return said;
+        }
+        match self.effects().get_mut(SAG) {
+            Some(sag) => ThrustByVoltage { exponent: sag.values[0] as f32, ..said },
+            None => said,
+        }
     }
 
     /// Who estimates, and from where on.

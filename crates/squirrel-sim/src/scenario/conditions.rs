@@ -112,7 +112,8 @@ impl Conditions {
     }
 }
 
-const SAG: &str = "battery_sag";
+/// The effect that a day brings.
+pub(crate) const SAG: &str = "battery_sag";
 
 #[cfg(test)]
 mod tests {

@@ -91,6 +91,8 @@ pub(super) fn build(
     }
     let control = t.control.as_ref().map(control);
     let plus = t.control.as_ref().and_then(|control| control.plus.as_ref());
+    let voltage_exponent =
+        t.control.as_ref().and_then(|control| control.voltage_exponent.as_ref()).map(|n| n.0);
     let asks_download = plus.is_some_and(|plus| plus.wing_download_n.is_none());
     if let Some(gains) = &control {
         gains.attitude.check().map_err(|e| e.to_string())?;
@@ -118,6 +120,14 @@ pub(super) fn build(
         effects: effects(t.effects, &vehicle)?,
         provenance: Vec::new(),
     };
+    if let Some(control) = &mut built.control {
+        let sag = built.effects.get_mut("battery_sag").map(|sag| sag.values[0]);
+        control.thrust = ThrustByVoltage {
+            exponent: voltage_exponent.or(sag).unwrap_or(0.0) as f32,
+            reference_v: vehicle.parameters().propulsion.reference_voltage_v as f32,
+        };
+        control.thrust.check().map_err(|e| e.to_string())?;
+    }
     if asks_download && built.effects.any() {
         let download_n = built.means()?.wing_download_in_hover_n;
         if let Some(plus) = built.control.as_mut().and_then(|control| control.twcc.plus.as_mut()) {
@@ -434,7 +444,7 @@ fn control(t: &ControlTable) -> StackParameters {
         twcc: twcc(&t.position, &t.wing, t.plus.as_ref(), t.thrust_min_n.0 as f32),
         // A flight makes its own, from the sensors.
         navigation: Navigation::external(),
-        // So does it for its day.
+        // From the effects of the file, which are read later.
         thrust: ThrustByVoltage::CONSTANT,
     }
 }

@@ -26,6 +26,8 @@ pub const SENSITIVITY_PEAK: f64 = 1.7;
 pub const WARN_BELOW_RAD: f64 = 35.0 * DEG;
 /// Frequencies at which sensitivity is looked at, rad/s: first, last, number.
 const SWEEP: (f64, f64, usize) = (0.1, 1000.0, 800);
+/// Gains that are tried: how many, and each over the one before.
+const SCAN: (i32, f64) = (120, 0.96);
 const DEG: f64 = std::f64::consts::PI / 180.0;
 
 /// One axis of the attitude loop.
@@ -135,7 +137,8 @@ pub fn loop_gains([c1, c2, lambda]: AxisGains, restoring: f64) -> [f64; 3] {
     [c1 * c2 + lambda + restoring, c2 * lambda, c1 + c2]
 }
 
-/// The fastest gains that have the stated margins with a lag and a delay, and at most `c1_max`.
+/// The fastest gains that have the stated margins with a lag and a delay, and at most `c1_max`; where
+/// none has them, those with most phase margin at twice the lag.
 ///
 /// Of one family: `c2 = 1.5 c1`, `lambda = c1^2 / 12`. That leaves the integral slow beside the
 /// rest.
@@ -143,17 +146,18 @@ pub fn loop_gains([c1, c2, lambda]: AxisGains, restoring: f64) -> [f64; 3] {
 /// * `restoring` - `r`: see the module
 pub fn gains_for_margins(lag_s: f64, delay_s: f64, restoring: f64, c1_max: f64) -> AxisGains {
     let family = |c1: f64| [c1, 1.5 * c1, c1 * c1 / 12.0];
-    let holds = |c1: f64| {
-        let gains = loop_gains(family(c1), restoring);
-        AxisLoop { gains, lag_s, delay_s }.holds()
+    let of = |c1: f64| AxisLoop { gains: loop_gains(family(c1), restoring), lag_s, delay_s };
+    // From the fast end: the slowest loops, of which `r` is all, are no better damped.
+    let scan = (0..SCAN.0).map(|k| c1_max * SCAN.1.powi(k));
+    let Some(found) = scan.clone().find(|c1| of(*c1).holds()) else {
+        let late = |c1: &f64| of(*c1).with_twice_the_lag().margins().phase_margin_rad;
+        let best = scan.max_by(|a, b| late(a).total_cmp(&late(b)));
+        return family(best.unwrap_or(c1_max));
     };
-    let (mut good, mut bad) = (0.0, c1_max);
-    if holds(bad) {
-        return family(bad);
-    }
-    for _ in 0..40 {
+    let (mut good, mut bad) = (found, (found / SCAN.1).min(c1_max));
+    for _ in 0..20 {
         let middle = 0.5 * (good + bad);
-        *(if holds(middle) { &mut good } else { &mut bad }) = middle;
+        *(if of(middle).holds() { &mut good } else { &mut bad }) = middle;
     }
     family(good)
 }

@@ -163,6 +163,9 @@ pub(super) struct LimitsTable {
 #[serde(deny_unknown_fields)]
 pub(super) struct ControlTable {
     pub(super) thrust_min_n: Number,
+    /// How the flight code believes rotor speed to follow the voltage; if left out, as the effect
+    /// `battery_sag` of the file says.
+    pub(super) voltage_exponent: Option<Number>,
     pub(super) attitude: AttitudeTable,
     pub(super) position: PositionTable,
     pub(super) wing: WingControlTable,

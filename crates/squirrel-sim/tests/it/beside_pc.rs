@@ -58,8 +58,8 @@ fn wings_do_no_harm_in_a_tail_wind() {
 /// where rotors have thrust to spare. Before it knew, the paper's controller sank 8 m.
 #[test]
 fn a_weak_battery_costs_no_height_where_there_is_thrust_to_spare() {
-    let mut vehicle = VehicleFile::squirrel();
-    vehicle.effects.insert("battery_sag").unwrap().values[0] = 0.9;
+    let sag = "\n[effects.battery_sag]\nvoltage_exponent = 0.9\n";
+    let vehicle = VehicleFile::parse(&(VehicleFile::squirrel().text + sag), "vehicle").unwrap();
     for (scenario, ratio, arm, most_m) in [
         ("hover", 3.0, Arm::Pc, 0.1),
         ("track", 3.0, Arm::Pc, 0.5),

@@ -65,7 +65,11 @@ const TURBULENCE: (f64, f64) = (0.12, 1.0);
 /// The vehicle file or the flight is refused, or the vehicle fell or tumbled.
 pub fn fly(order: &Order<'_>) -> Result<FlightLog, String> {
     let text = tables::vehicle(order);
-    let vehicle = VehicleFile::parse(&text, "individual").map_err(|error| error.to_string())?;
+    let mut vehicle = VehicleFile::parse(&text, "individual").map_err(|error| error.to_string())?;
+    if let Some(control) = &mut vehicle.control {
+        // What is hidden the flight code does not know either.
+        control.thrust.exponent = 0.0;
+    }
     let name = match order.excitation {
         Excitation::Rich => "excite_rich",
         Excitation::Normal => "excite_normal",

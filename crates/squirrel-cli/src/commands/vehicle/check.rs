@@ -1,6 +1,6 @@
 //! `squirrel vehicle check`: the numbers of a file.
 
-use crate::output::{self, Table, say, talk};
+use crate::output::{self, Table, say};
 use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_sim::vehicle_file::margins::{AxisMargins, WARN_BELOW_RAD};
@@ -58,17 +58,16 @@ impl Check {
         };
         if let (Some(margins), Some(steps)) = (&margins, &steps) {
             margins_in_words(margins, steps).print();
-            say("");
             for axis in margins.iter().filter(|axis| axis.nominal.phase_margin_rad < WARN_BELOW_RAD)
             {
-                talk(&format!(
-                    "{}: {} has {:.0} deg of phase margin; below {:.0} late rotors or a late gyro make it oscillate",
-                    vehicle.name,
+                say(&format!(
+                    "{} has {:.0} deg of phase margin: below {:.0} late rotors or a late gyro make it oscillate",
                     axis.axis,
                     axis.nominal.phase_margin_rad.to_degrees(),
                     WARN_BELOW_RAD.to_degrees(),
                 ));
             }
+            say("");
         }
         if let Some(weights) = &vehicle.weights {
             let [slow, fast] = weights.parnn().domain.speed_m_s;

@@ -26,6 +26,7 @@ use super::map::ImportMap;
 use super::meter::Meter;
 use super::names::nearest;
 use super::table::TableFile;
+use crate::envelope::{self, lengths_fit};
 use cdr::CdrFile;
 use json::JsonFile;
 use protobuf::ProtobufFile;
@@ -234,6 +235,10 @@ impl Reading<'_> {
             ),
             error => format!("damaged or cut off: {error}"),
         };
+        let too_long = || "damaged: a length in a record is larger than the record".to_owned();
+        if !envelope::frames(bytes).all(|frame| lengths_fit(frame.opcode, frame.body())) {
+            return Err(too_long());
+        }
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
             .with_record_length_limit(RECORD_MAX_BYTES);
@@ -249,6 +254,9 @@ impl Reading<'_> {
                 }
                 LinearReadEvent::Record { data, opcode } => {
                     if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
+                        if !lengths_fit(opcode, data) {
+                            return Err(too_long());
+                        }
                         self.record(mcap::parse_record(opcode, data).map_err(broken)?)?;
                     }
                 }

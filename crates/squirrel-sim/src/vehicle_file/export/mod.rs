@@ -179,6 +179,9 @@ pub struct Exported {
 pub fn export(file: &VehicleFile, target: Target) -> Result<Exported, String> {
     let flat = Flat::of(file)?;
     let keeps = target.keeps();
+    if matches!(target, Target::Mjcf | Target::Sdf) {
+        check_inertia(&flat)?;
+    }
     let text = match target {
         Target::Sdf => sdf::text(&flat, &keeps),
         Target::ArdupilotJson => ardupilot::text(&flat, &keeps)?,
@@ -195,6 +198,20 @@ pub fn export(file: &VehicleFile, target: Target) -> Result<Exported, String> {
         hover_rotor_speed_rad_s: flat.hover_rad_s,
         hover_thrust_fraction: flat.hover_thrust_fraction(),
     })
+}
+
+/// No body has a moment of inertia above the sum of the other two; a number with its error may.
+/// `MuJoCo` and Gazebo refuse it.
+fn check_inertia(flat: &Flat) -> Result<(), String> {
+    let moments = flat.inertia_kg_m2.symmetric_eigenvalues();
+    let (most, sum) = (moments.max(), moments.sum());
+    if most <= sum - most {
+        return Ok(());
+    }
+    let others = sum - most;
+    Err(format!(
+        "mass.inertia_kg_m2: its largest moment, {most:.3e}, is above the sum of the others, {others:.3e}, which no body has and this target refuses"
+    ))
 }
 
 /// A number in a file: nine digits, and a point or an exponent.

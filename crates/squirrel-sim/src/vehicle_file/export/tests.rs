@@ -70,6 +70,20 @@ fn effects_in_numbers_go_everywhere() {
     }
 }
 
+/// An inertia that no body has: some targets take it, those that refuse it are not written for.
+#[test]
+fn an_inertia_that_no_body_has_is_named() {
+    let effect = "[effects.inertia_error]\naxis = \"z\"\ninertia_fraction = 0.5\n";
+    let text =
+        SQUIRREL_TOML.replace("value = [3.22e-3, 4.68e-3, 7.72e-3]", "value = [3e-3, 3e-3, 5e-3]");
+    let file = VehicleFile::parse(&format!("{text}\n{effect}"), "squirrel").unwrap();
+    for target in [Target::Mjcf, Target::Sdf] {
+        let error = export(&file, target).unwrap_err();
+        assert!(error.starts_with("mass.inertia_kg_m2: its largest moment, 7.5"), "{error}");
+    }
+    assert!(export(&file, Target::Px4Params).is_ok());
+}
+
 #[test]
 fn files_are_well_formed() {
     let squirrel = VehicleFile::parse(SQUIRREL_TOML, "squirrel").unwrap();
