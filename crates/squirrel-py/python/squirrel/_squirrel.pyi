@@ -28,6 +28,7 @@ __all__ = [
     "plan_reach",
     "plan_trajectory",
     "program",
+    "read_log",
     "rk4_step",
     "rollout",
     "simulate",
@@ -410,7 +411,7 @@ class FlightLog:
         Parameters
         ----------
         path : str or os.PathLike
-            MCAP file that squirrel wrote; ``squirrel import`` makes one of other logs.
+            MCAP file that squirrel wrote; `squirrel.read_log` reads others, too.
         
         Returns
         -------
@@ -994,6 +995,50 @@ class Vehicle:
             There is none of this name.
         """
     @staticmethod
+    def new(*, frame: builtins.str, mass_kg: builtins.float, arm_m: typing.Optional[builtins.float] = None, propeller_inch: typing.Optional[builtins.float] = None, pitch_inch: typing.Optional[builtins.float] = None, cells: typing.Optional[builtins.int] = None, kv_rpm_per_v: typing.Optional[builtins.float] = None, capacity_ah: typing.Optional[builtins.float] = None, hover_thrust_fraction: typing.Optional[builtins.float] = None, name: builtins.str = 'vehicle') -> Vehicle:
+        r"""
+        A first vehicle from what its owner knows; what is not given is guessed from published machines.
+        
+        Parameters
+        ----------
+        frame : str
+            ``quad-x``, ``quad-plus``, ``hexa-x``, ``hexa-plus``, ``octo-x``, ``octo-plus`` (rotors numbered as PX4 and ArduPilot do),
+            ``quad-x-betaflight`` or ``quad-x-crazyflie``.
+        mass_kg : float
+            Ready to fly.
+        arm_m : float, optional
+            From the centre to a hub; needed where the propeller is not given.
+        propeller_inch, pitch_inch : float, optional
+            Diameter and pitch of the propellers.
+        cells : int, optional
+            Of the battery, in series.
+        kv_rpm_per_v : float, optional
+            Speed of a motor without load over voltage.
+        capacity_ah : float, optional
+            Of the battery.
+        hover_thrust_fraction : float, optional
+            Thrust in hover over the most thrust.
+        name : str
+            Name of the vehicle.
+        
+        Returns
+        -------
+        Vehicle
+            Each guessed number has its tolerance, and a source that begins with "guess".
+        
+        Raises
+        ------
+        ValueError
+            One line that names what is missing, or the number that cannot be.
+        
+        Examples
+        --------
+        >>> import squirrel
+        >>> vehicle = squirrel.Vehicle.new(frame="quad-x", mass_kg=0.75, propeller_inch=5.0)
+        >>> vehicle["mass.mass_kg"]
+        0.75
+        """
+    @staticmethod
     def parse(text: builtins.str, name: builtins.str = 'text') -> Vehicle:
         r"""
         Check the text of a vehicle file.
@@ -1221,6 +1266,42 @@ def program(arguments: typing.Sequence[builtins.str]) -> builtins.int:
     -------
     int
         Exit code: 0 done, 1 failed, 2 wrong usage.
+    """
+
+def read_log(path: builtins.str | os.PathLike | pathlib.Path, *, map: typing.Optional[builtins.str | os.PathLike | pathlib.Path] = None, topics: typing.Sequence[builtins.str] = []) -> FlightLog:
+    r"""
+    Read a log, whoever wrote it.
+    
+    Logs of squirrel, of PX4 (ULog), ArduPilot (dataflash), Betaflight and INAV (blackbox) and ROS 2
+    bags of known types (MCAP) say themselves what their channels are; others need a map.
+    
+    Parameters
+    ----------
+    path : str or os.PathLike
+        The log.
+    map : str or os.PathLike, optional
+        Import map (TOML) from columns to channels.
+    topics : list of str, optional
+        Topics of a ROS 2 bag to take where several say the same.
+    
+    Returns
+    -------
+    FlightLog
+    
+    Raises
+    ------
+    OSError
+        A file cannot be read.
+    ValueError
+        One line that names the file and what is wrong with it.
+    
+    Examples
+    --------
+    >>> import squirrel, tempfile, pathlib
+    >>> path = pathlib.Path(tempfile.mkdtemp()) / "hover.mcap"
+    >>> squirrel.simulate(scenario="hover").write(path)
+    >>> squirrel.read_log(path)["gnss.position_ned_m"].shape[1]
+    3
     """
 
 def rk4_step(vehicle: Vehicle, *, state: numpy.typing.NDArray[numpy.float64], command: numpy.typing.NDArray[numpy.float64], dt_s: builtins.float, steps: builtins.int = 1, wind_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float64]] = None, voltage_v: typing.Optional[builtins.float] = None) -> numpy.typing.NDArray[numpy.float64]:
