@@ -58,18 +58,17 @@ impl Import {
             self.paths(&self.paths).check()?;
             return if self.board { self.board() } else { self.recover() };
         }
-        let (map, notes) = match &self.map {
-            Some(file) => (ImportMap::load(file).map_err(|e| e.to_string())?, Vec::new()),
-            None => {
-                let path = self.one_path("an import without --map")?;
-                if !is_bag(path).map_err(|e| e.to_string())? {
-                    self.paths(&self.paths).check()?;
-                    return self.finish(&[], |watch| {
-                        import_without_map(path, watch).map_err(|e| e.to_string())
-                    });
-                }
-                map_of_bag(path, &self.topic).map_err(|e| e.to_string())?
+        let (map, notes) = if let Some(file) = &self.map {
+            (ImportMap::load(file).map_err(|e| e.to_string())?, Vec::new())
+        } else {
+            let path = self.one_path("an import without --map")?;
+            if !is_bag(path).map_err(|e| e.to_string())? {
+                self.paths(&self.paths).check()?;
+                return self.finish(&[], |watch| {
+                    import_without_map(path, watch).map_err(|e| e.to_string())
+                });
             }
+            map_of_bag(path, &self.topic).map_err(|e| e.to_string())?
         };
         // A folder may hold more than is read; an earlier import, for one.
         let found = files_of(&map, &self.paths).map_err(|e| e.to_string())?;

@@ -517,7 +517,7 @@ mod tests {
             // Attitude follows at once, so that thrust is chosen for where it is.
             for _ in 0..5 {
                 let AttitudeThrust { roll_rad, pitch_rad, .. } = command;
-                let motion = MeasuredMotion { residual, roll_rad, pitch_rad, ..still() };
+                let motion = MeasuredMotion { roll_rad, pitch_rad, residual, ..still() };
                 let attitude = Rotation::<Ned, Body, f32>::from_euler(roll_rad, pitch_rad, 0.0);
                 state.last = None;
                 let goal = at(0.0, 0.0, 0.0);

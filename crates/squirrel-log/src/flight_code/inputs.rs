@@ -2,7 +2,7 @@
 //! carry its time.
 
 use super::{ESTIMATE, wide};
-use crate::FlightLog;
+use crate::{Channel, FlightLog};
 use squirrel_core::control::AttitudeThrust;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::sensing::Obstacle;
@@ -140,6 +140,12 @@ fn as_it_is(row: &[f64]) -> Rotation<Ned, Body, f32> {
     Rotation::new(Unit::new_unchecked(q))
 }
 
+/// The number that a channel of one number a sample has at exactly this time.
+fn scalar(channel: &mut Option<(Cursor<'_>, &Channel)>, t: f64) -> Option<f32> {
+    let (cursor, channel) = channel.as_mut()?;
+    cursor.at(t).map(|i| channel.row(i)[0] as f32)
+}
+
 /// The frames that a log's flight code got, in order.
 ///
 /// # Errors
@@ -212,20 +218,12 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
                 velocity: In::new(velocity),
             });
         }
-        if let Some((cursor, altitude)) = &mut baro
-            && let Some(i) = cursor.at(*t)
-        {
-            frame.altitude_m = Some(altitude.row(i)[0] as f32);
-        }
+        frame.altitude_m = scalar(&mut baro, *t);
+        frame.battery_v = scalar(&mut voltage, *t);
         if let Some((cursor, field)) = &mut magnetic
             && let Some(i) = cursor.at(*t)
         {
             frame.magnetic = Some(In::new(narrow(field.row(i))));
-        }
-        if let Some((cursor, voltage)) = &mut voltage
-            && let Some(i) = cursor.at(*t)
-        {
-            frame.battery_v = Some(voltage.row(i)[0] as f32);
         }
         if let Some((cursor, rows)) = &mut obstacle
             && let Some(i) = cursor.at(*t)

@@ -49,12 +49,11 @@ impl Check {
         say("");
         let at = |e: String| format!("{}: {e}", file.display());
         let margins = vehicle.margins();
-        let steps = match margins {
-            None => None,
-            Some(_) => {
-                let hovering = Hovering::new(&vehicle).map_err(at)?;
-                Some([hovering.clone().answer(0), hovering.answer(1)])
-            }
+        let steps = if margins.is_some() {
+            let hovering = Hovering::new(&vehicle).map_err(at)?;
+            Some([hovering.clone().answer(0), hovering.answer(1)])
+        } else {
+            None
         };
         if let (Some(margins), Some(steps)) = (&margins, &steps) {
             margins_in_words(margins, steps).print();
