@@ -1,6 +1,6 @@
 //! A vehicle file for other simulators, and what is lost on the way.
 //!
-//! A target has some of the terms of a vehicle: [`Keeps`] says which and how. From that its force
+//! A target has some of the terms of a vehicle: `Keeps` says which and how. From that its force
 //! and moment are computed here and compared with the plant's own, so that what a target cannot
 //! express is named with the error that remains.
 
