@@ -49,12 +49,12 @@ use std::path::PathBuf;
 /// 3
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
-#[pyo3(signature = (path, *, map = None, topics = Vec::new()))]
+#[pyo3(signature = (path, *, map = None, topics = None))]
 pub(crate) fn read_log(
     py: Python<'_>,
     path: PathBuf,
     map: Option<PathBuf>,
-    topics: Vec<String>,
+    topics: Option<Vec<String>>,
 ) -> PyResult<FlightLog> {
     let log = py.detach(|| {
         if let Some(map) = map {
@@ -67,7 +67,8 @@ pub(crate) fn read_log(
             Some(own) => return own.map_err(|e| error::log(&e)),
         }
         if is_bag(&path).map_err(|e| error::import(&e))? {
-            let (map, _) = map_of_bag(&path, &topics).map_err(|e| error::import(&e))?;
+            let (map, _) =
+                map_of_bag(&path, &topics.unwrap_or_default()).map_err(|e| error::import(&e))?;
             return foreign(import(&map, &[path]));
         }
         foreign(import_without_map(&path, &|_, _| {}))

@@ -1268,7 +1268,7 @@ def program(arguments: typing.Sequence[builtins.str]) -> builtins.int:
         Exit code: 0 done, 1 failed, 2 wrong usage.
     """
 
-def read_log(path: builtins.str | os.PathLike | pathlib.Path, *, map: typing.Optional[builtins.str | os.PathLike | pathlib.Path] = None, topics: typing.Sequence[builtins.str] = []) -> FlightLog:
+def read_log(path: builtins.str | os.PathLike | pathlib.Path, *, map: typing.Optional[builtins.str | os.PathLike | pathlib.Path] = None, topics: typing.Optional[typing.Sequence[builtins.str]] = None) -> FlightLog:
     r"""
     Read a log, whoever wrote it.
     
