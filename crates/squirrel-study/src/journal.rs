@@ -256,8 +256,9 @@ impl<'a> Journal<'a> {
         };
         let mine = self.keep.mine(trials);
         // Looked for in order, before the threads: the error names the first on any number of them.
-        let missing = mine.iter().find(|trial| !self.done.contains_key(trial));
-        if let (Part::Merged, Some(trial)) = (self.keep.part, missing) {
+        if self.keep.part == Part::Merged
+            && let Some(trial) = mine.iter().find(|trial| !self.done.contains_key(trial))
+        {
             let problem = format!("flight = {trial}: missing, in none of the merged folders");
             return Err(self.at(&problem));
         }

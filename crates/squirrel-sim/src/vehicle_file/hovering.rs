@@ -2,6 +2,7 @@
 //! in the plant. Sensors tell the truth, the air is still, wings are folded.
 
 use super::VehicleFile;
+use super::margins::STEP_S;
 use crate::plant::{Plant, PlantState};
 use serde::Serialize;
 use squirrel_core::control::AttitudeThrust;
@@ -14,11 +15,10 @@ use squirrel_core::math::GRAVITY_M_S2;
 use squirrel_core::nalgebra::{UnitQuaternion, Vector3};
 use squirrel_core::policy::PilotCommand;
 use squirrel_core::stack::{Imu, SensorFrame, Stack, StackParameters, StackState};
+use squirrel_core::vehicle::Vehicle;
 
 /// Steps of the plant in one of the flight code's.
 const PLANT_STEPS: usize = 10;
-/// Step of the flight code, s, and of the plant.
-const STEP_S: f64 = 1.0 / 300.0;
 /// Step of the attitude command by which an answer is measured, rad.
 const COMMAND_RAD: f64 = 0.1;
 /// For how long the answer is watched, s.
@@ -46,6 +46,16 @@ pub struct StepAnswer {
     pub settling_s: f64,
 }
 
+/// At rest in the air, rotors sharing the weight.
+pub(super) fn hovering_body(vehicle: &Vehicle<f64>) -> State<f64> {
+    let mut body = State::at_rest();
+    let rotors = vehicle.rotors().len();
+    let rotor_n = vehicle.weight_n() / rotors as f64;
+    let speed = (rotor_n / vehicle.parameters().propulsion.thrust_coefficient_n_s2).sqrt();
+    body.rotor_speed_rad_s[..rotors].fill(speed);
+    body
+}
+
 impl Hovering {
     /// At rest in the air, rotors at the speed of hover.
     ///
@@ -63,12 +73,7 @@ impl Hovering {
             None,
             STEP_S / PLANT_STEPS as f64,
         )?;
-        let mut body = State::at_rest();
-        let rotors = vehicle.rotors().len();
-        let rotor_n = vehicle.weight_n() / rotors as f64;
-        let speed = (rotor_n / vehicle.parameters().propulsion.thrust_coefficient_n_s2).sqrt();
-        body.rotor_speed_rad_s[..rotors].fill(speed);
-        let state = plant.initial_state(body, 1.0);
+        let state = plant.initial_state(hovering_body(&vehicle), 1.0);
         let parameters = StackParameters { navigation: Navigation::external(), ..control };
         let here = Mission::Hover { position: In::zero() };
         let narrow = vehicle.cast().map_err(|e| e.to_string())?;

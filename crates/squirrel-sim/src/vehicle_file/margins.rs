@@ -17,7 +17,7 @@ use squirrel_core::control::backstepping::AttitudeForm;
 use squirrel_core::nalgebra::Complex;
 
 /// Step of the flight code's inner loop, s.
-const STEP_S: f64 = 1.0 / 300.0;
+pub(super) const STEP_S: f64 = 1.0 / 300.0;
 /// Phase margin that a loop shall have, with the rotors' lag as stated and twice as long, rad.
 pub const PHASE_MARGIN_RAD: [f64; 2] = [45.0 * DEG, 30.0 * DEG];
 /// Largest sensitivity peak that a loop shall have with the lag as stated.

@@ -3,6 +3,7 @@
 //! Forces are the plant's own, with the effects of the file, in still air.
 
 use super::VehicleFile;
+use super::hovering::hovering_body;
 use crate::plant::{MembraneState, Plant, PlantState, WingPlant};
 use serde::Serialize;
 use squirrel_core::aero::{Air, induced};
@@ -57,10 +58,7 @@ impl VehicleFile {
         let authority = |axis: usize| {
             vehicle.rotors().iter().map(|r| r.position.vector[axis].abs()).sum::<f64>() * to_spare_n
         };
-        let mut body = State::at_rest();
-        let speed = (hover_n / p.propulsion.thrust_coefficient_n_s2).sqrt();
-        body.rotor_speed_rad_s[..vehicle.rotors().len()].fill(speed);
-        let hovering = plant.initial_state(body, 1.0);
+        let hovering = plant.initial_state(hovering_body(&vehicle), 1.0);
         let force = |state: &PlantState| plant.wrench(state, In::zero()).force.vector;
         let mut moving = hovering;
         moving.body.velocity = In::new(Vector3::new(SPEED_M_S, 0.0, 0.0));

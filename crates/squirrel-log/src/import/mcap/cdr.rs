@@ -9,10 +9,10 @@ use std::rc::Rc;
 
 use super::cdr_walk::{Pick, steps, walk};
 use super::ros_schema::{Struct, Type};
-use super::{LOG_TIME, PUBLISH_TIME, Topic};
+use super::{Topic, cell, own_times};
 use crate::import::error::ImportError;
 use crate::import::meter::Meter;
-use crate::import::table::{Table, TableFile, checked, places};
+use crate::import::table::{Table, TableFile, places};
 
 /// Elements of an array or a sequence that are columns: images and point clouds are none.
 const ELEMENTS_MAX: usize = 1024;
@@ -64,11 +64,9 @@ impl<'a> CdrFile<'a> {
         }
         let mut columns = Vec::new();
         list(&message, &lengths, "", &mut columns);
-        for clock in [LOG_TIME, PUBLISH_TIME] {
-            if !columns.iter().any(|column| column == clock) {
-                columns.push(clock.to_owned());
-            }
-        }
+        let clocks: Vec<_> =
+            own_times(|clock| columns.iter().any(|column| column == clock)).collect();
+        columns.extend(clocks.into_iter().map(str::to_owned));
         Ok(Self { name, topic, message, columns, share, meter })
     }
 }
@@ -104,13 +102,7 @@ impl TableFile for CdrFile<'_> {
                 }
             })?;
             for (slot, &number) in row.iter().enumerate().filter(|(slot, _)| !clocks[*slot]) {
-                values[slot].push(checked(number).map_err(|problem| ImportError::Cell {
-                    file: self.name.clone(),
-                    column: wanted[slot].to_owned(),
-                    row: index as u64 + 1,
-                    value: number.to_string(),
-                    problem,
-                })?);
+                values[slot].push(cell(&self.name, wanted[slot], index, number)?);
             }
             self.meter.add(self.share);
         }

@@ -11,7 +11,7 @@ use std::rc::Rc;
 
 use serde_json::Value;
 
-use super::{LOG_TIME, PUBLISH_TIME, Topic};
+use super::{Topic, own_times};
 use crate::import::error::ImportError;
 use crate::import::meter::Meter;
 use crate::import::table::{Table, TableFile, checked, parsed, places};
@@ -52,8 +52,7 @@ impl<'a> JsonFile<'a> {
             })?;
             meter.add(share);
         }
-        let clocks: Vec<_> =
-            [LOG_TIME, PUBLISH_TIME].into_iter().filter(|&clock| !paths.contains(clock)).collect();
+        let clocks: Vec<_> = own_times(|clock| paths.contains(clock)).collect();
         let columns =
             paths.into_iter().chain(clocks.iter().map(|&clock| clock.to_owned())).collect();
         Ok(Self { name, columns, topic, clocks, share, meter })

@@ -25,7 +25,7 @@ use super::format;
 use super::map::ImportMap;
 use super::meter::Meter;
 use super::names::nearest;
-use super::table::TableFile;
+use super::table::{TableFile, checked};
 use crate::envelope::{self, lengths_fit};
 use cdr::CdrFile;
 use json::JsonFile;
@@ -106,6 +106,25 @@ impl Topic {
             _ => None,
         }
     }
+}
+
+/// MCAP's own times, but for those that a field hides.
+fn own_times(is_field: impl Fn(&str) -> bool) -> impl Iterator<Item = &'static str> {
+    [LOG_TIME, PUBLISH_TIME].into_iter().filter(move |clock| !is_field(clock))
+}
+
+/// A number of a message as a cell of a table.
+///
+/// # Errors
+/// [`ImportError::Cell`]: a number that no log has.
+fn cell(file: &str, column: &str, index: usize, number: f64) -> Result<f64, ImportError> {
+    checked(number).map_err(|problem| ImportError::Cell {
+        file: file.to_owned(),
+        column: column.to_owned(),
+        row: index as u64 + 1,
+        value: number.to_string(),
+        problem,
+    })
 }
 
 impl Logs {
@@ -236,7 +255,9 @@ impl Reading<'_> {
             error => format!("damaged or cut off: {error}"),
         };
         let too_long = || "damaged: a length in a record is larger than the record".to_owned();
-        if !envelope::frames(bytes).all(|frame| lengths_fit(frame.opcode, frame.body())) {
+        // The reader takes chunks apart itself; what it hands out is looked at below.
+        let mut chunks = envelope::frames(bytes).filter(|frame| frame.opcode == op::CHUNK);
+        if !chunks.all(|chunk| lengths_fit(op::CHUNK, chunk.body())) {
             return Err(too_long());
         }
         let options = LinearReaderOptions::default()

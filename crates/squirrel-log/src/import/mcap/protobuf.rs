@@ -14,10 +14,10 @@ use prost::encoding::{DecodeContext, WireType, decode_key, decode_varint, skip_f
 use prost_types::FileDescriptorSet;
 use prost_types::field_descriptor_proto::{Label, Type};
 
-use super::{LOG_TIME, PUBLISH_TIME, Topic};
+use super::{Topic, cell, own_times};
 use crate::import::error::ImportError;
 use crate::import::meter::Meter;
-use crate::import::table::{Table, TableFile, checked, places};
+use crate::import::table::{Table, TableFile, places};
 
 /// Deeper nesting than any message has; bounds the recursion.
 const DEPTH_MAX: usize = 32;
@@ -70,8 +70,7 @@ impl<'a> ProtobufFile<'a> {
                 .map_err(|problem| damaged(format!("message {} {problem}", index + 1)))?;
             meter.add(share);
         }
-        let clocks: Vec<_> =
-            [LOG_TIME, PUBLISH_TIME].into_iter().filter(|&clock| !paths.contains(clock)).collect();
+        let clocks: Vec<_> = own_times(|clock| paths.contains(clock)).collect();
         let columns =
             paths.into_iter().chain(clocks.iter().map(|&clock| clock.to_owned())).collect();
         Ok(Self { name, columns, topic, messages, clocks, share, meter })
@@ -105,13 +104,7 @@ impl TableFile for ProtobufFile<'_> {
                 },
             )?;
             for ((values, &number), column) in values.iter_mut().zip(&row).zip(wanted) {
-                values.push(checked(number).map_err(|problem| ImportError::Cell {
-                    file: self.name.clone(),
-                    column: (*column).to_owned(),
-                    row: index as u64 + 1,
-                    value: number.to_string(),
-                    problem,
-                })?);
+                values.push(cell(&self.name, column, index, number)?);
             }
             self.meter.add(self.share);
         }
