@@ -14,7 +14,7 @@
 use super::VehicleFile;
 use serde::Serialize;
 use squirrel_core::control::backstepping::AttitudeForm;
-use squirrel_core::nalgebra::Complex;
+use squirrel_core::nalgebra::{Complex, ComplexField};
 
 /// Step of the flight code's inner loop, s.
 pub(super) const STEP_S: f64 = 1.0 / 300.0;
@@ -70,8 +70,14 @@ impl AxisLoop {
     pub fn open_loop(&self, omega_rad_s: f64) -> Complex<f64> {
         let s = Complex::new(0.0, omega_rad_s);
         let [k_p, k_i, k_d] = self.gains;
-        (s * k_d + k_p + Complex::from(k_i) / s) / (s * s) * (s * -self.delay_s).exp()
-            / (s * self.lag_s + 1.0)
+        // As functions: `Complex` has methods of these names only where `std` is built in.
+        let late = ComplexField::exp(s * -self.delay_s) / (s * self.lag_s + 1.0);
+        (s * k_d + k_p + Complex::from(k_i) / s) / (s * s) * late
+    }
+
+    /// `|L(j w)|`.
+    fn gain(&self, omega_rad_s: f64) -> f64 {
+        self.open_loop(omega_rad_s).modulus()
     }
 
     /// Phase of `L` less `-180 deg`, not wrapped, rad.
@@ -86,24 +92,24 @@ impl AxisLoop {
     pub fn margins(&self) -> Margins {
         // The gain falls beyond the highest crossover, for good.
         let (mut low, mut high) = (SWEEP.0, SWEEP.1);
-        while self.open_loop(high).norm() > 1.0 {
+        while self.gain(high) > 1.0 {
             (low, high) = (high, 2.0 * high);
         }
         let ratio = (high / low).powf(1.0 / SWEEP.2 as f64);
         let mut at = high;
-        while at > low && self.open_loop(at / ratio).norm() < 1.0 {
+        while at > low && self.gain(at / ratio) < 1.0 {
             at /= ratio;
         }
         let [mut below, mut above] = [at / ratio, at];
         for _ in 0..60 {
             let middle = 0.5 * (below + above);
-            let is_below = self.open_loop(middle).norm() > 1.0;
+            let is_below = self.gain(middle) > 1.0;
             *(if is_below { &mut below } else { &mut above }) = middle;
         }
         let phase_margin_rad = self.phase_above_rad(above);
         let sweep = (0..SWEEP.2).map(|k| {
             let omega = SWEEP.0 * (SWEEP.1 / SWEEP.0).powf(k as f64 / (SWEEP.2 - 1) as f64);
-            1.0 / (self.open_loop(omega) + 1.0).norm()
+            1.0 / (self.open_loop(omega) + 1.0).modulus()
         });
         Margins {
             crossover_rad_s: above,
