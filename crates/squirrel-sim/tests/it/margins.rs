@@ -3,7 +3,8 @@
 //! ratio of what the flight code asks for to what the rotors get.
 
 use squirrel_core::nalgebra::{Complex, Vector3};
-use squirrel_sim::vehicle_file::{Hovering, VehicleFile, margins::AxisLoop};
+use squirrel_sim::vehicle_file::margins::{AxisLoop, PHASE_MARGIN_RAD, SENSITIVITY_PEAK};
+use squirrel_sim::vehicle_file::{Hovering, VehicleFile};
 
 const STEP_S: f64 = 1.0 / 300.0;
 
@@ -74,4 +75,18 @@ fn a_vehicle_oscillates_beyond_its_margin_of_delay() {
     // A lag of this size takes more phase than there is.
     assert!(with_lag(0.3).margins().unwrap()[0].nominal.phase_margin_rad < 0.0);
     assert!(settles_s(0.3) > 2.9);
+}
+
+/// What the rule of gains asks for, in the vehicle that is shipped.
+#[test]
+fn the_shipped_squirrel_has_the_margins_that_the_rule_asks_for() {
+    for axis in VehicleFile::squirrel().margins().unwrap() {
+        let (now, late) = (axis.nominal, axis.twice_the_lag);
+        assert!(
+            now.phase_margin_rad >= PHASE_MARGIN_RAD[0]
+                && late.phase_margin_rad >= PHASE_MARGIN_RAD[1]
+                && now.sensitivity_peak <= SENSITIVITY_PEAK,
+            "{axis:?}"
+        );
+    }
 }

@@ -64,7 +64,7 @@ fn by_rule(airframe: &Airframe) -> Gains {
         c1_per_s: of(0),
         c2_per_s: of(1),
         lambda_per_s2: of(2),
-        filter_frequency_rad_s: 20.0 * quick,
+        filter_frequency_rad_s: 14.0 * quick,
         position_per_s: outer([1.6, 1.6, 0.8]),
         velocity_per_s: outer([2.5, 2.5, 1.6]),
         acceleration_horizontal_m_s2: 0.9 * g * airframe.tilt_max_rad.tan(),
