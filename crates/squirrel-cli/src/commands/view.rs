@@ -202,20 +202,16 @@ fn body(file: &VehicleFile) -> Body {
     }
 }
 
-/// Thrust of all rotors at each logged speed, in air at rest.
+/// Thrust of each rotor at each logged speed, in air at rest.
 fn thrust(log: &FlightLog, file: &VehicleFile) -> Option<Vec<f64>> {
-    let (times, speeds) = log.channel("rotor.speed_rad_s")?;
+    let (_, speeds) = log.channel("rotor.speed_rad_s")?;
     if speeds.width != file.vehicle.rotors().len() {
         return None;
     }
-    let none = [0.0; MAX_ROTORS];
-    let thrust = [file.vehicle.parameters().propulsion.thrust_coefficient_n_s2; MAX_ROTORS];
-    let at = |i: usize| {
-        let mut speed = none;
-        speed[..speeds.width].copy_from_slice(speeds.row(i));
-        thrust_and_moment([&thrust, &none, &none, &none], &speed).0
-    };
-    Some((0..times.len()).map(at).collect())
+    let per_square = [file.vehicle.parameters().propulsion.thrust_coefficient_n_s2];
+    let none = [0.0];
+    let of = |speed: &f64| thrust_and_moment([&per_square, &none, &none, &none], &[*speed]).0;
+    Some(speeds.values.iter().map(of).collect())
 }
 
 /// Obstacles that the log knows.

@@ -156,8 +156,8 @@ pub(super) const ARROWS: [(&str, &str); 5] = [
 
 /// The pieces of a vehicle and of what goes with it: arrows, shadow, the mark of its reference.
 ///
-/// * `arrows` - names of those that the flight has
-pub(super) fn pieces(body: &Body, arrows: &[&str], reference: bool) -> Vec<Piece> {
+/// * `arrows` - names of those that the flight has, and how many there are of each
+pub(super) fn pieces(body: &Body, arrows: &[(&str, usize)], reference: bool) -> Vec<Piece> {
     let r = body.reach_m();
     let half_height = (0.5 * body.height_m).max(0.05 * r);
     let frame = ("frame", 1.0);
@@ -198,9 +198,11 @@ pub(super) fn pieces(body: &Body, arrows: &[&str], reference: bool) -> Vec<Piece
     if reference {
         all.push(piece("ball", "reference", ("ink", 0.75), [0.11 * r; 3], [0.0; 3]));
     }
-    for (name, ink) in ARROWS.iter().filter(|(name, _)| arrows.contains(name)) {
-        all.push(piece("shaft", &format!("{name}.shaft"), (ink, 1.0), [1.0; 3], [0.0; 3]));
-        all.push(piece("head", &format!("{name}.head"), (ink, 1.0), [1.0; 3], [0.0; 3]));
+    for (name, ink) in ARROWS {
+        let count = arrows.iter().find(|(own, _)| *own == name).map_or(0, |(_, count)| *count);
+        for (k, part) in (0..count).flat_map(|k| [(k, "shaft"), (k, "head")]) {
+            all.push(piece(part, &format!("{name}.{part}.{k}"), (ink, 1.0), [1.0; 3], [0.0; 3]));
+        }
     }
     all
 }

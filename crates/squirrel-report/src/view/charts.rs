@@ -47,7 +47,7 @@ fn plots() -> [Plot; 5] {
         Plot {
             title: "Thrust",
             axis: from(Axis::new("thrust", "N"), 0.0, 0.1),
-            curves: &[("thrust", |t| t[0], false)],
+            curves: &[("thrust", |t| t.iter().sum(), false)],
         },
     ]
 }

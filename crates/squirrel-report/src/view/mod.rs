@@ -34,7 +34,8 @@ pub struct ViewFlight<'a> {
     pub log: &'a FlightLog,
     /// How its vehicle looks.
     pub body: Body,
-    /// Thrust of all rotors at each sample of `rotor.speed_rad_s`, N, where it is known.
+    /// Thrust of each rotor at each sample of `rotor.speed_rad_s`, N, sample after sample, where it
+    /// is known.
     pub thrust_n: Option<Vec<f64>>,
     /// North m, east m, radius m of upright cylinders.
     pub obstacles: Vec<[f64; 3]>,
@@ -79,9 +80,7 @@ fn stage(scene: &Scene) -> String {
     let mut names = String::new();
     for (i, flight) in scene.flights.iter().enumerate() {
         let (class, name) = (Ink::Series(i).class(), escape(&flight.name));
-        names += &format!(
-            "<p class=\"name\"><i class=\"swatch {class}\"></i>{name}<output></output></p>"
-        );
+        names += &format!("<p class=\"name\"><i class=\"swatch {class}\"></i>{name}</p>");
     }
     format!(
         "<div class=\"stage\">\n<canvas tabindex=\"0\" role=\"img\" aria-label=\"The flight in three dimensions; \
@@ -117,10 +116,11 @@ fn controls(scene: &Scene) -> String {
     html += "<div class=\"wide\"><table id=\"readings\"></table></div>\n";
     html += &format!(
         "<p class=\"say\"><span id=\"count\">{} triangles in {} draw calls a frame with everything shown</span>. \
-         A square of the ground is {} m. 1 N is {:.1} cm of an arrow, 1 m/s {:.1} cm. Rotors turn at a fiftieth of their speed.{}</p>\n",
+         {} 1 N is {:.1} cm of an arrow, 1 m/s {:.1} cm. Rotors turn at a fiftieth of their speed.{}\
+         <span id=\"larger\"></span></p>\n",
         scene.triangles,
         scene.draw_calls,
-        scene.cell_m,
+        ground_words(scene),
         100.0 * scene.arrow_m_per_n,
         100.0 * scene.arrow_s,
         wing_words(scene),
@@ -128,12 +128,22 @@ fn controls(scene: &Scene) -> String {
     html
 }
 
+/// What the squares below the flight are.
+fn ground_words(scene: &Scene) -> String {
+    let cell = scene.cell_m;
+    if scene.ground_m < 0.0 {
+        let height = -scene.ground_m;
+        return format!("The squares are {cell} m wide, on a level plane {height} m high.");
+    }
+    format!("The squares of the ground are {cell} m wide.")
+}
+
 /// What a share of deployment is drawn as.
 fn wing_words(scene: &Scene) -> String {
     let wing = scene.flights.iter().find_map(|flight| flight.body.wing);
     wing.map_or_else(String::new, |wing| {
         format!(
-            " A log has wings as a share: folded (0) to spread (1) is drawn as {:.0} deg of a crank.",
+            " Wings from folded (0 %) to spread (100 %) are drawn as {:.0} deg of a crank; of their force each shows half.",
             wing.stroke_deg
         )
     })
@@ -142,7 +152,7 @@ fn wing_words(scene: &Scene) -> String {
 /// A box for each arrow that a flight has.
 fn arrow_boxes(scene: &Scene) -> String {
     let has = |name: &str| {
-        let on = format!("{name}.shaft");
+        let on = format!("{name}.shaft.0");
         scene.flights.iter().any(|flight| flight.pieces.iter().any(|piece| piece.on == on))
     };
     let shown = body::ARROWS.iter().filter(|(name, _)| has(name));

@@ -15,6 +15,8 @@ const RATES_HZ: [f64; 6] = [50.0, 25.0, 10.0, 5.0, 2.0, 1.0];
 const INSTANTS: f64 = 12_000.0;
 /// Obstacles further from the path are not drawn, m.
 const NEAR_M: f64 = 15.0;
+/// Flights that are never lower have a level plane in place of the ground, m.
+const HIGH_M: f64 = 4.0;
 /// Triangles and draw calls of the ground.
 const GROUND: [usize; 2] = [2, 1];
 
@@ -48,7 +50,7 @@ pub struct Scene {
     pub range_s: [f64; 2],
     /// Whether flights that shared no time were moved to begin together.
     pub moved: bool,
-    /// Where the ground is, m down.
+    /// Where the ground is, or a level plane below a flight high above it, m down.
     pub ground_m: f64,
     /// Width of a square of the ground, m.
     pub cell_m: f64,
@@ -97,11 +99,13 @@ fn span(flight: &ViewFlight<'_>) -> Result<[f64; 2], String> {
     if begin.is_finite() && end.is_finite() && end - begin < 1e7 {
         return Ok([begin, end]);
     }
-    Err(format!(
-        "has no attitude ({}) and no position ({})",
-        ATTITUDE.join(", "),
-        POSITION.join(", ")
-    ))
+    Err(nothing())
+}
+
+/// Why a flight cannot be shown.
+fn nothing() -> String {
+    let [attitude, position] = [ATTITUDE, POSITION].map(|names| names.join(", "));
+    format!("has no attitude ({attitude}) and no position ({position})")
 }
 
 /// The scene of one or more flights.
@@ -120,7 +124,11 @@ pub fn scene(flights: &[ViewFlight<'_>]) -> Result<Scene, (usize, String)> {
     for (flight, [begin, end]) in flights.iter().zip(&spans) {
         let count = ((end - begin) * rate_hz + 1e-6).floor() as usize + 1;
         let clock = Clock { begin_s: *begin, rate_hz, count };
-        seen.push(see(flight, clock, if apart { *begin } else { 0.0 }));
+        let one = see(flight, clock, if apart { *begin } else { 0.0 });
+        if !["position", "attitude"].iter().any(|name| one.tracks.contains_key(name)) {
+            return Err((seen.len(), nothing()));
+        }
+        seen.push(one);
     }
     let shifted = || spans.iter().zip(&seen).map(|(span, f)| span.map(|t| t - f.shift_s));
     let range_s = [
@@ -135,7 +143,7 @@ pub fn scene(flights: &[ViewFlight<'_>]) -> Result<Scene, (usize, String)> {
         ground_m: ground_m(&seen, reach_m),
         cell_m: if reach_m >= 0.08 { 1.0 } else { 0.1 },
         reach_m,
-        arrow_m_per_n: if weight_n > 0.0 { 2.0 * reach_m / weight_n } else { 0.05 },
+        arrow_m_per_n: if weight_n > 0.0 { 2.6 * reach_m / weight_n } else { 0.05 },
         arrow_s: 0.25 * reach_m,
         triangles: 0,
         draw_calls: 0,
@@ -147,14 +155,20 @@ pub fn scene(flights: &[ViewFlight<'_>]) -> Result<Scene, (usize, String)> {
     Ok(scene)
 }
 
-/// The ground is where heights begin, or below the lowest point.
+/// The ground is where heights begin, or below the lowest point. Of a flight high above it a level
+/// plane is shown instead, a whole number of metres up: without one nothing moves past.
 fn ground_m(flights: &[SceneFlight], reach_m: f64) -> f64 {
     let lowest = |f: &SceneFlight| {
         let rows = f.tracks.get("position").map(Track::rows)?;
         rows.iter().map(|p| p[2]).filter(|z| !z.is_nan()).reduce(f64::max)
     };
     let lowest = flights.iter().filter_map(lowest).reduce(f64::max);
-    lowest.map_or(4.0 * reach_m, |z| if z > 0.0 { z + reach_m } else { 0.0 })
+    let below = |z: f64| z + 2.0 * reach_m;
+    lowest.map_or(4.0 * reach_m, |z| match z {
+        z if z > 0.0 => below(z),
+        z if z > -HIGH_M => 0.0,
+        z => below(z).ceil(),
+    })
 }
 
 /// Reads what a scene has of one log.
@@ -180,20 +194,15 @@ fn see(flight: &ViewFlight<'_>, clock: Clock, shift_s: f64) -> SceneFlight {
     }
     add("rotor_speed", &["rotor.speed_rad_s"], Some(flight.body.rotors.len()), 1.0, line);
     add("wind", &["truth.wind_ned_m_s"], three, 1e-2, line);
-    let kind = Kind { width: Some(1), step: 1e-3, between: line };
-    let thrust = flight.thrust_n.as_ref().zip(log.channel("rotor.speed_rad_s"));
-    let thrust = thrust.filter(|(thrust, (times, _))| thrust.len() == times.len());
-    let thrust = thrust.and_then(|(thrust, (times, _))| {
-        Track::from_rows("rotor.speed_rad_s", times, |i| vec![thrust[i]], 1, (kind, clock))
-    });
-    let thrust = thrust.or_else(|| Track::of(log, "control.inner.thrust_n", kind, clock));
-    tracks.extend(thrust.map(|track| ("thrust", track)));
-
-    let has = |name: &str| match name {
-        "weight" => flight.body.weight_n.is_some(),
-        name => tracks.contains_key(name),
+    tracks.extend(thrust(flight, clock).map(|track| ("thrust", track)));
+    let count = |name: &str| match name {
+        "weight" => usize::from(flight.body.weight_n.is_some()),
+        "thrust" => tracks.get(name).map_or(0, |track| track.width),
+        // One on each wing.
+        "wing_force" => 2 * usize::from(tracks.contains_key(name)),
+        name => usize::from(tracks.contains_key(name)),
     };
-    let arrows: Vec<&str> = ARROWS.iter().map(|(name, _)| *name).filter(|name| has(name)).collect();
+    let arrows = ARROWS.map(|(name, _)| (name, count(name)));
     SceneFlight {
         name: flight.name.clone(),
         clock,
@@ -207,6 +216,22 @@ fn see(flight: &ViewFlight<'_>, clock: Clock, shift_s: f64) -> SceneFlight {
     }
 }
 
+/// Thrust of each rotor by its speed, else as the mixer meant it, else of all together.
+fn thrust(flight: &ViewFlight<'_>, clock: Clock) -> Option<Track> {
+    let (log, rotors) = (flight.log, flight.body.rotors.len());
+    let kind = |width| Kind { width: Some(width), step: 1e-3, between: Between::Line };
+    let from = "rotor.speed_rad_s";
+    let known = flight.thrust_n.as_ref().zip(log.channel(from));
+    let known = known.filter(|(thrust, (times, _))| thrust.len() == times.len() * rotors);
+    let known = known.and_then(|(thrust, (times, _))| {
+        let row = |i: usize| thrust[i * rotors..(i + 1) * rotors].to_vec();
+        Track::from_rows(from, times, row, rotors, (kind(rotors), clock))
+    });
+    known
+        .or_else(|| Track::of(log, "control.inner.rotor_thrust_n", kind(rotors), clock))
+        .or_else(|| Track::of(log, "control.inner.thrust_n", kind(1), clock))
+}
+
 /// What a log lacks, and what the scene shows instead.
 fn lacks(flight: &ViewFlight<'_>, tracks: &BTreeMap<&'static str, Track>) -> Vec<String> {
     let wing = flight.body.wing.is_some();
@@ -215,11 +240,7 @@ fn lacks(flight: &ViewFlight<'_>, tracks: &BTreeMap<&'static str, Track>) -> Vec
         ("attitude", true, "no attitude: the vehicle is drawn level"),
         ("deployment", wing, "no wing.deployment and no wing.command: wings are drawn folded"),
         ("rotor_speed", true, "no rotor.speed_rad_s: rotors stand still"),
-        (
-            "thrust",
-            true,
-            "neither rotor.speed_rad_s nor control.inner.thrust_n: no arrow of thrust",
-        ),
+        ("thrust", true, "neither rotor.speed_rad_s nor control.inner: no arrows of thrust"),
         ("wing_force", wing, "no truth.wing_force_body_n: no arrow of the wings' force"),
         ("wind", true, "no truth.wind_ned_m_s: no arrow of wind"),
     ];

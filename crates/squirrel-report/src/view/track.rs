@@ -83,11 +83,16 @@ impl Track {
         width: usize,
         (kind, clock): (Kind, Clock),
     ) -> Option<Self> {
+        // A source that has channels of several rates has NaN where one has no sample.
+        let sound: Vec<usize> =
+            (0..times.len()).filter(|i| row(*i).iter().all(|x| x.is_finite())).collect();
+        let times: Vec<f64> = sound.iter().map(|i| times[*i]).collect();
+        let row = |i: usize| row(sound[i]);
         let mut last = vec![0_i64; width];
         let mut deltas = Vec::with_capacity(clock.count * width);
         let mut some = false;
         for k in 0..clock.count {
-            let sample = at(times, &row, clock.time_s(k), clock.rate_hz, kind.between);
+            let sample = at(&times, row, clock.time_s(k), clock.rate_hz, kind.between);
             let counts = sample.and_then(|numbers| {
                 let counts = numbers.iter().map(|x| (x / kind.step).round());
                 counts
@@ -124,7 +129,7 @@ impl Track {
     }
 }
 
-/// What a channel says at an instant.
+/// What a channel of which every row is finite says at an instant.
 fn at(
     times: &[f64],
     row: impl Fn(usize) -> Vec<f64>,
@@ -132,33 +137,28 @@ fn at(
     rate_hz: f64,
     between: Between,
 ) -> Option<Vec<f64>> {
-    let sound = |row: Vec<f64>| row.iter().all(|x| x.is_finite()).then_some(row);
     // The clock's own arithmetic is off by less.
     let slack = 1e-6 + 1e-12 * time_s.abs();
     let after = times.partition_point(|t| *t <= time_s + slack);
     if after == 0 {
         let near = times.first().is_some_and(|t| t - time_s <= 1.0 / rate_hz);
-        return if near { turned(sound(row(0))?, between) } else { None };
+        return if near { turned(row(0), between) } else { None };
     }
     let (i, begin) = (after - 1, times[after - 1]);
     let since = (time_s - begin).max(0.0);
     let Some(end) = times.get(after).filter(|_| since > slack) else {
         // The last sample, or one that has the time.
-        return if since <= GAP_S.max(1.0 / rate_hz) {
-            turned(sound(row(i))?, between)
-        } else {
-            None
-        };
+        return if since <= GAP_S.max(1.0 / rate_hz) { turned(row(i), between) } else { None };
     };
     let gap = end - begin;
     if between == Between::Hold {
         // Commands stay until there is another.
-        return sound(row(i));
+        return Some(row(i));
     }
     if gap > GAP_S {
         return None;
     }
-    let (from, mut to) = (sound(row(i))?, sound(row(after))?);
+    let (from, mut to) = (row(i), row(after));
     if between == Between::Turn && from.iter().zip(&to).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
         to.iter_mut().for_each(|x| *x = -*x);
     }
@@ -202,13 +202,22 @@ mod tests {
 
     #[test]
     fn commands_stay_and_gaps_stay_gaps() {
-        let rows: [&[f64]; 3] = [&[0.0], &[1.0], &[f64::NAN]];
-        let held = track(&[0.0, 2.0, 2.55], &rows, 0.1, Between::Hold).unwrap().rows();
-        assert_eq!([held[19][0], held[20][0], held[25][0]], [0.0, 1.0, 1.0]);
-        assert!(held[26][0].is_nan());
-        let line = track(&[0.0, 2.0, 2.55], &rows, 0.1, Between::Line).unwrap().rows();
+        let rows: [&[f64]; 3] = [&[0.0], &[1.0], &[2.0]];
+        let held = track(&[0.0, 2.0, 2.5], &rows, 0.1, Between::Hold).unwrap().rows();
+        assert_eq!([held[19][0], held[20][0], held[24][0]], [0.0, 1.0, 1.0]);
+        let line = track(&[0.0, 2.0, 2.5], &rows, 0.1, Between::Line).unwrap().rows();
         let known: Vec<_> = (0..31).filter(|k| !line[*k][0].is_nan()).collect();
-        assert_eq!(known, [0, 20], "a gap of 2 s, and a line to a number that there is not");
+        assert_eq!(known[..2], [0, 20], "nothing is said of a gap of 2 s");
+        assert_eq!(known.len(), 12, "the last sample stays for a while");
+    }
+
+    /// Channels of several rates share an axis: one has NaN where another has its sample.
+    #[test]
+    fn samples_that_a_source_did_not_give_are_passed_over() {
+        let rows: [&[f64]; 4] = [&[1.0, 0.0], &[f64::NAN, 5.0], &[f64::NAN; 2], &[4.0, 0.0]];
+        let line = track(&[0.0, 0.1, 0.2, 0.3], &rows, 0.01, Between::Line).unwrap().rows();
+        assert!((line[1][0] - 2.0).abs() < 1e-9 && (line[2][0] - 3.0).abs() < 1e-9, "{line:?}");
+        assert_eq!(line[2][1], 0.0);
     }
 
     #[test]

@@ -71,49 +71,59 @@ for (const data of document.querySelectorAll("#scene")) {
     const inWorld = (v) => [0, 1, 2].map((r) => axes[0][r] * v[0] + axes[1][r] * v[1] + axes[2][r] * v[2]);
     const thrust = at(flight, "thrust", t);
     const force = at(flight, "wing_force", t);
-    const share = at(flight, "deployment", t);
+    const [share, wind, velocity] = ["deployment", "wind", "velocity"].map((name) => at(flight, name, t));
     const wing = flight.body.wing;
     return {
       place,
       axes,
       share,
-      thrust: thrust && thrust[0],
-      cranks: wing && (share || [0, 0]).map((d) => wing.folded_deg + wing.stroke_deg * d),
+      thrust: thrust && thrust.reduce((sum, x) => sum + x, 0),
+      cranks: wing && (share || [0, 0]).map((d) => wing.stroke_deg * d),
       turns: flight.turns && flight.body.rotors.map((_, k) => {
         const w = flight.body.rotors.length;
         const last = clamp((t + flight.shift_s - flight.clock.begin_s) * flight.clock.rate_hz, 0, flight.clock.count - 1);
         const [i, j] = [Math.floor(last), Math.min(Math.floor(last) + 1, flight.clock.count - 1)];
         return flight.turns[i * w + k] + (last - i) * (flight.turns[j * w + k] - flight.turns[i * w + k]);
       }),
-      velocity: at(flight, "velocity", t),
+      velocity,
       reference: at(flight, "reference", t),
       arrows: {
-        thrust: thrust && scaled(axes[2], -thrust[0] * scene.arrow_m_per_n),
-        wing_force: force && scaled(inWorld(force), scene.arrow_m_per_n),
-        weight: flight.body.weight_n && [0, 0, flight.body.weight_n * scene.arrow_m_per_n],
-        wind: at(flight, "wind", t) && scaled(at(flight, "wind", t), scene.arrow_s),
-        velocity: at(flight, "velocity", t) && scaled(at(flight, "velocity", t), scene.arrow_s),
+        thrust: thrust && thrust.map((x, k) => [scaled(axes[2], -x * scene.arrow_m_per_n),
+          inWorld(thrust.length > 1 ? flight.body.rotors[k].hub_body_m : [0, 0, 0])]),
+        // The log has one force of both wings: half of it on each.
+        wing_force: force && wing && [-1, 1].map((side, k) => {
+          const out = 0.5 * wing.span_m * Math.sin(((wing.folded_deg + wing.stroke_deg * (share ? share[k] : 0)) * Math.PI) / 180);
+          const [x, y, z] = wing.root_body_m;
+          return [scaled(inWorld(force), 0.5 * scene.arrow_m_per_n), inWorld([x, side * (y + out), z])];
+        }),
+        weight: flight.body.weight_n && [[[0, 0, flight.body.weight_n * scene.arrow_m_per_n], [0, 0, 0]]],
+        // Air flows past above the vehicle.
+        wind: wind && [[scaled(wind, scene.arrow_s), [0, 0, -1.7 * scene.reach_m]]],
+        velocity: velocity && [[scaled(velocity, scene.arrow_s), [0, 0, 0]]],
       },
     };
   };
-  /** The matrix of a frame at a state, or null where there is nothing to see. */
-  const frameOf = (flight, state, origin, on) => {
+  /** The matrix of a frame at a state, or null where there is nothing to see; vehicles may be drawn larger than they are. */
+  const frameOf = (flight, state, origin, on, larger) => {
     const here = state.place.map((x, k) => x - origin[k]);
-    const body = columns(...state.axes, here);
-    const [what, part] = on.split(".");
+    const body = columns(...state.axes.map((axis) => scaled(axis, larger)), here);
+    const [what, part, which] = on.split(".");
     const down = scene.ground_m - state.place[2];
     if (on === "world") return moved(origin.map((x) => -x));
     if (on === "body") return body;
-    if (on === "shadow") return moved([here[0], here[1], scene.ground_m - origin[2] - 0.002 * scene.reach_m]);
-    if (on === "drop") return down > 0 ? columns([1, 0, 0], [0, 1, 0], [0, 0, down], here) : null;
-    if (on === "reference") return state.reference && moved(state.reference.map((x, k) => x - origin[k]));
+    if (on === "shadow") {
+      const place = [here[0], here[1], scene.ground_m - origin[2] - 0.002 * scene.reach_m];
+      return columns([larger, 0, 0], [0, larger, 0], [0, 0, 1], place);
+    }
+    if (on === "drop") return down > 0 ? columns([larger, 0, 0], [0, larger, 0], [0, 0, down], here) : null;
+    if (on === "reference") return state.reference && columns([larger, 0, 0], [0, larger, 0], [0, 0, larger], state.reference.map((x, k) => x - origin[k]));
     if (what === "rotor") {
       const { hub_body_m: hub, spin } = flight.body.rotors[+part];
       return times(body, turned(0.6 + 1.3 * +part + (state.turns ? spin * state.turns[+part] : 0), hub));
     }
     if (what === "left" || what === "right") {
       const [wing, side] = [flight.body.wing, what === "right" ? 1 : -1];
-      const angle = (state.cranks[what === "right" ? 1 : 0] * Math.PI) / 180;
+      const angle = ((wing.folded_deg + state.cranks[what === "right" ? 1 : 0]) * Math.PI) / 180;
       const crank = [-Math.cos(angle), side * Math.sin(angle), 0];
       const [x, y, z] = wing.root_body_m;
       const root = (ahead) => [x + ahead * wing.chord_m, side * y, z];
@@ -121,15 +131,16 @@ for (const data of document.querySelectorAll("#scene")) {
       if (part === "edge") return times(body, moved(root(0).map((p, k) => p + wing.span_m * crank[k])));
       return times(body, columns(crank, [-crank[1], crank[0], 0], [0, 0, 1], root(part === "front" ? 0.5 : -0.5)));
     }
-    const arrow = state.arrows[what];
-    const length = arrow ? Math.hypot(...arrow) : 0;
-    if (!(length > 0.04 * scene.reach_m) || !shown.has(what)) return null;
+    const [arrow, start] = (state.arrows[what] || [])[+which] || [[0, 0, 0], [0, 0, 0]];
+    const length = larger * Math.hypot(...arrow);
+    const size = larger * scene.reach_m;
+    if (!(length > 0.04 * size) || !shown.has(what)) return null;
     const z = unit(arrow);
     const x = unit(cross(Math.abs(z[0]) < 0.7 ? [1, 0, 0] : [0, 1, 0], z));
     const y = cross(z, x);
-    const tip = Math.min(0.3 * scene.reach_m, 0.5 * length);
-    const wide = (part === "head" ? 0.35 * tip : 0.035 * scene.reach_m);
-    const from = part === "head" ? here.map((p, k) => p + z[k] * (length - tip)) : here;
+    const tip = Math.min(0.26 * size, 0.5 * length);
+    const wide = part === "head" ? 0.38 * tip : 0.035 * size;
+    const from = here.map((p, k) => p + larger * start[k] + (part === "head" ? z[k] * (length - tip) : 0));
     return columns(scaled(x, wide), scaled(y, wide), scaled(z, part === "head" ? tip : length - tip), from);
   };
 
@@ -142,7 +153,7 @@ for (const data of document.querySelectorAll("#scene")) {
       context.fillRect(0, 0, 1, 1);
       return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3).map((c) => c / 255);
     };
-    inks = Object.fromEntries(["s0", "s1", "s2", "s3", "s4", "s5", "muted", "ink", "block", "ground", "hull", "frame"].map((name) =>
+    inks = Object.fromEntries(["s0", "s1", "s2", "s3", "s4", "s5", "muted", "ink", "block", "hull", "frame"].map((name) =>
       [name, ink("--" + (name === "hull" || name === "frame" ? "view-" + name : name))]));
   };
 
@@ -179,7 +190,7 @@ for (const data of document.querySelectorAll("#scene")) {
     const course = scene.flights.map((flight) => at(flight, "velocity", begin + 0.3 * (end - begin))).find(Boolean);
     if (Number.isNaN(eye.azimuth)) eye.azimuth = (course && Math.hypot(course[0], course[1]) > 0.3 ? Math.atan2(course[1], course[0]) : 0) + 0.7;
     const span = Math.max(...box.map(([lo, hi]) => hi - lo), 4 * scene.reach_m);
-    eye.distance = kind === "follow" ? 8.5 * scene.reach_m : 1.35 * span;
+    eye.distance = kind === "follow" ? 6.5 * scene.reach_m : 1.2 * span;
     eye.elevation = kind === "above" ? 1.5 : kind === "whole" ? 0.6 : 0.42;
   };
 
@@ -191,7 +202,7 @@ for (const data of document.querySelectorAll("#scene")) {
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(1, Math.round(x * ratio)));
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
-    renderer.clear(inks.ground);
+    renderer.clear();
     const beside = scene.flights.length > 1 && layout.value === "beside";
     const views = beside ? scene.flights.map((_, i) => [i]) : [scene.flights.map((_, i) => i)];
     const part = Math.floor(width / views.length);
@@ -214,6 +225,9 @@ for (const data of document.querySelectorAll("#scene")) {
     const projected = (v, w) => [f / aspect * v[0], f * v[1], a * v[2] + (w ? b : 0), -v[2]];
     const seen = (v) => [dot(right, v), dot(up, v), -dot(forward, v)];
     const matrix = [[1, 0, 0], [0, 1, 0], [0, 0, 1]].flatMap((axis) => projected(seen(axis), false)).concat(projected(seen(scaled(from, -1)), true));
+    // From far away a vehicle is a dot: there it is drawn larger, and the page says so.
+    const larger = camera.value === "follow" ? 1 : Math.max(1, (0.028 * eye.distance) / scene.reach_m);
+    find("#larger").textContent = larger > 1 ? ` The vehicle is drawn ${larger.toFixed(0)} times as large as it is.` : "";
     const reach = 9 * eye.distance + 8 * scene.cell_m;
     const down = scene.ground_m - origin[2];
     const [n, e] = [0, 1].map((k) => origin[k] - Math.floor(origin[k] / (10 * scene.cell_m)) * 10 * scene.cell_m);
@@ -232,18 +246,26 @@ for (const data of document.querySelectorAll("#scene")) {
       const frames = {};
       for (const piece of flight.pieces) {
         const on = piece.on;
-        if (!(on in frames)) frames[on] = frameOf(flight, state, origin, on);
+        if (!(on in frames)) frames[on] = frameOf(flight, state, origin, on, larger);
         if (!frames[on]) continue;
         const m = times(frames[on], piece.at);
         const model = [m[0], m[4], m[8], 0, m[1], m[5], m[9], 0, m[2], m[6], m[10], 0, m[3], m[7], m[11], 1];
         const ink = inks[piece.ink === "own" ? "s" + i : piece.ink];
-        items.push({ mesh: piece.mesh, model, ink: [...ink, piece.alpha], lit: on === "shadow" || on === "drop" ? 0 : 1 });
+        const alpha = on === "world" && hides(m, from, state.place.map((x, k) => x - origin[k])) ? 0.14 : piece.alpha;
+        items.push({ mesh: piece.mesh, model, ink: [...ink, alpha], lit: on === "shadow" || on === "drop" ? 0 : 1 });
       }
     }
     // What hides goes first; of the rest the ground, which is below.
     const order = (item) => (item.ground ? 1 : item.ink[3] === 1 ? 0 : 2);
     items.sort((p, q) => order(p) - order(q));
     renderer.view(area, matrix, from, items);
+  };
+  /** Whether a trunk stands between the eye and a vehicle, or around one of them. */
+  const hides = (m, from, to) => {
+    const [radius, n, e] = [Math.hypot(m[0], m[4]), m[3], m[7]];
+    const [dn, de] = [to[0] - from[0], to[1] - from[1]];
+    const share = clamp(((n - from[0]) * dn + (e - from[1]) * de) / (dn * dn + de * de || 1), 0, 1);
+    return Math.hypot(from[0] + share * dn - n, from[1] + share * de - e) < 1.05 * radius + scene.reach_m;
   };
   const gridModel = (reach, down) => [2 * reach, 0, 0, 0, 0, 2 * reach, 0, 0, 0, 0, 0, 0, 0, -reach, down, 1];
 

@@ -1,7 +1,7 @@
 // Draws triangles, thick lines and the ground with WebGL 2. Matrices are columns of four; places are relative to what the
 // camera looks at, so that a far flight keeps its digits.
 const makeRenderer = (canvas, meshes) => {
-  const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+  const gl = canvas.getContext("webgl2", { antialias: true, alpha: true });
   if (!gl) return null;
   const program = (vertex, fragment) => {
     const made = gl.createProgram();
@@ -68,12 +68,12 @@ const makeRenderer = (canvas, meshes) => {
     `in vec3 seen; uniform vec4 ink; uniform vec2 offset; uniform float cell, reach; out vec4 colour;
      float lines(vec2 p) {
        vec2 wide = fwidth(p), off = abs(fract(p - 0.5) - 0.5) / max(wide, 1e-6);
-       return (1.0 - min(min(off.x, off.y) / 1.2, 1.0)) * (1.0 - smoothstep(0.15, 0.6, max(wide.x, wide.y)));
+       return (1.0 - min(min(off.x, off.y) / 1.2, 1.0)) * (1.0 - smoothstep(0.06, 0.3, max(wide.x, wide.y)));
      }
      void main() {
        vec2 p = (seen.xy + offset) / cell;
        float fade = 1.0 - smoothstep(0.25, 1.0, length(seen.xy) / reach);
-       float a = fade * ink.a * (0.12 + 0.38 * lines(p) + 0.5 * lines(p / 10.0));
+       float a = fade * ink.a * (0.1 + 0.4 * lines(p) + 0.5 * lines(p / 10.0));
        colour = vec4(ink.rgb * a, a);
      }`,
   );
@@ -117,11 +117,11 @@ const makeRenderer = (canvas, meshes) => {
       }
       return { array, segments: points.length / 4 - 1 };
     },
-    clear([r, g, b]) {
+    clear() {
       gl.viewport(0, 0, canvas.width, canvas.height);
       gl.disable(gl.SCISSOR_TEST);
       gl.depthMask(true);
-      gl.clearColor(r, g, b, 1);
+      gl.clearColor(0, 0, 0, 0);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       counted.triangles = counted.calls = 0;
     },

@@ -125,7 +125,8 @@ fn a_long_flight_is_thinned_and_says_so() {
     let times: Vec<f64> = (0..60_000).map(|k| f64::from(k) * 0.02).collect();
     let truth = log.sources.get_mut("truth").unwrap();
     for (name, channel) in &mut truth.channels {
-        let row = if name == "q_ned_from_body_wxyz" { vec![1.0, 0.0, 0.0, 0.0] } else { vec![1.5; 3] };
+        let row =
+            if name == "q_ned_from_body_wxyz" { vec![1.0, 0.0, 0.0, 0.0] } else { vec![1.5; 3] };
         channel.values = row.repeat(times.len());
     }
     truth.time_s = times;
@@ -176,11 +177,13 @@ fn wings_rotors_arrows_and_obstacles_are_among_the_pieces() {
         .iter()
         .map(|piece| piece["on"].as_str().unwrap())
         .collect();
-    for frame in ["body", "rotor.3", "left.front", "right.skin", "right.edge", "shadow", "reference"] {
+    for frame in
+        ["body", "rotor.3", "left.front", "right.skin", "right.edge", "shadow", "reference"]
+    {
         assert!(on.contains(&frame), "{frame}: {on:?}");
     }
     for arrow in ["thrust", "wing_force", "weight", "wind", "velocity"] {
-        let both = [format!("{arrow}.shaft"), format!("{arrow}.head")];
+        let both = [format!("{arrow}.shaft.0"), format!("{arrow}.head.0")];
         assert!(both.iter().all(|piece| on.contains(&piece.as_str())), "{arrow}");
         assert!(html.contains(&format!("name=\"arrow\" value=\"{arrow}\"")), "{arrow}");
     }
@@ -199,7 +202,9 @@ fn an_attitude_alone_is_shown_at_the_origin() {
     let scene = scene(&[view("bare", &log)]).unwrap();
     let html = page(&scene);
     assert!(html.contains("bare: the log has no position: the vehicle stays at the origin."));
-    for lack in ["wings are drawn folded", "rotors stand still", "no arrow of thrust", "no arrow of wind"] {
+    for lack in
+        ["wings are drawn folded", "rotors stand still", "no arrows of thrust", "no arrow of wind"]
+    {
         assert!(html.contains(lack), "{lack}");
     }
     let data = data(&html);
@@ -222,6 +227,8 @@ fn what_has_neither_position_nor_attitude_is_no_scene() {
     truth.time_s = vec![f64::NAN, f64::INFINITY];
     let channel = squirrel_log::Channel { width: 3, values: vec![f64::NAN; 6] };
     truth.channels.insert("position_ned_m".to_owned(), channel);
+    assert!(scene(&[view("a", &log)]).is_err());
+    log.sources.get_mut("truth").unwrap().time_s = vec![0.0, 1.0];
     assert!(scene(&[view("a", &log)]).is_err());
 }
 
