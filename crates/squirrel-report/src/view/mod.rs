@@ -23,7 +23,8 @@ use crate::page::{Columns, Page, Row};
 use squirrel_log::FlightLog;
 
 const STYLE: &str = include_str!("view.css");
-const SCRIPT: &str = concat!(include_str!("view_gl.js"), include_str!("view.js"));
+const SCRIPT: &str =
+    concat!(include_str!("view_gl.js"), include_str!("view_state.js"), include_str!("view.js"));
 
 /// A flight to look at.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,8 +11,8 @@ use std::collections::BTreeMap;
 
 /// Instants a second, the first that keeps a page below [`INSTANTS`].
 const RATES_HZ: [f64; 6] = [50.0, 25.0, 10.0, 5.0, 2.0, 1.0];
-/// Instants of all flights of a page: about a megabyte.
-const INSTANTS: f64 = 12_000.0;
+/// Instants of all flights of a page: a megabyte or a little more.
+const INSTANTS: f64 = 10_000.0;
 /// Obstacles further from the path are not drawn, m.
 const NEAR_M: f64 = 15.0;
 /// Flights that are never lower have a level plane in place of the ground, m.

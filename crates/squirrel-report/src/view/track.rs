@@ -158,7 +158,7 @@ fn at(
     if gap > GAP_S {
         return None;
     }
-    let (from, mut to) = (row(i), row(after));
+    let (from, mut to) = (turned(row(i), between)?, turned(row(after), between)?);
     if between == Between::Turn && from.iter().zip(&to).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
         to.iter_mut().for_each(|x| *x = -*x);
     }

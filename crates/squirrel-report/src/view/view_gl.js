@@ -1,5 +1,5 @@
-// Draws triangles, thick lines and the ground with WebGL 2. Matrices are columns of four; places are relative to what the
-// camera looks at, so that a far flight keeps its digits.
+// Draws triangles, thick lines and the ground with WebGL 2. Matrices are columns of four; places are relative to what
+// the camera looks at, so that a far flight keeps its digits.
 const makeRenderer = (canvas, meshes) => {
   const gl = canvas.getContext("webgl2", { antialias: true, alpha: true });
   if (!gl) return null;

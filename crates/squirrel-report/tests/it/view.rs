@@ -111,8 +111,10 @@ fn the_page_is_small_needs_no_network_and_is_the_same_again() {
     let make = || page(&scene(&[view("twcc_flat", &logs[0]), view("pc", &logs[1])]).unwrap());
     let html = make();
     assert!(html.len() < 700_000, "{} bytes for two flights of 20 s", html.len());
+    // The name of SVG is no address.
+    let text = html.replace("http://www.w3.org/2000/svg", "");
     for word in ["src=", "http:", "https:", "@import", "url(", "fetch(", "XMLHttp", "import("] {
-        assert!(!html.contains(word), "{word}");
+        assert!(!text.contains(word), "{word}");
     }
     assert_eq!(html, make());
     std::fs::write(std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("view.html"), html)
@@ -131,9 +133,9 @@ fn a_long_flight_is_thinned_and_says_so() {
     }
     truth.time_s = times;
     let scene = scene(&[view("long", &log)]).unwrap();
-    assert_eq!((scene.flights[0].clock.rate_hz, scene.flights[0].clock.count), (10.0, 12_000 - 1));
+    assert_eq!((scene.flights[0].clock.rate_hz, scene.flights[0].clock.count), (5.0, 6_000));
     let html = page(&scene);
-    assert!(html.contains("long: 11999 instants at 10 Hz"));
+    assert!(html.contains("long: 6000 instants at 5 Hz"));
     assert!(html.len() < 2_000_000, "{}", html.len());
 }
 
