@@ -2,7 +2,7 @@
 //! says, and pictures of it to look at.
 
 use crate::png;
-use crate::run::{call, cargo, target_directory};
+use crate::run::{call, cargo, root, target_directory};
 use std::path::Path;
 use std::process::Command;
 
@@ -64,7 +64,8 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
         }
     }
     if write {
-        std::fs::copy(folder.join("open-1280.png"), PICTURE)
+        let picture = root()?.join(PICTURE);
+        std::fs::copy(folder.join("open-1280.png"), picture)
             .map_err(|error| format!("{PICTURE}: {error}"))?;
     }
     eprintln!("{}", folder.display());

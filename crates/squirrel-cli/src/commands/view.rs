@@ -7,7 +7,7 @@ use squirrel_core::dynamics::rotors::{spin_signs, thrust_and_moment};
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_log::FlightLog;
 use squirrel_report::view::{
-    Body, Moment, RotorShape, Scene, ViewFlight, WingShape, render, scene,
+    Body, Moment, RotorNumbers, RotorShape, Scene, ViewFlight, WingShape, render, scene,
 };
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
@@ -175,7 +175,7 @@ fn flight<'a>(log: &'a FlightLog, name: &str, asked: Option<&VehicleFile>) -> Vi
         name: name.to_owned(),
         log,
         body,
-        thrust_n: vehicle.and_then(|vehicle| thrust(log, &vehicle)),
+        rotors: vehicle.and_then(|vehicle| rotors(log, &vehicle)),
         obstacles: obstacles(log),
         notes,
     }
@@ -202,16 +202,26 @@ fn body(file: &VehicleFile) -> Body {
     }
 }
 
-/// Thrust of each rotor at each logged speed, in air at rest.
-fn thrust(log: &FlightLog, file: &VehicleFile) -> Option<Vec<f64>> {
-    let (_, speeds) = log.channel("rotor.speed_rad_s")?;
-    if speeds.width != file.vehicle.rotors().len() {
-        return None;
-    }
-    let per_square = [file.vehicle.parameters().propulsion.thrust_coefficient_n_s2];
-    let none = [0.0];
-    let of = |speed: &f64| thrust_and_moment([&per_square, &none, &none, &none], &[*speed]).0;
-    Some(speeds.values.iter().map(of).collect())
+/// Rotors as their speeds say, else as they were commanded; thrust in air at rest.
+fn rotors(log: &FlightLog, file: &VehicleFile) -> Option<RotorNumbers> {
+    let p = &file.vehicle.parameters().propulsion;
+    let (per_square, none) = ([p.thrust_coefficient_n_s2], [0.0]);
+    let thrust = |speed: &f64| thrust_and_moment([&per_square, &none, &none, &none], &[*speed]).0;
+    let target = |command: &f64| {
+        if command.is_finite() { p.target_speed_rad_s(*command) } else { f64::NAN }
+    };
+    let numbers = |from: &'static str, speed: &dyn Fn(&f64) -> f64| {
+        let (_, channel) = log.channel(from)?;
+        let speeds: Vec<f64> = channel.values.iter().map(speed).collect();
+        let some =
+            channel.width == file.vehicle.rotors().len() && speeds.iter().any(|x| x.is_finite());
+        some.then(|| RotorNumbers {
+            from,
+            thrust_n: speeds.iter().map(thrust).collect(),
+            speed_rad_s: speeds,
+        })
+    };
+    numbers("rotor.speed_rad_s", &|x| *x).or_else(|| numbers("rotor.command", &target))
 }
 
 /// Obstacles that the log knows.

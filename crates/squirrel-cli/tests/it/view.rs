@@ -179,6 +179,7 @@ fn a_foreign_log_with_an_attitude_alone_is_a_page() {
     }
     let attitude = rows(&scene(&folder, "v.html")["flights"][0]["tracks"]["attitude"]);
     assert!((attitude[5][0] - 0.8).abs() < 1e-4 && (attitude[5][1] - 0.6).abs() < 1e-4);
+    assert_eq!(scene(&folder, "v.html")["flights"][0]["tracks"]["thrust"], Value::Null);
     // With its vehicle file it is drawn as it is.
     folder.write("v.toml", SQUIRREL);
     folder.succeeds(&["view", "f.mcap", "--vehicle", "v.toml", "--out", "w.html"]);
@@ -245,4 +246,30 @@ fn what_a_log_says_of_itself_stays_text() {
         scene(&folder, "v.html")["flights"][0]["body"]["rotors"].as_array().unwrap().len(),
         4
     );
+}
+
+#[test]
+fn rotors_without_a_speed_turn_as_commanded() {
+    let folder = Folder::new("view_commands");
+    folder.succeeds(&["fly", "--arm", "pc", "--scenario", "hover", "--out", "f.mcap"]);
+    let mut log = FlightLog::read(&folder.0.join("f.mcap")).unwrap();
+    log.sources.get_mut("rotor").unwrap().channels.remove("speed_rad_s");
+    log.write(&folder.0.join("g.mcap")).unwrap();
+    folder.succeeds(&["view", "g.mcap", "--out", "v.html"]);
+    let scene = scene(&folder, "v.html");
+    let flight = &scene["flights"][0];
+    assert!(
+        flight["lacks"].to_string().contains("rotors turn as commanded"),
+        "{}",
+        flight["lacks"]
+    );
+    let (_, command) = log.channel("rotor.command").unwrap();
+    let (speed, thrust) =
+        (rows(&flight["tracks"]["rotor_speed"]), rows(&flight["tracks"]["thrust"]));
+    // The squirrel's commands are shares of 3000 rad/s, of which the thrust is 5.4 N.
+    for k in [50, 200, 400] {
+        let share = command.row(6 * k)[2];
+        assert!((speed[k][2] - 3000.0 * share).abs() < 0.51, "{share}: {} rad/s", speed[k][2]);
+        assert!((thrust[k][2] - 5.4 * share * share).abs() < 1e-3, "{share}: {} N", thrust[k][2]);
+    }
 }

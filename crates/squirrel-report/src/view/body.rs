@@ -159,7 +159,7 @@ pub(super) const ARROWS: [(&str, &str); 5] = [
 /// * `arrows` - names of those that the flight has, and how many there are of each
 pub(super) fn pieces(body: &Body, arrows: &[(&str, usize)], reference: bool) -> Vec<Piece> {
     let r = body.reach_m();
-    let half_height = (0.5 * body.height_m).max(0.05 * r);
+    let half_height = (0.5 * body.height_m).clamp(0.05 * r, 0.2 * r);
     let frame = ("frame", 1.0);
     let mut all = vec![
         piece("hull", "body", ("hull", 1.0), [0.8 * r, 0.27 * r, half_height], [0.0; 3]),

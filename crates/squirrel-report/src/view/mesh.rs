@@ -8,8 +8,11 @@ use std::f32::consts::TAU;
 /// Corners of triangles, one after the other.
 pub(super) type Mesh = Vec<f32>;
 
+/// How a shape is made.
+pub(super) type Make = fn() -> Mesh;
+
 /// Names of the shapes, and how each is made.
-pub(super) const MESHES: [(&str, fn() -> Mesh); 9] = [
+pub(super) const MESHES: [(&str, Make); 9] = [
     ("ball", ball),
     ("box", block),
     ("cylinder", cylinder),

@@ -1,10 +1,10 @@
 //! The scene of flights: plain numbers on one clock, and the pieces that are drawn.
 
-use super::ViewFlight;
 use super::body::{ARROWS, Body, Piece, pieces};
 use super::mesh::{MESHES, Mesh, triangles};
 use super::moments::{Moment, moments};
 use super::track::{Between, Clock, Kind, Track};
+use super::{RotorNumbers, ViewFlight};
 use serde::Serialize;
 use squirrel_log::FlightLog;
 use std::collections::BTreeMap;
@@ -184,7 +184,7 @@ fn see(flight: &ViewFlight<'_>, clock: Clock, shift_s: f64) -> SceneFlight {
     let (three, line) = (Some(3), Between::Line);
     add("position", &POSITION, three, 1e-3, line);
     add("attitude", &ATTITUDE, Some(4), 1e-4, Between::Turn);
-    add("velocity", &VELOCITY, three, 1e-2, line);
+    add("velocity", &VELOCITY, three, 1e-3, line);
     add("reference", &REFERENCE, three, 1e-3, line);
     if flight.body.wing.is_some() {
         add("deployment", &["wing.deployment"], Some(2), 1e-3, line);
@@ -192,8 +192,9 @@ fn see(flight: &ViewFlight<'_>, clock: Clock, shift_s: f64) -> SceneFlight {
         add("deployment", &["wing.command"], Some(2), 1e-3, Between::Hold);
         add("wing_force", &["truth.wing_force_body_n"], three, 1e-3, line);
     }
-    add("rotor_speed", &["rotor.speed_rad_s"], Some(flight.body.rotors.len()), 1.0, line);
+
     add("wind", &["truth.wind_ned_m_s"], three, 1e-2, line);
+    tracks.extend(rotor_speed(flight, clock).map(|track| ("rotor_speed", track)));
     tracks.extend(thrust(flight, clock).map(|track| ("thrust", track)));
     let count = |name: &str| match name {
         "weight" => usize::from(flight.body.weight_n.is_some()),
@@ -216,18 +217,33 @@ fn see(flight: &ViewFlight<'_>, clock: Clock, shift_s: f64) -> SceneFlight {
     }
 }
 
+/// A track of what is known of each rotor.
+fn of_rotors(
+    flight: &ViewFlight<'_>,
+    clock: Clock,
+    kind: Kind,
+    pick: fn(&RotorNumbers) -> &Vec<f64>,
+) -> Option<Track> {
+    let (numbers, count) = (flight.rotors.as_ref()?, flight.body.rotors.len());
+    let (times, _) = flight.log.channel(numbers.from)?;
+    let values = pick(numbers);
+    let row = |i: usize| values[i * count..(i + 1) * count].to_vec();
+    (values.len() == times.len() * count)
+        .then(|| Track::from_rows(numbers.from, times, row, count, (kind, clock)))?
+}
+
+/// Speed of each rotor, rad/s.
+fn rotor_speed(flight: &ViewFlight<'_>, clock: Clock) -> Option<Track> {
+    let kind = Kind { width: Some(flight.body.rotors.len()), step: 1.0, between: Between::Line };
+    of_rotors(flight, clock, kind, |numbers| &numbers.speed_rad_s)
+        .or_else(|| Track::of(flight.log, "rotor.speed_rad_s", kind, clock))
+}
+
 /// Thrust of each rotor by its speed, else as the mixer meant it, else of all together.
 fn thrust(flight: &ViewFlight<'_>, clock: Clock) -> Option<Track> {
     let (log, rotors) = (flight.log, flight.body.rotors.len());
     let kind = |width| Kind { width: Some(width), step: 1e-3, between: Between::Line };
-    let from = "rotor.speed_rad_s";
-    let known = flight.thrust_n.as_ref().zip(log.channel(from));
-    let known = known.filter(|(thrust, (times, _))| thrust.len() == times.len() * rotors);
-    let known = known.and_then(|(thrust, (times, _))| {
-        let row = |i: usize| thrust[i * rotors..(i + 1) * rotors].to_vec();
-        Track::from_rows(from, times, row, rotors, (kind(rotors), clock))
-    });
-    known
+    of_rotors(flight, clock, kind(rotors), |numbers| &numbers.thrust_n)
         .or_else(|| Track::of(log, "control.inner.rotor_thrust_n", kind(rotors), clock))
         .or_else(|| Track::of(log, "control.inner.thrust_n", kind(1), clock))
 }
@@ -240,15 +256,20 @@ fn lacks(flight: &ViewFlight<'_>, tracks: &BTreeMap<&'static str, Track>) -> Vec
         ("attitude", true, "no attitude: the vehicle is drawn level"),
         ("deployment", wing, "no wing.deployment and no wing.command: wings are drawn folded"),
         ("rotor_speed", true, "no rotor.speed_rad_s: rotors stand still"),
-        ("thrust", true, "neither rotor.speed_rad_s nor control.inner: no arrows of thrust"),
+        ("thrust", true, "no rotors of a known vehicle, nor control.inner: no arrows of thrust"),
         ("wing_force", wing, "no truth.wing_force_body_n: no arrow of the wings' force"),
         ("wind", true, "no truth.wind_ned_m_s: no arrow of wind"),
     ];
     let missing = asked.into_iter().filter(|(name, of_it, _)| *of_it && !tracks.contains_key(name));
     let mut sentences: Vec<String> =
         missing.map(|(_, _, what)| format!("{}: the log has {what}.", flight.name)).collect();
+    let name = &flight.name;
+    if tracks.get("rotor_speed").is_some_and(|track| track.from == "rotor.command") {
+        sentences.push(format!(
+            "{name}: rotors turn as commanded, without lag; the log has no rotor.speed_rad_s."
+        ));
+    }
     if tracks.get("deployment").is_some_and(|track| track.from == "wing.command") {
-        let name = &flight.name;
         sentences
             .push(format!("{name}: wings are drawn as commanded; the log has no wing.deployment."));
     }

@@ -160,7 +160,9 @@ fn at(
     }
     let (from, mut to) = (turned(row(i), between)?, turned(row(after), between)?);
     if between == Between::Turn && from.iter().zip(&to).map(|(a, b)| a * b).sum::<f64>() < 0.0 {
-        to.iter_mut().for_each(|x| *x = -*x);
+        for x in &mut to {
+            *x = -*x;
+        }
     }
     let share = since / gap;
     turned(from.iter().zip(&to).map(|(a, b)| a + share * (b - a)).collect(), between)

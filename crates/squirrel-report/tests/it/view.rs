@@ -28,7 +28,7 @@ fn view<'a>(name: &str, log: &'a FlightLog) -> ViewFlight<'a> {
         name: name.to_owned(),
         log,
         body: body(),
-        thrust_n: None,
+        rotors: None,
         obstacles: OBSTACLES.to_vec(),
         notes: Vec::new(),
     }
@@ -72,7 +72,7 @@ fn numbers_of_the_scene_are_those_of_the_log() {
     for (name, channel, step) in [
         ("position", "truth.position_ned_m", 1e-3),
         ("attitude", "truth.q_ned_from_body_wxyz", 1e-4),
-        ("velocity", "truth.velocity_ned_m_s", 1e-2),
+        ("velocity", "truth.velocity_ned_m_s", 1e-3),
         ("deployment", "wing.deployment", 1e-3),
         ("thrust", "control.inner.thrust_n", 1e-3),
     ] {
