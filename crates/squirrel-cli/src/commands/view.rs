@@ -9,6 +9,7 @@ use squirrel_log::FlightLog;
 use squirrel_report::view::{
     Body, Moment, RotorNumbers, RotorShape, Scene, ViewFlight, WingShape, render, scene,
 };
+use squirrel_sim::flight::Setup;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -107,6 +108,15 @@ impl View {
         let (triangles, draw_calls) = (scene.triangles, scene.draw_calls);
         Viewed { bytes, triangles, draw_calls, flights: seen.collect() }
     }
+}
+
+/// The scene of flights that were just flown.
+pub(crate) fn scene_of(flights: &[(&Setup, &FlightLog)]) -> Result<Scene, String> {
+    let flights = flights
+        .iter()
+        .map(|(setup, log)| flight(log, setup.arm.name(), Some(&setup.vehicle)))
+        .collect::<Vec<_>>();
+    scene(&flights).map_err(|(_, problem)| problem)
 }
 
 /// What is drawn, in a table.

@@ -123,6 +123,21 @@ fn rotors_and_wings_are_where_the_vehicle_file_has_them() {
 }
 
 #[test]
+fn the_report_of_a_flight_has_its_scene() {
+    let folder = Folder::new("view_report");
+    let fly = ["fly", "--arm", "twcc_plus", "--scenario", "avoid", "--seed", "3"];
+    folder.succeeds(&[&fly[..], &["--out", "f.mcap", "--report", "r.html"]].concat());
+    let log = FlightLog::read(&folder.0.join("f.mcap")).unwrap();
+    let scene = scene(&folder, "r.html");
+    for track in ["position", "attitude", "deployment"] {
+        let off = steps_off(&scene["flights"][0], &log, track);
+        assert!(off < 0.51, "{track} is {off} steps off");
+    }
+    let bytes = fs::metadata(folder.0.join("r.html")).unwrap().len();
+    assert!(bytes < 500_000, "{bytes} bytes");
+}
+
+#[test]
 fn two_flights_stand_side_by_side() {
     let folder = Folder::new("view_two");
     for arm in ["pc", "twcc_plus"] {

@@ -26,7 +26,7 @@ pub(super) fn controls(scene: &Scene) -> String {
     let [begin, end] = scene.range_s;
     let mut html = format!(
         "<div class=\"transport\">\n<button type=\"button\" id=\"play\" aria-label=\"play\">\u{25b6}</button>\n\
-         <input type=\"range\" id=\"time\" min=\"{begin}\" max=\"{end}\" step=\"any\" value=\"{begin}\" aria-label=\"time, s\">\n\
+         <input type=\"range\" id=\"time\" min=\"{begin}\" max=\"{end}\" step=\"any\" value=\"{begin}\" aria-label=\"time, s\"/>\n\
          <output id=\"now\"></output>\n<select id=\"pace\" aria-label=\"speed of playing\">"
     );
     for (value, name) in [("0.1", "1/10"), ("0.25", "1/4"), ("1", "1x"), ("4", "4x")] {
@@ -90,7 +90,7 @@ fn arrow_boxes(scene: &Scene) -> String {
     let boxes = shown.map(|(name, ink)| {
         let checked = if *name == "velocity" { "" } else { " checked" };
         format!(
-            "<label><input type=\"checkbox\" name=\"arrow\" value=\"{name}\"{checked}><i class=\"swatch {ink}\"></i>{}</label>\n",
+            "<label><input type=\"checkbox\" name=\"arrow\" value=\"{name}\"{checked}/><i class=\"swatch {ink}\"></i>{}</label>\n",
             name.replace('_', " ")
         )
     });

@@ -66,10 +66,26 @@ pub fn render(title: &str, facts: &[(String, String)], scene: &Scene) -> String 
     page.html()
 }
 
+/// Adds scene and controls to a page that has plots of its own.
+pub(crate) fn embed(page: &mut Page, scene: &Scene) {
+    page.add("<div class=\"viewer alone\">\n");
+    seen(page, scene);
+    page.add("</div>\n");
+}
+
 /// Adds scene, controls and plots to a page.
 fn add(page: &mut Page, scene: &Scene) {
+    page.add("<div class=\"viewer\">\n");
+    seen(page, scene);
+    page.add("<div class=\"plots\">\n");
+    page.figures(Columns::One, &charts::figures(scene));
+    page.add("</div>\n</div>\n");
+}
+
+/// The scene with what it needs.
+fn seen(page: &mut Page, scene: &Scene) {
     page.needs(STYLE, SCRIPT);
-    page.add("<div class=\"viewer\">\n<div class=\"seen\">\n");
+    page.add("<div>\n");
     page.add(&controls::stage(scene));
     page.add(&controls::controls(scene));
     for note in scene.flights.iter().flat_map(|flight| &flight.lacks) {
@@ -78,13 +94,11 @@ fn add(page: &mut Page, scene: &Scene) {
     if scene.moved {
         page.missing("The flights share no time: each begins at 0 s here.");
     }
-    page.add("</div>\n<div class=\"plots\">\n");
-    page.figures(Columns::One, &charts::figures(scene));
-    page.add("</div>\n</div>\n");
     page.add(&format!(
         "<script type=\"application/json\" id=\"scene\">{}</script>\n",
         scene.json()
     ));
+    page.add("</div>\n");
 }
 
 /// A table of the channels that are drawn.

@@ -1,9 +1,11 @@
 //! The scene of flights: its numbers are the log's, what a log lacks is said, and no name in a log
 //! becomes part of the page.
 
-use super::support::{OBSTACLES, fly};
+use super::flight::check;
+use super::support::{OBSTACLES, fly, heading, views};
 use serde_json::Value;
 use squirrel_log::FlightLog;
+use squirrel_report::flight::{render as report, render_with_scene};
 use squirrel_report::view::{Body, RotorShape, Scene, ViewFlight, WingShape, render, scene};
 
 /// A cross of four rotors, with the wings of the squirrel.
@@ -113,6 +115,7 @@ fn the_page_is_small_needs_no_network_and_is_the_same_again() {
     assert!(html.len() < 700_000, "{} bytes for two flights of 20 s", html.len());
     // The name of SVG is no address.
     let text = html.replace("http://www.w3.org/2000/svg", "");
+    check(&html);
     for word in ["src=", "http:", "https:", "@import", "url(", "fetch(", "XMLHttp", "import("] {
         assert!(!text.contains(word), "{word}");
     }
@@ -270,4 +273,20 @@ fn names_of_a_log_stay_text() {
     // The scene's own script, that of the page, and no other end.
     assert_eq!(html.matches("</script>").count(), 2);
     assert_eq!(data(&html)["flights"][0]["name"], hostile, "and is whole in the data");
+}
+
+#[test]
+fn the_report_of_flights_has_the_scene_beside_its_charts() {
+    let logs = [fly(5.2, false, 6.0), fly(7.0, true, 6.0)];
+    let names = ["pc", "twcc_flat"];
+    let flights: Vec<_> = names.iter().zip(&logs).map(|(name, log)| view(name, log)).collect();
+    let scene = scene(&flights).unwrap();
+    let views = views(&logs);
+    let (with, without) =
+        (render_with_scene(&heading(), &views, &scene), report(&heading(), &views));
+    check(&with);
+    assert_eq!(data(&with), data(&page(&scene)));
+    assert!(!without.contains("<canvas") && with.matches("<canvas").count() == 1);
+    assert_eq!(with.matches("<svg").count(), without.matches("<svg").count());
+    assert!(with.len() < without.len() + 300_000, "{} and {}", with.len(), without.len());
 }
