@@ -11,6 +11,7 @@ mod png;
 mod python;
 mod run;
 mod thumb;
+mod view;
 mod weights;
 mod wheel;
 
@@ -19,7 +20,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 14] = [
+const CHORES: [Chore; 15] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     (
@@ -70,6 +71,12 @@ const CHORES: [Chore; 14] = [
         "[HTML [PNG [WIDTHxHEIGHT]]]",
         "draw a report with a headless Chromium; without a file, the gap report of a hidden effect",
         png::chore,
+    ),
+    (
+        "view-png",
+        "[--write]",
+        "two flights as a 3-D scene in a headless Chromium, held against their figures; --write takes the guide's picture",
+        view::chore,
     ),
     (
         "effect",

@@ -2,7 +2,8 @@
 //! hidden effect which is made, flown and diagnosed for it.
 
 use crate::chores::blind_bench;
-use crate::run::{call, succeeds, target_directory};
+use crate::run::{call, output, succeeds, target_directory};
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -38,7 +39,7 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
         [html, png, size] => (html, PathBuf::from(png), size.as_str()),
         _ => return Err("usage: report-png [HTML [PNG [WIDTHxHEIGHT]]]".to_owned()),
     };
-    draw(Path::new(html), &png, size)
+    draw(Path::new(html), "", &png, size)
 }
 
 /// Makes a case, has the program diagnose it, checks that the report has all panels, and draws it
@@ -68,7 +69,7 @@ fn gap_report() -> Result<(), String> {
         return Err(format!("{}: panel-{panel} is missing or lacks data", html.display()));
     }
     for size in GAP_SIZES {
-        draw(&html, &folder.join(format!("report-{size}.png")), size)?;
+        draw(&html, "", &folder.join(format!("report-{size}.png")), size)?;
     }
     eprintln!("{}", folder.display());
     Ok(())
@@ -82,34 +83,54 @@ fn holds_data(html: &str, panel: char) -> bool {
     })
 }
 
-/// Draws a page with the first Chromium in the path.
-fn draw(html: &Path, png: &Path, size: &str) -> Result<(), String> {
-    let (width, height) = parse_size(size)
-        .ok_or_else(|| format!("size '{size}' is not WIDTHxHEIGHT with 1 to 16384 pixels"))?;
-    let page = html.canonicalize().map_err(|error| format!("{}: {error}", html.display()))?;
-    let browser = BROWSERS
-        .into_iter()
-        .find(|name| succeeds(Command::new(name).arg("--version")))
-        .ok_or("no Chromium in PATH (apt install chromium)")?;
-    // Chromium succeeds without having written anything, and refuses endings that it does not know.
-    let profile = std::env::temp_dir().join(format!("squirrel-chromium-{}", std::process::id()));
-    let unfinished = png.with_extension("part.png");
-    let drawn = call(
-        Command::new(browser)
-            .args(FLAGS)
-            .arg(joined("--user-data-dir=", &profile))
-            .arg(joined("--screenshot=", &unfinished))
-            .arg(format!("--window-size={width},{height}"))
-            .arg(joined("file://", &page)),
-    );
-    let _ = std::fs::remove_dir_all(&profile);
-    drawn?;
-    std::fs::rename(&unfinished, png)
-        .map_err(|error| format!("{}: {browser} drew nothing: {error}", png.display()))
+/// The first Chromium in the path.
+fn browser() -> Result<&'static str, String> {
+    let runs = |name: &&str| succeeds(Command::new(name).arg("--version"));
+    let found = BROWSERS.into_iter().find(runs);
+    found.ok_or_else(|| "no Chromium in PATH (apt install chromium)".to_owned())
 }
 
-fn joined(flag: &str, path: &Path) -> std::ffi::OsString {
-    let mut text = std::ffi::OsString::from(flag);
+/// The browser on a page, with a profile of its own, which is gone afterwards.
+///
+/// * `fragment` - what follows the address, with its `#`; empty for nothing
+fn browse<T>(
+    html: &Path,
+    fragment: &str,
+    flags: &[OsString],
+    run: impl FnOnce(&mut Command) -> T,
+) -> Result<T, String> {
+    let page = html.canonicalize().map_err(|error| format!("{}: {error}", html.display()))?;
+    let profile = std::env::temp_dir().join(format!("squirrel-chromium-{}", std::process::id()));
+    let mut address = joined("file://", &page);
+    address.push(fragment);
+    let mut command = Command::new(browser()?);
+    command.args(FLAGS).arg(joined("--user-data-dir=", &profile)).args(flags).arg(address);
+    let ran = run(&mut command);
+    let _ = std::fs::remove_dir_all(&profile);
+    Ok(ran)
+}
+
+/// A page as text, after its scripts have run.
+pub(crate) fn dom(html: &Path, fragment: &str) -> Result<String, String> {
+    browse(html, fragment, &["--dump-dom".into()], output)?
+        .ok_or_else(|| format!("{}{fragment}: the browser failed", html.display()))
+}
+
+/// Draws a page.
+pub(crate) fn draw(html: &Path, fragment: &str, png: &Path, size: &str) -> Result<(), String> {
+    let (width, height) = parse_size(size)
+        .ok_or_else(|| format!("size '{size}' is not WIDTHxHEIGHT with 1 to 16384 pixels"))?;
+    // Chromium succeeds without having written anything, and refuses endings that it does not know.
+    let unfinished = png.with_extension("part.png");
+    let window = format!("--window-size={width},{height}");
+    let flags = [joined("--screenshot=", &unfinished), window.into()];
+    browse(html, fragment, &flags, call)??;
+    std::fs::rename(&unfinished, png)
+        .map_err(|error| format!("{}: the browser drew nothing: {error}", png.display()))
+}
+
+fn joined(flag: &str, path: &Path) -> OsString {
+    let mut text = OsString::from(flag);
     text.push(path);
     text
 }

@@ -38,6 +38,8 @@ enum Command {
     Study(commands::study::Studies),
     /// Train a model of the wing force on flight logs.
     Train(commands::train::Train),
+    /// Show one flight, or two beside each other, as a 3-D scene on one page.
+    View(commands::view::View),
     /// Run a log's inputs through the flight code again and compare every bit.
     Replay(commands::replay::Replay),
     /// Write the sensor frames of flights, and the hash of every output, for a target without
@@ -74,6 +76,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Fly(fly) => fly.run(),
         Command::Study(study) => study.run(),
         Command::Train(train) => train.run(),
+        Command::View(view) => view.run(),
         Command::Replay(replay) => replay.run(),
         Command::ExportVectors(export) => export.run(),
         Command::Import(import) => import.run(),

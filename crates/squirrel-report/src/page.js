@@ -81,15 +81,26 @@ const linked = [...document.querySelectorAll("svg[data-link]")].map((svg) => {
   };
   return { svg, show, left, right, lo, hi };
 });
+// A page with an instant of its own ("squirrel:time") keeps the cursor there, and hears where a chart was pressed.
+let instant = NaN;
+document.addEventListener("squirrel:time", (event) => {
+  instant = event.detail;
+  for (const { svg, show } of linked) if (svg.dataset.link === "time") show(instant);
+});
 for (const chart of linked) {
   const same = linked.filter((other) => other.svg.dataset.link === chart.svg.dataset.link);
-  chart.svg.addEventListener("pointermove", (event) => {
+  const under = (event) => {
     const box = chart.svg.getBoundingClientRect();
     const x = ((event.clientX - box.left) / box.width) * chart.svg.viewBox.baseVal.width;
-    const at = chart.lo + ((x - chart.left) / (chart.right - chart.left)) * (chart.hi - chart.lo);
-    for (const other of same) other.show(at);
+    return chart.lo + ((x - chart.left) / (chart.right - chart.left)) * (chart.hi - chart.lo);
+  };
+  chart.svg.addEventListener("pointermove", (event) => {
+    for (const other of same) other.show(under(event));
   });
   chart.svg.addEventListener("pointerleave", () => {
-    for (const other of same) other.show(NaN);
+    for (const other of same) other.show(instant);
+  });
+  chart.svg.addEventListener("click", (event) => {
+    document.dispatchEvent(new CustomEvent("squirrel:pick", { detail: under(event) }));
   });
 }

@@ -70,12 +70,16 @@ pub struct Card {
 pub struct Page {
     title: String,
     body: String,
+    /// Style sheets and scripts beyond those of every page.
+    styles: Vec<&'static str>,
+    scripts: Vec<&'static str>,
 }
 
 impl Page {
     /// A page with a title and a lead text, which may be empty.
     pub fn new(title: &str, lead: &str) -> Self {
-        let mut page = Self { title: title.to_owned(), body: String::new() };
+        let (styles, scripts) = (Vec::new(), Vec::new());
+        let mut page = Self { title: title.to_owned(), body: String::new(), styles, scripts };
         page.add(&format!("<h1>{}</h1>\n", escape(title)));
         page.paragraph("lead", lead);
         page
@@ -204,14 +208,23 @@ impl Page {
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n{}</main>\n\
-             <script>\n{SCRIPT}</script>\n</body>\n</html>\n",
+             <title>{}</title>\n<style>\n{STYLE}{}</style>\n</head>\n<body>\n<main>\n{}</main>\n\
+             <script>\n{SCRIPT}{}</script>\n</body>\n</html>\n",
             escape(&self.title),
-            self.body
+            self.styles.concat(),
+            self.body,
+            self.scripts.concat()
         )
     }
 
-    fn add(&mut self, markup: &str) {
+    /// Adds a style sheet and a script of a kind of page.
+    pub(crate) fn needs(&mut self, style: &'static str, script: &'static str) {
+        self.styles.push(style);
+        self.scripts.push(script);
+    }
+
+    /// Adds markup that is already safe.
+    pub(crate) fn add(&mut self, markup: &str) {
         self.body.push_str(markup);
     }
 

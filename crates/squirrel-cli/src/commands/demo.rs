@@ -5,7 +5,7 @@ use super::{facts, figures, view, write_log};
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use serde::Serialize;
-use squirrel_report::flight::{Heading, render};
+use squirrel_report::flight::{Heading, render_with_scene};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::{Flight, Integrator, Metrics, Setup};
 use squirrel_sim::scenario::Scenario;
@@ -107,7 +107,10 @@ impl Demo {
             card: String::new(),
         };
         let report = self.out.join(REPORT);
-        output::write_file(&report, render(&heading, &views).as_bytes())?;
+        let flown: Vec<_> =
+            setups.iter().zip(&views).map(|(setup, view)| (setup, view.log)).collect();
+        let scene = super::view::scene_of(&flown)?;
+        output::write_file(&report, render_with_scene(&heading, &views, &scene).as_bytes())?;
         let result = Figures {
             vehicle: setups[0].vehicle.name.clone(),
             thrust_to_weight: ratio,

@@ -10,7 +10,7 @@ use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::Stack;
 use squirrel_log::FlightLog;
 use squirrel_plan::pilot::offboard;
-use squirrel_report::flight::{Heading, render};
+use squirrel_report::flight::{Heading, render_with_scene};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{
@@ -264,7 +264,9 @@ impl Fly {
                         .map_err(|e| e.to_string())?
                         .unwrap_or_default(),
                 };
-                output::write_file(path, render(&heading, &[view(&setup, log, cells)]).as_bytes())?;
+                let scene = super::view::scene_of(&[(&setup, log)])?;
+                let html = render_with_scene(&heading, &[view(&setup, log, cells)], &scene);
+                output::write_file(path, html.as_bytes())?;
                 talk(&format!("wrote {}", path.display()));
             }
         }

@@ -12,6 +12,7 @@ pub(crate) mod replay;
 pub(crate) mod study;
 pub(crate) mod train;
 pub(crate) mod vehicle;
+pub(crate) mod view;
 
 use squirrel_log::FlightLog;
 use squirrel_report::flight::FlightView;

@@ -10,3 +10,4 @@ mod reach;
 mod support;
 mod train;
 mod vehicle;
+mod view;

@@ -8,6 +8,7 @@ mod tracks;
 
 use super::chart::{Ink, LARGEST};
 use super::page::{Columns, Page, Row};
+use super::view::{self, Scene};
 use squirrel_log::FlightLog;
 
 /// What stands above the panels.
@@ -42,6 +43,15 @@ pub struct FlightView<'a> {
 
 /// The report as one HTML file. The same flights give the same bytes.
 pub fn render(heading: &Heading, flights: &[FlightView<'_>]) -> String {
+    report(heading, flights, None)
+}
+
+/// The report with the flights in three dimensions, too.
+pub fn render_with_scene(heading: &Heading, flights: &[FlightView<'_>], scene: &Scene) -> String {
+    report(heading, flights, Some(scene))
+}
+
+fn report(heading: &Heading, flights: &[FlightView<'_>], scene: Option<&Scene>) -> String {
     let mut page = Page::new(&heading.title, &heading.lead);
     page.facts(&heading.facts);
     if !heading.card.is_empty() {
@@ -49,6 +59,12 @@ pub fn render(heading: &Heading, flights: &[FlightView<'_>]) -> String {
         page.preformatted(&heading.card);
     }
     arms(&mut page, flights);
+    if let Some(scene) = scene {
+        let text = "Look for wings that open while the vehicle tilts, and for what the rotors do meanwhile: a press on a chart \
+                    below goes to its instant.";
+        page.section("In three dimensions", text);
+        view::embed(&mut page, scene);
+    }
     if !flights.is_empty() {
         let inks: Vec<Ink> = (0..flights.len()).map(Ink::Series).collect();
         tracks::add(&mut page, flights, &inks);

@@ -46,7 +46,7 @@ fn drawn_points(markup: &str) -> usize {
 }
 
 /// Checks that tags balance, attributes are quoted and numbers in drawings are numbers.
-fn check(html: &str) {
+pub(crate) fn check(html: &str) {
     let body = html.split("<body>").nth(1).unwrap().split("<script>").next().unwrap();
     let mut open = Vec::new();
     for piece in body.split('<').skip(1) {

@@ -5,3 +5,4 @@ mod chart;
 mod chart_kinds;
 mod flight;
 mod support;
+mod view;
