@@ -23,14 +23,18 @@ const PAST_IT: [&str; 9] = [
 /// Sources that are compiled into tests alone.
 const OF_TESTS: [&str; 1] = ["crates/squirrel-sim/src/plant/membrane/measured.rs"];
 
+/// Whether a line names something, and not the end of a longer name.
+fn names(line: &str, call: &str) -> bool {
+    let is_of_a_name = |c: char| c.is_alphanumeric() || c == '_';
+    line.match_indices(call).any(|(at, _)| !line[..at].ends_with(is_of_a_name))
+}
+
 /// Lines of a source that go past it.
 fn past_it(text: &str) -> Vec<String> {
     let lines = product(text).into_iter().enumerate();
-    let goes = |line: &str| PAST_IT.iter().any(|call| line.contains(call));
-    lines
-        .filter(|(_, line)| goes(line))
-        .map(|(i, line)| format!("{}: {}", i + 1, line.trim()))
-        .collect()
+    let goes = |line: &str| PAST_IT.iter().any(|call| names(line, call));
+    let found = lines.filter(|(_, line)| goes(line));
+    found.map(|(i, line)| format!("{}: {}", i + 1, line.trim())).collect()
 }
 
 #[test]
@@ -39,7 +43,7 @@ fn no_product_opens_or_writes_a_file_past_the_one_place() {
     let (mut found, mut inside) = (Vec::new(), 0);
     for source in crates().iter().flat_map(|package| products(&package.join("src"))) {
         let path = source.strip_prefix(root()).unwrap();
-        if OF_TESTS.iter().any(|known| path == root().join(known).strip_prefix(root()).unwrap()) {
+        if OF_TESTS.iter().any(|known| path.ends_with(known)) {
             continue;
         }
         let lines = past_it(&fs::read_to_string(&source).unwrap());
@@ -55,6 +59,6 @@ fn no_product_opens_or_writes_a_file_past_the_one_place() {
 
 #[test]
 fn a_call_past_it_is_seen_and_a_tests_own_is_none() {
-    let text = "fn a() { std::fs::write(p, b); } // fs::rename\n#[cfg(test)]\nmod tests { fn b() { fs::read(p); } }";
-    assert_eq!(past_it(text), ["1: fn a() { std::fs::write(p, b); }"]);
+    let text = "fn a() { std::fs::write(p, b); CsvFile::open(p); } // fs::rename\n#[cfg(test)]\nmod tests { fn b() { fs::read(p); } }";
+    assert_eq!(past_it(text), ["1: fn a() { std::fs::write(p, b); CsvFile::open(p); }"]);
 }

@@ -6,13 +6,15 @@
 
 use std::borrow::Cow;
 use std::ops::Range;
+use std::rc::Rc;
 
 /// One number a row, most of them zero.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Column {
     rows: usize,
     first: usize,
-    kept: Vec<f64>,
+    /// Shared by all models that have it.
+    kept: Rc<Vec<f64>>,
 }
 
 impl Column {
@@ -22,7 +24,7 @@ impl Column {
         let first = all.iter().position(|x| *x != 0.0).unwrap_or(rows);
         let end = all.iter().rposition(|x| *x != 0.0).map_or(first, |last| last + 1);
         let kept = if (first, end) == (0, rows) { all } else { all[first..end].to_vec() };
-        Self { rows, first, kept }
+        Self { rows, first, kept: Rc::new(kept) }
     }
 
     pub(crate) fn rows(&self) -> usize {
@@ -57,7 +59,7 @@ impl Column {
     /// Adds a multiple of it to rows.
     pub(crate) fn add_scaled_to(&self, rows: &mut [f64], x: f64) {
         let own = rows.get_mut(self.span()).unwrap_or_default();
-        for (row, c) in own.iter_mut().zip(&self.kept) {
+        for (row, c) in own.iter_mut().zip(&*self.kept) {
             *row += c * x;
         }
     }
@@ -65,7 +67,7 @@ impl Column {
     /// Takes a multiple of it from rows.
     pub(crate) fn take_scaled_from(&self, rows: &mut [f64], x: f64) {
         let own = rows.get_mut(self.span()).unwrap_or_default();
-        for (row, c) in own.iter_mut().zip(&self.kept) {
+        for (row, c) in own.iter_mut().zip(&*self.kept) {
             *row -= c * x;
         }
     }

@@ -44,8 +44,10 @@ fn of_flights(predictor: &Predictor, linear: &Linear, set: &Scored) -> Vec<f64> 
         let (flight, time_s, _) = places[row];
         (flight, (time_s / BLOCK_S).floor() as i64)
     };
-    let mut blocks: BTreeMap<(usize, i64), DVector<f64>> =
-        (0..places.len()).map(|row| (block_of(row), DVector::zeros(live.len()))).collect();
+    let mut blocks: BTreeMap<(usize, i64), DVector<f64>> = BTreeMap::new();
+    for row in 0..places.len() {
+        blocks.entry(block_of(row)).or_insert_with(|| DVector::zeros(live.len()));
+    }
     for (slot, &i) in live.iter().enumerate() {
         for (row, c) in columns[i].kept() {
             if let Some(sum) = blocks.get_mut(&block_of(row)) {
