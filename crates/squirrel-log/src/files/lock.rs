@@ -27,6 +27,8 @@ impl Lock {
             let file = open(&path)?;
             match file.try_lock() {
                 Ok(()) => {}
+                // A file system without locks: whoever shares it has to take care.
+                Err(TryLockError::Error(e)) if e.kind() == ErrorKind::Unsupported => {}
                 Err(TryLockError::WouldBlock) => {
                     return Err(Error::new(
                         ErrorKind::WouldBlock,
