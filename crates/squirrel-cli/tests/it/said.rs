@@ -50,7 +50,7 @@ fn a_name_from_outside_is_spelt_out_and_no_screenful() {
     let long = "x".repeat(1 << 20);
     folder.write("key.toml", &format!("{SQUIRREL}\n[\"{long}\"]\n"));
     folder.write("line.toml", &format!("{SQUIRREL}\n{long} = [\n"));
-    folder.write("escape.toml", &SQUIRREL.replacen("[body]", "[\"bo\\u001b[2Jdy\"]", 1));
+    folder.write("escape.toml", &SQUIRREL.replacen("[limits]", "[\"li\\u001b[2Jmits\"]", 1));
     for file in ["key.toml", "line.toml", "escape.toml"] {
         let output = folder.run(&["vehicle", "check", file]);
         assert_eq!(output.status.code(), Some(1), "{file}");
@@ -75,7 +75,7 @@ fn limits_are_said_and_can_be_raised() {
     let refused = replay("1");
     let stderr = String::from_utf8_lossy(&refused.stderr);
     assert_eq!(refused.status.code(), Some(1), "{stderr}");
-    assert!(stderr.contains("f.mcap: its content is larger than 1 MB"), "{stderr}");
+    assert!(stderr.contains("f.mcap: is larger than 1 MB, the most that is read"), "{stderr}");
     assert!(stderr.contains("SQUIRREL_UNPACKED_MB=N allows N MB"), "{stderr}");
     assert!(replay("100").status.success());
 

@@ -7,6 +7,8 @@
 
 /// The variable that raises the limit, MB.
 const VARIABLE: &str = "SQUIRREL_UNPACKED_MB";
+/// How to take more, behind what is refused.
+pub(super) const RAISED_BY: &str = "; where it is trusted, SQUIRREL_UNPACKED_MB=N allows N MB";
 const MEGABYTE: u64 = 1_000_000;
 /// Most that comes out of one file, however large.
 const TOTAL_MAX_BYTES: u64 = 4000 * MEGABYTE;
@@ -28,8 +30,7 @@ pub struct Budget {
 /// A file's content is larger than it may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "its content is larger than {}, the most that is taken from a file of this size; where it is \
-     trusted, {VARIABLE}=N allows N MB",
+    "its content is larger than {}, the most that is taken from a file of this size{RAISED_BY}",
     megabytes(*most)
 )]
 pub struct TooLarge {

@@ -1,6 +1,6 @@
 //! Files are opened here, and no more of one is read than is meant to be.
 
-use super::budget::{TEXT_MAX_BYTES, content_max_bytes, megabytes};
+use super::budget::{RAISED_BY, TEXT_MAX_BYTES, content_max_bytes, megabytes};
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read, Result};
 use std::path::Path;
@@ -22,7 +22,7 @@ pub fn open(path: &Path) -> Result<File> {
 /// # Errors
 /// What the disk says; a file larger than what a content may be ([`Budget`](super::Budget)).
 pub fn read(path: &Path) -> Result<Vec<u8>> {
-    up_to(path, content_max_bytes())
+    up_to(path, content_max_bytes(), RAISED_BY)
 }
 
 /// A text that people write: a vehicle, a scenario, an import map.
@@ -30,7 +30,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>> {
 /// # Errors
 /// What the disk says; a file larger than any text that somebody wrote, or that is no text.
 pub fn read_text(path: &Path) -> Result<String> {
-    String::from_utf8(up_to(path, TEXT_MAX_BYTES)?)
+    String::from_utf8(up_to(path, TEXT_MAX_BYTES, "")?)
         .map_err(|_| Error::new(ErrorKind::InvalidData, "stream did not contain valid UTF-8"))
 }
 
@@ -44,11 +44,13 @@ pub fn begin(path: &Path, bytes: u64) -> Result<Vec<u8>> {
     Ok(begin)
 }
 
-fn up_to(path: &Path, most: u64) -> Result<Vec<u8>> {
+/// * `raised_by` - what is said of how to read more
+fn up_to(path: &Path, most: u64, raised_by: &str) -> Result<Vec<u8>> {
     let file = open(path)?;
     let too_large = || {
         let most = megabytes(most);
-        Error::new(ErrorKind::FileTooLarge, format!("is larger than {most}, the most that is read"))
+        let problem = format!("is larger than {most}, the most that is read{raised_by}");
+        Error::new(ErrorKind::FileTooLarge, problem)
     };
     let length = file.metadata()?.len();
     if length > most {
