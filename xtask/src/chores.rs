@@ -103,21 +103,24 @@ pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
     call(command.args(["bench", "--squirrel"]).arg(built.join("squirrel")).args(arguments))
 }
 
-/// `cargo xtask attack`: a test of the log readers, on more files than in `cargo xtask test`.
+/// `cargo xtask attack`: tests of what reads logs, vehicles, scenarios, weights and plans, on more
+/// files than in `cargo xtask test`.
 pub(crate) fn attack(arguments: &[String]) -> Result<(), String> {
     let [count, seed] = [(0, "2500"), (1, "1")]
         .map(|(i, default)| arguments.get(i).map_or_else(|| default.to_owned(), String::clone));
     for (name, text) in [("COUNT", &count), ("SEED", &seed)] {
         text.parse::<u64>().map_err(|_| format!("{name}: `{text}` is no whole number"))?;
     }
-    let test = ["--test", "it", "import_attack", "--", "--nocapture"];
-    call(
-        cargo()?
-            .args(["test", "--release", "--locked", "-p", "squirrel-log"])
-            .args(test)
-            .env("SQUIRREL_ATTACK_COUNT", count)
-            .env("SQUIRREL_ATTACK_SEED", seed),
-    )
+    for (package, test) in [("squirrel-log", "import_attack"), ("squirrel-sim", "attack::")] {
+        call(
+            cargo()?
+                .args(["test", "--release", "--locked", "-p", package])
+                .args(["--test", "it", test, "--", "--nocapture"])
+                .env("SQUIRREL_ATTACK_COUNT", &count)
+                .env("SQUIRREL_ATTACK_SEED", &seed),
+        )?;
+    }
+    Ok(())
 }
 
 /// Builds the program and its blind bench; the folder that they are in.

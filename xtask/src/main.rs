@@ -38,7 +38,7 @@ const CHORES: [Chore; 15] = [
     (
         "attack",
         "[COUNT [SEED]]",
-        "so many mutated files of each kind of log against their readers (2500), under limits of memory and time",
+        "so many mutated files of each kind (2500), logs under limits of memory and time, against their readers",
         chores::attack,
     ),
     (

@@ -67,8 +67,14 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Err(usage) => {
             // Help and version are results; anything else is wrong usage, exit code 2.
             let code = usage.exit_code();
-            let _ = usage.print();
-            return u8::try_from(code).unwrap_or(2);
+            output::note(usage.print());
+            return match output::said() {
+                Ok(()) => u8::try_from(code).unwrap_or(2),
+                Err(problem) => {
+                    output::error(&problem);
+                    1
+                }
+            };
         }
     };
     let done = match cli.command.unwrap_or(Command::Demo(cli.demo)) {
@@ -85,16 +91,17 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         Command::Reach(reach) => reach.run(),
         Command::Vehicle(mut vehicle) => match vehicle.lacks() {
             Some(usage) => {
-                output::talk(&format!("error: {usage}"));
+                output::error(&usage);
                 return 2;
             }
             None => vehicle.run(),
         },
     };
-    match done {
+    // What was not seen was not done, whatever else went wrong.
+    match done.and(output::said()) {
         Ok(()) => 0,
         Err(problem) => {
-            output::talk(&format!("error: {}", problem.replace('\n', " ")));
+            output::error(&problem);
             1
         }
     }

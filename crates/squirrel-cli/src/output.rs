@@ -4,19 +4,71 @@
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use squirrel_log::files;
+use std::borrow::Cow;
 use std::fmt::Write as _;
-use std::io::{IsTerminal, Write};
+use std::io::{ErrorKind, IsTerminal, Write};
 use std::path::Path;
+use std::sync::Mutex;
+
+/// What stdout refused first.
+static REFUSED: Mutex<Option<String>> = Mutex::new(None);
 
 /// A result line on stdout.
 pub(crate) fn say(line: &str) {
-    // A closed pipe (`squirrel | head`) is not an error of ours.
-    let _ = writeln!(std::io::stdout(), "{line}");
+    let mut stdout = std::io::stdout();
+    note(writeln!(stdout, "{}", plain(line)).and_then(|()| stdout.flush()));
+}
+
+/// Keeps what stdout refused. A closed pipe (`squirrel | head`) is not an error of ours.
+pub(crate) fn note(printed: std::io::Result<()>) {
+    if let Err(e) = printed
+        && e.kind() != ErrorKind::BrokenPipe
+        && let Ok(mut refused) = REFUSED.lock()
+    {
+        refused.get_or_insert_with(|| e.to_string());
+    }
+}
+
+/// Whether all that was said since the last time has gone out.
+///
+/// # Errors
+/// A full disk behind stdout, and its like.
+pub(crate) fn said() -> Result<(), String> {
+    let refused = REFUSED.lock().ok().and_then(|mut refused| refused.take());
+    refused.map_or(Ok(()), |e| Err(format!("stdout: {e}")))
 }
 
 /// A line for people on stderr.
 pub(crate) fn talk(line: &str) {
-    let _ = writeln!(std::io::stderr(), "{line}");
+    let _ = writeln!(std::io::stderr(), "{}", plain(line));
+}
+
+/// The one line of an error, at most so long that it can be read.
+pub(crate) fn error(problem: &str) {
+    /// Characters of its begin, and of its end, which says what is wrong.
+    const SHOWN: (usize, usize) = (600, 400);
+    let all: Vec<char> = plain(&problem.replace('\n', " ")).chars().collect();
+    let text = |part: &[char]| part.iter().collect::<String>();
+    let left_out = all.len().saturating_sub(SHOWN.0 + SHOWN.1);
+    if left_out == 0 {
+        return talk(&format!("error: {}", text(&all)));
+    }
+    let (begin, end) = (text(&all[..SHOWN.0]), text(&all[all.len() - SHOWN.1..]));
+    talk(&format!("error: {begin} [... {left_out} characters ...] {end}"));
+}
+
+/// A text in which names from files do nothing to a terminal: control characters, and those that
+/// turn the direction of writing, are spelt out.
+fn plain(text: &str) -> Cow<'_, str> {
+    let acts = |c: char| {
+        (c.is_control() && c != '\n' && c != '\t')
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    if !text.contains(acts) {
+        return Cow::Borrowed(text);
+    }
+    let spelt = |c: char| if acts(c) { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(spelt).collect())
 }
 
 /// A progress bar on stderr; silent where nobody looks.
@@ -109,5 +161,5 @@ pub(crate) fn write_json(
 
 /// Makes a folder for results.
 pub(crate) fn folder(path: &Path) -> Result<(), String> {
-    std::fs::create_dir_all(path).map_err(|e| format!("{}: {e}", path.display()))
+    files::folder(path).map_err(|e| format!("{}: {e}", path.display()))
 }

@@ -104,9 +104,9 @@ impl Paths {
     ///
     /// * `kept` - that file
     pub(crate) fn writes_json(self, json: Option<&PathBuf>, kept: Option<&PathBuf>) -> Self {
-        let ids = |path: &PathBuf| FileId::written(path);
-        let kept = kept.map(ids).unwrap_or_default();
-        self.writes("--json", json.filter(|json| !ids(json).iter().any(|id| kept.contains(id))))
+        let kept = kept.and_then(|path| FileId::written(path));
+        let is_kept = |json: &PathBuf| kept.is_some() && FileId::written(json) == kept;
+        self.writes("--json", json.filter(|json| !is_kept(json)))
     }
 
     /// Files that are written into the folder of `--out`.
@@ -133,17 +133,15 @@ impl Paths {
             taken.extend(id.map(|id| (id, (input, "what is read is never overwritten"))));
         }
         for result in &self.writes {
-            let ids = FileId::written(&result.path);
-            if let Some((other, why)) = ids.iter().find_map(|id| taken.get(id)) {
+            let Some(id) = FileId::written(&result.path) else { continue };
+            if let Some((other, why)) = taken.get(&id) {
                 let (path, its) = (result.path.display(), other.path.display());
                 let (argument, other) = (result.argument, other.argument);
                 return Err(format!(
                     "{argument} {path}: would be written over {other} {its}; {why}"
                 ));
             }
-            taken.extend(
-                ids.into_iter().map(|id| (id, (result, "each result needs a file of its own"))),
-            );
+            taken.insert(id, (result, "each result needs a file of its own"));
         }
         self.writes
             .iter()

@@ -105,6 +105,34 @@ pub enum GapError {
         /// Its time, s.
         time_s: f64,
     },
+    /// A clock that jumps: what is between would be invention, and costs time and memory.
+    #[error(
+        "{flight}: {channel}: time_s[{index}] = {time_s}: {problem}; the clock has jumped, or the file holds more than a flight"
+    )]
+    Jump {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Sample, from 0.
+        index: usize,
+        /// Its time, s.
+        time_s: f64,
+        /// How far from which other it is.
+        problem: String,
+    },
+    /// Samples closer than any sensor's: the clock stands still, or its unit is wrong.
+    #[error("{flight}: {channel}: its rate is {rate_hz:e} Hz, must be at most {most_hz:e} Hz")]
+    Fast {
+        /// Name of the flight.
+        flight: String,
+        /// Full name of the channel.
+        channel: &'static str,
+        /// Rate of the log, Hz.
+        rate_hz: f64,
+        /// Highest rate, Hz.
+        most_hz: f64,
+    },
     /// An attitude that is no rotation.
     #[error("{flight}: {channel}: norm {norm} at {time_s:.3} s, must be 1 within 5 %")]
     Rotation {
@@ -185,6 +213,8 @@ impl GapError {
     pub(crate) fn channel(&self) -> Option<&'static str> {
         match self {
             Self::Time { channel, .. }
+            | Self::Jump { channel, .. }
+            | Self::Fast { channel, .. }
             | Self::Rotation { channel, .. }
             | Self::Rate { channel, .. }
             | Self::TooShort { channel, .. } => Some(channel),

@@ -54,6 +54,7 @@ pub(super) fn frames(file: &[u8]) -> impl Iterator<Item = Frame<'_>> {
 pub(super) fn lengths_fit(opcode: u8, body: &[u8]) -> bool {
     let mut rest = Rest(body);
     let fits = match opcode {
+        op::HEADER => rest.texts(2),
         op::SCHEMA => rest.skip(2).and_then(|()| rest.texts(3)),
         op::CHANNEL => rest.skip(4).and_then(|()| rest.texts(2)).and_then(|()| rest.map()),
         op::METADATA => rest.texts(1).and_then(|()| rest.map()),

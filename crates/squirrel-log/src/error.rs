@@ -1,6 +1,7 @@
 //! What can be wrong with a flight log: one line each, which starts with the file name as the
 //! caller gave it.
 
+use crate::files::TooLarge;
 use std::io;
 
 /// A flight log that cannot be written or read.
@@ -34,6 +35,15 @@ pub enum LogError {
         file: String,
         /// What it has or lacks.
         why: String,
+    },
+    /// What comes out of the file is larger than may be.
+    #[error("{file}: {error}")]
+    TooLarge {
+        /// File as given.
+        file: String,
+        /// What it may be.
+        #[source]
+        error: TooLarge,
     },
     /// Bytes have changed since the file was written.
     #[error("{file}: corrupt: {what}")]

@@ -34,6 +34,22 @@ pub use read::Recovery;
 /// Name of the MCAP metadata record that holds [`FlightLog::metadata`].
 const METADATA_NAME: &str = "squirrel";
 
+/// What the header of a file says of who wrote it: in one of these the metadata have a checksum.
+const LIBRARY: &str = "squirrel 2";
+/// Key in that record of the CRC32 over all other entries: what of a file that was cut has no other
+/// checksum.
+const METADATA_CRC: &str = "metadata_crc32";
+
+/// CRC32 over keys and values of the metadata, with the length of each.
+fn metadata_crc32(metadata: &BTreeMap<String, String>) -> String {
+    let mut hasher = crc32fast::Hasher::new();
+    for text in metadata.iter().flat_map(|(key, value)| [key, value]) {
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    }
+    format!("{:08x}", hasher.finalize())
+}
+
 /// One channel of a source: `width` numbers a sample, row after row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channel {

@@ -9,6 +9,7 @@ use prost_types::FieldDescriptorProto;
 use prost_types::field_descriptor_proto::{Label, Type};
 
 use super::{Channel, LogError, Source, schema};
+use crate::files::Budget;
 
 /// Sample `index` of a source as a message of the schema that [`schema::encode`] makes.
 pub(super) fn encode(source: &Source, index: usize) -> Vec<u8> {
@@ -91,8 +92,14 @@ impl SourceReader {
     /// Appends one message.
     ///
     /// # Errors
-    /// [`LogError::Corrupt`], [`LogError::ValueCrc`], [`LogError::RowWidth`].
-    pub(super) fn push(&mut self, file: &str, message: &[u8]) -> Result<(), LogError> {
+    /// [`LogError::Corrupt`], [`LogError::ValueCrc`], [`LogError::RowWidth`],
+    /// [`LogError::TooLarge`].
+    pub(super) fn push(
+        &mut self,
+        file: &str,
+        message: &[u8],
+        budget: &mut Budget,
+    ) -> Result<(), LogError> {
         let corrupt = |what: String| LogError::Corrupt { file: file.to_owned(), what };
         let index = self.time_s.len();
         let (time_s, crc32) = self
@@ -107,6 +114,10 @@ impl SourceReader {
                 "{name} at {time_s:.6} s: {found} CRC32s for {need} channels"
             )));
         }
+        let asked = self.columns.iter().map(|column| column.grows_by(index)).sum::<usize>() + 1;
+        budget
+            .take_numbers(asked)
+            .map_err(|error| LogError::TooLarge { file: file.to_owned(), error })?;
         let full_name = |column: &Column| format!("{}.{}", self.name, column.name);
         for (column, crc32) in self.columns.iter_mut().zip(crc32) {
             if !column.row.is_empty() && row_crc32(time_s, &column.row) != crc32 {
@@ -173,6 +184,16 @@ impl Column {
             width: (field.label() != Label::Repeated).then_some(1),
             values: Vec::new(),
             row: Vec::new(),
+        }
+    }
+
+    /// How many numbers the row at hand adds as sample `index`: a first one brings those that all
+    /// samples before it lacked.
+    fn grows_by(&self, index: usize) -> usize {
+        match (self.row.len(), self.width) {
+            (0, width) => width.unwrap_or(0),
+            (own, Some(_)) => own,
+            (own, None) => own.saturating_mul(index + 1),
         }
     }
 

@@ -2,7 +2,6 @@
 //! unnoticed.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 use mcap::records::Record;
@@ -11,7 +10,11 @@ use mcap::{MAGIC, McapError};
 
 use super::envelope::{self, Damage, Frame};
 use super::message::SourceReader;
-use super::{FlightLog, LogError, METADATA_NAME, check, foxglove, schema};
+use super::{
+    FlightLog, LIBRARY, LogError, METADATA_CRC, METADATA_NAME, check, foxglove, metadata_crc32,
+    schema,
+};
+use crate::files::{self, Budget, TooLarge};
 
 /// Largest record or unpacked chunk, far above the 1 MiB that is written: a wrong length in a
 /// damaged file does not eat the memory.
@@ -83,7 +86,7 @@ impl FlightLog {
 /// The file's name and bytes, if they look like an MCAP file.
 fn open(path: &Path) -> Result<(String, Vec<u8>), LogError> {
     let file = path.display().to_string();
-    let bytes = match fs::read(path) {
+    let bytes = match files::read(path) {
         Ok(bytes) => bytes,
         Err(error) => return Err(LogError::Io { file, error }),
     };
@@ -114,7 +117,7 @@ fn load(
         Err(Damage::Cut) => true,
         Err(Damage::Corrupt(what)) => return Err(LogError::Corrupt { file, what }),
     };
-    let mut reader = Reader::new(&file, wanted);
+    let mut reader = Reader::new(&file, wanted, Budget::of(bytes.len() as u64));
     let mut whole = MAGIC.len().min(bytes.len());
     for frame in envelope::frames(&bytes) {
         match reader.frame(frame) {
@@ -142,6 +145,9 @@ fn load(
 struct Reader<'a> {
     file: &'a str,
     wanted: &'a dyn Fn(&str) -> bool,
+    budget: Budget,
+    /// Of the metadata; logs of before have none.
+    has_checksum: bool,
     metadata: Option<BTreeMap<String, String>>,
     schemas: BTreeMap<u16, Schema>,
     topics: BTreeMap<u16, Topic>,
@@ -160,8 +166,13 @@ enum Topic {
 }
 
 impl<'a> Reader<'a> {
-    fn new(file: &'a str, wanted: &'a dyn Fn(&str) -> bool) -> Self {
-        Self { file, wanted, metadata: None, schemas: BTreeMap::new(), topics: BTreeMap::new() }
+    fn new(file: &'a str, wanted: &'a dyn Fn(&str) -> bool, budget: Budget) -> Self {
+        let (schemas, topics) = (BTreeMap::new(), BTreeMap::new());
+        Self { file, wanted, budget, has_checksum: false, metadata: None, schemas, topics }
+    }
+
+    fn too_large(&self, error: TooLarge) -> LogError {
+        LogError::TooLarge { file: self.file.to_owned(), error }
     }
 
     fn corrupt(&self, what: impl std::fmt::Display) -> LogError {
@@ -216,13 +227,17 @@ impl<'a> Reader<'a> {
 
     /// One record of the file or of a chunk in it.
     fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), LogError> {
-        use mcap::records::op::{CHANNEL, MESSAGE, METADATA, SCHEMA};
+        use mcap::records::op::{CHANNEL, HEADER, MESSAGE, METADATA, SCHEMA};
         // The others are indexes for random access, or nothing that squirrel writes.
-        if ![CHANNEL, MESSAGE, METADATA, SCHEMA].contains(&opcode) {
+        if ![CHANNEL, HEADER, MESSAGE, METADATA, SCHEMA].contains(&opcode) {
             return Ok(());
         }
         self.check_lengths(opcode, body)?;
+        if opcode != MESSAGE {
+            self.budget.take(body.len() as u64).map_err(|error| self.too_large(error))?;
+        }
         match mcap::parse_record(opcode, body).map_err(|error| self.corrupt(error))? {
+            Record::Header(header) => self.has_checksum = header.library == LIBRARY,
             Record::Metadata(record) if record.name == METADATA_NAME => {
                 self.metadata.get_or_insert_default().extend(record.metadata);
             }
@@ -236,7 +251,7 @@ impl<'a> Reader<'a> {
                 self.topics.insert(channel.id, topic);
             }
             Record::Message { header, data } => match self.topics.get_mut(&header.channel_id) {
-                Some(Topic::Source(source)) => source.push(self.file, &data)?,
+                Some(Topic::Source(source)) => source.push(self.file, &data, &mut self.budget)?,
                 Some(Topic::Skipped) => {}
                 None => {
                     return Err(
@@ -281,7 +296,12 @@ impl<'a> Reader<'a> {
 
     fn finish(self) -> Result<FlightLog, LogError> {
         let foreign = self.foreign(format!("no metadata record `{METADATA_NAME}`"));
-        let metadata = self.metadata.ok_or(foreign)?;
+        let damaged = self.corrupt("the metadata does not match its CRC32");
+        let mut metadata = self.metadata.ok_or(foreign)?;
+        let written = metadata.remove(METADATA_CRC);
+        if written.map_or(self.has_checksum, |written| written != metadata_crc32(&metadata)) {
+            return Err(damaged);
+        }
         let sources = self.topics.into_values().filter_map(|topic| match topic {
             Topic::Source(source) if !source.is_empty() => Some(source.into_named()),
             _ => None,

@@ -6,7 +6,10 @@ use std::path::Path;
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapError, WriteOptions};
 
-use super::{FlightLog, LogError, METADATA_NAME, Source, check, foxglove, message, schema};
+use super::{
+    FlightLog, LIBRARY, LogError, METADATA_CRC, METADATA_NAME, Source, check, foxglove, message,
+    metadata_crc32, schema,
+};
 use crate::files::write_whole;
 
 /// A chunk is what a truncated file loses. It is closed by flight time, because only time bounds
@@ -52,12 +55,12 @@ impl FlightLog {
 
     fn encode(&self, obstacles: Option<&[[f64; 3]]>) -> Result<Vec<u8>, McapError> {
         // The library string and one compression thread keep the bytes the same on every machine.
-        let options = WriteOptions::new().library("squirrel").compression_threads(0);
+        let options = WriteOptions::new().library(LIBRARY).compression_threads(0);
         let mut writer = options.create(Cursor::new(Vec::new()))?;
-        writer.write_metadata(&Metadata {
-            name: METADATA_NAME.to_owned(),
-            metadata: self.metadata.clone(),
-        })?;
+        let mut metadata = self.metadata.clone();
+        metadata.remove(METADATA_CRC);
+        metadata.insert(METADATA_CRC.to_owned(), metadata_crc32(&metadata));
+        writer.write_metadata(&Metadata { name: METADATA_NAME.to_owned(), metadata })?;
         let mut tracks = Vec::new();
         for (name, source) in self.sources.iter().filter(|(_, source)| !source.time_s.is_empty()) {
             let set = schema::encode(name, source);

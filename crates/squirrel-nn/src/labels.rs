@@ -27,6 +27,10 @@ const STEP_S: f64 = 0.1;
 const SPREAD: f64 = 0.99;
 /// Time after which a servo has followed its command, s.
 const SETTLED_S: f64 = 0.5;
+/// Longest time between two samples of a flight, s.
+const JUMP_S: f64 = 3600.0;
+/// Time between two samples of the force from which on nothing is known there, s.
+const UNKNOWN_S: f64 = 1.0;
 /// A led plant needs a step only to be checked.
 const LED_STEP_S: f64 = 1e-9;
 
@@ -101,11 +105,21 @@ pub fn windows(
         .map(|line| line.time_s[line.time_s.len() - 1])
         .fold(f64::INFINITY, f64::min);
     let steps = ((end - 0.5 * STEP_S - start) / STEP_S).floor().max(0.0) as usize;
-    let mut rows: Vec<[f32; INPUTS]> = Vec::with_capacity(steps);
+    // As many as there are samples for, however long a clock says that the flight was.
+    let mut rows: Vec<[f32; INPUTS]> = Vec::new();
     let mut all = Vec::new();
     let mut spread_since: Option<f64> = None;
-    for step in 0..=steps {
+    let mut next = 0;
+    while next <= steps {
+        let step = next;
+        next += 1;
         let t = start + step as f64 * STEP_S;
+        if let Some(known_s) = force.unknown_until(t) {
+            // A window goes over nothing unknown.
+            next = next.max(((known_s - start) / STEP_S).ceil() as usize);
+            (rows, spread_since) = (Vec::new(), None);
+            continue;
+        }
         let q = attitude.rotation(t);
         let body = (q.inverse() * velocity.vector(t)).cast::<f32>();
         rows.push(features(In::new(body)));
@@ -177,6 +191,13 @@ impl Line {
         if let Some(i) = (1..time_s.len()).find(|i| !(time_s[*i] > time_s[i - 1])) {
             return refuse(format!("time {} s after {} s, must rise", time_s[i], time_s[i - 1]));
         }
+        if let Some(i) = (1..time_s.len()).find(|i| time_s[*i] - time_s[i - 1] > JUMP_S) {
+            return refuse(format!(
+                "time_s[{i}] = {}: is {:.1} s after the sample before it, at most {JUMP_S}; the clock has jumped",
+                time_s[i],
+                time_s[i] - time_s[i - 1]
+            ));
+        }
         if let Some(i) = values.values.iter().position(|x| !x.is_finite()) {
             return refuse(format!(
                 "{} at {} s, must be finite",
@@ -190,6 +211,11 @@ impl Line {
     /// The last sample before a time, the first before all.
     fn before(&self, t: f64) -> usize {
         self.time_s.partition_point(|s| *s <= t + 1e-9).saturating_sub(1)
+    }
+    /// Where the samples go on, if a time is between two that are far apart.
+    fn unknown_until(&self, t: f64) -> Option<f64> {
+        let (i, j, _) = self.about(t);
+        (self.time_s[j] - self.time_s[i] > UNKNOWN_S).then(|| self.time_s[j])
     }
     fn held(&self, t: f64) -> &[f64] {
         self.values.row(self.before(t))

@@ -37,6 +37,8 @@ pub struct Settings {
 
 /// Passes over the windows if nobody says; as in the paper.
 pub const EPOCHS: usize = 800;
+/// Most passes: what is more was not meant.
+const EPOCHS_MAX: usize = 100_000;
 
 impl Default for Settings {
     fn default() -> Self {
@@ -50,8 +52,8 @@ impl Settings {
         if self.batch == 0 {
             return refuse("batch", self.batch.to_string(), "must be at least 1");
         }
-        if self.epochs == 0 {
-            return refuse("epochs", self.epochs.to_string(), "must be at least 1");
+        if !(1..=EPOCHS_MAX).contains(&self.epochs) {
+            return refuse("epochs", self.epochs.to_string(), "must be 1 to 100000");
         }
         if !(self.rate > 0.0 && self.rate.is_finite()) {
             return refuse("rate", self.rate.to_string(), "must be positive");

@@ -25,6 +25,7 @@ use squirrel_core::guidance::trajectory::Trajectory;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_core::vehicle::ParameterError;
+use squirrel_log::files::read_text;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -150,7 +151,7 @@ impl Scenario {
             ));
         }
         let text =
-            std::fs::read_to_string(name_or_path).map_err(|e| format!("{name_or_path}: {e}"))?;
+            read_text(Path::new(name_or_path)).map_err(|e| format!("{name_or_path}: {e}"))?;
         Self::parse(&text, name_or_path)
     }
 

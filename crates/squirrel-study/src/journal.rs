@@ -1,9 +1,10 @@
 //! Studies that can be stopped, and split over machines: each trial's result is a line of a file,
 //! and who starts again flies only what is missing.
 //!
-//! The file is `NAME.trials.jsonl` in the study's folder. Its first line says what was planned; a
-//! study with another plan refuses to go on from it. A line that was cut off by the stop counts as
-//! not flown. Results are handed back in the order of the trials, and the lines of a study that is
+//! The file is `NAME.trials.jsonl` in the study's folder, which one program at a time has. Its first
+//! line says what was planned, and in which format it is; a study with another plan refuses to go on
+//! from it. A line that was cut off by the stop counts as not flown; one that has changed since is
+//! told by its hash. Results are handed back in the order of the trials, and the lines of a study that is
 //! done are put in that order, so that a study that was stopped ten times, or flown in parts
 //! ([`Shard`]) that were merged ([`crate::merge`]), leaves the same bytes as one that never was, on
 //! any number of threads.
@@ -12,11 +13,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use squirrel_core::stack::wire::{HASH_START, hash, written};
-use squirrel_log::files::write_whole;
+use squirrel_log::files::{self, Lock, write_whole};
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::collections::BTreeMap;
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -102,6 +103,9 @@ pub struct Keep<'a> {
     pub command: &'a [String],
     /// Who is told how far it is.
     pub progress: Option<&'a dyn Progress>,
+    /// The folder's lock, of who writes more into it than trials; otherwise it is locked while they
+    /// are flown.
+    pub lock: Option<&'a Lock>,
 }
 
 /// Who is told how far a study is.
@@ -137,15 +141,36 @@ pub struct Journal<'a> {
     file: Option<(PathBuf, Mutex<File>)>,
     head: Head,
     done: Lines,
+    _lock: Option<Lock>,
 }
 
 /// The first line.
 #[derive(Debug, Clone, PartialEq, Serialize, serde::Deserialize)]
 pub(crate) struct Head {
+    /// Of the lines that follow.
+    #[serde(default)]
+    pub(crate) format: u32,
     /// What a result depends on beside the program itself.
     pub(crate) plan: String,
     /// [`Keep::command`].
     pub(crate) command: Vec<String>,
+}
+
+/// Format of the lines: each ends with its hash.
+pub(crate) const FORMAT: u32 = 2;
+
+/// What stands between a line and its hash, and behind it.
+const HASH: (&str, &str) = (",\"hash\":\"", "\"}");
+
+/// A line with its hash as the last field, of all that is before it.
+fn hashed(line: &str) -> String {
+    let open = line.strip_suffix('}').unwrap_or(line);
+    format!("{open}{}{:016x}{}", HASH.0, hash(HASH_START, open.as_bytes()), HASH.1)
+}
+
+/// Whether a line is as it was written.
+fn is_as_written(line: &str) -> bool {
+    line.rsplit_once(HASH.0).is_some_and(|(open, _)| hashed(&format!("{open}}}")) == line)
 }
 
 #[derive(Serialize, serde::Deserialize)]
@@ -161,19 +186,34 @@ pub(crate) type Lines = BTreeMap<u32, String>;
 /// yet.
 pub(crate) fn read(path: &Path) -> Result<(Option<Head>, Lines, usize), FlightError> {
     let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
-    let text = match std::fs::read_to_string(path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => String::new(),
+    let bytes = match files::read(path) {
+        Ok(bytes) => bytes,
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Vec::new(),
         Err(e) => return Err(at(&e)),
     };
+    let text = String::from_utf8(bytes).map_err(|e| at(&e.utf8_error()))?;
     // What follows the last line feed was cut off.
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     let mut lines = whole.lines();
-    let head = lines.next().map(serde_json::from_str).transpose().map_err(|e| at(&e))?;
+    let head = lines.next().map(serde_json::from_str::<Head>).transpose().map_err(|e| at(&e))?;
+    if let Some(Head { format, .. }) = head.as_ref().filter(|head| head.format != FORMAT) {
+        let problem = format!(
+            "is of format {format}, this version writes and reads {FORMAT}; give another --out, or \
+             delete it"
+        );
+        return Err(at(&problem));
+    }
     let mut done = Lines::new();
     for (number, line) in lines.enumerate() {
+        let place = number + 2;
+        if !is_as_written(line) {
+            let problem = format!(
+                "line {place}: has changed since it was written; without it, its trial is flown again"
+            );
+            return Err(at(&problem));
+        }
         let Line::<serde_json::Value> { trial, .. } = serde_json::from_str(line)
-            .map_err(|e| at(&format!("line {}, from its begin: {e}", number + 2)))?;
+            .map_err(|e| at(&format!("line {place}, from its begin: {e}")))?;
         done.insert(trial, line.to_owned());
     }
     Ok((head, done, whole.len()))
@@ -190,23 +230,36 @@ pub(crate) fn write(path: &Path, head: &Head, lines: &Lines) -> Result<(), Fligh
     write_whole(path, text.as_bytes()).map_err(|e| at(&e))
 }
 
+/// Locks a study's folder.
+///
+/// # Errors
+/// Another program is writing into it.
+pub fn locked(folder: &Path) -> Result<Lock, FlightError> {
+    Lock::folder(folder).map_err(|e| FlightError(format!("{}: {e}", folder.display())))
+}
+
 impl<'a> Journal<'a> {
     /// The trials of a study.
     ///
     /// * `plan` - what a result depends on beside the program itself, in one line
     ///
     /// # Errors
-    /// The file cannot be read or written, or is of another plan; a part of a study that nobody
+    /// The file cannot be read or written, has changed, or is of another plan; another program is
+    /// writing into the folder; a part of a study that nobody
     /// keeps.
     pub fn open(keep: &Keep<'a>, name: &str, plan: &str) -> Result<Self, FlightError> {
-        let head = Head { plan: plan.to_owned(), command: keep.command.to_vec() };
+        let head = Head { format: FORMAT, plan: plan.to_owned(), command: keep.command.to_vec() };
         let Some(folder) = keep.folder else {
             if keep.part == Part::All {
-                return Ok(Self { keep: *keep, file: None, head, done: Lines::new() });
+                return Ok(Self { keep: *keep, file: None, head, done: Lines::new(), _lock: None });
             }
             return Err(FlightError(
                 "shard: needs a folder that keeps what was flown; give --out".to_owned(),
             ));
+        };
+        let lock = match keep.lock {
+            Some(_) => None,
+            None => Some(locked(folder)?),
         };
         let path = folder.join(format!("{name}.trials.jsonl"));
         let at = |e: &dyn std::fmt::Display| FlightError(format!("{}: {e}", path.display()));
@@ -225,14 +278,13 @@ impl<'a> Journal<'a> {
                 length = read(&path)?.2;
             }
         }
-        let mut file =
-            OpenOptions::new().create(true).append(true).open(&path).map_err(|e| at(&e))?;
-        file.set_len(length as u64).map_err(|e| at(&e))?;
+        let mut file = files::append(&path, length as u64).map_err(|e| at(&e))?;
         if length == 0 {
             let line = serde_json::to_string(&head).map_err(|e| at(&e))?;
             writeln!(file, "{line}").map_err(|e| at(&e))?;
         }
-        Ok(Self { keep: *keep, file: Some((path, Mutex::new(file))), head, done })
+        let file = Some((path, Mutex::new(file)));
+        Ok(Self { keep: *keep, file, head, done, _lock: lock })
     }
 
     /// The results of all trials, from 0; those that are missing are flown on all cores. `None`
@@ -291,6 +343,7 @@ impl<'a> Journal<'a> {
         result: &T,
     ) -> Result<T, FlightError> {
         let line = serde_json::to_string(&Line { trial, result }).map_err(|e| self.at(&e))?;
+        let line = hashed(&line);
         // A number that is none cannot be read again, and must not be kept.
         let kept = self.read(&line)?;
         if let Some((_, file)) = &self.file {

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 /// The end of every journal's name.
 const SUFFIX: &str = ".trials.jsonl";
 
-/// Writes the trials of all folders into another, which must exist; the arguments that describe the
+/// Writes the trials of all folders into another, which must exist and which the caller has locked
+/// ([`locked`](crate::journal::locked)); the arguments that describe the
 /// study.
 ///
 /// # Errors

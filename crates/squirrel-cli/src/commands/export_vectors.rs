@@ -9,6 +9,7 @@
 use crate::output::{self, Table, talk};
 use crate::paths::Paths;
 use crate::paths::log_files;
+use clap::value_parser;
 use serde::Serialize;
 use squirrel_core::stack::wire::{HASH_START, Header, RECORD_MAX, Record, Wire, hash, written};
 use squirrel_core::stack::{SensorFrame, Stack, StackState};
@@ -19,6 +20,8 @@ use squirrel_sim::replay;
 use std::path::PathBuf;
 
 const VECTORS: &str = "vectors.bin";
+/// Most pieces of a flight: what is more was not meant.
+const FAULTS_MAX: i64 = 10_000;
 
 /// Options of the export.
 #[derive(Debug, clap::Args)]
@@ -27,7 +30,7 @@ pub(crate) struct ExportVectors {
     #[arg(required = true)]
     flights: Vec<PathBuf>,
     /// Instead of each flight as it was, this many pieces of it with a sensor fault each.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = value_parser!(u32).range(0..=FAULTS_MAX))]
     faults: u32,
     /// Seed of the faults.
     #[arg(long, default_value_t = 0)]

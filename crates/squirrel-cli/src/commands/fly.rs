@@ -232,7 +232,10 @@ impl Fly {
             ),
         };
         bar.finish_and_clear();
-        let mut flight = flown.map_err(|e| e.to_string())?;
+        let mut flight = flown.map_err(|e| match &self.vehicle {
+            Some(file) => format!("{}: {e}", file.display()),
+            None => e.to_string(),
+        })?;
         let ratio = setup.thrust_to_weight();
         say(&format!(
             "{} flies {} with {who}, seed {}, effective thrust-to-weight {ratio:.2}\n",

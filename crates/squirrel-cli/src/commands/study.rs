@@ -9,12 +9,13 @@ use crate::paths::Paths;
 use clap::error::ErrorKind;
 use clap::{Arg, ArgMatches, Args as _, Command, FromArgMatches, value_parser};
 use indicatif::ProgressBar;
+use squirrel_log::files::Lock;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::scenario::Conditions;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::STUDIES;
 use squirrel_study::campaign::Plan;
-use squirrel_study::journal::{Keep, Part, Progress, Shard, check_trials};
+use squirrel_study::journal::{Keep, Part, Progress, Shard, check_trials, locked};
 use squirrel_study::study::{Arms, Found, Shown, Study, Timed, Work};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -158,14 +159,15 @@ impl FromArgMatches for Studies {
 impl Studies {
     pub(crate) fn run(&self) -> Result<(), String> {
         match self {
-            Self::Fly(flown) => flown.run(),
+            Self::Fly(flown) => flown.run(None),
             Self::Merge(merge) => merge.run(),
         }
     }
 }
 
 impl Flown {
-    fn run(&self) -> Result<(), String> {
+    /// * `lock` - of a merge that has locked the folder
+    fn run(&self, lock: Option<&Lock>) -> Result<(), String> {
         let plan = self.plan()?;
         let own = self.study.options.iter().map(|choice| {
             let value = || self.own.get_one::<f64>(choice.name).copied();
@@ -181,10 +183,16 @@ impl Flown {
         };
         let bar = Bar(output::progress(0, self.study.unit));
         let folder = self.common.out.as_deref();
+        // Until its figures are written, too; a merge has it already.
+        let own_lock = match folder.filter(|_| !self.merged) {
+            Some(folder) => Some(locked(folder).map_err(|e| e.to_string())?),
+            None => None,
+        };
+        let lock = own_lock.as_ref().or(lock);
         let found = (self.study.fly)(
             &plan,
             &own,
-            &Keep { folder, part, command: &command, progress: Some(&bar) },
+            &Keep { folder, part, command: &command, progress: Some(&bar), lock },
         );
         bar.0.finish_and_clear();
         if let Some(found) = found.map_err(|e| e.to_string())? {

@@ -151,7 +151,7 @@ impl Train {
 
     /// The checkpoint beside the weights; none where these go into a device or a pipe.
     fn checkpoint(&self) -> Option<PathBuf> {
-        let is_file = !FileId::written(&self.out).is_empty();
+        let is_file = FileId::written(&self.out).is_some();
         is_file.then(|| self.out.with_extension("checkpoint.safetensors"))
     }
 

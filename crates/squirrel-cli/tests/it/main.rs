@@ -1,12 +1,14 @@
 //! The tests of the command line. One binary: what they share is compiled and linked once.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod crash;
 mod export_vectors;
 mod gap;
 mod overwrite;
 mod plan;
 mod program;
 mod reach;
+mod said;
 mod support;
 mod train;
 mod vehicle;

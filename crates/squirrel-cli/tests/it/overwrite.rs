@@ -36,13 +36,7 @@ fn with_inputs(name: &str) -> Folder {
     for table in ["f.csv", "csv/f.csv"] {
         folder.write(table, "t,gx,gy,gz\n0,1,2,3\n0.1,1,2,3\n");
     }
-    for log in [
-        "x.mcap.partial",
-        "vectors/vectors.bin",
-        "vectors/setup-0.bin",
-        "d/find.json",
-        "d/report.html",
-    ] {
+    for log in ["vectors/vectors.bin", "vectors/setup-0.bin", "d/find.json", "d/report.html"] {
         fs::copy(folder.0.join("f/a.mcap"), folder.0.join(log)).unwrap();
     }
     for vehicle in STUDIES.map(|study| format!("d/{study}.csv")) {
@@ -131,7 +125,6 @@ fn no_command_overwrites_what_it_reads() {
         ("import --map map.toml f.csv --out @", "map.toml", ["--map", "--out"]),
         ("import --map files.toml csv --out @", "csv/f.csv", ["PATHS", "--out"]),
         ("import --recover f/a.mcap --out @", "f/a.mcap", ["PATHS", "--out"]),
-        ("import --recover @ --out x.mcap", "x.mcap.partial", ["PATHS", "--out"]),
         ("import --board board.bin --out @", "board.bin", ["PATHS", "--out"]),
         ("export-vectors f/a.mcap --out d --json @", "f/a.mcap", ["FLIGHTS", "--json"]),
         ("export-vectors f --out d --json @", "f/a.mcap", ["FLIGHTS", "--json"]),
@@ -200,8 +193,6 @@ fn no_two_results_go_into_one_file() {
         ("fly --json here/x --report x", ["--report", "--json"]),
         ("fly --json link --out there", ["--out", "--json"]),
         ("fly --json new --report dangling", ["--report", "--json"]),
-        // The second would be begun under the name of the first.
-        ("fly --out x.partial --json x", ["--out", "--json"]),
         ("plan --out x --report x", ["--out", "--report"]),
         ("reach --html x --json x", ["--html", "--json"]),
         ("train flat_plate --flights f --out x --json x", ["--out", "--json"]),

@@ -120,3 +120,20 @@ fn what_an_export_loses_is_said() {
     }
     folder.fails(&["vehicle", "export", "b.toml", "--to", "mjcf", "--out", "x"], &["b.toml"]);
 }
+
+/// Numbers of which each may be and that make no flight together: the check says what a flight
+/// would, and both say of which file.
+#[test]
+fn what_does_not_fly_is_not_called_sound() {
+    let folder = Folder::new("unsound");
+    for (from, to, field) in [
+        ("[0.276, 0.373, 0.025]", "[1e155, 0.373, 0.025]", "size_body_m[0] = 1000"),
+        ("value = 6.6e-9", "value = 1e12", "wrench.force_body_n[0] = NaN: must be finite"),
+    ] {
+        assert!(SQUIRREL.contains(from));
+        folder.write("v.toml", &SQUIRREL.replacen(from, to, 1));
+        folder.fails(&["vehicle", "check", "v.toml"], &["error: v.toml: ", field]);
+        let fly = ["fly", "--scenario", "hover", "--arm", "pc", "--vehicle", "v.toml"];
+        folder.fails(&fly, &["error: v.toml: ", field]);
+    }
+}

@@ -12,6 +12,13 @@ use squirrel_log::FlightLog;
 /// Longest distance of two samples that still belong together, in median periods.
 const GAP_PERIODS: f64 = 5.0;
 
+/// Longest time between two samples of a flight, s.
+const JUMP_S: f64 = 3600.0;
+/// Longest flight, s: eleven days.
+const FLIGHT_MAX_S: f64 = 1e6;
+/// Highest rate of a channel, Hz: filters reach over as many samples as there are in a time.
+const RATE_MAX_HZ: f64 = 1e5;
+
 /// First and last time, s.
 pub(crate) type Span = (f64, f64);
 
@@ -26,7 +33,7 @@ impl Series {
     /// The usable samples of a channel; `None` if the log lacks it.
     ///
     /// # Errors
-    /// Shape, length or times that cannot be, or fewer than two usable samples.
+    /// Shape, length or times that cannot be, a clock that jumps or stands, or fewer than two usable samples.
     pub(crate) fn read(
         flight: &str,
         log: &FlightLog,
@@ -52,6 +59,18 @@ impl Series {
         if let Some(index) = (0..time_s.len()).find(|&i| !runs_forward(i)) {
             return Err(GapError::Time { flight: flight(), channel, index, time_s: time_s[index] });
         }
+        for index in 1..time_s.len() {
+            let since = |other: usize| time_s[index] - time_s[other];
+            let problem = if since(index - 1) > JUMP_S {
+                format!("is {:.1} s after the sample before it, at most {JUMP_S}", since(index - 1))
+            } else if since(0) > FLIGHT_MAX_S {
+                format!("is {:.1} s after the first sample, at most {FLIGHT_MAX_S:e}", since(0))
+            } else {
+                continue;
+            };
+            let (flight, time_s) = (flight(), time_s[index]);
+            return Err(GapError::Jump { flight, channel, index, time_s, problem });
+        }
         let mut series = Self { channel, width, time_s: Vec::new(), values: Vec::new() };
         for (t, row) in time_s.iter().zip(found.values.chunks_exact(width)) {
             if row.iter().all(|x| x.is_finite()) {
@@ -61,6 +80,11 @@ impl Series {
         }
         if series.time_s.len() < 2 {
             return Err(GapError::Empty { flight: flight(), channel, samples: time_s.len() });
+        }
+        let rate_hz = 1.0 / series.median_period_s();
+        if rate_hz > RATE_MAX_HZ {
+            let (flight, most_hz) = (flight(), RATE_MAX_HZ);
+            return Err(GapError::Fast { flight, channel, rate_hz, most_hz });
         }
         Ok(Some(series))
     }

@@ -7,10 +7,11 @@
 //! `beta < 1` tempers the likelihood: a model of a flight is never right to the last bit, and the
 //! error of a wrong one does not average away like noise.
 
+use super::column::Column;
 use super::factor::Factor;
 use nalgebra::{DMatrix, DVector};
 use squirrel_sim::batch::simd::{BLOCK, Kernel, Path, Paths, Register};
-use std::ops::Range;
+use std::borrow::Cow;
 
 /// Tempering of the likelihood.
 pub(crate) const BETA: f64 = 0.3;
@@ -41,7 +42,7 @@ const PIECE: usize = 512;
 const WIDE: usize = 4;
 
 /// Inner products of columns with others, a row each; a column without rows is one of zeros.
-pub(crate) fn products(columns: &[&[f64]], others: &[&[f64]]) -> DMatrix<f64> {
+pub(crate) fn products(columns: &[&Column], others: &[&Column]) -> DMatrix<f64> {
     let out = DMatrix::zeros(columns.len(), others.len());
     f64::run(Path::best(), Products { columns, others, lower: false, out })
 }
@@ -49,8 +50,8 @@ pub(crate) fn products(columns: &[&[f64]], others: &[&[f64]]) -> DMatrix<f64> {
 /// Inner products on the registers of the processor. The order of the sums is that of [`BLOCK`] on
 /// all of them.
 struct Products<'a> {
-    columns: &'a [&'a [f64]],
-    others: &'a [&'a [f64]],
+    columns: &'a [&'a Column],
+    others: &'a [&'a Column],
     /// The two are the same, and what is above the diagonal is not asked for.
     lower: bool,
     out: DMatrix<f64>,
@@ -62,23 +63,25 @@ impl Kernel<f64> for Products<'_> {
     #[inline(always)]
     fn run<L: Register<Element = f64>>(self) -> DMatrix<f64> {
         let Self { columns, others, lower, mut out } = self;
-        let rows = columns.iter().map(|column| column.len()).max().unwrap_or_default();
+        let rows = columns.iter().map(|column| column.rows()).max().unwrap_or_default();
         // A column of one flight is zero in all others, and zeros add nothing.
-        let spans =
-            |columns: &[&[f64]]| columns.iter().map(|column| span(column)).collect::<Vec<_>>();
-        let (own, theirs) = (spans(columns), spans(others));
         for start in (0..rows).step_by(PIECE) {
             let piece = start..(start + PIECE).min(rows);
-            let acts = |span: &Range<usize>| span.start < piece.end && piece.start < span.end;
-            let acting: Vec<usize> = (0..others.len()).filter(|j| acts(&theirs[*j])).collect();
-            for (i, column) in columns.iter().enumerate().filter(|(i, _)| acts(&own[*i])) {
-                let a = &column[piece.clone()];
+            let acts = |column: &Column| {
+                let span = column.span();
+                span.start < piece.end && piece.start < span.end
+            };
+            let acting: Vec<usize> = (0..others.len()).filter(|j| acts(others[*j])).collect();
+            let theirs: Vec<Cow<'_, [f64]>> =
+                acting.iter().map(|j| others[*j].piece(piece.clone())).collect();
+            for (i, column) in columns.iter().enumerate().filter(|(_, column)| acts(column)) {
+                let own = column.piece(piece.clone());
+                let a = &*own;
                 let end = if lower { acting.partition_point(|j| *j <= i) } else { acting.len() };
-                for some in acting[..end].chunks(WIDE) {
+                for (some, b) in acting[..end].chunks(WIDE).zip(theirs.chunks(WIDE)) {
                     // What is missing of the last few is multiplied by its own column and
                     // forgotten.
-                    let b =
-                        [0, 1, 2, 3].map(|j| some.get(j).map_or(a, |j| &others[*j][piece.clone()]));
+                    let b = [0, 1, 2, 3].map(|j| b.get(j).map_or(a, |b| &**b));
                     for (j, sum) in some.iter().zip(side_by_side::<L>(a, b)) {
                         out[(i, *j)] += sum;
                     }
@@ -87,12 +90,6 @@ impl Kernel<f64> for Products<'_> {
         }
         out
     }
-}
-
-/// From the first row that is not zero to the last.
-fn span(column: &[f64]) -> Range<usize> {
-    let first = column.iter().position(|x| *x != 0.0).unwrap_or(column.len());
-    first..column.iter().rposition(|x| *x != 0.0).map_or(first, |last| last + 1)
 }
 
 /// Inner products of one series with four.
@@ -125,7 +122,7 @@ fn side_by_side<L: Register<Element = f64>>(a: &[f64], b: [&[f64]; WIDE]) -> [f6
 }
 
 /// Inner products of columns with each other.
-pub(crate) fn inner(columns: &[&[f64]]) -> DMatrix<f64> {
+pub(crate) fn inner(columns: &[&Column]) -> DMatrix<f64> {
     let n = columns.len();
     let out = DMatrix::zeros(n, n);
     let mut g = f64::run(Path::best(), Products { columns, others: columns, lower: true, out });
@@ -134,8 +131,8 @@ pub(crate) fn inner(columns: &[&[f64]]) -> DMatrix<f64> {
 }
 
 impl Gram {
-    pub(crate) fn new(columns: &[Vec<f64>], y: &[f64]) -> Self {
-        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+    pub(crate) fn new(columns: &[Column], y: &Column) -> Self {
+        let columns: Vec<&Column> = columns.iter().collect();
         let with_y = products(&[y], &[columns.as_slice(), &[y]].concat());
         let (b, yy) = (with_y.columns(0, columns.len()).transpose(), with_y[(0, columns.len())]);
         Self { g: inner(&columns), b: DVector::from_column_slice(b.as_slice()), yy }

@@ -35,21 +35,24 @@ fn of_flights(predictor: &Predictor, linear: &Linear, set: &Scored) -> Vec<f64> 
     let k = set.free.len();
     let columns = set.columns(linear);
     let live: Vec<usize> = (0..columns.len()).filter(|i| set.prior[*i] > 0.0).collect();
-    let mut left = set.y.clone();
+    let mut left = set.y.piece(0..set.y.rows()).into_owned();
     for &i in &live {
-        let x = set.posterior.mean[i];
-        for (value, c) in left.iter_mut().zip(columns[i]) {
-            *value -= c * x;
-        }
+        columns[i].take_scaled_from(&mut left, set.posterior.mean[i]);
     }
+    let places = linear.whitener.places(&predictor.segments);
+    let block_of = |row: usize| {
+        let (flight, time_s, _) = places[row];
+        (flight, (time_s / BLOCK_S).floor() as i64)
+    };
     let mut blocks: BTreeMap<(usize, i64), DVector<f64>> = BTreeMap::new();
-    for (row, (flight, time_s, _)) in
-        linear.whitener.places(&predictor.segments).into_iter().enumerate()
-    {
-        let block = (flight, (time_s / BLOCK_S).floor() as i64);
-        let sum = blocks.entry(block).or_insert_with(|| DVector::zeros(live.len()));
-        for (slot, &i) in live.iter().enumerate() {
-            sum[slot] += columns[i].get(row).map_or(0.0, |c| c * left[row]);
+    for row in 0..places.len() {
+        blocks.entry(block_of(row)).or_insert_with(|| DVector::zeros(live.len()));
+    }
+    for (slot, &i) in live.iter().enumerate() {
+        for (row, c) in columns[i].kept() {
+            if let Some(sum) = blocks.get_mut(&block_of(row)) {
+                sum[slot] += c * left[row];
+            }
         }
     }
     let n = live.len();

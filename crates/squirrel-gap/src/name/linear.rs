@@ -3,6 +3,7 @@
 //!
 //! A column without rows is one of zeros: heights, where no effect of height acts.
 
+use super::column::Column;
 use super::evidence::{BETA, Gram, inner};
 use super::parameters::Catalogue;
 use super::point::{Member, Other, Point, hypothesis};
@@ -19,9 +20,9 @@ pub(crate) struct Linear {
     pub(crate) whitener: Whitener,
     /// Columns as they are, in the units of the rows: as in [`Point::base`], and then what no
     /// hypothesis has ([`super::slow`]).
-    pub(crate) raw: Vec<Vec<f64>>,
+    pub(crate) raw: Vec<Column>,
     /// The same, whitened.
-    pub(crate) columns: Vec<Vec<f64>>,
+    pub(crate) columns: Vec<Column>,
     /// Tolerances of the columns, one standard deviation.
     pub(crate) tolerance: Vec<f64>,
     /// Inner products of the whitened columns.
@@ -83,18 +84,20 @@ impl Linear {
                 Some(before) if keeps => std::mem::take(&mut before[column]),
                 _ => {
                     let ahead = difference(&moved, step, None)?;
-                    if first && parameter.signed && catalogue.bends(parameter.candidate) {
-                        // Far from nothing, the two sides are not alike: the one that explains
-                        // more.
-                        moved.base[column] -= 2.0 * step;
-                        let back = difference(&moved, -step, None)?;
-                        let left = |c: &[f64], x: f64| -> f64 {
-                            residual.iter().zip(c).map(|(r, c)| (r - c * x).powi(2)).sum()
-                        };
-                        if left(&ahead, step) <= left(&back, -step) { ahead } else { back }
-                    } else {
-                        ahead
-                    }
+                    Column::of(
+                        if first && parameter.signed && catalogue.bends(parameter.candidate) {
+                            // Far from nothing, the two sides are not alike: the one that explains
+                            // more.
+                            moved.base[column] -= 2.0 * step;
+                            let back = difference(&moved, -step, None)?;
+                            let left = |c: &[f64], x: f64| -> f64 {
+                                residual.iter().zip(c).map(|(r, c)| (r - c * x).powi(2)).sum()
+                            };
+                            if left(&ahead, step) <= left(&back, -step) { ahead } else { back }
+                        } else {
+                            ahead
+                        },
+                    )
                 }
             });
         }
@@ -103,16 +106,16 @@ impl Linear {
             widest.push(sd);
             tolerance.push(sd);
             raw.push(match (other, &mut before) {
-                (Other::Height { .. }, _) => Vec::new(),
+                (Other::Height { .. }, _) => Column::default(),
                 // What cannot be off needs no column.
-                _ if sd == 0.0 => Vec::new(),
+                _ if sd == 0.0 => Column::default(),
                 (_, Some(before)) => std::mem::take(&mut before[column]),
                 (other, None) => {
                     let mut moved = point.clone();
                     moved.base[column] += sd;
                     let flight =
                         if let Other::Flight { flight, .. } = other { Some(flight) } else { None };
-                    difference(&moved, sd, flight)?
+                    Column::of(difference(&moved, sd, flight)?)
                 }
             });
         }
@@ -124,9 +127,9 @@ impl Linear {
             let draws = noise(predictor, &predictor.wind_columns(&about)?, sigma);
             whitener.refit(&predictor.segments, &draws, DYNAMIC);
         }
-        let columns: Vec<Vec<f64>> =
-            raw.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
-        let gram = inner(&columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let columns: Vec<Column> =
+            raw.iter().map(|c| whitener.apply_to(&predictor.segments, c)).collect();
+        let gram = inner(&columns.iter().collect::<Vec<_>>());
         Ok(Self { point: point.clone(), whitener, raw, columns, tolerance, gram, near: !first })
     }
 
@@ -149,7 +152,7 @@ pub(super) fn height_columns(
     catalogue: &Catalogue,
     point: &Point,
     residual: &[f64],
-) -> Result<Vec<(usize, Vec<f64>)>, GapError> {
+) -> Result<Vec<(usize, Column)>, GapError> {
     let mut all = Vec::new();
     if !catalogue.feels_height(&point.members) {
         return Ok(all);
@@ -184,7 +187,7 @@ pub(super) fn height_columns(
                     slope[row] = share * change[row] / step;
                 }
             }
-            all.push((column, slope));
+            all.push((column, Column::of(slope)));
         }
     }
     Ok(all)
@@ -211,7 +214,7 @@ pub(crate) fn settle_flights(
 ) -> Result<(), GapError> {
     let segments = &predictor.segments;
     let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
-    let mut of_flights: Vec<(usize, f64, Vec<f64>)> = Vec::new();
+    let mut of_flights: Vec<(usize, f64, Column)> = Vec::new();
     for column in catalogue.shared_columns()..catalogue.columns(predictor) {
         let (Other::Flight { flight, is_thrust }, sd) = catalogue.other(column) else { continue };
         let sd = if is_thrust { thrust_fraction.max(sd) } else { sd };
@@ -223,7 +226,7 @@ pub(crate) fn settle_flights(
             sd,
             Some(flight),
         )?;
-        of_flights.push((column, sd, whitener.apply(segments, &slope)));
+        of_flights.push((column, sd, whitener.apply_to(segments, &Column::of(slope))));
     }
     for _ in 0..HEIGHT_STEPS {
         let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
@@ -238,15 +241,13 @@ pub(crate) fn settle_flights(
         for (column, slope) in heights {
             index.push(column);
             sd.push(catalogue.other(column).1);
-            white.push(whitener.apply(segments, &slope));
+            white.push(whitener.apply_to(segments, &slope));
         }
         let mut y = whitener.apply(segments, &residual);
         for (column, c) in index.iter().zip(&white) {
-            for (y, c) in y.iter_mut().zip(c) {
-                *y += c * point.base[*column];
-            }
+            c.add_scaled_to(&mut y, point.base[*column]);
         }
-        let Some(posterior) = Gram::new(&white, &y).posterior(&sd, BETA) else { break };
+        let Some(posterior) = Gram::new(&white, &Column::of(y)).posterior(&sd, BETA) else { break };
         for ((column, x), sd) in index.iter().zip(posterior.mean.iter()).zip(&sd) {
             point.base[*column] = x.clamp(-INSIDE * sd, INSIDE * sd);
         }
@@ -261,7 +262,7 @@ pub(crate) fn settle_flights(
 /// autoregression to the rest.
 fn whitener(
     predictor: &Predictor,
-    columns: &[Vec<f64>],
+    columns: &[Column],
     widest: &[f64],
     residual: &[f64],
 ) -> Whitener {
@@ -270,9 +271,10 @@ fn whitener(
     let doubt = predictor.doubt();
     let mut whitener = Whitener::white(&predictor.segments, residual);
     for _ in 0..3 {
-        let white: Vec<Vec<f64>> =
-            columns.iter().map(|c| whitener.apply(&predictor.segments, c)).collect();
-        let gram = Gram::new(&white, &whitener.apply(&predictor.segments, residual));
+        let white: Vec<Column> =
+            columns.iter().map(|c| whitener.apply_to(&predictor.segments, c)).collect();
+        let y = Column::of(whitener.apply(&predictor.segments, residual));
+        let gram = Gram::new(&white, &y);
         let Some(posterior) = gram.posterior(widest, 1.0) else { break };
         let left = subtract(residual, columns, &posterior.mean);
         whitener = Whitener::fit(&predictor.segments, &left, &doubt);
@@ -281,12 +283,10 @@ fn whitener(
 }
 
 /// `y - X theta`.
-pub(crate) fn subtract(y: &[f64], columns: &[Vec<f64>], theta: &DVector<f64>) -> Vec<f64> {
+fn subtract(y: &[f64], columns: &[Column], theta: &DVector<f64>) -> Vec<f64> {
     let mut left = y.to_vec();
     for (column, x) in columns.iter().zip(theta.iter()) {
-        for (value, c) in left.iter_mut().zip(column) {
-            *value -= c * x;
-        }
+        column.take_scaled_from(&mut left, *x);
     }
     left
 }

@@ -9,6 +9,7 @@
 //! 3. What is left is held against what noise leaves ([`crate::leftover`]); intervals come from
 //!    blocks ([`interval`]).
 
+mod column;
 mod day;
 mod evidence;
 mod factor;
@@ -231,9 +232,7 @@ fn judge(search: &Search<'_>, found: Found) -> Result<Naming, GapError> {
     // What no hypothesis has is linear alone.
     let beyond = catalogue.columns(predictor)..point.base.len();
     for (column, x) in found.linear.raw[beyond.clone()].iter().zip(&point.base[beyond]) {
-        for (left, c) in left.iter_mut().zip(column) {
-            *left -= c * x;
-        }
+        column.take_scaled_from(&mut left, *x);
     }
     // Where little is known, a looser fit of what is seen well may be a worse one of the rest.
     let loose = loosened(&found, &point, left.clone());
@@ -322,9 +321,7 @@ fn loosened(found: &Found, point: &Point, mut left: Vec<f64>) -> Vec<f64> {
         };
         let moved = if best.prior[i] > 0.0 { loose.mean[i] - now } else { 0.0 };
         if moved != 0.0 {
-            for (value, c) in left.iter_mut().zip(column) {
-                *value -= c * moved;
-            }
+            column.take_scaled_from(&mut left, moved);
         }
     }
     left

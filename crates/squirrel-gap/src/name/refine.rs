@@ -1,6 +1,7 @@
 //! The numbers of one set of effects: Gauss-Newton through the simulator, everything else floating
 //! with its tolerance.
 
+use super::column::Column;
 use super::evidence::{BETA, Gram, Posterior, products};
 use super::linear::{Linear, height_columns};
 use super::parameters::{SLAB_OF_LARGEST, bounds};
@@ -35,20 +36,20 @@ pub(crate) struct Scored {
     /// Which number of which member each of the first columns is.
     pub(crate) free: Vec<(usize, usize)>,
     /// Columns of the free numbers, as they are and whitened.
-    pub(crate) own_raw: Vec<Rc<Vec<f64>>>,
-    pub(crate) own: Vec<Rc<Vec<f64>>>,
+    pub(crate) own_raw: Vec<Rc<Column>>,
+    pub(crate) own: Vec<Rc<Column>>,
     /// Where everything else is held, as in [`Point::base`], and whitened columns of heights, by
     /// index, if they matter there.
     base: Vec<f64>,
-    heights: BTreeMap<usize, Rc<Vec<f64>>>,
+    heights: BTreeMap<usize, Rc<Column>>,
     /// Whitened measurement, with the free numbers' part in it.
-    pub(crate) y: Vec<f64>,
+    pub(crate) y: Column,
 }
 
 impl Scored {
     /// Whitened columns in the order of the posterior: of the free numbers, then of everything
     /// else, heights as they act here.
-    pub(super) fn columns<'a>(&'a self, linear: &'a Linear) -> Vec<&'a Vec<f64>> {
+    pub(super) fn columns<'a>(&'a self, linear: &'a Linear) -> Vec<&'a Column> {
         let others = linear.columns.iter().enumerate();
         let here =
             others.map(|(index, column)| self.heights.get(&index).map_or(column, |here| &**here));
@@ -241,13 +242,13 @@ impl Search<'_> {
             for (index, column) in
                 height_columns(self.predictor, self.catalogue, &point, &residual)?
             {
-                heights.insert(index, Rc::new(linear.whitener.apply(segments, &column)));
+                heights.insert(index, Rc::new(linear.whitener.apply_to(segments, &column)));
             }
         }
         let column = |j: usize| heights.get(&j).map_or(&linear.columns[j], |column| &**column);
         for (j, x) in point.base.iter().enumerate() {
             if *x != 0.0 {
-                add_scaled(&mut y, column(j), *x);
+                column(j).add_scaled_to(&mut y, *x);
             }
         }
         let (mut own, mut own_raw, mut free, mut prior) =
@@ -266,12 +267,12 @@ impl Search<'_> {
                     let step = 0.1 * smallest;
                     let mut moved = point.clone();
                     moved.members[index].values[slot] += step;
-                    let column =
-                        self.predictor.slope(&residual, &self.hypothesis(&moved)?, step, None)?;
-                    let white = linear.whitener.apply(segments, &column);
+                    let moved = self.hypothesis(&moved)?;
+                    let column = Column::of(self.predictor.slope(&residual, &moved, step, None)?);
+                    let white = linear.whitener.apply_to(segments, &column);
                     (Rc::new(column), Rc::new(white))
                 };
-                add_scaled(&mut y, &white, member.values[slot]);
+                white.add_scaled_to(&mut y, member.values[slot]);
                 own.push(white);
                 own_raw.push(column);
                 places.push(place);
@@ -285,8 +286,8 @@ impl Search<'_> {
             before.map_or((&linear.gram, 0), |before| (&before.gram.g, before.free.len()));
         let is_new = |j: usize| heights.contains_key(&j) && !heights_hold;
         places.extend((0..n).map(|j| (!is_new(j)).then_some(offset + j)));
-        let all: Vec<&[f64]> =
-            own.iter().map(|c| c.as_slice()).chain((0..n).map(|j| column(j).as_slice())).collect();
+        let all: Vec<&Column> = own.iter().map(|c| &**c).chain((0..n).map(&column)).collect();
+        let y = Column::of(y);
         let gram = extended(known, &places, &all, &y);
         prior.extend(spikes);
         let posterior = gram.posterior(&prior, BETA).ok_or(GapError::NotFinite)?;
@@ -327,10 +328,15 @@ impl Search<'_> {
 }
 
 /// Inner products of columns of which some have places in known products.
-fn extended(known: &DMatrix<f64>, places: &[Option<usize>], columns: &[&[f64]], y: &[f64]) -> Gram {
+fn extended(
+    known: &DMatrix<f64>,
+    places: &[Option<usize>],
+    columns: &[&Column],
+    y: &Column,
+) -> Gram {
     let n = columns.len();
     let new: Vec<usize> = (0..n).filter(|i| places[*i].is_none()).collect();
-    let with_new: Vec<&[f64]> = new.iter().map(|i| columns[*i]).chain([y]).collect();
+    let with_new: Vec<&Column> = new.iter().map(|i| columns[*i]).chain([y]).collect();
     let inner = products(&with_new, &[columns, &[y]].concat());
     let mut g = DMatrix::from_fn(n, n, |i, j| match (places[i], places[j]) {
         (Some(i), Some(j)) => known[(i, j)],
@@ -343,10 +349,4 @@ fn extended(known: &DMatrix<f64>, places: &[Option<usize>], columns: &[&[f64]], 
         }
     }
     Gram { g, b: inner.row(new.len()).columns(0, n).transpose(), yy: inner[(new.len(), n)] }
-}
-
-fn add_scaled(y: &mut [f64], column: &[f64], x: f64) {
-    for (y, c) in y.iter_mut().zip(column) {
-        *y += c * x;
-    }
 }

@@ -7,6 +7,7 @@
 //! A name stands if the flights ask for it beside `Z`, which takes from it whatever is as slow, and
 //! if the two together leave nothing.
 
+use super::column::Column;
 use super::evidence::inner;
 use super::linear::Linear;
 use super::point::Member;
@@ -50,14 +51,15 @@ fn with_slow(predictor: &Predictor<'_>, naming: &Naming) -> Linear {
         for flight in 0..predictor.names.len() {
             for term in 0..TERMS {
                 let (column, sd) = slow(predictor, flight, *channel, term, &naming.left);
-                linear.columns.push(linear.whitener.apply(&predictor.segments, &column));
+                let column = Column::of(column);
+                linear.columns.push(linear.whitener.apply_to(&predictor.segments, &column));
                 linear.raw.push(column);
                 linear.tolerance.push(sd);
                 linear.point.base.push(0.0);
             }
         }
     }
-    linear.gram = inner(&linear.columns.iter().map(Vec::as_slice).collect::<Vec<_>>());
+    linear.gram = inner(&linear.columns.iter().collect::<Vec<_>>());
     linear
 }
 

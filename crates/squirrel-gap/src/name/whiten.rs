@@ -4,8 +4,11 @@
 //! same autoregression, the measurement and every column are as if the noise were white with
 //! variance 1, and sums of squares count evidence. Means over seconds are taken as white.
 
+use super::column::Column;
 use crate::predictor::{CHANNELS, Segment};
 use nalgebra::{DMatrix, DVector};
+use std::borrow::Cow;
+use std::ops::Range;
 
 /// Order of the autoregression.
 const ORDER: usize = 8;
@@ -99,17 +102,34 @@ impl Whitener {
         out
     }
 
-    /// A column through the filters; each segment loses its first samples. No rows stay none.
+    /// As [`Self::apply`], of a column.
+    pub(crate) fn apply_to(&self, segments: &[Segment], column: &Column) -> Column {
+        if column.rows() == 0 {
+            return Column::default();
+        }
+        Column::of(self.filtered(segments, |rows| column.piece(rows)))
+    }
+
+    /// Rows through the filters; each segment loses its first samples. No rows stay none.
     pub(crate) fn apply(&self, segments: &[Segment], column: &[f64]) -> Vec<f64> {
         if column.is_empty() {
             return Vec::new();
         }
+        self.filtered(segments, |rows| Cow::Borrowed(&column[rows]))
+    }
+
+    /// * `piece` - the rows of a segment
+    fn filtered<'c>(
+        &self,
+        segments: &[Segment],
+        piece: impl Fn(Range<usize>) -> Cow<'c, [f64]>,
+    ) -> Vec<f64> {
         let mut out = vec![0.0; self.rows(segments)];
         let mut rest = out.as_mut_slice();
         for segment in segments {
             let Some(filter) = &self.filters[segment.channel] else { continue };
             let Some(order) = filter.order_in(segment) else { continue };
-            let x = &column[segment.rows.clone()];
+            let x = &*piece(segment.rows.clone());
             let own = rest.split_off_mut(..x.len() - order).unwrap_or_default();
             // Most of a column of one flight; zeros that nothing writes cost no memory.
             if x.iter().all(|x| *x == 0.0) {

@@ -77,10 +77,10 @@ fn of_effect(
     effect: &str,
     key: &str,
 ) -> Vec<Conditional> {
-    let raw = &naming.found.best.own_raw[column];
+    let raw = naming.found.best.own_raw[column].piece(0..predictor.rows());
     let mut weight: Vec<(usize, f64)> = (0..CHANNELS.len()).map(|channel| (channel, 0.0)).collect();
     for segment in predictor.segments.iter().filter(|s| s.channel < CHANNELS.len()) {
-        let white = naming.found.linear.whitener.apply(std::slice::from_ref(segment), raw);
+        let white = naming.found.linear.whitener.apply(std::slice::from_ref(segment), &raw);
         weight[segment.channel].1 += white.iter().map(|x| x * x).sum::<f64>();
     }
     weight.sort_by(|a, b| b.1.total_cmp(&a.1));

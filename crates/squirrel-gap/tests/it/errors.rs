@@ -80,6 +80,39 @@ fn turning_without_a_cause_is_a_moment() {
     near(turning(&|t| [0.0, 4.0 * t, 0.0]), [0.0, 4.0 * j.y, 0.0]);
 }
 
+/// Memory goes with samples, not with what a clock says: one sample that is far away is named, and
+/// so are samples that no sensor could have given.
+#[test]
+fn a_clock_that_jumps_or_stands_is_named() {
+    for (source, channel) in
+        [("imu", "omega_body_rad_s"), ("gnss", "velocity_ned_m_s"), ("rotor", "command")]
+    {
+        for far_s in [1e4, 1e8, 1.7e9] {
+            let name = if source == "imu" { "" } else { channel };
+            let jumps = error(|log| log.sources.get_mut(source).unwrap().time_s[300] = far_s);
+            let place = format!("f: {source}.{name}");
+            assert!(jumps.starts_with(&place), "{jumps}");
+            let named = format!("time_s[300] = {far_s}: is ");
+            assert!(jumps.contains(&named) && jumps.contains("the clock has jumped"), "{jumps}");
+        }
+        let stands = error(|log| {
+            let times = &mut log.sources.get_mut(source).unwrap().time_s;
+            for (k, t) in times.iter_mut().enumerate().take(300) {
+                *t = k as f64 * 3e-12;
+            }
+        });
+        assert!(stands.contains("its rate is 3.33"), "{stands}");
+        assert!(stands.contains("e11 Hz, must be at most 1e5 Hz"), "{stands}");
+    }
+    // Each step is short enough, all of them are not.
+    let long = error(|log| {
+        for (k, t) in log.sources.get_mut("gnss").unwrap().time_s.iter_mut().enumerate() {
+            *t = k as f64 * 3599.0;
+        }
+    });
+    assert!(long.contains("after the first sample, at most 1e6"), "{long}");
+}
+
 #[test]
 fn what_a_residual_needs_is_named() {
     let instead = "gnss.position_ned_m, gnss.velocity_ned_m_s or imu.acceleration_ned_m_s2 with \

@@ -8,6 +8,7 @@
 
 use super::ImportError;
 use crate::FlightLog;
+use crate::files;
 use crate::flight_code::{FORMAT, Inputs, record_output};
 use serde::Serialize;
 use squirrel_core::estimate::navigator::Filter;
@@ -45,7 +46,7 @@ struct Recorded {
 pub fn import_board(path: &Path) -> Result<(FlightLog, BoardReport), ImportError> {
     let file = path.display().to_string();
     let bytes =
-        std::fs::read(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
+        files::read(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
     let (flights, lost_records) = flights(&bytes);
     let board = |problem: String| ImportError::Board { file: file.clone(), problem };
     let [flight] = flights.as_slice() else {

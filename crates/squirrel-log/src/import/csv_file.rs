@@ -38,7 +38,7 @@ impl<'a> CsvFile<'a> {
     pub(super) fn open(path: &Path, meter: &'a Meter<'a>) -> Result<Self, ImportError> {
         let name = path.display().to_string();
         let read_error = |source| ImportError::Read { file: path.display().to_string(), source };
-        let file = Metered::new(File::open(path).map_err(read_error)?, meter);
+        let file = Metered::new(crate::files::open(path).map_err(read_error)?, meter);
         // A newline at the very end, whether or not the file has one: the line of a row is then
         // always the reader's line less one. Empty lines are skipped, a carriage return is trimmed
         // as white space.

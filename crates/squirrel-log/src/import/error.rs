@@ -5,6 +5,7 @@
 //! files they are counted from
 //! 1. The file of a topic is named with it: ``log.ulg, topic `sensor_gyro` ``.
 
+use crate::files::TooLarge;
 use std::io;
 
 /// Why an import failed.
@@ -18,6 +19,14 @@ pub enum ImportError {
         file: String,
         /// What the system said.
         source: io::Error,
+    },
+    /// What comes out of a file is larger than may be.
+    #[error("{file}: {source}")]
+    TooLarge {
+        /// Path as given.
+        file: String,
+        /// What it may be.
+        source: TooLarge,
     },
     /// What a board wrote is no flight.
     #[error("{file}: {problem}")]

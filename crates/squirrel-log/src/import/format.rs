@@ -1,7 +1,6 @@
 //! What kind of log a file is: by its first bytes, whatever it is called.
 
-use std::fs;
-use std::io::{self, Read};
+use std::io;
 use std::path::Path;
 
 use super::ardupilot_file::is_bin;
@@ -10,6 +9,7 @@ use super::blackbox_file::is_blackbox;
 use super::error::ImportError;
 use super::ulog_file::is_ulog;
 use super::usd_format::is_usd;
+use crate::files;
 
 /// Bytes that tell every kind.
 const START_BYTES: u64 = 64;
@@ -126,7 +126,5 @@ const CONVERTIBLE: [(&[u8], &str); 4] = [
 ];
 
 fn start(path: &Path) -> io::Result<Vec<u8>> {
-    let mut start = Vec::new();
-    fs::File::open(path)?.take(START_BYTES).read_to_end(&mut start)?;
-    Ok(start)
+    files::begin(path, START_BYTES)
 }

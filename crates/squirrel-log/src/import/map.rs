@@ -4,7 +4,6 @@
 //! permutations, the mask.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Component, Path};
 
 use serde::Deserialize;
@@ -13,6 +12,7 @@ use super::error::ImportError;
 use super::frames::{AttitudeFrame, Body, Direction, Order, World};
 use super::mask::Condition;
 use super::names::{Kind, kind, nearest_canonical};
+use crate::files;
 
 /// A checked import map.
 #[derive(Debug, Clone, PartialEq)]
@@ -165,7 +165,7 @@ impl ImportMap {
     /// [`ImportError::Read`] if the file cannot be read, else as [`ImportMap::parse`].
     pub fn load(path: &Path) -> Result<Self, ImportError> {
         let name = path.display().to_string();
-        let text = fs::read_to_string(path)
+        let text = files::read_text(path)
             .map_err(|source| ImportError::Read { file: name.clone(), source })?;
         Self::parse(&text, &name)
     }

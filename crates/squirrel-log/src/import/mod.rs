@@ -193,7 +193,7 @@ fn autopilot_log(path: &Path) -> Result<(autopilot::Firmware, Vec<u8>), ImportEr
     }
     match format::format(path)?.firmware() {
         None => Err(ImportError::NeedsMap { file }),
-        Some(firmware) => Ok((firmware, std::fs::read(path).map_err(read)?)),
+        Some(firmware) => Ok((firmware, crate::files::read(path).map_err(read)?)),
     }
 }
 

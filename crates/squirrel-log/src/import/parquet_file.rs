@@ -18,6 +18,7 @@ use parquet::schema::types::ColumnDescriptor;
 use super::error::ImportError;
 use super::meter::Meter;
 use super::table::{Table, TableFile, checked, places};
+use crate::files::{self, Budget};
 
 /// Rows decoded at once.
 const BATCH_ROWS: usize = 8192;
@@ -41,7 +42,7 @@ impl<'a> ParquetFile<'a> {
     pub(super) fn open(path: &Path, meter: &'a Meter<'a>) -> Result<Self, ImportError> {
         let name = path.display().to_string();
         let read_error = |source| ImportError::Read { file: path.display().to_string(), source };
-        let file = File::open(path).map_err(read_error)?;
+        let file = files::open(path).map_err(read_error)?;
         let bytes = file.metadata().map_err(read_error)?.len();
         if bytes == 0 {
             return Err(ImportError::Empty { file: name });
@@ -53,7 +54,7 @@ impl<'a> ParquetFile<'a> {
     }
 
     /// All numbers of one column.
-    fn column(&self, place: usize) -> Result<Vec<f64>, ImportError> {
+    fn column(&self, place: usize, budget: &mut Budget) -> Result<Vec<f64>, ImportError> {
         let descriptor = self.reader.metadata().file_metadata().schema_descr().column(place);
         let mut values = Vec::new();
         for group in 0..self.reader.num_row_groups() {
@@ -61,6 +62,15 @@ impl<'a> ParquetFile<'a> {
             let group =
                 self.reader.get_row_group(group).map_err(|error| damaged(&self.name, &error))?;
             self.check_place(group.metadata().column(place))?;
+            // As many as the file says: what has others is damaged.
+            let claimed = usize::try_from(group.metadata().num_rows()).unwrap_or(usize::MAX);
+            budget
+                .take_numbers(claimed)
+                .map_err(|source| ImportError::TooLarge { file: self.name.clone(), source })?;
+            values.try_reserve_exact(claimed).map_err(|error| ImportError::Damaged {
+                file: self.name.clone(),
+                problem: error.to_string(),
+            })?;
             let pages =
                 group.get_column_page_reader(place).map_err(|error| damaged(&self.name, &error))?;
             let pages = Box::new(Pages { inner: pages, has_dictionary: false });
@@ -121,8 +131,11 @@ impl TableFile for ParquetFile<'_> {
 
     fn read(self: Box<Self>, wanted: &[&str]) -> Result<Table, ImportError> {
         let places = places(&self.name, &self.columns, wanted)?;
-        let values: Vec<Vec<f64>> =
-            places.into_iter().map(|place| self.column(place)).collect::<Result<_, _>>()?;
+        let mut budget = Budget::of(self.bytes);
+        let values: Vec<Vec<f64>> = places
+            .into_iter()
+            .map(|place| self.column(place, &mut budget))
+            .collect::<Result<_, _>>()?;
         let rows: Vec<u64> = (1..).take(values.first().map_or(0, Vec::len)).collect();
         if rows.is_empty() {
             return Err(ImportError::HeaderOnly { file: self.name });

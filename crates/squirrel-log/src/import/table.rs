@@ -1,7 +1,6 @@
 //! What every reader gives: the columns that a map asks for, as numbers, with the row of the file
 //! each came from.
 
-use std::fs;
 use std::path::Path;
 
 use super::ardupilot_file::BinFile;
@@ -18,6 +17,7 @@ use super::number::Column;
 use super::parquet_file::ParquetFile;
 use super::ulog_file::UlogFile;
 use super::usd_file::UsdFile;
+use crate::files;
 
 /// A file, or a topic of one, whose column names are known and whose numbers are not read yet.
 pub(super) trait TableFile {
@@ -77,7 +77,7 @@ pub(super) fn open<'a>(
         }
         topic => topic.as_deref().unwrap_or_default(),
     };
-    let whole = || match fs::read(path) {
+    let whole = || match files::read(path) {
         Ok(bytes) if bytes.is_empty() => Err(ImportError::Empty { file: file.clone() }),
         Ok(bytes) => Ok(bytes),
         Err(source) => Err(ImportError::Read { file: file.clone(), source }),

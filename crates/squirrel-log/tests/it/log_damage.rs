@@ -170,6 +170,71 @@ fn recover_does_not_vouch_for_a_changed_file() {
     );
 }
 
+/// Of what is recovered from a cut file every bit is that which was written: what is damaged is
+/// found, or is behind what is whole.
+#[test]
+fn no_flipped_byte_of_a_cut_file_is_recovered() {
+    let (whole, file) = (flight(3), path("cut_flip.mcap"));
+    whole.write(&file).unwrap();
+    let mut bytes = fs::read(&file).unwrap();
+    bytes.truncate(bytes.len() / 2);
+    let (mut found, mut recovered) = (0, 0);
+    for at in 0..bytes.len() {
+        for flip in [0x01, 0x80] {
+            bytes[at] ^= flip;
+            fs::write(&file, &bytes).unwrap();
+            bytes[at] ^= flip;
+            let Ok((log, _)) = FlightLog::recover(&file) else {
+                found += 1;
+                continue;
+            };
+            recovered += 1;
+            assert_eq!(log.metadata, whole.metadata, "byte {at}");
+            for (name, source) in &log.sources {
+                let (samples, all) = (source.time_s.len(), &whole.sources[name]);
+                assert_eq!(source.time_s, all.time_s[..samples], "byte {at}");
+                for (name, channel) in &source.channels {
+                    let written = &all.channels[name].values[..samples * channel.width];
+                    assert_eq!(channel.values, written, "byte {at}");
+                }
+            }
+        }
+    }
+    assert!(found > 0 && recovered > 0, "{found} found, {recovered} recovered");
+}
+
+/// A first row of many numbers stands for as many in every sample before it: 30 kB of messages
+/// that lack it, and 40 kB of one that has it, are gigabytes.
+#[test]
+fn what_a_small_file_claims_is_no_reason_to_ask_for_memory() {
+    const SAMPLES: usize = 20_000;
+    let file = path("bomb.mcap");
+    let mut log = FlightLog::default();
+    for i in 0..SAMPLES {
+        log.source_mut("imu").push(i as f64, &[("omega_body_rad_s", &[0.0, 0.0])]);
+    }
+    log.write(&file).unwrap();
+    let wide: Vec<u8> = vec![0; 8 * SAMPLES];
+    rewrite(&file, |_, time_s, message| {
+        // The list is field 2: key, length 16, two numbers.
+        let at = message.windows(2).position(|bytes| bytes == [2 << 3 | 2, 16]).unwrap();
+        message.drain(at..at + 18);
+        if time_s as usize == SAMPLES - 1 {
+            let mut row = vec![2 << 3 | 2];
+            prost::encoding::encode_varint(wide.len() as u64, &mut row);
+            row.extend_from_slice(&wide);
+            let crc = crc32fast::hash(&[&time_s.to_le_bytes()[..], &wide].concat());
+            let place = message.len() - 4;
+            message[place..].copy_from_slice(&crc.to_le_bytes());
+            message.splice(at..at, row);
+        }
+    });
+    assert!(fs::metadata(&file).unwrap().len() < 1_000_000);
+    let error = read_error(&file);
+    assert!(error.starts_with("its content is larger than 256 MB"), "{error}");
+    assert!(error.ends_with("SQUIRREL_UNPACKED_MB=N allows N MB"), "{error}");
+}
+
 /// Writes a file anew as another tool would, with fresh checksums, its messages changed.
 fn rewrite(file: &Path, change: impl Fn(&str, f64, &mut Vec<u8>)) {
     let bytes = fs::read(file).unwrap();

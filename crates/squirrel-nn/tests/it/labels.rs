@@ -109,6 +109,32 @@ fn the_label_in_ned_is_what_is_left_of_the_papers_balance_of_forces() {
     );
 }
 
+/// Memory goes with samples: one sample that is far away is named, and a pause is no window.
+#[test]
+fn a_clock_that_jumps_is_named_and_a_pause_is_left_out() {
+    let (vehicle, log) = flight();
+    for far_s in [1e4, 1e8, 1.7e9] {
+        let mut jumps = log.clone();
+        let times = &mut jumps.source_mut("imu").time_s;
+        let last = times.len() - 1;
+        times[last] = far_s;
+        let problem = windows(&vehicle, "monday", &jumps).unwrap_err().to_string();
+        let named = format!("monday: imu.specific_force_body_m_s2: time_s[{last}] = {far_s}: is ");
+        assert!(problem.starts_with(&named), "{problem}");
+        assert!(problem.ends_with("at most 3600; the clock has jumped"), "{problem}");
+    }
+    // An hour in the middle in which nothing was logged: nothing is learned there.
+    let mut paused = log.clone();
+    for source in paused.sources.values_mut() {
+        let middle = source.time_s.partition_point(|t| *t < 20.0);
+        for t in &mut source.time_s[middle..] {
+            *t += 3590.0;
+        }
+    }
+    let [whole, paused] = [&log, &paused].map(|log| windows(&vehicle, "monday", log).unwrap());
+    assert!(paused.len() <= whole.len() && paused.len() + 40 > whole.len(), "{}", paused.len());
+}
+
 #[test]
 fn a_log_that_lacks_something_says_what_and_why() {
     let (vehicle, log) = flight();

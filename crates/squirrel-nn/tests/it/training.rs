@@ -188,7 +188,13 @@ fn what_cannot_be_trained_is_one_line() {
     let cases = [
         (SHORT, AREA_M2, &none, "training: has no windows, at least one is needed"),
         (Settings { batch: 0, ..SHORT }, AREA_M2, &training, "batch = 0: must be at least 1"),
-        (Settings { epochs: 0, ..SHORT }, AREA_M2, &training, "epochs = 0: must be at least 1"),
+        (Settings { epochs: 0, ..SHORT }, AREA_M2, &training, "epochs = 0: must be 1 to 100000"),
+        (
+            Settings { epochs: 100_001, ..SHORT },
+            AREA_M2,
+            &training,
+            "epochs = 100001: must be 1 to 100000",
+        ),
         (Settings { rate: f64::NAN, ..SHORT }, AREA_M2, &training, "rate = NaN: must be positive"),
         (Settings { clip: -1.0, ..SHORT }, AREA_M2, &training, "clip = -1: must be positive"),
         (SHORT, f32::INFINITY, &training, "area_m2 = inf: must be positive"),

@@ -337,7 +337,10 @@ impl Setup {
                 let (output, met) = computer.step(&frame)?;
                 believed = output.navigation.or(believed);
                 let encounters = pilot.as_ref().map_or(met, |pilot| met.max(pilot.encounters()));
-                check_finite(&state, time_us)?;
+                if !state.body.is_finite() {
+                    // A plant that left the numbers has nothing more to tell.
+                    return Err(self.fails_at(time_us, "the vehicle's state is not finite"));
+                }
                 commands.send(time_us, Command::of(&output));
                 let followed = pilot.as_ref().and_then(|pilot| pilot.reference());
                 let reference = followed.unwrap_or(output.reference);
@@ -364,7 +367,8 @@ impl Setup {
             let before = state.body.velocity;
             let mut command = commands.acting(time_us);
             failing.hold(time_us, &mut command);
-            let contact = mover.step(plant, &mut state, &command.rotor, command.wing, air)?;
+            let moved = mover.step(plant, &mut state, &command.rotor, command.wing, air);
+            let contact = moved.map_err(|e| self.fails_at(time_us, &e.0))?;
             metrics.contact(contact, before.vector.norm());
             // While something pushes back, an accelerometer reads the whole change of velocity less
             // gravity.
@@ -373,6 +377,12 @@ impl Setup {
             });
         }
         Ok(Flight { metrics: metrics.finish(), log: recorder.map(record::Recorder::finish) })
+    }
+
+    /// What went wrong in a flight, of which vehicle and when.
+    fn fails_at(&self, time_us: u64, problem: &str) -> FlightError {
+        let (vehicle, time_s) = (&self.vehicle.name, time_us as f64 * 1e-6);
+        FlightError(format!("{vehicle}: at {time_s:.3} s: {problem}"))
     }
 
     /// At the start of the mission, level, rotors at hover speed.
@@ -384,14 +394,6 @@ impl Setup {
         state.rotor_speed_rad_s[..vehicle.rotors().len()].fill(speed);
         state
     }
-}
-
-/// A plant that left the numbers has nothing more to tell.
-fn check_finite(state: &PlantState, time_us: u64) -> Result<(), FlightError> {
-    if state.body.is_finite() {
-        return Ok(());
-    }
-    Err(FlightError(format!("at {:.3} s the vehicle's state is not finite", time_us as f64 * 1e-6)))
 }
 
 /// The command of each rotor that carries the weight.

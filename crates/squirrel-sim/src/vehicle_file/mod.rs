@@ -26,6 +26,7 @@ use crate::weights::{ParnnWeights, WeightsError};
 use squirrel_core::effects::Effects;
 use squirrel_core::stack::StackParameters;
 use squirrel_core::vehicle::Vehicle;
+use squirrel_log::files::read_text;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -111,7 +112,7 @@ impl VehicleFile {
     /// One line that names the file, the field or tensor, and the value.
     pub fn load(path: &Path) -> Result<Self, VehicleFileError> {
         let file = path.display().to_string();
-        let text = match std::fs::read_to_string(path) {
+        let text = match read_text(path) {
             Ok(text) => text,
             Err(source) => return Err(VehicleFileError::Read { file, source }),
         };
@@ -133,7 +134,7 @@ impl VehicleFile {
     /// read, or is no file: a pipe is read once.
     pub fn weights_path(path: &Path) -> Option<PathBuf> {
         let path = Some(path).filter(|path| path.is_file())?;
-        let table: toml::Table = std::fs::read_to_string(path).ok()?.parse().ok()?;
+        let table: toml::Table = read_text(path).ok()?.parse().ok()?;
         Some(beside(path, table.get("wing")?.get("parnn_weights")?.as_str()?))
     }
 

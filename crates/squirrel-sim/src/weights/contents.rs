@@ -28,8 +28,8 @@ impl Contents {
     /// The disk refuses, or as [`Contents::parse`].
     pub fn read(path: &Path) -> Result<Self, WeightsError> {
         let file = path.display().to_string();
-        let bytes =
-            std::fs::read(path).map_err(|error| WeightsError::Io { file: file.clone(), error })?;
+        let bytes = squirrel_log::files::read(path)
+            .map_err(|error| WeightsError::Io { file: file.clone(), error })?;
         Self::parse(file, &bytes)
     }
 

@@ -36,7 +36,7 @@ impl ParnnWeights {
     /// The disk refuses, or as [`ParnnWeights::parse`].
     pub fn load(path: &Path) -> Result<Self, WeightsError> {
         let file = path.display().to_string();
-        match std::fs::read(path) {
+        match squirrel_log::files::read(path) {
             Ok(bytes) => Self::parse(&file, bytes),
             Err(error) => Err(WeightsError::Io { file, error }),
         }

@@ -1,6 +1,7 @@
 //! The tests of the simulator. One binary: what they share is compiled and linked once.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
+mod attack;
 mod beside_pc;
 mod board_log;
 mod effects;

@@ -1,11 +1,12 @@
 //! Studies that were stopped, flown on other numbers of threads, or in parts that were merged,
 //! leave the same bytes.
 
+use squirrel_core::stack::wire;
 use squirrel_sim::arm::Arm;
 use squirrel_sim::flight::FlightError;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
-use squirrel_study::journal::{Keep, Part};
+use squirrel_study::journal::{self, Journal, Keep, Part};
 use squirrel_study::merge::merge;
 use squirrel_study::study::{Arms, Study};
 use squirrel_study::{STUDIES, forest, table3, thrust};
@@ -176,10 +177,53 @@ fn a_damaged_line_is_named() {
         fs::write(&file, text.replacen(from, to, 1)).unwrap();
         table3::run(&plan(1), &keep).unwrap_err().to_string()
     };
-    let error = damage("\"rmse_m\":", "\"rmse_m\":NaN,\"x\":");
+    // Every single digit counts.
+    let changed = "table3.trials.jsonl: line 2: has changed since it was written";
+    for (from, to) in [("\"rmse_m\":", "\"rmse_m\":1"), ("\"trial\":0", "\"trial\":7")] {
+        let error = damage(from, to);
+        assert!(error.contains(changed), "{error}");
+    }
+    let error = damage("\"format\":2", "\"format\":1");
+    assert!(error.contains("is of format 1, this version writes and reads 2"), "{error}");
+    // Lines with a right hash that hold something else.
+    let replaced = |from: &str, to: &str| {
+        let lines = text.lines().enumerate().map(|(i, line)| {
+            if i == 0 { line.to_owned() } else { hashed(&line.replacen(from, to, 1)) }
+        });
+        let lines: Vec<String> = lines.collect();
+        fs::write(&file, lines.join("\n") + "\n").unwrap();
+        table3::run(&plan(1), &keep).unwrap_err().to_string()
+    };
+    let error = replaced("\"rmse_m\":", "\"rmse_m\":NaN,\"x\":");
     assert!(error.contains("table3.trials.jsonl: line 2, from its begin:"), "{error}");
-    let error = damage("\"rmse_m\":", "\"rsme_m\":");
+    let error = replaced("\"rmse_m\":", "\"rsme_m\":");
     assert!(error.contains("{\"trial\":0...: missing field `rmse_m`"), "{error}");
+}
+
+/// A line of a journal with the hash of what it says now.
+fn hashed(line: &str) -> String {
+    let open = line.split_once(",\"hash\":").unwrap().0;
+    let hash = wire::hash(wire::HASH_START, open.as_bytes());
+    format!("{open},\"hash\":\"{hash:016x}\"}}")
+}
+
+/// Two at a time would each delete what the other has flown.
+#[test]
+fn one_program_at_a_time_has_a_study_of_a_folder() {
+    let folder = Folder::new("locked");
+    let keep = Keep { folder: Some(&folder.0), ..Keep::default() };
+    let first = Journal::open(&keep, "table3", "a plan").unwrap();
+    let refused = |name| Journal::open(&keep, name, "a plan").unwrap_err().to_string();
+    for name in ["table3", "thrust"] {
+        let error = refused(name);
+        assert!(error.contains("another squirrel is writing into this folder"), "{error}");
+    }
+    drop(first);
+    drop(Journal::open(&keep, "table3", "a plan").unwrap());
+    let lock = journal::locked(&folder.0).unwrap();
+    assert!(refused("table3").contains("another squirrel"));
+    // Who has locked it writes.
+    drop(Journal::open(&Keep { lock: Some(&lock), ..keep }, "table3", "a plan").unwrap());
 }
 
 #[test]
@@ -201,7 +245,9 @@ fn what_cannot_be_merged_is_named() {
     assert!(journals(&into).is_empty(), "nothing is half merged");
     let file = "thrust.trials.jsonl";
     let text = fs::read_to_string(one.join(file)).unwrap();
-    fs::write(other.join(file), text.replacen("\"rmse_m\":", "\"rmse_m\":1", 1)).unwrap();
+    let (head, lines) = text.split_once('\n').unwrap();
+    let line = hashed(&lines.lines().next().unwrap().replacen("\"rmse_m\":", "\"rmse_m\":1", 1));
+    fs::write(other.join(file), format!("{head}\n{line}\n")).unwrap();
     assert!(
         error(&both).contains("flight = 0: has another result in another folder"),
         "{}",
@@ -216,4 +262,36 @@ fn what_cannot_be_merged_is_named() {
     assert!(
         thrust::run(&plan(1), &keep).unwrap_err().to_string().starts_with("shard: needs a folder")
     );
+}
+
+/// No byte of a journal can be changed without being noticed, and none ends the program: what is
+/// not refused leaves the bytes that it would have left.
+#[test]
+fn no_changed_byte_of_a_journal_is_taken_for_a_result() {
+    let folder = Folder::new("attack");
+    let keep = Keep { folder: Some(&folder.0), ..Keep::default() };
+    let open = || Journal::open(&keep, "few", "a plan");
+    let run = |journal: &Journal<'_>| journal.run(8, |trial| Ok([f64::from(trial) / 7.0, -1.5]));
+    let whole = run(&open().unwrap()).unwrap();
+    let file = folder.0.join("few.trials.jsonl");
+    let good = fs::read(&file).unwrap();
+    let mut refused = 0;
+    for at in 0..good.len() {
+        for flip in [0x01, 0x10, 0x80] {
+            let mut bytes = good.clone();
+            bytes[at] ^= flip;
+            fs::write(&file, &bytes).unwrap();
+            match open().and_then(|journal| run(&journal)) {
+                Ok(flown) => assert_eq!(flown, whole, "byte {at}"),
+                Err(error) => {
+                    refused += 1;
+                    assert!(!error.to_string().contains('\n'), "{error}");
+                }
+            }
+        }
+        fs::write(&file, &good[..at]).unwrap();
+        assert_eq!(run(&open().unwrap()).unwrap(), whole, "cut at {at}");
+        assert_eq!(fs::read(&file).unwrap(), good, "cut at {at}");
+    }
+    assert!(refused > good.len(), "{refused}");
 }

@@ -4,6 +4,8 @@ use super::Studies;
 use crate::output;
 use crate::paths::Paths;
 use clap::Parser;
+use squirrel_log::files::Lock;
+use squirrel_study::journal::locked;
 use squirrel_study::merge::{journals, merge};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -38,7 +40,9 @@ impl Options {
         self.paths()?.check()?;
         let is_new = !self.out.exists();
         output::folder(&self.out)?;
-        let merged = self.merged();
+        let lock = locked(&self.out).map_err(|e| e.to_string())?;
+        let merged = self.merged(&lock);
+        drop(lock);
         if merged.is_err() && is_new {
             // Nothing half done is left.
             std::fs::remove_dir_all(&self.out)
@@ -61,7 +65,7 @@ impl Options {
         Ok(paths.writes_into(&self.out, &all))
     }
 
-    fn merged(&self) -> Result<(), String> {
+    fn merged(&self, lock: &Lock) -> Result<(), String> {
         let command = merge(&self.folders, &self.out).map_err(|e| e.to_string())?;
         let unknown = |_| format!("{}: is no study of this version", command.join(" "));
         let Studies::Fly(mut flown) = Again::try_parse_from(&command).map_err(unknown)?.study
@@ -72,6 +76,6 @@ impl Options {
         flown.common.vehicle.clone_from(&self.vehicle);
         flown.common.json.clone_from(&self.json);
         flown.merged = true;
-        flown.run()
+        flown.run(Some(lock))
     }
 }

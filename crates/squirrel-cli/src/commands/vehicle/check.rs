@@ -3,6 +3,9 @@
 use crate::output::{self, Table, say};
 use crate::paths::Paths;
 use serde::Serialize;
+use squirrel_sim::arm::Arm;
+use squirrel_sim::flight::{Integrator, Setup};
+use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::margins::{AxisMargins, WARN_BELOW_RAD};
 use squirrel_sim::vehicle_file::{Hovering, Means, Provenance, StepAnswer, VehicleFile};
 use std::collections::BTreeMap;
@@ -38,7 +41,9 @@ impl Check {
         let Self { file, json } = self;
         Paths::default().vehicle("FILE", [file]).writes("--json", json).check()?;
         let vehicle = VehicleFile::load(file).map_err(|e| e.to_string())?;
-        let means = vehicle.means().map_err(|e| format!("{}: {e}", file.display()))?;
+        let at = |e: String| format!("{}: {e}", file.display());
+        let means = vehicle.means().map_err(at)?;
+        flies(&vehicle).map_err(at)?;
         say(&format!(
             "{}: sound. {} rotors, {:.3} kg\n",
             vehicle.name,
@@ -47,7 +52,6 @@ impl Check {
         ));
         in_words(&means).print();
         say("");
-        let at = |e: String| format!("{}: {e}", file.display());
         let margins = vehicle.margins();
         let steps = if margins.is_some() {
             let hovering = Hovering::new(&vehicle).map_err(at)?;
@@ -91,6 +95,18 @@ impl Check {
             Checked { vehicle: &vehicle.name, sound: true, means, margins, steps, numbers };
         output::write_json(json.as_deref(), &result)
     }
+}
+
+/// That it flies for a moment, where it has a flight code: numbers of which each can be may together
+/// be none.
+fn flies(vehicle: &VehicleFile) -> Result<(), String> {
+    if vehicle.control.is_none() {
+        return Ok(());
+    }
+    let scenario = Scenario { duration_s: 0.5, ..Scenario::find("hover")? };
+    let (vehicle, integrator) = (vehicle.clone(), Integrator::Rk4);
+    let setup = Setup { vehicle, arm: Arm::Pc, scenario, integrator };
+    setup.fly(false, |_| {}).map(drop).map_err(|e| e.to_string())
 }
 
 /// The attitude loop: how far it is from oscillating, and how it follows.

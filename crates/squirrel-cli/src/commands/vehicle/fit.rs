@@ -151,5 +151,5 @@ fn name(path: &Path) -> String {
 }
 
 fn read(path: &Path) -> Result<String, String> {
-    std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))
+    squirrel_log::files::read_text(path).map_err(|e| format!("{}: {e}", path.display()))
 }

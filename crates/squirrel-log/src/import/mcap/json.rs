@@ -91,6 +91,9 @@ impl TableFile for JsonFile<'_> {
     }
 }
 
+/// Largest message: read, it takes up to 70 times as much memory.
+const MESSAGE_MAX_BYTES: usize = 4 << 20;
+
 /// Takes a path in a message and the value there.
 type Visit<'a> = dyn FnMut(&str, &Value) -> Result<(), ImportError> + 'a;
 
@@ -101,6 +104,16 @@ fn for_each_leaf(
     message: &[u8],
     visit: &mut Visit<'_>,
 ) -> Result<(), ImportError> {
+    if message.len() > MESSAGE_MAX_BYTES {
+        return Err(ImportError::Damaged {
+            file: name.to_owned(),
+            problem: format!(
+                "message {} has {} bytes, the most of one in JSON is {MESSAGE_MAX_BYTES}",
+                index + 1,
+                message.len()
+            ),
+        });
+    }
     let value = serde_json::from_slice(message).map_err(|error| ImportError::Damaged {
         file: name.to_owned(),
         problem: format!("message {} is no JSON: {error}", index + 1),

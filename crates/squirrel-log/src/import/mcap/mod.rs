@@ -12,7 +12,6 @@ mod protobuf;
 mod ros_schema;
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
@@ -27,6 +26,7 @@ use super::meter::Meter;
 use super::names::nearest;
 use super::table::{TableFile, checked};
 use crate::envelope::{self, lengths_fit};
+use crate::files::{self, Budget, TooLarge};
 use cdr::CdrFile;
 use json::JsonFile;
 use protobuf::ProtobufFile;
@@ -167,7 +167,7 @@ impl Log {
     ) -> Result<Self, ImportError> {
         let file = path.display().to_string();
         let bytes =
-            fs::read(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
+            files::read(path).map_err(|source| ImportError::Read { file: file.clone(), source })?;
         if bytes.is_empty() {
             return Err(ImportError::Empty { file });
         }
@@ -179,12 +179,16 @@ impl Log {
         }
         let mut reading = Reading {
             wanted,
+            budget: Budget::of(bytes.len() as u64),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
             topics: Vec::new(),
             others: BTreeSet::new(),
         };
-        reading.file(&bytes).map_err(damaged)?;
+        reading.file(&bytes).map_err(|problem| match problem {
+            Problem::Damaged(problem) => damaged(problem),
+            Problem::TooLarge(source) => ImportError::TooLarge { file: file.clone(), source },
+        })?;
         let Reading { topics, others, .. } = reading;
         let topics = topics
             .into_iter()
@@ -232,6 +236,7 @@ impl Log {
 /// What a pass over the file gathers.
 struct Reading<'w> {
     wanted: &'w dyn Fn(&str, &str) -> bool,
+    budget: Budget,
     schemas: BTreeMap<u16, Schema>,
     /// Place of each channel's topic in `topics`; `None` for one that nobody wants.
     channels: BTreeMap<u16, Option<usize>>,
@@ -245,8 +250,23 @@ struct Schema {
     data: Vec<u8>,
 }
 
+/// Why a pass ends early.
+enum Problem {
+    Damaged(String),
+    TooLarge(TooLarge),
+}
+
+impl From<String> for Problem {
+    fn from(problem: String) -> Self {
+        Self::Damaged(problem)
+    }
+}
+
+/// What a message takes beside its bytes: its times and its end, and the numbers of a few columns.
+const MESSAGE_BYTES: u64 = 64;
+
 impl Reading<'_> {
-    fn file(&mut self, bytes: &[u8]) -> Result<(), String> {
+    fn file(&mut self, bytes: &[u8]) -> Result<(), Problem> {
         let broken = |error: McapError| match error {
             McapError::UnsupportedCompression(name) => format!(
                 "its chunks are packed with {name}, import reads zstd and unpacked ones; \
@@ -258,7 +278,7 @@ impl Reading<'_> {
         // The reader takes chunks apart itself; what it hands out is looked at below.
         let mut chunks = envelope::frames(bytes).filter(|frame| frame.opcode == op::CHUNK);
         if !chunks.all(|chunk| lengths_fit(op::CHUNK, chunk.body())) {
-            return Err(too_long());
+            return Err(too_long().into());
         }
         let options = LinearReaderOptions::default()
             .with_prevalidate_chunk_crcs(true)
@@ -276,8 +296,10 @@ impl Reading<'_> {
                 LinearReadEvent::Record { data, opcode } => {
                     if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
                         if !lengths_fit(opcode, data) {
-                            return Err(too_long());
+                            return Err(too_long().into());
                         }
+                        let bytes = data.len() as u64 + MESSAGE_BYTES;
+                        self.budget.take(bytes).map_err(Problem::TooLarge)?;
                         self.record(mcap::parse_record(opcode, data).map_err(broken)?)?;
                     }
                 }
