@@ -1,8 +1,10 @@
 //! One flight in closed loop.
 
 use crate::error;
+use crate::interrupt::signalled;
 use crate::log::FlightLog;
 use crate::policy::Policy;
+use crate::scalars;
 use crate::vehicle::{Vehicle, or_squirrel};
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
@@ -15,7 +17,7 @@ use squirrel_sim::scenario::Scenario;
 use std::path::Path;
 
 /// Steps of the flight code between two looks at Ctrl-C: some milliseconds.
-const STEPS_A_LOOK: u32 = 1024;
+const STEPS_A_LOOK: u32 = 128;
 
 /// The flight code in this process; Ctrl-C ends the flight.
 struct Interruptible {
@@ -39,12 +41,6 @@ impl FlightComputer for Interruptible {
     }
 }
 
-/// What Python's own handler of a signal raises.
-#[allow(clippy::redundant_closure_for_method_calls, reason = "the method's lifetime is too narrow")]
-fn signalled() -> PyResult<()> {
-    Python::attach(|py| py.check_signals())
-}
-
 /// A scenario by name or file, with what the call says of it.
 pub(crate) fn scenario(
     name: &str,
@@ -55,6 +51,11 @@ pub(crate) fn scenario(
         && let Err(e) = std::fs::metadata(name)
     {
         return Err(error::system(e.kind(), format!("{name}: {e}")));
+    }
+    if let Some(ratio) = thrust_to_weight
+        && !(ratio > 1.0 && ratio <= 100.0)
+    {
+        return Err(error::value(format!("thrust_to_weight = {ratio}: must be > 1 and <= 100")));
     }
     let mut scenario = Scenario::find(name).map_err(error::value)?;
     scenario.seed = seed.unwrap_or(scenario.seed);
@@ -113,8 +114,8 @@ pub(crate) fn simulate(
     vehicle: Option<&Bound<'_, Vehicle>>,
     scenario: &str,
     arm: Option<&str>,
-    seed: Option<u64>,
-    thrust_to_weight: Option<f64>,
+    #[pyo3(from_py_with = scalars::seed)] seed: Option<u64>,
+    #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,
     estimator: Option<&str>,
     integrator: &str,
     policy: Option<&Bound<'_, Policy>>,
@@ -122,7 +123,10 @@ pub(crate) fn simulate(
     let by_default = if policy.is_some() { Arm::Pc } else { Arm::TwccFlat };
     let mut vehicle = or_squirrel(vehicle);
     if let Some(name) = estimator {
-        vehicle.estimator = Estimator::parse(name).map_err(error::value)?;
+        vehicle.estimator = Estimator::parse(name).map_err(|_| {
+            let known = Estimator::ALL.map(Estimator::name).join(", ");
+            error::value(format!("estimator = {name}: no such estimator; known are {known}"))
+        })?;
     }
     let setup = Setup {
         vehicle,
@@ -144,5 +148,5 @@ pub(crate) fn simulate(
     }
     let flight = flown.map_err(error::value)?;
     let log = flight.log.ok_or_else(|| error::value("the flight was not logged"))?;
-    Ok(FlightLog::new(log, Some(flight.metrics)))
+    FlightLog::new(log, Some(flight.metrics))
 }

@@ -6,6 +6,7 @@ use crate::error::value;
 use crate::interrupt::interruptible;
 use crate::json;
 use crate::log::table;
+use crate::scalars;
 use crate::vehicle::Vehicle;
 use nalgebra::{Vector2, Vector3};
 use numpy::PyArray1;
@@ -29,10 +30,10 @@ pub(crate) fn plan_reach<'py>(
     py: Python<'py>,
     vehicle: &Bound<'py, Vehicle>,
     velocity_ned_m_s: [f64; 3],
-    thrust_to_weight: Option<f64>,
+    #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,
     wing: String,
     tilt: String,
-    yaw_rad: Option<f64>,
+    #[pyo3(from_py_with = scalars::yaw_rad)] yaw_rad: Option<f64>,
     directions: Option<Array64<'py>>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<Bound<'py, PyDict>>)> {
     let file = &vehicle.get().file;
@@ -109,13 +110,13 @@ pub(crate) fn plan_trajectory<'py>(
     position_ned_m: [f64; 3],
     velocity_ned_m_s: [f64; 3],
     thrust_ned_n: Option<[f64; 3]>,
-    deployment: f64,
+    #[pyo3(from_py_with = scalars::deployment)] deployment: f64,
     obstacles_m: Array64<'py>,
     wing: Option<String>,
-    thrust_to_weight: Option<f64>,
-    step_s: f64,
-    speed_max_m_s: f64,
-    reserve: f64,
+    #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,
+    #[pyo3(from_py_with = scalars::step_s)] step_s: f64,
+    #[pyo3(from_py_with = scalars::speed_max_m_s)] speed_max_m_s: f64,
+    #[pyo3(from_py_with = scalars::reserve)] reserve: f64,
     wind_ned_m_s: [f64; 3],
 ) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
     let file = &vehicle.get().file;
@@ -147,7 +148,7 @@ pub(crate) fn plan_trajectory<'py>(
         .map(|(position, velocity)| Wanted { position, velocity });
     let task =
         Task::new(begin, wanted.collect(), obstacles, step_s, speed_max_m_s).map_err(value)?;
-    let plan = py.detach(|| Planner::default().plan(&craft, &task, None));
+    let plan = interruptible(py, move |_| Planner::default().plan(&craft, &task, None))?;
     let facts = PyDict::new(py);
     facts.set_item("status", plan.status.name())?;
     facts.set_item("cost", plan.cost)?;
