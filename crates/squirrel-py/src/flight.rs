@@ -19,6 +19,9 @@ use std::path::Path;
 /// Steps of the flight code between two looks at Ctrl-C: some milliseconds.
 const STEPS_A_LOOK: u32 = 128;
 
+/// What a log says of a vehicle whose file has no gains.
+const BY_RULE: &str = "by rule: the vehicle file has no [control]";
+
 /// The flight code in this process; Ctrl-C ends the flight.
 struct Interruptible {
     stack: Stack,
@@ -69,7 +72,8 @@ pub(crate) fn scenario(
 /// Parameters
 /// ----------
 /// vehicle : Vehicle, optional
-///     What flies; the paper's squirrel if left out.
+///     What flies; the paper's squirrel if left out. One without ``[control]`` flies by gains by rule, those of ``squirrel vehicle new``,
+///     and the log's metadata say so (``gains``).
 /// scenario : str
 ///     ``hover``, ``avoid``, ``steer``, ``track``, ``forest``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
 ///     the path of a scenario file (.toml).
@@ -128,6 +132,10 @@ pub(crate) fn simulate(
             error::value(format!("estimator = {name}: no such estimator; known are {known}"))
         })?;
     }
+    let by_rule = vehicle.control.is_none();
+    if by_rule {
+        vehicle = vehicle.with_gains_by_rule().map_err(|e| error::vehicle(&e))?;
+    }
     let setup = Setup {
         vehicle,
         arm: arm.map_or(Ok(by_default), Arm::parse).map_err(error::value)?,
@@ -147,6 +155,9 @@ pub(crate) fn simulate(
         return Err(signal);
     }
     let flight = flown.map_err(error::value)?;
-    let log = flight.log.ok_or_else(|| error::value("the flight was not logged"))?;
+    let mut log = flight.log.ok_or_else(|| error::value("the flight was not logged"))?;
+    if by_rule {
+        log.metadata.insert("gains".to_owned(), BY_RULE.to_owned());
+    }
     FlightLog::new(log, Some(flight.metrics))
 }

@@ -20,6 +20,7 @@ mod error;
 mod flight;
 mod gap;
 mod interrupt;
+mod keys;
 mod log;
 mod nn;
 mod pickle;

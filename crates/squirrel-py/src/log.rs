@@ -350,6 +350,10 @@ impl FlightLog {
         own
     }
 
+    fn _repr_html_(own: &Bound<'_, Self>) -> PyResult<String> {
+        own.py().import("squirrel._html")?.call_method1("log", (own,))?.extract()
+    }
+
     fn __repr__(&self) -> String {
         let of = |key: &str| self.log.metadata.get(key).map_or("unknown", String::as_str);
         format!("<FlightLog of {}, arm {}: {} channels>", of("vehicle"), of("arm"), self.__len__())

@@ -2,7 +2,7 @@
 
 use crate::arguments::{Array32, Numbers, rows};
 use crate::batch::settings;
-use crate::error::value;
+use crate::error::{value, vehicle as vehicle_error};
 use crate::interrupt::watched;
 use crate::log::table;
 use crate::pickle::{broken, reduced};
@@ -36,7 +36,7 @@ const ROTORS: usize = 4;
 ///     ``avoid``: follow a straight run of 4 to 8 m/s past trunks that are seen from 5 m; ``track``: follow a curve.
 /// vehicles : sequence of Vehicle
 ///     Each episode takes one of them, with its wings, battery and effects: domain randomisation is a list of vehicles. All have four
-///     rotors and ``[control]``.
+///     rotors; those without ``[control]`` fly by gains by rule (`gains_by_rule`).
 /// num_envs : int
 ///     How many environments.
 /// action : str
@@ -87,7 +87,9 @@ impl Tasks {
         if vehicles.is_empty() {
             return Err(value("vehicles: none given"));
         }
-        let files: Vec<_> = vehicles.iter().map(|vehicle| vehicle.get().file.clone()).collect();
+        let ruled = |vehicle: &Bound<'_, Vehicle>| vehicle.get().file.with_gains_by_rule();
+        let files: Result<Vec<_>, _> = vehicles.iter().map(ruled).collect();
+        let files = files.map_err(|e| vehicle_error(&e))?;
         let made =
             watched(py, |go_on| Environments::new_while(&files, count, seed, settings, go_on));
         let environments = Mutex::new(made?.map_err(value)?);
@@ -316,6 +318,15 @@ impl Tasks {
         self.check(index)?;
         let obstacles = self.lock(py)?.obstacles(index).map_err(value)?;
         table(py, obstacles.concat(), 3)
+    }
+
+    /// Which of the vehicles fly by gains by rule, because their files have none: places in the
+    /// sequence of vehicles.
+    #[getter]
+    fn gains_by_rule(&self) -> Vec<usize> {
+        let bare = |vehicle: &Py<Vehicle>| vehicle.get().file.control.is_none();
+        let places = self.vehicles.iter().enumerate().filter(|(_, vehicle)| bare(vehicle));
+        places.map(|(place, _)| place).collect()
     }
 
     /// Numbers of an observation.

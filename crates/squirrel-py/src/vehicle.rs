@@ -1,11 +1,12 @@
 //! Vehicles: what flies, as a file says it.
 
 use crate::error;
+use crate::keys::{set, table_of, to_python, to_toml};
 use crate::pickle::{broken, reduced};
 use crate::scalars;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyIterator, PyList, PyTuple};
+use pyo3::types::{PyIterator, PyList, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_log::files::write_whole;
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -14,7 +15,7 @@ use squirrel_sim::weights::ParnnWeights;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
-use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+use toml_edit::{DocumentMut, Value};
 
 /// Vehicle files that are part of the package.
 const BUNDLED: [(&str, &str); 5] = [
@@ -24,9 +25,6 @@ const BUNDLED: [(&str, &str); 5] = [
     ("crazyflie21_datasheet", include_str!("../../../vehicles/crazyflie21_datasheet.toml")),
     ("crazyflie2_arpl", include_str!("../../../vehicles/crazyflie2_arpl.toml")),
 ];
-
-/// Lists in lists that a file may have; it needs two.
-const DEPTH_MAX: usize = 8;
 
 /// A vehicle: airframe, rotors, wings, battery, gains, sensors and effects, checked when it is made
 /// and never changed.
@@ -377,6 +375,10 @@ impl Vehicle {
         vehicle.parameters().propulsion.command_for_thrust(share_n)
     }
 
+    fn _repr_html_(own: &Bound<'_, Self>) -> PyResult<String> {
+        own.py().import("squirrel._html")?.call_method1("vehicle", (own,))?.extract()
+    }
+
     fn __repr__(&self) -> String {
         let vehicle = &self.file.vehicle;
         let (name, rotors) = (&self.file.name, vehicle.rotors().len());
@@ -418,104 +420,4 @@ pub(crate) fn or_squirrel(vehicle: Option<&Bound<'_, Vehicle>>) -> VehicleFile {
 pub(crate) fn write_file(path: &Path, content: &[u8]) -> PyResult<()> {
     write_whole(path, content)
         .map_err(|e| error::system(e.kind(), format!("{}: {e}", path.display())))
-}
-
-/// The table that holds a key, and the last part of the key.
-///
-/// * `make` - tables that are missing
-fn table_of<'a, 'k>(
-    document: &'a mut DocumentMut,
-    key: &'k str,
-    make: bool,
-) -> Result<(&'a mut dyn TableLike, &'k str), String> {
-    let mut table: &mut dyn TableLike = document.as_table_mut();
-    let mut parts = key.split('.').peekable();
-    while let Some(part) = parts.next() {
-        if parts.peek().is_none() {
-            return Ok((table, part));
-        }
-        let (name, index) = match part.strip_suffix(']').and_then(|part| part.split_once('[')) {
-            Some((name, index)) => {
-                (name, Some(index.parse::<usize>().map_err(|_| format!("no table {part}"))?))
-            }
-            None => (part, None),
-        };
-        if make && index.is_none() && table.get(name).is_none() {
-            let mut new = Table::new();
-            // Only the headers of tables with numbers show.
-            new.set_implicit(true);
-            table.insert(name, Item::Table(new));
-        }
-        let inner = table.get_mut(name).ok_or_else(|| format!("no table {part}"))?;
-        table = match index {
-            None => inner.as_table_like_mut().ok_or_else(|| format!("{part} is not a table"))?,
-            Some(index) => inner
-                .as_array_of_tables_mut()
-                .and_then(|tables| tables.get_mut(index))
-                .ok_or_else(|| format!("no table {part}"))?,
-        };
-    }
-    Err("empty".to_owned())
-}
-
-fn set(document: &mut DocumentMut, key: &str, new: Option<Value>) -> Result<(), String> {
-    let (table, name) = table_of(document, key, true)?;
-    let Some(new) = new else {
-        return table.remove(name).map(|_| ()).ok_or_else(|| "not there".to_owned());
-    };
-    let long = table
-        .get_mut(name)
-        .and_then(Item::as_table_like_mut)
-        .filter(|long| long.contains_key("value"));
-    if let Some(long) = long {
-        long.insert("value", Item::Value(new));
-        // It told where the old number was from.
-        long.remove("source");
-    } else {
-        table.insert(name, Item::Value(new));
-    }
-    Ok(())
-}
-
-/// * `depth` - of lists about it: one may hold itself
-fn to_toml(key: &str, object: &Bound<'_, PyAny>, depth: usize) -> PyResult<Value> {
-    if object.is_instance_of::<PyBool>() {
-        return Ok(object.extract::<bool>()?.into());
-    }
-    if let Ok(text) = object.extract::<String>() {
-        return Ok(text.into());
-    }
-    if let Ok(number) = object.extract::<i64>() {
-        return Ok(number.into());
-    }
-    if let Ok(number) = object.extract::<f64>() {
-        return Ok(number.into());
-    }
-    // What has no length may have no end.
-    let is_list = depth < DEPTH_MAX && !object.is_instance_of::<PyDict>() && object.len().is_ok();
-    if let (true, Ok(list)) = (is_list, object.try_iter()) {
-        let list = list.map(|inner| to_toml(key, &inner?, depth + 1));
-        return Ok(list.collect::<PyResult<toml_edit::Array>>()?.into());
-    }
-    Err(error::value(format!(
-        "{key}: expected a number, text, truth value or list, got {}",
-        object.get_type().name()?
-    )))
-}
-
-fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
-    Ok(match value {
-        Value::Integer(x) => x.value().into_pyobject(py)?.into_any(),
-        Value::Float(x) => x.value().into_pyobject(py)?.into_any(),
-        Value::Boolean(x) => x.value().into_pyobject(py)?.to_owned().into_any(),
-        Value::Array(list) => {
-            PyList::new(py, list.iter().map(|x| to_python(py, x)).collect::<PyResult<Vec<_>>>()?)?
-                .into_any()
-        }
-        other => other
-            .as_str()
-            .map_or_else(|| other.to_string(), str::to_owned)
-            .into_pyobject(py)?
-            .into_any(),
-    })
 }

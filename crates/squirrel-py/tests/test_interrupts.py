@@ -51,8 +51,8 @@ def test_loops_look_every_so_many_turns(vehicle: squirrel.Vehicle) -> None:
         "derivative": (lambda: squirrel.dynamics.derivative(vehicle, **many), N, TURNS),
         "rk4_step, many": (lambda: squirrel.dynamics.rk4_step(vehicle, dt_s=1e-3, **many), N, TURNS),
         "rk4_step, long": (lambda: squirrel.dynamics.rk4_step(vehicle, dt_s=1e-3, steps=N, **one), N, TURNS),
-        "Tasks": (lambda: squirrel.Tasks(task="avoid", vehicles=[vehicle], num_envs=2000), 2000, TURNS),
-        "Tasks.reset": (squirrel.Tasks(task="avoid", vehicles=[vehicle], num_envs=2000).reset, 2000, TURNS),
+        "Tasks": (lambda: squirrel.Tasks(task="avoid", vehicles=[vehicle], num_envs=2000), 2000, 128),
+        "Tasks.reset": (squirrel.Tasks(task="avoid", vehicles=[vehicle], num_envs=2000).reset, 2000, 128),
         "Policy": (lambda: policy(np.zeros((5 * N, 25), np.float32)), 5 * N, 16_384),
         "Stack.step": (lambda: squirrel.Stack(vehicle, count=N).step(time_us=1), N, TURNS),
         "Backstepping.step": (

@@ -370,6 +370,11 @@ class Verdict:
     notes: tuple[str, ...]
     patched: Vehicle | None
 
+    def _repr_html_(self) -> str:
+        from squirrel import _html
+
+        return _html.verdict(self)
+
 
 def effects() -> list[dict[str, Any]]:
     """List the effects that a vehicle file may name, and that this workflow looks for.

@@ -96,6 +96,11 @@ class Reach:
     hull_volume_m3_s6: Compared
     support: Support | None
 
+    def _repr_html_(self) -> str:
+        from squirrel import _html
+
+        return _html.reach(self)
+
 
 def reach(
     vehicle: Vehicle,

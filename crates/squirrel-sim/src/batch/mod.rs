@@ -179,7 +179,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Self, BatchError> {
         let drives: Vec<Drive<T>> = kinds.iter().map(|kind| Drive::new(&vehicles[*kind])).collect();
-        let mut batch = Self::empty(&drives, Fitted::all(&[])?, None, settings, plain)?;
+        let mut batch = Self::empty(&drives, Fitted::all(&[])?, None, settings, plain, go_on)?;
         for (number, kind) in kinds.iter().enumerate() {
             if number % LOOK == 0 && !go_on() {
                 return Err(BatchError::Interrupted);
@@ -238,7 +238,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         }
         let drives: Vec<Drive<T>> = kinds.iter().map(|kind| own[*kind]).collect();
         let vehicle = members.first().map(|member| &member.vehicle);
-        let mut batch = Self::empty(&drives, fitted, vehicle, settings, whole)?;
+        let mut batch = Self::empty(&drives, fitted, vehicle, settings, whole, go_on)?;
         for (number, kind) in kinds.iter().enumerate() {
             if number % LOOK == 0 && !go_on() {
                 return Err(BatchError::Interrupted);
@@ -255,6 +255,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         vehicle: Option<&Vehicle<f64>>,
         settings: Settings,
         work: Work<T, ROTORS>,
+        go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Self, BatchError> {
         const { assert!(ROTORS >= 1 && ROTORS <= MAX_ROTORS) };
         let dt_s = settings.dt_s;
@@ -275,8 +276,12 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         }
         let each = BLOCK * CHUNK;
         let chunks = drives.chunks(each).enumerate();
-        let chunks = chunks.map(|(number, drives)| Chunk::new(number * each, &block, drives));
-        let pool = Pool::new(chunks.collect(), settings.threads, do_job)?;
+        let chunks = chunks.map(|(number, drives)| {
+            let stops = (number * each).is_multiple_of(LOOK) && !go_on();
+            let chunk = Chunk::new(number * each, &block, drives);
+            if stops { Err(BatchError::Interrupted) } else { Ok(chunk) }
+        });
+        let pool = Pool::new(chunks.collect::<Result<_, _>>()?, settings.threads, do_job)?;
         Ok(Self { pool, vehicles: drives.len(), fitted, settings, work, autopilot: None })
     }
 
