@@ -392,6 +392,9 @@ pub(crate) fn train(
     if batch == 0 {
         return Err(value("batch = 0: must be at least 1"));
     }
+    if flights.is_empty() {
+        return Err(value("flights: none given"));
+    }
     let vehicle = or_squirrel(vehicle);
     let validation = validation.unwrap_or_default();
     let held_out: Vec<&str> = validation.iter().map(String::as_str).collect();

@@ -67,9 +67,14 @@ def _seed(seed: Any) -> int:
 
 def _numbers(name: str, numbers: Any) -> NDArray[np.float32]:
     try:
-        return np.asarray(numbers, np.float32)
-    except (OverflowError, TypeError, ValueError):
-        raise ValueError(f"{name}: expected numbers (float32), got {type(numbers).__name__}") from None
+        given = np.asarray(numbers)
+    except ValueError:
+        given = np.array(None)
+    if given.dtype.kind not in "fiub":
+        raise ValueError(f"{name}: expected numbers (float32), got {given.dtype} of shape {given.shape}")
+    # What is too large for it becomes infinite, and is refused as such.
+    with np.errstate(over="ignore"):
+        return given.astype(np.float32)
 
 
 def _frames(tasks: Tasks, render_mode: str | None) -> list[Any]:
@@ -267,7 +272,7 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
             seed = int(np.random.default_rng().integers(2**62))
         if seed is not None:
             seeds: list[int | None]
-            if isinstance(seed, (list, tuple, np.ndarray)):
+            if isinstance(seed, (list, tuple)) or (isinstance(seed, np.ndarray) and seed.ndim == 1):
                 seeds = [None if one is None else _seed(one) for one in seed]
             else:
                 first = _seed(seed)

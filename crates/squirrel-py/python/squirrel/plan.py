@@ -149,8 +149,6 @@ def reach(
     (0.98, 1.74)
     """
     velocity = _three("velocity_ned_m_s", velocity_ned_m_s)
-    if not np.isfinite(velocity).all():
-        raise ValueError(f"velocity_ned_m_s = {velocity}: must be finite")
     case, support = plan_reach(vehicle, velocity, thrust_to_weight, wing, tilt, yaw_rad, directions)
     return Reach(
         thrust_to_weight=case["thrust_to_weight"],
@@ -276,7 +274,9 @@ def trajectory(
     if not 0.01 <= _number("step_s", step_s) <= 1.0:
         raise ValueError(f"step_s = {step_s}: must be 0.01 to 1")
     if reference_velocity_ned_m_s is None:
-        reference_velocity_ned_m_s = np.ascontiguousarray(np.gradient(positions, step_s, axis=0))
+        # What is too large is refused below.
+        with np.errstate(all="ignore"):
+            reference_velocity_ned_m_s = np.ascontiguousarray(np.gradient(positions, step_s, axis=0))
     reference_velocity_ned_m_s = _rows("reference_velocity_ned_m_s", reference_velocity_ned_m_s)
     if len(reference_velocity_ned_m_s) != len(positions):
         raise ValueError(f"reference_velocity_ned_m_s: {len(reference_velocity_ned_m_s)} rows, must be {len(positions)}")
@@ -326,8 +326,9 @@ def _rows(name: str, array: Any) -> NDArray[np.float64]:
     if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.ndim != 2 or array.shape[1] != 3:
         got = f"{array.dtype} of shape {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
         raise ValueError(f"{name}: expected a float64 array of shape (n, 3), got {got}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name}: must be finite")
+    for row, column in np.argwhere(~np.isfinite(array))[:1]:
+        value = array[row, column]
+        raise ValueError(f"{name}[{row}] = {'NaN' if np.isnan(value) else value}: must be finite")
     return array
 
 
