@@ -3,7 +3,7 @@
 use crate::arguments::{Array32, Numbers, Rows, rows};
 use crate::error::value;
 use crate::interrupt::now_and_then;
-use crate::pickle::{broken, put, reduced, take, take_rest};
+use crate::kept::{broken, put, reduced, take, take_rest};
 use crate::scalars::{self, checked_count};
 use crate::state::rotations;
 use crate::terms::Terms;

@@ -20,6 +20,7 @@ mod error;
 mod flight;
 mod gap;
 mod interrupt;
+mod kept;
 mod keys;
 mod log;
 mod nn;

@@ -2,7 +2,7 @@
 
 use crate::error;
 use crate::interrupt::interruptible;
-use crate::pickle::{broken, reduced};
+use crate::kept::{broken, reduced};
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;

@@ -3,8 +3,8 @@
 use crate::arguments::{Array32, Numbers, rows};
 use crate::error;
 use crate::interrupt::look;
+use crate::kept::{broken, reduced};
 use crate::log::table;
-use crate::pickle::{broken, reduced};
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyTuple};

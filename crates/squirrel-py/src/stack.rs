@@ -5,7 +5,7 @@ use crate::control::{lock, memory};
 use crate::error::value;
 use crate::flight::scenario;
 use crate::interrupt::now_and_then;
-use crate::pickle::{broken, put, reduced, take, take_rest};
+use crate::kept::{broken, put, reduced, take, take_rest};
 use crate::scalars;
 use crate::terms::Terms;
 use crate::vehicle::{Vehicle, or_squirrel};

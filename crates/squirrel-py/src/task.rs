@@ -1,11 +1,11 @@
 //! Environments: `squirrel_sim::task` as arrays. `squirrel.envs` makes Gymnasium's classes of it.
 
 use crate::arguments::{Array32, Numbers, rows};
-use crate::batch::settings;
+use crate::batch::{scheme_name, settings};
 use crate::error::{value, vehicle as vehicle_error};
 use crate::interrupt::watched;
+use crate::kept::{broken, reduced};
 use crate::log::table;
-use crate::pickle::{broken, reduced};
 use crate::scalars::{self, checked_count};
 use crate::vehicle::Vehicle;
 use numpy::{PyArray1, PyArray2};
@@ -15,8 +15,8 @@ use pyo3::sync::MutexExt;
 use pyo3::types::{PyBytes, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::policy::OBSERVATION;
+use squirrel_sim::batch::Settings;
 use squirrel_sim::batch::simd::Path;
-use squirrel_sim::batch::{Scheme, Settings};
 use squirrel_sim::task::course::CourseKind;
 use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks as Environments};
 use std::sync::{Mutex, MutexGuard};
@@ -373,13 +373,6 @@ impl Tasks {
 /// an episode, sensors, threads, memory.
 type Kept<'py> =
     (Vec<Bound<'py, Vehicle>>, usize, [String; 4], f64, bool, usize, Bound<'py, PyBytes>);
-
-pub(crate) fn scheme_name(scheme: Scheme) -> &'static str {
-    match scheme {
-        Scheme::Rk4 => "rk4",
-        Scheme::Euler => "euler",
-    }
-}
 
 fn task_settings(
     [task, action]: [&str; 2],

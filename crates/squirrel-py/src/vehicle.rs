@@ -1,8 +1,8 @@
 //! Vehicles: what flies, as a file says it.
 
 use crate::error;
+use crate::kept::{broken, reduced};
 use crate::keys::{set, table_of, to_python, to_toml};
-use crate::pickle::{broken, reduced};
 use crate::scalars;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;

@@ -67,7 +67,7 @@ def test_data_frames() -> None:
         ({"integrator": "leapfrog"}, "integrator = leapfrog"),
         ({"thrust_to_weight": -1.0}, "thrust_to_weight = -1"),
         ({"thrust_to_weight": float("nan")}, "thrust_to_weight = NaN"),
-        ({"vehicle": squirrel.Vehicle.bundled("crazyflie2_arpl")}, r"\[control\] is missing; a flight needs gains"),
+        ({"estimator": "hawk"}, "estimator = hawk: no such estimator; known are eskf, "),
     ],
 )
 def test_a_bad_argument_is_named(arguments: dict[str, object], line: str) -> None:

@@ -5,7 +5,7 @@ use super::{Batch, Locked};
 use crate::arguments::Float;
 use crate::error::value;
 use crate::interrupt::now_and_then;
-use crate::pickle::broken;
+use crate::kept::broken;
 use crate::scalars::Indices;
 use crate::vehicle::Vehicle;
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
@@ -50,6 +50,14 @@ pub(crate) fn settings(
         return Err(value(format!("threads = {threads}: must be {limit}")));
     }
     Ok(Settings { dt_s, scheme, threads: threads.unwrap_or(all.threads), path })
+}
+
+/// Name of a scheme in arguments.
+pub(crate) fn scheme_name(scheme: Scheme) -> &'static str {
+    match scheme {
+        Scheme::Rk4 => "rk4",
+        Scheme::Euler => "euler",
+    }
 }
 
 impl Batch {

@@ -8,9 +8,8 @@ pub(crate) mod rollout;
 use crate::arguments::{Array64, ArrayAny, Float, Numbers, rows};
 use crate::error::value;
 use crate::interrupt::{now_and_then, watched};
-use crate::pickle::reduced;
+use crate::kept::reduced;
 use crate::scalars::{self, Indices};
-use crate::task::scheme_name;
 use crate::vehicle::Vehicle;
 use any_batch::{AnyBatch, advance, air, check_wind};
 use pyo3::prelude::*;
@@ -19,7 +18,7 @@ use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_sim::batch::{BatchVehicle, Settings};
 use std::sync::Mutex;
 
-pub(crate) use make::settings;
+pub(crate) use make::{scheme_name, settings};
 
 /// Many vehicles at once, each with numbers of its own.
 ///
