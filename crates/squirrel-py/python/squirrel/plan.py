@@ -268,9 +268,7 @@ def trajectory(
     >>> plan.status
     'solved'
     """
-    positions = _rows("reference_position_ned_m", reference_position_ned_m)
-    if len(positions) < 3:
-        raise ValueError(f"reference_position_ned_m: expected an array of shape (n, 3), n > 2, got {positions.shape}")
+    positions = _rows("reference_position_ned_m", reference_position_ned_m, least=3)
     if not 0.01 <= _number("step_s", step_s) <= 1.0:
         raise ValueError(f"step_s = {step_s}: must be 0.01 to 1")
     if reference_velocity_ned_m_s is None:
@@ -322,10 +320,11 @@ def _number(name: str, number: Any) -> float:
         raise TypeError(f"{name}: expected a number, got {type(number).__name__}") from None
 
 
-def _rows(name: str, array: Any) -> NDArray[np.float64]:
-    if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.ndim != 2 or array.shape[1] != 3:
+def _rows(name: str, array: Any, least: int = 0) -> NDArray[np.float64]:
+    fits = isinstance(array, np.ndarray) and array.dtype == np.float64 and array.ndim == 2 and array.shape[1] == 3
+    if not fits or len(array) < least:
         got = f"{array.dtype} of shape {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
-        raise ValueError(f"{name}: expected a float64 array of shape (n, 3), got {got}")
+        raise ValueError(f"{name}: expected a float64 array of shape (n, 3){', n > 2' if least > 2 else ''}, got {got}")
     for row, column in np.argwhere(~np.isfinite(array))[:1]:
         value = array[row, column]
         raise ValueError(f"{name}[{row}] = {'NaN' if np.isnan(value) else value}: must be finite")
