@@ -41,6 +41,15 @@ pub struct Trained {
 }
 
 impl Trained {
+    /// A model of parts that were kept.
+    ///
+    /// # Errors
+    /// Another number of parameters than the model has, or one that is not finite.
+    pub fn of(card: Card, parameters: Vec<f32>) -> Result<Self, NnError> {
+        let blank = Self { parameters: vec![0.0; card.model.parameters()], card };
+        blank.with_parameters(parameters)
+    }
+
     /// All parameters in the order of [`Model::tensors`].
     pub fn parameters(&self) -> &[f32] {
         &self.parameters

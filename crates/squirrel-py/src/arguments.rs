@@ -64,28 +64,6 @@ array_argument! {
     ArrayAny "numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]";
 }
 
-/// Integers that can be iterated over, an array of them among others.
-#[derive(Debug, Clone)]
-pub(crate) struct Indices(pub(crate) Vec<usize>);
-
-impl<'a, 'py> FromPyObject<'a, 'py> for Indices {
-    type Error = PyErr;
-    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-        object.try_iter()?.map(|index| index?.extract()).collect::<PyResult<_>>().map(Self)
-    }
-}
-
-impl PyStubType for Indices {
-    fn type_output() -> TypeInfo {
-        TypeInfo {
-            name: "typing.Iterable[typing.SupportsIndex]".to_owned(),
-            source_module: None,
-            import: [Into::into("typing")].into(),
-            type_refs: std::collections::HashMap::new(),
-        }
-    }
-}
-
 /// What a number in an array may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Numbers {

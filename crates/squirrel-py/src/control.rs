@@ -2,6 +2,9 @@
 
 use crate::arguments::{Array32, Numbers, Rows, rows};
 use crate::error::value;
+use crate::interrupt::now_and_then;
+use crate::kept::{broken, put, reduced, take, take_rest};
+use crate::scalars::{self, checked_count};
 use crate::state::rotations;
 use crate::terms::Terms;
 use crate::vehicle::Vehicle;
@@ -9,7 +12,7 @@ use nalgebra::Vector3;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::control::Reference;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains, AttitudeState};
@@ -18,17 +21,14 @@ use squirrel_core::control::position::MeasuredMotion;
 use squirrel_core::control::twcc::{OuterAirframe, TwccParameters, TwccState};
 use squirrel_core::frames::In;
 use squirrel_core::stack::StackParameters;
+use squirrel_core::stack::wire::Reader;
 use squirrel_core::vehicle::Vehicle as Checked;
 use squirrel_sim::arm::Arm;
 use std::sync::{Mutex, MutexGuard};
 
 /// An empty memory for each vehicle.
 pub(crate) fn memory<T: Clone + Default>(count: usize) -> PyResult<Mutex<Vec<T>>> {
-    if count == 0 {
-        Err(value("count = 0: must be at least 1"))
-    } else {
-        Ok(Mutex::new(vec![T::default(); count]))
-    }
+    Ok(Mutex::new(vec![T::default(); checked_count("count", count)?]))
 }
 
 /// The memory of a law, one for each vehicle.
@@ -101,7 +101,10 @@ pub(crate) struct Backstepping {
 impl Backstepping {
     #[new]
     #[pyo3(signature = (vehicle, *, count = 1))]
-    fn new(vehicle: &Bound<'_, Vehicle>, count: usize) -> PyResult<Self> {
+    fn new(
+        vehicle: &Bound<'_, Vehicle>,
+        #[pyo3(from_py_with = scalars::count)] count: usize,
+    ) -> PyResult<Self> {
         Ok(Self {
             gains: gains(vehicle)?.attitude,
             vehicle: single(vehicle)?,
@@ -144,7 +147,7 @@ impl Backstepping {
         q_ned_from_body_wxyz: Array32<'py>,
         omega_body_rad_s: Array32<'py>,
         angle_rad: Array32<'py>,
-        dt_s: f64,
+        #[pyo3(from_py_with = scalars::dt_s)] dt_s: f64,
         rate_rad_s: Option<Array32<'py>>,
         acceleration_rad_s2: Option<Array32<'py>>,
         hold_integral: bool,
@@ -165,6 +168,7 @@ impl Backstepping {
         let inertia = &self.vehicle.parameters().inertia_kg_m2;
         let mut terms = Terms::default();
         for (i, state) in memory.iter_mut().enumerate() {
+            now_and_then(py, i)?;
             let wanted = EulerReference {
                 angle: Vector3::from(angle.row(i)),
                 rate: rate(i),
@@ -194,6 +198,30 @@ impl Backstepping {
         lock(&self.memory, py)?.fill(AttitudeState::default());
         Ok(())
     }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let mut bytes = Vec::new();
+        put(&mut bytes, self.vehicle.parameters());
+        put(&mut bytes, &self.gains);
+        lock(&self.memory, py)?.iter().for_each(|state| put(&mut bytes, state));
+        reduced(py, "Backstepping", (PyBytes::new(py, &bytes),))
+    }
+}
+
+impl Backstepping {
+    /// What pickle kept.
+    pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let class = "Backstepping";
+        let kept: Result<(Bound<'_, PyBytes>,), PyErr> = state.extract();
+        let (bytes,) = kept.map_err(|_| broken(class))?;
+        let mut from = Reader::new(bytes.as_bytes());
+        Ok(Self {
+            vehicle: Checked::new(take(class, &mut from)?).map_err(value)?,
+            gains: take(class, &mut from)?,
+            memory: Mutex::new(take_rest(class, &mut from)?),
+        })
+    }
 }
 
 /// Thrust-wing coordination: from a reference to angles, thrust and wings, the flight code's own
@@ -217,6 +245,7 @@ impl Backstepping {
 pub(crate) struct Twcc {
     parameters: TwccParameters,
     form: AttitudeForm,
+    vehicle: Checked<f32>,
     airframe: OuterAirframe,
     memory: Mutex<Vec<TwccState>>,
 }
@@ -226,15 +255,16 @@ pub(crate) struct Twcc {
 impl Twcc {
     #[new]
     #[pyo3(signature = (vehicle, *, arm = "twcc_flat", count = 1))]
-    fn new(vehicle: &Bound<'_, Vehicle>, arm: &str, count: usize) -> PyResult<Self> {
+    fn new(
+        vehicle: &Bound<'_, Vehicle>,
+        arm: &str,
+        #[pyo3(from_py_with = scalars::count)] count: usize,
+    ) -> PyResult<Self> {
         let gains = gains(vehicle)?;
         let (mut parameters, form, airframe) = (gains.twcc, gains.attitude.form, single(vehicle)?);
-        let limits = airframe.parameters().limits;
         let weights = vehicle.get().file.weights.as_ref();
         Arm::parse(arm).and_then(|arm| arm.configure(&mut parameters, weights)).map_err(value)?;
-        parameters.check(limits.thrust_max_n).map_err(value)?;
-        let airframe = OuterAirframe::new(&airframe, parameters.thrust_min_n, limits.tilt_max_rad);
-        Ok(Self { parameters, form, airframe, memory: memory(count)? })
+        Self::of(airframe, parameters, form, memory(count)?)
     }
 
     /// One tick of each vehicle.
@@ -277,9 +307,9 @@ impl Twcc {
         reference_position_ned_m: Array32<'py>,
         reference_velocity_ned_m_s: Option<Array32<'py>>,
         reference_acceleration_ned_m_s2: Option<Array32<'py>>,
-        reference_yaw_rad: f32,
+        #[pyo3(from_py_with = scalars::reference_yaw_rad)] reference_yaw_rad: f32,
         wing_force_ned_n: Option<Array32<'py>>,
-        dt_s: f64,
+        #[pyo3(from_py_with = scalars::dt_s)] dt_s: f64,
     ) -> PyResult<Bound<'py, PyDict>> {
         let mut memory = lock(&self.memory, py)?;
         let n = memory.len();
@@ -312,6 +342,7 @@ impl Twcc {
         let dt_s = step_s(dt_s)?;
         let mut terms = Terms::default();
         for (i, state) in memory.iter_mut().enumerate() {
+            now_and_then(py, i)?;
             let (.., yaw_rad) = attitudes[i].euler();
             let motion = MeasuredMotion::new(
                 In::new(Vector3::from(position.row(i))),
@@ -344,6 +375,41 @@ impl Twcc {
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
         lock(&self.memory, py)?.fill(TwccState::default());
         Ok(())
+    }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let mut bytes = Vec::new();
+        put(&mut bytes, self.vehicle.parameters());
+        put(&mut bytes, &self.parameters);
+        put(&mut bytes, &self.form);
+        lock(&self.memory, py)?.iter().for_each(|state| put(&mut bytes, state));
+        reduced(py, "Twcc", (PyBytes::new(py, &bytes),))
+    }
+}
+
+impl Twcc {
+    fn of(
+        vehicle: Checked<f32>,
+        parameters: TwccParameters,
+        form: AttitudeForm,
+        memory: Mutex<Vec<TwccState>>,
+    ) -> PyResult<Self> {
+        let limits = vehicle.parameters().limits;
+        parameters.check(limits.thrust_max_n).map_err(value)?;
+        let airframe = OuterAirframe::new(&vehicle, parameters.thrust_min_n, limits.tilt_max_rad);
+        Ok(Self { parameters, form, vehicle, airframe, memory })
+    }
+
+    /// What pickle kept.
+    pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let class = "Twcc";
+        let kept: Result<(Bound<'_, PyBytes>,), PyErr> = state.extract();
+        let (bytes,) = kept.map_err(|_| broken(class))?;
+        let mut from = Reader::new(bytes.as_bytes());
+        let vehicle = Checked::new(take(class, &mut from)?).map_err(value)?;
+        let (parameters, form) = (take(class, &mut from)?, take(class, &mut from)?);
+        Self::of(vehicle, parameters, form, Mutex::new(take_rest(class, &mut from)?))
     }
 }
 

@@ -2,7 +2,9 @@
 
 use crate::arguments::{Array64, Numbers, Rows, rows};
 use crate::error::value;
+use crate::interrupt::now_and_then;
 use crate::log::table;
+use crate::scalars;
 use crate::state::{check_attitudes, push, state};
 use crate::vehicle::Vehicle;
 use numpy::PyArray2;
@@ -14,9 +16,6 @@ use squirrel_core::frames::{In, Wrench};
 use squirrel_core::vehicle::MAX_ROTORS;
 use squirrel_core::{nalgebra::Vector3, vehicle};
 use squirrel_sim::batch::BODY_NUMBERS;
-
-/// Vehicle steps between two looks at Ctrl-C: a tenth of a second or less.
-const STEPS_A_LOOK: usize = 100_000;
 
 /// What a call is about.
 struct Model<'py> {
@@ -84,6 +83,7 @@ impl<'py> Model<'py> {
         let width = BODY_NUMBERS + self.rotors;
         let mut out = Vec::with_capacity(self.states.numbers().len());
         for (i, row) in self.states.numbers().chunks_exact(width).enumerate() {
+            now_and_then(py, i)?;
             push(&mut out, &result(state(row), &self.held(i))?, self.rotors);
         }
         table(py, out, width)
@@ -124,7 +124,7 @@ pub(crate) fn derivative<'py>(
     state: Array64<'py>,
     command: Array64<'py>,
     wind_ned_m_s: Option<Array64<'py>>,
-    voltage_v: Option<f64>,
+    #[pyo3(from_py_with = scalars::voltage_v)] voltage_v: Option<f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let model = Model::new(vehicle, &state, &command, wind_ned_m_s.as_ref(), voltage_v)?;
     model.map(py, |state, held| Ok(model.rate(&state, held)))
@@ -166,10 +166,10 @@ pub(crate) fn rk4_step<'py>(
     vehicle: &Bound<'py, Vehicle>,
     state: Array64<'py>,
     command: Array64<'py>,
-    dt_s: f64,
-    steps: usize,
+    #[pyo3(from_py_with = scalars::dt_s)] dt_s: f64,
+    #[pyo3(from_py_with = scalars::steps)] steps: usize,
     wind_ned_m_s: Option<Array64<'py>>,
-    voltage_v: Option<f64>,
+    #[pyo3(from_py_with = scalars::voltage_v)] voltage_v: Option<f64>,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     if !(dt_s > 0.0 && dt_s.is_finite()) {
         return Err(value(format!("dt_s = {dt_s}: must be finite and > 0")));
@@ -180,10 +180,8 @@ pub(crate) fn rk4_step<'py>(
         for _ in 0..steps {
             held.drive.settle(&mut state.rotor_speed_rad_s);
             state = rk4(state, dt_s, |stage| model.rate(stage, held)).normalised();
-            taken.set(taken.get() + 1);
-            if taken.get().is_multiple_of(STEPS_A_LOOK) {
-                py.check_signals()?;
-            }
+            taken.set(taken.get().wrapping_add(1));
+            now_and_then(py, taken.get())?;
         }
         Ok(state)
     })

@@ -1,8 +1,10 @@
 //! One flight in closed loop.
 
 use crate::error;
+use crate::interrupt::signalled;
 use crate::log::FlightLog;
 use crate::policy::Policy;
+use crate::scalars;
 use crate::vehicle::{Vehicle, or_squirrel};
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
@@ -15,7 +17,10 @@ use squirrel_sim::scenario::Scenario;
 use std::path::Path;
 
 /// Steps of the flight code between two looks at Ctrl-C: some milliseconds.
-const STEPS_A_LOOK: u32 = 1024;
+const STEPS_A_LOOK: u32 = 128;
+
+/// What a log says of a vehicle whose file has no gains.
+const BY_RULE: &str = "by rule: the vehicle file has no [control]";
 
 /// The flight code in this process; Ctrl-C ends the flight.
 struct Interruptible {
@@ -39,12 +44,6 @@ impl FlightComputer for Interruptible {
     }
 }
 
-/// What Python's own handler of a signal raises.
-#[allow(clippy::redundant_closure_for_method_calls, reason = "the method's lifetime is too narrow")]
-fn signalled() -> PyResult<()> {
-    Python::attach(|py| py.check_signals())
-}
-
 /// A scenario by name or file, with what the call says of it.
 pub(crate) fn scenario(
     name: &str,
@@ -55,6 +54,11 @@ pub(crate) fn scenario(
         && let Err(e) = std::fs::metadata(name)
     {
         return Err(error::system(e.kind(), format!("{name}: {e}")));
+    }
+    if let Some(ratio) = thrust_to_weight
+        && !(ratio > 1.0 && ratio <= 100.0)
+    {
+        return Err(error::value(format!("thrust_to_weight = {ratio}: must be > 1 and <= 100")));
     }
     let mut scenario = Scenario::find(name).map_err(error::value)?;
     scenario.seed = seed.unwrap_or(scenario.seed);
@@ -68,7 +72,8 @@ pub(crate) fn scenario(
 /// Parameters
 /// ----------
 /// vehicle : Vehicle, optional
-///     What flies; the paper's squirrel if left out.
+///     What flies; the paper's squirrel if left out. One without ``[control]`` flies by gains by rule, those of ``squirrel vehicle new``,
+///     and the log's metadata say so (``gains``).
 /// scenario : str
 ///     ``hover``, ``avoid``, ``steer``, ``track``, ``forest``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
 ///     the path of a scenario file (.toml).
@@ -113,8 +118,8 @@ pub(crate) fn simulate(
     vehicle: Option<&Bound<'_, Vehicle>>,
     scenario: &str,
     arm: Option<&str>,
-    seed: Option<u64>,
-    thrust_to_weight: Option<f64>,
+    #[pyo3(from_py_with = scalars::seed)] seed: Option<u64>,
+    #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,
     estimator: Option<&str>,
     integrator: &str,
     policy: Option<&Bound<'_, Policy>>,
@@ -122,7 +127,14 @@ pub(crate) fn simulate(
     let by_default = if policy.is_some() { Arm::Pc } else { Arm::TwccFlat };
     let mut vehicle = or_squirrel(vehicle);
     if let Some(name) = estimator {
-        vehicle.estimator = Estimator::parse(name).map_err(error::value)?;
+        vehicle.estimator = Estimator::parse(name).map_err(|_| {
+            let known = Estimator::ALL.map(Estimator::name).join(", ");
+            error::value(format!("estimator = {name}: no such estimator; known are {known}"))
+        })?;
+    }
+    let by_rule = vehicle.control.is_none();
+    if by_rule {
+        vehicle = vehicle.with_gains_by_rule().map_err(|e| error::vehicle(&e))?;
     }
     let setup = Setup {
         vehicle,
@@ -143,6 +155,9 @@ pub(crate) fn simulate(
         return Err(signal);
     }
     let flight = flown.map_err(error::value)?;
-    let log = flight.log.ok_or_else(|| error::value("the flight was not logged"))?;
-    Ok(FlightLog::new(log, Some(flight.metrics)))
+    let mut log = flight.log.ok_or_else(|| error::value("the flight was not logged"))?;
+    if by_rule {
+        log.metadata.insert("gains".to_owned(), BY_RULE.to_owned());
+    }
+    FlightLog::new(log, Some(flight.metrics))
 }

@@ -24,7 +24,7 @@ pub(crate) fn logs(argument: &str, flights: &Bound<'_, PyDict>) -> PyResult<Flig
         };
         let name: String = name.extract().map_err(|_| wrong())?;
         let log = log.cast::<FlightLog>().map_err(|_| wrong())?;
-        Ok((name, log.get().log.clone()))
+        Ok((name, squirrel_log::FlightLog::clone(&log.get().log)))
     });
     named.collect()
 }

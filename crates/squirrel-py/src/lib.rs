@@ -20,10 +20,14 @@ mod error;
 mod flight;
 mod gap;
 mod interrupt;
+mod kept;
+mod keys;
 mod log;
 mod nn;
+mod pickle;
 mod plan;
 mod policy;
+mod scalars;
 mod stack;
 mod state;
 mod task;
@@ -75,9 +79,13 @@ mod _squirrel {
     #[pymodule_export]
     use super::gap::{gap_check, gap_diagnose, gap_effects, gap_find};
     #[pymodule_export]
+    use super::interrupt::_looks;
+    #[pymodule_export]
     use super::log::{FlightLog, read_log};
     #[pymodule_export]
     use super::nn::{Model, forward, load, train, windows};
+    #[pymodule_export]
+    use super::pickle::_again;
     #[pymodule_export]
     use super::plan::{plan_reach, plan_trajectory};
     #[pymodule_export]

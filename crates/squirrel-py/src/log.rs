@@ -1,11 +1,12 @@
 //! Flight logs as arrays.
 
 use crate::error;
-use crate::json;
+use crate::interrupt::interruptible;
+use crate::kept::{broken, reduced};
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyIterator, PyList, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pyfunction, gen_stub_pymethods};
 use squirrel_log::LogError;
 use squirrel_log::import::{
@@ -14,6 +15,7 @@ use squirrel_log::import::{
 use squirrel_sim::flight::Metrics;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Read a log, whoever wrote it.
 ///
@@ -56,7 +58,7 @@ pub(crate) fn read_log(
     map: Option<PathBuf>,
     topics: Option<Vec<String>>,
 ) -> PyResult<FlightLog> {
-    let log = py.detach(|| {
+    let log = interruptible(py, move |_| {
         if let Some(map) = map {
             let map = ImportMap::load(&map).map_err(|e| error::import(&e))?;
             return foreign(import(&map, &[path]));
@@ -72,8 +74,8 @@ pub(crate) fn read_log(
             return foreign(import(&map, &[path]));
         }
         foreign(import_without_map(&path, &|_, _| {}))
-    })?;
-    Ok(FlightLog::new(log, None))
+    })??;
+    FlightLog::new(log, None)
 }
 
 fn foreign<R>(
@@ -98,13 +100,42 @@ fn foreign<R>(
 #[pyclass(frozen, module = "squirrel._squirrel", mapping)]
 #[derive(Debug)]
 pub(crate) struct FlightLog {
-    pub(crate) log: squirrel_log::FlightLog,
-    metrics: Option<Metrics>,
+    pub(crate) log: Arc<squirrel_log::FlightLog>,
+    /// As JSON.
+    metrics: Option<String>,
 }
 
+/// A source as pickle keeps it: times, and channels with their widths.
+type Kept<'py> = (Bound<'py, PyArray1<f64>>, BTreeMap<String, (usize, Bound<'py, PyArray1<f64>>)>);
+
 impl FlightLog {
-    pub(crate) fn new(log: squirrel_log::FlightLog, metrics: Option<Metrics>) -> Self {
-        Self { log, metrics }
+    pub(crate) fn new(log: squirrel_log::FlightLog, metrics: Option<Metrics>) -> PyResult<Self> {
+        let metrics = metrics.map(|metrics| serde_json::to_string(&metrics)).transpose();
+        Ok(Self { log: Arc::new(log), metrics: metrics.map_err(error::value)? })
+    }
+
+    /// What pickle kept.
+    pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let broken = |_: PyErr| broken("FlightLog");
+        let state: Result<
+            (BTreeMap<String, String>, BTreeMap<String, Kept<'_>>, Option<String>),
+            _,
+        > = state.extract();
+        let (metadata, kept, metrics) = state.map_err(broken)?;
+        let mut log = squirrel_log::FlightLog { metadata, sources: BTreeMap::new() };
+        for (name, (time_s, channels)) in kept {
+            let time_s = time_s.to_vec().map_err(|e| broken(error::value(e)))?;
+            let mut source = squirrel_log::Source { time_s, channels: BTreeMap::new() };
+            for (channel, (width, values)) in channels {
+                let values = values.to_vec().map_err(|e| broken(error::value(e)))?;
+                if width == 0 || Some(values.len()) != source.time_s.len().checked_mul(width) {
+                    return Err(broken(error::value("width")));
+                }
+                source.channels.insert(channel, squirrel_log::Channel { width, values });
+            }
+            log.sources.insert(name, source);
+        }
+        Ok(Self { log: Arc::new(log), metrics })
     }
 
     fn source(&self, name: &str) -> PyResult<&squirrel_log::Source> {
@@ -140,8 +171,8 @@ impl FlightLog {
     ///     One line that names the file and what is wrong with it: not a flight log, truncated, changed since it was written.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let log = py.detach(|| squirrel_log::FlightLog::read(&path)).map_err(|e| error::log(&e))?;
-        Ok(Self::new(log, None))
+        let read = interruptible(py, move |_| squirrel_log::FlightLog::read(&path))?;
+        Self::new(read.map_err(|e| error::log(&e))?, None)
     }
 
     /// Write the log as MCAP; the file appears under its name only when it is whole.
@@ -156,7 +187,8 @@ impl FlightLog {
     /// OSError
     ///     The disk refuses.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        py.detach(|| self.log.write(&path)).map_err(|e| error::log(&e))
+        let log = Arc::clone(&self.log);
+        interruptible(py, move |_| log.write(&path))?.map_err(|e| error::log(&e))
     }
 
     /// Full names of all channels.
@@ -212,8 +244,16 @@ impl FlightLog {
         Ok(numbers.reshape([time_s.len(), found.width])?.to_dyn().clone())
     }
 
-    fn __contains__(&self, channel: &str) -> bool {
-        self.log.channel(channel).is_some()
+    fn __contains__(
+        &self,
+        #[gen_stub(override_type(type_repr = "object"))] channel: &Bound<'_, PyAny>,
+    ) -> bool {
+        channel.extract::<String>().is_ok_and(|channel| self.log.channel(&channel).is_some())
+    }
+
+    #[gen_stub(override_return_type(type_repr = "typing.Iterator[str]", imports = ("typing")))]
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
+        PyList::new(py, self.keys())?.try_iter()
     }
 
     fn __len__(&self) -> usize {
@@ -229,9 +269,10 @@ impl FlightLog {
     /// What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was
     /// read.
     #[getter]
-    #[gen_stub(override_return_type(type_repr = "dict[str, float | None] | None"))]
+    #[gen_stub(override_return_type(type_repr = "squirrel.flight.Metrics | None", imports = ("squirrel.flight")))]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
-        self.metrics.as_ref().map(|metrics| json(py, metrics)).transpose()
+        let read = |text| py.import("json")?.call_method1("loads", (text,));
+        self.metrics.as_ref().map(read).transpose()
     }
 
     /// A source as a pandas data frame, which must be installed.
@@ -276,6 +317,41 @@ impl FlightLog {
     #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
     fn to_polars<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyAny>> {
         py.import("polars")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))
+    }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let sources = PyDict::new(py);
+        for (name, source) in &self.log.sources {
+            let channels = PyDict::new(py);
+            for (channel, found) in &source.channels {
+                channels
+                    .set_item(channel, (found.width, PyArray1::from_slice(py, &found.values)))?;
+            }
+            sources.set_item(name, (PyArray1::from_slice(py, &source.time_s), channels))?;
+        }
+        reduced(py, "FlightLog", (self.log.metadata.clone(), sources, self.metrics.clone()))
+    }
+
+    /// The same: it never changes.
+    fn __copy__(own: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        own
+    }
+
+    /// The same: it never changes.
+    fn __deepcopy__<'py>(
+        own: PyRef<'py, Self>,
+        #[gen_stub(override_type(type_repr = "typing.Any", imports = ("typing")))] memo: &Bound<
+            'py,
+            PyAny,
+        >,
+    ) -> PyRef<'py, Self> {
+        let _ = memo;
+        own
+    }
+
+    fn _repr_html_(own: &Bound<'_, Self>) -> PyResult<String> {
+        own.py().import("squirrel._html")?.call_method1("log", (own,))?.extract()
     }
 
     fn __repr__(&self) -> String {

@@ -3,13 +3,16 @@
 use crate::arguments::{Array32, Numbers, rows};
 use crate::error::{self, value};
 use crate::gap::logs;
+use crate::interrupt::{interruptible, look};
 use crate::json;
+use crate::kept::{broken, reduced};
 use crate::log::table;
+use crate::scalars;
 use crate::state::check_attitudes;
 use crate::vehicle::{Vehicle, or_squirrel};
 use numpy::{PyArray1, PyArray2, PyArrayDyn, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pyfunction, gen_stub_pymethods};
 use squirrel_core::rnn::parnn::{INPUTS, WINDOW};
 use squirrel_nn::NnError;
@@ -28,6 +31,21 @@ use std::path::PathBuf;
 pub(crate) struct Model {
     trained: Trained,
     history: Vec<Epoch>,
+}
+
+impl Model {
+    /// What pickle kept.
+    pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let broken = || broken("Model");
+        let state: Result<(String, Bound<'_, PyBytes>, String), _> = state.extract();
+        let (card, bytes, history) = state.map_err(|_: PyErr| broken())?;
+        let card = serde_json::from_str(&card).map_err(|_| broken())?;
+        let history = serde_json::from_str(&history).map_err(|_| broken())?;
+        let (numbers, rest) = bytes.as_bytes().as_chunks::<4>();
+        let parameters = numbers.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+        let trained = Trained::of(card, parameters).map_err(|e| error::nn(&e))?;
+        if rest.is_empty() { Ok(Self { trained, history }) } else { Err(broken()) }
+    }
 }
 
 #[gen_stub_pymethods]
@@ -117,6 +135,32 @@ impl Model {
             .iter()
             .flat_map(|e| [e.training.sqrt(), e.validation.map_or(f64::NAN, f64::sqrt)]);
         table(py, numbers.collect(), 2)
+    }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let bytes: Vec<u8> =
+            self.trained.parameters().iter().flat_map(|x| x.to_le_bytes()).collect();
+        let card = serde_json::to_string(&self.trained.card).map_err(value)?;
+        let history = serde_json::to_string(&self.history).map_err(value)?;
+        reduced(py, "Model", (card, PyBytes::new(py, &bytes), history))
+    }
+
+    /// The same: it never changes.
+    fn __copy__(own: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        own
+    }
+
+    /// The same: it never changes.
+    fn __deepcopy__<'py>(
+        own: PyRef<'py, Self>,
+        #[gen_stub(override_type(type_repr = "typing.Any", imports = ("typing")))] memo: &Bound<
+            'py,
+            PyAny,
+        >,
+    ) -> PyRef<'py, Self> {
+        let _ = memo;
+        own
     }
 
     fn __repr__(&self) -> String {
@@ -215,9 +259,17 @@ pub(crate) fn forward<'py>(
     };
     let windows: Vec<Window> =
         seen.numbers().chunks_exact(WINDOW * INPUTS).enumerate().map(window).collect();
-    let forces = py.detach(|| trained.forces_body_n(&windows));
+    let mut forces = Vec::with_capacity(windows.len());
+    for some in windows.chunks(WINDOWS_A_LOOK) {
+        forces.extend(py.detach(|| trained.forces_body_n(some)));
+        look(py)?;
+    }
     table(py, forces.into_flattened(), 3)
 }
+
+/// Windows between two looks at Ctrl-C: some hundredths of a second. A block of registers divides
+/// it, so that the bits are those of all at once.
+const WINDOWS_A_LOOK: usize = 4096;
 
 /// Windows of all flights; Ctrl-C ends it between two of them.
 fn windows_of(
@@ -227,7 +279,7 @@ fn windows_of(
 ) -> PyResult<Windows> {
     let mut all = Windows::new();
     for (name, log) in logs("flights", flights)? {
-        py.check_signals()?;
+        look(py)?;
         let found =
             py.detach(|| labels::windows(vehicle, &name, &log)).map_err(|e| error::nn(&e))?;
         all.push(&name, &found).map_err(|e| error::nn(&e))?;
@@ -294,7 +346,7 @@ pub(crate) fn windows<'py>(
     Ok(out)
 }
 
-/// Train a model of the wing force on flights. Ctrl-C ends it between two epochs.
+/// Train a model of the wing force on flights. Ctrl-C ends it.
 ///
 /// Parameters
 /// ----------
@@ -328,15 +380,21 @@ pub(crate) fn train(
     model: &str,
     vehicle: Option<&Bound<'_, Vehicle>>,
     validation: Option<Vec<String>>,
-    epochs: usize,
-    batch: usize,
-    rate: f64,
-    clip: f64,
-    patience: usize,
-    seed: u64,
+    #[pyo3(from_py_with = scalars::epochs)] epochs: usize,
+    #[pyo3(from_py_with = scalars::batch)] batch: usize,
+    #[pyo3(from_py_with = scalars::rate)] rate: f64,
+    #[pyo3(from_py_with = scalars::clip)] clip: f64,
+    #[pyo3(from_py_with = scalars::patience)] patience: usize,
+    #[pyo3(from_py_with = scalars::seed)] seed: u64,
 ) -> PyResult<Model> {
     let fail = |e: NnError| error::nn(&e);
     let kind: Kind = model.parse().map_err(fail)?;
+    if batch == 0 {
+        return Err(value("batch = 0: must be at least 1"));
+    }
+    if flights.is_empty() {
+        return Err(value("flights: none given"));
+    }
     let vehicle = or_squirrel(vehicle);
     let validation = validation.unwrap_or_default();
     let held_out: Vec<&str> = validation.iter().map(String::as_str).collect();
@@ -344,10 +402,13 @@ pub(crate) fn train(
     let (training, validation) = split.map_err(|e| value(format!("validation: {e}")))?;
     let settings = Settings { epochs, batch, rate, clip, patience, seed };
     let area_m2 = labels::plate_area_m2(&vehicle);
-    let mut trainer = Trainer::new(kind, &vehicle.name, area_m2, &training, &validation, settings)
-        .map_err(fail)?;
-    while py.detach(|| trainer.epoch()).map_err(fail)?.is_some() {
-        py.check_signals()?;
-    }
-    Ok(Model { trained: trainer.best(), history: trainer.history().to_vec() })
+    let trained = interruptible(py, move |stop| {
+        let mut trainer =
+            Trainer::new(kind, &vehicle.name, area_m2, &training, &validation, settings)?;
+        while trainer.epoch()?.is_some() {
+            stop.check();
+        }
+        Ok::<_, NnError>(Model { trained: trainer.best(), history: trainer.history().to_vec() })
+    })?;
+    trained.map_err(fail)
 }

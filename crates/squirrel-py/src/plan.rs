@@ -6,6 +6,7 @@ use crate::error::value;
 use crate::interrupt::interruptible;
 use crate::json;
 use crate::log::table;
+use crate::scalars;
 use crate::vehicle::Vehicle;
 use nalgebra::{Vector2, Vector3};
 use numpy::PyArray1;
@@ -29,18 +30,16 @@ pub(crate) fn plan_reach<'py>(
     py: Python<'py>,
     vehicle: &Bound<'py, Vehicle>,
     velocity_ned_m_s: [f64; 3],
-    thrust_to_weight: Option<f64>,
+    #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,
     wing: String,
     tilt: String,
-    yaw_rad: Option<f64>,
+    #[pyo3(from_py_with = scalars::yaw_rad)] yaw_rad: Option<f64>,
     directions: Option<Array64<'py>>,
 ) -> PyResult<(Bound<'py, PyAny>, Option<Bound<'py, PyDict>>)> {
     let file = &vehicle.get().file;
     let (p, weight_n) = (file.vehicle.parameters(), file.vehicle.weight_n());
     let ratio = thrust_to_weight.unwrap_or(p.limits.thrust_max_n / weight_n);
-    if !(ratio > 0.0 && ratio.is_finite()) {
-        return Err(value(format!("thrust_to_weight = {ratio}: must be finite and > 0")));
-    }
+    ratio_is_sound(ratio)?;
     let [north, east, _] = velocity_ned_m_s;
     let yaw_rad = yaw_rad.unwrap_or_else(|| east.atan2(north));
     let model = WingModel::parse(&wing).map_err(value)?;
@@ -92,6 +91,26 @@ fn arrays<'py>(py: Python<'py>, found: &[(f64, Support)]) -> PyResult<Bound<'py,
     Ok(arrays)
 }
 
+/// Refuses a thrust over weight that no vehicle has.
+fn ratio_is_sound(ratio: f64) -> PyResult<()> {
+    if ratio > 0.0 && ratio <= 100.0 {
+        return Ok(());
+    }
+    Err(value(format!("thrust_to_weight = {ratio}: must be > 0 and <= 100")))
+}
+
+/// What a task refuses, by the names of arguments: `reference[3].position_ned_m` is
+/// `reference_position_ned_m[3]`.
+fn named(line: &str) -> PyErr {
+    let of_reference = || {
+        let (at, rest) = line.strip_prefix("reference[")?.split_once("].")?;
+        let (field, rest) = rest.split_once(' ')?;
+        Some(format!("reference_{field}[{at}] {rest}"))
+    };
+    let of_obstacles = || Some(format!("obstacles_m[{}", line.strip_prefix("obstacles[")?));
+    value(of_reference().or_else(of_obstacles).unwrap_or_else(|| line.to_owned()))
+}
+
 /// A trajectory: status, cost, violation, iterations, and the nodes as arrays.
 ///
 /// * `reference_position_ned_m` - at each node, the first at the beginning
@@ -109,20 +128,27 @@ pub(crate) fn plan_trajectory<'py>(
     position_ned_m: [f64; 3],
     velocity_ned_m_s: [f64; 3],
     thrust_ned_n: Option<[f64; 3]>,
-    deployment: f64,
+    #[pyo3(from_py_with = scalars::deployment)] deployment: f64,
     obstacles_m: Array64<'py>,
     wing: Option<String>,
-    thrust_to_weight: Option<f64>,
-    step_s: f64,
-    speed_max_m_s: f64,
-    reserve: f64,
+    #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,
+    #[pyo3(from_py_with = scalars::step_s)] step_s: f64,
+    #[pyo3(from_py_with = scalars::speed_max_m_s)] speed_max_m_s: f64,
+    #[pyo3(from_py_with = scalars::reserve)] reserve: f64,
     wind_ned_m_s: [f64; 3],
 ) -> PyResult<(Bound<'py, PyDict>, Bound<'py, PyDict>)> {
     let file = &vehicle.get().file;
     let (p, weight_n) = (file.vehicle.parameters(), file.vehicle.weight_n());
+    thrust_to_weight.map_or(Ok(()), ratio_is_sound)?;
     let thrust_max_n = thrust_to_weight.map_or(p.limits.thrust_max_n, |ratio| ratio * weight_n);
     let model = wing.as_deref().map(WingModel::parse).transpose().map_err(value)?;
-    let mut craft = Craft::of(file, thrust_max_n, model, reserve).map_err(value)?;
+    let craft = Craft::of(file, thrust_max_n, model, reserve);
+    let mut craft = craft.map_err(|line| match thrust_to_weight {
+        Some(ratio) if line.contains("thrust_max_n") => {
+            value(format!("thrust_to_weight = {ratio}: {line}"))
+        }
+        _ => value(line),
+    })?;
     craft.air = Air::windy(wind_ned_m_s.into()).map_err(value)?;
     let three = |name: &str, array: &Array64<'py>, count: Option<usize>| {
         let rows = rows::<f64>(name, &array.0, &[count, Some(3)], Numbers::Any)?;
@@ -145,9 +171,9 @@ pub(crate) fn plan_trajectory<'py>(
         .into_iter()
         .zip(velocities)
         .map(|(position, velocity)| Wanted { position, velocity });
-    let task =
-        Task::new(begin, wanted.collect(), obstacles, step_s, speed_max_m_s).map_err(value)?;
-    let plan = py.detach(|| Planner::default().plan(&craft, &task, None));
+    let task = Task::new(begin, wanted.collect(), obstacles, step_s, speed_max_m_s)
+        .map_err(|e| named(&e))?;
+    let plan = interruptible(py, move |_| Planner::default().plan(&craft, &task, None))?;
     let facts = PyDict::new(py);
     facts.set_item("status", plan.status.name())?;
     facts.set_item("cost", plan.cost)?;

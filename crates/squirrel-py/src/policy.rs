@@ -2,9 +2,12 @@
 
 use crate::arguments::{Array32, Numbers, rows};
 use crate::error;
+use crate::interrupt::look;
+use crate::kept::{broken, reduced};
 use crate::log::table;
 use numpy::PyArray2;
 use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::policy::{self, ACTION, HIDDEN, OBSERVATION};
 use squirrel_core::rnn::elman::Dense;
@@ -31,6 +34,28 @@ use std::path::PathBuf;
 #[pyclass(frozen, module = "squirrel._squirrel")]
 pub(crate) struct Policy {
     pub(crate) weights: PolicyWeights,
+}
+
+/// Rows between two looks at Ctrl-C: some hundredths of a second.
+const ROWS_A_LOOK: usize = 16_384;
+
+impl Policy {
+    /// What pickle kept.
+    pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let broken = || broken("Policy");
+        let state: Result<(Bound<'_, PyBytes>, String), _> = state.extract();
+        let (bytes, name) = state.map_err(|_: PyErr| broken())?;
+        let (numbers, rest) = bytes.as_bytes().as_chunks::<4>();
+        let mut numbers = numbers.iter().map(|bytes| f32::from_le_bytes(*bytes));
+        let mut policy = policy::Policy::filled(0.0);
+        for number in policy.tensors_mut().into_iter().flatten() {
+            *number = numbers.next().filter(|x| x.is_finite()).ok_or_else(broken)?;
+        }
+        if !rest.is_empty() || numbers.next().is_some() {
+            return Err(broken());
+        }
+        Ok(Self { weights: PolicyWeights { policy, name } })
+    }
 }
 
 /// A layer from how PyTorch has it: `weight[output][input]`.
@@ -130,10 +155,15 @@ impl Policy {
             Numbers::Finite,
         )?;
         let numbers = seen.numbers();
-        let actions: Vec<f32> = py.detach(|| {
-            let each = numbers.as_chunks::<OBSERVATION>().0.iter();
-            each.flat_map(|observation| self.weights.policy.evaluate(observation)).collect()
-        });
+        let mut actions = Vec::with_capacity(numbers.len() / OBSERVATION * ACTION);
+        for some in numbers.chunks(ROWS_A_LOOK * OBSERVATION) {
+            py.detach(|| {
+                for observation in some.as_chunks::<OBSERVATION>().0 {
+                    actions.extend(self.weights.policy.evaluate(observation));
+                }
+            });
+            look(py)?;
+        }
         table(py, actions, ACTION)
     }
 
@@ -141,6 +171,46 @@ impl Policy {
     #[getter]
     fn hash(&self) -> String {
         self.weights.hash()
+    }
+
+    /// Whether the other is a policy with the same weights.
+    fn __eq__(
+        &self,
+        #[gen_stub(override_type(type_repr = "object"))] other: &Bound<'_, PyAny>,
+    ) -> bool {
+        other.cast::<Self>().is_ok_and(|other| self.weights.policy == other.get().weights.policy)
+    }
+
+    fn __hash__(&self) -> u64 {
+        self.weights.policy.tensors().into_iter().flatten().fold(0, |before, x| {
+            // Equal numbers have equal hashes, zeros of both signs too.
+            let bits = if *x == 0.0 { 0 } else { x.to_bits() };
+            (before ^ u64::from(bits)).wrapping_mul(0x0000_0100_0000_01B3)
+        })
+    }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let numbers = self.weights.policy.tensors().into_iter().flatten();
+        let bytes: Vec<u8> = numbers.flat_map(|x| x.to_le_bytes()).collect();
+        reduced(py, "Policy", (PyBytes::new(py, &bytes), &self.weights.name))
+    }
+
+    /// The same: it never changes.
+    fn __copy__(own: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        own
+    }
+
+    /// The same: it never changes.
+    fn __deepcopy__<'py>(
+        own: PyRef<'py, Self>,
+        #[gen_stub(override_type(type_repr = "typing.Any", imports = ("typing")))] memo: &Bound<
+            'py,
+            PyAny,
+        >,
+    ) -> PyRef<'py, Self> {
+        let _ = memo;
+        own
     }
 
     fn __repr__(&self) -> String {

@@ -4,13 +4,17 @@ use crate::arguments::{Array32, Numbers, Rows, rows};
 use crate::control::{lock, memory};
 use crate::error::value;
 use crate::flight::scenario;
+use crate::interrupt::now_and_then;
+use crate::kept::{broken, put, reduced, take, take_rest};
+use crate::scalars;
 use crate::terms::Terms;
 use crate::vehicle::{Vehicle, or_squirrel};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::frames::{In, Rotation};
+use squirrel_core::stack::wire::{Outside, Reader};
 use squirrel_core::stack::{self, Gnss, Imu, SensorFrame, StackState};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
@@ -50,9 +54,9 @@ impl Stack {
         vehicle: Option<&Bound<'_, Vehicle>>,
         arm: &str,
         scenario: &str,
-        seed: Option<u64>,
-        thrust_to_weight: Option<f64>,
-        count: usize,
+        #[pyo3(from_py_with = scalars::seed)] seed: Option<u64>,
+        #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,
+        #[pyo3(from_py_with = scalars::count)] count: usize,
     ) -> PyResult<Self> {
         let mut vehicle = or_squirrel(vehicle);
         // Attitudes come from the caller.
@@ -102,7 +106,7 @@ impl Stack {
     fn step<'py>(
         &self,
         py: Python<'py>,
-        time_us: u64,
+        #[pyo3(from_py_with = scalars::time_us)] time_us: u64,
         omega_body_rad_s: Option<Array32<'py>>,
         specific_force_body_m_s2: Option<Array32<'py>>,
         q_ned_from_body_wxyz: Option<Array32<'py>>,
@@ -132,6 +136,7 @@ impl Stack {
         let rotors = self.stack.vehicle().rotors().len();
         let mut terms = Terms::default();
         for (i, state) in memory.iter_mut().enumerate() {
+            now_and_then(py, i)?;
             let vector = |rows: &Rows<'_, f32>| Vector3::from(rows.row::<3>(i));
             let mut frame = SensorFrame::empty(time_us);
             frame.imu = omega.as_ref().zip(force.as_ref()).map(|(omega, force)| Imu {
@@ -177,6 +182,31 @@ impl Stack {
     ///     That goes on by itself.
     fn copy(&self, py: Python<'_>) -> PyResult<Self> {
         Ok(Self { stack: self.stack, memory: Mutex::new(lock(&self.memory, py)?.clone()) })
+    }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let mut bytes = Vec::new();
+        put(&mut bytes, &self.stack);
+        for state in lock(&self.memory, py)?.iter() {
+            // Attitudes come from outside, and nobody tells a voltage.
+            put(&mut bytes, &Outside::of(state).ok_or_else(|| broken("Stack"))?);
+        }
+        reduced(py, "Stack", (PyBytes::new(py, &bytes),))
+    }
+}
+
+impl Stack {
+    /// What pickle kept.
+    pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let class = "Stack";
+        let kept: Result<(Bound<'_, PyBytes>,), PyErr> = state.extract();
+        let (bytes,) = kept.map_err(|_| broken(class))?;
+        let mut from = Reader::new(bytes.as_bytes());
+        let stack = take(class, &mut from)?;
+        let memory: Vec<Outside> = take_rest(class, &mut from)?;
+        let memory = memory.iter().map(|outside| *outside.state()).collect();
+        Ok(Self { stack, memory: Mutex::new(memory) })
     }
 }
 

@@ -1,17 +1,22 @@
 //! Environments: `squirrel_sim::task` as arrays. `squirrel.envs` makes Gymnasium's classes of it.
 
 use crate::arguments::{Array32, Numbers, rows};
-use crate::batch::settings;
-use crate::error::value;
+use crate::batch::{scheme_name, settings};
+use crate::error::{value, vehicle as vehicle_error};
+use crate::interrupt::watched;
+use crate::kept::{broken, reduced};
 use crate::log::table;
+use crate::scalars::{self, checked_count};
 use crate::vehicle::Vehicle;
 use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
+use pyo3::types::{PyBytes, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::policy::OBSERVATION;
 use squirrel_sim::batch::Settings;
+use squirrel_sim::batch::simd::Path;
 use squirrel_sim::task::course::CourseKind;
 use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks as Environments};
 use std::sync::{Mutex, MutexGuard};
@@ -31,7 +36,7 @@ const ROTORS: usize = 4;
 ///     ``avoid``: follow a straight run of 4 to 8 m/s past trunks that are seen from 5 m; ``track``: follow a curve.
 /// vehicles : sequence of Vehicle
 ///     Each episode takes one of them, with its wings, battery and effects: domain randomisation is a list of vehicles. All have four
-///     rotors and ``[control]``.
+///     rotors; those without ``[control]`` fly by gains by rule (`gains_by_rule`).
 /// num_envs : int
 ///     How many environments.
 /// action : str
@@ -59,8 +64,9 @@ const ROTORS: usize = 4;
 #[pyclass(frozen, module = "squirrel._squirrel")]
 pub(crate) struct Tasks {
     environments: Mutex<Environments<ROTORS>>,
+    vehicles: Vec<Py<Vehicle>>,
+    settings: TaskSettings,
     count: usize,
-    level: Level,
 }
 
 impl Tasks {
@@ -70,9 +76,50 @@ impl Tasks {
         self.environments.lock_py_attached(py).map_err(broken)
     }
 
+    fn make(
+        vehicles: Vec<Bound<'_, Vehicle>>,
+        py: Python<'_>,
+        count: usize,
+        seed: u64,
+        settings: TaskSettings,
+    ) -> PyResult<Self> {
+        let count = checked_count("num_envs", count)?;
+        if vehicles.is_empty() {
+            return Err(value("vehicles: none given"));
+        }
+        let ruled = |vehicle: &Bound<'_, Vehicle>| vehicle.get().file.with_gains_by_rule();
+        let files: Result<Vec<_>, _> = vehicles.iter().map(ruled).collect();
+        let files = files.map_err(|e| vehicle_error(&e))?;
+        let made =
+            watched(py, |go_on| Environments::new_while(&files, count, seed, settings, go_on));
+        let environments = Mutex::new(made?.map_err(value)?);
+        let vehicles = vehicles.into_iter().map(Bound::unbind).collect();
+        Ok(Self { environments, vehicles, settings, count })
+    }
+
+    /// What pickle kept.
+    pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let py = state.py();
+        let kept: Result<Kept<'_>, PyErr> = state.extract();
+        let (vehicles, count, names, episode_s, sensors, threads, bytes) =
+            kept.map_err(|_| broken("Tasks"))?;
+        let [task, action, scheme, registers] = &names;
+        let registers = Path::available().into_iter().find(|path| path.name() == *registers);
+        let registers = registers.map(Path::name);
+        let run = settings(2e-3, scheme, Some(threads), registers)?;
+        let settings = task_settings([task, action], episode_s, sensors, run)?;
+        let tasks = Self::make(vehicles, py, count, 0, settings)?;
+        let mut guard = tasks.lock(py)?;
+        let (environments, bytes): (&mut Environments<ROTORS>, _) = (&mut guard, bytes.as_bytes());
+        watched(py, |go_on| environments.restore(bytes, go_on))?.map_err(value)?;
+        drop(guard);
+        Ok(tasks)
+    }
+
     fn check(&self, index: usize) -> PyResult<()> {
         let all = self.count;
-        let missing = || PyIndexError::new_err(format!("environment {index}: there are {all}"));
+        let missing =
+            || PyIndexError::new_err(format!("index = {index}: there are {all} environments"));
         if index < all { Ok(()) } else { Err(missing()) }
     }
 }
@@ -95,38 +142,22 @@ impl Tasks {
         registers = None,
     ))]
     fn new(
+        py: Python<'_>,
         task: &str,
         vehicles: Vec<Bound<'_, Vehicle>>,
-        num_envs: usize,
+        #[pyo3(from_py_with = scalars::num_envs)] num_envs: usize,
         action: &str,
-        seed: u64,
-        episode_s: f64,
+        #[pyo3(from_py_with = scalars::seed)] seed: u64,
+        #[pyo3(from_py_with = scalars::episode_s)] episode_s: f64,
         sensors: bool,
         scheme: &str,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = scalars::threads)] threads: Option<usize>,
         registers: Option<&str>,
     ) -> PyResult<Self> {
-        let kind = match task {
-            "avoid" => CourseKind::Avoid,
-            "track" => CourseKind::Track,
-            other => return Err(value(format!("task = {other}: must be avoid or track"))),
-        };
-        let level = match action {
-            "motor" => Level::Motor,
-            "body_rate" => Level::BodyRate,
-            "attitude_wing" => Level::AttitudeWing,
-            other => {
-                return Err(value(format!(
-                    "action = {other}: must be motor, body_rate or attitude_wing"
-                )));
-            }
-        };
         // The length of a step is the task's.
-        let Settings { scheme, threads, path, .. } = settings(2e-3, scheme, threads, registers)?;
-        let settings = TaskSettings { kind, level, episode_s, sensors, scheme, threads, path };
-        let files: Vec<_> = vehicles.iter().map(|vehicle| vehicle.get().file.clone()).collect();
-        let environments = Environments::new(&files, num_envs, seed, settings).map_err(value)?;
-        Ok(Self { environments: Mutex::new(environments), count: num_envs, level })
+        let run = settings(2e-3, scheme, threads, registers)?;
+        let settings = task_settings([task, action], episode_s, sensors, run)?;
+        Self::make(vehicles, py, num_envs, seed, settings)
     }
 
     /// New streams of random numbers, from the next episodes on.
@@ -142,7 +173,12 @@ impl Tasks {
     /// ------
     /// IndexError
     ///     There is no such environment.
-    fn seed(&self, py: Python<'_>, index: usize, seed: u64) -> PyResult<()> {
+    fn seed(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = scalars::index)] index: usize,
+        #[pyo3(from_py_with = scalars::seed)] seed: u64,
+    ) -> PyResult<()> {
         self.check(index)?;
         self.lock(py)?.seed(index, seed).map_err(value)
     }
@@ -177,7 +213,11 @@ impl Tasks {
         }
         let mut seen = vec![0.0; self.count * OBSERVATION];
         let which = |k: usize| mask.as_ref().is_none_or(|mask| mask[k]);
-        self.lock(py)?.reset(which, &mut seen).map_err(value)?;
+        let mut guard = self.lock(py)?;
+        let environments: &mut Environments<ROTORS> = &mut guard;
+        let rows = &mut seen;
+        watched(py, |go_on| environments.reset_while(which, rows, go_on))?.map_err(value)?;
+        drop(guard);
         table(py, seen, OBSERVATION)
     }
 
@@ -202,7 +242,7 @@ impl Tasks {
         imports = ("numpy.typing", "numpy")
     ))]
     fn step<'py>(&self, py: Python<'py>, actions: Array32<'py>) -> PyResult<Stepped<'py>> {
-        let shape = [Some(self.count), Some(self.level.numbers(ROTORS))];
+        let shape = [Some(self.count), Some(self.settings.level.numbers(ROTORS))];
         let actions = rows::<f32>("actions", &actions.0, &shape, Numbers::Finite)?;
         let n = self.count;
         let (mut observation, mut reward) = (vec![0.0; n * OBSERVATION], vec![0.0; n]);
@@ -270,10 +310,23 @@ impl Tasks {
     /// IndexError
     ///     There is no such environment.
     #[gen_stub(override_return_type(type_repr = "numpy.typing.NDArray[numpy.float32]", imports = ("numpy.typing", "numpy")))]
-    fn obstacles<'py>(&self, py: Python<'py>, index: usize) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    fn obstacles<'py>(
+        &self,
+        py: Python<'py>,
+        #[pyo3(from_py_with = scalars::index)] index: usize,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         self.check(index)?;
         let obstacles = self.lock(py)?.obstacles(index).map_err(value)?;
         table(py, obstacles.concat(), 3)
+    }
+
+    /// Which of the vehicles fly by gains by rule, because their files have none: places in the
+    /// sequence of vehicles.
+    #[getter]
+    fn gains_by_rule(&self) -> Vec<usize> {
+        let bare = |vehicle: &Py<Vehicle>| vehicle.get().file.control.is_none();
+        let places = self.vehicles.iter().enumerate().filter(|(_, vehicle)| bare(vehicle));
+        places.map(|(place, _)| place).collect()
     }
 
     /// Numbers of an observation.
@@ -286,12 +339,64 @@ impl Tasks {
     /// Numbers of an action.
     #[getter]
     fn action_numbers(&self) -> usize {
-        self.level.numbers(ROTORS)
+        self.settings.level.numbers(ROTORS)
+    }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let TaskSettings { kind, level, episode_s, sensors, scheme, threads, path } = self.settings;
+        let kind = match kind {
+            CourseKind::Avoid => "avoid",
+            CourseKind::Track => "track",
+        };
+        let level = match level {
+            Level::Motor => "motor",
+            Level::BodyRate => "body_rate",
+            Level::AttitudeWing => "attitude_wing",
+        };
+        let names = [kind, level, scheme_name(scheme), path.name()];
+        let guard = self.lock(py)?;
+        let environments: &Environments<ROTORS> = &guard;
+        let bytes = watched(py, |go_on| environments.memory(go_on))?.map_err(value)?;
+        drop(guard);
+        let vehicles: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.bind(py)).collect();
+        let bytes = PyBytes::new(py, &bytes);
+        reduced(py, "Tasks", (vehicles, self.count, names, episode_s, sensors, threads, bytes))
     }
 
     fn __len__(&self) -> usize {
         self.count
     }
+}
+
+/// What pickle keeps: vehicles, their number, names of task, action, scheme and registers, length of
+/// an episode, sensors, threads, memory.
+type Kept<'py> =
+    (Vec<Bound<'py, Vehicle>>, usize, [String; 4], f64, bool, usize, Bound<'py, PyBytes>);
+
+fn task_settings(
+    [task, action]: [&str; 2],
+    episode_s: f64,
+    sensors: bool,
+    run: Settings,
+) -> PyResult<TaskSettings> {
+    let kind = match task {
+        "avoid" => CourseKind::Avoid,
+        "track" => CourseKind::Track,
+        other => return Err(value(format!("task = {other}: must be avoid or track"))),
+    };
+    let level = match action {
+        "motor" => Level::Motor,
+        "body_rate" => Level::BodyRate,
+        "attitude_wing" => Level::AttitudeWing,
+        other => {
+            return Err(value(format!(
+                "action = {other}: must be motor, body_rate or attitude_wing"
+            )));
+        }
+    };
+    let Settings { scheme, threads, path, .. } = run;
+    Ok(TaskSettings { kind, level, episode_s, sensors, scheme, threads, path })
 }
 
 /// States and what they should be.

@@ -1,16 +1,21 @@
 //! Vehicles: what flies, as a file says it.
 
 use crate::error;
+use crate::kept::{broken, reduced};
+use crate::keys::{set, table_of, to_python, to_toml};
+use crate::scalars;
 use pyo3::exceptions::PyKeyError;
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyList};
+use pyo3::types::{PyIterator, PyList, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_log::files::write_whole;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_sim::vehicle_file::new::{Frame, Given, NewError, Said};
+use squirrel_sim::weights::ParnnWeights;
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
-use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+use toml_edit::{DocumentMut, Value};
 
 /// Vehicle files that are part of the package.
 const BUNDLED: [(&str, &str); 5] = [
@@ -35,7 +40,7 @@ const BUNDLED: [(&str, &str); 5] = [
 /// 0.548
 /// >>> heavier = vehicle.edited({"mass.mass_kg": 0.6})
 #[gen_stub_pyclass]
-#[pyclass(frozen, module = "squirrel._squirrel")]
+#[pyclass(frozen, module = "squirrel._squirrel", mapping)]
 #[derive(Debug)]
 pub(crate) struct Vehicle {
     pub(crate) file: VehicleFile,
@@ -135,14 +140,14 @@ impl Vehicle {
     #[pyo3(name = "new", signature = (*, frame, mass_kg, arm_m = None, propeller_inch = None, pitch_inch = None, cells = None, kv_rpm_per_v = None, capacity_ah = None, hover_thrust_fraction = None, name = "vehicle"))]
     fn first(
         frame: &str,
-        mass_kg: f64,
-        arm_m: Option<f64>,
-        propeller_inch: Option<f64>,
-        pitch_inch: Option<f64>,
-        cells: Option<u32>,
-        kv_rpm_per_v: Option<f64>,
-        capacity_ah: Option<f64>,
-        hover_thrust_fraction: Option<f64>,
+        #[pyo3(from_py_with = scalars::mass_kg)] mass_kg: f64,
+        #[pyo3(from_py_with = scalars::arm_m)] arm_m: Option<f64>,
+        #[pyo3(from_py_with = scalars::propeller_inch)] propeller_inch: Option<f64>,
+        #[pyo3(from_py_with = scalars::pitch_inch)] pitch_inch: Option<f64>,
+        #[pyo3(from_py_with = scalars::cells)] cells: Option<u32>,
+        #[pyo3(from_py_with = scalars::kv_rpm_per_v)] kv_rpm_per_v: Option<f64>,
+        #[pyo3(from_py_with = scalars::capacity_ah)] capacity_ah: Option<f64>,
+        #[pyo3(from_py_with = scalars::hover_thrust_fraction)] hover_thrust_fraction: Option<f64>,
         name: &str,
     ) -> PyResult<Self> {
         let said = |value: Option<f64>, argument: &str| {
@@ -213,7 +218,7 @@ impl Vehicle {
     fn edited(&self, changes: BTreeMap<String, Bound<'_, PyAny>>) -> PyResult<Self> {
         let mut document = self.document()?;
         for (key, new) in &changes {
-            let new = if new.is_none() { None } else { Some(to_toml(key, new)?) };
+            let new = if new.is_none() { None } else { Some(to_toml(key, new, 0)?) };
             set(&mut document, key, new).map_err(|why| error::value(format!("{key}: {why}")))?;
         }
         let weights = self.file.weights.clone();
@@ -281,12 +286,67 @@ impl Vehicle {
 
     #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
     fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-        let mut document = self.document()?;
-        let missing = || PyKeyError::new_err(key.to_owned());
-        let (table, name) = table_of(&mut document, key, false).map_err(|_| missing())?;
-        let item = table.get(name).ok_or_else(missing)?;
-        let own = item.as_table_like().and_then(|long| long.get("value")).unwrap_or(item);
-        own.as_value().map_or_else(|| Err(missing()), |own| to_python(py, own))
+        let own = self.value(key)?.ok_or_else(|| PyKeyError::new_err(key.to_owned()))?;
+        to_python(py, &own)
+    }
+
+    #[gen_stub(override_return_type(type_repr = "bool"))]
+    fn __contains__(
+        &self,
+        #[gen_stub(override_type(type_repr = "object"))] key: &Bound<'_, PyAny>,
+    ) -> PyResult<bool> {
+        // As a dictionary: what is no text is no key.
+        let Ok(key) = key.extract::<String>() else { return Ok(false) };
+        Ok(self.value(&key)?.is_some())
+    }
+
+    #[gen_stub(override_return_type(type_repr = "typing.Iterator[str]", imports = ("typing")))]
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
+        PyList::new(py, self.keys())?.try_iter()
+    }
+
+    fn __len__(&self) -> usize {
+        self.file.provenance.len()
+    }
+
+    /// Whether the other is a vehicle of the same file and the same weights.
+    fn __eq__(
+        &self,
+        #[gen_stub(override_type(type_repr = "object"))] other: &Bound<'_, PyAny>,
+    ) -> bool {
+        other.cast::<Self>().is_ok_and(|other| {
+            let (own, other) = (&self.file, &other.get().file);
+            own.text == other.text && own.name == other.name && own.weights == other.weights
+        })
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        (&self.file.name, &self.file.text).hash(&mut hasher);
+        hasher.finish()
+    }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let weights = self.file.weights.as_ref().map(ParnnWeights::to_hex);
+        reduced(py, "Vehicle", (&self.file.name, &self.file.text, weights))
+    }
+
+    /// The same: it never changes.
+    fn __copy__(own: PyRef<'_, Self>) -> PyRef<'_, Self> {
+        own
+    }
+
+    /// The same: it never changes.
+    fn __deepcopy__<'py>(
+        own: PyRef<'py, Self>,
+        #[gen_stub(override_type(type_repr = "typing.Any", imports = ("typing")))] memo: &Bound<
+            'py,
+            PyAny,
+        >,
+    ) -> PyRef<'py, Self> {
+        let _ = memo;
+        own
     }
 
     /// Name of the vehicle.
@@ -315,6 +375,10 @@ impl Vehicle {
         vehicle.parameters().propulsion.command_for_thrust(share_n)
     }
 
+    fn _repr_html_(own: &Bound<'_, Self>) -> PyResult<String> {
+        own.py().import("squirrel._html")?.call_method1("vehicle", (own,))?.extract()
+    }
+
     fn __repr__(&self) -> String {
         let vehicle = &self.file.vehicle;
         let (name, rotors) = (&self.file.name, vehicle.rotors().len());
@@ -323,6 +387,25 @@ impl Vehicle {
 }
 
 impl Vehicle {
+    /// What pickle kept.
+    pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
+        let state: Result<(String, String, Option<String>), _> = state.extract();
+        let (name, text, weights) = state.map_err(|_: PyErr| broken("Vehicle"))?;
+        let weights = weights.map(|hex| ParnnWeights::from_hex(&name, &hex)).transpose();
+        let weights = weights.map_err(|e| error::weights(&e))?;
+        let file = VehicleFile::parse_with(&text, &name, weights);
+        Ok(Self { file: file.map_err(|e| error::vehicle(&e))? })
+    }
+
+    /// The value of a key, if there is one.
+    fn value(&self, key: &str) -> PyResult<Option<Value>> {
+        let mut document = self.document()?;
+        let Ok((table, name)) = table_of(&mut document, key, false) else { return Ok(None) };
+        let Some(item) = table.get(name) else { return Ok(None) };
+        let own = item.as_table_like().and_then(|long| long.get("value")).unwrap_or(item);
+        Ok(own.as_value().cloned())
+    }
+
     fn document(&self) -> PyResult<DocumentMut> {
         self.file.text.parse().map_err(error::value)
     }
@@ -337,101 +420,4 @@ pub(crate) fn or_squirrel(vehicle: Option<&Bound<'_, Vehicle>>) -> VehicleFile {
 pub(crate) fn write_file(path: &Path, content: &[u8]) -> PyResult<()> {
     write_whole(path, content)
         .map_err(|e| error::system(e.kind(), format!("{}: {e}", path.display())))
-}
-
-/// The table that holds a key, and the last part of the key.
-///
-/// * `make` - tables that are missing
-fn table_of<'a, 'k>(
-    document: &'a mut DocumentMut,
-    key: &'k str,
-    make: bool,
-) -> Result<(&'a mut dyn TableLike, &'k str), String> {
-    let mut table: &mut dyn TableLike = document.as_table_mut();
-    let mut parts = key.split('.').peekable();
-    while let Some(part) = parts.next() {
-        if parts.peek().is_none() {
-            return Ok((table, part));
-        }
-        let (name, index) = match part.strip_suffix(']').and_then(|part| part.split_once('[')) {
-            Some((name, index)) => {
-                (name, Some(index.parse::<usize>().map_err(|_| format!("no table {part}"))?))
-            }
-            None => (part, None),
-        };
-        if make && index.is_none() && table.get(name).is_none() {
-            let mut new = Table::new();
-            // Only the headers of tables with numbers show.
-            new.set_implicit(true);
-            table.insert(name, Item::Table(new));
-        }
-        let inner = table.get_mut(name).ok_or_else(|| format!("no table {part}"))?;
-        table = match index {
-            None => inner.as_table_like_mut().ok_or_else(|| format!("{part} is not a table"))?,
-            Some(index) => inner
-                .as_array_of_tables_mut()
-                .and_then(|tables| tables.get_mut(index))
-                .ok_or_else(|| format!("no table {part}"))?,
-        };
-    }
-    Err("empty".to_owned())
-}
-
-fn set(document: &mut DocumentMut, key: &str, new: Option<Value>) -> Result<(), String> {
-    let (table, name) = table_of(document, key, true)?;
-    let Some(new) = new else {
-        return table.remove(name).map(|_| ()).ok_or_else(|| "not there".to_owned());
-    };
-    let long = table
-        .get_mut(name)
-        .and_then(Item::as_table_like_mut)
-        .filter(|long| long.contains_key("value"));
-    if let Some(long) = long {
-        long.insert("value", Item::Value(new));
-        // It told where the old number was from.
-        long.remove("source");
-    } else {
-        table.insert(name, Item::Value(new));
-    }
-    Ok(())
-}
-
-fn to_toml(key: &str, object: &Bound<'_, PyAny>) -> PyResult<Value> {
-    if object.is_instance_of::<PyBool>() {
-        return Ok(object.extract::<bool>()?.into());
-    }
-    if let Ok(text) = object.extract::<String>() {
-        return Ok(text.into());
-    }
-    if let Ok(number) = object.extract::<i64>() {
-        return Ok(number.into());
-    }
-    if let Ok(number) = object.extract::<f64>() {
-        return Ok(number.into());
-    }
-    if let (false, Ok(list)) = (object.is_instance_of::<PyDict>(), object.try_iter()) {
-        let list = list.map(|inner| to_toml(key, &inner?));
-        return Ok(list.collect::<PyResult<toml_edit::Array>>()?.into());
-    }
-    Err(error::value(format!(
-        "{key}: expected a number, text, truth value or list, got {}",
-        object.get_type().name()?
-    )))
-}
-
-fn to_python<'py>(py: Python<'py>, value: &Value) -> PyResult<Bound<'py, PyAny>> {
-    Ok(match value {
-        Value::Integer(x) => x.value().into_pyobject(py)?.into_any(),
-        Value::Float(x) => x.value().into_pyobject(py)?.into_any(),
-        Value::Boolean(x) => x.value().into_pyobject(py)?.to_owned().into_any(),
-        Value::Array(list) => {
-            PyList::new(py, list.iter().map(|x| to_python(py, x)).collect::<PyResult<Vec<_>>>()?)?
-                .into_any()
-        }
-        other => other
-            .as_str()
-            .map_or_else(|| other.to_string(), str::to_owned)
-            .into_pyobject(py)?
-            .into_any(),
-    })
 }

@@ -91,9 +91,9 @@ def test_single_vehicles_are_reset(vehicle: squirrel.Vehicle) -> None:
     np.testing.assert_array_equal(now[[3, 17]], start)
     others = [k for k in range(20) if k not in (3, 17)]
     np.testing.assert_array_equal(now[others], falling[others])
-    with pytest.raises(IndexError, match="vehicle 20: the batch has 20"):
+    with pytest.raises(IndexError, match=r"vehicles\[1\] = 20: the batch has 20 vehicles"):
         batch.reset(start, vehicles=[1, 20])
-    with pytest.raises(IndexError, match="vehicle 20: the batch has 20"):
+    with pytest.raises(IndexError, match=r"index = 20: the batch has 20 vehicles"):
         batch.replace(20, vehicle)
     np.testing.assert_array_equal(batch.states(), now)
 

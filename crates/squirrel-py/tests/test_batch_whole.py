@@ -208,9 +208,9 @@ def test_a_bad_argument_is_named(call: Callable[[squirrel.Batch], object], line:
 
 def test_a_vehicle_that_is_not_there_is_named() -> None:
     batch = squirrel.Batch(vehicles=[BASE] * 3)
-    with pytest.raises(IndexError, match="vehicle 3: the batch has 3"):
+    with pytest.raises(IndexError, match=r"vehicles\[0\] = 3: the batch has 3 vehicles"):
         batch.set_charge(np.zeros(1, np.float32), vehicles=[3])
-    with pytest.raises(IndexError, match="vehicle 3: the batch has 3"):
+    with pytest.raises(IndexError, match=r"vehicles\[0\] = 3: the batch has 3 vehicles"):
         batch.set_air(np.zeros((1, 3)), vehicles=[3])
 
 

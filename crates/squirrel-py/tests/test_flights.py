@@ -67,7 +67,7 @@ def test_data_frames() -> None:
         ({"integrator": "leapfrog"}, "integrator = leapfrog"),
         ({"thrust_to_weight": -1.0}, "thrust_to_weight = -1"),
         ({"thrust_to_weight": float("nan")}, "thrust_to_weight = NaN"),
-        ({"vehicle": squirrel.Vehicle.bundled("crazyflie2_arpl")}, r"\[control\] is missing; a flight needs gains"),
+        ({"estimator": "hawk"}, "estimator = hawk: no such estimator; known are eskf, "),
     ],
 )
 def test_a_bad_argument_is_named(arguments: dict[str, object], line: str) -> None:
@@ -161,3 +161,38 @@ def test_logs_of_others_are_read(tmp_path: Path) -> None:
     (tmp_path / "text.txt").write_text("hello")
     with pytest.raises(ValueError, match="text.txt: import reads"):
         squirrel.read_log(tmp_path / "text.txt")
+
+
+CRAZYFLIES = ["crazyflie21_brushed", "crazyflie21_brushed_curve", "crazyflie21_datasheet", "crazyflie2_arpl"]
+
+
+@pytest.mark.parametrize("name", CRAZYFLIES)
+def test_bundled_vehicles_without_gains_fly_by_rule_and_say_so(name: str) -> None:
+    vehicle = squirrel.Vehicle.bundled(name)
+    assert "control.thrust_min_n" not in vehicle
+    log = squirrel.simulate(vehicle=vehicle, scenario="hover", arm="pc", seed=1)
+    assert log.metadata["gains"].startswith("by rule") and "by rule: " in log.metadata["vehicle_toml"]
+    assert log.metrics is not None and log.metrics["rmse_m"] is not None and log.metrics["rmse_m"] < 1.0, log.metrics
+    assert "gains" not in squirrel.simulate(scenario="hover").metadata
+    squirrels = squirrel.Vehicle.bundled("squirrel")
+    tasks = squirrel.Tasks(task="track", vehicles=[squirrels, vehicle], num_envs=8)
+    assert tasks.gains_by_rule == [1]
+    tasks.reset()
+    for _ in range(25):
+        _, reward, terminated, _ = tasks.step(np.tile(np.float32([0, 0, 0, -1]), (8, 1)))
+    assert np.isfinite(reward).all() and not terminated.all()
+
+
+def test_notebooks_see_tables(vehicle: squirrel.Vehicle) -> None:
+    log = squirrel.simulate(scenario="hover")
+    reach = squirrel.plan.reach(vehicle, velocity_ned_m_s=(7.0, 0.0, 0.0), thrust_to_weight=1.1)
+    for thing, words in [
+        (vehicle, ["Vehicle squirrel", "0.548", "without a source"]),
+        (log, ["FlightLog", "rmse_m", "imu", "omega_body_rad_s"]),
+        (reach, ["Reach at T/W 1.1", "with wings", "upward"]),
+    ]:
+        html = thing._repr_html_()
+        assert html.count("<table>") == html.count("</table>") >= 1 and html.count("<tr>") == html.count("</tr>")
+        assert all(word in html for word in words), html
+    odd = vehicle.edited({"name": "<script>"})
+    assert "<script>" not in odd._repr_html_() and "&lt;script&gt;" in odd._repr_html_()

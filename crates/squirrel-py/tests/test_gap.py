@@ -93,3 +93,18 @@ def test_a_bad_argument_is_named(vehicle: squirrel.Vehicle) -> None:
         squirrel.gap.shrink(vehicle=vehicle, flights={}, held_out={})
     with pytest.raises(ValueError, match="flights: expected names .* got 1 of"):
         squirrel.gap.find(vehicle=vehicle, flights={1: None})  # type: ignore[dict-item]
+
+
+def test_a_notebook_sees_the_verdict() -> None:
+    effect = squirrel.gap.NamedEffect(
+        name="battery_sag",
+        form="standard",
+        evidence_nats=12.5,
+        parameters={"voltage_exponent": squirrel.gap.Parameter(value=0.9, low=0.8, high=1.0)},
+    )
+    verdict = squirrel.gap.Verdict(
+        verdict="named", effects=(effect,), moved=(), alternatives=(), where=(), goes_with=None, fly_next=None, gap=None,
+        leftover=None, closed_loop=(), model_patch=None, baseline=None, words="a < b", set_aside=(), notes=(), patched=None,
+    )  # fmt: skip
+    html = verdict._repr_html_()
+    assert "Verdict: named" in html and "a &lt; b" in html and "battery_sag.voltage_exponent" in html and "0.8 to 1" in html

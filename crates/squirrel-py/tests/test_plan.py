@@ -114,9 +114,9 @@ def test_a_bad_task_is_named(vehicle: squirrel.Vehicle) -> None:
     broken = ahead.copy()
     broken[3, 1] = np.nan
     for match, arguments in [
-        (r"reference\[3\].position_ned_m = NaN", {"reference_position_ned_m": broken, "reference_velocity_ned_m_s": ahead}),
+        (r"reference_position_ned_m\[3\] = NaN", {"reference_position_ned_m": broken, "reference_velocity_ned_m_s": ahead}),
         ("velocity_ned_m_s = NaN", {"velocity_ned_m_s": (np.nan, 0.0, 0.0)}),
-        (r"obstacles\[0\].radius_m = 0", {"obstacles_m": np.zeros((1, 3))}),
+        (r"obstacles_m\[0\].radius_m = 0", {"obstacles_m": np.zeros((1, 3))}),
         ("obstacles_m: expected a float64 array", {"obstacles_m": np.zeros((1, 2))}),
         ("step_s = 0", {"step_s": 0.0}),
         ("deployment = 2", {"deployment": 2.0}),

@@ -20,6 +20,7 @@ pub mod replay;
 pub mod scenario;
 pub mod sensors;
 pub mod setting;
+mod tape;
 pub mod task;
 pub mod track;
 pub mod vehicle_file;

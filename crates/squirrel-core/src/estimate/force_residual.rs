@@ -37,10 +37,10 @@ const SPARE_MAX: f32 = 0.2;
 
 /// What is remembered.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct Felt {
-    residual: ForceResidual,
+pub(crate) struct Felt {
+    pub(crate) residual: ForceResidual,
     /// Since the wings were commanded to spread, s; 0 while they are not.
-    spread_s: f32,
+    pub(crate) spread_s: f32,
 }
 
 /// What a step brings.

@@ -18,7 +18,7 @@
 pub mod altitude;
 mod covariance;
 pub mod eskf;
-mod force_residual;
+pub(crate) mod force_residual;
 pub mod mahony;
 pub mod mekf;
 pub mod monitor;

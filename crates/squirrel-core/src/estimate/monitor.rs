@@ -32,14 +32,14 @@ const FOLDED_S: f32 = 0.7;
 /// What is remembered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Monitor {
-    commanded: ThrustTorque,
-    omega: Option<Vector3<f32>>,
-    missing_n: f32,
-    torque_n_m: Vector3<f32>,
-    spread_ago_s: f32,
-    felt: Felt,
+    pub(crate) commanded: ThrustTorque,
+    pub(crate) omega: Option<Vector3<f32>>,
+    pub(crate) missing_n: f32,
+    pub(crate) torque_n_m: Vector3<f32>,
+    pub(crate) spread_ago_s: f32,
+    pub(crate) felt: Felt,
     /// Since the last inertial measurement.
-    waited_s: f32,
+    pub(crate) waited_s: f32,
 }
 
 impl Default for Monitor {

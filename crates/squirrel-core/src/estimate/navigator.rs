@@ -211,7 +211,7 @@ struct Waiting {
 /// Everything of the estimate that changes in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NavigationState {
-    voter: Voter,
+    pub(crate) voter: Voter,
     running: Running,
     altitude: Option<AltitudeFilter>,
     waiting: Waiting,

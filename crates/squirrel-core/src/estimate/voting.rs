@@ -34,12 +34,12 @@ const SPIKE_GAP_US: u32 = 20_000;
 
 /// What is known of one unit.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Unit {
-    last: Option<Imu>,
-    repeats: u16,
+pub(crate) struct Unit {
+    pub(crate) last: Option<Imu>,
+    pub(crate) repeats: u16,
     /// Doubted for this long still, us.
-    doubted_us: u32,
-    silent_us: u32,
+    pub(crate) doubted_us: u32,
+    pub(crate) silent_us: u32,
 }
 
 impl Unit {
@@ -57,18 +57,18 @@ impl Unit {
 /// Listens to the units of one vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Voter {
-    units: [Unit; 2],
+    pub(crate) units: [Unit; 2],
     /// First unit less the second.
-    difference: Difference,
-    voted: Option<Imu>,
-    since_us: u32,
-    spikes: u8,
+    pub(crate) difference: Difference,
+    pub(crate) voted: Option<Imu>,
+    pub(crate) since_us: u32,
+    pub(crate) spikes: u8,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Difference {
-    omega: Vector3<f32>,
-    force: Vector3<f32>,
+pub(crate) struct Difference {
+    pub(crate) omega: Vector3<f32>,
+    pub(crate) force: Vector3<f32>,
 }
 
 impl Default for Difference {

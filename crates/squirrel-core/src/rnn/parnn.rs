@@ -30,8 +30,8 @@ pub fn features(velocity: In<Body, f32>) -> [f32; INPUTS] {
 /// The last rows, oldest first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct History {
-    rows: [[f32; INPUTS]; WINDOW],
-    seen: usize,
+    pub(crate) rows: [[f32; INPUTS]; WINDOW],
+    pub(crate) seen: usize,
 }
 
 impl History {

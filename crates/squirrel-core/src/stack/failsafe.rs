@@ -150,10 +150,10 @@ pub struct Failsafe {
 
 /// How long one sensor has been silent, and how often it said the same.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Watch {
+pub(super) struct Watch {
     /// Since the last valid reading, us; `None` before the first.
-    age_us: Option<u32>,
-    repeats: u16,
+    pub(super) age_us: Option<u32>,
+    pub(super) repeats: u16,
 }
 
 impl Watch {
@@ -185,23 +185,23 @@ pub(super) struct Estimated {
 pub struct FailsafeState {
     /// What flies, and why.
     pub active: Failsafe,
-    imu: Watch,
-    attitude: Watch,
-    gnss: Watch,
-    altitude: Watch,
+    pub(super) imu: Watch,
+    pub(super) attitude: Watch,
+    pub(super) gnss: Watch,
+    pub(super) altitude: Watch,
     /// Since the last command, us; `None` before the first.
-    command_age_us: Option<u32>,
+    pub(super) command_age_us: Option<u32>,
     /// Frames since time went on.
-    standing: u16,
+    pub(super) standing: u16,
     /// Turned since the attitude changed, rad.
-    turned_rad: Vector3<f32>,
+    pub(super) turned_rad: Vector3<f32>,
     /// Climbed since the altitude changed, m.
-    climbed_m: f32,
+    pub(super) climbed_m: f32,
     /// It should have changed since then; holds until it does.
-    attitude_hangs: bool,
-    altitude_hangs: bool,
+    pub(super) attitude_hangs: bool,
+    pub(super) altitude_hangs: bool,
     /// Since things were as bad as `active` says, us.
-    better_us: u32,
+    pub(super) better_us: u32,
 }
 
 impl FailsafeState {

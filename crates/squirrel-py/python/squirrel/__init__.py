@@ -8,7 +8,7 @@ wings make reachable (`squirrel.plan`), and what a model lacks (`squirrel.gap`).
 SI units and radians; world NED, body FRD, quaternions Hamilton, body to NED, w x y z. Functions are batched over the first axis.
 """
 
-from squirrel import control, dynamics, gap, nn, plan, policy
+from squirrel import control, dynamics, flight, gap, nn, plan, policy
 from squirrel._squirrel import Batch, FlightLog, Policy, Stack, Tasks, Vehicle, __version__, read_log, rollout, simulate
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "__version__",
     "control",
     "dynamics",
+    "flight",
     "gap",
     "nn",
     "plan",

@@ -6,6 +6,7 @@ import numpy
 import numpy.typing
 import os
 import pathlib
+from squirrel import flight
 import typing
 __all__ = [
     "Backstepping",
@@ -89,6 +90,7 @@ class Backstepping:
         r"""
         Forget everything.
         """
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 @typing.final
 class Batch:
@@ -318,11 +320,12 @@ class Batch:
         Parameters
         ----------
         wind_ned_m_s : ndarray of the batch's dtype, shape (n, 3)
+            At most 1000 m/s along an axis.
         
         Raises
         ------
         ValueError
-            Another dtype or shape, a number that is not finite.
+            Another dtype or shape, a number that is not finite or beyond what air does.
         """
     def set_air(self, wind_ned_m_s: numpy.typing.NDArray[numpy.float64], *, gust_sigma_m_s: typing.Optional[numpy.typing.NDArray[numpy.float64]] = None, seed: typing.Optional[typing.Iterable[typing.SupportsIndex]] = None, vehicles: typing.Optional[typing.Iterable[typing.SupportsIndex]] = None) -> None:
         r"""
@@ -368,6 +371,31 @@ class Batch:
         ValueError
             Another number of rotors, rotors too quick for the step, something that the batch has no place for.
         """
+    def state(self) -> bytes:
+        r"""
+        Everything that changes in flight, to be taken up again by `restore`: motions, commands,
+        wings, batteries, loads, gusts and commands on their way.
+        
+        Returns
+        -------
+        bytes
+            Equal where the batches fly on alike, bit for bit.
+        """
+    def restore(self, state: bytes) -> None:
+        r"""
+        Be again where a batch was; vehicles stay those that there are.
+        
+        Parameters
+        ----------
+        state : bytes
+            What `state` returned, of this batch or of one that is made alike.
+        
+        Raises
+        ------
+        ValueError
+            The state of another kind of batch, or no state. Nothing has changed then.
+        """
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
     def __len__(self) -> builtins.int: ...
     def __repr__(self) -> builtins.str: ...
 
@@ -398,7 +426,7 @@ class FlightLog:
         What the log says of the flight: vehicle, arm, scenario, seed, version.
         """
     @property
-    def metrics(self) -> dict[str, float | None] | None:
+    def metrics(self) -> squirrel.flight.Metrics | None:
         r"""
         What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was
         read.
@@ -466,7 +494,8 @@ class FlightLog:
             The log lacks the source.
         """
     def __getitem__(self, channel: builtins.str) -> numpy.typing.NDArray[numpy.float64]: ...
-    def __contains__(self, channel: builtins.str) -> builtins.bool: ...
+    def __contains__(self, channel: object) -> builtins.bool: ...
+    def __iter__(self) -> typing.Iterator[str]: ...
     def __len__(self) -> builtins.int: ...
     def to_pandas(self, source: builtins.str) -> typing.Any:
         r"""
@@ -506,6 +535,16 @@ class FlightLog:
         KeyError
             The log lacks the source.
         """
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
+    def __copy__(self) -> FlightLog:
+        r"""
+        The same: it never changes.
+        """
+    def __deepcopy__(self, memo: typing.Any) -> FlightLog:
+        r"""
+        The same: it never changes.
+        """
+    def _repr_html_(self) -> builtins.str: ...
     def __repr__(self) -> builtins.str: ...
 
 @typing.final
@@ -566,6 +605,15 @@ class Model:
         ------
         ValueError
             A tensor is missing or unknown, of another dtype or shape, or not finite.
+        """
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
+    def __copy__(self) -> Model:
+        r"""
+        The same: it never changes.
+        """
+    def __deepcopy__(self, memo: typing.Any) -> Model:
+        r"""
+        The same: it never changes.
         """
     def __repr__(self) -> builtins.str: ...
 
@@ -650,6 +698,20 @@ class Policy:
         ValueError
             Names the argument, what was expected and what came.
         """
+    def __eq__(self, other: object) -> builtins.bool:
+        r"""
+        Whether the other is a policy with the same weights.
+        """
+    def __hash__(self) -> builtins.int: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
+    def __copy__(self) -> Policy:
+        r"""
+        The same: it never changes.
+        """
+    def __deepcopy__(self, memo: typing.Any) -> Policy:
+        r"""
+        The same: it never changes.
+        """
     def __repr__(self) -> builtins.str: ...
 
 @typing.final
@@ -721,6 +783,7 @@ class Stack:
         Stack
             That goes on by itself.
         """
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 @typing.final
 class Tasks:
@@ -737,7 +800,7 @@ class Tasks:
         ``avoid``: follow a straight run of 4 to 8 m/s past trunks that are seen from 5 m; ``track``: follow a curve.
     vehicles : sequence of Vehicle
         Each episode takes one of them, with its wings, battery and effects: domain randomisation is a list of vehicles. All have four
-        rotors and ``[control]``.
+        rotors; those without ``[control]`` fly by gains by rule (`gains_by_rule`).
     num_envs : int
         How many environments.
     action : str
@@ -762,6 +825,12 @@ class Tasks:
     ValueError
         Names the argument, what was expected and what came.
     """
+    @property
+    def gains_by_rule(self) -> builtins.list[builtins.int]:
+        r"""
+        Which of the vehicles fly by gains by rule, because their files have none: places in the
+        sequence of vehicles.
+        """
     @property
     def observation_numbers(self) -> builtins.int:
         r"""
@@ -856,6 +925,7 @@ class Tasks:
         IndexError
             There is no such environment.
         """
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
     def __len__(self) -> builtins.int: ...
 
 @typing.final
@@ -915,6 +985,7 @@ class Twcc:
         r"""
         Forget everything.
         """
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
 
 @typing.final
 class Vehicle:
@@ -1133,7 +1204,35 @@ class Vehicle:
             The file has no number of this key.
         """
     def __getitem__(self, key: builtins.str) -> typing.Any: ...
+    def __contains__(self, key: object) -> bool: ...
+    def __iter__(self) -> typing.Iterator[str]: ...
+    def __len__(self) -> builtins.int: ...
+    def __eq__(self, other: object) -> builtins.bool:
+        r"""
+        Whether the other is a vehicle of the same file and the same weights.
+        """
+    def __hash__(self) -> builtins.int: ...
+    def __reduce__(self) -> tuple[typing.Any, ...]: ...
+    def __copy__(self) -> Vehicle:
+        r"""
+        The same: it never changes.
+        """
+    def __deepcopy__(self, memo: typing.Any) -> Vehicle:
+        r"""
+        The same: it never changes.
+        """
+    def _repr_html_(self) -> builtins.str: ...
     def __repr__(self) -> builtins.str: ...
+
+def _again(class: builtins.str, state: tuple[typing.Any, ...]) -> typing.Any:
+    r"""
+    Make an object of what its ``__reduce__`` said; for pickle.
+    """
+
+def _looks() -> builtins.int:
+    r"""
+    Looks at signals so far, for tests.
+    """
 
 def derivative(vehicle: Vehicle, *, state: numpy.typing.NDArray[numpy.float64], command: numpy.typing.NDArray[numpy.float64], wind_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float64]] = None, voltage_v: typing.Optional[builtins.float] = None) -> numpy.typing.NDArray[numpy.float64]:
     r"""
@@ -1383,7 +1482,8 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
     Parameters
     ----------
     vehicle : Vehicle, optional
-        What flies; the paper's squirrel if left out.
+        What flies; the paper's squirrel if left out. One without ``[control]`` flies by gains by rule, those of ``squirrel vehicle new``,
+        and the log's metadata say so (``gains``).
     scenario : str
         ``hover``, ``avoid``, ``steer``, ``track``, ``forest``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
         the path of a scenario file (.toml).
@@ -1424,7 +1524,7 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
 
 def train(flights: dict[str, FlightLog], *, model: builtins.str = 'parnn', vehicle: typing.Optional[Vehicle] = None, validation: typing.Optional[typing.Sequence[builtins.str]] = None, epochs: builtins.int = 800, batch: builtins.int = 256, rate: builtins.float = 0.003, clip: builtins.float = 5.0, patience: builtins.int = 200, seed: builtins.int = 0) -> Model:
     r"""
-    Train a model of the wing force on flights. Ctrl-C ends it between two epochs.
+    Train a model of the wing force on flights. Ctrl-C ends it.
     
     Parameters
     ----------

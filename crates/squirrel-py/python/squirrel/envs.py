@@ -18,6 +18,7 @@ of a vectorised one with seed s does what a single one with seed s + k does, to 
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
 from typing import Any
 
@@ -28,6 +29,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from squirrel._picture import picture, text
 from squirrel._squirrel import Tasks, Vehicle
 
 __all__ = ["SquirrelEnv", "SquirrelVectorEnv", "register"]
@@ -35,8 +37,50 @@ __all__ = ["SquirrelEnv", "SquirrelVectorEnv", "register"]
 _LARGEST = 5.0
 
 
+_MODES = ["rgb_array", "ansi"]
+_SEEDS = 2**64
+
+
 def _vehicles(vehicles: Sequence[Vehicle] | None) -> list[Vehicle]:
-    return [Vehicle.bundled("squirrel")] if vehicles is None else list(vehicles)
+    if vehicles is None:
+        return [Vehicle.bundled("squirrel")]
+    if isinstance(vehicles, (list, tuple)) and all(isinstance(one, Vehicle) for one in vehicles):
+        return list(vehicles)
+    raise TypeError(f"vehicles: expected a list or tuple of Vehicle, got {type(vehicles).__name__}")
+
+
+def _mode(render_mode: str | None) -> str | None:
+    if render_mode is not None and render_mode not in _MODES:
+        raise ValueError(f"render_mode = {render_mode}: must be {' or '.join(_MODES)}")
+    return render_mode
+
+
+def _seed(seed: Any) -> int:
+    try:
+        number = operator.index(seed)
+    except TypeError:
+        raise TypeError(f"seed: expected a whole number, got {type(seed).__name__}") from None
+    if not 0 <= number < _SEEDS:
+        raise ValueError(f"seed = {number}: must be 0 to {_SEEDS - 1}")
+    return number
+
+
+def _numbers(name: str, numbers: Any) -> NDArray[np.float32]:
+    try:
+        given = np.asarray(numbers)
+    except ValueError:
+        given = np.array(None)
+    if given.dtype.kind not in "fiub":
+        raise ValueError(f"{name}: expected numbers (float32), got {given.dtype} of shape {given.shape}")
+    # What is too large for it becomes infinite, and is refused as such.
+    with np.errstate(over="ignore"):
+        return given.astype(np.float32)
+
+
+def _frames(tasks: Tasks, render_mode: str | None) -> list[Any]:
+    draw = picture if render_mode == "rgb_array" else text
+    states, references = tasks.states()
+    return [draw(states[k], references[k], tasks.obstacles(k)) for k in range(len(tasks))]
 
 
 def _spaces(tasks: Tasks) -> tuple[Box, Box]:
@@ -61,9 +105,11 @@ class SquirrelEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         Observations come from the vehicle's sensors instead of the true state.
     scheme : str
         ``rk4`` or ``euler``, of steps of 2 ms.
+    render_mode : str, optional
+        What `render` returns: ``rgb_array``, a picture from above, or ``ansi``, the same as text.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 50}
+    metadata: dict[str, Any] = {"render_modes": _MODES, "render_fps": 50}
 
     def __init__(
         self,
@@ -74,7 +120,9 @@ class SquirrelEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         episode_s: float = 10.0,
         sensors: bool = False,
         scheme: str = "rk4",
+        render_mode: str | None = None,
     ) -> None:
+        self.render_mode = _mode(render_mode)
         self.tasks = Tasks(
             task=task,
             vehicles=_vehicles(vehicles),
@@ -104,6 +152,7 @@ class SquirrelEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         tuple
             Observation and an empty dict.
         """
+        seed = None if seed is None else _seed(seed)
         super().reset(seed=seed)
         if seed is not None or not self._is_seeded:
             self.tasks.seed(0, int(self.np_random.integers(2**63)) if seed is None else seed)
@@ -125,9 +174,20 @@ class SquirrelEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         tuple
             Observation, reward, terminated, truncated, an empty dict.
         """
-        actions = np.asarray(action, np.float32)[np.newaxis]
+        actions = _numbers("action", action)[np.newaxis]
         observation, reward, terminated, truncated = self.tasks.step(actions)
         return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), {}
+
+    def render(self) -> Any:
+        """Show where the vehicle is, from above.
+
+        Returns
+        -------
+        ndarray of uint8, shape (240, 240, 3), or str, or None
+            As `render_mode` says; None where it says nothing. North is up and the vehicle in the middle of 24 m; the bar on the
+            right says how far it is above or below its reference, up to 6 m.
+        """
+        return None if self.render_mode is None else _frames(self.tasks, self.render_mode)[0]
 
 
 class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
@@ -151,10 +211,12 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         ``rk4`` or ``euler``, of steps of 2 ms.
     threads : int, optional
         That work; as many as there are cores if left out.
+    render_mode : str, optional
+        What `render` returns of each, as for `SquirrelEnv`.
     """
 
     metadata: dict[str, Any] = {
-        "render_modes": [],
+        "render_modes": _MODES,
         "render_fps": 50,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -170,7 +232,9 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         sensors: bool = False,
         scheme: str = "rk4",
         threads: int | None = None,
+        render_mode: str | None = None,
     ) -> None:
+        self.render_mode = _mode(render_mode)
         self.tasks = Tasks(
             task=task,
             vehicles=_vehicles(vehicles),
@@ -181,7 +245,7 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
             scheme=scheme,
             threads=threads,
         )
-        self.num_envs = num_envs
+        num_envs = self.num_envs = len(self.tasks)
         self.single_observation_space, self.single_action_space = _spaces(self.tasks)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -207,14 +271,23 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         if seed is None and not self._is_seeded:
             seed = int(np.random.default_rng().integers(2**62))
         if seed is not None:
-            seeds = [seed + k for k in range(self.num_envs)] if isinstance(seed, int) else list(seed)
+            seeds: list[int | None]
+            if isinstance(seed, (list, tuple)) or (isinstance(seed, np.ndarray) and seed.ndim == 1):
+                seeds = [None if one is None else _seed(one) for one in seed]
+            else:
+                first = _seed(seed)
+                seeds = [(first + k) % _SEEDS for k in range(self.num_envs)]
             if len(seeds) != self.num_envs:
                 raise ValueError(f"seed: {len(seeds)} values, must be {self.num_envs}")
             for index, one in enumerate(seeds):
                 if one is not None:
                     self.tasks.seed(index, one)
             self._is_seeded = True
+        if options is not None and not isinstance(options, dict):
+            raise TypeError(f"options: expected a dict, got {type(options).__name__}")
         mask = (options or {}).get("reset_mask")
+        if mask is not None and not isinstance(mask, (list, tuple, np.ndarray)):
+            raise TypeError(f"options: reset_mask: expected an array of bool, got {type(mask).__name__}")
         return self.tasks.reset(None if mask is None else [bool(one) for one in mask]), {}
 
     def step(
@@ -234,8 +307,18 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         tuple
             Observations, rewards, terminated, truncated, an empty dict.
         """
-        observation, reward, terminated, truncated = self.tasks.step(np.asarray(actions, np.float32))
+        observation, reward, terminated, truncated = self.tasks.step(_numbers("actions", actions))
         return observation, reward, terminated, truncated, {}
+
+    def render(self) -> tuple[Any, ...] | None:
+        """Show where the vehicles are, from above.
+
+        Returns
+        -------
+        tuple or None
+            A picture or text of each, as `SquirrelEnv.render` gives it; None where `render_mode` says nothing.
+        """
+        return None if self.render_mode is None else tuple(_frames(self.tasks, self.render_mode))
 
 
 def register() -> None:

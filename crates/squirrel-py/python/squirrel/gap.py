@@ -370,6 +370,11 @@ class Verdict:
     notes: tuple[str, ...]
     patched: Vehicle | None
 
+    def _repr_html_(self) -> str:
+        from squirrel import _html
+
+        return _html.verdict(self)
+
 
 def effects() -> list[dict[str, Any]]:
     """List the effects that a vehicle file may name, and that this workflow looks for.
@@ -411,7 +416,7 @@ def check(
     ValueError
         One line that names the flight or the field, and the value.
     """
-    return gap_check(vehicle, flights, held_out or {})
+    return gap_check(vehicle, flights, _given(held_out))
 
 
 def find(*, vehicle: Vehicle, flights: dict[str, FlightLog]) -> Finding:
@@ -460,7 +465,7 @@ def name(
     ValueError
         One line that names the flight or the field, and the value.
     """
-    return _verdict(*gap_diagnose(vehicle, flights, {}, baseline or {}, False, False, None))
+    return _verdict(*gap_diagnose(vehicle, flights, {}, _given(baseline), False, False, None))
 
 
 def shrink(
@@ -493,9 +498,9 @@ def shrink(
     ValueError
         One line that names the flight or the field, and the value.
     """
-    if not held_out:
+    if isinstance(held_out, dict) and not held_out:
         raise ValueError("held_out: none given; shrink needs flights that the fit never sees")
-    return _verdict(*gap_diagnose(vehicle, flights, held_out, baseline or {}, False, True, None))
+    return _verdict(*gap_diagnose(vehicle, flights, held_out, _given(baseline), False, True, None))
 
 
 def run(
@@ -536,7 +541,11 @@ def run(
     ValueError
         One line that names the flight or the field, and the value.
     """
-    return _verdict(*gap_diagnose(vehicle, flights, held_out or {}, baseline or {}, fit, True, out))
+    return _verdict(*gap_diagnose(vehicle, flights, _given(held_out), _given(baseline), fit, True, out))
+
+
+def _given(flights: dict[str, FlightLog] | None) -> dict[str, FlightLog]:
+    return {} if flights is None else flights
 
 
 def _places(places: list[dict[str, Any]]) -> tuple[Place, ...]:

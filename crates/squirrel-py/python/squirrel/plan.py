@@ -96,6 +96,11 @@ class Reach:
     hull_volume_m3_s6: Compared
     support: Support | None
 
+    def _repr_html_(self) -> str:
+        from squirrel import _html
+
+        return _html.reach(self)
+
 
 def reach(
     vehicle: Vehicle,
@@ -263,13 +268,18 @@ def trajectory(
     >>> plan.status
     'solved'
     """
-    positions = np.asarray(reference_position_ned_m)
-    if positions.ndim != 2 or len(positions) < 3:
-        raise ValueError(f"reference_position_ned_m: expected an array of shape (n, 3), n > 2, got {positions.shape}")
-    if not step_s > 0.0:
+    positions = _rows("reference_position_ned_m", reference_position_ned_m, least=3)
+    if not 0.01 <= _number("step_s", step_s) <= 1.0:
         raise ValueError(f"step_s = {step_s}: must be 0.01 to 1")
     if reference_velocity_ned_m_s is None:
-        reference_velocity_ned_m_s = np.ascontiguousarray(np.gradient(positions, step_s, axis=0))
+        # What is too large is refused below.
+        with np.errstate(all="ignore"):
+            reference_velocity_ned_m_s = np.ascontiguousarray(np.gradient(positions, step_s, axis=0))
+    reference_velocity_ned_m_s = _rows("reference_velocity_ned_m_s", reference_velocity_ned_m_s)
+    if len(reference_velocity_ned_m_s) != len(positions):
+        raise ValueError(f"reference_velocity_ned_m_s: {len(reference_velocity_ned_m_s)} rows, must be {len(positions)}")
+    if obstacles_m is not None:
+        obstacles_m = _rows("obstacles_m", obstacles_m)
     start = positions[0] if position_ned_m is None else position_ned_m
     velocity = reference_velocity_ned_m_s[0] if velocity_ned_m_s is None else velocity_ned_m_s
     facts, nodes = plan_trajectory(
@@ -292,10 +302,33 @@ def trajectory(
 
 
 def _three(name: str, numbers: Sequence[float] | NDArray[np.float64]) -> list[float]:
-    three = [float(x) for x in numbers]
-    if len(three) != 3:
-        raise ValueError(f"{name}: expected 3 numbers, got {len(three)}")
-    return three
+    try:
+        given = list(numbers)
+    except TypeError:
+        raise TypeError(f"{name}: expected 3 numbers, got {type(numbers).__name__}") from None
+    if len(given) != 3:
+        raise ValueError(f"{name}: expected 3 numbers, got {len(given)}")
+    return [_number(name, x) for x in given]
+
+
+def _number(name: str, number: Any) -> float:
+    try:
+        return float(number)
+    except OverflowError:
+        raise ValueError(f"{name}: too large for a number of double precision") from None
+    except (TypeError, ValueError):
+        raise TypeError(f"{name}: expected a number, got {type(number).__name__}") from None
+
+
+def _rows(name: str, array: Any, least: int = 0) -> NDArray[np.float64]:
+    fits = isinstance(array, np.ndarray) and array.dtype == np.float64 and array.ndim == 2 and array.shape[1] == 3
+    if not fits or len(array) < least:
+        got = f"{array.dtype} of shape {array.shape}" if isinstance(array, np.ndarray) else type(array).__name__
+        raise ValueError(f"{name}: expected a float64 array of shape (n, 3){', n > 2' if least > 2 else ''}, got {got}")
+    for row, column in np.argwhere(~np.isfinite(array))[:1]:
+        value = array[row, column]
+        raise ValueError(f"{name}[{row}] = {'NaN' if np.isnan(value) else value}: must be finite")
+    return array
 
 
 def _compared(both: dict[str, Any]) -> Compared:

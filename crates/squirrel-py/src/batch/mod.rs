@@ -2,44 +2,23 @@
 //! of rotors.
 
 mod any_batch;
+mod make;
 pub(crate) mod rollout;
 
-use crate::arguments::{Array64, ArrayAny, Float, Indices, Numbers, rows};
+use crate::arguments::{Array64, ArrayAny, Float, Numbers, rows};
 use crate::error::value;
+use crate::interrupt::{now_and_then, watched};
+use crate::kept::reduced;
+use crate::scalars::{self, Indices};
 use crate::vehicle::Vehicle;
-use any_batch::{AnyBatch, advance, air, any_batch};
-use pyo3::exceptions::{PyIndexError, PyRuntimeError};
+use any_batch::{AnyBatch, advance, air, check_wind};
 use pyo3::prelude::*;
-use pyo3::sync::MutexExt;
+use pyo3::types::{PyBytes, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
-use squirrel_sim::batch::simd::Path;
-use squirrel_sim::batch::{BatchVehicle, Scheme, Settings};
-use squirrel_sim::plant::WingPlant;
-use std::sync::{Mutex, MutexGuard};
+use squirrel_sim::batch::{BatchVehicle, Settings};
+use std::sync::Mutex;
 
-pub(crate) fn settings(
-    dt_s: f64,
-    scheme: &str,
-    threads: Option<usize>,
-    registers: Option<&str>,
-) -> PyResult<Settings> {
-    let scheme = match scheme {
-        "rk4" => Scheme::Rk4,
-        "euler" => Scheme::Euler,
-        other => return Err(value(format!("scheme = {other}: must be rk4 or euler"))),
-    };
-    let path = match registers {
-        None => Path::best(),
-        Some(name) => {
-            Path::available().into_iter().find(|path| path.name() == name).ok_or_else(|| {
-                let names: Vec<&str> = Path::available().into_iter().map(Path::name).collect();
-                value(format!("registers = {name}: this processor has {}", names.join(", ")))
-            })?
-        }
-    };
-    let all = Settings::default();
-    Ok(Settings { dt_s, scheme, threads: threads.unwrap_or(all.threads), path })
-}
+pub(crate) use make::{scheme_name, settings};
 
 /// Many vehicles at once, each with numbers of its own.
 ///
@@ -95,6 +74,8 @@ pub(crate) struct Batch {
     vehicles: usize,
     settings: Settings,
     whole: bool,
+    /// Those that it was made with, which decide what there is a place for.
+    made_with: Vec<Py<Vehicle>>,
     /// What any vehicle had when the batch was made.
     has_wings: bool,
     has_battery: bool,
@@ -107,77 +88,19 @@ struct Locked {
     vehicles: Vec<Py<Vehicle>>,
 }
 
-impl Batch {
-    fn make(
-        vehicles: Vec<Bound<'_, Vehicle>>,
-        settings: Settings,
-        in_32: bool,
-        whole: bool,
-    ) -> PyResult<Self> {
-        let mut batch = any_batch(&vehicles, settings, in_32, whole)?;
-        let any =
-            |has: fn(&Vehicle) -> bool| whole && vehicles.iter().any(|vehicle| has(vehicle.get()));
-        let has_wings = any(|vehicle| !matches!(vehicle.file.wing, WingPlant::None));
-        let has_battery = any(|vehicle| vehicle.file.battery.is_some());
-        for (number, vehicle) in vehicles.iter().enumerate() {
-            let file = &vehicle.get().file;
-            if whole && file.effects.gust().is_some() {
-                batch.set_air(
-                    number,
-                    &BatchVehicle::from(file),
-                    air([0.0; 3], 0.0),
-                    number as u64,
-                )?;
-            }
-        }
-        let count = vehicles.len();
-        let vehicles = vehicles.into_iter().map(Bound::unbind).collect();
-        let locked = Mutex::new(Locked { batch, vehicles });
-        Ok(Self { locked, vehicles: count, settings, whole, has_wings, has_battery })
-    }
-
-    fn lock<'a>(&'a self, py: Python<'_>) -> PyResult<MutexGuard<'a, Locked>> {
-        let broken =
-            |_| PyRuntimeError::new_err("a call on this batch has panicked; make a new one");
-        self.locked.lock_py_attached(py).map_err(broken)
-    }
-
-    /// The vehicles that a call is about: those it names, or all.
-    ///
-    /// # Errors
-    /// One that is not there.
-    fn numbers(&self, vehicles: Option<Indices>) -> PyResult<Vec<usize>> {
-        let numbers = vehicles.map_or_else(|| (0..self.vehicles).collect(), |given| given.0);
-        numbers.iter().try_for_each(|vehicle| self.check(*vehicle))?;
-        Ok(numbers)
-    }
-
-    fn check(&self, vehicle: usize) -> PyResult<()> {
-        let all = self.vehicles;
-        let missing = || PyIndexError::new_err(format!("vehicle {vehicle}: the batch has {all}"));
-        if vehicle < all { Ok(()) } else { Err(missing()) }
-    }
-
-    /// Refuses a call about something that no vehicle has, which would do nothing.
-    fn needs(&self, is_there: bool, what: &str) -> PyResult<()> {
-        let why =
-            if self.whole { "no vehicle of it has any" } else { "it was made with whole=False" };
-        if is_there { Ok(()) } else { Err(value(format!("the batch has no {what}: {why}"))) }
-    }
-}
-
 #[gen_stub_pymethods]
 #[pymethods]
 impl Batch {
     #[new]
     #[pyo3(signature = (*, vehicles, whole = true, dt_s = 1e-3, scheme = "rk4", dtype = "float32", threads = None, registers = None))]
     fn new(
+        py: Python<'_>,
         vehicles: Vec<Bound<'_, Vehicle>>,
         whole: bool,
-        dt_s: f64,
+        #[pyo3(from_py_with = scalars::dt_s)] dt_s: f64,
         scheme: &str,
         dtype: &str,
-        threads: Option<usize>,
+        #[pyo3(from_py_with = scalars::threads)] threads: Option<usize>,
         registers: Option<&str>,
     ) -> PyResult<Self> {
         let in_32 = match dtype {
@@ -185,7 +108,7 @@ impl Batch {
             "float64" => false,
             other => return Err(value(format!("dtype = {other}: must be float32 or float64"))),
         };
-        Self::make(vehicles, settings(dt_s, scheme, threads, registers)?, in_32, whole)
+        Self::make(py, vehicles, settings(dt_s, scheme, threads, registers)?, in_32, whole)
     }
 
     /// Tell the rotors what to do from now on.
@@ -229,7 +152,11 @@ impl Batch {
     /// steps : int
     ///     How many steps of `dt_s`.
     #[pyo3(signature = (steps = 1))]
-    fn step(&self, py: Python<'_>, steps: usize) -> PyResult<()> {
+    fn step(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = scalars::steps)] steps: usize,
+    ) -> PyResult<()> {
         advance(py, &mut *self.lock(py)?.batch, steps)
     }
 
@@ -260,7 +187,7 @@ impl Batch {
         &self,
         py: Python<'py>,
         command: ArrayAny<'py>,
-        steps: usize,
+        #[pyo3(from_py_with = scalars::steps)] steps: usize,
         out: Option<ArrayAny<'py>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         self.lock(py)?.batch.fly(py, &command.0, steps, out.map(|out| out.0))
@@ -350,7 +277,7 @@ impl Batch {
         vehicles: Option<Indices>,
     ) -> PyResult<()> {
         let vehicles = self.numbers(vehicles)?;
-        self.lock(py)?.batch.reset(&state.0, &vehicles)
+        self.lock(py)?.batch.reset(py, &state.0, &vehicles)
     }
 
     /// Rest batteries at a charge.
@@ -377,7 +304,7 @@ impl Batch {
     ) -> PyResult<()> {
         self.needs(self.has_battery, "battery")?;
         let vehicles = self.numbers(vehicles)?;
-        self.lock(py)?.batch.set_charge(&charge.0, &vehicles)
+        self.lock(py)?.batch.set_charge(py, &charge.0, &vehicles)
     }
 
     /// Velocity of the air about each vehicle from now on; gusts end, those of the effect ``gust``
@@ -386,13 +313,14 @@ impl Batch {
     /// Parameters
     /// ----------
     /// wind_ned_m_s : ndarray of the batch's dtype, shape (n, 3)
+    ///     At most 1000 m/s along an axis.
     ///
     /// Raises
     /// ------
     /// ValueError
-    ///     Another dtype or shape, a number that is not finite.
+    ///     Another dtype or shape, a number that is not finite or beyond what air does.
     fn set_wind(&self, py: Python<'_>, wind_ned_m_s: ArrayAny<'_>) -> PyResult<()> {
-        self.lock(py)?.batch.set_wind(&wind_ned_m_s.0)
+        self.lock(py)?.batch.set_wind(py, &wind_ned_m_s.0)
     }
 
     /// Moving air about vehicles from now on, as a flight of `simulate` with the same seed has it.
@@ -430,23 +358,27 @@ impl Batch {
         let n = vehicles.len();
         let wind =
             rows::<f64>("wind_ned_m_s", &wind_ned_m_s.0, &[Some(n), Some(3)], Numbers::Finite)?;
+        check_wind(wind.numbers(), 3)?;
         let name = "gust_sigma_m_s";
         let sigma =
             gust_sigma_m_s.map(|sigma| rows::<f64>(name, &sigma.0, &[Some(n)], Numbers::Finite));
         let sigma =
             sigma.transpose()?.map_or_else(|| vec![0.0; n], |sigma| sigma.numbers().to_vec());
-        if let Some(at) = sigma.iter().position(|sigma| *sigma < 0.0) {
-            return Err(value(format!("{name}[{at}] = {}: must be >= 0", sigma[at])));
+        if let Some(at) = sigma.iter().position(|sigma| !(0.0..=100.0).contains(sigma)) {
+            let limit = if sigma[at] < 0.0 { ">= 0" } else { "<= 100" };
+            return Err(value(format!("{name}[{at}] = {}: must be {limit}", sigma[at])));
         }
-        let seeds = seed.map_or_else(|| vehicles.clone(), |given| given.0);
+        let own = || vehicles.iter().map(|vehicle| *vehicle as u64).collect();
+        let seeds = seed.map_or_else(|| Ok(own()), |given| given.of("seed"))?;
         if seeds.len() != n {
             return Err(value(format!("seed: expected {n}, got {}", seeds.len())));
         }
         let mut locked = self.lock(py)?;
         let Locked { batch, vehicles: fitted } = &mut *locked;
         for (i, number) in vehicles.into_iter().enumerate() {
+            now_and_then(py, i)?;
             let member = BatchVehicle::from(&fitted[number].get().file);
-            batch.set_air(number, &member, air(wind.row(i), sigma[i]), seeds[i] as u64)?;
+            batch.set_air(number, &member, air(wind.row(i), sigma[i]), seeds[i])?;
         }
         Ok(())
     }
@@ -467,8 +399,13 @@ impl Batch {
     ///     There is no such vehicle.
     /// ValueError
     ///     Another number of rotors, rotors too quick for the step, something that the batch has no place for.
-    fn replace(&self, py: Python<'_>, index: usize, vehicle: &Bound<'_, Vehicle>) -> PyResult<()> {
-        self.check(index)?;
+    fn replace(
+        &self,
+        py: Python<'_>,
+        #[pyo3(from_py_with = scalars::index)] index: usize,
+        vehicle: &Bound<'_, Vehicle>,
+    ) -> PyResult<()> {
+        self.check(&"index", index)?;
         let file = &vehicle.get().file;
         let mut locked = self.lock(py)?;
         let (has, must) = (file.vehicle.rotors().len(), locked.batch.rotors());
@@ -484,6 +421,56 @@ impl Batch {
         }
         locked.vehicles[index] = vehicle.clone().unbind();
         Ok(())
+    }
+
+    /// Everything that changes in flight, to be taken up again by `restore`: motions, commands,
+    /// wings, batteries, loads, gusts and commands on their way.
+    ///
+    /// Returns
+    /// -------
+    /// bytes
+    ///     Equal where the batches fly on alike, bit for bit.
+    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let guard = self.lock(py)?;
+        let batch: &dyn AnyBatch = &*guard.batch;
+        let bytes = watched(py, |go_on| batch.memory(go_on))?.map_err(value)?;
+        drop(guard);
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// Be again where a batch was; vehicles stay those that there are.
+    ///
+    /// Parameters
+    /// ----------
+    /// state : bytes
+    ///     What `state` returned, of this batch or of one that is made alike.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The state of another kind of batch, or no state. Nothing has changed then.
+    fn restore(&self, py: Python<'_>, state: &Bound<'_, PyBytes>) -> PyResult<()> {
+        let mut guard = self.lock(py)?;
+        let (batch, bytes): (&mut dyn AnyBatch, _) = (&mut *guard.batch, state.as_bytes());
+        watched(py, |go_on| batch.restore(bytes, go_on))?.map_err(value)
+    }
+
+    #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let guard = self.lock(py)?;
+        let now = guard.vehicles.iter().enumerate();
+        let replaced: Vec<_> = now
+            .filter(|(index, vehicle)| !vehicle.is(&self.made_with[*index]))
+            .map(|(index, vehicle)| (index, vehicle.clone_ref(py)))
+            .collect();
+        let is_32 = guard.batch.is_32();
+        drop(guard);
+        let made_with: Vec<_> = self.made_with.iter().map(|vehicle| vehicle.bind(py)).collect();
+        let Settings { dt_s, scheme, threads, path } = self.settings;
+        let dtype = if is_32 { f32::NAME } else { f64::NAME };
+        let names = [scheme_name(scheme), path.name(), dtype];
+        let state = self.state(py)?;
+        reduced(py, "Batch", (made_with, replaced, dt_s, names, threads, self.whole, state))
     }
 
     /// Step, s.
@@ -522,10 +509,7 @@ impl Batch {
             (false, true) => ", battery",
             (false, false) => "",
         };
-        let scheme = match self.settings.scheme {
-            Scheme::Rk4 => "rk4",
-            Scheme::Euler => "euler",
-        };
+        let scheme = scheme_name(self.settings.scheme);
         Ok(format!("<Batch of {n}{with}: {scheme} at {} s, {scalar}>", self.settings.dt_s))
     }
 }

@@ -2,6 +2,8 @@
 
 use super::{Batch, settings};
 use crate::arguments::{ArrayAny, Float, Numbers, is_32, rows};
+use crate::interrupt::look;
+use crate::scalars;
 use crate::vehicle::Vehicle;
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::prelude::*;
@@ -55,14 +57,14 @@ pub(crate) fn rollout<'py>(
     state: ArrayAny<'py>,
     command: ArrayAny<'py>,
     wing_command: Option<ArrayAny<'py>>,
-    steps_per_command: usize,
-    dt_s: f64,
+    #[pyo3(from_py_with = scalars::steps_per_command)] steps_per_command: usize,
+    #[pyo3(from_py_with = scalars::dt_s)] dt_s: f64,
     scheme: &str,
     wind_ned_m_s: Option<ArrayAny<'py>>,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = scalars::threads)] threads: Option<usize>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let in_32 = is_32(&state.0);
-    let batch = Batch::make(vehicles, settings(dt_s, scheme, threads, None)?, in_32, whole)?;
+    let batch = Batch::make(py, vehicles, settings(dt_s, scheme, threads, None)?, in_32, whole)?;
     batch.reset(py, state, None)?;
     if let Some(wind) = wind_ned_m_s {
         batch.set_wind(py, wind)?;
@@ -102,7 +104,7 @@ fn periods<'py, T: Float>(
         batch.step(py, steps)?;
         let row = out.get_item(period)?;
         batch.lock(py)?.batch.states(py, Some(row))?;
-        py.check_signals()?;
+        look(py)?;
     }
     Ok(out.into_any())
 }

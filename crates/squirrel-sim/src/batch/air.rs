@@ -8,6 +8,7 @@
 use super::simd::{BLOCK, Paths};
 use crate::flight::CONTROL_RATE_HZ;
 use crate::plant::{Meeting, Wind};
+use crate::tape::Tape;
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::{Row, put};
 use squirrel_core::math::real;
@@ -150,6 +151,27 @@ impl Airs {
         }
         self.ticks = (clock as f64 * self.per_step() + 1e-6) as u64 + 1;
         self.clock = clock;
+    }
+
+    /// Where all of it is.
+    ///
+    /// * `now` - the block's clock
+    pub(super) fn keep(&mut self, tape: &mut Tape<'_>, now: u64) -> Option<()> {
+        tape.word(&mut self.ticks)?;
+        tape.word(&mut self.clock)?;
+        tape.double(&mut self.dt_s)?;
+        for airs in &mut self.of {
+            let count = tape.count(airs.len())?;
+            for number in 0..count {
+                if number >= airs.len() {
+                    airs.push(Wind::blank());
+                }
+                airs[number].keep(tape)?;
+            }
+            airs.truncate(count);
+        }
+        self.turning = self.of.iter().flatten().any(|air| air.angular_velocity().is_some());
+        (self.clock <= now).then_some(())
     }
 
     /// The step at which the next move is due.

@@ -9,6 +9,7 @@
 use super::rows::Block;
 use super::simd::{BLOCK, Kernel, Paths, Register};
 use super::{Batch, BatchError, CHUNK, Call, Settings, Work, place, shape};
+use crate::tape::{Tape, on_tape};
 use nalgebra::convert;
 use squirrel_core::control::backstepping::quaternion::{Law, Target};
 use squirrel_core::control::backstepping::{AttitudeGains, integrated, yaw_target};
@@ -133,6 +134,14 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
         put(&mut course.integral, lane, [real(0.0); 3]);
         course.sign[lane] = real(1.0);
         course.free[lane] = real(1.0);
+    }
+
+    /// Everything that changes between two steps.
+    pub(super) fn keep(&mut self, tape: &mut Tape<'_>) -> Option<()> {
+        on_tape!(tape, self.course)?;
+        tape.rows(&mut self.thrust)?;
+        self.wait = tape.count(self.wait)?;
+        Some(())
     }
 
     /// Set points of the first vehicles.

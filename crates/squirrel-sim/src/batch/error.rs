@@ -120,6 +120,12 @@ pub enum BatchError {
     /// An autopilot that never acts.
     #[error("period_steps = 0: must be at least 1")]
     Period,
+    /// A memory that is not of such a batch.
+    #[error("state: {0}")]
+    Memory(&'static str),
+    /// Whoever waited for it does so no more.
+    #[error("interrupted")]
+    Interrupted,
     /// Too few numbers, or too many.
     #[error("{what}: {given} numbers, must be {needed}")]
     Shape {
@@ -130,4 +136,18 @@ pub enum BatchError {
         /// How many there must be.
         needed: usize,
     },
+}
+
+impl BatchError {
+    /// The same of a vehicle in the place of a kind, where it is of one.
+    pub(super) fn of(mut self, place: impl Fn(usize) -> usize) -> Self {
+        match &mut self {
+            Self::Effect { vehicle, .. }
+            | Self::Network { vehicle }
+            | Self::Wings { vehicle }
+            | Self::Airframe { vehicle, .. } => *vehicle = place(*vehicle),
+            _ => {}
+        }
+        self
+    }
 }

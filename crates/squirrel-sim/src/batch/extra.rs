@@ -11,6 +11,7 @@ use super::rows::Block;
 use super::simd::{BLOCK, Paths};
 use super::vehicle::Fitted;
 use crate::plant::Meeting;
+use crate::tape::{Tape, on_tape};
 use nalgebra::{Vector3, try_convert};
 use squirrel_core::aero::flat_plate;
 use squirrel_core::aero::membrane::{Membrane, Side};
@@ -37,6 +38,35 @@ struct Late<S, const ROTORS: usize> {
     due: u64,
     lane: usize,
     command: Command<S, ROTORS>,
+}
+
+impl<S: Paths, const ROTORS: usize> Late<S, ROTORS> {
+    fn keep(&mut self, tape: &mut Tape<'_>) -> Option<()> {
+        tape.word(&mut self.due)?;
+        self.lane = tape.count(self.lane)?;
+        let mut of_wings = matches!(self.command, Command::Wings(_));
+        tape.flag(&mut of_wings)?;
+        self.command = match (of_wings, self.command) {
+            (true, Command::Wings(mut wings)) => {
+                tape.reals(&mut wings)?;
+                Command::Wings(wings)
+            }
+            (true, Command::Rotors(_)) => {
+                let mut wings = [real(0.0); 2];
+                tape.reals(&mut wings)?;
+                Command::Wings(wings)
+            }
+            (false, before) => {
+                let mut targets = match before {
+                    Command::Rotors(targets) => targets,
+                    Command::Wings(_) => [real(0.0); ROTORS],
+                };
+                tape.reals(&mut targets)?;
+                Command::Rotors(targets)
+            }
+        };
+        (self.lane < BLOCK).then_some(())
+    }
 }
 
 /// See the module. Rows first, as in a [`Block`].
@@ -119,6 +149,31 @@ impl<S: Paths, const ROTORS: usize> Extra<S, ROTORS> {
         if let Some(packs) = &mut self.packs {
             packs.rest(lane, charge);
         }
+    }
+
+    /// Everything that changes between two steps.
+    pub(super) fn keep(&mut self, tape: &mut Tape<'_>) -> Option<()> {
+        for side in 0..2 {
+            on_tape!(tape, self.sides[side])?;
+            on_tape!(tape, self.deployment[side])?;
+        }
+        tape.rows(&mut self.wing_angle)?;
+        tape.rows(&mut self.air_omega)?;
+        on_tape!(tape, self.load)?;
+        if let Some(packs) = &mut self.packs {
+            on_tape!(tape, packs.charge)?;
+        }
+        tape.word(&mut self.clock)?;
+        let count = tape.count(self.late.len())?;
+        for number in 0..count {
+            if number >= self.late.len() {
+                let command = Command::Wings([real(0.0); 2]);
+                self.late.push_back(Late { due: 0, lane: 0, command });
+            }
+            self.late[number].keep(tape)?;
+        }
+        self.late.truncate(count);
+        self.airs.keep(tape, self.clock)
     }
 
     /// Sends a command, which arrives when the vehicle's latency has passed.

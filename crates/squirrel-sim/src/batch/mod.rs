@@ -40,6 +40,7 @@ mod dynamics;
 mod error;
 mod exchange;
 mod extra;
+mod memory;
 pub(crate) mod pool;
 mod rows;
 pub mod simd;
@@ -68,6 +69,8 @@ use vehicle::Fitted;
 /// Blocks that a thread takes at once: little enough to share out evenly, enough to be worth
 /// claiming.
 const CHUNK: usize = 4;
+/// Vehicles that are made between two looks at whether anybody still waits.
+const LOOK: usize = 1024;
 /// Numbers of a vehicle's motion in a row of [`Batch::write_states`], before those of its rotors.
 pub const BODY_NUMBERS: usize = 13;
 
@@ -155,10 +158,33 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
     /// No vehicle, one with more than `ROTORS` rotors, a step that is not positive or longer than
     /// twice a rotor time constant, no threads.
     pub fn new(vehicles: &[Vehicle<T>], settings: Settings) -> Result<Self, BatchError> {
-        let drives: Vec<Drive<T>> = vehicles.iter().map(Drive::new).collect();
-        let mut batch = Self::empty(&drives, Fitted::all(&[])?, None, settings, plain)?;
-        for (number, vehicle) in vehicles.iter().enumerate() {
-            batch.put(number, vehicle, &Tuning::none())?;
+        let kinds: Vec<usize> = (0..vehicles.len()).collect();
+        Self::new_of_kinds(&kinds, vehicles, settings, &mut || true)
+    }
+
+    /// As [`Self::new`], of vehicles that may be many and alike.
+    ///
+    /// * `kinds` - of each vehicle, its place in `vehicles`
+    /// * `go_on` - asked now and then
+    ///
+    /// # Errors
+    /// As [`Self::new`]; `go_on` says no.
+    ///
+    /// # Panics
+    /// A kind that is not there.
+    pub fn new_of_kinds(
+        kinds: &[usize],
+        vehicles: &[Vehicle<T>],
+        settings: Settings,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Self, BatchError> {
+        let drives: Vec<Drive<T>> = kinds.iter().map(|kind| Drive::new(&vehicles[*kind])).collect();
+        let mut batch = Self::empty(&drives, Fitted::all(&[])?, None, settings, plain, go_on)?;
+        for (number, kind) in kinds.iter().enumerate() {
+            if number % LOOK == 0 && !go_on() {
+                return Err(BatchError::Interrupted);
+            }
+            batch.put(number, &vehicles[*kind], &Tuning::none())?;
         }
         Ok(batch)
     }
@@ -183,21 +209,41 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         members: &[BatchVehicle],
         settings: Settings,
     ) -> Result<Self, BatchError> {
-        let fitted = Fitted::all(members)?;
-        let mut kinds = Vec::with_capacity(members.len());
-        for (number, member) in members.iter().enumerate() {
-            kinds.push(Drive::new(&airframe(number, member)?.0));
+        let kinds: Vec<usize> = (0..members.len()).cycle().take(count).collect();
+        Self::of_kinds(&kinds, members, settings, &mut || true)
+    }
+
+    /// As [`Self::with`], of vehicles that may be many and alike; there is room for any of
+    /// `members` at any place.
+    ///
+    /// * `kinds` - of each vehicle, its place in `members`
+    /// * `go_on` - asked now and then
+    ///
+    /// # Errors
+    /// As [`Self::with`], of the first vehicle of a kind; `go_on` says no.
+    ///
+    /// # Panics
+    /// A kind that is not there.
+    pub fn of_kinds(
+        kinds: &[usize],
+        members: &[BatchVehicle],
+        settings: Settings,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Self, BatchError> {
+        let first = |kind: usize| kinds.iter().position(|own| *own == kind).unwrap_or(kind);
+        let fitted = Fitted::all(members).map_err(|error| error.of(first))?;
+        let mut own = Vec::with_capacity(members.len());
+        for (kind, member) in members.iter().enumerate() {
+            own.push(Drive::new(&airframe(kind, member).map_err(|error| error.of(first))?.0));
         }
-        let drives: Vec<Drive<T>> = kinds.iter().copied().cycle().take(count).collect();
-        let mut batch = Self::empty(
-            &drives,
-            fitted,
-            members.first().map(|member| &member.vehicle),
-            settings,
-            whole,
-        )?;
-        for (number, member) in members.iter().cycle().take(count).enumerate() {
-            batch.refit(number, member)?;
+        let drives: Vec<Drive<T>> = kinds.iter().map(|kind| own[*kind]).collect();
+        let vehicle = members.first().map(|member| &member.vehicle);
+        let mut batch = Self::empty(&drives, fitted, vehicle, settings, whole, go_on)?;
+        for (number, kind) in kinds.iter().enumerate() {
+            if number % LOOK == 0 && !go_on() {
+                return Err(BatchError::Interrupted);
+            }
+            batch.refit(number, &members[*kind])?;
             batch.reset(number, &State::at_rest())?;
         }
         Ok(batch)
@@ -209,6 +255,7 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         vehicle: Option<&Vehicle<f64>>,
         settings: Settings,
         work: Work<T, ROTORS>,
+        go_on: &mut dyn FnMut() -> bool,
     ) -> Result<Self, BatchError> {
         const { assert!(ROTORS >= 1 && ROTORS <= MAX_ROTORS) };
         let dt_s = settings.dt_s;
@@ -229,8 +276,12 @@ impl<T: Paths, const ROTORS: usize> Batch<T, ROTORS> {
         }
         let each = BLOCK * CHUNK;
         let chunks = drives.chunks(each).enumerate();
-        let chunks = chunks.map(|(number, drives)| Chunk::new(number * each, &block, drives));
-        let pool = Pool::new(chunks.collect(), settings.threads, do_job)?;
+        let chunks = chunks.map(|(number, drives)| {
+            let stops = (number * each).is_multiple_of(LOOK) && !go_on();
+            let chunk = Chunk::new(number * each, &block, drives);
+            if stops { Err(BatchError::Interrupted) } else { Ok(chunk) }
+        });
+        let pool = Pool::new(chunks.collect::<Result<_, _>>()?, settings.threads, do_job)?;
         Ok(Self { pool, vehicles: drives.len(), fitted, settings, work, autopilot: None })
     }
 

@@ -12,6 +12,7 @@
 
 pub mod course;
 mod level;
+mod memory;
 mod part;
 
 pub use level::{Level, RATE_MAX_RAD_S};
@@ -19,6 +20,7 @@ pub use level::{Level, RATE_MAX_RAD_S};
 use crate::batch::pool::Pool;
 use crate::batch::simd::Path;
 use crate::batch::{BatchError, Scheme};
+use crate::tape::Tape;
 use crate::vehicle_file::VehicleFile;
 use course::CourseKind;
 use part::{Candidate, Part};
@@ -110,6 +112,22 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
         seed: u64,
         settings: TaskSettings,
     ) -> Result<Self, TaskError> {
+        Self::new_while(vehicles, count, seed, settings, &mut || true)
+    }
+
+    /// As [`Self::new`].
+    ///
+    /// * `go_on` - asked now and then
+    ///
+    /// # Errors
+    /// As [`Self::new`]; `go_on` says no.
+    pub fn new_while(
+        vehicles: &[VehicleFile],
+        count: usize,
+        seed: u64,
+        settings: TaskSettings,
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Self, TaskError> {
         if count == 0 {
             return Err(TaskError::Number { what: "num_envs", given: 0.0, needed: "at least 1" });
         }
@@ -128,6 +146,9 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
             vehicles.iter().enumerate().map(|(number, file)| Candidate::new(number, file));
         let candidates: Arc<[Candidate]> = candidates.collect::<Result<_, _>>()?;
         let parts = (0..count).step_by(PART).map(|first| {
+            if !go_on() {
+                return Err(BatchError::Interrupted.into());
+            }
             Part::new(
                 &candidates,
                 PART.min(count - first),
@@ -193,8 +214,26 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
         which: impl Fn(usize) -> bool,
         observation: &mut [f32],
     ) -> Result<(), TaskError> {
+        self.reset_while(which, observation, &mut || true)
+    }
+
+    /// As [`Self::reset`].
+    ///
+    /// * `go_on` - asked now and then
+    ///
+    /// # Errors
+    /// As [`Self::reset`]; `go_on` says no, and some have begun anew then.
+    pub fn reset_while(
+        &mut self,
+        which: impl Fn(usize) -> bool,
+        observation: &mut [f32],
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), TaskError> {
         self.check("observation", observation.len(), OBSERVATION)?;
         for (number, seen) in observation.chunks_mut(PART * OBSERVATION).enumerate() {
+            if !go_on() {
+                return Err(BatchError::Interrupted.into());
+            }
             let mut part = self.parts.chunk(number);
             part.reset(|local| which(number * PART + local))?;
             seen.copy_from_slice(&part.observation);
@@ -230,6 +269,53 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
             truncated[all].copy_from_slice(&part.truncated);
         }
         Ok(())
+    }
+
+    /// What running episodes are made of, as bytes: what began them, and the actions since.
+    ///
+    /// * `go_on` - asked now and then
+    ///
+    /// # Errors
+    /// `go_on` says no.
+    pub fn memory(&self, go_on: &mut dyn FnMut() -> bool) -> Result<Vec<u8>, TaskError> {
+        let mut bytes = Vec::new();
+        // Writing refuses nothing.
+        let _ = self.head(&mut Tape::Write(&mut bytes));
+        for part in 0..self.count.div_ceil(PART) {
+            self.parts.chunk(part).write(&mut bytes);
+            if !go_on() {
+                return Err(BatchError::Interrupted.into());
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// Flies again what [`Self::memory`] wrote of as many environments with the same vehicles and
+    /// settings: they are where those were, bit for bit.
+    ///
+    /// * `go_on` - asked now and then
+    ///
+    /// # Errors
+    /// Bytes of others, or too few or too many; `go_on` says no. Environments are anywhere then.
+    pub fn restore(
+        &mut self,
+        memory: &[u8],
+        go_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), TaskError> {
+        let mut tape = Tape::Read(memory);
+        self.head(&mut tape).ok_or(BatchError::Memory("of other environments"))?;
+        for part in 0..self.count.div_ceil(PART) {
+            self.parts.chunk(part).read(&mut tape, go_on)?;
+        }
+        let rest = BatchError::Memory("longer than these environments'");
+        if tape.is_over() { Ok(()) } else { Err(rest.into()) }
+    }
+
+    /// What both sides must have.
+    fn head(&self, tape: &mut Tape<'_>) -> Option<()> {
+        tape.same(self.count)?;
+        tape.same(ROTORS)?;
+        tape.same(self.settings.level.numbers(ROTORS))
     }
 
     fn is_there(&self, number: usize) -> Result<(), TaskError> {

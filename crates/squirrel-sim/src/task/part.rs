@@ -1,6 +1,7 @@
 //! Environments that a thread takes at once, and what happens in one of them.
 
 use super::course::{self, Course};
+use super::memory::{Event, Played};
 use super::{STEPS, TaskError, TaskSettings};
 use crate::batch::{Autopilot, Batch, BatchError, BatchVehicle, Settings, Tuned};
 use crate::plant::WindParameters;
@@ -71,6 +72,8 @@ pub(super) struct Part<const ROTORS: usize> {
     pub(super) reward: Vec<f32>,
     pub(super) terminated: Vec<bool>,
     pub(super) truncated: Vec<bool>,
+    /// What running episodes are made of.
+    pub(super) played: Played,
     /// How the last step went.
     pub(super) went: Result<(), TaskError>,
 }
@@ -146,6 +149,7 @@ impl<const ROTORS: usize> Part<ROTORS> {
             reward: vec![0.0; count],
             terminated: vec![false; count],
             truncated: vec![false; count],
+            played: Played::new(count),
             went: Ok(()),
         };
         for number in 0..count {
@@ -153,6 +157,16 @@ impl<const ROTORS: usize> Part<ROTORS> {
             part.begin(number)?;
         }
         Ok(part)
+    }
+
+    /// Environments.
+    pub(super) fn len(&self) -> usize {
+        self.episodes.len()
+    }
+
+    /// The stream of one environment.
+    pub(super) fn stream(&mut self, number: usize) -> &mut Pcg64Mcg {
+        &mut self.episodes[number].rng
     }
 
     pub(super) fn state(&self, number: usize) -> Result<(State<f32>, Reference), TaskError> {
@@ -171,17 +185,27 @@ impl<const ROTORS: usize> Part<ROTORS> {
 
     /// Starts a new episode in every environment that `which` says; all of them look.
     pub(super) fn reset(&mut self, which: impl Fn(usize) -> bool) -> Result<(), TaskError> {
+        self.played.happens(Event::Look);
         for number in 0..self.episodes.len() {
             if which(number) {
                 self.begin(number)?;
             }
             self.look(number)?;
         }
+        self.played.forget();
         Ok(())
     }
 
     /// One action of each.
     pub(super) fn step(&mut self) -> Result<(), TaskError> {
+        self.played.happens(Event::Act(self.actions.clone().into_boxed_slice()));
+        self.fly()?;
+        self.played.forget();
+        Ok(())
+    }
+
+    /// The same, of which nobody takes note.
+    pub(super) fn fly(&mut self) -> Result<(), TaskError> {
         let level = self.settings.level;
         let width = level.command_numbers(ROTORS);
         for (number, action) in self.actions.chunks_exact(level.numbers(ROTORS)).enumerate() {
@@ -229,7 +253,7 @@ impl<const ROTORS: usize> Part<ROTORS> {
         Ok(())
     }
 
-    fn look(&mut self, number: usize) -> Result<(), TaskError> {
+    pub(super) fn look(&mut self, number: usize) -> Result<(), TaskError> {
         let state = self.batch.state(number)?;
         let episode = &mut self.episodes[number];
         let seen = episode.see(&state, &episode.reference());
@@ -238,8 +262,9 @@ impl<const ROTORS: usize> Part<ROTORS> {
     }
 
     /// Starts an episode.
-    fn begin(&mut self, number: usize) -> Result<(), TaskError> {
+    pub(super) fn begin(&mut self, number: usize) -> Result<(), TaskError> {
         let episode = &mut self.episodes[number];
+        self.played.begins(number, &episode.rng);
         let candidate = course::draw_below(&mut episode.rng, self.candidates.len());
         let chosen = &self.candidates[candidate];
         if candidate != episode.candidate || episode.steps == 0 {

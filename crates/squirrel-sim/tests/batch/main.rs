@@ -6,6 +6,7 @@ mod autopilot;
 mod errors;
 mod identity;
 mod lanes;
+mod memory;
 mod support;
 mod tasks;
 mod vehicle;

@@ -9,10 +9,12 @@
 //! with the hash that its output had where the stream was made. A file starts with a [`Header`]; a
 //! live link has none.
 
+mod memory;
 mod output;
 mod setup;
 mod stream;
 
+pub use memory::Outside;
 pub use stream::{FRAME, Header, MAGIC, RECORD_MAX, Record, SETUP, VERSION};
 
 use crate::frames::{Frame, In, Rotation};

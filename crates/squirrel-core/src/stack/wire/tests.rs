@@ -45,6 +45,32 @@ fn setups_frames_and_outputs_come_back() {
 }
 
 #[test]
+fn a_memory_comes_back_and_flies_on_to_the_bit() {
+    let stack = stack_on(&ForceModel::FlatPlate, &programme());
+    let mut state = StackState::default();
+    let frame = |k: u64| {
+        let mut frame = level(k * 3333);
+        frame.altitude_m = (k % 7 == 0).then_some(k as f32 * 0.01);
+        frame
+    };
+    for k in 0..400 {
+        stack.step(&mut state, &frame(k));
+    }
+    let there = bytes(&Outside::of(&state).unwrap());
+    let mut again = *back::<Outside>(&there).unwrap().state();
+    assert_eq!(again, state);
+    for k in 400..800 {
+        assert_eq!(stack.step(&mut again, &frame(k)), stack.step(&mut state, &frame(k)));
+    }
+    for end in 0..there.len() {
+        assert_eq!(back::<Outside>(&there[..end]), None, "{end}");
+    }
+    let map = crate::control::supply::ThrustByVoltage { exponent: 1.0, reference_v: 14.8 };
+    state.supply.hear(14.0, &map);
+    assert_eq!(Outside::of(&state), None, "a battery was heard");
+}
+
+#[test]
 fn truncated_or_wrong_bytes_are_none() {
     let stack = stack_on(&ForceModel::FlatPlate, &programme());
     for whole in [bytes(&Record::Setup(stack)), bytes(&Record::Frame(level(0), 1))] {

@@ -20,6 +20,7 @@
 //! it counts as `u` changes, and neither gust nor roll rate jumps where it flies back.
 
 use super::dryden;
+use crate::tape::Tape;
 use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::functions::{cbrt, exp, ln};
 use squirrel_core::nalgebra::{Vector2, Vector3};
@@ -114,6 +115,21 @@ impl Mil {
         };
         air.lagged = air.shaped();
         air
+    }
+
+    /// All that it is.
+    pub(super) fn keep(&mut self, tape: &mut Tape<'_>) -> Option<()> {
+        tape.doubles([&mut self.wind_6m_m_s, &mut self.span_m])?;
+        tape.doubles(
+            [&mut self.without_way, &mut self.along].into_iter().flat_map(|v| v.iter_mut()),
+        )?;
+        tape.doubles(self.here.length_m.iter_mut().chain(&mut self.here.sigma_m_s))?;
+        tape.doubles(
+            [&mut self.first, &mut self.second, &mut self.lagged]
+                .into_iter()
+                .flat_map(|v| v.iter_mut()),
+        )?;
+        tape.doubles(self.roll.iter_mut())
     }
 
     /// Lateral and vertical gusts of strength one; along the flight another shape holds.

@@ -11,6 +11,7 @@ mod mil;
 
 pub use mil::Meeting;
 
+use crate::tape::Tape;
 use mil::{Mil, SLOWEST_M_S};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -217,6 +218,43 @@ impl Wind {
         for (axis, noise) in noise.iter().enumerate() {
             dryden::advance([&mut self.first[axis], &mut self.second[axis]], keep, *noise);
         }
+    }
+
+    /// Any, to be read from a tape.
+    pub(crate) fn blank() -> Self {
+        Self::new(WindParameters::calm(), 1.0, 0)
+    }
+
+    /// All that it is, but for what it has computed before and would again.
+    pub(crate) fn keep(&mut self, tape: &mut Tape<'_>) -> Option<()> {
+        let p = &mut self.parameters;
+        tape.doubles(&mut p.mean_ned_m_s)?;
+        tape.double(&mut p.gust_sigma_m_s)?;
+        let (kind, mut number) = match p.gust {
+            GustModel::GaussMarkov { time_constant_s } => (0, time_constant_s),
+            GustModel::Dryden { scale_length_m } => (1, scale_length_m),
+            GustModel::Mil { wind_6m_m_s } => (2, wind_6m_m_s),
+        };
+        let kind = tape.count(kind)?;
+        tape.double(&mut number)?;
+        p.gust = match kind {
+            0 => GustModel::GaussMarkov { time_constant_s: number },
+            1 => GustModel::Dryden { scale_length_m: number },
+            2 => GustModel::Mil { wind_6m_m_s: number },
+            _ => return None,
+        };
+        let mut stream = self.rng.state();
+        tape.long(&mut stream)?;
+        self.rng = Pcg64Mcg::new(stream);
+        tape.doubles(self.first.iter_mut().chain(self.second.iter_mut()))?;
+        let mut turns = self.mil.is_some();
+        tape.flag(&mut turns)?;
+        if tape.is_read() {
+            self.decays = [Decay::new(0.0, 1.0); 2];
+            let blank = || Box::new(Mil::new(1.0, Vector3::zeros(), 1.0, || 0.0));
+            self.mil = turns.then(blank);
+        }
+        self.mil.as_mut().map_or(Some(()), |mil| mil.keep(tape))
     }
 
     fn noise(&mut self) -> Vector3<f64> {

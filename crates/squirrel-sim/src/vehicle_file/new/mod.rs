@@ -4,6 +4,7 @@
 //! each with how far these lie apart as its `sd`: the gap workflow then knows which numbers it may
 //! move, and by how much.
 
+mod by_rule;
 mod frame;
 mod gains;
 mod parameters;

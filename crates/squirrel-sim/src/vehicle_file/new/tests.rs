@@ -147,3 +147,20 @@ fn what_is_missing_and_what_cannot_be_is_named() {
     }
     assert!(Frame::parse("triangle").unwrap_err().contains("quad-plus"));
 }
+
+#[test]
+fn a_file_without_gains_gets_those_of_the_rule_and_says_so() {
+    for text in [
+        include_str!("../../../../../vehicles/crazyflie21_brushed.toml"),
+        include_str!("../../../../../vehicles/crazyflie2_arpl.toml"),
+    ] {
+        let bare = VehicleFile::parse(text, "bare").unwrap();
+        assert!(bare.control.is_none());
+        let ruled = bare.with_gains_by_rule().unwrap();
+        assert!(ruled.control.is_some() && ruled.text.starts_with(text.trim_end()));
+        assert!(ruled.text.contains("by rule: "), "{}", ruled.text);
+        assert_eq!(ruled.vehicle, bare.vehicle);
+        // A file that has its own keeps them.
+        assert_eq!(ruled.with_gains_by_rule().unwrap().text, ruled.text);
+    }
+}

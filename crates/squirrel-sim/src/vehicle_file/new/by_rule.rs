@@ -1,0 +1,31 @@
+//! Gains for a vehicle whose file has none, by the rule of `squirrel vehicle new`.
+
+use super::super::{VehicleFile, VehicleFileError};
+use super::gains::{self, Airframe};
+
+impl VehicleFile {
+    /// The same vehicle with `[control]` by rule where its file has none; the text says so.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn with_gains_by_rule(&self) -> Result<Self, VehicleFileError> {
+        if self.control.is_some() {
+            return Ok(self.clone());
+        }
+        let (p, weight_n) = (self.vehicle.parameters(), self.vehicle.weight_n());
+        let inertia = &p.inertia_kg_m2;
+        let rotor = &p.propulsion;
+        let to_spare_n = weight_n.min(p.limits.thrust_max_n - weight_n).max(0.05 * weight_n);
+        let ratio = rotor.torque_coefficient_n_m_s2 / rotor.thrust_coefficient_n_s2;
+        let airframe = Airframe {
+            weight_n,
+            thrust_to_weight: p.limits.thrust_max_n / weight_n,
+            lag_s: 0.5 * (rotor.time_constant_up_s + rotor.time_constant_down_s),
+            yaw_acceleration_rad_s2: ratio * to_spare_n / inertia[(2, 2)],
+            tilt_max_rad: p.limits.tilt_max_rad,
+            restoring: [0, 1].map(|axis| inertia[(2, 2)] / inertia[(axis, axis)]),
+        };
+        let text = format!("{}\n{}", self.text.trim_end(), gains::toml(&airframe));
+        Self::parse_with(&text, &self.name, self.weights.clone())
+    }
+}
