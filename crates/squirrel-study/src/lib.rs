@@ -5,6 +5,7 @@
 //! they have to say.
 
 pub mod campaign;
+pub mod dispersion;
 pub mod faults;
 pub mod filters;
 pub mod forest;
@@ -28,6 +29,7 @@ pub mod wing_flights;
 
 /// All studies, by name.
 pub static STUDIES: &[study::Study] = &[
+    dispersion::STUDY,
     faults::STUDY,
     filters::STUDY,
     forest::STUDY,
