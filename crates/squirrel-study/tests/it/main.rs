@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod claims;
+mod dispersion;
 mod faults;
 mod filters;
 mod pages;
