@@ -426,7 +426,7 @@ class FlightLog:
         What the log says of the flight: vehicle, arm, scenario, seed, version.
         """
     @property
-    def metrics(self) -> squirrel.flight.Metrics | None:
+    def metrics(self) -> flight.Metrics | None:
         r"""
         What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was
         read.
@@ -1224,7 +1224,7 @@ class Vehicle:
     def _repr_html_(self) -> builtins.str: ...
     def __repr__(self) -> builtins.str: ...
 
-def _again(class: builtins.str, state: tuple[typing.Any, ...]) -> typing.Any:
+def _again(kind: builtins.str, state: tuple[typing.Any, ...]) -> typing.Any:
     r"""
     Make an object of what its ``__reduce__`` said; for pickle.
     """
