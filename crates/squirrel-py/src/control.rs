@@ -264,7 +264,7 @@ impl Twcc {
         let (mut parameters, form, airframe) = (gains.twcc, gains.attitude.form, single(vehicle)?);
         let weights = vehicle.get().file.weights.as_ref();
         Arm::parse(arm).and_then(|arm| arm.configure(&mut parameters, weights)).map_err(value)?;
-        Self::of(airframe, parameters, form, memory(count)?)
+        Self::of(&airframe, &parameters, form, memory(count)?)
     }
 
     /// One tick of each vehicle.
@@ -390,15 +390,15 @@ impl Twcc {
 
 impl Twcc {
     fn of(
-        vehicle: Checked<f32>,
-        parameters: TwccParameters,
+        vehicle: &Checked<f32>,
+        parameters: &TwccParameters,
         form: AttitudeForm,
         memory: Mutex<Vec<TwccState>>,
     ) -> PyResult<Self> {
         let limits = vehicle.parameters().limits;
         parameters.check(limits.thrust_max_n).map_err(value)?;
-        let airframe = OuterAirframe::new(&vehicle, parameters.thrust_min_n, limits.tilt_max_rad);
-        Ok(Self { parameters, form, vehicle, airframe, memory })
+        let airframe = OuterAirframe::new(vehicle, parameters.thrust_min_n, limits.tilt_max_rad);
+        Ok(Self { parameters: *parameters, form, vehicle: *vehicle, airframe, memory })
     }
 
     /// What pickle kept.
@@ -409,7 +409,7 @@ impl Twcc {
         let mut from = Reader::new(bytes.as_bytes());
         let vehicle = Checked::new(take(class, &mut from)?).map_err(value)?;
         let (parameters, form) = (take(class, &mut from)?, take(class, &mut from)?);
-        Self::of(vehicle, parameters, form, Mutex::new(take_rest(class, &mut from)?))
+        Self::of(&vehicle, &parameters, form, Mutex::new(take_rest(class, &mut from)?))
     }
 }
 

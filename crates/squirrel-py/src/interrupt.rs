@@ -27,7 +27,7 @@ static LOOKS: AtomicU64 = AtomicU64::new(0);
 /// Looks at signals so far, for tests.
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
-pub(crate) fn _looks() -> u64 {
+pub(crate) fn looks() -> u64 {
     LOOKS.load(Ordering::Relaxed)
 }
 
@@ -51,7 +51,7 @@ pub(crate) fn now_and_then(py: Python<'_>, turn: usize) -> PyResult<()> {
 
 /// What Python's own handler of a signal raises, where the interpreter's lock is free.
 pub(crate) fn signalled() -> PyResult<()> {
-    Python::attach(|py| look(py))
+    Python::attach(look)
 }
 
 /// Work of a library that asks now and then whether it should go on; the interpreter's lock is free

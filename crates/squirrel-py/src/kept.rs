@@ -18,7 +18,7 @@ where
     T: IntoPyObject<'py, Target = PyTuple, Output = Bound<'py, PyTuple>>,
     T::Error: Into<PyErr>,
 {
-    let again = py.import("squirrel._squirrel")?.getattr("_again")?;
+    let again = py.import("squirrel._squirrel")?.getattr("again")?;
     let state = state.into_pyobject(py).map_err(Into::into)?;
     (again, (class, state)).into_pyobject(py)
 }

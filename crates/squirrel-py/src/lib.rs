@@ -79,13 +79,13 @@ mod _squirrel {
     #[pymodule_export]
     use super::gap::{gap_check, gap_diagnose, gap_effects, gap_find};
     #[pymodule_export]
-    use super::interrupt::_looks;
+    use super::interrupt::looks;
     #[pymodule_export]
     use super::log::{FlightLog, read_log};
     #[pymodule_export]
     use super::nn::{Model, forward, load, train, windows};
     #[pymodule_export]
-    use super::pickle::_again;
+    use super::pickle::again;
     #[pymodule_export]
     use super::plan::{plan_reach, plan_trajectory};
     #[pymodule_export]

@@ -105,6 +105,9 @@ pub(crate) struct FlightLog {
     metrics: Option<String>,
 }
 
+/// A log as pickle keeps it: metadata, sources, metrics as JSON.
+type Parts<'py> = (BTreeMap<String, String>, BTreeMap<String, Kept<'py>>, Option<String>);
+
 /// A source as pickle keeps it: times, and channels with their widths.
 type Kept<'py> = (Bound<'py, PyArray1<f64>>, BTreeMap<String, (usize, Bound<'py, PyArray1<f64>>)>);
 
@@ -117,10 +120,7 @@ impl FlightLog {
     /// What pickle kept.
     pub(crate) fn again(state: &Bound<'_, PyTuple>) -> PyResult<Self> {
         let broken = |_: PyErr| broken("FlightLog");
-        let state: Result<
-            (BTreeMap<String, String>, BTreeMap<String, Kept<'_>>, Option<String>),
-            _,
-        > = state.extract();
+        let state: Result<Parts<'_>, PyErr> = state.extract();
         let (metadata, kept, metrics) = state.map_err(broken)?;
         let mut log = squirrel_log::FlightLog { metadata, sources: BTreeMap::new() };
         for (name, (time_s, channels)) in kept {
@@ -269,7 +269,7 @@ impl FlightLog {
     /// What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was
     /// read.
     #[getter]
-    #[gen_stub(override_return_type(type_repr = "squirrel.flight.Metrics | None", imports = ("squirrel.flight")))]
+    #[gen_stub(override_return_type(type_repr = "flight.Metrics | None", imports = ("squirrel.flight")))]
     fn metrics<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let read = |text| py.import("json")?.call_method1("loads", (text,));
         self.metrics.as_ref().map(read).transpose()

@@ -18,14 +18,14 @@ use pyo3_stub_gen::derive::gen_stub_pyfunction;
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
 #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
-pub(crate) fn _again<'py>(
+pub(crate) fn again<'py>(
     py: Python<'py>,
-    class: &str,
+    kind: &str,
     #[gen_stub(override_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
     state: &Bound<'py, PyTuple>,
 ) -> PyResult<Py<PyAny>> {
     let made = |object: PyResult<Bound<'py, PyAny>>| object.map(Bound::unbind);
-    match class {
+    match kind {
         "Vehicle" => made(Ok(Bound::new(py, Vehicle::again(state)?)?.into_any())),
         "FlightLog" => made(Ok(Bound::new(py, FlightLog::again(state)?)?.into_any())),
         "Policy" => made(Ok(Bound::new(py, Policy::again(state)?)?.into_any())),
@@ -35,6 +35,6 @@ pub(crate) fn _again<'py>(
         "Backstepping" => made(Ok(Bound::new(py, Backstepping::again(state)?)?.into_any())),
         "Twcc" => made(Ok(Bound::new(py, Twcc::again(state)?)?.into_any())),
         "Tasks" => made(Ok(Bound::new(py, Tasks::again(state)?)?.into_any())),
-        other => Err(value(format!("class = {other}: not one of squirrel's"))),
+        other => Err(value(format!("kind = {other}: not one of squirrel's"))),
     }
 }

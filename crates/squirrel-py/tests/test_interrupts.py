@@ -9,7 +9,7 @@ import pytest
 from conftest import thrown
 
 import squirrel
-from squirrel._squirrel import _looks
+from squirrel._squirrel import looks as looked
 
 N = 20_000
 TURNS = 1024
@@ -17,9 +17,9 @@ TURNS = 1024
 
 
 def looks(call: Callable[[], object]) -> int:
-    before = _looks()
+    before = looked()
     call()
-    return _looks() - before
+    return looked() - before
 
 
 def test_loops_look_every_so_many_turns(vehicle: squirrel.Vehicle) -> None:

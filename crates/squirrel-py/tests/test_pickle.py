@@ -309,4 +309,4 @@ def test_objects_go_to_another_process_and_back(vehicle: squirrel.Vehicle) -> No
 def test_a_damaged_pickle_is_a_line(class_: str) -> None:
     for state in ((), (b"",), (b"\1\2\3",), (1, 2, 3), ("a", "b", "c")):
         with pytest.raises(ValueError):
-            squirrel._squirrel._again(class_, state)
+            squirrel._squirrel.again(class_, state)

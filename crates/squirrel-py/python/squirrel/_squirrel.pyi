@@ -19,6 +19,7 @@ __all__ = [
     "Twcc",
     "Vehicle",
     "__version__",
+    "again",
     "derivative",
     "forward",
     "gap_check",
@@ -26,6 +27,7 @@ __all__ = [
     "gap_effects",
     "gap_find",
     "load",
+    "looks",
     "plan_reach",
     "plan_trajectory",
     "program",
@@ -426,7 +428,7 @@ class FlightLog:
         What the log says of the flight: vehicle, arm, scenario, seed, version.
         """
     @property
-    def metrics(self) -> squirrel.flight.Metrics | None:
+    def metrics(self) -> flight.Metrics | None:
         r"""
         What the flight amounted to (``rmse_m``, ``height_lost_m``, ...); None of a log that was
         read.
@@ -1224,14 +1226,9 @@ class Vehicle:
     def _repr_html_(self) -> builtins.str: ...
     def __repr__(self) -> builtins.str: ...
 
-def _again(class: builtins.str, state: tuple[typing.Any, ...]) -> typing.Any:
+def again(kind: builtins.str, state: tuple[typing.Any, ...]) -> typing.Any:
     r"""
     Make an object of what its ``__reduce__`` said; for pickle.
-    """
-
-def _looks() -> builtins.int:
-    r"""
-    Looks at signals so far, for tests.
     """
 
 def derivative(vehicle: Vehicle, *, state: numpy.typing.NDArray[numpy.float64], command: numpy.typing.NDArray[numpy.float64], wind_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float64]] = None, voltage_v: typing.Optional[builtins.float] = None) -> numpy.typing.NDArray[numpy.float64]:
@@ -1332,6 +1329,11 @@ def load(path: builtins.str | os.PathLike | pathlib.Path) -> Model:
         The file cannot be read.
     ValueError
         One line that names the file, and the tensor or field with its value.
+    """
+
+def looks() -> builtins.int:
+    r"""
+    Looks at signals so far, for tests.
     """
 
 def plan_reach(vehicle: Vehicle, velocity_ned_m_s: typing.Sequence[builtins.float], thrust_to_weight: typing.Optional[builtins.float], wing: builtins.str, tilt: builtins.str, yaw_rad: typing.Optional[builtins.float], directions: typing.Optional[numpy.typing.NDArray[numpy.float64]]) -> tuple[dict[str, typing.Any], dict[str, typing.Any] | None]:

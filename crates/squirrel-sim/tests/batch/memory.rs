@@ -123,11 +123,9 @@ fn step(tasks: &mut Tasks, at: usize) -> (Vec<f32>, Vec<f32>, Vec<bool>, Vec<boo
 
 #[test]
 fn environments_go_on_to_the_bit() {
-    let files = [
-        file(""),
-        file("[effects.gust]\nsigma_m_s = 0.8\n"),
-        file("[effects.mass_error]\nmass_fraction = 0.1\n"),
-    ];
+    let texts =
+        ["", "[effects.gust]\nsigma_m_s = 0.8\n", "[effects.mass_error]\nmass_fraction = 0.1\n"];
+    let files: Vec<VehicleFile> = texts.into_iter().map(file).collect();
     for (level, sensors) in
         [(Level::Motor, false), (Level::BodyRate, true), (Level::AttitudeWing, true)]
     {
