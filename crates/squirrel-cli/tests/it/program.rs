@@ -84,7 +84,7 @@ fn replay_names_the_first_output_of_a_changed_gain_and_a_flipped_byte() {
     folder.succeeds(&["fly", "--arm", "pc", "--scenario", "hover", "--out", "f.mcap"]);
     folder.write(
         "v.toml",
-        &SQUIRREL.replace("c2_per_s = { value = [14.0", "c2_per_s = { value = [14.5"),
+        &SQUIRREL.replace("c2_per_s = { value = [7.9", "c2_per_s = { value = [8.4"),
     );
     folder.fails(
         &["replay", "f.mcap", "--vehicle", "v.toml"],
@@ -273,7 +273,7 @@ fn bad_vehicles_get_one_line_with_file_field_and_value() {
         ),
         (
             "filter",
-            "frequency_rad_s = { value = 20.0",
+            "frequency_rad_s = { value = 14.0",
             "frequency_rad_s = { value = 400.0",
             &["filter_frequency_rad_s = 400"],
         ),

@@ -67,7 +67,7 @@ fn find_knows_sensors_and_clocks_of_the_file() {
             0,
             2.0,
         ),
-        ("[effects.gnss_latency]\nlatency_s = 0.06", 0, 1.05),
+        ("[effects.gnss_latency]\nlatency_s = 0.04", 0, 1.02),
     ] {
         let flown = with(effect);
         let (known, unknown) = (left(&flown, &flown)[channel], left(&file, &flown)[channel]);

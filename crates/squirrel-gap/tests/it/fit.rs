@@ -58,7 +58,7 @@ fn numbers_are_fitted_inside_their_tolerance_where_nothing_is_missing() {
     let own = about_mean(&thrust.iter().copied().take(4).collect::<Vec<_>>());
     for (rotor, (fitted, true_fraction)) in own.iter().zip(about_mean(&ROTORS)).enumerate() {
         println!("rotor {}: {fitted:.4}, {true_fraction:.4} in truth", rotor + 1);
-        assert!((fitted - true_fraction).abs() < 0.003, "rotor {}", rotor + 1);
+        assert!((fitted - true_fraction).abs() < 0.004, "rotor {}", rotor + 1);
     }
 }
 

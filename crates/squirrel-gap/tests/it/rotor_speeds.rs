@@ -77,7 +77,7 @@ fn lag_and_sag_do_not_leak_into_thrust() {
         assert!((0.95..1.05).contains(&over(&measured)), "force, axis {axis}: {}", over(&measured));
         let over = |f: &Finding| moments(f)[axis] / moments(&clean)[axis];
         // Rotors that lag turn the vehicle less.
-        assert!((0.8..1.05).contains(&over(&measured)), "moment, axis {axis}: {}", over(&measured));
+        assert!((0.7..1.05).contains(&over(&measured)), "moment, axis {axis}: {}", over(&measured));
     }
     let over = moments(&told)[1] / moments(&clean)[1];
     assert!(over > 1.5, "by the commands the lag is a moment: {over}");

@@ -139,7 +139,8 @@ fn rich_flights_cover_speeds_climbs_headings_heights_and_wings() {
         }
         assert!(f.rungs_m.windows(2).all(|w| w[1] < w[0] - 0.1) && f.lowest_m > 0.12, "{say}");
         assert!(f.edges >= 6 && f.edges_at_speed >= 6, "{say}");
-        assert!(f.roll_pitch_rad < limit + 0.08, "{say}");
+        // The multisine is on top, and the loop overshoots.
+        assert!(f.roll_pitch_rad < limit + 0.15, "{say}");
     }
 }
 

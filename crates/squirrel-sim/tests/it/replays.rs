@@ -63,7 +63,7 @@ fn a_flight_outdoors_replays_from_its_log() {
 fn a_changed_gain_is_found_at_the_first_output_that_it_reaches() {
     let mut log = flown(Arm::TwccFlat);
     let changed = log.metadata["vehicle_toml"]
-        .replace("c1_per_s = { value = [9.0,", "c1_per_s = { value = [9.001,");
+        .replace("c1_per_s = { value = [5.3,", "c1_per_s = { value = [5.301,");
     assert_ne!(changed, log.metadata["vehicle_toml"]);
     log.metadata.insert("vehicle_toml".to_owned(), changed);
     let difference = replay(&log, &setup(&log).unwrap()).unwrap().first_difference.unwrap();

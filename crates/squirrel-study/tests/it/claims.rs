@@ -155,7 +155,7 @@ fn every_claim_has_a_row_and_a_test() {
 
 /// At T/W 2.
 #[test]
-fn the_better_controller_comes_through_and_the_papers_arms_owe_little_to_wings() {
+fn the_better_controller_comes_through_the_forest() {
     let study = &*FOREST;
     let row = |arm: &str| study.rows.iter().find(|row| row.arm == arm).unwrap();
     assert_eq!(study.rows.len(), Arm::ALONE.len());
@@ -166,7 +166,7 @@ fn the_better_controller_comes_through_and_the_papers_arms_owe_little_to_wings()
 
     // With ours' limit of speed they come further; ours is still ahead.
     let limited = |arm: &str| study.limited.iter().find(|row| row.arm == arm).unwrap();
-    let best = papers.iter().map(|arm| limited(arm).in_band.share.high).fold(0.0, f64::max);
+    let best = papers.iter().map(|arm| limited(arm).in_band.share.value).fold(0.0, f64::max);
     assert!(ours.low > best, "{ours:?}, with the limit {best}");
     assert!(limited("twcc_parnn").in_band.count > 2 * row("twcc_parnn").in_band.count);
     assert_eq!(limited("twcc_plus").ends, row("twcc_plus").ends, "it has the limit in any case");
@@ -178,15 +178,12 @@ fn the_better_controller_comes_through_and_the_papers_arms_owe_little_to_wings()
             && climbing.height_gained_m > 20.0
     );
     assert!(climbing.in_band.share.value < 0.1);
-    for (arm, least) in [("twcc_flat", 0.0), ("twcc_parnn", 0.05)] {
-        let over = row(arm).over_phantom.unwrap();
-        assert!(over.low < least && over.high < 0.2, "{arm}: {over:?}");
+    // Outflying what they see they owe little to wings; within the limit, most.
+    for arm in ["twcc_flat", "twcc_parnn"] {
+        let [free, held] = [row(arm), limited(arm)].map(|row| row.over_phantom.unwrap());
+        assert!(free.high < 0.2 && held.low > 0.4, "{arm}: {free:?}, with the limit {held:?}");
     }
-    let said = forest::words(study);
-    assert!(
-        said[0].starts_with("twcc_flat") && said[0].contains("does not owe its success to wings"),
-        "{said:?}"
-    );
+    assert!(forest::words(study)[0].starts_with("twcc_flat"));
     for row in &study.rows {
         assert!(row.in_band.count <= row.through.count && row.ends.len() == 105);
         assert!(row.path_m <= 400.1 && row.displacement_m <= row.path_m, "{row:?}");

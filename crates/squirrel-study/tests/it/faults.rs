@@ -53,13 +53,20 @@ fn a_study_that_was_stopped_goes_on_to_the_same_bytes() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert_eq!(json(&pool.install(|| study(24, Some(&folder)))), whole);
     assert_eq!(std::fs::read_to_string(&file).unwrap().lines().count(), 25);
-    // Nothing is flown again: what is in the file is what comes out.
-    let changed =
-        std::fs::read_to_string(&file).unwrap().replace("\"survived\":true", "\"survived\":false");
-    std::fs::write(&file, changed).unwrap();
-    assert_eq!(study(24, Some(&folder)).survived_share, 0.0);
-    let other = Plan::calm(VehicleFile::squirrel(), Vec::new(), 24, 4);
+    // What was kept is not flown again, and a line that somebody changed is not believed.
+    let kept = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(json(&study(24, Some(&folder))), whole);
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), kept);
     let there = Keep { folder: Some(&folder), ..Keep::default() };
+    std::fs::write(&file, kept.replace("\"survived\":true", "\"survived\":false")).unwrap();
+    let same = Plan::calm(VehicleFile::squirrel(), Vec::new(), 24, 3);
+    let error = run(&same, &there).unwrap_err().to_string();
+    assert!(
+        error.contains("faults.trials.jsonl: line ") && error.contains("has changed"),
+        "{error}"
+    );
+    std::fs::write(&file, kept).unwrap();
+    let other = Plan::calm(VehicleFile::squirrel(), Vec::new(), 24, 4);
     let error = run(&other, &there).unwrap_err().to_string();
     assert!(error.contains("faults.trials.jsonl: is of another plan"), "{error}");
     std::fs::write(&file, "not a journal\n").unwrap();
