@@ -50,7 +50,7 @@ fn a_memory_comes_back_and_flies_on_to_the_bit() {
     let mut state = StackState::default();
     let frame = |k: u64| {
         let mut frame = level(k * 3333);
-        frame.altitude_m = (k % 7 == 0).then_some(k as f32 * 0.01);
+        frame.altitude_m = k.is_multiple_of(7).then_some(k as f32 * 0.01);
         frame
     };
     for k in 0..400 {
