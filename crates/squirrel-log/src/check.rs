@@ -5,6 +5,17 @@ use super::{FlightLog, LogError, Source, schema};
 /// Times are stored in whole nanoseconds beside their exact value; later ones do not fit 64 bits.
 const TIME_MAX_S: f64 = 1.8e10;
 
+/// Longest time between two samples of a flight, s.
+const JUMP_S: f64 = 3600.0;
+
+/// What to say of a sample, in words behind its time, where the clock has jumped since the one
+/// before it.
+pub fn clock_jump(before_s: f64, time_s: f64) -> Option<String> {
+    let since_s = time_s - before_s;
+    (since_s > JUMP_S)
+        .then(|| format!("is {since_s:.1} s after the sample before it, at most {JUMP_S}"))
+}
+
 /// # Errors
 /// [`LogError`] with the first name, time or length that breaks a rule.
 pub(super) fn check(file: &str, log: &FlightLog) -> Result<(), LogError> {

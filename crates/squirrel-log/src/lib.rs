@@ -28,6 +28,7 @@ mod write;
 
 use std::collections::BTreeMap;
 
+pub use check::clock_jump;
 pub use error::LogError;
 pub use read::Recovery;
 

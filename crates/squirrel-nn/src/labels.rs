@@ -17,7 +17,7 @@ use squirrel_core::dynamics::State;
 use squirrel_core::frames::In;
 use squirrel_core::rnn::parnn::{INPUTS, WINDOW, features};
 use squirrel_core::vehicle::MAX_ROTORS;
-use squirrel_log::{Channel, FlightLog};
+use squirrel_log::{Channel, FlightLog, clock_jump};
 use squirrel_sim::plant::{Plant, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -27,8 +27,6 @@ const STEP_S: f64 = 0.1;
 const SPREAD: f64 = 0.99;
 /// Time after which a servo has followed its command, s.
 const SETTLED_S: f64 = 0.5;
-/// Longest time between two samples of a flight, s.
-const JUMP_S: f64 = 3600.0;
 /// Time between two samples of the force from which on nothing is known there, s.
 const UNKNOWN_S: f64 = 1.0;
 /// A led plant needs a step only to be checked.
@@ -191,12 +189,9 @@ impl Line {
         if let Some(i) = (1..time_s.len()).find(|i| !(time_s[*i] > time_s[i - 1])) {
             return refuse(format!("time {} s after {} s, must rise", time_s[i], time_s[i - 1]));
         }
-        if let Some(i) = (1..time_s.len()).find(|i| time_s[*i] - time_s[i - 1] > JUMP_S) {
-            return refuse(format!(
-                "time_s[{i}] = {}: is {:.1} s after the sample before it, at most {JUMP_S}; the clock has jumped",
-                time_s[i],
-                time_s[i] - time_s[i - 1]
-            ));
+        let jump = |i: usize| clock_jump(time_s[i - 1], time_s[i]).map(|problem| (i, problem));
+        if let Some((i, problem)) = (1..time_s.len()).find_map(jump) {
+            return refuse(format!("time_s[{i}] = {}: {problem}; the clock has jumped", time_s[i]));
         }
         if let Some(i) = values.values.iter().position(|x| !x.is_finite()) {
             return refuse(format!(

@@ -8,15 +8,15 @@
 //! to weight is the flight code's: a vehicle that is 15 % heavier has as much less.
 
 use crate::campaign::{self, Draw, Flown, Plan};
-use crate::faults::is_lost;
 use crate::journal::{Journal, Keep};
 use crate::sheet::{Cell, Sheet};
 use crate::statistics::{Estimate, Share, gain, mean, paired};
 use crate::study::{Arms, Found, Study};
-use serde::{Deserialize, Serialize};
+use crate::wind::{Flight, MEASURED_S, measure_for_long};
+use serde::Serialize;
 use squirrel_core::vehicle::Vehicle;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, InProcess, Metrics};
+use squirrel_sim::flight::{FlightError, InProcess};
 use squirrel_sim::plant::{Membrane, WingPlant};
 use squirrel_sim::scenario::{Conditions, Scenario};
 use squirrel_sim::sensors::{SUITES, SensorParameters};
@@ -44,8 +44,6 @@ pub const STUDY: Study = Study {
 const THRUST_TO_WEIGHT: [f64; 3] = [1.25, 1.5, 2.0];
 /// Classes of wind, by its upper end, m/s.
 const WINDS_M_S: [(&str, f64); 2] = [("0 to 4", 4.0), ("4 to 8", 8.0)];
-/// For so long the manoeuvre is measured, s: a vehicle that sinks has the time to show it.
-const MEASURED_S: f64 = 18.0;
 /// A sink that the flight code must have said something of, m.
 const DEEP_M: f64 = 5.0;
 
@@ -64,16 +62,6 @@ struct Drawn {
     gust_sigma_m_s: f64,
     battery_charge: f64,
     suite: &'static str,
-}
-
-/// One flight.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Flight {
-    wind_m_s: f64,
-    rmse_m: f64,
-    height_lost_m: f64,
-    lost: bool,
-    flagged: bool,
 }
 
 /// An arm at one ratio in one class of wind.
@@ -157,8 +145,7 @@ impl Drawn {
 
     fn scenario(&self, ratio: f64, seed: u64) -> Result<Scenario, FlightError> {
         let mut scenario = Scenario::find("avoid").map_err(FlightError)?;
-        scenario.duration_s += MEASURED_S - scenario.measured_window_s;
-        scenario.measured_window_s = MEASURED_S;
+        measure_for_long(&mut scenario);
         scenario.conditions = Conditions::Outdoors;
         scenario.thrust_to_weight = Some(ratio);
         let (east, north) = self.wind_to_rad.sin_cos();
@@ -170,18 +157,6 @@ impl Drawn {
     }
 }
 
-impl Flight {
-    fn of(m: &Metrics, drawn: &Drawn) -> Self {
-        Self {
-            wind_m_s: drawn.wind_m_s,
-            rmse_m: m.rmse_m,
-            height_lost_m: m.height_lost_m,
-            lost: is_lost(m),
-            flagged: !m.flags.names().is_empty(),
-        }
-    }
-}
-
 fn fly(plan: &Plan, arm: Arm, ratio: f64, trial: u32) -> Result<Flight, FlightError> {
     let drawn = Drawn::of(plan.seed, trial);
     let mut told = plan.setup(arm, drawn.scenario(ratio, plan.trial_seed(trial))?);
@@ -190,8 +165,7 @@ fn fly(plan: &Plan, arm: Arm, ratio: f64, trial: u32) -> Result<Flight, FlightEr
     let mut flown = told.clone();
     flown.vehicle = drawn.vehicle(&told.vehicle)?;
     let mut computer = InProcess::new(told.stack()?);
-    let metrics = flown.fly_on(&mut computer, None, false, |_| {})?.metrics;
-    Ok(Flight::of(&metrics, &drawn))
+    Ok(Flight::of(&flown.fly_on(&mut computer, None, false, |_| {})?.metrics))
 }
 
 /// Flies the study; `None` where only a part is flown here.
@@ -219,10 +193,12 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Dispersion>, FlightErr
         fly(plan, arm, THRUST_TO_WEIGHT[condition], trial)
     })?;
     let Some(flown) = flown else { return Ok(None) };
-    let flown = &flown;
+    let winds_m_s: Vec<f64> =
+        (0..plan.trials).map(|trial| Drawn::of(plan.seed, trial).wind_m_s).collect();
+    let (flown, winds_m_s) = (&flown, &winds_m_s[..]);
     let rows = (0..THRUST_TO_WEIGHT.len()).flat_map(|condition| {
         (0..WINDS_M_S.len()).flat_map(move |wind| {
-            plan.arms.iter().filter_map(move |arm| row(flown, *arm, condition, wind))
+            plan.arms.iter().filter_map(move |arm| row(flown, winds_m_s, *arm, [condition, wind]))
         })
     });
     let vehicle = plan.vehicle.name.clone();
@@ -230,13 +206,19 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Dispersion>, FlightErr
 }
 
 /// `None` where no draw has such a wind.
-fn row(flown: &Flown<Flight>, arm: Arm, condition: usize, wind: usize) -> Option<Row> {
+///
+/// * `winds_m_s` - of the trials
+fn row(
+    flown: &Flown<Flight>,
+    winds_m_s: &[f64],
+    arm: Arm,
+    [condition, wind]: [usize; 2],
+) -> Option<Row> {
     let above = if wind == 0 { 0.0 } else { WINDS_M_S[wind - 1].1 };
     let (name, below) = WINDS_M_S[wind];
-    let of = |arm| {
-        let mut flights = flown.of(arm, condition);
-        flights.retain(|flight| (above..below).contains(&flight.wind_m_s));
-        flights
+    let of = |arm| -> Vec<&Flight> {
+        let all = flown.of(arm, condition).into_iter().zip(winds_m_s);
+        all.filter(|(_, wind)| (above..below).contains(*wind)).map(|(flight, _)| flight).collect()
     };
     let flights = of(arm);
     if flights.is_empty() {

@@ -42,16 +42,16 @@ const SPEEDS_M_S: [f64; 3] = [3.0, 5.0, 8.0];
 /// Effective thrust-to-weight ratios.
 const THRUST_TO_WEIGHT: [f64; 4] = [1.2, 1.25, 1.5, 2.0];
 /// For so long the manoeuvre is measured, s: a vehicle that sinks has the time to show it.
-const MEASURED_S: f64 = 18.0;
+pub(crate) const MEASURED_S: f64 = 18.0;
 
 /// One flight.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-struct Flight {
-    rmse_m: f64,
-    height_lost_m: f64,
+pub(crate) struct Flight {
+    pub(crate) rmse_m: f64,
+    pub(crate) height_lost_m: f64,
     wings_open_s: f64,
-    lost: bool,
-    flagged: bool,
+    pub(crate) lost: bool,
+    pub(crate) flagged: bool,
 }
 
 /// An arm in one wind at one ratio.
@@ -107,10 +107,7 @@ fn conditions(plan: &Plan) -> Result<Vec<Condition>, FlightError> {
         for (from, to, speed) in std::iter::once(("calm", [0.0; 2], 0.0)).chain(blown) {
             let mut scenario = Scenario::find(mission).map_err(FlightError)?;
             scenario.thrust_to_weight = Some(ratio);
-            if scenario.measured_window_s > 0.0 {
-                scenario.duration_s += MEASURED_S - scenario.measured_window_s;
-                scenario.measured_window_s = MEASURED_S;
-            }
+            measure_for_long(&mut scenario);
             scenario.conditions = plan.conditions;
             scenario.wind.mean_ned_m_s = [speed * to[0], speed * to[1], 0.0];
             scenario.wind.gust_sigma_m_s = GUST_M_S;
@@ -118,6 +115,14 @@ fn conditions(plan: &Plan) -> Result<Vec<Condition>, FlightError> {
         }
     }
     Ok(all)
+}
+
+/// Has a manoeuvre measured for [`MEASURED_S`]; what is measured as a whole stays so.
+pub(crate) fn measure_for_long(scenario: &mut Scenario) {
+    if scenario.measured_window_s > 0.0 {
+        scenario.duration_s += MEASURED_S - scenario.measured_window_s;
+        scenario.measured_window_s = MEASURED_S;
+    }
 }
 
 /// Flies the study; `None` where only a part is flown here.
@@ -138,7 +143,7 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Wind>, FlightError> {
 }
 
 impl Flight {
-    fn of(m: &Metrics) -> Self {
+    pub(crate) fn of(m: &Metrics) -> Self {
         Self {
             rmse_m: m.rmse_m,
             height_lost_m: m.height_lost_m,

@@ -7,13 +7,11 @@
 
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
-use squirrel_log::FlightLog;
+use squirrel_log::{FlightLog, clock_jump};
 
 /// Longest distance of two samples that still belong together, in median periods.
 const GAP_PERIODS: f64 = 5.0;
 
-/// Longest time between two samples of a flight, s.
-const JUMP_S: f64 = 3600.0;
 /// Longest flight, s: eleven days.
 const FLIGHT_MAX_S: f64 = 1e6;
 /// Highest rate of a channel, Hz: filters reach over as many samples as there are in a time.
@@ -60,14 +58,15 @@ impl Series {
             return Err(GapError::Time { flight: flight(), channel, index, time_s: time_s[index] });
         }
         for index in 1..time_s.len() {
-            let since = |other: usize| time_s[index] - time_s[other];
-            let problem = if since(index - 1) > JUMP_S {
-                format!("is {:.1} s after the sample before it, at most {JUMP_S}", since(index - 1))
-            } else if since(0) > FLIGHT_MAX_S {
-                format!("is {:.1} s after the first sample, at most {FLIGHT_MAX_S:e}", since(0))
-            } else {
-                continue;
-            };
+            let since_first_s = time_s[index] - time_s[0];
+            let problem = clock_jump(time_s[index - 1], time_s[index]).or_else(|| {
+                (since_first_s > FLIGHT_MAX_S).then(|| {
+                    format!(
+                        "is {since_first_s:.1} s after the first sample, at most {FLIGHT_MAX_S:e}"
+                    )
+                })
+            });
+            let Some(problem) = problem else { continue };
             let (flight, time_s) = (flight(), time_s[index]);
             return Err(GapError::Jump { flight, channel, index, time_s, problem });
         }

@@ -12,16 +12,14 @@ impl VehicleFile {
         if self.control.is_some() {
             return Ok(self.clone());
         }
-        let (p, weight_n) = (self.vehicle.parameters(), self.vehicle.weight_n());
-        let inertia = &p.inertia_kg_m2;
-        let rotor = &p.propulsion;
-        let to_spare_n = weight_n.min(p.limits.thrust_max_n - weight_n).max(0.05 * weight_n);
-        let ratio = rotor.torque_coefficient_n_m_s2 / rotor.thrust_coefficient_n_s2;
+        let p = self.vehicle.parameters();
+        let (inertia, rotor) = (&p.inertia_kg_m2, &p.propulsion);
         let airframe = Airframe {
-            weight_n,
-            thrust_to_weight: p.limits.thrust_max_n / weight_n,
+            weight_n: self.vehicle.weight_n(),
+            thrust_max_n: p.limits.thrust_max_n,
             lag_s: 0.5 * (rotor.time_constant_up_s + rotor.time_constant_down_s),
-            yaw_acceleration_rad_s2: ratio * to_spare_n / inertia[(2, 2)],
+            torque_per_thrust_m: rotor.torque_coefficient_n_m_s2 / rotor.thrust_coefficient_n_s2,
+            inertia_z_kg_m2: inertia[(2, 2)],
             tilt_max_rad: p.limits.tilt_max_rad,
             restoring: [0, 1].map(|axis| inertia[(2, 2)] / inertia[(axis, axis)]),
         };

@@ -13,11 +13,11 @@ use super::super::margins::gains_for_margins;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Airframe {
     pub(super) weight_n: f64,
-    /// Most thrust over the weight.
-    pub(super) thrust_to_weight: f64,
+    pub(super) thrust_max_n: f64,
     pub(super) lag_s: f64,
-    /// Most yaw acceleration about hover, rad/s^2.
-    pub(super) yaw_acceleration_rad_s2: f64,
+    /// Reaction torque of a rotor over its thrust, m.
+    pub(super) torque_per_thrust_m: f64,
+    pub(super) inertia_z_kg_m2: f64,
     pub(super) tilt_max_rad: f64,
     /// Largest moment of inertia over those about x and y.
     pub(super) restoring: [f64; 2],
@@ -45,11 +45,20 @@ const FASTEST_PER_S: [f64; 2] = [12.0, 4.0];
 /// Yaw acceleration of that vehicle about hover, rad/s^2.
 const REFERENCE_YAW: f64 = 7.6;
 
+impl Airframe {
+    /// Most yaw acceleration about hover, rad/s^2.
+    fn yaw_acceleration_rad_s2(&self) -> f64 {
+        let Self { weight_n, thrust_max_n, .. } = *self;
+        let to_spare_n = weight_n.min(thrust_max_n - weight_n).max(0.05 * weight_n);
+        self.torque_per_thrust_m * to_spare_n / self.inertia_z_kg_m2
+    }
+}
+
 fn by_rule(airframe: &Airframe) -> Gains {
     let (lag_s, other_s) = REFERENCE;
     let quick = ((lag_s + other_s) / (airframe.lag_s + other_s)).clamp(0.5, 1.5);
     let slow = quick.sqrt().min(1.0);
-    let yaw = (airframe.yaw_acceleration_rad_s2 / REFERENCE_YAW).sqrt().clamp(0.3, 1.5);
+    let yaw = (airframe.yaw_acceleration_rad_s2() / REFERENCE_YAW).sqrt().clamp(0.3, 1.5);
     let [roll_pitch, yaw_fastest] = FASTEST_PER_S;
     let axes = [
         (airframe.restoring[0], roll_pitch),
@@ -60,6 +69,7 @@ fn by_rule(airframe: &Airframe) -> Gains {
     let of = |k: usize| axes.map(|axis| axis[k]);
     let outer = |of: [f64; 3]| of.map(|gain| gain * slow);
     let g = squirrel_core::math::GRAVITY_M_S2;
+    let thrust_to_weight = airframe.thrust_max_n / airframe.weight_n;
     Gains {
         c1_per_s: of(0),
         c2_per_s: of(1),
@@ -68,7 +78,7 @@ fn by_rule(airframe: &Airframe) -> Gains {
         position_per_s: outer([1.6, 1.6, 0.8]),
         velocity_per_s: outer([2.5, 2.5, 1.6]),
         acceleration_horizontal_m_s2: 0.9 * g * airframe.tilt_max_rad.tan(),
-        acceleration_vertical_m_s2: (0.4 * g * (airframe.thrust_to_weight - 1.0)).clamp(0.5, 3.0),
+        acceleration_vertical_m_s2: (0.4 * g * (thrust_to_weight - 1.0)).clamp(0.5, 3.0),
     }
 }
 

@@ -478,15 +478,14 @@ impl Sizes {
     }
 
     fn airframe(&self) -> gains::Airframe {
-        let weight_n = self.mass_kg.value * GRAVITY_M_S2;
-        let ratio = self.torque_coefficient_n_m_s2.value / self.thrust_coefficient_n_s2.value;
-        let inertia_z = self.mass_kg.value * (scaling::GYRATION_Z.value * self.arm_m.value).powi(2);
-        let to_spare_n = weight_n.min(self.thrust_max_n.value - weight_n).max(0.05 * weight_n);
         gains::Airframe {
-            weight_n,
-            thrust_to_weight: self.thrust_max_n.value / weight_n,
+            weight_n: self.mass_kg.value * GRAVITY_M_S2,
+            thrust_max_n: self.thrust_max_n.value,
             lag_s: scaling::MOTOR_LAG_S.value,
-            yaw_acceleration_rad_s2: ratio * to_spare_n / inertia_z,
+            torque_per_thrust_m: self.torque_coefficient_n_m_s2.value
+                / self.thrust_coefficient_n_s2.value,
+            inertia_z_kg_m2: self.mass_kg.value
+                * (scaling::GYRATION_Z.value * self.arm_m.value).powi(2),
             tilt_max_rad: self.tilt_max_rad,
             restoring: [(scaling::GYRATION_Z.value / scaling::GYRATION_XY.value).powi(2); 2],
         }
