@@ -106,11 +106,7 @@ pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
 /// `cargo xtask attack`: tests of what reads logs, vehicles, scenarios, weights and plans, on more
 /// files than in `cargo xtask test`.
 pub(crate) fn attack(arguments: &[String]) -> Result<(), String> {
-    let [count, seed] = [(0, "2500"), (1, "1")]
-        .map(|(i, default)| arguments.get(i).map_or_else(|| default.to_owned(), String::clone));
-    for (name, text) in [("COUNT", &count), ("SEED", &seed)] {
-        text.parse::<u64>().map_err(|_| format!("{name}: `{text}` is no whole number"))?;
-    }
+    let [count, seed] = count_and_seed(arguments, ["2500", "1"])?;
     for (package, test) in [("squirrel-log", "import_attack"), ("squirrel-sim", "attack::")] {
         call(
             cargo()?
@@ -121,6 +117,29 @@ pub(crate) fn attack(arguments: &[String]) -> Result<(), String> {
         )?;
     }
     Ok(())
+}
+
+/// `cargo xtask kill`: tests of what a killed command leaves, at more moments than in `cargo xtask
+/// test`.
+pub(crate) fn kill(arguments: &[String]) -> Result<(), String> {
+    let [count, seed] = count_and_seed(arguments, ["200", "1"])?;
+    call(
+        cargo()?
+            .args(["test", "--release", "--locked", "-p", "squirrel-cli"])
+            .args(["--test", "it", "crash::", "--", "--nocapture"])
+            .env("SQUIRREL_KILL_COUNT", &count)
+            .env("SQUIRREL_KILL_SEED", &seed),
+    )
+}
+
+/// The arguments of a chore that does something random so many times.
+fn count_and_seed(arguments: &[String], defaults: [&str; 2]) -> Result<[String; 2], String> {
+    let all =
+        [0, 1].map(|i| arguments.get(i).map_or_else(|| defaults[i].to_owned(), String::clone));
+    for (name, text) in [("COUNT", &all[0]), ("SEED", &all[1])] {
+        text.parse::<u64>().map_err(|_| format!("{name}: `{text}` is no whole number"))?;
+    }
+    Ok(all)
 }
 
 /// Builds the program and its blind bench; the folder that they are in.

@@ -7,6 +7,7 @@ mod chores;
 mod effect;
 mod firmware;
 mod fresh;
+mod growth;
 mod png;
 mod python;
 mod run;
@@ -20,7 +21,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 15] = [
+const CHORES: [Chore; 17] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     (
@@ -40,6 +41,18 @@ const CHORES: [Chore; 15] = [
         "[COUNT [SEED]]",
         "so many mutated files of each kind (2500), logs under limits of memory and time, against their readers",
         chores::attack,
+    ),
+    (
+        "kill",
+        "[COUNT [SEED]]",
+        "kill fly, study, train, gap run and import at so many moments each (200): old files or new ones, whole",
+        chores::kill,
+    ),
+    (
+        "growth",
+        "[MINUTES]",
+        "time and memory of gap run, fly, replay and import by flights and minutes (120); fails where memory grows",
+        growth::chore,
     ),
     (
         "batch-gate",

@@ -19,9 +19,21 @@ pub fn clock_jump(before_s: f64, time_s: f64) -> Option<String> {
 /// # Errors
 /// [`LogError`] with the first name, time or length that breaks a rule.
 pub(super) fn check(file: &str, log: &FlightLog) -> Result<(), LogError> {
+    check_piece(file, log, |_| None)
+}
+
+/// As [`check`], of a piece of a log.
+///
+/// * `before` - of a source by its name, how many samples are before the piece, and the time of the
+///   last of them, s
+pub(super) fn check_piece(
+    file: &str,
+    log: &FlightLog,
+    before: impl Fn(&str) -> Option<(usize, f64)>,
+) -> Result<(), LogError> {
     for (name, source) in &log.sources {
         check_names(file, name, source)?;
-        check_times(file, name, source)?;
+        check_times(file, name, source, before(name))?;
         check_lengths(file, name, source)?;
     }
     Ok(())
@@ -69,9 +81,15 @@ fn is_identifier(name: &str) -> bool {
         && name.chars().all(|letter| letter.is_ascii_alphanumeric() || letter == '_')
 }
 
-fn check_times(file: &str, source_name: &str, source: &Source) -> Result<(), LogError> {
-    for (index, &time_s) in source.time_s.iter().enumerate() {
-        let before_s = index.checked_sub(1).map(|before| source.time_s[before]);
+fn check_times(
+    file: &str,
+    source_name: &str,
+    source: &Source,
+    before: Option<(usize, f64)>,
+) -> Result<(), LogError> {
+    let (first, mut last_s) = before.map_or((0, None), |(samples, last_s)| (samples, Some(last_s)));
+    for (index, &time_s) in (first..).zip(&source.time_s) {
+        let before_s = last_s.replace(time_s);
         let why = if !time_s.is_finite() {
             "not finite".to_owned()
         } else if time_s < 0.0 {

@@ -6,6 +6,7 @@
 
 use mcap::MAGIC;
 use mcap::records::op;
+use std::io::{ErrorKind, Read, Result, Seek, SeekFrom};
 
 /// Opcode and length.
 const HEAD: usize = 1 + 8;
@@ -20,15 +21,46 @@ pub(super) struct Frame<'a> {
     pub(super) bytes: &'a [u8],
 }
 
+/// The head of a record.
+#[derive(Clone, Copy)]
+pub(super) struct Head {
+    pub(super) opcode: u8,
+    /// First byte in the file.
+    pub(super) start: u64,
+    /// Length of what is behind the head.
+    pub(super) body_bytes: u64,
+}
+
+impl Head {
+    /// `None` if the record does not end inside the file.
+    ///
+    /// * `left` - bytes from its start to the end of the file
+    fn new(bytes: [u8; HEAD], start: u64, left: u64) -> Option<Self> {
+        let [opcode, length @ ..] = bytes;
+        let body_bytes = u64::from_le_bytes(length);
+        let fits = body_bytes.checked_add(HEAD as u64).is_some_and(|bytes| bytes <= left);
+        // There is no record 0: what follows was never written.
+        (opcode != 0 && fits).then_some(Self { opcode, start, body_bytes })
+    }
+
+    fn end(self) -> u64 {
+        self.start + HEAD as u64 + self.body_bytes
+    }
+
+    /// The record, whose bytes are at hand.
+    pub(super) fn frame(self, bytes: &[u8]) -> Frame<'_> {
+        let start = usize::try_from(self.start).unwrap_or(usize::MAX);
+        Frame { opcode: self.opcode, start, bytes }
+    }
+}
+
 impl<'a> Frame<'a> {
     /// The record that starts at byte `start`; `None` if it does not end inside the file.
     fn at(file: &'a [u8], start: usize) -> Option<Self> {
         let rest = &file[start..];
-        let (&opcode, tail) = rest.split_first()?;
-        let length = u64::from_le_bytes(*tail.first_chunk()?);
-        let end = usize::try_from(length).ok()?.checked_add(HEAD)?;
-        // There is no record 0: what follows was never written.
-        (opcode != 0).then_some(Self { opcode, start, bytes: rest.get(..end)? })
+        let head = Head::new(*rest.first_chunk()?, start as u64, rest.len() as u64)?;
+        let bytes = rest.get(..usize::try_from(head.body_bytes).ok()? + HEAD)?;
+        Some(head.frame(bytes))
     }
 
     pub(super) fn body(&self) -> &'a [u8] {
@@ -47,6 +79,56 @@ pub(super) fn frames(file: &[u8]) -> impl Iterator<Item = Frame<'_>> {
     std::iter::successors(first, |frame| {
         if frame.opcode == op::FOOTER { None } else { Frame::at(file, frame.end()) }
     })
+}
+
+/// The records of a file that is not held, as [`frames`].
+pub(super) struct Walk<R> {
+    file: R,
+    /// Length of the file.
+    bytes: u64,
+    /// Start of the next record, of which the head may have been read.
+    next: u64,
+    head: Option<Head>,
+    is_over: bool,
+}
+
+impl<R: Read + Seek> Walk<R> {
+    /// * `bytes` - length of the file
+    pub(super) fn new(file: R, bytes: u64) -> Self {
+        Self { file, bytes, next: MAGIC.len() as u64, head: None, is_over: false }
+    }
+
+    /// The next record's head, the same until it is read or skipped.
+    pub(super) fn head(&mut self) -> Result<Option<Head>> {
+        if self.head.is_none() && !self.is_over {
+            let left = self.bytes.saturating_sub(self.next);
+            if left >= HEAD as u64 {
+                self.file.seek(SeekFrom::Start(self.next))?;
+                let mut head = [0; HEAD];
+                self.file.read_exact(&mut head)?;
+                self.head = Head::new(head, self.next, left);
+            }
+        }
+        Ok(self.head)
+    }
+
+    pub(super) fn skip(&mut self, head: Head) -> Result<()> {
+        self.next = head.end();
+        self.is_over = head.opcode == op::FOOTER;
+        self.head = None;
+        Ok(())
+    }
+
+    /// Reads the record with its head.
+    pub(super) fn record(&mut self, head: Head, into: &mut Vec<u8>) -> Result<()> {
+        into.clear();
+        self.file.seek(SeekFrom::Start(head.start))?;
+        let bytes = HEAD as u64 + head.body_bytes;
+        if self.file.by_ref().take(bytes).read_to_end(into)? as u64 != bytes {
+            return Err(ErrorKind::UnexpectedEof.into());
+        }
+        self.skip(head)
+    }
 }
 
 /// Whether the texts of a record end inside it. mcap's parser makes room for what a length says
@@ -105,53 +187,122 @@ pub(super) enum Damage {
     Cut,
     /// Bytes have changed.
     Corrupt(String),
+    /// What the disk said.
+    Io(std::io::Error),
+}
+
+impl From<std::io::Error> for Damage {
+    fn from(error: std::io::Error) -> Self {
+        Self::Io(error)
+    }
 }
 
 /// Checks a file that starts with the magic bytes, or is too short for them.
 ///
 /// A CRC of 0 means by MCAP's rules that the program which wrote the file took none.
-pub(super) fn check(file: &[u8]) -> Result<(), Damage> {
+///
+/// * `bytes` - length of the file
+pub(super) fn check(file: &mut dyn Read, bytes: u64) -> std::result::Result<(), Damage> {
     let corrupt = |what: String| Err(Damage::Corrupt(what));
-    let mut data_end = None;
-    let mut end = MAGIC.len().min(file.len());
-    let mut footer = false;
-    for frame in frames(file) {
-        end = frame.end();
-        match frame.opcode {
+    let mut sum = Sum { file, crc: crc32fast::Hasher::new(), last: [0; 8] };
+    let mut end = bytes.min(MAGIC.len() as u64);
+    let (mut has_data_end, mut footer) = (false, false);
+    sum.pass(end)?;
+    let mut rest = bytes - end;
+    while rest >= HEAD as u64 && !footer {
+        let before = sum.crc.clone();
+        let head = Head::new(sum.head()?, end, rest);
+        rest -= HEAD as u64;
+        let Some(head) = head else { break };
+        match head.opcode {
             op::DATA_END => {
-                check_crc("data section", &file[..frame.start], frame)?;
-                data_end = Some(end);
+                sum.pass(head.body_bytes)?;
+                check_crc("data section", before, head, sum.saved())?;
+                (sum.crc, has_data_end) = (crc32fast::Hasher::new(), true);
             }
             op::FOOTER => {
-                let Some(summary) = data_end else {
+                if !has_data_end {
                     return corrupt("there is a footer but no end of the data section".to_owned());
-                };
-                check_crc("summary section", &file[summary..end.saturating_sub(4)], frame)?;
+                }
+                sum.pass(head.body_bytes.saturating_sub(4))?;
+                let summary = sum.crc.clone();
+                sum.pass(head.body_bytes.min(4))?;
+                check_crc("summary section", summary, head, sum.saved())?;
                 footer = true;
             }
-            _ => {}
+            _ => sum.pass(head.body_bytes)?,
         }
+        rest -= head.body_bytes;
+        end = head.end();
     }
-    let rest = &file[end..];
-    match (footer, rest) {
-        (true, rest) if rest == MAGIC => Ok(()),
-        (true, rest) if !MAGIC.starts_with(rest) => corrupt(format!(
-            "{} bytes after the footer are not those that end an MCAP file",
-            rest.len()
-        )),
-        (false, rest) if rest.ends_with(MAGIC) => {
+    sum.pass(rest)?;
+    let after = bytes - end;
+    let last = &sum.last[8 - after.min(8) as usize..];
+    match footer {
+        true if after == MAGIC.len() as u64 && last == MAGIC => Ok(()),
+        true if after >= MAGIC.len() as u64 || !MAGIC.starts_with(last) => {
+            corrupt(format!("{after} bytes after the footer are not those that end an MCAP file"))
+        }
+        false if after >= MAGIC.len() as u64 && last == MAGIC => {
             corrupt(format!("the record at byte {end} runs past the end of the file"))
         }
         _ => Err(Damage::Cut),
     }
 }
 
-/// Compares the CRC32 of `bytes` with the last four bytes of a record.
-fn check_crc(section: &str, bytes: &[u8], frame: Frame) -> Result<(), Damage> {
-    let Some(&saved) = frame.body().last_chunk() else {
-        return Err(Damage::Corrupt(format!("the record at byte {} has no CRC32", frame.start)));
-    };
-    let (saved, found) = (u32::from_le_bytes(saved), crc32fast::hash(bytes));
+/// Reads a file once, from its begin to its end, and sums it up.
+struct Sum<'a> {
+    file: &'a mut dyn Read,
+    crc: crc32fast::Hasher,
+    /// The last bytes that were read.
+    last: [u8; 8],
+}
+
+impl Sum<'_> {
+    fn head(&mut self) -> Result<[u8; HEAD]> {
+        let mut head = [0; HEAD];
+        self.file.read_exact(&mut head)?;
+        self.see(&head);
+        Ok(head)
+    }
+
+    /// Reads so many bytes.
+    fn pass(&mut self, mut bytes: u64) -> Result<()> {
+        let mut part = [0; 16 << 10];
+        while bytes > 0 {
+            let now = bytes.min(part.len() as u64) as usize;
+            self.file.read_exact(&mut part[..now])?;
+            self.see(&part[..now]);
+            bytes -= now as u64;
+        }
+        Ok(())
+    }
+
+    fn see(&mut self, bytes: &[u8]) {
+        self.crc.update(bytes);
+        let kept = bytes.len().min(8);
+        self.last.rotate_left(kept);
+        self.last[8 - kept..].copy_from_slice(&bytes[bytes.len() - kept..]);
+    }
+
+    /// The last four bytes, where a record has its checksum.
+    fn saved(&self) -> u32 {
+        let [.., a, b, c, d] = self.last;
+        u32::from_le_bytes([a, b, c, d])
+    }
+}
+
+/// Compares a CRC32 with the one that a record has in its last four bytes.
+fn check_crc(
+    section: &str,
+    found: crc32fast::Hasher,
+    head: Head,
+    saved: u32,
+) -> std::result::Result<(), Damage> {
+    if head.body_bytes < 4 {
+        return Err(Damage::Corrupt(format!("the record at byte {} has no CRC32", head.start)));
+    }
+    let found = found.finalize();
     if saved != 0 && saved != found {
         return Err(Damage::Corrupt(format!(
             "the {section} has CRC32 {found:08x}, not {saved:08x} as written"

@@ -22,6 +22,7 @@ mod envelope;
 mod error;
 mod foxglove;
 mod message;
+mod pieces;
 mod read;
 mod schema;
 mod write;
@@ -30,6 +31,7 @@ use std::collections::BTreeMap;
 
 pub use check::clock_jump;
 pub use error::LogError;
+pub use pieces::{LogReader, LogWriter};
 pub use read::Recovery;
 
 /// Name of the MCAP metadata record that holds [`FlightLog::metadata`].
@@ -105,7 +107,73 @@ impl FlightLog {
     }
 }
 
+impl FlightLog {
+    /// Appends the samples of a later piece of the same flight.
+    pub fn append(&mut self, piece: Self) {
+        for (name, piece) in piece.sources {
+            match self.sources.get_mut(&name) {
+                Some(source) if !source.time_s.is_empty() => source.append(&piece),
+                _ => drop(self.sources.insert(name, piece)),
+            }
+        }
+    }
+
+    /// Takes out what is before a time, s; what is left has the same channels.
+    pub fn split_before(&mut self, time_s: f64) -> Self {
+        let split = |(name, source): (&String, &mut Source)| {
+            let samples = source.time_s.partition_point(|sample_s| *sample_s < time_s);
+            (samples > 0).then(|| (name.clone(), source.take(samples)))
+        };
+        let sources = self.sources.iter_mut().filter_map(split).collect();
+        Self { metadata: BTreeMap::new(), sources }
+    }
+}
+
 impl Source {
+    /// Takes out the first samples.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    pub fn take(&mut self, samples: usize) -> Self {
+        let front = |values: &mut Vec<f64>, count| values.drain(..count).collect::<Vec<_>>();
+        let channels = self.channels.iter_mut().map(|(name, channel)| {
+            let width = channel.width;
+            let values = front(&mut channel.values, samples * width);
+            (name.clone(), Channel { width, values })
+        });
+        let channels = channels.collect();
+        Self { time_s: front(&mut self.time_s, samples), channels }
+    }
+
+    /// A copy of the samples from one on.
+    ///
+    /// # Panics
+    /// If there are fewer.
+    pub fn from_sample(&self, first: usize) -> Self {
+        let channels = self.channels.iter().map(|(name, channel)| {
+            let values = channel.values[first * channel.width..].to_vec();
+            (name.clone(), Channel { width: channel.width, values })
+        });
+        Self { time_s: self.time_s[first..].to_vec(), channels: channels.collect() }
+    }
+
+    /// Appends the samples of a later piece of the same source. A channel that one of the two lacks
+    /// has NaN there.
+    fn append(&mut self, piece: &Self) {
+        let (before, after) = (self.time_s.len(), piece.time_s.len());
+        self.time_s.extend_from_slice(&piece.time_s);
+        for (name, channel) in &piece.channels {
+            let own = self.channels.entry(name.clone()).or_insert_with(|| {
+                let values = vec![f64::NAN; before * channel.width];
+                Channel { width: channel.width, values }
+            });
+            own.values.extend_from_slice(&channel.values);
+        }
+        for channel in self.channels.values_mut() {
+            channel.values.resize((before + after) * channel.width, f64::NAN);
+        }
+    }
+
     /// Appends one sample: its time, s, and a row of every channel. The first sample makes the
     /// channels.
     ///

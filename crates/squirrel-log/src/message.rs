@@ -165,14 +165,15 @@ impl SourceReader {
         Ok((time_s, crc32))
     }
 
-    /// Name and source; a list channel that no message had is left out, for nobody knows its width.
-    pub(super) fn into_named(self) -> (String, Source) {
-        let channel = |column: Column| {
-            let width = column.width?;
-            Some((column.name, Channel { width, values: column.values }))
+    /// Takes out name and samples; a list channel that no message had is left out, for nobody knows
+    /// its width.
+    pub(super) fn take(&mut self) -> (String, Source) {
+        let channel = |column: &mut Column| {
+            let values = std::mem::take(&mut column.values);
+            Some((column.name.clone(), Channel { width: column.width?, values }))
         };
-        let channels = self.columns.into_iter().filter_map(channel).collect();
-        (self.name, Source { time_s: self.time_s, channels })
+        let channels = self.columns.iter_mut().filter_map(channel).collect();
+        (self.name.clone(), Source { time_s: std::mem::take(&mut self.time_s), channels })
     }
 }
 

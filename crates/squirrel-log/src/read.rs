@@ -18,7 +18,7 @@ use crate::files::{self, Budget, TooLarge};
 
 /// Largest record or unpacked chunk, far above the 1 MiB that is written: a wrong length in a
 /// damaged file does not eat the memory.
-const RECORD_MAX_BYTES: usize = 256 << 20;
+pub(super) const RECORD_MAX_BYTES: usize = 256 << 20;
 
 /// What [`FlightLog::recover`] found.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -112,10 +112,11 @@ fn load(
     wanted: &dyn Fn(&str) -> bool,
 ) -> Result<(FlightLog, Recovery, bool), LogError> {
     let (file, bytes) = open(path)?;
-    let cut = match envelope::check(&bytes) {
+    let cut = match envelope::check(&mut &*bytes, bytes.len() as u64) {
         Ok(()) => false,
         Err(Damage::Cut) => true,
         Err(Damage::Corrupt(what)) => return Err(LogError::Corrupt { file, what }),
+        Err(Damage::Io(error)) => return Err(LogError::Io { file, error }),
     };
     let mut reader = Reader::new(&file, wanted, Budget::of(bytes.len() as u64));
     let mut whole = MAGIC.len().min(bytes.len());
@@ -142,8 +143,8 @@ fn load(
 }
 
 /// Gathers a flight from the records of a file.
-struct Reader<'a> {
-    file: &'a str,
+pub(super) struct Reader<'a> {
+    file: String,
     wanted: &'a dyn Fn(&str) -> bool,
     budget: Budget,
     /// Of the metadata; logs of before have none.
@@ -166,25 +167,35 @@ enum Topic {
 }
 
 impl<'a> Reader<'a> {
-    fn new(file: &'a str, wanted: &'a dyn Fn(&str) -> bool, budget: Budget) -> Self {
-        let (schemas, topics) = (BTreeMap::new(), BTreeMap::new());
+    /// Records that it looks at. The others are chunks, indexes for random access, or nothing that
+    /// squirrel writes.
+    pub(super) const READS: [u8; 5] = [
+        mcap::records::op::CHANNEL,
+        mcap::records::op::HEADER,
+        mcap::records::op::MESSAGE,
+        mcap::records::op::METADATA,
+        mcap::records::op::SCHEMA,
+    ];
+
+    pub(super) fn new(file: &str, wanted: &'a dyn Fn(&str) -> bool, budget: Budget) -> Self {
+        let (file, schemas, topics) = (file.to_owned(), BTreeMap::new(), BTreeMap::new());
         Self { file, wanted, budget, has_checksum: false, metadata: None, schemas, topics }
     }
 
     fn too_large(&self, error: TooLarge) -> LogError {
-        LogError::TooLarge { file: self.file.to_owned(), error }
+        LogError::TooLarge { file: self.file.clone(), error }
     }
 
     fn corrupt(&self, what: impl std::fmt::Display) -> LogError {
-        LogError::Corrupt { file: self.file.to_owned(), what: what.to_string() }
+        LogError::Corrupt { file: self.file.clone(), what: what.to_string() }
     }
 
     fn foreign(&self, why: String) -> LogError {
-        LogError::Foreign { file: self.file.to_owned(), why }
+        LogError::Foreign { file: self.file.clone(), why }
     }
 
     /// One record of the file.
-    fn frame(&mut self, frame: Frame) -> Result<(), LogError> {
+    pub(super) fn frame(&mut self, frame: Frame) -> Result<(), LogError> {
         self.check_lengths(frame.opcode, frame.body())?;
         if frame.opcode != mcap::records::op::CHUNK {
             return self.record(frame.opcode, frame.body());
@@ -227,13 +238,11 @@ impl<'a> Reader<'a> {
 
     /// One record of the file or of a chunk in it.
     fn record(&mut self, opcode: u8, body: &[u8]) -> Result<(), LogError> {
-        use mcap::records::op::{CHANNEL, HEADER, MESSAGE, METADATA, SCHEMA};
-        // The others are indexes for random access, or nothing that squirrel writes.
-        if ![CHANNEL, HEADER, MESSAGE, METADATA, SCHEMA].contains(&opcode) {
+        if !Self::READS.contains(&opcode) {
             return Ok(());
         }
         self.check_lengths(opcode, body)?;
-        if opcode != MESSAGE {
+        if opcode != mcap::records::op::MESSAGE {
             self.budget.take(body.len() as u64).map_err(|error| self.too_large(error))?;
         }
         match mcap::parse_record(opcode, body).map_err(|error| self.corrupt(error))? {
@@ -251,7 +260,7 @@ impl<'a> Reader<'a> {
                 self.topics.insert(channel.id, topic);
             }
             Record::Message { header, data } => match self.topics.get_mut(&header.channel_id) {
-                Some(Topic::Source(source)) => source.push(self.file, &data, &mut self.budget)?,
+                Some(Topic::Source(source)) => source.push(&self.file, &data, &mut self.budget)?,
                 Some(Topic::Skipped) => {}
                 None => {
                     return Err(
@@ -294,20 +303,34 @@ impl<'a> Reader<'a> {
         SourceReader::new(topic, name, set).map(Topic::Source).map_err(|what| self.corrupt(what))
     }
 
-    fn finish(self) -> Result<FlightLog, LogError> {
-        let foreign = self.foreign(format!("no metadata record `{METADATA_NAME}`"));
-        let damaged = self.corrupt("the metadata does not match its CRC32");
-        let mut metadata = self.metadata.ok_or(foreign)?;
+    /// The metadata so far, if there are any.
+    ///
+    /// # Errors
+    /// [`LogError::Corrupt`]: they are not those that were written.
+    pub(super) fn metadata(&self) -> Result<Option<BTreeMap<String, String>>, LogError> {
+        let Some(mut metadata) = self.metadata.clone() else { return Ok(None) };
         let written = metadata.remove(METADATA_CRC);
         if written.map_or(self.has_checksum, |written| written != metadata_crc32(&metadata)) {
-            return Err(damaged);
+            return Err(self.corrupt("the metadata does not match its CRC32"));
         }
-        let sources = self.topics.into_values().filter_map(|topic| match topic {
-            Topic::Source(source) if !source.is_empty() => Some(source.into_named()),
+        Ok(Some(metadata))
+    }
+
+    /// Takes out the samples that are gathered; a source without one is left out.
+    pub(super) fn take(&mut self) -> FlightLog {
+        let sources = self.topics.values_mut().filter_map(|topic| match topic {
+            Topic::Source(source) if !source.is_empty() => Some(source.take()),
             _ => None,
         });
-        let log = FlightLog { metadata, sources: sources.collect() };
-        check::check(self.file, &log)?;
+        FlightLog { metadata: BTreeMap::new(), sources: sources.collect() }
+    }
+
+    fn finish(mut self) -> Result<FlightLog, LogError> {
+        let metadata = self.metadata()?;
+        let metadata = metadata
+            .ok_or_else(|| self.foreign(format!("no metadata record `{METADATA_NAME}`")))?;
+        let log = FlightLog { metadata, ..self.take() };
+        check::check(&self.file, &log)?;
         Ok(log)
     }
 }

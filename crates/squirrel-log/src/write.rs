@@ -1,16 +1,17 @@
 //! Writes a flight as an MCAP file: metadata first, then all samples in the order of time.
 
-use std::io::Cursor;
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
 use std::path::Path;
 
 use mcap::records::{MessageHeader, Metadata};
-use mcap::{McapError, WriteOptions};
+use mcap::{McapError, WriteOptions, Writer};
 
 use super::{
     FlightLog, LIBRARY, LogError, METADATA_CRC, METADATA_NAME, Source, check, foxglove, message,
     metadata_crc32, schema,
 };
-use crate::files::write_whole;
+use crate::files::Growing;
 
 /// A chunk is what a truncated file loses. It is closed by flight time, because only time bounds
 /// the loss for every mix of sources: 1 s is some 300 kB of a simulated flight and 2 kB of a GNSS
@@ -20,7 +21,10 @@ const CHUNK_NS: u64 = 1_000_000_000;
 /// Poses for the 3-D panel, at most 50 a second.
 const TRANSFORM_INTERVAL_NS: u64 = 20_000_000;
 
-type Writer = mcap::Writer<Cursor<Vec<u8>>>;
+/// Sources that begin in this time from the first sample on, s, have their topics at the begin of
+/// the file in the order of their names; one that begins later has its own where it begins. So the
+/// bytes of a flight are the same whether all of it is there or it is still flown.
+pub(super) const HEAD_S: f64 = 60.0;
 
 impl FlightLog {
     /// Writes the log as an MCAP file; equal logs give equal bytes.
@@ -40,69 +44,160 @@ impl FlightLog {
     pub fn write(&self, path: &Path) -> Result<(), LogError> {
         let file = path.display().to_string();
         check::check(&file, self)?;
-        let bytes = self.to_mcap(&file)?;
-        write_whole(path, &bytes).map_err(|error| LogError::Io { file, error })
+        let mut encoder = Encoder::at(path, &file, &self.metadata)?;
+        encoder
+            .put(self, f64::INFINITY)
+            .and_then(|()| encoder.finish())
+            .map_err(|error| refused(file, error))
     }
+}
 
-    fn to_mcap(&self, file: &str) -> Result<Vec<u8>, LogError> {
+/// What the disk or the MCAP writer said.
+pub(super) fn refused(file: String, error: McapError) -> LogError {
+    match error {
+        McapError::Io(error) => LogError::Io { file, error },
+        error => LogError::Mcap { file, error },
+    }
+}
+
+/// A log on its way into a file.
+pub(super) struct Encoder<W: Write + Seek> {
+    writer: Writer<W>,
+    /// For the 3-D panel, until they are written.
+    obstacles: Option<Vec<[f64; 3]>>,
+    topics: BTreeMap<String, Topic>,
+    chunk_start_ns: u64,
+}
+
+/// A source's topic.
+struct Topic {
+    id: u16,
+    /// Samples that are written.
+    samples: usize,
+    pose: Option<Pose>,
+}
+
+impl Encoder<Growing> {
+    /// Begins a file with the metadata.
+    ///
+    /// # Errors
+    /// [`LogError`]: obstacles that are none, or what the disk says.
+    pub(super) fn at(
+        path: &Path,
+        file: &str,
+        metadata: &BTreeMap<String, String>,
+    ) -> Result<Self, LogError> {
         let obstacles =
-            self.metadata.get("obstacles_json").map(|json| serde_json::from_str(json)).transpose();
-        let obstacles: Option<Vec<[f64; 3]>> =
+            metadata.get("obstacles_json").map(|json| serde_json::from_str(json)).transpose();
+        let obstacles =
             obstacles.map_err(|error| LogError::Obstacles { file: file.to_owned(), error })?;
-        self.encode(obstacles.as_deref())
-            .map_err(|error| LogError::Mcap { file: file.to_owned(), error })
+        let at = |error| LogError::Io { file: file.to_owned(), error };
+        let growing = Growing::at(path).map_err(at)?;
+        Self::new(growing, metadata, obstacles).map_err(|error| refused(file.to_owned(), error))
     }
 
-    fn encode(&self, obstacles: Option<&[[f64; 3]]>) -> Result<Vec<u8>, McapError> {
+    /// Ends the file, which takes its name.
+    pub(super) fn finish(mut self) -> Result<(), McapError> {
+        self.writer.finish()?;
+        Ok(self.writer.into_inner().becomes_whole()?)
+    }
+}
+
+impl<W: Write + Seek> Encoder<W> {
+    fn new(
+        to: W,
+        metadata: &BTreeMap<String, String>,
+        obstacles: Option<Vec<[f64; 3]>>,
+    ) -> Result<Self, McapError> {
         // The library string and one compression thread keep the bytes the same on every machine.
         let options = WriteOptions::new().library(LIBRARY).compression_threads(0);
-        let mut writer = options.create(Cursor::new(Vec::new()))?;
-        let mut metadata = self.metadata.clone();
+        let mut writer = options.create(to)?;
+        let mut metadata = metadata.clone();
         metadata.remove(METADATA_CRC);
         metadata.insert(METADATA_CRC.to_owned(), metadata_crc32(&metadata));
         writer.write_metadata(&Metadata { name: METADATA_NAME.to_owned(), metadata })?;
-        let mut tracks = Vec::new();
-        for (name, source) in self.sources.iter().filter(|(_, source)| !source.time_s.is_empty()) {
-            let set = schema::encode(name, source);
-            let id = add_topic(&mut writer, name, &schema::message_name(name), &set)?;
-            tracks.push(Track { source, next: 0, id, pose: Pose::of(name, source, &mut writer)? });
+        Ok(Self { writer, obstacles, topics: BTreeMap::new(), chunk_start_ns: 0 })
+    }
+
+    /// Writes the samples before a time, in the order of time. Those of the head must be in the
+    /// first log that is given ([`HEAD_S`]), and no log has samples that were given before.
+    pub(super) fn put(&mut self, log: &FlightLog, before_s: f64) -> Result<(), McapError> {
+        if self.topics.is_empty() {
+            self.head(log)?;
         }
-        let start_ns = tracks.iter().map(|track| time_ns(track.source.time_s[0])).min();
-        if let (Some(start_ns), Some(obstacles)) = (start_ns, obstacles) {
-            let set = foxglove::scene_schema();
-            let id = add_topic(&mut writer, foxglove::SCENE_TOPIC, foxglove::SCENE_SCHEMA, &set)?;
-            put(&mut writer, id, 0, start_ns, &foxglove::scene(start_ns, obstacles))?;
-        }
-        let mut chunk_start_ns = start_ns.unwrap_or(0);
-        while let Some(track) = next(&mut tracks) {
-            let index = track.next;
-            let now_ns = time_ns(track.source.time_s[index]);
-            if now_ns - chunk_start_ns >= CHUNK_NS {
-                writer.flush()?;
-                chunk_start_ns = now_ns;
-            }
-            put(&mut writer, track.id, index, now_ns, &message::encode(track.source, index))?;
-            if let Some(pose) = &mut track.pose {
-                pose.put(&mut writer, track.source, index, now_ns)?;
-            }
+        let sources = log.sources.iter().filter(|(_, source)| !source.time_s.is_empty());
+        let mut tracks: Vec<Track<'_>> =
+            sources.map(|(name, source)| Track { name, source, next: 0 }).collect();
+        while let Some(track) = next(&mut tracks, before_s) {
+            self.sample(track.name, track.source, track.next)?;
             track.next += 1;
         }
-        writer.finish()?;
-        Ok(writer.into_inner().into_inner())
+        Ok(())
+    }
+
+    /// The topics of what begins early, and the obstacles.
+    fn head(&mut self, log: &FlightLog) -> Result<(), McapError> {
+        let begins = |source: &Source| source.time_s.first().copied();
+        let Some(start_s) = log.sources.values().filter_map(begins).min_by(f64::total_cmp) else {
+            return Ok(());
+        };
+        for (name, source) in &log.sources {
+            if begins(source).is_some_and(|begin_s| begin_s < start_s + HEAD_S) {
+                self.topic(name, source)?;
+            }
+        }
+        let start_ns = time_ns(start_s);
+        self.chunk_start_ns = start_ns;
+        if let Some(obstacles) = self.obstacles.take() {
+            let set = foxglove::scene_schema();
+            let writer = &mut self.writer;
+            let id = add_topic(writer, foxglove::SCENE_TOPIC, foxglove::SCENE_SCHEMA, &set)?;
+            put(writer, id, 0, start_ns, &foxglove::scene(start_ns, &obstacles))?;
+        }
+        Ok(())
+    }
+
+    fn topic(&mut self, name: &str, source: &Source) -> Result<(), McapError> {
+        let set = schema::encode(name, source);
+        let id = add_topic(&mut self.writer, name, &schema::message_name(name), &set)?;
+        let pose = Pose::of(name, source, &mut self.writer)?;
+        self.topics.insert(name.to_owned(), Topic { id, samples: 0, pose });
+        Ok(())
+    }
+
+    fn sample(&mut self, name: &str, source: &Source, index: usize) -> Result<(), McapError> {
+        let now_ns = time_ns(source.time_s[index]);
+        if now_ns.saturating_sub(self.chunk_start_ns) >= CHUNK_NS {
+            self.writer.flush()?;
+            self.chunk_start_ns = now_ns;
+        }
+        if !self.topics.contains_key(name) {
+            self.topic(name, source)?;
+        }
+        let Some(topic) = self.topics.get_mut(name) else { return Ok(()) };
+        let writer = &mut self.writer;
+        put(writer, topic.id, topic.samples, now_ns, &message::encode(source, index))?;
+        topic.samples += 1;
+        if let Some(pose) = &mut topic.pose {
+            pose.put(writer, source, index, now_ns)?;
+        }
+        Ok(())
     }
 }
 
 /// A source on its way into the file.
 struct Track<'a> {
+    name: &'a str,
     source: &'a Source,
     next: usize,
-    id: u16,
-    pose: Option<Pose>,
 }
 
-/// The track with the earliest sample left; of equal times the first by source name.
-fn next<'a, 'b>(tracks: &'b mut [Track<'a>]) -> Option<&'b mut Track<'a>> {
-    let left = tracks.iter_mut().filter(|track| track.next < track.source.time_s.len());
+/// The track with the earliest sample left before a time; of equal times the first by source name.
+fn next<'a, 'b>(tracks: &'b mut [Track<'a>], before_s: f64) -> Option<&'b mut Track<'a>> {
+    let is_left = |track: &&mut Track<'_>| {
+        track.source.time_s.get(track.next).is_some_and(|time_s| *time_s < before_s)
+    };
+    let left = tracks.iter_mut().filter(is_left);
     left.min_by(|a, b| a.source.time_s[a.next].total_cmp(&b.source.time_s[b.next]))
 }
 
@@ -119,7 +214,11 @@ impl Pose {
     const ATTITUDE: &str = "q_ned_from_body_wxyz";
 
     /// `None` unless the source is `truth` and knows place and attitude.
-    fn of(name: &str, source: &Source, writer: &mut Writer) -> Result<Option<Self>, McapError> {
+    fn of(
+        name: &str,
+        source: &Source,
+        writer: &mut Writer<impl Write + Seek>,
+    ) -> Result<Option<Self>, McapError> {
         let has =
             |name, width| source.channels.get(name).is_some_and(|channel| channel.width == width);
         if name != "truth" || !has(Self::POSITION, 3) || !has(Self::ATTITUDE, 4) {
@@ -132,7 +231,7 @@ impl Pose {
 
     fn put(
         &mut self,
-        writer: &mut Writer,
+        writer: &mut Writer<impl Write + Seek>,
         source: &Source,
         index: usize,
         now_ns: u64,
@@ -153,17 +252,17 @@ impl Pose {
 }
 
 fn add_topic(
-    writer: &mut Writer,
+    writer: &mut Writer<impl Write + Seek>,
     topic: &str,
     schema_name: &str,
     set: &[u8],
 ) -> Result<u16, McapError> {
     let schema = writer.add_schema(schema_name, "protobuf", set)?;
-    writer.add_channel(schema, topic, "protobuf", &std::collections::BTreeMap::new())
+    writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())
 }
 
 fn put(
-    writer: &mut Writer,
+    writer: &mut Writer<impl Write + Seek>,
     channel_id: u16,
     index: usize,
     time_ns: u64,

@@ -4,6 +4,10 @@
 //! another vehicle file, to see what a changed gain would have done) and stepped with the recorded
 //! frames.
 
+mod pieces;
+
+pub use pieces::replay_pieces;
+
 use crate::arm::Arm;
 use crate::estimator::Estimator;
 use crate::flight::{self, Integrator, Setup};
@@ -13,6 +17,7 @@ use crate::weights::ParnnWeights;
 use squirrel_core::stack::StackState;
 use squirrel_log::FlightLog;
 use squirrel_log::flight_code::{ESTIMATE, frames, record_output};
+use std::collections::BTreeMap;
 
 /// Sources that the flight code writes, causes before consequences: of two that differ at one time,
 /// the first is named.
@@ -60,12 +65,20 @@ pub struct Replay {
 /// # Errors
 /// One line that names the metadata that is missing or cannot be used.
 pub fn setup(log: &FlightLog) -> Result<Setup, String> {
+    setup_of(&log.metadata)
+}
+
+/// As [`setup`], by a log's metadata alone.
+///
+/// # Errors
+/// As [`setup`].
+pub fn setup_of(metadata: &BTreeMap<String, String>) -> Result<Setup, String> {
     let text = |key: &str| {
-        log.metadata.get(key).ok_or_else(|| {
+        metadata.get(key).ok_or_else(|| {
             format!("metadata {key}: missing; the log was not recorded by squirrel fly")
         })
     };
-    let weights = log.metadata.get(flight::PARNN_WEIGHTS).map(|hex| {
+    let weights = metadata.get(flight::PARNN_WEIGHTS).map(|hex| {
         ParnnWeights::from_hex(&format!("metadata {}", flight::PARNN_WEIGHTS), hex)
             .map_err(|e| e.to_string())
     });
@@ -75,10 +88,8 @@ pub fn setup(log: &FlightLog) -> Result<Setup, String> {
         weights.transpose()?,
     )
     .map_err(|e| e.to_string())?;
-    vehicle.estimator = log
-        .metadata
-        .get(flight::ESTIMATOR)
-        .map_or(Ok(Estimator::External), |n| Estimator::parse(n))?;
+    vehicle.estimator =
+        metadata.get(flight::ESTIMATOR).map_or(Ok(Estimator::External), |n| Estimator::parse(n))?;
     let scenario = Scenario::parse(text("scenario_toml")?, "metadata scenario_toml")?;
     let integrator = Integrator::parse(text("integrator")?)?;
     Ok(Setup { vehicle, arm: Arm::parse(text("arm")?)?, scenario, integrator })

@@ -1,26 +1,27 @@
 //! `squirrel fly`: one scenario, one arm, one log.
 
 use super::hil::EmulatedM7;
-use super::{facts, figures, vehicle, view, write_log};
+use super::{commit, facts, figures, vehicle, view};
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use serde::Serialize;
 use squirrel_core::control::follow::FollowGains;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::Stack;
-use squirrel_log::FlightLog;
+use squirrel_log::{FlightLog, LogError, LogWriter};
 use squirrel_plan::pilot::offboard;
-use squirrel_report::flight::{Heading, render_with_scene};
+use squirrel_report::flight::{Heading, Shown, render_with_scene};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{
-    FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Setup,
+    FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Recipient, Recording, Setup,
 };
 use squirrel_sim::scenario::{Conditions, MissionTable, Scenario};
 use squirrel_sim::track::Track;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_sim::weights::PolicyWeights;
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// Options of a flight.
 #[derive(Debug, clap::Args)]
@@ -99,6 +100,54 @@ struct Flown {
     metrics: Metrics,
 }
 
+/// Where a flight goes while it is flown.
+struct Recorded<'a> {
+    out: Option<&'a Path>,
+    writer: Option<LogWriter>,
+    /// For the report.
+    shown: Option<Shown>,
+    /// Why the log could not be written.
+    refused: Option<String>,
+}
+
+impl Recorded<'_> {
+    fn written<T>(&mut self, result: Result<T, LogError>) -> Result<T, FlightError> {
+        result.map_err(|problem| {
+            self.refused = Some(problem.to_string());
+            FlightError(problem.to_string())
+        })
+    }
+
+    /// The log has its name.
+    fn finish(&mut self) -> Result<(), String> {
+        if let (Some(writer), Some(path)) = (self.writer.take(), self.out) {
+            writer.finish().map_err(|e| e.to_string())?;
+            talk(&format!("wrote {}", path.display()));
+        }
+        Ok(())
+    }
+}
+
+impl Recipient for Recorded<'_> {
+    fn begin(&mut self, metadata: &BTreeMap<String, String>) -> Result<(), FlightError> {
+        let Some(path) = self.out else { return Ok(()) };
+        let mut metadata = metadata.clone();
+        metadata.extend([commit()]);
+        let writer = LogWriter::at(path, &metadata);
+        self.writer = Some(self.written(writer)?);
+        Ok(())
+    }
+
+    fn take(&mut self, piece: FlightLog, now_s: f64) -> Result<(), FlightError> {
+        if let Some(shown) = &mut self.shown {
+            shown.push(&piece);
+        }
+        let Some(writer) = &mut self.writer else { return Ok(()) };
+        let pushed = writer.push(piece, now_s);
+        self.written(pushed)
+    }
+}
+
 /// How far from the start of a scenario a plan may begin, m.
 const START_M: f64 = 1.0;
 
@@ -166,6 +215,42 @@ impl Fly {
             .writes("--json", &self.json)
     }
 
+    /// A problem that its vehicle has, by the file that it is from.
+    fn of_vehicle(&self, problem: &FlightError) -> String {
+        match &self.vehicle {
+            Some(file) => format!("{}: {problem}", file.display()),
+            None => problem.to_string(),
+        }
+    }
+
+    /// Writes the report.
+    fn report(
+        &self,
+        setup: &Setup,
+        who: &str,
+        shown: &Shown,
+        cells: Vec<(String, String)>,
+        path: &Path,
+    ) -> Result<(), String> {
+        let mut facts = facts(setup);
+        if shown.every() > 1 {
+            let of = format!("every {}th sample, the flight is long", shown.every());
+            facts.push(("shown".to_owned(), of));
+        }
+        let heading = Heading {
+            title: format!("{}: {who}", setup.scenario.name),
+            lead: String::new(),
+            facts,
+            card: setup.scenario.pilot_card().map_err(|e| e.to_string())?.unwrap_or_default(),
+        };
+        let log = shown.log();
+        let scene = super::view::scene_of(&[(setup, log)])?;
+        let html = render_with_scene(&heading, &[view(setup, log, cells)], &scene);
+        output::write_file(path, html.as_bytes())?;
+        talk(&format!("wrote {}", path.display()));
+        Ok(())
+    }
+
     pub(crate) fn run(&self) -> Result<(), String> {
         self.paths().check()?;
         let mut scenario = Scenario::find(&self.scenario)?;
@@ -198,10 +283,7 @@ impl Fly {
             scenario,
             integrator: Integrator::parse(&self.integrator)?,
         };
-        let stack = setup.stack().map_err(|e| match &self.vehicle {
-            Some(file) => format!("{}: {e}", file.display()),
-            None => e.to_string(),
-        })?;
+        let stack = setup.stack().map_err(|e| self.of_vehicle(&e))?;
         let weights = self
             .policy
             .as_deref()
@@ -218,24 +300,35 @@ impl Fly {
         };
         let policy = weights.as_ref().map(PolicyWeights::hash);
         let mut pilot = offboard_of(&setup, &stack, weights, track).map_err(|e| e.to_string())?;
-        let record = self.out.is_some() || self.report.is_some();
+        let mut recorded = Recorded {
+            out: self.out.as_deref(),
+            writer: None,
+            shown: self.report.is_some().then(Shown::default),
+            refused: None,
+        };
         let bar = output::progress((setup.scenario.duration_s * 10.0) as u64, "x 0.1 s");
         let progress = |t: f64| bar.set_position((t * 10.0) as u64);
         let pilot = pilot.as_mut().map(|pilot| &mut **pilot as &mut dyn Offboard);
+        let recording = if self.out.is_some() || self.report.is_some() {
+            Recording::Given(&mut recorded)
+        } else {
+            Recording::None
+        };
         let flown = match self.hil {
-            None => setup.fly_on(&mut InProcess::new(stack), pilot, record, progress),
-            Some(Hil::Qemu) => setup.fly_on(
+            None => setup.fly_recorded(&mut InProcess::new(stack), pilot, recording, progress),
+            Some(Hil::Qemu) => setup.fly_recorded(
                 &mut EmulatedM7::start(&self.hil_image, &stack)?,
                 pilot,
-                record,
+                recording,
                 progress,
             ),
         };
         bar.finish_and_clear();
-        let mut flight = flown.map_err(|e| match &self.vehicle {
-            Some(file) => format!("{}: {e}", file.display()),
-            None => e.to_string(),
-        })?;
+        let flight = match flown {
+            Ok(flight) => flight,
+            // What is wrong with the log is not the vehicle's.
+            Err(e) => return Err(recorded.refused.take().unwrap_or_else(|| self.of_vehicle(&e))),
+        };
         let ratio = setup.thrust_to_weight();
         say(&format!(
             "{} flies {} with {who}, seed {}, effective thrust-to-weight {ratio:.2}\n",
@@ -251,27 +344,9 @@ impl Fly {
                 "no encounter in duration_s = {duration_s}: the figures are of the whole flight"
             ));
         }
-        if let Some(log) = &mut flight.log {
-            if let Some(path) = &self.out {
-                write_log(log, path)?;
-                talk(&format!("wrote {}", path.display()));
-            }
-            if let Some(path) = &self.report {
-                let heading = Heading {
-                    title: format!("{}: {who}", setup.scenario.name),
-                    lead: String::new(),
-                    facts: facts(&setup),
-                    card: setup
-                        .scenario
-                        .pilot_card()
-                        .map_err(|e| e.to_string())?
-                        .unwrap_or_default(),
-                };
-                let scene = super::view::scene_of(&[(&setup, log)])?;
-                let html = render_with_scene(&heading, &[view(&setup, log, cells)], &scene);
-                output::write_file(path, html.as_bytes())?;
-                talk(&format!("wrote {}", path.display()));
-            }
+        recorded.finish()?;
+        if let (Some(shown), Some(path)) = (&recorded.shown, &self.report) {
+            self.report(&setup, &who, shown, cells, path)?;
         }
         let result = Flown {
             vehicle: setup.vehicle.name.clone(),

@@ -30,9 +30,13 @@ fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
 
 /// Writes a log that says which commit of the program flew.
 fn write_log(log: &mut FlightLog, path: &Path) -> Result<(), String> {
-    log.metadata
-        .insert("git".to_owned(), option_env!("SQUIRREL_COMMIT").unwrap_or("unknown").to_owned());
+    log.metadata.extend([commit()]);
     log.write(path).map_err(|e| e.to_string())
+}
+
+/// Metadata: the commit of the program.
+fn commit() -> (String, String) {
+    ("git".to_owned(), option_env!("SQUIRREL_COMMIT").unwrap_or("unknown").to_owned())
 }
 
 /// The table columns that every flight has: name with unit, and the figure.

@@ -3,7 +3,8 @@
 use crate::output::{self, say};
 use crate::paths::Paths;
 use serde::Serialize;
-use squirrel_log::FlightLog;
+use squirrel_log::{FlightLog, LogReader};
+use squirrel_sim::flight::Setup;
 use squirrel_sim::replay;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::PathBuf;
@@ -31,17 +32,37 @@ struct Replayed<'a> {
 }
 
 impl Replay {
+    /// What flies: the log's own setup, with another vehicle where one is asked for.
+    fn setup(&self, mut setup: Setup) -> Result<Setup, String> {
+        if let Some(path) = &self.vehicle {
+            setup.vehicle = VehicleFile::load(path).map_err(|e| e.to_string())?;
+        }
+        Ok(setup)
+    }
+
     pub(crate) fn run(&self) -> Result<(), String> {
         let paths =
             Paths::default().reads("FLIGHT", [&self.flight]).vehicle("--vehicle", &self.vehicle);
         paths.writes("--json", &self.json).check()?;
         let file = self.flight.display();
-        let log = FlightLog::read(&self.flight).map_err(|e| e.to_string())?;
-        let mut setup = replay::setup(&log).map_err(|e| format!("{file}: {e}"))?;
-        if let Some(path) = &self.vehicle {
-            setup.vehicle = VehicleFile::load(path).map_err(|e| e.to_string())?;
-        }
-        let replay = replay::replay(&log, &setup).map_err(|e| format!("{file}: {e}"))?;
+        let at = |problem| format!("{file}: {problem}");
+        let in_pieces = match LogReader::open(&self.flight).map_err(|e| e.to_string())? {
+            None => None,
+            Some(mut log) => {
+                let setup = self.setup(replay::setup_of(log.metadata()).map_err(at)?)?;
+                let replay = replay::replay_pieces(&mut log, &setup).map_err(at)?;
+                replay.map(|replay| (setup, replay))
+            }
+        };
+        let (setup, replay) = match in_pieces {
+            Some(both) => both,
+            None => {
+                let log = FlightLog::read(&self.flight).map_err(|e| e.to_string())?;
+                let setup = self.setup(replay::setup(&log).map_err(at)?)?;
+                let replay = replay::replay(&log, &setup).map_err(at)?;
+                (setup, replay)
+            }
+        };
         let result = Replayed {
             flight: file.to_string(),
             arm: setup.arm.name(),

@@ -1,5 +1,7 @@
 //! Killed at whatever moment: under every name stands the old file whole or the new one whole, and
 //! the same command then goes through.
+//!
+//! `cargo xtask kill COUNT SEED` kills more often.
 #![cfg(unix)]
 
 use crate::support::{Folder, MAP, SQUIRREL};
@@ -9,8 +11,27 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-/// Kills of each command; each waits a little longer than the one before, up to the whole run.
-const KILLS: u32 = 12;
+/// Kills of each command in a test; the chore takes more.
+const KILLS_IN_TESTS: u64 = 12;
+/// Of so many kills the last one is followed by the whole run.
+const RESUMED_EVERY: u64 = 6;
+/// The first moment of a kill, and the last one in doublings of it: from nothing to long after the
+/// end, however busy the machine is.
+const MOMENT: (Duration, f64) = (Duration::from_micros(300), 13.0);
+
+/// A number that the chore sets.
+fn asked(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| text.parse().unwrap())
+}
+
+/// When the kth kill comes: moments are spread evenly over all orders of magnitude, however many
+/// there are, and no two are the same.
+fn moment(seed: u64, k: u64) -> Duration {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let (first, doublings) = MOMENT;
+    let place = (GOLDEN * (1000.0 * seed as f64 + k as f64)).fract();
+    first.mul_f64((doublings * place).exp2())
+}
 
 /// Names and bytes of the files below a folder, but for what a kill leaves under names of nobody.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
@@ -51,8 +72,10 @@ fn is_killed(folder: &Folder, arguments: &[&str], before: &[&str], grows: fn(&st
     let new = run(arguments);
     fs::remove_dir_all(&out).unwrap();
     let old = run(before);
+    let (kills, seed) =
+        (asked("SQUIRREL_KILL_COUNT", KILLS_IN_TESTS), asked("SQUIRREL_KILL_SEED", 1));
     let mut killed = 0;
-    for k in 0..KILLS {
+    for k in 0..kills {
         fs::remove_dir_all(&out).unwrap();
         for (name, bytes) in &old {
             let path = out.join(name);
@@ -68,9 +91,8 @@ fn is_killed(folder: &Folder, arguments: &[&str], before: &[&str], grows: fn(&st
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        // From nothing to long after its end, however busy the machine is.
-        std::thread::sleep(Duration::from_micros(300 * 2_u64.pow(k)));
-        killed += u32::from(child.try_wait().unwrap().is_none());
+        std::thread::sleep(moment(seed, k));
+        killed += u64::from(child.try_wait().unwrap().is_none());
         child.kill().unwrap();
         child.wait().unwrap();
         for (name, bytes) in files(&out) {
@@ -78,9 +100,16 @@ fn is_killed(folder: &Folder, arguments: &[&str], before: &[&str], grows: fn(&st
             let is_whole = [&old, &new].iter().any(|all| all.get(&name) == Some(&bytes));
             assert!(is_whole || is_part, "{arguments:?}, kill {k}: {name} is neither");
         }
+        if k % RESUMED_EVERY == RESUMED_EVERY - 1 || k + 1 == kills {
+            assert_eq!(
+                run(arguments),
+                new,
+                "{arguments:?}, kill {k}: does not go through after it"
+            );
+        }
     }
+    println!("{}: {killed} of {kills} kills while it ran", arguments[0]);
     assert!(killed > 0, "{arguments:?}: always over before it could be killed");
-    assert_eq!(run(arguments), new, "{arguments:?}: does not go through afterwards");
 }
 
 fn never(_: &str) -> bool {

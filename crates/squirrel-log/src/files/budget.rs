@@ -41,8 +41,16 @@ pub struct TooLarge {
 impl Budget {
     /// Of a file of so many bytes.
     pub fn of(file_bytes: u64) -> Self {
+        let by_size = Self::by_size(file_bytes);
+        let most = asked_bytes().unwrap_or(by_size.most.min(TOTAL_MAX_BYTES));
+        Self { most, left: most }
+    }
+
+    /// Of a file of so many bytes whose content is not held but looked at as it comes: bounded by the
+    /// size of the file alone.
+    pub fn by_size(file_bytes: u64) -> Self {
         let by_ratio = file_bytes.saturating_mul(RATIO_MAX).max(ALWAYS_BYTES);
-        let most = asked_bytes().unwrap_or(by_ratio.min(TOTAL_MAX_BYTES));
+        let most = asked_bytes().unwrap_or(by_ratio);
         Self { most, left: most }
     }
 

@@ -13,4 +13,4 @@ pub use budget::{Budget, TooLarge};
 pub use lock::Lock;
 pub use place::FileId;
 pub use read::{begin, open, read, read_text};
-pub use write::{append, folder, writable, write_whole};
+pub use write::{Growing, append, folder, writable, write_whole};

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 const LINKS_MAX: usize = 40;
 
 /// Where what is written under a path goes.
+#[derive(Debug)]
 pub(super) enum Place {
     /// A file, or none yet: no link any more.
     File(PathBuf),

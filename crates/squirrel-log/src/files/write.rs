@@ -4,7 +4,7 @@ use super::place::{Place, place};
 use std::collections::hash_map::RandomState;
 use std::fs::{File, OpenOptions};
 use std::hash::BuildHasher;
-use std::io::{ErrorKind, Result, Write};
+use std::io::{BufWriter, Cursor, ErrorKind, Result, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 /// Names that are tried before giving up: the first is free but for an attacker who guesses it.
@@ -24,7 +24,16 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
             partial.file.write_all(content)?;
             partial.becomes(&path)
         }
-        Place::Open(path) => OpenOptions::new().append(true).open(path)?.write_all(content),
+        open => write_open(open, content),
+    }
+}
+
+/// What has no name to take: content goes behind what is there.
+fn write_open(place: Place, content: &[u8]) -> Result<()> {
+    match place {
+        Place::File(path) | Place::Open(path) => {
+            OpenOptions::new().append(true).open(path)?.write_all(content)
+        }
         // Opened anew, a file behind them would be written from its begin, or over what is printed
         // later.
         Place::Stdout => {
@@ -32,6 +41,69 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
             stdout.write_all(content).and_then(|()| stdout.flush())
         }
         Place::Stderr => std::io::stderr().write_all(content),
+    }
+}
+
+/// A file that is written piece by piece, and has its name when all of it is there, as
+/// [`write_whole`] gives it. Dropped before, it leaves nothing behind.
+#[derive(Debug)]
+pub struct Growing(To);
+
+#[derive(Debug)]
+enum To {
+    File(BufWriter<Partial>, PathBuf),
+    /// Who writes piece by piece goes back in it, which a pipe cannot: it gets all at the end.
+    Open(Cursor<Vec<u8>>, Place),
+}
+
+impl Growing {
+    /// With nothing in it yet.
+    ///
+    /// # Errors
+    /// What the disk says.
+    pub fn at(path: &Path) -> Result<Self> {
+        Ok(Self(match place(path)? {
+            Place::File(path) => To::File(BufWriter::new(Partial::beside(&path)?), path),
+            open => To::Open(Cursor::new(Vec::new()), open),
+        }))
+    }
+
+    /// All of it is there: it takes its name.
+    ///
+    /// # Errors
+    /// What the disk says.
+    pub fn becomes_whole(self) -> Result<()> {
+        match self.0 {
+            To::File(file, path) => {
+                file.into_inner().map_err(std::io::IntoInnerError::into_error)?.becomes(&path)
+            }
+            To::Open(content, place) => write_open(place, content.get_ref()),
+        }
+    }
+}
+
+impl Write for Growing {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        match &mut self.0 {
+            To::File(file, _) => file.write(bytes),
+            To::Open(content, _) => content.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        match &mut self.0 {
+            To::File(file, _) => file.flush(),
+            To::Open(..) => Ok(()),
+        }
+    }
+}
+
+impl Seek for Growing {
+    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
+        match &mut self.0 {
+            To::File(file, _) => file.seek(to),
+            To::Open(content, _) => content.seek(to),
+        }
     }
 }
 
@@ -64,6 +136,7 @@ pub fn folder(path: &Path) -> Result<()> {
 }
 
 /// A file under a temporary name, which is gone with this unless it got its own.
+#[derive(Debug)]
 struct Partial {
     file: File,
     path: PathBuf,
@@ -125,6 +198,22 @@ impl Partial {
             let _ = File::open(folder).and_then(|folder| folder.sync_all());
         }
         Ok(())
+    }
+}
+
+impl Write for Partial {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for Partial {
+    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
+        self.file.seek(to)
     }
 }
 

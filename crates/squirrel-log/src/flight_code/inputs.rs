@@ -151,6 +151,33 @@ fn scalar(channel: &mut Option<(Cursor<'_>, &Channel)>, t: f64) -> Option<f32> {
 /// # Errors
 /// A channel that a frame needs and the log lacks or holds in another shape.
 pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
+    Frames::new(log.sources.contains_key(ESTIMATE)).of(log)
+}
+
+/// Frames of a log that is read in pieces.
+#[derive(Debug, Clone)]
+pub struct Frames {
+    /// Those of the last frame.
+    obstacles: Vec<Obstacle>,
+    estimates: bool,
+}
+
+impl Frames {
+    /// Of a flight code that estimates the attitude itself, or does not.
+    pub fn new(estimates: bool) -> Self {
+        Self { obstacles: Vec::new(), estimates }
+    }
+
+    /// The frames of the next piece, which has all samples of its steps.
+    ///
+    /// # Errors
+    /// As [`frames`].
+    pub fn of(&mut self, log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
+        frames_of(log, self)
+    }
+}
+
+fn frames_of(log: &FlightLog, before: &mut Frames) -> Result<Vec<SensorFrame>, InputError> {
     let channel = |name: &str, width: usize| match log.channel(name) {
         None => Ok(None),
         Some((_, c)) if c.width != width => {
@@ -175,11 +202,7 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
     let mut imu_2 = channel("imu_2.omega_body_rad_s", 3)?;
     let force_2 = channel("imu_2.specific_force_body_m_s2", 3)?;
     // Where the flight code estimates, an attitude in the log is its own.
-    let attitude_name = if log.sources.contains_key(ESTIMATE) {
-        None
-    } else {
-        Some("attitude.q_ned_from_body_wxyz")
-    };
+    let attitude_name = (!before.estimates).then_some("attitude.q_ned_from_body_wxyz");
     let mut attitude = attitude_name.map_or(Ok(None), |name| channel(name, 4))?;
     let mut gnss = channel("gnss.position_ned_m", 3)?;
     let velocity = channel("gnss.velocity_ned_m_s", 3)?;
@@ -191,7 +214,7 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
     let mut command = channel(&format!("offboard.{COMMAND}"), 4)?;
 
     let narrow = |row: &[f64]| Vector3::new(row[0] as f32, row[1] as f32, row[2] as f32);
-    let mut obstacles: Vec<Obstacle> = Vec::new();
+    let obstacles = &mut before.obstacles;
     let mut all = Vec::with_capacity(times.len());
     for (t, us) in times.iter().zip(&time_us.values) {
         let mut frame = SensorFrame::empty(*us as u64);
@@ -229,11 +252,11 @@ pub fn frames(log: &FlightLog) -> Result<Vec<SensorFrame>, InputError> {
             && let Some(i) = cursor.at(*t)
         {
             let present = rows.row(i).chunks_exact(3).filter(|r| r[0] >= 0.0);
-            obstacles = present
+            *obstacles = present
                 .map(|r| Obstacle { id: r[0] as u32, north_m: r[1] as f32, east_m: r[2] as f32 })
                 .collect();
         }
-        frame.set_obstacles(&obstacles);
+        frame.set_obstacles(obstacles);
         if let Some((cursor, force)) = &mut wing_force
             && let Some(i) = cursor.at(*t)
         {

@@ -7,7 +7,7 @@
 mod inputs;
 mod outputs;
 
-pub use inputs::{INPUT_SOURCES, InputError, Inputs, frames};
+pub use inputs::{Frames, INPUT_SOURCES, InputError, Inputs, frames};
 pub use outputs::{Moved, record_output, record_reference};
 
 use squirrel_core::nalgebra::Vector3;

@@ -89,6 +89,7 @@ mod meter;
 mod names;
 mod number;
 mod parquet_file;
+mod parquet_split;
 mod report;
 mod rows;
 mod table;

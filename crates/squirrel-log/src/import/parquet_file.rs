@@ -6,7 +6,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use parquet::basic::{ConvertedType, Encoding};
+use parquet::basic::{ConvertedType, Encoding, Type};
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
@@ -17,6 +17,7 @@ use parquet::schema::types::ColumnDescriptor;
 
 use super::error::ImportError;
 use super::meter::Meter;
+use super::parquet_split;
 use super::table::{Table, TableFile, checked, places};
 use crate::files::{self, Budget};
 
@@ -73,7 +74,12 @@ impl<'a> ParquetFile<'a> {
             })?;
             let pages =
                 group.get_column_page_reader(place).map_err(|error| damaged(&self.name, &error))?;
-            let pages = Box::new(Pages { inner: pages, has_dictionary: false });
+            let value_bytes = match descriptor.physical_type() {
+                Type::INT64 | Type::DOUBLE => 8,
+                _ => 4,
+            };
+            let level = descriptor.max_def_level();
+            let pages = Box::new(Pages { inner: pages, has_dictionary: false, value_bytes, level });
             match numbers(get_column_reader(descriptor.clone(), pages), &descriptor, &mut values) {
                 Ok(true) => {}
                 Ok(false) => {
@@ -218,6 +224,10 @@ fn append<T: DataType>(
 struct Pages {
     inner: Box<dyn PageReader>,
     has_dictionary: bool,
+    /// Bytes of one value.
+    value_bytes: usize,
+    /// Definition level of a value that is there.
+    level: i16,
 }
 
 impl Iterator for Pages {
@@ -232,6 +242,7 @@ impl PageReader for Pages {
     fn get_next_page(&mut self) -> Result<Option<Page>, ParquetError> {
         let page = self.inner.get_next_page()?;
         if let Some(page) = &page {
+            parquet_split::check(page, self.value_bytes, self.level)?;
             let needs_dictionary =
                 matches!(page.encoding(), Encoding::PLAIN_DICTIONARY | Encoding::RLE_DICTIONARY);
             self.has_dictionary |= page.is_dictionary_page();

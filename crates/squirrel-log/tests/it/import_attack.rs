@@ -32,8 +32,21 @@ const CHILD_KIB: u64 = (192 + 64) << 10;
 /// Processor time of a thousand files, s: a hang of 5 s shows.
 const CHILD_S: u64 = 5;
 
-const KINDS: [&str; 10] =
-    ["ulog", "ulog-map", "ardupilot", "blackbox", "usd", "csv", "parquet", "map", "mcap", "bag"];
+const KINDS: [&str; 11] = [
+    "ulog",
+    "ulog-map",
+    "ardupilot",
+    "blackbox",
+    "usd",
+    "csv",
+    "parquet",
+    "map",
+    "map-table",
+    "mcap",
+    "bag",
+];
+
+const TABLE: &str = "t,x,y,z\n1,2,3,4\n2,3,4,5\n3.5,-1e-3,nan,7\n";
 
 const CRAZYPAD: &str = include_str!("../../../../vehicles/maps/crazypad.toml");
 
@@ -51,8 +64,9 @@ fn good(kind: &str) -> Vec<u8> {
         "mcap" => return own_log(),
         "bag" => return fs::read(data("ros/ros.mcap")).unwrap(),
         "usd" => return fs::read(data("crazypad/E8_log00.bin")).unwrap(),
-        "csv" => "t,x,y,z\n1,2,3,4\n2,3,4,5\n3.5,-1e-3,nan,7\n".repeat(3).into_bytes(),
+        "csv" => TABLE.repeat(3).into_bytes(),
         "map" => CRAZYPAD.as_bytes().to_vec(),
+        "map-table" => one_source(OMEGA).into_bytes(),
         "parquet" => {
             let column = || (0..40).map(|i| Some(i as f32)).collect();
             return parquet_bytes(
@@ -120,9 +134,16 @@ fn read(kind: &str, path: &Path) {
         }
         "usd" => by_map(CRAZYPAD),
         "csv" | "parquet" => by_map(&one_source(OMEGA)),
+        // A map that is taken reads the file that it was made for.
         _ => {
-            if let Ok(text) = fs::read_to_string(path) {
-                let _ = ImportMap::parse(&text, "map");
+            let Ok(text) = fs::read_to_string(path) else { return };
+            let Ok(map) = ImportMap::parse(&text, "map") else { return };
+            if kind == "map" {
+                let _ = import(&map, &[data("crazypad/E8_log00.bin")]);
+            } else {
+                let table = path.with_extension("csv");
+                fs::write(&table, TABLE).unwrap();
+                let _ = import(&map, &[table]);
             }
         }
     }

@@ -3,8 +3,11 @@
 //! Reads `truth.*`, `reference.*`, `wing.*` and `control.*` of each log. A log may lack any of
 //! them: the panel then names the missing channel and shows the other arms.
 mod curves;
+mod shown;
 mod time;
 mod tracks;
+
+pub use shown::Shown;
 
 use super::chart::{Ink, LARGEST};
 use super::page::{Columns, Page, Row};

@@ -19,6 +19,7 @@ pub use metrics::{Flags, Metrics, OVER_RAD};
 pub use offboard::{Follower, Offboard};
 pub use pilot::Pilot;
 pub(crate) use record::{ESTIMATOR, PARNN_WEIGHTS};
+pub use record::{Recipient, Recording};
 
 use crate::arm::Arm;
 use crate::estimator::Estimator;
@@ -268,8 +269,23 @@ impl Setup {
     pub fn fly_on(
         &self,
         computer: &mut dyn FlightComputer,
-        mut pilot: Option<&mut dyn Offboard>,
+        pilot: Option<&mut dyn Offboard>,
         record: bool,
+        progress: impl FnMut(f64),
+    ) -> Result<Flight, FlightError> {
+        let recording = if record { Recording::Whole } else { Recording::None };
+        self.fly_recorded(computer, pilot, recording, progress)
+    }
+
+    /// As [`Setup::fly_on`], where somebody may take what is recorded.
+    ///
+    /// # Errors
+    /// As [`Setup::fly_on`], and what who takes it says.
+    pub fn fly_recorded(
+        &self,
+        computer: &mut dyn FlightComputer,
+        mut pilot: Option<&mut dyn Offboard>,
+        recording: Recording<'_>,
         mut progress: impl FnMut(f64),
     ) -> Result<Flight, FlightError> {
         self.check()?;
@@ -296,8 +312,8 @@ impl Setup {
         let mut air = velocity_of(&winds);
         let mut sensors = Sensors::new(self.sensors(), plant.effects(), seed);
         let mut metrics = metrics::Meter::new(&self.scenario);
-        let mut recorder = record
-            .then(|| record::Recorder::new(self, pilot.as_deref(), plant.vehicle().rotors().len()));
+        let rotors = plant.vehicle().rotors().len();
+        let mut recorder = record::Recorder::new(self, pilot.as_deref(), rotors, recording)?;
         let hover = Command { rotor: [hover_command(plant.vehicle()); MAX_ROTORS], wing: [0.0; 2] };
         let mut commands = CommandLine::new(plant.effects().command_latency_s(), hover);
         let (mut tick, mut last_tick_us) = (0u64, 0u64);
@@ -354,7 +370,7 @@ impl Setup {
                         &state,
                         total_wind(plant.acting(), &state.body, air),
                         plant.wing_force(&state, air, state.deployment()),
-                    );
+                    )?;
                 }
                 if tick % (CONTROL_RATE_HZ / 10) == 0 {
                     progress(time_us as f64 * 1e-6);
@@ -376,7 +392,8 @@ impl Setup {
                 (state.body.velocity - before) * (1.0 / dt_s) - In::new(Vector3::z() * GRAVITY_M_S2)
             });
         }
-        Ok(Flight { metrics: metrics.finish(), log: recorder.map(record::Recorder::finish) })
+        let log = recorder.map_or(Ok(None), record::Recorder::finish)?;
+        Ok(Flight { metrics: metrics.finish(), log })
     }
 
     /// What went wrong in a flight, of which vehicle and when.
