@@ -80,7 +80,7 @@ impl Lab {
             let seconds = 60 * minutes;
             self.write(
                 "s.toml",
-                &format!("name = \"long\"\nduration_s = {seconds}.0\n[mission.circle]\nradius_m = 6.0\nspeed_m_s = 4.0\n"),
+                &format!("name = \"long\"\nduration_s = {seconds}.0\nheight_m = 30.0\n[mission]\nkind = \"circle\"\nradius_m = 6.0\nspeed_m_s = 4.0\n"),
             )?;
             self.write("rows.csv", &rows_of(seconds))?;
             let import = ["import", "--map", "map.toml", "rows.csv", "--out", "o.mcap"];
@@ -97,7 +97,7 @@ impl Lab {
     fn flights(&self, most: u32) -> Result<Row, String> {
         self.write(
             "s.toml",
-            "name = \"short\"\nduration_s = 20.0\n[mission.circle]\nradius_m = 6.0\nspeed_m_s = 4.0\n",
+            "name = \"short\"\nduration_s = 20.0\nheight_m = 30.0\n[mission]\nkind = \"circle\"\nradius_m = 6.0\nspeed_m_s = 4.0\n",
         )?;
         // Flights of a vehicle with effects that the file does not know: the whole workflow has work.
         let vehicles = root()?.join("vehicles");

@@ -130,6 +130,9 @@ impl Recorded<'_> {
 
 impl Recipient for Recorded<'_> {
     fn begin(&mut self, metadata: &BTreeMap<String, String>) -> Result<(), FlightError> {
+        if let Some(shown) = &mut self.shown {
+            shown.begin(metadata);
+        }
         let Some(path) = self.out else { return Ok(()) };
         let mut metadata = metadata.clone();
         metadata.extend([commit()]);

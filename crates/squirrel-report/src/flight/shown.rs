@@ -29,6 +29,11 @@ pub struct Shown {
 }
 
 impl Shown {
+    /// Takes what is said of the flight: obstacles, for one.
+    pub fn begin(&mut self, metadata: &BTreeMap<String, String>) {
+        self.log.metadata = metadata.clone();
+    }
+
     /// Takes the samples that follow those before.
     pub fn push(&mut self, piece: &FlightLog) {
         let shown = piece.sources.iter().filter(|(name, _)| SOURCES.contains(&name.as_str()));
