@@ -5,7 +5,6 @@ use super::{facts, figures, vehicle, view, write_log};
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use serde::Serialize;
-use squirrel_core::control::follow::FollowGains;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::Stack;
 use squirrel_log::FlightLog;
@@ -110,7 +109,7 @@ fn offboard_of(
     track: Option<Track>,
 ) -> Result<Option<Box<dyn Offboard + Send>>, FlightError> {
     if let Some(track) = track {
-        let mut follower = Follower::new(setup, FollowGains::default())?;
+        let mut follower = Follower::new(setup)?;
         follower.follow(track, 0);
         return Ok(Some(Box::new(follower)));
     }
