@@ -13,7 +13,7 @@ use crate::sheet::{Cell, Sheet};
 use crate::study::{Found, Study};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, Integrator, Metrics, OVER_RAD, Setup};
+use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
 use squirrel_sim::scenario::{FaultKind, FaultTable, Scenario};
 use squirrel_sim::sensors::{SUITES, SensorParameters};
 
@@ -22,7 +22,7 @@ pub const HEALTHY_RATIO: f64 = 1.6;
 /// What a rotor loses.
 const ROTOR_LOSS: f64 = 0.3;
 /// A vehicle that comes down slower has landed, m/s.
-const LANDING_M_S: f64 = 2.0;
+pub(crate) const LANDING_M_S: f64 = 2.0;
 const SCENARIOS: [&str; 3] = ["avoid", "track", "hover"];
 
 /// On the command line.
@@ -186,12 +186,6 @@ pub fn scenario(plan: &Plan, trial: u32) -> Result<(Scenario, &'static str), Fli
     Ok((scenario, suite))
 }
 
-/// Whether a vehicle turned over, met the ground, or left the numbers.
-pub(crate) fn is_lost(metrics: &Metrics) -> bool {
-    let hit = metrics.contact_speed_m_s.is_some_and(|speed| speed > LANDING_M_S);
-    hit || metrics.tilt_max_rad > OVER_RAD || metrics.not_finite
-}
-
 fn fly(plan: &Plan, trial: u32) -> Result<Trial, FlightError> {
     let (scenario, suite) = scenario(plan, trial)?;
     let mut vehicle = plan.vehicle.clone();
@@ -217,7 +211,7 @@ fn fly(plan: &Plan, trial: u32) -> Result<Trial, FlightError> {
         scenario: name,
         thrust_to_weight: ratio,
         survivable,
-        survived: !is_lost(&metrics),
+        survived: !metrics.is_lost(LANDING_M_S),
         flags: metrics.flags.names(),
         not_finite: metrics.not_finite,
         tilt_max_deg: metrics.tilt_max_rad.to_degrees(),
