@@ -1,5 +1,6 @@
 //! Flights in which one thing fails, and studies that are stopped.
 
+use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::faults::{Faults, run};
@@ -7,8 +8,8 @@ use squirrel_study::journal::Keep;
 use std::path::Path;
 
 fn study(trials: u32, folder: Option<&Path>) -> Faults {
-    let plan = Plan::calm(VehicleFile::squirrel(), Vec::new(), trials, 3);
-    run(&plan, &Keep { folder, ..Keep::default() }).unwrap().unwrap()
+    let plan = Plan::calm(VehicleFile::squirrel(), vec![Arm::TwccPlus], trials, 3);
+    run(&plan, 1, &Keep { folder, ..Keep::default() }).unwrap().unwrap()
 }
 
 #[test]
@@ -29,10 +30,10 @@ fn nine_of_ten_survivable_faults_are_survived_and_what_is_lost_is_flagged() {
         let names = |flag: &str| flight.flags.iter().any(|f| f == flag);
         // A unit that is gone is named by its number.
         if flight.fault.name() == "imu_dead" {
-            let which = flight.table.which.unwrap();
+            let which = flight.faults[&flight.fault].which.unwrap();
             assert!(names(&format!("imu_{which}_out")), "{k}: {flight:?}");
         }
-        if flight.fault.name() == "gnss_lost" && flight.table.duration_s.is_none() {
+        if flight.fault.name() == "gnss_lost" && flight.faults[&flight.fault].duration_s.is_none() {
             assert!(names("gnss_lost") && names("position_lost"), "{k}: {flight:?}");
         }
     }
@@ -59,17 +60,17 @@ fn a_study_that_was_stopped_goes_on_to_the_same_bytes() {
     assert_eq!(std::fs::read_to_string(&file).unwrap(), kept);
     let there = Keep { folder: Some(&folder), ..Keep::default() };
     std::fs::write(&file, kept.replace("\"survived\":true", "\"survived\":false")).unwrap();
-    let same = Plan::calm(VehicleFile::squirrel(), Vec::new(), 24, 3);
-    let error = run(&same, &there).unwrap_err().to_string();
+    let same = Plan::calm(VehicleFile::squirrel(), vec![Arm::TwccPlus], 24, 3);
+    let error = run(&same, 1, &there).unwrap_err().to_string();
     assert!(
         error.contains("faults.trials.jsonl: line ") && error.contains("has changed"),
         "{error}"
     );
     std::fs::write(&file, kept).unwrap();
-    let other = Plan::calm(VehicleFile::squirrel(), Vec::new(), 24, 4);
-    let error = run(&other, &there).unwrap_err().to_string();
+    let other = Plan::calm(VehicleFile::squirrel(), vec![Arm::TwccPlus], 24, 4);
+    let error = run(&other, 1, &there).unwrap_err().to_string();
     assert!(error.contains("faults.trials.jsonl: is of another plan"), "{error}");
     std::fs::write(&file, "not a journal\n").unwrap();
-    assert!(run(&other, &there).unwrap_err().to_string().contains("faults.trials.jsonl"));
+    assert!(run(&other, 1, &there).unwrap_err().to_string().contains("faults.trials.jsonl"));
     std::fs::remove_dir_all(&folder).unwrap();
 }
