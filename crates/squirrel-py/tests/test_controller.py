@@ -98,6 +98,12 @@ def test_what_is_wrong_is_named(arguments: dict, error: type[Exception], line: s
         squirrel.simulate(scenario="hover", **arguments)
 
 
+def test_what_it_raises_says_when() -> None:
+    with pytest.raises(KeyError) as raised:
+        squirrel.simulate(scenario="hover", controller=raises)
+    assert raised.value.__notes__[0].startswith("controller: raised at 0.")
+
+
 def test_a_policy_and_a_controller_do_not_share_a_vehicle() -> None:
     policy = squirrel.Policy(**layers())
     with pytest.raises(ValueError, match="controller: flies alone, without policy"):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import venv
 from pathlib import Path
+from typing import get_origin
 
 import pytest
 from conftest import ROOT
@@ -17,7 +18,7 @@ from squirrel import _squirrel
 PYTHON = Path(squirrel.__file__).parent
 EXAMPLES = sorted((ROOT / "examples/python").glob("*.py"))
 # Pages with lines of Python, each one program.
-PAGES = ["README.md", "docs/guide/python.md"]
+PAGES = ["README.md", "docs/guide/python.md", "crates/squirrel-py/README.md"]
 # Modules of the standard library that the import may bring beyond those of NumPy; three with Python 3.11.
 FURTHER_MODULES = 15
 # What an example has to say, beside something.
@@ -124,6 +125,8 @@ def test_everything_public_is_documented() -> None:
             if isinstance(thing, str):
                 continue
             parts = {name: thing} | {f"{name}.{k}": v for k, v in getattr(thing, "__dict__", {}).items() if not k.startswith("_")}
+            # Names of types that are of `typing` have no words of their own.
+            parts = {k: v for k, v in parts.items() if get_origin(v) is None and getattr(v, "__module__", "") != "typing"}
             is_module = thing in modules
             bare += [k for k, v in parts.items() if not is_module and callable(v) and not (v.__doc__ or "").strip()]
     assert not bare
@@ -154,7 +157,7 @@ def test_examples_run(example: Path, tmp_path: Path) -> None:
 
 
 def test_no_page_has_lines_that_are_not_run() -> None:
-    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]
+    pages = [ROOT / "README.md", ROOT / "crates/squirrel-py/README.md", *(ROOT / "docs").rglob("*.md")]
     assert {path for path in pages if python_blocks(path)} == {ROOT / page for page in PAGES}
 
 
