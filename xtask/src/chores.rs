@@ -5,7 +5,7 @@
 //! demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, programs, root, run, succeeds, target_directory};
-use crate::{firmware, python, thumb, weights, wheel};
+use crate::{firmware, package, python, thumb, weights, wheel};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -42,7 +42,7 @@ const QUICK_NEEDS: Step = Step {
     action: Action::Function(|| python::reachable().map(|()| String::new())),
 };
 
-const TEST: [Step; 9] = [
+const TEST: [Step; 10] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
@@ -55,6 +55,7 @@ const TEST: [Step; 9] = [
     },
     Step { name: "demo", action: Action::Function(demo) },
     Step { name: "weights", action: Action::Function(weights::check) },
+    Step { name: "crates", action: Action::Function(|| package::crates().map(|()| String::new())) },
     Step { name: "wheel", action: Action::Function(wheel::step) },
 ];
 
@@ -202,7 +203,9 @@ fn needs() -> Result<String, String> {
         Ok(None) => {}
         Err(lack) => lacks.push(lack),
     }
-    if lacks.is_empty() { Ok(String::new()) } else { Err(lacks.join("; ")) }
+    // One line, however many words a lack has.
+    let line = lacks.join("; ").split_whitespace().collect::<Vec<_>>().join(" ");
+    if line.is_empty() { Ok(String::new()) } else { Err(line) }
 }
 
 /// The tests that take no time, of the libraries and programs that the whole test has.

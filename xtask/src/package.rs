@@ -28,12 +28,15 @@ const MANYLINUX: &str = "manylinux_2_28";
 const TRY: &str =
     "import squirrel; print(squirrel.simulate(scenario='hover').metrics['rmse_m'] < 1.0)";
 
+/// A part of the chore: its word, and how.
+type Part = (&'static str, fn() -> Result<(), String>);
+
 /// `cargo xtask package`.
 ///
 /// # Errors
 /// A part that is not there, or the first that fails.
 pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
-    let parts: [(&str, fn() -> Result<(), String>); 5] = [
+    let parts: [Part; 5] = [
         ("crates", crates),
         ("sdist", sdist),
         ("wheels", wheels),

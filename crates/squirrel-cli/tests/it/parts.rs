@@ -48,7 +48,7 @@ fn a_study_that_stops_itself_is_one_of_that_many_trials() {
     let folder = Folder::new("parts-until");
     let until =
         |out, most, percent| [&STUDY[..], &[out, "--trials", most, "--until", percent]].concat();
-    // A share of half of 16 trials is known to 22 points: never to 15, and to 60 at once.
+    // Of 16 trials shares are known to 22 points, differences to some more: 60 at once, 1 never.
     folder.succeeds(&until("wide", "40", "60%"));
     folder.succeeds(&[&STUDY[..], &["sixteen", "--trials", "16"]].concat());
     same(&folder, "wide", "sixteen");
