@@ -5,6 +5,7 @@
 //! demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, programs, root, run, succeeds, target_directory};
+use crate::slow::SLOW;
 use crate::{firmware, package, python, thumb, weights, wheel};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -65,10 +66,6 @@ const QUICK: [Step; 2] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Function(quick_tests) },
 ];
-
-/// Tests that fly, train or diagnose for many seconds, by parts of their names: `--quick` leaves
-/// them to CI.
-const SLOW: [&str; 0] = [];
 
 /// `cargo xtask lint`.
 pub(crate) fn lint(_: &[String]) -> Result<(), String> {

@@ -11,6 +11,7 @@ mod package;
 mod png;
 mod python;
 mod run;
+mod slow;
 mod targets;
 mod thumb;
 mod view;
