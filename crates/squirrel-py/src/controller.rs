@@ -144,11 +144,10 @@ impl Controller {
     fn ask(&self, py: Python<'_>, time_us: u64) -> PyResult<Option<Vec<f32>>> {
         let Some(sight) = self.sight(py, time_us)? else { return Ok(None) };
         let time_s = time_us as f64 * 1e-6;
-        let answer = self.function.bind(py).call1((sight, time_s)).map_err(|raised| {
-            // Where it happened, beside what the function has to say; without it, that is enough.
+        let answer = self.function.bind(py).call1((sight, time_s)).inspect_err(|raised| {
+            // When it was, beside what the function has to say; without it, that is enough.
             let note = format!("controller: raised at {time_s:.3} s of the flight");
             let _ = raised.value(py).call_method1("add_note", (note,));
-            raised
         })?;
         let numbers = self.rotors.map_or(ATTITUDE.len(), |rotors| rotors + 1);
         let name = |i: usize| match self.rotors {
