@@ -7,21 +7,30 @@ mod chores;
 mod effect;
 mod firmware;
 mod fresh;
+mod package;
 mod png;
 mod python;
 mod run;
+mod slow;
+mod targets;
 mod thumb;
 mod view;
 mod weights;
 mod wheel;
+mod zig;
 
 use std::process::ExitCode;
 
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 15] = [
-    ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
+const CHORES: [Chore; 17] = [
+    (
+        "test",
+        "[--quick]",
+        "everything that a change must pass; sets up what it needs; --quick: minutes, without what is slow",
+        chores::test,
+    ),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     (
         "bench",
@@ -65,6 +74,18 @@ const CHORES: [Chore; 15] = [
         "[ARGUMENT...]",
         "build the Python package, install it, run its tests; arguments go to pytest",
         wheel::chore,
+    ),
+    (
+        "package",
+        "[crates|sdist|wheels|installs|sdist-builds]...",
+        "what is published: crates, wheels for old glibc on two machines, the sdist; made, checked, installed",
+        package::chore,
+    ),
+    (
+        "targets",
+        "[TARGET...]",
+        "check the workspace for macOS, Windows and aarch64 Linux",
+        targets::chore,
     ),
     (
         "report-png",

@@ -293,8 +293,9 @@ impl FlightLog {
     ///     The log lacks the source.
     #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
     fn to_pandas<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyAny>> {
-        let frame =
-            py.import("pandas")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))?;
+        let frame = extra(py, "pandas", "to_pandas")?
+            .getattr("DataFrame")?
+            .call1((self.columns(py, source)?,))?;
         frame.call_method1("set_index", ("time_s",))
     }
 
@@ -316,7 +317,7 @@ impl FlightLog {
     ///     The log lacks the source.
     #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
     fn to_polars<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyAny>> {
-        py.import("polars")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))
+        extra(py, "polars", "to_polars")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))
     }
 
     #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
@@ -386,4 +387,14 @@ pub(crate) fn table<T: numpy::Element>(
 ) -> PyResult<Bound<'_, PyArray2<T>>> {
     let rows = numbers.len() / width;
     PyArray1::from_vec(py, numbers).reshape([rows, width])
+}
+
+/// A package that squirrel can do without.
+///
+/// # Errors
+/// `ModuleNotFoundError` that names the extra to install.
+fn extra<'py>(py: Python<'py>, package: &str, method: &str) -> PyResult<Bound<'py, PyModule>> {
+    let module = format!("FlightLog.{method}");
+    py.import("squirrel._extra")?.call_method1("needed", (module, package, package))?;
+    py.import(package)
 }

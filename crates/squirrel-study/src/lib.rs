@@ -24,6 +24,7 @@ pub mod table2;
 pub mod table3;
 pub mod thrust;
 pub mod tracking;
+pub mod until;
 pub mod wind;
 pub mod wing_flights;
 
