@@ -5,7 +5,7 @@
 //! demo share the libraries.
 
 use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
-use crate::{firmware, python, thumb, weights, wheel};
+use crate::{docs, firmware, python, thumb, weights, wheel};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -34,7 +34,7 @@ const LINT: [Step; 4] = [
     },
 ];
 
-const TEST: [Step; 9] = [
+const TEST: [Step; 10] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
@@ -48,6 +48,8 @@ const TEST: [Step; 9] = [
     Step { name: "demo", action: Action::Function(demo) },
     Step { name: "weights", action: Action::Function(weights::check) },
     Step { name: "wheel", action: Action::Function(wheel::step) },
+    // With the program and the package as they are built now.
+    Step { name: "docs", action: Action::Function(docs::step) },
 ];
 
 /// `cargo xtask lint`.

@@ -4,6 +4,7 @@
 //! stderr.
 
 mod chores;
+mod docs;
 mod effect;
 mod firmware;
 mod fresh;
@@ -20,7 +21,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 15] = [
+const CHORES: [Chore; 16] = [
     ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     (
@@ -65,6 +66,12 @@ const CHORES: [Chore; 15] = [
         "[ARGUMENT...]",
         "build the Python package, install it, run its tests; arguments go to pytest",
         wheel::chore,
+    ),
+    (
+        "docs",
+        "[--site|--page PAGE|--write]",
+        "build the guide, check its links, run what its pages show; --write takes the page of commands",
+        docs::chore,
     ),
     (
         "report-png",
