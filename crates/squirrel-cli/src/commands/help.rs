@@ -72,8 +72,12 @@ fn section(command: &Command, level: usize, text: &mut String) {
     for (heading, arguments) in headed(command) {
         let _ = write!(text, "\n| {} | meaning |\n|---|---|\n", heading.to_lowercase());
         for argument in arguments {
-            let _ =
-                writeln!(text, "| `{}` | {} |", cell(&called(argument)), cell(&meaning(argument)));
+            let _ = writeln!(
+                text,
+                "| `{}` | {} |",
+                called(argument).replace('|', "\\|"),
+                cell(&meaning(argument))
+            );
         }
     }
     for below in subcommands {
@@ -119,11 +123,15 @@ fn meaning(argument: &Arg) -> String {
             .filter(|v| !v.is_hide_set())
             .map(clap::builder::PossibleValue::get_name)
             .collect();
+        let defaults: Vec<_> =
+            argument.get_default_values().iter().map(|v| v.to_string_lossy()).collect();
+        let more = !names.is_empty() || !defaults.is_empty() || argument.is_required_set();
+        if more && !text.ends_with(['.', '?']) {
+            text.push('.');
+        }
         if !names.is_empty() {
             let _ = write!(text, " One of {}.", names.join(", "));
         }
-        let defaults: Vec<_> =
-            argument.get_default_values().iter().map(|v| v.to_string_lossy()).collect();
         if !defaults.is_empty() {
             let _ = write!(text, " Default: `{}`.", defaults.join(" "));
         }
