@@ -69,8 +69,8 @@ const CHORES: [Chore; 16] = [
     ),
     (
         "docs",
-        "[--site|--page PAGE|--write]",
-        "build the guide, check its links, run what its pages show; --write takes the page of commands",
+        "[--site|--pages|--page PAGE|--write]",
+        "build the guide, check its links, run what its pages show (--pages, with what is built); --write takes the page of commands",
         docs::chore,
     ),
     (

@@ -2,6 +2,12 @@
 //!
 //! Results go to stdout, talk and progress bars to stderr, and to `--json FILE` for machines. Exit
 //! codes: 0 done, 1 failed with one line that names file, field and value, 2 wrong usage.
+//!
+//! ```
+//! let arguments = ["squirrel", "help", "fly"];
+//! assert_eq!(squirrel_cli::run(arguments.map(Into::into)), 0);
+//! assert_eq!(squirrel_cli::run(["squirrel", "fli"].map(Into::into)), 2);
+//! ```
 
 mod commands;
 mod output;

@@ -33,12 +33,10 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
                 .map_err(|error| format!("{}: {error}", page.display()))
         }
         ["--site"] => site::build().map(|note| eprintln!("{note}")),
-        ["--page", page] => {
-            built()?;
-            wheel::installed()?;
-            play::pages(&program()?, Some(page)).map(|note| eprintln!("{note}"))
-        }
-        _ => Err("docs takes nothing, --write, --site, or --page PAGE".to_owned()),
+        // By what is built, for whoever writes a page.
+        ["--page", page] => play::pages(&program()?, Some(page)).map(|note| eprintln!("{note}")),
+        ["--pages"] => step().map(|note| eprintln!("{note}")),
+        _ => Err("docs takes nothing, --write, --site, --pages, or --page PAGE".to_owned()),
     }
 }
 

@@ -10,6 +10,9 @@ use std::process::Command;
 /// Pages beside those of `docs`.
 const MORE: [&str; 3] = ["README.md", "CONTRIBUTING.md", "SECURITY.md"];
 
+/// What pages take for there, as in a checkout.
+const PARTS: [&str; 2] = ["vehicles", "tests/data/flights"];
+
 /// Runs all pages, or one, and says how many blocks ran.
 ///
 /// # Errors
@@ -29,7 +32,7 @@ pub(super) fn pages(program: &Path, only: Option<&str>) -> Result<String, String
         let name = page.display();
         let text = fs::read_to_string(root.join(&page)).map_err(|e| format!("{name}: {e}"))?;
         let folder = scratch.join(page.to_string_lossy().replace(['/', '\\'], "-"));
-        match Page::new(&root, &folder, program).and_then(|place| place.run(&text)) {
+        match Page::new(&root, &folder, program, &text).and_then(|place| place.run(&text)) {
             Ok(count) => ran += count,
             Err(problem) => {
                 eprintln!("{name}: {problem}");
@@ -55,6 +58,22 @@ fn collect(root: &Path, folder: &Path, pages: &mut Vec<PathBuf>) -> Result<(), S
     Ok(())
 }
 
+/// Copies a folder with all below it.
+fn copy(from: &Path, to: &Path) -> Result<(), String> {
+    let at = |error: std::io::Error| format!("{}: {error}", from.display());
+    fs::create_dir_all(to).map_err(at)?;
+    for entry in fs::read_dir(from).map_err(at)? {
+        let entry = entry.map_err(at)?;
+        let name = entry.file_name();
+        if entry.path().is_dir() {
+            copy(&entry.path(), &to.join(name))?;
+        } else {
+            fs::copy(entry.path(), to.join(name)).map_err(at)?;
+        }
+    }
+    Ok(())
+}
+
 /// Where the blocks of one page run.
 struct Page<'a> {
     folder: &'a Path,
@@ -62,18 +81,16 @@ struct Page<'a> {
 }
 
 impl<'a> Page<'a> {
-    /// An empty folder, with nothing of the repository but the shipped vehicles.
-    fn new(root: &Path, folder: &'a Path, program: &Path) -> Result<Self, String> {
+    /// An empty folder, with nothing of the repository but what the page speaks of.
+    fn new(root: &Path, folder: &'a Path, program: &Path, text: &str) -> Result<Self, String> {
         let at = |error: std::io::Error| format!("{}: {error}", folder.display());
         if folder.exists() {
             fs::remove_dir_all(folder).map_err(at)?;
         }
-        fs::create_dir_all(folder.join("vehicles")).map_err(at)?;
-        for entry in fs::read_dir(root.join("vehicles")).map_err(at)? {
-            let entry = entry.map_err(at)?;
-            if entry.path().is_file() {
-                fs::copy(entry.path(), folder.join("vehicles").join(entry.file_name()))
-                    .map_err(at)?;
+        fs::create_dir_all(folder).map_err(at)?;
+        for part in PARTS {
+            if text.contains(part) {
+                copy(&root.join(part), &folder.join(part))?;
             }
         }
         let venv = wheel::environment()?;
