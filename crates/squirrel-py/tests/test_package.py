@@ -164,7 +164,7 @@ def public_names() -> dict[str, tuple[object, str]]:
         for name in where.__all__:
             thing = getattr(where, name)
             names[prefix + name] = (thing, prefix + name)
-            if isinstance(thing, type) and thing.__module__ == "builtins":
+            if isinstance(thing, type) and thing.__module__ == "squirrel._squirrel":
                 members = [member for member in vars(thing) if not member.startswith("_")]
                 names |= {f"{prefix}{name}.{member}": (getattr(thing, member), f".{member}") for member in members}
     return names
