@@ -18,7 +18,6 @@ import pytest
 from conftest import ROOT
 
 import squirrel
-from squirrel import _squirrel
 
 PYTHON = Path(squirrel.__file__).parent
 EXAMPLES = sorted((ROOT / "examples/python").glob("*.py"))
@@ -141,10 +140,11 @@ def test_everything_public_is_documented() -> None:
 
 def test_examples_in_docstrings_run() -> None:
     parser, runner = doctest.DocTestParser(), doctest.DocTestRunner()
-    documented = {name: thing.__doc__ for name, thing in vars(_squirrel).items() if ">>>" in (thing.__doc__ or "")}
+    texts = {name: getattr(thing, "__doc__", None) or "" for name, (thing, _) in public_names().items()}
+    documented = {name: text for name, text in texts.items() if ">>>" in text}
     for name, text in documented.items():
         runner.run(parser.get_doctest(text, {}, name, None, 0))
-    assert {"Batch", "FlightLog", "Vehicle", "simulate"} <= set(documented)
+    assert {f"squirrel.{name}" for name in ("Batch", "FlightLog", "Vehicle", "Vehicle.new", "plan.reach", "simulate")} <= set(documented)
     assert runner.failures == 0
 
 
