@@ -6,7 +6,7 @@
 
 use crate::run::{Action, Step, call, cargo, programs, root, run, succeeds, target_directory};
 use crate::slow::SLOW;
-use crate::{firmware, package, python, thumb, weights, wheel};
+use crate::{docs, firmware, package, python, thumb, weights, wheel};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -43,7 +43,7 @@ const QUICK_NEEDS: Step = Step {
     action: Action::Function(|| python::reachable().map(|()| String::new())),
 };
 
-const TEST: [Step; 10] = [
+const TEST: [Step; 11] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
@@ -58,6 +58,8 @@ const TEST: [Step; 10] = [
     Step { name: "weights", action: Action::Function(weights::check) },
     Step { name: "crates", action: Action::Function(|| package::crates().map(|()| String::new())) },
     Step { name: "wheel", action: Action::Function(wheel::step) },
+    // With the program and the package as they are built now.
+    Step { name: "docs", action: Action::Function(docs::step) },
 ];
 
 /// What `--quick` does after format and clippy: no documentation and its examples, no target but

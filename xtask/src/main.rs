@@ -4,6 +4,7 @@
 //! stderr.
 
 mod chores;
+mod docs;
 mod effect;
 mod firmware;
 mod fresh;
@@ -24,7 +25,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 17] = [
+const CHORES: [Chore; 18] = [
     (
         "test",
         "[--quick]",
@@ -86,6 +87,12 @@ const CHORES: [Chore; 17] = [
         "[TARGET...]",
         "check the workspace for macOS, Windows and aarch64 Linux",
         targets::chore,
+    ),
+    (
+        "docs",
+        "[--site|--pages|--page PAGE|--write]",
+        "build the guide, check its links, run what its pages show (--pages, with what is built); --write takes the page of commands",
+        docs::chore,
     ),
     (
         "report-png",

@@ -27,12 +27,31 @@ pub(crate) fn step() -> Result<String, String> {
     run(&[])
 }
 
-fn run(arguments: &[String]) -> Result<String, String> {
-    let folder = target_directory()?.join("wheel");
-    let venv = folder.join("venv");
+/// The environment that the wheel is installed in, whether it exists yet or not.
+///
+/// # Errors
+/// As [`target_directory`].
+pub(crate) fn environment() -> Result<PathBuf, String> {
+    Ok(target_directory()?.join("wheel/venv"))
+}
+
+/// Builds the wheel and installs it into its environment; the wheel.
+///
+/// # Errors
+/// The environment, the build or the installation failed.
+pub(crate) fn installed() -> Result<PathBuf, String> {
+    let venv = environment()?;
     python::environment(&venv, PACKAGES)?;
     let package = root()?.join("crates/squirrel-py");
-    let wheel = build(&venv, &package, &folder.join("dist"))?;
+    let wheel = build(&venv, &package, &target_directory()?.join("wheel/dist"))?;
+    let pip = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"];
+    call(Command::new(python::program(&venv, "python")).args(pip).arg(&wheel))?;
+    Ok(wheel)
+}
+
+fn run(arguments: &[String]) -> Result<String, String> {
+    let wheel = installed()?;
+    let package = root()?.join("crates/squirrel-py");
     let bytes =
         std::fs::metadata(&wheel).map_err(|error| format!("{}: {error}", wheel.display()))?.len();
     let size = format!("{:.2} MB", bytes as f64 / 1e6);
@@ -43,9 +62,7 @@ fn run(arguments: &[String]) -> Result<String, String> {
             BYTES_MAX / 1_000_000
         ));
     }
-    let python = python::program(&venv, "python");
-    let pip = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"];
-    call(Command::new(&python).args(pip).arg(&wheel))?;
+    let python = python::program(&environment()?, "python");
     call(
         Command::new(&python)
             .current_dir(&package)

@@ -4,6 +4,15 @@
 //! arrays; nothing is computed here. Arrays are checked where they come in (`arguments`), errors
 //! are squirrel's own lines as Python's exceptions (`error`), and whatever takes long runs without
 //! the interpreter's lock.
+//!
+//! ```python
+//! import squirrel
+//!
+//! log = squirrel.simulate(scenario="avoid", arm="twcc_plus", seed=1)
+//! print(log.metrics["height_lost_m"])
+//! ```
+//!
+//! `docs/guide/python-examples.md` has an example of every name, and each of them runs in CI.
 
 #![allow(clippy::doc_link_with_quotes, reason = "examples in docstrings are Python")]
 #![allow(
