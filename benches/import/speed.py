@@ -140,10 +140,9 @@ def cpu_s(call):
 def row(built, kind, path, bar, other, extra=()):
     out, mb = path.with_suffix(".out.mcap"), path.stat().st_size / 1e6
     map_ = [argument for argument in extra if str(argument).endswith(".toml")]
-    read = subprocess.run([built / "examples/read_speed", path, *map_], check=True, capture_output=True, text=True)
-    read_s = float(read.stdout)
-    whole = [built / "squirrel", "import", *extra, path, "--out", out]
-    import_s = min(cpu_s(lambda: subprocess.run(whole, check=True, capture_output=True)) for _ in range(3))
+    best = lambda command: min(cpu_s(lambda: subprocess.run(command, check=True, capture_output=True)) for _ in range(3))
+    read_s = best([built / "examples/read_speed", path, *map_])
+    import_s = best([built / "squirrel", "import", *extra, path, "--out", out])
     text = f"{kind:14} {mb:6.1f} MB   read {mb / read_s:7.1f} MB/s (bar {bar})   import {mb / import_s:7.1f} MB/s"
     if other:
         name, call = other
