@@ -117,16 +117,12 @@ fn every_format_gives_the_flight_of_the_csv() {
         assert_eq!(report.files[0].rows, counted.files[0].rows, "{file}");
         assert_eq!(report.channels[0].samples_missing, 1, "{file}");
     }
-    for compression in
-        [Compression::SNAPPY, Compression::ZSTD(parquet::basic::ZstdLevel::default())]
-    {
-        flight.write("f.parquet", &parquet(compression));
+    let split = parquet_by(|schema, columns| parquet_split(schema, columns, 9));
+    let packed = [Compression::SNAPPY, Compression::ZSTD(parquet::basic::ZstdLevel::default())];
+    for (i, bytes) in packed.map(parquet).into_iter().chain([split]).enumerate() {
+        flight.write("f.parquet", &bytes);
         let (log, _) = flight.import(&map("f.parquet"), &["f.parquet"]).unwrap();
-        assert_eq!(
-            format!("{:?}", log.sources),
-            format!("{:?}", expected.sources),
-            "{compression}"
-        );
+        assert_eq!(format!("{:?}", log.sources), format!("{:?}", expected.sources), "{i}");
     }
 }
 
