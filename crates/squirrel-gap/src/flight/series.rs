@@ -2,8 +2,8 @@
 //! can.
 //!
 //! Samples with a number that is not finite are left out. A channel exists between two of its
-//! samples that are at most five of its median periods apart, or a hundredth of a second; beyond, a
-//! line between them would be invention.
+//! samples that are at most five of its median periods apart; beyond, a line between them would be
+//! invention.
 
 use crate::GapError;
 use nalgebra::{Quaternion, Vector3};
@@ -11,9 +11,6 @@ use squirrel_log::{FlightLog, clock_jump};
 
 /// Longest distance of two samples that still belong together, in median periods.
 const GAP_PERIODS: f64 = 5.0;
-/// Distance that is none at any rate, s: a log at 100 Hz has no less, and one at the rate of a
-/// flight controller's loop would end at each frame that its writer had no time for.
-const GAP_LEAST_S: f64 = 0.01;
 
 /// Longest flight, s: eleven days.
 const FLIGHT_MAX_S: f64 = 1e6;
@@ -140,7 +137,7 @@ impl Series {
 
     /// The times in which the channel exists.
     pub(crate) fn spans(&self) -> Vec<Span> {
-        let longest_s = (GAP_PERIODS * self.median_period_s()).max(GAP_LEAST_S);
+        let longest_s = GAP_PERIODS * self.median_period_s();
         let mut spans: Vec<Span> = Vec::new();
         for &t in &self.time_s {
             match spans.last_mut() {
