@@ -62,7 +62,7 @@ mod workflow;
 
 pub use add::{add, add_effect, difference, fit, patched};
 pub use baseline::Baseline;
-pub use check::check;
+pub use check::{check, check_since};
 pub use checked::{ChannelCheck, Check, Choice, EffectCheck, FlightCheck, NumberCheck, Shows};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use compatibility::contradictions;

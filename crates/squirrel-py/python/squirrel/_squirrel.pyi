@@ -1395,15 +1395,17 @@ def read_log(path: builtins.str | os.PathLike | pathlib.Path, *, map: typing.Opt
     r"""
     Read a log, whoever wrote it.
     
-    Logs of squirrel, of PX4 (ULog), ArduPilot (dataflash), Betaflight and INAV (blackbox) and ROS 2
-    bags of known types (MCAP) say themselves what their channels are; others need a map.
+    Logs of squirrel, of PX4 (ULog), ArduPilot (dataflash), Betaflight and INAV (blackbox), Crazyflies
+    (micro-SD) and ROS 2 bags of known types (MCAP) say themselves what their channels are; others
+    need a map.
     
     Parameters
     ----------
     path : str or os.PathLike
         The log.
     map : str or os.PathLike, optional
-        Import map (TOML) from columns to channels.
+        Import map (TOML) from columns to channels, or the name of a built-in one: ``nanobench``,
+        ``crazypad``, ``arpl``.
     topics : list of str, optional
         Topics of a ROS 2 bag to take where several say the same.
     
