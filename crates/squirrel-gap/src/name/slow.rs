@@ -19,6 +19,7 @@ use super::search::{Found, Search};
 use super::{Naming, judge, only};
 use crate::GapError;
 use crate::predictor::{DYNAMIC, Predictor, Segment};
+use squirrel_core::effects::{BatterySag, Effect};
 use std::rc::Rc;
 
 /// Numbers of a flight and channel.
@@ -36,7 +37,8 @@ const LOST: f64 = 0.5;
 
 /// An explanation without those names that the flights ask for only as long as no thrust drifts:
 /// all of them, where together they stand in for a drift, or else the one that loses most first,
-/// since what falls may have stood in for another.
+/// since what falls may have stood in for another. Where the voltage is among the names, a drift has
+/// a cause that was measured, and is no rival of it.
 ///
 /// # Errors
 /// What the predictor says.
@@ -59,6 +61,9 @@ fn kept_beside_drift(
     sd: &[f64],
 ) -> Option<Vec<Member>> {
     let members = &found.best.members;
+    if members.iter().any(|member| search.effect(member) == BatterySag::<f64>::NAME) {
+        return None;
+    }
     let beside = |set: &Scored| log_evidence_beside(found, set, drifts, sd);
     let best = beside(&found.best)?;
     let falls = |now: f64, before: f64, needed: f64| now < needed && now < LOST * before;

