@@ -127,8 +127,8 @@ fn lines(names: &[&str]) -> Vec<String> {
             _ => false,
         };
         if has(columns) && !taken(channel) && !better {
-            let rest: String = rest.iter().map(|part| format!(", {part}")).collect();
-            lines.push((channel, format!("\"{channel}\" = {{ columns = {columns:?}{rest} }}")));
+            let parts = [&[&*format!("columns = {columns:?}")], rest].concat().join(", ");
+            lines.push((channel, format!("\"{channel}\" = {{ {parts} }}")));
         }
     }
     lines.into_iter().map(|(_, line)| line).collect()
