@@ -17,7 +17,6 @@
 //! ```
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
-use squirrel_core::control::follow::FollowGains;
 use squirrel_core::frames::In;
 use squirrel_core::guidance::trajectory::Trajectory;
 use squirrel_core::nalgebra::Vector3;
@@ -92,7 +91,7 @@ fn fly(thrust_to_weight: f64, wing: Option<WingModel>) -> Outcome<Flown> {
     let both: Vec<TrackPoint> = run_up.track.points().iter().chain(&points[1..]).copied().collect();
     let track = Track::even(STEP_S, both);
     let setup = Setup { vehicle, arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
-    let mut follower = Follower::new(&setup, FollowGains::default())?;
+    let mut follower = Follower::new(&setup)?;
     follower.follow(track.clone(), 0);
     let flight =
         setup.fly_on(&mut InProcess::new(setup.stack()?), Some(&mut follower), true, |_| {})?;

@@ -3,7 +3,7 @@
 //! Each trial draws a fault, its size and time, sensors, scenario and thrust. A flight is lost
 //! where it turns over or hits the ground; a fault is flagged where the flight code reports
 //! anything. A loss that nobody was told of is the worst outcome, so it has a column of its own.
-//! Look at which fault is survived unnoticed: a wing that is stuck.
+//! Look at which fault is survived unnoticed: a wing that is stuck where that costs nothing.
 //!
 //! ```sh
 //! cargo run --release -p squirrel-examples --example study_faults
@@ -12,6 +12,7 @@
 #![allow(clippy::print_stdout, reason = "a lesson is told")]
 
 use squirrel_examples::Outcome;
+use squirrel_sim::arm::Arm;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_study::campaign::Plan;
 use squirrel_study::faults::{self, Faults};
@@ -19,8 +20,8 @@ use squirrel_study::journal::Keep;
 use squirrel_study::statistics::Share;
 
 fn study() -> Outcome<Faults> {
-    let plan = Plan::calm(VehicleFile::squirrel(), Vec::new(), 100, 1);
-    Ok(faults::run(&plan, &Keep::default())?.ok_or("a part of a study")?)
+    let plan = Plan::calm(VehicleFile::squirrel(), vec![Arm::TwccPlus], 100, 1);
+    Ok(faults::run(&plan, 1, &Keep::default())?.ok_or("a part of a study")?)
 }
 
 /// Of faults that can be survived, those that were.

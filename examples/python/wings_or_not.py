@@ -4,7 +4,7 @@ import numpy as np
 
 import squirrel
 
-ARMS = ["pc", "twcc_flat", "phantom"]
+ARMS: list[squirrel.flight.Arm] = ["pc", "twcc_flat", "phantom"]
 
 print(f"{'arm':<12}{'error m':>9}{'height lost m':>15}{'largest tilt deg':>18}{'wings open s':>14}")
 for arm in ARMS:

@@ -4,8 +4,9 @@
 //! dependencies and, with `test`, the build scripts and procedural macros; `test`, `bench` and the
 //! demo share the libraries.
 
-use crate::run::{Action, Step, call, cargo, root, run, succeeds, target_directory};
-use crate::{firmware, python, thumb, weights, wheel};
+use crate::run::{Action, Step, call, cargo, programs, root, run, succeeds, target_directory};
+use crate::slow::SLOW;
+use crate::{docs, firmware, package, python, thumb, weights, wheel};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -34,7 +35,15 @@ const LINT: [Step; 4] = [
     },
 ];
 
-const TEST: [Step; 9] = [
+/// Said before the first step takes its minutes.
+const NEEDS: Step = Step { name: "needs", action: Action::Function(needs) };
+
+const QUICK_NEEDS: Step = Step {
+    name: "needs",
+    action: Action::Function(|| python::reachable().map(|()| String::new())),
+};
+
+const TEST: [Step; 11] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
@@ -47,7 +56,17 @@ const TEST: [Step; 9] = [
     },
     Step { name: "demo", action: Action::Function(demo) },
     Step { name: "weights", action: Action::Function(weights::check) },
+    Step { name: "crates", action: Action::Function(|| package::crates().map(|()| String::new())) },
     Step { name: "wheel", action: Action::Function(wheel::step) },
+    // With the program and the package as they are built now.
+    Step { name: "docs", action: Action::Function(docs::step) },
+];
+
+/// What `--quick` does after format and clippy: no documentation and its examples, no target but
+/// this machine's, no wheel.
+const QUICK: [Step; 2] = [
+    Step { name: "python", action: Action::Function(python::prepare) },
+    Step { name: "test", action: Action::Function(quick_tests) },
 ];
 
 /// `cargo xtask lint`.
@@ -56,8 +75,18 @@ pub(crate) fn lint(_: &[String]) -> Result<(), String> {
 }
 
 /// `cargo xtask test`.
-pub(crate) fn test(_: &[String]) -> Result<(), String> {
-    let steps: Vec<Step> = LINT.into_iter().chain(TEST).collect();
+pub(crate) fn test(arguments: &[String]) -> Result<(), String> {
+    let quick = match arguments {
+        [] => false,
+        [word] if word == "--quick" => true,
+        _ => return Err(format!("arguments = {}: must be none or --quick", arguments.join(" "))),
+    };
+    let steps: Vec<Step> = if quick {
+        let [tools, format, clippy, _] = LINT;
+        [QUICK_NEEDS, tools, format, clippy].into_iter().chain(QUICK).collect()
+    } else {
+        [NEEDS].into_iter().chain(LINT).chain(TEST).collect()
+    };
     run(&steps)
 }
 
@@ -144,9 +173,7 @@ fn count_and_seed(arguments: &[String], defaults: [&str; 2]) -> Result<[String; 
 
 /// Builds the program and its blind bench; the folder that they are in.
 pub(crate) fn blind_bench() -> Result<PathBuf, String> {
-    let packages = ["-p", "squirrel-cli", "-p", "hidden-effects"];
-    call(cargo()?.args(["build", "--release", "--locked"]).args(packages))?;
-    Ok(target_directory()?.join("release"))
+    programs(&["squirrel", "hidden-effects"])
 }
 
 /// The files in the crates' `benches` folders, without extension, in order.
@@ -181,6 +208,29 @@ fn demo() -> Result<String, String> {
         folder.join("release").join("squirrel").with_extension(std::env::consts::EXE_EXTENSION);
     call(Command::new(program).args(["demo", "--out"]).arg(folder.join("demo")))
         .map(|()| String::new())
+}
+
+/// What the machine lacks: an error where a step would fail for it, a line where one is left out.
+fn needs() -> Result<String, String> {
+    let mut lacks = Vec::new();
+    for lack in [python::reachable(), thumb::reachable()] {
+        lacks.extend(lack.err());
+    }
+    match firmware::missing() {
+        Ok(Some(note)) => eprintln!("{note}"),
+        Ok(None) => {}
+        Err(lack) => lacks.push(lack),
+    }
+    // One line, however many words a lack has.
+    let line = lacks.join("; ").split_whitespace().collect::<Vec<_>>().join(" ");
+    if line.is_empty() { Ok(String::new()) } else { Err(line) }
+}
+
+/// The tests that take no time, of the libraries and programs that the whole test has.
+fn quick_tests() -> Result<String, String> {
+    let skipped = SLOW.iter().flat_map(|name| ["--skip", name]);
+    let tests = ["test", "--release", "--workspace", "--locked", "--tests", "--"];
+    call(cargo()?.args(tests).args(skipped)).map(|()| String::new())
 }
 
 /// rustfmt and clippy, which rustup's minimal profile leaves out.
@@ -223,7 +273,8 @@ mod tests {
 
     #[test]
     fn step_names_are_unique_and_fit_the_table() {
-        let mut names: Vec<&str> = LINT.iter().chain(&TEST).map(|step| step.name).collect();
+        let mut names: Vec<&str> =
+            LINT.iter().chain(&TEST).chain([&NEEDS]).map(|step| step.name).collect();
         assert!(names.iter().all(|name| name.len() <= 10), "{names:?}");
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]), "{names:?}");

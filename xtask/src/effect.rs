@@ -34,8 +34,9 @@ pub(crate) fn chore(_: &[String]) -> Result<(), String> {
     copied(&root, &copy)?;
     // A version of its own: cargo takes the crates of two folders that share a target folder for the
     // same, and what is built here would be what is run there.
-    let own = format!("\nversion = \"{VERSION}\"\n");
-    replace(&copy.join("Cargo.toml"), &own, "\nversion = \"0.0.0-effect\"\n")?;
+    let (manifest, own) = (copy.join("Cargo.toml"), format!("version = \"{VERSION}\""));
+    let text = read(&manifest)?.replace(&own, "version = \"0.0.0-effect\"");
+    write(&manifest, text.as_bytes())?;
     for (path, text) in &page.files {
         write(&copy.join(path), text.as_bytes())?;
     }
@@ -167,7 +168,8 @@ fn copied(root: &Path, copy: &Path) -> Result<(), String> {
                 continue;
             }
             let (from, path) = (entry.path(), folder.join(&name));
-            if entry.file_type().map_err(say)?.is_dir() {
+            // Through links, too: crates link the vehicles that they bring along.
+            if from.is_dir() {
                 folders.push(path);
             } else if from.is_file() {
                 let bytes =

@@ -4,25 +4,35 @@
 //! stderr.
 
 mod chores;
+mod docs;
 mod effect;
 mod firmware;
 mod fresh;
 mod growth;
+mod package;
 mod png;
 mod python;
 mod run;
+mod slow;
+mod targets;
 mod thumb;
 mod view;
 mod weights;
 mod wheel;
+mod zig;
 
 use std::process::ExitCode;
 
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 17] = [
-    ("test", "", "everything that a change must pass; sets up what it needs", chores::test),
+const CHORES: [Chore; 20] = [
+    (
+        "test",
+        "[--quick]",
+        "everything that a change must pass; sets up what it needs; --quick: minutes, without what is slow",
+        chores::test,
+    ),
     ("lint", "", "format, clippy and documentation only", chores::lint),
     (
         "bench",
@@ -78,6 +88,24 @@ const CHORES: [Chore; 17] = [
         "[ARGUMENT...]",
         "build the Python package, install it, run its tests; arguments go to pytest",
         wheel::chore,
+    ),
+    (
+        "package",
+        "[crates|sdist|wheels|installs|sdist-builds]...",
+        "what is published: crates, wheels for old glibc on two machines, the sdist; made, checked, installed",
+        package::chore,
+    ),
+    (
+        "targets",
+        "[TARGET...]",
+        "check the workspace for macOS, Windows and aarch64 Linux",
+        targets::chore,
+    ),
+    (
+        "docs",
+        "[--site|--pages|--page PAGE|--write]",
+        "build the guide, check its links, run what its pages show (--pages, with what is built); --write takes the page of commands",
+        docs::chore,
     ),
     (
         "report-png",

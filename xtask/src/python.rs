@@ -1,6 +1,6 @@
 //! Python for tests: virtual environments of their own in the target directory, packages pinned.
 
-use crate::run::{call, output, target_directory};
+use crate::run::{call, installed_on_ci, output, target_directory};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -47,10 +47,7 @@ pub(crate) fn environment(venv: &Path, packages: &str) -> Result<String, String>
     if made && output(Command::new(&python).arg("--version")).is_some() {
         return Ok(String::new());
     }
-    let base = CANDIDATES
-        .into_iter()
-        .find(|name| version(name).is_some_and(|version| version >= OLDEST))
-        .ok_or_else(|| format!("no Python {}.{} or newer in PATH", OLDEST.0, OLDEST.1))?;
+    let base = base()?;
     call(Command::new(base).args(["-m", "venv", "--clear"]).arg(venv))
         .map_err(|error| format!("{error} (on Debian: apt install python3-venv)"))?;
     call(
@@ -60,6 +57,34 @@ pub(crate) fn environment(venv: &Path, packages: &str) -> Result<String, String>
     )?;
     std::fs::write(&stamp, packages).map_err(|error| format!("{}: {error}", stamp.display()))?;
     Ok(format!("made with {base}"))
+}
+
+/// Whether environments can be made, or are there, before anything is built. Where nobody can be
+/// asked, on CI as root, Python is installed.
+///
+/// # Errors
+/// As [`environment`], of what needs no network.
+pub(crate) fn reachable() -> Result<(), String> {
+    if output(Command::new(interpreter()?).arg("--version")).is_some() {
+        return Ok(());
+    }
+    let lacking = || -> Result<(), String> {
+        let base = base()?;
+        let can = output(Command::new(base).args(["-c", "import venv, ensurepip"])).is_some();
+        let lack = format!("{base} cannot make environments (on Debian: apt install python3-venv)");
+        if can { Ok(()) } else { Err(lack) }
+    };
+    lacking().or_else(|lack| {
+        if installed_on_ci(&["python3", "python3-venv"]) { lacking() } else { Err(lack) }
+    })
+}
+
+/// The machine's Python.
+fn base() -> Result<&'static str, String> {
+    CANDIDATES
+        .into_iter()
+        .find(|name| version(name).is_some_and(|version| version >= OLDEST))
+        .ok_or_else(|| format!("no Python {}.{} or newer in PATH", OLDEST.0, OLDEST.1))
 }
 
 fn version(python: &str) -> Option<(u32, u32)> {

@@ -111,6 +111,18 @@ pub(crate) fn cargo() -> Result<Command, String> {
     Ok(command)
 }
 
+/// Builds programs of the workspace, with the features that all its crates ask for, as tests are
+/// built: of one crate alone, cargo would compile everything below it a second time. The folder
+/// that they are in.
+///
+/// # Errors
+/// As [`root`], or they do not build.
+pub(crate) fn programs(names: &[&str]) -> Result<PathBuf, String> {
+    let names = names.iter().flat_map(|name| ["--bin", name]);
+    call(cargo()?.args(["build", "--release", "--locked", "--workspace"]).args(names))?;
+    Ok(target_directory()?.join("release"))
+}
+
 /// Runs a command to its end; what it prints goes through.
 ///
 /// # Errors

@@ -31,6 +31,14 @@ pub(crate) fn chore(_: &[String]) -> Result<(), String> {
     Ok(())
 }
 
+/// Whether there is a route, before anything is built.
+///
+/// # Errors
+/// No route on this machine.
+pub(crate) fn reachable() -> Result<(), String> {
+    choose(has_target, add_target, has_debian).map(|_| ())
+}
+
 /// Checks squirrel-core for the target; the note says by which route.
 ///
 /// # Errors

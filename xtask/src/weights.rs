@@ -4,7 +4,7 @@
 //! It is what a user would do by hand, with the program as it is built now; CONTRIBUTING.md says
 //! when the file changes.
 
-use crate::run::{call, cargo, root, target_directory};
+use crate::run::{call, programs, root, target_directory};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -48,8 +48,7 @@ pub(crate) fn check() -> Result<String, String> {
 
 /// Flies and trains in a folder of its own; the file that came of it.
 fn make() -> Result<PathBuf, String> {
-    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli"]))?;
-    let squirrel = target_directory()?.join("release/squirrel");
+    let squirrel = programs(&["squirrel"])?.join("squirrel");
     let folder = target_directory()?.join("weights");
     let flights = folder.join("flights");
     let at = |error: std::io::Error| format!("{}: {error}", folder.display());

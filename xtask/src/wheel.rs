@@ -1,18 +1,19 @@
 //! `cargo xtask wheel`: the Python package, built as it is shipped and tested as it is installed.
 //!
-//! The wheel is built in the release profile and the target folder of everything else, and
-//! installed into a virtual environment of its own. The tests then see nothing but that
+//! The wheel is built in the release profile and the target folder of everything else, which has
+//! all that is below the package already: only the package itself is compiled here, and nowhere
+//! else. It is installed into a virtual environment of its own. The tests then see nothing but that
 //! environment: they check arguments, bits, threads, types and stubs, run the lines of the README,
 //! the guide and the examples, and install the wheel once more where nothing is.
 
 use crate::python;
-use crate::run::{call, cargo, root, target_directory};
+use crate::run::{call, root, target_directory};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What builds and tests the wheel, what it can use where it is there, what runs notebooks, and
 /// studies in parts.
-const PACKAGES: &str = "numpy==2.4.6 maturin==1.16.0 pytest==9.2.0 mypy==2.4.1 matplotlib==3.11.2 pandas==3.1.1 polars==2.1.0 gymnasium==1.4.0 nbclient==0.11.0 ipykernel==7.4.0 distributed==2026.8.0";
+const PACKAGES: &str = "numpy==2.4.6 maturin==1.16.0 pytest==9.2.0 mypy==2.4.1 matplotlib==3.11.2 pandas==3.1.1 polars==2.1.0 gymnasium==1.4.0 nbclient==0.11.0 ipykernel==7.4.0 distributed==2026.8.0 ray==2.60.0";
 /// Largest wheel.
 const BYTES_MAX: u64 = 8_000_000;
 
@@ -26,12 +27,31 @@ pub(crate) fn step() -> Result<String, String> {
     run(&[])
 }
 
-fn run(arguments: &[String]) -> Result<String, String> {
-    let folder = target_directory()?.join("wheel");
-    let venv = folder.join("venv");
+/// The environment that the wheel is installed in, whether it exists yet or not.
+///
+/// # Errors
+/// As [`target_directory`].
+pub(crate) fn environment() -> Result<PathBuf, String> {
+    Ok(target_directory()?.join("wheel/venv"))
+}
+
+/// Builds the wheel and installs it into its environment; the wheel.
+///
+/// # Errors
+/// The environment, the build or the installation failed.
+pub(crate) fn installed() -> Result<PathBuf, String> {
+    let venv = environment()?;
     python::environment(&venv, PACKAGES)?;
     let package = root()?.join("crates/squirrel-py");
-    let wheel = build(&venv, &package, &folder.join("dist"))?;
+    let wheel = build(&venv, &package, &target_directory()?.join("wheel/dist"))?;
+    let pip = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"];
+    call(Command::new(python::program(&venv, "python")).args(pip).arg(&wheel))?;
+    Ok(wheel)
+}
+
+fn run(arguments: &[String]) -> Result<String, String> {
+    let wheel = installed()?;
+    let package = root()?.join("crates/squirrel-py");
     let bytes =
         std::fs::metadata(&wheel).map_err(|error| format!("{}: {error}", wheel.display()))?.len();
     let size = format!("{:.2} MB", bytes as f64 / 1e6);
@@ -42,24 +62,11 @@ fn run(arguments: &[String]) -> Result<String, String> {
             BYTES_MAX / 1_000_000
         ));
     }
-    let python = python::program(&venv, "python");
-    let pip = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"];
-    call(Command::new(&python).args(pip).arg(&wheel))?;
-    call(cargo()?.args([
-        "build",
-        "--release",
-        "--locked",
-        "-p",
-        "squirrel-py",
-        "--example",
-        "stubs",
-    ]))?;
-    let stubs = target_directory()?.join("release/examples").join(library("stubs"));
+    let python = python::program(&environment()?, "python");
     call(
         Command::new(&python)
             .current_dir(&package)
             .env("SQUIRREL_WHEEL", &wheel)
-            .env("SQUIRREL_STUBS", &stubs)
             // Drawing needs no screen, and the repository stays as it is.
             .env("MPLBACKEND", "agg")
             .env("PYTHONDONTWRITEBYTECODE", "1")
@@ -103,9 +110,4 @@ fn has_lld() -> bool {
     };
     cfg!(all(target_arch = "x86_64", target_os = "linux", target_env = "gnu"))
         && sysroot.is_some_and(|sysroot| lld(sysroot).exists())
-}
-
-/// File name of a dynamic library.
-fn library(name: &str) -> String {
-    format!("{}{name}{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX)
 }

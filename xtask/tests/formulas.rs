@@ -109,7 +109,7 @@ const DENSITY: [&str; 11] = [
     "core/src/effects/rotor_wash.rs",
     "core/src/effects/wing_tangential.rs",
     "core/src/math.rs",
-    "core/src/vehicle/mod.rs",
+    "core/src/vehicle/parameters.rs",
     "sim/src/plant/membrane.rs",
     // Other simulators are told it, and coefficients of propellers are over it.
     "sim/src/vehicle_file/export/ardupilot.rs",

@@ -2,12 +2,18 @@
 //!
 //! Results go to stdout, talk and progress bars to stderr, and to `--json FILE` for machines. Exit
 //! codes: 0 done, 1 failed with one line that names file, field and value, 2 wrong usage.
+//!
+//! ```
+//! let arguments = ["squirrel", "help", "fly"];
+//! assert_eq!(squirrel_cli::run(arguments.map(Into::into)), 0);
+//! assert_eq!(squirrel_cli::run(["squirrel", "fli"].map(Into::into)), 2);
+//! ```
 
 mod commands;
 mod output;
 mod paths;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 
 /// A flight stack for multirotors that change shape: fly it, log it, replay it, compare it with
@@ -29,7 +35,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Fly the paper's avoidance manoeuvre with three controllers (the default).
+    /// Fly the paper's avoidance manoeuvre in front of a solid trunk, with its controllers and ours
+    /// (the default).
     Demo(commands::demo::Demo),
     /// Fly one scenario with one controller and log it.
     Fly(commands::fly::Fly),
@@ -57,12 +64,17 @@ enum Command {
     /// Make, check, fit, compare and export vehicle files.
     #[command(subcommand)]
     Vehicle(commands::vehicle::VehicleCommand),
+    /// Say what a command does; without one, what there is.
+    Help(commands::help::Help),
 }
 
 /// Runs the program on arguments, the first of which is its name, and says its exit code: Python's
 /// front end needs the number.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let cli = match Cli::try_parse_from(arguments) {
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let program = arguments.first().map_or("squirrel".into(), |name| name.to_string_lossy());
+    let program = commands::demo::quoted(&program);
+    let cli = match Cli::try_parse_from(&arguments) {
         Ok(cli) => cli,
         Err(usage) => {
             // Help and version are results; anything else is wrong usage, exit code 2.
@@ -78,7 +90,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
         }
     };
     let done = match cli.command.unwrap_or(Command::Demo(cli.demo)) {
-        Command::Demo(demo) => demo.run(),
+        Command::Demo(demo) => demo.run(&program),
         Command::Fly(fly) => fly.run(),
         Command::Study(study) => study.run(),
         Command::Train(train) => train.run(),
@@ -95,6 +107,16 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> u8 {
                 return 2;
             }
             None => vehicle.run(),
+        },
+        Command::Help(help) => match help.run(Cli::command()) {
+            Ok(text) => {
+                output::say(text.trim_end());
+                Ok(())
+            }
+            Err(usage) => {
+                output::error(&usage);
+                return 2;
+            }
         },
     };
     // What was not seen was not done, whatever else went wrong.

@@ -25,6 +25,19 @@
 //! No allocation, no clock, no panic in a step; all memory of a controller is one plain `Copy`
 //! struct. SI units and radians. World frame NED, body frame FRD, quaternions Hamilton, body to
 //! world.
+//!
+//! ```
+//! use squirrel_core::frames::{Body, In, Ned, Rotation};
+//! use squirrel_core::nalgebra::Vector3;
+//!
+//! // Thrust acts along minus z of the body: with the nose up it pushes back.
+//! let nose_up = Rotation::<Ned, Body, f64>::from_euler(0.0, 0.3, 0.0);
+//! let thrust: In<Body, f64> = In::new(Vector3::new(0.0, 0.0, -1.0));
+//! let force = (nose_up * thrust).vector;
+//! assert!(force.x < -0.29 && force.z < -0.95);
+//! ```
+//!
+//! `docs/embedding.md` has the whole flight code on a board in 30 lines.
 
 #![cfg_attr(not(any(test, feature = "std")), no_std)]
 #![deny(unsafe_code)]

@@ -51,6 +51,18 @@ pub struct Baseline {
 }
 
 impl Baseline {
+    /// # Errors
+    /// [`GapError::SameName`]: a flight that is one of the baseline.
+    pub(crate) fn has_none_of<'f>(
+        &self,
+        mut flights: impl Iterator<Item = &'f (String, FlightLog)>,
+    ) -> Result<(), GapError> {
+        match flights.find(|(name, _)| self.flights.contains(name)) {
+            Some((flight, _)) => Err(GapError::SameName { flight: flight.clone() }),
+            None => Ok(()),
+        }
+    }
+
     /// Fits the numbers of a vehicle file to flights in which the machine flew well.
     ///
     /// # Errors

@@ -50,10 +50,7 @@ pub fn diagnose_since(
     held_out: &[(String, FlightLog)],
     progress: &dyn Fn(&str),
 ) -> Result<Diagnosis, GapError> {
-    let is_good = |(name, _): &&(String, FlightLog)| baseline.flights.contains(name);
-    if let Some((flight, _)) = flights.iter().chain(held_out).find(is_good) {
-        return Err(GapError::SameName { flight: flight.clone() });
-    }
+    baseline.has_none_of(flights.iter().chain(held_out))?;
     diagnose_against(&baseline.declared, Some(baseline), flights, held_out, progress)
 }
 

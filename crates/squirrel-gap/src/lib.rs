@@ -11,6 +11,29 @@
 //! - [`Workflow`] is all of that in a row, with a report.
 //!
 //! The physics is that of the simulator; nothing of it is written here again.
+//!
+//! ```
+//! use squirrel_gap::{Kind, diagnose};
+//! use squirrel_sim::arm::Arm;
+//! use squirrel_sim::flight::{Integrator, Setup};
+//! use squirrel_sim::scenario::Scenario;
+//! use squirrel_sim::vehicle_file::{SQUIRREL_TOML, VehicleFile};
+//!
+//! // The machine has a battery that sags, and its file does not say so.
+//! let file = VehicleFile::squirrel();
+//! let text = format!("{SQUIRREL_TOML}\n[effects.battery_sag]\nvoltage_exponent = 0.9\n");
+//! let machine = VehicleFile::parse(&text, "machine")?;
+//! let mut flights = Vec::new();
+//! for seed in [1, 2] {
+//!     let scenario = Scenario { seed, ..Scenario::find("excite_rich")? };
+//!     let setup = Setup { vehicle: machine.clone(), arm: Arm::Pc, scenario, integrator: Integrator::Rk4 };
+//!     flights.push((format!("f{seed}"), setup.fly(true, |_| {})?.log.expect("was asked for")));
+//! }
+//!
+//! let verdict = diagnose(&file, &flights, &[], &|_| {})?.verdict;
+//! assert_eq!((verdict.verdict, verdict.effects[0].name), (Kind::Named, "battery_sag"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod add;
 mod baseline;
@@ -39,7 +62,7 @@ mod workflow;
 
 pub use add::{add, add_effect, difference, fit, patched};
 pub use baseline::Baseline;
-pub use check::check;
+pub use check::{check, check_since};
 pub use checked::{ChannelCheck, Check, Choice, EffectCheck, FlightCheck, NumberCheck, Shows};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use compatibility::contradictions;

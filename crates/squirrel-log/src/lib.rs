@@ -11,6 +11,24 @@
 //!   frames from a log.
 //! - [`import`] makes a log of foreign files, by a map or by what an autopilot writes.
 //! - [`files`] writes whatever is written, whole or not at all, and tells which paths are one file.
+//!
+//! ```
+//! # let folder = std::env::temp_dir();
+//! # let path = folder.join(format!("squirrel-log-doctest-{}.mcap", std::process::id()));
+//! use squirrel_log::FlightLog;
+//!
+//! let mut log = FlightLog::default();
+//! let imu = log.source_mut("imu");
+//! imu.push(0.00, &[("omega_body_rad_s", &[0.0, 0.0, 0.1])]);
+//! imu.push(0.01, &[("omega_body_rad_s", &[0.0, 0.0, 0.2])]);
+//! log.write(&path)?;
+//!
+//! let again = FlightLog::read(&path)?;
+//! let (time_s, omega) = again.channel("imu.omega_body_rad_s").expect("was written");
+//! assert_eq!((time_s[1], omega.row(1)), (0.01, &[0.0, 0.0, 0.2][..]));
+//! # std::fs::remove_file(&path).expect("was there");
+//! # Ok::<(), squirrel_log::LogError>(())
+//! ```
 
 pub mod files;
 pub mod flight_code;

@@ -13,7 +13,6 @@ use crate::trajectory::{Begin, Craft, KeepOut, Planner, Task, Wanted};
 use crate::wing::WingModel;
 use nalgebra::{Vector2, Vector3};
 use squirrel_core::control::Reference;
-use squirrel_core::control::follow::FollowGains;
 use squirrel_core::control::position::MeasuredMotion;
 use squirrel_core::frames::{Body, In, Ned, Rotation};
 use squirrel_core::guidance::mission::{Mission, MissionState};
@@ -89,7 +88,7 @@ impl Replanner {
             thrust_n: craft.hover().z,
             air: AirEstimate::new(craft),
             felt: None,
-            follower: Follower::new(setup, FollowGains::default())?,
+            follower: Follower::new(setup)?,
             mission,
             state: MissionState::default(),
             sensing,

@@ -5,6 +5,7 @@ use numpy::{
     Element, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3_stub_gen::{PyStubType, TypeInfo};
 
@@ -28,6 +29,23 @@ impl Float for f64 {
     }
 }
 
+/// An array of another library as NumPy's, over the same memory, where it speaks DLPack; anything
+/// else as it is.
+///
+/// # Errors
+/// `TypeError`: it is on another device, or part of a gradient.
+fn of_others(object: Bound<'_, PyAny>) -> PyResult<Bound<'_, PyAny>> {
+    if object.is_instance_of::<PyUntypedArray>() || !object.hasattr("__dlpack__")? {
+        return Ok(object);
+    }
+    let py = object.py();
+    py.import("numpy")?.call_method1("from_dlpack", (&object,)).map_err(|error| {
+        let kind = object.get_type().name().map_or_else(|_| String::new(), |n| n.to_string());
+        let why = error.value(py);
+        PyTypeError::new_err(format!("{kind}: must be on the CPU and detached ({why})"))
+    })
+}
+
 /// Any object in an argument that must be an array; the types are for the stubs.
 macro_rules! array_argument {
     ($($(#[$doc:meta])* $name:ident $type:literal;)*) => {$(
@@ -38,7 +56,7 @@ macro_rules! array_argument {
         impl<'a, 'py> FromPyObject<'a, 'py> for $name<'py> {
             type Error = PyErr;
             fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
-                Ok(Self(object.to_owned()))
+                of_others(object.to_owned()).map(Self)
             }
         }
 

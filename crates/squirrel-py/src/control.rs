@@ -257,6 +257,7 @@ impl Twcc {
     #[pyo3(signature = (vehicle, *, arm = "twcc_flat", count = 1))]
     fn new(
         vehicle: &Bound<'_, Vehicle>,
+        #[gen_stub(override_type(type_repr = "flight.Arm", imports = ("squirrel.flight")))]
         arm: &str,
         #[pyo3(from_py_with = scalars::count)] count: usize,
     ) -> PyResult<Self> {

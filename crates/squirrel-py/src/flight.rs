@@ -1,5 +1,6 @@
 //! One flight in closed loop.
 
+use crate::controller::{Controller, Heard};
 use crate::error;
 use crate::interrupt::signalled;
 use crate::log::FlightLog;
@@ -28,6 +29,8 @@ struct Interruptible {
     state: StackState,
     steps: u32,
     signal: Option<PyErr>,
+    /// A Python function that flies.
+    heard: Option<Heard>,
 }
 
 impl FlightComputer for Interruptible {
@@ -39,7 +42,13 @@ impl FlightComputer for Interruptible {
             self.signal = Some(signal);
             return Err(FlightError("interrupted".to_owned()));
         }
-        let output = self.stack.step(&mut self.state, frame);
+        if self.heard.as_ref().is_some_and(Heard::is_over) {
+            return Err(FlightError("the controller raised".to_owned()));
+        }
+        let mut output = self.stack.step(&mut self.state, frame);
+        if let Some(heard) = &self.heard {
+            heard.replace(&mut output);
+        }
         Ok((output, self.state.mission.encounters))
     }
 }
@@ -92,10 +101,22 @@ pub(crate) fn scenario(
 /// policy : Policy, optional
 ///     Flies instead of the arm's outer loop: asked 50 times a second, its commands go to the flight code as an offboard computer's.
 ///
+/// controller : callable, optional
+///     A function that flies instead of the arm's outer loop, ``controller(sight, time_s)``. ``sight`` is a dict of float32 arrays of what the
+///     flight code knows: ``position_ned_m``, ``velocity_ned_m_s``, ``q_ned_from_body_wxyz``, ``omega_body_rad_s``,
+///     ``specific_force_body_m_s2``, and of the scenario ``reference_position_ned_m``, ``reference_velocity_ned_m_s``,
+///     ``reference_acceleration_ned_m_s2``. First asked once all of that is known. What it raises ends the flight and is raised.
+/// controller_hz : int
+///     How often it is asked; a divisor of 300, the rate of the flight code.
+/// controller_commands : str
+///     What it returns. ``attitude``: four numbers, collective thrust (N), roll and pitch (rad), wings (0 folded, 1 spread); the flight
+///     code's inner loop flies them. ``rotors``: a command for each rotor in the vehicle's unit, then one for the wings; they replace
+///     those of the flight code, and `squirrel replay` of such a log finds others.
+///
 /// Returns
 /// -------
 /// FlightLog
-///     With `FlightLog.metrics`. Equal arguments give equal bits.
+///     With `FlightLog.metrics`. Equal arguments give equal bits, with a controller as far as it answers equally.
 ///
 /// Raises
 /// ------
@@ -110,21 +131,47 @@ pub(crate) fn scenario(
 /// >>> log = squirrel.simulate(scenario="avoid", arm="twcc_flat", seed=3)
 /// >>> log["truth.position_ned_m"].shape[1]
 /// 3
+///
+/// A controller of four lines: hold height, level.
+///
+/// >>> def hold(sight, time_s):
+/// ...     down, sinking = sight["position_ned_m"][2], sight["velocity_ned_m_s"][2]
+/// ...     thrust_n = 5.4 + 4.0 * (down - sight["reference_position_ned_m"][2]) + 4.0 * sinking
+/// ...     return thrust_n, 0.0, 0.0, 0.0
+/// >>> log = squirrel.simulate(scenario="hover", controller=hold, controller_hz=50)
+/// >>> log.metadata["controller"]
+/// 'a Python function commands attitude at 50 Hz'
 #[gen_stub_pyfunction(module = "squirrel._squirrel")]
 #[pyfunction]
-#[pyo3(signature = (*, vehicle = None, scenario = "avoid", arm = None, seed = None, thrust_to_weight = None, estimator = None, integrator = "rk4", policy = None))]
+#[pyo3(signature = (*, vehicle = None, scenario = "avoid", arm = None, seed = None, thrust_to_weight = None, estimator = None, integrator = "rk4", policy = None, controller = None, controller_hz = 50, controller_commands = "attitude"))]
 pub(crate) fn simulate(
     py: Python<'_>,
     vehicle: Option<&Bound<'_, Vehicle>>,
+    #[gen_stub(override_type(type_repr = "flight.Scenario | builtins.str", imports = ("squirrel.flight", "builtins")))]
     scenario: &str,
+    #[gen_stub(override_type(type_repr = "flight.Arm | None", imports = ("squirrel.flight")))]
     arm: Option<&str>,
     #[pyo3(from_py_with = scalars::seed)] seed: Option<u64>,
     #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,
+    #[gen_stub(override_type(type_repr = "flight.Estimator | None", imports = ("squirrel.flight")))]
     estimator: Option<&str>,
+    #[gen_stub(override_type(type_repr = "flight.Integrator", imports = ("squirrel.flight")))]
     integrator: &str,
     policy: Option<&Bound<'_, Policy>>,
+    #[gen_stub(override_type(
+        type_repr = "collections.abc.Callable[[dict[str, numpy.typing.NDArray[numpy.float32]], builtins.float], collections.abc.Sequence[builtins.float] | numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] | None",
+        imports = ("collections.abc", "numpy", "numpy.typing", "builtins")
+    ))]
+    controller: Option<Bound<'_, PyAny>>,
+    #[pyo3(from_py_with = scalars::controller_hz)] controller_hz: u64,
+    #[gen_stub(override_type(type_repr = "flight.Commands", imports = ("squirrel.flight")))]
+    controller_commands: &str,
 ) -> PyResult<FlightLog> {
-    let by_default = if policy.is_some() { Arm::Pc } else { Arm::TwccFlat };
+    if controller.is_some() && policy.is_some() {
+        return Err(error::value("controller: flies alone, without policy"));
+    }
+    let is_outside = policy.is_some() || controller.is_some();
+    let by_default = if is_outside { Arm::Pc } else { Arm::TwccFlat };
     let mut vehicle = or_squirrel(vehicle);
     if let Some(name) = estimator {
         vehicle.estimator = Estimator::parse(name).map_err(|_| {
@@ -144,15 +191,30 @@ pub(crate) fn simulate(
     };
     let stack = setup.stack().map_err(error::value)?;
     let policy = policy.map(|policy| policy.get().weights.clone());
-    let mut pilot = pilot::offboard(&setup, &stack, policy).map_err(error::value)?;
-    let mut computer =
-        Interruptible { stack, state: StackState::default(), steps: 0, signal: None };
+    let controller = controller
+        .map(|function| Controller::new(&function, controller_hz, controller_commands, &setup))
+        .transpose()?;
+    let heard = controller.as_ref().map(Controller::heard);
+    let mut pilot: Option<Box<dyn Offboard + Send>> = match controller {
+        Some(controller) => Some(Box::new(controller)),
+        None => pilot::offboard(&setup, &stack, policy).map_err(error::value)?,
+    };
+    let mut computer = Interruptible {
+        stack,
+        state: StackState::default(),
+        steps: 0,
+        signal: None,
+        heard: heard.clone(),
+    };
     let flown = py.detach(|| {
         let pilot = pilot.as_mut().map(|pilot| &mut **pilot as &mut dyn Offboard);
         setup.fly_on(&mut computer, pilot, true, |_| {})
     });
     if let Some(signal) = computer.signal {
         return Err(signal);
+    }
+    if let Some(raised) = heard.as_ref().and_then(Heard::raised) {
+        return Err(raised);
     }
     let flight = flown.map_err(error::value)?;
     let mut log = flight.log.ok_or_else(|| error::value("the flight was not logged"))?;

@@ -4,6 +4,15 @@
 //! arrays; nothing is computed here. Arrays are checked where they come in (`arguments`), errors
 //! are squirrel's own lines as Python's exceptions (`error`), and whatever takes long runs without
 //! the interpreter's lock.
+//!
+//! ```python
+//! import squirrel
+//!
+//! log = squirrel.simulate(scenario="avoid", arm="twcc_plus", seed=1)
+//! print(log.metrics["height_lost_m"])
+//! ```
+//!
+//! `docs/guide/python-examples.md` has an example of every name, and each of them runs in CI.
 
 #![allow(clippy::doc_link_with_quotes, reason = "examples in docstrings are Python")]
 #![allow(
@@ -15,6 +24,7 @@
 mod arguments;
 mod batch;
 mod control;
+mod controller;
 mod dynamics;
 mod error;
 mod flight;
@@ -35,6 +45,7 @@ mod terms;
 mod vehicle;
 
 use pyo3::prelude::*;
+use pyo3_stub_gen::StubInfo;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use pyo3_stub_gen::pyproject::StubGenConfig;
 use std::ffi::OsString;
@@ -95,6 +106,8 @@ mod _squirrel {
     #[pymodule_export]
     use super::stack::Stack;
     #[pymodule_export]
+    use super::stubs;
+    #[pymodule_export]
     use super::task::Tasks;
     #[pymodule_export]
     use super::vehicle::Vehicle;
@@ -107,17 +120,17 @@ mod _squirrel {
 pyo3_stub_gen::module_variable!("squirrel._squirrel", "__version__", String);
 pyo3_stub_gen::export_verbatim!("squirrel._squirrel", "__version__");
 
-/// What the stubs of this module are made of. Here, because only the crate that declares them finds
-/// its own declarations.
-///
-/// # Errors
-/// The declarations contradict each other.
-pub fn stub_info() -> pyo3_stub_gen::Result<pyo3_stub_gen::StubInfo> {
+/// Text of `_squirrel.pyi`, for the test that holds the file to the code. Here, because only the
+/// crate that declares them finds its own declarations; only where the sources are.
+#[gen_stub_pyfunction(module = "squirrel._squirrel")]
+#[pyfunction]
+fn stubs() -> PyResult<String> {
     let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-    pyo3_stub_gen::StubInfo::from_project_root(
-        "squirrel._squirrel".to_owned(),
-        here,
-        true,
-        StubGenConfig::default(),
-    )
+    let name = "squirrel._squirrel";
+    StubInfo::from_project_root(name.to_owned(), here, true, StubGenConfig::default())
+        .map_err(error::value)?
+        .modules
+        .get(name)
+        .map(ToString::to_string)
+        .ok_or_else(|| error::value(format!("{name} is not there")))
 }

@@ -9,9 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyIterator, PyList, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pyfunction, gen_stub_pymethods};
 use squirrel_log::LogError;
-use squirrel_log::import::{
-    ImportError, ImportMap, import, import_without_map, is_bag, map_of_bag,
-};
+use squirrel_log::import::Reading;
 use squirrel_sim::flight::Metrics;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -19,15 +17,17 @@ use std::sync::Arc;
 
 /// Read a log, whoever wrote it.
 ///
-/// Logs of squirrel, of PX4 (ULog), ArduPilot (dataflash), Betaflight and INAV (blackbox) and ROS 2
-/// bags of known types (MCAP) say themselves what their channels are; others need a map.
+/// Logs of squirrel, of PX4 (ULog), ArduPilot (dataflash), Betaflight and INAV (blackbox), Crazyflies
+/// (micro-SD) and ROS 2 bags of known types (MCAP) say themselves what their channels are; others
+/// need a map.
 ///
 /// Parameters
 /// ----------
 /// path : str or os.PathLike
 ///     The log.
 /// map : str or os.PathLike, optional
-///     Import map (TOML) from columns to channels.
+///     Import map (TOML) from columns to channels, or the name of a built-in one: ``nanobench``,
+///     ``crazypad``, ``arpl``.
 /// topics : list of str, optional
 ///     Topics of a ROS 2 bag to take where several say the same.
 ///
@@ -59,29 +59,18 @@ pub(crate) fn read_log(
     topics: Option<Vec<String>>,
 ) -> PyResult<FlightLog> {
     let log = interruptible(py, move |_| {
-        if let Some(map) = map {
-            let map = ImportMap::load(&map).map_err(|e| error::import(&e))?;
-            return foreign(import(&map, &[path]));
+        // A map says what it is; else it may be one of our own.
+        if map.is_none() && !path.is_dir() {
+            match squirrel_log::FlightLog::read(&path) {
+                Err(LogError::NotMcap { .. } | LogError::Foreign { .. }) => {}
+                own => return own.map_err(|e| error::log(&e)),
+            }
         }
-        let own = if path.is_dir() { None } else { Some(squirrel_log::FlightLog::read(&path)) };
-        match own {
-            None | Some(Err(LogError::NotMcap { .. } | LogError::Foreign { .. })) => {}
-            Some(own) => return own.map_err(|e| error::log(&e)),
-        }
-        if is_bag(&path).map_err(|e| error::import(&e))? {
-            let (map, _) =
-                map_of_bag(&path, &topics.unwrap_or_default()).map_err(|e| error::import(&e))?;
-            return foreign(import(&map, &[path]));
-        }
-        foreign(import_without_map(&path, &|_, _| {}))
+        let reading = Reading::new(&[path], map.as_deref(), &topics.unwrap_or_default());
+        let read = reading.and_then(|reading| reading.import(&|_, _| {}));
+        read.map(|(log, _)| log).map_err(|e| error::import(&e))
     })??;
     FlightLog::new(log, None)
-}
-
-fn foreign<R>(
-    read: Result<(squirrel_log::FlightLog, R), ImportError>,
-) -> PyResult<squirrel_log::FlightLog> {
-    read.map(|(log, _)| log).map_err(|e| error::import(&e))
 }
 
 /// A flight: sources (``imu``, ``gnss``, ``control.inner``, ...) with a time axis each, and their
@@ -293,8 +282,9 @@ impl FlightLog {
     ///     The log lacks the source.
     #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
     fn to_pandas<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyAny>> {
-        let frame =
-            py.import("pandas")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))?;
+        let frame = extra(py, "pandas", "to_pandas")?
+            .getattr("DataFrame")?
+            .call1((self.columns(py, source)?,))?;
         frame.call_method1("set_index", ("time_s",))
     }
 
@@ -316,7 +306,7 @@ impl FlightLog {
     ///     The log lacks the source.
     #[gen_stub(override_return_type(type_repr = "typing.Any", imports = ("typing")))]
     fn to_polars<'py>(&self, py: Python<'py>, source: &str) -> PyResult<Bound<'py, PyAny>> {
-        py.import("polars")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))
+        extra(py, "polars", "to_polars")?.getattr("DataFrame")?.call1((self.columns(py, source)?,))
     }
 
     #[gen_stub(override_return_type(type_repr = "tuple[typing.Any, ...]", imports = ("typing")))]
@@ -386,4 +376,14 @@ pub(crate) fn table<T: numpy::Element>(
 ) -> PyResult<Bound<'_, PyArray2<T>>> {
     let rows = numbers.len() / width;
     PyArray1::from_vec(py, numbers).reshape([rows, width])
+}
+
+/// A package that squirrel can do without.
+///
+/// # Errors
+/// `ModuleNotFoundError` that names the extra to install.
+fn extra<'py>(py: Python<'py>, package: &str, method: &str) -> PyResult<Bound<'py, PyModule>> {
+    let module = format!("FlightLog.{method}");
+    py.import("squirrel._extra")?.call_method1("needed", (module, package, package))?;
+    py.import(package)
 }

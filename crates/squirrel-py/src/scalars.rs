@@ -72,7 +72,7 @@ macro_rules! arguments {
     )*};
 }
 arguments! {
-    arm_m batch capacity_ah cells clip count deployment dt_s episode_s epochs hover_thrust_fraction index kv_rpm_per_v mass_kg num_envs patience
+    arm_m batch capacity_ah cells clip controller_hz count deployment dt_s episode_s epochs hover_thrust_fraction index kv_rpm_per_v mass_kg num_envs patience
     pitch_inch propeller_inch rate reference_yaw_rad reserve seed speed_max_m_s step_s steps steps_per_command threads thrust_to_weight
     time_us voltage_v yaw_rad
 }

@@ -52,7 +52,9 @@ impl Stack {
     #[pyo3(signature = (vehicle = None, *, arm = "twcc_flat", scenario = "hover", seed = None, thrust_to_weight = None, count = 1))]
     fn new(
         vehicle: Option<&Bound<'_, Vehicle>>,
+        #[gen_stub(override_type(type_repr = "flight.Arm", imports = ("squirrel.flight")))]
         arm: &str,
+        #[gen_stub(override_type(type_repr = "flight.Scenario | builtins.str", imports = ("squirrel.flight", "builtins")))]
         scenario: &str,
         #[pyo3(from_py_with = scalars::seed)] seed: Option<u64>,
         #[pyo3(from_py_with = scalars::thrust_to_weight)] thrust_to_weight: Option<f64>,

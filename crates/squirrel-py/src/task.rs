@@ -12,12 +12,12 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::exceptions::{PyIndexError, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::sync::MutexExt;
-use pyo3::types::{PyBytes, PyTuple};
+use pyo3::types::{PyBytes, PyDict, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
 use squirrel_core::policy::OBSERVATION;
 use squirrel_sim::batch::Settings;
 use squirrel_sim::batch::simd::Path;
-use squirrel_sim::task::course::CourseKind;
+use squirrel_sim::task::course::{CourseKind, Terms};
 use squirrel_sim::task::{Level, Outcome, TaskSettings, Tasks as Environments};
 use std::sync::{Mutex, MutexGuard};
 
@@ -27,13 +27,22 @@ const ROTORS: usize = 4;
 /// Environments to learn in, side by side: what the classes of `squirrel.envs` are made of.
 ///
 /// An action is 20 ms of flight. An episode that has ended is followed by a new one in the next
-/// step, whose action is not looked at. Environment k draws from ``seed + k``: what happens in it
+/// step, whose action is not looked at. The reward of a step of 20 ms is
+///
+///     (1 - d / 5 m - 0.005 w^2) / 50
+///
+/// with d the distance to the reference and w the angular rate in rad/s, so that ten seconds are worth ten at most; -5 where the
+/// vehicle is lost: it hit a trunk, overturned, or d reached 5 m. `reward_terms` has its parts. The air is still but for the
+/// vehicles' own effects (``constant_wind``, ``gust``): vehicles with different ones are how wind, gusts and everything else
+/// are randomised. Environment k draws from ``seed + k``: what happens in it
 /// does not depend on how many there are, nor on threads.
 ///
 /// Parameters
 /// ----------
 /// task : str
-///     ``avoid``: follow a straight run of 4 to 8 m/s past trunks that are seen from 5 m; ``track``: follow a curve.
+///     ``avoid``: follow a straight run of 4 to 8 m/s, from rest or at speed, past six trunks of 0.5 m radius that are seen from 5 m: each
+///     8 to 16 m behind the one before and up to 0.7 m beside the run. ``track``: follow a curve, one sine an axis, of 1 to 5 m and
+///     1 to 4 m/s (0.3 times as much in height), at most 4 m/s^2. All are drawn anew for each episode, evenly within these limits.
 /// vehicles : sequence of Vehicle
 ///     Each episode takes one of them, with its wings, battery and effects: domain randomisation is a list of vehicles. All have four
 ///     rotors; those without ``[control]`` fly by gains by rule (`gains_by_rule`).
@@ -143,13 +152,16 @@ impl Tasks {
     ))]
     fn new(
         py: Python<'_>,
+        #[gen_stub(override_type(type_repr = "flight.Task", imports = ("squirrel.flight")))]
         task: &str,
         vehicles: Vec<Bound<'_, Vehicle>>,
         #[pyo3(from_py_with = scalars::num_envs)] num_envs: usize,
+        #[gen_stub(override_type(type_repr = "flight.Action", imports = ("squirrel.flight")))]
         action: &str,
         #[pyo3(from_py_with = scalars::seed)] seed: u64,
         #[pyo3(from_py_with = scalars::episode_s)] episode_s: f64,
         sensors: bool,
+        #[gen_stub(override_type(type_repr = "flight.Scheme", imports = ("squirrel.flight")))]
         scheme: &str,
         #[pyo3(from_py_with = scalars::threads)] threads: Option<usize>,
         registers: Option<&str>,
@@ -264,6 +276,27 @@ impl Tasks {
             PyArray1::from_vec(py, terminated),
             PyArray1::from_vec(py, truncated),
         ))
+    }
+
+    /// What the rewards of the last step are made of.
+    ///
+    /// Returns
+    /// -------
+    /// dict of str to ndarray of float32, shape (num_envs,)
+    ///     ``near``: (1 - d / 5 m) / 50, d the distance to the reference; ``turning``: -0.005 w^2 / 50, w the angular rate in rad/s;
+    ///     ``lost``: -5 where the vehicle hit a trunk, overturned or strayed by 5 m, and then the others are 0. Their sum is the reward, to
+    ///     the rounding. Zero before the first step, and where an episode began in the last one.
+    #[gen_stub(override_return_type(type_repr = "dict[str, numpy.typing.NDArray[numpy.float32]]", imports = ("numpy.typing", "numpy")))]
+    fn reward_terms<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let terms = self.lock(py)?.reward_terms();
+        let out = PyDict::new(py);
+        let put = |name: &str, of: fn(&Terms) -> f32| {
+            out.set_item(name, PyArray1::from_vec(py, terms.iter().map(of).collect()))
+        };
+        put("near", |terms| terms.near)?;
+        put("turning", |terms| terms.turning)?;
+        put("lost", |terms| terms.lost)?;
+        Ok(out)
     }
 
     /// Motions of all vehicles and what they should follow.

@@ -20,10 +20,10 @@ use toml_edit::{DocumentMut, Value};
 /// Vehicle files that are part of the package.
 const BUNDLED: [(&str, &str); 5] = [
     ("squirrel", squirrel_sim::vehicle_file::SQUIRREL_TOML),
-    ("crazyflie21_brushed", include_str!("../../../vehicles/crazyflie21_brushed.toml")),
-    ("crazyflie21_brushed_curve", include_str!("../../../vehicles/crazyflie21_brushed_curve.toml")),
-    ("crazyflie21_datasheet", include_str!("../../../vehicles/crazyflie21_datasheet.toml")),
-    ("crazyflie2_arpl", include_str!("../../../vehicles/crazyflie2_arpl.toml")),
+    ("crazyflie21_brushed", include_str!("../vehicles/crazyflie21_brushed.toml")),
+    ("crazyflie21_brushed_curve", include_str!("../vehicles/crazyflie21_brushed_curve.toml")),
+    ("crazyflie21_datasheet", include_str!("../vehicles/crazyflie21_datasheet.toml")),
+    ("crazyflie2_arpl", include_str!("../vehicles/crazyflie2_arpl.toml")),
 ];
 
 /// A vehicle: airframe, rotors, wings, battery, gains, sensors and effects, checked when it is made

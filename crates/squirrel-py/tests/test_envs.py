@@ -106,3 +106,33 @@ def test_a_wrapper_of_gymnasium_fits() -> None:
     infos = [envs.step(np.zeros((4, 4), np.float32))[4] for _ in range(12)]
     assert any("episode" in info for info in infos)
     assert pickle.loads(pickle.dumps(envs.single_action_space)) == envs.single_action_space
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_info_has_what_rewards_are_made_of(name: str) -> None:
+    envs = gymnasium.make_vec(name, num_envs=4, action="motor", episode_s=3.0)
+    single = gymnasium.make(name, action="motor", episode_s=3.0)
+    envs.reset(seed=5)
+    single.reset(seed=5)
+    parts = ["reward_near", "reward_turning", "reward_lost"]
+    lost = 0
+    for _ in range(150):
+        actions = np.full((4, 5), -0.2, np.float32)
+        actions[1:, 0] = 0.4
+        states, references = envs.unwrapped.tasks.states()
+        _, reward, terminated, _, info = envs.step(actions)
+        assert list(info) == parts
+        np.testing.assert_allclose(sum(info[part] for part in parts), reward, atol=1e-7)
+        assert np.array_equal(info["reward_lost"] == -5.0, terminated)
+        states, references = envs.unwrapped.tasks.states()
+        away = np.linalg.norm(states[:, :3] - references, axis=1)
+        near = (1.0 - away / 5.0) / 50.0
+        turning = -0.005 * (states[:, 10:13] ** 2).sum(axis=1) / 50.0
+        flies = (reward != 0.0) & ~terminated
+        np.testing.assert_allclose(info["reward_near"][flies], near[flies], atol=1e-6)
+        np.testing.assert_allclose(info["reward_turning"][flies], turning[flies], rtol=1e-5, atol=1e-7)
+        lost += int(terminated.sum())
+        if lost == 0:
+            _, one, *_, alone = single.step(actions[0])
+            assert one == reward[0] and alone == {part: float(info[part][0]) for part in parts}
+    assert lost > 0

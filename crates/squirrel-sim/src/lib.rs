@@ -8,6 +8,23 @@
 //!   [`faults`] breaks sensors in recorded frames; [`track`] is a plan to follow.
 //! - [`batch`] flies thousands of vehicles at once on wide registers, [`task`] makes environments
 //!   of it in which policies learn.
+//!
+//! ```
+//! use squirrel_sim::arm::Arm;
+//! use squirrel_sim::flight::{Flight, Integrator, Setup};
+//! use squirrel_sim::scenario::Scenario;
+//! use squirrel_sim::vehicle_file::VehicleFile;
+//!
+//! let setup = Setup {
+//!     vehicle: VehicleFile::squirrel(),
+//!     arm: Arm::TwccPlus,
+//!     scenario: Scenario { seed: 1, ..Scenario::find("hover")? },
+//!     integrator: Integrator::Rk4,
+//! };
+//! let Flight { metrics, log } = setup.fly(true, |_| {})?;
+//! assert!(metrics.rmse_m < 1.0 && log.is_some());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod arm;
 pub mod batch;

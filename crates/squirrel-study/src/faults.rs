@@ -1,45 +1,60 @@
-//! What becomes of flights in which one thing fails: a thousand random single faults, by kind.
+//! What becomes of flights in which one thing fails, or two: a thousand random faults, by kind.
 //!
 //! Each trial draws a fault, its size and time, a suite of sensors, a scenario, a thrust-to-weight
-//! ratio and gusts. A flight is *lost* where it turns over, meets the ground faster than a landing,
-//! or leaves the numbers. A fault is *survivable* unless it is a rotor that lacks thrust at a ratio
-//! below [`HEALTHY_RATIO`], or both inertial units that say nothing that is a number. A fault is
-//! *flagged* where the flight code reports anything from the fault on, be it health or a reason of
-//! its failsafe.
+//! ratio and gusts; with `--faults 2` another kind on top. A flight is *lost* where it turns over,
+//! meets the ground faster than a landing, or leaves the numbers. Faults are *survivable* unless a
+//! rotor lacks thrust at a ratio below [`HEALTHY_RATIO`], or both inertial units are stuck, silent
+//! or no number at once. A flight is *flagged* where the flight code reports anything from the fault on, be
+//! it health or a reason of its failsafe. A stuck wing is *costly* where the flight errs by
+//! [`COSTLY_M`] more than the same one without it.
 
 use crate::campaign::{Draw, Plan};
-use crate::journal::{Journal, Keep, check_trials, identity};
+use crate::journal::{Journal, Keep, check_trials};
 use crate::sheet::{Cell, Sheet};
-use crate::study::{Found, Study};
+use crate::study::{Arms, Choice, Found, Study};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, Integrator, Metrics, OVER_RAD, Setup};
+use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
 use squirrel_sim::scenario::{FaultKind, FaultTable, Scenario};
 use squirrel_sim::sensors::{SUITES, SensorParameters};
+use std::collections::BTreeMap;
 
 /// Thrust-to-weight ratio from which a weak rotor is survivable.
 pub const HEALTHY_RATIO: f64 = 1.6;
 /// What a rotor loses.
 const ROTOR_LOSS: f64 = 0.3;
+/// What a costly wing makes a flight err by, m RMSE.
+const COSTLY_M: f64 = 0.5;
 /// A vehicle that comes down slower has landed, m/s.
-const LANDING_M_S: f64 = 2.0;
+pub(crate) const LANDING_M_S: f64 = 2.0;
 const SCENARIOS: [&str; 3] = ["avoid", "track", "hover"];
 
 /// On the command line.
-pub const STUDY: Study = Study::new(
-    "faults",
-    "What becomes of flights in which one thing fails",
-    (1000, "Flights, each with one random fault"),
-    study,
-);
+pub const STUDY: Study = Study {
+    arms: Arms::Asked(&[Arm::TwccPlus]),
+    options: &[Choice {
+        name: "faults",
+        help: "What fails in each flight: one thing, or two",
+        default: 1.0,
+        whole: true,
+    }],
+    ..Study::new(
+        "faults",
+        "What becomes of flights in which something fails",
+        (1000, "Flights of each arm, each with random faults"),
+        study,
+    )
+};
 
 /// One flight.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Trial {
-    /// What fails.
+    /// Who flies.
+    pub arm: String,
+    /// What fails first of all kinds; by it flights are counted.
     pub fault: FaultKind,
-    /// When, how much, which.
-    pub table: FaultTable,
+    /// What fails: when, how much, which.
+    pub faults: BTreeMap<FaultKind, FaultTable>,
     /// Sensors.
     pub suite: String,
     /// Mission.
@@ -52,6 +67,8 @@ pub struct Trial {
     pub survived: bool,
     /// What was reported from the fault on.
     pub flags: Vec<String>,
+    /// What a stuck wing makes it err by, m RMSE, where one is.
+    pub wing_cost_m: Option<f64>,
     /// Whether a command was not finite.
     pub not_finite: bool,
     /// Largest tilt, deg.
@@ -60,9 +77,11 @@ pub struct Trial {
     pub contact_speed_m_s: Option<f64>,
 }
 
-/// All flights with one kind of fault.
+/// All flights of an arm with one kind of fault.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Row {
+    /// Who flies.
+    pub arm: &'static str,
     /// Name of the fault.
     pub fault: &'static str,
     /// Flights.
@@ -77,6 +96,10 @@ pub struct Row {
     pub lost: u32,
     /// Of those, without any report.
     pub lost_unflagged: u32,
+    /// Flights with a costly wing.
+    pub costly: u32,
+    /// Of those, reported.
+    pub costly_flagged: u32,
     /// Flights with a command that is not finite.
     pub not_finite: u32,
 }
@@ -86,13 +109,15 @@ pub struct Row {
 pub struct Faults {
     /// Name of the vehicle.
     pub vehicle: String,
-    /// Flights.
+    /// Flights of each arm.
     pub trials: u32,
     /// Seed.
     pub seed: u64,
-    /// Share of survivable faults that were survived.
+    /// Things that fail in each.
+    pub together: u32,
+    /// Share of survivable flights that were survived, of all arms.
     pub survived_share: f64,
-    /// By fault.
+    /// By arm and fault.
     pub rows: Vec<Row>,
     /// All flights.
     pub flights: Vec<Trial>,
@@ -100,21 +125,28 @@ pub struct Faults {
 
 /// Flies the study; the result depends neither on threads nor on how often it was stopped.
 ///
-/// * `plan` - whose sensors are drawn, and whose arms do not matter: [`Arm::TwccFlat`] flies
+/// * `plan` - its sensors are those of a drawn suite
+/// * `together` - things that fail in each flight, 1 or 2
 /// * `keep` - keeps the trials, so that a study that was stopped goes on; without a result where it
 ///   is a part of one
 ///
 /// # Errors
-/// A vehicle that cannot fly, or a folder that cannot be written.
-pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Faults>, FlightError> {
+/// A vehicle that cannot fly, another number of faults, or a folder that cannot be written.
+pub fn run(plan: &Plan, together: u32, keep: &Keep<'_>) -> Result<Option<Faults>, FlightError> {
     check_trials(plan.trials)?;
-    let journal = Journal::open(keep, "faults", &identity("faults", &plan.vehicle, plan.seed))?;
-    let Some(flights) = journal.run(plan.trials, |trial| fly(plan, trial))? else {
+    if !(1..=2).contains(&together) {
+        return Err(FlightError(format!("--faults {together}: must be 1 or 2")));
+    }
+    let named = format!("{}, {together} at once", plan.identity("faults", []));
+    let journal = Journal::open(keep, "faults", &named)?;
+    let Some(trials) = journal.run(plan.trials, |trial| fly(plan, together, trial))? else {
         return Ok(None);
     };
-    let rows: Vec<Row> = FaultKind::ALL
+    let flights: Vec<Trial> = trials.into_iter().flatten().collect();
+    let rows: Vec<Row> = plan
+        .arms
         .iter()
-        .map(|kind| row(*kind, &flights))
+        .flat_map(|arm| FaultKind::ALL.iter().map(|kind| row(*arm, *kind, &flights)))
         .filter(|row| row.flights > 0)
         .collect();
     let sum = |of: fn(&Row) -> u32| f64::from(rows.iter().map(of).sum::<u32>());
@@ -122,17 +154,23 @@ pub fn run(plan: &Plan, keep: &Keep<'_>) -> Result<Option<Faults>, FlightError> 
         vehicle: plan.vehicle.name.clone(),
         trials: plan.trials,
         seed: plan.seed,
+        together,
         survived_share: sum(|row| row.survived) / sum(|row| row.survivable),
         rows,
         flights,
     }))
 }
 
-fn row(kind: FaultKind, flights: &[Trial]) -> Row {
-    let count = |is: fn(&Trial) -> bool| {
-        flights.iter().filter(|trial| trial.fault == kind && is(trial)).count() as u32
-    };
+fn is_costly(trial: &Trial) -> bool {
+    trial.wing_cost_m.is_some_and(|cost_m| cost_m > COSTLY_M)
+}
+
+fn row(arm: Arm, kind: FaultKind, flights: &[Trial]) -> Row {
+    let of = |t: &&Trial| t.arm == arm.name() && t.fault == kind;
+    let count =
+        |is: fn(&Trial) -> bool| flights.iter().filter(of).filter(|trial| is(trial)).count() as u32;
     Row {
+        arm: arm.name(),
         fault: kind.name(),
         flights: count(|_| true),
         survivable: count(|t| t.survivable),
@@ -140,18 +178,23 @@ fn row(kind: FaultKind, flights: &[Trial]) -> Row {
         flagged: count(|t| !t.flags.is_empty()),
         lost: count(|t| !t.survived),
         lost_unflagged: count(|t| !t.survived && t.flags.is_empty()),
+        costly: count(is_costly),
+        costly_flagged: count(|t| is_costly(t) && !t.flags.is_empty()),
         not_finite: count(|t| t.not_finite),
     }
 }
 
-/// The scenario of a trial with its fault, and its sensors.
-///
-/// # Errors
-/// Never in a program that has the built-in scenarios.
-pub fn scenario(plan: &Plan, trial: u32) -> Result<(Scenario, &'static str), FlightError> {
+/// What is flown in a trial, and by which sensors.
+struct Drawn {
+    scenario: Scenario,
+    suite: &'static str,
+    first: FaultKind,
+}
+
+fn draw(plan: &Plan, together: u32, trial: u32) -> Result<Drawn, FlightError> {
     let mut draw = Draw::new(plan.seed, trial);
     // Kinds take turns, so that each has its share of the flights.
-    let kind = FaultKind::ALL[trial as usize % FaultKind::ALL.len()];
+    let turn = trial as usize % FaultKind::ALL.len();
     let suite = draw.one_of(&SUITES);
     let mut scenario = Scenario::find(draw.one_of(&SCENARIOS)).map_err(FlightError)?;
     scenario.seed = plan.trial_seed(trial);
@@ -159,7 +202,48 @@ pub fn scenario(plan: &Plan, trial: u32) -> Result<(Scenario, &'static str), Fli
     scenario.wind.gust_sigma_m_s = draw.between(0.0, 1.0);
     // Also what follows the manoeuvre counts.
     scenario.measured_window_s = 0.0;
-    let start_s = draw.between(2.0, 0.7 * scenario.duration_s);
+    let rotors = plan.vehicle.vehicle.rotors().len() as u32;
+    let first = FaultKind::ALL[turn];
+    let table = fault(first, scenario.duration_s, rotors, &mut draw);
+    scenario.faults.insert(first, table);
+    if together > 1 {
+        let others = FaultKind::ALL.len() - 1;
+        let further = 1 + (draw.between(0.0, others as f64) as usize).min(others - 1);
+        let second = FaultKind::ALL[(turn + further) % FaultKind::ALL.len()];
+        let mut table = fault(second, scenario.duration_s, rotors, &mut draw);
+        if weakens_rotors(first) && weakens_rotors(second) {
+            // A vehicle's effects change once in a flight.
+            let one = &scenario.faults[&first];
+            (table.start_s, table.duration_s) = (one.start_s, one.duration_s);
+        }
+        scenario.faults.insert(second, table);
+    }
+    Ok(Drawn { scenario, suite, first })
+}
+
+fn weakens_rotors(kind: FaultKind) -> bool {
+    matches!(kind, FaultKind::MotorWeak | FaultKind::BatterySag)
+}
+
+/// Whether a vehicle can fly on.
+fn is_survivable(faults: &BTreeMap<FaultKind, FaultTable>, thrust_to_weight: f64) -> bool {
+    let strong = thrust_to_weight >= HEALTHY_RATIO || !faults.contains_key(&FaultKind::MotorWeak);
+    let silent = [FaultKind::ImuStuck, FaultKind::ImuNan, FaultKind::ImuDead];
+    let mut out = faults.iter().filter(|(kind, _)| silent.contains(kind)).map(|(_, table)| table);
+    let until = |table: &FaultTable| table.start_s + table.duration_s.unwrap_or(f64::INFINITY);
+    let sees = match (out.next(), out.next()) {
+        (Some(one), Some(other)) => {
+            let apart = one.start_s >= until(other) || other.start_s >= until(one);
+            one.which.is_some() && other.which.is_some() && (one.which == other.which || apart)
+        }
+        (Some(one), None) => one.which.is_some(),
+        _ => true,
+    };
+    strong && sees
+}
+
+fn fault(kind: FaultKind, flight_s: f64, rotors: u32, draw: &mut Draw) -> FaultTable {
+    let start_s = draw.between(2.0, 0.7 * flight_s);
     let duration_s = draw.one_of(&[None, Some(0.5), Some(2.0), Some(4.0)]);
     let sign = draw.one_of(&[-1.0, 1.0]);
     let size = match kind {
@@ -176,66 +260,67 @@ pub fn scenario(plan: &Plan, trial: u32) -> Result<(Scenario, &'static str), Fli
             Some(draw.one_of(&[1, 2]))
         }
         FaultKind::ImuNan | FaultKind::WingStuck => draw.one_of(&[None, Some(1), Some(2)]),
-        FaultKind::MotorWeak => {
-            Some(1 + draw.between(0.0, plan.vehicle.vehicle.rotors().len() as f64) as u32)
-        }
+        FaultKind::MotorWeak => Some(1 + draw.between(0.0, f64::from(rotors)) as u32),
         _ => None,
     };
-    let which = which.map(|which: u32| which.min(plan.vehicle.vehicle.rotors().len() as u32));
-    scenario.faults.insert(kind, FaultTable { start_s, duration_s, size, which });
-    Ok((scenario, suite))
+    FaultTable { start_s, duration_s, size, which: which.map(|which: u32| which.min(rotors)) }
 }
 
-/// Whether a vehicle turned over, met the ground, or left the numbers.
-pub(crate) fn is_lost(metrics: &Metrics) -> bool {
-    let hit = metrics.contact_speed_m_s.is_some_and(|speed| speed > LANDING_M_S);
-    hit || metrics.tilt_max_rad > OVER_RAD || metrics.not_finite
-}
-
-fn fly(plan: &Plan, trial: u32) -> Result<Trial, FlightError> {
-    let (scenario, suite) = scenario(plan, trial)?;
+fn fly(plan: &Plan, together: u32, trial: u32) -> Result<Vec<Trial>, FlightError> {
+    let Drawn { scenario, suite, first } = draw(plan, together, trial)?;
     let mut vehicle = plan.vehicle.clone();
     vehicle.sensors = SensorParameters::suite(suite).unwrap_or(vehicle.sensors);
-    let (Some((fault, table)), Some(ratio)) =
-        (scenario.faults.first_key_value(), scenario.thrust_to_weight)
-    else {
-        return Err(FlightError("a trial without a fault".to_owned()));
+    let thrust_to_weight = scenario
+        .thrust_to_weight
+        .ok_or_else(|| FlightError("a trial without a thrust-to-weight ratio".to_owned()))?;
+    let survivable = is_survivable(&scenario.faults, thrust_to_weight);
+    let flown = |arm: Arm, scenario: Scenario| {
+        let setup = Setup { vehicle: vehicle.clone(), arm, scenario, integrator: Integrator::Rk4 };
+        setup.fly(false, |_| {}).map(|flight| flight.metrics)
     };
-    let (fault, table) = (*fault, *table);
-    let survivable = match fault {
-        FaultKind::MotorWeak => ratio >= HEALTHY_RATIO,
-        FaultKind::ImuNan => table.which.is_some(),
-        _ => true,
-    };
-    let name = scenario.name.clone();
-    let setup = Setup { vehicle, arm: Arm::TwccFlat, scenario, integrator: Integrator::Rk4 };
-    let metrics: Metrics = setup.fly(false, |_| {})?.metrics;
-    Ok(Trial {
-        fault,
-        table,
-        suite: suite.to_owned(),
-        scenario: name,
-        thrust_to_weight: ratio,
-        survivable,
-        survived: !is_lost(&metrics),
-        flags: metrics.flags.names(),
-        not_finite: metrics.not_finite,
-        tilt_max_deg: metrics.tilt_max_rad.to_degrees(),
-        contact_speed_m_s: metrics.contact_speed_m_s,
-    })
+    plan.arms
+        .iter()
+        .map(|arm| {
+            let metrics: Metrics = flown(*arm, scenario.clone())?;
+            let mut sound = scenario.clone();
+            let wing_cost_m = match sound.faults.remove(&FaultKind::WingStuck) {
+                Some(_) => Some(metrics.rmse_m - flown(*arm, sound)?.rmse_m),
+                None => None,
+            };
+            Ok(Trial {
+                arm: arm.name().to_owned(),
+                fault: first,
+                faults: scenario.faults.clone(),
+                suite: suite.to_owned(),
+                scenario: scenario.name.clone(),
+                thrust_to_weight,
+                survivable,
+                survived: !metrics.is_lost(LANDING_M_S),
+                flags: metrics.flags.names(),
+                wing_cost_m,
+                not_finite: metrics.not_finite,
+                tilt_max_deg: metrics.tilt_max_rad.to_degrees(),
+                contact_speed_m_s: metrics.contact_speed_m_s,
+            })
+        })
+        .collect()
 }
 
-fn study(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightError> {
-    let Some(study) = run(plan, keep)? else { return Ok(None) };
+fn study(plan: &Plan, asked: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, FlightError> {
+    let Some(study) = run(plan, asked[0] as u32, keep)? else { return Ok(None) };
     let mut found = Found::of(&study)?;
     found.say(format!(
-        "{} single faults in flights of {} from seed {}.\n",
-        study.trials, study.vehicle, study.seed
+        "{} flights of {} from seed {}, in each of which {} fails.\n",
+        study.trials,
+        study.vehicle,
+        study.seed,
+        if study.together == 1 { "one thing" } else { "this and another thing" }
     ));
     let mut sheet = Sheet::default();
     for row in &study.rows {
         let count = |n: u32| Cell::Number(f64::from(n), 0);
         sheet.row(&[
+            ("arm", "arm", Cell::Text(row.arm)),
             ("fault", "fault", Cell::Text(row.fault)),
             ("flights", "flights", count(row.flights)),
             ("survivable", "survivable", count(row.survivable)),
@@ -243,11 +328,15 @@ fn study(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, Fligh
             ("flagged", "flagged", count(row.flagged)),
             ("lost", "lost", count(row.lost)),
             ("lost unflagged", "lost_unflagged", count(row.lost_unflagged)),
+            ("costly wing", "costly", count(row.costly)),
+            ("flagged", "costly_flagged", count(row.costly_flagged)),
             ("not finite", "not_finite", count(row.not_finite)),
         ]);
     }
     found.csv = found.sheet(sheet);
-    found
-        .say(format!("\nSurvived {:.1} % of the survivable faults.", 100.0 * study.survived_share));
+    found.say(format!(
+        "\nSurvived {:.1} % of the survivable flights.",
+        100.0 * study.survived_share
+    ));
     Ok(Some(found))
 }

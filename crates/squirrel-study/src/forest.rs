@@ -23,7 +23,7 @@ use crate::statistics::{Estimate, FEW, Share, mean, paired_shares};
 use serde::{Deserialize, Serialize};
 use squirrel_plan::pilot;
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, OVER_RAD};
+use squirrel_sim::flight::FlightError;
 use squirrel_sim::scenario::Scenario;
 
 /// Height that may be lost or gained, m.
@@ -181,7 +181,7 @@ fn fly(plan: &Plan, arm: Arm, thrust_to_weight: f64, trial: u32) -> Result<Fligh
         height_lost_m: m.height_lost_m,
         encounters: m.encounters,
         wings_open_s: m.wings_open_s,
-        through: m.path_m >= way_m && m.contact_s.is_none() && m.tilt_max_rad < OVER_RAD,
+        through: m.path_m >= way_m && !m.is_lost(0.0),
     })
 }
 

@@ -7,7 +7,7 @@ use crate::statistics::{self, Estimate, mean, paired};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
-use squirrel_sim::flight::{FlightError, Integrator, Metrics, OVER_RAD, Setup};
+use squirrel_sim::flight::{FlightError, Integrator, Metrics, Setup};
 use squirrel_sim::scenario::Scenario;
 use squirrel_sim::sensors::{SUITES, SensorParameters};
 use squirrel_sim::vehicle_file::VehicleFile;
@@ -95,7 +95,7 @@ fn pair(vehicle: &VehicleFile, suite: &str, seed: u64) -> Result<Pair, FlightErr
     let (ours, oracle) = (fly(vehicle.estimator)?, fly(Estimator::Oracle)?);
     Ok(Pair {
         rmse_m: [ours.rmse_m, oracle.rmse_m],
-        lost: ours.contact_s.is_some() || ours.tilt_max_rad > OVER_RAD,
+        lost: ours.is_lost(0.0),
         flags: ours.flags.names(),
     })
 }

@@ -3,6 +3,20 @@
 //! [`STUDIES`] are all of them, each a module that says what is asked, how it is flown
 //! ([`campaign`], [`journal`]) and what is shown of it ([`sheet`], [`pages`]); [`study`] is what
 //! they have to say.
+//!
+//! ```
+//! use squirrel_sim::arm::Arm;
+//! use squirrel_sim::vehicle_file::VehicleFile;
+//! use squirrel_study::campaign::Plan;
+//! use squirrel_study::journal::Keep;
+//! use squirrel_study::thrust;
+//!
+//! // One trial of two arms; with `Keep::default()` nothing is kept on disk.
+//! let plan = Plan::calm(VehicleFile::squirrel(), vec![Arm::TwccPlus, Arm::PcPlus], 1, 1);
+//! let study = thrust::run(&plan, &Keep::default())?.expect("is no part of a study");
+//! assert!(study.points.iter().any(|point| point.thrust_to_weight == 1.2));
+//! # Ok::<(), squirrel_sim::flight::FlightError>(())
+//! ```
 
 pub mod campaign;
 pub mod dispersion;
@@ -24,6 +38,7 @@ pub mod table2;
 pub mod table3;
 pub mod thrust;
 pub mod tracking;
+pub mod until;
 pub mod wind;
 pub mod wing_flights;
 

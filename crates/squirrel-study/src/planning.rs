@@ -19,7 +19,6 @@ use crate::journal::{Journal, Keep};
 use crate::statistics::{Estimate, Share, gain, mean, paired};
 use serde::{Deserialize, Serialize};
 use squirrel_core::control::Reference;
-use squirrel_core::control::follow::FollowGains;
 use squirrel_core::frames::In;
 use squirrel_core::guidance::trajectory::Trajectory;
 use squirrel_core::nalgebra::{Vector2, Vector3};
@@ -224,7 +223,7 @@ struct Once {
 
 impl Once {
     fn new(drawn: Drawn, setup: &Setup) -> Result<Self, FlightError> {
-        let follower = Follower::new(setup, FollowGains::default())?;
+        let follower = Follower::new(setup)?;
         Ok(Self { craft: craft(setup)?, drawn, setup: setup.clone(), follower, made: None })
     }
 }

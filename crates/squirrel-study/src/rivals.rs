@@ -12,7 +12,7 @@ use crate::statistics::{Estimate, mean, paired};
 use crate::study::{Arms, Found, Study};
 use serde::{Deserialize, Serialize};
 use squirrel_sim::arm::Arm;
-use squirrel_sim::flight::{FlightError, Metrics, OVER_RAD};
+use squirrel_sim::flight::{FlightError, Metrics};
 use squirrel_sim::scenario::{BUILT_IN, Scenario};
 
 /// On the command line.
@@ -127,7 +127,7 @@ impl Flight {
         Self {
             rmse_m: m.rmse_m,
             height_lost_m: m.height_lost_m,
-            lost: m.contact_s.is_some() || m.tilt_max_rad > OVER_RAD || m.not_finite,
+            lost: m.is_lost(0.0),
             flagged: !m.flags.names().is_empty(),
         }
     }

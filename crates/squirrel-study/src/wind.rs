@@ -9,7 +9,7 @@
 //! the ground or leaves the numbers, and *flagged* where the flight code reports anything.
 
 use crate::campaign::{self, Flown, Plan};
-use crate::faults::is_lost;
+use crate::faults::LANDING_M_S;
 use crate::journal::Keep;
 use crate::sheet::{Cell, Sheet};
 use crate::statistics::{Estimate, Share, mean, paired};
@@ -148,7 +148,7 @@ impl Flight {
             rmse_m: m.rmse_m,
             height_lost_m: m.height_lost_m,
             wings_open_s: m.wings_open_s,
-            lost: is_lost(m),
+            lost: m.is_lost(LANDING_M_S),
             flagged: !m.flags.names().is_empty(),
         }
     }

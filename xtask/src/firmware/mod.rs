@@ -19,7 +19,7 @@ mod figures;
 mod policy;
 mod stack;
 
-use crate::run::{call, cargo, installed_on_ci, root, succeeds, target_directory};
+use crate::run::{installed_on_ci, programs, root, succeeds, target_directory};
 use crate::thumb;
 use elf::Elf;
 use figures::{FIGURES, Figures, check_budget, compare, parse, recorded};
@@ -105,8 +105,7 @@ pub(crate) fn check() -> Result<String, String> {
 fn host() -> Result<Squirrel, String> {
     let folder = target_directory()?.join("firmware");
     std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
-    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli"]))?;
-    Ok(Squirrel { program: target_directory()?.join("release/squirrel"), folder })
+    Ok(Squirrel { program: programs(&["squirrel"])?.join("squirrel"), folder })
 }
 
 fn measure() -> Result<Figures, String> {
@@ -164,6 +163,20 @@ fn measure() -> Result<Figures, String> {
     }
     board::size(&mut figures)?;
     Ok(figures)
+}
+
+/// What is missing here that the step leaves out or, on CI, cannot do without.
+///
+/// # Errors
+/// As [`step`], before anything is built.
+pub(crate) fn missing() -> Result<Option<String>, String> {
+    match emulator() {
+        Ok(()) => Ok(None),
+        Err(_) if std::env::var_os("CI").is_none() => {
+            Ok(Some(format!("no {QEMU}, so that the firmware is left out (apt install {QEMU})")))
+        }
+        Err(error) => Err(error),
+    }
 }
 
 /// Looks for the emulator. Where nobody can be asked, on CI as root, it is installed.

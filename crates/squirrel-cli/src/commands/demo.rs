@@ -1,5 +1,5 @@
-//! `squirrel demo`: the paper's avoidance manoeuvre with three controllers, on numbers that are
-//! part of the program.
+//! `squirrel demo`: the paper's avoidance manoeuvre in front of a solid trunk, with the paper's
+//! controllers and ours, on numbers that are part of the program.
 
 use super::{facts, figures, view, write_log};
 use crate::output::{self, Table, say, talk};
@@ -12,8 +12,13 @@ use squirrel_sim::scenario::Scenario;
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::PathBuf;
 
-const ARMS: [Arm; 3] = [Arm::Pc, Arm::TwccFlat, Arm::TwccOracle];
+/// The paper's two, then ours; of each pair the first keeps its wings folded.
+const ARMS: [Arm; 4] = [Arm::Pc, Arm::TwccFlat, Arm::PcPlus, Arm::TwccPlus];
 const REPORT: &str = "report.html";
+const SPEED_M_S: f64 = 7.3;
+/// Where the trunk is seen. The paper's flights saw theirs, which was not there, at 4 m: nothing
+/// that is as fast stops within that, with or without wings.
+const SEEN_M: f64 = 6.0;
 
 /// Options of the demo.
 #[derive(Debug, clap::Args)]
@@ -32,7 +37,6 @@ pub(crate) struct Demo {
 #[derive(Serialize)]
 struct Row {
     arm: &'static str,
-    gain: f64,
     #[serde(flatten)]
     metrics: Metrics,
 }
@@ -46,16 +50,15 @@ struct Figures {
 }
 
 impl Demo {
-    pub(crate) fn run(&self) -> Result<(), String> {
+    /// Flies; `program` is how the user called the program, for the commands to go on with.
+    pub(crate) fn run(&self, program: &str) -> Result<(), String> {
         let names = ARMS.map(flight_file).into_iter().chain([REPORT.to_owned()]);
         Paths::default().writes_into(&self.out, names).writes("--json", &self.json).check()?;
         output::folder(&self.out)?;
-        let mut scenario = Scenario::find("avoid")?;
-        scenario.seed = self.seed;
         let setups = ARMS.map(|arm| Setup {
             vehicle: VehicleFile::squirrel(),
             arm,
-            scenario: scenario.clone(),
+            scenario: scenario(self.seed),
             integrator: Integrator::Rk4,
         });
         let bar = output::progress(ARMS.len() as u64, "flights");
@@ -69,18 +72,19 @@ impl Demo {
 
         let ratio = setups[0].thrust_to_weight();
         say(&format!(
-            "Avoidance manoeuvre of the paper: 7.3 m/s, obstacle seen at 4 m, turn of 110 to 130 deg, error over 6 s.\n\
-             Effective thrust-to-weight {ratio:.2}, seed {}. Gain is mean error of pc over mean error of the arm, minus 1.\n",
+            "A quadrotor with foldable wings flies at {SPEED_M_S} m/s, sees a trunk {SEEN_M} m ahead and turns away by 110 to 130 deg.\n\
+             Its rotors lift {ratio:.2} times its weight; seed {}. Clearance is from its centre to the bark.\n",
             self.seed
         ));
-        let reference = flights[0].metrics.rmse_m;
-        let mut rows = Vec::new();
+        let row = |(setup, flight): (&Setup, &Flight)| Row {
+            arm: setup.arm.name(),
+            metrics: flight.metrics,
+        };
+        let rows: Vec<Row> = setups.iter().zip(&flights).map(row).collect();
         let mut views = Vec::new();
         let mut table: Option<Table> = None;
         for (setup, flight) in setups.iter().zip(&mut flights) {
-            let gain = reference / flight.metrics.rmse_m - 1.0;
-            let mut cells = figures(&flight.metrics);
-            cells.insert(2, ("gain %".to_owned(), format!("{:+.1}", 100.0 * gain)));
+            let cells = figures(&flight.metrics);
             let table = table.get_or_insert_with(|| {
                 let names: Vec<&str> =
                     std::iter::once("arm").chain(cells.iter().map(|(n, _)| n.as_str())).collect();
@@ -88,7 +92,6 @@ impl Demo {
             });
             let name = std::iter::once(setup.arm.name().to_owned());
             table.row(name.chain(cells.iter().map(|(_, v)| v.clone())).collect());
-            rows.push(Row { arm: setup.arm.name(), gain, metrics: flight.metrics });
             if let Some(log) = &mut flight.log {
                 let path = self.out.join(flight_file(setup.arm));
                 write_log(log, &path)?;
@@ -98,11 +101,13 @@ impl Demo {
         if let Some(table) = table {
             table.print();
         }
+        say(&format!("\n{}", seen(&rows)));
         let heading = Heading {
-            title: "Avoidance at high speed: three controllers".to_owned(),
-            lead: "A quadrotor with foldable wings flies straight at 7.3 m/s, sees an obstacle 4 m ahead and turns away. \
-                   pc keeps the wings folded; the others may open them to brake."
-                .to_owned(),
+            title: "A trunk at 7.3 m/s: the paper's controllers and ours".to_owned(),
+            lead: format!(
+                "A quadrotor with foldable wings flies straight at {SPEED_M_S} m/s, sees a trunk {SEEN_M} m ahead and turns away. {}",
+                seen(&rows)
+            ),
             facts: facts(&setups[0]),
             card: String::new(),
         };
@@ -119,14 +124,78 @@ impl Demo {
         };
         output::write_json(self.json.as_deref(), &result)?;
         talk(&format!(
-            "\nwrote {} and flight-*.mcap (open in Foxglove) beside it",
+            "\nThe report is {}; a log of each flight (MCAP) is beside it. Go on with",
             report.display()
         ));
+        for next in self.next() {
+            talk(&format!("  {program} {next}"));
+        }
         Ok(())
     }
+
+    /// What to do next, each a command that runs as it stands.
+    fn next(&self) -> [String; 3] {
+        let [without, with] = [Arm::Pc, Arm::TwccPlus]
+            .map(|arm| quoted(&self.out.join(flight_file(arm)).to_string_lossy()));
+        [
+            format!("view {without} {with} --out view.html"),
+            "fly --arm twcc_plus --scenario forest --out forest.mcap --report forest.html"
+                .to_owned(),
+            "vehicle new --frame quad-x --mass-kg 0.75 --propeller-inch 5 --out mine.toml"
+                .to_owned(),
+        ]
+    }
+}
+
+/// The paper's manoeuvre, but the trunk is solid and is seen in time to do something about it.
+fn scenario(seed: u64) -> Scenario {
+    Scenario {
+        seed,
+        thrust_to_weight: Some(1.25),
+        solid_obstacles: true,
+        ..Scenario::turn("demo", SPEED_M_S, SEEN_M, 110.0, 130.0)
+    }
+}
+
+/// What to see in two sentences: the paper's pair and ours.
+fn seen(rows: &[Row]) -> String {
+    let fate = |row: &Row| match (row.metrics.contact_s, row.metrics.clearance_m) {
+        (Some(time), _) => format!("{} hits the trunk after {time:.1} s", row.arm),
+        (None, Some(clearance)) => format!("{} passes it by {clearance:.2} m", row.arm),
+        (None, None) => format!("{} does not come near it", row.arm),
+    };
+    let pair =
+        |rows: &[Row]| rows.iter().map(fate).collect::<Vec<_>>().join(" with folded wings, ");
+    let (theirs, ours) = rows.split_at(rows.len() / 2);
+    format!(
+        "The paper's controllers: {} with open ones.\nOurs: {} with open ones.",
+        pair(theirs),
+        pair(ours)
+    )
+}
+
+/// A word of a command line, for a shell.
+pub(crate) fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:\\".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', "'\\''"))
 }
 
 /// The log of one controller.
 fn flight_file(arm: Arm) -> String {
     format!("flight-{}.mcap", arm.name())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn words_of_a_shell_stay_words() {
+        assert_eq!(quoted("target/release/squirrel"), "target/release/squirrel");
+        assert_eq!(quoted("my drone's"), "'my drone'\\''s'");
+        assert_eq!(quoted(""), "''");
+    }
 }

@@ -5,7 +5,6 @@ use super::{commit, facts, figures, vehicle, view};
 use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use serde::Serialize;
-use squirrel_core::control::follow::FollowGains;
 use squirrel_core::nalgebra::Vector3;
 use squirrel_core::stack::Stack;
 use squirrel_log::{FlightLog, LogError, LogWriter};
@@ -162,7 +161,7 @@ fn offboard_of(
     track: Option<Track>,
 ) -> Result<Option<Box<dyn Offboard + Send>>, FlightError> {
     if let Some(track) = track {
-        let mut follower = Follower::new(setup, FollowGains::default())?;
+        let mut follower = Follower::new(setup)?;
         follower.follow(track, 0);
         return Ok(Some(Box::new(follower)));
     }

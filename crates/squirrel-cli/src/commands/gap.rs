@@ -75,6 +75,10 @@ pub(crate) struct Looked {
     /// Flight logs, or folders of them, for the proof: their data alone are looked at.
     #[arg(long, num_args = 1..)]
     held_out: Vec<PathBuf>,
+    /// Good flights of the same machine, or folders of them: what could be shown of what has
+    /// changed since.
+    #[arg(long, num_args = 1..)]
+    baseline: Vec<PathBuf>,
     /// Folder for the result and its page.
     #[arg(long)]
     out: Option<PathBuf>,
@@ -129,6 +133,7 @@ impl Looked {
             .vehicle("--vehicle", [&self.vehicle])
             .flights("--flights", &self.flights)?
             .flights("--held-out", &self.held_out)?
+            .flights("--baseline", &self.baseline)?
             .writes_json(self.json.as_ref(), kept.as_ref());
         if let Some(folder) = &self.out {
             paths = paths.writes_into(folder, [CHECK_PAGE, CHECK]);
@@ -136,7 +141,7 @@ impl Looked {
         paths.check()?;
         let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
         let (flights, held_out) = (logs(&self.flights)?, logs(&self.held_out)?);
-        let found = looked(&vehicle, &flights, &held_out)?;
+        let found = looked(&vehicle, &logs(&self.baseline)?, &flights, &held_out)?;
         check::show(&found);
         notes(&found.notes);
         if let Some(folder) = &self.out {
@@ -152,14 +157,22 @@ impl Looked {
 }
 
 /// What flights are worth before any verdict.
+///
+/// * `good` - flights of the same machine; may be empty
 fn looked(
     vehicle: &VehicleFile,
+    good: &[(String, FlightLog)],
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
 ) -> Result<squirrel_gap::Check, String> {
     let bar = output::spinner();
     let tell = |what: &str| bar.set_message(what.to_owned());
-    let found = squirrel_gap::check(vehicle, flights, held_out, &tell);
+    let found = if good.is_empty() {
+        squirrel_gap::check(vehicle, flights, held_out, &tell)
+    } else {
+        squirrel_gap::Baseline::fit(vehicle, good, &tell)
+            .and_then(|own| squirrel_gap::check_since(&own, flights, held_out, &tell))
+    };
     bar.finish_and_clear();
     found.map_err(|e| e.to_string())
 }
@@ -296,7 +309,7 @@ impl Given {
         self.check(&[self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
         let (vehicle, flights, held_out) = self.read()?;
         // Whatever it finds, the verdict is what it would be without.
-        let check = looked(&vehicle, &flights, &held_out).ok();
+        let check = looked(&vehicle, &logs(&self.baseline)?, &flights, &held_out).ok();
         let mut found = self.diagnosed(vehicle, flights, held_out)?;
         if let Some(check) = &check {
             talk(&check.words);

@@ -3,10 +3,7 @@
 use crate::output::{self, say, talk};
 use crate::paths::Paths;
 use squirrel_log::FlightLog;
-use squirrel_log::import::{
-    ImportMap, ImportReport, files_of, import_board, import_watched, import_without_map, is_bag,
-    map_of_bag,
-};
+use squirrel_log::import::{ImportReport, Reading, import_board};
 use std::path::{Path, PathBuf};
 
 /// Smaller files are read before a progress bar could be seen.
@@ -18,8 +15,9 @@ type Watch<'a> = &'a dyn Fn(u64, u64);
 /// Options of an import.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Import {
-    /// Map from columns to channels (TOML); logs of PX4, ArduPilot, Betaflight and INAV, and ROS 2 bags
-    /// of known types, need none.
+    /// Map from columns to channels (TOML), or the name of a built-in one: nanobench, crazypad, arpl;
+    /// logs of PX4, ArduPilot, Betaflight, INAV and Crazyflies, and ROS 2 bags of known types, need
+    /// none.
     #[arg(long)]
     map: Option<PathBuf>,
     /// Topic of a ROS 2 bag to take where several say the same, without --map; may be repeated.
@@ -31,9 +29,9 @@ pub(crate) struct Import {
     /// Fly what a board wrote down its serial line again: inputs and outputs of its flight code.
     #[arg(long, conflicts_with_all = ["map", "recover"])]
     board: bool,
-    /// The log of an autopilot: ULog (PX4), dataflash (ArduPilot), blackbox (Betaflight, INAV); a ROS 2
-    /// bag (MCAP); with --map files or folders of one flight: these, CSV, Parquet, MATLAB .mat, MCAP
-    /// with JSON or protobuf, Crazyflie micro-SD; with --board what the board wrote.
+    /// The log of an autopilot: ULog (PX4), dataflash (ArduPilot), blackbox (Betaflight, INAV), micro-SD
+    /// (Crazyflie); a ROS 2 bag (MCAP); with --map files or folders of one flight: these, CSV, Parquet,
+    /// MATLAB .mat, MCAP with JSON or protobuf; with --board what the board wrote.
     #[arg(required = true)]
     paths: Vec<PathBuf>,
     /// Flight log to write.
@@ -58,24 +56,13 @@ impl Import {
             self.paths(&self.paths).check()?;
             return if self.board { self.board() } else { self.recover() };
         }
-        let (map, notes) = if let Some(file) = &self.map {
-            (ImportMap::load(file).map_err(|e| e.to_string())?, Vec::new())
-        } else {
-            let path = self.one_path("an import without --map")?;
-            if !is_bag(path).map_err(|e| e.to_string())? {
-                self.paths(&self.paths).check()?;
-                return self.finish(&[], |watch| {
-                    import_without_map(path, watch).map_err(|e| e.to_string())
-                });
-            }
-            map_of_bag(path, &self.topic).map_err(|e| e.to_string())?
-        };
+        let reading = Reading::new(&self.paths, self.map.as_deref(), &self.topic)
+            .map_err(|e| e.to_string())?;
         // A folder may hold more than is read; an earlier import, for one.
-        let found = files_of(&map, &self.paths).map_err(|e| e.to_string())?;
+        let found = reading.files().map_err(|e| e.to_string())?;
         self.paths(&found).reads("--map", &self.map).check()?;
-        self.finish(&notes, |watch| {
-            import_watched(&map, &self.paths, watch).map_err(|e| e.to_string())
-        })
+        let notes = reading.notes.clone();
+        self.finish(&notes, |watch| reading.import(watch).map_err(|e| e.to_string()))
     }
 
     /// Imports with a progress bar, writes the log and says what was read.

@@ -4,6 +4,7 @@ pub(crate) mod demo;
 pub(crate) mod export_vectors;
 pub(crate) mod fly;
 pub(crate) mod gap;
+pub(crate) mod help;
 pub(crate) mod hil;
 pub(crate) mod import;
 pub(crate) mod plan;

@@ -17,6 +17,7 @@ use squirrel_study::STUDIES;
 use squirrel_study::campaign::Plan;
 use squirrel_study::journal::{Keep, Part, Progress, Shard, check_trials, locked};
 use squirrel_study::study::{Arms, Found, Shown, Study, Timed, Work};
+use squirrel_study::until::Until;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -73,6 +74,11 @@ struct Common {
     /// the parts together.
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
+    /// Stop as soon as every 95 % interval reaches at most so far to either side, in percent of the
+    /// figure, or in points where that is below 1; --trials is the most. Looks after 16 trials, 32
+    /// and so on, and leaves the bytes of a study of that many. Needs --out.
+    #[arg(long, value_name = "PERCENT")]
+    until: Option<Until>,
 }
 
 const MERGE: &str = "merge";
@@ -168,14 +174,13 @@ impl Studies {
 impl Flown {
     /// * `lock` - of a merge that has locked the folder
     fn run(&self, lock: Option<&Lock>) -> Result<(), String> {
-        let plan = self.plan()?;
+        let mut plan = self.plan()?;
         let own = self.study.options.iter().map(|choice| {
             let value = || self.own.get_one::<f64>(choice.name).copied();
             let count = || self.own.get_one(choice.name).map(|n: &usize| *n as f64);
             if choice.whole { count() } else { value() }.unwrap_or(choice.default)
         });
         let own: Vec<f64> = own.collect();
-        let command = self.command(&plan, &own);
         let part = match self.common.shard {
             _ if self.merged => Part::Merged,
             Some(shard) => Part::Shard(shard),
@@ -189,11 +194,24 @@ impl Flown {
             None => None,
         };
         let lock = own_lock.as_ref().or(lock);
-        let found = (self.study.fly)(
-            &plan,
-            &own,
-            &Keep { folder, part, command: &command, progress: Some(&bar), lock },
-        );
+        let rounds: Vec<u32> = match self.common.until {
+            Some(_) => Until::rounds(self.trials).collect(),
+            None => vec![self.trials],
+        };
+        let mut found = Ok(None);
+        for trials in rounds {
+            plan.trials = trials;
+            let command = self.command(&plan, &own);
+            let keep = Keep { folder, part, command: &command, progress: Some(&bar), lock };
+            found = (self.study.fly)(&plan, &own, &keep);
+            let (Some(until), Ok(Some(now))) = (self.common.until, &found) else { break };
+            let (is_met, widest) = until.is_met(&now.json).map_err(|e| e.to_string())?;
+            let percent = 100.0 * widest;
+            talk(&format!("{trials} trials: the widest interval reaches {percent:.1} %"));
+            if is_met {
+                break;
+            }
+        }
         bar.0.finish_and_clear();
         if let Some(found) = found.map_err(|e| e.to_string())? {
             return self.end(&found);
@@ -245,6 +263,13 @@ impl Flown {
             return Err(
                 "--json: a part of a study has no figures; merge the parts first".to_owned()
             );
+        }
+        if self.common.until.is_some() && (shard.is_some() || out.is_none()) {
+            return Err(if shard.is_some() {
+                "--until: a part of a study has no intervals; it goes without --shard".to_owned()
+            } else {
+                "--until: needs a folder that keeps what was flown; give --out".to_owned()
+            });
         }
         check_trials(self.trials).map_err(|e| e.to_string())?;
         let kept = out.as_ref().map(|folder| folder.join(format!("{name}.json")));

@@ -5,6 +5,7 @@ mod crash;
 mod export_vectors;
 mod gap;
 mod overwrite;
+mod parts;
 mod plan;
 mod program;
 mod reach;

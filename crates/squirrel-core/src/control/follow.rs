@@ -9,6 +9,7 @@
 //! the thrust does not suffice, height goes first.
 
 use super::AttitudeThrust;
+use super::backstepping::AttitudeGains;
 use super::position::{MeasuredMotion, heading_frame};
 use super::twcc::OuterAirframe;
 use crate::command::PilotCommand;
@@ -52,20 +53,20 @@ const HEIGHT_SHARE: f32 = 0.95;
 /// What height has in any case, over the weight.
 const WEIGHT_SHARE: f32 = 1.02;
 
-impl Default for FollowGains {
-    /// For an attitude loop of 10 rad/s and more behind a command filter of 20 rad/s.
-    fn default() -> Self {
+impl FollowGains {
+    /// For an attitude loop with these gains: what it adds to its command filter's delay is left
+    /// to the errors (0.02 s more follows a turn with little thrust closer, and one with much
+    /// thrust less closely).
+    pub fn behind(attitude: &AttitudeGains) -> Self {
         Self {
             position_per_s2: 4.0,
             velocity_per_s: 3.5,
             acceleration_max_m_s2: 6.0,
-            delay_s: 0.12,
+            delay_s: attitude.filter_delay_s(),
             wing_delay_s: 0.05,
         }
     }
-}
 
-impl FollowGains {
     /// # Errors
     /// The first number out of range, by its name.
     pub fn check(&self) -> Result<(), ParameterError> {
@@ -124,10 +125,28 @@ impl FollowGains {
 
 #[cfg(test)]
 mod tests {
+    use super::super::backstepping::AttitudeForm;
+    use super::super::command_filter::{Filter, Poles};
     use super::super::position::fixtures::still;
     use super::super::twcc::fixtures::airframe;
     use super::*;
     use crate::frames::{Body, Rotation};
+
+    fn gains() -> FollowGains {
+        FollowGains::behind(&attitude())
+    }
+
+    fn attitude() -> AttitudeGains {
+        AttitudeGains {
+            form: AttitudeForm::Quaternion,
+            c1_per_s: Vector3::repeat(5.0),
+            c2_per_s: Vector3::repeat(8.0),
+            lambda_per_s2: Vector3::repeat(2.0),
+            integral_max_rad_s: 0.1,
+            filter_frequency_rad_s: 20.0,
+            filter_damping: 1.0,
+        }
+    }
 
     fn hovering() -> PlanPoint {
         let thrust = In::new(Vector3::new(0.0, 0.0, -0.548 * 9.80665));
@@ -140,8 +159,7 @@ mod tests {
         for heading_rad in [0.0, 0.8, -2.0] {
             let thrust = Vector3::new(1.1, -0.8, -5.5);
             let motion = MeasuredMotion { heading_rad, ..still() };
-            let gains = FollowGains::default();
-            let command = gains.command(&airframe(), &motion, &hovering(), In::new(thrust), 1.0);
+            let command = gains().command(&airframe(), &motion, &hovering(), In::new(thrust), 1.0);
             let a = command.attitude;
             let ned_from_body =
                 Rotation::<Ned, Body, f32>::from_euler(a.roll_rad, a.pitch_rad, heading_rad);
@@ -155,9 +173,8 @@ mod tests {
     #[test]
     fn errors_are_flown_out() {
         let ahead = PlanPoint { position: In::new(Vector3::new(0.3, 0.2, -0.2)), ..hovering() };
-        let command = FollowGains::default()
-            .command(&airframe(), &still(), &ahead, hovering().thrust, 0.0)
-            .attitude;
+        let command =
+            gains().command(&airframe(), &still(), &ahead, hovering().thrust, 0.0).attitude;
         assert!(
             command.pitch_rad < -0.05 && command.roll_rad > 0.03 && command.thrust_n > 5.4,
             "{command:?}"
@@ -172,7 +189,7 @@ mod tests {
             for position in [0.0, 1e6, -1e30] {
                 let far = PlanPoint { position: In::new(Vector3::repeat(position)), ..hovering() };
                 let thrust = In::new(Vector3::from(thrust));
-                let a = FollowGains::default().command(&airframe, &still(), &far, thrust, 7.0);
+                let a = gains().command(&airframe, &still(), &far, thrust, 7.0);
                 let e = airframe.envelope;
                 let a = (a.attitude, a.wing);
                 assert!(
@@ -184,10 +201,28 @@ mod tests {
         }
     }
 
+    /// A command goes out as long before the plan's thrust as the command filter holds it back: it
+    /// is `2 zeta / w` behind a ramp (docs/equations.md B.2), here measured.
+    #[test]
+    fn what_is_ahead_is_the_filters_delay() {
+        let attitude = attitude();
+        let poles = Poles::new(attitude.filter_frequency_rad_s, attitude.filter_damping);
+        let mut filter = Filter { angle: [0.0; 3], rate: [0.0; 3] };
+        let (rate_rad_s, dt_s) = (0.2, 1.0 / 3000.0);
+        let mut target = 0.0_f32;
+        for _ in 0..6000 {
+            target += rate_rad_s * dt_s;
+            filter.step(&[target, 0.0, 0.0], &poles, dt_s);
+        }
+        let behind_s = (target - filter.angle[0]) / rate_rad_s;
+        assert!((attitude.filter_delay_s() - behind_s).abs() < 0.001, "{behind_s}");
+        assert_eq!(gains().delay_s, attitude.filter_delay_s());
+    }
+
     #[test]
     fn a_bad_gain_is_named() {
-        let bad = FollowGains { delay_s: f32::NAN, ..FollowGains::default() };
+        let bad = FollowGains { delay_s: f32::NAN, ..gains() };
         assert!(bad.check().unwrap_err().to_string().starts_with("follow.delay_s = NaN"));
-        FollowGains::default().check().unwrap();
+        gains().check().unwrap();
     }
 }

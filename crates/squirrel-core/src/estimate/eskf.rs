@@ -83,7 +83,9 @@ pub struct EskfParameters {
     pub baro_noise_m: f32,
     /// Of the compass's heading, rad: iron that nobody took off included.
     pub heading_noise_rad: f32,
-    /// What the accelerometer may be off gravity where there are no fixes, m/s^2.
+    /// What the accelerometer may be off gravity where there are no fixes, m/s^2: of each sample as
+    /// if they erred apart, though a turn of 3 m/s^2 lasts a second and a rotor's thrust always
+    /// points along body z. Less than this lays the vehicle level in a turn without fixes.
     pub alone_noise_m_s2: f32,
     /// Deviations beyond which a measurement is rejected.
     pub gate: f32,
@@ -105,7 +107,7 @@ impl Default for EskfParameters {
             gnss_latency_s: 0.0,
             baro_noise_m: 0.1,
             heading_noise_rad: 0.05,
-            alone_noise_m_s2: 5.0,
+            alone_noise_m_s2: 40.0,
             gate: 5.0,
         }
     }

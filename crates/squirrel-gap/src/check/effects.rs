@@ -2,8 +2,9 @@
 
 use crate::GapError;
 use crate::checked::{Choice, EffectCheck, NumberCheck, Shows};
+use crate::compatibility::Ready;
 use crate::diagnose::curve_hides_sag;
-use crate::name::{Catalogue, Search, Showable, air_hides_names, catalogue, gust_sizes};
+use crate::name::{Catalogue, Scatter, Search, Showable, air_hides_names, catalogue, gust_sizes};
 use crate::predictor::{Predictor, TURNING};
 use squirrel_core::effects::{
     BatterySag, Effect, Effects, FORM, Gust, Kind, Profile, Response, Shown,
@@ -17,14 +18,17 @@ const UNKNOWN_AIR: &str = "gnss.velocity_ned_m_s, attitude: without both the air
 /// Why a sag cannot.
 const THRUST_CURVE: &str = "propulsion.pwm_to_thrust_n: its sd does what a sag does";
 
-/// * `nominal` - residual of the vehicle as it is
+/// * `scatter` - how much a machine differs from one flight to the next, against a baseline
 /// * `command_hz` - how often commands change
 pub(super) fn effects(
-    predictor: &Predictor<'_>,
-    nominal: &[f64],
+    Ready { predictor, nominal, .. }: &Ready<'_>,
+    scatter: Option<&Scatter>,
     command_hz: Option<f64>,
 ) -> Result<Vec<EffectCheck>, GapError> {
-    let catalogue = catalogue(predictor, nominal)?;
+    let mut catalogue = catalogue(predictor, nominal)?;
+    if let Some(scatter) = scatter {
+        catalogue.take(scatter);
+    }
     let search = Search { predictor, catalogue: &catalogue, gust_m_s: None, progress: &|| () };
     let showable = search.showable()?;
     let air_hides = air_hides_names(predictor)?;

@@ -3,6 +3,7 @@
 
 mod effects;
 
+use crate::baseline::Baseline;
 use crate::checked::{Check, EffectCheck, FlightCheck, Shows};
 use crate::compatibility::{self, Moments, Ready, channels, saturation};
 use crate::flight::series::Span;
@@ -29,8 +30,37 @@ pub fn check(
     held_out: &[(String, FlightLog)],
     progress: &dyn Fn(&str),
 ) -> Result<Check, GapError> {
+    seen(Seen::default(), vehicle, flights, held_out, progress)
+}
+
+/// What flights of a machine are worth before anybody looks for what has changed since those of a
+/// baseline.
+///
+/// * other arguments as of [`check`]
+///
+/// # Errors
+/// As [`check`]; a flight that is one of the baseline.
+pub fn check_since(
+    baseline: &Baseline,
+    flights: &[(String, FlightLog)],
+    held_out: &[(String, FlightLog)],
+    progress: &dyn Fn(&str),
+) -> Result<Check, GapError> {
+    baseline.has_none_of(flights.iter().chain(held_out))?;
+    let mut found = Seen { own: Some(baseline), ..Seen::default() };
+    let aside = baseline.set_aside.iter();
+    found.notes.extend(aside.map(|a| format!("set aside of the baseline: {}", a.words)));
+    seen(found, &baseline.declared, flights, held_out, progress)
+}
+
+fn seen(
+    mut found: Seen<'_>,
+    vehicle: &VehicleFile,
+    flights: &[(String, FlightLog)],
+    held_out: &[(String, FlightLog)],
+    progress: &dyn Fn(&str),
+) -> Result<Check, GapError> {
     progress("reading");
-    let mut found = Seen::default();
     found.look(vehicle, flights, held_out, progress)?;
     let all = flights.iter().map(|flight| (flight, false));
     let all = all.chain(held_out.iter().map(|flight| (flight, true)));
@@ -47,7 +77,9 @@ pub fn check(
 
 /// What was seen of flights.
 #[derive(Default)]
-struct Seen {
+struct Seen<'b> {
+    /// The machine as it flew when it flew well.
+    own: Option<&'b Baseline>,
     aside: Vec<SetAside>,
     /// By flight, when forces can be compared.
     spans: BTreeMap<String, Vec<Span>>,
@@ -55,7 +87,7 @@ struct Seen {
     notes: Vec<String>,
 }
 
-impl Seen {
+impl Seen<'_> {
     /// Looks at flights, and without those that have a problem again.
     fn look(
         &mut self,
@@ -79,10 +111,15 @@ impl Seen {
         self.spans.extend(spans(&ready.predictor));
         self.spans.extend(ready.unseen.iter().flat_map(spans));
         progress("what the flights could show");
-        let ready = ready.narrowed(flights, Moments::IfKnown)?;
-        let hz = command_hz(flights);
-        self.effects = effects::effects(&ready.predictor, &ready.nominal, hz)?;
-        self.notes.clone_from(&ready.predictor.notes);
+        let (ready, moments) = match self.own {
+            // As a diagnosis does: the data are the file's matter, sizes are the machine's.
+            Some(own) => (Ready::new(&own.vehicle, flights, held_out)?, own.moments),
+            None => (ready, Moments::IfKnown),
+        };
+        let ready = ready.narrowed(flights, moments)?;
+        let scatter = self.own.map(|own| &own.scatter);
+        self.effects = effects::effects(&ready, scatter, command_hz(flights))?;
+        self.notes.extend_from_slice(&ready.predictor.notes);
         Ok(())
     }
 

@@ -328,7 +328,7 @@ impl Search<'_> {
 }
 
 /// Inner products of columns of which some have places in known products.
-fn extended(
+pub(super) fn extended(
     known: &DMatrix<f64>,
     places: &[Option<usize>],
     columns: &[&Column],

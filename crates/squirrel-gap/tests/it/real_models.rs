@@ -93,6 +93,18 @@ fn a_name_stands_beside_a_slow_force_of_each_flight() {
     assert_eq!(answer(&file).verdict, Kind::OutsideCatalogue);
 }
 
+/// A ladder of hovers and a few dashes are each flown at one time of a flight: what acts there
+/// alone, or several names together, can stand in for thrust that drifts by four per cent over it,
+/// and are no names for it.
+#[test]
+fn thrust_that_drifts_over_one_flight_has_no_name() {
+    let file = VehicleFile::squirrel();
+    let flight = drifting(fly("excite_normal", &file, 1), -0.01);
+    let verdict = diagnose(&file, &[flight], &[], &|_| {}).unwrap().verdict;
+    let refused = [Kind::None, Kind::OutsideCatalogue, Kind::NotIdentifiable];
+    assert!(refused.contains(&verdict.verdict), "{}", verdict.words);
+}
+
 /// A flight whose rotors were told less and less of what the log says, or more and more.
 fn drifting((name, mut log): (String, FlightLog), drift: f64) -> (String, FlightLog) {
     let rotor = log.sources.get_mut("rotor").unwrap();

@@ -90,10 +90,17 @@ pub enum ImportError {
         /// Path as given.
         path: String,
     },
+    /// More than one file, or none, without a map.
+    #[error("PATH: an import without --map takes one file, got {given}")]
+    NotOneFile {
+        /// How many.
+        given: usize,
+    },
     /// What the file holds does not say what its channels mean.
     #[error(
         "{file}: needs --map: without one, import reads ULog (PX4), dataflash logs (ArduPilot), \
-         blackbox logs (Betaflight, INAV) and ROS 2 bags (MCAP), one file at a time"
+         blackbox logs (Betaflight, INAV), micro-SD logs (Crazyflie) and ROS 2 bags (MCAP), one file at a time; \
+         maps that are built in: nanobench, crazypad, arpl"
     )]
     NeedsMap {
         /// Path as given.

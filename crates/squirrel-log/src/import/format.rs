@@ -120,7 +120,8 @@ const CONVERTIBLE: [(&[u8], &str); 4] = [
     ),
     (
         b"MATLAB 7.3 MAT-f",
-        "a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB, `save -v7 FILE.mat` writes one",
+        "a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB `load FILE.mat` and `save -v7 OTHER.mat`, or in Python \
+         `pip install mat73 scipy` and `scipy.io.savemat(\"OTHER.mat\", mat73.loadmat(\"FILE.mat\"))`",
     ),
     (b"\x89HDF\r\n\x1a\n", "an HDF5 file; import reads CSV, Parquet and MATLAB's `save -v7`"),
 ];

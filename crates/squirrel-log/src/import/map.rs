@@ -158,13 +158,23 @@ enum Repeats {
     ForwardFilled,
 }
 
+/// The maps of public data sets, which are built in.
+const BUILT_IN: [(&str, &str); 3] = [
+    ("nanobench", include_str!("../../../../vehicles/maps/nanobench.toml")),
+    ("crazypad", include_str!("../../../../vehicles/maps/crazypad.toml")),
+    ("arpl", include_str!("../../../../vehicles/maps/arpl.toml")),
+];
+
 impl ImportMap {
-    /// Reads and checks a map file.
+    /// Reads and checks a map file, or takes a built-in map by its name where no such file is.
     ///
     /// # Errors
     /// [`ImportError::Read`] if the file cannot be read, else as [`ImportMap::parse`].
     pub fn load(path: &Path) -> Result<Self, ImportError> {
         let name = path.display().to_string();
+        if let Some((_, text)) = BUILT_IN.iter().find(|(own, _)| *own == name && !path.exists()) {
+            return Self::parse(text, &name);
+        }
         let text = files::read_text(path)
             .map_err(|source| ImportError::Read { file: name.clone(), source })?;
         Self::parse(&text, &name)

@@ -89,7 +89,8 @@ mod meter;
 mod names;
 mod number;
 mod parquet_file;
-mod parquet_split;
+mod parquet_pages;
+mod reading;
 mod report;
 mod rows;
 mod table;
@@ -98,6 +99,7 @@ mod ulog_file;
 mod ulog_format;
 mod usd_file;
 mod usd_format;
+mod usd_known;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -105,6 +107,7 @@ use std::path::{Path, PathBuf};
 pub use board::{BoardReport, import_board};
 pub use error::ImportError;
 pub use map::ImportMap;
+pub use reading::Reading;
 pub use report::{AbsentChannel, ChannelReport, FileReport, Gaps, ImportReport};
 
 use crate::FlightLog;
@@ -145,15 +148,7 @@ pub fn files_of(map: &ImportMap, paths: &[PathBuf]) -> Result<Vec<PathBuf>, Impo
 /// # Errors
 /// The file cannot be read, no topic has a known type, or several have the same one.
 pub fn map_of_bag(path: &Path, topics: &[String]) -> Result<(ImportMap, Vec<String>), ImportError> {
-    mcap::map_of_bag(path, topics)
-}
-
-/// Whether a path is a ROS 2 bag, or a folder that may hold one.
-///
-/// # Errors
-/// A file that cannot be read, or of a kind that import does not know.
-pub fn is_bag(path: &Path) -> Result<bool, ImportError> {
-    Ok(path.is_dir() || format::format(path)? == format::Format::Mcap)
+    mcap::map_of_bag(path, topics, &mut mcap::Logs::default())
 }
 
 /// Imports the log of an autopilot, which says itself what its channels are: PX4's ULog, ArduPilot's
@@ -209,11 +204,20 @@ pub fn import_watched(
     paths: &[PathBuf],
     watch: &dyn Fn(u64, u64),
 ) -> Result<(FlightLog, ImportReport), ImportError> {
+    import_of(map, paths, watch, mcap::Logs::default())
+}
+
+/// * `logs` - MCAP files that were read before
+fn import_of(
+    map: &ImportMap,
+    paths: &[PathBuf],
+    watch: &dyn Fn(u64, u64),
+    mut logs: mcap::Logs,
+) -> Result<(FlightLog, ImportReport), ImportError> {
     let found = files::find(map, paths)?;
     // A file that two sources read is worked through twice.
     let total = found.iter().filter_map(|path| Some(path.metadata().ok()?.len())).sum();
     let meter = Meter::new(total, watch);
-    let mut logs = mcap::Logs::default();
     let opened =
         (0..).zip(&found).map(|(index, path)| table::open(map, index, path, &mut logs, &meter));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;

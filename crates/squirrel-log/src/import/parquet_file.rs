@@ -6,8 +6,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use parquet::basic::{ConvertedType, Encoding, Type};
-use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::basic::ConvertedType;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
@@ -17,7 +16,7 @@ use parquet::schema::types::ColumnDescriptor;
 
 use super::error::ImportError;
 use super::meter::Meter;
-use super::parquet_split;
+use super::parquet_pages::Pages;
 use super::table::{Table, TableFile, checked, places};
 use crate::files::{self, Budget};
 
@@ -74,12 +73,7 @@ impl<'a> ParquetFile<'a> {
             })?;
             let pages =
                 group.get_column_page_reader(place).map_err(|error| damaged(&self.name, &error))?;
-            let value_bytes = match descriptor.physical_type() {
-                Type::INT64 | Type::DOUBLE => 8,
-                _ => 4,
-            };
-            let level = descriptor.max_def_level();
-            let pages = Box::new(Pages { inner: pages, has_dictionary: false, value_bytes, level });
+            let pages = Box::new(Pages::new(pages, &descriptor));
             match numbers(get_column_reader(descriptor.clone(), pages), &descriptor, &mut values) {
                 Ok(true) => {}
                 Ok(false) => {
@@ -216,50 +210,5 @@ fn append<T: DataType>(
             let next = |at: &i16| if *at == level { present.next() } else { None };
             values.extend(levels.iter().map(next).map(|x| x.map_or(f64::NAN, &to_f64)));
         }
-    }
-}
-
-/// The pages of a column chunk; a page that needs a dictionary comes only after one, which the
-/// decoder takes for granted.
-struct Pages {
-    inner: Box<dyn PageReader>,
-    has_dictionary: bool,
-    /// Bytes of one value.
-    value_bytes: usize,
-    /// Definition level of a value that is there.
-    level: i16,
-}
-
-impl Iterator for Pages {
-    type Item = Result<Page, ParquetError>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        self.get_next_page().transpose()
-    }
-}
-
-impl PageReader for Pages {
-    fn get_next_page(&mut self) -> Result<Option<Page>, ParquetError> {
-        let page = self.inner.get_next_page()?;
-        if let Some(page) = &page {
-            parquet_split::check(page, self.value_bytes, self.level)?;
-            let needs_dictionary =
-                matches!(page.encoding(), Encoding::PLAIN_DICTIONARY | Encoding::RLE_DICTIONARY);
-            self.has_dictionary |= page.is_dictionary_page();
-            if needs_dictionary && !self.has_dictionary {
-                return Err(ParquetError::General(
-                    "a page refers to a dictionary that is not there".to_owned(),
-                ));
-            }
-        }
-        Ok(page)
-    }
-
-    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>, ParquetError> {
-        self.inner.peek_next_page()
-    }
-
-    fn skip_next_page(&mut self) -> Result<(), ParquetError> {
-        self.inner.skip_next_page()
     }
 }

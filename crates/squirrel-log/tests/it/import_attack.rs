@@ -12,10 +12,12 @@ use std::process::Command;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use squirrel_log::FlightLog;
-use squirrel_log::import::{ImportMap, import, import_without_map, map_of_bag, parameters};
+use squirrel_log::import::{
+    ImportMap, Reading, import, import_without_map, map_of_bag, parameters,
+};
 
 use crate::import_fields::data;
-use crate::import_support::formats::{Cells, parquet_bytes};
+use crate::import_support::formats::{Cells, parquet_bytes, parquet_split};
 use crate::import_support::{OMEGA, one_source};
 
 /// Set in the child: the kind, how many files, the seed.
@@ -32,7 +34,7 @@ const CHILD_KIB: u64 = (192 + 64) << 10;
 /// Processor time of a thousand files, s: a hang of 5 s shows.
 const CHILD_S: u64 = 5;
 
-const KINDS: [&str; 11] = [
+const KINDS: [&str; 15] = [
     "ulog",
     "ulog-map",
     "ardupilot",
@@ -40,10 +42,14 @@ const KINDS: [&str; 11] = [
     "usd",
     "csv",
     "parquet",
+    "parquet-split",
     "map",
     "map-table",
     "mcap",
     "bag",
+    "protobuf",
+    "mat",
+    "mat-packed",
 ];
 
 const TABLE: &str = "t,x,y,z\n1,2,3,4\n2,3,4,5\n3.5,-1e-3,nan,7\n";
@@ -63,28 +69,37 @@ fn good(kind: &str) -> Vec<u8> {
         "blackbox" => fs::read(data("blackbox/sitl.bbl")).unwrap(),
         "mcap" => return own_log(),
         "bag" => return fs::read(data("ros/ros.mcap")).unwrap(),
+        "protobuf" => return fs::read(data("protobuf/flight.mcap")).unwrap(),
+        "mat" => return fs::read(data("mat/plain.mat")).unwrap(),
+        "mat-packed" => return fs::read(data("mat/packed.mat")).unwrap(),
         "usd" => return fs::read(data("crazypad/E8_log00.bin")).unwrap(),
         "csv" => TABLE.repeat(3).into_bytes(),
         "map" => CRAZYPAD.as_bytes().to_vec(),
         "map-table" => one_source(OMEGA).into_bytes(),
         "parquet" => {
-            let column = || (0..40).map(|i| Some(i as f32)).collect();
-            return parquet_bytes(
-                "required int64 t; required float x; optional float y; required float z;",
-                &[
-                    Cells::Longs((0..40).map(Some).collect()),
-                    Cells::Floats(column()),
-                    Cells::Floats(column()),
-                    Cells::Floats(column()),
-                ],
-                16,
-                parquet::basic::Compression::SNAPPY,
-            );
+            return parquet(|schema, columns| {
+                parquet_bytes(schema, columns, 16, parquet::basic::Compression::SNAPPY)
+            });
         }
+        "parquet-split" => return parquet(|schema, columns| parquet_split(schema, columns, 16)),
         other => panic!("no kind `{other}`"),
     };
     bytes.truncate(if kind == "ulog-map" { 64_000 } else { GOOD_BYTES_MAX });
     bytes
+}
+
+fn parquet(bytes: impl Fn(&str, &[Cells]) -> Vec<u8>) -> Vec<u8> {
+    let column = || (0..40).map(|i| (i % 7 > 0).then_some(i as f32)).collect();
+    let whole = || (0..40).map(|i| Some(i as f32)).collect();
+    bytes(
+        "required int64 t; required float x; optional float y; required float z;",
+        &[
+            Cells::Longs((0..40).map(Some).collect()),
+            Cells::Floats(whole()),
+            Cells::Floats(column()),
+            Cells::Floats(whole()),
+        ],
+    )
 }
 
 /// A flight of a second, as squirrel writes it.
@@ -132,8 +147,17 @@ fn read(kind: &str, path: &Path) {
                 let _ = import(&map, &[path.to_path_buf()]);
             }
         }
-        "usd" => by_map(CRAZYPAD),
-        "csv" | "parquet" => by_map(&one_source(OMEGA)),
+        "usd" => {
+            by_map(CRAZYPAD);
+            let _ =
+                Reading::new(&[path.to_path_buf()], None, &[]).and_then(|r| r.import(&|_, _| {}));
+        }
+        "csv" | "parquet" | "parquet-split" => by_map(&one_source(OMEGA)),
+        "protobuf" => by_map(&topic("/flight", "log_time", "ns", "\"maybe\"")),
+        "mat" | "mat-packed" => {
+            let map = topic("", "t", "s", "\"log.gyro[0]\"");
+            by_map(&map.replace("topic = \"\"\n", ""));
+        }
         // A map that is taken reads the file that it was made for.
         _ => {
             let Ok(text) = fs::read_to_string(path) else { return };

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 
 use squirrel_log::FlightLog;
-use squirrel_log::import::{ImportMap, import};
+use squirrel_log::import::{ImportMap, Reading, import};
 
 const GRAVITY_M_S2: f64 = 9.80665;
 
@@ -52,6 +52,37 @@ fn the_map_turns_a_piece_of_a_flight_into_our_frames() {
     close("imu.acceleration_ned_m_s2", &acceleration_g.map(|g| g * GRAVITY_M_S2));
     close("attitude.roll_rad", &[-0.06214368715882301_f64.to_radians()]);
     close("attitude.yaw_rad", &[-3.140734910964966_f64.to_radians()]);
+}
+
+/// The same without a map: what the names of the variables say.
+#[test]
+fn the_names_of_the_variables_are_map_enough() {
+    let piece = [root("tests/data/crazypad/E8_log00.bin")];
+    let (by_map, _) = import(&map(&map_text()), &piece).unwrap();
+    let reading = Reading::new(&piece, None, &[]).unwrap();
+    assert_eq!(reading.files().unwrap(), piece);
+    assert_eq!(
+        reading.notes,
+        [
+            "of the variables of the event `fixedFrequency`, by their names",
+            "kept: what is flown above 0.3 m, for on the floor legs push"
+        ]
+    );
+    let (log, _) = reading.import(&|_, _| {}).unwrap();
+    let names: Vec<&String> = log.sources.keys().collect();
+    assert_eq!(names, by_map.sources.keys().collect::<Vec<_>>());
+    for (name, source) in &by_map.sources {
+        let own = &log.sources[name];
+        assert_eq!(
+            own.channels.keys().collect::<Vec<_>>(),
+            source.channels.keys().collect::<Vec<_>>()
+        );
+        // Its rows end a little later, after the motors have slowed down.
+        for (channel, expected) in &source.channels {
+            let got = &own.channels[channel].values;
+            assert_eq!(got[..expected.values.len()], expected.values[..], "{name}.{channel}");
+        }
+    }
 }
 
 /// All flights, by name; two of the whole set have no yaw, one of the cut-outs.

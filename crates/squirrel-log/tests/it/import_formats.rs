@@ -3,7 +3,7 @@
 
 use std::fmt::Write;
 
-use super::import_support::formats::{Cells, Ulog, Usd, mcap_bytes, parquet_bytes};
+use super::import_support::formats::{Cells, Ulog, Usd, mcap_bytes, parquet_bytes, parquet_split};
 use super::import_support::{Flight, OMEGA, one_source};
 use parquet::basic::Compression;
 
@@ -26,10 +26,14 @@ fn csv() -> String {
 }
 
 fn parquet(compression: Compression) -> Vec<u8> {
+    parquet_by(|schema, columns| parquet_bytes(schema, columns, 9, compression))
+}
+
+fn parquet_by(bytes: impl Fn(&str, &[Cells]) -> Vec<u8>) -> Vec<u8> {
     let axis =
         |i: usize| (0..ROWS).map(|r| Some(row(r).1[i]).filter(|x| !x.is_nan())).collect::<Vec<_>>();
     let doubles = axis(2).iter().map(|z| z.map(f64::from)).collect();
-    parquet_bytes(
+    bytes(
         "required int64 t; required float x; optional float y; optional double z;",
         &[
             Cells::Longs((0..ROWS).map(|r| Some(row(r).0)).collect()),
@@ -37,8 +41,6 @@ fn parquet(compression: Compression) -> Vec<u8> {
             Cells::Floats(axis(1)),
             Cells::Doubles(doubles),
         ],
-        9,
-        compression,
     )
 }
 
@@ -115,16 +117,12 @@ fn every_format_gives_the_flight_of_the_csv() {
         assert_eq!(report.files[0].rows, counted.files[0].rows, "{file}");
         assert_eq!(report.channels[0].samples_missing, 1, "{file}");
     }
-    for compression in
-        [Compression::SNAPPY, Compression::ZSTD(parquet::basic::ZstdLevel::default())]
-    {
-        flight.write("f.parquet", &parquet(compression));
+    let split = parquet_by(|schema, columns| parquet_split(schema, columns, 9));
+    let packed = [Compression::SNAPPY, Compression::ZSTD(parquet::basic::ZstdLevel::default())];
+    for (i, bytes) in packed.map(parquet).into_iter().chain([split]).enumerate() {
+        flight.write("f.parquet", &bytes);
         let (log, _) = flight.import(&map("f.parquet"), &["f.parquet"]).unwrap();
-        assert_eq!(
-            format!("{:?}", log.sources),
-            format!("{:?}", expected.sources),
-            "{compression}"
-        );
+        assert_eq!(format!("{:?}", log.sources), format!("{:?}", expected.sources), "{i}");
     }
 }
 

@@ -94,7 +94,8 @@ fn a_mat_file_that_says_something_else_is_one_line() {
     for (bytes, problem) in [
         (
             later,
-            "f.mat: a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB, `save -v7 FILE.mat` writes one",
+            "f.mat: a MAT-file v7.3 (HDF5); import reads up to v7: in MATLAB `load FILE.mat` and `save -v7 OTHER.mat`, or in Python \
+             `pip install mat73 scipy` and `scipy.io.savemat(\"OTHER.mat\", mat73.loadmat(\"FILE.mat\"))`",
         ),
         (plain[..100].to_vec(), "f.mat: ends inside the header, after 100 bytes"),
         (vec![0; 200], "f.mat: no MAT-file of level 5; in MATLAB, `save -v7` writes one"),

@@ -76,7 +76,7 @@ impl Air {
 
 /// Part of thrust and tilt that a plan leaves to whoever follows it to its end.
 pub const RESERVE: f64 = 0.05;
-/// Of the command filter and the attitude loop.
+/// Of a vehicle whose attitude loop is not known.
 const DELAY_S: f64 = 0.1;
 /// Most of a half turn that the command filter and the attitude loop do in a second.
 const TILT_RATE_MAX_RAD_S: f64 = 2.5;
@@ -122,7 +122,7 @@ impl Craft {
                 .map_or(0.1 * weight_n, |c| f64::from(c.twcc.thrust_min_n)),
             thrust_max_n,
             tilt_max_rad: p.limits.tilt_max_rad * (1.0 - reserve),
-            delay_s: DELAY_S,
+            delay_s: vehicle.control.map_or(DELAY_S, |c| f64::from(c.attitude.filter_delay_s())),
             turning_s2: turning_s2(vehicle),
             tilt_rate_max_rad_s: TILT_RATE_MAX_RAD_S,
             thrust_rate_max_n_s: thrust_max_n / THRUST_TIME_S,

@@ -60,8 +60,7 @@ fn a_known_wind_is_planned_for() {
     let rmse_m = |craft: &Craft| {
         let task = Task::of(&setup.scenario, craft, 0.8, 8.0, 0.1).unwrap();
         let plan = Planner::default().plan(craft, &task, None);
-        let mut follower =
-            Follower::new(&setup, squirrel_core::control::follow::FollowGains::default()).unwrap();
+        let mut follower = Follower::new(&setup).unwrap();
         follower.follow(plan.track, 0);
         let mut link = InProcess::new(setup.stack().unwrap());
         setup.fly_on(&mut link, Some(&mut follower), false, |_| {}).unwrap().metrics.rmse_m

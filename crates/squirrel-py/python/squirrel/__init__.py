@@ -6,6 +6,8 @@ force (`squirrel.nn`), environments in which policies learn (`Tasks`; `squirrel.
 wings make reachable (`squirrel.plan`), and what a model lacks (`squirrel.gap`). `squirrel.plot` needs matplotlib, `squirrel.torch` PyTorch.
 
 SI units and radians; world NED, body FRD, quaternions Hamilton, body to NED, w x y z. Functions are batched over the first axis.
+Arrays that come in may be of any library that speaks DLPack, PyTorch and JAX among them: on the CPU, detached, of the dtype that is asked for;
+they are read where they lie. What comes out is NumPy's.
 """
 
 from squirrel import control, dynamics, flight, gap, nn, plan, policy

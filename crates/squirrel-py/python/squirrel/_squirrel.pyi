@@ -2,6 +2,7 @@
 # ruff: noqa: E501, F401, F403, F405
 
 import builtins
+import collections.abc
 import numpy
 import numpy.typing
 import os
@@ -35,6 +36,7 @@ __all__ = [
     "rk4_step",
     "rollout",
     "simulate",
+    "stubs",
     "train",
     "windows",
 ]
@@ -165,7 +167,7 @@ class Batch:
         r"""
         ``float32`` or ``float64``.
         """
-    def __new__(cls, *, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, dt_s: builtins.float = 0.001, scheme: builtins.str = 'rk4', dtype: builtins.str = 'float32', threads: typing.Optional[builtins.int] = None, registers: typing.Optional[builtins.str] = None) -> Batch: ...
+    def __new__(cls, *, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, dt_s: builtins.float = 0.001, scheme: flight.Scheme = "rk4", dtype: builtins.str = 'float32', threads: typing.Optional[builtins.int] = None, registers: typing.Optional[builtins.str] = None) -> Batch: ...
     def command(self, command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]) -> None:
         r"""
         Tell the rotors what to do from now on.
@@ -737,7 +739,7 @@ class Stack:
     ValueError
         One line that names the argument or field, and the value.
     """
-    def __new__(cls, vehicle: typing.Optional[Vehicle] = None, *, arm: builtins.str = 'twcc_flat', scenario: builtins.str = 'hover', seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, count: builtins.int = 1) -> Stack: ...
+    def __new__(cls, vehicle: typing.Optional[Vehicle] = None, *, arm: flight.Arm = "twcc_flat", scenario: flight.Scenario | builtins.str = "hover", seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, count: builtins.int = 1) -> Stack: ...
     def step(self, *, time_us: builtins.int, omega_body_rad_s: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, specific_force_body_m_s2: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, q_ned_from_body_wxyz: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, position_ned_m: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, velocity_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, altitude_m: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, wing_force_ned_n: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None) -> dict[str, numpy.typing.NDArray[numpy.float32]]:
         r"""
         One step of each vehicle.
@@ -793,13 +795,22 @@ class Tasks:
     Environments to learn in, side by side: what the classes of `squirrel.envs` are made of.
     
     An action is 20 ms of flight. An episode that has ended is followed by a new one in the next
-    step, whose action is not looked at. Environment k draws from ``seed + k``: what happens in it
+    step, whose action is not looked at. The reward of a step of 20 ms is
+    
+        (1 - d / 5 m - 0.005 w^2) / 50
+    
+    with d the distance to the reference and w the angular rate in rad/s, so that ten seconds are worth ten at most; -5 where the
+    vehicle is lost: it hit a trunk, overturned, or d reached 5 m. `reward_terms` has its parts. The air is still but for the
+    vehicles' own effects (``constant_wind``, ``gust``): vehicles with different ones are how wind, gusts and everything else
+    are randomised. Environment k draws from ``seed + k``: what happens in it
     does not depend on how many there are, nor on threads.
     
     Parameters
     ----------
     task : str
-        ``avoid``: follow a straight run of 4 to 8 m/s past trunks that are seen from 5 m; ``track``: follow a curve.
+        ``avoid``: follow a straight run of 4 to 8 m/s, from rest or at speed, past six trunks of 0.5 m radius that are seen from 5 m: each
+        8 to 16 m behind the one before and up to 0.7 m beside the run. ``track``: follow a curve, one sine an axis, of 1 to 5 m and
+        1 to 4 m/s (0.3 times as much in height), at most 4 m/s^2. All are drawn anew for each episode, evenly within these limits.
     vehicles : sequence of Vehicle
         Each episode takes one of them, with its wings, battery and effects: domain randomisation is a list of vehicles. All have four
         rotors; those without ``[control]`` fly by gains by rule (`gains_by_rule`).
@@ -843,7 +854,7 @@ class Tasks:
         r"""
         Numbers of an action.
         """
-    def __new__(cls, *, task: builtins.str, vehicles: typing.Sequence[Vehicle], num_envs: builtins.int = 1, action: builtins.str = 'attitude_wing', seed: builtins.int = 0, episode_s: builtins.float = 10.0, sensors: builtins.bool = False, scheme: builtins.str = 'rk4', threads: typing.Optional[builtins.int] = None, registers: typing.Optional[builtins.str] = None) -> Tasks: ...
+    def __new__(cls, *, task: flight.Task, vehicles: typing.Sequence[Vehicle], num_envs: builtins.int = 1, action: flight.Action = "attitude_wing", seed: builtins.int = 0, episode_s: builtins.float = 10.0, sensors: builtins.bool = False, scheme: flight.Scheme = "rk4", threads: typing.Optional[builtins.int] = None, registers: typing.Optional[builtins.str] = None) -> Tasks: ...
     def seed(self, index: builtins.int, seed: builtins.int) -> None:
         r"""
         New streams of random numbers, from the next episodes on.
@@ -898,6 +909,17 @@ class Tasks:
         ValueError
             Another dtype or shape, a number that is not finite.
         """
+    def reward_terms(self) -> dict[str, numpy.typing.NDArray[numpy.float32]]:
+        r"""
+        What the rewards of the last step are made of.
+        
+        Returns
+        -------
+        dict of str to ndarray of float32, shape (num_envs,)
+            ``near``: (1 - d / 5 m) / 50, d the distance to the reference; ``turning``: -0.005 w^2 / 50, w the angular rate in rad/s;
+            ``lost``: -5 where the vehicle hit a trunk, overturned or strayed by 5 m, and then the others are 0. Their sum is the reward, to
+            the rounding. Zero before the first step, and where an episode began in the last one.
+        """
     def states(self) -> tuple[numpy.typing.NDArray[numpy.float32], numpy.typing.NDArray[numpy.float32]]:
         r"""
         Motions of all vehicles and what they should follow.
@@ -950,7 +972,7 @@ class Twcc:
     ValueError
         The vehicle has no gains, or not the weights that the arm needs.
     """
-    def __new__(cls, vehicle: Vehicle, *, arm: builtins.str = 'twcc_flat', count: builtins.int = 1) -> Twcc: ...
+    def __new__(cls, vehicle: Vehicle, *, arm: flight.Arm = "twcc_flat", count: builtins.int = 1) -> Twcc: ...
     def step(self, *, position_ned_m: numpy.typing.NDArray[numpy.float32], velocity_ned_m_s: numpy.typing.NDArray[numpy.float32], q_ned_from_body_wxyz: numpy.typing.NDArray[numpy.float32], reference_position_ned_m: numpy.typing.NDArray[numpy.float32], reference_velocity_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, reference_acceleration_ned_m_s2: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, reference_yaw_rad: builtins.float = 0.0, wing_force_ned_n: typing.Optional[numpy.typing.NDArray[numpy.float32]] = None, dt_s: builtins.float = 0.1) -> dict[str, numpy.typing.NDArray[numpy.float32]]:
         r"""
         One tick of each vehicle.
@@ -1373,15 +1395,17 @@ def read_log(path: builtins.str | os.PathLike | pathlib.Path, *, map: typing.Opt
     r"""
     Read a log, whoever wrote it.
     
-    Logs of squirrel, of PX4 (ULog), ArduPilot (dataflash), Betaflight and INAV (blackbox) and ROS 2
-    bags of known types (MCAP) say themselves what their channels are; others need a map.
+    Logs of squirrel, of PX4 (ULog), ArduPilot (dataflash), Betaflight and INAV (blackbox), Crazyflies
+    (micro-SD) and ROS 2 bags of known types (MCAP) say themselves what their channels are; others
+    need a map.
     
     Parameters
     ----------
     path : str or os.PathLike
         The log.
     map : str or os.PathLike, optional
-        Import map (TOML) from columns to channels.
+        Import map (TOML) from columns to channels, or the name of a built-in one: ``nanobench``,
+        ``crazypad``, ``arpl``.
     topics : list of str, optional
         Topics of a ROS 2 bag to take where several say the same.
     
@@ -1437,7 +1461,7 @@ def rk4_step(vehicle: Vehicle, *, state: numpy.typing.NDArray[numpy.float64], co
         Names the argument, what was expected and what came.
     """
 
-def rollout(*, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, state: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], wing_command: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None, steps_per_command: builtins.int = 1, dt_s: builtins.float = 0.001, scheme: builtins.str = 'rk4', wind_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None, threads: typing.Optional[builtins.int] = None) -> numpy.typing.NDArray[typing.Any]:
+def rollout(*, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, state: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], command: numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64], wing_command: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None, steps_per_command: builtins.int = 1, dt_s: builtins.float = 0.001, scheme: flight.Scheme = "rk4", wind_ned_m_s: typing.Optional[numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] = None, threads: typing.Optional[builtins.int] = None) -> numpy.typing.NDArray[typing.Any]:
     r"""
     Fly many vehicles under given commands and keep every motion.
     
@@ -1477,7 +1501,7 @@ def rollout(*, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, 
         Names the argument, what was expected and what came.
     """
 
-def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str = 'avoid', arm: typing.Optional[builtins.str] = None, seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, estimator: typing.Optional[builtins.str] = None, integrator: builtins.str = 'rk4', policy: typing.Optional[Policy] = None) -> FlightLog:
+def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: flight.Scenario | builtins.str = "avoid", arm: flight.Arm | None = None, seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, estimator: flight.Estimator | None = None, integrator: flight.Integrator = "rk4", policy: typing.Optional[Policy] = None, controller: collections.abc.Callable[[dict[str, numpy.typing.NDArray[numpy.float32]], builtins.float], collections.abc.Sequence[builtins.float] | numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] | None = None, controller_hz: builtins.int = 50, controller_commands: flight.Commands = "attitude") -> FlightLog:
     r"""
     Fly one scenario in closed loop: plant, sensors and flight code.
     
@@ -1504,10 +1528,22 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
     policy : Policy, optional
         Flies instead of the arm's outer loop: asked 50 times a second, its commands go to the flight code as an offboard computer's.
     
+    controller : callable, optional
+        A function that flies instead of the arm's outer loop, ``controller(sight, time_s)``. ``sight`` is a dict of float32 arrays of what the
+        flight code knows: ``position_ned_m``, ``velocity_ned_m_s``, ``q_ned_from_body_wxyz``, ``omega_body_rad_s``,
+        ``specific_force_body_m_s2``, and of the scenario ``reference_position_ned_m``, ``reference_velocity_ned_m_s``,
+        ``reference_acceleration_ned_m_s2``. First asked once all of that is known. What it raises ends the flight and is raised.
+    controller_hz : int
+        How often it is asked; a divisor of 300, the rate of the flight code.
+    controller_commands : str
+        What it returns. ``attitude``: four numbers, collective thrust (N), roll and pitch (rad), wings (0 folded, 1 spread); the flight
+        code's inner loop flies them. ``rotors``: a command for each rotor in the vehicle's unit, then one for the wings; they replace
+        those of the flight code, and `squirrel replay` of such a log finds others.
+    
     Returns
     -------
     FlightLog
-        With `FlightLog.metrics`. Equal arguments give equal bits.
+        With `FlightLog.metrics`. Equal arguments give equal bits, with a controller as far as it answers equally.
     
     Raises
     ------
@@ -1522,6 +1558,22 @@ def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: builtins.str
     >>> log = squirrel.simulate(scenario="avoid", arm="twcc_flat", seed=3)
     >>> log["truth.position_ned_m"].shape[1]
     3
+    
+    A controller of four lines: hold height, level.
+    
+    >>> def hold(sight, time_s):
+    ...     down, sinking = sight["position_ned_m"][2], sight["velocity_ned_m_s"][2]
+    ...     thrust_n = 5.4 + 4.0 * (down - sight["reference_position_ned_m"][2]) + 4.0 * sinking
+    ...     return thrust_n, 0.0, 0.0, 0.0
+    >>> log = squirrel.simulate(scenario="hover", controller=hold, controller_hz=50)
+    >>> log.metadata["controller"]
+    'a Python function commands attitude at 50 Hz'
+    """
+
+def stubs() -> builtins.str:
+    r"""
+    Text of `_squirrel.pyi`, for the test that holds the file to the code. Here, because only the
+    crate that declares them finds its own declarations; only where the sources are.
     """
 
 def train(flights: dict[str, FlightLog], *, model: builtins.str = 'parnn', vehicle: typing.Optional[Vehicle] = None, validation: typing.Optional[typing.Sequence[builtins.str]] = None, epochs: builtins.int = 800, batch: builtins.int = 256, rate: builtins.float = 0.003, clip: builtins.float = 5.0, patience: builtins.int = 200, seed: builtins.int = 0) -> Model:

@@ -11,6 +11,19 @@ attitude-and-wing level. Needs Gymnasium, to which importing this module makes t
 >>> observation.shape
 (100, 25)
 
+The reward of a step of 20 ms, with d the distance to the reference and w the angular rate in rad/s, is::
+
+    (1 - d / 5 m - 0.005 w^2) / 50      -5 where the vehicle is lost: it hit a trunk, overturned, or d reached 5 m
+
+and ``info`` has its parts: ``reward_near``, ``reward_turning``, ``reward_lost``. Wind, gusts and everything else that a vehicle file says are
+randomised by a list of vehicles, of which each episode takes one, evenly; the air is still but for their effects:
+
+>>> from squirrel import Vehicle
+>>> still = Vehicle.bundled("squirrel")
+>>> winds = [{"effects.constant_wind.wind_north_m_s": w, "effects.constant_wind.wind_east_m_s": 0.0} for w in (-4.0, 4.0)]
+>>> windy = [still.edited(wind) for wind in winds]
+>>> env = gymnasium.make("SquirrelTrack-v0", vehicles=[still, *windy])
+
 Observations are those of the flight code, so what was learned at attitude-and-wing level flies in ``squirrel fly --policy``; the table
 of their numbers is in the documentation of the crate ``squirrel-core``, module ``policy``. All of it runs in Rust, and environment k
 of a vectorised one with seed s does what a single one with seed s + k does, to the bit.
@@ -22,6 +35,10 @@ import operator
 from collections.abc import Sequence
 from typing import Any
 
+from squirrel._extra import needed
+
+needed("squirrel.envs", "gymnasium", "gym")
+
 import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
@@ -31,6 +48,7 @@ from numpy.typing import NDArray
 
 from squirrel._picture import picture, text
 from squirrel._squirrel import Tasks, Vehicle
+from squirrel.flight import Action, Scheme, Task
 
 __all__ = ["SquirrelEnv", "SquirrelVectorEnv", "register"]
 
@@ -83,6 +101,11 @@ def _frames(tasks: Tasks, render_mode: str | None) -> list[Any]:
     return [draw(states[k], references[k], tasks.obstacles(k)) for k in range(len(tasks))]
 
 
+def _info(tasks: Tasks, index: int | None = None) -> dict[str, Any]:
+    terms = {f"reward_{name}": numbers for name, numbers in tasks.reward_terms().items()}
+    return terms if index is None else {name: float(numbers[index]) for name, numbers in terms.items()}
+
+
 def _spaces(tasks: Tasks) -> tuple[Box, Box]:
     observation = Box(-_LARGEST, _LARGEST, (tasks.observation_numbers,), np.float32)
     return observation, Box(-1.0, 1.0, (tasks.action_numbers,), np.float32)
@@ -114,12 +137,12 @@ class SquirrelEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
     def __init__(
         self,
         *,
-        task: str,
+        task: Task,
         vehicles: Sequence[Vehicle] | None = None,
-        action: str = "attitude_wing",
+        action: Action = "attitude_wing",
         episode_s: float = 10.0,
         sensors: bool = False,
-        scheme: str = "rk4",
+        scheme: Scheme = "rk4",
         render_mode: str | None = None,
     ) -> None:
         self.render_mode = _mode(render_mode)
@@ -172,11 +195,12 @@ class SquirrelEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         Returns
         -------
         tuple
-            Observation, reward, terminated, truncated, an empty dict.
+            Observation, reward, terminated, truncated, and the parts of the reward: ``reward_near``, ``reward_turning`` and
+            ``reward_lost``, see `squirrel.Tasks.reward_terms`.
         """
         actions = _numbers("action", action)[np.newaxis]
         observation, reward, terminated, truncated = self.tasks.step(actions)
-        return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), {}
+        return observation[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), _info(self.tasks, 0)
 
     def render(self) -> Any:
         """Show where the vehicle is, from above.
@@ -224,13 +248,13 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
     def __init__(
         self,
         *,
-        task: str,
+        task: Task,
         num_envs: int = 1,
         vehicles: Sequence[Vehicle] | None = None,
-        action: str = "attitude_wing",
+        action: Action = "attitude_wing",
         episode_s: float = 10.0,
         sensors: bool = False,
-        scheme: str = "rk4",
+        scheme: Scheme = "rk4",
         threads: int | None = None,
         render_mode: str | None = None,
     ) -> None:
@@ -305,10 +329,11 @@ class SquirrelVectorEnv(gymnasium.vector.VectorEnv[NDArray[np.float32], NDArray[
         Returns
         -------
         tuple
-            Observations, rewards, terminated, truncated, an empty dict.
+            Observations, rewards, terminated, truncated, and the parts of the rewards, arrays of float32 of shape (num_envs,):
+            ``reward_near``, ``reward_turning`` and ``reward_lost``, see `squirrel.Tasks.reward_terms`.
         """
         observation, reward, terminated, truncated = self.tasks.step(_numbers("actions", actions))
-        return observation, reward, terminated, truncated, {}
+        return observation, reward, terminated, truncated, _info(self.tasks)
 
     def render(self) -> tuple[Any, ...] | None:
         """Show where the vehicles are, from above.

@@ -1,10 +1,52 @@
-"""What a flight amounts to."""
+"""What a flight amounts to, and the names that say how it is flown."""
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import Literal, TypeAlias, TypedDict
 
-__all__ = ["Metrics"]
+__all__ = ["Action", "Arm", "Commands", "Estimator", "Integrator", "Metrics", "Scenario", "Scheme", "Task"]
+
+Arm: TypeAlias = Literal[
+    "pc",
+    "pc_wings_open",
+    "wiic_no_wings",
+    "phantom",
+    "phantom_parnn",
+    "twcc_flat",
+    "twcc_parnn",
+    "twcc_oracle",
+    "twcc_flat_ff",
+    "twcc_parnn_ff",
+    "twcc_plus",
+    "pc_plus",
+    "indi",
+    "plan_wings",
+    "plan_no_wings",
+]
+"""Who flies."""
+
+Scenario: TypeAlias = Literal[
+    "hover", "avoid", "steer", "track", "forest", "excite_calm", "excite_normal", "excite_rich", "random_spread"
+]
+"""Scenarios that are built in; others are files."""
+
+Estimator: TypeAlias = Literal["eskf", "mekf", "mahony", "rkf_mtf", "rkf_stf", "kalman", "external", "oracle"]
+"""Who tells the flight code attitude, velocity and position."""
+
+Integrator: TypeAlias = Literal["rk4", "rapier"]
+"""How the plant of a flight moves."""
+
+Commands: TypeAlias = Literal["attitude", "rotors"]
+"""What a controller in Python returns."""
+
+Scheme: TypeAlias = Literal["rk4", "euler"]
+"""How batches step."""
+
+Task: TypeAlias = Literal["avoid", "track"]
+"""What environments ask for."""
+
+Action: TypeAlias = Literal["motor", "body_rate", "attitude_wing"]
+"""What actions of environments mean."""
 
 
 class Metrics(TypedDict):

@@ -8,6 +8,10 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from squirrel._extra import needed
+
+needed("squirrel.torch", "torch", "torch")
+
 import torch
 from torch import nn
 

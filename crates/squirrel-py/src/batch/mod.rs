@@ -98,6 +98,7 @@ impl Batch {
         vehicles: Vec<Bound<'_, Vehicle>>,
         whole: bool,
         #[pyo3(from_py_with = scalars::dt_s)] dt_s: f64,
+        #[gen_stub(override_type(type_repr = "flight.Scheme", imports = ("squirrel.flight")))]
         scheme: &str,
         dtype: &str,
         #[pyo3(from_py_with = scalars::threads)] threads: Option<usize>,

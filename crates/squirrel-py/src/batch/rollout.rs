@@ -59,6 +59,7 @@ pub(crate) fn rollout<'py>(
     wing_command: Option<ArrayAny<'py>>,
     #[pyo3(from_py_with = scalars::steps_per_command)] steps_per_command: usize,
     #[pyo3(from_py_with = scalars::dt_s)] dt_s: f64,
+    #[gen_stub(override_type(type_repr = "flight.Scheme", imports = ("squirrel.flight")))]
     scheme: &str,
     wind_ned_m_s: Option<ArrayAny<'py>>,
     #[pyo3(from_py_with = scalars::threads)] threads: Option<usize>,

@@ -89,7 +89,17 @@ fn names<S: serde::Serializer>(flags: &Flags, to: S) -> Result<S::Ok, S::Error> 
 }
 
 /// A vehicle that tilts further has turned over, rad.
-pub const OVER_RAD: f64 = 1.6;
+const OVER_RAD: f64 = 1.6;
+
+impl Metrics {
+    /// Whether the vehicle turned over, left the numbers, or met anything.
+    ///
+    /// * `landing_m_s` - who meets the ground no faster has landed; 0 where nobody should
+    pub fn is_lost(&self, landing_m_s: f64) -> bool {
+        let hit = self.contact_speed_m_s.is_some_and(|speed| speed > landing_m_s);
+        hit || self.tilt_max_rad > OVER_RAD || self.not_finite
+    }
+}
 
 /// Collects [`Metrics`].
 pub(super) struct Meter<'a> {

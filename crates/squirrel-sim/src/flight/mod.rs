@@ -15,7 +15,7 @@ mod record;
 mod surroundings;
 
 pub use integrator::Integrator;
-pub use metrics::{Flags, Metrics, OVER_RAD};
+pub use metrics::{Flags, Metrics};
 pub use offboard::{Follower, Offboard};
 pub use pilot::Pilot;
 pub(crate) use record::{ESTIMATOR, PARNN_WEIGHTS};

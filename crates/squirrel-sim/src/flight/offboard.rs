@@ -61,9 +61,10 @@ impl Follower {
     ///
     /// # Errors
     /// A vehicle that cannot be flown.
-    pub fn new(setup: &Setup, gains: FollowGains) -> Result<Self, FlightError> {
-        gains.check().map_err(|e| FlightError(e.to_string()))?;
+    pub fn new(setup: &Setup) -> Result<Self, FlightError> {
         let stack = setup.stack()?;
+        let gains = FollowGains::behind(&stack.parameters().attitude);
+        gains.check().map_err(|e| FlightError(e.to_string()))?;
         let vehicle = stack.vehicle();
         let tilt_max_rad = vehicle.parameters().limits.tilt_max_rad;
         let airframe =

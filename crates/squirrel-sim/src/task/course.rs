@@ -6,7 +6,7 @@
 //!
 //! The reward of a step is its length times how near the vehicle is to where it should be, from 1
 //! to 0, less a little for turning; an episode of ten seconds is worth ten at most. A vehicle that
-//! hits a trunk, overturns or strays is lost, which costs five.
+//! hits a trunk, overturns or strays is lost, which costs five. [`Terms`] are its parts.
 
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
@@ -79,6 +79,18 @@ pub struct Sines {
 pub(super) struct Verdict {
     pub(super) reward: f32,
     pub(super) lost: bool,
+    pub(super) terms: Terms,
+}
+
+/// What the reward of a step is the sum of, but for rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Terms {
+    /// How near the vehicle is, times the length of the step; 0 where it is lost.
+    pub near: f32,
+    /// Less than zero for turning; 0 where it is lost.
+    pub turning: f32,
+    /// -5 where the vehicle is lost, else 0.
+    pub lost: f32,
 }
 
 /// Evenly from `[0, 2^64)`.
@@ -165,8 +177,13 @@ impl Course {
         let lost = hit || overturned || !(away < STRAY_M);
         let omega = state.omega.vector.norm_squared();
         let near = 1.0 - away / STRAY_M;
-        let reward = if lost { -LOST } else { (near - TURNING * omega) / RATE_HZ as f32 };
-        Verdict { reward, lost }
+        if lost {
+            let terms = Terms { lost: -LOST, ..Terms::default() };
+            return Verdict { reward: -LOST, lost, terms };
+        }
+        let (turning, rate_hz) = (TURNING * omega, RATE_HZ as f32);
+        let terms = Terms { near: near / rate_hz, turning: -turning / rate_hz, lost: 0.0 };
+        Verdict { reward: (near - turning) / rate_hz, lost, terms }
     }
 }
 

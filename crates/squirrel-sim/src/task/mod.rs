@@ -22,7 +22,7 @@ use crate::batch::simd::Path;
 use crate::batch::{BatchError, Scheme};
 use crate::tape::Tape;
 use crate::vehicle_file::VehicleFile;
-use course::CourseKind;
+use course::{CourseKind, Terms};
 use part::{Candidate, Part};
 use squirrel_core::control::Reference;
 use squirrel_core::dynamics::State;
@@ -269,6 +269,13 @@ impl<const ROTORS: usize> Tasks<ROTORS> {
             truncated[all].copy_from_slice(&part.truncated);
         }
         Ok(())
+    }
+
+    /// What the rewards of the last step are made of, a row for each environment; zero before it
+    /// and where an episode began in it.
+    pub fn reward_terms(&self) -> Vec<Terms> {
+        let parts = 0..self.count.div_ceil(PART);
+        parts.flat_map(|part| self.parts.chunk(part).terms.clone()).collect()
     }
 
     /// What running episodes are made of, as bytes: what began them, and the actions since.

@@ -1,6 +1,6 @@
 //! Environments that a thread takes at once, and what happens in one of them.
 
-use super::course::{self, Course};
+use super::course::{self, Course, Terms};
 use super::memory::{Event, Played};
 use super::{STEPS, TaskError, TaskSettings};
 use crate::batch::{Autopilot, Batch, BatchError, BatchVehicle, Settings, Tuned};
@@ -70,6 +70,8 @@ pub(super) struct Part<const ROTORS: usize> {
     /// Out: [`OBSERVATION`] numbers for each environment.
     pub(super) observation: Vec<f32>,
     pub(super) reward: Vec<f32>,
+    /// What rewards are made of.
+    pub(super) terms: Vec<Terms>,
     pub(super) terminated: Vec<bool>,
     pub(super) truncated: Vec<bool>,
     /// What running episodes are made of.
@@ -147,6 +149,7 @@ impl<const ROTORS: usize> Part<ROTORS> {
             actions: vec![0.0; count * level.numbers(ROTORS)],
             observation: vec![0.0; count * OBSERVATION],
             reward: vec![0.0; count],
+            terms: vec![Terms::default(); count],
             terminated: vec![false; count],
             truncated: vec![false; count],
             played: Played::new(count),
@@ -236,6 +239,7 @@ impl<const ROTORS: usize> Part<ROTORS> {
                 self.look(number)?;
                 (self.reward[number], self.terminated[number], self.truncated[number]) =
                     (0.0, false, false);
+                self.terms[number] = Terms::default();
                 continue;
             }
             let state = self.batch.state(number)?;
@@ -249,6 +253,7 @@ impl<const ROTORS: usize> Part<ROTORS> {
             self.observation[OBSERVATION * number..][..OBSERVATION].copy_from_slice(&seen);
             (self.reward[number], self.terminated[number], self.truncated[number]) =
                 (verdict.reward, verdict.lost, truncated);
+            self.terms[number] = verdict.terms;
         }
         Ok(())
     }

@@ -31,14 +31,12 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// The squirrel of the paper, as shipped.
-pub const SQUIRREL_TOML: &str = include_str!("../../../../vehicles/squirrel.toml");
+pub const SQUIRREL_TOML: &str = include_str!("../../vehicles/squirrel.toml");
 
 /// Its weights, under the name that its file gives them. They are part of the program: a copy or a
 /// patch of the file finds them wherever it lies.
-const SQUIRREL_PARNN: (&str, &[u8]) = (
-    "squirrel-parnn.safetensors",
-    include_bytes!("../../../../vehicles/squirrel-parnn.safetensors"),
-);
+const SQUIRREL_PARNN: (&str, &[u8]) =
+    ("squirrel-parnn.safetensors", include_bytes!("../../vehicles/squirrel-parnn.safetensors"));
 
 /// Everything that a vehicle file says.
 #[derive(Debug, Clone)]
@@ -203,7 +201,7 @@ impl VehicleFile {
     /// Never: a test parses it.
     #[allow(clippy::expect_used, reason = "the text is part of the program and tested")]
     pub fn squirrel_in_air() -> Self {
-        const TEXT: &str = include_str!("../../../../vehicles/squirrel_air.toml");
+        const TEXT: &str = include_str!("../../vehicles/squirrel_air.toml");
         Self::parse(TEXT, "squirrel_air.toml").expect("the shipped vehicle is sound")
     }
 

@@ -103,6 +103,12 @@ pub struct AttitudeTerms {
 }
 
 impl AttitudeGains {
+    /// How long a command takes through the command filter, s: `2 zeta / w`, how far the filter is
+    /// behind a ramp.
+    pub fn filter_delay_s(&self) -> f32 {
+        2.0 * self.filter_damping / self.filter_frequency_rad_s
+    }
+
     /// # Errors
     /// The first gain that is not finite and positive, by its name in `[control.attitude]`.
     pub fn check(&self) -> Result<(), ParameterError> {

@@ -7,8 +7,9 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
-use super::{LOG_TIME, Log, Topic};
+use super::{LOG_TIME, Log, Logs, Topic};
 use crate::import::error::ImportError;
 use crate::import::format;
 use crate::import::map::ImportMap;
@@ -86,6 +87,7 @@ fn offers(schema: &str) -> &'static [(Role, u8)] {
 /// The map of a bag, and what was chosen, a line each.
 ///
 /// * `chosen` - topics that are taken where several of a type would do
+/// * `logs` - gets the bag, so that an import by the map need not read it again
 ///
 /// # Errors
 /// The file cannot be read, no topic has a known type, several say the same, a message contradicts
@@ -93,6 +95,7 @@ fn offers(schema: &str) -> &'static [(Role, u8)] {
 pub(in crate::import) fn map_of_bag(
     path: &Path,
     chosen: &[String],
+    logs: &mut Logs,
 ) -> Result<(ImportMap, Vec<String>), ImportError> {
     let (path, inside) = bag_in(path)?;
     format::check_known(&path)?;
@@ -102,7 +105,8 @@ pub(in crate::import) fn map_of_bag(
             problem: "no ROS 2 bag (MCAP): say by --map what its columns are".to_owned(),
         });
     }
-    let log = Log::read(&path, &|_, schema| !offers(schema).is_empty())?;
+    let log = Rc::new(Log::read(&path, &|_, schema| !offers(schema).is_empty())?);
+    logs.keep(&path, &log);
     let damaged = |problem| ImportError::Damaged { file: log.file.clone(), problem };
     if let Some(topic) = chosen.iter().find(|topic| !log.topics.contains_key(*topic)) {
         return Err(damaged(format!("--topic {topic}: no topic of a known type has this name")));

@@ -40,12 +40,13 @@ const PUBLISH_TIME: &str = "publish_time";
 const RECORD_MAX_BYTES: usize = 256 << 20;
 
 /// The MCAP files of one import, each read once.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct Logs {
     read: BTreeMap<PathBuf, Rc<Log>>,
 }
 
 /// The messages of some topics of a file.
+#[derive(Debug)]
 pub(super) struct Log {
     /// Path as given, for error messages.
     file: String,
@@ -56,7 +57,7 @@ pub(super) struct Log {
 }
 
 /// The messages of one topic in the order of the file.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct Topic {
     encoding: String,
     /// Name, encoding and text of the schema; empty where the file has none.
@@ -128,6 +129,11 @@ fn cell(file: &str, column: &str, index: usize, number: f64) -> Result<f64, Impo
 }
 
 impl Logs {
+    /// Takes a file that has been read with all topics that a map will ask for.
+    fn keep(&mut self, path: &Path, log: &Rc<Log>) {
+        self.read.insert(path.to_owned(), Rc::clone(log));
+    }
+
     /// The topic that a source of the map reads.
     ///
     /// # Errors

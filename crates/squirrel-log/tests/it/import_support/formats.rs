@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use mcap::WriteOptions;
 use mcap::records::MessageHeader;
-use parquet::basic::Compression;
+use parquet::basic::{Compression, Encoding};
 use parquet::column::writer::ColumnWriter;
 use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
@@ -30,9 +30,26 @@ pub(crate) fn parquet_bytes(
     group_rows: usize,
     compression: Compression,
 ) -> Vec<u8> {
+    let properties = WriterProperties::builder().set_compression(compression).build();
+    parquet_written(schema, columns, group_rows, properties)
+}
+
+/// The same unpacked, each number split into its bytes.
+pub(crate) fn parquet_split(schema: &str, columns: &[Cells], group_rows: usize) -> Vec<u8> {
+    let properties = WriterProperties::builder()
+        .set_dictionary_enabled(false)
+        .set_encoding(Encoding::BYTE_STREAM_SPLIT);
+    parquet_written(schema, columns, group_rows, properties.build())
+}
+
+fn parquet_written(
+    schema: &str,
+    columns: &[Cells],
+    group_rows: usize,
+    properties: WriterProperties,
+) -> Vec<u8> {
     let schema = Arc::new(parse_message_type(&format!("message flight {{ {schema} }}")).unwrap());
-    let properties = Arc::new(WriterProperties::builder().set_compression(compression).build());
-    let mut writer = SerializedFileWriter::new(Vec::new(), schema, properties).unwrap();
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties)).unwrap();
     for start in (0..columns[0].len()).step_by(group_rows) {
         let mut group = writer.next_row_group().unwrap();
         for cells in columns {

@@ -1,0 +1,119 @@
+//! When a study has flown enough: as soon as its 95 % intervals are narrow.
+//!
+//! A study that stops so is one of that many trials, byte for byte: nothing of it says how it came
+//! to them. Whoever looks again and again stops a little early by chance, so that intervals cover
+//! somewhat less than they say; the rounds are few for that reason.
+
+use serde_json::Value;
+use squirrel_sim::flight::FlightError;
+use std::str::FromStr;
+
+/// Trials of the first round.
+const FIRST: u32 = 16;
+
+/// How far an interval may reach to either side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Until {
+    /// As a share of the figure, or of 1 where the figure is smaller: a share, gain or ratio is
+    /// known to so many points.
+    share: f64,
+}
+
+impl FromStr for Until {
+    type Err = String;
+
+    /// `5%`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = text.strip_suffix('%').and_then(|percent| percent.parse::<f64>().ok());
+        match number {
+            Some(percent) if percent > 0.0 && percent <= 100.0 => {
+                Ok(Self { share: percent / 100.0 })
+            }
+            _ => Err("must be a share above 0% and up to 100%, as 5%".to_owned()),
+        }
+    }
+}
+
+impl Until {
+    /// Trials after which a study looks whether it is done: each time twice as many, the most
+    /// last.
+    pub fn rounds(most: u32) -> impl Iterator<Item = u32> {
+        let next = |n: &u32| n.checked_mul(2);
+        std::iter::successors(Some(FIRST), next)
+            .take_while(move |n| *n < most)
+            .chain(std::iter::once(most))
+    }
+
+    /// Whether the widest interval is narrow enough, and how far it reaches, as a share.
+    ///
+    /// * `json` - what the study found, [`crate::study::Found::json`]
+    ///
+    /// # Errors
+    /// A study without intervals.
+    pub fn is_met(self, json: &str) -> Result<(bool, f64), FlightError> {
+        let found: Value = serde_json::from_str(json).map_err(|e| FlightError(e.to_string()))?;
+        let widest = widest(&found).ok_or_else(|| {
+            FlightError("until: this study has no intervals; say --trials alone".to_owned())
+        })?;
+        Ok((widest <= self.share, widest))
+    }
+}
+
+/// The farthest reach of an interval; infinite where it has no ends yet.
+fn widest(found: &Value) -> Option<f64> {
+    let larger = |all: &mut dyn Iterator<Item = f64>| all.reduce(f64::max);
+    match found {
+        Value::Array(all) => larger(&mut all.iter().filter_map(widest)),
+        Value::Object(fields) => {
+            if let (Some(value), Some(low), Some(high)) =
+                (fields.get("value"), fields.get("low"), fields.get("high"))
+            {
+                let reach = [value, low, high].map(Value::as_f64);
+                let [Some(value), Some(low), Some(high)] = reach else {
+                    return Some(f64::INFINITY);
+                };
+                return Some((high - value).max(value - low) / value.abs().max(1.0));
+            }
+            larger(&mut fields.values().filter_map(widest))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounds_double_and_end_with_the_most() {
+        assert_eq!(Until::rounds(100).collect::<Vec<_>>(), [16, 32, 64, 100]);
+        assert_eq!(Until::rounds(64).collect::<Vec<_>>(), [16, 32, 64]);
+        assert_eq!(Until::rounds(3).collect::<Vec<_>>(), [3]);
+    }
+
+    #[test]
+    fn the_widest_interval_decides() {
+        let text = |low: &str| {
+            format!(
+                r#"{{"arms": [{{"lost": {{"value": 0.5, "low": {low}, "high": 0.54}}}},
+                    {{"gain": {{"value": 4.0, "low": 3.8, "high": 4.1}}, "flights": 9}}]}}"#
+            )
+        };
+        let until: Until = "5%".parse().unwrap();
+        // 4 points of a share, and 0.2 of 4.
+        let (met, widest) = until.is_met(&text("0.47")).unwrap();
+        assert!(met && (widest - 0.05).abs() < 1e-12, "{widest}");
+        assert!(!until.is_met(&text("0.44")).unwrap().0);
+        assert!(!until.is_met(&text("null")).unwrap().0, "no interval yet");
+        let error = until.is_met(r#"{"value": 1.0}"#).unwrap_err();
+        assert!(error.to_string().starts_with("until: this study has no intervals"), "{error}");
+    }
+
+    #[test]
+    fn a_share_has_its_sign() {
+        assert_eq!("2.5%".parse(), Ok(Until { share: 0.025 }));
+        for wrong in ["5", "0%", "-1%", "101%", "%", "NaN%"] {
+            assert!(wrong.parse::<Until>().is_err(), "{wrong}");
+        }
+    }
+}
