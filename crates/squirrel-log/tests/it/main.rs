@@ -19,4 +19,5 @@ mod import_turned;
 mod import_usd;
 mod log_damage;
 mod log_foxglove;
+mod log_pieces;
 mod log_round_trip;

@@ -1,12 +1,12 @@
 //! Replay: the same bits from the same inputs, and the first thing that differs where something was
 //! changed.
 
-use squirrel_log::FlightLog;
 use squirrel_log::flight_code::INPUT_SOURCES;
+use squirrel_log::{FlightLog, LogReader};
 use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{Integrator, Setup};
-use squirrel_sim::replay::{OUTPUT_SOURCES, replay, setup};
+use squirrel_sim::replay::{OUTPUT_SOURCES, replay, replay_pieces, setup, setup_of};
 use squirrel_sim::scenario::{Conditions, Scenario};
 use squirrel_sim::vehicle_file::VehicleFile;
 
@@ -33,6 +33,10 @@ fn every_arm_replays_bit_for_bit_through_a_file() {
         let result = replay(&log, &setup(&log).unwrap()).unwrap();
         assert_eq!(result.first_difference, None, "{arm:?}");
         assert!(result.steps > 3000 && result.values > 100_000);
+        // As it is read in pieces.
+        let mut log = LogReader::open(&path).unwrap().unwrap();
+        let setup = setup_of(log.metadata()).unwrap();
+        assert_eq!(replay_pieces(&mut log, &setup).unwrap(), Some(result), "{arm:?}");
     }
     std::fs::remove_dir_all(&folder).unwrap();
 }
@@ -66,7 +70,14 @@ fn a_changed_gain_is_found_at_the_first_output_that_it_reaches() {
         .replace("c1_per_s = { value = [5.3,", "c1_per_s = { value = [5.301,");
     assert_ne!(changed, log.metadata["vehicle_toml"]);
     log.metadata.insert("vehicle_toml".to_owned(), changed);
-    let difference = replay(&log, &setup(&log).unwrap()).unwrap().first_difference.unwrap();
+    let of_whole = replay(&log, &setup(&log).unwrap()).unwrap();
+    let path = std::env::temp_dir().join(format!("squirrel-gain-{}.mcap", std::process::id()));
+    log.write(&path).unwrap();
+    let mut in_pieces = LogReader::open(&path).unwrap().unwrap();
+    let changed = setup_of(in_pieces.metadata()).unwrap();
+    assert_eq!(replay_pieces(&mut in_pieces, &changed).unwrap(), Some(of_whole.clone()));
+    std::fs::remove_file(&path).unwrap();
+    let difference = of_whole.first_difference.unwrap();
     assert!(
         difference.time_s < 0.1 && difference.channel.starts_with("control.inner."),
         "{difference:?}"
