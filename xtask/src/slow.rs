@@ -57,7 +57,8 @@ pub(crate) const SLOW: &[&str] = &[
     // Studies.
     "claims::",
     "dispersion::nobody_is_better_where_nothing_is_as_it_was_told",
-    "faults::nine_of_ten_survivable_faults_are_survived_and_what_is_lost_is_flagged",
+    "faults::survivable_faults_are_survived_and_what_is_lost_is_flagged",
+    "faults::two_faults_at_once_are_survived_nineteen_times_of_twenty",
     "filters::one_thread_and_two_give_the_same_numbers",
     "filters::the_default_needs_no_calibration_and_the_papers_filter_does",
     "pages::steering_has_its_wheels_and_the_tracks_of_one_cell",

@@ -112,11 +112,10 @@ impl<R: Read + Seek> Walk<R> {
         Ok(self.head)
     }
 
-    pub(super) fn skip(&mut self, head: Head) -> Result<()> {
+    pub(super) fn skip(&mut self, head: Head) {
         self.next = head.end();
         self.is_over = head.opcode == op::FOOTER;
         self.head = None;
-        Ok(())
     }
 
     /// Reads the record with its head.
@@ -127,7 +126,8 @@ impl<R: Read + Seek> Walk<R> {
         if self.file.by_ref().take(bytes).read_to_end(into)? as u64 != bytes {
             return Err(ErrorKind::UnexpectedEof.into());
         }
-        self.skip(head)
+        self.skip(head);
+        Ok(())
     }
 }
 

@@ -137,6 +137,7 @@ impl FlightLog {
     }
 
     /// Takes out what is before a time, s; what is left has the same channels.
+    #[must_use]
     pub fn split_before(&mut self, time_s: f64) -> Self {
         let split = |(name, source): (&String, &mut Source)| {
             let samples = source.time_s.partition_point(|sample_s| *sample_s < time_s);
@@ -152,6 +153,7 @@ impl Source {
     ///
     /// # Panics
     /// If there are fewer.
+    #[must_use]
     pub fn take(&mut self, samples: usize) -> Self {
         let front = |values: &mut Vec<f64>, count| values.drain(..count).collect::<Vec<_>>();
         let channels = self.channels.iter_mut().map(|(name, channel)| {
@@ -167,6 +169,7 @@ impl Source {
     ///
     /// # Panics
     /// If there are fewer.
+    #[must_use]
     pub fn from_sample(&self, first: usize) -> Self {
         let channels = self.channels.iter().map(|(name, channel)| {
             let values = channel.values[first * channel.width..].to_vec();

@@ -24,7 +24,7 @@ pub const HEALTHY_RATIO: f64 = 1.6;
 /// What a rotor loses.
 const ROTOR_LOSS: f64 = 0.3;
 /// What a costly wing makes a flight err by, m RMSE.
-const COSTLY_M: f64 = 0.5;
+pub const COSTLY_M: f64 = 0.5;
 /// A vehicle that comes down slower has landed, m/s.
 pub(crate) const LANDING_M_S: f64 = 2.0;
 const SCENARIOS: [&str; 3] = ["avoid", "track", "hover"];

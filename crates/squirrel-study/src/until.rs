@@ -96,13 +96,13 @@ mod tests {
         let text = |low: &str| {
             format!(
                 r#"{{"arms": [{{"lost": {{"value": 0.5, "low": {low}, "high": 0.54}}}},
-                    {{"gain": {{"value": 4.0, "low": 3.8, "high": 4.1}}, "flights": 9}}]}}"#
+                    {{"gain": {{"value": 4.0, "low": 3.84, "high": 4.1}}, "flights": 9}}]}}"#
             )
         };
         let until: Until = "5%".parse().unwrap();
-        // 4 points of a share, and 0.2 of 4.
+        // 4 points of a share, and 0.16 of 4.
         let (met, widest) = until.is_met(&text("0.47")).unwrap();
-        assert!(met && (widest - 0.05).abs() < 1e-12, "{widest}");
+        assert!(met && (widest - 0.04).abs() < 1e-12, "{widest}");
         assert!(!until.is_met(&text("0.44")).unwrap().0);
         assert!(!until.is_met(&text("null")).unwrap().0, "no interval yet");
         let error = until.is_met(r#"{"value": 1.0}"#).unwrap_err();

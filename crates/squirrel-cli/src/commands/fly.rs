@@ -168,6 +168,33 @@ fn offboard_of(
     offboard(setup, stack, policy)
 }
 
+/// Writes the report.
+fn report(
+    setup: &Setup,
+    who: &str,
+    shown: &Shown,
+    cells: Vec<(String, String)>,
+    path: &Path,
+) -> Result<(), String> {
+    let mut facts = facts(setup);
+    if shown.every() > 1 {
+        let of = format!("every {}th sample, the flight is long", shown.every());
+        facts.push(("shown".to_owned(), of));
+    }
+    let heading = Heading {
+        title: format!("{}: {who}", setup.scenario.name),
+        lead: String::new(),
+        facts,
+        card: setup.scenario.pilot_card().map_err(|e| e.to_string())?.unwrap_or_default(),
+    };
+    let log = shown.log();
+    let scene = super::view::scene_of(&[(setup, log)])?;
+    let html = render_with_scene(&heading, &[view(setup, log, cells)], &scene);
+    output::write_file(path, html.as_bytes())?;
+    talk(&format!("wrote {}", path.display()));
+    Ok(())
+}
+
 impl Fly {
     /// The plan of `--reference`.
     fn track(&self, vehicle: &VehicleFile, scenario: &Scenario) -> Result<Option<Track>, String> {
@@ -223,34 +250,6 @@ impl Fly {
             Some(file) => format!("{}: {problem}", file.display()),
             None => problem.to_string(),
         }
-    }
-
-    /// Writes the report.
-    fn report(
-        &self,
-        setup: &Setup,
-        who: &str,
-        shown: &Shown,
-        cells: Vec<(String, String)>,
-        path: &Path,
-    ) -> Result<(), String> {
-        let mut facts = facts(setup);
-        if shown.every() > 1 {
-            let of = format!("every {}th sample, the flight is long", shown.every());
-            facts.push(("shown".to_owned(), of));
-        }
-        let heading = Heading {
-            title: format!("{}: {who}", setup.scenario.name),
-            lead: String::new(),
-            facts,
-            card: setup.scenario.pilot_card().map_err(|e| e.to_string())?.unwrap_or_default(),
-        };
-        let log = shown.log();
-        let scene = super::view::scene_of(&[(setup, log)])?;
-        let html = render_with_scene(&heading, &[view(setup, log, cells)], &scene);
-        output::write_file(path, html.as_bytes())?;
-        talk(&format!("wrote {}", path.display()));
-        Ok(())
     }
 
     pub(crate) fn run(&self) -> Result<(), String> {
@@ -348,7 +347,7 @@ impl Fly {
         }
         recorded.finish()?;
         if let (Some(shown), Some(path)) = (&recorded.shown, &self.report) {
-            self.report(&setup, &who, shown, cells, path)?;
+            report(&setup, &who, shown, cells, path)?;
         }
         let result = Flown {
             vehicle: setup.vehicle.name.clone(),

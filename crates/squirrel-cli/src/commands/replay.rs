@@ -54,14 +54,13 @@ impl Replay {
                 replay.map(|replay| (setup, replay))
             }
         };
-        let (setup, replay) = match in_pieces {
-            Some(both) => both,
-            None => {
-                let log = FlightLog::read(&self.flight).map_err(|e| e.to_string())?;
-                let setup = self.setup(replay::setup(&log).map_err(at)?)?;
-                let replay = replay::replay(&log, &setup).map_err(at)?;
-                (setup, replay)
-            }
+        let (setup, replay) = if let Some(both) = in_pieces {
+            both
+        } else {
+            let log = FlightLog::read(&self.flight).map_err(|e| e.to_string())?;
+            let setup = self.setup(replay::setup(&log).map_err(at)?)?;
+            let replay = replay::replay(&log, &setup).map_err(at)?;
+            (setup, replay)
         };
         let result = Replayed {
             flight: file.to_string(),

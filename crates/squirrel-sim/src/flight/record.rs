@@ -156,7 +156,7 @@ impl<'a> Recorder<'a> {
             if samples > first {
                 piece.sources.insert(name.clone(), source.from_sample(first));
                 self.given.insert(name.clone());
-                source.take(samples - 1);
+                drop(source.take(samples - 1));
             }
         }
         recipient.take(piece, now_s)

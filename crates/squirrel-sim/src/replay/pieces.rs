@@ -18,7 +18,7 @@ const AHEAD_MAX: usize = 10_000;
 /// # Errors
 /// One line that names what cannot be used.
 pub fn replay_pieces(log: &mut LogReader, setup: &Setup) -> Result<Option<Replay>, String> {
-    let mut again = Again::new(setup.stack().map_err(|e| e.to_string())?);
+    let mut again = Again::new(&setup.stack().map_err(|e| e.to_string())?);
     loop {
         // What is wrong with the file is said by who reads all of it.
         let Ok(piece) = log.next_piece() else { return Ok(None) };
@@ -49,9 +49,9 @@ struct Again {
 }
 
 impl Again {
-    fn new(stack: Stack) -> Self {
+    fn new(stack: &Stack) -> Self {
         Self {
-            stack,
+            stack: *stack,
             state: StackState::default(),
             frames: None,
             estimates: false,
