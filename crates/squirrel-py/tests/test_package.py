@@ -19,6 +19,7 @@ import pytest
 from conftest import ROOT
 
 import squirrel
+from squirrel import _squirrel
 
 PYTHON = Path(squirrel.__file__).parent
 EXAMPLES = sorted((ROOT / "examples/python").glob("*.py"))
@@ -64,6 +65,7 @@ import sys
 import numpy
 before = set(sys.modules)
 import squirrel
+from squirrel import _squirrel
 print(*sorted(set(sys.modules) - before))
 """
 
