@@ -2,7 +2,7 @@
 //! the sources of the Python package. CI has the wheel's tests and `crates`; the rest compiles the
 //! workspace several times over and is for who releases.
 
-use crate::run::{call, cargo, output, root, target_directory};
+use crate::run::{call, cargo, output, path_after, root, target_directory};
 use crate::{python, zig};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -66,9 +66,7 @@ pub(crate) fn crates() -> Result<(), String> {
 
 /// The environment with what makes packages, and the folder that they go to.
 fn place() -> Result<(PathBuf, PathBuf), String> {
-    let folder = target_directory()?.join("package");
-    let venv = folder.join("venv");
-    python::environment(&venv, zig::PACKAGES)?;
+    let (folder, venv) = zig::environment()?;
     Ok((venv, folder.join("dist")))
 }
 
@@ -112,18 +110,13 @@ fn wheels() -> Result<(), String> {
         maturin.args(["--release", "--locked", "--quiet", "--compression-level", "9", "--zig"]);
         maturin.args(["--target", machine, "--compatibility", MANYLINUX]);
         // zig is found as a module of the Python that is first.
-        call(maturin.env("PATH", first(&venv)?))?;
+        let python = python::program(&venv, "python");
+        let programs: Vec<&Path> = python.parent().into_iter().collect();
+        call(maturin.env("PATH", path_after(&programs)?))?;
         let name = machine.split('-').next().unwrap_or(machine);
         looked_at(&venv, &newest(&dist, &format!("{MANYLINUX}_{name}.whl"))?)?;
     }
     Ok(())
-}
-
-fn first(venv: &Path) -> Result<std::ffi::OsString, String> {
-    let programs = python::program(venv, "python").parent().map(PathBuf::from).unwrap_or_default();
-    let others = std::env::var_os("PATH").unwrap_or_default();
-    std::env::join_paths(std::iter::once(programs).chain(std::env::split_paths(&others)))
-        .map_err(|error| error.to_string())
 }
 
 /// The wheel of this machine in an empty environment of each Python that uv can fetch.

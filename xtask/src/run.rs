@@ -1,6 +1,7 @@
 //! Steps: commands or functions run one after another, with a table of seconds at the end.
 
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -109,6 +110,17 @@ pub(crate) fn cargo() -> Result<Command, String> {
     let mut command = Command::new("cargo");
     command.current_dir(root()?).env("SQUIRREL_PYTHON", crate::python::interpreter()?);
     Ok(command)
+}
+
+/// `PATH` with folders before those that it has.
+///
+/// # Errors
+/// A folder whose name `PATH` cannot hold.
+pub(crate) fn path_after(first: &[&Path]) -> Result<OsString, String> {
+    let rest = std::env::var_os("PATH").unwrap_or_default();
+    let first = first.iter().map(|folder| folder.to_path_buf());
+    std::env::join_paths(first.chain(std::env::split_paths(&rest)))
+        .map_err(|error| error.to_string())
 }
 
 /// Builds programs of the workspace, with the features that all its crates ask for, as tests are

@@ -4,8 +4,8 @@
 //! the headers of all of them. Python's package is left out: its checks need no Python, but its
 //! dependencies are those of the others.
 
-use crate::run::{call, cargo, output, root, target_directory};
-use crate::{python, zig};
+use crate::run::{call, cargo, output, root};
+use crate::zig;
 use std::process::Command;
 
 /// Rust's name and zig's.
@@ -24,9 +24,7 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     if let Some(no) = arguments.iter().find(|name| !known.contains(&name.as_str())) {
         return Err(format!("target = {no}: must be {}", known.join(", ")));
     }
-    let folder = target_directory()?.join("package");
-    let venv = folder.join("venv");
-    python::environment(&venv, zig::PACKAGES)?;
+    let (folder, venv) = zig::environment()?;
     for (target, of_zig) in TARGETS {
         if !(arguments.is_empty() || arguments.iter().any(|name| name == target)) {
             continue;

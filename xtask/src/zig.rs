@@ -1,10 +1,22 @@
 //! zig as a C compiler for other targets, from PyPI.
 
 use crate::python;
+use crate::run::target_directory;
 use std::path::{Path, PathBuf};
 
 /// What packages are made and looked at with.
-pub(crate) const PACKAGES: &str = "maturin==1.16.0 ziglang==0.17.1 twine==7.0.0 uv==0.13.9";
+const PACKAGES: &str = "maturin==1.16.0 ziglang==0.17.1 twine==7.0.0 uv==0.13.9";
+
+/// The folder of what is made for others, and the environment in it that has the packages.
+///
+/// # Errors
+/// As [`python::environment`].
+pub(crate) fn environment() -> Result<(PathBuf, PathBuf), String> {
+    let folder = target_directory()?.join("package");
+    let venv = folder.join("venv");
+    python::environment(&venv, PACKAGES)?;
+    Ok((folder, venv))
+}
 
 /// A compiler and an archiver for a target, as programs: what builds C asks for one word each, and
 /// names the target in its own way, which zig does not know.

@@ -15,8 +15,8 @@ use crate::scenario::Scenario;
 use crate::vehicle_file::VehicleFile;
 use crate::weights::ParnnWeights;
 use squirrel_core::stack::StackState;
-use squirrel_log::FlightLog;
 use squirrel_log::flight_code::{ESTIMATE, frames, record_output};
+use squirrel_log::{Channel, FlightLog};
 use std::collections::BTreeMap;
 
 /// Sources that the flight code writes, causes before consequences: of two that differ at one time,
@@ -146,18 +146,26 @@ fn compare(
             ));
         }
         replay.values += values.values.len();
-        let differs = |(a, b): (&f64, &f64)| a.to_bits() != b.to_bits();
-        let Some(at) = before.values.iter().zip(&values.values).position(differs) else { continue };
-        let time_s = logged.time_s[at / values.width];
-        if replay.first_difference.as_ref().is_none_or(|d| time_s < d.time_s) {
-            replay.first_difference = Some(Difference {
-                channel: full,
-                time_s,
-                index: at % values.width,
-                logged: before.values[at],
-                replayed: values.values[at],
-            });
+        if let Some(found) = Difference::first(full, &logged.time_s, before, values)
+            && replay.first_difference.as_ref().is_none_or(|d| found.time_s < d.time_s)
+        {
+            replay.first_difference = Some(found);
         }
     }
     Ok(())
+}
+
+impl Difference {
+    /// The first of a channel whose numbers are as wide in the log as in the replay.
+    fn first(name: String, time_s: &[f64], logged: &Channel, replayed: &Channel) -> Option<Self> {
+        let differs = |(a, b): (&f64, &f64)| a.to_bits() != b.to_bits();
+        let at = logged.values.iter().zip(&replayed.values).position(differs)?;
+        Some(Self {
+            channel: name,
+            time_s: time_s[at / replayed.width],
+            index: at % replayed.width,
+            logged: logged.values[at],
+            replayed: replayed.values[at],
+        })
+    }
 }

@@ -8,7 +8,7 @@ mod blocks;
 mod play;
 mod site;
 
-use crate::run::{call, cargo, root, target_directory};
+use crate::run::{programs, root, target_directory};
 use crate::wheel;
 use std::path::PathBuf;
 use std::process::Command;
@@ -21,13 +21,13 @@ pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     match arguments[..] {
         [] => {
-            built()?;
+            programs(&["squirrel"])?;
             wheel::installed()?;
             step().map(|note| eprintln!("{note}"))?;
             site::build().map(|note| eprintln!("{note}"))
         }
         ["--write"] => {
-            built()?;
+            programs(&["squirrel"])?;
             let page = root()?.join(COMMANDS);
             std::fs::write(&page, commands()?)
                 .map_err(|error| format!("{}: {error}", page.display()))
@@ -48,11 +48,6 @@ pub(crate) fn step() -> Result<String, String> {
         return Err(format!("{COMMANDS} is of another version: cargo xtask docs --write"));
     }
     play::pages(&program()?, None)
-}
-
-/// Builds the program where nothing else has.
-fn built() -> Result<(), String> {
-    call(cargo()?.args(["build", "--release", "--locked", "-p", "squirrel-cli"]))
 }
 
 fn program() -> Result<PathBuf, String> {

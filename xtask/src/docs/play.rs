@@ -1,8 +1,9 @@
 //! Runs what the pages show: commands of the shell in the order of the page, then its Python.
 
 use super::blocks::{self, Use};
-use crate::run::{root, target_directory};
+use crate::run::{path_after, root, target_directory};
 use crate::{python, wheel};
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -78,7 +79,7 @@ fn copy(from: &Path, to: &Path) -> Result<(), String> {
 /// Where the blocks of one page run.
 struct Page<'a> {
     folder: &'a Path,
-    path: String,
+    path: OsString,
 }
 
 impl<'a> Page<'a> {
@@ -95,15 +96,9 @@ impl<'a> Page<'a> {
             }
         }
         let venv = wheel::environment()?;
-        let first = [program.parent(), python::program(&venv, "python").parent()]
-            .into_iter()
-            .flatten()
-            .map(Path::to_owned)
-            .collect::<Vec<_>>();
-        let rest = std::env::var_os("PATH").unwrap_or_default();
-        let path = std::env::join_paths(first.into_iter().chain(std::env::split_paths(&rest)))
-            .map_err(|error| error.to_string())?;
-        Ok(Self { folder, path: path.to_string_lossy().into_owned() })
+        let python = python::program(&venv, "python");
+        let first: Vec<&Path> = [program, &python].iter().filter_map(|p| p.parent()).collect();
+        Ok(Self { folder, path: path_after(&first)? })
     }
 
     /// Runs the blocks of a page; how many ran.

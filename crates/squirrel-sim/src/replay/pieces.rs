@@ -132,17 +132,10 @@ impl Again {
         for (channel, values) in &replayed.channels {
             let before = logged.channels.get(channel).filter(|c| c.width == values.width)?;
             self.values += values.values.len();
-            let differs = |(a, b): (&f64, &f64)| a.to_bits() != b.to_bits();
-            let at = before.values.iter().zip(&values.values).position(differs);
-            let Some(at) = at else { continue };
-            let of = (place, channel.clone());
-            self.differences.entry(of).or_insert_with(|| Difference {
-                channel: format!("{name}.{channel}"),
-                time_s: logged.time_s[at / values.width],
-                index: at % values.width,
-                logged: before.values[at],
-                replayed: values.values[at],
-            });
+            let full = format!("{name}.{channel}");
+            if let Some(found) = Difference::first(full, &logged.time_s, before, values) {
+                self.differences.entry((place, channel.clone())).or_insert(found);
+            }
         }
         Some(())
     }
