@@ -31,6 +31,7 @@ fn stack(form: AttitudeForm, force_model: &ForceModel) -> Stack {
         c2_per_s: Vector3::new(14.0, 14.0, 5.0),
         lambda_per_s2: Vector3::new(8.0, 8.0, 2.0),
         integral_max_rad_s: 0.1,
+        rotor_lead: 1.0,
         filter_frequency_rad_s: 20.0,
         filter_damping: 1.0,
     };

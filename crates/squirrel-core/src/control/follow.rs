@@ -143,6 +143,7 @@ mod tests {
             c2_per_s: Vector3::repeat(8.0),
             lambda_per_s2: Vector3::repeat(2.0),
             integral_max_rad_s: 0.1,
+            rotor_lead: 1.0,
             filter_frequency_rad_s: 20.0,
             filter_damping: 1.0,
         }

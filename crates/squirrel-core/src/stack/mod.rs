@@ -19,6 +19,7 @@ pub use crate::frame::{Gnss, Imu, MAX_OBSTACLES, SensorFrame};
 
 use crate::control::backstepping::{AttitudeGains, AttitudeState, AttitudeTerms, INNER_STEP_MAX_S};
 use crate::control::command_filter::{self, EulerReference};
+use crate::control::lead::Lead;
 use crate::control::mixer::{Mixer, MixerTerms, ThrustTorque};
 use crate::control::position::MeasuredMotion;
 use crate::control::supply::{Supply, ThrustByVoltage};
@@ -60,6 +61,7 @@ pub struct StackParameters {
 pub struct Stack {
     vehicle: Vehicle<f32>,
     airframe: OuterAirframe,
+    lead: Lead<f32>,
     mixer: Mixer,
     parameters: StackParameters,
     mission: Mission,
@@ -184,7 +186,8 @@ impl Stack {
             return Err(ParameterError::of("limits.tilt_max_rad", p.limits.tilt_max_rad, reason));
         }
         let airframe = OuterAirframe::new(&vehicle, parameters.twcc.thrust_min_n, tilt_max_rad);
-        Ok(Self { mixer: Mixer::new(&vehicle)?, vehicle, airframe, parameters, mission })
+        let lead = Lead::new(parameters.attitude.rotor_lead, &p.propulsion);
+        Ok(Self { mixer: Mixer::new(&vehicle)?, lead, vehicle, airframe, parameters, mission })
     }
 
     /// The vehicle as the flight code believes it to be.
@@ -422,7 +425,11 @@ impl Stack {
             state.saturated,
             dt_s,
         );
-        let demand = ThrustTorque { thrust_n, torque_n_m: attitude.torque_n_m };
+        let mut followed_n_m = state.attitude.followed_n_m.into();
+        let torque_n_m =
+            self.lead.step(&mut followed_n_m, &attitude.torque_n_m.into(), dt_s).into();
+        state.attitude.followed_n_m = followed_n_m.into();
+        let demand = ThrustTorque { thrust_n, torque_n_m };
         let most_n = self.vehicle.rotor_thrust_at_n(state.supply.share());
         let mixer = self.mixer.allocate_within(most_n, &demand);
         state.saturated = mixer.saturated;

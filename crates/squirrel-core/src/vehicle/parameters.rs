@@ -146,6 +146,11 @@ impl<T: Real> Rotor<T> {
 }
 
 impl<T: Real> Propulsion<T> {
+    /// Mean of the lags of speeding up and of slowing down, s.
+    pub fn time_constant_s(&self) -> T {
+        real::<T>(0.5) * (self.time_constant_up_s + self.time_constant_down_s)
+    }
+
     /// Steady rotor speed at the reference voltage for a command, rad/s. Commands outside their
     /// range are limited.
     #[inline]

@@ -1,7 +1,7 @@
 //! The inner loop of the flight code on registers: set points to rotor speeds, between steps of the
 //! batch.
 //!
-//! Yaw lead, command filter, quaternion backstepping (docs/equations.md B.3) and mixer are those of
+//! Yaw limit, command filter, quaternion backstepping (docs/equations.md B.3), lead and mixer are of
 //! `squirrel_core::control`, and what rotors are told is what they make of the flight code's
 //! commands: in `f32` a vehicle has the flight code's bits (`tests/batch_autopilot.rs`,
 //! `tests/tasks.rs`).
@@ -14,6 +14,7 @@ use nalgebra::convert;
 use squirrel_core::control::backstepping::quaternion::{Law, Target};
 use squirrel_core::control::backstepping::{AttitudeGains, integrated, yaw_target};
 use squirrel_core::control::command_filter::{Filter, Poles};
+use squirrel_core::control::lead::Lead;
 use squirrel_core::control::mix::Table;
 use squirrel_core::control::mixer::Mixer;
 use squirrel_core::dynamics::State;
@@ -43,6 +44,8 @@ numbers! {
         angle [3], rate [3],
         /// Of the vector part of the attitude error, s.
         integral [3],
+        /// See [`Lead`], N m.
+        followed [3],
         /// 1, or -1 where the long way round is taken.
         sign,
         /// 1, or 0 where the rotors could not do what was asked.
@@ -56,6 +59,8 @@ numbers! {
         c1 [3], c2 [3], lambda [3], k, integral_max,
         /// Square of the filter's frequency, and twice its damping times frequency.
         stiffness, damping,
+        /// Of [`Lead`].
+        lead, lead_lag,
         /// By columns.
         inertia [3] [3],
         thrust_coefficient,
@@ -101,6 +106,7 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
             [gains.c1_per_s, gains.c2_per_s, gains.lambda_per_s2].map(Into::into);
         let law = Law::<f32>::from_euler_gains(&c1, &c2, &lambda, &p.inertia_kg_m2.into());
         let poles = Poles::new(gains.filter_frequency_rad_s, gains.filter_damping);
+        let lead = Lead::new(gains.rotor_lead, &p.propulsion);
         let is_part =
             matches!(p.propulsion.command, CommandKind::SpeedFraction | CommandKind::Duty);
         let rounds = p.propulsion.thrust_curve.is_some()
@@ -115,6 +121,8 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
             integral_max: 0.5 * gains.integral_max_rad_s,
             stiffness: poles.stiffness,
             damping: poles.damping,
+            lead: lead.gain,
+            lead_lag: lead.lag_s,
             inertia: law.inertia,
             thrust_coefficient: p.propulsion.thrust_coefficient_n_s2,
             full_speed: if is_part { p.propulsion.speed_max_rad_s } else { 0.0 },
@@ -132,6 +140,7 @@ impl<S: Paths, const ROTORS: usize> Autopilots<S, ROTORS> {
         put(&mut course.angle, lane, angle.map(real));
         put(&mut course.rate, lane, [real(0.0); 3]);
         put(&mut course.integral, lane, [real(0.0); 3]);
+        put(&mut course.followed, lane, [real(0.0); 3]);
         course.sign[lane] = real(1.0);
         course.free[lane] = real(1.0);
     }
@@ -180,6 +189,8 @@ impl<S: Paths, const ROTORS: usize> Kernel<S> for Act<'_, S, ROTORS> {
                 }
                 SetPoint::BodyRate => body_rate(&gains, &course, &omega),
             };
+            let lead = Lead { gain: gains.lead, lag_s: gains.lead_lag };
+            let torque = lead.step(&mut course.followed, &torque, dt);
             let mixer = Table::<L, ROTORS>::load(&autopilots.mixer, start);
             let mixed = mixer.mix(ROTORS, course.set_point[3], torque);
             course.free = L::of(1.0) - mixed.saturated;

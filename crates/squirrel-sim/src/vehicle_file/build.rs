@@ -459,6 +459,7 @@ fn attitude(t: &AttitudeTable) -> AttitudeGains {
         c2_per_s: triple(&t.c2_per_s),
         lambda_per_s2: triple(&t.lambda_per_s2),
         integral_max_rad_s: t.integral_max_rad_s.0 as f32,
+        rotor_lead: t.rotor_lead.as_ref().map_or(1.0, |lead| lead.0 as f32),
         filter_frequency_rad_s: t.filter_frequency_rad_s.0 as f32,
         filter_damping: t.filter_damping.0 as f32,
     }

@@ -105,7 +105,7 @@ impl Hovering {
             wing: 0.0,
         });
         let output = self.stack.control(&mut self.flight_code, &frame);
-        let asked = output.inner.map_or(Vector3::zeros(), |inner| inner.attitude.torque_n_m);
+        let asked = output.inner.map_or(Vector3::zeros(), |inner| inner.demand.torque_n_m);
         let asked = asked.map(f64::from);
         let vehicle = self.stack.vehicle();
         let demand = ThrustTorque {

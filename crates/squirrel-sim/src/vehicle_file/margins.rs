@@ -4,9 +4,11 @@
 //! (docs/equations.md B.4), rotors lag and everything that is late is one delay:
 //!
 //! ```text
-//! L(s) = (k_p + k_i / s + k_d s) / s^2  exp(-s T) / (tau s + 1)
+//! L(s) = (k_p + k_i / s + k_d s) / s^2  D(s)  exp(-s T) / (tau s + 1)
+//! D(s) = (tau_0 s + 1) / (tau_0 / a s + 1)
 //! k_p = c1 c2 + lambda + r    k_i = c2 lambda    k_d = c1 + c2    r = 1 (Euler), J_max / J (quaternion)
 //! ```
+//! `D` is the lead of the flight code (docs/equations.md B.5), which knows the lag as it is stated.
 //! `T` is the latency of gyro and of commands, and half a step, for which a command is held in the
 //! mean. Phase margin: at the highest frequency at which `|L| = 1`. `M_s`: the largest
 //! `|1 / (1 + L)|`. A measured response in the plant agrees within 3 deg (`tests/it/margins.rs`).
@@ -37,6 +39,8 @@ pub struct AxisLoop {
     pub gains: [f64; 3],
     /// Time constant of the rotors, s.
     pub lag_s: f64,
+    /// Lead of the torque demand: the lag that it knows, s, and the ratio of zero to pole.
+    pub lead: [f64; 2],
     /// Everything that is late, s.
     pub delay_s: f64,
 }
@@ -71,7 +75,9 @@ impl AxisLoop {
         let s = Complex::new(0.0, omega_rad_s);
         let [k_p, k_i, k_d] = self.gains;
         // As functions: `Complex` has methods of these names only where `std` is built in.
-        let late = ComplexField::exp(s * -self.delay_s) / (s * self.lag_s + 1.0);
+        let [known_s, ratio] = self.lead;
+        let lead = (s * known_s + 1.0) / (s * (known_s / ratio) + 1.0);
+        let late = lead * ComplexField::exp(s * -self.delay_s) / (s * self.lag_s + 1.0);
         (s * k_d + k_p + Complex::from(k_i) / s) / (s * s) * late
     }
 
@@ -83,7 +89,9 @@ impl AxisLoop {
     /// Phase of `L` less `-180 deg`, not wrapped, rad.
     fn phase_above_rad(&self, omega_rad_s: f64) -> f64 {
         let [k_p, k_i, k_d] = self.gains;
-        (k_d * omega_rad_s - k_i / omega_rad_s).atan2(k_p)
+        let [known_s, ratio] = self.lead;
+        (k_d * omega_rad_s - k_i / omega_rad_s).atan2(k_p) + (known_s * omega_rad_s).atan()
+            - (known_s / ratio * omega_rad_s).atan()
             - (self.lag_s * omega_rad_s).atan()
             - self.delay_s * omega_rad_s
     }
@@ -143,16 +151,23 @@ pub fn loop_gains([c1, c2, lambda]: AxisGains, restoring: f64) -> [f64; 3] {
     [c1 * c2 + lambda + restoring, c2 * lambda, c1 + c2]
 }
 
-/// The fastest gains that have the stated margins with a lag and a delay, and at most `c1_max`; where
-/// none has them, those with most phase margin at twice the lag.
+/// The fastest gains that have the stated margins with a lag, a lead and a delay, and at most
+/// `c1_max`; where none has them, those with most phase margin at twice the lag.
 ///
 /// Of one family: `c2 = 1.5 c1`, `lambda = c1^2 / 12`. That leaves the integral slow beside the
 /// rest.
 ///
 /// * `restoring` - `r`: see the module
-pub fn gains_for_margins(lag_s: f64, delay_s: f64, restoring: f64, c1_max: f64) -> AxisGains {
+pub fn gains_for_margins(
+    lag_s: f64,
+    rotor_lead: f64,
+    delay_s: f64,
+    restoring: f64,
+    c1_max: f64,
+) -> AxisGains {
     let family = |c1: f64| [c1, 1.5 * c1, c1 * c1 / 12.0];
-    let of = |c1: f64| AxisLoop { gains: loop_gains(family(c1), restoring), lag_s, delay_s };
+    let lead = [lag_s, rotor_lead];
+    let of = |c1: f64| AxisLoop { gains: loop_gains(family(c1), restoring), lag_s, lead, delay_s };
     // From the fast end: the slowest loops, of which `r` is all, are no better damped.
     let scan = (0..SCAN.0).map(|k| c1_max * SCAN.1.powi(k));
     let Some(found) = scan.clone().find(|c1| of(*c1).holds()) else {
@@ -176,14 +191,15 @@ impl VehicleFile {
         let inertia = p.inertia_kg_m2.diagonal();
         let delay_s =
             0.5 * STEP_S + self.sensors.imu.timing.latency_s + self.effects.command_latency_s();
-        let lag_s = 0.5 * (p.propulsion.time_constant_up_s + p.propulsion.time_constant_down_s);
+        let lag_s = p.propulsion.time_constant_s();
+        let lead = [lag_s, f64::from(gains.rotor_lead)];
         Some(std::array::from_fn(|i| {
             let restoring = match gains.form {
                 AttitudeForm::Euler => 1.0,
                 AttitudeForm::Quaternion => inertia.max() / inertia[i],
             };
             let of = [gains.c1_per_s[i], gains.c2_per_s[i], gains.lambda_per_s2[i]];
-            AxisLoop { gains: loop_gains(of.map(f64::from), restoring), lag_s, delay_s }
+            AxisLoop { gains: loop_gains(of.map(f64::from), restoring), lag_s, lead, delay_s }
         }))
     }
 
@@ -242,7 +258,8 @@ mod tests {
     /// A double integrator with a rate and an angle gain: textbook, phase `atan(w k_d / k_p)`.
     #[test]
     fn margins_of_a_loop_by_hand() {
-        let simple = AxisLoop { gains: [1.0, 0.0, 2.0], lag_s: 0.0, delay_s: 0.0 };
+        let simple =
+            AxisLoop { gains: [1.0, 0.0, 2.0], lag_s: 0.0, lead: [0.0, 1.0], delay_s: 0.0 };
         let m = simple.margins();
         // |2 j w + 1| = w^2.
         let crossover = (2.0 + 5.0_f64.sqrt()).sqrt();
@@ -254,14 +271,22 @@ mod tests {
 
     #[test]
     fn gains_by_rule_have_the_margins_and_no_more_than_needed() {
-        for (lag_s, delay_s, restoring) in
-            [(0.04, 0.002, 2.4), (0.02, 0.006, 1.0), (0.1, 0.02, 1.6)]
-        {
-            let gains = gains_for_margins(lag_s, delay_s, restoring, 100.0);
-            let of = |gains| AxisLoop { gains: loop_gains(gains, restoring), lag_s, delay_s };
+        for (lag_s, ratio, delay_s, restoring) in [
+            (0.04, 1.0, 0.002, 2.4),
+            (0.04, 3.0, 0.002, 2.4),
+            (0.02, 1.0, 0.006, 1.0),
+            (0.1, 2.0, 0.02, 1.6),
+        ] {
+            let gains = gains_for_margins(lag_s, ratio, delay_s, restoring, 100.0);
+            let lead = [lag_s, ratio];
+            let of = |gains| AxisLoop { gains: loop_gains(gains, restoring), lag_s, lead, delay_s };
             assert!(of(gains).holds(), "{gains:?}");
             assert!(!of([1.02 * gains[0], 1.02 * gains[1], 1.0404 * gains[2]]).holds());
         }
-        assert_eq!(gains_for_margins(0.001, 0.0, 1.0, 5.0)[0], 5.0, "no faster than asked for");
+        assert_eq!(
+            gains_for_margins(0.001, 1.0, 0.0, 1.0, 5.0)[0],
+            5.0,
+            "no faster than asked for"
+        );
     }
 }

@@ -187,6 +187,7 @@ pub(super) struct AttitudeTable {
     pub(super) c2_per_s: Triple,
     pub(super) lambda_per_s2: Triple,
     pub(super) integral_max_rad_s: Number,
+    pub(super) rotor_lead: Option<Number>,
     pub(super) filter_frequency_rad_s: Number,
     pub(super) filter_damping: Number,
 }

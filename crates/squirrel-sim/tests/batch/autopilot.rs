@@ -5,6 +5,7 @@ use super::support::{Thrown, bits};
 use nalgebra::Vector3;
 use squirrel_core::control::backstepping::{AttitudeForm, AttitudeGains, AttitudeState};
 use squirrel_core::control::command_filter::{self, EulerReference};
+use squirrel_core::control::lead::Lead;
 use squirrel_core::control::mixer::{Mixer, ThrustTorque};
 use squirrel_sim::batch::simd::Path;
 use squirrel_sim::batch::{Autopilot, Batch, BatchError, Scheme, SetPoint, Settings, Tuned};
@@ -52,6 +53,8 @@ fn flies_as_the_flight_code(tuned: &Tuned) {
     batch.engage(attitudes(1), std::slice::from_ref(tuned)).unwrap();
     let mixer = Mixer::new(&tuned.vehicle).unwrap();
     let inertia = tuned.vehicle.parameters().inertia_kg_m2;
+    let lead = Lead::new(tuned.gains.rotor_lead, &tuned.vehicle.parameters().propulsion);
+    let mut followed = [0.0; 3];
     let (mut filter, mut loop_state, mut saturated) =
         (EulerReference::default(), AttitudeState::default(), false);
     let (mut tilted, mut beyond, mut led) = (0.0_f32, 0, 0);
@@ -76,7 +79,8 @@ fn flies_as_the_flight_code(tuned: &Tuned) {
             saturated,
             2e-3,
         );
-        let mixed = mixer.allocate(&ThrustTorque { thrust_n, torque_n_m: terms.torque_n_m });
+        let torque_n_m = lead.step(&mut followed, &terms.torque_n_m.into(), 2e-3).into();
+        let mixed = mixer.allocate(&ThrustTorque { thrust_n, torque_n_m });
         saturated = mixed.saturated;
         beyond += u32::from(saturated);
         let propulsion = &tuned.vehicle.parameters().propulsion;
@@ -97,6 +101,8 @@ fn it_flies_as_the_flight_code_to_the_bit() {
     for kind in ["\"speed_fraction\"", "\"thrust_n\"", "\"pwm_us\""] {
         flies_as_the_flight_code(&commanded(kind));
     }
+    let gains = AttitudeGains { rotor_lead: 3.0, ..squirrel().gains };
+    flies_as_the_flight_code(&Tuned { gains, ..squirrel() });
 }
 
 fn flown<const N: usize>(

@@ -7,6 +7,7 @@ mod board_log;
 mod effects;
 mod excitation;
 mod faults;
+mod first_file_flies;
 mod flights;
 mod import_flights;
 mod margins;

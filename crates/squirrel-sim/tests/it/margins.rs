@@ -40,7 +40,10 @@ fn computed_loops_are_those_of_the_plant() {
     };
     let late = edit("time_constant_s = { value = 0.04,", "time_constant_s = { value = 0.07,");
     let euler = edit("form = \"quaternion\"", "form = \"euler\"");
-    for (name, file) in [("squirrel", &base), ("late rotors", &late), ("euler", &euler)] {
+    let lead = edit("[control.attitude]", "[control.attitude]\nrotor_lead = 3.0");
+    for (name, file) in
+        [("squirrel", &base), ("late rotors", &late), ("euler", &euler), ("lead", &lead)]
+    {
         let loops: [AxisLoop; 3] = file.attitude_loops().unwrap();
         for axis in 0..3 {
             let crossover = loops[axis].margins().crossover_rad_s;

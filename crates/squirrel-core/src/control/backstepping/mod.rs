@@ -21,6 +21,9 @@ pub const INNER_STEP_MAX_S: f32 = 0.02;
 /// leave.
 pub const YAW_LEAD_MAX_RAD: f32 = 0.35;
 
+/// Largest [`AttitudeGains::rotor_lead`]: what it multiplies the noise of a gyro by.
+const ROTOR_LEAD_MAX: f32 = 10.0;
+
 /// Which law turns error into torque.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AttitudeForm {
@@ -71,6 +74,10 @@ pub struct AttitudeGains {
     pub lambda_per_s2: Vector3<f32>,
     /// Limit of the integral of the angle error, rad s.
     pub integral_max_rad_s: f32,
+    /// How much of the rotors' lag is made up for: ratio of zero to pole of [`Lead`], 1 for none.
+    ///
+    /// [`Lead`]: super::lead::Lead
+    pub rotor_lead: f32,
     /// Corner of the command filter, rad/s.
     pub filter_frequency_rad_s: f32,
     /// Damping of the command filter.
@@ -82,6 +89,8 @@ pub struct AttitudeGains {
 pub struct AttitudeState {
     /// Integral of the angle error, rad s.
     pub integral: Vector3<f32>,
+    /// What a rotor of the lag that [`Lead`](super::lead::Lead) leaves has made of the torque, N m.
+    pub followed_n_m: Vector3<f32>,
     /// The quaternion law took the long way's sign at the last step.
     pub negative_sign: bool,
 }
@@ -116,6 +125,10 @@ impl AttitudeGains {
         each_positive("control.attitude.c2_per_s", self.c2_per_s.as_slice())?;
         each_positive("control.attitude.lambda_per_s2", self.lambda_per_s2.as_slice())?;
         positive("control.attitude.integral_max_rad_s", self.integral_max_rad_s)?;
+        if !(1.0..=ROTOR_LEAD_MAX).contains(&self.rotor_lead) {
+            let reason = "must be 1 (none) to 10";
+            return Err(ParameterError::of("control.attitude.rotor_lead", self.rotor_lead, reason));
+        }
         positive("control.attitude.filter_frequency_rad_s", self.filter_frequency_rad_s)?;
         positive("control.attitude.filter_damping", self.filter_damping)?;
         // Where the filter's step is stable, for the longest step that the stack takes.

@@ -121,5 +121,5 @@ wire_struct! {
     MissionState { turned, handled, encounters }
     TwccState { position, flag, mode, mode_age_s, clamped, last, history }
     PositionState { integral, last_error }
-    AttitudeState { integral, negative_sign }
+    AttitudeState { integral, followed_n_m, negative_sign }
 }

@@ -228,7 +228,7 @@ wire_struct! {
     StackParameters { attitude, twcc, navigation, thrust }
     ThrustByVoltage { exponent, reference_v }
     AttitudeGains {
-        form, c1_per_s, c2_per_s, lambda_per_s2, integral_max_rad_s, filter_frequency_rad_s, filter_damping,
+        form, c1_per_s, c2_per_s, lambda_per_s2, integral_max_rad_s, rotor_lead, filter_frequency_rad_s, filter_damping,
     }
     Navigation { filter, altitude, start }
     Start { ned_from_body, gyro_bias, position, fix_offset, altitude_offset_m }

@@ -14,11 +14,13 @@ impl VehicleFile {
         }
         let p = self.vehicle.parameters();
         let (inertia, rotor) = (&p.inertia_kg_m2, &p.propulsion);
+        let arms = self.vehicle.rotors().iter().map(|r| r.position.vector.xy().norm());
         let airframe = Airframe {
             weight_n: self.vehicle.weight_n(),
             thrust_max_n: p.limits.thrust_max_n,
-            lag_s: 0.5 * (rotor.time_constant_up_s + rotor.time_constant_down_s),
+            lag_s: rotor.time_constant_s(),
             torque_per_thrust_m: rotor.torque_coefficient_n_m_s2 / rotor.thrust_coefficient_n_s2,
+            arm_m: arms.sum::<f64>() / self.vehicle.rotors().len() as f64,
             inertia_z_kg_m2: inertia[(2, 2)],
             tilt_max_rad: p.limits.tilt_max_rad,
             restoring: [0, 1].map(|axis| inertia[(2, 2)] / inertia[(axis, axis)]),

@@ -1,8 +1,9 @@
 //! Gains of the flight code from the numbers of an airframe, by a stated rule.
 //!
 //! The laws ask for accelerations, so inertia and mass are in them already; what bounds their gains
-//! is how late a rotor answers. Those of the attitude are the fastest that have the margins of
-//! [`super::super::margins`], which `squirrel vehicle check` shows. The outer loop, which must stay
+//! is how late a rotor answers, of which the lead leaves a third. Those of the attitude are the
+//! fastest that have the margins of [`super::super::margins`], which `squirrel vehicle check` shows.
+//! Their integral holds a centre of mass that is [`CENTRE_OFF_SHARE`] of the arm beside the middle. The outer loop, which must stay
 //! slower, is `vehicles/squirrel.toml`'s, scaled by the root of the time in which a rotor and the
 //! command filter answer. Yaw is turned by reaction torque alone: its gains are capped by the
 //! acceleration that is to be had.
@@ -17,6 +18,8 @@ pub(super) struct Airframe {
     pub(super) lag_s: f64,
     /// Reaction torque of a rotor over its thrust, m.
     pub(super) torque_per_thrust_m: f64,
+    /// Mean distance of the hubs from the middle, m.
+    pub(super) arm_m: f64,
     pub(super) inertia_z_kg_m2: f64,
     pub(super) tilt_max_rad: f64,
     /// Largest moment of inertia over those about x and y.
@@ -29,6 +32,7 @@ struct Gains {
     c1_per_s: [f64; 3],
     c2_per_s: [f64; 3],
     lambda_per_s2: [f64; 3],
+    integral_max_rad_s: f64,
     filter_frequency_rad_s: f64,
     position_per_s: [f64; 3],
     velocity_per_s: [f64; 3],
@@ -38,6 +42,10 @@ struct Gains {
 
 /// Rotor lag of the vehicle whose gains are scaled, and the other delays in its inner loop, s.
 const REFERENCE: (f64, f64) = (0.04, 0.03);
+/// Lead of the torque demand, see `squirrel_core::control::lead`.
+const ROTOR_LEAD: f64 = 3.0;
+/// How far beside the middle a centre of mass may be, in arms: a battery that slipped.
+const CENTRE_OFF_SHARE: f64 = 0.15;
 /// What is late beside the rotors: half a step of the flight code, and a gyro, s.
 const DELAY_S: f64 = 0.004;
 /// Fastest `c1` of roll and pitch, and of yaw at the acceleration below, 1/s.
@@ -52,6 +60,13 @@ impl Airframe {
         let to_spare_n = weight_n.min(thrust_max_n - weight_n).max(0.05 * weight_n);
         self.torque_per_thrust_m * to_spare_n / self.inertia_z_kg_m2
     }
+
+    /// Roll (0) or pitch (1) acceleration of the weight at a centre of mass that is as far off as
+    /// may be, rad/s^2.
+    fn centre_off_rad_s2(&self, axis: usize) -> f64 {
+        let inertia_kg_m2 = self.inertia_z_kg_m2 / self.restoring[axis];
+        CENTRE_OFF_SHARE * self.arm_m * self.weight_n / inertia_kg_m2
+    }
 }
 
 fn by_rule(airframe: &Airframe) -> Gains {
@@ -65,7 +80,11 @@ fn by_rule(airframe: &Airframe) -> Gains {
         (airframe.restoring[1], roll_pitch),
         (1.0, yaw_fastest * yaw),
     ]
-    .map(|(restoring, fastest)| gains_for_margins(airframe.lag_s, DELAY_S, restoring, fastest));
+    .map(|(restoring, fastest)| {
+        gains_for_margins(airframe.lag_s, ROTOR_LEAD, DELAY_S, restoring, fastest)
+    });
+    let integral_max_rad_s =
+        [0, 1].map(|i| airframe.centre_off_rad_s2(i) / (axes[i][1] * axes[i][2]));
     let of = |k: usize| axes.map(|axis| axis[k]);
     let outer = |of: [f64; 3]| of.map(|gain| gain * slow);
     let g = squirrel_core::math::GRAVITY_M_S2;
@@ -74,6 +93,7 @@ fn by_rule(airframe: &Airframe) -> Gains {
         c1_per_s: of(0),
         c2_per_s: of(1),
         lambda_per_s2: of(2),
+        integral_max_rad_s: integral_max_rad_s[0].max(integral_max_rad_s[1]),
         filter_frequency_rad_s: 14.0 * quick,
         position_per_s: outer([1.6, 1.6, 0.8]),
         velocity_per_s: outer([2.5, 2.5, 1.6]),
@@ -88,6 +108,7 @@ pub(super) fn toml(airframe: &Airframe) -> String {
         c1_per_s,
         c2_per_s,
         lambda_per_s2,
+        integral_max_rad_s,
         filter_frequency_rad_s,
         position_per_s,
         velocity_per_s,
@@ -108,7 +129,8 @@ form = \"quaternion\"
 c1_per_s = {{ value = {c1}, source = \"{rule}\" }}
 c2_per_s = {{ value = {c2}, source = \"{rule}\" }}
 lambda_per_s2 = {{ value = {lambda}, source = \"{rule}\" }}
-integral_max_rad_s = {{ value = 0.1, source = \"{same}\" }}
+integral_max_rad_s = {{ value = {integral_max:?}, source = \"by rule: holds a centre of mass 0.15 arms beside the middle\" }}
+rotor_lead = {{ value = {ROTOR_LEAD:?}, source = \"by rule: leaves a third of the rotors' lag\" }}
 filter_frequency_rad_s = {{ value = {filter:?}, source = \"{scaled}\" }}
 filter_damping = {{ value = 1.0, source = \"{same}\" }}
 
@@ -147,6 +169,7 @@ dwell_s = 0.3
         c1 = three(c1_per_s),
         c2 = three(c2_per_s),
         lambda = three(lambda_per_s2),
+        integral_max = one(integral_max_rad_s),
         filter = one(filter_frequency_rad_s),
         position = three(position_per_s),
         velocity = three(velocity_per_s),

@@ -484,6 +484,7 @@ impl Sizes {
             lag_s: scaling::MOTOR_LAG_S.value,
             torque_per_thrust_m: self.torque_coefficient_n_m_s2.value
                 / self.thrust_coefficient_n_s2.value,
+            arm_m: self.arm_m.value,
             inertia_z_kg_m2: self.mass_kg.value
                 * (scaling::GYRATION_Z.value * self.arm_m.value).powi(2),
             tilt_max_rad: self.tilt_max_rad,
