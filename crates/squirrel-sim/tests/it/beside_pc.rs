@@ -30,7 +30,8 @@ fn what_the_simplest_controller_holds_is_held() {
 }
 
 /// From behind, the air pushes wings down that the flat plate in still air believes to carry: they
-/// must be folded again as soon as that is felt. Mean error and sink of the avoidance manoeuvre.
+/// must be folded again as soon as that is felt. Mean error and sink of the avoidance manoeuvre; the
+/// latter stays small, too (it was 1.6 m).
 #[test]
 fn wings_do_no_harm_in_a_tail_wind() {
     let vehicle = VehicleFile::squirrel();
@@ -46,11 +47,11 @@ fn wings_do_no_harm_in_a_tail_wind() {
         };
         [mean(|m| m.rmse_m), mean(|m| m.height_lost_m)]
     };
-    for wind_m_s in [3.0, 5.0, 8.0] {
+    for (wind_m_s, sunk_m) in [(3.0, 1.0), (5.0, 1.0), (8.0, 2.0)] {
         let ([ours_m, sink_m], [rival_m, rival_sink_m]) =
             (fly(Arm::TwccPlus, wind_m_s), fly(Arm::PcPlus, wind_m_s));
         assert!(ours_m < 1.05 * rival_m, "{wind_m_s} m/s: {ours_m} m, folded {rival_m} m");
-        let most_m = rival_sink_m + 0.2;
+        let most_m = f64::min(sunk_m, rival_sink_m + 0.2);
         assert!(sink_m < most_m, "{wind_m_s} m/s: sinks {sink_m} m, folded {rival_sink_m} m");
     }
 }

@@ -55,7 +55,9 @@ const TURN_M_S2: f32 = 5.0;
 /// With which a sink is turned at least, m/s^2: no thrust to spare is no reason to divide by it.
 const TURN_MIN_M_S2: f32 = 2.0;
 /// Share of the weight by which lift at the tilt limit must be above it to hold height and the way.
-const HELD_SHARE: f32 = 0.08;
+const HELD_SHARE: f32 = 0.04;
+/// Up to which thrust is scarce in a turn.
+const SCARCE_SHARE: f32 = 0.08;
 /// From which on there is plenty.
 const PLENTY_SHARE: f32 = 0.2;
 
@@ -172,7 +174,7 @@ impl Plus {
     /// Where thrust is scarce a turn begins with all of it, before the attitude is there: lift that
     /// is lost later. Where there is plenty that only climbs, and pushes on along the old way.
     fn thrust_share(&self, airframe: &OuterAirframe) -> f32 {
-        let plenty = (lift_to_spare(airframe) - HELD_SHARE) / (PLENTY_SHARE - HELD_SHARE);
+        let plenty = (lift_to_spare(airframe) - SCARCE_SHARE) / (PLENTY_SHARE - SCARCE_SHARE);
         self.thrust_share * (1.0 - limit(plenty, 0.0, 1.0))
     }
 

@@ -149,7 +149,7 @@ integral_max_m = {{ value = 2.0, source = \"{same}\" }}
 delay_s = {{ value = {delay:?}, source = \"the command filter's: twice its damping over its frequency\" }}
 vertical_weight = {{ value = 0.5, source = \"{same}\" }}
 height_band_m = {{ value = 1.5, source = \"{same}\" }}
-sink_band_m = {{ value = 0.3, source = \"{same}\" }}
+sink_band_m = {{ value = 0.2, source = \"{same}\" }}
 thrust_share = {{ value = 0.5, source = \"{same}\" }}
 approach_share = {{ value = 0.5, source = \"{same}\" }}
 open_above_m_s2 = {{ value = 0.3, source = \"{same}\" }}
