@@ -3,19 +3,21 @@
 //! Chu and de Croon, JGCD 39(3), 2016; docs/equations.md E.6).
 //!
 //! ```text
-//! folded    r_z  = m f_z + T                                      mean over 0.3 s
 //! all       f_0  = R (m f + T)                                    mean over 0.1 s
+//! folded    s    = f_0,z / cos(tilt)                              mean over 0.3 s
+//!           r_z  = m f_z + T                                      mean over 0.3 s
 //! spread    w_z  = (m f_z + T - r_z) / d - N_z                    mean over 0.05 s
 //! ```
-//! `d` is how far they are spread. `r_z` is thrust that is short (sag, inflow, load); it rests while
-//! wings are not folded. `w_z` is what spread wings do beside the plate in still air: wind, the
-//! rotors' wash, a wing that is weaker. It is kept after they fold and forgotten slowly, so that
-//! wings that harmed open again no sooner than that.
+//! `d` is how far they are spread. `s` is thrust that is short (sag, inflow, load), where drag is
+//! horizontal: along body z a tilted vehicle feels a part of its drag, which more thrust would not
+//! answer but with a climb. Both rest while wings are not folded. `w_z` is what spread wings do
+//! beside the plate in still air: wind, the rotors' wash, a wing that is weaker. It is kept after
+//! they fold and forgotten slowly, so that wings that harmed open again no sooner than that.
 
 use crate::aero::flat_plate;
 use crate::control::position::ForceResidual;
 use crate::frames::{Body, In, Ned, Rotation};
-use crate::math::{all_finite, limit, limit_norm, lower};
+use crate::math::{all_finite, limit, limit_norm, lower, upper};
 
 /// Time constant of what is felt with wings folded, s.
 const FOLDED_MEAN_S: f32 = 0.3;
@@ -34,11 +36,15 @@ const MEMORY_S: f32 = 10.0;
 /// Weights that may be short, and that may be too much: on the ground the ground carries.
 const SHORT_MAX: f32 = 0.5;
 const SPARE_MAX: f32 = 0.2;
+/// Cosine of the tilt from which on height says little about thrust.
+const UPRIGHT_MIN: f32 = 0.5;
 
 /// What is remembered.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Felt {
     pub(crate) residual: ForceResidual,
+    /// `r_z`, N.
+    pub(crate) along_n: f32,
     /// Since the wings were commanded to spread, s; 0 while they are not.
     pub(crate) spread_s: f32,
 }
@@ -68,7 +74,8 @@ impl Felt {
         self.residual
     }
 
-    pub(super) fn look(&mut self, step: &Step<'_>) {
+    /// Looks at a step; thrust that is short at this instant, N.
+    pub(super) fn look(&mut self, step: &Step<'_>) -> f32 {
         let Step { ned_from_body, weight_n, dt_s, .. } = *step;
         let force_n = step.force.vector.z;
         self.spread_s =
@@ -77,26 +84,35 @@ impl Felt {
         let follow = |mean_s: f32| dt_s / (dt_s + mean_s);
         let beside = (*ned_from_body * step.force).vector;
         r.beside.vector += (beside - r.beside.vector) * follow(BESIDE_MEAN_S);
+        let short_n = beside.z / upper(super::down(&ned_from_body.quaternion).z, UPRIGHT_MIN);
         if step.spread_ago_s >= FOLDING_S {
-            r.short_n += (force_n - r.short_n) * follow(FOLDED_MEAN_S);
+            r.short_n += (short_n - r.short_n) * follow(FOLDED_MEAN_S);
+            self.along_n += (force_n - self.along_n) * follow(FOLDED_MEAN_S);
         }
         let spread = step.wings * self.spread_s / SPREADING_S;
         if spread >= SPREAD_ENOUGH {
             let velocity = (ned_from_body.inverse() * step.velocity).vector;
             let down = [0.0, 0.0, 1.0];
             let plate_n = flat_plate::plate(&velocity.into(), &down, step.wing_area_m2)[2];
-            let wings_n = (force_n - r.short_n) / spread - plate_n - step.download_n;
+            let wings_n = (force_n - self.along_n) / spread - plate_n - step.download_n;
             r.wings_n += (wings_n - r.wings_n) * follow(SPREAD_MEAN_S);
         } else if step.wings <= 0.0 {
             r.wings_n -= r.wings_n * follow(MEMORY_S);
         }
-        if !(r.short_n.is_finite() && r.wings_n.is_finite() && all_finite(&r.beside.vector)) {
+        if !(self.along_n.is_finite()
+            && r.short_n.is_finite()
+            && r.wings_n.is_finite()
+            && all_finite(&r.beside.vector))
+        {
             // Before the limits, which make a number of what is none.
-            *r = ForceResidual::default();
+            (*r, self.along_n) = (ForceResidual::default(), 0.0);
         }
-        r.short_n = limit(r.short_n, -SPARE_MAX * weight_n, SHORT_MAX * weight_n);
+        for short_n in [&mut r.short_n, &mut self.along_n] {
+            *short_n = limit(*short_n, -SPARE_MAX * weight_n, SHORT_MAX * weight_n);
+        }
         r.wings_n = limit(r.wings_n, -weight_n, weight_n);
         r.beside.vector = limit_norm(r.beside.vector, SHORT_MAX * weight_n);
+        short_n
     }
 }
 
@@ -148,6 +164,33 @@ mod tests {
         assert!(felt.residual().wings_n > 1.0, "{:?}", felt.residual());
         feels(&mut felt, 0.0, [0.0; 3], 0.0, 60.0);
         assert!(felt.residual().wings_n < 0.02, "{:?}", felt.residual());
+    }
+
+    /// Drag of a vehicle that leans into the wind to stay where it is: no thrust is short, and more
+    /// of it would climb.
+    #[test]
+    fn drag_is_no_thrust_that_is_short() {
+        let mut felt = Felt::default();
+        let ned_from_body = Rotation::from_euler(0.0, -0.4, 0.0);
+        let drag: In<Ned, f32> = In::new(Vector3::new(-2.0, 0.0, 0.0));
+        let force = ned_from_body.inverse() * drag;
+        assert!(force.vector.z > 0.7, "{force:?}");
+        let step = Step {
+            force,
+            ned_from_body: &ned_from_body,
+            velocity: In::zero(),
+            wing_area_m2: AREA_M2,
+            download_n: 0.0,
+            weight_n: WEIGHT_N,
+            wings: 0.0,
+            spread_ago_s: FOLDING_S,
+            dt_s: 1.0 / 300.0,
+        };
+        for _ in 0..600 {
+            felt.look(&step);
+        }
+        let r = felt.residual();
+        assert!(r.short_n.abs() < 0.01 && (r.beside.vector.x + 2.0).abs() < 0.01, "{r:?}");
     }
 
     /// Falling at 4 m/s on a plate: -rho A v^2, which is expected.

@@ -2,8 +2,9 @@
 //! mixer promised.
 //!
 //! ```text
-//! thrust:  -m f_z - T           torque:  J w' + w x J w - tau
+//! thrust:  m f_z + T            torque:  J w' + w x J w - tau
 //! ```
+//! Where attitude is known, thrust that is short is told from drag ([`super::force_residual`]).
 //! `T` and `tau` follow the mixer's answer with the rotors' time constant. Both differences are
 //! means over [`MEAN_S`], for a weak rotor, a sagging battery or a stuck wing stays, and noise and
 //! gusts do not. While wings are spread on purpose they push too, and nothing is learnt.
@@ -104,9 +105,9 @@ impl Monitor {
         let is_folded = self.spread_ago_s >= FOLDED_S;
         let mut felt = imu.specific_force.vector * p.mass_kg;
         felt.z += self.commanded.thrust_n;
-        let missing_n = if is_folded { felt.z } else { 0.0 };
+        let mut short_n = felt.z;
         if let (Some(ned_from_body), Some(velocity)) = (seen.attitude, seen.velocity) {
-            self.felt.look(&Step {
+            short_n = self.felt.look(&Step {
                 force: In::new(felt),
                 ned_from_body,
                 velocity,
@@ -121,9 +122,9 @@ impl Monitor {
         let spin = p.inertia_kg_m2 * omega;
         let turned = p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin)
             - self.commanded.torque_n_m;
-        self.missing_n += (missing_n - self.missing_n) * learn;
-        self.torque_n_m +=
-            (if is_folded { turned } else { Vector3::zeros() } - self.torque_n_m) * learn;
+        let (short_n, turned) = if is_folded { (short_n, turned) } else { (0.0, Vector3::zeros()) };
+        self.missing_n += (short_n - self.missing_n) * learn;
+        self.torque_n_m += (turned - self.torque_n_m) * learn;
         if !(self.missing_n.is_finite() && all_finite(&self.torque_n_m)) {
             *self = Self::default();
         }

@@ -110,7 +110,7 @@ wire_struct! {
     Unit { last, repeats, doubted_us, silent_us }
     Difference { omega, force }
     Monitor { commanded, omega, missing_n, torque_n_m, spread_ago_s, felt, waited_s }
-    Felt { residual, spread_s }
+    Felt { residual, along_n, spread_s }
     ForceResidual { short_n, wings_n, beside }
     Known { imu, attitude, gnss, altitude_m, wing_force, command }
     FailsafeState {
