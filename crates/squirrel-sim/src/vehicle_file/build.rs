@@ -528,6 +528,10 @@ fn plus(t: &PlusTable, position: &PositionGains) -> Plus {
             acceleration_feed_forward: 1.0,
             acceleration_max_horizontal_m_s2: t.acceleration_max_horizontal_m_s2.0 as f32,
             acceleration_max_vertical_m_s2: t.acceleration_max_vertical_m_s2.0 as f32,
+            integral_max_m: t
+                .integral_max_m
+                .as_ref()
+                .map_or(position.integral_max_m, |m| m.0 as f32),
             ..*position
         },
         delay_s: t.delay_s.0 as f32,

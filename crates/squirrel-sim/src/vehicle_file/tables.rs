@@ -258,6 +258,7 @@ pub(super) struct PlusTable {
     pub(super) open_above_m_s2: Number,
     pub(super) acceleration_max_horizontal_m_s2: Number,
     pub(super) acceleration_max_vertical_m_s2: Number,
+    pub(super) integral_max_m: Option<Number>,
     /// What the file's effects say, if it is left out.
     pub(super) wing_download_n: Option<Number>,
 }

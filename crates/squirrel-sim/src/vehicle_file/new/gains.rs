@@ -155,6 +155,7 @@ approach_share = {{ value = 0.5, source = \"{same}\" }}
 open_above_m_s2 = {{ value = 0.3, source = \"{same}\" }}
 acceleration_max_horizontal_m_s2 = {{ value = 30.0, source = \"{same}\" }}
 acceleration_max_vertical_m_s2 = {{ value = {plus_vertical:?}, source = \"twice that of [control.position]\" }}
+integral_max_m = {{ value = 30.0, source = \"{same}\" }}
 
 # Without wings these do nothing; the table has to be there.
 [control.wing]
