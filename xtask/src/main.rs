@@ -9,6 +9,7 @@ mod effect;
 mod firmware;
 mod fresh;
 mod growth;
+mod notices;
 mod package;
 mod png;
 mod python;
@@ -26,7 +27,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 20] = [
+const CHORES: [Chore; 21] = [
     (
         "test",
         "[--quick]",
@@ -94,6 +95,12 @@ const CHORES: [Chore; 20] = [
         "[crates|sdist|wheels|installs|sdist-builds]...",
         "what is published: crates, wheels for old glibc on two machines, the sdist; made, checked, installed",
         package::chore,
+    ),
+    (
+        "notices",
+        "[--write]",
+        "licences of what is compiled into the Python package; --write takes the list of now",
+        notices::chore,
     ),
     (
         "targets",

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What is published on crates.io, in the order in which it can be.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
+    "squirrel-vehicles",
     "squirrel-core",
     "squirrel-log",
     "squirrel-report",

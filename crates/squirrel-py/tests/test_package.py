@@ -123,6 +123,24 @@ def test_types_are_right(tmp_path: Path) -> None:
         assert checked.returncode == 0, checked.stdout + checked.stderr
 
 
+DRAWS = """
+import sys
+import squirrel
+assert "squirrel.plot" not in sys.modules
+assert squirrel.plot.tilt is sys.modules["squirrel.plot"].tilt
+try:
+    squirrel.plots
+except AttributeError as error:
+    print(error)
+"""
+
+
+def test_modules_that_need_more_are_imported_where_they_are_asked_for() -> None:
+    pytest.importorskip("matplotlib")
+    done = run(sys.executable, "-c", DRAWS)
+    assert done.stdout == "module 'squirrel' has no attribute 'plots'\n", done.stderr
+
+
 def test_everything_public_is_documented() -> None:
     modules = [squirrel, squirrel.control, squirrel.dynamics, squirrel.gap, squirrel.nn]
     bare = []
