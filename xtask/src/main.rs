@@ -116,8 +116,8 @@ const CHORES: [Chore; 21] = [
     ),
     (
         "report-png",
-        "[HTML [PNG [WIDTHxHEIGHT]]]",
-        "draw a report with a headless Chromium; without a file, the gap report of a hidden effect",
+        "[--write|HTML [PNG [WIDTHxHEIGHT]]]",
+        "draw a report with a headless Chromium; without a file, the gap report of a hidden effect; --write takes the README's picture",
         png::chore,
     ),
     (
