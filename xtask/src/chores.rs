@@ -6,7 +6,7 @@
 
 use crate::run::{Action, Step, call, cargo, programs, root, run, succeeds, target_directory};
 use crate::slow::SLOW;
-use crate::{docs, firmware, package, python, thumb, weights, wheel};
+use crate::{docs, firmware, notices, package, python, thumb, weights, wheel};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -43,12 +43,13 @@ const QUICK_NEEDS: Step = Step {
     action: Action::Function(|| python::reachable().map(|()| String::new())),
 };
 
-const TEST: [Step; 11] = [
+const TEST: [Step; 12] = [
     Step { name: "python", action: Action::Function(python::prepare) },
     Step { name: "test", action: Action::Cargo(&["test", "--release", "--workspace", "--locked"]) },
     Step { name: "thumb", action: Action::Function(thumb::check) },
     Step { name: "firmware", action: Action::Function(firmware::step) },
     Step { name: "deny", action: Action::Function(deny) },
+    Step { name: "notices", action: Action::Function(notices::step) },
     // Workspace features always have rapier; this is the simulator as who flies free builds it.
     Step {
         name: "no-rapier",

@@ -168,7 +168,6 @@ fn copied(root: &Path, copy: &Path) -> Result<(), String> {
                 continue;
             }
             let (from, path) = (entry.path(), folder.join(&name));
-            // Through links, too: crates link the vehicles that they bring along.
             if from.is_dir() {
                 folders.push(path);
             } else if from.is_file() {

@@ -9,6 +9,7 @@ mod effect;
 mod firmware;
 mod fresh;
 mod growth;
+mod notices;
 mod package;
 mod png;
 mod python;
@@ -26,7 +27,7 @@ use std::process::ExitCode;
 /// A chore: name, arguments, what it does, how.
 type Chore = (&'static str, &'static str, &'static str, fn(&[String]) -> Result<(), String>);
 
-const CHORES: [Chore; 20] = [
+const CHORES: [Chore; 21] = [
     (
         "test",
         "[--quick]",
@@ -96,6 +97,12 @@ const CHORES: [Chore; 20] = [
         package::chore,
     ),
     (
+        "notices",
+        "[--write]",
+        "licences of what is compiled into the Python package; --write takes the list of now",
+        notices::chore,
+    ),
+    (
         "targets",
         "[TARGET...]",
         "check the workspace for macOS, Windows and aarch64 Linux",
@@ -109,8 +116,8 @@ const CHORES: [Chore; 20] = [
     ),
     (
         "report-png",
-        "[HTML [PNG [WIDTHxHEIGHT]]]",
-        "draw a report with a headless Chromium; without a file, the gap report of a hidden effect",
+        "[--write|HTML [PNG [WIDTHxHEIGHT]]]",
+        "draw a report with a headless Chromium; without a file, the gap report of a hidden effect; --write takes the README's picture",
         png::chore,
     ),
     (

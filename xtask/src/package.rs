@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What is published on crates.io, in the order in which it can be.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
+    "squirrel-vehicles",
     "squirrel-core",
     "squirrel-log",
     "squirrel-report",
@@ -101,9 +102,11 @@ fn sdist() -> Result<(), String> {
     looked_at(&venv, &newest(&dist, ".tar.gz")?)
 }
 
-/// Wheels for machines with an old glibc, by zig, in a target folder of their own.
+/// Wheels for machines with an old glibc, by zig, in a target folder of their own: other builds do
+/// not wait for them.
 fn wheels() -> Result<(), String> {
     let (venv, dist) = place()?;
+    let target = dist.with_file_name("target");
     for machine in MACHINES {
         call(Command::new("rustup").args(["target", "add", machine]))?;
         let mut maturin = maturin(&venv, "build", &dist)?;
@@ -112,7 +115,7 @@ fn wheels() -> Result<(), String> {
         // zig is found as a module of the Python that is first.
         let python = python::program(&venv, "python");
         let programs: Vec<&Path> = python.parent().into_iter().collect();
-        call(maturin.env("PATH", path_after(&programs)?))?;
+        call(maturin.env("PATH", path_after(&programs)?).env("CARGO_TARGET_DIR", &target))?;
         let name = machine.split('-').next().unwrap_or(machine);
         looked_at(&venv, &newest(&dist, &format!("{MANYLINUX}_{name}.whl"))?)?;
     }

@@ -2,7 +2,7 @@
 //! hidden effect which is made, flown and diagnosed for it.
 
 use crate::chores::blind_bench;
-use crate::run::{call, output, succeeds, target_directory};
+use crate::run::{call, output, programs, root, succeeds, target_directory};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -29,11 +29,16 @@ const GAP_CASE: [&str; 7] = ["make", "--set", "single", "--n", "1", "--seed", "5
 /// Panels of a gap report.
 const GAP_PANELS: std::ops::RangeInclusive<char> = 'a'..='h';
 
+/// Measured flights whose report the README shows: fitted to, and the last one held out.
+const REAL: [&str; 3] = ["B3_figure8_fast", "B8_star_slow", "B2_circle_medium"];
+const REAL_PICTURE: &str = "docs/pictures/gap.png";
+
 /// `cargo xtask report-png [HTML [PNG [WIDTHxHEIGHT]]]`; without a file, the gap report of a hidden
-/// effect.
+/// effect. `--write` draws the picture of the README anew.
 pub(crate) fn chore(arguments: &[String]) -> Result<(), String> {
     let (html, png, size) = match arguments {
         [] => return gap_report(),
+        [word] if word == "--write" => return real_report(),
         [html] => (html, PathBuf::from(html).with_extension("png"), "1200x3000"),
         [html, png] => (html, PathBuf::from(png), "1200x3000"),
         [html, png, size] => (html, PathBuf::from(png), size.as_str()),
@@ -73,6 +78,29 @@ fn gap_report() -> Result<(), String> {
     }
     eprintln!("{}", folder.display());
     Ok(())
+}
+
+/// What the README does with measured flights, and the first screen of its report.
+fn real_report() -> Result<(), String> {
+    let (built, folder) = (programs(&["squirrel"])?, target_directory()?.join("real-report"));
+    std::fs::create_dir_all(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    let squirrel = || {
+        let mut command = Command::new(built.join("squirrel"));
+        command.current_dir(&folder);
+        command
+    };
+    let flight = |name: &str| format!("{name}.mcap");
+    for name in REAL {
+        let csv = root()?.join(format!("tests/data/flights/nanobench/{name}_rep1.csv"));
+        let mut import = squirrel();
+        import.arg("import").arg(csv);
+        call(import.args(["--map", "nanobench", "--out", &flight(name)]))?;
+    }
+    let [figure8, star, circle] = REAL.map(flight);
+    let mut run = squirrel();
+    run.args(["gap", "run", "--vehicle", "crazyflie21_brushed", "--flights", &figure8, &star]);
+    call(run.args(["--held-out", &circle, "--out", "gap"]))?;
+    draw(&folder.join("gap/report.html"), "", &root()?.join(REAL_PICTURE), "1280x690")
 }
 
 /// Whether a panel is there and says of nothing that it is missing.

@@ -58,6 +58,24 @@ fn the_readme_is_short() {
     assert!(lines <= README_LINES, "{lines} lines; what is longer belongs to docs/guide");
 }
 
+/// What the README says of the report that it shows is what the guide's page of the same flights
+/// prints, which is compared with the program.
+#[test]
+fn the_picture_of_the_report_is_of_this_version() {
+    let read = |path: &str| fs::read_to_string(root().join(path)).unwrap();
+    let (readme, page) = (read("README.md"), read("docs/guide/csv-log.md"));
+    let told =
+        readme.split("](docs/pictures/gap.png)").next().unwrap().rsplit("![").next().unwrap();
+    let number = |text: &str, after: &str| {
+        let rest = text.split(after).nth(1).unwrap();
+        rest.trim_start().chars().take_while(|c| "0123456789.".contains(*c)).collect::<String>()
+    };
+    let exponent = number(&page, "(voltage_exponent");
+    assert!(told.contains(&format!("exponent {exponent} (")), "{told}: not {exponent}");
+    let gain = number(&page, "On held-out flights it removes");
+    assert!(told.contains(&format!("{gain} % less error")), "{told}: not {gain}");
+}
+
 #[test]
 fn links_are_told_from_code_and_from_the_network() {
     let page =

@@ -16,13 +16,12 @@ mod paths;
 use clap::{CommandFactory, Parser, Subcommand};
 use std::ffi::OsString;
 
-/// A flight stack for multirotors that change shape: fly it, log it, replay it, compare it with
-/// measured flights.
+/// A flight stack for multirotors that change shape: flies, studies, trains, plans, and says what a
+/// vehicle model lacks.
 #[derive(Debug, Parser)]
 #[command(
     name = "squirrel",
     version,
-    about,
     disable_help_subcommand = true,
     args_conflicts_with_subcommands = true
 )]

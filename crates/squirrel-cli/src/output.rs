@@ -101,6 +101,9 @@ pub(crate) struct Table {
     rows: Vec<Vec<String>>,
 }
 
+/// Longest line below the header: where cells are longer, a terminal breaks them anyway.
+const RULE_MAX: usize = 120;
+
 impl Table {
     pub(crate) fn new(header: &[&str]) -> Self {
         Self::of(vec![header.iter().map(|&h| h.to_owned()).collect()])
@@ -136,7 +139,8 @@ impl Table {
             }
             say(line.trim_end());
             if i == 0 {
-                say(&"-".repeat(widths.iter().sum::<usize>() + 2 * columns.saturating_sub(1)));
+                let length = widths.iter().sum::<usize>() + 2 * columns.saturating_sub(1);
+                say(&"-".repeat(length.min(RULE_MAX)));
             }
         }
     }

@@ -59,13 +59,14 @@ impl Paths {
         self
     }
 
-    /// A vehicle file, and the weights that it names.
+    /// A vehicle file, and the weights that it names; a bundled vehicle is no file.
     pub(crate) fn vehicle<'a>(
         self,
         argument: &'static str,
         path: impl IntoIterator<Item = &'a PathBuf>,
     ) -> Self {
-        path.into_iter().fold(self, |paths, file| {
+        let files = path.into_iter().filter(|path| !VehicleFile::is_bundled(path));
+        files.fold(self, |paths, file| {
             // Where they are missing, others stand in for them.
             let weights = VehicleFile::weights_path(file).filter(|weights| weights.is_file());
             paths.reads(argument, [file]).reads("wing.parnn_weights of the vehicle", weights)

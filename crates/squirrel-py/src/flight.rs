@@ -6,7 +6,7 @@ use crate::interrupt::signalled;
 use crate::log::FlightLog;
 use crate::policy::Policy;
 use crate::scalars;
-use crate::vehicle::{Vehicle, or_squirrel};
+use crate::vehicle::found;
 use pyo3::prelude::*;
 use pyo3_stub_gen::derive::gen_stub_pyfunction;
 use squirrel_core::stack::{SensorFrame, Stack, StackOutput, StackState};
@@ -15,6 +15,7 @@ use squirrel_sim::arm::Arm;
 use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{FlightComputer, FlightError, Integrator, Offboard, Setup};
 use squirrel_sim::scenario::Scenario;
+use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
 
 /// Steps of the flight code between two looks at Ctrl-C: some milliseconds.
@@ -80,8 +81,8 @@ pub(crate) fn scenario(
 ///
 /// Parameters
 /// ----------
-/// vehicle : Vehicle, optional
-///     What flies; the paper's squirrel if left out. One without ``[control]`` flies by gains by rule, those of ``squirrel vehicle new``,
+/// vehicle : Vehicle, str or os.PathLike, optional
+///     What flies, or its file, or the name of a bundled vehicle; the paper's squirrel if left out. One without ``[control]`` flies by gains by rule, those of ``squirrel vehicle new``,
 ///     and the log's metadata say so (``gains``).
 /// scenario : str
 ///     ``hover``, ``avoid``, ``steer``, ``track``, ``forest``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or
@@ -146,7 +147,9 @@ pub(crate) fn scenario(
 #[pyo3(signature = (*, vehicle = None, scenario = "avoid", arm = None, seed = None, thrust_to_weight = None, estimator = None, integrator = "rk4", policy = None, controller = None, controller_hz = 50, controller_commands = "attitude"))]
 pub(crate) fn simulate(
     py: Python<'_>,
-    vehicle: Option<&Bound<'_, Vehicle>>,
+    #[gen_stub(override_type(type_repr = "Vehicle | builtins.str | os.PathLike[builtins.str] | None", imports = ("builtins", "os")))]
+    #[pyo3(from_py_with = found)]
+    vehicle: Option<VehicleFile>,
     #[gen_stub(override_type(type_repr = "flight.Scenario | builtins.str", imports = ("squirrel.flight", "builtins")))]
     scenario: &str,
     #[gen_stub(override_type(type_repr = "flight.Arm | None", imports = ("squirrel.flight")))]
@@ -172,7 +175,7 @@ pub(crate) fn simulate(
     }
     let is_outside = policy.is_some() || controller.is_some();
     let by_default = if is_outside { Arm::Pc } else { Arm::TwccFlat };
-    let mut vehicle = or_squirrel(vehicle);
+    let mut vehicle = vehicle.unwrap_or_else(VehicleFile::squirrel);
     if let Some(name) = estimator {
         vehicle.estimator = Estimator::parse(name).map_err(|_| {
             let known = Estimator::ALL.map(Estimator::name).join(", ");

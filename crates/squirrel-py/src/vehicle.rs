@@ -4,7 +4,7 @@ use crate::error;
 use crate::kept::{broken, reduced};
 use crate::keys::{set, table_of, to_python, to_toml};
 use crate::scalars;
-use pyo3::exceptions::PyKeyError;
+use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyIterator, PyList, PyTuple};
 use pyo3_stub_gen::derive::{gen_stub_pyclass, gen_stub_pymethods};
@@ -16,15 +16,6 @@ use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Value};
-
-/// Vehicle files that are part of the package.
-const BUNDLED: [(&str, &str); 5] = [
-    ("squirrel", squirrel_sim::vehicle_file::SQUIRREL_TOML),
-    ("crazyflie21_brushed", include_str!("../vehicles/crazyflie21_brushed.toml")),
-    ("crazyflie21_brushed_curve", include_str!("../vehicles/crazyflie21_brushed_curve.toml")),
-    ("crazyflie21_datasheet", include_str!("../vehicles/crazyflie21_datasheet.toml")),
-    ("crazyflie2_arpl", include_str!("../vehicles/crazyflie2_arpl.toml")),
-];
 
 /// A vehicle: airframe, rotors, wings, battery, gains, sensors and effects, checked when it is made
 /// and never changed.
@@ -76,8 +67,9 @@ impl Vehicle {
     /// Parameters
     /// ----------
     /// name : str
-    ///     ``squirrel`` (the paper's), ``crazyflie21_brushed``, ``crazyflie21_brushed_curve``,
-    ///     ``crazyflie21_datasheet`` or ``crazyflie2_arpl``.
+    ///     ``squirrel`` (the paper's), ``squirrel_air`` (the same with measured rotors),
+    ///     ``crazyflie21_brushed``, ``crazyflie21_brushed_curve``, ``crazyflie21_datasheet`` or
+    ///     ``crazyflie2_arpl``.
     ///
     /// Returns
     /// -------
@@ -89,11 +81,9 @@ impl Vehicle {
     ///     There is none of this name.
     #[staticmethod]
     fn bundled(name: &str) -> PyResult<Self> {
-        let Some((name, text)) = BUNDLED.iter().find(|(own, _)| *own == name) else {
-            let names = BUNDLED.map(|(own, _)| own).join(", ");
-            return Err(error::value(format!("name = {name}: no such vehicle; known are {names}")));
-        };
-        Self::parse(text, name)
+        // Not a file that cannot be read: a wrong argument.
+        let file = VehicleFile::bundled(name).map_err(|e| error::value(format!("name = {e}")))?;
+        Ok(Self { file })
     }
 
     /// A first vehicle from what its owner knows; what is not given is guessed from published machines.
@@ -414,6 +404,21 @@ impl Vehicle {
 /// The vehicle of an argument that may be left out: the paper's.
 pub(crate) fn or_squirrel(vehicle: Option<&Bound<'_, Vehicle>>) -> VehicleFile {
     vehicle.map_or_else(VehicleFile::squirrel, |given| given.get().file.clone())
+}
+
+/// The vehicle of an argument that may be its file or the name of a bundled one, too.
+pub(crate) fn found(object: &Bound<'_, PyAny>) -> PyResult<Option<VehicleFile>> {
+    if object.is_none() {
+        return Ok(None);
+    }
+    if let Ok(given) = object.cast::<Vehicle>() {
+        return Ok(Some(given.get().file.clone()));
+    }
+    let path: PathBuf = object.extract().map_err(|_| {
+        let kind = object.get_type().name().map_or_else(|_| String::new(), |n| n.to_string());
+        PyTypeError::new_err(format!("vehicle: expected a Vehicle, a file or a name, got {kind}"))
+    })?;
+    VehicleFile::find(&path).map(Some).map_err(|e| error::vehicle(&e))
 }
 
 /// Writes a file, whole or not at all.

@@ -4,6 +4,7 @@ import ast
 import doctest
 import importlib
 import importlib.machinery
+import importlib.metadata
 import importlib.util
 import os
 import pkgutil
@@ -121,6 +122,33 @@ def test_types_are_right(tmp_path: Path) -> None:
     for what in (EXAMPLES, packages):
         checked = run(sys.executable, "-m", "mypy", "--strict", *what, cwd=tmp_path)
         assert checked.returncode == 0, checked.stdout + checked.stderr
+
+
+def test_the_licences_are_installed_with_it() -> None:
+    """Ours, and those of what is compiled in; `cargo xtask notices` holds the list to what cargo compiles."""
+    files = {file.name: file for file in importlib.metadata.files("squirrel-flight") or []}
+    assert {"LICENSE-MIT", "LICENSE-APACHE", "THIRD-PARTY.txt"} <= set(files)
+    listed = files["THIRD-PARTY.txt"].read_text()
+    for package in ("rapier3d-f64", "zstd-sys", "clarabel", "pyo3", "the Rust standard library"):
+        assert f"* {package}" in listed and listed.count(package) >= 2, package
+
+
+DRAWS = """
+import sys
+import squirrel
+assert "squirrel.plot" not in sys.modules
+assert squirrel.plot.tilt is sys.modules["squirrel.plot"].tilt
+try:
+    squirrel.plots
+except AttributeError as error:
+    print(error)
+"""
+
+
+def test_modules_that_need_more_are_imported_where_they_are_asked_for() -> None:
+    pytest.importorskip("matplotlib")
+    done = run(sys.executable, "-c", DRAWS)
+    assert done.stdout == "module 'squirrel' has no attribute 'plots'\n", done.stderr
 
 
 def test_everything_public_is_documented() -> None:

@@ -11,11 +11,23 @@ import squirrel
 
 def test_bundled_vehicles_are_those_of_the_repository() -> None:
     crazyflies = ["crazyflie21_brushed", "crazyflie21_brushed_curve", "crazyflie21_datasheet", "crazyflie2_arpl"]
-    for name in ["squirrel", *crazyflies]:
+    for name in ["squirrel", "squirrel_air", *crazyflies]:
         vehicle = squirrel.Vehicle.bundled(name)
         assert vehicle.text == (ROOT / f"vehicles/{name}.toml").read_text()
     with pytest.raises(ValueError, match=r"name = hawk: no such vehicle; known are squirrel, "):
         squirrel.Vehicle.bundled("hawk")
+
+
+def test_a_flight_takes_a_file_or_the_name_of_a_bundled_vehicle(tmp_path: Path) -> None:
+    air = squirrel.Vehicle.bundled("squirrel_air")
+    air.save(tmp_path / "mine.toml")
+    expected = squirrel.simulate(vehicle=air, scenario="hover").metrics
+    for given in ("squirrel_air", tmp_path / "mine.toml", str(tmp_path / "mine.toml")):
+        assert squirrel.simulate(vehicle=given, scenario="hover").metrics == expected
+    with pytest.raises(FileNotFoundError, match="hawk: no such file, and no bundled vehicle; known are squirrel, "):
+        squirrel.simulate(vehicle="hawk", scenario="hover")
+    with pytest.raises(TypeError, match="vehicle: expected a Vehicle, a file or a name, got int"):
+        squirrel.simulate(vehicle=1, scenario="hover")  # type: ignore[arg-type]
 
 
 def test_numbers_by_key(vehicle: squirrel.Vehicle) -> None:

@@ -20,6 +20,9 @@ const SPEED_M_S: f64 = 7.3;
 /// that is as fast stops within that, with or without wings.
 const SEEN_M: f64 = 6.0;
 
+/// Figures that the table leaves to the page, so that a terminal has room for a row.
+const LEFT_OUT: [&str; 2] = ["RMSE horiz. m", "height gained m"];
+
 /// Options of the demo.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Demo {
@@ -72,8 +75,9 @@ impl Demo {
 
         let ratio = setups[0].thrust_to_weight();
         say(&format!(
-            "A quadrotor with foldable wings flies at {SPEED_M_S} m/s, sees a trunk {SEEN_M} m ahead and turns away by 110 to 130 deg.\n\
-             Its rotors lift {ratio:.2} times its weight; seed {}. Clearance is from its centre to the bark.\n",
+            "A quadrotor with foldable wings flies at {SPEED_M_S} m/s, sees a trunk {SEEN_M} m ahead and turns away\n\
+             by 110 to 130 deg. Its rotors lift {ratio:.2} times its weight; seed {}.\n\
+             Clearance is from its centre to the bark.\n",
             self.seed
         ));
         let row = |(setup, flight): (&Setup, &Flight)| Row {
@@ -85,13 +89,15 @@ impl Demo {
         let mut table: Option<Table> = None;
         for (setup, flight) in setups.iter().zip(&mut flights) {
             let cells = figures(&flight.metrics);
+            // The page has all of them.
+            let shown = || cells.iter().filter(|(name, _)| !LEFT_OUT.contains(&name.as_str()));
             let table = table.get_or_insert_with(|| {
                 let names: Vec<&str> =
-                    std::iter::once("arm").chain(cells.iter().map(|(n, _)| n.as_str())).collect();
+                    std::iter::once("arm").chain(shown().map(|(n, _)| n.as_str())).collect();
                 Table::new(&names)
             });
             let name = std::iter::once(setup.arm.name().to_owned());
-            table.row(name.chain(cells.iter().map(|(_, v)| v.clone())).collect());
+            table.row(name.chain(shown().map(|(_, v)| v.clone())).collect());
             if let Some(log) = &mut flight.log {
                 let path = self.out.join(flight_file(setup.arm));
                 write_log(log, &path)?;
@@ -106,7 +112,7 @@ impl Demo {
             title: "A trunk at 7.3 m/s: the paper's controllers and ours".to_owned(),
             lead: format!(
                 "A quadrotor with foldable wings flies straight at {SPEED_M_S} m/s, sees a trunk {SEEN_M} m ahead and turns away. {}",
-                seen(&rows)
+                seen(&rows).replace("\n  ", " ")
             ),
             facts: facts(&setups[0]),
             card: String::new(),
@@ -124,7 +130,7 @@ impl Demo {
         };
         output::write_json(self.json.as_deref(), &result)?;
         talk(&format!(
-            "\nThe report is {}; a log of each flight (MCAP) is beside it. Go on with",
+            "\nThe report is {}, beside it a log of each flight (MCAP). Next:",
             report.display()
         ));
         for next in self.next() {
@@ -157,7 +163,7 @@ fn scenario(seed: u64) -> Scenario {
     }
 }
 
-/// What to see in two sentences: the paper's pair and ours.
+/// What to see in two sentences, each on two lines: the paper's pair and ours.
 fn seen(rows: &[Row]) -> String {
     let fate = |row: &Row| match (row.metrics.contact_s, row.metrics.clearance_m) {
         (Some(time), _) => format!("{} hits the trunk after {time:.1} s", row.arm),
@@ -165,7 +171,7 @@ fn seen(rows: &[Row]) -> String {
         (None, None) => format!("{} does not come near it", row.arm),
     };
     let pair =
-        |rows: &[Row]| rows.iter().map(fate).collect::<Vec<_>>().join(" with folded wings, ");
+        |rows: &[Row]| rows.iter().map(fate).collect::<Vec<_>>().join(" with folded wings,\n  ");
     let (theirs, ours) = rows.split_at(rows.len() / 2);
     format!(
         "The paper's controllers: {} with open ones.\nOurs: {} with open ones.",

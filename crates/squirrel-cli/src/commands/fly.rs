@@ -15,7 +15,7 @@ use squirrel_sim::estimator::Estimator;
 use squirrel_sim::flight::{
     FlightError, Follower, InProcess, Integrator, Metrics, Offboard, Recipient, Recording, Setup,
 };
-use squirrel_sim::scenario::{Conditions, MissionTable, Scenario};
+use squirrel_sim::scenario::{BUILT_IN, Conditions, MissionTable, Scenario};
 use squirrel_sim::track::Track;
 use squirrel_sim::vehicle_file::VehicleFile;
 use squirrel_sim::weights::PolicyWeights;
@@ -25,13 +25,10 @@ use std::path::{Path, PathBuf};
 /// Options of a flight.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Fly {
-    /// Vehicle file; the shipped squirrel if left out.
+    /// Vehicle file, or the name of a bundled vehicle; squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
-    /// Controller and what it flies: pc, pc_wings_open, wiic_no_wings, phantom, twcc_flat,
-    /// twcc_parnn, twcc_oracle, twcc_plus, pc_plus, plan_wings, plan_no_wings; if left out,
-    /// twcc_flat, or pc with a policy or a reference.
-    #[arg(long)]
+    #[arg(long, help = arms())]
     arm: Option<String>,
     /// Policy that flies instead of the arm's outer loop (.safetensors); the mission goes straight
     /// on, to avoid is its own business.
@@ -41,9 +38,7 @@ pub(crate) struct Fly {
     /// with a reference), to its end.
     #[arg(long, conflicts_with = "policy")]
     reference: Option<PathBuf>,
-    /// hover, avoid, steer, track, excite_calm, excite_normal, excite_rich, or a scenario file
-    /// (.toml).
-    #[arg(long, default_value = "avoid")]
+    #[arg(long, default_value = "avoid", help = scenarios())]
     scenario: String,
     /// Seed of everything random; overrides the scenario's.
     #[arg(long)]
@@ -77,6 +72,20 @@ pub(crate) struct Fly {
     /// Write the figures here as JSON.
     #[arg(long)]
     json: Option<PathBuf>,
+}
+
+/// The help of `--arm`, with all names that there are.
+fn arms() -> String {
+    let names: Vec<&str> = Arm::all().map(Arm::name).collect();
+    format!(
+        "Controller and what it flies: {}; if left out, twcc_flat, or pc with a policy or a reference",
+        names.join(", ")
+    )
+}
+
+/// The help of `--scenario`, likewise.
+fn scenarios() -> String {
+    format!("{}, or a scenario file (.toml)", BUILT_IN.join(", "))
 }
 
 /// Where the flight code may run instead of here.
@@ -344,6 +353,12 @@ impl Fly {
             talk(&format!(
                 "no encounter in duration_s = {duration_s}: the figures are of the whole flight"
             ));
+        }
+        let is_inside = flight.metrics.clearance_m.is_some_and(|clearance| clearance < 0.0);
+        if is_inside && !setup.scenario.solid_obstacles {
+            talk(
+                "clearance is below 0: it flew through an obstacle, which in this scenario is only seen, not solid",
+            );
         }
         recorded.finish()?;
         if let (Some(shown), Some(path)) = (&recorded.shown, &self.report) {

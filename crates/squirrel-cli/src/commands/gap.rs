@@ -13,7 +13,7 @@ use squirrel_gap::{
 use squirrel_log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
 use squirrel_sim::vehicle_file::VehicleFile;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::path::PathBuf;
 
 /// What the steps write into the folder of `--out`.
@@ -66,7 +66,7 @@ pub(crate) enum Gap {
 /// What is looked at before any verdict.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Looked {
-    /// Vehicle file.
+    /// Vehicle file, or the name of a bundled vehicle.
     #[arg(long)]
     vehicle: PathBuf,
     /// Flight logs, or folders of them, from which effects are to be named.
@@ -90,7 +90,7 @@ pub(crate) struct Looked {
 /// What every other step is given.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Given {
-    /// Vehicle file.
+    /// Vehicle file, or the name of a bundled vehicle.
     #[arg(long)]
     vehicle: PathBuf,
     /// Flight logs, or folders of them, that the explanation is fitted to.
@@ -139,7 +139,7 @@ impl Looked {
             paths = paths.writes_into(folder, [CHECK_PAGE, CHECK]);
         }
         paths.check()?;
-        let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
+        let vehicle = VehicleFile::find(&self.vehicle).map_err(|e| e.to_string())?;
         let (flights, held_out) = (logs(&self.flights)?, logs(&self.held_out)?);
         let found = looked(&vehicle, &logs(&self.baseline)?, &flights, &held_out)?;
         check::show(&found);
@@ -196,7 +196,7 @@ impl Given {
     }
 
     fn read(&self) -> Result<(VehicleFile, Flights, Flights), String> {
-        let vehicle = VehicleFile::load(&self.vehicle).map_err(|e| e.to_string())?;
+        let vehicle = VehicleFile::find(&self.vehicle).map_err(|e| e.to_string())?;
         Ok((vehicle, logs(&self.flights)?, logs(&self.held_out)?))
     }
 
@@ -282,7 +282,7 @@ impl Given {
             self.check(&[])?;
         } else {
             self.patch_path()?;
-            self.check(&[self.patch_name(), VERDICT.as_ref()])?;
+            self.check(&[&self.patch_name(), VERDICT.as_ref()])?;
         }
         let mut found = self.diagnose()?;
         show(&found.diagnosis.verdict);
@@ -306,7 +306,7 @@ impl Given {
 
     fn everything(&self, fit: bool) -> Result<(), String> {
         self.patch_path()?;
-        self.check(&[self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
+        self.check(&[&self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
         let (vehicle, flights, held_out) = self.read()?;
         // Whatever it finds, the verdict is what it would be without.
         let check = looked(&vehicle, &logs(&self.baseline)?, &flights, &held_out).ok();
@@ -348,8 +348,12 @@ impl Given {
         Ok(folder.join(self.patch_name()))
     }
 
-    fn patch_name(&self) -> &OsStr {
-        self.vehicle.file_name().unwrap_or_default()
+    fn patch_name(&self) -> OsString {
+        let mut name = self.vehicle.file_name().unwrap_or_default().to_owned();
+        if VehicleFile::is_bundled(&self.vehicle) {
+            name.push(".toml");
+        }
+        name
     }
 
     /// Writes the patched vehicle file.

@@ -21,12 +21,12 @@ use squirrel_sim::flight::{Metrics, Setup};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::path::Path;
 
-/// The vehicle of a `--vehicle` option: a file, or the shipped squirrel.
+/// The vehicle of a `--vehicle` option: a file, a bundled one by its name, or the squirrel.
 fn vehicle(path: Option<&Path>) -> Result<VehicleFile, String> {
-    match path {
-        None => Ok(VehicleFile::squirrel()),
-        Some(path) => VehicleFile::load(path).map_err(|e| e.to_string()),
-    }
+    path.map_or_else(
+        || Ok(VehicleFile::squirrel()),
+        |path| VehicleFile::find(path).map_err(|e| e.to_string()),
+    )
 }
 
 /// Writes a log that says which commit of the program flew.

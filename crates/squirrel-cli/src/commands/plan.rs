@@ -17,7 +17,7 @@ use std::path::PathBuf;
 /// Options of a plan.
 #[derive(Debug, clap::Args)]
 pub(crate) struct PlanCommand {
-    /// Vehicle file; the shipped squirrel if left out.
+    /// Vehicle file, or the name of a bundled vehicle; squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
     /// hover, avoid, steer, track, forest, or a scenario file (.toml).

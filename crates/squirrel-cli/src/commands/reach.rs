@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Options of the command.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Reach {
-    /// Vehicle file; the shipped squirrel if left out.
+    /// Vehicle file, or the name of a bundled vehicle; squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
     /// What spread wings do: flat, membrane, parnn. The paper's flat plate is the default, for

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 pub(crate) struct Replay {
     /// Flight log recorded by `squirrel fly` or `squirrel demo`.
     flight: PathBuf,
-    /// Fly this vehicle file instead of the one in the log.
+    /// Fly this vehicle, a file or the name of a bundled one, instead of the one in the log.
     #[arg(long)]
     vehicle: Option<PathBuf>,
     /// Write the result here as JSON.
@@ -35,7 +35,7 @@ impl Replay {
     /// What flies: the log's own setup, with another vehicle where one is asked for.
     fn setup(&self, mut setup: Setup) -> Result<Setup, String> {
         if let Some(path) = &self.vehicle {
-            setup.vehicle = VehicleFile::load(path).map_err(|e| e.to_string())?;
+            setup.vehicle = VehicleFile::find(path).map_err(|e| e.to_string())?;
         }
         Ok(setup)
     }

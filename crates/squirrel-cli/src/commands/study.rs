@@ -60,7 +60,7 @@ struct Common {
     /// Seed of all trials.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Vehicle file; the shipped squirrel if left out.
+    /// Vehicle file, or the name of a bundled vehicle; squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
     /// Folder for the figures as CSV and JSON, and for what else there is to look at; it keeps the

@@ -35,7 +35,7 @@ pub(crate) struct Train {
     /// Weights to write (.safetensors).
     #[arg(long)]
     out: PathBuf,
-    /// Vehicle that flew; the shipped squirrel if left out.
+    /// Vehicle that flew, a file or the name of a bundled one; squirrel if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
     /// Seed of first weights and order of windows.

@@ -20,7 +20,7 @@ pub(crate) struct View {
     /// Flight log, and another to show beside it.
     #[arg(required = true, num_args = 1..=2, value_name = "FLIGHT")]
     flights: Vec<PathBuf>,
-    /// Vehicle file to draw; the one in the log if left out.
+    /// Vehicle to draw, a file or the name of a bundled one; the one in the log if left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
     /// Page to write (.html); it needs nothing else, and no network.
@@ -70,7 +70,7 @@ impl View {
             .check()?;
         let read = |path: &PathBuf| FlightLog::read(path).map_err(|e| e.to_string());
         let logs = self.flights.iter().map(read).collect::<Result<Vec<_>, _>>()?;
-        let vehicle = self.vehicle.as_deref().map(VehicleFile::load).transpose();
+        let vehicle = self.vehicle.as_deref().map(VehicleFile::find).transpose();
         let vehicle = vehicle.map_err(|e| e.to_string())?;
         let names = names(&self.flights, &logs);
         let flights =

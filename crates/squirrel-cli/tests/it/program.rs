@@ -295,6 +295,40 @@ fn wrong_usage_is_exit_code_two() {
 }
 
 #[test]
+fn a_bundled_vehicle_is_found_by_its_name_wherever_a_file_is() {
+    let folder = Folder::new("bundled");
+    let fly = ["fly", "--vehicle", "crazyflie2_arpl", "--scenario", "hover", "--arm", "pc"];
+    // A folder of this name, as a clone of the repository is one, is no vehicle.
+    fs::create_dir(folder.0.join("squirrel")).unwrap();
+    let flown = folder.succeeds(&["fly", "--vehicle", "squirrel", "--scenario", "hover"]);
+    assert!(flown.starts_with("squirrel flies hover"), "{flown}");
+    let shown = folder.succeeds(&["vehicle", "check", "crazyflie2_arpl"]);
+    assert!(shown.starts_with("crazyflie2_arpl: sound"), "{shown}");
+    folder.succeeds(&["vehicle", "diff", "squirrel", "squirrel_air"]);
+    // A file of the name comes first.
+    folder.write("crazyflie2_arpl", SQUIRREL);
+    let flown = folder.succeeds(&fly);
+    assert!(flown.starts_with("squirrel flies hover"), "{flown}");
+    folder.fails(
+        &["fly", "--vehicle", "sqirrel", "--scenario", "hover"],
+        &["sqirrel: no such file, and no bundled vehicle", "squirrel_air", "crazyflie21_brushed"],
+    );
+}
+
+#[test]
+fn a_patch_of_a_bundled_vehicle_is_a_vehicle_file() {
+    let folder = Folder::new("bundled-patch");
+    let log = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/data/flights/nanobench/B3_figure8_fast_rep1.csv"
+    );
+    folder.succeeds(&["import", "--map", "nanobench", log, "--out", "f.mcap"]);
+    let lacks = ["--vehicle", "crazyflie21_brushed", "--flights", "f.mcap", "--out", "gap"];
+    folder.succeeds(&[&["gap", "run"], &lacks[..]].concat());
+    folder.succeeds(&["vehicle", "check", "gap/crazyflie21_brushed.toml"]);
+}
+
+#[test]
 fn bad_vehicles_get_one_line_with_file_field_and_value() {
     let folder = Folder::new("bad-vehicles");
     let cases: [(&str, &str, &str, &[&str]); 17] = [

@@ -159,11 +159,7 @@ enum Repeats {
 }
 
 /// The maps of public data sets, which are built in.
-const BUILT_IN: [(&str, &str); 3] = [
-    ("nanobench", include_str!("../../../../vehicles/maps/nanobench.toml")),
-    ("crazypad", include_str!("../../../../vehicles/maps/crazypad.toml")),
-    ("arpl", include_str!("../../../../vehicles/maps/arpl.toml")),
-];
+const BUILT_IN: &[(&str, &str)] = &squirrel_vehicles::MAPS;
 
 impl ImportMap {
     /// Reads and checks a map file, or takes a built-in map by its name where no such file is.

@@ -10,6 +10,8 @@ Arrays that come in may be of any library that speaks DLPack, PyTorch and JAX am
 they are read where they lie. What comes out is NumPy's.
 """
 
+from typing import TYPE_CHECKING
+
 from squirrel import control, dynamics, flight, gap, nn, plan, policy
 from squirrel._squirrel import Batch, FlightLog, Policy, Stack, Tasks, Vehicle, __version__, read_log, rollout, simulate
 
@@ -32,3 +34,13 @@ __all__ = [
     "rollout",
     "simulate",
 ]
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name):
+        """What needs further packages, imported where it is asked for first."""
+        if name in ("envs", "plot", "torch"):
+            from importlib import import_module
+
+            return import_module(f"squirrel.{name}")
+        raise AttributeError(f"module 'squirrel' has no attribute {name!r}")

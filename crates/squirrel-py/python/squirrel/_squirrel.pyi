@@ -1077,8 +1077,9 @@ class Vehicle:
         Parameters
         ----------
         name : str
-            ``squirrel`` (the paper's), ``crazyflie21_brushed``, ``crazyflie21_brushed_curve``,
-            ``crazyflie21_datasheet`` or ``crazyflie2_arpl``.
+            ``squirrel`` (the paper's), ``squirrel_air`` (the same with measured rotors),
+            ``crazyflie21_brushed``, ``crazyflie21_brushed_curve``, ``crazyflie21_datasheet`` or
+            ``crazyflie2_arpl``.
         
         Returns
         -------
@@ -1501,14 +1502,14 @@ def rollout(*, vehicles: typing.Sequence[Vehicle], whole: builtins.bool = True, 
         Names the argument, what was expected and what came.
     """
 
-def simulate(*, vehicle: typing.Optional[Vehicle] = None, scenario: flight.Scenario | builtins.str = "avoid", arm: flight.Arm | None = None, seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, estimator: flight.Estimator | None = None, integrator: flight.Integrator = "rk4", policy: typing.Optional[Policy] = None, controller: collections.abc.Callable[[dict[str, numpy.typing.NDArray[numpy.float32]], builtins.float], collections.abc.Sequence[builtins.float] | numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] | None = None, controller_hz: builtins.int = 50, controller_commands: flight.Commands = "attitude") -> FlightLog:
+def simulate(*, vehicle: Vehicle | builtins.str | os.PathLike[builtins.str] | None = None, scenario: flight.Scenario | builtins.str = "avoid", arm: flight.Arm | None = None, seed: typing.Optional[builtins.int] = None, thrust_to_weight: typing.Optional[builtins.float] = None, estimator: flight.Estimator | None = None, integrator: flight.Integrator = "rk4", policy: typing.Optional[Policy] = None, controller: collections.abc.Callable[[dict[str, numpy.typing.NDArray[numpy.float32]], builtins.float], collections.abc.Sequence[builtins.float] | numpy.typing.NDArray[numpy.float32] | numpy.typing.NDArray[numpy.float64]] | None = None, controller_hz: builtins.int = 50, controller_commands: flight.Commands = "attitude") -> FlightLog:
     r"""
     Fly one scenario in closed loop: plant, sensors and flight code.
     
     Parameters
     ----------
-    vehicle : Vehicle, optional
-        What flies; the paper's squirrel if left out. One without ``[control]`` flies by gains by rule, those of ``squirrel vehicle new``,
+    vehicle : Vehicle, str or os.PathLike, optional
+        What flies, or its file, or the name of a bundled vehicle; the paper's squirrel if left out. One without ``[control]`` flies by gains by rule, those of ``squirrel vehicle new``,
         and the log's metadata say so (``gains``).
     scenario : str
         ``hover``, ``avoid``, ``steer``, ``track``, ``forest``, ``excite_calm``, ``excite_normal``, ``excite_rich``, ``random_spread``, or

@@ -296,6 +296,10 @@ for (const data of document.querySelectorAll("#scene")) {
   readInks();
   lookAlong();
   setCamera("follow");
+  // Unless the address says otherwise, it begins where wings are first open: there is something to see.
+  const links = [...document.querySelectorAll(".moments a")];
+  const open = links.find((link) => link.textContent.startsWith("open "));
+  if (open) now = parseFloat(open.hash.slice(3));
   follow();
   addEventListener("hashchange", follow);
   addEventListener("resize", draw);

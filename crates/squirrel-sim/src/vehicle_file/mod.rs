@@ -4,6 +4,7 @@
 //! line that names the file, the field and the value.
 
 mod build;
+mod bundled;
 pub mod diff;
 mod effects;
 pub mod export;
@@ -31,12 +32,11 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 /// The squirrel of the paper, as shipped.
-pub const SQUIRREL_TOML: &str = include_str!("../../vehicles/squirrel.toml");
+pub const SQUIRREL_TOML: &str = squirrel_vehicles::SQUIRREL;
 
 /// Its weights, under the name that its file gives them. They are part of the program: a copy or a
 /// patch of the file finds them wherever it lies.
-const SQUIRREL_PARNN: (&str, &[u8]) =
-    ("squirrel-parnn.safetensors", include_bytes!("../../vehicles/squirrel-parnn.safetensors"));
+const SQUIRREL_PARNN: (&str, &[u8]) = squirrel_vehicles::SQUIRREL_PARNN;
 
 /// Everything that a vehicle file says.
 #[derive(Debug, Clone)]
@@ -201,8 +201,8 @@ impl VehicleFile {
     /// Never: a test parses it.
     #[allow(clippy::expect_used, reason = "the text is part of the program and tested")]
     pub fn squirrel_in_air() -> Self {
-        const TEXT: &str = include_str!("../../vehicles/squirrel_air.toml");
-        Self::parse(TEXT, "squirrel_air.toml").expect("the shipped vehicle is sound")
+        Self::parse(squirrel_vehicles::SQUIRREL_AIR, "squirrel_air.toml")
+            .expect("the shipped vehicle is sound")
     }
 
     /// The same vehicle with wings that do what its network says: the paper's simulation, in which

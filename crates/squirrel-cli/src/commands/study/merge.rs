@@ -19,7 +19,8 @@ pub(crate) struct Options {
     /// Folder for the whole study, as its own --out.
     #[arg(long)]
     out: PathBuf,
-    /// The vehicle file that the parts were flown with; the shipped squirrel if left out.
+    /// The vehicle that the parts were flown with, a file or the name of a bundled one; squirrel if
+    /// left out.
     #[arg(long)]
     vehicle: Option<PathBuf>,
     /// Write the figures here as JSON.

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 /// Options of the command.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Check {
-    /// Vehicle file.
+    /// Vehicle file, or the name of a bundled vehicle.
     file: PathBuf,
     /// Write the numbers here as JSON.
     #[arg(long)]
@@ -40,7 +40,7 @@ impl Check {
     pub(crate) fn run(&self) -> Result<(), String> {
         let Self { file, json } = self;
         Paths::default().vehicle("FILE", [file]).writes("--json", json).check()?;
-        let vehicle = VehicleFile::load(file).map_err(|e| e.to_string())?;
+        let vehicle = VehicleFile::find(file).map_err(|e| e.to_string())?;
         let at = |e: String| format!("{}: {e}", file.display());
         let means = vehicle.means().map_err(at)?;
         flies(&vehicle).map_err(at)?;

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Options of the command.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Diff {
-    /// Vehicle file.
+    /// Vehicle file, or the name of a bundled vehicle.
     a: PathBuf,
     /// The other.
     b: PathBuf,
@@ -36,7 +36,7 @@ impl Diff {
             .vehicle("B", [&self.b])
             .writes("--json", &self.json)
             .check()?;
-        let [a, b] = [&self.a, &self.b].map(|path| VehicleFile::load(path));
+        let [a, b] = [&self.a, &self.b].map(|path| VehicleFile::find(path));
         let (a, b) = (a.map_err(|e| e.to_string())?, b.map_err(|e| e.to_string())?);
         let compared = compare(&a, &b)?;
         if compared.numbers.is_empty() {

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Options of the command.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Export {
-    /// Vehicle file, one that `gap add` has changed, too.
+    /// Vehicle file, one that `gap add` has changed, too; or the name of a bundled vehicle.
     file: PathBuf,
     /// sdf (Gazebo), ardupilot-json, px4-params, mjcf (MuJoCo), rotorpy, crazyflow.
     #[arg(long, value_parser = Target::parse)]
@@ -38,7 +38,7 @@ impl Export {
             .writes("--out", [&self.out])
             .writes("--json", &self.json)
             .check()?;
-        let vehicle = VehicleFile::load(&self.file).map_err(|e| e.to_string())?;
+        let vehicle = VehicleFile::find(&self.file).map_err(|e| e.to_string())?;
         let exported = export(&vehicle, self.to)?;
         output::write_file(&self.out, exported.text.as_bytes())?;
         for lost in &exported.lost {

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Options of the command.
 #[derive(Debug, clap::Args)]
 pub(crate) struct Fit {
-    /// Vehicle file.
+    /// Vehicle file, or the name of a bundled vehicle.
     file: PathBuf,
     /// Thrust stand, CSV with columns thrust_n (or thrust_g, thrust_kgf), rotor_speed_rad_s or
     /// rotor_speed_rpm, command (0 to 1) or command_pwm_us, torque_n_m, voltage_v.
@@ -61,7 +61,7 @@ impl Fit {
             .writes("--out", [&self.out])
             .writes("--json", &self.json)
             .check()?;
-        let mut vehicle = VehicleFile::load(&self.file).map_err(|e| e.to_string())?;
+        let mut vehicle = VehicleFile::find(&self.file).map_err(|e| e.to_string())?;
         let (mut all, mut residual) = (Vec::new(), None);
         // One after the other: a hover scales what the stand has said.
         if let Some(path) = &self.bench {

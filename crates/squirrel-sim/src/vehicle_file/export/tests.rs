@@ -2,7 +2,7 @@ use super::*;
 use crate::vehicle_file::SQUIRREL_TOML;
 
 fn practice(effects: &str) -> VehicleFile {
-    let text = include_str!("../../../vehicles/crazyflie21_datasheet.toml");
+    let text = squirrel_vehicles::CRAZYFLIE21_DATASHEET;
     VehicleFile::parse(&format!("{text}\n{effects}"), "cf").unwrap()
 }
 

@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn the_shipped_crazyflie_has_its_numbering() {
-        let text = include_str!("../../../vehicles/crazyflie21_brushed.toml");
+        let text = squirrel_vehicles::CRAZYFLIE21_BRUSHED;
         let shipped = crate::vehicle_file::VehicleFile::parse(text, "file").unwrap();
         for (place, rotor) in Frame::QuadXCrazyflie.places().iter().zip(shipped.vehicle.rotors()) {
             assert_eq!(place.yaw_sign, rotor.yaw_sign);

@@ -150,10 +150,7 @@ fn what_is_missing_and_what_cannot_be_is_named() {
 
 #[test]
 fn a_file_without_gains_gets_those_of_the_rule_and_says_so() {
-    for text in [
-        include_str!("../../../vehicles/crazyflie21_brushed.toml"),
-        include_str!("../../../vehicles/crazyflie2_arpl.toml"),
-    ] {
+    for text in [squirrel_vehicles::CRAZYFLIE21_BRUSHED, squirrel_vehicles::CRAZYFLIE2_ARPL] {
         let bare = VehicleFile::parse(text, "bare").unwrap();
         assert!(bare.control.is_none());
         let ruled = bare.with_gains_by_rule().unwrap();
