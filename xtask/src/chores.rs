@@ -137,7 +137,7 @@ pub(crate) fn gap_bench(arguments: &[String]) -> Result<(), String> {
 /// files than in `cargo xtask test`.
 pub(crate) fn attack(arguments: &[String]) -> Result<(), String> {
     let [count, seed] = count_and_seed(arguments, ["2500", "1"])?;
-    for (package, test) in [("squirrel-log", "import_attack"), ("squirrel-sim", "attack::")] {
+    for (package, test) in [("squirrel-log", "attack"), ("squirrel-sim", "attack")] {
         call(
             cargo()?
                 .args(["test", "--release", "--locked", "-p", package])

@@ -171,7 +171,7 @@ pub enum GapError {
     },
     /// Less than a second in which all channels exist and the filter has no edge.
     #[error(
-        "{flight}: {channel}: leaves {usable_s:.3} s of usable flight, at least {least_s} s are needed"
+        "{flight}: {channel}: leaves {usable_s:.3} s of usable flight, at least {least_s} s are needed{cut}"
     )]
     TooShort {
         /// Name of the flight.
@@ -182,6 +182,8 @@ pub enum GapError {
         usable_s: f64,
         /// Smallest usable time, s.
         least_s: f64,
+        /// How gaps cut it, behind a semicolon; nothing if they do not.
+        cut: String,
     },
     /// Numbers of the flights or of the vehicle that are too large for the linear algebra.
     #[error(

@@ -162,13 +162,4 @@ pub enum LogError {
         #[source]
         error: serde_json::Error,
     },
-    /// The MCAP writer refused.
-    #[error("{file}: {error}")]
-    Mcap {
-        /// File as given.
-        file: String,
-        /// What it said.
-        #[source]
-        error: mcap::McapError,
-    },
 }

@@ -36,6 +36,7 @@ pub mod import;
 pub mod toml_text;
 
 mod check;
+mod container;
 mod envelope;
 mod error;
 mod foxglove;

@@ -4,33 +4,44 @@
 //! changed is found and named even where the tool wrote fresh checksums around it.
 
 use prost::DecodeError;
-use prost::encoding::{DecodeContext, decode_key, double, fixed32, skip_field};
+use prost::encoding::{
+    DecodeContext, WireType, decode_key, double, encode_key, encode_varint, fixed32, skip_field,
+};
 use prost_types::FieldDescriptorProto;
 use prost_types::field_descriptor_proto::{Label, Type};
 
 use super::{Channel, LogError, Source, schema};
 use crate::files::Budget;
 
-/// Sample `index` of a source as a message of the schema that [`schema::encode`] makes.
-pub(super) fn encode(source: &Source, index: usize) -> Vec<u8> {
+/// Appends sample `index` of a source as a message of the schema that [`schema::encode`] makes.
+pub(super) fn encode(source: &Source, index: usize, to: &mut Vec<u8>) {
     let time_s = source.time_s[index];
-    let mut message = Vec::new();
-    double::encode(schema::TIME.1 as u32, &time_s, &mut message);
+    double::encode(schema::TIME.1 as u32, &time_s, to);
     for (channel, number) in source.channels.values().zip(schema::TIME.1 as u32 + 1..) {
         match channel.row(index) {
-            [value] => double::encode(number, value, &mut message),
-            row => double::encode_packed(number, row, &mut message),
+            [value] => double::encode(number, value, to),
+            row => double::encode_packed(number, row, to),
         }
     }
-    let crc32: Vec<u32> =
-        source.channels.values().map(|channel| row_crc32(time_s, channel.row(index))).collect();
-    fixed32::encode_packed(schema::CRC.1 as u32, &crc32, &mut message);
-    message
+    if !source.channels.is_empty() {
+        encode_key(schema::CRC.1 as u32, WireType::LengthDelimited, to);
+        encode_varint(4 * source.channels.len() as u64, to);
+        let of_time = time_crc32(time_s);
+        for channel in source.channels.values() {
+            to.extend_from_slice(&row_crc32(&of_time, channel.row(index)).to_le_bytes());
+        }
+    }
 }
 
-fn row_crc32(time_s: f64, row: &[f64]) -> u32 {
+/// What a CRC32 over a time and numbers begins with.
+fn time_crc32(time_s: f64) -> crc32fast::Hasher {
     let mut hasher = crc32fast::Hasher::new();
     hasher.update(&time_s.to_le_bytes());
+    hasher
+}
+
+fn row_crc32(of_time: &crc32fast::Hasher, row: &[f64]) -> u32 {
+    let mut hasher = of_time.clone();
     for value in row {
         hasher.update(&value.to_le_bytes());
     }
@@ -118,9 +129,10 @@ impl SourceReader {
         budget
             .take_numbers(asked)
             .map_err(|error| LogError::TooLarge { file: file.to_owned(), error })?;
+        let of_time = time_crc32(time_s);
         let full_name = |column: &Column| format!("{}.{}", self.name, column.name);
         for (column, crc32) in self.columns.iter_mut().zip(crc32) {
-            if !column.row.is_empty() && row_crc32(time_s, &column.row) != crc32 {
+            if !column.row.is_empty() && row_crc32(&of_time, &column.row) != crc32 {
                 return Err(LogError::ValueCrc {
                     file: file.to_owned(),
                     channel: full_name(column),

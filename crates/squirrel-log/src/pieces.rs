@@ -9,7 +9,7 @@ use mcap::records::op;
 
 use super::envelope::{self, Walk};
 use super::read::{RECORD_MAX_BYTES, Reader};
-use super::write::{Encoder, HEAD_S, refused};
+use super::write::{Encoder, HEAD_S};
 use super::{FlightLog, LogError, check};
 use crate::files::{self, Budget, Growing};
 use std::fs::File;
@@ -86,9 +86,8 @@ impl LogWriter {
         if !self.has_head {
             return Ok(());
         }
-        self.encoder
-            .put(&self.log, settled_s)
-            .map_err(|error| refused(self.file.clone(), error))?;
+        let at = |error| LogError::Io { file: self.file.clone(), error };
+        self.encoder.put(&self.log, settled_s).map_err(at)?;
         drop(self.log.split_before(settled_s));
         Ok(())
     }
@@ -101,7 +100,7 @@ impl LogWriter {
         self.encoder
             .put(&self.log, f64::INFINITY)
             .and_then(|()| self.encoder.finish())
-            .map_err(|error| refused(self.file, error))
+            .map_err(|error| LogError::Io { file: self.file, error })
     }
 }
 

@@ -1,12 +1,10 @@
 //! Writes a flight as an MCAP file: metadata first, then all samples in the order of time.
 
 use std::collections::BTreeMap;
-use std::io::{Seek, Write};
+use std::io::{Result, Write};
 use std::path::Path;
 
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{McapError, WriteOptions, Writer};
-
+use super::container::Container;
 use super::{
     FlightLog, LIBRARY, LogError, METADATA_CRC, METADATA_NAME, Source, check, foxglove, message,
     metadata_crc32, schema,
@@ -41,39 +39,31 @@ impl FlightLog {
     /// [`LogError`] that names the source, index and value if a time is not finite, negative or not
     /// after the one before it, if the number of values does not fit, if a name cannot be a field,
     /// or if the disk refuses.
-    pub fn write(&self, path: &Path) -> Result<(), LogError> {
+    pub fn write(&self, path: &Path) -> std::result::Result<(), LogError> {
         let file = path.display().to_string();
         check::check(&file, self)?;
         let mut encoder = Encoder::at(path, &file, &self.metadata)?;
         encoder
             .put(self, f64::INFINITY)
             .and_then(|()| encoder.finish())
-            .map_err(|error| refused(file, error))
-    }
-}
-
-/// What the disk or the MCAP writer said.
-pub(super) fn refused(file: String, error: McapError) -> LogError {
-    match error {
-        McapError::Io(error) => LogError::Io { file, error },
-        error => LogError::Mcap { file, error },
+            .map_err(|error| LogError::Io { file, error })
     }
 }
 
 /// A log on its way into a file.
-pub(super) struct Encoder<W: Write + Seek> {
-    writer: Writer<W>,
+pub(super) struct Encoder<W> {
+    file: Container<W>,
     /// For the 3-D panel, until they are written.
     obstacles: Option<Vec<[f64; 3]>>,
-    topics: BTreeMap<String, Topic>,
+    topics: Vec<Topic>,
+    /// Their places, by source.
+    places: BTreeMap<String, usize>,
     chunk_start_ns: u64,
 }
 
 /// A source's topic.
 struct Topic {
     id: u16,
-    /// Samples that are written.
-    samples: usize,
     pose: Option<Pose>,
 }
 
@@ -86,57 +76,60 @@ impl Encoder<Growing> {
         path: &Path,
         file: &str,
         metadata: &BTreeMap<String, String>,
-    ) -> Result<Self, LogError> {
+    ) -> std::result::Result<Self, LogError> {
         let obstacles =
             metadata.get("obstacles_json").map(|json| serde_json::from_str(json)).transpose();
         let obstacles =
             obstacles.map_err(|error| LogError::Obstacles { file: file.to_owned(), error })?;
         let at = |error| LogError::Io { file: file.to_owned(), error };
-        let growing = Growing::at(path).map_err(at)?;
-        Self::new(growing, metadata, obstacles).map_err(|error| refused(file.to_owned(), error))
+        Growing::at(path).and_then(|to| Self::new(to, metadata, obstacles)).map_err(at)
     }
 
     /// Ends the file, which takes its name.
-    pub(super) fn finish(mut self) -> Result<(), McapError> {
-        self.writer.finish()?;
-        Ok(self.writer.into_inner().becomes_whole()?)
+    pub(super) fn finish(self) -> Result<()> {
+        self.file.finish()?.becomes_whole()
     }
 }
 
-impl<W: Write + Seek> Encoder<W> {
+impl<W: Write> Encoder<W> {
     fn new(
         to: W,
         metadata: &BTreeMap<String, String>,
         obstacles: Option<Vec<[f64; 3]>>,
-    ) -> Result<Self, McapError> {
-        // The library string and one compression thread keep the bytes the same on every machine.
-        let options = WriteOptions::new().library(LIBRARY).compression_threads(0);
-        let mut writer = options.create(to)?;
+    ) -> Result<Self> {
+        let mut file = Container::new(to, LIBRARY)?;
         let mut metadata = metadata.clone();
         metadata.remove(METADATA_CRC);
         metadata.insert(METADATA_CRC.to_owned(), metadata_crc32(&metadata));
-        writer.write_metadata(&Metadata { name: METADATA_NAME.to_owned(), metadata })?;
-        Ok(Self { writer, obstacles, topics: BTreeMap::new(), chunk_start_ns: 0 })
+        file.metadata(METADATA_NAME, &metadata)?;
+        let (topics, places) = (Vec::new(), BTreeMap::new());
+        Ok(Self { file, obstacles, topics, places, chunk_start_ns: 0 })
     }
 
     /// Writes the samples before a time, in the order of time. Those of the head must be in the
     /// first log that is given ([`HEAD_S`]), and no log has samples that were given before.
-    pub(super) fn put(&mut self, log: &FlightLog, before_s: f64) -> Result<(), McapError> {
+    pub(super) fn put(&mut self, log: &FlightLog, before_s: f64) -> Result<()> {
         if self.topics.is_empty() {
             self.head(log)?;
         }
         let sources = log.sources.iter().filter(|(_, source)| !source.time_s.is_empty());
-        let mut tracks: Vec<Track<'_>> =
-            sources.map(|(name, source)| Track { name, source, next: 0 }).collect();
+        let mut tracks: Vec<Track<'_>> = sources
+            .map(|(name, source)| Track {
+                name,
+                source,
+                topic: self.places.get(name).copied(),
+                next: 0,
+            })
+            .collect();
         while let Some(track) = next(&mut tracks, before_s) {
-            self.sample(track.name, track.source, track.next)?;
+            self.sample(track)?;
             track.next += 1;
         }
         Ok(())
     }
 
     /// The topics of what begins early, and the obstacles.
-    fn head(&mut self, log: &FlightLog) -> Result<(), McapError> {
+    fn head(&mut self, log: &FlightLog) -> Result<()> {
         let begins = |source: &Source| source.time_s.first().copied();
         let Some(start_s) = log.sources.values().filter_map(begins).min_by(f64::total_cmp) else {
             return Ok(());
@@ -150,36 +143,40 @@ impl<W: Write + Seek> Encoder<W> {
         self.chunk_start_ns = start_ns;
         if let Some(obstacles) = self.obstacles.take() {
             let set = foxglove::scene_schema();
-            let writer = &mut self.writer;
-            let id = add_topic(writer, foxglove::SCENE_TOPIC, foxglove::SCENE_SCHEMA, &set)?;
-            put(writer, id, 0, start_ns, &foxglove::scene(start_ns, &obstacles))?;
+            let id = self.file.topic(foxglove::SCENE_TOPIC, foxglove::SCENE_SCHEMA, &set)?;
+            let scene = foxglove::scene(start_ns, &obstacles);
+            self.file.message(id, start_ns, |to| to.extend(scene))?;
         }
         Ok(())
     }
 
-    fn topic(&mut self, name: &str, source: &Source) -> Result<(), McapError> {
+    /// Begins a source's topic; returns its place.
+    fn topic(&mut self, name: &str, source: &Source) -> Result<usize> {
         let set = schema::encode(name, source);
-        let id = add_topic(&mut self.writer, name, &schema::message_name(name), &set)?;
-        let pose = Pose::of(name, source, &mut self.writer)?;
-        self.topics.insert(name.to_owned(), Topic { id, samples: 0, pose });
-        Ok(())
+        let id = self.file.topic(name, &schema::message_name(name), &set)?;
+        let pose = Pose::of(name, source, &mut self.file)?;
+        let place = self.topics.len();
+        self.topics.push(Topic { id, pose });
+        self.places.insert(name.to_owned(), place);
+        Ok(place)
     }
 
-    fn sample(&mut self, name: &str, source: &Source, index: usize) -> Result<(), McapError> {
+    /// Writes the next sample of a track.
+    fn sample(&mut self, track: &mut Track<'_>) -> Result<()> {
+        let (source, index) = (track.source, track.next);
         let now_ns = time_ns(source.time_s[index]);
         if now_ns.saturating_sub(self.chunk_start_ns) >= CHUNK_NS {
-            self.writer.flush()?;
+            self.file.end_chunk()?;
             self.chunk_start_ns = now_ns;
         }
-        if !self.topics.contains_key(name) {
-            self.topic(name, source)?;
-        }
-        let Some(topic) = self.topics.get_mut(name) else { return Ok(()) };
-        let writer = &mut self.writer;
-        put(writer, topic.id, topic.samples, now_ns, &message::encode(source, index))?;
-        topic.samples += 1;
+        let place = match track.topic {
+            Some(place) => place,
+            None => *track.topic.insert(self.topic(track.name, source)?),
+        };
+        let topic = &mut self.topics[place];
+        self.file.message(topic.id, now_ns, |to| message::encode(source, index, to))?;
         if let Some(pose) = &mut topic.pose {
-            pose.put(writer, source, index, now_ns)?;
+            pose.put(&mut self.file, source, index, now_ns)?;
         }
         Ok(())
     }
@@ -189,6 +186,8 @@ impl<W: Write + Seek> Encoder<W> {
 struct Track<'a> {
     name: &'a str,
     source: &'a Source,
+    /// Place of its topic, once it has begun.
+    topic: Option<usize>,
     next: usize,
 }
 
@@ -204,7 +203,6 @@ fn next<'a, 'b>(tracks: &'b mut [Track<'a>], before_s: f64) -> Option<&'b mut Tr
 /// The topic of the vehicle's pose, beside the source `truth`.
 struct Pose {
     id: u16,
-    messages: usize,
     /// Interval of the message before.
     interval: Option<u64>,
 }
@@ -214,28 +212,24 @@ impl Pose {
     const ATTITUDE: &str = "q_ned_from_body_wxyz";
 
     /// `None` unless the source is `truth` and knows place and attitude.
-    fn of(
-        name: &str,
-        source: &Source,
-        writer: &mut Writer<impl Write + Seek>,
-    ) -> Result<Option<Self>, McapError> {
+    fn of(name: &str, source: &Source, file: &mut Container<impl Write>) -> Result<Option<Self>> {
         let has =
             |name, width| source.channels.get(name).is_some_and(|channel| channel.width == width);
         if name != "truth" || !has(Self::POSITION, 3) || !has(Self::ATTITUDE, 4) {
             return Ok(None);
         }
         let set = foxglove::transform_schema();
-        let id = add_topic(writer, foxglove::TRANSFORM_TOPIC, foxglove::TRANSFORM_SCHEMA, &set)?;
-        Ok(Some(Self { id, messages: 0, interval: None }))
+        let id = file.topic(foxglove::TRANSFORM_TOPIC, foxglove::TRANSFORM_SCHEMA, &set)?;
+        Ok(Some(Self { id, interval: None }))
     }
 
     fn put(
         &mut self,
-        writer: &mut Writer<impl Write + Seek>,
+        file: &mut Container<impl Write>,
         source: &Source,
         index: usize,
         now_ns: u64,
-    ) -> Result<(), McapError> {
+    ) -> Result<()> {
         let interval = now_ns / TRANSFORM_INTERVAL_NS;
         if self.interval == Some(interval) {
             return Ok(());
@@ -243,38 +237,11 @@ impl Pose {
         let row = |name| source.channels[name].row(index);
         let message = foxglove::frame_transform(now_ns, row(Self::POSITION), row(Self::ATTITUDE));
         if let Some(message) = message {
-            put(writer, self.id, self.messages, now_ns, &message)?;
-            self.messages += 1;
+            file.message(self.id, now_ns, |to| to.extend(message))?;
             self.interval = Some(interval);
         }
         Ok(())
     }
-}
-
-fn add_topic(
-    writer: &mut Writer<impl Write + Seek>,
-    topic: &str,
-    schema_name: &str,
-    set: &[u8],
-) -> Result<u16, McapError> {
-    let schema = writer.add_schema(schema_name, "protobuf", set)?;
-    writer.add_channel(schema, topic, "protobuf", &BTreeMap::new())
-}
-
-fn put(
-    writer: &mut Writer<impl Write + Seek>,
-    channel_id: u16,
-    index: usize,
-    time_ns: u64,
-    message: &[u8],
-) -> Result<(), McapError> {
-    let header = MessageHeader {
-        channel_id,
-        sequence: index as u32,
-        log_time: time_ns,
-        publish_time: time_ns,
-    };
-    writer.write_to_known_channel(&header, message)
 }
 
 fn time_ns(time_s: f64) -> u64 {

@@ -168,6 +168,37 @@ fn check_says_what_flights_are_worth_and_run_begins_with_it() {
     folder.fails(&[&["gap", "check"], &flights[..], &["--json", "f.mcap"]].concat(), &["f.mcap"]);
 }
 
+/// Good flights of the same machine: what could be shown is then what has changed since, and what is
+/// wrong with them is said of them.
+#[test]
+fn check_with_good_flights_says_what_a_change_since_would_show() {
+    let folder = Folder::new("gap-check-since");
+    write_vehicles(&folder);
+    for (seed, out) in [("1", "good.mcap"), ("2", "f.mcap")] {
+        let flight = ["fly", "--arm", "pc", "--scenario", "excite_rich", "--seed", seed];
+        folder.succeeds(&[&flight[..], &["--out", out]].concat());
+    }
+    let given = ["gap", "check", "--vehicle", "squirrel.toml", "--flights", "f.mcap"];
+    let check = |more: &[&str]| folder.succeeds(&[&given[..], more].concat());
+    check(&["--json", "alone.json"]);
+    check(&["--baseline", "good.mcap", "--json", "since.json", "--out", "since"]);
+    let [alone, since] = ["alone.json", "since.json"].map(|file| json(&folder, file));
+    // A gyroscope's scale was as wrong in the good flights: half of it shows.
+    let smallest = |found: &serde_json::Value| {
+        let effects = found["effects"].as_array().unwrap();
+        let scale = effects.iter().find(|effect| effect["name"] == "gyro_scale").unwrap();
+        scale["numbers"][0]["smallest_shown"].as_f64().unwrap()
+    };
+    let [before, after] = [smallest(&alone), smallest(&since)];
+    assert!(after < 0.7 * before, "{after} of {before}");
+    assert!(folder.0.join("since/check.html").exists());
+    folder.fails(&[&given[..], &["--baseline", "none.mcap"]].concat(), &["none.mcap"]);
+    folder.fails(
+        &[&given[..], &["--baseline", "good.mcap", "--json", "good.mcap"]].concat(),
+        &["good.mcap"],
+    );
+}
+
 /// The lines of a text stand in another one in their order.
 fn holds_in_order(text: &str, lines: &str) -> bool {
     let mut left = text.lines();

@@ -161,6 +161,7 @@ impl Sources {
             channel,
             usable_s: 0.0,
             least_s: 1.0,
+            cut: String::new(),
         };
         let (mut notes, mut velocity) = (Vec::new(), None);
         if let Some(held) = self.differences.heading {

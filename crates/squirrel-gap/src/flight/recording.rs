@@ -225,14 +225,28 @@ impl<'a> Recording<'a> {
         exists: &[Span],
     ) -> Result<Vec<Span>, GapError> {
         let mut left = common(spans, exists);
+        let cut = self.cut(&left);
         left.retain(|span| self.samples_usable(*span) > 0);
-        let usable_s =
-            left.iter().map(|span| self.samples_usable(*span) as f64 * self.period_s).sum::<f64>();
+        let usable: usize = left.iter().map(|span| self.samples_usable(*span)).sum();
+        let usable_s = usable as f64 * self.period_s;
         if usable_s < USABLE_MIN_S {
-            let flight = self.flight.to_owned();
-            return Err(GapError::TooShort { flight, channel, usable_s, least_s: USABLE_MIN_S });
+            let (flight, least_s) = (self.flight.to_owned(), USABLE_MIN_S);
+            return Err(GapError::TooShort { flight, channel, usable_s, least_s, cut });
         }
         Ok(left)
+    }
+
+    /// How gaps cut a flight, for an error.
+    fn cut(&self, pieces: &[Span]) -> String {
+        if pieces.len() < 2 {
+            return String::new();
+        }
+        let longest_s = pieces.iter().map(|(start_s, end_s)| end_s - start_s).fold(0.0, f64::max);
+        format!(
+            "; gaps cut the flight into {} pieces, the longest of {longest_s:.3} s, and each loses {:.3} s at either end",
+            pieces.len(),
+            self.edge() as f64 * self.period_s
+        )
     }
 
     /// Height over ground at a time, m, by barometer or else by position; `None` if the log has

@@ -232,6 +232,19 @@ fn a_flight_must_last_a_second_in_every_channel() {
         "f: imu.specific_force_body_m_s2: leaves 0.970 s of usable flight, at least 1 s are needed"
     );
     assert!(run(&squirrel, &hover(1.45)).is_ok());
+    // A log with a gap in every quarter of a second.
+    let torn = error(|log| {
+        let omega = values(log, "imu", "omega_body_rad_s");
+        for (row, numbers) in omega.chunks_exact_mut(3).enumerate() {
+            if row % 75 < 8 {
+                numbers.fill(f64::NAN);
+            }
+        }
+    });
+    assert_eq!(
+        torn,
+        "f: imu.omega_body_rad_s: leaves 0.920 s of usable flight, at least 1 s are needed; gaps cut the flight into 4 pieces, the longest of 0.660 s, and each loses 0.220 s at either end"
+    );
     let cut = error(|log| values(log, "gnss", "velocity_ned_m_s")[300..].fill(f64::NAN));
     assert!(cut.starts_with("f: gnss.velocity_ned_m_s: leaves 0.560 s"), "{cut}");
     let slow = error(|log| {

@@ -4,7 +4,7 @@ use super::place::{Place, place};
 use std::collections::hash_map::RandomState;
 use std::fs::{File, OpenOptions};
 use std::hash::BuildHasher;
-use std::io::{BufWriter, Cursor, ErrorKind, Result, Seek, SeekFrom, Write};
+use std::io::{BufWriter, ErrorKind, Result, Write};
 use std::path::{Path, PathBuf};
 
 /// Names that are tried before giving up: the first is free but for an attacker who guesses it.
@@ -52,8 +52,8 @@ pub struct Growing(To);
 #[derive(Debug)]
 enum To {
     File(BufWriter<Partial>, PathBuf),
-    /// Who writes piece by piece goes back in it, which a pipe cannot: it gets all at the end.
-    Open(Cursor<Vec<u8>>, Place),
+    /// It gets all at the end: what is in a pipe cannot be taken back.
+    Open(Vec<u8>, Place),
 }
 
 impl Growing {
@@ -64,7 +64,7 @@ impl Growing {
     pub fn at(path: &Path) -> Result<Self> {
         Ok(Self(match place(path)? {
             Place::File(path) => To::File(BufWriter::new(Partial::beside(&path)?), path),
-            open => To::Open(Cursor::new(Vec::new()), open),
+            open => To::Open(Vec::new(), open),
         }))
     }
 
@@ -77,7 +77,7 @@ impl Growing {
             To::File(file, path) => {
                 file.into_inner().map_err(std::io::IntoInnerError::into_error)?.becomes(&path)
             }
-            To::Open(content, place) => write_open(place, content.get_ref()),
+            To::Open(content, place) => write_open(place, &content),
         }
     }
 }
@@ -94,15 +94,6 @@ impl Write for Growing {
         match &mut self.0 {
             To::File(file, _) => file.flush(),
             To::Open(..) => Ok(()),
-        }
-    }
-}
-
-impl Seek for Growing {
-    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
-        match &mut self.0 {
-            To::File(file, _) => file.seek(to),
-            To::Open(content, _) => content.seek(to),
         }
     }
 }
@@ -208,12 +199,6 @@ impl Write for Partial {
 
     fn flush(&mut self) -> Result<()> {
         self.file.flush()
-    }
-}
-
-impl Seek for Partial {
-    fn seek(&mut self, to: SeekFrom) -> Result<u64> {
-        self.file.seek(to)
     }
 }
 

@@ -19,6 +19,7 @@ use squirrel_log::import::{
 use crate::import_fields::data;
 use crate::import_support::formats::{Cells, parquet_bytes, parquet_split};
 use crate::import_support::{OMEGA, one_source};
+use crate::log_attack;
 
 /// Set in the child: the kind, how many files, the seed.
 const ASKED: &str = "SQUIRREL_ATTACK_CHILD";
@@ -34,7 +35,7 @@ const CHILD_KIB: u64 = (192 + 64) << 10;
 /// Processor time of a thousand files, s: a hang of 5 s shows.
 const CHILD_S: u64 = 5;
 
-const KINDS: [&str; 15] = [
+const KINDS: [&str; 16] = [
     "ulog",
     "ulog-map",
     "ardupilot",
@@ -46,6 +47,7 @@ const KINDS: [&str; 15] = [
     "map",
     "map-table",
     "mcap",
+    "mcap-loose",
     "bag",
     "protobuf",
     "mat",
@@ -68,6 +70,8 @@ fn good(kind: &str) -> Vec<u8> {
         "ardupilot" => fs::read(data("ardupilot/quad.bin")).unwrap(),
         "blackbox" => fs::read(data("blackbox/sitl.bbl")).unwrap(),
         "mcap" => return own_log(),
+        // Its records; see `log_attack`.
+        "mcap-loose" => return log_attack::records(&own_log()),
         "bag" => return fs::read(data("ros/ros.mcap")).unwrap(),
         "protobuf" => return fs::read(data("protobuf/flight.mcap")).unwrap(),
         "mat" => return fs::read(data("mat/plain.mat")).unwrap(),
@@ -138,10 +142,7 @@ fn read(kind: &str, path: &Path) {
             log.write(&path.with_extension("mcap")).unwrap();
         }
         "ulog-map" => by_map(&topic("sensor_combined", "timestamp", "us", "\"gyro_rad[0]\"")),
-        "mcap" => {
-            let _ = FlightLog::read(path);
-            let _ = FlightLog::recover(path);
-        }
+        "mcap" | "mcap-loose" => log_attack::read(path),
         "bag" => {
             if let Ok((map, _)) = map_of_bag(path, &[]) {
                 let _ = import(&map, &[path.to_path_buf()]);
@@ -214,6 +215,11 @@ fn mutate(good: &[u8], kind: &str, rng: &mut Pcg64Mcg) -> Vec<u8> {
     bytes
 }
 
+/// The file of what is mutated.
+fn file_of(kind: &str, content: Vec<u8>) -> Vec<u8> {
+    if kind == "mcap-loose" { log_attack::file(&content) } else { content }
+}
+
 fn folder(name: &str) -> PathBuf {
     let folder =
         std::env::temp_dir().join(format!("squirrel-attack-{}-{name}", std::process::id()));
@@ -228,11 +234,11 @@ fn attack_child() {
     let [kind, count, seed, file]: [&str; 4] =
         asked.split(' ').collect::<Vec<_>>().try_into().unwrap();
     let (good, file) = (good(kind), Path::new(file));
-    fs::write(file, &good).unwrap();
+    fs::write(file, file_of(kind, good.clone())).unwrap();
     read(kind, file);
     let mut rng = Pcg64Mcg::seed_from_u64(seed.parse().unwrap());
     for _ in 0..count.parse::<u64>().unwrap() {
-        fs::write(file, mutate(&good, kind, &mut rng)).unwrap();
+        fs::write(file, file_of(kind, mutate(&good, kind, &mut rng))).unwrap();
         read(kind, file);
     }
 }

@@ -144,6 +144,70 @@ fn no_chunk_spans_more_than_a_second_and_metadata_comes_first() {
     assert_eq!(kinds.len(), 3);
 }
 
+/// What mcap's own writer makes of the messages of a file, chunk by chunk.
+fn by_mcap(bytes: &[u8]) -> mcap::Summary {
+    let summary = mcap::Summary::read(bytes).unwrap().unwrap();
+    let mut again = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::WriteOptions::new().library("squirrel 2").create(&mut again).unwrap();
+    let metadata = mcap::read::metadata(bytes, &summary.metadata_indexes[0]).unwrap();
+    writer.write_metadata(&metadata).unwrap();
+    for id in 1..=summary.channels.len() as u16 {
+        let channel = &summary.channels[&id];
+        let schema = channel.schema.as_ref().unwrap();
+        let schema = writer.add_schema(&schema.name, &schema.encoding, &schema.data).unwrap();
+        let (topic, encoding) = (&channel.topic, &channel.message_encoding);
+        assert_eq!(writer.add_channel(schema, topic, encoding, &channel.metadata).unwrap(), id);
+    }
+    for chunk in &summary.chunk_indexes {
+        for message in summary.stream_chunk(bytes, chunk).unwrap().map(Result::unwrap) {
+            let header = mcap::records::MessageHeader {
+                channel_id: message.channel.id,
+                sequence: message.sequence,
+                log_time: message.log_time,
+                publish_time: message.publish_time,
+            };
+            writer.write_to_known_channel(&header, &message.data).unwrap();
+        }
+        writer.flush().unwrap();
+    }
+    writer.finish().unwrap()
+}
+
+#[test]
+fn a_file_is_what_mcap_s_own_writer_makes_of_it() {
+    let file = path("container.mcap");
+    let mut log = small_flight();
+    // A second of more than a chunk has.
+    for i in 0..300 {
+        log.source_mut("wide").push(0.9 + f64::from(i) / 300.0, &[("x", &[1.0; 1000])]);
+    }
+    log.metadata.insert("obstacles_json".to_owned(), "[[10.0, 0.5, 0.2]]".to_owned());
+    log.write(&file).unwrap();
+    let bytes = fs::read(&file).unwrap();
+    let (ours, theirs) = (mcap::Summary::read(&bytes).unwrap().unwrap(), by_mcap(&bytes));
+    assert_eq!(ours.stats, theirs.stats);
+    assert_eq!((&ours.schemas, &ours.channels), (&theirs.schemas, &theirs.channels));
+    assert_eq!(ours.metadata_indexes, theirs.metadata_indexes);
+    assert!(ours.chunk_indexes.len() > 3 && ours.chunk_indexes.len() == theirs.chunk_indexes.len());
+    let mut messages = 0;
+    for (own, their) in ours.chunk_indexes.iter().zip(&theirs.chunk_indexes) {
+        let times = |index: &mcap::records::ChunkIndex| {
+            (index.message_start_time, index.message_end_time, index.uncompressed_size)
+        };
+        assert_eq!(times(own), times(their));
+        // Each entry of an index leads to its message.
+        let indexes = ours.read_message_indexes(&bytes, own).unwrap();
+        messages += indexes.values().map(Vec::len).sum::<usize>();
+        assert!(indexes.iter().all(|(channel, entries)| {
+            entries.iter().all(|entry| {
+                let message = ours.seek_message(&bytes, own, entry).unwrap();
+                (&message.channel, message.log_time) == (channel, entry.log_time)
+            })
+        }));
+    }
+    assert_eq!(messages, 250 + 25 + 300 + 1);
+}
+
 #[test]
 fn the_schema_in_the_file_names_the_channels() {
     let file = path("schema.mcap");

@@ -17,6 +17,7 @@ mod import_support;
 mod import_topics;
 mod import_turned;
 mod import_usd;
+mod log_attack;
 mod log_damage;
 mod log_foxglove;
 mod log_pieces;

@@ -21,7 +21,7 @@ const COUNT_IN_TESTS: u64 = 300;
 const FLIGHT_S: f64 = 0.12;
 
 /// Numbers at the ends of what there is, and what is none.
-const ENDS: [&str; 16] = [
+pub(super) const ENDS: [&str; 16] = [
     "0",
     "-0.0",
     "-1",
@@ -43,7 +43,7 @@ const ENDS: [&str; 16] = [
 const SQUIRREL: &str = include_str!("../../../../vehicles/squirrel_air.toml");
 const PARNN: &[u8] = include_bytes!("../../../../vehicles/squirrel-parnn.safetensors");
 
-fn count_and_rng() -> (u64, Pcg64Mcg) {
+pub(super) fn count_and_rng() -> (u64, Pcg64Mcg) {
     let number = |name: &str, default: u64| {
         std::env::var(name).map_or(default, |text| text.parse().unwrap())
     };
@@ -68,7 +68,7 @@ fn numbers(text: &str) -> Vec<std::ops::Range<usize>> {
 }
 
 /// A text with a few of its numbers, bytes or lines changed.
-fn mutated(good: &str, rng: &mut Pcg64Mcg) -> String {
+pub(super) fn mutated(good: &str, rng: &mut Pcg64Mcg) -> String {
     let mut text = good.to_owned();
     for _ in 0..rng.random_range(1..4) {
         let places = numbers(&text);
@@ -104,7 +104,7 @@ fn mutated(good: &str, rng: &mut Pcg64Mcg) -> String {
 }
 
 /// An error is one line that is no screenful.
-fn is_a_line(error: &str) {
+pub(super) fn is_a_line(error: &str) {
     assert!(!error.is_empty() && !error.contains('\n'), "{error}");
 }
 
@@ -246,7 +246,7 @@ fn no_mutated_plan_ends_the_program() {
     assert!(taken > 0);
 }
 
-fn folder() -> PathBuf {
+pub(super) fn folder() -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("attack");
     std::fs::create_dir_all(&folder).unwrap();
     folder
