@@ -157,7 +157,7 @@ pub(crate) fn standing(
     naming: Naming,
     hold: impl Fn(&Naming) -> Result<Option<Vec<bool>>, GapError>,
 ) -> Result<Naming, GapError> {
-    let naming = slow::beside_drift(search, naming)?;
+    let naming = held(search, slow::beside_drift(search, naming)?, &hold)?;
     // What is left of forces alone, or of moments, may be one missing effect: names must explain
     // most of what is there.
     let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
@@ -204,6 +204,37 @@ pub(crate) fn standing(
         now = Some(fewer);
     }
     Ok(Naming { stands: true, ..now.unwrap_or(naming) })
+}
+
+/// An explanation that leaves nothing without those names that held-out flights are predicted
+/// better without, the one worth least first, as long as nothing is left for that: evidence ranks
+/// names, and what was seen in the flights that they come from alone is theirs.
+///
+/// # Errors
+/// What the predictor says.
+fn held(
+    search: &Search<'_>,
+    mut naming: Naming,
+    hold: &impl Fn(&Naming) -> Result<Option<Vec<bool>>, GapError>,
+) -> Result<Naming, GapError> {
+    while !naming.leftover.is_real() && naming.gust_m_s.is_none() {
+        let members = &naming.found.best.members;
+        if members.is_empty() {
+            break;
+        }
+        let Some(holds) = hold(&naming)? else { break };
+        let worth = |i: &usize| naming.found.worth(*i);
+        let falls = (0..members.len()).filter(|i| !holds[*i]);
+        let Some(least) = falls.min_by(|a, b| worth(a).total_cmp(&worth(b))) else { break };
+        let mut kept = members.clone();
+        kept.remove(least);
+        let fewer = only(search, &naming, &kept)?;
+        if fewer.leftover.is_real() {
+            break;
+        }
+        naming = fewer;
+    }
+    Ok(naming)
 }
 
 /// The same explanation with these of its names alone.
