@@ -6,7 +6,7 @@
 
 use crate::GapError;
 use crate::name::{
-    Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights,
+    BETA, Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights,
 };
 use crate::predictor::{CHANNELS, Hypothesis, Predictor, TURNING};
 use crate::shrink::{Errors12, Floor, Flown};
@@ -98,6 +98,15 @@ const HOLDS: f64 = 1e-3;
 /// Part of a channel's mean square by which a name must change it by itself to be judged by it.
 const ACTS: f64 = 1e-9;
 
+/// What held-out flights say of a name.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Held {
+    /// They are predicted better with it.
+    pub(crate) better: bool,
+    /// By so much in evidence, nats; below 0 where they speak against it.
+    pub(crate) nats: f64,
+}
+
 /// Of each name, whether held-out flights are predicted better with it, every channel in units of
 /// what the model leaves there: a model that misses a little everywhere is far above the noise of
 /// some channels, and a name may act on others. Channels on which it does not act by itself have no
@@ -111,20 +120,26 @@ pub(crate) fn hold(
     unseen: Option<&Predictor>,
     search: &Search<'_>,
     naming: &Naming,
-) -> Result<Option<Vec<bool>>, GapError> {
+) -> Result<Option<Vec<Held>>, GapError> {
     let Some(unseen) = unseen else { return Ok(None) };
     // What floats is shared: without a name it would take its place.
     let whole = search.whole(&naming.found.best);
     let settled = |members: &[Member]| settled_on(unseen, search, naming, members, &whole.base);
     let residual = |point: &Point| unseen.residual(&hypothesis(unseen, search.catalogue, point)?);
     let point = settled(&whole.members)?;
+    let squares = |rows: &[f64]| -> f64 {
+        let white = naming.found.linear.whitener.apply(&unseen.segments, rows);
+        white.iter().map(|x| x * x).sum()
+    };
     let rows = residual(&point)?;
     let with = mean_squares(unseen, &rows);
     let mut all = Vec::with_capacity(whole.members.len());
     for out in 0..whole.members.len() {
         let mut rest = whole.members.clone();
         rest.remove(out);
-        let without = mean_squares(unseen, &residual(&settled(&rest)?)?);
+        let others = residual(&settled(&rest)?)?;
+        let nats = 0.5 * BETA * (squares(&others) - squares(&rows));
+        let without = mean_squares(unseen, &others);
         let alone = residual(&Point { members: rest, base: point.base.clone() })?;
         let change: Vec<f64> = rows.iter().zip(&alone).map(|(with, out)| out - with).collect();
         let acts = mean_squares(unseen, &change);
@@ -136,7 +151,8 @@ pub(crate) fn hold(
             .filter(|(channel, gain)| *channel < TURNING || gain.abs() > HOLDS)
             .map(|(_, gain)| gain)
             .collect();
-        all.push(gains.iter().sum::<f64>() > HOLDS * gains.len() as f64);
+        let better = gains.iter().sum::<f64>() > HOLDS * gains.len() as f64;
+        all.push(Held { better, nats });
     }
     Ok(Some(all))
 }

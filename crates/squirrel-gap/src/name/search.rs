@@ -215,7 +215,7 @@ impl Search<'_> {
         }
     }
 
-    /// What a member must be worth beside others, nats: as much to come in as to stay.
+    /// What a member must be worth to come in beside others, nats.
     fn needed_beside(&self, member: &Member, others: usize) -> f64 {
         let least = if others == 0 { NATS_MIN } else { FURTHER_NATS };
         self.needed(member).max(least)
@@ -507,10 +507,7 @@ impl Search<'_> {
                 let mut rest = best.members.clone();
                 let out = rest.remove(i);
                 let without = self.score(linear, &rest)?;
-                // What happened to a machine that flew well may be one thing with several names.
-                let others = if self.catalogue.is_of_one_machine { 0 } else { rest.len() };
-                let needed = self.needed_beside(&out, others);
-                if without.log_evidence > best.log_evidence - needed {
+                if without.log_evidence > best.log_evidence - self.needed(&out) {
                     *best = without;
                     changed = true;
                     break;

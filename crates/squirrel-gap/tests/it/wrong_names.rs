@@ -26,13 +26,6 @@ fn what_held_out_flights_are_worse_with_is_no_name() {
     }
 }
 
-/// A clock that jumps by 60 ms leaves a little at the edges of the wings, 8 nats.
-#[test]
-fn a_second_name_must_be_worth_as_much_to_stay_as_to_come_in() {
-    let (verdict, names) = asked(Set::Sensors, 13, 71001);
-    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["clock_step"]));
-}
-
 /// A rotor that lost less than the file says, 7 nats; other names in its place are worth 2.
 #[test]
 fn what_flights_hardly_ask_for_is_no_other_explanation() {
@@ -45,6 +38,13 @@ fn what_flights_hardly_ask_for_is_no_other_explanation() {
 #[test]
 fn an_effect_that_starts_flat_is_off_by_what_it_does() {
     let (verdict, names) = asked(Set::Overstated, 35, 82003);
+    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["ground_effect"]));
+}
+
+/// More of it than the file has looks like nothing that the flights show, less like everything.
+#[test]
+fn a_file_may_have_all_of_an_effect_that_starts_flat_too_much() {
+    let (verdict, names) = asked(Set::Overstated, 3, 93007);
     assert_eq!((verdict.verdict, names), (Kind::Named, vec!["ground_effect"]));
 }
 
