@@ -226,7 +226,10 @@ fn held(
         let Some(holds) = hold(&naming)? else { break };
         let worth = |i: &usize| naming.found.worth(*i);
         let falls = (0..members.len()).filter(|i| {
-            !holds[*i].better && worth(i) + holds[*i].nats < search.needed(&members[*i])
+            // What is clear is told with the flights that lack it, and is no accident of some.
+            worth(i) < search::FURTHER_NATS
+                && !holds[*i].better
+                && worth(i) + holds[*i].nats < search.needed(&members[*i])
         });
         let Some(least) = falls.min_by(|a, b| worth(a).total_cmp(&worth(b))) else { break };
         let mut kept = members.clone();
