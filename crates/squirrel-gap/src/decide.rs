@@ -53,9 +53,23 @@ pub(crate) fn close<'a>(
         let times = if is_behind { RIVAL_GAP_BEHIND } else { RIVAL_GAP };
         left.is_some_and(|left| left - 1.0 >= times * (gap.after - 1.0).max(HELD_OUT_NOISE))
     };
-    let is_close =
-        |(i, rival): &(usize, &Scored)| rival.log_evidence > best - NATS_MIN && !clearly_worse(*i);
+    // What is in the place of a name must be worth something itself: what flights hardly ask for is
+    // no other explanation, but none at all, which a name has left behind already.
+    let is_worth = |rival: &Scored| {
+        naming.found.without.iter().all(|without| {
+            !is_one_more(rival, without) || rival.log_evidence >= without.log_evidence + BEHIND_NATS
+        })
+    };
+    let is_close = |(i, rival): &(usize, &Scored)| {
+        rival.log_evidence > best - NATS_MIN && is_worth(rival) && !clearly_worse(*i)
+    };
     rivals.iter().enumerate().filter(is_close).map(|(_, rival)| rival).collect()
+}
+
+/// Whether a set is another one with one member more.
+fn is_one_more(set: &Scored, than: &Scored) -> bool {
+    let has = |member: &Member| set.members.iter().any(|own| own.candidate == member.candidate);
+    set.members.len() == than.members.len() + 1 && than.members.iter().all(has)
 }
 
 /// The names that an answer shares with all that are as good, if that is a part of it: they stand

@@ -54,27 +54,6 @@ pub fn diagnose_since(
     diagnose_against(&baseline.declared, Some(baseline), flights, held_out, progress)
 }
 
-/// What has changed since good flights of the same machine, where there are any; else what the
-/// vehicle file lacks.
-///
-/// * `good` - name and log of each; may be empty
-/// * other arguments as of [`diagnose`]
-///
-/// # Errors
-/// As [`Baseline::fit`] and [`diagnose_since`].
-pub fn diagnose_with(
-    vehicle: &VehicleFile,
-    good: &[(String, FlightLog)],
-    flights: &[(String, FlightLog)],
-    held_out: &[(String, FlightLog)],
-    progress: &dyn Fn(&str),
-) -> Result<Diagnosis, GapError> {
-    if good.is_empty() {
-        return diagnose(vehicle, flights, held_out, progress);
-    }
-    diagnose_since(&Baseline::fit(vehicle, good, progress)?, flights, held_out, progress)
-}
-
 fn diagnose_against<'a>(
     vehicle: &'a VehicleFile,
     baseline: Option<&'a Baseline>,

@@ -66,7 +66,7 @@ pub use check::{check, check_since};
 pub use checked::{ChannelCheck, Check, Choice, EffectCheck, FlightCheck, NumberCheck, Shows};
 pub use closed_loop::{ClosedLoop, closed_loop};
 pub use compatibility::contradictions;
-pub use diagnose::{diagnose, diagnose_since, diagnose_with};
+pub use diagnose::{diagnose, diagnose_since};
 pub use diagnosis::{Covered, Diagnosis};
 pub use error::GapError;
 pub use find::{Finding, find};

@@ -6,7 +6,7 @@
 
 use crate::GapError;
 use crate::name::{
-    Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights,
+    BETA, Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights,
 };
 use crate::predictor::{CHANNELS, Hypothesis, Predictor, TURNING};
 use crate::shrink::{Errors12, Floor, Flown};
@@ -34,7 +34,10 @@ pub(crate) fn prove(
     naming: &Naming,
     others: &[Scored],
 ) -> Result<Option<HeldOut>, GapError> {
-    let at = |members: &[Member], base: &[f64]| settled_on(unseen, search, naming, members, base);
+    let at = |members: &[Member], base: &[f64]| -> Result<_, GapError> {
+        let point = settled_on(unseen, search, naming, members, base)?;
+        hypothesis(unseen, search.catalogue, &point)
+    };
     let whole = search.whole(&naming.found.best);
     let fitted_at = at(&whole.members, &whole.base)?;
     let flown = Flown::new(unseen, &fitted_at)?;
@@ -70,7 +73,7 @@ pub(crate) fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
     }
 }
 
-/// A hypothesis on flights that were not fitted. What floats inside its tolerance is shared; what
+/// A point for flights that were not fitted. What floats inside its tolerance is shared; what
 /// the sensors of other flights did is not, and is found from these.
 fn settled_on(
     unseen: &Predictor,
@@ -78,24 +81,38 @@ fn settled_on(
     naming: &Naming,
     members: &[Member],
     base: &[f64],
-) -> Result<Hypothesis, GapError> {
+) -> Result<Point, GapError> {
     let catalogue = search.catalogue;
     let mut base = base[..catalogue.shared_columns()].to_vec();
     base.resize(catalogue.columns(unseen), 0.0);
     let mut point = Point { members: members.to_vec(), base };
     let thrust = catalogue.tolerance_of(Declared::Thrust);
     settle_flights(unseen, catalogue, &naming.found.linear.whitener, thrust, &mut point)?;
-    hypothesis(unseen, catalogue, &point)
+    Ok(point)
 }
 
 /// By how much residuals must be smaller with a name for it to hold: mean over channels of the
 /// logarithm of mean squares.
 const HOLDS: f64 = 1e-3;
 
-/// Of each name, whether the force and moment of held-out flights are predicted better with it,
-/// every channel in units of what the model leaves there: a model that misses a little everywhere
-/// is far above the noise of some channels, and a name may act on others. Not flown for a second:
-/// what is missed carries such a flight away from any name. `None` without such flights.
+/// Part of a channel's mean square by which a name must change it by itself to be judged by it.
+const ACTS: f64 = 1e-9;
+
+/// What held-out flights say of a name.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Held {
+    /// They are predicted better with it.
+    pub(crate) better: bool,
+    /// By so much in evidence, nats; below 0 where they speak against it.
+    pub(crate) nats: f64,
+}
+
+/// Of each name, whether held-out flights are predicted better with it, every channel in units of
+/// what the model leaves there: a model that misses a little everywhere is far above the noise of
+/// some channels, and a name may act on others. Channels on which it does not act by itself have no
+/// vote: sensors that are put where they fit best beside it move fixes, and say nothing of a force.
+/// Not flown for a second: what is missed carries such a flight away from any name. `None` without
+/// such flights.
 ///
 /// # Errors
 /// What the predictor says.
@@ -103,32 +120,39 @@ pub(crate) fn hold(
     unseen: Option<&Predictor>,
     search: &Search<'_>,
     naming: &Naming,
-) -> Result<Option<Vec<bool>>, GapError> {
+) -> Result<Option<Vec<Held>>, GapError> {
     let Some(unseen) = unseen else { return Ok(None) };
     // What floats is shared: without a name it would take its place.
     let whole = search.whole(&naming.found.best);
-    let residual = |members: &[Member]| -> Result<Vec<f64>, GapError> {
-        let rows = unseen.residual(&settled_on(unseen, search, naming, members, &whole.base)?)?;
-        Ok(mean_squares(unseen, &rows))
+    let settled = |members: &[Member]| settled_on(unseen, search, naming, members, &whole.base);
+    let residual = |point: &Point| unseen.residual(&hypothesis(unseen, search.catalogue, point)?);
+    let point = settled(&whole.members)?;
+    let squares = |rows: &[f64]| -> f64 {
+        let white = naming.found.linear.whitener.apply(&unseen.segments, rows);
+        white.iter().map(|x| x * x).sum()
     };
-    let with = residual(&whole.members)?;
+    let rows = residual(&point)?;
+    let with = mean_squares(unseen, &rows);
     let mut all = Vec::with_capacity(whole.members.len());
     for out in 0..whole.members.len() {
         let mut rest = whole.members.clone();
         rest.remove(out);
-        let without = residual(&rest)?;
-        let gains: Vec<f64> = with
-            .iter()
-            .zip(&without)
-            .enumerate()
-            .filter(|(_, (w, _))| **w > 0.0)
-            .map(|(channel, (w, without))| (channel, (without / w).ln()))
+        let others = residual(&settled(&rest)?)?;
+        let nats = 0.5 * BETA * (squares(&others) - squares(&rows));
+        let without = mean_squares(unseen, &others);
+        let alone = residual(&Point { members: rest, base: point.base.clone() })?;
+        let change: Vec<f64> = rows.iter().zip(&alone).map(|(with, out)| out - with).collect();
+        let acts = mean_squares(unseen, &change);
+        let gains: Vec<f64> = (0..CHANNELS.len())
+            .filter(|channel| with[*channel] > 0.0 && acts[*channel] > ACTS * with[*channel])
+            .map(|channel| (channel, (without[channel] / with[channel]).ln()))
             // A gyroscope against the attitude says nothing of most names, and is no vote against
             // them.
             .filter(|(channel, gain)| *channel < TURNING || gain.abs() > HOLDS)
             .map(|(_, gain)| gain)
             .collect();
-        all.push(gains.iter().sum::<f64>() > HOLDS * gains.len() as f64);
+        let better = gains.iter().sum::<f64>() > HOLDS * gains.len() as f64;
+        all.push(Held { better, nats });
     }
     Ok(Some(all))
 }

@@ -4,9 +4,10 @@
 
 use crate::GapError;
 use crate::add::{add_effect, patched};
+use crate::baseline::Baseline;
 use crate::checked::Check;
 use crate::closed_loop::closed_loop;
-use crate::diagnose::diagnose_with;
+use crate::diagnose::{diagnose, diagnose_since};
 use crate::diagnosis::Diagnosis;
 use crate::picture::picture;
 use crate::report;
@@ -39,27 +40,55 @@ pub struct Patched {
 }
 
 impl Workflow {
-    /// Finds out what a vehicle lacks, see [`diagnose_with`]. Flights that are set aside take no
-    /// part in what follows.
+    /// Finds out what a vehicle lacks, see [`diagnose`](crate::diagnose()). Flights that are set
+    /// aside take no part in what follows.
     ///
     /// * `baseline` - good flights of the same machine; none for a vehicle that is taken as its
     ///   file has it
     ///
     /// # Errors
-    /// As [`diagnose_with`].
+    /// As [`Baseline::fit`] and [`diagnose_since`].
     pub fn diagnose(
         vehicle: VehicleFile,
         baseline: &[(String, FlightLog)],
         flights: Flights,
-        mut held_out: Flights,
+        held_out: Flights,
         progress: &dyn Fn(&str),
     ) -> Result<Self, GapError> {
-        let diagnosis = diagnose_with(&vehicle, baseline, &flights, &held_out, progress)?;
+        if !baseline.is_empty() {
+            let own = Baseline::fit(&vehicle, baseline, progress)?;
+            return Self::diagnose_since(&own, flights, held_out, progress);
+        }
+        let diagnosis = diagnose(&vehicle, &flights, &held_out, progress)?;
+        Ok(Self::of(diagnosis, vehicle, flights, held_out))
+    }
+
+    /// Finds out what has changed since the flights of a baseline: for those who have asked it
+    /// before, as [`check_since`](crate::check_since) does, and fit it once.
+    ///
+    /// # Errors
+    /// As [`diagnose_since`].
+    pub fn diagnose_since(
+        baseline: &Baseline,
+        flights: Flights,
+        held_out: Flights,
+        progress: &dyn Fn(&str),
+    ) -> Result<Self, GapError> {
+        let diagnosis = diagnose_since(baseline, &flights, &held_out, progress)?;
+        Ok(Self::of(diagnosis, baseline.declared.clone(), flights, held_out))
+    }
+
+    fn of(
+        diagnosis: Diagnosis,
+        vehicle: VehicleFile,
+        flights: Flights,
+        mut held_out: Flights,
+    ) -> Self {
         let looked_at = |flight: &str| diagnosis.verdict.has_looked_at(flight);
         held_out.retain(|(name, _)| looked_at(name));
         let flights =
             flights.into_iter().map(|(name, _)| name).filter(|name| looked_at(name)).collect();
-        Ok(Self { diagnosis, check: None, vehicle, flights, held_out })
+        Self { diagnosis, check: None, vehicle, flights, held_out }
     }
 
     /// The vehicle file as it was given.

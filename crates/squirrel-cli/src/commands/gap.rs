@@ -7,8 +7,8 @@ use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use crate::paths::log_files;
 use squirrel_gap::{
-    ClosedLoop, Flights, Kind, Moved, NamedEffect, Patched, RotorHealth, Value, Verdict, Workflow,
-    significant,
+    Baseline, ClosedLoop, Flights, Kind, Moved, NamedEffect, Patched, RotorHealth, Value, Verdict,
+    Workflow, significant,
 };
 use squirrel_log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
@@ -141,7 +141,8 @@ impl Looked {
         paths.check()?;
         let vehicle = VehicleFile::find(&self.vehicle).map_err(|e| e.to_string())?;
         let (flights, held_out) = (logs(&self.flights)?, logs(&self.held_out)?);
-        let found = looked(&vehicle, &logs(&self.baseline)?, &flights, &held_out)?;
+        let own = fitted(&vehicle, &self.baseline)?;
+        let found = looked(&vehicle, own.as_ref(), &flights, &held_out)?;
         check::show(&found);
         notes(&found.notes);
         if let Some(folder) = &self.out {
@@ -156,22 +157,35 @@ impl Looked {
     }
 }
 
+/// What a machine's own good flights make of its file; none where there are no such flights.
+fn fitted(vehicle: &VehicleFile, good: &[PathBuf]) -> Result<Option<Baseline>, String> {
+    if good.is_empty() {
+        return Ok(None);
+    }
+    let good = logs(good)?;
+    let bar = output::spinner();
+    let found = Baseline::fit(vehicle, &good, &|what| {
+        bar.set_message(what.to_owned());
+        bar.inc(1);
+    });
+    bar.finish_and_clear();
+    found.map(Some).map_err(|e| e.to_string())
+}
+
 /// What flights are worth before any verdict.
 ///
-/// * `good` - flights of the same machine; may be empty
+/// * `own` - the same machine as it flew when it flew well, where that is known
 fn looked(
     vehicle: &VehicleFile,
-    good: &[(String, FlightLog)],
+    own: Option<&Baseline>,
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
 ) -> Result<squirrel_gap::Check, String> {
     let bar = output::spinner();
     let tell = |what: &str| bar.set_message(what.to_owned());
-    let found = if good.is_empty() {
-        squirrel_gap::check(vehicle, flights, held_out, &tell)
-    } else {
-        squirrel_gap::Baseline::fit(vehicle, good, &tell)
-            .and_then(|own| squirrel_gap::check_since(&own, flights, held_out, &tell))
+    let found = match own {
+        Some(own) => squirrel_gap::check_since(own, flights, held_out, &tell),
+        None => squirrel_gap::check(vehicle, flights, held_out, &tell),
     };
     bar.finish_and_clear();
     found.map_err(|e| e.to_string())
@@ -202,22 +216,25 @@ impl Given {
 
     fn diagnose(&self) -> Result<Workflow, String> {
         let (vehicle, flights, held_out) = self.read()?;
-        self.diagnosed(vehicle, flights, held_out)
+        let own = fitted(&vehicle, &self.baseline)?;
+        Self::diagnosed(vehicle, own.as_ref(), flights, held_out)
     }
 
     fn diagnosed(
-        &self,
         vehicle: VehicleFile,
+        own: Option<&Baseline>,
         flights: Flights,
         held_out: Flights,
     ) -> Result<Workflow, String> {
-        let good = logs(&self.baseline)?;
         let bar = output::spinner();
         let tell = |what: &str| {
             bar.set_message(what.to_owned());
             bar.inc(1);
         };
-        let found = Workflow::diagnose(vehicle, &good, flights, held_out, &tell);
+        let found = match own {
+            Some(own) => Workflow::diagnose_since(own, flights, held_out, &tell),
+            None => Workflow::diagnose(vehicle, &[], flights, held_out, &tell),
+        };
         bar.finish_and_clear();
         found.map_err(|e| e.to_string())
     }
@@ -226,13 +243,7 @@ impl Given {
         self.check(&[FIND.as_ref()])?;
         let (declared, flights, held_out) = self.read()?;
         let all = [flights, held_out].concat();
-        let own = match &self.baseline[..] {
-            [] => None,
-            good => Some(
-                squirrel_gap::Baseline::fit(&declared, &logs(good)?, &|_| ())
-                    .map_err(|e| e.to_string())?,
-            ),
-        };
+        let own = fitted(&declared, &self.baseline)?;
         let vehicle = own.as_ref().map_or(&declared, |own| &own.vehicle);
         let finding = squirrel_gap::find(vehicle, &all).map_err(|e| e.to_string())?;
         let triple = |x: &[f64; 3]| x.map(|v| format!("{v:.4e}")).join("  ");
@@ -309,8 +320,9 @@ impl Given {
         self.check(&[&self.patch_name(), REPORT.as_ref(), VERDICT.as_ref()])?;
         let (vehicle, flights, held_out) = self.read()?;
         // Whatever it finds, the verdict is what it would be without.
-        let check = looked(&vehicle, &logs(&self.baseline)?, &flights, &held_out).ok();
-        let mut found = self.diagnosed(vehicle, flights, held_out)?;
+        let own = fitted(&vehicle, &self.baseline)?;
+        let check = looked(&vehicle, own.as_ref(), &flights, &held_out).ok();
+        let mut found = Self::diagnosed(vehicle, own.as_ref(), flights, held_out)?;
         if let Some(check) = &check {
             talk(&check.words);
         }

@@ -7,6 +7,7 @@ use super::column::Column;
 use super::evidence::{BETA, Gram, inner};
 use super::parameters::Catalogue;
 use super::point::{Member, Other, Point, hypothesis};
+use super::search::LEAST;
 use super::whiten::Whitener;
 use crate::GapError;
 use crate::leftover::noise;
@@ -79,25 +80,34 @@ impl Linear {
                 moved.base[column] += step;
                 step
             };
+            // What has a slope of its own below what the file has: lags and delays, and what starts
+            // flat, of which a file may have too much.
+            let own = catalogue.absent(predictor, parameter.candidate).values[parameter.slot];
+            let is_flat = catalogue.starts_flat(parameter.candidate);
+            let down = if is_named {
+                None
+            } else if is_flat && own >= parameter.smallest {
+                Some(own - LEAST * parameter.smallest)
+            } else {
+                (first && parameter.signed && catalogue.bends(parameter.candidate)).then_some(step)
+            };
             let keeps = alike && !is_named && !catalogue.bends(parameter.candidate);
             raw.push(match &mut before {
                 Some(before) if keeps => std::mem::take(&mut before[column]),
                 _ => {
                     let ahead = difference(&moved, step, None)?;
-                    Column::of(
-                        if first && parameter.signed && catalogue.bends(parameter.candidate) {
-                            // Far from nothing, the two sides are not alike: the one that explains
-                            // more.
-                            moved.base[column] -= 2.0 * step;
-                            let back = difference(&moved, -step, None)?;
-                            let left = |c: &[f64], x: f64| -> f64 {
-                                residual.iter().zip(c).map(|(r, c)| (r - c * x).powi(2)).sum()
-                            };
-                            if left(&ahead, step) <= left(&back, -step) { ahead } else { back }
-                        } else {
-                            ahead
-                        },
-                    )
+                    Column::of(if let Some(down) = down {
+                        // Far from nothing, the two sides are not alike: the one that explains
+                        // more.
+                        moved.base[column] -= step + down;
+                        let back = difference(&moved, -down, None)?;
+                        let left = |c: &[f64], x: f64| -> f64 {
+                            residual.iter().zip(c).map(|(r, c)| (r - c * x).powi(2)).sum()
+                        };
+                        if left(&ahead, step) <= left(&back, -down) { ahead } else { back }
+                    } else {
+                        ahead
+                    })
                 }
             });
         }
@@ -109,8 +119,10 @@ impl Linear {
                 (Other::Height { .. }, _) => Column::default(),
                 // What cannot be off needs no column.
                 _ if sd == 0.0 => Column::default(),
-                (_, Some(before)) => std::mem::take(&mut before[column]),
-                (other, None) => {
+                (_, Some(before)) if !catalogue.is_of_wings(column) => {
+                    std::mem::take(&mut before[column])
+                }
+                (other, _) => {
                     let mut moved = point.clone();
                     moved.base[column] += sd;
                     let flight =

@@ -48,6 +48,7 @@ use crate::GapError;
 use crate::leftover::{Leftover, Slack, gusts, leftover, noise};
 pub(crate) use crate::predictor::TURBULENCE_M_S;
 use crate::predictor::{Hypothesis, Motion, Predictor};
+use crate::proof::Held;
 use crate::verdict::Left;
 use squirrel_core::effects::Timing;
 use std::rc::Rc;
@@ -155,9 +156,9 @@ const MOST: f64 = 0.5;
 pub(crate) fn standing(
     search: &Search<'_>,
     naming: Naming,
-    hold: impl Fn(&Naming) -> Result<Option<Vec<bool>>, GapError>,
+    hold: impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
 ) -> Result<Naming, GapError> {
-    let naming = slow::beside_drift(search, naming)?;
+    let naming = held(search, slow::beside_drift(search, naming)?, &hold)?;
     // What is left of forces alone, or of moments, may be one missing effect: names must explain
     // most of what is there.
     let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
@@ -177,7 +178,7 @@ pub(crate) fn standing(
             |index| search.stands_out(&naming.found.best, index, &naming.deviations) >= STANDS;
         let stands = (0..naming.found.best.members.len()).all(clear)
             && slow::leaves_nothing_else(search, &naming)?
-            && hold(&naming)?.is_none_or(|holds| holds.iter().all(|holds| *holds));
+            && hold(&naming)?.is_none_or(|holds| holds.iter().all(|held| held.better));
         return Ok(Naming { stands, ..naming });
     }
     let mut kept: Vec<Member> = naming.found.best.members.clone();
@@ -187,7 +188,7 @@ pub(crate) fn standing(
         let holds = hold(at)?;
         let clear = |index: usize| search.stands_out(&at.found.best, index, &at.deviations);
         let falls = |index: &usize| {
-            holds.as_ref().is_some_and(|holds| !holds[*index]) || clear(*index) < STANDS
+            holds.as_ref().is_some_and(|holds| !holds[*index].better) || clear(*index) < STANDS
         };
         // One at a time, the least clear first: what falls may have stood in for what stands.
         let weakest = (0..kept.len()).filter(falls).min_by(|a, b| clear(*a).total_cmp(&clear(*b)));
@@ -204,6 +205,42 @@ pub(crate) fn standing(
         now = Some(fewer);
     }
     Ok(Naming { stands: true, ..now.unwrap_or(naming) })
+}
+
+/// An explanation that leaves nothing without those names that held-out flights are predicted
+/// better without and speak against more than the others spoke for them, the one worth least first,
+/// as long as nothing is left for that.
+///
+/// # Errors
+/// What the predictor says.
+fn held(
+    search: &Search<'_>,
+    mut naming: Naming,
+    hold: &impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
+) -> Result<Naming, GapError> {
+    while !naming.leftover.is_real() && naming.gust_m_s.is_none() {
+        let members = &naming.found.best.members;
+        if members.is_empty() {
+            break;
+        }
+        let Some(holds) = hold(&naming)? else { break };
+        let worth = |i: &usize| naming.found.worth(*i);
+        let falls = (0..members.len()).filter(|i| {
+            // What is clear is told with the flights that lack it, and is no accident of some.
+            worth(i) < search::FURTHER_NATS
+                && !holds[*i].better
+                && worth(i) + holds[*i].nats < search.needed(&members[*i])
+        });
+        let Some(least) = falls.min_by(|a, b| worth(a).total_cmp(&worth(b))) else { break };
+        let mut kept = members.clone();
+        kept.remove(least);
+        let fewer = only(search, &naming, &kept)?;
+        if fewer.leftover.is_real() {
+            break;
+        }
+        naming = fewer;
+    }
+    Ok(naming)
 }
 
 /// The same explanation with these of its names alone.

@@ -1,7 +1,7 @@
 //! What floats beside the named effects and moved with them: numbers of effects hold together with
 //! these alone.
 
-use super::point::Airframe;
+use super::point::{Airframe, WING_PLACE};
 use super::refine::Scored;
 use super::search::{ACTS, Search};
 use crate::verdict::Moved;
@@ -38,6 +38,7 @@ impl Search<'_> {
                 Airframe::Arm { rotor, axis } => format!("rotor[{rotor}].position_body_m[{axis}]"),
                 Airframe::Torque { rotor } => format!("rotor[{rotor}].torque_fraction"),
                 Airframe::Drag { axis } => format!("drag.linear_n_s_per_m[{axis}]"),
+                Airframe::Wing { axis } => WING_PLACE[axis].to_owned(),
             };
         };
         let candidate = &self.catalogue.candidates[parameter.candidate];

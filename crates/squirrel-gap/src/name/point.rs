@@ -47,6 +47,10 @@ const SHORT: usize = 4;
 /// All of them.
 const OF_A_FLIGHT: usize = SHORT + HEIGHT_KNOTS;
 
+/// Fields of a vehicle file that say where the wings are: ahead, to each side, below.
+pub(super) const WING_PLACE: [&str; 3] =
+    ["wing.longitudinal_arm_m", "wing.lateral_arm_m", "wing.vertical_arm_m"];
+
 /// An effect with its numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Member {
@@ -74,6 +78,9 @@ pub(crate) enum Airframe {
     Torque { rotor: usize },
     /// Linear drag along an axis, N s/m.
     Drag { axis: usize },
+    /// Place of the wings along an axis, m: ahead, to each side, below. What the rotors blow at
+    /// them goes with it.
+    Wing { axis: usize },
 }
 
 impl Airframe {
@@ -87,8 +94,21 @@ impl Airframe {
             Self::Arm { rotor, axis } => vehicle.with_rotor_off(rotor, In::new(along(axis)), 1.0),
             Self::Torque { rotor } => vehicle.with_rotor_off(rotor, In::zero(), 1.0 + x),
             Self::Drag { axis } => vehicle.with_more_drag(along(axis)),
+            Self::Wing { axis } => with_wing_off(vehicle, axis, x),
         }
     }
+}
+
+/// The vehicle with its wings elsewhere; as it is where it has none, or no file may have such ones.
+fn with_wing_off(vehicle: &Vehicle<f64>, axis: usize, x: f64) -> Vehicle<f64> {
+    let mut p = *vehicle.parameters();
+    if let Some(wing) = &mut p.wing {
+        let place =
+            [&mut wing.longitudinal_arm_m, &mut wing.lateral_arm_m, &mut wing.vertical_arm_m];
+        *place[axis] += x;
+    }
+    let factors = vehicle.rotor_factors();
+    Vehicle::new(p).and_then(|own| own.with_rotor_factors(factors)).unwrap_or(*vehicle)
 }
 
 /// What a column of a [`Point`] beside the catalogue's parameters stands for.
@@ -247,6 +267,13 @@ impl Catalogue {
         }
     }
 
+    /// Whether a column is a place of the wings: what it changes goes with what blows on them.
+    pub(crate) fn is_of_wings(&self, column: usize) -> bool {
+        let index = column.checked_sub(self.parameters.len());
+        let number = index.and_then(|index| self.airframe.get(index));
+        matches!(number, Some((Airframe::Wing { .. }, _)))
+    }
+
     /// The effect that a column changes a number of, with the smallest size of it that is worth
     /// reporting; `None` for what belongs to a flight, to the place of a rotor, or to no effect.
     pub(crate) fn group(&self, column: usize) -> Option<(&'static str, f64)> {
@@ -257,7 +284,7 @@ impl Catalogue {
                 .then_some((self.candidates[parameter.candidate].effect, parameter.smallest));
         }
         match self.airframe.get(column - self.parameters.len())?.0 {
-            Airframe::Arm { .. } => None,
+            Airframe::Arm { .. } | Airframe::Wing { .. } => None,
             Airframe::Torque { .. } => Some((behind(Declared::Torque)?, TORQUE_FRACTION)),
             Airframe::Drag { .. } => {
                 let drag = self.parameters.iter().find(|p| p.is_behind(Declared::LinearDrag(0)))?;
@@ -279,12 +306,12 @@ impl Catalogue {
         }
     }
 
-    /// Takes the tolerances of one machine: its rotors are where they were.
+    /// Takes the tolerances of one machine: its rotors and wings are where they were.
     pub(crate) fn take(&mut self, scatter: &Scatter) {
         self.is_of_one_machine = true;
         self.usual = scatter.usual;
         for (number, tolerance) in &mut self.airframe {
-            if matches!(number, Airframe::Arm { .. }) {
+            if matches!(number, Airframe::Arm { .. } | Airframe::Wing { .. }) {
                 *tolerance = 0.0;
             }
         }

@@ -82,25 +82,30 @@ impl Search<'_> {
     /// floating.
     pub(crate) fn blind(&self, set: &Scored) -> Vec<&'static str> {
         let offset = set.free.len();
-        let mut all = self.catalogue.unseen.clone();
-        for candidate in &self.catalogue.candidates {
-            let profile = Effects::<f64>::profile(candidate.effect);
-            if all.contains(&candidate.effect)
-                || profile.is_some_and(|profile| profile.is_of_a_state)
-                || set.members.iter().any(|m| self.effect(m) == candidate.effect)
-            {
-                continue;
-            }
+        let shows = |candidate: &Candidate| {
             let mut prior = set.prior.clone();
             for p in &candidate.parameters {
                 prior[offset + p] = self.catalogue.parameters[*p].slab;
             }
-            let Some(posterior) = set.gram.posterior(&prior, BETA) else { continue };
-            let shows = candidate.parameters.iter().any(|p| {
+            let Some(posterior) = set.gram.posterior(&prior, BETA) else { return true };
+            candidate.parameters.iter().any(|p| {
                 let largest = self.catalogue.parameters[*p].largest;
                 largest * largest > VISIBLE * posterior.variance(offset + p)
-            });
-            if !shows {
+            })
+        };
+        let candidates = &self.catalogue.candidates;
+        let shown: Vec<bool> = candidates.iter().map(shows).collect();
+        let mut all = self.catalogue.unseen.clone();
+        for (index, candidate) in candidates.iter().enumerate() {
+            let profile = Effects::<f64>::profile(candidate.effect);
+            // One of its forms is enough.
+            let is_shown = (0..candidates.len())
+                .any(|other| shown[other] && self.catalogue.is_one_thing(index, other));
+            if !all.contains(&candidate.effect)
+                && !is_shown
+                && !profile.is_some_and(|profile| profile.is_of_a_state)
+                && !set.members.iter().any(|m| self.effect(m) == candidate.effect)
+            {
                 all.push(candidate.effect);
             }
         }

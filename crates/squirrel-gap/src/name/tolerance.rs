@@ -1,7 +1,7 @@
 //! How far each number may be off without a name: what the vehicle file declares, and what is known
 //! of sensors and batteries.
 
-use super::point::Airframe;
+use super::point::{Airframe, WING_PLACE};
 use crate::GapError;
 use crate::number::significant;
 use crate::predictor::Predictor;
@@ -245,6 +245,11 @@ pub(super) fn airframe(predictor: &Predictor) -> Vec<(Airframe, f64)> {
             all.extend(
                 sd.filter(|_| torque > 0.0).map(|sd| (Airframe::Torque { rotor }, sd[0] / torque)),
             );
+        }
+    }
+    if p.wing.is_some() {
+        for (axis, field) in WING_PLACE.iter().enumerate() {
+            all.extend(sds(vehicle, field).map(|sd| (Airframe::Wing { axis }, sd[0])));
         }
     }
     if predictor.has_channel(0) {

@@ -37,7 +37,7 @@ use nalgebra::{Vector3, Vector6};
 use squirrel_core::effects::{Effect, Effects, ThrustCoefficient};
 use squirrel_core::vehicle::{PerRotor, Vehicle};
 use squirrel_log::FlightLog;
-use squirrel_sim::plant::{Plant, PlantState};
+use squirrel_sim::plant::{Plant, PlantState, WingPlant};
 use squirrel_sim::vehicle_file::VehicleFile;
 use std::ops::Range;
 use std::rc::Rc;
@@ -451,7 +451,15 @@ impl<'a> Predictor<'a> {
     /// # Errors
     /// [`GapError::Vehicle`]: the plant cannot be stepped with these numbers.
     pub(crate) fn plant_at(&self, hypothesis: &Hypothesis, dt_s: f64) -> Result<Plant, GapError> {
-        Plant::new(hypothesis.vehicle, hypothesis.effects, self.vehicle.wing.clone(), None, dt_s)
+        let mut wing = self.vehicle.wing.clone();
+        if let (WingPlant::Flat { wing, .. }, Some(own)) =
+            (&mut wing, hypothesis.vehicle.parameters().wing)
+        {
+            wing.longitudinal_arm_m = own.longitudinal_arm_m;
+            wing.lateral_arm_m = own.lateral_arm_m;
+            wing.vertical_arm_m = own.vertical_arm_m;
+        }
+        Plant::new(hypothesis.vehicle, hypothesis.effects, wing, None, dt_s)
             .map(|plant| if self.rotor_speeds { plant.told_rotor_speeds() } else { plant })
             .map_err(|problem| self.refused(problem))
     }

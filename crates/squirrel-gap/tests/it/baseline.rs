@@ -3,9 +3,12 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 use crate::support::{flights, fly_rich, imported, vehicle};
-use squirrel_gap::{Baseline, Diagnosis, Kind, Value, add, diagnose, diagnose_since};
+use squirrel_gap::{
+    Baseline, Diagnosis, Kind, Value, Workflow, add, check_since, diagnose, diagnose_since,
+};
 use squirrel_log::FlightLog;
 use squirrel_sim::vehicle_file::VehicleFile;
+use std::cell::Cell;
 
 type Flights = Vec<(String, FlightLog)>;
 
@@ -195,4 +198,20 @@ fn bad_good_flights_are_said() {
     );
     let own = Baseline::fit(&file, &[bad, fly_rich(&file, 2)], &|_| ()).unwrap();
     assert_eq!((own.flights.len(), own.set_aside.len()), (1, 1));
+}
+
+/// Whoever asks twice, as `gap run` does, fits once.
+#[test]
+fn what_is_fitted_is_asked_again_without_another_fit() {
+    let file = VehicleFile::squirrel();
+    let (good, now) = (vec![fly_rich(&file, 1)], vec![fly_rich(&file, 3)]);
+    let fits = Cell::new(0);
+    let tell = |what: &str| fits.set(fits.get() + u32::from(what == "reading the baseline"));
+    let own = Baseline::fit(&file, &good, &tell).unwrap();
+    let check = check_since(&own, &now, &[], &tell).unwrap();
+    let again = Workflow::diagnose_since(&own, now.clone(), Vec::new(), &tell).unwrap();
+    assert_eq!((fits.get(), check.flights.len()), (1, 1));
+    let anew = Workflow::diagnose(file, &good, now, Vec::new(), &tell).unwrap();
+    let text = |found: &Workflow| serde_json::to_string(&found.diagnosis.verdict).unwrap();
+    assert_eq!((fits.get(), text(&again)), (2, text(&anew)));
 }

@@ -27,3 +27,4 @@ mod scale;
 mod sensors;
 mod simulated;
 mod spoilt_maps;
+mod wrong_names;

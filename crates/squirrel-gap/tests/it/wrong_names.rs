@@ -1,0 +1,73 @@
+//! Flights that once got a wrong name, or no answer, and why they do not.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+use crate::foreign::flown;
+use crate::support::{fly_rich, vehicle_with};
+use hidden_effects::case::{Case, Set};
+use squirrel_gap::{Kind, Verdict, diagnose};
+use squirrel_sim::vehicle_file::VehicleFile;
+
+/// The verdict on a case of the bench, and the names in it.
+fn asked(set: Set, index: usize, seed: u64) -> (Verdict, Vec<&'static str>) {
+    let (vehicle, flights, held_out) = flown(&Case::draw(set, index, seed));
+    let verdict = diagnose(&vehicle, &flights, &held_out, &|_| {}).unwrap().verdict;
+    println!("{}", verdict.words);
+    let names = verdict.effects.iter().map(|effect| effect.name).collect();
+    (verdict, names)
+}
+
+/// Two flights ask for wings that meet the air at another angle, by 7 and 9 nats, and the third is
+/// predicted worse with it.
+#[test]
+fn what_held_out_flights_are_worse_with_is_no_name() {
+    for index in [2, 6] {
+        let (verdict, names) = asked(Set::None, index, 82003);
+        assert_eq!((verdict.verdict, names), (Kind::None, Vec::new()), "case {index}");
+    }
+}
+
+/// A rotor that lost less than the file says, 7 nats; other names in its place are worth 2.
+#[test]
+fn what_flights_hardly_ask_for_is_no_other_explanation() {
+    let (verdict, names) = asked(Set::Overstated, 39, 82003);
+    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["weak_rotor"]));
+}
+
+/// The force near the ground grows with the square of the radius: a third of the radius less is
+/// half of the force less, whatever a third of the smallest radius is.
+#[test]
+fn an_effect_that_starts_flat_is_off_by_what_it_does() {
+    let (verdict, names) = asked(Set::Overstated, 35, 82003);
+    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["ground_effect"]));
+}
+
+/// More of it than the file has looks like nothing that the flights show, less like everything.
+#[test]
+fn a_file_may_have_all_of_an_effect_that_starts_flat_too_much() {
+    let (verdict, names) = asked(Set::Overstated, 3, 93007);
+    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["ground_effect"]));
+}
+
+/// Rotors that blow on the wings push where the wings are: a centimetre, which the file allows, is
+/// no wing of another kind.
+#[test]
+fn wings_may_be_where_the_file_allows() {
+    let wash = "[effects.rotor_wash]\ngain = 0.8\n\n[limits]";
+    let flat = [
+        ("model = \"membrane\"", "model = \"flat\""),
+        ("parnn_weights = \"squirrel-parnn.safetensors\"", ""),
+        ("filter = \"eskf\"", "filter = \"external\""),
+        ("[limits]", wash),
+    ];
+    let file = vehicle_with("squirrel.toml", &flat);
+    let off = [
+        ("lateral_arm_m = { value = 0.09,", "lateral_arm_m = { value = 0.092,"),
+        ("longitudinal_arm_m = { value = 0.0,", "longitudinal_arm_m = { value = 0.005,"),
+        ("vertical_arm_m = { value = 0.02,", "vertical_arm_m = { value = 0.03,"),
+    ];
+    let real = vehicle_with("squirrel.toml", &[flat.as_slice(), &off].concat());
+    let fly = |vehicle: &VehicleFile, seed: u64| fly_rich(vehicle, seed);
+    let verdict = diagnose(&file, &[fly(&real, 1), fly(&real, 2)], &[fly(&real, 3)], &|_| {});
+    let verdict = verdict.unwrap().verdict;
+    assert_eq!(verdict.verdict, Kind::None, "{}", verdict.words);
+}
