@@ -4,7 +4,7 @@
 //! ```text
 //! thrust:  m f_z + T            torque:  J w' + w x J w - tau
 //! ```
-//! Where attitude is known, thrust that is short is told from drag ([`super::force_residual`]).
+//! Where attitude is known, thrust that is short is told from drag (`force_residual`).
 //! `T` and `tau` follow the mixer's answer with the rotors' time constant. Both differences are
 //! means over [`MEAN_S`], for a weak rotor, a sagging battery or a stuck wing stays, and noise and
 //! gusts do not. While wings are spread on purpose they push too, and nothing is learnt.
