@@ -5,6 +5,7 @@ use crate::plant::WingPlant;
 use crate::vehicle_file::VehicleFile;
 use crate::weights::ParnnWeights;
 use squirrel_core::control::plus::{Feels, Plus};
+use squirrel_core::control::position::PositionGains;
 use squirrel_core::control::twcc::{TwccParameters, WingPolicy};
 use squirrel_core::control::wing_force::ForceModel;
 
@@ -167,7 +168,10 @@ impl Arm {
         match (self, plus) {
             (Self::TwccFlatFf | Self::TwccParnnFf, Some(plus)) => twcc.position = plus.position,
             (Self::Indi, Some(plus)) => {
-                twcc.plus = Some(Plus { feels: Feels::Everything, ..plus });
+                // What acts is felt already: a large integral beside it would count it twice.
+                let integral_max_m = twcc.position.integral_max_m;
+                let position = PositionGains { integral_max_m, ..plus.position };
+                twcc.plus = Some(Plus { position, feels: Feels::Everything, ..plus });
             }
             // Of planners it is what flies where commands cease.
             (arm, plus) if needs_plus || arm.plans() => twcc.plus = plus,
