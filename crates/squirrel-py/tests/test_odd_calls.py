@@ -233,7 +233,7 @@ def rollout(*, steps_per_command: Any, **rest: Any) -> np.ndarray:
 
 
 # What a call may also raise: a key or a number of a thing that is not there, or a file.
-LOOKUPS = {"key", "source", "channel", "index", "vehicles", "out", "path", "map", "scenario"}
+LOOKUPS = {"key", "source", "channel", "index", "vehicle", "vehicles", "out", "path", "map", "scenario"}
 # Where what is wrong has a better name than the argument.
 BETTER = {
     "changes": ["a", "argument 'changes'"],
