@@ -6,7 +6,7 @@
 
 use crate::GapError;
 use crate::name::{
-    BETA, Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights,
+    BETA, Held, Member, Naming, Point, Scored, Search, TURBULENCE_M_S, hypothesis, settle_flights,
 };
 use crate::predictor::{CHANNELS, Hypothesis, Predictor, TURNING};
 use crate::shrink::{Errors12, Floor, Flown};
@@ -97,15 +97,6 @@ const HOLDS: f64 = 1e-3;
 
 /// Part of a channel's mean square by which a name must change it by itself to be judged by it.
 const ACTS: f64 = 1e-9;
-
-/// What held-out flights say of a name.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Held {
-    /// They are predicted better with it.
-    pub(crate) better: bool,
-    /// By so much in evidence, nats; below 0 where they speak against it.
-    pub(crate) nats: f64,
-}
 
 /// Of each name, whether held-out flights are predicted better with it, every channel in units of
 /// what the model leaves there: a model that misses a little everywhere is far above the noise of

@@ -48,7 +48,6 @@ use crate::GapError;
 use crate::leftover::{Leftover, Slack, gusts, leftover, noise};
 pub(crate) use crate::predictor::TURBULENCE_M_S;
 use crate::predictor::{Hypothesis, Motion, Predictor};
-use crate::proof::Held;
 use crate::verdict::Left;
 use squirrel_core::effects::Timing;
 use std::rc::Rc;
@@ -56,6 +55,15 @@ use std::rc::Rc;
 pub(crate) const BEHIND_NATS: f64 = 3.0;
 /// 95 % of a normal distribution lies within this many standard deviations.
 pub(crate) const INTERVAL: f64 = 1.96;
+
+/// What held-out flights say of a name.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Held {
+    /// They are predicted better with it.
+    pub(crate) better: bool,
+    /// By so much in evidence, nats; below 0 where they speak against it.
+    pub(crate) nats: f64,
+}
 
 /// The best explanation of a set of flights, and what it leaves.
 pub(crate) struct Naming {
