@@ -107,8 +107,10 @@ impl<W: Write> Container<W> {
         let schema = Fields::default().u16(number).text(schema).text("protobuf").sized(set).0;
         let channel = Fields::default().u16(number).u16(number).text(name);
         let channel = channel.text("protobuf").sized(&[]).0;
-        record(op::SCHEMA, &schema, &mut self.records);
-        record(op::CHANNEL, &channel, &mut self.records);
+        for (opcode, content) in [(op::SCHEMA, &schema), (op::CHANNEL, &channel)] {
+            self.records.extend(head(opcode, content.len()));
+            self.records.extend(content);
+        }
         self.topics.push(Topic { schema, channel, messages: 0, index: Vec::new() });
         Ok(number)
     }
@@ -253,7 +255,7 @@ impl<W: Write> Container<W> {
     }
 
     fn head(&mut self, opcode: u8, length: usize) -> Result<()> {
-        self.put(&Fields(vec![opcode]).u64(length as u64).0)
+        self.put(&head(opcode, length))
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
@@ -263,11 +265,9 @@ impl<W: Write> Container<W> {
     }
 }
 
-/// Appends a record.
-fn record(opcode: u8, content: &[u8], to: &mut Vec<u8>) {
-    to.push(opcode);
-    to.extend_from_slice(&(content.len() as u64).to_le_bytes());
-    to.extend_from_slice(content);
+/// What a record begins with.
+fn head(opcode: u8, length: usize) -> Vec<u8> {
+    Fields(vec![opcode]).u64(length as u64).0
 }
 
 /// Fields of a record, one behind the other.

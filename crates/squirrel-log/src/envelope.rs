@@ -6,6 +6,7 @@
 
 use mcap::MAGIC;
 use mcap::records::op;
+use mcap::sans_io::LinearReader;
 use std::io::{ErrorKind, Read, Result, Seek, SeekFrom};
 
 /// Opcode and length.
@@ -309,4 +310,12 @@ fn check_crc(
         )));
     }
     Ok(())
+}
+
+/// Gives a reader the bytes that it asks for, as far as there are any.
+pub(super) fn feed(reader: &mut LinearReader, rest: &mut &[u8], need: usize) {
+    let (now, later) = rest.split_at(need.min(rest.len()));
+    reader.insert(now.len()).copy_from_slice(now);
+    reader.notify_read(now.len());
+    *rest = later;
 }

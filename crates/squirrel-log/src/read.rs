@@ -217,12 +217,7 @@ impl<'a> Reader<'a> {
                 error => self.corrupt(format!("chunk at byte {}: {error}", frame.start)),
             });
             match event? {
-                LinearReadEvent::ReadRequest(need) => {
-                    let (now, later) = rest.split_at(need.min(rest.len()));
-                    reader.insert(now.len()).copy_from_slice(now);
-                    reader.notify_read(now.len());
-                    rest = later;
-                }
+                LinearReadEvent::ReadRequest(need) => envelope::feed(&mut reader, &mut rest, need),
                 LinearReadEvent::Record { data, opcode } => self.record(opcode, data)?,
             }
         }

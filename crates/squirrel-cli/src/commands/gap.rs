@@ -7,8 +7,8 @@ use crate::output::{self, Table, say, talk};
 use crate::paths::Paths;
 use crate::paths::log_files;
 use squirrel_gap::{
-    Baseline, ClosedLoop, Flights, Kind, Moved, NamedEffect, Patched, RotorHealth, Value, Verdict,
-    Workflow, significant,
+    Baseline, ClosedLoop, Flights, GapError, Kind, Moved, NamedEffect, Patched, RotorHealth, Value,
+    Verdict, Workflow, significant,
 };
 use squirrel_log::FlightLog;
 use squirrel_sim::scenario::pilot_card;
@@ -163,13 +163,18 @@ fn fitted(vehicle: &VehicleFile, good: &[PathBuf]) -> Result<Option<Baseline>, S
         return Ok(None);
     }
     let good = logs(good)?;
+    telling(|tell| Baseline::fit(vehicle, &good, tell)).map(Some)
+}
+
+/// Long work that tells what it is at.
+fn telling<T>(work: impl FnOnce(&dyn Fn(&str)) -> Result<T, GapError>) -> Result<T, String> {
     let bar = output::spinner();
-    let found = Baseline::fit(vehicle, &good, &|what| {
+    let done = work(&|what| {
         bar.set_message(what.to_owned());
         bar.inc(1);
     });
     bar.finish_and_clear();
-    found.map(Some).map_err(|e| e.to_string())
+    done.map_err(|e| e.to_string())
 }
 
 /// What flights are worth before any verdict.
@@ -181,14 +186,10 @@ fn looked(
     flights: &[(String, FlightLog)],
     held_out: &[(String, FlightLog)],
 ) -> Result<squirrel_gap::Check, String> {
-    let bar = output::spinner();
-    let tell = |what: &str| bar.set_message(what.to_owned());
-    let found = match own {
-        Some(own) => squirrel_gap::check_since(own, flights, held_out, &tell),
-        None => squirrel_gap::check(vehicle, flights, held_out, &tell),
-    };
-    bar.finish_and_clear();
-    found.map_err(|e| e.to_string())
+    telling(|tell| match own {
+        Some(own) => squirrel_gap::check_since(own, flights, held_out, tell),
+        None => squirrel_gap::check(vehicle, flights, held_out, tell),
+    })
 }
 
 impl Given {
@@ -226,17 +227,10 @@ impl Given {
         flights: Flights,
         held_out: Flights,
     ) -> Result<Workflow, String> {
-        let bar = output::spinner();
-        let tell = |what: &str| {
-            bar.set_message(what.to_owned());
-            bar.inc(1);
-        };
-        let found = match own {
-            Some(own) => Workflow::diagnose_since(own, flights, held_out, &tell),
-            None => Workflow::diagnose(vehicle, &[], flights, held_out, &tell),
-        };
-        bar.finish_and_clear();
-        found.map_err(|e| e.to_string())
+        telling(|tell| match own {
+            Some(own) => Workflow::diagnose_since(own, flights, held_out, tell),
+            None => Workflow::diagnose(vehicle, &[], flights, held_out, tell),
+        })
     }
 
     fn find(&self) -> Result<(), String> {

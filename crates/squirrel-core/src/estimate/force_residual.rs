@@ -124,19 +124,30 @@ mod tests {
     const WEIGHT_N: f32 = 5.4;
     const AREA_M2: f32 = 0.04;
 
-    /// What is felt of a force on a level body, for a while.
-    fn feels(felt: &mut Felt, force_n: f32, velocity: [f32; 3], wings: f32, seconds: f32) {
-        let step = Step {
-            force: In::new(Vector3::new(0.2, -0.1, force_n)),
-            ned_from_body: &Rotation::identity(),
-            velocity: In::new(velocity.into()),
+    /// A step at rest.
+    fn step(
+        force: In<Body, f32>,
+        ned_from_body: &Rotation<Ned, Body, f32>,
+        wings: f32,
+    ) -> Step<'_> {
+        Step {
+            force,
+            ned_from_body,
+            velocity: In::zero(),
             wing_area_m2: AREA_M2,
             download_n: 0.0,
             weight_n: WEIGHT_N,
             wings,
             spread_ago_s: if wings > 0.0 { 0.0 } else { FOLDING_S },
             dt_s: 1.0 / 300.0,
-        };
+        }
+    }
+
+    /// What is felt of a force on a level body, for a while.
+    fn feels(felt: &mut Felt, force_n: f32, velocity: [f32; 3], wings: f32, seconds: f32) {
+        let force = In::new(Vector3::new(0.2, -0.1, force_n));
+        let level = Rotation::identity();
+        let step = Step { velocity: In::new(velocity.into()), ..step(force, &level, wings) };
         for _ in 0..(seconds * 300.0) as u32 {
             felt.look(&step);
         }
@@ -175,17 +186,7 @@ mod tests {
         let drag: In<Ned, f32> = In::new(Vector3::new(-2.0, 0.0, 0.0));
         let force = ned_from_body.inverse() * drag;
         assert!(force.vector.z > 0.7, "{force:?}");
-        let step = Step {
-            force,
-            ned_from_body: &ned_from_body,
-            velocity: In::zero(),
-            wing_area_m2: AREA_M2,
-            download_n: 0.0,
-            weight_n: WEIGHT_N,
-            wings: 0.0,
-            spread_ago_s: FOLDING_S,
-            dt_s: 1.0 / 300.0,
-        };
+        let step = step(force, &ned_from_body, 0.0);
         for _ in 0..600 {
             felt.look(&step);
         }

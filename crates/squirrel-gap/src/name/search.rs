@@ -215,12 +215,6 @@ impl Search<'_> {
         }
     }
 
-    /// What a member must be worth to come in beside others, nats.
-    fn needed_beside(&self, member: &Member, others: usize) -> f64 {
-        let least = if others == 0 { NATS_MIN } else { FURTHER_NATS };
-        self.needed(member).max(least)
-    }
-
     /// A set without each of its members in turn.
     pub(super) fn without(&self, linear: &Linear, set: &Scored) -> Result<Vec<Scored>, GapError> {
         (0..set.members.len())
@@ -253,26 +247,21 @@ impl Search<'_> {
 
     /// Adds effects as long as the evidence asks for them.
     pub(super) fn extend(&self, linear: &Linear, best: &mut Scored) -> Result<(), GapError> {
-        while let Some(next) = self.next(linear, best)? {
+        while best.members.len() < MEMBERS_MAX {
+            let Some(next) = self.best_addition(linear, best, &[], f64::NEG_INFINITY)? else {
+                break;
+            };
+            let least = if best.members.is_empty() { NATS_MIN } else { FURTHER_NATS };
+            let needed = next.members.last().map_or(least, |member| self.needed(member).max(least));
+            if next.log_evidence < best.log_evidence + needed {
+                break;
+            }
             *best = next;
             // Before a second effect explains what the first leaves, the first may have another
             // form.
             self.choose_forms(linear, best)?;
         }
         Ok(())
-    }
-
-    /// A set with one more effect, if the evidence asks for it.
-    fn next(&self, linear: &Linear, best: &Scored) -> Result<Option<Scored>, GapError> {
-        if best.members.len() == MEMBERS_MAX {
-            return Ok(None);
-        }
-        let needed = |next: &Scored| {
-            let own = next.members.last();
-            own.map_or(NATS_MIN, |member| self.needed_beside(member, best.members.len()))
-        };
-        let next = self.best_addition(linear, best, &[], f64::NEG_INFINITY)?;
-        Ok(next.filter(|next| next.log_evidence >= best.log_evidence + needed(next)))
     }
 
     /// The best set with one more effect.

@@ -455,9 +455,7 @@ impl<'a> Predictor<'a> {
         if let (WingPlant::Flat { wing, .. }, Some(own)) =
             (&mut wing, hypothesis.vehicle.parameters().wing)
         {
-            wing.longitudinal_arm_m = own.longitudinal_arm_m;
-            wing.lateral_arm_m = own.lateral_arm_m;
-            wing.vertical_arm_m = own.vertical_arm_m;
+            *wing = own;
         }
         Plant::new(hypothesis.vehicle, hypothesis.effects, wing, None, dt_s)
             .map(|plant| if self.rotor_speeds { plant.told_rotor_speeds() } else { plant })

@@ -16,6 +16,12 @@ fn asked(set: Set, index: usize, seed: u64) -> (Verdict, Vec<&'static str>) {
     (verdict, names)
 }
 
+/// A case of the bench in which one effect is off, and nothing else is.
+fn is_named(set: Set, index: usize, seed: u64, effect: &'static str) {
+    let (verdict, names) = asked(set, index, seed);
+    assert_eq!((verdict.verdict, names), (Kind::Named, vec![effect]));
+}
+
 /// Two flights ask for wings that meet the air at another angle, by 7 and 9 nats, and the third is
 /// predicted worse with it.
 #[test]
@@ -29,23 +35,20 @@ fn what_held_out_flights_are_worse_with_is_no_name() {
 /// A rotor that lost less than the file says, 7 nats; other names in its place are worth 2.
 #[test]
 fn what_flights_hardly_ask_for_is_no_other_explanation() {
-    let (verdict, names) = asked(Set::Overstated, 39, 82003);
-    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["weak_rotor"]));
+    is_named(Set::Overstated, 39, 82003, "weak_rotor");
 }
 
 /// The force near the ground grows with the square of the radius: a third of the radius less is
 /// half of the force less, whatever a third of the smallest radius is.
 #[test]
 fn an_effect_that_starts_flat_is_off_by_what_it_does() {
-    let (verdict, names) = asked(Set::Overstated, 35, 82003);
-    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["ground_effect"]));
+    is_named(Set::Overstated, 35, 82003, "ground_effect");
 }
 
 /// More of it than the file has looks like nothing that the flights show, less like everything.
 #[test]
 fn a_file_may_have_all_of_an_effect_that_starts_flat_too_much() {
-    let (verdict, names) = asked(Set::Overstated, 3, 93007);
-    assert_eq!((verdict.verdict, names), (Kind::Named, vec!["ground_effect"]));
+    is_named(Set::Overstated, 3, 93007, "ground_effect");
 }
 
 /// Rotors that blow on the wings push where the wings are: a centimetre, which the file allows, is

@@ -158,9 +158,6 @@ enum Repeats {
     ForwardFilled,
 }
 
-/// The maps of public data sets, which are built in.
-const BUILT_IN: &[(&str, &str)] = &squirrel_vehicles::MAPS;
-
 impl ImportMap {
     /// Reads and checks a map file, or takes a built-in map by its name where no such file is.
     ///
@@ -168,7 +165,9 @@ impl ImportMap {
     /// [`ImportError::Read`] if the file cannot be read, else as [`ImportMap::parse`].
     pub fn load(path: &Path) -> Result<Self, ImportError> {
         let name = path.display().to_string();
-        if let Some((_, text)) = BUILT_IN.iter().find(|(own, _)| *own == name && !path.exists()) {
+        if let Some((_, text)) =
+            squirrel_vehicles::MAPS.iter().find(|(own, _)| *own == name && !path.exists())
+        {
             return Self::parse(text, &name);
         }
         let text = files::read_text(path)

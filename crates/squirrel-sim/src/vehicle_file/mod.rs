@@ -34,10 +34,6 @@ use std::path::{Path, PathBuf};
 /// The squirrel of the paper, as shipped.
 pub const SQUIRREL_TOML: &str = squirrel_vehicles::SQUIRREL;
 
-/// Its weights, under the name that its file gives them. They are part of the program: a copy or a
-/// patch of the file finds them wherever it lies.
-const SQUIRREL_PARNN: (&str, &[u8]) = squirrel_vehicles::SQUIRREL_PARNN;
-
 /// Everything that a vehicle file says.
 #[derive(Debug, Clone)]
 pub struct VehicleFile {
@@ -232,8 +228,9 @@ fn beside(path: &Path, name: &str) -> PathBuf {
     path.with_file_name("").join(name)
 }
 
-/// The shipped weights, where this is their name.
+/// The shipped weights, where this is their name: a copy or a patch of their vehicle's file finds
+/// them wherever it lies.
 fn shipped(name: &str) -> Option<Result<ParnnWeights, WeightsError>> {
-    let (own, bytes) = SQUIRREL_PARNN;
+    let (own, bytes) = squirrel_vehicles::SQUIRREL_PARNN;
     (name == own).then(|| ParnnWeights::parse(own, bytes.to_vec()))
 }

@@ -293,12 +293,7 @@ impl Reading<'_> {
         let mut rest = bytes;
         while let Some(event) = reader.next_event() {
             match event.map_err(broken)? {
-                LinearReadEvent::ReadRequest(need) => {
-                    let (now, later) = rest.split_at(need.min(rest.len()));
-                    reader.insert(now.len()).copy_from_slice(now);
-                    reader.notify_read(now.len());
-                    rest = later;
-                }
+                LinearReadEvent::ReadRequest(need) => envelope::feed(&mut reader, &mut rest, need),
                 LinearReadEvent::Record { data, opcode } => {
                     if [op::SCHEMA, op::CHANNEL, op::MESSAGE].contains(&opcode) {
                         if !lengths_fit(opcode, data) {

@@ -2,11 +2,11 @@
 //!
 //! The laws ask for accelerations, so inertia and mass are in them already; what bounds their gains
 //! is how late a rotor answers, of which the lead leaves a third. Those of the attitude are the
-//! fastest that have the margins of [`super::super::margins`], which `squirrel vehicle check` shows.
-//! Their integral holds a centre of mass that is [`CENTRE_OFF_SHARE`] of the arm beside the middle. The outer loop, which must stay
-//! slower, is `vehicles/squirrel.toml`'s, scaled by the root of the time in which a rotor and the
-//! command filter answer. Yaw is turned by reaction torque alone: its gains are capped by the
-//! acceleration that is to be had.
+//! fastest that have the margins of [`super::super::margins`], which `squirrel vehicle check`
+//! shows. Their integral holds a centre of mass that is [`CENTRE_OFF_SHARE`] of the arm beside the
+//! middle. The outer loop, which must stay slower, is `vehicles/squirrel.toml`'s, scaled by the
+//! root of the time in which a rotor and the command filter answer. Yaw is turned by reaction
+//! torque alone: its gains are capped by the acceleration that is to be had.
 
 use super::super::margins::gains_for_margins;
 
