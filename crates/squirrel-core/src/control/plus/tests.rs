@@ -138,6 +138,29 @@ fn wings_that_harm_stay_folded() {
     assert_eq!(opened(-2.5, 2.5), 1.0, "felt to be no push after all");
 }
 
+/// Wings that were opened and then are felt to be pushed down fold at the next tick, without a
+/// dwell, unless they are worth opening even so.
+#[test]
+fn wings_that_harm_fold_at_once() {
+    let opened = |wings_n: f32| {
+        let p = TwccParameters { plus: Some(plus()), dwell_s: 1.0, ..parameters() };
+        let mut state = TwccState::default();
+        assert_eq!(tick(&p, &mut state, 6.45).wing_command, 1.0);
+        let felt = ForceResidual { wings_n, ..ForceResidual::default() };
+        tick_with(&p, &mut state, 6.45, felt)
+    };
+    let (fair, harmed) = (opened(0.0), opened(2.5));
+    assert_eq!((fair.wing_command, harmed.wing_command), (1.0, 0.0));
+    assert_eq!(harmed.reason, Reason::InsideLimits, "no dwell");
+    // What they are worth goes down with the push, and ends where they would not be opened.
+    for n in 0u8..=25 {
+        let terms = opened(0.1 * f32::from(n));
+        let worth = terms.wing.helpful_n / airframe().mass_kg;
+        let least = if f32::from(n) > 5.4 { plus().open_above_m_s2 } else { 0.0 };
+        assert_eq!(terms.wing_command > 0.0, worth > least, "{n}: {worth}");
+    }
+}
+
 /// Thrust that is short is asked for on top.
 #[test]
 fn what_is_felt_is_made_up_for() {
@@ -220,6 +243,7 @@ fn a_climb_ends_in_the_band() {
     assert_eq!(weight(0.0, 0.0), 0.25);
     assert_eq!(weight(-1.5, 0.0), 1.0, "twice the weight at the band's edge");
     assert_eq!(weight(0.5, 0.0), 1.0, "a sink counts sooner");
+    assert_eq!(weight(30.0, 0.0), weight(3.0, 0.0), "a vehicle that is level climbs no faster");
     let rising = weight(-1.0, -5.0);
     assert!(rising > weight(-1.0, 0.0) && weight(-1.0, 3.0) < rising);
     let brake =

@@ -6,10 +6,11 @@ use super::super::twcc::{
 };
 use super::super::woeg::WingFlag;
 use super::super::{AttitudeThrust, Reference};
-use super::Plus;
 use super::choice::{Believed, Demand, between, saved};
+use super::{HARM_SHARE, Plus};
 use crate::aero::angle_of_attack;
 use crate::frames::{Body, In, Ned, Rotation};
+use crate::math::GRAVITY_M_S2;
 use nalgebra::Vector3;
 
 impl TwccParameters {
@@ -78,13 +79,16 @@ impl TwccParameters {
             let spread = demand.best(request, 1.0);
             let saved = saved(&folded, &spread);
             helpful_n = airframe.mass_kg * saved;
-            let threshold = if state.mode == Mode::Primary { plus.open_above_m_s2 } else { 0.0 };
-            let open = saved > threshold;
+            let pushed_n = HARM_SHARE * airframe.mass_kg * GRAVITY_M_S2 as f32;
+            let harm = motion.residual.wings_n > pushed_n;
+            let keep = state.mode != Mode::Primary && !harm;
+            let open = saved > if keep { 0.0 } else { plus.open_above_m_s2 };
             let wanted = if open { Mode::WingsOpen } else { Mode::Primary };
             state.mode_age_s = state.mode_age_s.map(|age| age + dt_s);
             reason = if open { Reason::WingsComeCloser } else { Reason::InsideLimits };
             if wanted != state.mode {
-                if state.mode_age_s.is_some_and(|age| age < self.dwell_s) {
+                // A dwell is for wings that might open again at once: those that harm cost height.
+                if open && state.mode_age_s.is_some_and(|age| age < self.dwell_s) {
                     reason = Reason::Dwell;
                 } else {
                     state.mode = wanted;
