@@ -114,6 +114,8 @@ pub struct MeasuredMotion {
     /// The heading that roll and pitch are of, measured and commanded ones, rad: see
     /// [`super::backstepping::AttitudeForm::heading_rad`].
     pub heading_rad: f32,
+    /// Of the air over ground, m/s; the paper's laws know of none.
+    pub wind: In<Ned, f32>,
     /// Force that nobody commanded; the paper's laws know of none.
     pub residual: ForceResidual,
 }
@@ -132,7 +134,7 @@ impl MeasuredMotion {
         let roll_rad = -libm::asinf(limit(level.y, -1.0, 1.0));
         let pitch_rad = libm::atan2f(level.x, down.z);
         let residual = ForceResidual::default();
-        Self { position, velocity, roll_rad, pitch_rad, heading_rad, residual }
+        Self { position, velocity, roll_rad, pitch_rad, heading_rad, wind: In::zero(), residual }
     }
 }
 
@@ -295,6 +297,7 @@ pub(super) mod fixtures {
             roll_rad: 0.0,
             pitch_rad: 0.0,
             heading_rad: 0.0,
+            wind: In::zero(),
             residual: ForceResidual::default(),
         }
     }

@@ -55,7 +55,7 @@ pub(super) struct Step<'a> {
     /// `m f + T`, N.
     pub force: In<Body, f32>,
     pub ned_from_body: &'a Rotation<Ned, Body, f32>,
-    /// Over ground, m/s.
+    /// Through the air, as far as that is known, m/s.
     pub velocity: In<Ned, f32>,
     /// Of the flat plate, m^2.
     pub wing_area_m2: f32,

@@ -26,6 +26,7 @@ pub mod navigator;
 pub mod rest;
 pub mod rkf;
 pub mod voting;
+pub mod wind;
 
 use crate::frame::{Gnss, Imu};
 use crate::frames::{Body, In, Ned, Rotation};

@@ -11,6 +11,7 @@
 
 use super::force_residual::{Felt, Step};
 use super::navigator::Health;
+use super::wind::{Look, Wind};
 use crate::control::mixer::ThrustTorque;
 use crate::control::position::ForceResidual;
 use crate::frame::Imu;
@@ -39,6 +40,7 @@ pub struct Monitor {
     pub(crate) torque_n_m: Vector3<f32>,
     pub(crate) spread_ago_s: f32,
     pub(crate) felt: Felt,
+    pub(crate) wind: Wind,
     /// Since the last inertial measurement.
     pub(crate) waited_s: f32,
 }
@@ -52,6 +54,7 @@ impl Default for Monitor {
             torque_n_m: Vector3::zeros(),
             spread_ago_s: FOLDED_S,
             felt: Felt::default(),
+            wind: Wind::default(),
             waited_s: 0.0,
         }
     }
@@ -110,7 +113,7 @@ impl Monitor {
             short_n = self.felt.look(&Step {
                 force: In::new(felt),
                 ned_from_body,
-                velocity,
+                velocity: velocity - self.wind.velocity,
                 wing_area_m2: vehicle.plate_area_m2(),
                 download_n: seen.download_n,
                 weight_n: vehicle.weight_n(),
@@ -118,6 +121,9 @@ impl Monitor {
                 spread_ago_s: self.spread_ago_s,
                 dt_s,
             });
+            let ForceResidual { beside, short_n, .. } = self.felt.residual();
+            let look = Look { ned_from_body, velocity, beside, short_n, is_folded, dt_s };
+            self.wind.look(vehicle, &look);
         }
         let spin = p.inertia_kg_m2 * omega;
         let turned = p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin)
@@ -128,6 +134,11 @@ impl Monitor {
         if !(self.missing_n.is_finite() && all_finite(&self.torque_n_m)) {
             *self = Self::default();
         }
+    }
+
+    /// Wind as estimated.
+    pub(crate) fn wind(&self) -> Wind {
+        self.wind
     }
 
     /// Force that nobody commanded.

@@ -18,7 +18,7 @@ use crate::math::GRAVITY_M_S2;
 pub(crate) const RATE_HZ: u64 = 300;
 
 /// A stream of numbers that look random, with unit variance.
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
     fn uniform(&mut self) -> f64 {
@@ -29,7 +29,7 @@ impl Noise {
     fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
-    fn vector(&mut self, size: f64) -> Vector3<f64> {
+    pub(super) fn vector(&mut self, size: f64) -> Vector3<f64> {
         Vector3::from_fn(|_, _| self.normal()) * size
     }
 }

@@ -29,6 +29,7 @@ use crate::estimate::monitor::{Monitor, Seen};
 use crate::estimate::navigator::{
     Health, Navigated, Navigation, NavigationState, NavigationTerms, Start,
 };
+use crate::estimate::wind::Wind;
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
@@ -143,6 +144,8 @@ pub struct StackOutput {
     pub health: Health,
     /// What is believed, where the flight code estimates and has heard enough to.
     pub navigation: Option<NavigationTerms>,
+    /// Wind, as far as drag shows it.
+    pub wind: Wind,
     /// The outer loop, where it ran in this step; it does not while commands come from outside.
     pub outer: Option<TwccTerms>,
     /// The inner loop, once attitude and rate are known; rotors stand still before that and while
@@ -258,6 +261,7 @@ impl Stack {
             state.navigation.health,
         );
         output.navigation = navigated.terms;
+        output.wind = state.monitor.wind();
     }
 
     /// One inner step on the attitude, position and velocity that the frame brings; as total as
@@ -326,6 +330,7 @@ impl Stack {
             failsafe,
             health: state.navigation.health,
             navigation: None,
+            wind: Wind::default(),
             outer,
             inner,
         }
@@ -374,6 +379,7 @@ impl Stack {
         let residual = state.monitor.residual();
         let motion = MeasuredMotion {
             residual,
+            wind: state.monitor.wind().velocity,
             ..MeasuredMotion::new(position, gnss.velocity, &ned_from_body, heading_rad)
         };
         let terms = self.parameters.twcc.update(

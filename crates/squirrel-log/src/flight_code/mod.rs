@@ -17,6 +17,8 @@ pub const FORMAT: &str = "1";
 
 /// Source of what the flight code believes.
 pub const ESTIMATE: &str = "estimate";
+/// Source of the wind as the flight code estimates it.
+pub const WIND: &str = "estimate.wind";
 /// Source of what an offboard computer follows, where that is not the mission.
 pub const FOLLOWED: &str = "offboard.reference";
 fn wide(v: &Vector3<f32>) -> [f64; 3] {

@@ -1,6 +1,6 @@
 //! Every term of a step of the flight code, recorded.
 
-use super::{ESTIMATE, wide};
+use super::{ESTIMATE, WIND, wide};
 use crate::FlightLog;
 use squirrel_core::control::Reference;
 use squirrel_core::control::wing_force::ParnnTerms;
@@ -140,6 +140,16 @@ fn record_estimate(log: &mut FlightLog, t: f64, output: &StackOutput) {
         t,
         &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])],
     );
+    if output.wind.is_new() {
+        let deviation = f64::from(output.wind.deviation_m_s);
+        log.source_mut(WIND).push(
+            t,
+            &[
+                ("velocity_ned_m_s", &wide(&output.wind.velocity.vector)),
+                ("deviation_m_s", &[deviation]),
+            ],
+        );
+    }
     if let Some(terms) = &output.navigation {
         let attitude = terms.ned_from_body.wxyz().map(f64::from);
         log.source_mut(ESTIMATE).push(

@@ -17,6 +17,7 @@ mod pilot;
 mod policy_weights;
 mod replays;
 mod weights;
+mod wind_estimate;
 mod weights_support;
 mod world_clearance;
 mod world_contact;

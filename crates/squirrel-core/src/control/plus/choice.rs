@@ -18,7 +18,7 @@ const STEP_RAD: f32 = 0.2;
 pub(super) struct Believed<'a> {
     /// What flies.
     pub(super) airframe: &'a OuterAirframe,
-    /// Over ground, m/s.
+    /// Through the air, as far as the wind is known, m/s.
     pub(super) velocity: Vector3<f32>,
     /// What nobody commanded: along body z, and what of it has its direction in this frame.
     pub(super) residual: Residual,

@@ -40,7 +40,7 @@ impl TwccParameters {
         };
         let believed = Believed {
             airframe,
-            velocity: heading(&motion.velocity.vector),
+            velocity: heading(&(motion.velocity - motion.wind).vector),
             residual: plus.believes(&motion.residual, heading),
         };
         let (mut ahead, mut goal) = (*motion, *reference);
@@ -65,7 +65,10 @@ impl TwccParameters {
             gains.update(&mut state.position, airframe.mass_kg, &ahead, &goal, state.clamped, dt_s);
         let request = &position.request;
         let demand = Demand {
-            believed: Believed { velocity: heading(&ahead.velocity.vector), ..believed },
+            believed: Believed {
+                velocity: heading(&(ahead.velocity - motion.wind).vector),
+                ..believed
+            },
             acceleration: heading(&position.acceleration.vector),
             weight: plus.weight(
                 &believed,

@@ -10,6 +10,7 @@ use crate::estimate::force_residual::Felt;
 use crate::estimate::monitor::Monitor;
 use crate::estimate::navigator::{Health, NavigationState};
 use crate::estimate::voting::{Difference, Unit, Voter};
+use crate::estimate::wind::Wind;
 use crate::guidance::mission::MissionState;
 use crate::rnn::parnn::{History, WINDOW};
 use crate::stack::failsafe::{FailsafeState, Watch};
@@ -109,7 +110,8 @@ wire_struct! {
     Voter { units, difference, voted, since_us, spikes }
     Unit { last, repeats, doubted_us, silent_us }
     Difference { omega, force }
-    Monitor { commanded, omega, missing_n, torque_n_m, spread_ago_s, felt, waited_s }
+    Monitor { commanded, omega, missing_n, torque_n_m, spread_ago_s, felt, wind, waited_s }
+    Wind { velocity, deviation_m_s, waited_s }
     Felt { residual, along_n, spread_s }
     ForceResidual { short_n, wings_n, beside }
     Known { imu, attitude, gnss, altitude_m, wing_force, command }

@@ -71,7 +71,7 @@ wire_struct! {
     Imu { omega, specific_force }
     Gnss { position, velocity }
     Obstacle { id, north_m, east_m }
-    StackOutput { rotor_command, wing_command, reference, rejected, failsafe, health, navigation, outer, inner }
+    StackOutput { rotor_command, wing_command, reference, rejected, failsafe, health, navigation, wind, outer, inner }
     NavigationTerms { ned_from_body, gyro_bias, position, velocity }
     Failsafe { mode, reason }
     Reference { position, velocity, acceleration, yaw_rad }

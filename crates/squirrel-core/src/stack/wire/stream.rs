@@ -6,7 +6,7 @@ use crate::stack::{SensorFrame, Stack};
 /// First bytes of a file of vectors.
 pub const MAGIC: [u8; 8] = *b"SQRLVECT";
 /// Version of everything in this module.
-pub const VERSION: u32 = 8;
+pub const VERSION: u32 = 9;
 /// First byte of a record that holds a setup.
 pub const SETUP: u8 = 0;
 /// First byte of a record that holds a frame.
