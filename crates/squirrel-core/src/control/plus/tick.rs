@@ -90,8 +90,8 @@ impl TwccParameters {
             state.mode_age_s = state.mode_age_s.map(|age| age + dt_s);
             reason = if open { Reason::WingsComeCloser } else { Reason::InsideLimits };
             if wanted != state.mode {
-                // A dwell is for wings that might open again at once: those that harm cost height.
-                if open && state.mode_age_s.is_some_and(|age| age < self.dwell_s) {
+                // Those that harm cost height in every tenth of a second.
+                if !harm && state.mode_age_s.is_some_and(|age| age < self.dwell_s) {
                     reason = Reason::Dwell;
                 } else {
                     state.mode = wanted;
