@@ -145,10 +145,10 @@ fn whole<T: Paths, const ROTORS: usize>(blocks: &mut [Block<T, ROTORS>], call: C
     T::run(path, AdvanceWhole(Advance { blocks, scheme, dt_s: convert(dt_s), steps: call.steps }));
 }
 
-/// What nearly everybody flies, compiled into this crate. All else of a batch is compiled by each
-/// program, test and bench that has one; these are long, and many: for each scheme, wing and
-/// register.
-#[cfg(not(test))]
+/// What nearly everybody flies, compiled into this crate where it is asked to. All else of a batch
+/// is compiled by each program, test and bench that has one; these are long, and many: for each
+/// scheme, wing and register.
+#[cfg(all(feature = "batches", not(test)))]
 #[allow(dead_code, reason = "it is there to be compiled")]
 static COMPILED: ([Work<f32, 4>; 2], Flown<f32, 4>, [Work<f64, 4>; 2]) =
     ([plain, whole], autopilot::flown, [plain, whole]);
