@@ -18,6 +18,10 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// What is asked of the copy, by module. The last two ask for one effect by `SQUIRREL_EFFECT`.
 const TESTS: [&str; 4] = ["effects::", "vehicle::", "seen_by_find::", "twins::"];
 
+/// Crates of the copy that are compiled with little optimisation: compiling them takes far longer
+/// than what the tests ask of them.
+const PLAIN: [&str; 4] = ["squirrel-log", "squirrel-report", "squirrel-gap", "hidden-effects"];
+
 /// `cargo xtask effect`: compiles the simulator again, so it is no step of `cargo xtask test`.
 ///
 /// # Errors
@@ -67,6 +71,9 @@ fn tested(copy: &Path, name: &str) -> Result<(), String> {
     command.env("SQUIRREL_EFFECT", name).env("SQUIRREL_EFFECTS_WRITE", "1");
     // The lock file has the version that the copy no longer has; everything is there already.
     command.args(["test", "--release", "--offline"]);
+    for name in PLAIN {
+        command.args(["--config", &format!("profile.release.package.{name}.opt-level=1")]);
+    }
     command.args(
         ["squirrel-py", "squirrel-sim", "hidden-effects"].iter().flat_map(|name| ["-p", name]),
     );

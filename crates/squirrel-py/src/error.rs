@@ -12,12 +12,20 @@ use std::io;
 
 /// A `ValueError` with this line.
 pub(crate) fn value(line: impl ToString) -> PyErr {
-    PyValueError::new_err(line.to_string())
+    PyValueError::new_err(one_line(&line.to_string()))
 }
 
 /// The `OSError` of this kind (`FileNotFoundError`, `PermissionError`, ...) with this line.
 pub(crate) fn system(kind: io::ErrorKind, line: impl ToString) -> PyErr {
-    io::Error::new(kind, line.to_string()).into()
+    io::Error::new(kind, one_line(&line.to_string())).into()
+}
+
+/// Line breaks and other control characters of a name or a file spelt out, as Python's `repr` does:
+/// an error stays one line, and does nothing to a terminal.
+fn one_line(text: &str) -> String {
+    let spelt =
+        |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
+    text.chars().map(spelt).collect()
 }
 
 /// Of a vehicle file.

@@ -441,3 +441,19 @@ def test_environments_are_drawn_and_written(action: str) -> None:
     assert len(envs.render()) == 3
     with pytest.raises(ValueError, match="render_mode = human: must be rgb_array or ansi"):
         squirrel.envs.SquirrelEnv(task="avoid", render_mode="human")
+    for mode in (np.array([]), np.array(["ansi", "human"]), 1):
+        with pytest.raises(TypeError, match="^render_mode: expected str or None, got "):
+            squirrel.envs.SquirrelEnv(task="avoid", render_mode=mode)  # type: ignore[arg-type]
+
+
+def test_an_error_is_one_line_whatever_is_given() -> None:
+    calls: list[Callable[[str], Any]] = [
+        lambda name: squirrel.simulate(scenario="hover", estimator=name),
+        lambda name: squirrel.simulate(scenario="hover", integrator=name),
+        lambda name: squirrel.simulate(scenario="hover", arm=name),
+        lambda name: squirrel.envs.SquirrelEnv(task="avoid", render_mode=name),
+    ]
+    for call in calls:
+        with pytest.raises(ValueError, match=r" = a\\nb: ") as error:
+            call("a\nb")
+        assert "\n" not in str(error.value)

@@ -8,13 +8,32 @@ use std::path::Path;
 /// Opens a file, or whatever else a path leads to, for reading.
 ///
 /// # Errors
-/// What the disk says; a folder.
+/// What the disk says, and of a file that is not there where it was looked for; a folder.
 pub fn open(path: &Path) -> Result<File> {
-    let file = File::open(path)?;
+    let file = File::open(path).map_err(|error| told_where(path, error))?;
     if file.metadata()?.is_dir() {
         return Err(Error::new(ErrorKind::IsADirectory, "is a folder, must be a file"));
     }
     Ok(file)
+}
+
+/// A name without a folder does not say where the program looks for it, and one with folders not
+/// which of them is missing.
+fn told_where(path: &Path, error: Error) -> Error {
+    if error.kind() != ErrorKind::NotFound || path.is_symlink() {
+        return error;
+    }
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+        Some(_) => std::env::current_dir().unwrap_or_default(),
+        None => return error,
+    };
+    let missing = folder.ancestors().take_while(|folder| !folder.as_os_str().is_empty());
+    let reason = match missing.take_while(|folder| !folder.exists()).last() {
+        Some(missing) => format!("No such file: there is no folder {}", missing.display()),
+        None => format!("No such file in {}", folder.display()),
+    };
+    Error::new(ErrorKind::NotFound, reason)
 }
 
 /// All of a file: a log, weights, a journal.

@@ -56,6 +56,20 @@ fn a_link_stays_and_the_file_that_it_leads_to_is_written() {
 }
 
 #[test]
+fn a_file_that_is_not_there_is_told_with_where_it_was_looked_for() {
+    let folder = folder("missing");
+    let said = |path: &Path| read_text(path).unwrap_err().to_string();
+    let here = std::env::current_dir().unwrap();
+    assert_eq!(said(Path::new("no.mcap")), format!("No such file in {}", here.display()));
+    assert_eq!(said(&folder.join("no.mcap")), format!("No such file in {}", folder.display()));
+    let deep = folder.join("flihgts/monday/no.mcap");
+    let missing = folder.join("flihgts");
+    assert_eq!(said(&deep), format!("No such file: there is no folder {}", missing.display()));
+    symlink("nowhere", folder.join("dangling")).unwrap();
+    assert!(said(&folder.join("dangling")).starts_with("No such file or directory"));
+}
+
+#[test]
 fn links_in_a_circle_and_into_missing_folders_are_errors_and_stay() {
     let folder = folder("circle");
     symlink("b", folder.join("a")).unwrap();

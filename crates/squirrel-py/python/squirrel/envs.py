@@ -68,8 +68,11 @@ def _vehicles(vehicles: Sequence[Vehicle] | None) -> list[Vehicle]:
 
 
 def _mode(render_mode: str | None) -> str | None:
+    # An array answers `in` with an array, or with an error that names no argument.
+    if render_mode is not None and not isinstance(render_mode, str):
+        raise TypeError(f"render_mode: expected str or None, got {type(render_mode).__name__}")
     if render_mode is not None and render_mode not in _MODES:
-        raise ValueError(f"render_mode = {render_mode}: must be {' or '.join(_MODES)}")
+        raise ValueError(f"render_mode = {repr(render_mode)[1:-1]}: must be {' or '.join(_MODES)}")
     return render_mode
 
 

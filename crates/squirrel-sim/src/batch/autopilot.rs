@@ -295,6 +295,7 @@ pub struct Tuned {
 }
 
 /// Takes the steps of a call, with the loops in between.
+#[inline(never)]
 pub(super) fn flown<T: Paths, const ROTORS: usize>(
     blocks: &mut [Block<T, ROTORS>],
     work: Work<T, ROTORS>,

@@ -127,13 +127,16 @@ type Work<T, const ROTORS: usize> = fn(&mut [Block<T, ROTORS>], Call);
 /// The same, with an autopilot in between.
 type Flown<T, const ROTORS: usize> = fn(&mut [Block<T, ROTORS>], Work<T, ROTORS>, Call, Autopilot);
 
-/// Steps of the base model.
+/// Steps of the base model. Never inlined, as [`whole`] and `flown`: only then does a crate above use
+/// what is compiled here.
+#[inline(never)]
 fn plain<T: Paths, const ROTORS: usize>(blocks: &mut [Block<T, ROTORS>], call: Call) {
     let Settings { dt_s, scheme, path, .. } = call.settings;
     T::run(path, Advance { blocks, scheme, dt_s: convert(dt_s), steps: call.steps });
 }
 
 /// Steps of whole vehicles.
+#[inline(never)]
 fn whole<T: Paths, const ROTORS: usize>(blocks: &mut [Block<T, ROTORS>], call: Call) {
     if blocks.first().is_none_or(|block| block.extra.is_none()) {
         return plain(blocks, call);
@@ -141,6 +144,14 @@ fn whole<T: Paths, const ROTORS: usize>(blocks: &mut [Block<T, ROTORS>], call: C
     let Settings { dt_s, scheme, path, .. } = call.settings;
     T::run(path, AdvanceWhole(Advance { blocks, scheme, dt_s: convert(dt_s), steps: call.steps }));
 }
+
+/// What nearly everybody flies, compiled into this crate where it is asked to. All else of a batch
+/// is compiled by each program, test and bench that has one; these are long, and many: for each
+/// scheme, wing and register.
+#[cfg(all(feature = "batches", not(test)))]
+#[allow(dead_code, reason = "it is there to be compiled")]
+static COMPILED: ([Work<f32, 4>; 2], Flown<f32, 4>, [Work<f64, 4>; 2]) =
+    ([plain, whole], autopilot::flown, [plain, whole]);
 
 /// Where a vehicle is: chunk, block in it, column.
 fn place(vehicle: usize) -> (usize, usize, usize) {

@@ -1,6 +1,7 @@
 //! First files of machines that others have measured.
 
 use super::scaling::published::{MACHINES, Machine};
+use super::sizes::INCH_M;
 use super::*;
 use crate::arm::Arm;
 use crate::quantity::Provenance;
