@@ -153,6 +153,12 @@ pub(crate) fn decide(
     } else {
         Kind::Ambiguous
     };
+    let is_named = matches!(kind, Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers);
+    let kind = match (is_named && is_doubtful(search, naming), rivals.is_empty()) {
+        (false, _) => kind,
+        (true, true) => Kind::OutsideCatalogue,
+        (true, false) => Kind::Ambiguous,
+    };
     let is_open = !open.is_empty();
     let mut alternatives =
         if is_open { open } else { alternatives(search, naming, rivals.iter().take(SHOWN)) };
@@ -211,6 +217,14 @@ pub(crate) fn decide(
     };
     verdict.words = words::paragraph(&verdict, &blind, curve_hides_sag);
     verdict
+}
+
+/// Whether a name is forced into the end of its range or past what is plausible of one side of a
+/// ratio, or its number is hardly another one than the vehicle file has it: no answer without a
+/// doubt.
+fn is_doubtful(search: &Search<'_>, naming: &Naming) -> bool {
+    let is_forced = |member| search.is_at_its_end(member) || search.is_far_side(member);
+    naming.found.best.members.iter().any(is_forced) || search.least_clear(naming).is_some()
 }
 
 /// Part of what the vehicle as it was leaves, above noise, that the explanation leaves, too, in the

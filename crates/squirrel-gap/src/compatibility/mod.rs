@@ -216,7 +216,8 @@ pub(crate) fn leave_out(predictor: &mut Predictor<'_>, residual: &[f64], moments
         predictor.leave_out_moments();
     } else if moments == Moments::Lasting {
         predictor.keep_trim();
-    } else if !moments_fit(predictor, residual) {
+    } else if !predictor.has_pitch() || !moments_fit(predictor, residual) {
+        // What turned a vehicle is not known where its pitch is what its force would have it be.
         predictor.leave_out_moments();
     }
 }

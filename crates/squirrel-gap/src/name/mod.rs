@@ -148,6 +148,8 @@ fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
 /// Standard deviations, from blocks of the flights, by which a number stands out from a model that
 /// misses a little everywhere.
 pub(crate) const STANDS: f64 = 5.0;
+/// The same where nothing is left: with less the flights do not tell a number from what the file has.
+pub(crate) const CLEAR: f64 = 3.0;
 
 /// Part of what is above noise that names explain which leave something in forces alone, or in
 /// moments.
@@ -166,7 +168,7 @@ pub(crate) fn standing(
     naming: Naming,
     hold: impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
 ) -> Result<Naming, GapError> {
-    let naming = held(search, slow::beside_drift(search, naming)?, &hold)?;
+    let naming = held(search, clear(search, slow::beside_drift(search, naming)?)?, &hold)?;
     // What is left of forces alone, or of moments, may be one missing effect: names must explain
     // most of what is there.
     let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
@@ -213,6 +215,26 @@ pub(crate) fn standing(
         now = Some(fewer);
     }
     Ok(Naming { stands: true, ..now.unwrap_or(naming) })
+}
+
+/// An explanation that leaves nothing without those names whose numbers blocks of the flights do
+/// not tell from what the vehicle file has, the least clear first, as long as nothing is left for
+/// that: evidence counts rows that a model misses together as if each were another proof.
+///
+/// # Errors
+/// What the predictor says.
+fn clear(search: &Search<'_>, mut naming: Naming) -> Result<Naming, GapError> {
+    while !naming.leftover.is_real() && naming.gust_m_s.is_none() {
+        let Some(least) = search.least_clear(&naming) else { break };
+        let mut kept = naming.found.best.members.clone();
+        kept.remove(least);
+        let fewer = only(search, &naming, &kept)?;
+        if fewer.leftover.is_real() {
+            break;
+        }
+        naming = fewer;
+    }
+    Ok(naming)
 }
 
 /// An explanation that leaves nothing without those names that held-out flights are predicted

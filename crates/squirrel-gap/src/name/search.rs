@@ -6,6 +6,7 @@ use super::linear::Linear;
 use super::parameters::{Candidate, Catalogue};
 use super::point::{Member, Point, hypothesis};
 use super::refine::Scored;
+use super::{CLEAR, Naming};
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
 use squirrel_core::effects::{Effect, Mimic, Profile, Ratio, Response, WeakRotor};
@@ -306,7 +307,7 @@ impl Search<'_> {
             .all(|member| self.is_beyond_tolerance(member) && !self.is_at_its_end(member))
     }
 
-    fn is_at_its_end(&self, member: &Member) -> bool {
+    pub(crate) fn is_at_its_end(&self, member: &Member) -> bool {
         self.catalogue.own(member).any(|p| {
             let (least, most) = p.bounds;
             let value = member.values[p.slot];
@@ -370,6 +371,25 @@ impl Search<'_> {
         let own = set.free.iter().zip(deviations).filter(|((member, _), _)| *member == index);
         own.map(|((_, slot), sd)| (set.members[index].values[*slot] - before[*slot]).abs() / sd)
             .fold(0.0, f64::max)
+    }
+
+    /// Whether a member is one side of a ratio and farther off than is plausible. Flights show the
+    /// ratio; how far off each side may be chose this one, and says nothing of that far out.
+    pub(crate) fn is_far_side(&self, member: &Member) -> bool {
+        let before = self.catalogue.absent(self.predictor, member.candidate).values;
+        ratio(&self.catalogue.candidates[member.candidate]).is_some()
+            && self
+                .catalogue
+                .own(member)
+                .any(|p| (member.values[p.slot] - before[p.slot]).abs() > p.largest)
+    }
+
+    /// The member that stands out least, if that is too little to be told.
+    pub(crate) fn least_clear(&self, naming: &Naming) -> Option<usize> {
+        let best = &naming.found.best;
+        let clear = |i: &usize| self.stands_out(best, *i, &naming.deviations);
+        let unclear = (0..best.members.len()).filter(|i| clear(i) < CLEAR);
+        unclear.min_by(|a, b| clear(a).total_cmp(&clear(b)))
     }
 
     /// Whether no member is larger than anything plausible: what is forced into a name goes to its

@@ -231,10 +231,12 @@ impl<'a> Predictor<'a> {
     /// Leaves the moments out of everything that follows.
     pub(crate) fn leave_out_moments(&mut self) {
         self.segments.retain(|s| !(3..DYNAMIC).contains(&s.channel));
-        self.notes.push(
-            "moments: the vehicle file explains next to nothing of the measured ones; effects are named from forces alone"
-                .to_owned(),
-        );
+        let why = if self.has_pitch() {
+            "the vehicle file explains next to nothing of the measured ones"
+        } else {
+            "pitch was not measured"
+        };
+        self.notes.push(format!("moments: {why}; effects are named from forces alone"));
     }
 
     /// Leaves everything but the moments out of everything that follows.
@@ -394,6 +396,10 @@ impl<'a> Predictor<'a> {
     /// Whether the heading of every flight was measured, and not taken as held.
     pub(crate) fn has_heading(&self) -> bool {
         self.tracks.iter().all(|t| t.derived.heading.is_none())
+    }
+    /// Whether the pitch of every flight was measured, and not taken for where thrust points.
+    pub(crate) fn has_pitch(&self) -> bool {
+        self.tracks.iter().all(|t| t.derived.pitch.is_none())
     }
     /// Whether every flight has a height.
     pub(crate) fn has_height(&self) -> bool {

@@ -215,3 +215,17 @@ fn what_is_fitted_is_asked_again_without_another_fit() {
     let text = |found: &Workflow| serde_json::to_string(&found.diagnosis.verdict).unwrap();
     assert_eq!((fits.get(), text(&again)), (2, text(&anew)));
 }
+
+/// A file of another machine, and no good flights: its thrust is a quarter off, and with it the mass
+/// would have to be, or the inertia of a pitch that nobody measured. Neither is said without a doubt.
+#[test]
+fn without_good_flights_another_machine_has_no_cause() {
+    let file = vehicle("crazyflie21_brushed.toml");
+    for flight in crazypad(&["normal_flight__E8_log02", "normal_flight__E9_log00"]) {
+        let found = diagnose(&file, &[flight], &[], &|_| ()).unwrap().verdict;
+        let is_sure =
+            matches!(found.verdict, Kind::Named | Kind::NamedIncomplete | Kind::NamedFormDiffers);
+        assert!(!is_sure, "{}", found.words);
+        assert!(found.notes.iter().any(|n| n.contains("pitch was not measured")));
+    }
+}
