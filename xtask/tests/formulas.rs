@@ -114,7 +114,7 @@ const DENSITY: [&str; 11] = [
     // Other simulators are told it, and coefficients of propellers are over it.
     "sim/src/vehicle_file/export/ardupilot.rs",
     "sim/src/vehicle_file/export/mjcf.rs",
-    "sim/src/vehicle_file/new/mod.rs",
+    "sim/src/vehicle_file/new/sizes.rs",
 ];
 
 /// What a file calls, without spaces, instead of writing it again.
