@@ -283,8 +283,8 @@ def complaint(case: Case, name: str, value: Any, usual: str | None) -> str | Non
             return None
         if isinstance(error, (LookupError, OSError)) and not isinstance(error, ValueError):
             return None if name in LOOKUPS else f"{shown()}: {type(error).__name__} {said:.200}"
-        # What is in a file is named by the file, its control characters spelt out.
-        file = [repr(str(value))[1:-1]] if name in ("path", "map") else []
+        # What is in a file is named by the file, line breaks in its name spelt out.
+        file = [str(value).replace("\n", "\\n")] if name in ("path", "map") else []
         if any(word in said for word in (name, *BETTER.get(name, []), *file)):
             return None
         return f"{shown()}: does not name it: {type(error).__name__} {said:.200}"
