@@ -18,7 +18,7 @@ use squirrel_core::frames::{In, Ned};
 use squirrel_core::lane::vector::rotation;
 use squirrel_core::lane::{Dual, Lane};
 use squirrel_core::nalgebra::{Quaternion, SMatrix};
-use squirrel_core::vehicle::{MAX_ROTORS, PerRotor};
+use squirrel_core::vehicle::{MAX_ROTORS, PerRotor, ROTOR_BLOCK};
 
 /// Variables of a motion: position, m, rotation, rad, velocity, m/s, rate, rad/s; three each.
 pub const VARIABLES: usize = 12;
@@ -33,8 +33,7 @@ impl Plant {
     /// network.
     ///
     /// * arguments as in [`Self::step`], which moves the state; this does not
-    // A step on twelve derivatives takes long to compile. Inline, so that only who asks for it does,
-    // and for as many rotors as there may be, so that it is once for each wing.
+    // A step on twelve derivatives takes long to compile: inline, so that only who asks for it does.
     #[inline]
     pub fn jacobian(
         &self,
@@ -46,9 +45,22 @@ impl Plant {
         let mut state = *state;
         self.drive(&mut state, rotor_command);
         let deployment = self.deploy(&mut state, wing_command);
+        if self.vehicle().rotor_blocks() == 1 {
+            self.of_rotors::<ROTOR_BLOCK>(&state, deployment, wind)
+        } else {
+            self.of_rotors::<MAX_ROTORS>(&state, deployment, wind)
+        }
+    }
+
+    fn of_rotors<const ROTORS: usize>(
+        &self,
+        state: &PlantState,
+        deployment: [f64; 2],
+        wind: In<Ned, f64>,
+    ) -> Option<Jacobian> {
         let constant = Variable::constant;
         let vehicle = self.vehicle();
-        let all = |rotors: &PerRotor<f64>| rotors.map(constant);
+        let first = |all: &PerRotor<f64>| core::array::from_fn(|i| constant(all[i]));
         let own = vehicle.parameters().wing;
         let (plate, membrane) = match &self.wing {
             WingPlant::None => (own, None),
@@ -58,24 +70,24 @@ impl Plant {
         };
         let plate = plate.as_ref().map_or(flat_plate::Pair::all(0.0), flat_plate::Pair::new);
         let extra_s = self.acting().rotor_extra_time_constant_s();
-        let mut vehicle = Whole::<Variable, MAX_ROTORS> {
+        let mut vehicle = Whole::<Variable, ROTORS> {
             airframe: Airframe::new(vehicle, extra_s).map(constant),
             held: Held {
                 wind: <[f64; 3]>::from(wind.vector).map(constant),
-                target_speed: all(&state.drive.target_rad_s),
+                target_speed: first(&state.drive.target_rad_s),
             },
             air_omega: state.air_omega.map(|air| <[f64; 3]>::from(air.vector).map(constant)),
             plate: plate.map(constant),
             membrane: membrane.unwrap_or(Membrane::all(0.0)).map(constant),
             present: self.acting().present(),
             effects: self.acting().numbers().map(constant),
-            spin: all(&spin_signs(vehicle)),
+            spin: first(&spin_signs(vehicle)),
             swing: self.swing.unwrap_or(Swing::all(0.0)).map(constant),
             load: PendulumState::map(&state.load, constant),
             deployment: deployment.map(constant),
             angle_rate: [constant(0.0); 2],
         };
-        let before = variables(&Motion::from(&state.body));
+        let before = variables::<ROTORS>(&Motion::from(&state.body));
         let m = &state.membrane;
         let side = |side: usize| Side {
             fast_camber: constant(m.fast_camber[side]),
@@ -84,8 +96,7 @@ impl Plant {
         };
         let sides = [side(0), side(1)];
         if membrane.is_some() {
-            let air =
-                whole::air::<_, MAX_ROTORS, true>(&vehicle, &before, &rotation(&before.attitude));
+            let air = whole::air::<_, ROTORS, true>(&vehicle, &before, &rotation(&before.attitude));
             let y = lateral(vehicle.membrane.arm_m);
             for side in 0..2 {
                 let turned = vehicle.membrane.angle_of_attack(&air, y[side])
@@ -96,14 +107,12 @@ impl Plant {
         let stages = runge_kutta(constant(self.dt_s()));
         let (after, _) = match self.wing {
             WingPlant::None => {
-                whole::step::<_, MAX_ROTORS, 4, NONE, true>(&vehicle, &stages, &before, &sides)
+                whole::step::<_, ROTORS, 4, NONE, true>(&vehicle, &stages, &before, &sides)
             }
             WingPlant::Flat { .. } => {
-                whole::step::<_, MAX_ROTORS, 4, FLAT, true>(&vehicle, &stages, &before, &sides)
+                whole::step::<_, ROTORS, 4, FLAT, true>(&vehicle, &stages, &before, &sides)
             }
-            _ => {
-                whole::step::<_, MAX_ROTORS, 4, MEMBRANE, true>(&vehicle, &stages, &before, &sides)
-            }
+            _ => whole::step::<_, ROTORS, 4, MEMBRANE, true>(&vehicle, &stages, &before, &sides),
         };
         Some(rows(&after))
     }
@@ -117,7 +126,7 @@ fn along(q: Quaternion<f64>, axis: usize) -> Quaternion<f64> {
 }
 
 /// A motion whose derivatives by itself are one.
-fn variables(motion: &Motion<f64, MAX_ROTORS>) -> Motion<Variable, MAX_ROTORS> {
+fn variables<const ROTORS: usize>(motion: &Motion<f64, ROTORS>) -> Motion<Variable, ROTORS> {
     let three = |numbers: [f64; 3], from: usize| {
         [0, 1, 2].map(|axis| Variable::variable(numbers[axis], from + axis))
     };
@@ -138,7 +147,7 @@ fn variables(motion: &Motion<f64, MAX_ROTORS>) -> Motion<Variable, MAX_ROTORS> {
     }
 }
 
-fn rows(motion: &Motion<Variable, MAX_ROTORS>) -> Jacobian {
+fn rows<const ROTORS: usize>(motion: &Motion<Variable, ROTORS>) -> Jacobian {
     let [w, x, y, z] = motion.attitude.map(|component| component.value);
     let back = Quaternion::new(w, x, y, z).conjugate();
     Jacobian::from_fn(|row, column| {
