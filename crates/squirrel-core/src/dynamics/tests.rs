@@ -10,6 +10,18 @@ fn no_surfaces(_: &Air<f64>) -> Wrench<Body, f64> {
     Wrench::zero()
 }
 
+/// A step of a vehicle without wings and effects in still air.
+fn stepped(
+    vehicle: &Vehicle<f64>,
+    state: State<f64>,
+    drive: RotorDrive<f64>,
+    dt_s: f64,
+) -> State<f64> {
+    let none = acting(&Effects::none());
+    let held = Held::in_still_air(drive);
+    rk4(state, dt_s, |s| derivative(vehicle, &none, s, &held, no_surfaces))
+}
+
 #[test]
 fn hover_trim_stands_still() {
     let vehicle = Vehicle::new(squirrel::<f64>()).unwrap();
@@ -19,15 +31,7 @@ fn hover_trim_stands_still() {
     let mut state = State::at_rest();
     state.rotor_speed_rad_s = drive.target_rad_s;
     for _ in 0..1000 {
-        state = rk4(state, 1e-3, |s| {
-            derivative(
-                &vehicle,
-                &acting(&Effects::none()),
-                s,
-                &Held::in_still_air(drive),
-                no_surfaces,
-            )
-        });
+        state = stepped(&vehicle, state, drive, 1e-3);
     }
     assert!(state.position.vector.norm() < 1e-9 && state.omega.vector.norm() < 1e-9);
 }
@@ -47,16 +51,7 @@ fn torque_free_tumbling_keeps_energy_and_angular_momentum() {
     };
     let (energy, momentum_ned) = invariants(&state);
     for _ in 0..10_000 {
-        state = rk4(state, 1e-3, |s| {
-            derivative(
-                &vehicle,
-                &acting(&Effects::none()),
-                s,
-                &Held::in_still_air(drive),
-                no_surfaces,
-            )
-        })
-        .normalised();
+        state = stepped(&vehicle, state, drive, 1e-3).normalised();
     }
     let (energy_end, momentum_end) = invariants(&state);
     assert!(
@@ -80,15 +75,7 @@ fn rk4_is_of_fourth_order() {
         let mut state =
             State { velocity: In::new(Vector3::new(3.0, -1.0, 0.5)), ..State::at_rest() };
         for _ in 0..steps {
-            state = rk4(state, 0.4 / steps as f64, |s| {
-                derivative(
-                    &vehicle,
-                    &acting(&Effects::none()),
-                    s,
-                    &Held::in_still_air(drive),
-                    no_surfaces,
-                )
-            });
+            state = stepped(&vehicle, state, drive, 0.4 / steps as f64);
         }
         state.position.vector
     };

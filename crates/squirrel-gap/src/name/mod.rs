@@ -218,42 +218,31 @@ pub(crate) fn standing(
 }
 
 /// An explanation that leaves nothing without those names whose numbers blocks of the flights do
-/// not tell from what the vehicle file has, the least clear first, as long as nothing is left for
-/// that: evidence counts rows that a model misses together as if each were another proof.
+/// not tell from what the vehicle file has, the least clear first: evidence counts rows that a model
+/// misses together as if each were another proof.
 ///
 /// # Errors
 /// What the predictor says.
-fn clear(search: &Search<'_>, mut naming: Naming) -> Result<Naming, GapError> {
-    while !naming.leftover.is_real() && naming.gust_m_s.is_none() {
-        let Some(least) = search.least_clear(&naming) else { break };
-        let mut kept = naming.found.best.members.clone();
-        kept.remove(least);
-        let fewer = only(search, &naming, &kept)?;
-        if fewer.leftover.is_real() {
-            break;
-        }
-        naming = fewer;
-    }
-    Ok(naming)
+fn clear(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
+    dropping(search, naming, |naming| Ok(search.least_clear(naming)))
 }
 
 /// An explanation that leaves nothing without those names that held-out flights are predicted
-/// better without and speak against more than the others spoke for them, the one worth least first,
-/// as long as nothing is left for that.
+/// better without and speak against more than the others spoke for them, the one worth least first.
 ///
 /// # Errors
 /// What the predictor says.
 fn held(
     search: &Search<'_>,
-    mut naming: Naming,
+    naming: Naming,
     hold: &impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
 ) -> Result<Naming, GapError> {
-    while !naming.leftover.is_real() && naming.gust_m_s.is_none() {
+    dropping(search, naming, |naming| {
         let members = &naming.found.best.members;
         if members.is_empty() {
-            break;
+            return Ok(None);
         }
-        let Some(holds) = hold(&naming)? else { break };
+        let Some(holds) = hold(naming)? else { return Ok(None) };
         let worth = |i: &usize| naming.found.worth(*i);
         let falls = (0..members.len()).filter(|i| {
             // What is clear is told with the flights that lack it, and is no accident of some.
@@ -261,9 +250,26 @@ fn held(
                 && !holds[*i].better
                 && worth(i) + holds[*i].nats < search.needed(&members[*i])
         });
-        let Some(least) = falls.min_by(|a, b| worth(a).total_cmp(&worth(b))) else { break };
-        let mut kept = members.clone();
-        kept.remove(least);
+        Ok(falls.min_by(|a, b| worth(a).total_cmp(&worth(b))))
+    })
+}
+
+/// An explanation without the names that are pointed at, one after the other, as long as nothing is
+/// left for that.
+///
+/// * `weakest` - which of the members falls next, if any
+///
+/// # Errors
+/// What the predictor and `weakest` say.
+fn dropping(
+    search: &Search<'_>,
+    mut naming: Naming,
+    weakest: impl Fn(&Naming) -> Result<Option<usize>, GapError>,
+) -> Result<Naming, GapError> {
+    while !naming.leftover.is_real() && naming.gust_m_s.is_none() {
+        let Some(weakest) = weakest(&naming)? else { break };
+        let mut kept = naming.found.best.members.clone();
+        kept.remove(weakest);
         let fewer = only(search, &naming, &kept)?;
         if fewer.leftover.is_real() {
             break;
