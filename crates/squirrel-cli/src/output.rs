@@ -64,11 +64,7 @@ fn plain(text: &str) -> Cow<'_, str> {
         (c.is_control() && c != '\n' && c != '\t')
             || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
     };
-    if !text.contains(acts) {
-        return Cow::Borrowed(text);
-    }
-    let spelt = |c: char| if acts(c) { c.escape_default().to_string() } else { c.to_string() };
-    Cow::Owned(text.chars().map(spelt).collect())
+    files::spelt_out(text, acts)
 }
 
 /// A progress bar on stderr; silent where nobody looks.

@@ -3,8 +3,8 @@
 
 use pyo3::PyErr;
 use pyo3::exceptions::PyValueError;
-use squirrel_log::LogError;
 use squirrel_log::import::ImportError;
+use squirrel_log::{LogError, files};
 use squirrel_nn::NnError;
 use squirrel_sim::vehicle_file::VehicleFileError;
 use squirrel_sim::weights::WeightsError;
@@ -23,9 +23,7 @@ pub(crate) fn system(kind: io::ErrorKind, line: impl ToString) -> PyErr {
 /// Line breaks and other control characters of a name or a file spelt out, as Python's `repr` does:
 /// an error stays one line, and does nothing to a terminal.
 fn one_line(text: &str) -> String {
-    let spelt =
-        |c: char| if c.is_control() { c.escape_default().to_string() } else { c.to_string() };
-    text.chars().map(spelt).collect()
+    files::spelt_out(text, char::is_control).into_owned()
 }
 
 /// Of a vehicle file.

@@ -79,17 +79,17 @@ pub(crate) struct Seen<'a> {
 }
 
 impl Monitor {
-    /// Looks at a step.
-    pub(crate) fn look(&mut self, vehicle: &Vehicle<f32>, seen: &Seen<'_>) {
+    /// Looks at a step; whether it looked at the wind, too.
+    pub(crate) fn look(&mut self, vehicle: &Vehicle<f32>, seen: &Seen<'_>) -> bool {
         let Seen { achieved, imu, wings, dt_s, .. } = *seen;
         let Some(achieved) = achieved else {
             *self = Self::default();
-            return;
+            return false;
         };
         let dt_s = self.waited_s + dt_s;
         let Some(imu) = imu else {
             self.waited_s = lower(dt_s, MEAN_S);
-            return;
+            return false;
         };
         self.waited_s = 0.0;
         let p = vehicle.parameters();
@@ -99,7 +99,7 @@ impl Monitor {
             if wings > 0.0 { 0.0 } else { lower(self.spread_ago_s + dt_s, FOLDED_S) };
         let (Some(before), true) = (before, dt_s > 0.0) else {
             self.commanded = *achieved;
-            return;
+            return false;
         };
         let follow = dt_s / (dt_s + p.propulsion.time_constant_up_s);
         self.commanded.thrust_n += (achieved.thrust_n - self.commanded.thrust_n) * follow;
@@ -108,7 +108,7 @@ impl Monitor {
         let is_folded = self.spread_ago_s >= FOLDED_S;
         let mut felt = imu.specific_force.vector * p.mass_kg;
         felt.z += self.commanded.thrust_n;
-        let mut short_n = felt.z;
+        let (mut short_n, mut is_wind_new) = (felt.z, false);
         if let (Some(ned_from_body), Some(velocity)) = (seen.attitude, seen.velocity) {
             short_n = self.felt.look(&Step {
                 force: In::new(felt),
@@ -123,7 +123,7 @@ impl Monitor {
             });
             let ForceResidual { beside, short_n, .. } = self.felt.residual();
             let look = Look { ned_from_body, velocity, beside, short_n, is_folded, dt_s };
-            self.wind.look(vehicle, &look);
+            is_wind_new = self.wind.look(vehicle, &look);
         }
         let spin = p.inertia_kg_m2 * omega;
         let turned = p.inertia_kg_m2 * (omega - before) / dt_s + omega.cross(&spin)
@@ -134,10 +134,11 @@ impl Monitor {
         if !(self.missing_n.is_finite() && all_finite(&self.torque_n_m)) {
             *self = Self::default();
         }
+        is_wind_new
     }
 
     /// Wind as estimated.
-    pub(crate) fn wind(&self) -> Wind {
+    pub fn wind(&self) -> Wind {
         self.wind
     }
 

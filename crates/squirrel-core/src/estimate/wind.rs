@@ -66,16 +66,11 @@ pub(super) struct Look<'a> {
 }
 
 impl Wind {
-    /// Whether it was looked at in this step; in between it stays what it is.
-    pub fn is_new(&self) -> bool {
-        self.waited_s == 0.0
-    }
-
-    /// Looks at a step, once a period.
-    pub(super) fn look(&mut self, vehicle: &Vehicle<f32>, look: &Look<'_>) {
+    /// Looks at a step, once a period; whether this one ends it.
+    pub(super) fn look(&mut self, vehicle: &Vehicle<f32>, look: &Look<'_>) -> bool {
         self.waited_s += look.dt_s;
         if self.waited_s < PERIOD_S {
-            return;
+            return false;
         }
         let dt_s = core::mem::take(&mut self.waited_s);
         let variance =
@@ -86,7 +81,7 @@ impl Wind {
             // Before the limits, which make a number of what is none.
             if !innovation.norm_squared().is_finite() {
                 *self = Self::default();
-                return;
+                return true;
             }
             let noise = error_n * error_n * (ERROR_STAYS_S / PERIOD_S);
             let expected = variance * slope * slope + noise;
@@ -98,6 +93,7 @@ impl Wind {
             variance *= 1.0 - gain * slope;
         }
         self.deviation_m_s = sqrt(variance);
+        true
     }
 
     /// Felt less believed drag, N, how it changes with the wind, N s/m, and its error, N.

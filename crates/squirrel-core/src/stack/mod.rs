@@ -144,8 +144,8 @@ pub struct StackOutput {
     pub health: Health,
     /// What is believed, where the flight code estimates and has heard enough to.
     pub navigation: Option<NavigationTerms>,
-    /// Wind, as far as drag shows it.
-    pub wind: Wind,
+    /// Wind, as far as drag shows it, where it was looked at in this step.
+    pub wind: Option<Wind>,
     /// The outer loop, where it ran in this step; it does not while commands come from outside.
     pub outer: Option<TwccTerms>,
     /// The inner loop, once attitude and rate are known; rotors stand still before that and while
@@ -254,14 +254,14 @@ impl Stack {
             wings: state.wing_command,
             dt_s: lower(navigated.elapsed_us as f32 * 1e-6, INNER_STEP_MAX_S),
         };
-        state.monitor.look(&self.vehicle, &seen);
+        let is_wind_new = state.monitor.look(&self.vehicle, &seen);
+        output.wind = is_wind_new.then(|| state.monitor.wind());
         output.health = state.monitor.judge(
             &self.vehicle,
             navigated.frame.attitude.as_ref(),
             state.navigation.health,
         );
         output.navigation = navigated.terms;
-        output.wind = state.monitor.wind();
     }
 
     /// One inner step on the attitude, position and velocity that the frame brings; as total as
@@ -330,7 +330,7 @@ impl Stack {
             failsafe,
             health: state.navigation.health,
             navigation: None,
-            wind: Wind::default(),
+            wind: None,
             outer,
             inner,
         }

@@ -5,12 +5,14 @@
 
 mod budget;
 mod lock;
+mod names;
 mod place;
 mod read;
 mod write;
 
 pub use budget::{Budget, TooLarge};
 pub use lock::Lock;
+pub use names::spelt_out;
 pub use place::FileId;
 pub use read::{begin, open, read, read_text};
 pub use write::{Growing, append, folder, writable, write_whole};

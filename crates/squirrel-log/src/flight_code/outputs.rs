@@ -140,13 +140,12 @@ fn record_estimate(log: &mut FlightLog, t: f64, output: &StackOutput) {
         t,
         &[("rejected", &[f64::from(output.rejected)]), ("health", &[f64::from(output.health.0)])],
     );
-    if output.wind.is_new() {
-        let deviation = f64::from(output.wind.deviation_m_s);
+    if let Some(wind) = &output.wind {
         log.source_mut(WIND).push(
             t,
             &[
-                ("velocity_ned_m_s", &wide(&output.wind.velocity.vector)),
-                ("deviation_m_s", &[deviation]),
+                ("velocity_ned_m_s", &wide(&wind.velocity.vector)),
+                ("deviation_m_s", &[f64::from(wind.deviation_m_s)]),
             ],
         );
     }

@@ -58,14 +58,14 @@ const TURN_MIN_M_S2: f32 = 2.0;
 const HELD_SHARE: f32 = 0.04;
 /// Up to which thrust is scarce in a turn.
 const SCARCE_SHARE: f32 = 0.08;
+/// From which on there is plenty.
+const PLENTY_SHARE: f32 = 0.2;
 /// Bands of height that count, at most: beyond, the vehicle is level already, and a sink that wings
 /// or a gust made in an instant would stop it from braking at all.
-const SHARE_MAX: f32 = 3.5;
+const BANDS_MAX: f32 = 3.5;
 /// Share of the weight from which on a push down on spread wings, felt and not known, is harm: they
 /// stay open only for what they would be opened for.
 const HARM_SHARE: f32 = 0.1;
-/// From which on there is plenty.
-const PLENTY_SHARE: f32 = 0.2;
 
 /// What of the force that nobody commanded the law believes to act on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -195,7 +195,7 @@ impl Plus {
         let foreseen_m = down_m + down_m_s * down_m_s.abs() / (2.0 * turn);
         let band_m =
             if foreseen_m > 0.0 { self.sink_band(believed.airframe) } else { self.height_band_m };
-        let share = lower(foreseen_m.abs() / band_m, SHARE_MAX);
+        let share = lower(foreseen_m.abs() / band_m, BANDS_MAX);
         let weight = self.vertical_weight * (1.0 + share * share);
         weight * weight
     }

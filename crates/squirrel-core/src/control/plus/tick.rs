@@ -38,9 +38,10 @@ impl TwccParameters {
             pitch_rad: motion.pitch_rad,
             thrust_n: 0.0,
         };
+        let through_air = |velocity: In<Ned, f32>| heading(&(velocity - motion.wind).vector);
         let believed = Believed {
             airframe,
-            velocity: heading(&(motion.velocity - motion.wind).vector),
+            velocity: through_air(motion.velocity),
             residual: plus.believes(&motion.residual, heading),
         };
         let (mut ahead, mut goal) = (*motion, *reference);
@@ -65,10 +66,7 @@ impl TwccParameters {
             gains.update(&mut state.position, airframe.mass_kg, &ahead, &goal, state.clamped, dt_s);
         let request = &position.request;
         let demand = Demand {
-            believed: Believed {
-                velocity: heading(&(ahead.velocity - motion.wind).vector),
-                ..believed
-            },
+            believed: Believed { velocity: through_air(ahead.velocity), ..believed },
             acceleration: heading(&position.acceleration.vector),
             weight: plus.weight(
                 &believed,
