@@ -36,22 +36,24 @@ const SHOWN: usize = 5;
 /// Other names that are as good: the evidence hardly tells them apart, and held-out flights do not
 /// either.
 pub(crate) fn close<'a>(
+    search: &Search<'_>,
     naming: &Naming,
     rivals: &'a [Scored],
     proof: Option<&HeldOut>,
     gap: Option<&Gap>,
 ) -> Vec<&'a Scored> {
-    let named = naming.found.best.log_evidence;
+    let named = search.weighed(&naming.found.best);
     // A set that was not named may have more evidence than what was: too little for each of its
     // names.
-    let best = rivals.iter().map(|rival| rival.log_evidence).fold(named, f64::max);
+    let best = rivals.iter().map(|rival| search.weighed(rival)).fold(named, f64::max);
     let clearly_worse = |rival: usize| {
         let (Some(proof), Some(gap)) = (proof, gap) else { return false };
-        let left =
-            proof.rivals.get(rival).map(|errors| errors.over(&proof.floor.of(&proof.fitted)));
-        let is_behind = rivals[rival].log_evidence < named - BEHIND_NATS;
-        let times = if is_behind { RIVAL_GAP_BEHIND } else { RIVAL_GAP };
-        left.is_some_and(|left| left - 1.0 >= times * (gap.after - 1.0).max(HELD_OUT_NOISE))
+        let Some(held_out) = proof.rivals.get(rival) else { return false };
+        // Flights that were fitted and those that were not are evidence of the same things.
+        let behind = named - search.weighed(&rivals[rival]) + held_out.nats;
+        let left = held_out.errors.over(&proof.floor.of(&proof.fitted));
+        let times = if behind > BEHIND_NATS { RIVAL_GAP_BEHIND } else { RIVAL_GAP };
+        behind > NATS_MIN || left - 1.0 >= times * (gap.after - 1.0).max(HELD_OUT_NOISE)
     };
     // What is in the place of a name must be worth something itself: what flights hardly ask for is
     // no other explanation, but none at all, which a name has left behind already.
@@ -61,7 +63,7 @@ pub(crate) fn close<'a>(
         })
     };
     let is_close = |(i, rival): &(usize, &Scored)| {
-        rival.log_evidence > best - NATS_MIN && is_worth(rival) && !clearly_worse(*i)
+        search.weighed(rival) > best - NATS_MIN && is_worth(rival) && !clearly_worse(*i)
     };
     rivals.iter().enumerate().filter(is_close).map(|(_, rival)| rival).collect()
 }

@@ -187,10 +187,10 @@ fn judged(
         let gap = proof.as_ref().map(|proof| gap(held_out, proof));
         Ok((proof, gap))
     };
-    let best = naming.found.best.log_evidence;
-    let near = rivals.iter().filter(|rival| rival.log_evidence > best - NATS_MIN).count();
+    let best = search.weighed(&naming.found.best);
+    let near = rivals.iter().filter(|rival| search.weighed(rival) > best - NATS_MIN).count();
     let (mut proof, mut numbers) = proven(&naming, &rivals[..rivals.len().min(1.max(near))])?;
-    let close = close(&naming, &rivals, proof.as_ref(), numbers.as_ref());
+    let close = close(&search, &naming, &rivals, proof.as_ref(), numbers.as_ref());
     let mut open = Vec::new();
     if let Some(kept) = shared(&search, &naming, &close) {
         open = alternatives(

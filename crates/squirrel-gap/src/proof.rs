@@ -20,11 +20,19 @@ pub(crate) struct HeldOut {
     pub(crate) nominal: Errors12,
     /// Of the best other name and of all that the evidence hardly tells from the answer, the best
     /// first.
-    pub(crate) rivals: Vec<Errors12>,
+    pub(crate) rivals: Vec<Rival>,
     pub(crate) fitted: Errors12,
     /// What the explanation leaves if it is true, and what is left in air without gusts.
     pub(crate) floor: Floor,
     pub(crate) calm: Floor,
+}
+
+/// What held-out flights say of another name.
+#[derive(Debug)]
+pub(crate) struct Rival {
+    pub(crate) errors: Errors12,
+    /// Evidence against it, nats; below 0 where they speak for it.
+    pub(crate) nats: f64,
 }
 
 /// Re-simulates the held-out flights as the vehicle was, with the explanation and with other names.
@@ -42,12 +50,15 @@ pub(crate) fn prove(
     let fitted_at = at(&whole.members, &whole.base)?;
     let flown = Flown::new(unseen, &fitted_at)?;
     let errors =
-        |hypothesis: Hypothesis| Ok::<_, GapError>(Flown::new(unseen, &hypothesis)?.errors());
+        |hypothesis: &Hypothesis| Ok::<_, GapError>(Flown::new(unseen, hypothesis)?.errors());
     let Some(fitted) = flown.errors() else { return Ok(None) };
-    let Some(nominal) = errors(at(&[], &whole.base)?)? else { return Ok(None) };
+    let Some(nominal) = errors(&at(&[], &whole.base)?)? else { return Ok(None) };
+    let left = Left::of(unseen, naming, &unseen.residual(&fitted_at)?);
     let mut rivals = Vec::with_capacity(others.len());
     for rival in others {
-        rivals.extend(errors(at(&rival.members, &search.whole(rival).base)?)?);
+        let hypothesis = at(&rival.members, &search.whole(rival).base)?;
+        let nats = Left::of(unseen, naming, &unseen.residual(&hypothesis)?).behind(&left);
+        rivals.extend(errors(&hypothesis)?.map(|errors| Rival { errors, nats }));
     }
     let calm = flown.floor(TURBULENCE_M_S);
     let floor = naming.gust_m_s.map_or_else(|| calm.clone(), |sigma| flown.floor(sigma));
@@ -61,7 +72,7 @@ pub(crate) fn gap(held_out: &[(String, FlightLog)], proof: &HeldOut) -> Gap {
     let before = proof.nominal.over(&proof.calm.of(&proof.fitted));
     let floor = proof.floor.of(&proof.fitted);
     let after = proof.fitted.over(&floor);
-    let best_rival = proof.rivals.iter().map(|rival| rival.over(&floor)).reduce(f64::min);
+    let best_rival = proof.rivals.iter().map(|rival| rival.errors.over(&floor)).reduce(f64::min);
     let removed = |left: f64| if before > 1.0 { 1.0 - (left - 1.0) / (before - 1.0) } else { 0.0 };
     Gap {
         held_out_flights: held_out.iter().map(|(name, _)| name.clone()).collect(),
@@ -118,18 +129,15 @@ pub(crate) fn hold(
     let settled = |members: &[Member]| settled_on(unseen, search, naming, members, &whole.base);
     let residual = |point: &Point| unseen.residual(&hypothesis(unseen, search.catalogue, point)?);
     let point = settled(&whole.members)?;
-    let squares = |rows: &[f64]| -> f64 {
-        let white = naming.found.linear.whitener.apply(&unseen.segments, rows);
-        white.iter().map(|x| x * x).sum()
-    };
     let rows = residual(&point)?;
+    let left = Left::of(unseen, naming, &rows);
     let with = mean_squares(unseen, &rows);
     let mut all = Vec::with_capacity(whole.members.len());
     for out in 0..whole.members.len() {
         let mut rest = whole.members.clone();
         rest.remove(out);
         let others = residual(&settled(&rest)?)?;
-        let nats = 0.5 * BETA * (squares(&others) - squares(&rows));
+        let nats = Left::of(unseen, naming, &others).behind(&left);
         let without = mean_squares(unseen, &others);
         let alone = residual(&Point { members: rest, base: point.base.clone() })?;
         let change: Vec<f64> = rows.iter().zip(&alone).map(|(with, out)| out - with).collect();
@@ -146,6 +154,35 @@ pub(crate) fn hold(
         all.push(Held { better, nats });
     }
     Ok(Some(all))
+}
+
+/// What is left of flights by channel, in units of the noise.
+struct Left {
+    squares: [f64; CHANNELS.len()],
+    rows: [f64; CHANNELS.len()],
+}
+
+impl Left {
+    fn of(unseen: &Predictor, naming: &Naming, rows: &[f64]) -> Self {
+        let whitener = &naming.found.linear.whitener;
+        let mut left = Self { squares: [0.0; CHANNELS.len()], rows: [0.0; CHANNELS.len()] };
+        let white = whitener.apply(&unseen.segments, rows);
+        for (x, (_, _, channel)) in white.iter().zip(whitener.places(&unseen.segments)) {
+            left.squares[channel] += x * x;
+            left.rows[channel] += 1.0;
+        }
+        left
+    }
+
+    /// Evidence for a better one, nats. What that leaves in a channel is the noise there: flights
+    /// that no model predicts tell models apart that much less.
+    fn behind(&self, better: &Self) -> f64 {
+        let of = |channel: usize| {
+            let noise = better.squares[channel] / better.rows[channel].max(1.0);
+            (self.squares[channel] - better.squares[channel]) / noise.max(1.0)
+        };
+        0.5 * BETA * (0..CHANNELS.len()).map(of).sum::<f64>()
+    }
 }
 
 /// Mean square of a residual by channel; 0 where it has none.

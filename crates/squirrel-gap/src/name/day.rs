@@ -4,11 +4,9 @@
 
 use super::{Catalogue, Naming, Search, explain};
 use crate::GapError;
-use crate::predictor::Predictor;
+use crate::predictor::{FORCE_Z, Predictor};
 use squirrel_core::effects::Declared;
 
-/// The channel that shows it.
-const FORCE_Z: usize = 2;
 /// Part of the tolerance of thrust by which it may differ among flights of one machine.
 const SHARE_OF_TOLERANCE: f64 = 1.0;
 

@@ -11,7 +11,7 @@ use super::search::LEAST;
 use super::whiten::Whitener;
 use crate::GapError;
 use crate::leftover::noise;
-use crate::predictor::{DYNAMIC, HEIGHT_KNOTS, Predictor};
+use crate::predictor::{DYNAMIC, FORCE_Z, HEIGHT_KNOTS, Predictor};
 use nalgebra::{DMatrix, DVector};
 
 /// The predictor as a linear model about a point.
@@ -213,6 +213,9 @@ const HEIGHT_STEPS: usize = 5;
 /// Puts what the sensors and the thrust of flights were off by where it fits best inside its
 /// tolerance: of flights that nothing was fitted to, this is not known from others.
 ///
+/// Sensors as evidence has it, thrust by the plain error of its force: to noise that is known to be
+/// slow, a thrust that is off for a whole flight is next to nothing.
+///
 /// * `thrust_fraction` - by how much thrust may differ from that of the flights that were fitted
 ///
 /// # Errors
@@ -227,6 +230,7 @@ pub(crate) fn settle_flights(
     let segments = &predictor.segments;
     let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
     let mut of_flights: Vec<(usize, f64, Column)> = Vec::new();
+    let mut thrusts: Vec<(usize, f64, Vec<f64>)> = Vec::new();
     for column in catalogue.shared_columns()..catalogue.columns(predictor) {
         let (Other::Flight { flight, is_thrust }, sd) = catalogue.other(column) else { continue };
         let sd = if is_thrust { thrust_fraction.max(sd) } else { sd };
@@ -238,6 +242,9 @@ pub(crate) fn settle_flights(
             sd,
             Some(flight),
         )?;
+        if is_thrust {
+            thrusts.push((column, sd, slope.clone()));
+        }
         of_flights.push((column, sd, whitener.apply_to(segments, &Column::of(slope))));
     }
     for _ in 0..HEIGHT_STEPS {
@@ -265,6 +272,17 @@ pub(crate) fn settle_flights(
         }
         if is_last {
             break;
+        }
+    }
+    let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
+    let of_thrust = segments.iter().filter(|s| s.channel == FORCE_Z).map(|s| s.rows.clone());
+    for (column, sd, slope) in thrusts {
+        let [along, square] = of_thrust.clone().flatten().fold([0.0, 0.0], |[along, square], row| {
+            [along + residual[row] * slope[row], square + slope[row] * slope[row]]
+        });
+        if square > 0.0 {
+            let x = point.base[column] + along / square;
+            point.base[column] = x.clamp(-INSIDE * sd, INSIDE * sd);
         }
     }
     Ok(())

@@ -118,14 +118,35 @@ fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
     // Gusts look like drag or wind for a while: what is named beside them must be worth it in their
     // noise.
     let windy = Search { gust_m_s: Some(sigma), ..*search };
-    let mut again = judge(&windy, windy.run()?)?;
-    let Some(sigma) = gust_of(&windy, &again)?.filter(|sigma| (least..=most).contains(sigma))
-    else {
-        return Ok(naming);
+    let again = judge(&windy, windy.run()?)?;
+    // In louder noise, in which what is slow is no noise, the flights may show a way to a name that
+    // was not seen in calm air.
+    let start = (naming.found.best.members.is_empty() && !again.found.best.members.is_empty())
+        .then(|| search.settled(&again.found.best));
+    if let Some(windy) = with_gusts(search, &windy, again)? {
+        return Ok(windy);
+    }
+    let Some(start) = start else { return Ok(naming) };
+    let found = search.run_from(start)?;
+    if found.best.members.is_empty() { Ok(naming) } else { judge(search, found) }
+}
+
+/// An explanation in gusts, if gusts they are that blow: in all that they act on and in nothing
+/// else, as strong as is plausible.
+///
+/// * `windy` - the search that has found it
+fn with_gusts(
+    search: &Search<'_>,
+    windy: &Search<'_>,
+    mut again: Naming,
+) -> Result<Option<Naming>, GapError> {
+    let (least, most) = GUST_M_S;
+    let Some(sigma) = gust_of(windy, &again)?.filter(|sigma| (least..=most).contains(sigma)) else {
+        return Ok(None);
     };
     let calm = blown(search, &again, TURBULENCE_M_S, sigma)?;
     if calm.is_foreign() || calm.is_predicted() {
-        return Ok(naming);
+        return Ok(None);
     }
     let mut left = blown(search, &again, sigma, sigma)?;
     // A flight holds few gusts: their size scatters from one to the next.
@@ -136,13 +157,13 @@ fn explain(search: &Search<'_>) -> Result<Naming, GapError> {
             >= GUST_SHARE
     };
     if left.excess.iter().any(|(channel, ratio)| *ratio >= GUST_SCATTER || !blown_on(*channel)) {
-        return Ok(naming);
+        return Ok(None);
     }
     left.excess.clear();
     again.gust_m_s = Some(sigma);
     again.gust_nats = gust_nats(&calm);
     again.leftover = left;
-    Ok(again)
+    Ok(Some(again))
 }
 
 /// Standard deviations, from blocks of the flights, by which a number stands out from a model that

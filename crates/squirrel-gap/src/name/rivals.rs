@@ -60,7 +60,7 @@ impl Search<'_> {
                 all.push(load);
             }
         }
-        all.sort_by(|a, b| b.log_evidence.total_cmp(&a.log_evidence));
+        all.sort_by(|a, b| self.weighed(b).total_cmp(&self.weighed(a)));
         Ok(all)
     }
 

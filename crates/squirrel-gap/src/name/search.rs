@@ -80,10 +80,19 @@ impl Found {
 }
 
 impl Search<'_> {
+    /// The best set, from the vehicle file as it is.
+    ///
     /// # Errors
     /// What the predictor says.
     pub(crate) fn run(&self) -> Result<Found, GapError> {
-        let mut point = self.nothing();
+        self.run_from(self.nothing())
+    }
+
+    /// The best set, from where an explanation has everything.
+    ///
+    /// # Errors
+    /// What the predictor says.
+    pub(crate) fn run_from(&self, mut point: Point) -> Result<Found, GapError> {
         let mut linear = self.linear(&point, None)?;
         let mut round = 1;
         loop {
@@ -214,6 +223,12 @@ impl Search<'_> {
             Some(sigma) if profile.mimic == Mimic::Gusts => BLOWN_NATS * (sigma * sigma).max(1.0),
             Some(_) => BESIDE_GUSTS_NATS,
         }
+    }
+
+    /// Evidence of a set, less what its names must be worth beyond others', nats.
+    pub(crate) fn weighed(&self, set: &Scored) -> f64 {
+        let beyond = set.members.iter().map(|member| self.needed(member) - NATS_MIN);
+        set.log_evidence - beyond.sum::<f64>()
     }
 
     /// A set without each of its members in turn.

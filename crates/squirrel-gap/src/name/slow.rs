@@ -18,7 +18,7 @@ use super::refine::{Scored, extended};
 use super::search::{Found, Search};
 use super::{Naming, judge, only};
 use crate::GapError;
-use crate::predictor::{DYNAMIC, Predictor, Segment};
+use crate::predictor::{DYNAMIC, FORCE_Z, Predictor, Segment};
 use squirrel_core::effects::{BatterySag, Effect};
 use std::rc::Rc;
 
@@ -29,8 +29,6 @@ const SIZE_TIMES: f64 = 2.0;
 /// By how much thrust may drift from the middle of a flight to its ends, as a fraction, one
 /// standard deviation: 2 % over the flight.
 const DRIFT: f64 = 0.01;
-/// The channel that shows it.
-const FORCE_Z: usize = 2;
 /// Part of its evidence that a name must lose to such a drift to be doubted for it: what is at the
 /// edge of its bar anyway falls for less.
 const LOST: f64 = 0.5;

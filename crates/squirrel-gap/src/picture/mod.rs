@@ -212,7 +212,7 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
     };
     let at = |channel: usize, bin: usize| Errors {
         nominal: flown.nominal.rms(channel, bin),
-        rival: flown.rivals.first().map_or(f64::NAN, |rival| rival.rms(channel, bin)),
+        rival: flown.rivals.first().map_or(f64::NAN, |rival| rival.errors.rms(channel, bin)),
         fitted: flown.fitted.rms(channel, bin),
         floor: flown.floor.mean.rms(channel, bin),
     };
@@ -237,7 +237,7 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
             errors: at(channel, last),
             second: Errors {
                 nominal: flown.nominal.mse()[channel].sqrt(),
-                rival: flown.rivals.first().map_or(f64::NAN, |rival| rival.mse()[channel].sqrt()),
+                rival: flown.rivals.first().map_or(f64::NAN, |rival| rival.errors.mse()[channel].sqrt()),
                 fitted: flown.fitted.mse()[channel].sqrt(),
                 floor: flown.floor.mean.mse()[channel].sqrt(),
             },

@@ -59,6 +59,8 @@ pub(crate) const CHANNELS: [&str; 12] = [
 ];
 /// Channels of the dynamics; the rest are kinematic.
 pub(crate) const DYNAMIC: usize = 6;
+/// The channel that shows thrust.
+pub(crate) const FORCE_Z: usize = 2;
 /// The first channel of the gyroscope against the attitude, which tells of nothing but these two.
 pub(crate) const TURNING: usize = 9;
 
