@@ -50,6 +50,46 @@ fn thrust_sags_with_the_battery_of_a_crazyflie() {
     assert!(after <= 0.5 * before, "{after} N, without sag {before} N");
 }
 
+/// One flight of NanoBench against another one.
+fn one_against_another(vehicle: &str, fitted: &[&str], held_out: &str) -> Verdict {
+    let folder = flights("nanobench");
+    let read = |name: &&str| {
+        ((*name).to_owned(), imported("nanobench.toml", &folder.join(format!("{name}.csv"))))
+    };
+    let fitted: Flights = fitted.iter().map(read).collect();
+    diagnosed(&self::vehicle(vehicle), &fitted, &vec![read(&held_out)]).verdict
+}
+
+/// A slow flight alone does not tell a sag from rotors that are late by twice what the file allows;
+/// another flight, on a fuller battery, does.
+#[test]
+fn held_out_flights_tell_names_apart_that_fitted_flights_do_not() {
+    let verdict = one_against_another(
+        "crazyflie21_datasheet.toml",
+        &["B9_trefoil_slow_rep1"],
+        "B3_figure8_fast_rep1",
+    );
+    let rival = &verdict.alternatives[0];
+    assert_eq!(rival.effects, ["motor_lag"]);
+    assert!(verdict.effects[0].evidence_nats - rival.evidence_nats < 3.0, "{rival:?}");
+    assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
+    assert_eq!(verdict.effects[0].name, "battery_sag");
+}
+
+/// Thrust of the held-out flight is another one, as it is from day to day with brushed motors: no
+/// error of a name, and it hides none.
+#[test]
+fn the_thrust_of_a_held_out_flight_is_its_own() {
+    let verdict = one_against_another(
+        "crazyflie21_brushed.toml",
+        &["B3_figure8_fast_rep1", "B8_star_slow_rep1", "B9_trefoil_slow_rep1"],
+        "B2_circle_medium_rep1",
+    );
+    assert_eq!(verdict.verdict, Kind::Named, "{}", verdict.words);
+    let gap = verdict.gap.unwrap();
+    assert!(gap.removed_fraction > 0.5, "{gap:?}");
+}
+
 /// Where the thrust curve is free, the same flights cannot tell the curve from the sag.
 #[test]
 fn sag_and_a_free_thrust_curve_are_confounded() {
