@@ -205,11 +205,11 @@ pub(crate) fn standing(
         if !is_refused || naming.found.best.members.is_empty() {
             return Ok(naming);
         }
-        let clear =
-            |index| search.stands_out(&naming.found.best, index, &naming.deviations) >= STANDS;
-        let stands = (0..naming.found.best.members.len()).all(clear)
-            && slow::leaves_nothing_else(search, &naming)?
-            && hold(&naming)?.is_none_or(|holds| holds.iter().all(|held| held.better));
+        let holds = hold(&naming)?;
+        let stands = (0..naming.found.best.members.len())
+            .all(|index| clearness(search, &naming, holds.as_deref(), index) >= STANDS)
+            && holds.as_ref().is_none_or(|holds| holds.iter().all(|held| held.better))
+            && slow::leaves_nothing_else(search, &naming, holds.as_deref())?;
         return Ok(Naming { stands, ..naming });
     }
     let mut kept: Vec<Member> = naming.found.best.members.clone();
@@ -217,7 +217,7 @@ pub(crate) fn standing(
     loop {
         let at = now.as_ref().unwrap_or(&naming);
         let holds = hold(at)?;
-        let clear = |index: usize| search.stands_out(&at.found.best, index, &at.deviations);
+        let clear = |index: usize| clearness(search, at, holds.as_deref(), index);
         let falls = |index: &usize| {
             holds.as_ref().is_some_and(|holds| !holds[*index].better) || clear(*index) < STANDS
         };
@@ -238,14 +238,36 @@ pub(crate) fn standing(
     Ok(Naming { stands: true, ..now.unwrap_or(naming) })
 }
 
+/// By how many standard deviations a name stands out: by blocks of the flights, and by those that
+/// were held out, which are evidence of the same thing.
+fn clearness(
+    search: &Search<'_>,
+    naming: &Naming,
+    holds: Option<&[Held]>,
+    index: usize,
+) -> f64 {
+    let own = search.stands_out(&naming.found.best, index, &naming.deviations);
+    let nats = holds.map_or(0.0, |holds| holds[index].nats);
+    (own * own + 2.0 * nats).max(0.0).sqrt()
+}
+
 /// An explanation that leaves nothing without those names whose numbers blocks of the flights do
 /// not tell from what the vehicle file has, the least clear first: evidence counts rows that a model
-/// misses together as if each were another proof.
+/// misses together as if each were another proof. Nor with those that others, once their numbers
+/// are right, leave less for than they had to have to join them.
 ///
 /// # Errors
 /// What the predictor says.
 fn clear(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
-    dropping(search, naming, |naming| Ok(search.least_clear(naming)))
+    let naming = dropping(search, naming, |naming| Ok(search.least_clear(naming)))?;
+    dropping(search, naming, |naming| {
+        // Rotors of one machine are one thing.
+        let is_one = search.catalogue.is_of_one_machine || naming.found.best.members.len() < 2;
+        let worth = |i: &usize| naming.found.worth(*i);
+        let all = 0..naming.found.best.members.len();
+        let least = all.min_by(|a, b| worth(a).total_cmp(&worth(b)));
+        Ok(least.filter(|i| !is_one && worth(i) < search::FURTHER_NATS))
+    })
 }
 
 /// An explanation that leaves nothing without those names that held-out flights are predicted

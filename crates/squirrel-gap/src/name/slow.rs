@@ -16,7 +16,7 @@ use super::linear::Linear;
 use super::point::Member;
 use super::refine::{Scored, extended};
 use super::search::{Found, Search};
-use super::{Naming, judge, only};
+use super::{Held, Naming, judge, only};
 use crate::GapError;
 use crate::predictor::{DYNAMIC, FORCE_Z, Predictor, Segment};
 use squirrel_core::effects::{BatterySag, Effect};
@@ -115,16 +115,24 @@ fn drifts(predictor: &Predictor<'_>, linear: &Linear) -> (Vec<Column>, Vec<f64>)
 /// Whether flights ask for every name of an explanation beside what is slow, and nothing else is
 /// left.
 ///
+/// * `holds` - what held-out flights say of each name
+///
 /// # Errors
 /// What the predictor says.
-pub(super) fn leaves_nothing_else(search: &Search<'_>, naming: &Naming) -> Result<bool, GapError> {
+pub(super) fn leaves_nothing_else(
+    search: &Search<'_>,
+    naming: &Naming,
+    holds: Option<&[Held]>,
+) -> Result<bool, GapError> {
     let linear = Rc::new(with_slow(search.predictor, naming));
     let best = search.score(&linear, &naming.found.best.members)?;
     let without = search.without(&linear, &best)?;
-    let is_asked_for = |(member, rest): (&Member, &Scored)| {
-        best.log_evidence >= rest.log_evidence + search.needed(member)
+    let is_asked_for = |index: usize| {
+        let unseen = holds.map_or(0.0, |holds| holds[index].nats);
+        let worth = best.log_evidence - without[index].log_evidence + unseen;
+        worth >= search.needed(&best.members[index])
     };
-    if !(best.members.iter().zip(&without).all(is_asked_for) && search.is_off(&best)) {
+    if !((0..without.len()).all(is_asked_for) && search.is_off(&best)) {
         return Ok(false);
     }
     let null = Rc::clone(&naming.found.null);
