@@ -2,7 +2,8 @@
 //! motors, worn cells or a new propeller by per cents. One number for all flights then leaves a
 //! force along z that is each flight's own.
 
-use super::{Catalogue, Naming, Search, explain};
+use super::gusts::explain;
+use super::{Catalogue, Naming, Search};
 use crate::GapError;
 use crate::predictor::{FORCE_Z, Predictor};
 use squirrel_core::effects::Declared;

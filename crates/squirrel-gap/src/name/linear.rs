@@ -277,9 +277,10 @@ pub(crate) fn settle_flights(
     let residual = predictor.residual(&hypothesis(predictor, catalogue, point)?)?;
     let of_thrust = segments.iter().filter(|s| s.channel == FORCE_Z).map(|s| s.rows.clone());
     for (column, sd, slope) in thrusts {
-        let [along, square] = of_thrust.clone().flatten().fold([0.0, 0.0], |[along, square], row| {
-            [along + residual[row] * slope[row], square + slope[row] * slope[row]]
-        });
+        let [along, square] =
+            of_thrust.clone().flatten().fold([0.0, 0.0], |[along, square], row| {
+                [along + residual[row] * slope[row], square + slope[row] * slope[row]]
+            });
         if square > 0.0 {
             let x = point.base[column] + along / square;
             point.base[column] = x.clamp(-INSIDE * sd, INSIDE * sd);

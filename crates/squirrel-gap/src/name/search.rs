@@ -3,13 +3,12 @@
 
 use super::evidence::BETA;
 use super::linear::Linear;
-use super::parameters::{Candidate, Catalogue};
+use super::parameters::Catalogue;
 use super::point::{Member, Point, hypothesis};
 use super::refine::Scored;
-use super::{CLEAR, Naming};
 use crate::GapError;
 use crate::predictor::{Hypothesis, Predictor};
-use squirrel_core::effects::{Effect, Mimic, Profile, Ratio, Response, WeakRotor};
+use squirrel_core::effects::{Effect, Mimic, Profile, Response, WeakRotor};
 use std::rc::Rc;
 
 /// What an effect must be worth to be named, nats.
@@ -28,16 +27,8 @@ const JUMP_NATS: f64 = 40.0;
 /// What a scale of the accelerometer must be worth: an attitude that leans into accelerations makes
 /// one, too.
 const LEANS_NATS: f64 = 12.0;
-/// Tolerances beyond which a number is off: what is inside them the vehicle file allows.
-pub(super) const TOLERANCES_MIN: f64 = 3.0;
 /// Part of its smallest size that a number without a sign has at least.
 pub(super) const LEAST: f64 = 0.02;
-/// Part of its bounds at which a number is at its end.
-const AT_ITS_END: f64 = 0.98;
-/// How much larger than the largest plausible size a number may be.
-const PLAUSIBLE: f64 = 1.3;
-/// How many times the largest plausible size a first step may lead to.
-const FIRST_STEP: f64 = 1.5;
 /// Candidates that are refined after each linear ranking.
 const REFINED: usize = 4;
 /// A candidate is given up if its first step leaves more than this part of what must be explained,
@@ -313,45 +304,6 @@ impl Search<'_> {
         Ok(best)
     }
 
-    /// Whether each member is beyond what the vehicle file allows it, and none at the end of what
-    /// is plausible: what is forced into a name goes there.
-    pub(crate) fn is_off(&self, scored: &Scored) -> bool {
-        scored
-            .members
-            .iter()
-            .all(|member| self.is_beyond_tolerance(member) && !self.is_at_its_end(member))
-    }
-
-    pub(crate) fn is_at_its_end(&self, member: &Member) -> bool {
-        self.catalogue.own(member).any(|p| {
-            let (least, most) = p.bounds;
-            let value = member.values[p.slot];
-            // What takes away all that the vehicle file has is no end of anything.
-            value >= AT_ITS_END * most || (least == -most && value <= AT_ITS_END * least)
-        }) || self.free_slots(member).into_iter().any(|slot| {
-            // A number that gives an effect its form, and does not want to be there.
-            let range = self.range(member, slot);
-            let is_own = self.catalogue.own(member).any(|p| p.slot == slot);
-            !is_own && !range.signed && member.values[slot] * AT_ITS_END <= LEAST * range.smallest
-        })
-    }
-
-    /// By the numbers of the standard form, unless this form has others.
-    fn is_beyond_tolerance(&self, member: &Member) -> bool {
-        let before = self.catalogue.absent(self.predictor, member.candidate).values;
-        let free = self.free_slots(member);
-        let mut standard = self.catalogue.own(member).filter(|p| free.contains(&p.slot)).peekable();
-        // What starts flat grows with the square of its number, from what the file has as from
-        // nothing.
-        let is_flat = self.profile(member).response == Response::StartsFlat;
-        let off = |was: f64, is: f64| {
-            if is_flat { (is * is - was * was).abs().sqrt() } else { (is - was).abs() }
-        };
-        standard.peek().is_none()
-            || standard
-                .any(|p| off(before[p.slot], member.values[p.slot]) >= TOLERANCES_MIN * p.least())
-    }
-
     /// Drops members that refinement has made too small to be off; whether there were any.
     fn prune(&self, linear: &Linear, best: &mut Scored) -> Result<bool, GapError> {
         let before = best.members.len();
@@ -375,133 +327,6 @@ impl Search<'_> {
         let without = self.without(&linear, &best)?;
         self.finish(&mut best);
         Ok(Found { linear, null: Rc::clone(&found.null), best, without, beaten: None })
-    }
-
-    /// By how many standard deviations a member's number differs from what the vehicle file has,
-    /// the clearest of them.
-    ///
-    /// * `deviations` - of the free numbers
-    pub(crate) fn stands_out(&self, set: &Scored, index: usize, deviations: &[f64]) -> f64 {
-        let before = self.catalogue.absent(self.predictor, set.members[index].candidate).values;
-        let own = set.free.iter().zip(deviations).filter(|((member, _), _)| *member == index);
-        own.map(|((_, slot), sd)| (set.members[index].values[*slot] - before[*slot]).abs() / sd)
-            .fold(0.0, f64::max)
-    }
-
-    /// Whether a member is one side of a ratio and farther off than is plausible. Flights show the
-    /// ratio; how far off each side may be chose this one, and says nothing of that far out.
-    pub(crate) fn is_far_side(&self, member: &Member) -> bool {
-        let before = self.catalogue.absent(self.predictor, member.candidate).values;
-        ratio(&self.catalogue.candidates[member.candidate]).is_some()
-            && self
-                .catalogue
-                .own(member)
-                .any(|p| (member.values[p.slot] - before[p.slot]).abs() > p.largest)
-    }
-
-    /// The member that stands out least, if that is too little to be told.
-    pub(crate) fn least_clear(&self, naming: &Naming) -> Option<usize> {
-        let best = &naming.found.best;
-        let clear = |i: &usize| self.stands_out(best, *i, &naming.deviations);
-        let unclear = (0..best.members.len()).filter(|i| clear(i) < CLEAR);
-        unclear.min_by(|a, b| clear(a).total_cmp(&clear(b)))
-    }
-
-    /// Whether no member is larger than anything plausible: what is forced into a name goes to its
-    /// limit.
-    pub(crate) fn is_plausible(&self, scored: &Scored) -> bool {
-        scored.members.iter().all(|member| {
-            self.free_slots(member).into_iter().all(|slot| {
-                member.values[slot].abs() <= PLAUSIBLE * self.range(member, slot).largest
-            })
-        })
-    }
-
-    /// Priors of a set with one candidate more, as large as is plausible.
-    pub(super) fn widened(&self, set: &Scored, candidate: &Candidate) -> Vec<f64> {
-        let offset = set.free.len();
-        let mut prior = set.prior.clone();
-        // A payload is one thing at several lengths.
-        if swings(&candidate.profile) {
-            for (p, parameter) in self.catalogue.parameters.iter().enumerate() {
-                if self.catalogue.candidates[parameter.candidate].effect == candidate.effect {
-                    prior[offset + p] = 0.0;
-                }
-            }
-        }
-        for p in &candidate.parameters {
-            prior[offset + p] = self.catalogue.parameters[*p].slab;
-        }
-        prior
-    }
-
-    /// Candidates by the evidence that a linear model gives them beside a set, best first, with
-    /// their linear numbers.
-    pub(crate) fn ranked(&self, set: &Scored, except: &[&str]) -> Vec<(f64, Member)> {
-        let offset = set.free.len();
-        let mut all = Vec::new();
-        for (index, candidate) in self.catalogue.candidates.iter().enumerate() {
-            let in_set = set
-                .members
-                .iter()
-                .any(|m| excludes(&self.catalogue.candidates[m.candidate], candidate));
-            if in_set || except.contains(&candidate.effect) {
-                continue;
-            }
-            let Some(posterior) = set.gram.posterior(&self.widened(set, candidate), BETA) else {
-                continue;
-            };
-            let mut member = self.catalogue.absent(self.predictor, index);
-            let mut plausible = true;
-            for p in &candidate.parameters {
-                let parameter = &self.catalogue.parameters[*p];
-                let value = &mut member.values[parameter.slot];
-                let own = *value;
-                *value += posterior.mean[offset + p];
-                // Less than a file has may be as little as nothing; what it has not is not there by
-                // less than nothing.
-                if !parameter.signed && own > 0.0 {
-                    *value = value.max(LEAST * parameter.smallest);
-                }
-                plausible &= parameter.signed || *value > 0.0;
-                let (least, most) = parameter.bounds;
-                *value = value.clamp(
-                    least.max(-FIRST_STEP * parameter.largest),
-                    most.min(FIRST_STEP * parameter.largest),
-                );
-                // What starts flat is not found from below.
-                if self.catalogue.starts_flat(parameter.candidate) {
-                    *value = value.max(parameter.smallest);
-                }
-            }
-            if !plausible {
-                continue;
-            }
-            all.extend(self.without_delay(&member).map(|other| (posterior.log_evidence, other)));
-            all.push((posterior.log_evidence, member));
-        }
-        all.sort_by(|a, b| b.0.total_cmp(&a.0));
-        // Of the several lines of a payload, the best two.
-        let mut payloads = 0;
-        all.retain(|(_, m)| {
-            let is_payload = swings(self.profile(m));
-            payloads += usize::from(is_payload);
-            !is_payload || payloads <= 2
-        });
-        all
-    }
-
-    /// A lag or delay of the vehicle file started from nothing: far off, what is quick has no slope
-    /// that leads there.
-    fn without_delay(&self, member: &Member) -> Option<Member> {
-        let stated = self.catalogue.absent(self.predictor, member.candidate);
-        let own = self.catalogue.own(member).next()?;
-        let is_stated = stated.values[own.slot] >= own.smallest;
-        (self.catalogue.bends(member.candidate) && is_stated).then(|| {
-            let mut other = stated;
-            other.values[own.slot] = LEAST * own.smallest;
-            other
-        })
     }
 
     pub(crate) fn effect(&self, member: &Member) -> &'static str {
@@ -555,25 +380,4 @@ impl Search<'_> {
         }
         Ok(if changed { Vec::new() } else { all })
     }
-}
-
-/// Whether an effect leaves no room for another: itself, and where flights show a ratio alone, what
-/// stands on its other side.
-fn excludes(named: &Candidate, other: &Candidate) -> bool {
-    let on_one_ratio = ratio(named).is_some() && ratio(named) == ratio(other);
-    // Two rotors may be weak.
-    let rotors = |c: &Candidate| c.effect == WEAK_ROTOR;
-    let same = named.effect == other.effect && !(rotors(named) && named.fixed != other.fixed);
-    same || on_one_ratio
-}
-
-/// The ratio of which a candidate, with the choices that it makes, changes one side.
-fn ratio(candidate: &Candidate) -> Option<Ratio> {
-    let side = candidate.profile.side_of?;
-    let makes = |choice: usize| candidate.fixed.iter().any(|(_, value)| *value as usize == choice);
-    side.choice.is_none_or(makes).then_some(side.ratio)
-}
-
-fn swings(profile: &Profile) -> bool {
-    matches!(profile.response, Response::Swings { .. })
 }

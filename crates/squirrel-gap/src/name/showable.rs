@@ -14,9 +14,11 @@
 //! that holds in nearly all flights like these, below another in hardly any.
 
 use super::evidence::{BETA, Posterior};
+use super::gusts::{GUST_M_S, GUST_SHARE};
+use super::off::TOLERANCES_MIN;
 use super::parameters::Candidate;
-use super::search::{Search, TOLERANCES_MIN};
-use super::{GUST_M_S, GUST_SHARE};
+use super::search::Search;
+
 use crate::GapError;
 use crate::leftover::{SLOW_RATIO, noise, slow_parts};
 use crate::predictor::{Predictor, TURBULENCE_M_S};

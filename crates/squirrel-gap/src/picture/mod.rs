@@ -237,7 +237,10 @@ fn proof(flown: Option<&Flown>, flights: Vec<String>, rival: &str) -> HeldOut {
             errors: at(channel, last),
             second: Errors {
                 nominal: flown.nominal.mse()[channel].sqrt(),
-                rival: flown.rivals.first().map_or(f64::NAN, |rival| rival.errors.mse()[channel].sqrt()),
+                rival: flown
+                    .rivals
+                    .first()
+                    .map_or(f64::NAN, |rival| rival.errors.mse()[channel].sqrt()),
                 fitted: flown.fitted.mse()[channel].sqrt(),
                 floor: flown.floor.mean.mse()[channel].sqrt(),
             },

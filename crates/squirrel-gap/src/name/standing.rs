@@ -1,0 +1,169 @@
+//! Which names stand: beside a model that misses a little everywhere, in flights that were held out,
+//! and clear of what the vehicle file has.
+
+use super::point::Member;
+use super::search::{FURTHER_NATS, Search};
+use super::{Naming, only, slow};
+use crate::GapError;
+use crate::leftover::Leftover;
+use crate::verdict::Left;
+
+/// What held-out flights say of a name.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Held {
+    /// They are predicted better with it.
+    pub(crate) better: bool,
+    /// By so much in evidence, nats; below 0 where they speak against it.
+    pub(crate) nats: f64,
+}
+
+/// Standard deviations, from blocks of the flights, by which a number stands out from a model that
+/// misses a little everywhere.
+pub(crate) const STANDS: f64 = 5.0;
+/// The same where nothing is left: with less the flights do not tell a number from what the file has.
+pub(crate) const CLEAR: f64 = 3.0;
+
+/// Part of what is above noise that names explain which leave something in forces alone, or in
+/// moments.
+const MOST: f64 = 0.5;
+
+/// The explanation with those names alone that stand beside what the model misses everywhere, or
+/// with all of them where they stand beside what is slow in each flight; as it was where what is
+/// left is another thing, or nothing.
+///
+/// * `hold` - of each name, whether held-out flights want it; `None` where there are none
+///
+/// # Errors
+/// What the predictor says.
+pub(crate) fn standing(
+    search: &Search<'_>,
+    naming: Naming,
+    hold: impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
+) -> Result<Naming, GapError> {
+    let naming = held(search, clear(search, slow::beside_drift(search, naming)?)?, &hold)?;
+    // What is left of forces alone, or of moments, may be one missing effect: names must explain
+    // most of what is there.
+    let most = |leftover: &Leftover| leftover.is_in_all || Left::of(leftover).share_removed >= MOST;
+    let is_candidate = |naming: &Naming| {
+        naming.leftover.is_everywhere
+            && most(&naming.leftover)
+            && !naming.leftover.is_foreign()
+            && naming.gust_m_s.is_none()
+            && !naming.found.best.members.is_empty()
+    };
+    if !is_candidate(&naming) {
+        let is_refused = naming.leftover.is_real() && naming.gust_m_s.is_none();
+        if !is_refused || naming.found.best.members.is_empty() {
+            return Ok(naming);
+        }
+        let holds = hold(&naming)?;
+        let stands = (0..naming.found.best.members.len())
+            .all(|index| clearness(search, &naming, holds.as_deref(), index) >= STANDS)
+            && holds.as_ref().is_none_or(|holds| holds.iter().all(|held| held.better))
+            && slow::leaves_nothing_else(search, &naming, holds.as_deref())?;
+        return Ok(Naming { stands, ..naming });
+    }
+    let mut kept: Vec<Member> = naming.found.best.members.clone();
+    let mut now = None;
+    loop {
+        let at = now.as_ref().unwrap_or(&naming);
+        let holds = hold(at)?;
+        let clear = |index: usize| clearness(search, at, holds.as_deref(), index);
+        let falls = |index: &usize| {
+            holds.as_ref().is_some_and(|holds| !holds[*index].better) || clear(*index) < STANDS
+        };
+        // One at a time, the least clear first: what falls may have stood in for what stands.
+        let weakest = (0..kept.len()).filter(falls).min_by(|a, b| clear(*a).total_cmp(&clear(*b)));
+        let Some(weakest) = weakest else { break };
+        kept.remove(weakest);
+        if kept.is_empty() {
+            return Ok(naming);
+        }
+        let fewer = only(search, at, &kept)?;
+        kept.clone_from(&fewer.found.best.members);
+        if !is_candidate(&fewer) {
+            return Ok(naming);
+        }
+        now = Some(fewer);
+    }
+    Ok(Naming { stands: true, ..now.unwrap_or(naming) })
+}
+
+/// By how many standard deviations a name stands out: by blocks of the flights, and by those that
+/// were held out, which are evidence of the same thing.
+fn clearness(search: &Search<'_>, naming: &Naming, holds: Option<&[Held]>, index: usize) -> f64 {
+    let own = search.stands_out(&naming.found.best, index, &naming.deviations);
+    let nats = holds.map_or(0.0, |holds| holds[index].nats);
+    (own * own + 2.0 * nats).max(0.0).sqrt()
+}
+
+/// An explanation that leaves nothing without those names whose numbers blocks of the flights do
+/// not tell from what the vehicle file has, the least clear first: evidence counts rows that a model
+/// misses together as if each were another proof. Nor with those that others, once their numbers
+/// are right, leave less for than they had to have to join them.
+///
+/// # Errors
+/// What the predictor says.
+fn clear(search: &Search<'_>, naming: Naming) -> Result<Naming, GapError> {
+    let naming = dropping(search, naming, |naming| Ok(search.least_clear(naming)))?;
+    dropping(search, naming, |naming| {
+        // Rotors of one machine are one thing.
+        let is_one = search.catalogue.is_of_one_machine || naming.found.best.members.len() < 2;
+        let worth = |i: &usize| naming.found.worth(*i);
+        let all = 0..naming.found.best.members.len();
+        let least = all.min_by(|a, b| worth(a).total_cmp(&worth(b)));
+        Ok(least.filter(|i| !is_one && worth(i) < FURTHER_NATS))
+    })
+}
+
+/// An explanation that leaves nothing without those names that held-out flights are predicted
+/// better without and speak against more than the others spoke for them, the one worth least first.
+///
+/// # Errors
+/// What the predictor says.
+fn held(
+    search: &Search<'_>,
+    naming: Naming,
+    hold: &impl Fn(&Naming) -> Result<Option<Vec<Held>>, GapError>,
+) -> Result<Naming, GapError> {
+    dropping(search, naming, |naming| {
+        let members = &naming.found.best.members;
+        if members.is_empty() {
+            return Ok(None);
+        }
+        let Some(holds) = hold(naming)? else { return Ok(None) };
+        let worth = |i: &usize| naming.found.worth(*i);
+        let falls = (0..members.len()).filter(|i| {
+            // What is clear is told with the flights that lack it, and is no accident of some.
+            worth(i) < FURTHER_NATS
+                && !holds[*i].better
+                && worth(i) + holds[*i].nats < search.needed(&members[*i])
+        });
+        Ok(falls.min_by(|a, b| worth(a).total_cmp(&worth(b))))
+    })
+}
+
+/// An explanation without the names that are pointed at, one after the other, as long as nothing is
+/// left for that.
+///
+/// * `weakest` - which of the members falls next, if any
+///
+/// # Errors
+/// What the predictor and `weakest` say.
+fn dropping(
+    search: &Search<'_>,
+    mut naming: Naming,
+    weakest: impl Fn(&Naming) -> Result<Option<usize>, GapError>,
+) -> Result<Naming, GapError> {
+    while !naming.leftover.is_real() && naming.gust_m_s.is_none() {
+        let Some(weakest) = weakest(&naming)? else { break };
+        let mut kept = naming.found.best.members.clone();
+        kept.remove(weakest);
+        let fewer = only(search, &naming, &kept)?;
+        if fewer.leftover.is_real() {
+            break;
+        }
+        naming = fewer;
+    }
+    Ok(naming)
+}
