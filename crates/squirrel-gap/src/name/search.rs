@@ -4,6 +4,7 @@
 use super::evidence::BETA;
 use super::linear::Linear;
 use super::parameters::Catalogue;
+use super::off::TOLERANCES_MIN;
 use super::point::{Member, Point, hypothesis};
 use super::refine::Scored;
 use crate::GapError;
@@ -91,7 +92,7 @@ impl Search<'_> {
             if !self.has_settled(&best, &point.members) {
                 // Numbers first: about others, columns are others, and all that is asked now would
                 // be asked again.
-                point = self.settled(&best);
+                point = self.plausible(&linear, &best);
                 linear = self.linear(&point, Some(linear))?;
                 best = self.score(&linear, &point.members)?;
             }
@@ -113,7 +114,7 @@ impl Search<'_> {
                     beaten,
                 });
             }
-            point = self.settled(&best);
+            point = self.plausible(&linear, &best);
             linear = self.linear(&point, Some(linear))?;
             round += 1;
         }
@@ -198,6 +199,16 @@ impl Search<'_> {
             if x.abs() < ACTS * parameter.tolerance {
                 *x = 0.0;
             }
+        }
+        point
+    }
+
+    /// The same no farther out than is plausible: where a set does not explain the flights yet,
+    /// everything else bends to what is left, and about such a point no set does.
+    fn plausible(&self, linear: &Linear, set: &Scored) -> Point {
+        let mut point = self.settled(set);
+        for (x, sd) in point.base.iter_mut().zip(&linear.tolerance) {
+            *x = x.clamp(-TOLERANCES_MIN * sd, TOLERANCES_MIN * sd);
         }
         point
     }
