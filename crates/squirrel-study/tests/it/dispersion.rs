@@ -20,7 +20,7 @@ fn nobody_is_better_where_nothing_is_as_it_was_told() {
     for row in &study.rows {
         match row.over_twcc_plus {
             Some(over) => assert!(over.low <= 0.0, "{row:?}"),
-            None => assert!(row.lost.count == 0 && row.deep_unflagged == 0, "{row:?}"),
+            None => assert!(row.lost.count == 0 && row.deep_flagged_late == 0, "{row:?}"),
         }
     }
     let classes = study.rows.iter().filter(|row| row.arm == "twcc_plus").count();
