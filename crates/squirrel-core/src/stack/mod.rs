@@ -33,7 +33,7 @@ use crate::estimate::wind::Wind;
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
-use crate::math::{limit, lower, whole};
+use crate::math::{limit, lower, upper, whole};
 use crate::policy::PilotCommand;
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
 use failsafe::{
@@ -66,7 +66,14 @@ pub struct Stack {
     mixer: Mixer,
     parameters: StackParameters,
     mission: Mission,
+    /// Share of the mission's excitation that is flown.
+    excited_share: f32,
+    /// What that takes of the largest thrust, N.
+    excited_n: f32,
 }
+
+/// Of the thrust above the weight, what an excitation may take: the rest holds height.
+const EXCITED_SHARE: f32 = 0.5;
 
 /// The latest valid measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -190,7 +197,12 @@ impl Stack {
         }
         let airframe = OuterAirframe::new(&vehicle, parameters.twcc.thrust_min_n, tilt_max_rad);
         let lead = Lead::new(parameters.attitude.rotor_lead, &p.propulsion);
-        Ok(Self { mixer: Mixer::new(&vehicle)?, lead, vehicle, airframe, parameters, mission })
+        let spare_n = upper(airframe.envelope.thrust_max_n - vehicle.weight_n(), 0.0);
+        let taken_n = mission.excitation_thrust_n(&vehicle);
+        let excited_n = lower(taken_n, EXCITED_SHARE * spare_n);
+        let excited_share = if excited_n < taken_n { excited_n / taken_n } else { 1.0 };
+        let mixer = Mixer::new(&vehicle)?;
+        Ok(Self { vehicle, airframe, lead, mixer, parameters, mission, excited_share, excited_n })
     }
 
     /// The vehicle as the flight code believes it to be.
@@ -382,15 +394,21 @@ impl Stack {
             wind: state.monitor.wind().velocity,
             ..MeasuredMotion::new(position, gnss.velocity, &ned_from_body, heading_rad)
         };
-        let terms = self.parameters.twcc.update(
+        let airframe = self.airframe.supplied(state.supply.share());
+        let plus = self.parameters.twcc.plus.as_ref();
+        let ending = plus.zip(self.mission.rest_down_m(frame.time_us)).and_then(|(plus, rest)| {
+            plus.ending_sink(&airframe, &motion, &reference, rest, self.excited_n)
+        });
+        let mut terms = self.parameters.twcc.update(
             &mut state.twcc,
-            &self.airframe.supplied(state.supply.share()),
+            &airframe,
             &motion,
             &ned_from_body,
             state.known.wing_force,
-            &reference,
+            ending.as_ref().unwrap_or(&reference),
             dt_s,
         );
+        terms.clamped |= ending.is_some();
         state.command = terms.command;
         state.wing_command = self.mission.wing_command(frame.time_us).unwrap_or(terms.wing_command);
         Some(terms)
@@ -416,7 +434,7 @@ impl Stack {
             gains.filter_damping,
             dt_s,
         );
-        let excitation = self.mission.excitation(time_us);
+        let excitation = self.mission.excitation(time_us).map(|e| e.scaled(self.excited_share));
         let (mut wanted, mut thrust_n) = (state.filter, state.command.thrust_n);
         if let Some(extra) = &excitation {
             wanted = wanted.plus(&extra.attitude);
