@@ -74,6 +74,9 @@ pub struct Stack {
 
 /// Of the thrust above the weight, what an excitation may take: the rest holds height.
 const EXCITED_SHARE: f32 = 0.5;
+/// So far below its reference a vehicle has sunk, m, if it asks for so much of its thrust.
+const SUNK_M: f32 = 1.5;
+const ALL_SHARE: f32 = 0.98;
 
 /// The latest valid measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -273,6 +276,7 @@ impl Stack {
             navigated.frame.attitude.as_ref(),
             state.navigation.health,
         );
+        output.health = output.health.with(Health::SUNK, self.has_sunk(state, output));
         output.navigation = navigated.terms;
     }
 
@@ -369,16 +373,32 @@ impl Stack {
         }
     }
 
-    fn outer(&self, state: &mut StackState, frame: &SensorFrame, dt_s: f32) -> Option<TwccTerms> {
-        let (Some(gnss), Some(ned_from_body)) = (state.known.gnss, state.known.attitude) else {
-            return None;
-        };
-        let mut position = gnss.position;
+    /// Where it is believed to be, by the barometer as long as that is heard.
+    fn position(state: &StackState) -> Option<In<Ned, f32>> {
+        let mut position = state.known.gnss?.position;
         if let Some(altitude) = state.known.altitude_m
             && state.failsafe.active.reason != FailsafeReason::AltitudeLost
         {
             position.vector.z = -altitude;
         }
+        Some(position)
+    }
+
+    /// Far below the mission's reference, while its outer loop asks for all the thrust there is.
+    fn has_sunk(&self, state: &StackState, output: &StackOutput) -> bool {
+        let reference_m = output.reference.position.vector.z;
+        output.failsafe.mode == FailsafeMode::Off
+            && state.known.command.is_none()
+            && Self::position(state).is_some_and(|p| p.vector.z - reference_m > SUNK_M)
+            && state.command.thrust_n
+                >= ALL_SHARE * self.airframe.supplied(state.supply.share()).envelope.thrust_max_n
+    }
+
+    fn outer(&self, state: &mut StackState, frame: &SensorFrame, dt_s: f32) -> Option<TwccTerms> {
+        let (Some(gnss), Some(ned_from_body)) = (state.known.gnss, state.known.attitude) else {
+            return None;
+        };
+        let position = Self::position(state)?;
         self.mission.sense(
             &mut state.mission,
             frame.time_us,

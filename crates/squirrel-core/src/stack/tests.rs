@@ -408,6 +408,28 @@ fn an_excitation_follows_the_thrust_that_is_left() {
     assert_eq!(flown(1.0).0.attitude.acceleration.norm(), 0.0, "nothing is left");
 }
 
+/// Below its reference with all the thrust there is, and only then.
+#[test]
+fn who_sinks_with_all_the_thrust_says_so() {
+    let parameters = stack(AttitudeForm::Quaternion).parameters;
+    let says = |down_m: f32, ratio: f32, command: Option<PilotCommand>| {
+        let mut vehicle = squirrel();
+        vehicle.limits.thrust_max_n = ratio * vehicle.mass_kg * GRAVITY_M_S2 as f32;
+        let mission = Mission::Hover { position: In::zero() };
+        let stack = Stack::new(Vehicle::new(vehicle).unwrap(), parameters, mission).unwrap();
+        let mut frame = level(0);
+        let position = In::new(Vector3::new(0.0, 0.0, down_m));
+        frame.gnss = Some(Gnss { position, velocity: In::zero() });
+        frame.altitude_m = Some(-down_m);
+        frame.command = command;
+        stack.step(&mut StackState::default(), &frame).health.has(Health::SUNK)
+    };
+    assert!(says(2.0, 1.1, None));
+    assert!(!says(1.0, 1.1, None), "not yet");
+    assert!(!says(2.0, 2.0, None), "there is thrust to climb with");
+    assert!(!says(2.0, 1.1, Some(commanded([0.0, 0.0, 100.0, 0.0]))), "asked for from outside");
+}
+
 #[test]
 fn a_filter_that_would_run_away_is_refused() {
     let mut gains = stack(AttitudeForm::Euler).parameters.attitude;
