@@ -88,6 +88,11 @@ pub struct Row {
     pub lost: Share,
     /// Flights that sank by more than 5 m, or were lost, without any report.
     pub deep_unflagged: u32,
+    /// Flights that sank by more than 5 m of which the first report came when more than half of
+    /// that was lost, those without any report among them.
+    pub deep_flagged_late: u32,
+    /// Most height lost before a report in such flights, m.
+    pub deep_before_flag_max_m: f64,
 }
 
 /// The study.
@@ -154,6 +159,13 @@ impl Drawn {
         scenario.battery_charge = self.battery_charge;
         scenario.seed = seed;
         Ok(scenario)
+    }
+}
+
+impl Flight {
+    /// A deep sink of which nothing was said before half of it.
+    fn is_deep_and_late(&self) -> bool {
+        self.height_lost_m > DEEP_M && self.height_lost_unflagged_m > 0.5 * self.height_lost_m
     }
 }
 
@@ -230,6 +242,8 @@ fn row(
     let errors = figures(&flights, |flight| flight.rmse_m);
     let ours = figures(&of(Arm::TwccPlus), |flight| flight.rmse_m);
     let sinks = figures(&flights, |flight| flight.height_lost_m);
+    let late = flights.iter().filter(|flight| flight.is_deep_and_late());
+    let before_flag_m = late.clone().map(|flight| flight.height_lost_unflagged_m);
     Some(Row {
         thrust_to_weight: THRUST_TO_WEIGHT[condition],
         wind_m_s: name,
@@ -244,6 +258,8 @@ fn row(
             .iter()
             .filter(|flight| (flight.lost || flight.height_lost_m > DEEP_M) && !flight.flagged)
             .count() as u32,
+        deep_flagged_late: late.count() as u32,
+        deep_before_flag_max_m: before_flag_m.fold(0.0, f64::max),
     })
 }
 
@@ -270,6 +286,7 @@ fn study(plan: &Plan, _: &[f64], keep: &Keep<'_>) -> Result<Option<Found>, Fligh
             ("lost", "lost", Cell::Number(f64::from(row.lost.count), 0)),
             ("95 %", "lost_low,lost_high", Cell::PercentInterval(Some(row.lost.share), 0)),
             ("unflagged", "deep_unflagged", Cell::Number(f64::from(row.deep_unflagged), 0)),
+            ("late", "deep_flagged_late", Cell::Number(f64::from(row.deep_flagged_late), 0)),
         ]);
     }
     found.csv = found.sheet(sheet);

@@ -49,6 +49,8 @@ pub(crate) const MEASURED_S: f64 = 18.0;
 pub(crate) struct Flight {
     pub(crate) rmse_m: f64,
     pub(crate) height_lost_m: f64,
+    /// Of that, before the first report.
+    pub(crate) height_lost_unflagged_m: f64,
     wings_open_s: f64,
     pub(crate) lost: bool,
     pub(crate) flagged: bool,
@@ -147,6 +149,7 @@ impl Flight {
         Self {
             rmse_m: m.rmse_m,
             height_lost_m: m.height_lost_m,
+            height_lost_unflagged_m: m.height_lost_unflagged_m,
             wings_open_s: m.wings_open_s,
             lost: m.is_lost(LANDING_M_S),
             flagged: !m.flags.names().is_empty(),

@@ -112,9 +112,11 @@ impl Health {
     /// The filter started anew at some time in this flight: fixes contradicted it for long, or its
     /// biases or its covariance were impossible.
     pub const RESTARTED: Self = Self(1 << 10);
+    /// It is far below its reference with all the thrust that may be asked for, whatever the reason.
+    pub const SUNK: Self = Self(1 << 11);
 
     /// Name of each bit, from the lowest.
-    pub const NAMES: [&str; 11] = [
+    pub const NAMES: [&str; 12] = [
         "imu_1_out",
         "imu_2_out",
         "not_a_reading",
@@ -126,6 +128,7 @@ impl Health {
         "torque_off",
         "upset",
         "restarted",
+        "sunk",
     ];
 
     /// Whether all of another's bits are set.

@@ -11,8 +11,8 @@ use super::mission::scramble;
 use crate::command::EulerReference;
 use crate::command::Reference;
 use crate::frames::{In, Ned};
-use crate::math::{limit, lower, upper, wrap_angle};
-use crate::vehicle::{ParameterError, positive};
+use crate::math::{limit, lower, sqrt, upper, wrap_angle};
+use crate::vehicle::{ParameterError, Vehicle, positive};
 use core::f32::consts::TAU;
 use nalgebra::Vector3;
 
@@ -28,6 +28,8 @@ const BASE_HZ: f32 = 0.025;
 const CORNER_HZ: f32 = 3.0;
 /// The multisine fades in over this time, s.
 const FADE_S: f32 = 1.0;
+/// Mean size of a normally distributed number of deviation 1.
+const MEAN_OF_NORMAL: f32 = 0.798;
 /// A change of heading takes this long, s: a quarter turn stays within the yaw torque of small
 /// rotors.
 const YAW_S: f32 = 1.5;
@@ -109,6 +111,20 @@ pub struct Excitation {
     pub thrust_share: f32,
 }
 
+impl Excitation {
+    /// All of it, a share of it.
+    #[must_use]
+    pub(crate) fn scaled(&self, share: f32) -> Self {
+        let EulerReference { angle, rate, acceleration } = self.attitude;
+        let attitude = EulerReference {
+            angle: angle * share,
+            rate: rate * share,
+            acceleration: acceleration * share,
+        };
+        Self { attitude, thrust_share: self.thrust_share * share }
+    }
+}
+
 /// One sine.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Line {
@@ -170,6 +186,29 @@ impl Multisine {
     pub fn tilt_max_rad(&self) -> f32 {
         let sum = |axis: usize| self.lines[axis].iter().map(|l| l.amplitude).sum::<f32>();
         upper(sum(0), sum(1))
+    }
+
+    /// What turning along with the sines takes of the collective thrust where rotors give all they
+    /// can, N: roll and pitch come first there, so that of four rotors those that are told less
+    /// lower the sum, by `|roll| + |pitch|` in the mean.
+    pub(crate) fn thrust_taken_n(&self, vehicle: &Vehicle<f32>) -> f32 {
+        let inertia = vehicle.parameters().inertia_kg_m2;
+        let count = vehicle.rotors().len() as f32;
+        // Of a sum of sines in roll or pitch, normally distributed.
+        let torque_n_m = |axis: usize| {
+            let square = |line: &Line| {
+                let rate = TAU * line.frequency_hz;
+                let peak = line.amplitude * rate * rate;
+                0.5 * peak * peak
+            };
+            let squares: f32 = self.lines[axis].iter().map(square).sum();
+            inertia[(axis, axis)] * sqrt(squares) * MEAN_OF_NORMAL
+        };
+        let arm_m = |axis: usize| {
+            let sum: f32 = vehicle.rotors().iter().map(|r| r.position.vector[axis].abs()).sum();
+            upper(sum / count, 1e-3)
+        };
+        torque_n_m(0) / arm_m(1) + torque_n_m(1) / arm_m(0)
     }
 
     /// Frequencies of one axis, Hz: roll, pitch, yaw, thrust.
@@ -279,6 +318,11 @@ impl Programme {
             acceleration: way * dds,
             yaw_rad: yaw + wrap_angle(leg.yaw_rad - yaw) * turned,
         }
+    }
+
+    /// Where the leg at a time comes to rest, m down.
+    pub(super) fn rest_down_m(&self, time_us: u64) -> f32 {
+        self.leg(time_us).0.to.vector.z
     }
 
     /// Wing command at a time: 0 folded, 1 spread.

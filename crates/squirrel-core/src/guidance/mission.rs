@@ -11,7 +11,7 @@ use super::trajectory::Trajectory;
 use crate::command::Reference;
 use crate::frames::{In, Ned};
 use crate::math::{whole, wrap_angle};
-use crate::vehicle::ParameterError;
+use crate::vehicle::{ParameterError, Vehicle};
 use nalgebra::Vector3;
 
 /// What to do.
@@ -186,6 +186,14 @@ impl Mission {
         }
     }
 
+    /// Where the reference's sink at a time will have ended, m down; `None` where it never sinks.
+    pub fn rest_down_m(&self, time_us: u64) -> Option<f32> {
+        match self {
+            Self::Excite(programme) => Some(programme.rest_down_m(time_us)),
+            _ => None,
+        }
+    }
+
     /// Wing command that the mission forces whatever the controller wants, 0 folded to 1 spread.
     pub fn wing_command(&self, time_us: u64) -> Option<f32> {
         match self {
@@ -199,6 +207,14 @@ impl Mission {
         match self {
             Self::Excite(programme) => programme.excitation(time_us),
             _ => None,
+        }
+    }
+
+    /// What [`Self::excitation`] takes of a vehicle's largest thrust, N.
+    pub(crate) fn excitation_thrust_n(&self, vehicle: &Vehicle<f32>) -> f32 {
+        match self {
+            Self::Excite(programme) => programme.multisine().thrust_taken_n(vehicle),
+            _ => 0.0,
         }
     }
 

@@ -33,7 +33,7 @@ use crate::estimate::wind::Wind;
 use crate::frames::{Body, In, Ned, Rotation};
 use crate::guidance::excite::Excitation;
 use crate::guidance::mission::{Mission, MissionState};
-use crate::math::{limit, lower, whole};
+use crate::math::{limit, lower, upper, whole};
 use crate::policy::PilotCommand;
 use crate::vehicle::{MAX_ROTORS, ParameterError, PerRotor, Vehicle};
 use failsafe::{
@@ -66,7 +66,17 @@ pub struct Stack {
     mixer: Mixer,
     parameters: StackParameters,
     mission: Mission,
+    /// Share of the mission's excitation that is flown.
+    excited_share: f32,
+    /// What that takes of the largest thrust, N.
+    excited_n: f32,
 }
+
+/// Of the thrust above the weight, what an excitation may take: the rest holds height.
+const EXCITED_SHARE: f32 = 0.5;
+/// So far below its reference a vehicle has sunk, m, if it asks for so much of its thrust.
+const SUNK_M: f32 = 1.5;
+const ALL_SHARE: f32 = 0.98;
 
 /// The latest valid measurements.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -190,7 +200,12 @@ impl Stack {
         }
         let airframe = OuterAirframe::new(&vehicle, parameters.twcc.thrust_min_n, tilt_max_rad);
         let lead = Lead::new(parameters.attitude.rotor_lead, &p.propulsion);
-        Ok(Self { mixer: Mixer::new(&vehicle)?, lead, vehicle, airframe, parameters, mission })
+        let spare_n = upper(airframe.envelope.thrust_max_n - vehicle.weight_n(), 0.0);
+        let taken_n = mission.excitation_thrust_n(&vehicle);
+        let excited_n = lower(taken_n, EXCITED_SHARE * spare_n);
+        let excited_share = if excited_n < taken_n { excited_n / taken_n } else { 1.0 };
+        let mixer = Mixer::new(&vehicle)?;
+        Ok(Self { vehicle, airframe, lead, mixer, parameters, mission, excited_share, excited_n })
     }
 
     /// The vehicle as the flight code believes it to be.
@@ -261,6 +276,7 @@ impl Stack {
             navigated.frame.attitude.as_ref(),
             state.navigation.health,
         );
+        output.health = output.health.with(Health::SUNK, self.has_sunk(state, output));
         output.navigation = navigated.terms;
     }
 
@@ -357,16 +373,32 @@ impl Stack {
         }
     }
 
-    fn outer(&self, state: &mut StackState, frame: &SensorFrame, dt_s: f32) -> Option<TwccTerms> {
-        let (Some(gnss), Some(ned_from_body)) = (state.known.gnss, state.known.attitude) else {
-            return None;
-        };
-        let mut position = gnss.position;
+    /// Where it is believed to be, by the barometer as long as that is heard.
+    fn position(state: &StackState) -> Option<In<Ned, f32>> {
+        let mut position = state.known.gnss?.position;
         if let Some(altitude) = state.known.altitude_m
             && state.failsafe.active.reason != FailsafeReason::AltitudeLost
         {
             position.vector.z = -altitude;
         }
+        Some(position)
+    }
+
+    /// Far below the mission's reference, while its outer loop asks for all the thrust there is.
+    fn has_sunk(&self, state: &StackState, output: &StackOutput) -> bool {
+        let reference_m = output.reference.position.vector.z;
+        output.failsafe.mode == FailsafeMode::Off
+            && state.known.command.is_none()
+            && Self::position(state).is_some_and(|p| p.vector.z - reference_m > SUNK_M)
+            && state.command.thrust_n
+                >= ALL_SHARE * self.airframe.supplied(state.supply.share()).envelope.thrust_max_n
+    }
+
+    fn outer(&self, state: &mut StackState, frame: &SensorFrame, dt_s: f32) -> Option<TwccTerms> {
+        let (Some(gnss), Some(ned_from_body)) = (state.known.gnss, state.known.attitude) else {
+            return None;
+        };
+        let position = Self::position(state)?;
         self.mission.sense(
             &mut state.mission,
             frame.time_us,
@@ -382,15 +414,21 @@ impl Stack {
             wind: state.monitor.wind().velocity,
             ..MeasuredMotion::new(position, gnss.velocity, &ned_from_body, heading_rad)
         };
-        let terms = self.parameters.twcc.update(
+        let airframe = self.airframe.supplied(state.supply.share());
+        let plus = self.parameters.twcc.plus.as_ref();
+        let ending = plus.zip(self.mission.rest_down_m(frame.time_us)).and_then(|(plus, rest)| {
+            plus.ending_sink(&airframe, &motion, &reference, rest, self.excited_n)
+        });
+        let mut terms = self.parameters.twcc.update(
             &mut state.twcc,
-            &self.airframe.supplied(state.supply.share()),
+            &airframe,
             &motion,
             &ned_from_body,
             state.known.wing_force,
-            &reference,
+            ending.as_ref().unwrap_or(&reference),
             dt_s,
         );
+        terms.clamped |= ending.is_some();
         state.command = terms.command;
         state.wing_command = self.mission.wing_command(frame.time_us).unwrap_or(terms.wing_command);
         Some(terms)
@@ -416,7 +454,7 @@ impl Stack {
             gains.filter_damping,
             dt_s,
         );
-        let excitation = self.mission.excitation(time_us);
+        let excitation = self.mission.excitation(time_us).map(|e| e.scaled(self.excited_share));
         let (mut wanted, mut thrust_n) = (state.filter, state.command.thrust_n);
         if let Some(extra) = &excitation {
             wanted = wanted.plus(&extra.attitude);

@@ -6,6 +6,7 @@ use crate::control::twcc;
 use crate::control::wing_force::{ForceModel, Guard, fixtures::loud};
 use crate::estimate::eskf::EskfParameters;
 use crate::estimate::navigator::Filter;
+use crate::guidance::excite::{Leg, Multisine, Programme};
 use crate::guidance::sensing::Obstacle;
 use crate::math::GRAVITY_M_S2;
 use crate::vehicle::fixtures::squirrel;
@@ -380,6 +381,53 @@ fn the_failsafe_acts_whatever_is_commanded() {
             "{k}"
         );
     }
+}
+
+/// Sines leave half of the thrust above the weight, and are whole where there is enough of it.
+#[test]
+fn an_excitation_follows_the_thrust_that_is_left() {
+    let multisine = Multisine::new([0.01, 0.01, 0.0015], 0.01, 3).unwrap();
+    let programme = Programme::new(In::zero(), &[Leg::UNUSED], multisine).unwrap();
+    let (mission, parameters) =
+        (Mission::Excite(programme), stack(AttitudeForm::Quaternion).parameters);
+    let flown = |ratio: f32| {
+        let mut vehicle = squirrel();
+        vehicle.limits.thrust_max_n = ratio * vehicle.mass_kg * GRAVITY_M_S2 as f32;
+        let stack = Stack::new(Vehicle::new(vehicle).unwrap(), parameters, mission).unwrap();
+        let taken_n = mission.excitation_thrust_n(&stack.vehicle);
+        let output = stack.control(&mut StackState::default(), &level(2_000_000));
+        (output.inner.unwrap().excitation.unwrap(), taken_n / stack.vehicle.weight_n())
+    };
+    let (whole, taken) = flown(2.0);
+    assert_eq!(Some(whole), mission.excitation(2_000_000));
+    assert!(taken > 0.06 && taken < 0.2, "{taken} of the weight");
+    let (smaller, _) = flown(1.1);
+    let share = smaller.attitude.angle.norm() / whole.attitude.angle.norm();
+    assert!((share * taken - 0.05).abs() < 1e-3, "{share} of {taken}");
+    assert!((smaller.thrust_share / whole.thrust_share - share).abs() < 1e-4);
+    assert_eq!(flown(1.0).0.attitude.acceleration.norm(), 0.0, "nothing is left");
+}
+
+/// Below its reference with all the thrust there is, and only then.
+#[test]
+fn who_sinks_with_all_the_thrust_says_so() {
+    let parameters = stack(AttitudeForm::Quaternion).parameters;
+    let says = |down_m: f32, ratio: f32, command: Option<PilotCommand>| {
+        let mut vehicle = squirrel();
+        vehicle.limits.thrust_max_n = ratio * vehicle.mass_kg * GRAVITY_M_S2 as f32;
+        let mission = Mission::Hover { position: In::zero() };
+        let stack = Stack::new(Vehicle::new(vehicle).unwrap(), parameters, mission).unwrap();
+        let mut frame = level(0);
+        let position = In::new(Vector3::new(0.0, 0.0, down_m));
+        frame.gnss = Some(Gnss { position, velocity: In::zero() });
+        frame.altitude_m = Some(-down_m);
+        frame.command = command;
+        stack.step(&mut StackState::default(), &frame).health.has(Health::SUNK)
+    };
+    assert!(says(2.0, 1.1, None));
+    assert!(!says(1.0, 1.1, None), "not yet");
+    assert!(!says(2.0, 2.0, None), "there is thrust to climb with");
+    assert!(!says(2.0, 1.1, Some(commanded([0.0, 0.0, 100.0, 0.0]))), "asked for from outside");
 }
 
 #[test]

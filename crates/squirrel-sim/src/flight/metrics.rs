@@ -26,6 +26,8 @@ pub struct Metrics {
     pub rmse_measured_m: Option<f64>,
     /// Largest sink below the reference height, m.
     pub height_lost_m: f64,
+    /// Of that, what was lost before the first of [`Self::flags`], m.
+    pub height_lost_unflagged_m: f64,
     /// Largest climb above the reference height, m.
     pub height_gained_m: f64,
     /// Time with wings more than half spread, s.
@@ -135,6 +137,7 @@ impl<'a> Meter<'a> {
             rmse_horizontal_m: 0.0,
             rmse_measured_m: None,
             height_lost_m: 0.0,
+            height_lost_unflagged_m: 0.0,
             height_gained_m: 0.0,
             wings_open_s: 0.0,
             wiic_s: 0.0,
@@ -221,6 +224,9 @@ impl<'a> Meter<'a> {
         sums.volt += state.battery.voltage_v;
         self.metrics.window_s = elapsed_s;
         self.metrics.height_lost_m = self.metrics.height_lost_m.max(error.z);
+        if self.metrics.flags == Flags::default() {
+            self.metrics.height_lost_unflagged_m = self.metrics.height_lost_m;
+        }
         self.metrics.height_gained_m = self.metrics.height_gained_m.max(-error.z);
         if state.deployment().iter().sum::<f64>() > 1.0 {
             sums.wings_us += step_us;
@@ -234,7 +240,9 @@ impl<'a> Meter<'a> {
     fn begin(&mut self, time_us: u64) {
         self.start_us = Some(time_us);
         self.sums = Sums::default();
-        (self.metrics.height_lost_m, self.metrics.height_gained_m) = (0.0, 0.0);
+        self.metrics.height_lost_m = 0.0;
+        self.metrics.height_lost_unflagged_m = 0.0;
+        self.metrics.height_gained_m = 0.0;
     }
 
     /// What it passes, and how far it has come.

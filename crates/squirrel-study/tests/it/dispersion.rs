@@ -13,11 +13,12 @@ fn study(arms: &[Arm], trials: u32) -> Dispersion {
 }
 
 /// No arm is better than ours beyond the interval, in no class of thrust and wind, and none of ours
-/// is lost or sinks deep without a word.
+/// is lost. Whoever sinks deep, it is reported before half of that is lost.
 #[test]
 fn nobody_is_better_where_nothing_is_as_it_was_told() {
     let study = study(&[Arm::Pc, Arm::TwccFlatFf, Arm::PcPlus, Arm::Indi], 12);
     for row in &study.rows {
+        assert_eq!(row.deep_flagged_late, 0, "{row:?}");
         match row.over_twcc_plus {
             Some(over) => assert!(over.low <= 0.0, "{row:?}"),
             None => assert!(row.lost.count == 0 && row.deep_unflagged == 0, "{row:?}"),

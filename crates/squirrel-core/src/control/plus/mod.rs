@@ -26,6 +26,7 @@
 //!   the plate, so that wings which harm fold again, and stay folded for a while;
 //! - the way to the reference is flown no faster than rotors alone can brake it beside what the
 //!   reference itself asks for;
+//! - a mission's descent is flown no faster than rotors can end it where it ends (`sink`);
 //! - velocity and acceleration of the reference are fed forward by the position loop
 //!   ([`PositionGains`]).
 //!
@@ -37,6 +38,7 @@
 //! they no longer make it smaller. Without wings it is the same controller: the fair rival.
 
 mod choice;
+mod sink;
 #[cfg(test)]
 mod tests;
 mod tick;

@@ -9,7 +9,7 @@ use super::*;
 use crate::frames::{Body, In, Ned, Rotation};
 use proptest::prelude::*;
 
-fn plus() -> Plus {
+pub(super) fn plus() -> Plus {
     let position = PositionGains {
         velocity_feed_forward: 1.0,
         acceleration_feed_forward: 1.0,
