@@ -202,8 +202,14 @@ impl Flown {
         for trials in rounds {
             plan.trials = trials;
             let command = self.command(&plan, &own);
-            let keep =
-                Keep { folder, part, command: &command, commit: COMMIT, progress: Some(&bar), lock };
+            let keep = Keep {
+                folder,
+                part,
+                command: &command,
+                commit: COMMIT,
+                progress: Some(&bar),
+                lock,
+            };
             found = (self.study.fly)(&plan, &own, &keep);
             let (Some(until), Ok(Some(now))) = (self.common.until, &found) else { break };
             let (is_met, widest) = until.is_met(&now.json).map_err(|e| e.to_string())?;
