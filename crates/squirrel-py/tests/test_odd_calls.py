@@ -454,10 +454,10 @@ def test_an_error_is_one_line_whatever_is_given() -> None:
         lambda name: squirrel.envs.SquirrelEnv(task="avoid", render_mode=name),
     ]
     for call in calls:
-        with pytest.raises(ValueError, match=r" = a\\nb\\u{202e}: ") as error:
+        with pytest.raises(ValueError, match=r" = a\\nb\\u\{202e\}: ") as error:
             call("a\nb\u202e")
         assert "\n" not in str(error.value) and "\u202e" not in str(error.value)
     for read in (squirrel.Vehicle.load, squirrel.read_log, squirrel.Policy.load, squirrel.nn.load):
-        with pytest.raises(OSError, match=r"\\u{1b}\[2J\\u{2066}") as gone:
+        with pytest.raises(OSError, match=r"\\u\{1b\}\[2J\\u\{2066\}") as gone:
             read("no/\x1b[2J\u2066such")
         assert str(gone.value).isprintable()
